@@ -1,0 +1,1 @@
+"""Datasets: the labelled arrays of Procedure 1, and their files."""

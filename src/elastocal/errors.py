@@ -1,0 +1,59 @@
+"""The error tree: one base class, one line a message.
+
+Every message names the offending thing, its value and what is allowed, so that the command
+line can print it as it stands. Each error is also the builtin that a caller would expect
+(`ValueError`, `OSError`), so that library users need not import this module to catch one.
+"""
+
+import difflib
+from collections.abc import Iterable
+
+
+class ElastocalError(Exception):
+    """Base of every error that elastocal raises on purpose."""
+
+
+class UnitError(ElastocalError, ValueError):
+    """A quantity has no unit, an unknown one, or one of the wrong dimension."""
+
+
+class RobotError(ElastocalError, ValueError):
+    """A robot description that cannot be used: bad URDF, missing frame, unknown catalogue name."""
+
+
+class UnreachableError(ElastocalError, ValueError):
+    """No joint configuration reaches the pose that was asked for."""
+
+
+class SpringError(ElastocalError, ValueError):
+    """A spring layout that does not fit the robot or does not make sense."""
+
+
+class DatasetError(ElastocalError, ValueError):
+    """Measurements that break the dataset contract."""
+
+
+class SchemaError(ElastocalError, ValueError):
+    """A file of an unknown kind or schema version."""
+
+
+class IdentificationError(ElastocalError, ValueError):
+    """A fit that cannot be made: too few poses, impossible bounds, nothing to fit."""
+
+
+class ConventionError(IdentificationError):
+    """Data that are explained only when a sign or a frame is read otherwise than stated."""
+
+
+class FileAccessError(ElastocalError, OSError):
+    """A file that cannot be read or written."""
+
+
+def nearest(name: str, allowed: Iterable[str]) -> str:
+    """Return ``"; did you mean 'x'?"`` for the closest allowed name, or an empty string.
+
+    >>> nearest("bering", ["actuated", "bearing"])
+    "; did you mean 'bearing'?"
+    """
+    matches = difflib.get_close_matches(name, list(allowed), n=1)
+    return f"; did you mean {matches[0]!r}?" if matches else ""

@@ -1,0 +1,124 @@
+"""A serial chain as data, and the Pinocchio model made from it.
+
+Both the rigid robot and the elastic one are the same chain; the elastic one has springs
+inserted as additional joints, before or after the joint they belong to.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+IndexArray = NDArray[np.intp]
+
+
+@dataclass(frozen=True)
+class ChainJoint:
+    """One movable joint, with everything that is rigidly fixed behind it."""
+
+    name: str
+    revolute: bool
+    """True for a revolute joint, False for a prismatic one."""
+    axis: FloatArray
+    """Unit vector of the joint axis in the joint frame, shape (3,)."""
+    placement: FloatArray
+    """T_parent_joint: joint frame at zero in the previous joint's frame, shape (4, 4)."""
+    lower: float
+    """Lower position limit in rad or m; -inf when there is none."""
+    upper: float
+    """Upper position limit in rad or m; inf when there is none."""
+    velocity: float
+    """Largest velocity in rad/s or m/s; NaN when not known."""
+    effort: float
+    """Largest torque in N·m or force in N; NaN when not known."""
+    mass: float
+    """Mass in kg of the links behind the joint; 0 when not known."""
+    centre_of_mass: FloatArray
+    """Centre of that mass in the joint frame, shape (3,), in m."""
+    inertia: FloatArray
+    """Inertia about the centre of mass, in the joint frame, shape (3, 3), in kg·m²."""
+
+
+@dataclass(frozen=True)
+class SerialChain:
+    """Joints from a base link to a tip link."""
+
+    joints: tuple[ChainJoint, ...]
+    base: str
+    tip: str
+    T_last_tip: FloatArray
+    """Tip frame in the last joint's moving frame, shape (4, 4)."""
+
+
+@dataclass(frozen=True)
+class InsertedJoint:
+    """A virtual joint, always at zero, that a spring acts about."""
+
+    name: str
+    parent: int
+    """Index of the joint of the chain that it is inserted at."""
+    axis: FloatArray
+    """Unit vector in that joint's frame, shape (3,)."""
+    revolute: bool
+    distal: bool
+    """True: in the moving frame, behind the joint's own motion. False: before it."""
+
+
+@dataclass(frozen=True)
+class ChainModel:
+    """A Pinocchio model of a chain, with where to find the columns of its Jacobians."""
+
+    model: pin.Model
+    tip_frame: int
+    joint_columns: IndexArray
+    """Column of each joint of the chain, shape (joint,)."""
+    inserted_columns: IndexArray
+    """Column of each inserted joint, in the order given, shape (inserted,)."""
+
+
+def build_model(chain: SerialChain, inserted: Sequence[InsertedJoint] = ()) -> ChainModel:
+    """Return the Pinocchio model of a chain with virtual joints inserted.
+
+    Continuous joints become revolute ones without limits, so that a configuration always has
+    one number a joint.
+    """
+    model = pin.Model()
+    joint_columns: list[int] = []
+    column_of: dict[str, int] = {}
+    parent = 0
+    for index, joint in enumerate(chain.joints):
+        placement = pin.SE3(joint.placement)
+        here = [virtual for virtual in inserted if virtual.parent == index]
+        for virtual in (v for v in here if not v.distal):
+            parent = _add(model, parent, virtual.revolute, virtual.axis, placement, virtual.name)
+            column_of[virtual.name] = model.idx_vs[parent]
+            placement = pin.SE3.Identity()
+        parent = _add(model, parent, joint.revolute, joint.axis, placement, joint.name)
+        joint_columns.append(model.idx_vs[parent])
+        for virtual in (v for v in here if v.distal):
+            parent = _add(
+                model, parent, virtual.revolute, virtual.axis, pin.SE3.Identity(), virtual.name
+            )
+            column_of[virtual.name] = model.idx_vs[parent]
+        model.appendBodyToJoint(
+            parent, pin.Inertia(joint.mass, joint.centre_of_mass, joint.inertia), pin.SE3.Identity()
+        )
+    tip = model.addFrame(
+        pin.Frame(chain.tip, parent, pin.SE3(chain.T_last_tip), pin.FrameType.OP_FRAME)
+    )
+    return ChainModel(
+        model,
+        tip,
+        np.array(joint_columns, dtype=np.intp),
+        np.array([column_of[virtual.name] for virtual in inserted], dtype=np.intp),
+    )
+
+
+def _add(
+    model: pin.Model, parent: int, revolute: bool, axis: FloatArray, at: pin.SE3, name: str
+) -> int:
+    kind = pin.JointModelRevoluteUnaligned if revolute else pin.JointModelPrismaticUnaligned
+    return int(model.addJoint(parent, kind(np.asarray(axis)), at, name))

@@ -1,0 +1,250 @@
+"""The rigid robot: kinematics, limits and gravity torques of a serial chain."""
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import ArrayLike
+
+from elastocal.errors import RobotError
+from elastocal.files import read_text, sha256
+from elastocal.robot.chain import ChainModel, FloatArray, IndexArray, SerialChain, build_model
+from elastocal.robot.urdf import Assumption, assumptions, parse_urdf, read_chain, robot_name
+
+GRAVITY = (0.0, 0.0, -9.80665)
+"""Standard gravity in the base frame of a robot that stands upright, in m/s² (ISO 80000-3)."""
+
+
+@dataclass(frozen=True)
+class Jacobian:
+    """Velocity of a point per unit joint velocity, in base axes (paper Eq. 1-2).
+
+    The paper stacks rotation over translation, Pinocchio the other way round; here the two
+    parts have names.
+    """
+
+    translation: FloatArray
+    """Rows of the linear velocity, shape (..., 3, joint), in m/rad or m/m."""
+    rotation: FloatArray
+    """Rows of the angular velocity, shape (..., 3, joint), in rad/rad or rad/m."""
+
+
+@dataclass(frozen=True)
+class JointLimits:
+    """Limits of the joints, in SI units; what is not known is infinite or NaN."""
+
+    lower: FloatArray
+    """Shape (joint,), in rad or m; -inf when there is none."""
+    upper: FloatArray
+    """Shape (joint,), in rad or m; inf when there is none."""
+    velocity: FloatArray
+    """Shape (joint,), in rad/s or m/s; NaN when not known."""
+    effort: FloatArray
+    """Shape (joint,), in N·m or N; NaN when not known."""
+
+    def margin(self, q: ArrayLike) -> FloatArray:
+        """Return the distance of each joint to its nearer limit; negative when outside.
+
+        Parameters
+        ----------
+        q : array_like, shape (..., joint)
+            Joint positions in rad or m.
+        """
+        q = np.asarray(q, dtype=float)
+        margin: FloatArray = np.minimum(q - self.lower, self.upper - q)
+        return margin
+
+
+@dataclass(frozen=True, eq=False)
+class Robot:
+    """A serial robot from its base link to its tool centre point.
+
+    Joints before the last six are *external axes*: a rail, a turntable. Make one with
+    `from_urdf`, `from_file` or `elastocal.robot.catalogue.load`.
+    """
+
+    name: str
+    urdf: str
+    """The URDF text that the robot was made from."""
+    chain: SerialChain
+    assumptions: tuple[Assumption, ...] = ()
+    """Numbers of the description that have no source."""
+    _rigid: ChainModel = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "_rigid", build_model(self.chain))
+
+    @classmethod
+    def from_urdf(cls, text: str, tip: str, base: str | None = None) -> "Robot":
+        """Return the robot that a URDF text describes.
+
+        Parameters
+        ----------
+        text : str
+            The URDF.
+        tip : str
+            Link at the tool centre point, its z axis out of the tool.
+        base : str, optional
+            Link that positions and forces are expressed in; the root link by default.
+
+        Raises
+        ------
+        RobotError
+            If the URDF cannot be read or has no such links.
+        """
+        chain = read_chain(text, tip, base)
+        root = parse_urdf(text)
+        return cls(robot_name(root), text, chain, assumptions(root))
+
+    @classmethod
+    def from_file(cls, path: Path, tip: str, base: str | None = None) -> "Robot":
+        """Return the robot that a URDF file describes; see `from_urdf`."""
+        return cls.from_urdf(read_text(path), tip, base)
+
+    @property
+    def joint_names(self) -> tuple[str, ...]:
+        """Names of the movable joints, from base to tip."""
+        return tuple(joint.name for joint in self.chain.joints)
+
+    @property
+    def base(self) -> str:
+        """Name of the link that positions and forces are expressed in."""
+        return self.chain.base
+
+    @property
+    def tip(self) -> str:
+        """Name of the link at the tool centre point."""
+        return self.chain.tip
+
+    @property
+    def external_axes(self) -> int:
+        """Number of joints before the six of the arm."""
+        return max(0, len(self.chain.joints) - 6)
+
+    @property
+    def revolute(self) -> tuple[bool, ...]:
+        """Whether each joint is revolute (else prismatic)."""
+        return tuple(joint.revolute for joint in self.chain.joints)
+
+    @property
+    def urdf_hash(self) -> str:
+        """SHA-256 of the URDF text."""
+        return sha256(self.urdf)
+
+    @property
+    def limits(self) -> JointLimits:
+        """Limits of the joints."""
+        joints = self.chain.joints
+        return JointLimits(
+            *(
+                np.array([getattr(joint, name) for joint in joints], dtype=float)
+                for name in ("lower", "upper", "velocity", "effort")
+            )
+        )
+
+    def forward(self, q: ArrayLike) -> FloatArray:
+        """Return T_base_tcp.
+
+        Parameters
+        ----------
+        q : array_like, shape (..., joint)
+            Joint positions in rad or m.
+
+        Returns
+        -------
+        ndarray, shape (..., 4, 4)
+            Pose of the tool centre point in base; translation in m.
+        """
+        q = self.check_positions(q)
+        model, data = self._rigid.model, self._rigid.model.createData()
+        flat = q.reshape(-1, q.shape[-1])
+        poses = np.empty((len(flat), 4, 4))
+        for pose, configuration in zip(poses, flat, strict=True):
+            pin.forwardKinematics(model, data, configuration)
+            pose[:] = pin.updateFramePlacement(model, data, self._rigid.tip_frame).homogeneous
+        return poses.reshape(*q.shape[:-1], 4, 4)
+
+    def jacobian(self, q: ArrayLike) -> Jacobian:
+        """Return the geometric Jacobian of the tool centre point (paper Eq. 1-2).
+
+        Parameters
+        ----------
+        q : array_like, shape (..., joint)
+            Joint positions in rad or m.
+        """
+        q = self.check_positions(q)
+        return evaluate_jacobian(self._rigid, q, self._rigid.joint_columns)
+
+    def gravity_torques(self, q: ArrayLike, gravity: ArrayLike = GRAVITY) -> FloatArray:
+        """Return the joint torques that hold the robot still under its own weight.
+
+        Parameters
+        ----------
+        q : array_like, shape (..., joint)
+            Joint positions in rad or m.
+        gravity : array_like, shape (3,)
+            Acceleration of gravity in base, in m/s².
+
+        Returns
+        -------
+        ndarray, shape (..., joint)
+            Torques in N·m, forces in N for prismatic joints.
+
+        Raises
+        ------
+        RobotError
+            If no link of the robot has a mass.
+        """
+        if not any(joint.mass > 0 for joint in self.chain.joints):
+            raise RobotError(f"robot {self.name!r} has no link masses: gravity torques unknown")
+        q = self.check_positions(q)
+        model = self._rigid.model.copy()
+        model.gravity.linear = np.asarray(gravity, dtype=float)
+        data = model.createData()
+        flat = q.reshape(-1, q.shape[-1])
+        torques = [pin.computeGeneralizedGravity(model, data, row).copy() for row in flat]
+        return np.array(torques).reshape(q.shape)
+
+    def check_positions(self, q: ArrayLike) -> FloatArray:
+        """Return ``q`` as a float array, or refuse it by shape or value.
+
+        Raises
+        ------
+        RobotError
+            If the last axis is not the number of joints or a value is not finite.
+        """
+        array = np.asarray(q, dtype=float)
+        count = len(self.chain.joints)
+        if array.ndim == 0 or array.shape[-1] != count:
+            raise RobotError(
+                f"joint positions of shape {array.shape}: the last axis must be the {count} joints"
+                f" of {self.name} ({', '.join(self.joint_names)})"
+            )
+        if not np.all(np.isfinite(array)):
+            raise RobotError(f"joint positions of {self.name} hold a value that is not finite")
+        return array
+
+
+def evaluate_jacobian(chain: ChainModel, q: FloatArray, columns: IndexArray) -> Jacobian:
+    """Return the named columns of a chain model's tip Jacobian in base axes.
+
+    Parameters
+    ----------
+    chain : ChainModel
+        The model; inserted joints stay at zero.
+    q : ndarray, shape (..., joint)
+        Positions of the chain's own joints in rad or m.
+    columns : ndarray of int, shape (column,)
+        Which columns of the model to return, in which order.
+    """
+    model, data = chain.model, chain.model.createData()
+    flat = q.reshape(-1, q.shape[-1])
+    full = np.zeros((len(flat), model.nq))
+    full[:, chain.joint_columns] = flat
+    rows = np.empty((len(flat), 6, model.nv))
+    frame, axes = chain.tip_frame, pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
+    for row, configuration in zip(rows, full, strict=True):
+        row[:] = pin.computeFrameJacobian(model, data, configuration, frame, axes)
+    rows = rows[:, :, columns].reshape(*q.shape[:-1], 6, len(columns))
+    return Jacobian(rows[..., :3, :], rows[..., 3:, :])

@@ -1,0 +1,193 @@
+"""Read a URDF: check it by name, then let Pinocchio parse it into a serial chain.
+
+The checks come before Pinocchio because its parser reports problems on the C++ error stream;
+a user of elastocal gets one line that names the link, the joint and the allowed ones.
+"""
+
+import xml.etree.ElementTree as ElementTree
+from dataclasses import dataclass
+
+import numpy as np
+import pinocchio as pin
+
+from elastocal.errors import RobotError, nearest
+from elastocal.robot.chain import ChainJoint, SerialChain
+
+
+@dataclass(frozen=True)
+class Assumption:
+    """A number of a robot description that has no source.
+
+    Read from the element ``<assumption field="…" source="…"/>`` that the catalogue writes into
+    its URDFs; whoever uses such a number has to say so.
+    """
+
+    field: str
+    """What is assumed: ``position``, ``velocity``, ``effort`` or ``inertia``."""
+    reason: str
+    """Where the value comes from, in words."""
+
+
+def parse_urdf(text: str) -> ElementTree.Element:
+    """Return the root element of a URDF.
+
+    Raises
+    ------
+    RobotError
+        If the text is not XML or its root is not ``<robot>``.
+    """
+    try:
+        root = ElementTree.fromstring(text)
+    except ElementTree.ParseError as error:
+        raise RobotError(f"URDF is not valid XML: {error}") from error
+    if root.tag != "robot":
+        raise RobotError(f"URDF root element is <{root.tag}>, not <robot>")
+    return root
+
+
+def robot_name(root: ElementTree.Element) -> str:
+    """Return the name attribute of a URDF, or ``"unnamed"``."""
+    return root.get("name") or "unnamed"
+
+
+def root_link(root: ElementTree.Element) -> str:
+    """Return the link that is nobody's child.
+
+    Raises
+    ------
+    RobotError
+        If the links do not form one tree.
+    """
+    links = _link_names(root)
+    children = {_link_of(joint, "child") for joint in root.findall("joint")}
+    roots = [link for link in links if link not in children]
+    if len(roots) != 1:
+        raise RobotError(f"URDF must have exactly one root link, has {roots or 'none'}")
+    return roots[0]
+
+
+def assumptions(root: ElementTree.Element) -> tuple[Assumption, ...]:
+    """Return what the URDF itself marks as having no source."""
+    return tuple(
+        Assumption(element.get("field", ""), element.get("reason", ""))
+        for element in root.iter("assumption")
+    )
+
+
+def read_chain(text: str, tip: str, base: str | None = None) -> SerialChain:
+    """Return the serial chain from ``base`` to ``tip``.
+
+    Parameters
+    ----------
+    text : str
+        The URDF.
+    tip : str
+        Name of the last link, e.g. the tool centre point.
+    base : str, optional
+        Name of the first link; the root of the tree by default.
+
+    Raises
+    ------
+    RobotError
+        If the URDF cannot be parsed, a link is missing, or the chain is not serial.
+    """
+    root = parse_urdf(text)
+    links = _link_names(root)
+    base = base or root_link(root)
+    for role, link in (("tip", tip), ("base", base)):
+        if link not in links:
+            raise RobotError(
+                f"URDF of {robot_name(root)} has no {role} link {link!r}{nearest(link, links)}"
+                f" (links: {', '.join(links)})"
+            )
+    joints = _joints_between(root, base, tip)
+    try:
+        model = pin.buildModelFromXML(text)
+    except ValueError as error:
+        raise RobotError(f"URDF of {robot_name(root)} is refused by Pinocchio: {error}") from error
+    return _chain_of(model, joints, base, tip)
+
+
+def _link_names(root: ElementTree.Element) -> list[str]:
+    return [link.get("name", "") for link in root.findall("link")]
+
+
+def _link_of(joint: ElementTree.Element, role: str) -> str:
+    element = joint.find(role)
+    if element is None or not element.get("link"):
+        raise RobotError(f"URDF joint {joint.get('name')!r} has no {role} link")
+    return element.get("link", "")
+
+
+def _joints_between(root: ElementTree.Element, base: str, tip: str) -> list[str]:
+    """Return the names of the movable joints from base to tip, checked one by one."""
+    parent_joint = {_link_of(joint, "child"): joint for joint in root.findall("joint")}
+    names: list[str] = []
+    link, seen = tip, set[str]()
+    while link != base:
+        joint = parent_joint.get(link)
+        if joint is None or link in seen:
+            raise RobotError(f"URDF has no chain from base link {base!r} to tip link {tip!r}")
+        seen.add(link)
+        if joint.get("type") != "fixed":
+            _check_movable(joint)
+            names.append(joint.get("name", ""))
+        link = _link_of(joint, "parent")
+    if not names:
+        raise RobotError(f"URDF has no movable joint between {base!r} and {tip!r}")
+    return names[::-1]
+
+
+def _check_movable(joint: ElementTree.Element) -> None:
+    name, kind = joint.get("name"), joint.get("type")
+    if kind not in ("revolute", "continuous", "prismatic"):
+        raise RobotError(
+            f"URDF joint {name!r} is {kind}: the chain may have revolute, continuous, prismatic"
+            " and fixed joints"
+        )
+    if joint.find("mimic") is not None:
+        raise RobotError(f"URDF joint {name!r} mimics another one: not possible inside the chain")
+    if kind != "continuous" and joint.find("limit") is None:
+        raise RobotError(f"URDF joint {name!r} is {kind} and has no <limit>")
+
+
+def _chain_of(model: pin.Model, names: list[str], base: str, tip: str) -> SerialChain:
+    """Cut the joints ``names`` out of a tree; everything else is locked at zero."""
+    locked = [i for i in range(1, model.njoints) if model.names[i] not in names]
+    if locked:
+        model = pin.buildReducedModel(model, locked, pin.neutral(model))
+    T_root_base = _placement_in_joint(model, base)
+    joints = []
+    for index, name in enumerate(names):
+        joint_id = model.getJointId(name)
+        placement = model.jointPlacements[joint_id]
+        if index == 0:
+            placement = T_root_base.actInv(placement)
+        joints.append(_joint_of(model, joint_id, placement))
+    return SerialChain(tuple(joints), base, tip, _placement_in_joint(model, tip).homogeneous)
+
+
+def _placement_in_joint(model: pin.Model, link: str) -> pin.SE3:
+    return model.frames[model.getFrameId(link, pin.FrameType.BODY)].placement
+
+
+def _joint_of(model: pin.Model, joint_id: int, placement: pin.SE3) -> ChainJoint:
+    joint = model.joints[joint_id]
+    motion = np.asarray(joint.createData().S).ravel()
+    revolute = bool(np.any(motion[3:]))
+    bounded = joint.nq == 1
+    inertia = model.inertias[joint_id]
+    effort, velocity = model.upperEffortLimit[joint.idx_v], model.upperVelocityLimit[joint.idx_v]
+    return ChainJoint(
+        name=model.names[joint_id],
+        revolute=revolute,
+        axis=motion[3:] if revolute else motion[:3],
+        placement=placement.homogeneous,
+        lower=model.lowerPositionLimit[joint.idx_q] if bounded else -np.inf,
+        upper=model.upperPositionLimit[joint.idx_q] if bounded else np.inf,
+        velocity=velocity if velocity > 0 else np.nan,
+        effort=effort if effort > 0 else np.nan,
+        mass=inertia.mass,
+        centre_of_mass=inertia.lever,
+        inertia=inertia.inertia,
+    )

@@ -1,0 +1,1 @@
+"""Simulated truth. Only the composition roots and the tests may import it."""

@@ -1,0 +1,82 @@
+"""Units: SI and radians inside, everything else only at the edges (spec section 1).
+
+A person writes ``"175 mm"`` in YAML and ``force_x[kN]`` in a CSV header; the rest of the
+package only ever sees metres, radians, newtons. The table below is the whole list.
+"""
+
+import math
+import re
+
+from elastocal.errors import UnitError, nearest
+
+_FACTORS: dict[str, dict[str, float]] = {
+    "length": {"m": 1.0, "mm": 1e-3, "um": 1e-6, "µm": 1e-6},
+    "angle": {"rad": 1.0, "deg": math.pi / 180.0},
+    "force": {"N": 1.0, "kN": 1e3},
+    "moment": {"N*m": 1.0, "Nm": 1.0, "N·m": 1.0, "kN*m": 1e3, "N*mm": 1e-3},
+    "mass": {"kg": 1.0, "t": 1e3},
+    "time": {"s": 1.0, "ms": 1e-3, "min": 60.0},
+    "rotational compliance": {"rad/(N*m)": 1.0, "rad/Nm": 1.0, "rad/(N·m)": 1.0},
+    "translational compliance": {"m/N": 1.0, "mm/N": 1e-3, "um/N": 1e-6},
+}
+
+_QUANTITY = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(\S.*)\s*")
+_COLUMN = re.compile(r"\s*(?P<name>[^\[\]]+?)\s*(?:\[(?P<unit>[^\[\]]*)\])?\s*")
+
+
+def factor(unit: str, dimension: str) -> float:
+    """Return the SI value of one ``unit`` of ``dimension``.
+
+    >>> factor("mm", "length")
+    0.001
+
+    Raises
+    ------
+    UnitError
+        If the unit is not one of the dimension's.
+    """
+    table = _FACTORS[dimension]
+    if unit not in table:
+        raise UnitError(
+            f"unit {unit!r} is not a {dimension}: allowed are {', '.join(table)}"
+            f"{nearest(unit, table)}"
+        )
+    return table[unit]
+
+
+def parse_quantity(text: object, dimension: str) -> float:
+    """Return the SI value of a quantity such as ``"175 mm"``; a bare number is refused.
+
+    >>> parse_quantity("1.1 kN", "force")
+    1100.0
+
+    Raises
+    ------
+    UnitError
+        If ``text`` is not a string, has no unit, or a unit of another dimension.
+    """
+    match = _QUANTITY.fullmatch(text) if isinstance(text, str) else None
+    if match is None:
+        units = ", ".join(_FACTORS[dimension])
+        raise UnitError(f"{text!r} is not a {dimension} with its unit (one of {units})")
+    return float(match[1]) * factor(match[2].strip(), dimension)
+
+
+def split_column(header: str) -> tuple[str, str | None]:
+    """Split a CSV header such as ``force_x[N]`` into its name and its unit.
+
+    >>> split_column("force_x[N]")
+    ('force_x', 'N')
+    >>> split_column("pose")
+    ('pose', None)
+
+    Raises
+    ------
+    UnitError
+        If brackets do not match or nothing stands before them.
+    """
+    match = _COLUMN.fullmatch(header)
+    if match is None:
+        raise UnitError(f"column header {header!r} is not of the form name[unit]")
+    unit = match["unit"]
+    return match["name"], None if unit is None else unit.strip()
