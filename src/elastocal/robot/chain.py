@@ -65,6 +65,8 @@ class InsertedJoint:
     revolute: bool
     distal: bool
     """True: in the moving frame, behind the joint's own motion. False: before it."""
+    offset: FloatArray
+    """Point of that frame that the axis passes through, shape (3,), in m."""
 
 
 @dataclass(frozen=True)
@@ -90,31 +92,37 @@ def build_model(chain: SerialChain, inserted: Sequence[InsertedJoint] = ()) -> C
     column_of: dict[str, int] = {}
     parent = 0
     for index, joint in enumerate(chain.joints):
-        placement = pin.SE3(joint.placement)
         here = [virtual for virtual in inserted if virtual.parent == index]
+        placement = pin.SE3(joint.placement)
         for virtual in (v for v in here if not v.distal):
-            parent = _add(model, parent, virtual.revolute, virtual.axis, placement, virtual.name)
+            parent, placement = _insert(model, parent, virtual, placement)
             column_of[virtual.name] = model.idx_vs[parent]
-            placement = pin.SE3.Identity()
         parent = _add(model, parent, joint.revolute, joint.axis, placement, joint.name)
         joint_columns.append(model.idx_vs[parent])
+        placement = pin.SE3.Identity()
         for virtual in (v for v in here if v.distal):
-            parent = _add(
-                model, parent, virtual.revolute, virtual.axis, pin.SE3.Identity(), virtual.name
-            )
+            parent, placement = _insert(model, parent, virtual, placement)
             column_of[virtual.name] = model.idx_vs[parent]
         model.appendBodyToJoint(
-            parent, pin.Inertia(joint.mass, joint.centre_of_mass, joint.inertia), pin.SE3.Identity()
+            parent, pin.Inertia(joint.mass, joint.centre_of_mass, joint.inertia), placement
         )
-    tip = model.addFrame(
-        pin.Frame(chain.tip, parent, pin.SE3(chain.T_last_tip), pin.FrameType.OP_FRAME)
-    )
+    T_last_tip = placement * pin.SE3(chain.T_last_tip)
+    tip = model.addFrame(pin.Frame(chain.tip, parent, T_last_tip, pin.FrameType.OP_FRAME))
     return ChainModel(
         model,
         tip,
         np.array(joint_columns, dtype=np.intp),
         np.array([column_of[virtual.name] for virtual in inserted], dtype=np.intp),
     )
+
+
+def _insert(
+    model: pin.Model, parent: int, virtual: InsertedJoint, at: pin.SE3
+) -> tuple[int, pin.SE3]:
+    """Add a virtual joint and return it with the frame that follows, undisplaced."""
+    shift = pin.SE3(np.eye(3), virtual.offset)
+    joint = _add(model, parent, virtual.revolute, virtual.axis, at * shift, virtual.name)
+    return joint, shift.inverse()
 
 
 def _add(

@@ -1,0 +1,36 @@
+"""Global attributes of a dataset: texts, and only those that are known."""
+
+from collections.abc import Hashable, Mapping
+from typing import Any
+
+from elastocal.dataset.layout import ATTRIBUTES, CF_ATTRIBUTES, SCHEMA
+from elastocal.errors import DatasetError, SchemaError, nearest
+
+
+def canonical_attributes(attributes: Mapping[Hashable, Any]) -> dict[str, str]:
+    """Return the global attributes in order, with empty texts where a text is optional.
+
+    Raises
+    ------
+    DatasetError
+        If an attribute is unknown or not a text.
+    SchemaError
+        If the schema is missing or not known.
+    """
+    known = (*ATTRIBUTES, *CF_ATTRIBUTES)
+    schema = attributes.get("schema")
+    if not isinstance(schema, str) or schema != SCHEMA:
+        found = "no attribute 'schema'" if schema is None else f"schema {schema!r}"
+        raise SchemaError(f"dataset has {found}; this version reads {SCHEMA!r}")
+    for name, value in attributes.items():
+        if name not in known:
+            raise DatasetError(
+                f"attribute {name!r} is not known{nearest(str(name), known)}"
+                f" (allowed: {', '.join(known)})"
+            )
+        if not isinstance(value, str) or "\0" in value:
+            raise DatasetError(f"attribute {name!r} is {value!r:.60}: it must be a text")
+        if name in ("robot_urdf", "tcp_frame") and not value:
+            raise DatasetError(f"attribute {name!r} is empty: leave it out when it is not known")
+    texts = {"robot_name": "", "provenance": "", **attributes}
+    return {name: str(texts[name]) for name in known if name in texts}

@@ -1,0 +1,159 @@
+"""What a dataset consists of: variables, dimensions, units, statuses, attributes (spec section 3).
+
+This is the one list; the NetCDF file, its CSV twin and every check are made from it. The
+variables are those of the paper's Procedure 1: ``P^c``, ``P^m``, ``F^m`` and ``Theta^c``.
+"""
+
+import difflib
+import re
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+StringArray = NDArray[np.str_]
+
+SCHEMA = "elastocal.dataset/1"
+"""The schema that this version reads and writes."""
+
+AXES = ("x", "y", "z")
+"""Labels of the coordinate axes, in order."""
+
+STATUSES = ("ok", "slipped", "unstable", "aborted", "missing")
+"""What a reading can be; its position is the CF flag value."""
+
+OK = STATUSES.index("ok")
+MISSING = STATUSES.index("missing")
+
+JOINT_UNITS = {"rad": "angle", "deg": "angle", "m": "length", "mm": "length"}
+"""Units of a joint position, with their dimension: an angle is revolute, a length prismatic."""
+
+SI_JOINT_UNITS = {"angle": "rad", "length": "m"}
+
+ATTRIBUTES = ("schema", "robot_name", "robot_urdf", "tcp_frame", "provenance")
+"""Global attributes with a meaning here, in the order in which they are written."""
+
+CF_ATTRIBUTES = (
+    "Conventions",
+    "title",
+    "institution",
+    "source",
+    "history",
+    "references",
+    "comment",
+)
+"""Global attributes that the CF conventions (section 2.6) give every file; carried through."""
+
+
+@dataclass(frozen=True)
+class Variable:
+    """A variable of a dataset."""
+
+    name: str
+    dims: tuple[str, ...]
+    dimension: str
+    """Physical dimension, as `elastocal.units` names them."""
+    unit: str
+    """SI unit in memory and in NetCDF files."""
+    meaning: str
+    required: bool = False
+    broadcast: bool = False
+    """Whether it may come with fewer dimensions, which then are filled with equal values."""
+
+    @property
+    def column_unit(self) -> str:
+        """The SI unit as a CSV header writes it."""
+        return self.unit.replace(" ", "*")
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """Names of the CSV columns of the three components."""
+        return tuple(f"{self.name}_{axis}" for axis in AXES)
+
+
+_READING = ("pose", "load_case", "axis")
+
+JOINT_POSITION = Variable(
+    "joint_position",
+    ("pose", "load_case", "joint"),
+    "angle",
+    "rad",
+    "joint positions after the load case has settled",
+    required=True,
+)
+
+VECTORS = (
+    Variable("force", _READING, "force", "N", "force on the robot at the TCP, in base", True),
+    Variable("moment", _READING, "moment", "N m", "moment on the robot at the TCP, in base"),
+    Variable(
+        "controller_displacement",
+        _READING,
+        "length",
+        "m",
+        "TCP displacement that the controller reports, in base",
+        required=True,
+    ),
+    Variable(
+        "marker_displacement",
+        _READING,
+        "length",
+        "m",
+        "marker displacement that the tracker measures, in base",
+        required=True,
+    ),
+    Variable(
+        "force_sigma", _READING, "force", "N", "standard deviation of the force", broadcast=True
+    ),
+    Variable(
+        "marker_sigma",
+        _READING,
+        "length",
+        "m",
+        "standard deviation of the marker displacement",
+        broadcast=True,
+    ),
+    Variable("tcp_position", ("pose", "axis"), "length", "m", "unloaded TCP position in base"),
+)
+"""The variables that have an x, a y and a z."""
+
+VARIABLES = (JOINT_POSITION, *VECTORS)
+"""Every variable but the status."""
+
+VARIABLE_NAMES = (*(variable.name for variable in VARIABLES), "status")
+COORDINATES = ("pose", "load_case", "axis", "joint", "joint_unit")
+
+TEXT_COLUMNS = ("pose", "load_case", "status")
+"""CSV columns without a unit."""
+
+COLUMN_NAMES = (*TEXT_COLUMNS, *(name for variable in VECTORS for name in variable.columns))
+"""Every CSV column but those of the joints."""
+
+_JOINT_NAME = re.compile(r"[^\[\],;\"#\s](?:[^\[\],;\"#]*[^\[\],;\"#\s])?")
+_SIMILAR = 0.85
+"""Similarity (difflib ratio) from which a joint name is taken for a misspelt column."""
+
+
+def joint_name_problem(name: str) -> str | None:
+    """Return why ``name`` cannot name a joint column, or None when it can.
+
+    A joint column is every column that is not known otherwise, so a name that is all but equal
+    to a known column must be refused: it is a slip of the pen, not a joint.
+
+    >>> joint_name_problem("joint_a1") is None
+    True
+    >>> joint_name_problem("tcp_positon_x")
+    "it is not a joint; did you mean 'tcp_position_x'?"
+    """
+    if name in (*COLUMN_NAMES, *VARIABLE_NAMES):
+        return "the name stands for something else in a dataset"
+    if not name.isprintable() or _JOINT_NAME.fullmatch(name) is None:
+        return "a joint name is not empty and has no brackets, delimiters, quotes or line breaks"
+    similar = difflib.get_close_matches(name, COLUMN_NAMES, n=1, cutoff=_SIMILAR)
+    return f"it is not a joint; did you mean {similar[0]!r}?" if similar else None
+
+
+def freeze(array: NDArray[np.generic]) -> None:
+    """Make an array read-only, so that values do not change under anyone's feet."""
+    array.setflags(write=False)

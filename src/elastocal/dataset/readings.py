@@ -1,0 +1,102 @@
+"""Readings: the usable part of a dataset as flat arrays, one row a reading."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, fields
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from elastocal.dataset.layout import FloatArray, IntArray, StringArray, freeze
+from elastocal.errors import DatasetError
+
+
+@dataclass(frozen=True, eq=False)
+class Readings:
+    """Readings that are ok, in (pose, load case) order; all arrays are read-only copies.
+
+    Raises
+    ------
+    DatasetError
+        If the shapes do not belong together or a number is not finite.
+    """
+
+    pose: IntArray
+    """Label of the pose of each reading, shape (reading,)."""
+    load_case: StringArray
+    """Load case of each reading, shape (reading,)."""
+    joint_position: FloatArray
+    """Joint positions after settling (paper: Theta^c), shape (reading, joint), in rad or m."""
+    force: FloatArray
+    """Force on the robot at the TCP in base (paper: F^m), shape (reading, 3), in N."""
+    controller_displacement: FloatArray
+    """TCP displacement by the controller, in base (P^c), shape (reading, 3), in m."""
+    marker_displacement: FloatArray
+    """Marker displacement by the tracker, in base (P^m), shape (reading, 3), in m."""
+    moment: FloatArray | None = None
+    """Moment on the robot at the TCP in base, shape (reading, 3), in N·m; None: not measured."""
+    force_sigma: FloatArray | None = None
+    """Standard deviation of the force, shape (reading, 3), in N; None: not known."""
+    marker_sigma: FloatArray | None = None
+    """Standard deviation of the marker displacement, shape (reading, 3), in m; None: not known."""
+    tcp_position: FloatArray | None = None
+    """Unloaded TCP position in base, shape (reading, 3), in m; None: not known."""
+
+    def __post_init__(self) -> None:
+        self._own("pose", np.array(self.pose, dtype=np.int64), (len(self.pose),))
+        self._own("load_case", np.array(self.load_case, dtype=np.str_), (len(self.pose),))
+        for name, value in self._numbers():
+            array = np.array(value, dtype=np.float64)
+            width = array.shape[-1] if name == "joint_position" and array.ndim else 3
+            self._own(name, array, (len(self.pose), width))
+            if not np.all(np.isfinite(array)):
+                row = int(np.argwhere(~np.isfinite(array))[0, 0])
+                raise DatasetError(
+                    f"{name} of pose {self.pose[row]}, load case {str(self.load_case[row])!r}"
+                    f" is {array[row].tolist()}: every number of a reading must be finite"
+                )
+
+    def __len__(self) -> int:
+        return len(self.pose)
+
+    @property
+    def deflection(self) -> FloatArray:
+        """Real minus commanded TCP position, shape (reading, 3), in m (spec section 1).
+
+        ``deflection = marker_displacement - controller_displacement``: the paper's Eq. (10)
+        and (13) with both signs turned.
+        """
+        deflection: FloatArray = self.marker_displacement - self.controller_displacement
+        freeze(deflection)
+        return deflection
+
+    def take(self, index: ArrayLike) -> "Readings":
+        """Return some of the readings, in the order asked for, repeated ones included.
+
+        Parameters
+        ----------
+        index : array_like of int or bool, shape (n,) or (reading,)
+            Rows, or a mask of them.
+
+        Raises
+        ------
+        IndexError
+            If a row does not exist.
+        """
+        chosen = np.asarray(index)
+        rows = np.arange(len(self))[chosen.astype(np.intp) if chosen.size == 0 else chosen]
+        taken: dict[str, Any] = {"pose": self.pose[rows], "load_case": self.load_case[rows]}
+        taken |= {name: value[rows] for name, value in self._numbers()}
+        return Readings(**taken)
+
+    def _numbers(self) -> Iterator[tuple[str, FloatArray]]:
+        for field in fields(self)[2:]:
+            value = getattr(self, field.name)
+            if value is not None:
+                yield field.name, value
+
+    def _own(self, name: str, array: np.ndarray, shape: tuple[int, ...]) -> None:
+        if array.shape != shape:
+            raise DatasetError(f"{name} of the readings has shape {array.shape}, not {shape}")
+        freeze(array)
+        object.__setattr__(self, name, array)

@@ -1,0 +1,91 @@
+"""Layout from a YAML file: any list of springs.
+
+Example::
+
+    schema: elastocal.springs/1
+    include: actuated            # optional: start from a named layout
+    springs:
+      - {joint: joint_a2, axis: x}                          # torsion, bearing housing
+      - {joint: joint_a3, axis: [0, 1, 1], frame: distal}   # any axis, behind the joint
+      - {joint: joint_a6, axis: z, kind: prismatic, offset: ["0 mm", "0 mm", "150 mm"]}
+"""
+
+from pathlib import Path
+from typing import Annotated, Literal
+
+from pydantic import BeforeValidator, Field
+
+from elastocal.elastic.springs import AXES, Spring, as_axis, axial
+from elastocal.errors import SpringError
+from elastocal.robot import Robot
+from elastocal.robot.chain import ChainJoint
+from elastocal.schema import StrictModel, read_yaml
+from elastocal.units import parse_quantity
+
+SCHEMA = "elastocal.springs/1"
+
+Length = Annotated[float, BeforeValidator(lambda text: parse_quantity(text, "length"))]
+
+
+class SpringEntry(StrictModel):
+    """One spring as a person writes it."""
+
+    joint: str
+    axis: Literal["axial", "x", "y", "z"] | tuple[float, float, float] = "axial"
+    kind: Literal["revolute", "prismatic"] | None = None
+    """Default: revolute; the joint's own kind for ``axial``."""
+    frame: Literal["proximal", "distal"] = "proximal"
+    offset: tuple[Length, Length, Length] = (0.0, 0.0, 0.0)
+    name: str | None = None
+
+
+class SpringFile(StrictModel):
+    """A spring file."""
+
+    include: Literal["actuated", "bearing"] | None = None
+    springs: tuple[SpringEntry, ...] = Field(default=())
+
+
+def read_springs(path: Path) -> SpringFile:
+    """Return a validated spring file.
+
+    Raises
+    ------
+    SchemaError, FileAccessError
+        If the file cannot be read or does not fit.
+    """
+    return read_yaml(path, SpringFile, SCHEMA)
+
+
+def custom(robot: Robot, entries: tuple[SpringEntry, ...]) -> tuple[Spring, ...]:
+    """Return the springs that a file lists for a robot, in its order."""
+    joints = {joint.name: joint for joint in robot.chain.joints}
+    return tuple(_spring(entry, joints) for entry in entries)
+
+
+def _spring(entry: SpringEntry, joints: dict[str, ChainJoint]) -> Spring:
+    if entry.joint not in joints:
+        raise SpringError(f"spring at joint {entry.joint!r}: the robot has {', '.join(joints)}")
+    joint = joints[entry.joint]
+    distal = entry.frame == "distal"
+    if entry.axis == "axial":
+        base = axial(joint)
+        axis, name = base.axis, base.name
+        revolute = joint.revolute if entry.kind is None else entry.kind == "revolute"
+    else:
+        axis = AXES[entry.axis] if isinstance(entry.axis, str) else as_axis(entry.axis)
+        revolute = entry.kind != "prismatic"
+        name = f"{joint.name}.{_label(entry, axis)}"
+    return Spring(entry.name or name, joint.name, axis, revolute, distal, entry.offset)
+
+
+def _label(entry: SpringEntry, axis: tuple[float, float, float]) -> str:
+    """Name a spring by what distinguishes it, e.g. ``x``, ``distal-x``, ``linear-z``."""
+    direction = entry.axis if isinstance(entry.axis, str) else _direction(axis)
+    parts = ["linear"] if entry.kind == "prismatic" else []
+    parts += ["distal"] if entry.frame == "distal" else []
+    return "-".join([*parts, direction])
+
+
+def _direction(axis: tuple[float, float, float]) -> str:
+    return "(" + " ".join(f"{component:.3g}" for component in axis) + ")"

@@ -1,0 +1,85 @@
+"""The calibrated model: what the compensation and every prediction work with."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from elastocal.elastic import ElasticModel
+from elastocal.identification.bootstrap import interval
+from elastocal.identification.observability import Observability
+from elastocal.robot.chain import FloatArray
+
+_CHUNK = 2000
+"""Configurations predicted at a time, so that the draws of a long path fit into memory."""
+
+
+@dataclass(frozen=True)
+class Prediction:
+    """Predicted deflections with their 95 % intervals (bootstrap draws of the model)."""
+
+    deflection: FloatArray
+    """Real minus commanded tcp position in base, shape (row, 3), in m."""
+    low: FloatArray
+    """Lower ends, shape (row, 3), in m."""
+    high: FloatArray
+    """Upper ends, shape (row, 3), in m."""
+
+
+@dataclass(frozen=True, eq=False)
+class CalibratedModel:
+    """An elastic model with identified compliances and their bootstrap draws."""
+
+    model: ElasticModel
+    compliance: FloatArray
+    """Shape (spring,), in rad/(N·m) or m/N."""
+    draws: FloatArray
+    """Bootstrap draws, shape (draw, spring)."""
+    observability: Observability
+    provenance: str = ""
+    """Where the data came from."""
+
+    def __post_init__(self) -> None:
+        for name in ("compliance", "draws"):
+            array = np.array(getattr(self, name), dtype=float)
+            array.flags.writeable = False
+            object.__setattr__(self, name, array)
+
+    @property
+    def stiffness(self) -> FloatArray:
+        """Stiffness of each spring, ``1 / c``, infinite where the compliance is zero."""
+        return np.divide(
+            1.0,
+            self.compliance,
+            out=np.full_like(self.compliance, np.inf),
+            where=self.compliance != 0,
+        )
+
+    def interval(self) -> tuple[FloatArray, FloatArray]:
+        """Return the 95 % intervals of the compliances, two arrays of shape (spring,)."""
+        return interval(self.draws)
+
+    def predict(
+        self, q: ArrayLike, force: ArrayLike, moment: ArrayLike | None = None
+    ) -> Prediction:
+        """Return the deflections at configurations under loads.
+
+        Parameters
+        ----------
+        q : array_like, shape (row, joint)
+            Joint positions in rad or m.
+        force : array_like, shape (row, 3)
+            Force on the robot at the tcp in base, in N.
+        moment : array_like, shape (row, 3), optional
+            Moment on the robot about the tcp in base, in N·m.
+        """
+        q, force = np.asarray(q, dtype=float), np.asarray(force, dtype=float)
+        moment = None if moment is None else np.asarray(moment, dtype=float)
+        result = np.empty((3, len(q), 3))
+        for start in range(0, len(q), _CHUNK):
+            rows = slice(start, start + _CHUNK)
+            m = None if moment is None else moment[rows]
+            blocks = self.model.observation_blocks(q[rows], force[rows], m)
+            result[0, rows] = blocks @ self.compliance
+            result[1:, rows] = interval(np.moveaxis(blocks @ self.draws.T, -1, 0))
+        return Prediction(*result)

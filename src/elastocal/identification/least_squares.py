@@ -1,0 +1,98 @@
+"""Bounded least squares on a small factored system.
+
+The system is given by its singular value decomposition ``A = U diag(s) V^T`` and ``y = U^T b``,
+columns scaled to unit norm. Directions that the data do not determine are given the smallest
+norm that the bounds allow; everything the data do determine is the least-squares solution.
+"""
+
+import numpy as np
+from scipy.optimize import lsq_linear, nnls
+
+from elastocal.errors import IdentificationError
+from elastocal.robot.chain import FloatArray
+
+RANK_TOLERANCE = 1e-6
+"""Singular values of the column-scaled system below this part of the largest count as zero:
+a direction a millionth as visible as the best one is below one nanometre in a deflection of a
+millimetre, which no tracker sees."""
+
+_FLOOR = 1e-6
+"""Weight, relative to the largest singular value, that holds undetermined directions small."""
+
+
+def rank(s: FloatArray) -> int:
+    """Return the number of singular values above the tolerance; ``s`` in falling order."""
+    return int(np.count_nonzero(s > RANK_TOLERANCE * s[0])) if len(s) and s[0] > 0.0 else 0
+
+
+def minimise(
+    s: FloatArray, Vt: FloatArray, y: FloatArray, lower: FloatArray, upper: FloatArray
+) -> FloatArray:
+    """Return ``argmin || diag(s) V^T x - y ||`` subject to ``lower <= x <= upper``.
+
+    Parameters
+    ----------
+    s : ndarray, shape (n,)
+        Singular values in falling order.
+    Vt : ndarray, shape (n, n)
+        Right singular vectors, a row each.
+    y : ndarray, shape (n,)
+        Right-hand side in the left singular basis.
+    lower, upper : ndarray, shape (n,)
+        Bounds; may be infinite.
+
+    Raises
+    ------
+    IdentificationError
+        If all singular values are zero: the data determine nothing.
+    """
+    determined = rank(s)
+    if determined == 0:
+        raise IdentificationError("the forces load no spring: nothing can be identified")
+    s, y = s.copy(), y.copy()
+    s[determined:], y[determined:] = _FLOOR * s[0], 0.0
+    x = Vt.T @ (y / s)
+    if np.all((lower <= x) & (x <= upper)):
+        return np.asarray(x)
+    A = s[:, None] * Vt
+    if np.all(np.isfinite(lower)) and np.all(np.isposinf(upper)):
+        return lower + _nonnegative(A, y - A @ lower)
+    return _boxed(A, y, lower, upper)
+
+
+def kkt_violation(
+    s: FloatArray,
+    Vt: FloatArray,
+    y: FloatArray,
+    x: FloatArray,
+    lower: FloatArray,
+    upper: FloatArray,
+) -> float:
+    """Return how far a solution is from satisfying the optimality conditions.
+
+    The largest gradient component that a bound does not excuse, relative to the gradient at
+    zero (Lawson and Hanson, *Solving Least Squares Problems*, 1974, chapter 23).
+    """
+    gradient = Vt.T @ (s * (s * (Vt @ x) - y))
+    # A solution on a bound may only want to move outwards.
+    excess = np.where(x <= lower, np.minimum(gradient, 0.0), gradient)
+    excess = np.where(x >= upper, np.maximum(excess, 0.0), excess)
+    reference = float(np.linalg.norm(Vt.T @ (s * y)))
+    return float(np.abs(excess).max() / reference) if reference > 0.0 else 0.0
+
+
+def _nonnegative(A: FloatArray, y: FloatArray) -> FloatArray:
+    try:
+        return np.asarray(nnls(A, y, maxiter=30 * A.shape[1])[0])
+    except RuntimeError:
+        # The active-set method can cycle on nearly dependent columns; BVLS does not.
+        return _boxed(A, y, np.zeros(A.shape[1]), np.full(A.shape[1], np.inf))
+
+
+def _boxed(A: FloatArray, y: FloatArray, lower: FloatArray, upper: FloatArray) -> FloatArray:
+    x = lower.copy()
+    free = lower < upper
+    if np.any(free):
+        rest = y - A[:, ~free] @ x[~free]
+        x[free] = lsq_linear(A[:, free], rest, (lower[free], upper[free]), method="bvls").x
+    return x

@@ -1,0 +1,94 @@
+"""Certify: what the data can tell about each spring.
+
+With forces only and positions only, springs that share an origin add up to one symmetric tensor
+and consecutive wrist frames share axes, so some springs can never be told apart, however many
+poses are taken. Predictions need only the combinations that are observable; tables must say
+which springs are not (spec section 2, trap 1).
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from elastocal.elastic import Spring
+from elastocal.identification.least_squares import rank
+from elastocal.identification.solve import Factored
+from elastocal.identification.sparse_basis import sparse_basis
+from elastocal.robot.chain import FloatArray
+
+_SEEN = 1e-6
+"""A spring counts as observable when its part in the null space is below this."""
+
+
+@dataclass(frozen=True)
+class Term:
+    """One spring of an unobservable combination."""
+
+    spring: str
+    weight: float
+
+
+@dataclass(frozen=True)
+class Observability:
+    """Rank, conditioning, and the springs that cannot be told apart."""
+
+    rank: int
+    springs: int
+    condition: float
+    """Condition number of the column-scaled system over the observable directions."""
+    observable: tuple[bool, ...]
+    """Whether each spring is determined by itself."""
+    unobservable: tuple[tuple[Term, ...], ...]
+    """Combinations of compliances that the data do not see, in a sparse basis: adding any
+    multiple of one of them changes no predicted deflection."""
+
+
+def observability(system: Factored, springs: Sequence[Spring]) -> Observability:
+    """Return what a factored system determines.
+
+    Parameters
+    ----------
+    system : Factored
+        From `solve.factor`.
+    springs : sequence of Spring
+        In column order.
+    """
+    determined = rank(system.s)
+    null_space = system.Vt[determined:].T
+    part = np.linalg.norm(null_space, axis=1)
+    groups = _readable(null_space / system.scale[:, None], springs)
+    condition = system.s[0] / system.s[determined - 1] if determined else np.inf
+    return Observability(
+        determined, len(springs), float(condition), tuple(bool(p < _SEEN) for p in part), groups
+    )
+
+
+def _readable(null_space: FloatArray, springs: Sequence[Spring]) -> tuple[tuple[Term, ...], ...]:
+    """Return the null space of the compliances, by name."""
+    joints = list(dict.fromkeys(spring.joint for spring in springs))
+    orthonormal = np.linalg.qr(null_space)[0]
+    basis = sparse_basis(orthonormal, [joints.index(spring.joint) for spring in springs])
+    return tuple(
+        tuple(Term(springs[i].name, float(vector[i])) for i in map(int, np.flatnonzero(vector)))
+        for vector in basis
+    )
+
+
+def describe(group: Sequence[Term]) -> str:
+    """Return an unobservable combination as a person would write it.
+
+    >>> describe([Term("a4.y", 1.0), Term("a4.z", 1.0), Term("a5.axial", -1.0)])
+    '(a4.y + a4.z) - a5.axial'
+    """
+    sides = (
+        [_written(term) for term in group if term.weight > 0],
+        [_written(term) for term in group if term.weight < 0],
+    )
+    written = [f"({' + '.join(side)})" if len(side) > 1 else side[0] for side in sides if side]
+    return " - ".join(written)
+
+
+def _written(term: Term) -> str:
+    size = abs(term.weight)
+    return term.spring if size == 1.0 else f"{size:.3g} {term.spring}"

@@ -1,0 +1,90 @@
+"""What a user may choose about a fit."""
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from elastocal.errors import IdentificationError
+from elastocal.identification.losses import LOSSES, check_loss
+from elastocal.robot.chain import FloatArray
+
+Weights = Literal["none", "sigma"]
+
+
+@dataclass(frozen=True)
+class Prior:
+    """What is known of the compliances before the data, e.g. from last year's calibration.
+
+    Adds the rows ``noise / sigma * (c - mean)`` to the least-squares system.
+    """
+
+    mean: ArrayLike
+    """Expected compliances, shape (spring,), in rad/(N·m) or m/N."""
+    sigma: ArrayLike
+    """Their standard deviations, same shape and unit."""
+    noise: float
+    """Standard deviation of one component of a deflection that the prior is weighed against,
+    in m."""
+
+
+@dataclass(frozen=True)
+class FitOptions:
+    """Options of the identification; the defaults are the paper's (Eq. 19, `lsqlin`)."""
+
+    lower: ArrayLike = 0.0
+    """Lower bound of the compliances, a number or shape (spring,). Zero by default: on few
+    poses an unbounded fit of 18 springs is worse than one of 6."""
+    upper: ArrayLike = np.inf
+    """Upper bound, likewise."""
+    weights: Weights = "none"
+    """``sigma``: weigh by the measured standard deviations of the dataset."""
+    loss: str = "linear"
+    """One of `losses.LOSSES`; anything but ``linear`` is solved by reweighting."""
+    prior: Prior | None = None
+    set_blunders_aside: bool = True
+    """Leave readings out of the fit that cannot be measurements of this robot (see
+    `suspicious`); they are always named."""
+    draws: int = 200
+    """Number of pose-block bootstrap draws."""
+
+    def __post_init__(self) -> None:
+        check_loss(self.loss)
+        if self.weights not in ("none", "sigma"):
+            raise IdentificationError(f"weights {self.weights!r}: allowed are none, sigma")
+        if not self.draws >= MINIMUM_DRAWS:
+            raise IdentificationError(
+                f"{self.draws} bootstrap draws: at least {MINIMUM_DRAWS} make a 95 % interval"
+            )
+
+
+MINIMUM_DRAWS = 40
+"""Fewest draws that leave one beyond each end of a 95 % interval."""
+
+
+def bounds(options: FitOptions, springs: int) -> tuple[FloatArray, FloatArray]:
+    """Return the lower and upper bounds, each of shape (spring,).
+
+    Raises
+    ------
+    IdentificationError
+        If a bound has another shape, is NaN, or a lower bound exceeds the upper one.
+    """
+    try:
+        lower = np.broadcast_to(np.asarray(options.lower, dtype=float), (springs,))
+        upper = np.broadcast_to(np.asarray(options.upper, dtype=float), (springs,))
+    except ValueError as error:
+        raise IdentificationError(
+            f"bounds must be a number or one number for each of the {springs} springs"
+        ) from error
+    bad = np.flatnonzero(~((lower <= upper) & (lower < np.inf) & (upper > -np.inf)))
+    if len(bad):
+        raise IdentificationError(
+            f"bounds exclude everything: spring {bad[0] + 1} of {springs} would have to lie between"
+            f" {lower[bad[0]]:g} and {upper[bad[0]]:g}"
+        )
+    return lower, upper
+
+
+__all__ = ["LOSSES", "FitOptions", "Prior", "bounds"]

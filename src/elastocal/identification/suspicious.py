@@ -1,0 +1,77 @@
+"""Readings that look wrong: robust scores and leverage.
+
+Each reading's residual is taken from a fit that gross errors hardly pull (Cauchy loss), divided
+by the robust standard deviation and by ``sqrt(1 - leverage)``, since a reading that pulls the
+fit towards itself shows a smaller residual (Rousseeuw and Leroy, *Robust Regression and Outlier
+Detection*, 1987, chapter 6).
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.stats import chi
+
+from elastocal.identification.problem import Problem
+from elastocal.identification.solve import Solution, normalised_residuals, solve
+from elastocal.robot.chain import FloatArray
+
+FALSE_ALARM = 0.01
+"""Probability that a data set with normal noise and no blunder names any reading."""
+
+BLUNDER_SCORE = 25.0
+"""Robust score above which a reading may be set aside ..."""
+BLUNDER_SIZE = 0.25
+"""... if its residual is also above this part of the median deflection. Both together are
+beyond any model error: a broken beam, a marker knocked off, a reading of another pose."""
+MOST_BLUNDERS = 0.1
+"""Largest part of the readings that may be set aside; more is a bad campaign, not blunders."""
+
+_MOST_LEVERAGE = 0.99
+
+
+@dataclass(frozen=True)
+class Screening:
+    """How each reading looks to a robust fit."""
+
+    score: FloatArray
+    """Leverage-corrected residual norm in robust standard deviations, shape (reading,)."""
+    residual: FloatArray
+    """Residual norm of the robust fit, shape (reading,), in m."""
+    leverage: FloatArray
+    """Mean leverage of a reading's three rows, shape (reading,), 0 to 1."""
+    threshold: float
+    """Score above which a reading is named."""
+    blunder: FloatArray
+    """Whether the reading cannot be a measurement of this robot, shape (reading,), bool."""
+
+    @property
+    def suspicious(self) -> FloatArray:
+        """Whether each reading is named, shape (reading,), bool."""
+        return np.asarray(self.score > self.threshold)
+
+
+def screen(problem: Problem) -> Screening:
+    """Return how the readings of a problem look to a robust fit."""
+    robust = solve(problem, "cauchy")
+    weighted = problem.reweighted(robust.reading_weight)
+    h = leverage(weighted, robust)
+    score = normalised_residuals(problem, robust.compliance) / np.sqrt(1.0 - h)
+    residual = np.linalg.norm(problem.residuals(robust.compliance), axis=1)
+    typical = float(np.median(np.linalg.norm(problem.d, axis=1)))
+    blunder = (score > BLUNDER_SCORE) & (residual > BLUNDER_SIZE * typical)
+    if blunder.mean() > MOST_BLUNDERS:
+        blunder = np.zeros_like(blunder)
+    threshold = float(chi.ppf(1.0 - FALSE_ALARM / len(problem), 3))
+    return Screening(score, residual, h, threshold, blunder)
+
+
+def leverage(problem: Problem, solution: Solution) -> FloatArray:
+    """Return the mean leverage of each reading's rows over the observable directions.
+
+    The diagonal of the hat matrix, shape (reading,), at most 0.99.
+    """
+    system = solution.factored
+    seen = system.s > system.s[0] * 1e-6
+    basis = (system.Vt[seen] / system.s[seen, None]) / system.scale
+    rows = (problem.O * problem.weight[..., None]) @ basis.T
+    return np.asarray(np.minimum(np.square(rows).sum(axis=2).mean(axis=1), _MOST_LEVERAGE))

@@ -1,0 +1,101 @@
+"""Files that people write (YAML): strict models, one-line errors.
+
+Unknown keys are refused with the nearest known one; a problem is reported by its path in the
+file, for example ``springs.2.axis``.
+"""
+
+from pathlib import Path
+from typing import Any, TypeVar
+
+import yaml
+from pydantic import BaseModel, ConfigDict, ValidationError
+
+from elastocal.errors import SchemaError, nearest
+from elastocal.files import read_text
+
+
+class StrictModel(BaseModel):
+    """Base of every model that is read from a file: frozen, no unknown keys."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+
+Model = TypeVar("Model", bound=StrictModel)
+
+
+def read_yaml(path: Path, model: type[Model], schema: str) -> Model:
+    """Return the contents of a YAML file as a validated model.
+
+    Raises
+    ------
+    SchemaError
+        If the file is not YAML, has another schema, or does not fit the model.
+    FileAccessError
+        If the file cannot be read.
+    """
+    try:
+        data = yaml.safe_load(read_text(path))
+    except yaml.YAMLError as error:
+        raise SchemaError(f"{path} is not valid YAML: {' '.join(str(error).split())}") from error
+    if not isinstance(data, dict):
+        raise SchemaError(f"{path} must hold keys and values, e.g. 'schema: {schema}'")
+    check_schema(data.pop("schema", None), schema, str(path))
+    return validate(data, model, str(path))
+
+
+def check_schema(found: object, known: str, what: str) -> None:
+    """Refuse a missing or unknown schema by name.
+
+    Raises
+    ------
+    SchemaError
+        If ``found`` is not ``known``.
+    """
+    if found != known:
+        raise SchemaError(f"{what} has schema {found!r}; this version reads {known!r}")
+
+
+def validate(data: Any, model: type[Model], what: str) -> Model:
+    """Return ``data`` as a model, or refuse it in one line.
+
+    Raises
+    ------
+    SchemaError
+        With the path of the first problem, its value and what is allowed.
+    """
+    try:
+        return model.model_validate(data)
+    except ValidationError as error:
+        first = error.errors(include_url=False)[0]
+        path = ".".join(str(part) for part in first["loc"])
+        if first["type"] == "extra_forbidden":
+            key, known = str(first["loc"][-1]), _known_keys(model, first["loc"][:-1])
+            allowed = f" (known: {', '.join(known)})" if known else ""
+            message = f"unknown key {path!r}{nearest(key, known)}{allowed}"
+        elif first["type"] == "missing":
+            message = f"key {path!r} is missing"
+        else:
+            message = f"{path}: {first['msg']}, got {first['input']!r}"
+        raise SchemaError(f"{what}: {message}") from error
+
+
+def _known_keys(model: type[BaseModel], path: tuple[int | str, ...]) -> list[str]:
+    """Return the keys of the model that a location points into."""
+    current: type[BaseModel] = model
+    for part in path:
+        if isinstance(part, str) and part in current.model_fields:
+            inner = _model_in(current.model_fields[part].annotation)
+            if inner is None:
+                return []
+            current = inner
+    return list(current.model_fields)
+
+
+def _model_in(annotation: Any) -> type[BaseModel] | None:
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        return annotation
+    for argument in getattr(annotation, "__args__", ()):
+        found = _model_in(argument)
+        if found is not None:
+            return found
+    return None

@@ -1,0 +1,133 @@
+"""Torque laws: how hard a spring of the simulated arm resists being turned.
+
+A law is three verbs, each vectorised over angles: the energy stored, the torque (its derivative)
+and the stiffness (the derivative of that). For a prismatic spring read m, N, N/m.
+"""
+
+from dataclasses import dataclass, fields
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from elastocal.errors import SpringError
+
+FloatArray = NDArray[np.float64]
+
+
+class TorqueLaw(Protocol):
+    """An elastic law: symmetric, stiffness positive everywhere, torque 0 at angle 0."""
+
+    def energy(self, angle: FloatArray) -> FloatArray:
+        """Return the energy stored, in J, for angles of any shape in rad."""
+        ...
+
+    def torque(self, angle: FloatArray) -> FloatArray:
+        """Return the torque that holds the spring there, in N·m: d energy / d angle."""
+        ...
+
+    def stiffness(self, angle: FloatArray) -> FloatArray:
+        """Return the tangent stiffness in N·m/rad: d torque / d angle."""
+        ...
+
+
+@dataclass(frozen=True)
+class Linear:
+    """Hooke's spring: ``torque = k angle``."""
+
+    k: float
+    """Stiffness in N·m/rad, or N/m."""
+
+    def __post_init__(self) -> None:
+        _require_positive(self)
+
+    def energy(self, angle: FloatArray) -> FloatArray:
+        """Return ``k angle² / 2``."""
+        return 0.5 * self.k * angle**2
+
+    def torque(self, angle: FloatArray) -> FloatArray:
+        """Return ``k angle``."""
+        return self.k * angle
+
+    def stiffness(self, angle: FloatArray) -> FloatArray:
+        """Return ``k``, in the shape of ``angle``."""
+        return np.full_like(angle, self.k)
+
+
+@dataclass(frozen=True)
+class CubicGear:
+    """A gear that stiffens without end: ``torque = k angle (1 + (angle / scale)²)``.
+
+    A linear plus a cubic term is the stiffness curve with which Tuttle and Seering, "A nonlinear
+    dynamic model of a harmonic drive gear transmission", IEEE Trans. Robotics and Automation 12
+    (1996), describe strain-wave gears: more teeth share the load as it grows.
+    """
+
+    k: float
+    """Stiffness at rest in N·m/rad."""
+    scale: float
+    """Angle in rad at which the torque is twice that of the linear spring."""
+
+    def __post_init__(self) -> None:
+        _require_positive(self)
+
+    def energy(self, angle: FloatArray) -> FloatArray:
+        """Return ``k angle² (1 + (angle / scale)² / 2) / 2``."""
+        return 0.5 * self.k * angle**2 * (1.0 + 0.5 * (angle / self.scale) ** 2)
+
+    def torque(self, angle: FloatArray) -> FloatArray:
+        """Return ``k angle (1 + (angle / scale)²)``."""
+        return self.k * angle * (1.0 + (angle / self.scale) ** 2)
+
+    def stiffness(self, angle: FloatArray) -> FloatArray:
+        """Return ``k (1 + 3 (angle / scale)²)``."""
+        return self.k * (1.0 + 3.0 * (angle / self.scale) ** 2)
+
+
+@dataclass(frozen=True)
+class TwoSlopeGear:
+    """A gear that is soft around zero and stiff beyond a knee, without a corner.
+
+    Gear makers tabulate stiffness as two or three straight pieces, K1 < K2 (< K3), soft at low
+    torque where not all teeth touch yet. Here the tangent stiffness passes smoothly from the one
+    to the other, ``soft + (stiff - soft) angle² / (angle² + knee²)``, whose integrals are closed.
+    """
+
+    soft: float
+    """Stiffness at rest in N·m/rad."""
+    stiff: float
+    """Stiffness far beyond the knee in N·m/rad; larger than ``soft``."""
+    knee: float
+    """Angle in rad at which the stiffness is half way."""
+
+    def __post_init__(self) -> None:
+        _require_positive(self)
+        if not self.stiff > self.soft:
+            raise SpringError(f"TwoSlopeGear stiff {self.stiff:g} must exceed soft {self.soft:g}")
+
+    def energy(self, angle: FloatArray) -> FloatArray:
+        """Return the integral of `torque`."""
+        ratio = angle / self.knee
+        gap = self.knee**2 * (ratio * np.arctan(ratio) - 0.5 * np.log1p(ratio**2))
+        energy: FloatArray = 0.5 * self.stiff * angle**2 - (self.stiff - self.soft) * gap
+        return energy
+
+    def torque(self, angle: FloatArray) -> FloatArray:
+        """Return ``stiff angle - (stiff - soft) knee atan(angle / knee)``."""
+        lost = self.knee * np.arctan(angle / self.knee)
+        torque: FloatArray = self.stiff * angle - (self.stiff - self.soft) * lost
+        return torque
+
+    def stiffness(self, angle: FloatArray) -> FloatArray:
+        """Return ``soft + (stiff - soft) angle² / (angle² + knee²)``."""
+        square = angle**2
+        return self.soft + (self.stiff - self.soft) * square / (square + self.knee**2)
+
+
+def _require_positive(law: Linear | CubicGear | TwoSlopeGear) -> None:
+    for parameter in fields(law):
+        value = getattr(law, parameter.name)
+        if not 0.0 < value < np.inf:
+            raise SpringError(
+                f"{type(law).__name__} {parameter.name} is {value!r}: must be positive and finite"
+            )
