@@ -19,14 +19,14 @@ MEASURED = ("joint_position", "force", "controller_displacement", "marker_displa
 
 
 def keywords(
-    poses: int = 3, load_cases: tuple[str, ...] = ("normal", "north"), **changes: Any
+    count: int = 3, load_cases: tuple[str, ...] = ("normal", "north"), **changes: Any
 ) -> dict[str, Any]:
     """Return arguments of `Dataset.from_arrays`; the same ones at every call."""
     random = np.random.default_rng(7)
-    shape = (poses, len(load_cases), 3)
+    shape = (count, len(load_cases), 3)
     force = random.normal(0.0, 300.0, shape)
     controller = random.normal(0.0, 1e-4, shape)
-    joints = random.uniform(-2.0, 2.0, (poses, len(load_cases), len(JOINTS)))
+    joints = random.uniform(-2.0, 2.0, (count, len(load_cases), len(JOINTS)))
     return {
         "joint_position": joints,
         "force": force,
@@ -105,8 +105,9 @@ def datasets(draw: st.DrawFn) -> Dataset:
         "force": force,
         "controller_displacement": controller,
         "marker_displacement": controller + 2e-6 * force,
-        "joint_units": draw(st.lists(st.sampled_from("rad m".split()), min_size=len(joints),
-                                     max_size=len(joints))),
+        "joint_units": draw(
+            st.lists(st.sampled_from(["rad", "m"]), min_size=len(joints), max_size=len(joints))
+        ),
     }
     for name in MEASURED:
         arguments[name][status == 4] = np.nan

@@ -64,7 +64,10 @@ def _fitted(
     values: ArrayLike | None, variable: Variable, sizes: Mapping[str, int]
 ) -> tuple[tuple[str, ...], np.ndarray]:
     """Return the dimensions that an array has, and the array."""
-    array = np.asarray(values)
+    try:
+        array = np.asarray(values)
+    except ValueError as error:
+        raise DatasetError(f"{variable.name} is ragged: its rows differ in length") from error
     shapes = {variable.dims: tuple(sizes[dim] for dim in variable.dims)}
     if variable.broadcast:
         shapes[variable.dims[:2]] = shapes[variable.dims][:2]

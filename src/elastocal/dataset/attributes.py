@@ -28,9 +28,14 @@ def canonical_attributes(attributes: Mapping[Hashable, Any]) -> dict[str, str]:
                 f"attribute {name!r} is not known{nearest(str(name), known)}"
                 f" (allowed: {', '.join(known)})"
             )
-        if not isinstance(value, str) or "\0" in value:
+        if not isinstance(value, str) or not _storable(value):
             raise DatasetError(f"attribute {name!r} is {value!r:.60}: it must be a text")
         if name in ("robot_urdf", "tcp_frame") and not value:
             raise DatasetError(f"attribute {name!r} is empty: leave it out when it is not known")
     texts = {"robot_name": "", "provenance": "", **attributes}
     return {name: str(texts[name]) for name in known if name in texts}
+
+
+def _storable(text: str) -> bool:
+    """Return whether a NetCDF file can hold a text: UTF-8, without the zero that ends it in C."""
+    return "\0" not in text and not any("\ud800" <= letter <= "\udfff" for letter in text)

@@ -97,7 +97,7 @@ class Dataset:
             If shapes, labels or values break the contract, or look like a unit mistake.
         """
         if poses is None:
-            poses = range(len(np.atleast_1d(np.asarray(force))))
+            poses = range(len(force) if isinstance(force, Sequence | np.ndarray) else 0)
         data = assemble(
             {"pose": poses, "load_case": load_cases, "joint": joint_names},
             {
@@ -238,6 +238,7 @@ def _positions(kind: str, labels: Sequence[Any], known: Sequence[Hashable]) -> l
     for label in labels:
         if label not in known:
             listed = ", ".join(map(str, known[:20])) + (", …" if len(known) > 20 else "")
-            hint = nearest(label, [str(name) for name in known]) if isinstance(label, str) else ""
+            names = [name for name in known if isinstance(name, str)]
+            hint = nearest(label, names) if isinstance(label, str) else ""
             raise DatasetError(f"{kind} {label!r} is not in the dataset{hint} (known: {listed})")
     return [known.index(label) for label in labels]

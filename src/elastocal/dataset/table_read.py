@@ -98,6 +98,7 @@ def _grid(table: TableText, text: Mapping[str, int]) -> _Grid:
 
 def _pose(cell: str, line: int) -> int:
     try:
+        _refuse_underscore(cell)
         return int(cell)
     except ValueError as error:
         raise DatasetError(f"row {line}: pose is {cell!r}: it must be an integer") from error
@@ -109,6 +110,7 @@ def _numbers(table: TableText, columns: Sequence[Column]) -> FloatArray:
     for position, column in enumerate(columns):
         cells = [row[column.index] for row in table.rows]
         try:
+            _refuse_underscore("".join(cells))
             values[:, position] = [float(cell) if cell else math.nan for cell in cells]
         except ValueError:
             # Rarely taken: some cell is blank or no number, and its row has to be found.
@@ -124,12 +126,19 @@ def _number(cell: str, line: int, column: Column) -> float:
     if not cell.strip():
         return math.nan
     try:
+        _refuse_underscore(cell)
         return float(cell)
     except ValueError as error:
         hint = " (the decimal sign is a point)" if "," in cell else ""
         raise DatasetError(
             f"row {line}, column {column.header!r}: {cell!r} is not a number{hint}"
         ) from error
+
+
+def _refuse_underscore(text: str) -> None:
+    """Refuse ``1_5``, which is 15 to Python and a slip of the pen in a table."""
+    if "_" in text:
+        raise ValueError(text)
 
 
 def _statuses(table: TableText, text: Mapping[str, int], empty: BoolArray) -> np.ndarray:

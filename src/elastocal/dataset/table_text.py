@@ -48,7 +48,10 @@ def cut(text: str) -> TableText:
     header_line, above = "", 0
     for number, line in enumerate(lines, start=1):
         if line.startswith("#"):
-            attributes.update(_attribute(line.strip(), number))
+            for name, value in _attribute(line.strip(), number).items():
+                if name in attributes:
+                    raise DatasetError(f"row {number}: attribute {name!r} stands twice")
+                attributes[name] = value
         elif line.strip():
             header_line, above = line, number - 1
             break

@@ -16,16 +16,11 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike
 
+from elastocal.arrays import FloatArray, IndexArray
 from elastocal.elastic.springs import Spring, check_springs, is_axial
 from elastocal.errors import SpringError
 from elastocal.robot import Jacobian, Robot
-from elastocal.robot.chain import (
-    ChainModel,
-    FloatArray,
-    IndexArray,
-    InsertedJoint,
-    build_model,
-)
+from elastocal.robot.chain import ChainModel, InsertedJoint, build_model
 from elastocal.robot.robot import evaluate_jacobian
 
 

@@ -10,8 +10,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
+from elastocal.arrays import FloatArray
 from elastocal.errors import SpringError, nearest
-from elastocal.robot.chain import ChainJoint, FloatArray
+from elastocal.robot.chain import ChainJoint
 
 AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 _ALIGNED = 1.0 - 1e-9

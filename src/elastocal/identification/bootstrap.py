@@ -8,8 +8,8 @@ draws are kept, so that every prediction anywhere gets an interval.
 import numpy as np
 from numpy.random import Generator
 
+from elastocal.arrays import FloatArray
 from elastocal.identification.grams import PoseGrams
-from elastocal.robot.chain import FloatArray
 
 CONFIDENCE = 0.95
 

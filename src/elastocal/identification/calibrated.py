@@ -5,10 +5,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
+from elastocal.arrays import FloatArray
 from elastocal.elastic import ElasticModel
 from elastocal.identification.bootstrap import interval
 from elastocal.identification.observability import Observability
-from elastocal.robot.chain import FloatArray
 
 _CHUNK = 2000
 """Configurations predicted at a time, so that the draws of a long path fit into memory."""

@@ -1,12 +1,13 @@
 """From a dataset to a calibrated model: build, solve, certify (paper Eq. 15-19)."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.random import Generator
 from numpy.typing import ArrayLike
 
-from elastocal.dataset import Dataset, Readings
+from elastocal.arrays import BoolArray, FloatArray
+from elastocal.dataset import Readings
 from elastocal.elastic import LAYOUTS, ElasticModel
 from elastocal.errors import IdentificationError
 from elastocal.identification.bootstrap import bootstrap
@@ -22,7 +23,7 @@ from elastocal.identification.poses import same_configuration
 from elastocal.identification.problem import Problem, build
 from elastocal.identification.solve import Solution, solve
 from elastocal.identification.suspicious import Screening, screen
-from elastocal.robot.chain import FloatArray
+from elastocal.identification.widening import widen, widening
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,7 +33,7 @@ class Calibration:
     calibrated: CalibratedModel
     readings: Readings
     """The readings that were offered, in the order of the arrays below."""
-    used: FloatArray
+    used: BoolArray
     """Whether each reading entered the fit, shape (reading,), bool."""
     residual: FloatArray
     """``O c - d`` of every reading, shape (reading, 3), in m."""
@@ -42,6 +43,8 @@ class Calibration:
     """Errors at left-out poses of the readings that entered the fit."""
     comparison: Comparison | None
     """The 6-spring model on the same left-out poses (or the 18-spring one against it)."""
+    widening: float
+    """Factor by which the bootstrap draws were stretched; see `widening`."""
     screening: Screening
     solution: Solution
     warnings: tuple[str, ...]
@@ -59,37 +62,40 @@ class Calibration:
 
 def calibrate(
     model: ElasticModel,
-    dataset: Dataset,
+    readings: Readings,
     rng: Generator,
     options: FitOptions | None = None,
+    *,
     marker_offset: ArrayLike | None = None,
+    provenance: str = "",
 ) -> Calibration:
-    """Identify the compliances of a robot from a measured dataset.
+    """Identify the compliances of a robot from measured readings.
 
     Parameters
     ----------
     model : ElasticModel
         Robot and springs.
-    dataset : Dataset
-        Measurements; joints are matched by name.
+    readings : Readings
+        Measurements, joints in the robot's order; from `Dataset.readings`.
     rng : Generator
         Source of randomness of the bootstrap.
     options : FitOptions, optional
         Bounds, weights, loss, prior, number of draws.
     marker_offset : array_like, shape (3,), optional
         Metrology marker in the tcp frame, in m.
+    provenance : str
+        Where the readings came from; kept with the model.
 
     Raises
     ------
     DatasetError
-        If the joints are not the robot's or outside its limits.
+        If joints are outside the robot's limits or elsewhere than the recorded positions.
     ConventionError
         If the data fit only with a sign or frame read otherwise.
     IdentificationError
         If there are too few poses or the bounds are impossible.
     """
     options = options or FitOptions()
-    readings = dataset.readings(model.robot.joint_names)
     warnings = list(check_joints(model.robot, readings))
     problem = build(model, readings, options, marker_offset)
     warnings += _repeated(readings, problem)
@@ -98,20 +104,22 @@ def calibrate(
         warnings.append(f"the springs leave {left:.0%} of the median deflection unexplained")
 
     screening = screen(problem)
-    used = ~screening.blunder if options.set_blunders_aside else np.ones(len(problem), dtype=bool)
+    used = ~screening.blunder if options.set_blunders_aside else np.ones_like(screening.blunder)
     kept = problem.take(used)
     solution = solve(kept, options.loss)
     weighted = kept.reweighted(solution.reading_weight)
+    held_out = leave_poses_out(weighted)
+    draws = bootstrap(PoseGrams.of(weighted), options.draws, rng)
+    by = widening(weighted, solution.compliance, draws, held_out.compliance)
     calibrated = CalibratedModel(
         model,
         solution.compliance,
-        bootstrap(PoseGrams.of(weighted), options.draws, rng),
+        widen(weighted, solution.compliance, draws, by),
         observability(solution.factored, model.springs),
-        dataset.provenance,
+        provenance,
     )
     offset = force_offset(model, readings.take(used), kept, solution.compliance)
     warnings += [offset.message()] if offset else []
-    held_out = leave_poses_out(weighted)
     return Calibration(
         calibrated=calibrated,
         readings=readings,
@@ -120,6 +128,7 @@ def calibrate(
         poses=len(np.unique(kept.block)),
         held_out=held_out,
         comparison=_compare(model, weighted, held_out, rng),
+        widening=by,
         screening=screening,
         solution=solution,
         warnings=tuple(warnings),
@@ -146,4 +155,4 @@ def _compare(
         other = leave_poses_out(problem.with_springs(columns))
     except IdentificationError:
         return None
-    return compare(ours, other, "actuated", replace(problem), rng)
+    return compare(ours, other, "actuated", problem, rng)

@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from elastocal.arrays import FloatArray
 from elastocal.dataset import Readings
 from elastocal.elastic import ElasticModel
 from elastocal.errors import ConventionError
@@ -17,7 +18,6 @@ from elastocal.identification.options import FitOptions
 from elastocal.identification.problem import build
 from elastocal.identification.solve import solve
 from elastocal.robot import Robot
-from elastocal.robot.chain import FloatArray
 
 GOOD = 0.35
 """Part of the median deflection that may stay unexplained without any question."""

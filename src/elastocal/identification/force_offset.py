@@ -9,10 +9,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from elastocal.arrays import FloatArray
 from elastocal.dataset import Readings
 from elastocal.elastic import ElasticModel
 from elastocal.identification.problem import Problem
-from elastocal.robot.chain import FloatArray
 
 _SIGNIFICANT = 6.0
 """Number of standard errors from which an offset is named."""

@@ -9,9 +9,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from elastocal.arrays import FloatArray
 from elastocal.identification.least_squares import minimise
 from elastocal.identification.problem import Problem
-from elastocal.robot.chain import FloatArray
 
 
 @dataclass(frozen=True, eq=False)

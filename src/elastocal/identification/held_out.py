@@ -8,10 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.random import Generator
 
+from elastocal.arrays import FloatArray, IndexArray
 from elastocal.identification.bootstrap import interval
 from elastocal.identification.grams import PoseGrams
 from elastocal.identification.problem import Problem
-from elastocal.robot.chain import FloatArray, IndexArray
 
 MOST_FOLDS = 100
 """With more pose blocks than this, several are left out together."""
@@ -25,6 +25,8 @@ class HeldOut:
     """Norm of the prediction error of each reading, shape (reading,), in m."""
     fold: IndexArray
     """Which refit predicted each reading, shape (reading,)."""
+    compliance: FloatArray
+    """Compliances of each refit, shape (fold, spring)."""
 
     @property
     def mean(self) -> float:
@@ -39,7 +41,7 @@ class HeldOut:
     @property
     def folds(self) -> int:
         """Number of refits."""
-        return len(np.unique(self.fold))
+        return len(self.compliance)
 
 
 @dataclass(frozen=True)
@@ -70,7 +72,7 @@ def leave_poses_out(problem: Problem) -> HeldOut:
     compliance = PoseGrams.of(problem).refit(kept.astype(float))
     fold = fold_of_block[index]
     predicted = np.einsum("rin,rn->ri", problem.O, compliance[fold])
-    return HeldOut(np.linalg.norm(predicted - problem.d, axis=1), fold)
+    return HeldOut(np.linalg.norm(predicted - problem.d, axis=1), fold, compliance)
 
 
 def compare(

@@ -49,7 +49,8 @@ def _positions(robot: Robot, readings: Readings) -> list[str]:
     if readings.tcp_position is None:
         return []
     computed = robot.forward(readings.joint_position)[:, :3, 3]
-    distance = np.linalg.norm(computed - readings.tcp_position, axis=1)
+    recorded = readings.tcp_position + readings.controller_displacement
+    distance = np.linalg.norm(computed - recorded, axis=1)
     median = float(np.median(distance))
     message = (
         f"recorded tcp_position is {1e3 * median:.1f} mm (median) from that of the joints of"

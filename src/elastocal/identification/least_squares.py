@@ -8,8 +8,8 @@ norm that the bounds allow; everything the data do determine is the least-square
 import numpy as np
 from scipy.optimize import lsq_linear, nnls
 
+from elastocal.arrays import FloatArray
 from elastocal.errors import IdentificationError
-from elastocal.robot.chain import FloatArray
 
 RANK_TOLERANCE = 1e-6
 """Singular values of the column-scaled system below this part of the largest count as zero:

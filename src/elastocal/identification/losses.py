@@ -9,8 +9,8 @@ from collections.abc import Callable
 
 import numpy as np
 
+from elastocal.arrays import FloatArray
 from elastocal.errors import IdentificationError, nearest
-from elastocal.robot.chain import FloatArray
 
 MEDIAN_NORM = 1.5381722544550522
 """Median of the chi distribution with three degrees of freedom."""

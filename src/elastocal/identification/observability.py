@@ -11,11 +11,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from elastocal.arrays import FloatArray
 from elastocal.elastic import Spring
 from elastocal.identification.least_squares import rank
 from elastocal.identification.solve import Factored
 from elastocal.identification.sparse_basis import sparse_basis
-from elastocal.robot.chain import FloatArray
 
 _SEEN = 1e-6
 """A spring counts as observable when its part in the null space is below this."""

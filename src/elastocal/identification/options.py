@@ -1,16 +1,17 @@
 """What a user may choose about a fit."""
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from elastocal.arrays import FloatArray
 from elastocal.errors import IdentificationError
 from elastocal.identification.losses import LOSSES, check_loss
-from elastocal.robot.chain import FloatArray
 
 Weights = Literal["none", "sigma"]
+WEIGHTS: tuple[Weights, ...] = get_args(Weights)
 
 
 @dataclass(frozen=True)
@@ -51,8 +52,10 @@ class FitOptions:
 
     def __post_init__(self) -> None:
         check_loss(self.loss)
-        if self.weights not in ("none", "sigma"):
-            raise IdentificationError(f"weights {self.weights!r}: allowed are none, sigma")
+        if self.weights not in WEIGHTS:
+            raise IdentificationError(
+                f"unknown weights {self.weights!r} (allowed: {', '.join(WEIGHTS)})"
+            )
         if not self.draws >= MINIMUM_DRAWS:
             raise IdentificationError(
                 f"{self.draws} bootstrap draws: at least {MINIMUM_DRAWS} make a 95 % interval"

@@ -10,9 +10,9 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
+from elastocal.arrays import IndexArray
 from elastocal.dataset import Readings
 from elastocal.errors import IdentificationError
-from elastocal.robot.chain import IndexArray
 
 SAME_CONFIGURATION = 2e-3
 """Distance in joint space (rad, m) below which two poses are the same configuration: far more

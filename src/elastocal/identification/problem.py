@@ -5,12 +5,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike
 
+from elastocal.arrays import FloatArray, IndexArray
 from elastocal.dataset import Readings
 from elastocal.elastic import ElasticModel
 from elastocal.errors import IdentificationError
 from elastocal.identification.options import FitOptions, Prior, bounds
 from elastocal.identification.poses import pose_blocks
-from elastocal.robot.chain import FloatArray, IndexArray
 
 
 @dataclass(frozen=True, eq=False)

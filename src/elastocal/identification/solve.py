@@ -4,11 +4,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from elastocal.arrays import FloatArray
 from elastocal.errors import IdentificationError
 from elastocal.identification.least_squares import kkt_violation, minimise
 from elastocal.identification.losses import LOSSES, MEDIAN_NORM
 from elastocal.identification.problem import Problem
-from elastocal.robot.chain import FloatArray
 
 _OPTIMALITY = 1e-7
 """Largest accepted violation of the optimality conditions, relative to the start."""

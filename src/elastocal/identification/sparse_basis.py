@@ -13,7 +13,7 @@ from math import comb
 
 import numpy as np
 
-from elastocal.robot.chain import FloatArray, IndexArray
+from elastocal.arrays import FloatArray, IndexArray
 
 _ZERO = 1e-6
 """Components below this part of the largest count as zero."""

@@ -45,6 +45,7 @@ def summary(calibration: Calibration) -> dict[str, Any]:
         "held_out": _held_out(calibration.held_out),
         "comparison": _comparison(calibration),
         "draws": len(calibrated.draws),
+        "interval_widening": calibration.widening,
         "warnings": list(calibration.warnings),
     }
 

@@ -11,9 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import chi
 
+from elastocal.arrays import BoolArray, FloatArray
 from elastocal.identification.problem import Problem
 from elastocal.identification.solve import Solution, normalised_residuals, solve
-from elastocal.robot.chain import FloatArray
 
 FALSE_ALARM = 0.01
 """Probability that a data set with normal noise and no blunder names any reading."""
@@ -41,11 +41,11 @@ class Screening:
     """Mean leverage of a reading's three rows, shape (reading,), 0 to 1."""
     threshold: float
     """Score above which a reading is named."""
-    blunder: FloatArray
+    blunder: BoolArray
     """Whether the reading cannot be a measurement of this robot, shape (reading,), bool."""
 
     @property
-    def suspicious(self) -> FloatArray:
+    def suspicious(self) -> BoolArray:
         """Whether each reading is named, shape (reading,), bool."""
         return np.asarray(self.score > self.threshold)
 

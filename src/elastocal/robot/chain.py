@@ -9,10 +9,8 @@ from dataclasses import dataclass
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
-IndexArray = NDArray[np.intp]
+from elastocal.arrays import FloatArray, IndexArray
 
 
 @dataclass(frozen=True)

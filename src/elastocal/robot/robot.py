@@ -7,9 +7,10 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike
 
+from elastocal.arrays import FloatArray, IndexArray
 from elastocal.errors import RobotError
 from elastocal.files import read_text, sha256
-from elastocal.robot.chain import ChainModel, FloatArray, IndexArray, SerialChain, build_model
+from elastocal.robot.chain import ChainModel, SerialChain, build_model
 from elastocal.robot.urdf import Assumption, assumptions, parse_urdf, read_chain, robot_name
 
 GRAVITY = (0.0, 0.0, -9.80665)

@@ -7,8 +7,8 @@ singular wrist, and does not help a correction that the arm has to make.
 import numpy as np
 from numpy.typing import ArrayLike
 
+from elastocal.arrays import FloatArray
 from elastocal.errors import RobotError
-from elastocal.robot.chain import FloatArray
 from elastocal.robot.robot import Robot
 
 _SAMPLES = 256

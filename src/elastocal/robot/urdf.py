@@ -66,6 +66,12 @@ def root_link(root: ElementTree.Element) -> str:
     return roots[0]
 
 
+def leaf_links(root: ElementTree.Element) -> list[str]:
+    """Return the links that have no child: the candidates for a tool centre point."""
+    parents = {_link_of(joint, "parent") for joint in root.findall("joint")}
+    return [link for link in _link_names(root) if link not in parents]
+
+
 def assumptions(root: ElementTree.Element) -> tuple[Assumption, ...]:
     """Return what the URDF itself marks as having no source."""
     return tuple(

@@ -13,23 +13,23 @@ from elastocal.sim.skeleton import TruthSpring
 from elastocal.sim.torque_laws import CubicGear, Linear, TorqueLaw
 from elastocal.sim.truth import ElasticArm
 
-AXIAL_STIFFNESS = (1.9e6, 2.9e6, 1.8e6, 5.0e5, 4.2e5, 2.8e5)
+AXIAL_STIFFNESS = (2.4e6, 2.9e6, 2.6e6, 8.0e5, 6.0e5, 3.0e5)
 """Axial stiffnesses of the six joints of a 1.1 t arm, in N·m/rad.
 
 Of the size measured on a FANUC R-2000iC, a robot of the same class (2.8e5 … 2.9e6 N·m/rad by
 least squares on its 43 published readings: github.com/longton2001-pixel,
 breakthrough-surge-suppression-in-high-speed-robotic-drilling, commit e5c2f795). That fit has six
-springs, so its axial ones carry the tilt of the bearings too; joints 1 and 4 are taken stiffer.
+springs, so its axial ones carry the tilt of the bearings too; within its range they are therefore
+taken stiffer, so that arm and tilt together deflect as much.
 """
 
-TRANSVERSE_RATIO = (2.5, 3.5)
+TRANSVERSE_RATIO = (4.0, 6.0)
 """Stiffness of the two tilts of a bearing over that of its gear. An assumption: tilt is left to
 crossed-roller bearings, which are stiffer than gears, but not so stiff as to be negligible."""
 
-LINK_BENDING = 6.0e6
-"""Bending stiffness of an arm-sized link hinged at its middle, in N·m/rad. An assumption, of the
-size of ``E I / length`` for a cast box of 0.25 m with 10 mm walls in iron (1.1e11 Pa, 9e-5 m⁴,
-1.15 m: 9e6)."""
+LINK_BENDING = 9.0e6
+"""Bending stiffness of an arm-sized link hinged at its middle, in N·m/rad. An assumption: that
+is ``E I / length`` of a 1.15 m iron box of 0.25 m with 10 mm walls (1.1e11 Pa, 9.2e-5 m⁴)."""
 
 GEAR_SCALE = 2.0e-3
 """Angle in rad at which a stiffening gear has twice the torque of a linear one. An assumption:

@@ -4,10 +4,11 @@ from abc import ABC, abstractmethod
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 from scipy.spatial.transform import Rotation
 
-from elastocal.robot.chain import FloatArray
+from elastocal.arrays import FloatArray
+from elastocal.errors import RobotError
 from elastocal.robot.inverse.limits import TURN, nearest_zero
 from elastocal.robot.inverse.protocol import InverseSolutions
 from elastocal.robot.inverse.request import check_external, check_poses
@@ -53,7 +54,10 @@ class BranchSolver(ABC):
 
     def solve(self, T_base_tcp: ArrayLike, external: ArrayLike = ()) -> FloatArray:
         """Return the distinct configurations of one pose; see `InverseKinematics.solve`."""
-        found = self.solve_many(np.asarray(T_base_tcp, dtype=float)[None], external)
+        pose = np.asarray(T_base_tcp, dtype=float)
+        if pose.shape != (4, 4):
+            raise RobotError(f"pose of shape {pose.shape}: must be (4, 4)")
+        found = self.solve_many(pose[None], external)
         return distinct(self.robot, found.q[0][found.exists[0]], _SAME)
 
     def solve_many(self, T_base_tcp: ArrayLike, external: ArrayLike = ()) -> InverseSolutions:
@@ -116,9 +120,7 @@ def pose_error(T_reached: FloatArray, T_wanted: FloatArray) -> FloatArray:
     return np.concatenate([shift, Rotation.from_matrix(turn).as_rotvec()], axis=-1)
 
 
-def reaches(
-    robot: Robot, q: FloatArray, T_base_tcp: FloatArray
-) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
+def reaches(robot: Robot, q: FloatArray, T_base_tcp: FloatArray) -> NDArray[np.bool_]:
     """Return whether each configuration reaches its pose to `REACHED`, shape (pose,).
 
     The angle follows from the chord ``|R - R'| = 2 sqrt(2) sin(angle / 2)`` (Frobenius norm),
@@ -128,7 +130,7 @@ def reaches(
     distance = np.linalg.norm(T[:, :3, 3] - T_base_tcp[:, :3, 3], axis=-1)
     chord = np.linalg.norm(T[:, :3, :3] - T_base_tcp[:, :3, :3], axis=(-2, -1))
     angle = 2.0 * np.arcsin(np.minimum(1.0, chord / np.sqrt(8.0)))
-    return (distance <= REACHED) & (angle <= REACHED)
+    return np.asarray((distance <= REACHED) & (angle <= REACHED))
 
 
 def distinct(robot: Robot, q: FloatArray, tolerance: float) -> FloatArray:

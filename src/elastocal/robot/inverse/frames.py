@@ -4,7 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from elastocal.robot.chain import ChainJoint, FloatArray
+from elastocal.arrays import FloatArray
+from elastocal.robot.chain import ChainJoint
 from elastocal.robot.robot import Robot
 
 

@@ -5,8 +5,8 @@ import itertools
 import numpy as np
 from numpy.typing import ArrayLike
 
+from elastocal.arrays import FloatArray
 from elastocal.errors import RobotError
-from elastocal.robot.chain import FloatArray
 from elastocal.robot.robot import Robot
 
 TURN = 2.0 * np.pi

@@ -4,8 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from elastocal.arrays import FloatArray
 from elastocal.errors import RobotError
-from elastocal.robot.chain import FloatArray
 from elastocal.robot.inverse.branch_solver import BranchSolver, distinct, pose_error, reaches
 from elastocal.robot.inverse.limits import nearest_zero
 from elastocal.robot.singularity import characteristic_length

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from elastocal.robot.chain import FloatArray
+from elastocal.arrays import FloatArray
 from elastocal.robot.inverse.branch_solver import BranchSolver
 from elastocal.robot.inverse.frames import arm_base, inverse_transform
 from elastocal.robot.inverse.opw_geometry import OpwGeometry, OpwParameters, derive_opw
@@ -36,8 +36,8 @@ class OpwInverse(BranchSolver):
 
     * straight wrist (axes 4 and 6 in one line; only their sum counts): joint 4 is at zero,
       or as near as its limits allow, joint 6 takes the rest; wrist 0 and 1 are equal;
-    * wrist centre on axis 1 with ``b = 0`` (any joint 1 will do): joint 1 is at zero, or as
-      near as its limits allow;
+    * wrist centre on axis 1 with ``b = 0`` (any joint 1 will do): joint 1 of shoulder 0 is at
+      zero, or as near as its limits allow, that of shoulder 1 half a turn from it;
     * stretched or folded elbow, and wrist centre at distance ``b`` from axis 1: the two
       branches that meet there are equal.
 
@@ -72,12 +72,12 @@ class OpwInverse(BranchSolver):
         T_opw_flange = T_opw_base @ T_base_tcp @ inverse_transform(geometry.T_flange_tcp)
         signs, offsets = np.array(parameters.signs), np.array(parameters.offsets)
         theta = opw_branches(parameters, T_opw_flange, signs * self._rest() + offsets)
-        return signs * (theta - offsets)
+        return np.asarray(signs * (theta - offsets))
 
     def _rest(self) -> FloatArray:
         """Return the arm configuration nearest to zero within the limits, shape (6,)."""
         limits = self.robot.limits
-        return np.clip(0.0, limits.lower[-6:], limits.upper[-6:])
+        return np.asarray(np.clip(0.0, limits.lower[-6:], limits.upper[-6:]))
 
 
 def opw_branches(
@@ -126,10 +126,8 @@ def _shoulder(
     bearing = np.arctan2(centre[:, 1], centre[:, 0])
     bearing = np.where(radius <= _SINGULAR, rest, bearing)
     reach = np.sqrt(np.maximum(radius**2 - b**2, 0.0)) * (1 - 2 * shoulder)
+    # atan2 tells a reach of -0.0 from 0.0: the two shoulders stay half a turn apart.
     theta1 = bearing - np.arctan2(b, reach)
-    if shoulder:
-        # b = 0 gives minus half a turn only for b = -0.0; keep the two arms one turn apart.
-        theta1 = np.where(b == 0.0, bearing - np.pi, theta1)
     return np.where(radius >= abs(b) - _SINGULAR, theta1, np.nan), reach
 
 

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from elastocal.arrays import FloatArray
 from elastocal.errors import RobotError
-from elastocal.robot.chain import FloatArray
 from elastocal.robot.inverse.frames import (
     AxisLines,
     arm_axes,
@@ -24,6 +24,7 @@ from elastocal.robot.robot import Robot
 
 EXACT = 1e-9
 """Largest deviation of an axis (rad, m) and of the forward kinematics (rad, m) from OPW."""
+_ROUND_OFF = 1e-12
 _SAMPLES = 16
 
 
@@ -38,11 +39,11 @@ class OpwParameters:
     a1: float
     """Axis 1 to axis 2; never negative."""
     a2: float
-    """Axis 3 to axis 4, along the forearm's x axis."""
+    """Axis 3 to axis 4, along the forearm's x axis: positive when below a level forearm."""
     b: float
     """Wrist centre beside axis 1, along axis 2."""
     c1: float
-    """Arm frame's origin to axis 2, along axis 1; never negative."""
+    """Arm frame's origin to axis 2, along axis 1; never negative, that is what up means here."""
     c2: float
     """Axis 2 to axis 3; positive."""
     c3: float
@@ -103,7 +104,7 @@ def derive_opw(robot: Robot) -> OpwGeometry:
     centre = _wrist_centre(robot, axes)
     T_arm_opw = _opw_base(axes)
     T_arm_tcp = arm_tip_at_zero(robot)
-    parameters = _parameters(robot, axes, centre, T_arm_opw, T_arm_tcp[:3, 3])
+    parameters = _parameters(axes, centre, T_arm_opw, T_arm_tcp[:3, 3])
     T_arm_flange = T_arm_opw @ parameters.forward(np.array(parameters.offsets))
     T_flange_tcp = inverse_transform(T_arm_flange) @ T_arm_tcp
     deviation = _deviation(robot, parameters, T_arm_opw, T_flange_tcp)
@@ -158,7 +159,7 @@ def _opw_base(axes: AxisLines) -> FloatArray:
 
 
 def _parameters(
-    robot: Robot, axes: AxisLines, centre: FloatArray, T_arm_opw: FloatArray, tip: FloatArray
+    axes: AxisLines, centre: FloatArray, T_arm_opw: FloatArray, tip: FloatArray
 ) -> OpwParameters:
     """Read lengths, senses and zero angles off the axes in the OPW base frame."""
     R, origin = T_arm_opw[:3, :3], T_arm_opw[:3, 3]
@@ -177,10 +178,10 @@ def _parameters(
     theta5 = np.arctan2(tool @ np.cross(bend, forearm), tool @ forearm)
     senses = (np.array([0.0, 0.0, 1.0]), y, y, forearm, bend, tool)
     return OpwParameters(
-        a1=float(p[1][0]),
-        a2=float((centre - p[2]) @ across),
-        b=float(centre[1]),
-        c1=float(p[1][2]),
+        a1=_length(p[1][0]),
+        a2=_length((centre - p[2]) @ across),
+        b=_length(centre[1]),
+        c1=_length(p[1][2]),
         c2=float(np.hypot(upper_arm[0], upper_arm[2])),
         c3=float((centre - p[2]) @ forearm),
         c4=float((tip - centre) @ tool),
@@ -200,6 +201,11 @@ def _deviation(
     theta = np.array(parameters.signs) * arm + np.array(parameters.offsets)
     T = arm_base(robot, external) @ T_arm_opw @ parameters.forward(theta) @ T_flange_tcp
     return float(np.abs(T - robot.forward(q)).max())
+
+
+def _length(value: float) -> float:
+    """Return a length without its round-off: a `b` of 1e-17 m would hide a singularity."""
+    return 0.0 if abs(value) < _ROUND_OFF else float(value)
 
 
 def _toward(direction: FloatArray, aim: FloatArray) -> FloatArray:

@@ -6,7 +6,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from elastocal.robot.chain import FloatArray
+from elastocal.arrays import FloatArray
 from elastocal.robot.robot import Robot
 
 
@@ -25,14 +25,12 @@ class InverseSolutions:
     @property
     def exists(self) -> NDArray[np.bool_]:
         """Whether the slot holds a configuration, shape (pose, branch)."""
-        exists: NDArray[np.bool_] = np.isfinite(self.q).all(axis=-1)
-        return exists
+        return np.asarray(np.isfinite(self.q).all(axis=-1))
 
     @property
     def reachable(self) -> NDArray[np.bool_]:
         """Whether any configuration reaches the pose within the limits, shape (pose,)."""
-        reachable: NDArray[np.bool_] = self.exists.any(axis=-1)
-        return reachable
+        return np.asarray(self.exists.any(axis=-1))
 
 
 class InverseKinematics(Protocol):

@@ -3,8 +3,8 @@
 import numpy as np
 from numpy.typing import ArrayLike
 
+from elastocal.arrays import FloatArray
 from elastocal.errors import RobotError
-from elastocal.robot.chain import FloatArray
 from elastocal.robot.robot import Robot
 
 _RIGID = 1e-6

@@ -1,0 +1,86 @@
+"""``elastocal calibrate``: from a measured dataset to a calibrated model."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, cast
+
+import typer
+
+if TYPE_CHECKING:
+    from elastocal.identification.options import Weights
+
+
+def calibrate(  # noqa: PLR0913 - one parameter an option
+    data: Annotated[Path, typer.Argument(help="Dataset, .nc or .csv.")],
+    out: Annotated[Path, typer.Option(help="Model file to write.")],
+    robot: Annotated[
+        str | None, typer.Option(help="URDF file or catalogue name; default: the dataset's own.")
+    ] = None,
+    tcp: Annotated[
+        str | None, typer.Option(help="Link at the tool centre point; default: the dataset's.")
+    ] = None,
+    tool: Annotated[
+        str | None,
+        typer.Option(help="Tcp behind that link: 'x, y, z, a, b, c' with units (Z-Y'-X'')."),
+    ] = None,
+    springs: Annotated[
+        str, typer.Option(help="Spring layout: actuated, bearing, or a .yaml file.")
+    ] = "bearing",
+    loss: Annotated[str, typer.Option(help="linear, huber or cauchy.")] = "linear",
+    weights: Annotated[str, typer.Option(help="none, or sigma from the dataset.")] = "none",
+    bounds: Annotated[
+        str, typer.Option(help="Lowest and highest compliance in SI units.")
+    ] = "0,inf",
+    marker: Annotated[
+        str | None, typer.Option(help="Marker in the tcp frame: 'x, y, z' with units.")
+    ] = None,
+    exclude: Annotated[
+        list[str] | None, typer.Option(help="Leave out POSE or POSE:LOAD_CASE; repeatable.")
+    ] = None,
+    keep_blunders: Annotated[
+        bool, typer.Option("--keep-blunders", help="Fit also what cannot be a measurement.")
+    ] = False,
+    draws: Annotated[int, typer.Option(help="Bootstrap draws.")] = 200,
+    seed: Annotated[int, typer.Option(help="Seed of the bootstrap.")] = 0,
+    as_json: Annotated[
+        bool, typer.Option("--json", help="Print the figures as one JSON object.")
+    ] = False,
+) -> None:
+    """Identify the compliances of a robot from a measured dataset."""
+    import numpy as np
+
+    from elastocal import dataset as datasets
+    from elastocal.cli.calibration_table import show_calibration
+    from elastocal.cli.output import console, print_json
+    from elastocal.cli.parsing import parse_bounds, parse_point
+    from elastocal.cli.robot_source import find_robot
+    from elastocal.cli.selection import without
+    from elastocal.elastic import ElasticModel, layout
+    from elastocal.identification import FitOptions, summary, write_model
+    from elastocal.identification import calibrate as identify
+
+    lower, upper = parse_bounds(bounds)
+    options = FitOptions(
+        lower=lower,
+        upper=upper,
+        weights=cast("Weights", weights),
+        loss=loss,
+        set_blunders_aside=not keep_blunders,
+        draws=draws,
+    )
+    measured = datasets.read(data)
+    arm = find_robot(robot, tcp, tool, measured)
+    readings = without(measured.readings(arm.joint_names), exclude or [])
+    calibration = identify(
+        ElasticModel(arm, layout(arm, springs)),
+        readings,
+        np.random.default_rng(seed),
+        options,
+        marker_offset=None if marker is None else parse_point(marker),
+        provenance=f"{data}; {measured.provenance}" if measured.provenance else str(data),
+    )
+    figures = summary(calibration)
+    write_model(out, calibration.calibrated, figures)
+    if as_json:
+        print_json(figures)
+    else:
+        show_calibration(console(), figures, out)

@@ -1,0 +1,154 @@
+"""The table that ``calibrate`` prints: a user's first questions, in their order.
+
+How well does it fit; is it better than 6 springs; which springs are really known, and how well;
+which readings look wrong.
+"""
+
+from pathlib import Path
+from typing import Any
+
+from rich.console import Console
+from rich.table import Table
+
+from elastocal.identification import describe
+from elastocal.identification.observability import Term
+
+Figures = dict[str, Any]
+_MOST_SUSPICIOUS = 10
+
+
+def show_calibration(console: Console, figures: Figures, out: Path) -> None:
+    """Print the figures of a calibration for a person."""
+    _show_fit(console, figures)
+    _show_comparison(console, figures["comparison"])
+    console.print()
+    console.print(_spring_table(figures))
+    _show_groups(console, figures)
+    _show_suspicious(console, figures["suspicious"])
+    for warning in figures["warnings"]:
+        console.print(f"[yellow]warning:[/yellow] {warning}")
+    console.print(f"\nmodel written to [bold]{out}[/bold]")
+
+
+def _show_fit(console: Console, figures: Figures) -> None:
+    mean, peak = figures["deflection"]["mean"], figures["deflection"]["max"]
+    fit, held_out = figures["residual"], figures["held_out"]
+    console.print(
+        f"[bold]{figures['robot']}[/bold]: {figures['springs_total']} springs,"
+        f" {figures['readings']} readings at {figures['poses']} poses,"
+        f" measured deflection {_mm(mean)} mean, {_mm(peak)} max"
+    )
+    table = Table(box=None, pad_edge=False)
+    for heading in ("error norm", "mean", "of deflection", "95 %", "max"):
+        table.add_column(heading, justify="left" if heading == "error norm" else "right")
+    table.add_row(
+        f"at left-out poses ({held_out['folds']} refits)",
+        f"[bold]{_mm(held_out['mean'])}[/bold]",
+        f"{held_out['mean'] / mean:.2%}",
+        "",
+        _mm(held_out["max"]),
+    )
+    table.add_row(
+        "at the poses fitted",
+        _mm(fit["mean"]),
+        f"{fit['mean'] / mean:.2%}",
+        _mm(fit["p95"]),
+        _mm(fit["max"]),
+    )
+    console.print(table)
+
+
+def _show_comparison(console: Console, comparison: Figures | None) -> None:
+    if comparison is None:
+        return
+    other, difference = comparison["held_out"]["mean"], comparison["difference"]
+    low, high = difference["low"], difference["high"]
+    if low > 0.0:
+        verdict = "[green]more springs are better[/green]"
+    elif high < 0.0:
+        verdict = "[red]fewer springs are better[/red]: use --springs actuated"
+    else:
+        verdict = "[yellow]no clear difference[/yellow]: the poses do not decide"
+    console.print(
+        f"axial springs alone: {_mm(other)} at left-out poses,"
+        f" {1e3 * difference['mean']:+.3f} mm ({1e3 * low:+.3f} to {1e3 * high:+.3f}, 95 %);"
+        f" {verdict}"
+    )
+
+
+def _spring_table(figures: Figures) -> Table:
+    group_of = {
+        term["spring"]: number
+        for number, group in reversed(list(enumerate(figures["unobservable"], start=1)))
+        for term in group
+    }
+    table = Table(box=None, pad_edge=False, title_justify="left")
+    table.add_column("spring")
+    table.add_column("compliance", justify="right")
+    table.add_column("95 % interval", justify="right")
+    table.add_column("stiffness", justify="right")
+    table.add_column("known?")
+    for spring in figures["springs"]:
+        table.add_row(*_spring_row(spring, group_of.get(spring["name"])))
+    return table
+
+
+def _spring_row(spring: Figures, group: int | None) -> tuple[str, ...]:
+    value, low, high = (1e6 * spring[name] for name in ("compliance", "low", "high"))
+    revolute = spring["kind"] == "revolute"
+    unit, stiff = ("µrad/(N·m)", "N·m/rad") if revolute else ("µm/N", "N/m")
+    if not spring["observable"]:
+        cells = (f"[dim]{value:.4g} {unit}[/dim]", "[dim]-[/dim]", "[dim]-[/dim]")
+        return spring["name"], *cells, f"[yellow]not by itself[/yellow] (group {group})"
+    stiffness = f"{1.0 / spring['compliance']:.3g} {stiff}" if value > 0.0 else "rigid (at bound)"
+    return (
+        spring["name"],
+        f"{value:.4g} {unit}",
+        f"{low:.3g} … {high:.3g}",
+        stiffness,
+        _known(value, low, high),
+    )
+
+
+def _known(value: float, low: float, high: float) -> str:
+    spread = (high - low) / 2.0
+    if value <= 0.0:
+        return "[green]stiff[/green]" if spread <= 0.0 else f"below {high:.3g}"
+    relative = spread / value
+    colour = "green" if relative < 0.2 else "yellow" if relative < 0.5 else "red"
+    return f"[{colour}]±{relative:.0%}[/{colour}]"
+
+
+def _show_groups(console: Console, figures: Figures) -> None:
+    if not figures["unobservable"]:
+        console.print(f"every spring is observable; condition number {figures['condition']:.0f}")
+        return
+    console.print(
+        f"\nrank {figures['rank']} of {figures['springs_total']} (condition number"
+        f" {figures['condition']:.0f}): these combinations change no deflection, so their springs"
+        " have no value of their own; predictions do not need one"
+    )
+    for number, group in enumerate(figures["unobservable"], start=1):
+        terms = [Term(term["spring"], term["weight"]) for term in group]
+        console.print(f"   group {number}: {describe(terms)}")
+
+
+def _show_suspicious(console: Console, suspicious: list[Figures]) -> None:
+    if not suspicious:
+        console.print("no reading looks wrong")
+        return
+    console.print(f"\n[yellow]{len(suspicious)} readings look wrong[/yellow] (robust score):")
+    for reading in suspicious[:_MOST_SUSPICIOUS]:
+        note = " [red]set aside as a blunder[/red]" if reading["set_aside"] else ""
+        console.print(
+            f"   pose {reading['pose']} {reading['load_case']}: {_mm(reading['residual'])} off,"
+            f" score {reading['score']:.1f}{note}"
+        )
+    if len(suspicious) > _MOST_SUSPICIOUS:
+        console.print(f"   … and {len(suspicious) - _MOST_SUSPICIOUS} more (--json lists all)")
+    first = suspicious[0]
+    console.print(f"   to leave one out: --exclude {first['pose']}:{first['load_case']}")
+
+
+def _mm(metres: float) -> str:
+    return f"{1e3 * metres:.3f} mm"

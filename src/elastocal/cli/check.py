@@ -1,0 +1,28 @@
+"""``elastocal check``: validate any of our files."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+
+def check(
+    file: Annotated[
+        Path,
+        typer.Argument(help="Dataset (.nc, .csv), model (.json), robot (.urdf), springs (.yaml)."),
+    ],
+    as_json: Annotated[
+        bool, typer.Option("--json", help="Print the findings as one JSON object.")
+    ] = False,
+) -> None:
+    """Validate a file and say what it holds."""
+    from elastocal.cli.file_kinds import describe_file
+    from elastocal.cli.output import console, print_json
+
+    kind, facts = describe_file(file)
+    if as_json:
+        print_json({"file": str(file), "kind": kind, **facts})
+        return
+    console().print(f"[green]ok[/green] {file} is a {kind}")
+    for name, value in facts.items():
+        console().print(f"   {name.replace('_', ' ')}: {value}", markup=False)

@@ -1,0 +1,47 @@
+"""``elastocal predict``: the deflection of each row of joints and force."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+
+def predict(
+    model: Annotated[Path, typer.Argument(help="Model file from calibrate.")],
+    rows: Annotated[Path, typer.Argument(help="CSV: joint columns, force_x[N] …, moment_x[N*m] …")],
+    out: Annotated[Path, typer.Option(help="CSV to write.")],
+    as_json: Annotated[
+        bool, typer.Option("--json", help="Print a summary as one JSON object.")
+    ] = False,
+) -> None:
+    """Predict the deflection of each row, with its 95 % interval."""
+    import numpy as np
+
+    from elastocal.cli.output import console, print_json
+    from elastocal.dataset.load_rows import joint_dimensions, read_load_rows, write_load_rows
+    from elastocal.identification import read_model
+
+    calibrated = read_model(model)
+    robot = calibrated.model.robot
+    loads = read_load_rows(rows, joint_dimensions(robot.joint_names, robot.revolute))
+    prediction = calibrated.predict(loads.joint_position, loads.force, loads.moment)
+    parts = (
+        ("", prediction.deflection),
+        ("_low", prediction.low),
+        ("_high", prediction.high),
+    )
+    added = {
+        f"deflection_{axis}{suffix}[m]": values[:, index]
+        for suffix, values in parts
+        for index, axis in enumerate("xyz")
+    }
+    write_load_rows(out, loads, added)
+    norms = np.linalg.norm(prediction.deflection, axis=1)
+    figures = {"rows": len(norms), "deflection": {"mean": norms.mean(), "max": norms.max()}}
+    if as_json:
+        print_json(figures)
+    else:
+        console().print(
+            f"{len(norms)} rows: predicted deflection {1e3 * norms.mean():.3f} mm mean,"
+            f" {1e3 * norms.max():.3f} mm max; written to {out}"
+        )

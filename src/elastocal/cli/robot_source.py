@@ -1,0 +1,74 @@
+"""Which robot a command works with: a URDF file, a catalogue name, or what the dataset says."""
+
+from pathlib import Path
+
+from elastocal.dataset import Dataset
+from elastocal.errors import RobotError
+from elastocal.files import read_text
+from elastocal.robot import Robot, catalogue
+from elastocal.robot.mounting import with_tool
+from elastocal.robot.pose import T_from_xyzabc
+from elastocal.robot.urdf import leaf_links, parse_urdf
+from elastocal.units import parse_quantity
+
+TOOL_LINK = "tcp"
+"""Name of the link that a tool given by numbers gets."""
+
+
+def find_robot(
+    robot: str | None, tcp: str | None, tool: str | None, dataset: Dataset | None = None
+) -> Robot:
+    """Return the robot that a user means.
+
+    Parameters
+    ----------
+    robot : str or None
+        A URDF file, a catalogue name, or None for the dataset's own.
+    tcp : str or None
+        Link at the tool centre point; by default the dataset's, or the robot's only leaf link.
+    tool : str or None
+        Pose of the tcp behind that link, ``"x, y, z, a, b, c"`` with units (KUKA Z-Y'-X'').
+    dataset : Dataset, optional
+        A dataset that may name both.
+
+    Raises
+    ------
+    RobotError
+        If there is no robot, or no way to tell its tool centre point.
+    """
+    own = dataset is not None and robot is None
+    urdf = _urdf_of(robot, dataset)
+    tcp = tcp or (dataset.tcp_frame if own and dataset is not None else None)
+    if tcp is None:
+        leaves = leaf_links(parse_urdf(urdf))
+        if len(leaves) != 1:
+            raise RobotError(f"name the tool centre point with --tcp: {', '.join(leaves)}")
+        tcp = leaves[0]
+    if tool is not None:
+        urdf = with_tool(urdf, tcp, TOOL_LINK, T_from_xyzabc(*_six(tool)))
+        tcp = TOOL_LINK
+    return Robot.from_urdf(urdf, tcp)
+
+
+def _urdf_of(robot: str | None, dataset: Dataset | None) -> str:
+    if robot is None:
+        if dataset is None or not dataset.robot_urdf:
+            raise RobotError(
+                "the dataset names no robot: give --robot with a URDF file or a catalogue name"
+                " (see `elastocal robots`)"
+            )
+        return dataset.robot_urdf
+    path = Path(robot)
+    if path.suffix.lower() in (".urdf", ".xml") or path.is_file():
+        return read_text(path)
+    return catalogue.urdf(robot)
+
+
+def _six(text: str) -> tuple[float, ...]:
+    parts = [part.strip() for part in text.split(",")]
+    if len(parts) != 6:
+        raise RobotError(
+            f"tool {text!r} must be six quantities, e.g. '0 mm, 0 mm, 565 mm, 0 deg, 0 deg, 0 deg'"
+        )
+    dimensions = ("length",) * 3 + ("angle",) * 3
+    return tuple(parse_quantity(part, of) for part, of in zip(parts, dimensions, strict=True))

@@ -1,0 +1,155 @@
+"""Rows of joints and forces, to predict deflections for (spec section 4, ``ROWS.csv``).
+
+Every other column is carried through untouched, in its place.
+"""
+
+import csv
+import io
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from elastocal.dataset.layout import AXES, FloatArray
+from elastocal.dataset.table_text import cut
+from elastocal.errors import DatasetError, UnitError, nearest
+from elastocal.files import read_text, write_text
+from elastocal.units import factor, split_column
+
+_EXAMPLES = {"angle": "rad", "length": "m", "force": "N", "moment": "N*m"}
+
+
+@dataclass(frozen=True, eq=False)
+class LoadRows:
+    """Configurations under load, with the text they were read from."""
+
+    joint_position: FloatArray
+    """Shape (row, joint), in rad or m."""
+    force: FloatArray
+    """Force on the robot at the tcp in base, shape (row, 3), in N."""
+    moment: FloatArray | None
+    """Moment on the robot about the tcp in base, shape (row, 3), in N·m; None: no columns."""
+    header: tuple[str, ...]
+    cells: tuple[tuple[str, ...], ...]
+
+
+def read_load_rows(path: Path, joint_units: Mapping[str, str]) -> LoadRows:
+    """Return the rows of a CSV file.
+
+    Parameters
+    ----------
+    path : Path
+        The file; its header names a unit for each quantity.
+    joint_units : mapping of str to str
+        The robot's joints, in its order, with their dimension: ``angle`` or ``length``.
+
+    Raises
+    ------
+    DatasetError
+        If a column is missing, has no unit or a wrong one, or a cell is not a finite number.
+    FileAccessError
+        If the file cannot be read.
+    """
+    try:
+        table = cut(read_text(path))
+        columns = _columns(table.header)
+        joints = [(name, dimension) for name, dimension in joint_units.items()]
+        force = [(f"force_{axis}", "force") for axis in AXES]
+        moment = [(f"moment_{axis}", "moment") for axis in AXES]
+        has_moment = any(name in columns for name, _ in moment)
+        wanted = [*joints, *force, *(moment if has_moment else [])]
+        values = np.column_stack(
+            [_values(table.rows, table.lines, columns, *column) for column in wanted]
+        )
+    except (DatasetError, UnitError) as error:
+        raise DatasetError(f"{path}: {error}") from error
+    n = len(joints)
+    return LoadRows(
+        values[:, :n],
+        values[:, n : n + 3],
+        values[:, n + 3 :] if has_moment else None,
+        tuple(table.header),
+        tuple(tuple(row) for row in table.rows),
+    )
+
+
+def write_load_rows(path: Path, rows: LoadRows, added: Mapping[str, FloatArray]) -> None:
+    """Write the rows with columns added at the end, atomically.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    rows : LoadRows
+        As read.
+    added : mapping of str to ndarray, shape (row,)
+        Header and values of each new column; a column of that name is replaced.
+
+    Raises
+    ------
+    FileAccessError
+        If the file cannot be written.
+    """
+    kept = [index for index, name in enumerate(rows.header) if name not in added]
+    text = io.StringIO(newline="")
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow([*(rows.header[index] for index in kept), *added])
+    for cells, numbers in zip(rows.cells, np.column_stack([*added.values()]), strict=True):
+        writer.writerow([*(cells[index] for index in kept), *(repr(float(x)) for x in numbers)])
+    write_text(path, text.getvalue())
+
+
+def joint_dimensions(names: Sequence[str], revolute: Sequence[bool]) -> dict[str, str]:
+    """Return the dimension of each joint's position, by name."""
+    return {
+        name: "angle" if turns else "length" for name, turns in zip(names, revolute, strict=True)
+    }
+
+
+def _columns(header: Sequence[str]) -> dict[str, tuple[int, str | None]]:
+    columns: dict[str, tuple[int, str | None]] = {}
+    for index, cell in enumerate(header):
+        name, unit = split_column(cell)
+        if name in columns:
+            raise DatasetError(f"column {name!r} stands twice in the header")
+        columns[name] = (index, unit)
+    return columns
+
+
+def _values(
+    rows: Sequence[Sequence[str]],
+    lines: Sequence[int],
+    columns: Mapping[str, tuple[int, str | None]],
+    name: str,
+    dimension: str,
+) -> FloatArray:
+    if name not in columns:
+        raise DatasetError(
+            f"column '{name}[…]' is missing{nearest(name, columns)} (columns: {', '.join(columns)})"
+        )
+    index, unit = columns[name]
+    if unit is None:
+        example = _EXAMPLES[dimension]
+        raise DatasetError(f"column {name!r} has no unit: it is written {name}[{example}]")
+    scale = factor(unit, dimension)
+    return (
+        np.array(
+            [
+                _number(row[index], line, f"{name}[{unit}]")
+                for row, line in zip(rows, lines, strict=True)
+            ]
+        )
+        * scale
+    )
+
+
+def _number(cell: str, line: int, column: str) -> float:
+    try:
+        value = float(cell)
+    except ValueError as error:
+        raise DatasetError(f"row {line}, column {column!r}: {cell!r} is not a number") from error
+    if not math.isfinite(value):
+        raise DatasetError(f"row {line}, column {column!r}: {cell!r} is not a finite number")
+    return value
