@@ -246,6 +246,9 @@ def evaluate_jacobian(chain: ChainModel, q: FloatArray, columns: IndexArray) -> 
     rows = np.empty((len(flat), 6, model.nv))
     frame, axes = chain.tip_frame, pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
     for row, configuration in zip(rows, full, strict=True):
-        row[:] = pin.computeFrameJacobian(model, data, configuration, frame, axes)
+        # A chain of one joint comes back flat.
+        row[:] = pin.computeFrameJacobian(model, data, configuration, frame, axes).reshape(
+            row.shape
+        )
     rows = rows[:, :, columns].reshape(*q.shape[:-1], 6, len(columns))
     return Jacobian(rows[..., :3, :], rows[..., 3:, :])

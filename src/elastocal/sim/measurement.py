@@ -37,9 +37,8 @@ class Noise:
 
 
 SHOP_FLOOR = Noise(force=5.0, marker=20e-6, controller=20e-6)
-"""A noise of plausible size: a 2 kN sensor good to 0.25 % of its range, a tracker at 3 m (15 µm +
-6 µm/m is the maximum permissible error that makers of such trackers state, twice a sigma or more),
-and a third of the ±0.06 mm that data sheets give as repeatability of such arms (ISO 9283)."""
+"""A noise of plausible size. Assumptions, none from a data sheet: a 2 kN sensor good to 0.25 % of
+its range, a tracker a few metres away, a third of a repeatability of ±0.06 mm."""
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,44 @@
+"""Run the command line in this process, as a user would see it."""
+
+import contextlib
+import io
+import sys
+from dataclasses import dataclass
+from unittest import mock
+
+from elastocal.cli.main import run
+
+
+@dataclass(frozen=True)
+class Result:
+    """What a command left behind."""
+
+    code: int
+    out: str
+    err: str
+
+    @property
+    def reason(self) -> str:
+        """The one line of a refusal; fails when there is more, less, or a traceback."""
+        lines = self.err.strip().splitlines()
+        assert self.code == 1, (self.code, self.out, self.err)
+        assert len(lines) == 1, self.err
+        assert "Traceback" not in self.err
+        assert self.out == ""
+        return lines[0]
+
+
+def elastocal(*arguments: object) -> Result:
+    """Run ``elastocal ARGUMENTS`` and return its exit code and output."""
+    out, err = io.StringIO(), io.StringIO()
+    argv = ["elastocal", *map(str, arguments)]
+    with (
+        mock.patch.object(sys, "argv", argv),
+        contextlib.redirect_stdout(out),
+        contextlib.redirect_stderr(err),
+    ):
+        try:
+            run()
+        except SystemExit as stop:
+            return Result(int(stop.code or 0), out.getvalue(), err.getvalue())
+    raise AssertionError("run() returned without an exit code")
