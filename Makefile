@@ -1,0 +1,42 @@
+# Two commands set a fresh machine up: `make demo` and `make test`. They need python3 with venv,
+# make and gcc, and nothing else.
+
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+
+.PHONY: demo test nightly docs bench clean
+
+demo: $(VENV)/installed
+	$(BIN)/elastocal demo --out demo
+
+test: $(VENV)/installed-dev
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+	$(BIN)/lint-imports
+	$(BIN)/pytest -n auto
+	$(BIN)/mkdocs build --strict --quiet
+
+nightly: $(VENV)/installed-dev
+	$(BIN)/pytest -n auto -m slow -rA
+
+docs: $(VENV)/installed-dev
+	$(BIN)/mkdocs serve
+
+bench: $(VENV)/installed-dev
+	$(BIN)/python benchmarks/run.py
+
+clean:
+	rm -rf $(VENV) demo site
+
+$(VENV)/bin/python:
+	$(PYTHON) -m venv $(VENV)
+
+$(VENV)/installed: pyproject.toml | $(VENV)/bin/python
+	$(BIN)/pip install --quiet --disable-pip-version-check -e .
+	touch $@
+
+$(VENV)/installed-dev: pyproject.toml | $(VENV)/bin/python
+	$(BIN)/pip install --quiet --disable-pip-version-check -e '.[dev,docs]'
+	touch $@ $(VENV)/installed

@@ -1,0 +1,98 @@
+"""Print the figures of docs/explanation/performance.md, each beside a reference of the same run.
+
+Times are medians over repetitions; machines differ and are noisy, so the ratios are what counts.
+Run with ``make bench``.
+"""
+
+import statistics
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+from scipy.optimize import lsq_linear
+
+from elastocal.elastic import ElasticModel, layout
+from elastocal.identification import build, calibrate, solve
+from elastocal.identification.problem import Problem
+from elastocal.robot import Robot, catalogue
+from elastocal.robot.mounting import with_tool
+from elastocal.sim.layouts import bearing_truth
+from elastocal.sim.linkage import Linkage
+from elastocal.sim.measurement import SHOP_FLOOR, measure
+from elastocal.sim.scene import press_forces, press_poses
+
+TOOL = np.array([[1.0, 0, 0, 0.15], [0, 1.0, 0, 0], [0, 0, 1.0, 0.35], [0, 0, 0, 1.0]])
+
+
+def median_ms(work: Callable[[], object], repetitions: int) -> float:
+    """Return the median time of a call in ms, after one call that is not counted."""
+    work()
+    times = []
+    for _ in range(repetitions):
+        start = time.perf_counter()
+        work()
+        times.append(time.perf_counter() - start)
+    return 1e3 * statistics.median(times)
+
+
+def full_system(problem: Problem) -> None:
+    """Solve the bounded problem the direct way."""
+    lsq_linear(problem.O.reshape(-1, problem.springs), problem.d.ravel(), (0.0, np.inf))
+
+
+def command_ms(*command: str) -> float:
+    """Return the median time of a process in ms."""
+    return median_ms(lambda: subprocess.run(command, check=True, capture_output=True), 7)
+
+
+def main() -> None:
+    """Measure and print."""
+    urdf = with_tool(catalogue.urdf("KR 120 R2700 extra HA"), "flange", "tcp", TOOL)
+    robot = Robot.from_urdf(urdf, "tcp")
+    linkage = Linkage.from_urdf(urdf, "tcp")
+    rng = np.random.default_rng(0)
+    pressed = press_poses(linkage, 31, rng)
+    forces = press_forces(pressed.T_base_tcp)
+    data = measure(bearing_truth(linkage), pressed.joints, forces, SHOP_FLOOR, rng)
+    readings = data.readings(robot.joint_names)
+    model = ElasticModel(robot, layout(robot, "bearing"))
+    problem = build(model, readings)
+
+    fit, reference = (
+        median_ms(lambda: solve(problem), 50),
+        median_ms(lambda: full_system(problem), 20),
+    )
+    print(f"bounded fit, 18 springs, 31 x 5 readings: {fit:.2f} ms")
+    print(
+        f"  scipy.optimize.lsq_linear, full system: {reference:.2f} ms; ratio 1/{reference / fit:.1f}"
+    )
+
+    whole = median_ms(lambda: calibrate(model, readings, np.random.default_rng(0)), 20)
+    print(
+        f"calibrate, 200 bootstrap draws: {whole:.1f} ms; {whole / reference:.2f} x that lsq_linear"
+    )
+
+    q = rng.uniform(-1.0, 1.0, (3000, 1, 6))
+    force = rng.uniform(-1e3, 1e3, (3000, 5, 3))
+    each = np.broadcast_to(q, (3000, 5, 6))
+    shared_ms = median_ms(lambda: model.observation_blocks(q, force), 20)
+    each_ms = median_ms(lambda: model.observation_blocks(each, force), 20)
+    rigid_ms = median_ms(lambda: robot.jacobian(each), 20)
+    print(f"observation blocks, 3000 poses x 5 loads, joints a pose: {shared_ms:.1f} ms")
+    print(
+        f"  joints a reading: {each_ms:.1f} ms; {each_ms / rigid_ms:.2f} x the rigid robot's"
+        " 6-joint Jacobians"
+    )
+
+    python = command_ms(sys.executable, "-c", "pass")
+    shown = command_ms(str(Path(sys.executable).parent / "elastocal"), "--help")
+    print(
+        f"elastocal --help: {shown:.0f} ms; {shown / python:.1f} x an empty Python ({python:.0f} ms)"
+    )
+
+
+if __name__ == "__main__":
+    main()

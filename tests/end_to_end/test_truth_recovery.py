@@ -1,0 +1,70 @@
+"""A planted truth, made by other equations than the estimator's, comes back."""
+
+import numpy as np
+import pytest
+
+from elastocal.elastic import ElasticModel, layout
+from elastocal.identification import Calibration, calibrate
+from elastocal.sim.measurement import Blunder
+from support.cells import QUIET, Cell, linear_truth, rich_truth, robot, unseen
+
+
+def fitted(cell: Cell, springs: str = "bearing") -> Calibration:
+    model = ElasticModel(robot(), layout(robot(), springs))
+    return calibrate(model, cell.readings(), np.random.default_rng(cell.seed))
+
+
+def relative_error(calibration: Calibration, arm) -> float:
+    """Return the mean error at unseen poses over the mean deflection there."""
+    truth = unseen(arm)
+    found = calibration.calibrated.predict(truth.joint_position, truth.force).deflection
+    error = np.linalg.norm(found - truth.deflection, axis=1).mean()
+    return float(error / np.linalg.norm(truth.deflection, axis=1).mean())
+
+
+def test_without_noise_eighteen_springs_miss_by_the_large_deflections_only():
+    eighteen = relative_error(fitted(Cell(linear_truth(), noise=QUIET)), linear_truth())
+    six = relative_error(fitted(Cell(linear_truth(), noise=QUIET), "actuated"), linear_truth())
+    assert 1e-6 < eighteen < 4e-3
+    assert six > 4.0 * eighteen
+
+
+def test_bending_links_stiffening_gears_and_noise_leave_two_percent():
+    eighteen = relative_error(fitted(Cell(rich_truth())), rich_truth())
+    six = relative_error(fitted(Cell(rich_truth()), "actuated"), rich_truth())
+    assert 1e-4 < eighteen < 0.02
+    assert eighteen < 0.5 * six
+
+
+@pytest.mark.parametrize("offset", [(3e-3, 0.0, 0.0), (0.0, -0.5, 0.0)], ids=["3 mm", "500 mm"])
+def test_a_blunder_is_named_first_and_does_not_spoil_the_fit(offset):
+    cell = Cell(rich_truth(), blunders=(Blunder(12, "north", offset),))
+    calibration = fitted(cell)
+    screening = calibration.screening
+    worst = int(screening.score.argmax())
+    assert (calibration.readings.pose[worst], calibration.readings.load_case[worst]) == (
+        12,
+        "north",
+    )
+    assert screening.suspicious[worst]
+    assert relative_error(calibration, rich_truth()) < 0.02
+
+
+def test_the_truth_that_was_planted_is_never_reproduced_exactly():
+    """No inverse crime: with the same springs and no noise an error remains."""
+    calibration = fitted(Cell(linear_truth(), noise=QUIET))
+    assert calibration.residual_norm.mean() > 1e-8
+
+
+@pytest.mark.slow
+def test_95_percent_intervals_cover_about_95_percent_of_200_campaigns():
+    truth = unseen(linear_truth())
+    covered = []
+    for seed in range(200):
+        calibration = fitted(Cell(linear_truth(), seed=seed))
+        found = calibration.calibrated.predict(truth.joint_position, truth.force)
+        inside = (found.low <= truth.deflection) & (truth.deflection <= found.high)
+        covered.append(inside.mean())
+    coverage = float(np.mean(covered))
+    print(f"coverage {coverage:.4f} +- {np.std(covered) / np.sqrt(200):.4f}")
+    assert 0.93 < coverage < 0.97
