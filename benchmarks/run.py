@@ -67,7 +67,8 @@ def main() -> None:
     )
     print(f"bounded fit, 18 springs, 31 x 5 readings: {fit:.2f} ms")
     print(
-        f"  scipy.optimize.lsq_linear, full system: {reference:.2f} ms; ratio 1/{reference / fit:.1f}"
+        f"  scipy.optimize.lsq_linear, full system: {reference:.2f} ms;"
+        f" ratio 1/{reference / fit:.1f}"
     )
 
     whole = median_ms(lambda: calibrate(model, readings, np.random.default_rng(0)), 20)
@@ -90,7 +91,8 @@ def main() -> None:
     python = command_ms(sys.executable, "-c", "pass")
     shown = command_ms(str(Path(sys.executable).parent / "elastocal"), "--help")
     print(
-        f"elastocal --help: {shown:.0f} ms; {shown / python:.1f} x an empty Python ({python:.0f} ms)"
+        f"elastocal --help: {shown:.0f} ms;"
+        f" {shown / python:.1f} x an empty Python ({python:.0f} ms)"
     )
 
 

@@ -37,3 +37,10 @@ def test_numbers_have_all_their_digits(path):
     data = dataset()
     write_table(data.data, path)
     assert f",{data.data['force'].values[0, 0, 1].item()!r}," in path.read_text()
+
+
+def test_a_number_that_is_missing_is_an_empty_cell(path):
+    write_table(Dataset.from_arrays(**full_keywords()).data, path)
+    text = path.read_text()
+    assert "\n2,normal,missing,,,,,," in text
+    assert ",nan" not in text

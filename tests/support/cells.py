@@ -14,12 +14,20 @@ from elastocal.sim.truth import ElasticArm
 from support.urdfs import opw_arm_urdf
 
 QUIET = Noise()
+TRACKED = Noise(force=2.0, marker=15e-6)
+"""A laser tracker at two metres, averaged; the controller repeats itself."""
 
 
 @cache
 def urdf() -> str:
-    """Return an arm with the dimensions of a KR 120 R2700 extra (hardware facts, section 7)."""
-    return opw_arm_urdf(0.35, 0.041, 0.0, 0.675, 1.15, 1.2, 0.215)
+    """Return an arm with the dimensions of a KR 120 R2700 extra (hardware facts, section 7).
+
+    Its tool reaches 150 mm aside, or the last spring would never be loaded.
+    """
+    arm = opw_arm_urdf(0.35, 0.041, 0.0, 0.675, 1.15, 1.2, 0.215)
+    on_the_axis, aside = 'xyz="0.0 0.0 0.215"', 'xyz="0.15 0.0 0.565"'
+    assert arm.count(on_the_axis) == 1
+    return arm.replace(on_the_axis, aside)
 
 
 @cache

@@ -72,7 +72,7 @@ def _robot(path: Path) -> Facts:
     return {
         "robot": robots[0].name,
         "tips": leaves,
-        "joints": list(max((robot.joint_names for robot in robots), key=len)),
+        "joints": list(max(robots, key=lambda robot: len(robot.joint_names)).joint_names),
         "assumptions": [f"{a.field}: {a.reason}" for a in robots[0].assumptions],
     }
 

@@ -60,14 +60,25 @@ def assemble(
     return xr.Dataset(variables, coordinates, present)
 
 
+def as_array(name: str, values: ArrayLike | None) -> np.ndarray:
+    """Return values as an array.
+
+    Raises
+    ------
+    DatasetError
+        If nested sequences differ in length.
+    """
+    try:
+        return np.asarray(values)
+    except ValueError as error:
+        raise DatasetError(f"{name} is ragged: its rows differ in length") from error
+
+
 def _fitted(
     values: ArrayLike | None, variable: Variable, sizes: Mapping[str, int]
 ) -> tuple[tuple[str, ...], np.ndarray]:
     """Return the dimensions that an array has, and the array."""
-    try:
-        array = np.asarray(values)
-    except ValueError as error:
-        raise DatasetError(f"{variable.name} is ragged: its rows differ in length") from error
+    array = as_array(variable.name, values)
     shapes = {variable.dims: tuple(sizes[dim] for dim in variable.dims)}
     if variable.broadcast:
         shapes[variable.dims[:2]] = shapes[variable.dims][:2]

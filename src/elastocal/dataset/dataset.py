@@ -8,7 +8,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike
 
-from elastocal.dataset.assembly import assemble
+from elastocal.dataset.assembly import as_array, assemble
 from elastocal.dataset.layout import SCHEMA, SI_JOINT_UNITS, FloatArray, freeze
 from elastocal.dataset.plausibility import check_plausible
 from elastocal.dataset.readings import Readings
@@ -97,7 +97,7 @@ class Dataset:
             If shapes, labels or values break the contract, or look like a unit mistake.
         """
         if poses is None:
-            poses = range(len(force) if isinstance(force, Sequence | np.ndarray) else 0)
+            poses = range(len(np.atleast_1d(as_array("force", force))))
         data = assemble(
             {"pose": poses, "load_case": load_cases, "joint": joint_names},
             {

@@ -44,23 +44,11 @@ def cut(text: str) -> TableText:
         If a comment holds a bad attribute, a row is not as long as the header, or there is none.
     """
     lines = iter(io.StringIO(text))
-    attributes: dict[str, object] = {}
-    header_line, above = "", 0
-    for number, line in enumerate(lines, start=1):
-        if line.startswith("#"):
-            for name, value in _attribute(line.strip(), number).items():
-                if name in attributes:
-                    raise DatasetError(f"row {number}: attribute {name!r} stands twice")
-                attributes[name] = value
-        elif line.strip():
-            header_line, above = line, number - 1
-            break
+    attributes, header_line, above = _preamble(lines)
     delimiter = max(DELIMITERS, key=header_line.count)
     reader = csv.reader(chain([header_line], lines), delimiter=delimiter, strict=True)
     try:
         header = next(reader)
-        if not any(cell.strip() for cell in header):
-            raise DatasetError("file has no header line, only comments")
         numbered = [(above + reader.line_num, row) for row in reader if any(map(str.strip, row))]
     except csv.Error as error:
         raise DatasetError(f"row {above + reader.line_num}: {error}") from error
@@ -77,6 +65,20 @@ def attribute_lines(attributes: Mapping[str, str]) -> Iterator[str]:
     """Yield a comment line for each attribute, its text as JSON so that it fits on one line."""
     for name, value in attributes.items():
         yield f"# {name}: {json.dumps(value)}\n"
+
+
+def _preamble(lines: Iterator[str]) -> tuple[dict[str, object], str, int]:
+    """Return the leading attributes, the header line and the number of lines above it."""
+    attributes: dict[str, object] = {}
+    for number, line in enumerate(lines, start=1):
+        if line.startswith("#"):
+            for name, value in _attribute(line.strip(), number).items():
+                if name in attributes:
+                    raise DatasetError(f"row {number}: attribute {name!r} stands twice")
+                attributes[name] = value
+        elif line.strip():
+            return attributes, line, number - 1
+    raise DatasetError("file has no header line, only comments")
 
 
 def _attribute(line: str, number: int) -> dict[str, object]:

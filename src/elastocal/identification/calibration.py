@@ -12,7 +12,7 @@ from elastocal.elastic import LAYOUTS, ElasticModel
 from elastocal.errors import IdentificationError
 from elastocal.identification.bootstrap import bootstrap
 from elastocal.identification.calibrated import CalibratedModel
-from elastocal.identification.conventions import GOOD, check_conventions
+from elastocal.identification.conventions import POOR, check_conventions
 from elastocal.identification.force_offset import force_offset
 from elastocal.identification.grams import PoseGrams
 from elastocal.identification.held_out import Comparison, HeldOut, compare, leave_poses_out
@@ -100,7 +100,7 @@ def calibrate(
     problem = build(model, readings, options, marker_offset)
     warnings += _repeated(readings, problem)
     left = check_conventions(model, readings)
-    if left > GOOD:
+    if left > POOR:
         warnings.append(f"the springs leave {left:.0%} of the median deflection unexplained")
 
     screening = screen(problem)

@@ -5,10 +5,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from elastocal.arrays import FloatArray, IndexArray
+from elastocal.arrays import BoolArray, FloatArray, IndexArray
 from elastocal.dataset import Readings
 from elastocal.elastic import ElasticModel
 from elastocal.errors import IdentificationError
+from elastocal.identification.least_squares import RANK_TOLERANCE
 from elastocal.identification.options import FitOptions, Prior, bounds
 from elastocal.identification.poses import pose_blocks
 
@@ -107,6 +108,7 @@ def build(
     options = options or FitOptions()
     q, force = readings.joint_position, readings.force
     blocks = model.observation_blocks(q, force, readings.moment, marker_offset)
+    blocks[:, :, _unloaded(blocks)] = 0.0
     lower, upper = bounds(options, len(model.springs))
     return Problem(
         O=blocks,
@@ -117,6 +119,15 @@ def build(
         upper=upper,
         prior_rows=_prior_rows(options.prior, len(model.springs)),
     )
+
+
+def _unloaded(blocks: FloatArray) -> BoolArray:
+    """Return which springs no force turns, e.g. the last joint when the tcp is on its axis.
+
+    Their columns are round-off; scaled to unit norm it would pass for information.
+    """
+    norms = np.linalg.norm(blocks, axis=(0, 1))
+    return np.asarray(norms < RANK_TOLERANCE * norms.max())
 
 
 def _weights(readings: Readings, options: FitOptions) -> FloatArray:

@@ -52,7 +52,9 @@ def sparse_basis(null_space: FloatArray, joints: Sequence[int]) -> FloatArray:
 def _circuits(null_space: FloatArray, involved: IndexArray) -> Iterator[FloatArray]:
     """Yield the vectors that vanish on each set of ``k - 1`` coordinates."""
     k = null_space.shape[1]
-    sets = np.array(list(combinations(involved, k - 1)), dtype=np.intp).reshape(-1, k - 1)
+    sets = np.array(list(combinations(involved, k - 1)), dtype=np.intp).reshape(
+        comb(len(involved), k - 1), k - 1
+    )
     _, s, Vt = np.linalg.svd(null_space[sets], full_matrices=True)
     unique = s[:, -1] > _ZERO if k > 1 else np.ones(len(sets), dtype=bool)
     seen: set[tuple[float, ...]] = set()
@@ -85,7 +87,7 @@ def _normalised(vector: FloatArray) -> FloatArray:
 
 
 def _oriented(vector: FloatArray, joints: Sequence[int]) -> FloatArray:
-    first = min(np.flatnonzero(vector), key=lambda i: (joints[i], i))
+    first = min(map(int, np.flatnonzero(vector)), key=lambda i: (joints[i], i))
     return np.asarray(vector * np.sign(vector[first]))
 
 
