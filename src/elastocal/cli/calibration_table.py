@@ -77,17 +77,18 @@ def _show_comparison(console: Console, comparison: Figures | None) -> None:
 
 
 def _spring_table(figures: Figures) -> Table:
+    """Return a row a spring; linear springs, rare, name their own units."""
     group_of = {
         term["spring"]: number
         for number, group in reversed(list(enumerate(figures["unobservable"], start=1)))
         for term in group
     }
-    table = Table(box=None, pad_edge=False, title_justify="left")
-    table.add_column("spring")
-    table.add_column("compliance", justify="right")
-    table.add_column("95 % interval", justify="right")
-    table.add_column("stiffness", justify="right")
-    table.add_column("known?")
+    table = Table(box=None, pad_edge=False)
+    table.add_column("spring", no_wrap=True)
+    table.add_column("compliance\nµrad/(N·m)", justify="right", no_wrap=True)
+    table.add_column("95 %\ninterval", justify="right", no_wrap=True)
+    table.add_column("stiffness\nMN·m/rad", justify="right", no_wrap=True)
+    table.add_column("known?", no_wrap=True)
     for spring in figures["springs"]:
         table.add_row(*_spring_row(spring, group_of.get(spring["name"])))
     return table
@@ -95,26 +96,23 @@ def _spring_table(figures: Figures) -> Table:
 
 def _spring_row(spring: Figures, group: int | None) -> tuple[str, ...]:
     value, low, high = (1e6 * spring[name] for name in ("compliance", "low", "high"))
-    revolute = spring["kind"] == "revolute"
-    unit, stiff = ("µrad/(N·m)", "N·m/rad") if revolute else ("µm/N", "N/m")
+    unit, stiff = ("", "") if spring["kind"] == "revolute" else (" µm/N", " MN/m")
     if not spring["observable"]:
-        cells = (f"[dim]{value:.4g} {unit}[/dim]", "[dim]-[/dim]", "[dim]-[/dim]")
-        return spring["name"], *cells, f"[yellow]not by itself[/yellow] (group {group})"
-    stiffness = f"{1.0 / spring['compliance']:.3g} {stiff}" if value > 0.0 else "rigid (at bound)"
+        note = f"[yellow]not by itself[/yellow], group {group}"
+        return spring["name"], f"[dim]({value:.4f}{unit})[/dim]", "", "", note
     return (
         spring["name"],
-        f"{value:.4g} {unit}",
-        f"{low:.3g} … {high:.3g}",
-        stiffness,
+        f"{value:.4f}{unit}",
+        f"{low:.3f} … {high:.3f}",
+        f"{1.0 / value:.3f}{stiff}" if value > 0.0 else "rigid",
         _known(value, low, high),
     )
 
 
 def _known(value: float, low: float, high: float) -> str:
-    spread = (high - low) / 2.0
-    if value <= 0.0:
-        return "[green]stiff[/green]" if spread <= 0.0 else f"below {high:.3g}"
-    relative = spread / value
+    if not value > 0.0:
+        return "[green]rigid[/green]" if not high > 0.0 else f"at bound, below {high:.3f}"
+    relative = (high - low) / 2.0 / value
     colour = "green" if relative < 0.2 else "yellow" if relative < 0.5 else "red"
     return f"[{colour}]±{relative:.0%}[/{colour}]"
 
@@ -137,7 +135,8 @@ def _show_suspicious(console: Console, suspicious: list[Figures]) -> None:
     if not suspicious:
         console.print("no reading looks wrong")
         return
-    console.print(f"\n[yellow]{len(suspicious)} readings look wrong[/yellow] (robust score):")
+    many = "reading looks" if len(suspicious) == 1 else "readings look"
+    console.print(f"\n[yellow]{len(suspicious)} {many} wrong[/yellow] (robust score):")
     for reading in suspicious[:_MOST_SUSPICIOUS]:
         note = " [red]set aside as a blunder[/red]" if reading["set_aside"] else ""
         console.print(

@@ -6,7 +6,6 @@ Exit codes: 0 done; 1 the work could not be done, with a one-line reason; 2 usag
 
 import sys
 
-import click
 import typer
 
 from elastocal import __version__
@@ -46,17 +45,10 @@ def _root(
 def run() -> None:
     """Run the command line and exit with its code."""
     try:
-        code = app(standalone_mode=False)
+        app()
     except ElastocalError as error:
         _complain(str(error))
         sys.exit(1)
-    except click.ClickException as error:
-        error.show()
-        sys.exit(error.exit_code)
-    except (KeyboardInterrupt, click.Abort):
-        _complain("interrupted")
-        sys.exit(130)
-    sys.exit(code if isinstance(code, int) else 0)
 
 
 def _complain(message: str) -> None:

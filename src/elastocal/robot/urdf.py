@@ -18,12 +18,13 @@ from elastocal.robot.chain import ChainJoint, SerialChain
 class Assumption:
     """A number of a robot description that has no source.
 
-    Read from the element ``<assumption field="…" source="…"/>`` that the catalogue writes into
+    Read from the element ``<assumption field="…" reason="…"/>`` that the catalogue writes into
     its URDFs; whoever uses such a number has to say so.
     """
 
     field: str
-    """What is assumed: ``position``, ``velocity``, ``effort`` or ``inertia``."""
+    """What is assumed: ``dimension``, ``position``, ``velocity``, ``effort``, ``inertia`` or
+    ``shape``."""
     reason: str
     """Where the value comes from, in words."""
 

@@ -1,0 +1,140 @@
+"""What the catalogue knows of a robot: numbers in groups, each with its source or its excuse."""
+
+import math
+from typing import Annotated, Self
+
+from pydantic import Field, FiniteFloat, model_validator
+
+from elastocal.schema import StrictModel
+
+LINKS = ("base_link", "link_1", "link_2", "link_3", "link_4", "link_5", "link_6")
+"""Links of a catalogue robot that have a mass, from the base on."""
+
+Six = tuple[FiniteFloat, FiniteFloat, FiniteFloat, FiniteFloat, FiniteFloat, FiniteFloat]
+Vector = tuple[FiniteFloat, FiniteFloat, FiniteFloat]
+Length = Annotated[float, Field(ge=0.0, allow_inf_nan=False)]
+
+
+class Group(StrictModel):
+    """Numbers that share an origin. At least one of the two texts is there."""
+
+    source: str | None = None
+    """Where the numbers were read."""
+    assumption: str | None = None
+    """Why they are not to be taken as fact, or why there are none; None for sourced numbers."""
+
+    @model_validator(mode="after")
+    def _has_an_origin(self) -> Self:
+        if self.source is None and self.assumption is None:
+            raise ValueError("numbers need a source or an assumption")
+        return self
+
+
+class Dimensions(Group):
+    """Lengths of an ortho-parallel arm with a spherical wrist, in m (OPW parameters, b = 0).
+
+    Reference: Brandstötter, Angerer, Hofbaur, "An analytical solution of the inverse kinematics
+    problem of industrial serial manipulators with an ortho-parallel basis and a spherical
+    wrist", Austrian Robotics Workshop 2014.
+    """
+
+    a1: Length
+    """From the A1 axis forward to the A2 axis."""
+    a2: FiniteFloat
+    """From the A3 axis *down* to the A4 axis, the forearm stretched forward."""
+    c1: Length
+    """From the floor up to the A2 axis."""
+    c2: Length
+    """From the A2 axis to the A3 axis."""
+    c3: Length
+    """From the A3 axis along the forearm to the wrist centre."""
+    c4: Length
+    """From the wrist centre to the flange."""
+    published_reach: Length | None = None
+    """Largest distance of the wrist centre from the A1 axis according to the maker."""
+
+
+class PositionLimits(Group):
+    """Range of A1 to A6 in deg, in the sense of the controller's pendant."""
+
+    lower: Six
+    upper: Six
+
+
+class Maxima(Group):
+    """Largest velocities in deg/s or torques in N·m of A1 to A6; None when not known."""
+
+    maximum: Six | None = None
+
+    @model_validator(mode="after")
+    def _unknown_is_said(self) -> Self:
+        if self.maximum is None and self.assumption is None:
+            raise ValueError("maxima that are not known need an assumption that says so")
+        return self
+
+
+class LinkInertia(StrictModel):
+    """Mass properties of a link in the frame of its joint; axes as the base's at zero."""
+
+    mass: Length
+    """In kg; 0 when the source lumps the link into another one."""
+    centre: Vector
+    """Centre of mass in m."""
+    tensor: Six
+    """xx, yy, zz, xy, xz, yz about the centre of mass, in kg·m²."""
+
+
+class Inertias(Group):
+    """Mass properties of every link."""
+
+    links: dict[str, LinkInertia]
+
+    @model_validator(mode="after")
+    def _complete(self) -> Self:
+        if tuple(self.links) != LINKS:
+            raise ValueError(f"links must be {', '.join(LINKS)}, in this order")
+        return self
+
+
+class CatalogueEntry(StrictModel):
+    """A robot of the catalogue, in the units a person reads (m, deg, deg/s, N·m, kg)."""
+
+    name: str
+    dimensions: Dimensions
+    position: PositionLimits
+    velocity: Maxima
+    effort: Maxima
+    inertia: Inertias
+
+    @property
+    def groups(self) -> dict[str, Group]:
+        """The groups of numbers by what they describe."""
+        return {
+            "dimension": self.dimensions,
+            "position": self.position,
+            "velocity": self.velocity,
+            "effort": self.effort,
+            "inertia": self.inertia,
+        }
+
+    @property
+    def sources(self) -> dict[str, str]:
+        """Where each group of numbers was read; groups without a source are left out."""
+        return {field: group.source for field, group in self.groups.items() if group.source}
+
+    @property
+    def assumptions(self) -> dict[str, str]:
+        """Why each group that is not fact is not; see `elastocal.robot.urdf.Assumption`."""
+        return {field: group.assumption for field, group in self.groups.items() if group.assumption}
+
+    @property
+    def reach(self) -> float:
+        """Largest distance of the wrist centre from the A1 axis, in m.
+
+        ``a1 + c2 cos(A2) + hypot(c3, a2)`` with A2 as near to the horizontal as its limits let
+        it; gives the reach that KUKA publishes to a millimetre.
+        """
+        lower, upper = self.position.lower[1], self.position.upper[1]
+        nearest_to_horizontal = math.radians(min(max(0.0, lower), upper))
+        arm = self.dimensions
+        return arm.a1 + arm.c2 * math.cos(nearest_to_horizontal) + math.hypot(arm.c3, arm.a2)

@@ -1,0 +1,92 @@
+"""The table of robots, read once from the package, and how to find a robot in it by name."""
+
+import functools
+import importlib.resources
+import re
+from typing import Any
+
+import yaml
+
+from elastocal.errors import RobotError, SchemaError, nearest
+from elastocal.robot.catalogue.entry import CatalogueEntry, Dimensions
+from elastocal.robot.catalogue.likeness import inertias_like
+from elastocal.schema import check_schema, validate
+
+FILE = "kuka.yaml"
+SCHEMA = "elastocal.catalogue/1"
+
+
+@functools.cache
+def entries() -> dict[str, CatalogueEntry]:
+    """Return the robots of the package by name, in the order of the table."""
+    text = importlib.resources.files(__package__).joinpath(FILE).read_text(encoding="utf-8")
+    return read_table(text, FILE)
+
+
+def read_table(text: str, what: str) -> dict[str, CatalogueEntry]:
+    """Return the robots of a table text by name.
+
+    Parameters
+    ----------
+    text : str
+        YAML: `schema`, free `sources` to refer to, and the list `robots`.
+    what : str
+        Name of the table, for messages.
+
+    Raises
+    ------
+    SchemaError
+        If the table has another schema, a robot does not fit `CatalogueEntry`, two have the
+        same name, or an inertia is ``like`` a robot that has no inertia of its own.
+    """
+    data = yaml.safe_load(text)
+    check_schema(data.get("schema"), SCHEMA, what)
+    by_name = {str(robot["name"]): robot for robot in data["robots"]}
+    if len(by_name) != len(data["robots"]):
+        raise SchemaError(f"{what}: two robots have the same name")
+    return {name: _entry(name, by_name, what) for name in by_name}
+
+
+def find(name: str) -> CatalogueEntry:
+    """Return the robot of a name; case, spaces, hyphens and underscores do not matter.
+
+    Raises
+    ------
+    RobotError
+        If there is none, with the nearest name and the list of all.
+    """
+    table = entries()
+    by_key = {_key(known): known for known in table}
+    known = by_key.get(_key(name))
+    if known is None:
+        raise RobotError(
+            f"no robot {name!r} in the catalogue{_suggestion(name, by_key)}"
+            f" (robots: {', '.join(table)})"
+        )
+    return table[known]
+
+
+def _entry(name: str, by_name: dict[str, Any], what: str) -> CatalogueEntry:
+    """Return one robot; masses that are ``like`` a sister's are estimated from hers."""
+    robot = by_name[name]
+    sister_name = robot.get("inertia", {}).get("like")
+    if sister_name is not None:
+        if "links" not in by_name.get(sister_name, {}).get("inertia", {}):
+            raise SchemaError(
+                f"{what}: inertia of {name} is like {sister_name!r}, which has none of its own"
+            )
+        arm = validate(robot["dimensions"], Dimensions, f"{what}: {name}")
+        robot = robot | {"inertia": inertias_like(_entry(sister_name, by_name, what), arm)}
+    return validate(robot, CatalogueEntry, f"{what}: {name}")
+
+
+def _key(name: str) -> str:
+    return re.sub(r"[\s_-]+", "", name).casefold()
+
+
+def _suggestion(name: str, by_key: dict[str, str]) -> str:
+    """Return the nearest name as a person writes it; `nearest` compares spelling only."""
+    hint = nearest(_key(name), by_key)
+    for key, known in by_key.items():
+        hint = hint.replace(repr(key), repr(known))
+    return hint

@@ -1,0 +1,219 @@
+"""The commands as a user meets them: output, exit codes, one-line refusals."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from elastocal import dataset
+from elastocal.dataset.load_rows import read_load_rows
+from support.cells import Cell, linear_truth, robot, unseen, urdf
+from support.cli import elastocal
+
+KEYS = {
+    "schema", "robot", "springs", "rank", "springs_total", "condition", "unobservable", "residual",
+    "deflection", "readings", "poses", "suspicious", "held_out",
+}  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory) -> Path:
+    """A folder with a dataset, the model calibrated from it, and rows to predict."""
+    folder = tmp_path_factory.mktemp("calibrated")
+    dataset.write(Cell(linear_truth(), poses=12).measure(), folder / "data.nc")
+    result = elastocal("calibrate", folder / "data.nc", "--out", folder / "model.json")
+    assert result.code == 0, result.err
+    assert result.out == ""
+    write_rows(folder / "rows.csv")
+    (folder / "arm.urdf").write_text(urdf())
+    (folder / "springs.yaml").write_text(
+        "schema: elastocal.springs/1\ninclude: actuated\nsprings:\n  - {joint: joint_2, axis: x}\n"
+    )
+    return folder
+
+
+def write_rows(path: Path, angle: str = "rad", force: str = "N", scale: float = 1.0) -> None:
+    rows = unseen(linear_truth())
+    names = [f"{name}[{angle}]" for name in robot().joint_names]
+    header = ["note", *names, *(f"force_{axis}[{force}]" for axis in "xyz")]
+    q = np.degrees(rows.joint_position) if angle == "deg" else rows.joint_position
+    lines = [",".join(header)]
+    for number, values in enumerate(np.hstack([q, rows.force * scale])):
+        lines.append(",".join([f"row {number}", *(repr(float(value)) for value in values)]))
+    path.write_text("\n".join(lines) + "\n")
+
+
+def columns(path: Path, *names: str) -> np.ndarray:
+    header, *rows = (line.split(",") for line in path.read_text().splitlines())
+    return np.array([[float(row[header.index(name)]) for name in names] for row in rows])
+
+
+def test_calibrate_prints_a_table_that_answers_the_first_questions(folder):
+    shown = elastocal("calibrate", folder / "data.nc", "--out", folder / "again.json").err
+    for text in (
+        "left-out poses",
+        "axial springs alone",
+        "95 % interval",
+        "not by itself",
+        "group 1",
+    ):
+        assert text in shown
+
+
+def test_calibrate_json_has_the_contract_keys_and_nothing_else_on_standard_output(folder):
+    result = elastocal("calibrate", folder / "data.nc", "--out", folder / "again.json", "--json")
+    figures = json.loads(result.out)
+    assert set(figures) >= KEYS
+    assert result.err == ""
+    assert set(figures["springs"][0]) >= {"name", "kind", "compliance", "low", "high", "observable"}
+    assert set(figures["residual"]) >= {"mean", "max", "p95"}
+    assert figures["springs_total"] == len(figures["springs"]) == 18
+
+
+def test_calibrate_twice_gives_the_same_file(folder):
+    elastocal("calibrate", folder / "data.nc", "--out", folder / "again.json")
+    assert (folder / "again.json").read_text() == (folder / "model.json").read_text()
+
+
+def test_a_spring_file_replaces_a_layout(folder):
+    out = folder / "custom.json"
+    result = elastocal(
+        "calibrate",
+        folder / "data.nc",
+        "--out",
+        out,
+        "--json",
+        "--springs",
+        folder / "springs.yaml",
+    )
+    assert [spring["name"] for spring in json.loads(result.out)["springs"]][-1] == "joint_2.x"
+
+
+def test_predict_adds_the_deflection_with_its_interval_and_keeps_the_rest(folder):
+    out = folder / "predicted.csv"
+    result = elastocal("predict", folder / "model.json", folder / "rows.csv", "--out", out)
+    assert result.code == 0, result.err
+    header = out.read_text().splitlines()[0].split(",")
+    assert header[0] == "note"
+    assert header[-9:-6] == ["deflection_x[m]", "deflection_y[m]", "deflection_z[m]"]
+    truth = unseen(linear_truth()).deflection
+    found = columns(out, *(f"deflection_{axis}[m]" for axis in "xyz"))
+    low = columns(out, *(f"deflection_{axis}_low[m]" for axis in "xyz"))
+    high = columns(out, *(f"deflection_{axis}_high[m]" for axis in "xyz"))
+    assert (
+        np.linalg.norm(found - truth, axis=1).mean() < 0.05 * np.linalg.norm(truth, axis=1).mean()
+    )
+    assert np.all(low < high)
+    assert np.mean((low <= truth) & (truth <= high)) > 0.75
+
+
+def test_predict_reads_degrees_and_kilonewtons_by_their_header(folder):
+    write_rows(folder / "degrees.csv", "deg", "kN", 1e-3)
+    outs = []
+    for rows in ("rows.csv", "degrees.csv"):
+        out = folder / f"predicted_{rows}"
+        elastocal("predict", folder / "model.json", folder / rows, "--out", out)
+        outs.append(columns(out, "deflection_x[m]", "deflection_z[m]"))
+    np.testing.assert_allclose(outs[0], outs[1], rtol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("find", "replace", "message"),
+    [
+        ("force_x[N]", "force_x", "no unit"),
+        ("force_x[N]", "force_x[m]", "not a force"),
+        ("joint_3[rad]", "joint_9[rad]", "joint_3"),
+        ("force_y[N]", "force_x[N]", "twice"),
+        ("row 7,", "row 7,x", "row 9, column 'joint_1[rad]'"),
+        ("row 7,", "row 7,nan", "row 9"),
+    ],
+)
+def test_predict_refuses_a_bad_row_by_name(folder, find, replace, message):
+    text = (folder / "rows.csv").read_text()
+    if find.startswith("row"):
+        line = next(line for line in text.splitlines() if line.startswith(find))
+        cells = line.split(",")
+        cells[1] = replace.split(",")[1]
+        text = text.replace(line, ",".join(cells))
+    else:
+        text = text.replace(find, replace)
+    (folder / "bad.csv").write_text(text)
+    out = folder / "refused.csv"
+    reason = elastocal("predict", folder / "model.json", folder / "bad.csv", "--out", out).reason
+    assert message in reason
+    assert not out.exists()
+
+
+@pytest.mark.parametrize("name", ["data.nc", "model.json", "arm.urdf", "springs.yaml"])
+def test_check_says_what_a_good_file_is(folder, name):
+    result = elastocal("check", folder / name, "--json")
+    assert result.code == 0, result.err
+    assert json.loads(result.out)["kind"]
+    assert "ok" in elastocal("check", folder / name).err
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "message"),
+    [
+        ("a.txt", "x", "suffix '.txt'"),
+        ("missing.nc", None, "cannot read"),
+        ("a.nc", "not netcdf", "a.nc"),
+        ("a.json", "{", "not valid JSON"),
+        ("a.json", '{"schema": "elastocal.model/7"}', "elastocal.model/7"),
+        ("a.json", '{"schema": "elastocal.model/1"}', "robot"),
+        ("a.urdf", "<robot>", "not valid XML"),
+        ("a.yaml", "schema: elastocal.springs/1\nspings: []\n", "did you mean 'springs'"),
+        ("a.yaml", "schema: elastocal.springs/1\nsprings: [{joint: j, axis: w}]\n", "springs.0"),
+        ("a.yaml", ":\n  - ]", "not valid YAML"),
+    ],
+)
+def test_check_refuses_a_bad_file_by_name(tmp_path, name, text, message):
+    if text is not None:
+        (tmp_path / name).write_text(text)
+    assert message in elastocal("check", tmp_path / name).reason
+
+
+def test_a_model_whose_robot_was_edited_is_refused(folder):
+    text = (folder / "model.json").read_text().replace("0.675", "0.685", 1)
+    (folder / "edited.json").write_text(text)
+    out = folder / "none.csv"
+    result = elastocal("predict", folder / "edited.json", folder / "rows.csv", "--out", out)
+    assert "hash" in result.reason
+
+
+def test_usage_mistakes_exit_with_2():
+    assert elastocal("calibrate").code == 2
+    assert elastocal("calibrat").code == 2
+    assert elastocal("predict", "--nonsense").code == 2
+
+
+def test_help_and_version_load_no_numerical_library():
+    code = (
+        "import sys; sys.argv = ['elastocal', '--help']\n"
+        "from elastocal.cli.main import run\n"
+        "try: run()\n"
+        "except SystemExit: pass\n"
+        "heavy = {'numpy', 'scipy', 'pinocchio', 'xarray', 'pydantic'} & set(sys.modules)\n"
+        "assert not heavy, heavy"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert "calibrate" in done.stdout
+
+
+def test_load_rows_know_moments(tmp_path):
+    path = tmp_path / "rows.csv"
+    axes = ("x", "y", "z")
+    path.write_text(
+        "a[rad],"
+        + ",".join(f"force_{axis}[N]" for axis in axes)
+        + ","
+        + ",".join(f"moment_{axis}[N*mm]" for axis in axes)
+        + "\n0.1,1,2,3,1000,0,0\n"
+    )
+    rows = read_load_rows(path, {"a": "angle"})
+    assert rows.moment is not None
+    np.testing.assert_allclose(rows.moment, [[1.0, 0.0, 0.0]])

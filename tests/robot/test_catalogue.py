@@ -1,0 +1,301 @@
+"""The catalogue: sourced numbers, kinematics by an independent solver, honest about gaps."""
+
+import math
+import xml.etree.ElementTree as ElementTree
+
+import coal
+import numpy as np
+import pinocchio as pin
+import py_opw_kinematics as opw
+import pytest
+import yaml
+
+from elastocal.errors import RobotError, SchemaError
+from elastocal.robot import catalogue
+from elastocal.robot.catalogue import table
+from elastocal.robot.catalogue.entry import LINKS, CatalogueEntry
+
+NAMES = catalogue.names()
+TRANSPORT = np.radians([0.0, -90.0, 90.0, 0.0, 45.0, 0.0])
+every_robot = pytest.mark.parametrize("name", NAMES)
+
+
+def opw_forward(entry: CatalogueEntry, q: np.ndarray) -> np.ndarray:
+    """Return T_base_flange by the OPW convention: theta = sign * q - offset."""
+    arm = entry.dimensions
+    model = opw.KinematicModel(
+        a1=arm.a1, a2=arm.a2, b=0.0, c1=arm.c1, c2=arm.c2, c3=arm.c3, c4=arm.c4
+    )
+    theta = np.array([-1, 1, 1, -1, 1, -1]) * q - np.radians([0, -90, 0, 0, 0, 0])
+    return opw.Robot(model, degrees=False).forward(tuple(theta)).as_matrix()
+
+
+class TestNames:
+    def test_all_seventeen_robots_are_there(self):
+        assert len(NAMES) == 17
+        assert {"KR 120 R2700 extra HA", "KR 300 R2500 ultra", "KR 210 R3300-2 K"} <= set(NAMES)
+
+    @pytest.mark.parametrize(
+        "name", ["kr 120 r2700-2", "KR120R2700-2", "kr_120_r2700_2", "KR-120 R2700 2"]
+    )
+    def test_case_spaces_hyphens_and_underscores_do_not_matter(self, name):
+        assert catalogue.entry(name).name == "KR 120 R2700-2"
+
+    def test_no_two_names_are_the_same_to_a_lookup(self):
+        assert all(catalogue.entry(name).name == name for name in NAMES)
+
+    def test_unknown_name_is_refused_with_the_nearest_and_all_names(self):
+        with pytest.raises(RobotError, match="did you mean 'KR 120 R2700 extra HA'") as refusal:
+            catalogue.load("KR 120 R2700 extra")
+        assert "\n" not in str(refusal.value)
+        assert all(name in str(refusal.value) for name in NAMES)
+
+    def test_unknown_tip_is_refused_with_the_links(self):
+        with pytest.raises(RobotError, match=r"no tip link 'flnage'; did you mean 'flange'"):
+            catalogue.load("KR 120 R2700-2", tip="flnage")
+
+
+class TestKinematics:
+    @every_robot
+    def test_forward_kinematics_agree_with_opw(self, name):
+        robot, entry = catalogue.load(name), catalogue.entry(name)
+        rng = np.random.default_rng(7)
+        for q in rng.uniform(robot.limits.lower, robot.limits.upper, (20, 6)):
+            assert np.abs(robot.forward(q) - opw_forward(entry, q)).max() < 1e-9
+
+    @every_robot
+    def test_zero_pose_is_the_arm_stretched_forward(self, name):
+        arm = catalogue.entry(name).dimensions
+        T = catalogue.load(name).forward(np.zeros(6))
+        reach = arm.a1 + arm.c2 + arm.c3 + arm.c4
+        np.testing.assert_allclose(T[:3, 3], [reach, 0.0, arm.c1 - arm.a2], atol=1e-12)
+        np.testing.assert_allclose(T[:3, 2], [1.0, 0.0, 0.0], atol=1e-12)
+
+    def test_positive_a1_turns_clockwise_seen_from_above(self):
+        robot = catalogue.load("KR 120 R2700-2")
+        assert robot.forward(np.radians([30.0, 0, 0, 0, 0, 0]))[1, 3] < 0.0
+
+    def test_positive_a2_lowers_the_arm(self):
+        robot = catalogue.load("KR 120 R2700-2")
+        raised = robot.forward(np.radians([0.0, -60.0, 0, 0, 0, 0]))[2, 3]
+        assert robot.forward(np.radians([0.0, -30.0, 0, 0, 0, 0]))[2, 3] < raised
+
+    @pytest.mark.parametrize(
+        ("name", "a2_above_forearm"), [("KR 210 R2700 extra", 0.041), ("KR 210 R2700-2", -0.115)]
+    )
+    def test_forearm_lies_below_a3_in_one_generation_and_above_in_the_next(
+        self, name, a2_above_forearm
+    ):
+        arm = catalogue.entry(name).dimensions
+        drop = arm.c1 - catalogue.load(name).forward(np.zeros(6))[2, 3]
+        assert drop == pytest.approx(a2_above_forearm, abs=1e-12)
+
+    @every_robot
+    def test_reach_is_that_of_the_name_and_of_the_maker(self, name):
+        entry = catalogue.entry(name)
+        in_name = float(name.split(" R")[1][:4]) / 1000.0
+        assert entry.reach == pytest.approx(in_name, abs=7e-3)
+        if entry.dimensions.published_reach is not None:
+            assert entry.reach == pytest.approx(entry.dimensions.published_reach, abs=5e-4)
+
+    def test_reaches_of_both_robots_of_the_paper_are_published(self):
+        for name in ("KR 120 R2700 extra HA", "KR 300 R2500 ultra"):
+            assert catalogue.entry(name).dimensions.published_reach is not None
+
+    @every_robot
+    def test_reach_is_where_the_wrist_gets_to(self, name):
+        entry, robot = catalogue.entry(name), catalogue.load(name)
+        arm, a2 = entry.dimensions, np.clip(0.0, robot.limits.lower[1], robot.limits.upper[1])
+        a3 = math.atan2(-arm.a2, arm.c3) - a2
+        T = robot.forward([0.0, a2, a3, 0.0, 0.0, 0.0])
+        wrist = T[:3, 3] - arm.c4 * T[:3, 2]
+        assert wrist[0] == pytest.approx(entry.reach, abs=1e-12)
+
+
+class TestLimits:
+    @every_robot
+    def test_urdf_carries_the_tables_numbers_in_si(self, name):
+        entry, limits = catalogue.entry(name), catalogue.load(name).limits
+        np.testing.assert_allclose(np.degrees(limits.lower), entry.position.lower, rtol=1e-14)
+        np.testing.assert_allclose(np.degrees(limits.upper), entry.position.upper, rtol=1e-14)
+        if entry.velocity.maximum is not None:
+            np.testing.assert_allclose(np.degrees(limits.velocity), entry.velocity.maximum)
+        if entry.effort.maximum is not None:
+            np.testing.assert_array_equal(limits.effort, entry.effort.maximum)
+
+    @every_robot
+    def test_unknown_maxima_are_nan_and_marked(self, name):
+        robot = catalogue.load(name)
+        marked = {assumption.field for assumption in robot.assumptions}
+        for field in ("velocity", "effort"):
+            unknown = np.isnan(getattr(robot.limits, field))
+            assert unknown.all() or not unknown.any()
+            assert unknown.all() == (field in marked)
+
+    def test_speeds_and_torques_of_the_papers_robots_are_not_invented(self):
+        for name in ("KR 120 R2700 extra HA", "KR 300 R2500 ultra"):
+            limits = catalogue.load(name).limits
+            assert np.isnan([*limits.velocity, *limits.effort]).all()
+
+    def test_borrowed_position_limits_are_marked(self):
+        robot = catalogue.load("KR 300 R2500 ultra")
+        reasons = {assumption.field: assumption.reason for assumption in robot.assumptions}
+        assert "KR 210 R3100 ultra" in reasons["position"]
+
+    @every_robot
+    def test_transport_pose_is_within_the_limits(self, name):
+        assert (catalogue.load(name).limits.margin(TRANSPORT) > 0.0).all()
+
+
+class TestSources:
+    @every_robot
+    def test_every_group_has_a_source_or_is_marked(self, name):
+        robot, entry = catalogue.load(name), catalogue.entry(name)
+        marked = {assumption.field: assumption.reason for assumption in robot.assumptions}
+        assert len(marked) == len(robot.assumptions)
+        assert set(entry.groups) <= set(entry.sources) | set(marked)
+        assert marked == entry.assumptions | {"shape": marked["shape"]}
+        assert all(len(reason) > 20 for reason in marked.values())
+
+    @every_robot
+    def test_comments_of_the_urdf_name_the_sources(self, name):
+        header = catalogue.urdf(name).split("-->")[0]
+        assert all(source in header for source in catalogue.entry(name).sources.values())
+
+    @every_robot
+    def test_parsers_find_nothing_to_complain_about(self, name, capfd):
+        pin.buildModelFromXML(catalogue.urdf(name))
+        assert capfd.readouterr() == ("", "")
+
+
+class TestMasses:
+    @every_robot
+    def test_quantec_weighs_about_a_tonne_and_fortec_about_two(self, name):
+        entry = catalogue.entry(name)
+        mass = sum(link.mass for link in entry.inertia.links.values())
+        fortec = entry.dimensions.a1 == 0.5
+        assert (1600.0 if fortec else 1000.0) < mass < (2500.0 if fortec else 1300.0)
+
+    @every_robot
+    def test_sourced_inertias_are_physically_possible(self, name):
+        entry = catalogue.entry(name)
+        if entry.inertia.assumption is not None and "estimated" not in entry.inertia.assumption:
+            pytest.skip("the source is incomplete, and the URDF says so")
+        for link in entry.inertia.links.values():
+            xx, yy, zz, xy, xz, yz = link.tensor
+            moments = np.linalg.eigvalsh([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+            assert moments[0] > 0.0
+            assert moments[0] + moments[1] > 0.999 * moments[2]
+
+    @every_robot
+    def test_a2_carries_kilonewton_metres_but_a1_nothing_on_a_level_floor(self, name):
+        torque = catalogue.load(name).gravity_torques(np.radians([20.0, -10, 10, 0, 0, 0]))
+        assert torque[0] == pytest.approx(0.0, abs=1e-9)
+        assert 4e3 < -torque[1] < 2.5e4
+
+    def test_estimated_masses_move_with_the_lengths(self):
+        short, long = (catalogue.entry(f"KR {n}").inertia.links for n in SISTERS)
+        assert short["link_3"].mass == long["link_3"].mass
+        ratio = short["link_3"].centre[0] / long["link_3"].centre[0]
+        assert ratio == pytest.approx(1.0 / 1.22)
+
+
+SISTERS = ("300 R2500 ultra", "300 R2700-2")
+
+
+class TestShapes:
+    @every_robot
+    def test_every_link_has_the_same_shapes_to_see_and_to_hit(self, name):
+        root = ElementTree.fromstring(catalogue.urdf(name))
+        for link in root.findall("link"):
+            seen, hit = (
+                [ElementTree.tostring(shape).split(b">", 1)[1] for shape in link.findall(kind)]
+                for kind in ("visual", "collision")
+            )
+            assert bool(hit) == (link.get("name") in LINKS)
+            assert [s.replace(b"visual", b"") for s in seen] == [
+                s.replace(b"collision", b"") for s in hit
+            ]
+
+    @every_robot
+    def test_links_that_are_not_neighbours_keep_clear(self, name):
+        robot = catalogue.load(name)
+        at_transport = TRANSPORT.copy()
+        for a5 in (TRANSPORT[4], robot.limits.lower[4], robot.limits.upper[4]):
+            at_transport[4] = a5
+            assert colliding_links(catalogue.urdf(name), at_transport) == []
+
+    def test_forearm_hits_the_floor_when_it_should(self):
+        q = np.radians([0.0, -90.0, 155.0, 0.0, 0.0, 0.0])
+        clear = colliding_links(catalogue.urdf("KR 120 R2700-2"), q)
+        assert clear == []
+        q[1:3] = np.radians([-140.0, 168.0])
+        assert colliding_links(catalogue.urdf("KR 120 R2700-2"), q) != []
+
+
+def colliding_links(urdf: str, q: np.ndarray) -> list[tuple[str, str]]:
+    """Return the pairs of links, not neighbours, whose shapes touch."""
+    model = pin.buildModelFromXML(urdf)
+    shapes = pin.buildGeomFromUrdfString(model, urdf, pin.GeometryType.COLLISION)
+    data = shapes.createData()
+    pin.updateGeometryPlacements(model, model.createData(), shapes, data, q)
+    objects = shapes.geometryObjects
+    hits = []
+    for i, first in enumerate(objects):
+        for j, second in enumerate(objects[:i]):
+            if abs(first.parentJoint - second.parentJoint) < 2:
+                continue
+            at_first, at_second = (
+                coal.Transform3s(data.oMg[k].rotation, data.oMg[k].translation) for k in (i, j)
+            )
+            result = coal.CollisionResult()
+            request = coal.CollisionRequest()
+            if coal.collide(first.geometry, at_first, second.geometry, at_second, request, result):
+                hits.append((first.name, second.name))
+    return hits
+
+
+class TestTable:
+    def broken(self, change) -> str:
+        arm = {"source": "s", "a1": 0.3, "a2": 0.0, "c1": 0.6, "c2": 1.0, "c3": 1.0, "c4": 0.2}
+        link = {"mass": 1.0, "centre": [0, 0, 0], "tensor": [1, 1, 1, 0, 0, 0]}
+        robot = {
+            "name": "A",
+            "dimensions": arm,
+            "position": {"source": "s", "lower": [-1] * 6, "upper": [1] * 6},
+            "velocity": {"source": "s", "maximum": [1] * 6},
+            "effort": {"assumption": "unknown"},
+            "inertia": {"source": "s", "links": dict.fromkeys(LINKS, link)},
+        }
+        data = {"schema": table.SCHEMA, "robots": [robot]}
+        change(data, robot)
+        return yaml.safe_dump(data, sort_keys=False)
+
+    def test_sound_table_is_read(self):
+        entries = table.read_table(self.broken(lambda data, robot: None), "t.yaml")
+        assert entries["A"].sources == {
+            "dimension": "s",
+            "position": "s",
+            "velocity": "s",
+            "inertia": "s",
+        }
+        assert entries["A"].assumptions == {"effort": "unknown"}
+
+    @pytest.mark.parametrize(
+        ("change", "message"),
+        [
+            (lambda data, robot: data.update(schema="x/9"), "schema 'x/9'"),
+            (lambda data, robot: data["robots"].append(robot), "same name"),
+            (lambda data, robot: robot["dimensions"].pop("source"), "source or an assumption"),
+            (lambda data, robot: robot["velocity"].pop("maximum"), "not known need an assumption"),
+            (lambda data, robot: robot["position"]["lower"].pop(), "position.lower"),
+            (lambda data, robot: robot["dimensions"].update(c2=math.nan), "dimensions.c2"),
+            (lambda data, robot: robot["inertia"]["links"].pop("link_6"), "in this order"),
+            (lambda data, robot: robot.update(inertia={"like": "B"}), "is like 'B'"),
+            (lambda data, robot: robot.update(payload=120), "unknown key 'payload'"),
+        ],
+    )
+    def test_broken_table_is_refused_by_name(self, change, message):
+        with pytest.raises(SchemaError, match=message) as refusal:
+            table.read_table(self.broken(change), "t.yaml")
+        assert str(refusal.value).startswith("t.yaml")
