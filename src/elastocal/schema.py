@@ -1,9 +1,10 @@
-"""Files that people write (YAML): strict models, one-line errors.
+"""Files with a schema (YAML that people write, JSON that we write): strict models, one-line errors.
 
 Unknown keys are refused with the nearest known one; a problem is reported by its path in the
 file, for example ``springs.2.axis``.
 """
 
+import json
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -37,10 +38,16 @@ def read_yaml(path: Path, model: type[Model], schema: str) -> Model:
         data = yaml.safe_load(read_text(path))
     except yaml.YAMLError as error:
         raise SchemaError(f"{path} is not valid YAML: {' '.join(str(error).split())}") from error
-    if not isinstance(data, dict):
-        raise SchemaError(f"{path} must hold keys and values, e.g. 'schema: {schema}'")
-    check_schema(data.pop("schema", None), schema, str(path))
-    return validate(data, model, str(path))
+    return _checked(data, path, model, schema)
+
+
+def read_json(path: Path, model: type[Model], schema: str) -> Model:
+    """Return the contents of a JSON file as a validated model; see `read_yaml`."""
+    try:
+        data = json.loads(read_text(path))
+    except json.JSONDecodeError as error:
+        raise SchemaError(f"{path} is not valid JSON: {error}") from error
+    return _checked(data, path, model, schema)
 
 
 def check_schema(found: object, known: str, what: str) -> None:
@@ -77,6 +84,13 @@ def validate(data: Any, model: type[Model], what: str) -> Model:
         else:
             message = f"{path}: {first['msg']}, got {first['input']!r}"
         raise SchemaError(f"{what}: {message}") from error
+
+
+def _checked(data: Any, path: Path, model: type[Model], schema: str) -> Model:
+    if not isinstance(data, dict):
+        raise SchemaError(f"{path} must hold keys and values, among them the schema {schema!r}")
+    check_schema(data.pop("schema", None), schema, str(path))
+    return validate(data, model, str(path))
 
 
 def _known_keys(model: type[BaseModel], path: tuple[int | str, ...]) -> list[str]:

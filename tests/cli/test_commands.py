@@ -56,7 +56,7 @@ def test_calibrate_prints_a_table_that_answers_the_first_questions(folder):
     for text in (
         "left-out poses",
         "axial springs alone",
-        "95 % interval",
+        "interval",
         "not by itself",
         "group 1",
     ):

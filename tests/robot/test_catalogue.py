@@ -220,7 +220,7 @@ class TestShapes:
 
     def test_hand_folded_back_under_the_arm_hits_the_column(self):
         urdf = catalogue.urdf("KR 120 R2700-2")
-        assert colliding_links(urdf, np.radians([0.0, -60.0, 160.0, 0.0, 0.0, 0.0])) != []
+        assert colliding_links(urdf, np.radians([0.0, -10.0, 165.0, 0.0, 0.0, 0.0])) != []
 
 
 def colliding_links(urdf: str, q: np.ndarray) -> list[tuple[str, str]]:
@@ -276,7 +276,7 @@ class TestTable:
         assert entry.assumptions == {"effort": "unknown"}
 
     def test_another_schema_is_refused(self):
-        with pytest.raises(SchemaError, match="t.yaml has schema 'x/9'"):
+        with pytest.raises(SchemaError, match=r"t\.yaml has schema 'x/9'"):
             read(small_table() | {"schema": "x/9"})
 
     def test_two_robots_of_one_name_are_refused(self):

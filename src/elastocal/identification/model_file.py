@@ -9,11 +9,11 @@ from pydantic import JsonValue
 
 from elastocal.elastic import ElasticModel, Spring
 from elastocal.errors import SchemaError
-from elastocal.files import read_text, sha256, write_text
+from elastocal.files import sha256, write_text
 from elastocal.identification.calibrated import CalibratedModel
 from elastocal.identification.observability import Observability, Term
 from elastocal.robot import Robot
-from elastocal.schema import StrictModel, check_schema, validate
+from elastocal.schema import StrictModel, read_json
 
 SCHEMA = "elastocal.model/1"
 
@@ -164,11 +164,4 @@ def read_record(path: Path) -> ModelRecord:
     FileAccessError
         If it cannot be read.
     """
-    try:
-        data = json.loads(read_text(path))
-    except json.JSONDecodeError as error:
-        raise SchemaError(f"{path} is not valid JSON: {error}") from error
-    if not isinstance(data, dict):
-        raise SchemaError(f"{path} is not a model file: it holds no object")
-    check_schema(data.pop("schema", None), SCHEMA, str(path))
-    return validate(data, ModelRecord, str(path))
+    return read_json(path, ModelRecord, SCHEMA)

@@ -1,0 +1,186 @@
+"""Reading a URDF: the chain that comes out, and what is refused by name."""
+
+import math
+
+import numpy as np
+import pytest
+
+from elastocal.errors import RobotError
+from elastocal.robot import Robot
+from elastocal.robot.urdf import Assumption, assumptions, leaf_links, parse_urdf, read_chain
+
+
+def joint(
+    name: str,
+    parent: str,
+    child: str,
+    kind: str = "revolute",
+    xyz: str = "0 0 1",
+    inner: str = '<limit lower="-1" upper="2" velocity="3" effort="4"/>',
+) -> str:
+    return (
+        f'<joint name="{name}" type="{kind}"><parent link="{parent}"/><child link="{child}"/>'
+        f'<origin xyz="{xyz}"/><axis xyz="0 0 1"/>{inner}</joint>'
+    )
+
+
+def robot(*parts: str, links: str = "base a b tcp", name: str = 'name="r"') -> str:
+    listed = "".join(f'<link name="{link}"/>' for link in links.split())
+    return f"<robot {name}>{listed}{''.join(parts)}</robot>"
+
+
+TWO_JOINTS = robot(
+    joint("j1", "base", "a"),
+    joint("j2", "a", "b", "prismatic"),
+    joint("j3", "b", "tcp", "fixed"),
+)
+
+
+class TestParsing:
+    def test_text_that_is_not_xml_is_refused(self):
+        with pytest.raises(RobotError, match="URDF is not valid XML: "):
+            parse_urdf("<robot><link></robot>")
+
+    def test_another_root_element_is_refused(self):
+        with pytest.raises(RobotError, match="root element is <sdf>, not <robot>"):
+            parse_urdf("<sdf/>")
+
+    def test_robot_without_a_name_is_unnamed(self):
+        text = robot(joint("j1", "base", "tcp"), links="base tcp", name="")
+        with pytest.raises(RobotError, match="URDF of unnamed has no tip link 'x'"):
+            read_chain(text, "x")
+
+    def test_assumptions_are_read(self):
+        root = parse_urdf(robot('<assumption field="effort" reason="no source"/>'))
+        assert assumptions(root) == (Assumption("effort", "no source"),)
+
+    def test_leaves_are_the_links_without_children(self):
+        root = parse_urdf(
+            robot(joint("j1", "base", "a"), joint("j2", "base", "tcp"), links="base a tcp")
+        )
+        assert leaf_links(root) == ["a", "tcp"]
+
+
+class TestChain:
+    def test_joints_come_from_base_to_tip_whatever_their_order_in_the_file(self):
+        text = robot(
+            joint("j3", "b", "tcp", "fixed"),
+            joint("j2", "a", "b", "prismatic"),
+            joint("j1", "base", "a"),
+            links="tcp b base a",
+        )
+        chain = read_chain(text, "tcp")
+        assert [j.name for j in chain.joints] == ["j1", "j2"]
+        assert [j.revolute for j in chain.joints] == [True, False]
+        assert (chain.base, chain.tip) == ("base", "tcp")
+
+    def test_limits_are_read(self):
+        first = read_chain(TWO_JOINTS, "tcp").joints[0]
+        assert (first.lower, first.upper, first.velocity, first.effort) == (-1.0, 2.0, 3.0, 4.0)
+
+    def test_velocity_and_effort_of_zero_are_unknown(self):
+        limit = '<limit lower="-1" upper="2" velocity="0" effort="0"/>'
+        chain = read_chain(robot(joint("j1", "base", "tcp", inner=limit), links="base tcp"), "tcp")
+        assert math.isnan(chain.joints[0].velocity)
+        assert math.isnan(chain.joints[0].effort)
+
+    def test_continuous_joint_has_one_number_and_no_limits(self):
+        text = robot(joint("j1", "base", "tcp", "continuous", inner=""), links="base tcp")
+        arm = Robot.from_urdf(text, "tcp")
+        assert (arm.limits.lower[0], arm.limits.upper[0]) == (-math.inf, math.inf)
+        T = arm.forward([7.0])
+        np.testing.assert_allclose(T[:2, 0], [math.cos(7.0), math.sin(7.0)], atol=1e-14)
+
+    def test_continuous_joint_before_others_does_not_shift_their_limits(self):
+        text = robot(
+            joint("j1", "base", "a", "continuous", inner=""),
+            joint("j2", "a", "tcp"),
+            links="base a tcp",
+        )
+        second = read_chain(text, "tcp").joints[1]
+        assert (second.lower, second.upper, second.velocity) == (-1.0, 2.0, 3.0)
+
+    def test_branch_is_locked_at_zero_and_keeps_its_mass(self):
+        heavy = '<inertial><mass value="5"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial>'
+        text = robot(
+            joint("j1", "base", "a"),
+            joint("side", "a", "gripper", xyz="2 0 0"),
+            joint("j2", "a", "tcp"),
+            f'<link name="gripper">{heavy}</link>',
+            links="base a tcp",
+        )
+        chain = read_chain(text, "tcp")
+        assert [j.name for j in chain.joints] == ["j1", "j2"]
+        assert chain.joints[0].mass == pytest.approx(5.0)
+        np.testing.assert_allclose(chain.joints[0].centre_of_mass, [2.0, 0.0, 0.0], atol=1e-14)
+
+    def test_another_base_than_the_root_is_where_positions_start(self):
+        text = robot(
+            joint("rail", "base", "a", "prismatic"), joint("j2", "a", "b"), joint("j3", "b", "tcp")
+        )
+        whole, arm = Robot.from_urdf(text, "tcp"), Robot.from_urdf(text, "tcp", base="a")
+        assert arm.joint_names == ("j2", "j3")
+        assert arm.base == "a"
+        T_base_a = Robot.from_urdf(text, "a").forward([0.5])
+        np.testing.assert_allclose(
+            T_base_a @ arm.forward([0.3, -0.4]), whole.forward([0.5, 0.3, -0.4]), atol=1e-14
+        )
+
+    def test_base_fixed_to_the_root_counts_from_the_base(self):
+        text = robot(
+            joint("mount", "base", "a", "fixed", xyz="3 2 1"),
+            joint("j1", "a", "b"),
+            joint("end", "b", "tcp", "fixed"),
+        )
+        np.testing.assert_allclose(
+            Robot.from_urdf(text, "tcp", base="a").forward([0.0])[:3, 3],
+            [0.0, 0.0, 2.0],
+            atol=1e-14,
+        )
+        np.testing.assert_allclose(
+            Robot.from_urdf(text, "tcp").forward([0.0])[:3, 3], [3.0, 2.0, 3.0], atol=1e-14
+        )
+
+
+class TestRefusals:
+    @pytest.mark.parametrize(
+        ("text", "tip", "base", "message"),
+        [
+            (TWO_JOINTS, "tpc", None, r"no tip link 'tpc'; did you mean 'tcp'\? \(links: base, a"),
+            (TWO_JOINTS, "tcp", "bass", "no base link 'bass'; did you mean 'base'"),
+            (TWO_JOINTS, "base", "tcp", "no chain from base link 'tcp' to tip link 'base'"),
+            (TWO_JOINTS, "tcp", "b", "no movable joint between 'b' and 'tcp'"),
+            (TWO_JOINTS, "base", None, "no movable joint between 'base' and 'base'"),
+            (robot(joint("j1", "base", "tcp")), "tcp", None, "exactly one root link, has"),
+            (
+                robot(joint("j1", "base", "tcp", "planar"), links="base tcp"),
+                "tcp",
+                None,
+                "joint 'j1' is planar: the chain may have revolute",
+            ),
+            (
+                robot(joint("j1", "base", "tcp", inner=""), links="base tcp"),
+                "tcp",
+                None,
+                "joint 'j1' is revolute and has no <limit>",
+            ),
+            (
+                robot('<joint name="j1" type="revolute"><child link="tcp"/></joint>'),
+                "tcp",
+                "base",
+                "joint 'j1' has no parent link",
+            ),
+        ],
+    )
+    def test_bad_urdf_is_refused_by_name_in_one_line(self, text, tip, base, message):
+        with pytest.raises(RobotError, match=message) as refusal:
+            read_chain(text, tip, base)
+        assert "\n" not in str(refusal.value)
+
+    def test_mimicking_joint_is_refused(self):
+        mimic = '<limit lower="-1" upper="1" velocity="1" effort="1"/><mimic joint="j1"/>'
+        text = robot(
+            joint("j1", "base", "a"), joint("j2", "a", "tcp", inner=mimic), links="base a tcp"
+        )
+        with pytest.raises(RobotError, match="joint 'j2' mimics another one"):
+            read_chain(text, "tcp")
