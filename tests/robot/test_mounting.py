@@ -4,12 +4,12 @@ import math
 
 import numpy as np
 import pytest
-from support.urdfs import KR_LIKE, opw_arm_urdf
 
 from elastocal.errors import RobotError
 from elastocal.robot import Robot, catalogue
 from elastocal.robot.mounting import Rail, on_rail, with_tool
 from elastocal.robot.pose import T_from_xyzabc
+from support.urdfs import KR_LIKE, opw_arm_urdf
 
 ARM = opw_arm_urdf(**KR_LIKE)
 Q = np.radians([20.0, -70.0, 95.0, 30.0, 40.0, -110.0])

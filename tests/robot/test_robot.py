@@ -5,14 +5,14 @@ import json
 import numpy as np
 import pinocchio as pin
 import pytest
-from support.shared import GOLDEN, needs_shared
-from support.urdfs import FLOOR, KR_LIKE, WALL, opw_arm_urdf
 
 from elastocal.errors import FileAccessError, RobotError
 from elastocal.files import sha256
 from elastocal.robot import GRAVITY, Robot, catalogue
 from elastocal.robot.chain import InsertedJoint, build_model
 from elastocal.robot.mounting import Rail, on_rail
+from support.shared import GOLDEN, needs_shared
+from support.urdfs import FLOOR, KR_LIKE, WALL, opw_arm_urdf
 
 ARMS = {
     "arm": Robot.from_urdf(opw_arm_urdf(**KR_LIKE), "tcp"),
@@ -66,27 +66,44 @@ class TestKinematics:
         rail = ARMS["arm with rail and table on a wall"]
         assert rail.revolute == (False, *[True] * 7)
 
-    def test_virtual_joints_at_zero_leave_the_robot_as_it_is(self):
+    @pytest.mark.parametrize("distal", [False, True])
+    @pytest.mark.parametrize("parent", range(6))
+    def test_virtual_joint_at_zero_leaves_the_robot_as_it_is(self, parent, distal):
         robot = ARMS["KUKA"]
-        x, offset = np.array([1.0, 0.0, 0.0]), np.array([0.1, -0.2, 0.3])
-        inserted = [
-            InsertedJoint(f"v{index}", index, x, index % 2 == 0, distal, offset)
-            for index in (0, 3, 5)
-            for distal in (False, True)
-            if not (index == 5 and distal)
-        ]
-        soft = build_model(robot.chain, inserted)
-        q = configurations(robot, 1)[0]
-        full = np.zeros(soft.model.nq)
-        full[soft.joint_columns] = q
-        data = soft.model.createData()
-        pin.framesForwardKinematics(soft.model, data, full)
-        tip = data.oMf[soft.tip_frame].homogeneous
-        np.testing.assert_allclose(tip, robot.forward(q), atol=1e-14)
-        torques = pin.computeGeneralizedGravity(soft.model, data, full)[soft.joint_columns]
-        np.testing.assert_allclose(
-            torques, robot.gravity_torques(q, (0.0, 0.0, -9.81)), rtol=1e-9, atol=1e-9
-        )
+        assert_same_robot(robot, [virtual_joint("v", parent, distal, (0.0, 0.0, 0.0))])
+
+    @pytest.mark.parametrize(
+        ("parent", "distal"), [*((parent, False) for parent in range(6)), (5, True)]
+    )
+    def test_offset_of_a_virtual_joint_displaces_nothing_behind_it(self, parent, distal):
+        first = virtual_joint("v", parent, distal, (0.1, -0.2, 0.3))
+        second = virtual_joint("w", parent, distal, (-0.3, 0.0, 0.2))
+        assert_same_robot(ARMS["KUKA"], [first, second])
+
+    @pytest.mark.parametrize("parent", range(5))
+    def test_offset_of_a_distal_virtual_joint_displaces_no_later_joint(self, parent):
+        assert_same_robot(ARMS["KUKA"], [virtual_joint("v", parent, True, (0.1, -0.2, 0.3))])
+
+
+def virtual_joint(
+    name: str, parent: int, distal: bool, offset: tuple[float, float, float]
+) -> InsertedJoint:
+    return InsertedJoint(name, parent, np.array([1.0, 0.0, 0.0]), True, distal, np.array(offset))
+
+
+def assert_same_robot(robot: Robot, inserted: list[InsertedJoint]) -> None:
+    """Check pose and gravity torques with the virtual joints at zero."""
+    soft = build_model(robot.chain, inserted)
+    soft.model.gravity.linear = np.array(GRAVITY)
+    q = configurations(robot, 1)[0]
+    full = np.zeros(soft.model.nq)
+    full[soft.joint_columns] = q
+    data = soft.model.createData()
+    pin.framesForwardKinematics(soft.model, data, full)
+    tip = data.oMf[soft.tip_frame].homogeneous
+    np.testing.assert_allclose(tip, robot.forward(q), atol=1e-14)
+    torques = pin.computeGeneralizedGravity(soft.model, data, full)[soft.joint_columns]
+    np.testing.assert_allclose(torques, robot.gravity_torques(q), rtol=1e-12, atol=1e-9)
 
 
 class TestGravity:
@@ -168,30 +185,29 @@ class TestRefusals:
             getattr(ARMS["KUKA"], method)([0.0, 0.0, 0.0, value, 0.0, 0.0])
 
 
+@pytest.fixture(scope="module")
+def golden() -> dict[str, np.ndarray]:
+    """Return the arrays of the golden file by name."""
+    data = json.loads((GOLDEN / "golden_6r.json").read_text())
+    names = ("joint_position", "tcp_position", "tcp_rotation", "spring_jacobian")
+    return {name: np.array(data[name]) for name in names}
+
+
 @needs_shared
 class TestGolden:
     """Numbers of an independent implementation (shared/data/golden_6r)."""
 
-    @pytest.fixture(scope="class")
-    def golden(self) -> dict[str, np.ndarray]:
-        data = json.loads((GOLDEN / "golden_6r.json").read_text())
-        names = ("joint_position", "tcp_position", "tcp_rotation", "spring_jacobian")
-        return {name: np.array(data[name]) for name in names}
-
-    @pytest.fixture(scope="class")
-    def robot(self) -> Robot:
-        return Robot.from_file(GOLDEN / "golden_6r.urdf", "tcp")
-
-    def test_poses_agree(self, robot, golden):
-        T = robot.forward(golden["joint_position"])
+    def test_poses_agree(self, golden):
+        T = Robot.from_file(GOLDEN / "golden_6r.urdf", "tcp").forward(golden["joint_position"])
         np.testing.assert_allclose(T[:, :3, 3], golden["tcp_position"], atol=1e-12)
         np.testing.assert_allclose(T[:, :3, :3], golden["tcp_rotation"], atol=1e-12)
 
-    def test_jacobian_columns_agree(self, robot, golden):
+    def test_jacobian_columns_agree(self, golden):
+        robot = Robot.from_file(GOLDEN / "golden_6r.urdf", "tcp")
         J = robot.jacobian(golden["joint_position"]).translation
         np.testing.assert_allclose(J, golden["spring_jacobian"][..., :6], atol=1e-12)
 
-    def test_catalogue_shares_its_zero_pose_and_signs(self, robot, golden):
+    def test_catalogue_shares_its_zero_pose_and_signs(self, golden):
         ours = catalogue.load("KR 120 R2700 extra HA", tip="link_6")
         theirs = Robot.from_file(GOLDEN / "golden_6r.urdf", "link_6")
         q = golden["joint_position"]

@@ -101,7 +101,8 @@ class TestChain:
         assert (second.lower, second.upper, second.velocity) == (-1.0, 2.0, 3.0)
 
     def test_branch_is_locked_at_zero_and_keeps_its_mass(self):
-        heavy = '<inertial><mass value="5"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial>'
+        tensor = '<inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/>'
+        heavy = f'<inertial><mass value="5"/>{tensor}</inertial>'
         text = robot(
             joint("j1", "base", "a"),
             joint("side", "a", "gripper", xyz="2 0 0"),
@@ -165,7 +166,7 @@ class TestRefusals:
                 "joint 'j1' is revolute and has no <limit>",
             ),
             (
-                robot('<joint name="j1" type="revolute"><child link="tcp"/></joint>'),
+                robot('<joint name="j1" type="fixed"><child link="tcp"/></joint>'),
                 "tcp",
                 "base",
                 "joint 'j1' has no parent link",

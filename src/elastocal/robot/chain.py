@@ -89,22 +89,24 @@ def build_model(chain: SerialChain, inserted: Sequence[InsertedJoint] = ()) -> C
     joint_columns: list[int] = []
     column_of: dict[str, int] = {}
     parent = 0
+    # What follows a joint, in its moving frame; a distal spring with an offset shifts it.
+    behind = pin.SE3.Identity()
     for index, joint in enumerate(chain.joints):
         here = [virtual for virtual in inserted if virtual.parent == index]
-        placement = pin.SE3(joint.placement)
+        placement = behind * pin.SE3(joint.placement)
         for virtual in (v for v in here if not v.distal):
             parent, placement = _insert(model, parent, virtual, placement)
             column_of[virtual.name] = model.idx_vs[parent]
         parent = _add(model, parent, joint.revolute, joint.axis, placement, joint.name)
         joint_columns.append(model.idx_vs[parent])
-        placement = pin.SE3.Identity()
+        behind = pin.SE3.Identity()
         for virtual in (v for v in here if v.distal):
-            parent, placement = _insert(model, parent, virtual, placement)
+            parent, behind = _insert(model, parent, virtual, behind)
             column_of[virtual.name] = model.idx_vs[parent]
         model.appendBodyToJoint(
-            parent, pin.Inertia(joint.mass, joint.centre_of_mass, joint.inertia), placement
+            parent, pin.Inertia(joint.mass, joint.centre_of_mass, joint.inertia), behind
         )
-    T_last_tip = placement * pin.SE3(chain.T_last_tip)
+    T_last_tip = behind * pin.SE3(chain.T_last_tip)
     tip = model.addFrame(pin.Frame(chain.tip, parent, T_last_tip, pin.FrameType.OP_FRAME))
     return ChainModel(
         model,

@@ -40,7 +40,7 @@ class Rail:
         axis = np.array(self.axis, dtype=float)
         if axis.shape != (3,) or not 0.0 < float(np.linalg.norm(axis)) < math.inf:
             raise RobotError(
-                f"axis {self.axis!r} of rail {self.name!r} must be 3 numbers, not all 0"
+                f"axis {self.axis!r} of rail {self.name!r} must be 3 finite numbers, not all 0"
             )
         if not -math.inf < self.lower < self.upper < math.inf:
             raise RobotError(
