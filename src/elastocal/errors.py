@@ -45,6 +45,10 @@ class ConventionError(IdentificationError):
     """Data that are explained only when a sign or a frame is read otherwise than stated."""
 
 
+class PlanningError(ElastocalError, ValueError):
+    """A search for poses that cannot be made: too small a pool, missing rows, unknown technique."""
+
+
 class FileAccessError(ElastocalError, OSError):
     """A file that cannot be read or written."""
 

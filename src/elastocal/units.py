@@ -20,7 +20,7 @@ _FACTORS: dict[str, dict[str, float]] = {
     "translational compliance": {"m/N": 1.0, "mm/N": 1e-3, "um/N": 1e-6},
 }
 
-_QUANTITY = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(\S.*)\s*")
+_QUANTITY = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*([^\s\d.].*)\s*")
 _COLUMN = re.compile(r"\s*(?P<name>[^\[\]]+?)\s*(?:\[(?P<unit>[^\[\]]*)\])?\s*")
 
 

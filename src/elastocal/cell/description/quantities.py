@@ -1,0 +1,91 @@
+"""Fields of the cell file that have a dimension: a string with its unit, read as SI."""
+
+import math
+from typing import Annotated
+
+from pydantic import AfterValidator, BeforeValidator, Field
+
+from elastocal.units import parse_quantity
+
+
+def _read(dimension: str) -> BeforeValidator:
+    return BeforeValidator(lambda text: parse_quantity(text, dimension))
+
+
+def _finite(value: float) -> float:
+    if not math.isfinite(value):
+        raise ValueError("must be finite")
+    return value
+
+
+_FINITE = AfterValidator(_finite)
+_POSITIVE = Field(gt=0.0)
+_NOT_NEGATIVE = Field(ge=0.0)
+
+Length = Annotated[float, _read("length"), _FINITE]
+"""In m."""
+PositiveLength = Annotated[float, _read("length"), _POSITIVE, _FINITE]
+"""In m, above 0."""
+Distance = Annotated[float, _read("length"), _NOT_NEGATIVE, _FINITE]
+"""In m, 0 or above."""
+Angle = Annotated[float, _read("angle"), _FINITE]
+"""In rad."""
+PositiveAngle = Annotated[float, _read("angle"), _POSITIVE, Field(le=math.pi)]
+"""In rad, above 0, at most π."""
+SpanAngle = Annotated[float, _read("angle"), _NOT_NEGATIVE, Field(le=math.pi)]
+"""In rad, from 0 to π."""
+Force = Annotated[float, _read("force"), _NOT_NEGATIVE, _FINITE]
+"""In N, 0 or above."""
+PositiveForce = Annotated[float, _read("force"), _POSITIVE, _FINITE]
+"""In N, above 0."""
+PositiveMoment = Annotated[float, _read("moment"), _POSITIVE, _FINITE]
+"""In N·m, above 0."""
+Mass = Annotated[float, _read("mass"), _NOT_NEGATIVE, _FINITE]
+"""In kg, 0 or above."""
+PositiveMass = Annotated[float, _read("mass"), _POSITIVE, _FINITE]
+"""In kg, above 0."""
+
+Point = tuple[Length, Length, Length]
+"""x, y, z in m."""
+
+
+def _not_zero(values: tuple[float, ...]) -> tuple[float, ...]:
+    if not 0.0 < math.hypot(*values) < math.inf:
+        raise ValueError("must be a direction, not all zero")
+    return values
+
+
+Direction = Annotated[tuple[float, float, float], AfterValidator(_not_zero)]
+"""Three numbers without dimension, not all zero; any length."""
+
+
+def _ascending(values: tuple[float, float]) -> tuple[float, float]:
+    if not values[0] < values[1]:
+        raise ValueError("the first must be below the second")
+    return values
+
+
+Travel = Annotated[tuple[Length, Length], AfterValidator(_ascending)]
+"""Lower and upper end in m."""
+Range = Annotated[tuple[Distance, Distance], AfterValidator(_ascending)]
+"""Nearest and farthest in m, 0 or above."""
+
+
+def check_exactly_one(**given: object) -> None:
+    """Refuse a model that has not exactly one of some keys.
+
+    Parameters
+    ----------
+    **given : object
+        The keys with their values; None where there is none.
+
+    Raises
+    ------
+    ValueError
+        With the keys that are there and those that could be.
+    """
+    found = [name for name, value in given.items() if value is not None]
+    if len(found) != 1:
+        raise ValueError(
+            f"exactly one of {', '.join(given)} is needed; there is {' and '.join(found) or 'none'}"
+        )

@@ -1,0 +1,43 @@
+"""How poses are searched for."""
+
+from typing import Annotated, Any, Literal
+
+from pydantic import Field, field_validator
+
+from elastocal.cell.description.quantities import PositiveLength
+from elastocal.schema import StrictModel
+
+DEFAULT_POSES = 31
+"""Number of poses of the paper's first case study."""
+
+
+class Search(StrictModel):
+    """Pool and technique; ends at ``poses`` or at ``d_max``, whichever comes first."""
+
+    technique: str = "cover"
+    """Name of a search technique (`elastocal.planning.search`)."""
+    metric: Literal["euclidean", "geodesic"] = "euclidean"
+    """How COVER measures the distance between contact points."""
+    poses: Annotated[int, Field(ge=1)] | None = None
+    """Largest number of poses N."""
+    d_max: PositiveLength | None = None
+    """Cover distance at which COVER may stop, in m."""
+    pool: Annotated[int, Field(ge=1)] = 3000
+    """Number of candidates."""
+    seed: Annotated[int, Field(ge=0)] = 0
+    """Of everything random."""
+
+    @field_validator("pool")
+    @classmethod
+    def _holds_the_poses(cls, pool: int, info: Any) -> int:
+        poses = info.data.get("poses")
+        if poses is not None and not poses <= pool:
+            raise ValueError(f"must be at least the {poses} poses that are to be chosen")
+        return pool
+
+    @property
+    def most(self) -> int | None:
+        """Largest number of poses; None when only ``d_max`` ends the search."""
+        if self.poses is None and self.d_max is None:
+            return DEFAULT_POSES
+        return self.poses

@@ -1,0 +1,25 @@
+"""``elastocal init``: write an example cell to start from."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+
+def init(
+    folder: Annotated[Path, typer.Argument(metavar="DIR", help="Folder to write into.")],
+    like: Annotated[
+        str, typer.Option(help="Which example: afp (dome on a rail) or machining (block).")
+    ] = "afp",
+    force: Annotated[bool, typer.Option("--force", help="Replace files that are there.")] = False,
+) -> None:
+    """Write a commented example cell with its mesh."""
+    from elastocal.cell.examples import write_example
+    from elastocal.cli.output import console
+
+    cell, *meshes = write_example(folder, like, force)
+    names = ", ".join(mesh.name for mesh in meshes)
+    console().print(
+        f"wrote [bold]{cell}[/bold] and {names}: edit it, then `elastocal plan {cell} --out DIR`",
+        soft_wrap=True,
+    )

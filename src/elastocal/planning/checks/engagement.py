@@ -1,0 +1,46 @@
+"""Check ``engagement``: the whole contact disk lies on the surface (spec section 2)."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from elastocal.arrays import FloatArray
+from elastocal.planning.postures import Postures
+from elastocal.planning.surface import DiskFit
+
+
+@dataclass(frozen=True, eq=False)
+class EdgeCheck:
+    """Distance from the contact point to the nearest edge, less disk radius and margin."""
+
+    edge_distance: FloatArray
+    """Of each sampled point, shape (point,), in m."""
+    radius: float
+    """Radius of the contact disk in m."""
+    keep: float
+    """Distance to keep between disk and edge, in m."""
+    name: str = "edge"
+    unit: str = "m"
+    advice: str = "use a smaller disk or margin, or a larger region of the surface"
+
+    def margin(self, postures: Postures) -> FloatArray:
+        """Return the margin of each posture, shape (pose,), in m."""
+        return np.asarray(self.edge_distance[postures.point] - self.radius - self.keep)
+
+
+@dataclass(frozen=True, eq=False)
+class FlatnessCheck:
+    """Tolerance of the normals under the disk, less the largest angle between them."""
+
+    fit: DiskFit
+    """How a disk lies at each sampled point."""
+    tolerance: float
+    """Largest angle between the normal at the centre and under the disk, in rad."""
+    name: str = "flatness"
+    unit: str = "rad"
+    advice: str = "use a smaller disk, or allow a larger angle: the surface is too curved"
+
+    def margin(self, postures: Postures) -> FloatArray:
+        """Return the margin of each posture, shape (pose,), in rad."""
+        angle = np.where(self.fit.supported, self.fit.angle, np.pi)
+        return np.asarray(self.tolerance - angle[postures.point])

@@ -1,0 +1,64 @@
+"""Check ``torque``: gravity and load stay within the actuators' torques (paper section 4.1).
+
+Standing still under a force ``f`` on the robot at the tcp, the actuators supply
+
+    tau = g(q) - J^T f - J_com^T (m g),
+
+with ``g`` the arm's gravity torques and ``m g`` the weight of the tool at its centre of mass.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from elastocal.arrays import FloatArray
+from elastocal.planning.postures import Postures
+from elastocal.robot import GRAVITY, Robot
+
+
+@dataclass(frozen=True, eq=False)
+class TorqueCheck:
+    """Smallest part of a joint's allowed torque that is left, over joints and load cases."""
+
+    robot: Robot
+    force_tcp: FloatArray
+    """Force on the robot in each load case, tcp frame, shape (load_case, 3), in N."""
+    allowed: FloatArray
+    """Continuous torque of each joint, shape (joint,), in N·m (N); NaN: not known, not judged."""
+    tool_mass: float
+    """Mass behind the flange in kg."""
+    tool_centre: FloatArray
+    """Its centre of mass in the tcp frame, shape (3,), in m."""
+    gravity: tuple[float, float, float] = GRAVITY
+    """In base, in m/s²."""
+    name: str = "torque"
+    unit: str = "1"
+    advice: str = "lower the forces, bring the tooling nearer, or give the true continuous torques"
+
+    @property
+    def judged(self) -> tuple[str, ...]:
+        """Names of the joints whose torque is known."""
+        known = np.isfinite(self.allowed)
+        return tuple(
+            name for name, is_known in zip(self.robot.joint_names, known, strict=True) if is_known
+        )
+
+    def torques(self, postures: Postures) -> FloatArray:
+        """Return the static torques, shape (load_case, pose, joint), in N·m (N)."""
+        jacobian = self.robot.jacobian(postures.q)
+        R_base_tcp = postures.T_base_tcp[:, :3, :3]
+        lever = R_base_tcp @ self.tool_centre
+        J_com = jacobian.translation + np.cross(jacobian.rotation, lever[..., None], axis=-2)
+        weight = self.tool_mass * np.asarray(self.gravity)
+        resting = self.robot.gravity_torques(postures.q, self.gravity)
+        resting = resting - np.einsum("pij,i->pj", J_com, weight)
+        force = np.einsum("pij,lj->lpi", R_base_tcp, self.force_tcp)
+        return np.asarray(resting - np.einsum("pij,lpi->lpj", jacobian.translation, force))
+
+    def margin(self, postures: Postures) -> FloatArray:
+        """Return the margin of each posture, shape (pose,): 1 is unloaded, 0 at the limit."""
+        known = np.isfinite(self.allowed)
+        if not np.any(known):
+            return np.ones(len(postures))
+        used = np.abs(self.torques(postures)[..., known]) / self.allowed[known]
+        return np.asarray(1.0 - used.max(axis=(0, 2)))

@@ -1,0 +1,53 @@
+"""Candidates with joints: where the tool touches, and how the robot stands there."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from elastocal.arrays import FloatArray, IndexArray
+
+
+@dataclass(frozen=True, eq=False)
+class Postures:
+    """Contact poses on the surface with the robot's configurations; arrays are read-only."""
+
+    T_base_tcp: FloatArray
+    """Contact frames, z into the surface, shape (pose, 4, 4), in m."""
+    normal: FloatArray
+    """Outward unit normals of the surface in base, shape (pose, 3)."""
+    q: FloatArray
+    """Joint positions in contact, shape (pose, joint), in rad or m."""
+    q_approach: FloatArray
+    """Joint positions at the approach pose, off along the normal, shape (pose, joint)."""
+    point: IndexArray
+    """Which point of the sampled surface each posture touches, shape (pose,)."""
+
+    def __post_init__(self) -> None:
+        for name in ("T_base_tcp", "normal", "q", "q_approach"):
+            array = np.array(getattr(self, name), dtype=float)
+            array.flags.writeable = False
+            object.__setattr__(self, name, array)
+        point = np.array(self.point, dtype=np.intp)
+        point.flags.writeable = False
+        object.__setattr__(self, "point", point)
+
+    def __len__(self) -> int:
+        return len(self.q)
+
+    @property
+    def contact(self) -> FloatArray:
+        """Contact points in base, shape (pose, 3), in m."""
+        return self.T_base_tcp[:, :3, 3]
+
+    def take(self, index: ArrayLike) -> "Postures":
+        """Return some of the postures (a mask or indices)."""
+        rows = np.asarray(index)
+        rows = rows.astype(np.intp) if rows.size == 0 else rows
+        return Postures(
+            self.T_base_tcp[rows],
+            self.normal[rows],
+            self.q[rows],
+            self.q_approach[rows],
+            self.point[rows],
+        )

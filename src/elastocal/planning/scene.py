@@ -1,0 +1,195 @@
+"""The robot with its tool among the tooling, as collision geometry (coal, through Pinocchio)."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import coal
+import numpy as np
+import pinocchio as pin
+
+from elastocal.arrays import BoolArray, FloatArray, IndexArray
+from elastocal.errors import RobotError
+from elastocal.robot import Robot
+
+NEIGHBOURS = 1
+"""Links this many joints apart touch by construction and are not checked against each other."""
+
+
+@dataclass(frozen=True, eq=False)
+class Body:
+    """A rigid shape with its place."""
+
+    name: str
+    shape: coal.CollisionGeometry
+    T_frame_body: FloatArray
+    """Place of the shape in its frame (base for obstacles, tcp for tool parts), shape (4, 4)."""
+
+
+def mesh_shape(vertices: FloatArray, faces: IndexArray) -> coal.CollisionGeometry:
+    """Return a triangle mesh as a bounding volume hierarchy.
+
+    Parameters
+    ----------
+    vertices : ndarray, shape (vertex, 3)
+        In m.
+    faces : ndarray of int, shape (face, 3)
+    """
+    points, triangles = coal.StdVec_Vec3s(), coal.StdVec_Triangle()
+    for vertex in np.asarray(vertices, dtype=float):
+        points.append(vertex)
+    for a, b, c in np.asarray(faces):
+        triangles.append(coal.Triangle(int(a), int(b), int(c)))
+    shape = coal.BVHModelOBBRSS()
+    shape.beginModel(len(triangles), len(points))
+    shape.addSubModel(points, triangles)
+    shape.endModel()
+    return shape
+
+
+@dataclass(frozen=True, eq=False)
+class CollisionScene:
+    """Which bodies must stay apart: links and tool from obstacles and from one another.
+
+    Obstacles named in ``touched`` are those that the tool presses on: the tool is checked
+    against them only where it is not in contact.
+    """
+
+    robot: Robot
+    tool: tuple[Body, ...]
+    obstacles: tuple[Body, ...]
+    touched: frozenset[str] = frozenset()
+    _model: pin.Model = field(init=False, repr=False)
+    _geometry: pin.GeometryModel = field(init=False, repr=False)
+    _tool_on_touched: BoolArray = field(init=False, repr=False)
+    _columns: IndexArray = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        model = pin.buildModelFromXML(self.robot.urdf)
+        geometry = pin.buildGeomFromUrdfString(model, self.robot.urdf, pin.GeometryType.COLLISION)
+        if geometry.ngeoms == 0:
+            raise RobotError(f"robot {self.robot.name!r} has no collision shapes in its URDF")
+        links = list(range(geometry.ngeoms))
+        tool = _add_tool(model, geometry, self.robot.tip, self.tool)
+        obstacles = _add_obstacles(model, geometry, self.robot.base, self.obstacles)
+        pairs = _pairs(geometry, links, tool, obstacles)
+        for pair in pairs:
+            geometry.addCollisionPair(pin.CollisionPair(*pair))
+        touched = {i for i in obstacles if geometry.geometryObjects[i].name in self.touched}
+        on_touched = [a in tool and b in touched for a, b in pairs]
+        object.__setattr__(self, "_model", model)
+        object.__setattr__(self, "_geometry", geometry)
+        object.__setattr__(self, "_tool_on_touched", np.array(on_touched, dtype=bool))
+        columns = [model.joints[model.getJointId(name)].idx_q for name in self.robot.joint_names]
+        object.__setattr__(self, "_columns", np.array(columns, dtype=np.intp))
+
+    def clearance(self, q: FloatArray, in_contact: bool, enough: float) -> FloatArray:
+        """Return a distance that bodies that must stay apart keep at least.
+
+        Bounding volumes decide as far as they can, which is a hundred times faster than exact
+        distances; so this is a lower bound, and 0 for bodies nearer than ``enough``.
+
+        Parameters
+        ----------
+        q : ndarray, shape (pose, joint)
+            Joint positions in rad or m.
+        in_contact : bool
+            Whether the tool touches the tooling and is not checked against it.
+        enough : float
+            Distance in m that settles the question.
+
+        Returns
+        -------
+        ndarray, shape (pose,)
+            In m, never negative.
+        """
+        model, geometry = self._model, self._geometry
+        data, results = model.createData(), geometry.createData()
+        judged = np.flatnonzero(~self._tool_on_touched) if in_contact else None
+        for pair, request in enumerate(results.collisionRequests):
+            request.security_margin = enough
+            if judged is not None and self._tool_on_touched[pair]:
+                results.deactivateCollisionPair(pair)
+        pairs = range(len(geometry.collisionPairs)) if judged is None else judged.tolist()
+        least = np.empty(len(q))
+        for pose, configuration in enumerate(self._configurations(q)):
+            if pin.computeCollisions(model, data, geometry, results, configuration, True):
+                least[pose] = 0.0
+            else:
+                found = results.collisionResults
+                least[pose] = min(found[pair].distance_lower_bound for pair in pairs)
+        return least
+
+    def nearest(self, q: FloatArray) -> tuple[str, str]:
+        """Return the names of the two bodies that are nearest to each other at one posture."""
+        pair = self._geometry.collisionPairs[int(self._distances(q[None])[0].argmin())]
+        names = [self._geometry.geometryObjects[i].name for i in (pair.first, pair.second)]
+        return names[0], names[1]
+
+    def _distances(self, q: FloatArray) -> FloatArray:
+        """Return the exact distance of each pair, shape (pose, pair), in m."""
+        model, geometry = self._model, self._geometry
+        data, results = model.createData(), geometry.createData()
+        distances = np.empty((len(q), len(geometry.collisionPairs)))
+        for row, configuration in zip(distances, self._configurations(q), strict=True):
+            pin.computeDistances(model, data, geometry, results, configuration)
+            row[:] = [result.min_distance for result in results.distanceResults]
+        return distances
+
+    def _configurations(self, q: FloatArray) -> FloatArray:
+        """Return the model's configurations, joints off the chain at neutral."""
+        full = np.tile(pin.neutral(self._model), (len(q), 1))
+        full[:, self._columns] = q
+        return full
+
+
+def _add_tool(
+    model: pin.Model, geometry: pin.GeometryModel, tip: str, bodies: Sequence[Body]
+) -> list[int]:
+    frame = model.frames[model.getFrameId(tip, pin.FrameType.BODY)]
+    return [
+        geometry.addGeometryObject(
+            pin.GeometryObject(
+                body.name,
+                frame.parentJoint,
+                model.getFrameId(tip, pin.FrameType.BODY),
+                frame.placement * pin.SE3(body.T_frame_body),
+                body.shape,
+            )
+        )
+        for body in bodies
+    ]
+
+
+def _add_obstacles(
+    model: pin.Model, geometry: pin.GeometryModel, base: str, bodies: Sequence[Body]
+) -> list[int]:
+    frame = model.frames[model.getFrameId(base, pin.FrameType.BODY)]
+    return [
+        geometry.addGeometryObject(
+            pin.GeometryObject(
+                body.name,
+                frame.parentJoint,
+                model.getFrameId(base, pin.FrameType.BODY),
+                frame.placement * pin.SE3(body.T_frame_body),
+                body.shape,
+            )
+        )
+        for body in bodies
+    ]
+
+
+def _pairs(
+    geometry: pin.GeometryModel, links: list[int], tool: list[int], obstacles: list[int]
+) -> list[tuple[int, int]]:
+    """Return links and tool against obstacles, and distant links against one another."""
+    joint = [body.parentJoint for body in geometry.geometryObjects]
+    moving = [*links, *tool]
+    # What stands on the floor may touch the tooling: that is the cell's business.
+    outside = [(a, b) for a in moving if joint[a] > NEIGHBOURS for b in obstacles]
+    inside = [
+        (a, b)
+        for i, a in enumerate(moving)
+        for b in moving[i + 1 :]
+        if abs(joint[a] - joint[b]) > NEIGHBOURS
+    ]
+    return [*outside, *inside]

@@ -1,0 +1,26 @@
+"""Poses drawn at random: what every other technique has to beat."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from elastocal.planning.search.candidates import Candidates
+from elastocal.planning.search.technique import Selection, check_count
+
+
+@dataclass(frozen=True)
+class RandomChoice:
+    """Draw without replacement, every candidate as likely as any other."""
+
+    @property
+    def name(self) -> str:
+        """Name of the technique."""
+        return "random"
+
+    def search(
+        self, candidates: Candidates, count: int, rng: np.random.Generator | None = None
+    ) -> Selection:
+        """Return candidates in the order in which they are drawn; see `SearchTechnique`."""
+        check_count(candidates, count)
+        rng = np.random.default_rng(0) if rng is None else rng
+        return Selection(rng.permutation(len(candidates))[:count], self.name)

@@ -1,0 +1,177 @@
+"""What is odd about a surface, said in one line each, before a robot is sent there."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.random import Generator
+
+from elastocal.arrays import BoolArray, FloatArray
+from elastocal.planning.surface.flatness import tangents
+from elastocal.planning.surface.sampling import sample_uniform
+from elastocal.planning.surface.surface import Surface, SurfacePoints
+
+FAR = 5.0
+"""A surface whose nearest point is more than this many reaches away is in the wrong unit."""
+TINY = 0.02
+"""So is one whose bounding box is smaller than this part of the reach."""
+_POINTS = 200
+_SPINS = 4
+_CLEARLY = 0.25
+"""By how much of the points the other side has to be the better reachable one."""
+
+Reachable = Callable[[FloatArray], BoolArray]
+"""Whether the robot reaches poses T_base_tcp, shape (pose, 4, 4), within its limits."""
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One thing that a user should know."""
+
+    kind: str
+    """``open``, ``non-manifold``, ``winding``, ``degenerate``, ``far``, ``tiny``, ``inverted``."""
+    message: str
+    """One line."""
+    fatal: bool = False
+    """Whether planning on this surface cannot lead anywhere."""
+
+
+def mesh_findings(surface: Surface) -> tuple[Finding, ...]:
+    """Return what is odd about the mesh itself. None of it stops the work.
+
+    Parameters
+    ----------
+    surface : Surface
+        The surface.
+    """
+    name, found = surface.name, []
+    if surface.mesh.degenerate:
+        text = f"{name}: {surface.mesh.degenerate} faces without area were left out"
+        found.append(Finding("degenerate", text))
+    if surface.turned:
+        text = f"{name}: {surface.turned} faces were wound against their neighbours and were turned"
+        found.append(Finding("winding", text))
+    if surface.non_manifold_edges:
+        text = (
+            f"{name} is not a manifold: {surface.non_manifold_edges} edges have three faces or"
+            " more, or none that agree; the contact disk keeps away from them"
+        )
+        found.append(Finding("non-manifold", text))
+    if surface.open_edges:
+        text = (
+            f"{name} is an open mesh with {surface.open_edges} edges at its border; the contact"
+            " disk keeps away from them"
+        )
+        found.append(Finding("open", text))
+    return tuple(found)
+
+
+def placement_findings(
+    surface: Surface,
+    stands: FloatArray,
+    reach: float,
+    reachable: Reachable,
+    rng: Generator,
+) -> tuple[Finding, ...]:
+    """Return what is odd about where the surface is, seen from the robot.
+
+    Parameters
+    ----------
+    surface : Surface
+        The surface.
+    stands : ndarray, shape (stand, 3)
+        Where the arm can stand, in base, in m: one row without a rail.
+    reach : float
+        Of the arm with its tool, in m; an upper bound will do.
+    reachable : callable
+        The robot; see `Reachable`.
+    rng : Generator
+        Seeded source of randomness, for the points that are tried.
+    """
+    vertices = surface.mesh.vertices
+    gap = np.linalg.norm(vertices[:, None] - stands[None], axis=2).min()
+    if not gap <= FAR * reach:
+        text = (
+            f"{surface.name}: its nearest point is {gap:.3g} m from the robot, whose reach is"
+            f" {reach:.3g} m: is the mesh in mm and read as m (surface.unit), or its pose wrong?"
+        )
+        return (Finding("far", text, fatal=True),)
+    size = float(np.linalg.norm(np.ptp(vertices, axis=0)))
+    found: tuple[Finding, ...] = ()
+    if size < TINY * reach:
+        text = (
+            f"{surface.name} is only {1e3 * size:.3g} mm across; the reach of the robot is"
+            f" {reach:.3g} m: is the mesh in m and read as mm (surface.unit)?"
+        )
+        found = (Finding("tiny", text),)
+    return found + inverted_finding(surface, reachable, rng)
+
+
+def inverted_finding(surface: Surface, reachable: Reachable, rng: Generator) -> tuple[Finding, ...]:
+    """Return a finding when the normals point to the side where the robot cannot work.
+
+    A closed mesh tells its outside by the sign of its volume. An open one has no outside: there
+    the side counts from which the robot reaches clearly more of 200 points.
+
+    Parameters
+    ----------
+    surface : Surface
+        The surface.
+    reachable : callable
+        The robot; see `Reachable`.
+    rng : Generator
+        Seeded source of randomness.
+    """
+    offer = "; set surface.flip_normals: true to turn them"
+    if surface.closed:
+        if surface.signed_volume >= 0.0:
+            return ()
+        text = f"{surface.name} is closed and inside out: its normals point inwards{offer}"
+        return (Finding("inverted", text),)
+    points = sample_uniform(surface, _POINTS, rng)
+    front, back = (_reached(points, sign, reachable) for sign in (1.0, -1.0))
+    if not back - front > _CLEARLY:
+        return ()
+    text = (
+        f"{surface.name}: the normals point away from the robot's side: it reaches"
+        f" {front:.0%} of the points along them and {back:.0%} against them{offer}"
+    )
+    return (Finding("inverted", text),)
+
+
+def contact_poses(points: SurfacePoints, spin: FloatArray) -> FloatArray:
+    """Return T_base_tcp at the points, z into the surface, turned about z by each spin.
+
+    Parameters
+    ----------
+    points : SurfacePoints
+        The contact points.
+    spin : ndarray, shape (spin,)
+        In rad.
+
+    Returns
+    -------
+    ndarray, shape (point, spin, 4, 4)
+        In m. At spin 0 the x axis lies in the plane of the normal and the base's x axis, or, for
+        a normal along x, is arbitrary but always the same.
+    """
+    z = -points.normal
+    first, second = tangents(z)
+    # Of all directions square to z, the one nearest to base x: so that the spin means something.
+    lean = np.arctan2(second[:, 0], first[:, 0])
+    turn = lean[:, None] + spin
+    cosine, sine = np.cos(turn)[..., None], np.sin(turn)[..., None]
+    T = np.zeros((*turn.shape, 4, 4))
+    T[..., :3, 0] = cosine * first[:, None] + sine * second[:, None]
+    T[..., :3, 1] = cosine * second[:, None] - sine * first[:, None]
+    T[..., :3, 2] = z[:, None]
+    T[..., :3, 3] = points.position[:, None]
+    T[..., 3, 3] = 1.0
+    return T
+
+
+def _reached(points: SurfacePoints, sign: float, reachable: Reachable) -> float:
+    """Return the share of the points that are reached at any of a few spins."""
+    turned = SurfacePoints(points.position, sign * points.normal, points.face, points.barycentric)
+    poses = contact_poses(turned, np.linspace(0.0, 2.0 * np.pi, _SPINS, endpoint=False))
+    return float(reachable(poses.reshape(-1, 4, 4)).reshape(len(points), -1).any(axis=1).mean())

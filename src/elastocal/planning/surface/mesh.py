@@ -1,0 +1,119 @@
+"""Read a triangle mesh: STL, OBJ or PLY, welded, in metres, without faces that have no area."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import trimesh
+
+from elastocal.arrays import FloatArray, IndexArray
+from elastocal.errors import ElastocalError, FileAccessError
+
+SUFFIXES = (".stl", ".obj", ".ply")
+_WELD = 1e-6
+"""Vertices nearer than this part of the mesh's diagonal are one; STL carries seven digits."""
+_FLAT = 1e-10
+"""A face whose area is below this part of its longest edge squared has no usable normal."""
+
+
+class SurfaceError(ElastocalError, ValueError):
+    """A tooling surface that cannot be used: unreadable mesh, no faces, empty region."""
+
+
+@dataclass(frozen=True, eq=False)
+class TriangleMesh:
+    """Welded triangles."""
+
+    vertices: FloatArray
+    """Shape (vertex, 3), in m."""
+    faces: IndexArray
+    """Vertex numbers, counter-clockwise as seen from outside, shape (face, 3)."""
+    degenerate: int = 0
+    """Faces without area that were left out."""
+
+
+def read_mesh(path: Path, unit: float) -> TriangleMesh:
+    """Return the triangles of a mesh file.
+
+    Parameters
+    ----------
+    path : Path
+        An STL (binary or text), OBJ or PLY file.
+    unit : float
+        Length of one unit of the file, in m; mesh files do not say.
+
+    Raises
+    ------
+    FileAccessError
+        If the file cannot be opened.
+    SurfaceError
+        If the suffix is another, the contents are not such a mesh, or it has no face.
+    """
+    path = Path(path)
+    if path.suffix.lower() not in SUFFIXES:
+        raise SurfaceError(
+            f"mesh {path}: suffix {path.suffix!r} is not one of {', '.join(SUFFIXES)}"
+        )
+    try:
+        with path.open("rb") as file:
+            loaded = trimesh.load_mesh(file, file_type=path.suffix[1:].lower(), process=False)
+    except OSError as error:
+        raise FileAccessError(f"cannot read {path}: {error.strerror or error}") from error
+    # What the readers of trimesh raise on bad contents is not documented; these were seen.
+    except (ValueError, IndexError, KeyError, TypeError, AttributeError) as error:
+        reason = " ".join(str(error).split()) or type(error).__name__
+        raise SurfaceError(f"mesh {path} is not a readable {path.suffix[1:]}: {reason}") from error
+    vertices = np.asarray(getattr(loaded, "vertices", ()), dtype=float).reshape(-1, 3)
+    faces = np.asarray(getattr(loaded, "faces", ()), dtype=np.intp).reshape(-1, 3)
+    return weld(vertices * unit, faces, f"mesh {path}")
+
+
+def weld(vertices: FloatArray, faces: IndexArray, what: str) -> TriangleMesh:
+    """Return a mesh whose coincident vertices are one and whose faces all have an area.
+
+    Parameters
+    ----------
+    vertices : ndarray, shape (vertex, 3)
+        In m.
+    faces : ndarray of int, shape (face, 3)
+        Vertex numbers.
+    what : str
+        Name of the mesh, for messages.
+
+    Raises
+    ------
+    SurfaceError
+        If there is no face with an area, a vertex is not finite, or a number is out of range.
+    """
+    if not len(faces):
+        raise SurfaceError(f"{what} has no faces")
+    if not np.isfinite(vertices).all():
+        raise SurfaceError(f"{what} has a vertex that is not finite")
+    if not (faces.min() >= 0 and faces.max() < len(vertices)):
+        raise SurfaceError(
+            f"{what} has a face that names vertex {faces.max()}; there are {len(vertices)}"
+        )
+    used, faces = np.unique(faces, return_inverse=True)
+    vertices, faces = vertices[used], faces.reshape(-1, 3)
+    size = float(np.linalg.norm(np.ptp(vertices, axis=0))) or 1.0
+    _, first, same = np.unique(
+        np.round((vertices - vertices.min(axis=0)) / (_WELD * size)).astype(np.int64),
+        axis=0,
+        return_index=True,
+        return_inverse=True,
+    )
+    vertices, faces = vertices[first], same.reshape(-1)[faces]
+    good = has_area(vertices, faces)
+    if not good.any():
+        raise SurfaceError(f"{what} has no face with an area ({len(faces)} degenerate ones)")
+    return TriangleMesh(vertices, faces[good], int(np.sum(~good)))
+
+
+def has_area(vertices: FloatArray, faces: IndexArray) -> np.ndarray:
+    """Return whether each face has an area, shape (face,)."""
+    corners = vertices[faces]
+    longest = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
+    doubled = np.linalg.norm(
+        np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1
+    )
+    return np.asarray(doubled > 2.0 * _FLAT * longest**2)

@@ -1,0 +1,16 @@
+"""``elastocal init``, called as a function; the command line registers it."""
+
+import pytest
+
+from elastocal.cli.init import init
+from elastocal.errors import FileAccessError
+
+
+def test_init_writes_a_cell_and_says_what_comes_next(tmp_path, capsys):
+    init(tmp_path / "new", like="machining")
+    assert {p.name for p in (tmp_path / "new").iterdir()} == {"cell.yaml", "block.stl"}
+    shown = capsys.readouterr()
+    assert shown.out == ""
+    assert "elastocal plan" in shown.err
+    with pytest.raises(FileAccessError, match="--force"):
+        init(tmp_path / "new", like="machining")

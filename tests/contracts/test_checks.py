@@ -1,0 +1,93 @@
+"""The suite that every check of a calibration pose passes."""
+
+import coal
+import numpy as np
+import pytest
+
+from elastocal.planning.checks import (
+    CollisionCheck,
+    EdgeCheck,
+    FlatnessCheck,
+    FrictionCheck,
+    JointLimitsCheck,
+    SensorCheck,
+    SightCheck,
+    SingularityCheck,
+    Station,
+    TorqueCheck,
+    WristCheck,
+    verdicts,
+)
+from elastocal.planning.scene import Body, CollisionScene
+from elastocal.planning.surface import DiskFit
+from support.postures import FORCE_TCP, arm, postures
+
+
+def scene() -> CollisionScene:
+    tool = Body("tool", coal.Box(0.2, 0.2, 0.2), np.eye(4))
+    away = np.eye(4)
+    away[:3, 3] = (0.0, 3.0, 0.5)
+    return CollisionScene(arm(), (tool,), (Body("post", coal.Box(0.2, 0.2, 1.0), away),))
+
+
+def every_check():
+    count = len(postures())
+    fit = DiskFit(np.linspace(0.0, 0.1, count), np.zeros(count))
+    T_sensor_tcp = np.eye(4)
+    T_sensor_tcp[2, 3] = 0.3
+    return [
+        JointLimitsCheck(arm(), 0.05),
+        SingularityCheck(arm(), 0.05),
+        WristCheck(arm(), 0.1),
+        FrictionCheck(FORCE_TCP, 0.5, 1.5),
+        TorqueCheck(arm(), FORCE_TCP, np.full(6, 9000.0), 60.0, np.array([0.0, 0.0, -0.2])),
+        SensorCheck(FORCE_TCP, T_sensor_tcp, np.full(3, 1500.0), np.full(3, 240.0)),
+        EdgeCheck(np.linspace(0.0, 0.3, count), 0.03, 0.005),
+        FlatnessCheck(fit, 0.05),
+        CollisionCheck(scene(), 0.02),
+        SightCheck(
+            (Station("north", (3.0, 2.0, 2.0), 1.0, 10.0),),
+            np.array([0.0, 0.1, -0.1]),
+            np.array([0.0, 0.0, -1.0]),
+            1.0,
+        ),
+    ]
+
+
+@pytest.mark.parametrize("check", every_check(), ids=lambda check: check.name)
+class TestEveryCheck:
+    def test_gives_one_finite_margin_a_posture(self, check):
+        margin = check.margin(postures())
+        assert margin.shape == (len(postures()),)
+        assert np.all(np.isfinite(margin))
+
+    def test_judges_each_posture_by_itself(self, check):
+        chosen = np.array([7, 3, 11])
+        alone = check.margin(postures().take(chosen))
+        np.testing.assert_allclose(alone, check.margin(postures())[chosen], atol=1e-6)
+
+    def test_has_a_name_a_unit_and_advice(self, check):
+        assert check.name.isidentifier()
+        assert check.unit
+        assert len(check.advice.split()) > 3
+
+    def test_of_no_posture_is_empty(self, check):
+        assert check.margin(postures().take([])).shape == (0,)
+
+
+def test_verdicts_count_what_each_check_refuses():
+    found = verdicts(every_check(), postures())
+    for name, margin in zip(found.names, found.margin, strict=True):
+        assert found.refused[name] == np.count_nonzero(margin <= 0.0)
+    assert np.array_equal(found.passed, np.all(found.margin > 0.0, axis=0))
+    assert len(set(found.names)) == len(found.names)
+
+
+def test_a_margin_that_is_not_a_number_does_not_pass():
+    class Unsure(FrictionCheck):
+        def margin(self, postures):
+            return np.full(len(postures), np.nan)
+
+    found = verdicts([Unsure(FORCE_TCP, 0.5, 1.0)], postures())
+    assert not np.any(found.passed)
+    assert found.bottleneck == "friction"

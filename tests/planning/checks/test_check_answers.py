@@ -1,0 +1,150 @@
+"""Known answers of the checks."""
+
+import coal
+import numpy as np
+import pytest
+import trimesh
+
+from elastocal.planning.checks import (
+    CollisionCheck,
+    FrictionCheck,
+    JointLimitsCheck,
+    SensorCheck,
+    SightCheck,
+    Station,
+    TorqueCheck,
+    WristCheck,
+)
+from elastocal.planning.scene import Body, CollisionScene
+from support.postures import FORCE_TCP, arm, postures
+
+NO_TOOL = (0.0, np.zeros(3))
+
+
+def test_friction_is_what_holds_less_what_pulls():
+    # 0.5 * 1100 / 1.25 - 280
+    check = FrictionCheck(FORCE_TCP, 0.5, 1.25)
+    assert check.margin(postures())[0] == pytest.approx(160.0)
+    assert FrictionCheck(FORCE_TCP, 0.25, 1.0).margin(postures())[0] == pytest.approx(-5.0)
+
+
+def test_joint_limits_look_at_contact_and_approach():
+    one = postures().take([0])
+    limits = arm().limits
+    both = min(limits.margin(one.q).min(), limits.margin(one.q_approach).min())
+    assert JointLimitsCheck(arm(), 0.1).margin(one)[0] == pytest.approx(both - 0.1)
+
+
+def test_the_wrist_angle_is_that_of_joint_five():
+    margin = WristCheck(arm(), 0.0).margin(postures())
+    folded = np.abs(postures().q[:, 4])
+    np.testing.assert_allclose(margin, np.minimum(folded, np.pi - folded), atol=1e-9)
+
+
+def test_torques_do_the_work_of_the_loads_backwards():
+    """Virtual work: tau . dq = -(f . dp), with gravity off."""
+    check = TorqueCheck(arm(), FORCE_TCP[1:2], np.ones(6), *NO_TOOL, gravity=(0.0, 0.0, 0.0))
+    few = postures().take([0, 5])
+    step = 1e-6 * np.array([1.0, -2.0, 1.5, 0.5, -1.0, 2.0])
+    moved = arm().forward(few.q + step)[:, :3, 3] - arm().forward(few.q - step)[:, :3, 3]
+    force = few.T_base_tcp[:, :3, :3] @ FORCE_TCP[1]
+    work = np.sum(force * moved, axis=1)
+    np.testing.assert_allclose(check.torques(few)[0] @ (2.0 * step), -work, rtol=1e-6)
+
+
+def test_the_tool_weighs_on_the_joints_like_a_force_at_its_centre():
+    centre = np.array([0.1, 0.0, -0.2])
+    light = TorqueCheck(arm(), 0.0 * FORCE_TCP[:1], np.ones(6), 0.0, centre)
+    heavy = TorqueCheck(arm(), 0.0 * FORCE_TCP[:1], np.ones(6), 50.0, centre)
+    few = postures().take([0, 5])
+    extra = (heavy.torques(few) - light.torques(few))[0]
+    step = 1e-6 * np.eye(6)
+    for column in range(6):
+        height = []
+        for sign in (1.0, -1.0):
+            T = arm().forward(few.q + sign * step[column])
+            height.append((T[:, :3, :3] @ centre + T[:, :3, 3])[:, 2])
+        slope = (height[0] - height[1]) / 2e-6
+        np.testing.assert_allclose(extra[:, column], 50.0 * 9.80665 * slope, atol=1e-3)
+
+
+def test_unknown_torques_are_not_judged_and_said_so():
+    allowed = np.array([np.nan, 9000.0, np.nan, np.nan, np.nan, np.nan])
+    assert TorqueCheck(arm(), FORCE_TCP, allowed, *NO_TOOL).judged == ("joint_a2",)
+    nothing = TorqueCheck(arm(), FORCE_TCP, np.full(6, np.nan), *NO_TOOL)
+    assert nothing.judged == ()
+
+
+def test_the_sensor_feels_the_lever_arm():
+    T = np.eye(4)
+    T[2, 3] = 0.45
+    check = SensorCheck(np.array([[500.0, 0, -1500]]), T, np.full(3, 1e9), np.full(3, 300.0))
+    # 500 N * 0.45 m = 225 N·m of 300
+    assert check.margin(postures())[0] == pytest.approx(0.25)
+
+
+def test_a_post_in_the_way_is_a_collision_and_named():
+    one = postures().take([0])
+    inside = np.eye(4)
+    T_base_tcp = one.T_base_tcp[0]
+    inside[:3, 3] = T_base_tcp[:3, :3] @ [-0.15, 0.0, -0.55] + T_base_tcp[:3, 3]
+    obstacles = (Body("post", coal.Box(0.3, 0.3, 0.3), inside),)
+    scene = CollisionScene(arm(), (), obstacles)
+    assert CollisionCheck(scene, 0.01).margin(one)[0] < 0.0
+    assert "post" in scene.nearest(one.q[0])
+
+
+def test_in_contact_the_tool_may_touch_what_it_presses_on():
+    one = postures().take([0])
+    here = np.eye(4)
+    here[:3, 3] = one.contact[0]
+    tool = (Body("disk", coal.Sphere(0.02), np.eye(4)),)
+    mould = (Body("mould", coal.Sphere(0.02), here),)
+    pressed = CollisionScene(arm(), tool, mould, frozenset({"mould"}))
+    assert pressed.clearance(one.q, True, 0.01)[0] > 0.01
+    assert pressed.clearance(one.q, False, 0.01)[0] == 0.0
+    assert pressed.clearance(one.q_approach, False, 0.01)[0] > 0.01
+
+
+def test_the_clearance_is_at_most_the_exact_distance():
+    away = np.eye(4)
+    away[:3, 3] = (1.2, 1.2, 0.8)
+    scene = CollisionScene(arm(), (), (Body("post", coal.Box(0.3, 0.3, 0.3), away),))
+    q = postures().q
+    bound, exact = scene.clearance(q, False, 0.01), scene._distances(q).min(axis=1)
+    assert np.all(bound <= exact + 1e-9)
+    assert np.all(bound[exact > 0.01] > 0.0)
+    assert np.all(bound[exact < 0.01 - 1e-6] == 0.0)
+
+
+class TestSight:
+    marker, axis = np.array([0.0, 0.0, -0.1]), np.array([0.0, 0.0, -1.0])
+
+    def station(self, away=3.0, **changes):
+        one = postures().take([0])
+        R, p = one.T_base_tcp[0, :3, :3], one.contact[0]
+        position = p + R @ (self.marker + away * self.axis)
+        fields = {"nearest": 1.0, "farthest": 10.0} | changes
+        return one, Station("north", tuple(position), **fields)
+
+    def test_straight_ahead_the_whole_acceptance_is_left(self):
+        one, station = self.station()
+        check = SightCheck((station,), self.marker, self.axis, 0.5)
+        assert check.margin(one)[0] == pytest.approx(0.5)
+        assert check.seen_by(one) == ["north"]
+
+    def test_a_wall_or_the_range_hides_the_marker(self):
+        one, station = self.station()
+        wall = trimesh.creation.box((0.5, 0.5, 0.5))
+        wall.apply_translation((np.array(station.position) + one.contact[0]) / 2.0)
+        hidden = SightCheck((station,), self.marker, self.axis, 0.5, wall)
+        assert hidden.margin(one)[0] == -np.pi
+        assert hidden.seen_by(one) == [None]
+        _, near = self.station(farthest=2.0)
+        assert SightCheck((near,), self.marker, self.axis, 0.5).margin(one)[0] == -np.pi
+
+    def test_of_two_stations_the_better_one_counts(self):
+        one, station = self.station()
+        _, near = self.station(farthest=2.0)
+        both = SightCheck((near, station), self.marker, self.axis, 0.5)
+        assert both.margin(one)[0] == pytest.approx(0.5)

@@ -1,0 +1,136 @@
+"""What is odd about a surface is said."""
+
+import numpy as np
+import pytest
+
+from elastocal.cell import load_cell
+from elastocal.cell.examples import EXAMPLES, write_example
+from elastocal.cell.examples.meshes import block, dome_section
+from elastocal.planning.surface import (
+    ReachableFrom,
+    arm_reach,
+    arm_stands,
+    build_surface,
+    contact_poses,
+    flipped,
+    inverted_finding,
+    load_surface,
+    mesh_findings,
+    placement_findings,
+    sample_uniform,
+)
+from elastocal.robot.inverse import inverse_for
+from support.tooling import plane, soup
+
+RNG = 11
+
+
+@pytest.fixture(scope="module", params=sorted(EXAMPLES))
+def cell(request, tmp_path_factory):
+    return load_cell(write_example(tmp_path_factory.mktemp("cell"), request.param)[0])
+
+
+def placed(cell, unit=None):
+    source = cell.file.surface
+    return load_surface(cell.surface_path, unit or source.metres, cell.T_base_surface)
+
+
+def kinds(cell, surface):
+    reachable = ReachableFrom(inverse_for(cell.robot), cell.external_positions)
+    stands = arm_stands(cell.robot, cell.external_positions)
+    rng = np.random.default_rng(RNG)
+    found = placement_findings(surface, stands, arm_reach(cell.robot), reachable, rng)
+    assert all("\n" not in finding.message for finding in found)
+    return {finding.kind: finding for finding in found}
+
+
+def test_the_examples_are_well_placed(cell):
+    assert kinds(cell, placed(cell)) == {}
+
+
+def test_inverted_normals_are_found_and_turning_them_is_offered(cell):
+    found = kinds(cell, flipped(placed(cell)))
+    assert list(found) == ["inverted"]
+    assert "flip_normals: true" in found["inverted"].message
+
+
+def test_a_mesh_in_mm_that_is_read_as_m_is_found_by_the_reach(cell):
+    found = kinds(cell, build_surface(placed(cell, unit=1.0).mesh, np.eye(4)))
+    if cell.name == "machining":
+        assert found == {} or "far" in found
+    far = build_surface(placed(cell, unit=1.0).mesh, np.diag([1.0, 1, 1, 1]) + _shift(900.0))
+    found = kinds(cell, far)
+    assert found["far"].fatal
+    assert "mm" in found["far"].message
+
+
+def test_a_mesh_in_m_that_is_read_as_mm_is_tiny(cell):
+    assert "tiny" in kinds(cell, placed(cell, unit=1e-6))
+
+
+def test_the_reach_is_a_bound_that_a_stretched_arm_nearly_attains(cell):
+    reach = arm_reach(cell.robot)
+    rng = np.random.default_rng(0)
+    limits = cell.robot.limits
+    q = rng.uniform(limits.lower, limits.upper, (500, len(limits.lower)))
+    q[:, : cell.robot.external_axes] = 0.0
+    stand = arm_stands(cell.robot, np.zeros((1, cell.robot.external_axes)))[0]
+    distance = np.linalg.norm(cell.robot.forward(q)[:, :3, 3] - stand, axis=1)
+    assert 0.6 * reach < distance.max() <= reach
+
+
+def test_an_open_mesh_is_said_and_a_closed_one_is_not():
+    assert [f.kind for f in mesh_findings(plane())] == ["open"]
+    assert "4 edges" in mesh_findings(plane())[0].message
+    assert mesh_findings(soup(block())) == ()
+
+
+def test_a_third_face_at_an_edge_a_turned_and_a_flat_face_are_said():
+    triangles = block()
+    fin = np.array(
+        [triangles[0][0], triangles[0][1], triangles[0][:2].mean(axis=0) + np.array([-1, 0, 0.3])]
+    )
+    flat = np.repeat(triangles[0][:1], 3, axis=0)
+    turned = triangles.copy()
+    turned[3] = turned[3][::-1]
+    surface = soup(np.concatenate([turned, [fin, flat]]))
+    assert {f.kind for f in mesh_findings(surface)} >= {"non-manifold", "degenerate", "winding"}
+
+
+def test_a_block_inside_out_is_found_without_asking_the_robot():
+    def nowhere(poses):
+        raise AssertionError("not asked")
+
+    rng = np.random.default_rng(RNG)
+    assert inverted_finding(soup(block()), nowhere, rng) == ()
+    (found,) = inverted_finding(soup(block()[:, ::-1]), nowhere, rng)
+    assert "inside out" in found.message
+
+
+def test_a_surface_that_is_reached_nowhere_is_not_called_inverted():
+    rng = np.random.default_rng(RNG)
+    never = lambda poses: np.zeros(len(poses), dtype=bool)  # noqa: E731
+    assert inverted_finding(soup(dome_section()), never, rng) == ()
+
+
+def test_contact_poses_press_into_the_surface_and_turn_about_their_z():
+    points = sample_uniform(soup(block()), 40, np.random.default_rng(0))
+    spin = np.linspace(0, np.pi, 5)
+    T = contact_poses(points, spin)
+    R = T[..., :3, :3]
+    np.testing.assert_allclose(
+        R @ R.swapaxes(-1, -2), np.broadcast_to(np.eye(3), R.shape), atol=1e-12
+    )
+    np.testing.assert_allclose(np.linalg.det(R), 1.0)
+    np.testing.assert_allclose(T[..., :3, 2], -np.repeat(points.normal[:, None], 5, axis=1))
+    np.testing.assert_allclose(
+        np.einsum("pi,psi->ps", R[:, 0, :, 0], R[..., 0]), np.cos([spin] * 40)
+    )
+    level = np.abs(points.normal[:, 0]) < 0.5
+    np.testing.assert_allclose(T[level, 0, 0, 0], 1.0)
+
+
+def _shift(metres):
+    T = np.zeros((4, 4))
+    T[0, 3] = metres
+    return T
