@@ -18,7 +18,7 @@ from elastocal.files import read_text
 class StrictModel(BaseModel):
     """Base of every model that is read from a file: frozen, no unknown keys."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
 
 Model = TypeVar("Model", bound=StrictModel)
@@ -36,7 +36,7 @@ def read_yaml(path: Path, model: type[Model], schema: str) -> Model:
     """
     try:
         data = yaml.safe_load(read_text(path))
-    except yaml.YAMLError as error:
+    except (yaml.YAMLError, ValueError) as error:
         raise SchemaError(f"{path} is not valid YAML: {' '.join(str(error).split())}") from error
     return _checked(data, path, model, schema)
 

@@ -111,7 +111,7 @@ def _spring_row(spring: Figures, group: int | None) -> tuple[str, ...]:
 
 def _known(value: float, low: float, high: float) -> str:
     if not value > 0.0:
-        return "[green]rigid[/green]" if not high > 0.0 else f"at bound, below {high:.3f}"
+        return "[yellow]at bound[/yellow]" + (f", below {high:.3f}" if high > 0.0 else "")
     relative = (high - low) / 2.0 / value
     colour = "green" if relative < 0.2 else "yellow" if relative < 0.5 else "red"
     return f"[{colour}]±{relative:.0%}[/{colour}]"

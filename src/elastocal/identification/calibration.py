@@ -21,7 +21,7 @@ from elastocal.identification.observability import observability
 from elastocal.identification.options import FitOptions
 from elastocal.identification.poses import same_configuration
 from elastocal.identification.problem import Problem, build
-from elastocal.identification.solve import Solution, solve
+from elastocal.identification.solve import Solution, factor, solve
 from elastocal.identification.suspicious import Screening, screen
 from elastocal.identification.widening import widen, widening
 
@@ -115,10 +115,11 @@ def calibrate(
         model,
         solution.compliance,
         widen(weighted, solution.compliance, draws, by),
-        observability(solution.factored, model.springs),
+        # A prior makes nothing observable: what was believed before is not measured.
+        observability(factor(weighted.without_prior()), model.springs),
         provenance,
     )
-    offset = force_offset(model, readings.take(used), kept, solution.compliance)
+    offset = force_offset(model, readings.take(used), weighted, solution.compliance, marker_offset)
     warnings += [offset.message()] if offset else []
     return Calibration(
         calibrated=calibrated,

@@ -13,7 +13,7 @@ import numpy as np
 
 from elastocal.dataset import Readings
 from elastocal.elastic import ElasticModel
-from elastocal.errors import ConventionError
+from elastocal.errors import ConventionError, IdentificationError
 from elastocal.identification.mistakes import mistakes_of
 from elastocal.identification.options import FitOptions
 from elastocal.identification.problem import Problem, build
@@ -39,8 +39,12 @@ def check_conventions(model: ElasticModel, readings: Readings) -> float:
     ------
     ConventionError
         If the data are explained far better with a sign or a frame read otherwise.
+    IdentificationError
+        If most deflections are zero.
     """
     problem = build(model, readings, FitOptions())
+    if not np.median(np.linalg.norm(problem.d, axis=1)) > 0.0:
+        raise IdentificationError("most deflections are zero: there is nothing to identify")
     robust = solve(problem, "huber")
     stated = _unexplained(problem.reweighted(robust.reading_weight))
     found = []

@@ -134,8 +134,10 @@ def read_model(path: Path) -> CalibratedModel:
     for name, rows in (("compliance", (record.compliance,)), ("draws", record.draws)):
         if any(len(row) != n for row in rows) or not rows:
             raise SchemaError(f"{path}: {name} must have one number for each of {n} springs")
-    robot = Robot.from_urdf(record.robot.urdf, record.robot.tcp, record.robot.base)
     seen = record.observability
+    if len(seen.observable) != n or not 0 <= seen.rank <= n:
+        raise SchemaError(f"{path}: observability (rank {seen.rank}) does not fit {n} springs")
+    robot = Robot.from_urdf(record.robot.urdf, record.robot.tcp, record.robot.base)
     return CalibratedModel(
         ElasticModel(robot, springs),
         np.array(record.compliance),

@@ -12,6 +12,7 @@ import numpy as np
 from scipy.stats import chi
 
 from elastocal.arrays import BoolArray, FloatArray
+from elastocal.identification.least_squares import rank
 from elastocal.identification.problem import Problem
 from elastocal.identification.solve import Solution, normalised_residuals, solve
 
@@ -55,13 +56,15 @@ def screen(problem: Problem) -> Screening:
     robust = solve(problem, "cauchy")
     weighted = problem.reweighted(robust.reading_weight)
     h = leverage(weighted, robust)
-    score = normalised_residuals(problem, robust.compliance) / np.sqrt(1.0 - h)
+    score = normalised_residuals(problem, robust.compliance, np.sqrt(1.0 - h))
     residual = np.linalg.norm(problem.residuals(robust.compliance), axis=1)
     typical = float(np.median(np.linalg.norm(problem.d, axis=1)))
     blunder = (score > BLUNDER_SCORE) & (residual > BLUNDER_SIZE * typical)
     if blunder.mean() > MOST_BLUNDERS:
         blunder = np.zeros_like(blunder)
-    threshold = float(chi.ppf(1.0 - FALSE_ALARM / len(problem), 3))
+    # The scale is a median itself; from N readings it is uncertain by about half of 1/sqrt(N).
+    uncertain = 1.0 + 1.0 / np.sqrt(len(problem))
+    threshold = float(uncertain * chi.ppf(1.0 - FALSE_ALARM / len(problem), 3))
     return Screening(score, residual, h, threshold, blunder)
 
 
@@ -71,7 +74,7 @@ def leverage(problem: Problem, solution: Solution) -> FloatArray:
     The diagonal of the hat matrix, shape (reading,), at most 0.99.
     """
     system = solution.factored
-    seen = system.s > system.s[0] * 1e-6
-    basis = (system.Vt[seen] / system.s[seen, None]) / system.scale
-    rows = (problem.O * problem.weight[..., None]) @ basis.T
+    seen = rank(system.s)
+    basis = system.Vt[:seen] / system.s[:seen, None]
+    rows = problem.scaled().rows @ basis.T
     return np.asarray(np.minimum(np.square(rows).sum(axis=2).mean(axis=1), _MOST_LEVERAGE))
