@@ -14,15 +14,15 @@ def made(readings, options=None, **more):
 
 
 def doubtful():
-    readings, truth = linear_readings("actuated", sigma=1e-5)
+    readings, _ = linear_readings("actuated", sigma=1e-5)
     marker = readings.marker_displacement.copy()
     marker[[5, 50]] += 2e-4
-    return replace(readings, marker_displacement=marker), truth
+    return replace(readings, marker_displacement=marker)
 
 
 @pytest.mark.parametrize("loss", ["huber", "cauchy"])
 def test_refits_keep_the_weights_that_the_loss_gave(loss):
-    readings, _ = doubtful()
+    readings = doubtful()
     found = made(readings, FitOptions(loss=loss))
     weighted = build(elastic("actuated"), readings).reweighted(found.solution.reading_weight)
     expected = leave_poses_out(weighted)
@@ -32,14 +32,13 @@ def test_refits_keep_the_weights_that_the_loss_gave(loss):
 
 
 def test_the_compliances_are_those_of_the_readings_kept():
-    readings, truth = doubtful()
+    readings = doubtful()
     marker = readings.marker_displacement.copy()
     marker[100] += 0.5
     found = made(replace(readings, marker_displacement=marker))
     assert np.flatnonzero(~found.used).tolist() == [100]
     kept = build(elastic("actuated"), readings).take(found.used)
     np.testing.assert_allclose(found.calibrated.compliance, solve(kept).compliance, rtol=1e-9)
-    np.testing.assert_allclose(found.calibrated.compliance, truth, rtol=0.2)
 
 
 def test_the_estimate_lies_in_its_interval():
@@ -60,11 +59,12 @@ def test_a_marker_far_from_the_tcp_gives_the_springs_when_its_lever_is_told():
 
 
 def test_one_configuration_under_two_labels_is_worth_a_warning():
-    readings = campaign()
-    pose = np.where(readings.load_case == "west", readings.pose + 100, readings.pose)
-    found = made(replace(readings, pose=pose))
+    again = campaign().take(np.append(np.arange(155), np.flatnonzero(campaign().pose == 3)))
+    pose = again.pose.copy()
+    pose[155:] = 100
+    found = made(replace(again, pose=pose))
     assert found.poses == 31
-    assert "poses 0, 100 are one configuration" in found.warnings[0]
+    assert found.warnings[0].startswith("poses 3, 100 are one configuration")
 
 
 def test_a_fit_that_explains_little_is_worth_a_warning():

@@ -33,13 +33,13 @@ def test_a_pose_measured_under_two_labels_is_one_block():
     assert same_configuration(readings, blocks) == [(10, 13)]
 
 
-def test_two_milliradians_apart_are_two_configurations():
-    assert len(np.unique(pose_blocks(with_joints([0.0, 0.0019, 0.1, 0.2])))) == 3
-    assert len(np.unique(pose_blocks(with_joints([0.0, 0.0021, 0.1, 0.2])))) == 4
+def test_five_milliradians_apart_are_two_configurations():
+    assert len(np.unique(pose_blocks(with_joints([0.0, 0.0049, 0.1, 0.2])))) == 3
+    assert len(np.unique(pose_blocks(with_joints([0.0, 0.0051, 0.1, 0.2])))) == 4
 
 
 def test_three_labels_of_one_configuration_are_one_group():
-    readings = with_joints([0.0, 0.0015, 0.003, 0.1, 0.2])
+    readings = with_joints([0.0, 0.003, 0.006, 0.1, 0.2])
     assert same_configuration(readings, pose_blocks(readings)) == [(0, 1, 2)]
 
 
