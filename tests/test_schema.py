@@ -96,6 +96,13 @@ def test_a_number_that_is_not_finite_is_refused(tmp_path, value):
         read_yaml(path, Cell, SCHEMA)
 
 
+def test_a_key_that_stands_twice_is_refused(tmp_path):
+    path = tmp_path / "cell.yaml"
+    path.write_text(f"schema: {SCHEMA}\nrobot: a\nrobot: b\n")
+    with pytest.raises(SchemaError, match="'robot' stands twice"):
+        read_yaml(path, Cell, SCHEMA)
+
+
 def test_a_key_that_is_no_text_is_refused(tmp_path):
     path = tmp_path / "cell.yaml"
     path.write_text(f"schema: {SCHEMA}\nrobot: a\n1: 2\n")

@@ -24,6 +24,21 @@ class StrictModel(BaseModel):
 Model = TypeVar("Model", bound=StrictModel)
 
 
+class _UniqueKeyLoader(yaml.SafeLoader):
+    """The safe loader, but a key that stands twice is an error instead of the last one winning."""
+
+
+def _unique_mapping(loader: yaml.SafeLoader, node: yaml.MappingNode) -> dict[Any, Any]:
+    keys = [key.value for key, _ in node.value]
+    twice = sorted({str(key) for key in keys if keys.count(key) > 1})
+    if twice:
+        raise yaml.YAMLError(f"key {twice[0]!r} stands twice, {node.start_mark}")
+    return loader.construct_mapping(node, deep=True)
+
+
+_UniqueKeyLoader.add_constructor(yaml.resolver.BaseResolver.DEFAULT_MAPPING_TAG, _unique_mapping)
+
+
 def read_yaml(path: Path, model: type[Model], schema: str) -> Model:
     """Return the contents of a YAML file as a validated model.
 
@@ -35,7 +50,8 @@ def read_yaml(path: Path, model: type[Model], schema: str) -> Model:
         If the file cannot be read.
     """
     try:
-        data = yaml.safe_load(read_text(path))
+        # The loader is PyYAML's safe one with duplicate keys refused.
+        data = yaml.load(read_text(path), _UniqueKeyLoader)
     except (yaml.YAMLError, ValueError) as error:
         raise SchemaError(f"{path} is not valid YAML: {' '.join(str(error).split())}") from error
     return _checked(data, path, model, schema)

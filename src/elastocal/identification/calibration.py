@@ -99,7 +99,7 @@ def calibrate(
     warnings = list(check_joints(model.robot, readings))
     problem = build(model, readings, options, marker_offset)
     warnings += _repeated(readings, problem)
-    left = check_conventions(model, readings)
+    left = check_conventions(model, readings, marker_offset)
     if left > POOR:
         warnings.append(f"the springs leave {left:.0%} of the median deflection unexplained")
 

@@ -10,6 +10,7 @@ from dataclasses import replace
 from operator import itemgetter
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from elastocal.dataset import Readings
 from elastocal.elastic import ElasticModel
@@ -32,8 +33,19 @@ NOTHING = 0.5
 spring; with so few, another reading may fit better by chance."""
 
 
-def check_conventions(model: ElasticModel, readings: Readings) -> float:
+def check_conventions(
+    model: ElasticModel, readings: Readings, marker_offset: ArrayLike | None = None
+) -> float:
     """Return the part of the median deflection that a robust fit leaves unexplained.
+
+    Parameters
+    ----------
+    model : ElasticModel
+        Robot and springs.
+    readings : Readings
+        What was measured.
+    marker_offset : array_like, shape (3,), optional
+        Marker in the tcp frame, in m.
 
     Raises
     ------
@@ -42,7 +54,7 @@ def check_conventions(model: ElasticModel, readings: Readings) -> float:
     IdentificationError
         If most deflections are zero.
     """
-    problem = build(model, readings, FitOptions())
+    problem = build(model, readings, FitOptions(), marker_offset)
     if not np.median(np.linalg.norm(problem.d, axis=1)) > 0.0:
         raise IdentificationError("most deflections are zero: there is nothing to identify")
     robust = solve(problem, "huber")
@@ -50,7 +62,8 @@ def check_conventions(model: ElasticModel, readings: Readings) -> float:
     found = []
     for mistake in mistakes_of(model.robot):
         undone = mistake.undo(model.robot, readings)
-        blocks = model.observation_blocks(undone.joint_position, undone.force, undone.moment)
+        q, force, moment = undone.joint_position, undone.force, undone.moment
+        blocks = model.observation_blocks(q, force, moment, marker_offset)
         # The weights of the stated reading keep a blunder out of every other one, too.
         other = replace(problem, O=blocks, d=undone.deflection).reweighted(robust.reading_weight)
         found.append((_unexplained(other), mistake.message))

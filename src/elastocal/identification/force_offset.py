@@ -27,6 +27,8 @@ _SMALLEST = 0.03
 """Part of the median force below which an offset is not worth naming."""
 _REDUCTION = 0.3
 """Part of the sum of squared residuals that the offset must explain to be named."""
+_FEWEST_POSES = 10
+"""With fewer poses, what the springs miss at one of them may pass for an offset."""
 _ROUNDS = 20
 _SETTLED = 1e-3
 """Step at which the offset stands still, relative to its size."""
@@ -85,6 +87,8 @@ def force_offset(
     marker_offset : array_like, shape (3,), optional
         Marker in the tcp frame, in m, as the problem was built with.
     """
+    if len(np.unique(problem.block)) < _FEWEST_POSES:
+        return None
     T_base_tcp = model.robot.forward(readings.joint_position)
     turns = {
         "base": np.broadcast_to(np.eye(3), (len(readings), 3, 3)),

@@ -9,7 +9,7 @@ Detection*, 1987, chapter 6).
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import chi
+from scipy.stats import f
 
 from elastocal.arrays import BoolArray, FloatArray
 from elastocal.identification.least_squares import rank
@@ -62,9 +62,9 @@ def screen(problem: Problem) -> Screening:
     blunder = (score > BLUNDER_SCORE) & (residual > BLUNDER_SIZE * typical)
     if blunder.mean() > MOST_BLUNDERS:
         blunder = np.zeros_like(blunder)
-    # The scale is a median itself; from N readings it is uncertain by about half of 1/sqrt(N).
-    uncertain = 1.0 + 1.0 / np.sqrt(len(problem))
-    threshold = float(uncertain * chi.ppf(1.0 - FALSE_ALARM / len(problem), 3))
+    # The scale is a median itself, about half as good as a variance of all that is left over.
+    freedom = 0.5 * max(problem.d.size - rank(robust.factored.s), 2)
+    threshold = float(np.sqrt(3.0 * f.ppf(1.0 - FALSE_ALARM / len(problem), 3, freedom)))
     return Screening(score, residual, h, threshold, blunder)
 
 
