@@ -52,7 +52,7 @@ def read_yaml(path: Path, model: type[Model], schema: str) -> Model:
     try:
         # The loader is PyYAML's safe one with duplicate keys refused.
         data = yaml.load(read_text(path), _UniqueKeyLoader)
-    except (yaml.YAMLError, ValueError) as error:
+    except (yaml.YAMLError, ValueError, RecursionError) as error:
         raise SchemaError(f"{path} is not valid YAML: {' '.join(str(error).split())}") from error
     return _checked(data, path, model, schema)
 
@@ -61,7 +61,7 @@ def read_json(path: Path, model: type[Model], schema: str) -> Model:
     """Return the contents of a JSON file as a validated model; see `read_yaml`."""
     try:
         data = json.loads(read_text(path))
-    except json.JSONDecodeError as error:
+    except (ValueError, RecursionError) as error:
         raise SchemaError(f"{path} is not valid JSON: {error}") from error
     return _checked(data, path, model, schema)
 

@@ -26,10 +26,13 @@ DECISIVE = 0.6
 """A mistake is named when undoing it leaves at most this part of what was unexplained. Model
 errors and noise stay whichever way correct data are read, so that for correct data every
 mistake leaves more, not less."""
+EXPLAINED = 0.2
+"""Part that a mistake's undoing may leave unexplained to be named: it has to fit well itself.
+Springs that the model lacks can make a wrong reading of good data fit less badly, never well."""
 EXACT = 1e-8
 """Unexplained part below which data are exact and comparing remainders compares round-off."""
 NOTHING = 0.5
-"""Unexplained part above which a mistake is named even when there are fewer than two equations a
+"""Unexplained part above which a mistake is named even when there are fewer than four equations a
 spring; with so few, another reading may fit better by chance."""
 
 
@@ -68,8 +71,9 @@ def check_conventions(
         other = replace(problem, O=blocks, d=undone.deflection).reweighted(robust.reading_weight)
         found.append((_unexplained(other), mistake.message))
     best, message = min(found, key=itemgetter(0))
-    few = problem.d.size < 2 * problem.springs
-    if best <= DECISIVE * stated and stated > (NOTHING if few else EXACT):
+    few = problem.d.size < 4 * problem.springs
+    enough = stated > (NOTHING if few else EXACT)
+    if enough and best <= min(DECISIVE * stated, EXPLAINED):
         raise ConventionError(
             f"{message}: read that way the fit leaves {best:.1%} of the median deflection"
             f" unexplained, as stated {stated:.1%}"

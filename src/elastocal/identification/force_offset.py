@@ -29,6 +29,8 @@ _REDUCTION = 0.3
 """Part of the sum of squared residuals that the offset must explain to be named."""
 _FEWEST_POSES = 10
 """With fewer poses, what the springs miss at one of them may pass for an offset."""
+_SPARE = 2.0
+"""Fewest equations for each unknown, offset included."""
 _ROUNDS = 20
 _SETTLED = 1e-3
 """Step at which the offset stands still, relative to its size."""
@@ -87,7 +89,8 @@ def force_offset(
     marker_offset : array_like, shape (3,), optional
         Marker in the tcp frame, in m, as the problem was built with.
     """
-    if len(np.unique(problem.block)) < _FEWEST_POSES:
+    unknowns = problem.springs + 3
+    if len(np.unique(problem.block)) < _FEWEST_POSES or problem.d.size < _SPARE * unknowns:
         return None
     T_base_tcp = model.robot.forward(readings.joint_position)
     turns = {
@@ -101,7 +104,9 @@ def force_offset(
     if not first[frame].explained > _REDUCTION:
         return None
     found = _settle(model, readings, problem, compliance, turns[frame], marker_offset)
-    large = float(np.linalg.norm(found.force)) > _SMALLEST * median
+    if found is None:
+        return None
+    large = _SMALLEST * median < float(np.linalg.norm(found.force)) < median
     significant = bool(np.any(np.abs(found.force) > _SIGNIFICANT * found.sigma))
     return ForceOffset(frame, found.force, found.sigma) if large and significant else None
 
@@ -113,8 +118,8 @@ def _settle(
     compliance: FloatArray,
     R: FloatArray,
     marker_offset: ArrayLike | None,
-) -> _Step:
-    """Fit offset and compliances in turn; return the offset with its last standard errors."""
+) -> _Step | None:
+    """Fit offset and compliances in turn; None when the offset does not come to rest."""
     offset = np.zeros(3)
     for _ in range(_ROUNDS):
         force = readings.force - R @ offset
@@ -126,8 +131,8 @@ def _settle(
         step = _step(corrected, -_yield(model, readings, compliance, marker_offset) @ R)
         offset = offset + step.force
         if np.linalg.norm(step.force) < _SETTLED * np.linalg.norm(offset):
-            break
-    return replace(step, force=offset)
+            return replace(step, force=offset)
+    return None
 
 
 def _yield(

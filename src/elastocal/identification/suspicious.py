@@ -27,6 +27,8 @@ beyond any model error: a broken beam, a marker knocked off, a reading of anothe
 MOST_BLUNDERS = 0.1
 """Largest part of the readings that may be set aside; more is a bad campaign, not blunders."""
 
+REDUNDANCY = 1.5
+"""Fewest equations for each determined direction; with fewer, residuals say nothing."""
 _MOST_LEVERAGE = 0.99
 
 
@@ -56,6 +58,9 @@ def screen(problem: Problem) -> Screening:
     robust = solve(problem, "cauchy")
     weighted = problem.reweighted(robust.reading_weight)
     h = leverage(weighted, robust)
+    if problem.d.size < REDUNDANCY * rank(robust.factored.s):
+        nothing = np.zeros(len(problem))
+        return Screening(nothing, nothing, h, np.inf, nothing > 0.0)
     score = normalised_residuals(problem, robust.compliance, np.sqrt(1.0 - h))
     residual = np.linalg.norm(problem.residuals(robust.compliance), axis=1)
     typical = float(np.median(np.linalg.norm(problem.d, axis=1)))
