@@ -98,7 +98,7 @@ def test_the_figures_of_the_calibration_stand_in_the_file(path):
         (["robot", "urdf_sha256"], "0" * 64, "robot.urdf was changed"),
         (["compliance"], [1e-6], "compliance must have one number for each of 18 springs"),
         (["draws", 3], [1e-6], "draws must have one number for each of 18 springs"),
-        (["draws"], [], "draws must have one number"),
+        (["draws"], [], "0 draws, at least 40 are needed"),
         (["springs"], [], "one number for each of 0 springs"),
         (["compliance", 0], "soft", r"compliance\.0: .*got 'soft'"),
         (["compliance", 0], float("nan"), r"compliance\.0: .*finite"),

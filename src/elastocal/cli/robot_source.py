@@ -59,9 +59,7 @@ def _urdf_of(robot: str | None, dataset: Dataset | None) -> str:
             )
         return dataset.robot_urdf
     path = Path(robot)
-    if path.suffix.lower() in (".urdf", ".xml") or (
-        robot not in catalogue.names() and _is_file(path)
-    ):
+    if path.suffix.lower() in (".urdf", ".xml") or _is_file(path):
         return read_text(path)
     return catalogue.urdf(robot)
 

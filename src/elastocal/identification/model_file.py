@@ -133,9 +133,7 @@ def read_model(path: Path) -> CalibratedModel:
     springs = tuple(Spring(**spring.model_dump()) for spring in record.springs)
     n = len(springs)
     if len(record.draws) < MINIMUM_DRAWS:
-        raise SchemaError(
-            f"{path}: draws must be at least {MINIMUM_DRAWS}, got {len(record.draws)}"
-        )
+        raise SchemaError(f"{path}: {len(record.draws)} draws, at least {MINIMUM_DRAWS} are needed")
     for name, rows in (("compliance", (record.compliance,)), ("draws", record.draws)):
         if any(len(row) != n for row in rows) or not rows:
             raise SchemaError(f"{path}: {name} must have one number for each of {n} springs")

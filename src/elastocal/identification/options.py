@@ -58,7 +58,7 @@ class FitOptions:
             raise IdentificationError(
                 f"unknown weights {self.weights!r} (allowed: {', '.join(WEIGHTS)})"
             )
-        if not (isinstance(self.draws, int) and self.draws >= MINIMUM_DRAWS):
+        if not self.draws >= MINIMUM_DRAWS or self.draws != int(self.draws):
             raise IdentificationError(
                 f"{self.draws} bootstrap draws: at least {MINIMUM_DRAWS} make a 95 % interval"
             )
