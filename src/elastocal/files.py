@@ -26,8 +26,8 @@ def replacing(path: Path) -> Iterator[Path]:
     """
     path = Path(path)
     try:
-        if path.is_dir():
-            raise IsADirectoryError(f"{path} is a folder")
+        if path.exists() and not path.is_file():
+            raise IsADirectoryError("it is a folder or a device, not a file")
         handle, name = tempfile.mkstemp(path.suffix, f".{path.name}.", path.parent)
         os.close(handle)
     except OSError as error:

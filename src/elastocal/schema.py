@@ -18,10 +18,25 @@ from elastocal.files import read_text
 class StrictModel(BaseModel):
     """Base of every model that is read from a file: frozen, no unknown keys."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
 
 Model = TypeVar("Model", bound=StrictModel)
+
+
+class _UniqueKeyLoader(yaml.SafeLoader):
+    """The safe loader, but a key that stands twice is an error instead of the last one winning."""
+
+
+def _unique_mapping(loader: yaml.SafeLoader, node: yaml.MappingNode) -> dict[Any, Any]:
+    keys = [key.value for key, _ in node.value]
+    twice = sorted({str(key) for key in keys if keys.count(key) > 1})
+    if twice:
+        raise yaml.YAMLError(f"key {twice[0]!r} stands twice, {node.start_mark}")
+    return loader.construct_mapping(node, deep=True)
+
+
+_UniqueKeyLoader.add_constructor(yaml.resolver.BaseResolver.DEFAULT_MAPPING_TAG, _unique_mapping)
 
 
 def read_yaml(path: Path, model: type[Model], schema: str) -> Model:
@@ -35,8 +50,9 @@ def read_yaml(path: Path, model: type[Model], schema: str) -> Model:
         If the file cannot be read.
     """
     try:
-        data = yaml.safe_load(read_text(path))
-    except yaml.YAMLError as error:
+        # The loader is PyYAML's safe one with duplicate keys refused.
+        data = yaml.load(read_text(path), _UniqueKeyLoader)
+    except (yaml.YAMLError, ValueError, RecursionError) as error:
         raise SchemaError(f"{path} is not valid YAML: {' '.join(str(error).split())}") from error
     return _checked(data, path, model, schema)
 
@@ -45,7 +61,7 @@ def read_json(path: Path, model: type[Model], schema: str) -> Model:
     """Return the contents of a JSON file as a validated model; see `read_yaml`."""
     try:
         data = json.loads(read_text(path))
-    except json.JSONDecodeError as error:
+    except (ValueError, RecursionError) as error:
         raise SchemaError(f"{path} is not valid JSON: {error}") from error
     return _checked(data, path, model, schema)
 

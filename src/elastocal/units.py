@@ -59,7 +59,10 @@ def parse_quantity(text: object, dimension: str) -> float:
     if match is None:
         units = ", ".join(_FACTORS[dimension])
         raise UnitError(f"{text!r} is not a {dimension} with its unit (one of {units})")
-    return float(match[1]) * factor(match[2].strip(), dimension)
+    value = float(match[1]) * factor(match[2].strip(), dimension)
+    if not math.isfinite(value):
+        raise UnitError(f"{text!r} is not a finite {dimension}")
+    return value
 
 
 def split_column(header: str) -> tuple[str, str | None]:
@@ -76,7 +79,7 @@ def split_column(header: str) -> tuple[str, str | None]:
         If brackets do not match or nothing stands before them.
     """
     match = _COLUMN.fullmatch(header)
-    if match is None:
+    if match is None or not match["name"].strip():
         raise UnitError(f"column header {header!r} is not of the form name[unit]")
     unit = match["unit"]
     return match["name"], None if unit is None else unit.strip()

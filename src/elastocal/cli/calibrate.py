@@ -39,8 +39,14 @@ def calibrate(  # noqa: PLR0913 - one parameter an option
     keep_blunders: Annotated[
         bool, typer.Option("--keep-blunders", help="Fit also what cannot be a measurement.")
     ] = False,
+    trust_conventions: Annotated[
+        bool,
+        typer.Option(
+            "--trust-conventions", help="Fit data that fit far better with a sign read otherwise."
+        ),
+    ] = False,
     draws: Annotated[int, typer.Option(help="Bootstrap draws.")] = 200,
-    seed: Annotated[int, typer.Option(help="Seed of the bootstrap.")] = 0,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of the bootstrap.")] = 0,
     as_json: Annotated[
         bool, typer.Option("--json", help="Print the figures as one JSON object.")
     ] = False,
@@ -50,7 +56,7 @@ def calibrate(  # noqa: PLR0913 - one parameter an option
 
     from elastocal import dataset as datasets
     from elastocal.cli.calibration_table import show_calibration
-    from elastocal.cli.output import console, print_json
+    from elastocal.cli.output import console, print_json, refuse_overwriting
     from elastocal.cli.parsing import parse_bounds, parse_point
     from elastocal.cli.robot_source import find_robot
     from elastocal.cli.selection import without
@@ -65,8 +71,10 @@ def calibrate(  # noqa: PLR0913 - one parameter an option
         weights=cast("Weights", weights),
         loss=loss,
         set_blunders_aside=not keep_blunders,
+        trust_conventions=trust_conventions,
         draws=draws,
     )
+    refuse_overwriting(out, data)
     measured = datasets.read(data)
     arm = find_robot(robot, tcp, tool, measured)
     readings = without(measured.readings(arm.joint_names), exclude or [])

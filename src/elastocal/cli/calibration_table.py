@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from rich.console import Console
+from rich.markup import escape
 from rich.table import Table
 
 from elastocal.identification import describe
@@ -15,6 +16,8 @@ from elastocal.identification.observability import Term
 
 Figures = dict[str, Any]
 _MOST_SUSPICIOUS = 10
+_MOST_TERMS = 6
+"""A combination of more springs than this tells a reader nothing."""
 
 
 def show_calibration(console: Console, figures: Figures, out: Path) -> None:
@@ -26,15 +29,15 @@ def show_calibration(console: Console, figures: Figures, out: Path) -> None:
     _show_groups(console, figures)
     _show_suspicious(console, figures["suspicious"])
     for warning in figures["warnings"]:
-        console.print(f"[yellow]warning:[/yellow] {warning}")
-    console.print(f"\nmodel written to [bold]{out}[/bold]")
+        console.print(f"[yellow]warning:[/yellow] {escape(warning)}")
+    console.print(f"\nmodel written to [bold]{escape(str(out))}[/bold]")
 
 
 def _show_fit(console: Console, figures: Figures) -> None:
     mean, peak = figures["deflection"]["mean"], figures["deflection"]["max"]
     fit, held_out = figures["residual"], figures["held_out"]
     console.print(
-        f"[bold]{figures['robot']}[/bold]: {figures['springs_total']} springs,"
+        f"[bold]{escape(figures['robot'])}[/bold]: {figures['springs_total']} springs,"
         f" {figures['readings']} readings at {figures['poses']} poses,"
         f" measured deflection {_mm(mean)} mean, {_mm(peak)} max"
     )
@@ -99,9 +102,9 @@ def _spring_row(spring: Figures, group: int | None) -> tuple[str, ...]:
     unit, stiff = ("", "") if spring["kind"] == "revolute" else (" µm/N", " MN/m")
     if not spring["observable"]:
         note = f"[yellow]not by itself[/yellow], group {group}"
-        return spring["name"], f"[dim]({value:.4f}{unit})[/dim]", "", "", note
+        return escape(spring["name"]), f"[dim]({value:.4f}{unit})[/dim]", "", "", note
     return (
-        spring["name"],
+        escape(spring["name"]),
         f"{value:.4f}{unit}",
         f"{low:.3f} … {high:.3f}",
         f"{1.0 / value:.3f}{stiff}" if value > 0.0 else "rigid",
@@ -111,7 +114,7 @@ def _spring_row(spring: Figures, group: int | None) -> tuple[str, ...]:
 
 def _known(value: float, low: float, high: float) -> str:
     if not value > 0.0:
-        return "[green]rigid[/green]" if not high > 0.0 else f"at bound, below {high:.3f}"
+        return "[yellow]at bound[/yellow]" + (f", below {high:.3f}" if high > 0.0 else "")
     relative = (high - low) / 2.0 / value
     colour = "green" if relative < 0.2 else "yellow" if relative < 0.5 else "red"
     return f"[{colour}]±{relative:.0%}[/{colour}]"
@@ -121,14 +124,22 @@ def _show_groups(console: Console, figures: Figures) -> None:
     if not figures["unobservable"]:
         console.print(f"every spring is observable; condition number {figures['condition']:.0f}")
         return
+    missing = figures["rank_attainable"] - figures["rank"]
+    meaning = (
+        "these combinations change no deflection under a force, so their springs have no value of"
+        " their own; predictions do not need one"
+        if missing <= 0
+        else f"{missing} more directions could be seen with other poses or load cases, so not all"
+        " of these combinations are harmless"
+    )
     console.print(
         f"\nrank {figures['rank']} of {figures['springs_total']} (condition number"
-        f" {figures['condition']:.0f}): these combinations change no deflection, so their springs"
-        " have no value of their own; predictions do not need one"
+        f" {figures['condition']:.0f}): {meaning}"
     )
     for number, group in enumerate(figures["unobservable"], start=1):
         terms = [Term(term["spring"], term["weight"]) for term in group]
-        console.print(f"   group {number}: {describe(terms)}")
+        shown = describe(terms) if len(terms) <= _MOST_TERMS else f"{len(terms)} springs mixed"
+        console.print(f"   group {number}: {escape(shown)}")
 
 
 def _show_suspicious(console: Console, suspicious: list[Figures]) -> None:
@@ -139,14 +150,15 @@ def _show_suspicious(console: Console, suspicious: list[Figures]) -> None:
     console.print(f"\n[yellow]{len(suspicious)} {many} wrong[/yellow] (robust score):")
     for reading in suspicious[:_MOST_SUSPICIOUS]:
         note = " [red]set aside as a blunder[/red]" if reading["set_aside"] else ""
+        off = _mm(reading["residual"])
         console.print(
-            f"   pose {reading['pose']} {reading['load_case']}: {_mm(reading['residual'])} off,"
+            f"   pose {reading['pose']} {escape(reading['load_case'])}: {off} off,"
             f" score {reading['score']:.1f}{note}"
         )
     if len(suspicious) > _MOST_SUSPICIOUS:
         console.print(f"   … and {len(suspicious) - _MOST_SUSPICIOUS} more (--json lists all)")
     first = suspicious[0]
-    console.print(f"   to leave one out: --exclude {first['pose']}:{first['load_case']}")
+    console.print(f"   to leave one out: --exclude {first['pose']}:{escape(first['load_case'])}")
 
 
 def _mm(metres: float) -> str:

@@ -16,6 +16,8 @@ def check(
     ] = False,
 ) -> None:
     """Validate a file and say what it holds."""
+    from rich.markup import escape
+
     from elastocal.cli.file_kinds import describe_file
     from elastocal.cli.output import console, print_json
 
@@ -23,6 +25,6 @@ def check(
     if as_json:
         print_json({"file": str(file), "kind": kind, **facts})
         return
-    console().print(f"[green]ok[/green] {file} is a {kind}")
+    console().print(f"[green]ok[/green] {escape(str(file))} is a {kind}")
     for name, value in facts.items():
         console().print(f"   {name.replace('_', ' ')}: {value}", markup=False)

@@ -8,7 +8,7 @@ import typer
 
 def demo(
     out: Annotated[Path, typer.Option(help="Folder for the results.")] = Path("demo"),
-    seed: Annotated[int, typer.Option(help="Seed of the simulated cell.")] = 0,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of the simulated cell.")] = 0,
 ) -> None:
     """Calibrate a simulated KUKA KR 120 HA and predict deflections at poses it has not seen."""
     from elastocal.cli.demo_cell import run_demo

@@ -6,7 +6,7 @@ from typing import Any
 
 from elastocal import dataset
 from elastocal.elastic.layouts import read_springs
-from elastocal.errors import SchemaError
+from elastocal.errors import RobotError, SchemaError
 from elastocal.files import read_text
 from elastocal.identification.model_file import read_model
 from elastocal.robot import Robot
@@ -68,6 +68,8 @@ def _model(path: Path) -> Facts:
 def _robot(path: Path) -> Facts:
     text = read_text(path)
     leaves = leaf_links(parse_urdf(text))
+    if not leaves:
+        raise RobotError(f"{path}: URDF has no link at the end of a chain")
     robots = [Robot.from_urdf(text, leaf) for leaf in leaves]
     return {
         "robot": robots[0].name,

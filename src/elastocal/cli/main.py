@@ -49,6 +49,10 @@ def run() -> None:
     except ElastocalError as error:
         _complain(str(error))
         sys.exit(1)
+    except OSError as error:
+        # Standard output that is full or gone; every file of ours has its own refusal.
+        _complain(f"cannot write output: {error.strerror or error}")
+        sys.exit(1)
 
 
 def _complain(message: str) -> None:

@@ -2,14 +2,30 @@
 
 import json
 import sys
+from pathlib import Path
 from typing import Any
 
 from rich.console import Console
+
+from elastocal.errors import FileAccessError
 
 
 def console() -> Console:
     """Return the console that people read; standard output stays free for data."""
     return Console(stderr=True, highlight=False, soft_wrap=False)
+
+
+def refuse_overwriting(out: Path, *inputs: Path) -> None:
+    """Refuse an output path that is also an input: measurements are not to be replaced.
+
+    Raises
+    ------
+    FileAccessError
+        If the paths are the same file.
+    """
+    for path in inputs:
+        if out.resolve() == path.resolve():
+            raise FileAccessError(f"--out {out} is an input of this command: name another file")
 
 
 def print_json(data: Any) -> None:

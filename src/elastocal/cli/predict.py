@@ -17,10 +17,11 @@ def predict(
     """Predict the deflection of each row, with its 95 % interval."""
     import numpy as np
 
-    from elastocal.cli.output import console, print_json
+    from elastocal.cli.output import console, print_json, refuse_overwriting
     from elastocal.dataset.load_rows import joint_dimensions, read_load_rows, write_load_rows
     from elastocal.identification import read_model
 
+    refuse_overwriting(out, model, rows)
     calibrated = read_model(model)
     robot = calibrated.model.robot
     loads = read_load_rows(rows, joint_dimensions(robot.joint_names, robot.revolute))

@@ -59,9 +59,16 @@ def _urdf_of(robot: str | None, dataset: Dataset | None) -> str:
             )
         return dataset.robot_urdf
     path = Path(robot)
-    if path.suffix.lower() in (".urdf", ".xml") or path.is_file():
+    if path.suffix.lower() in (".urdf", ".xml") or _is_file(path):
         return read_text(path)
     return catalogue.urdf(robot)
+
+
+def _is_file(path: Path) -> bool:
+    try:
+        return path.is_file()
+    except OSError:
+        return False
 
 
 def _six(text: str) -> tuple[float, ...]:

@@ -10,6 +10,9 @@ from numpy.typing import ArrayLike
 from elastocal.dataset.layout import FloatArray, IntArray, StringArray, freeze
 from elastocal.errors import DatasetError
 
+_LARGEST = 1e9
+"""No SI number of a robot's reading comes near; what does is a damaged file."""
+
 
 @dataclass(frozen=True, eq=False)
 class Readings:
@@ -49,11 +52,13 @@ class Readings:
             array = np.array(value, dtype=np.float64)
             width = array.shape[-1] if name == "joint_position" and array.ndim else 3
             self._own(name, array, (len(self.pose), width))
-            if not np.all(np.isfinite(array)):
-                row = int(np.argwhere(~np.isfinite(array))[0, 0])
+            usable = np.abs(array) < _LARGEST
+            if not np.all(usable):
+                row = int(np.argwhere(~usable)[0, 0])
                 raise DatasetError(
                     f"{name} of pose {self.pose[row]}, load case {str(self.load_case[row])!r}"
-                    f" is {array[row].tolist()}: every number of a reading must be finite"
+                    f" is {array[row].tolist()}: every number of a reading must be finite and"
+                    f" below {_LARGEST:g} in SI units"
                 )
 
     def __len__(self) -> int:

@@ -113,13 +113,20 @@ class ElasticModel:
         -------
         ndarray, shape (..., 3, spring)
             In m per unit of compliance.
+
+        Raises
+        ------
+        RobotError, SpringError
+            If an argument has another shape or is not finite.
         """
+        force = check_vectors("force", force)
+        moment = None if moment is None else check_vectors("moment", moment)
         jacobian = self.spring_jacobian(q)
         torques = spring_torques(jacobian, force, moment)
         observed = jacobian.translation
         if marker_offset is not None and np.any(marker_offset):
             rotation = self.robot.forward(q)[..., :3, :3]
-            lever = rotation @ np.asarray(marker_offset, dtype=float)
+            lever = rotation @ check_vectors("marker_offset", marker_offset)
             observed = observed + np.cross(jacobian.rotation, lever[..., None], axis=-2)
         blocks: FloatArray = observed * torques[..., None, :]
         return blocks
@@ -182,6 +189,22 @@ class ElasticModel:
                 f" got shape {c.shape}"
             )
         return c
+
+
+def check_vectors(name: str, vectors: ArrayLike) -> FloatArray:
+    """Return vectors as a float array, or refuse them by name.
+
+    Raises
+    ------
+    SpringError
+        If the last axis is not x, y, z or a value is not finite.
+    """
+    array = np.asarray(vectors, dtype=float)
+    if array.ndim == 0 or array.shape[-1] != 3:
+        raise SpringError(f"{name} has shape {array.shape}: the last axis must be x, y, z")
+    if not np.all(np.isfinite(array)):
+        raise SpringError(f"{name} holds a value that is not finite")
+    return array
 
 
 def spring_torques(

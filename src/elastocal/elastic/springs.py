@@ -18,6 +18,9 @@ AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 _ALIGNED = 1.0 - 1e-9
 """Cosine above which a joint axis counts as a coordinate axis."""
 
+_UNIT = 1e-9
+"""Largest error of the length of a unit vector."""
+
 
 @dataclass(frozen=True)
 class Spring:
@@ -112,7 +115,8 @@ def check_springs(springs: Sequence[Spring], joint_names: Sequence[str]) -> None
     Raises
     ------
     SpringError
-        If the list is empty, a name occurs twice, or a joint is not the robot's.
+        If the list is empty, a name occurs twice, a joint is not the robot's, or an axis is no
+        unit vector.
     """
     if not springs:
         raise SpringError("a model needs at least one spring")
@@ -126,3 +130,7 @@ def check_springs(springs: Sequence[Spring], joint_names: Sequence[str]) -> None
                 f"spring {spring.name!r} sits at joint {spring.joint!r}, which the robot does not"
                 f" have{nearest(spring.joint, joint_names)} (joints: {', '.join(joint_names)})"
             )
+        if not abs(float(np.linalg.norm(spring.axis)) - 1.0) < _UNIT:
+            raise SpringError(f"axis of spring {spring.name!r} is {spring.axis}, not a unit vector")
+        if not np.all(np.isfinite(spring.offset)):
+            raise SpringError(f"offset of spring {spring.name!r} is {spring.offset}, not finite")

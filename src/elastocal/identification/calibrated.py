@@ -7,6 +7,8 @@ from numpy.typing import ArrayLike
 
 from elastocal.arrays import FloatArray
 from elastocal.elastic import ElasticModel
+from elastocal.elastic.model import check_vectors
+from elastocal.errors import SpringError
 from elastocal.identification.bootstrap import interval
 from elastocal.identification.observability import Observability
 
@@ -73,8 +75,12 @@ class CalibratedModel:
         moment : array_like, shape (row, 3), optional
             Moment on the robot about the tcp in base, in N·m.
         """
-        q, force = np.asarray(q, dtype=float), np.asarray(force, dtype=float)
-        moment = None if moment is None else np.asarray(moment, dtype=float)
+        q, force = self.model.robot.check_positions(q), check_vectors("force", force)
+        moment = None if moment is None else check_vectors("moment", moment)
+        for name, array in (("force", force), ("moment", moment)):
+            if q.ndim != 2 or (array is not None and array.shape != (len(q), 3)):
+                shape = None if array is None else array.shape
+                raise SpringError(f"{name} {shape} does not have a row for each of q {q.shape}")
         result = np.empty((3, len(q), 3))
         for start in range(0, len(q), _CHUNK):
             rows = slice(start, start + _CHUNK)

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 from elastocal.arrays import BoolArray, FloatArray
 from elastocal.dataset import Readings
 from elastocal.elastic import LAYOUTS, ElasticModel
-from elastocal.errors import IdentificationError
+from elastocal.errors import ConventionError, IdentificationError
 from elastocal.identification.bootstrap import bootstrap
 from elastocal.identification.calibrated import CalibratedModel
 from elastocal.identification.conventions import POOR, check_conventions
@@ -17,11 +17,11 @@ from elastocal.identification.force_offset import force_offset
 from elastocal.identification.grams import PoseGrams
 from elastocal.identification.held_out import Comparison, HeldOut, compare, leave_poses_out
 from elastocal.identification.joint_check import check_joints
-from elastocal.identification.observability import observability
+from elastocal.identification.observability import attainable_rank, observability
 from elastocal.identification.options import FitOptions
 from elastocal.identification.poses import same_configuration
 from elastocal.identification.problem import Problem, build
-from elastocal.identification.solve import Solution, solve
+from elastocal.identification.solve import Solution, factor, solve
 from elastocal.identification.suspicious import Screening, screen
 from elastocal.identification.widening import widen, widening
 
@@ -39,6 +39,8 @@ class Calibration:
     """``O c - d`` of every reading, shape (reading, 3), in m."""
     poses: int
     """Number of distinct poses."""
+    attainable_rank: int
+    """Rank that any number of poses and forces would reach; see `observability`."""
     held_out: HeldOut
     """Errors at left-out poses of the readings that entered the fit."""
     comparison: Comparison | None
@@ -93,16 +95,11 @@ def calibrate(
     ConventionError
         If the data fit only with a sign or frame read otherwise.
     IdentificationError
-        If there are too few poses or the bounds are impossible.
+        If there are too few poses, or the bounds are impossible or leave the data no part.
     """
     options = options or FitOptions()
-    warnings = list(check_joints(model.robot, readings))
     problem = build(model, readings, options, marker_offset)
-    warnings += _repeated(readings, problem)
-    left = check_conventions(model, readings)
-    if left > POOR:
-        warnings.append(f"the springs leave {left:.0%} of the median deflection unexplained")
-
+    doubts = _doubts(model, readings, problem, options, marker_offset)
     screening = screen(problem)
     used = ~screening.blunder if options.set_blunders_aside else np.ones_like(screening.blunder)
     kept = problem.take(used)
@@ -115,24 +112,70 @@ def calibrate(
         model,
         solution.compliance,
         widen(weighted, solution.compliance, draws, by),
-        observability(solution.factored, model.springs),
+        # A prior makes nothing observable: what was believed before is not measured.
+        observability(factor(weighted.without_prior()), model.springs),
         provenance,
     )
-    offset = force_offset(model, readings.take(used), kept, solution.compliance)
-    warnings += [offset.message()] if offset else []
+    offset = force_offset(model, readings.take(used), weighted, solution.compliance, marker_offset)
+    reach = max(attainable_rank(model, marker_offset), calibrated.observability.rank)
+    doubts += [offset.message()] if offset else []
+    doubts += _worth(calibrated, reach, held_out, weighted)
     return Calibration(
         calibrated=calibrated,
         readings=readings,
         used=used,
         residual=problem.residuals(solution.compliance),
         poses=len(np.unique(kept.block)),
+        attainable_rank=reach,
         held_out=held_out,
         comparison=_compare(model, weighted, held_out, rng),
         widening=by,
         screening=screening,
         solution=solution,
-        warnings=tuple(warnings),
+        warnings=tuple(doubts),
     )
+
+
+def _doubts(
+    model: ElasticModel,
+    readings: Readings,
+    problem: Problem,
+    options: FitOptions,
+    marker_offset: ArrayLike | None,
+) -> list[str]:
+    """Return what is odd about the data before they are fitted, or refuse them."""
+    doubts = list(check_joints(model.robot, readings)) + _repeated(readings, problem)
+    try:
+        left = check_conventions(model, readings, marker_offset)
+    except ConventionError as error:
+        if not options.trust_conventions:
+            raise
+        return [*doubts, f"fitted in spite of this: {error}"]
+    if left > POOR:
+        doubts.append(f"the springs leave {left:.0%} of the median deflection unexplained")
+    return doubts
+
+
+def _worth(
+    calibrated: CalibratedModel, reach: int, held_out: HeldOut, problem: Problem
+) -> list[str]:
+    """Return what limits the use of a fit, or refuse one that the data had no part in."""
+    c = calibrated.compliance
+    if np.all((c == problem.lower) | (c == problem.upper)):
+        raise IdentificationError(
+            "every spring ends at a bound: the bounds, not the data, would make the model"
+        )
+    doubts = []
+    missing = reach - calibrated.observability.rank
+    if missing > 0:
+        doubts.append(
+            f"poses and load cases determine {calibrated.observability.rank} of the {reach}"
+            " directions that more of them would: predictions elsewhere are not covered"
+        )
+    deflection = float(np.linalg.norm(problem.d, axis=1).mean())
+    if held_out.mean >= deflection:
+        doubts.append("at left-out poses the model predicts no better than none at all")
+    return doubts
 
 
 def _repeated(readings: Readings, problem: Problem) -> list[str]:

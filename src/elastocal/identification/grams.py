@@ -29,14 +29,14 @@ class PoseGrams:
     @classmethod
     def of(cls, problem: Problem) -> "PoseGrams":
         """Return the Gram blocks of a problem, in the order of its sorted block numbers."""
-        scale = np.append(problem.scale, 1.0)
-        rows = np.concatenate([problem.O, problem.d[..., None]], axis=2)
-        rows = rows * problem.weight[..., None] / scale
+        scaled = problem.scaled()
+        deflection = (problem.d * problem.weight)[..., None]
+        rows = np.concatenate([scaled.rows, deflection], axis=2)
         blocks, index = np.unique(problem.block, return_inverse=True)
-        gram = np.zeros((len(blocks), len(scale), len(scale)))
+        gram = np.zeros((len(blocks), rows.shape[2], rows.shape[2]))
         np.add.at(gram, index, np.swapaxes(rows, 1, 2) @ rows)
-        prior = problem.prior_rows / scale
-        return cls(gram, prior.T @ prior, scale[:-1], problem.lower, problem.upper)
+        prior = problem.prior_rows / np.append(scaled.scale, 1.0)
+        return cls(gram, prior.T @ prior, scaled.scale, problem.lower, problem.upper)
 
     def refit(self, multiplicity: FloatArray) -> FloatArray:
         """Return the compliances of each choice of poses.

@@ -39,6 +39,11 @@ def _limits(robot: Robot, readings: Readings) -> list[str]:
         f"{robot.joint_names[joint]} at pose {readings.pose[reading]} is {value:.4g} {unit},"
         f" outside the robot's {limits.lower[joint]:.4g} to {limits.upper[joint]:.4g} {unit}"
     )
+    if limits.lower[joint] >= limits.upper[joint]:
+        raise DatasetError(
+            f"URDF of {robot.name} leaves {robot.joint_names[joint]} no range: its limits are"
+            f" {limits.lower[joint]:g} to {limits.upper[joint]:g} {unit}"
+        )
     assumed = any(assumption.field == "position" for assumption in robot.assumptions)
     if worst < -OUTSIDE and not assumed:
         raise DatasetError(f"{message}: degrees, another joint order, or another robot?")

@@ -19,6 +19,10 @@ millimetre, which no tracker sees."""
 _FLOOR = 1e-6
 """Weight, relative to the largest singular value, that holds undetermined directions small."""
 
+_BVLS_SWEEPS = 50
+"""Largest number of iterations a variable."""
+_BVLS_TOLERANCE = 1e-15
+
 
 def rank(s: FloatArray) -> int:
     """Return the number of singular values above the tolerance; ``s`` in falling order."""
@@ -94,5 +98,13 @@ def _boxed(A: FloatArray, y: FloatArray, lower: FloatArray, upper: FloatArray) -
     free = lower < upper
     if np.any(free):
         rest = y - A[:, ~free] @ x[~free]
-        x[free] = lsq_linear(A[:, free], rest, (lower[free], upper[free]), method="bvls").x
+        limits = (lower[free], upper[free])
+        # Its default of one iteration a variable stops before the optimum.
+        most = _BVLS_SWEEPS * int(np.count_nonzero(free))
+        found = lsq_linear(
+            A[:, free], rest, limits, method="bvls", tol=_BVLS_TOLERANCE, max_iter=most
+        )
+        # What it holds at a bound may miss it by a rounding.
+        held = np.where(found.active_mask < 0, limits[0], limits[1])
+        x[free] = np.where(found.active_mask == 0, found.x, held)
     return x

@@ -12,6 +12,7 @@ from elastocal.errors import SchemaError
 from elastocal.files import sha256, write_text
 from elastocal.identification.calibrated import CalibratedModel
 from elastocal.identification.observability import Observability, Term
+from elastocal.identification.options import MINIMUM_DRAWS
 from elastocal.robot import Robot
 from elastocal.schema import StrictModel, read_json
 
@@ -131,11 +132,15 @@ def read_model(path: Path) -> CalibratedModel:
         raise SchemaError(f"{path}: robot.urdf was changed: its hash is not robot.urdf_sha256")
     springs = tuple(Spring(**spring.model_dump()) for spring in record.springs)
     n = len(springs)
+    if len(record.draws) < MINIMUM_DRAWS:
+        raise SchemaError(f"{path}: {len(record.draws)} draws, at least {MINIMUM_DRAWS} are needed")
     for name, rows in (("compliance", (record.compliance,)), ("draws", record.draws)):
         if any(len(row) != n for row in rows) or not rows:
             raise SchemaError(f"{path}: {name} must have one number for each of {n} springs")
-    robot = Robot.from_urdf(record.robot.urdf, record.robot.tcp, record.robot.base)
     seen = record.observability
+    if len(seen.observable) != n or not 0 <= seen.rank <= n:
+        raise SchemaError(f"{path}: observability (rank {seen.rank}) does not fit {n} springs")
+    robot = Robot.from_urdf(record.robot.urdf, record.robot.tcp, record.robot.base)
     return CalibratedModel(
         ElasticModel(robot, springs),
         np.array(record.compliance),

@@ -10,15 +10,16 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from elastocal.arrays import FloatArray
-from elastocal.elastic import Spring
-from elastocal.identification.least_squares import rank
+from elastocal.elastic import ElasticModel, Spring
+from elastocal.identification.least_squares import RANK_TOLERANCE, rank
 from elastocal.identification.solve import Factored
 from elastocal.identification.sparse_basis import sparse_basis
 
-_SEEN = 1e-6
-"""A spring counts as observable when its part in the null space is below this."""
+_PROBES, _PROBE_SEED = 60, 0
+"""Number and seed of the configurations that show what could be observed at all."""
 
 
 @dataclass(frozen=True)
@@ -41,7 +42,8 @@ class Observability:
     """Whether each spring is determined by itself."""
     unobservable: tuple[tuple[Term, ...], ...]
     """Combinations of compliances that the data do not see, in a sparse basis: adding any
-    multiple of one of them changes no predicted deflection."""
+    multiple of one of them changes no deflection that was measured. Whether it changes others
+    is told by `attainable_rank`."""
 
 
 def observability(system: Factored, springs: Sequence[Spring]) -> Observability:
@@ -56,12 +58,35 @@ def observability(system: Factored, springs: Sequence[Spring]) -> Observability:
     """
     determined = rank(system.s)
     null_space = system.Vt[determined:].T
-    part = np.linalg.norm(null_space, axis=1)
     groups = _readable(null_space / system.scale[:, None], springs)
     condition = system.s[0] / system.s[determined - 1] if determined else np.inf
-    return Observability(
-        determined, len(springs), float(condition), tuple(bool(p < _SEEN) for p in part), groups
-    )
+    mixed = {term.spring for group in groups for term in group}
+    observable = tuple(spring.name not in mixed for spring in springs)
+    return Observability(determined, len(springs), float(condition), observable, groups)
+
+
+def attainable_rank(model: ElasticModel, marker_offset: ArrayLike | None = None) -> int:
+    """Return the rank that any number of poses and forces would reach.
+
+    Below it, poses or load cases are missing and predictions elsewhere are not covered; at it,
+    what is not observable never matters for a deflection under a force.
+
+    Parameters
+    ----------
+    model : ElasticModel
+        Robot and springs.
+    marker_offset : array_like, shape (3,), optional
+        Marker in the tcp frame, in m.
+    """
+    limits = model.robot.limits
+    lower, upper = np.maximum(limits.lower, -np.pi), np.minimum(limits.upper, np.pi)
+    rng = np.random.default_rng(_PROBE_SEED)
+    q = rng.uniform(lower, upper, (_PROBES, len(lower)))
+    blocks = model.observation_blocks(q[:, None], np.eye(3), marker_offset=marker_offset)
+    rows = blocks.reshape(-1, len(model.springs))
+    norms = np.linalg.norm(rows, axis=0)
+    loaded = norms > RANK_TOLERANCE * norms.max()
+    return rank(np.linalg.svd(rows[:, loaded] / norms[loaded], compute_uv=False))
 
 
 def _readable(null_space: FloatArray, springs: Sequence[Spring]) -> tuple[tuple[Term, ...], ...]:

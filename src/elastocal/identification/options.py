@@ -47,6 +47,8 @@ class FitOptions:
     set_blunders_aside: bool = True
     """Leave readings out of the fit that cannot be measurements of this robot (see
     `suspicious`); they are always named."""
+    trust_conventions: bool = False
+    """Fit also data that would fit far better with a sign or frame read otherwise."""
     draws: int = 200
     """Number of pose-block bootstrap draws."""
 
@@ -56,7 +58,7 @@ class FitOptions:
             raise IdentificationError(
                 f"unknown weights {self.weights!r} (allowed: {', '.join(WEIGHTS)})"
             )
-        if not self.draws >= MINIMUM_DRAWS:
+        if not self.draws >= MINIMUM_DRAWS or self.draws != int(self.draws):
             raise IdentificationError(
                 f"{self.draws} bootstrap draws: at least {MINIMUM_DRAWS} make a 95 % interval"
             )

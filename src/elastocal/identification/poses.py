@@ -14,9 +14,10 @@ from elastocal.arrays import IndexArray
 from elastocal.dataset import Readings
 from elastocal.errors import IdentificationError
 
-SAME_CONFIGURATION = 2e-3
-"""Distance in joint space (rad, m) below which two poses are the same configuration: far more
-than a controller's repeatability, far less than the step between calibration poses."""
+SAME_CONFIGURATION = 5e-3
+"""Distance in joint space (rad, m) below which two poses are the same configuration: more than
+the few millimetres that the controller travels under load, far less than the step between
+calibration poses."""
 
 MINIMUM_BLOCKS = 3
 """Fewest distinct poses: one to leave out and two to fit, so that the spread is seen."""

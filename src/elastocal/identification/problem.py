@@ -5,13 +5,23 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from elastocal.arrays import BoolArray, FloatArray, IndexArray
+from elastocal.arrays import FloatArray, IndexArray
 from elastocal.dataset import Readings
 from elastocal.elastic import ElasticModel
 from elastocal.errors import IdentificationError
 from elastocal.identification.least_squares import RANK_TOLERANCE
 from elastocal.identification.options import FitOptions, Prior, bounds
 from elastocal.identification.poses import pose_blocks
+
+
+@dataclass(frozen=True, eq=False)
+class ScaledRows:
+    """Weighted observation blocks whose columns are comparable."""
+
+    rows: FloatArray
+    """Columns of unit norm, zero for an unloaded spring, shape (reading, 3, spring)."""
+    scale: FloatArray
+    """What each column was divided by, shape (spring,); the largest for an unloaded spring."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,9 +57,21 @@ class Problem:
 
     @property
     def scale(self) -> FloatArray:
-        """Norm of each weighted column, 1 for a zero column, shape (spring,)."""
-        norms = np.sqrt(np.einsum("rin,ri->n", np.square(self.O), np.square(self.weight)))
-        return np.where(norms > 0.0, norms, 1.0)
+        """Norm of each weighted column; see `scaled`. Shape (spring,)."""
+        return self.scaled().scale
+
+    def scaled(self) -> "ScaledRows":
+        """Return the weighted observation blocks with columns of unit norm.
+
+        The column of a spring that no force turns, e.g. of the last joint when the tcp is on its
+        axis, is round-off that would pass for information; it becomes zero.
+        """
+        rows = self.O * self.weight[..., None]
+        norms = np.sqrt(np.einsum("rin,rin->n", rows, rows))
+        largest = norms.max() or 1.0
+        loaded = norms > RANK_TOLERANCE * largest
+        rows *= np.where(loaded, 1.0 / np.where(loaded, norms, 1.0), 0.0)
+        return ScaledRows(rows, np.where(loaded, norms, largest))
 
     def residuals(self, compliance: FloatArray) -> FloatArray:
         """Return ``O c - d``, unweighted, shape (reading, 3), in m."""
@@ -58,6 +80,10 @@ class Problem:
     def reweighted(self, factor: FloatArray) -> "Problem":
         """Return the problem with each reading's squared residual multiplied by a factor."""
         return replace(self, weight=self.weight * np.sqrt(factor)[:, None])
+
+    def without_prior(self) -> "Problem":
+        """Return the problem of the data alone."""
+        return replace(self, prior_rows=self.prior_rows[:0])
 
     def take(self, readings: ArrayLike) -> "Problem":
         """Return the problem of some of the readings (a mask or indices)."""
@@ -108,7 +134,6 @@ def build(
     options = options or FitOptions()
     q, force = readings.joint_position, readings.force
     blocks = model.observation_blocks(q, force, readings.moment, marker_offset)
-    blocks[:, :, _unloaded(blocks)] = 0.0
     lower, upper = bounds(options, len(model.springs))
     return Problem(
         O=blocks,
@@ -119,15 +144,6 @@ def build(
         upper=upper,
         prior_rows=_prior_rows(options.prior, len(model.springs)),
     )
-
-
-def _unloaded(blocks: FloatArray) -> BoolArray:
-    """Return which springs no force turns, e.g. the last joint when the tcp is on its axis.
-
-    Their columns are round-off; scaled to unit norm it would pass for information.
-    """
-    norms = np.linalg.norm(blocks, axis=(0, 1))
-    return np.asarray(norms < RANK_TOLERANCE * norms.max())
 
 
 def _weights(readings: Readings, options: FitOptions) -> FloatArray:
@@ -147,7 +163,7 @@ def _prior_rows(prior: Prior | None, springs: int) -> FloatArray:
     mean, sigma = np.asarray(prior.mean, dtype=float), np.asarray(prior.sigma, dtype=float)
     if mean.shape != (springs,) or sigma.shape != (springs,):
         raise IdentificationError(f"prior must have one mean and sigma for {springs} springs")
-    if not (np.all(np.isfinite(mean)) and np.all(sigma > 0.0) and prior.noise > 0.0):
+    if not (np.all(np.isfinite(mean)) and np.all(sigma > 0.0) and 0.0 < prior.noise < np.inf):
         raise IdentificationError("prior needs finite means, and sigmas and noise above 0")
     gain = prior.noise / sigma
     return np.column_stack([np.diag(gain), gain * mean])

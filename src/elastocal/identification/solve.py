@@ -7,7 +7,7 @@ import numpy as np
 from elastocal.arrays import FloatArray
 from elastocal.errors import IdentificationError
 from elastocal.identification.least_squares import kkt_violation, minimise
-from elastocal.identification.losses import LOSSES, MEDIAN_NORM
+from elastocal.identification.losses import LOSSES, MEDIAN_NORM, check_loss
 from elastocal.identification.problem import Problem
 
 _OPTIMALITY = 1e-7
@@ -46,17 +46,15 @@ class Solution:
 
 def factor(problem: Problem) -> Factored:
     """Reduce the weighted rows to a triangle and decompose it."""
-    scale = problem.scale
-    rows = (problem.O * problem.weight[..., None]).reshape(-1, problem.springs)
-    system = np.column_stack([rows, (problem.d * problem.weight).ravel()])
-    system = np.vstack([system, problem.prior_rows])
-    n = problem.springs
+    n, scaled = problem.springs, problem.scaled()
+    deflection = (problem.d * problem.weight).ravel()
+    system = np.column_stack([scaled.rows.reshape(-1, n), deflection])
+    system = np.vstack([system, problem.prior_rows / np.append(scaled.scale, 1.0)])
     if len(system) < n + 1:
         system = np.vstack([system, np.zeros((n + 1 - len(system), n + 1))])
-    system[:, :n] /= scale
     triangle = np.asarray(np.linalg.qr(system, mode="r"), dtype=float)
     U, s, Vt = np.linalg.svd(triangle[:n, :n])
-    return Factored(s, Vt, U.T @ triangle[:n, n], scale)
+    return Factored(s, Vt, U.T @ triangle[:n, n], scaled.scale)
 
 
 def solve(problem: Problem, loss: str = "linear") -> Solution:
@@ -67,6 +65,7 @@ def solve(problem: Problem, loss: str = "linear") -> Solution:
     IdentificationError
         If nothing can be identified, or the solver did not reach the optimum.
     """
+    check_loss(loss)
     if loss == "linear":
         return _solve_linear(problem, np.ones(len(problem)))
     weigh = LOSSES[loss]
@@ -81,13 +80,24 @@ def solve(problem: Problem, loss: str = "linear") -> Solution:
     return _solve_linear(problem, weight)
 
 
-def normalised_residuals(problem: Problem, compliance: FloatArray) -> FloatArray:
+def normalised_residuals(
+    problem: Problem, compliance: FloatArray, shrinkage: FloatArray | float = 1.0
+) -> FloatArray:
     """Return the norm of each reading's weighted residual in robust standard deviations.
 
     The scale is the median norm over that of the chi distribution with three degrees of
-    freedom, shape (reading,).
+    freedom. Shape (reading,).
+
+    Parameters
+    ----------
+    problem : Problem
+        The problem.
+    compliance : ndarray, shape (spring,)
+        Where residuals are taken.
+    shrinkage : ndarray, shape (reading,), or float
+        By how much the fit has shrunk each residual, at most 1; divided out.
     """
-    norms = np.linalg.norm(problem.residuals(compliance) * problem.weight, axis=1)
+    norms = np.linalg.norm(problem.residuals(compliance) * problem.weight, axis=1) / shrinkage
     sigma = np.median(norms) / MEDIAN_NORM
     smallest = np.finfo(float).eps * float(np.abs(problem.d).max())
     return np.asarray(norms / max(sigma, smallest))
@@ -103,4 +113,6 @@ def _solve_linear(problem: Problem, reading_weight: FloatArray) -> Solution:
         raise IdentificationError(
             f"the solver stopped short of the optimum (violation {violation:.1e})"
         )
-    return Solution(x / system.scale, system, reading_weight, violation)
+    # Scaling back may miss a bound by a rounding.
+    compliance = np.clip(x / system.scale, problem.lower, problem.upper)
+    return Solution(compliance, system, reading_weight, violation)

@@ -26,6 +26,7 @@ def summary(calibration: Calibration) -> dict[str, Any]:
         "robot": calibrated.model.robot.name,
         "springs": springs(calibration),
         "rank": seen.rank,
+        "rank_attainable": calibration.attainable_rank,
         "springs_total": seen.springs,
         "condition": seen.condition,
         "unobservable": [

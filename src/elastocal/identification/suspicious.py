@@ -9,9 +9,10 @@ Detection*, 1987, chapter 6).
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import chi
+from scipy.stats import f
 
 from elastocal.arrays import BoolArray, FloatArray
+from elastocal.identification.least_squares import rank
 from elastocal.identification.problem import Problem
 from elastocal.identification.solve import Solution, normalised_residuals, solve
 
@@ -26,6 +27,8 @@ beyond any model error: a broken beam, a marker knocked off, a reading of anothe
 MOST_BLUNDERS = 0.1
 """Largest part of the readings that may be set aside; more is a bad campaign, not blunders."""
 
+REDUNDANCY = 1.5
+"""Fewest equations for each determined direction; with fewer, residuals say nothing."""
 _MOST_LEVERAGE = 0.99
 
 
@@ -55,13 +58,18 @@ def screen(problem: Problem) -> Screening:
     robust = solve(problem, "cauchy")
     weighted = problem.reweighted(robust.reading_weight)
     h = leverage(weighted, robust)
-    score = normalised_residuals(problem, robust.compliance) / np.sqrt(1.0 - h)
+    if problem.d.size < REDUNDANCY * rank(robust.factored.s):
+        nothing = np.zeros(len(problem))
+        return Screening(nothing, nothing, h, np.inf, nothing > 0.0)
+    score = normalised_residuals(problem, robust.compliance, np.sqrt(1.0 - h))
     residual = np.linalg.norm(problem.residuals(robust.compliance), axis=1)
     typical = float(np.median(np.linalg.norm(problem.d, axis=1)))
     blunder = (score > BLUNDER_SCORE) & (residual > BLUNDER_SIZE * typical)
     if blunder.mean() > MOST_BLUNDERS:
         blunder = np.zeros_like(blunder)
-    threshold = float(chi.ppf(1.0 - FALSE_ALARM / len(problem), 3))
+    # The scale is a median itself, about half as good as a variance of all that is left over.
+    freedom = 0.5 * max(problem.d.size - rank(robust.factored.s), 2)
+    threshold = float(np.sqrt(3.0 * f.ppf(1.0 - FALSE_ALARM / len(problem), 3, freedom)))
     return Screening(score, residual, h, threshold, blunder)
 
 
@@ -71,7 +79,7 @@ def leverage(problem: Problem, solution: Solution) -> FloatArray:
     The diagonal of the hat matrix, shape (reading,), at most 0.99.
     """
     system = solution.factored
-    seen = system.s > system.s[0] * 1e-6
-    basis = (system.Vt[seen] / system.s[seen, None]) / system.scale
-    rows = (problem.O * problem.weight[..., None]) @ basis.T
+    seen = rank(system.s)
+    basis = system.Vt[:seen] / system.s[:seen, None]
+    rows = problem.scaled().rows @ basis.T
     return np.asarray(np.minimum(np.square(rows).sum(axis=2).mean(axis=1), _MOST_LEVERAGE))

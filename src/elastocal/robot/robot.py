@@ -244,11 +244,11 @@ def evaluate_jacobian(chain: ChainModel, q: FloatArray, columns: IndexArray) -> 
     full = np.zeros((len(flat), model.nq))
     full[:, chain.joint_columns] = flat
     rows = np.empty((len(flat), 6, model.nv))
+    # A chain of one joint comes back from Pinocchio flat.
+    targets = rows if model.nv > 1 else rows[:, :, 0]
     frame, axes = chain.tip_frame, pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
-    for row, configuration in zip(rows, full, strict=True):
-        # A chain of one joint comes back flat.
-        row[:] = pin.computeFrameJacobian(model, data, configuration, frame, axes).reshape(
-            row.shape
-        )
-    rows = rows[:, :, columns].reshape(*q.shape[:-1], 6, len(columns))
-    return Jacobian(rows[..., :3, :], rows[..., 3:, :])
+    jacobian = pin.computeFrameJacobian
+    for target, configuration in zip(targets, full, strict=True):
+        target[:] = jacobian(model, data, configuration, frame, axes)
+    picked = np.take(rows, columns, axis=2).reshape(*q.shape[:-1], 6, len(columns))
+    return Jacobian(picked[..., :3, :], picked[..., 3:, :])

@@ -12,6 +12,7 @@ import pinocchio as pin
 
 from elastocal.errors import RobotError, nearest
 from elastocal.robot.chain import ChainJoint, SerialChain
+from elastocal.robot.urdf_elements import check_elements
 
 
 @dataclass(frozen=True)
@@ -107,6 +108,7 @@ def read_chain(text: str, tip: str, base: str | None = None) -> SerialChain:
                 f"URDF of {robot_name(root)} has no {role} link {link!r}{nearest(link, links)}"
                 f" (links: {', '.join(links)})"
             )
+    check_elements(root)
     joints = _joints_between(root, base, tip)
     try:
         model = pin.buildModelFromXML(text)

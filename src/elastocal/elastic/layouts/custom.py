@@ -68,23 +68,21 @@ def _spring(entry: SpringEntry, joints: dict[str, ChainJoint]) -> Spring:
         raise SpringError(f"spring at joint {entry.joint!r}: the robot has {', '.join(joints)}")
     joint = joints[entry.joint]
     distal = entry.frame == "distal"
+    usual = joint.revolute if entry.axis == "axial" else True
+    revolute = usual if entry.kind is None else entry.kind == "revolute"
+    axis = _axis(entry, joint)
+    # A name tells what distinguishes a spring, e.g. x, distal-x, linear-z.
+    parts = [] if revolute == usual else ["torsion" if revolute else "linear"]
+    parts += ["distal"] if distal else []
+    parts += [entry.axis if isinstance(entry.axis, str) else _direction(axis)]
+    name = entry.name or f"{joint.name}.{'-'.join(parts)}"
+    return Spring(name, joint.name, axis, revolute, distal, entry.offset)
+
+
+def _axis(entry: SpringEntry, joint: ChainJoint) -> tuple[float, float, float]:
     if entry.axis == "axial":
-        base = axial(joint)
-        axis, name = base.axis, base.name
-        revolute = joint.revolute if entry.kind is None else entry.kind == "revolute"
-    else:
-        axis = AXES[entry.axis] if isinstance(entry.axis, str) else as_axis(entry.axis)
-        revolute = entry.kind != "prismatic"
-        name = f"{joint.name}.{_label(entry, axis)}"
-    return Spring(entry.name or name, joint.name, axis, revolute, distal, entry.offset)
-
-
-def _label(entry: SpringEntry, axis: tuple[float, float, float]) -> str:
-    """Name a spring by what distinguishes it, e.g. ``x``, ``distal-x``, ``linear-z``."""
-    direction = entry.axis if isinstance(entry.axis, str) else _direction(axis)
-    parts = ["linear"] if entry.kind == "prismatic" else []
-    parts += ["distal"] if entry.frame == "distal" else []
-    return "-".join([*parts, direction])
+        return axial(joint).axis
+    return AXES[entry.axis] if isinstance(entry.axis, str) else as_axis(entry.axis)
 
 
 def _direction(axis: tuple[float, float, float]) -> str:

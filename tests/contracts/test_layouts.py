@@ -1,0 +1,97 @@
+"""What every spring layout keeps, on every kind of arm."""
+
+from functools import cache, partial
+
+import numpy as np
+import pytest
+
+from elastocal.elastic import LAYOUTS, ElasticModel, Spring
+from elastocal.elastic.layouts import bearing, custom
+from elastocal.elastic.layouts.custom import SpringEntry
+from elastocal.elastic.springs import axial
+from elastocal.robot import Robot
+from elastocal.sim.linkage import Linkage
+from support.virtual_chain import ARMS, configurations, numerical_column
+
+
+def everything(robot: Robot) -> tuple[Spring, ...]:
+    """Return what a spring file can ask for at the last joint, behind the axial springs."""
+    entries = tuple(
+        SpringEntry(joint=robot.joint_names[-1], axis=axis, kind=kind, frame=frame, offset=offset)
+        for axis in ("x", (1.0, -2.0, 0.5))
+        for kind in ("revolute", "prismatic")
+        for frame, offset in (
+            ("proximal", ("0 mm", "0 mm", "0 mm")),
+            ("distal", ("30 mm", "-1 m", "2 mm")),
+        )
+    )
+    return (*LAYOUTS["actuated"](robot), *custom(robot, entries))
+
+
+CASES = {**LAYOUTS, "bearing, distal": partial(bearing, distal=True), "custom": everything}
+
+
+@cache
+def arm(name: str) -> tuple[Robot, Linkage]:
+    return Robot.from_urdf(ARMS[name], "tcp"), Linkage.from_urdf(ARMS[name], "tcp")
+
+
+@pytest.mark.parametrize("arm_name", ARMS)
+@pytest.mark.parametrize("case", CASES)
+class TestEveryLayout:
+    def test_names_are_unique_and_begin_with_the_joint(self, case, arm_name):
+        springs = CASES[case](arm(arm_name)[0])
+        assert len({spring.name for spring in springs}) == len(springs)
+        assert all(spring.name.startswith(f"{spring.joint}.") for spring in springs)
+
+    def test_axes_are_unit_vectors(self, case, arm_name):
+        axes = np.array([spring.axis for spring in CASES[case](arm(arm_name)[0])])
+        np.testing.assert_allclose(np.linalg.norm(axes, axis=1), 1.0, atol=1e-15)
+
+    def test_axial_springs_come_first_in_the_order_of_the_joints(self, case, arm_name):
+        robot = arm(arm_name)[0]
+        joints = robot.chain.joints
+        springs = CASES[case](robot)
+        assert springs[: len(joints)] == tuple(axial(joint) for joint in joints)
+        order = [robot.joint_names.index(spring.joint) for spring in springs[len(joints) :]]
+        assert order == sorted(order)
+
+    def test_axial_columns_are_those_of_the_rigid_robot(self, case, arm_name):
+        robot, linkage = arm(arm_name)
+        q = configurations(linkage, 4)
+        found = ElasticModel(robot, CASES[case](robot)).spring_jacobian(q)
+        rigid, n = robot.jacobian(q), len(robot.joint_names)
+        np.testing.assert_allclose(found.translation[..., :n], rigid.translation, atol=1e-12)
+        np.testing.assert_allclose(found.rotation[..., :n], rigid.rotation, atol=1e-12)
+
+    def test_columns_are_finite_differences_of_the_chain_with_the_spring_moved(
+        self, case, arm_name
+    ):
+        robot, linkage = arm(arm_name)
+        springs = CASES[case](robot)
+        for q in configurations(linkage, 2, seed=3):
+            found = ElasticModel(robot, springs).spring_jacobian(q)
+            columns = [numerical_column(linkage, q, spring) for spring in springs]
+            translation, rotation = np.moveaxis(columns, 0, -1)
+            np.testing.assert_allclose(found.translation, translation, atol=2e-9)
+            np.testing.assert_allclose(found.rotation, rotation, atol=2e-9)
+
+    def test_cartesian_compliance_is_symmetric_and_positive_semidefinite(self, case, arm_name):
+        robot, linkage = arm(arm_name)
+        model = ElasticModel(robot, CASES[case](robot))
+        c = np.random.default_rng(2).uniform(1e-7, 1e-5, len(model.springs))
+        found = model.cartesian_compliance(c, configurations(linkage, 5))
+        whole = np.block(
+            [[found.translation, found.coupling], [found.coupling.swapaxes(1, 2), found.rotation]]
+        )
+        np.testing.assert_allclose(whole, whole.swapaxes(1, 2), atol=1e-20)
+        eigenvalues = np.linalg.eigvalsh(whole)
+        assert np.all(eigenvalues >= -1e-14 * eigenvalues.max())
+
+    def test_the_compliance_is_linear_in_each_spring(self, case, arm_name):
+        robot, linkage = arm(arm_name)
+        model = ElasticModel(robot, CASES[case](robot))
+        q, force = configurations(linkage, 3), np.array([100.0, -200.0, 300.0])
+        c = np.random.default_rng(2).uniform(1e-7, 1e-5, len(model.springs))
+        alone = [model.deflection(row, q, force) for row in np.diag(c)]
+        np.testing.assert_allclose(np.sum(alone, axis=0), model.deflection(c, q, force), rtol=1e-9)

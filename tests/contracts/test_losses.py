@@ -1,0 +1,36 @@
+"""What every loss keeps."""
+
+import numpy as np
+import pytest
+
+from elastocal.identification import LOSSES, solve
+from support.problems import planted
+
+SIZES = np.concatenate([[0.0], np.logspace(-6, 12, 400)])
+
+
+@pytest.mark.parametrize("name", LOSSES)
+class TestEveryLoss:
+    def test_a_perfect_reading_has_weight_one(self, name):
+        assert LOSSES[name](np.zeros(3)) == pytest.approx(1.0)
+
+    def test_weights_are_positive_at_most_one_and_never_rise(self, name):
+        weight = LOSSES[name](SIZES)
+        assert weight.shape == SIZES.shape
+        assert np.all((weight > 0.0) & (weight <= 1.0))
+        assert np.all(np.diff(weight) <= 0.0)
+
+    def test_the_pull_of_a_reading_never_exceeds_its_size(self, name):
+        assert np.all(LOSSES[name](SIZES) * SIZES <= SIZES)
+
+    def test_exact_data_give_the_planted_compliances(self, name):
+        problem, truth = planted(sigma=0.0)
+        np.testing.assert_allclose(solve(problem, name).compliance, truth, rtol=1e-9)
+
+    def test_noisy_data_give_them_within_the_noise(self, name):
+        problem, truth = planted(sigma=1e-5)
+        found = solve(problem, name).compliance
+        rows = problem.O.reshape(-1, problem.springs)
+        sigma = 1e-5 * np.sqrt(np.diag(np.linalg.inv(rows.T @ rows)))
+        assert np.all(np.abs(found - truth) < 4.0 * sigma)
+        assert np.any(np.abs(found - truth) > 0.1 * sigma)

@@ -1,0 +1,116 @@
+import numpy as np
+import pytest
+
+from elastocal.elastic import ElasticModel, layout
+from elastocal.errors import FileAccessError, SchemaError, SpringError
+from elastocal.robot import Robot
+from support.cells import robot
+from support.urdfs import sliding_arm_urdf
+
+HEAD = "schema: elastocal.springs/1\n"
+
+
+@pytest.fixture
+def read(tmp_path):
+    path = tmp_path / "springs.yaml"
+
+    def springs(text, head=HEAD):
+        path.write_text(head + text)
+        return layout(robot(), str(path))
+
+    return springs
+
+
+def test_the_example_of_the_documentation_is_read(read):
+    springs = read(
+        "include: actuated\n"
+        "springs:\n"
+        "  - {joint: joint_2, axis: x}\n"
+        "  - {joint: joint_3, axis: [0, 1, 1], frame: distal}\n"
+        '  - {joint: joint_6, axis: z, kind: prismatic, offset: ["0 mm", "0 mm", "150 mm"]}\n'
+    )
+    assert springs[:6] == layout(robot(), "actuated")
+    tilt, oblique, axial = springs[6:]
+    assert (tilt.name, tilt.axis, tilt.revolute, tilt.distal) == (
+        "joint_2.x",
+        (1.0, 0.0, 0.0),
+        True,
+        False,
+    )
+    assert oblique.distal
+    assert oblique.axis == pytest.approx((0.0, np.sqrt(0.5), np.sqrt(0.5)))
+    assert (axial.revolute, axial.offset) == (False, pytest.approx((0.0, 0.0, 0.15)))
+    ElasticModel(robot(), springs)
+
+
+def test_a_spring_has_the_name_it_is_given(read):
+    (spring,) = read("springs: [{joint: joint_6, axis: x, name: spindle}]")
+    assert spring.name == "spindle"
+
+
+@pytest.mark.parametrize("kind", ["revolute", "prismatic"])
+@pytest.mark.parametrize("frame", ["proximal", "distal"])
+@pytest.mark.parametrize("axis", ["axial", "x", "[1, 1, 0]"])
+def test_springs_that_differ_have_names_that_differ(read, kind, frame, axis):
+    usual = (kind, frame) == ("revolute", "proximal")
+    wanted = f"{{joint: joint_6, axis: {axis}, kind: {kind}, frame: {frame}}}"
+    (spring,) = read(f"springs: [{wanted}]")
+    (plain,) = read(f"springs: [{{joint: joint_6, axis: {axis}}}]")
+    assert (spring.name == plain.name) == usual
+
+
+def test_an_axial_spring_takes_the_kind_of_its_joint(tmp_path):
+    path = tmp_path / "springs.yml"
+    path.write_text(HEAD + "springs: [{joint: slide}, {joint: roll}]")
+    sliding = Robot.from_urdf(sliding_arm_urdf(), "tcp")
+    assert [spring.revolute for spring in layout(sliding, str(path))] == [False, True]
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("sprigs: []", "'sprigs'; did you mean 'springs'"),
+        ("springs: [{joint: joint_6, axs: x}]", r"'springs\.0\.axs'; did you mean 'axis'"),
+        ("springs: [{axis: x}]", r"'springs\.0\.joint' is missing"),
+        ("springs: [{joint: joint_6, axis: w}]", r"springs\.0\.axis.*got 'w'"),
+        ("springs: [{joint: joint_6, kind: linear}]", r"springs\.0\.kind.*got 'linear'"),
+        ("springs: [{joint: joint_6, frame: middle}]", r"springs\.0\.frame.*'proximal'"),
+        ("springs: [{joint: joint_6, offset: [1, 2, 3]}]", "1 is not a length with its unit"),
+        ("springs: [{joint: joint_6, offset: [1 mm, 2 N, 3 mm]}]", "'N' is not a length"),
+        ("springs: [{joint: joint_6, axis: [.nan, 0, 1]}]", "axis"),
+        ("include: bearings", "'bearing', got 'bearings'"),
+        ("springs: 3", "springs"),
+        ("1: 2", "1"),
+    ],
+)
+def test_a_file_that_does_not_fit_is_refused_by_its_place(read, text, message):
+    with pytest.raises((SchemaError, SpringError), match=message) as refusal:
+        read(text)
+    assert "\n" not in str(refusal.value)
+
+
+@pytest.mark.parametrize(
+    ("text", "error", "message"),
+    [
+        ("springs: [{joint: joint_9}]", SpringError, "'joint_9'.*joint_1, joint_2"),
+        ("springs: [{joint: joint_6, axis: [0, 0, 0]}]", SpringError, "not all zero"),
+    ],
+)
+def test_springs_that_do_not_fit_the_robot_are_refused(read, text, error, message):
+    with pytest.raises(error, match=message):
+        read(text)
+
+
+def test_another_schema_is_refused_by_name(read):
+    with pytest.raises(SchemaError, match=r"'elastocal\.springs/2'.*'elastocal\.springs/1'"):
+        read("", head="schema: elastocal.springs/2\n")
+
+
+def test_a_name_that_is_no_layout_is_refused_with_the_nearest():
+    with pytest.raises(SpringError, match=r"'bering'; did you mean 'bearing'.*actuated, bearing"):
+        layout(robot(), "bering")
+
+
+def test_a_missing_file_is_refused_by_its_path(tmp_path):
+    with pytest.raises(FileAccessError, match=r"cannot read .*none\.yaml"):
+        layout(robot(), str(tmp_path / "none.yaml"))

@@ -1,0 +1,82 @@
+import numpy as np
+import pytest
+
+from elastocal.errors import RobotError
+from elastocal.identification import CalibratedModel, Observability
+from support.problems import elastic
+from support.virtual_chain import configurations
+
+RNG = np.random.default_rng(0)
+C = np.array([0.0, 1e-6, 2e-6, 3e-6, 4e-6, 5e-6])
+DRAWS = C * RNG.uniform(0.8, 1.2, (60, 6))
+SEEN = Observability(6, 6, 3.0, (True,) * 6, ())
+
+
+@pytest.fixture(scope="module")
+def calibrated():
+    return CalibratedModel(elastic("actuated"), C, DRAWS, SEEN, "made up")
+
+
+def rows(count):
+    from elastocal.sim.linkage import Linkage
+    from support.cells import urdf
+
+    q = configurations(Linkage.from_urdf(urdf(), "tcp"), count)
+    return q, RNG.normal(0.0, 500.0, (count, 3)), RNG.normal(0.0, 100.0, (count, 3))
+
+
+def test_a_prediction_is_the_deflection_of_the_model(calibrated):
+    q, force, moment = rows(7)
+    for m in (None, moment):
+        found = calibrated.predict(q, force, m).deflection
+        expected = elastic("actuated").deflection(C, q, force, m)
+        np.testing.assert_allclose(found, expected, rtol=1e-12, atol=1e-18)
+
+
+def test_its_interval_is_that_of_the_predictions_of_the_draws(calibrated):
+    q, force, _ = rows(7)
+    each = [elastic("actuated").deflection(draw, q, force) for draw in DRAWS]
+    low, high = np.percentile(each, [2.5, 97.5], axis=0)
+    found = calibrated.predict(q, force)
+    np.testing.assert_allclose(found.low, low, rtol=1e-9, atol=1e-15)
+    np.testing.assert_allclose(found.high, high, rtol=1e-9, atol=1e-15)
+    assert np.all(found.low <= found.high)
+
+
+def test_a_long_path_is_predicted_as_its_parts(calibrated):
+    q, force, moment = rows(2003)
+    whole = calibrated.predict(q, force, moment)
+    tail = calibrated.predict(q[1990:], force[1990:], moment[1990:])
+    for name in ("deflection", "low", "high"):
+        np.testing.assert_allclose(
+            getattr(whole, name)[1990:], getattr(tail, name), rtol=1e-12, atol=1e-15
+        )
+
+
+def test_no_rows_have_no_predictions(calibrated):
+    assert calibrated.predict(np.zeros((0, 6)), np.zeros((0, 3))).high.shape == (0, 3)
+
+
+def test_stiffness_is_infinite_where_nothing_yields(calibrated):
+    np.testing.assert_allclose(calibrated.stiffness, [np.inf, 1e6, 5e5, 1e6 / 3, 2.5e5, 2e5])
+
+
+def test_the_interval_of_a_compliance_is_that_of_its_draws(calibrated):
+    low, high = calibrated.interval()
+    np.testing.assert_allclose([low, high], np.percentile(DRAWS, [2.5, 97.5], axis=0))
+
+
+def test_arrays_are_copied_and_read_only():
+    c, draws = C.copy(), DRAWS.copy()
+    calibrated = CalibratedModel(elastic("actuated"), c, draws, SEEN)
+    c[:], draws[:] = 7.0, 7.0
+    np.testing.assert_array_equal(calibrated.compliance, C)
+    np.testing.assert_array_equal(calibrated.draws, DRAWS)
+    for array in (calibrated.compliance, calibrated.draws):
+        with pytest.raises(ValueError, match="read-only"):
+            array[0] = 1.0
+
+
+def test_joints_that_are_not_finite_are_refused(calibrated):
+    with pytest.raises(RobotError, match="not finite"):
+        calibrated.predict(np.full((1, 6), np.nan), np.ones((1, 3)))

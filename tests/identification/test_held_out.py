@@ -1,0 +1,83 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from elastocal.identification import leave_poses_out, solve
+from elastocal.identification.held_out import MOST_FOLDS, compare
+from support.problems import made_up, planted
+
+
+def noisy(blocks, seed=0, sigma=0.1):
+    problem, truth = made_up(np.random.default_rng(seed), blocks=blocks)
+    noise = np.random.default_rng(seed + 1).normal(0.0, sigma, problem.d.shape)
+    return replace(problem, d=problem.d + noise), truth
+
+
+def test_leaving_poses_out_is_a_loop_of_refits():
+    problem, _ = planted(sigma=2e-5)
+    found = leave_poses_out(problem)
+    assert found.folds == 31
+    for block in range(31):
+        out = problem.block == block
+        refit = solve(problem.take(~out)).compliance
+        expected = np.linalg.norm(problem.residuals(refit)[out], axis=1)
+        np.testing.assert_allclose(found.error[out], expected, rtol=1e-5, atol=1e-12)
+
+
+def test_each_reading_is_predicted_by_a_fit_without_its_pose():
+    problem, _ = noisy(blocks=8)
+    found = leave_poses_out(problem)
+    predicted = np.einsum("rin,rn->ri", problem.O, found.compliance[found.fold])
+    np.testing.assert_allclose(np.linalg.norm(predicted - problem.d, axis=1), found.error)
+    spoiled = replace(problem, d=np.where((problem.block == 3)[:, None], 1e3, problem.d))
+    again = leave_poses_out(spoiled)
+    fold = int(found.fold[problem.block == 3][0])
+    np.testing.assert_allclose(again.compliance[fold], found.compliance[fold], rtol=1e-9)
+
+
+def test_many_poses_are_left_out_together():
+    problem, _ = noisy(blocks=MOST_FOLDS + 30)
+    found = leave_poses_out(problem)
+    assert found.folds == MOST_FOLDS
+    together = found.fold == 0
+    assert set(problem.block[together]) == {0, MOST_FOLDS}
+    refit = solve(problem.take(~together)).compliance
+    np.testing.assert_allclose(found.compliance[0], refit, rtol=1e-6)
+
+
+def test_held_out_errors_exceed_those_of_the_fit():
+    problem, _ = noisy(blocks=4)
+    fit = np.linalg.norm(problem.residuals(solve(problem).compliance), axis=1).mean()
+    assert leave_poses_out(problem).mean > fit
+
+
+def test_mean_and_max_are_those_of_the_errors():
+    found = leave_poses_out(noisy(blocks=4)[0])
+    assert (found.mean, found.max) == (found.error.mean(), found.error.max())
+
+
+def test_a_model_that_lacks_a_spring_compares_worse_with_an_interval_above_zero():
+    problem, _ = noisy(blocks=12)
+    ours = leave_poses_out(problem)
+    other = leave_poses_out(problem.with_springs(np.arange(4)))
+    found = compare(ours, other, "four", problem, np.random.default_rng(0))
+    assert found.difference == pytest.approx(other.mean - ours.mean)
+    assert 0.0 < found.low < found.difference < found.high
+
+
+def test_a_model_compared_with_itself_differs_by_nothing():
+    problem, _ = noisy(blocks=5)
+    ours = leave_poses_out(problem)
+    found = compare(ours, ours, "same", problem, np.random.default_rng(0))
+    assert (found.difference, found.low, found.high) == (0.0, 0.0, 0.0)
+
+
+def test_the_interval_of_a_comparison_is_reproducible_by_seed():
+    problem, _ = noisy(blocks=6)
+    ours = leave_poses_out(problem)
+    other = leave_poses_out(problem.with_springs(np.arange(4)))
+    lows = [
+        compare(ours, other, "four", problem, np.random.default_rng(seed)).low for seed in (1, 1, 2)
+    ]
+    assert lows[0] == lows[1] != lows[2]

@@ -1,0 +1,113 @@
+import hashlib
+import os
+import stat
+
+import pytest
+
+from elastocal.errors import FileAccessError
+from elastocal.files import read_text, replacing, sha256, write_text
+
+
+def test_text_comes_back_as_it_was_written(tmp_path):
+    path = tmp_path / "a.txt"
+    write_text(path, "µm\r\nline\n")
+    assert path.read_bytes() == "µm\r\nline\n".encode()
+    assert [entry.name for entry in tmp_path.iterdir()] == ["a.txt"]
+
+
+def test_a_file_is_replaced_whole_and_a_reader_keeps_the_old_one(tmp_path):
+    path = tmp_path / "a.txt"
+    write_text(path, "old")
+    with path.open() as reader:
+        write_text(path, "new")
+        assert reader.read() == "old"
+    assert read_text(path) == "new"
+
+
+@pytest.mark.parametrize("reason", [KeyboardInterrupt, ValueError])
+def test_an_interruption_leaves_the_old_file_and_nothing_else(tmp_path, reason):
+    path = tmp_path / "a.txt"
+    write_text(path, "old")
+
+    def interrupted():
+        with replacing(path) as temporary:
+            temporary.write_text("half")
+            raise reason
+
+    with pytest.raises(reason):
+        interrupted()
+    assert path.read_text() == "old"
+    assert [entry.name for entry in tmp_path.iterdir()] == ["a.txt"]
+
+
+def test_the_temporary_file_is_beside_its_target_with_its_suffix(tmp_path):
+    with replacing(tmp_path / "a.nc") as temporary:
+        assert (temporary.parent, temporary.suffix) == (tmp_path, ".nc")
+        assert not (tmp_path / "a.nc").exists()
+    assert (tmp_path / "a.nc").exists()
+
+
+def test_the_temporary_name_may_be_replaced_by_the_writer(tmp_path):
+    """Libraries that write to a new file of their own and rename it are served, too."""
+    with replacing(tmp_path / "a.txt") as temporary:
+        other = tmp_path / "other"
+        other.write_text("whole")
+        other.replace(temporary)
+    assert read_text(tmp_path / "a.txt") == "whole"
+
+
+def test_a_new_file_has_the_usual_permissions(tmp_path):
+    before = os.umask(0o027)
+    try:
+        write_text(tmp_path / "a.txt", "text")
+    finally:
+        os.umask(before)
+    assert stat.S_IMODE((tmp_path / "a.txt").stat().st_mode) == 0o640
+
+
+def test_a_missing_folder_or_a_folder_for_a_file_cannot_be_written(tmp_path):
+    for path in (tmp_path / "none" / "a.txt", tmp_path):
+        with pytest.raises(FileAccessError, match=f"cannot write {path}: ") as refusal:
+            write_text(path, "text")
+        assert isinstance(refusal.value, OSError)
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_pipe_is_not_replaced_by_a_file(tmp_path):
+    """Renaming onto /dev/null would take it away from the whole machine."""
+    pipe = tmp_path / "pipe"
+    os.mkfifo(pipe)
+    with pytest.raises(FileAccessError, match=f"cannot write {pipe}"):
+        write_text(pipe, "text")
+    assert stat.S_ISFIFO(pipe.stat().st_mode)
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        (b"", "the file is empty"),
+        (b" \n\t", "the file is empty"),
+        (b"\xff\xfe\x00", "not a UTF-8 text file"),
+    ],
+)
+def test_what_is_not_text_is_refused(tmp_path, content, message):
+    path = tmp_path / "a.txt"
+    path.write_bytes(content)
+    with pytest.raises(FileAccessError, match=f"cannot read {path}: {message}"):
+        read_text(path)
+
+
+def test_a_missing_file_is_refused_by_its_path(tmp_path):
+    with pytest.raises(FileAccessError, match=r"cannot read .*none: No such file"):
+        read_text(tmp_path / "none")
+
+
+def test_the_mark_that_windows_puts_in_front_is_dropped(tmp_path):
+    path = tmp_path / "a.csv"
+    path.write_bytes(b"\xef\xbb\xbfpose")
+    assert read_text(path) == "pose"
+
+
+def test_a_hash_is_that_of_the_utf8_bytes():
+    assert sha256("µm") == hashlib.sha256("µm".encode()).hexdigest()
+    assert sha256("a\n") != sha256("a\r\n")

@@ -1,0 +1,134 @@
+"""The README's tour runs as printed, and the pages quote the code as it is."""
+
+import ast
+import contextlib
+import io
+import re
+import shlex
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+
+from support.cli import Result, elastocal
+
+ROOT = Path(__file__).parents[1]
+TOUR = (ROOT / "README.md").read_text(encoding="utf-8").split("## Five-minute tour")[1]
+TOUR = TOUR.split("\n## ")[0]
+NUMBER = re.compile(r"[-+±]?\d+\.\d+")
+
+
+@dataclass(frozen=True)
+class Toured:
+    """What the tour left behind."""
+
+    folder: Path
+    results: dict[str, Result]
+
+
+def blocks(language: str) -> list[str]:
+    return re.findall(rf"^```{language}\n(.*?)^```", TOUR, flags=re.MULTILINE | re.DOTALL)
+
+
+def shell_lines() -> list[str]:
+    return [line for block in blocks("sh") for line in block.splitlines() if line.strip()]
+
+
+@pytest.fixture(scope="module")
+def toured(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("tour")
+    results = {}
+    with contextlib.chdir(folder):
+        for line in shell_lines():
+            command, *arguments = shlex.split(line)
+            assert command == "elastocal", line
+            results[line] = elastocal(*arguments)
+    return Toured(folder, results)
+
+
+def test_the_tour_has_the_lines_that_a_new_user_needs():
+    commands = {shlex.split(line)[1] for line in shell_lines()}
+    assert commands == {"demo", "check", "calibrate", "predict", "robots"}
+    assert len(blocks("python")) == len(blocks("text")) == 1
+
+
+def test_every_shell_line_of_the_tour_is_done(toured):
+    failed = {line: result.err for line, result in toured.results.items() if result.code != 0}
+    assert not failed
+    for name in ("model.json", "six.json", "without.json", "predicted.csv"):
+        assert (toured.folder / name).is_file(), name
+
+
+def test_the_output_in_the_readme_is_what_calibrate_prints(toured):
+    printed = toured.results["elastocal calibrate demo/dataset.nc --out model.json"].err
+    words = printed.split()
+    for part in re.split(r"^…$", blocks("text")[0], flags=re.MULTILINE):
+        words = words[after(part.split(), words) :]
+
+
+def after(wanted: list[str], words: list[str]) -> int:
+    """Return where the words that follow the wanted ones begin; fail when they do not stand."""
+    for start in range(len(words) - len(wanted) + 1):
+        if all(map(alike, wanted, words[start:])):
+            return start + len(wanted)
+    raise AssertionError(f"calibrate does not print {' '.join(wanted)}\nbut {' '.join(words)}")
+
+
+def alike(shown: str, printed: str) -> bool:
+    """Return whether two words are equal, decimal numbers in them nearly so."""
+    if NUMBER.sub("#", shown) != NUMBER.sub("#", printed):
+        return False
+    numbers = [[float(n.lstrip("±")) for n in NUMBER.findall(word)] for word in (shown, printed)]
+    return numbers[0] == pytest.approx(numbers[1], rel=0.02, abs=0.002)
+
+
+def test_the_python_of_the_tour_runs_and_prints_its_figures(toured):
+    printed = io.StringIO()
+    with contextlib.chdir(toured.folder), contextlib.redirect_stdout(printed):
+        exec(compile(blocks("python")[0], "README.md", "exec"), {})
+    assert "'split': 'leave-poses-out'" in printed.getvalue()
+
+
+def test_the_files_that_the_readme_links_to_exist():
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    links = [link for link in re.findall(r"\]\(([^)#]+)\)", text) if "://" not in link]
+    assert links
+    assert not [link for link in links if not (ROOT / link).exists()]
+
+
+def messages() -> list[str]:
+    """Return every text of the source, ``…`` in place of what is filled in."""
+    found = []
+    for path in (ROOT / "src").rglob("*.py"):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            parts = node.values if isinstance(node, ast.JoinedStr) else [node]
+            found.append(
+                "".join(
+                    part.value
+                    if isinstance(part, ast.Constant) and isinstance(part.value, str)
+                    else "…"
+                    for part in parts
+                )
+            )
+    return found
+
+
+def test_the_refusals_that_the_docs_quote_are_those_of_the_code():
+    page = (ROOT / "docs/how-to/when-it-refuses.md").read_text(encoding="utf-8")
+    quoted = re.findall(r"^\| `([^`]+)`", page, flags=re.MULTILINE)
+    known = messages()
+    assert len(quoted) > 20
+    assert not [text for text in quoted if not any(text in message for message in known)]
+
+
+@pytest.mark.parametrize("package", ["robot", "elastic", "dataset", "identification"])
+def test_every_public_name_has_an_entry_in_the_reference(package):
+    tree = ast.parse((ROOT / f"src/elastocal/{package}/__init__.py").read_text(encoding="utf-8"))
+    (exported,) = (
+        ast.literal_eval(node.value)
+        for node in tree.body
+        if isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) == "__all__"
+    )
+    page = (ROOT / f"docs/reference/api/{package}.md").read_text(encoding="utf-8")
+    shown = re.findall(r"^\s*- (\w+)$|^::: [\w.]+\.(\w+)$", page, flags=re.MULTILINE)
+    assert set(exported) <= {name for pair in shown for name in pair}

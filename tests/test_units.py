@@ -1,0 +1,82 @@
+import math
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from elastocal.errors import UnitError
+from elastocal.units import factor, parse_quantity, split_column
+
+
+@pytest.mark.parametrize(
+    ("text", "dimension", "value"),
+    [
+        ("175 mm", "length", 0.175),
+        ("175mm", "length", 0.175),
+        ("  -2.5e-1  m ", "length", -0.25),
+        ("+3 um", "length", 3e-6),
+        (".5 µm", "length", 0.5e-6),
+        ("5. m", "length", 5.0),
+        ("180 deg", "angle", math.pi),
+        ("1.1 kN", "force", 1100.0),
+        ("2 N·m", "moment", 2.0),
+        ("2 Nm", "moment", 2.0),
+        ("3 N*mm", "moment", 3e-3),
+        ("3 kN*m", "moment", 3e3),
+        ("1.1 t", "mass", 1100.0),
+        ("2 min", "time", 120.0),
+        ("1e-6 rad/(N*m)", "rotational compliance", 1e-6),
+        ("2 um/N", "translational compliance", 2e-6),
+    ],
+)
+def test_a_quantity_is_read_in_si(text, dimension, value):
+    assert parse_quantity(text, dimension) == pytest.approx(value, rel=1e-15)
+
+
+@given(st.floats(-1e12, 1e12))
+def test_a_quantity_written_in_si_is_read_back_exactly(value):
+    assert parse_quantity(f"{value!r} m", "length") == value
+
+
+@pytest.mark.parametrize(
+    "text", [175, 0.175, True, None, "175", "mm", "", "nan mm", "inf mm", "1,5 mm", "0x10 mm", []]
+)
+def test_a_number_without_its_unit_is_refused_with_the_units_allowed(text):
+    with pytest.raises(UnitError, match="mm"):
+        parse_quantity(text, "length")
+
+
+@pytest.mark.parametrize("text", ["1 N", "1 mm mm", "1 MM", "1 m/s", "1 inch"])
+def test_a_unit_of_another_dimension_is_refused(text):
+    with pytest.raises(UnitError, match=r"is not a length: allowed are m, mm"):
+        parse_quantity(text, "length")
+
+
+def test_an_overflowing_quantity_is_refused():
+    with pytest.raises(UnitError, match="1e999 m"):
+        parse_quantity("1e999 m", "length")
+
+
+def test_a_near_miss_is_named():
+    with pytest.raises(UnitError, match="did you mean 'mm'"):
+        factor("mmm", "length")
+
+
+@pytest.mark.parametrize(
+    ("header", "expected"),
+    [
+        ("force_x[N]", ("force_x", "N")),
+        (" force_x [ N ] ", ("force_x", "N")),
+        ("pose", ("pose", None)),
+        ("empty[]", ("empty", "")),
+        ("two words[mm]", ("two words", "mm")),
+    ],
+)
+def test_a_header_is_a_name_and_a_unit(header, expected):
+    assert split_column(header) == expected
+
+
+@pytest.mark.parametrize("header", ["", "[N]", "force_x[N", "force_xN]", "a[N][m]", "a[N]b", "  "])
+def test_a_header_of_another_form_is_refused(header):
+    with pytest.raises(UnitError, match=r"is not of the form name\[unit\]"):
+        split_column(header)
