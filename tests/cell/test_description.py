@@ -148,7 +148,7 @@ def test_process_poses_are_read(folder, example):
         ("load_cases.safety", 0.9, "load_cases.safety: Input should be greater than or equal to 1"),
         ("load_cases.fz", "0 N", "load_cases.fz: Input should be greater than 0"),
         ("load_cases.fx", "0 N", "north and south need fx above 0"),
-        ("load_cases.fx", "1e999 N", "must be finite"),
+        ("load_cases.fx", "1e999 N", "not a finite force"),
         ("load_cases.cases", [], "at least one load case"),
         ("load_cases.cases", ["normal", "normal"], "named twice"),
         ("load_cases.cases", ["nord"], "'normal', 'north', 'south', 'east' or 'west'"),

@@ -11,6 +11,6 @@ def test_init_writes_a_cell_and_says_what_comes_next(tmp_path, capsys):
     assert {p.name for p in (tmp_path / "new").iterdir()} == {"cell.yaml", "block.stl"}
     shown = capsys.readouterr()
     assert shown.out == ""
-    assert "elastocal plan" in shown.err
+    assert "elastocal check" in shown.err
     with pytest.raises(FileAccessError, match="--force"):
         init(tmp_path / "new", like="machining")

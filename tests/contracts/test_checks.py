@@ -64,7 +64,7 @@ class TestEveryCheck:
     def test_judges_each_posture_by_itself(self, check):
         chosen = np.array([7, 3, 11])
         alone = check.margin(postures().take(chosen))
-        np.testing.assert_allclose(alone, check.margin(postures())[chosen], atol=1e-6)
+        np.testing.assert_allclose(alone, check.margin(postures())[chosen], atol=1e-9)
 
     def test_has_a_name_a_unit_and_advice(self, check):
         assert check.name.isidentifier()

@@ -1,10 +1,12 @@
 """The kinds of file that ``elastocal check`` knows, by suffix."""
 
+import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 from elastocal import dataset
+from elastocal.cell import load_cell
 from elastocal.elastic.layouts import read_springs
 from elastocal.errors import RobotError, SchemaError
 from elastocal.files import read_text
@@ -13,6 +15,8 @@ from elastocal.robot import Robot
 from elastocal.robot.urdf import leaf_links, parse_urdf
 
 Facts = dict[str, Any]
+
+_SCHEMA_LINE = re.compile(r"^schema:\s*[\"']?elastocal\.cell/", re.MULTILINE)
 
 
 def describe_file(path: Path) -> tuple[str, Facts]:
@@ -30,8 +34,8 @@ def describe_file(path: Path) -> tuple[str, Facts]:
         ".csv": ("dataset", _dataset),
         ".json": ("calibrated model", _model),
         ".urdf": ("robot description", _robot),
-        ".yaml": ("spring file", _springs),
-        ".yml": ("spring file", _springs),
+        ".yaml": ("settings file", _settings),
+        ".yml": ("settings file", _settings),
     }
     found: tuple[str, Callable[[Path], Facts]] | None = known.get(path.suffix.lower())
     if found is None:
@@ -79,6 +83,20 @@ def _robot(path: Path) -> Facts:
     }
 
 
-def _springs(path: Path) -> Facts:
+def _settings(path: Path) -> Facts:
+    """Describe a YAML file by the schema that it states."""
+    if _SCHEMA_LINE.search(read_text(path)):
+        return _cell(path)
     file = read_springs(path)
-    return {"include": file.include, "springs": len(file.springs)}
+    return {"schema": "elastocal.springs/1", "include": file.include, "springs": len(file.springs)}
+
+
+def _cell(path: Path) -> Facts:
+    cell = load_cell(path)
+    return {
+        "schema": "elastocal.cell/1",
+        "cell": cell.name,
+        "robot": cell.robot.name,
+        "load_cases": list(cell.file.load_cases.cases),
+        "trackers": [tracker.name for tracker in cell.file.trackers],
+    }

@@ -20,6 +20,6 @@ def init(
     cell, *meshes = write_example(folder, like, force)
     names = ", ".join(mesh.name for mesh in meshes)
     console().print(
-        f"wrote [bold]{cell}[/bold] and {names}: edit it, then `elastocal plan {cell} --out DIR`",
+        f"wrote [bold]{cell}[/bold] and {names}: edit it, then `elastocal check {cell}`",
         soft_wrap=True,
     )

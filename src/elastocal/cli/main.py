@@ -12,6 +12,7 @@ from elastocal import __version__
 from elastocal.cli.calibrate import calibrate
 from elastocal.cli.check import check
 from elastocal.cli.demo import demo
+from elastocal.cli.init import init
 from elastocal.cli.predict import predict
 from elastocal.cli.robots import robots
 from elastocal.errors import ElastocalError
@@ -23,7 +24,7 @@ app = typer.Typer(
     add_completion=False,
     pretty_exceptions_enable=False,
 )
-for command in (robots, check, calibrate, predict, demo):
+for command in (robots, init, check, calibrate, predict, demo):
     app.command()(command)
 
 

@@ -113,14 +113,18 @@ def make_pool(
     fast = verdicts(quick, options.postures)
     passed = fast.passed
     order = _preference(options, passed, fast.margin, len(points))
-    chosen = _ask_slow_checks(options, order, slow, len(points), progress)
-    postures = options.postures.take(chosen)
-    refused = _refused(options, fast, chosen, slow, len(points))
+    asked = _ask_slow_checks(options, order, slow, len(points), progress)
+    both = Verdicts(
+        (*fast.names, *asked.verdicts.names),
+        (*fast.units, *asked.verdicts.units),
+        (*fast.advice, *asked.verdicts.advice),
+        np.vstack([fast.margin[:, asked.chosen], asked.verdicts.margin]),
+    )
     return Pool(
-        postures,
-        options.branch[chosen],
-        verdicts([*quick, *slow], postures),
-        refused,
+        options.postures.take(asked.chosen),
+        options.branch[asked.chosen],
+        both,
+        _refused(options, fast, asked.chosen, slow, len(points)),
         len(points),
     )
 
@@ -200,26 +204,39 @@ def _branch_ranks(options: _Options, passed: BoolArray) -> IndexArray:
     return ranks
 
 
+@dataclass(frozen=True, eq=False)
+class _Asked:
+    """The postures that the slow checks let pass."""
+
+    chosen: IndexArray
+    verdicts: Verdicts
+
+
 def _ask_slow_checks(
     options: _Options,
     order: list[IndexArray],
     slow: Sequence[Check],
     points: int,
     progress: Progress,
-) -> IndexArray:
+) -> _Asked:
     """Return the posture of each point that has one, asking the slow checks round by round."""
-    if not slow:
-        return np.array([ranked[0] for ranked in order if len(ranked)], dtype=np.intp)
-    chosen: dict[int, int] = {}
+    chosen = np.full(points, -1, dtype=np.intp)
+    margin = np.zeros((len(slow), points))
+    waiting = np.array([p for p in range(points) if len(order[p])], dtype=np.intp)
     for attempt in range(_ROUNDS):
-        waiting = [p for p in range(points) if p not in chosen and len(order[p]) > attempt]
-        if not waiting:
+        waiting = waiting[[len(order[p]) > attempt for p in waiting]]
+        if not len(waiting):
             break
         index = np.array([order[p][attempt] for p in waiting], dtype=np.intp)
-        good = verdicts(slow, options.postures.take(index)).passed
-        chosen |= {p: int(i) for p, i, ok in zip(waiting, index, good, strict=True) if ok}
-        progress("collision and sight", len(chosen), points)
-    return np.array([chosen[p] for p in sorted(chosen)], dtype=np.intp)
+        found = verdicts(slow, options.postures.take(index))
+        good = found.passed
+        chosen[waiting[good]] = index[good]
+        margin[:, waiting[good]] = found.margin[:, good]
+        waiting = waiting[~good]
+        progress("collision and sight", int(np.count_nonzero(chosen >= 0)), points)
+    has = chosen >= 0
+    names = verdicts(slow, options.postures.take([]))
+    return _Asked(chosen[has], Verdicts(names.names, names.units, names.advice, margin[:, has]))
 
 
 def _refused(

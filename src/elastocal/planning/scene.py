@@ -82,50 +82,41 @@ class CollisionScene:
         columns = [model.joints[model.getJointId(name)].idx_q for name in self.robot.joint_names]
         object.__setattr__(self, "_columns", np.array(columns, dtype=np.intp))
 
-    def clearance(self, q: FloatArray, in_contact: bool, enough: float) -> FloatArray:
-        """Return a distance that bodies that must stay apart keep at least.
-
-        Bounding volumes decide as far as they can, which is a hundred times faster than exact
-        distances; so this is a lower bound, and 0 for bodies nearer than ``enough``.
+    def keeps(self, q: FloatArray, distance: float, in_contact: bool) -> BoolArray:
+        """Return whether all bodies that must stay apart keep a distance.
 
         Parameters
         ----------
         q : ndarray, shape (pose, joint)
             Joint positions in rad or m.
+        distance : float
+            In m.
         in_contact : bool
             Whether the tool touches the tooling and is not checked against it.
-        enough : float
-            Distance in m that settles the question.
 
         Returns
         -------
-        ndarray, shape (pose,)
-            In m, never negative.
+        ndarray of bool, shape (pose,)
         """
         model, geometry = self._model, self._geometry
         data, results = model.createData(), geometry.createData()
-        judged = np.flatnonzero(~self._tool_on_touched) if in_contact else None
         for pair, request in enumerate(results.collisionRequests):
-            request.security_margin = enough
-            if judged is not None and self._tool_on_touched[pair]:
+            request.security_margin = distance
+            if in_contact and self._tool_on_touched[pair]:
                 results.deactivateCollisionPair(pair)
-        pairs = range(len(geometry.collisionPairs)) if judged is None else judged.tolist()
-        least = np.empty(len(q))
-        for pose, configuration in enumerate(self._configurations(q)):
-            if pin.computeCollisions(model, data, geometry, results, configuration, True):
-                least[pose] = 0.0
-            else:
-                found = results.collisionResults
-                least[pose] = min(found[pair].distance_lower_bound for pair in pairs)
-        return least
+        near = [
+            pin.computeCollisions(model, data, geometry, results, configuration, True)
+            for configuration in self._configurations(q)
+        ]
+        return np.logical_not(near)
 
     def nearest(self, q: FloatArray) -> tuple[str, str]:
         """Return the names of the two bodies that are nearest to each other at one posture."""
-        pair = self._geometry.collisionPairs[int(self._distances(q[None])[0].argmin())]
+        pair = self._geometry.collisionPairs[int(self.distances(q[None])[0].argmin())]
         names = [self._geometry.geometryObjects[i].name for i in (pair.first, pair.second)]
         return names[0], names[1]
 
-    def _distances(self, q: FloatArray) -> FloatArray:
+    def distances(self, q: FloatArray) -> FloatArray:
         """Return the exact distance of each pair, shape (pose, pair), in m."""
         model, geometry = self._model, self._geometry
         data, results = model.createData(), geometry.createData()

@@ -101,20 +101,20 @@ def test_in_contact_the_tool_may_touch_what_it_presses_on():
     tool = (Body("disk", coal.Sphere(0.02), np.eye(4)),)
     mould = (Body("mould", coal.Sphere(0.02), here),)
     pressed = CollisionScene(arm(), tool, mould, frozenset({"mould"}))
-    assert pressed.clearance(one.q, True, 0.01)[0] > 0.01
-    assert pressed.clearance(one.q, False, 0.01)[0] == 0.0
-    assert pressed.clearance(one.q_approach, False, 0.01)[0] > 0.01
+    assert pressed.keeps(one.q, 0.01, in_contact=True)[0]
+    assert not pressed.keeps(one.q, 0.0, in_contact=False)[0]
+    assert pressed.keeps(one.q_approach, 0.01, in_contact=False)[0]
 
 
-def test_the_clearance_is_at_most_the_exact_distance():
+def test_what_is_kept_is_the_exact_distance():
     away = np.eye(4)
     away[:3, 3] = (1.2, 1.2, 0.8)
     scene = CollisionScene(arm(), (), (Body("post", coal.Box(0.3, 0.3, 0.3), away),))
-    q = postures().q
-    bound, exact = scene.clearance(q, False, 0.01), scene._distances(q).min(axis=1)
-    assert np.all(bound <= exact + 1e-9)
-    assert np.all(bound[exact > 0.01] > 0.0)
-    assert np.all(bound[exact < 0.01 - 1e-6] == 0.0)
+    exact = scene.distances(postures().q).min(axis=1)
+    for distance in (0.01, 0.1, 0.3):
+        decided = np.abs(exact - distance) > 1e-4
+        kept = scene.keeps(postures().q, distance, in_contact=False)
+        np.testing.assert_array_equal(kept[decided], exact[decided] > distance)
 
 
 class TestSight:

@@ -106,8 +106,8 @@ class Cover:
         field.add(order[0])
         radius = [(far := field.farthest()).distance]
         while len(order) < count and far.distance > enough:
-            field.add(far.index)
-            order.append(far.index)
+            field.add(far.pose)
+            order.append(far.pose)
             far = field.farthest()
             radius.append(far.distance)
         trace = {"covering_radius": np.array(radius)}

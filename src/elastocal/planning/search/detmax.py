@@ -66,7 +66,9 @@ def exchange(
         If the criterion gives NaN.
     """
     start = np.sort(np.asarray(start, dtype=np.intp))
-    chosen, added, dropped = start, [], []
+    chosen = start
+    added: list[int] = []
+    dropped: list[int] = []
     seen = {chosen.tobytes()}
     ended = "whole pool" if len(chosen) == len(information) else "cap"
     while ended == "cap" and len(added) < cap:

@@ -19,7 +19,7 @@ CHOSEN = -1.0
 class Farthest(NamedTuple):
     """The worst-covered candidate."""
 
-    index: int
+    pose: int
     """Its number; the lowest where several are equally far."""
     distance: float
     """From the nearest chosen candidate, in m; 0 when all are chosen."""

@@ -32,7 +32,8 @@ class Information:
     """Information of each candidate about the ``r`` observable directions."""
 
     gram: FloatArray
-    """``O_p^T O_p`` of each pose, shape (pose, r, r), dimensionless; trace r on average."""
+    """``O_p^T O_p`` of each pose, shape (pose, r, r), dimensionless; each spring that is
+    loaded gives 1 to the trace of a typical pose."""
     rows: FloatArray
     """The same factored, ``gram[p] = rows[:, :, p]^T rows[:, :, p]``, shape (row, r, pose);
     as many rows as the richest pose has independent ones (6 for forces at one point)."""
@@ -85,8 +86,8 @@ def build_information(candidates: Candidates) -> Information:
         raise PlanningError("the pool has no observation rows, which this search technique needs")
     if not np.any(observation):
         raise PlanningError("the observation rows of the pool are all zero: they load no spring")
-    gram = _grams(observation)
-    mean = gram.mean(axis=0)
+    flat = observation.reshape(-1, observation.shape[2])
+    mean = flat.T @ flat / len(observation)
     loaded = _loaded(mean)
     scale = np.where(loaded, np.sqrt(np.where(loaded, np.diag(mean), 1.0)), 1.0)
     shrink = loaded / scale
@@ -94,16 +95,11 @@ def build_information(candidates: Candidates) -> Information:
     r = rank(np.sqrt(np.maximum(eigenvalues[::-1], 0.0)))
     basis = vectors[:, ::-1][:, :r]
     projection = shrink[:, None] * basis
-    gram = _projected(gram, projection)
+    gram = _projected(observation, projection)
     process, unseen = _process(candidates.process, shrink, basis)
     return Information(
         gram, _factored(gram), basis, scale, int(observation.shape[1]), process, unseen
     )
-
-
-def _grams(observation: FloatArray) -> FloatArray:
-    gram: FloatArray = np.swapaxes(observation, 1, 2) @ observation
-    return gram
 
 
 def _loaded(mean: FloatArray) -> BoolArray:
@@ -112,12 +108,14 @@ def _loaded(mean: FloatArray) -> BoolArray:
     return np.asarray(norms >= RANK_TOLERANCE * norms.max())
 
 
-def _projected(gram: FloatArray, projection: FloatArray) -> FloatArray:
-    projected = np.empty((len(gram), projection.shape[1], projection.shape[1]))
-    for begin in range(0, len(gram), _CHUNK):
+def _projected(observation: FloatArray, projection: FloatArray) -> FloatArray:
+    """Return the Gram matrix of each pose's projected rows, shape (pose, r, r)."""
+    gram = np.empty((len(observation), projection.shape[1], projection.shape[1]))
+    for begin in range(0, len(observation), _CHUNK):
         part = slice(begin, begin + _CHUNK)
-        projected[part] = projection.T @ gram[part] @ projection
-    return projected
+        rows = observation[part]
+        gram[part] = projection.T @ (np.swapaxes(rows, 1, 2) @ rows) @ projection
+    return gram
 
 
 def _process(

@@ -11,8 +11,8 @@ from elastocal.planning.search.criteria.criterion import Criterion, singular_val
 class EOptimal(Criterion):
     """``sr^2``: the smallest eigenvalue, one over the largest variance of any direction.
 
-    It ranks choices as O3 does. Y. Sun, J. M. Hollerbach, "Observability index selection for robot calibration", ICRA 2008
-    (the paper's [56]).
+    It ranks choices as O3 does. Y. Sun, J. M. Hollerbach, "Observability index selection for
+    robot calibration", ICRA 2008 (the paper's [56]).
     """
 
     name: ClassVar[str] = "e"

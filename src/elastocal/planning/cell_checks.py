@@ -1,0 +1,175 @@
+"""The checks that a cell file asks for."""
+
+import math
+
+import coal
+import numpy as np
+import trimesh
+
+from elastocal.arrays import FloatArray
+from elastocal.cell import Cell
+from elastocal.cell.description.shapes import Box, Cylinder, Shape, Sphere
+from elastocal.planning.checks import (
+    Check,
+    CollisionCheck,
+    EdgeCheck,
+    FlatnessCheck,
+    FrictionCheck,
+    JointLimitsCheck,
+    SensorCheck,
+    SightCheck,
+    SingularityCheck,
+    Station,
+    TorqueCheck,
+    WristCheck,
+)
+from elastocal.planning.scene import Body, CollisionScene, mesh_shape
+from elastocal.planning.surface import (
+    Surface,
+    SurfacePoints,
+    distance_to_boundary,
+    fit_disk,
+    read_mesh,
+)
+
+TOOLING = "tooling"
+"""Name of the surface among the obstacles."""
+
+_STANDARD = 9.80665
+
+
+def quick_checks(cell: Cell, surface: Surface, points: SurfacePoints) -> list[Check]:
+    """Return the checks that cost microseconds a posture.
+
+    Parameters
+    ----------
+    cell : Cell
+        The cell.
+    surface : Surface
+        What the robot presses on.
+    points : SurfacePoints
+        The sampled points that postures refer to.
+    """
+    file, robot = cell.file, cell.robot
+    engagement, loads, limits = file.engagement, file.load_cases, file.limits
+    radius = engagement.disk_radius
+    force = loads.force_tcp
+    checks: list[Check] = [
+        EdgeCheck(distance_to_boundary(surface, points), radius, engagement.edge_margin),
+        FlatnessCheck(fit_disk(surface, points, radius), engagement.normal_tolerance),
+        JointLimitsCheck(robot, cell.joint_margin),
+        SingularityCheck(robot, limits.singular_value),
+        WristCheck(robot, limits.wrist_angle),
+        FrictionCheck(force, loads.friction, loads.safety),
+        TorqueCheck(
+            robot,
+            force,
+            cell.torque_limits,
+            file.tool.mass,
+            cell.tool_centre_tcp,
+            tuple(cell.gravity_base.tolist()),
+        ),
+    ]
+    sensor = _sensor_check(cell, force)
+    return [*checks, sensor] if sensor else checks
+
+
+def slow_checks(cell: Cell, surface: Surface) -> list[Check]:
+    """Return the checks that ask meshes: collision and line of sight."""
+    checks: list[Check] = [
+        CollisionCheck(collision_scene(cell, surface), cell.file.limits.clearance)
+    ]
+    sight = _sight_check(cell, surface)
+    return [*checks, sight] if sight else checks
+
+
+def collision_scene(cell: Cell, surface: Surface) -> CollisionScene:
+    """Return robot and tool among tooling and fixtures."""
+    mould = mesh_shape(surface.mesh.vertices, surface.mesh.faces)
+    tool = tuple(
+        _body(cell, shape, f"tool {number}", cell.T_tcp_flange)
+        for number, shape in enumerate(cell.file.tool.shapes, start=1)
+    )
+    fixtures = tuple(
+        _body(cell, shape, f"fixture {number}", np.eye(4))
+        for number, shape in enumerate(cell.file.fixtures, start=1)
+    )
+    obstacles = (Body(TOOLING, mould, np.eye(4)), *fixtures)
+    return CollisionScene(cell.robot, tool, obstacles, frozenset({TOOLING}))
+
+
+def _body(cell: Cell, shape: Shape, name: str, T_frame: FloatArray) -> Body:
+    return Body(shape.name or name, _solid(cell, shape), T_frame @ shape.pose.T)
+
+
+def _solid(cell: Cell, shape: Shape) -> coal.CollisionGeometry:
+    solid = shape.solid
+    if isinstance(solid, Box):
+        return coal.Box(*solid.size)
+    if isinstance(solid, Cylinder):
+        return coal.Cylinder(solid.radius, solid.length)
+    if isinstance(solid, Sphere):
+        return coal.Sphere(solid.radius)
+    mesh = read_mesh(cell.find(solid.file), solid.metres)
+    return mesh_shape(mesh.vertices, mesh.faces)
+
+
+def _sensor_check(cell: Cell, force: FloatArray) -> SensorCheck | None:
+    sensor, T_sensor_tcp = cell.file.sensor, cell.T_sensor_tcp
+    if sensor is None or T_sensor_tcp is None:
+        return None
+    centre = T_sensor_tcp[:3, :3] @ cell.tool_centre_tcp + T_sensor_tcp[:3, 3]
+    return SensorCheck(
+        force,
+        T_sensor_tcp,
+        sensor.largest_force,
+        sensor.largest_moment,
+        cell.file.tool.mass * _STANDARD,
+        float(np.linalg.norm(centre)),
+    )
+
+
+def _sight_check(cell: Cell, surface: Surface) -> SightCheck | None:
+    marker, trackers = cell.file.marker, cell.file.trackers
+    if marker is None or not trackers:
+        return None
+    stations = tuple(
+        Station(
+            tracker.name,
+            (float(x), float(y), float(z)),
+            float(tracker.range[0]),
+            float(tracker.range[1]),
+        )
+        for tracker in trackers
+        for x, y, z in [tracker.position_base]
+    )
+    tooling = trimesh.Trimesh(surface.mesh.vertices, surface.mesh.faces, process=False)
+    solids = [tooling, *(_mesh_of(cell, shape) for shape in cell.file.fixtures)]
+    return SightCheck(
+        stations,
+        marker.position_tcp,
+        marker.axis_tcp,
+        min(marker.acceptance, math.pi),
+        _joined(solids),
+    )
+
+
+def _mesh_of(cell: Cell, shape: Shape) -> trimesh.Trimesh:
+    solid = shape.solid
+    if isinstance(solid, Box):
+        mesh = trimesh.creation.box(solid.size)
+    elif isinstance(solid, Cylinder):
+        mesh = trimesh.creation.cylinder(solid.radius, solid.length)
+    elif isinstance(solid, Sphere):
+        mesh = trimesh.creation.icosphere(3, solid.radius)
+    else:
+        triangles = read_mesh(cell.find(solid.file), solid.metres)
+        mesh = trimesh.Trimesh(triangles.vertices, triangles.faces, process=False)
+    placed: trimesh.Trimesh = mesh.apply_transform(shape.pose.T)
+    return placed
+
+
+def _joined(meshes: list[trimesh.Trimesh]) -> trimesh.Trimesh:
+    joined = trimesh.util.concatenate(meshes)
+    assert isinstance(joined, trimesh.Trimesh)
+    return joined
