@@ -12,6 +12,7 @@ if TYPE_CHECKING:
 def calibrate(  # noqa: PLR0913 - one parameter an option
     data: Annotated[Path, typer.Argument(help="Dataset, .nc or .csv.")],
     out: Annotated[Path, typer.Option(help="Model file to write.")],
+    *,
     robot: Annotated[
         str | None, typer.Option(help="URDF file or catalogue name; default: the dataset's own.")
     ] = None,

@@ -69,8 +69,8 @@ class CollisionScene:
         if geometry.ngeoms == 0:
             raise RobotError(f"robot {self.robot.name!r} has no collision shapes in its URDF")
         links = list(range(geometry.ngeoms))
-        tool = _add_tool(model, geometry, self.robot.tip, self.tool)
-        obstacles = _add_obstacles(model, geometry, self.robot.base, self.obstacles)
+        tool = _add(model, geometry, self.robot.tip, self.tool)
+        obstacles = _add(model, geometry, self.robot.base, self.obstacles)
         pairs = _pairs(geometry, links, tool, obstacles)
         for pair in pairs:
             geometry.addCollisionPair(pin.CollisionPair(*pair))
@@ -133,34 +133,18 @@ class CollisionScene:
         return full
 
 
-def _add_tool(
-    model: pin.Model, geometry: pin.GeometryModel, tip: str, bodies: Sequence[Body]
+def _add(
+    model: pin.Model, geometry: pin.GeometryModel, link: str, bodies: Sequence[Body]
 ) -> list[int]:
-    frame = model.frames[model.getFrameId(tip, pin.FrameType.BODY)]
+    """Fix bodies to a link; return their numbers in the geometry model."""
+    frame_id = model.getFrameId(link, pin.FrameType.BODY)
+    frame = model.frames[frame_id]
     return [
         geometry.addGeometryObject(
             pin.GeometryObject(
                 body.name,
                 frame.parentJoint,
-                model.getFrameId(tip, pin.FrameType.BODY),
-                frame.placement * pin.SE3(body.T_frame_body),
-                body.shape,
-            )
-        )
-        for body in bodies
-    ]
-
-
-def _add_obstacles(
-    model: pin.Model, geometry: pin.GeometryModel, base: str, bodies: Sequence[Body]
-) -> list[int]:
-    frame = model.frames[model.getFrameId(base, pin.FrameType.BODY)]
-    return [
-        geometry.addGeometryObject(
-            pin.GeometryObject(
-                body.name,
-                frame.parentJoint,
-                model.getFrameId(base, pin.FrameType.BODY),
+                frame_id,
                 frame.placement * pin.SE3(body.T_frame_body),
                 body.shape,
             )
