@@ -4,15 +4,14 @@ Times are medians over repetitions; machines differ and are noisy, so the ratios
 Run with ``make bench``.
 """
 
-import statistics
 import subprocess
 import sys
-import time
 from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 from scipy.optimize import lsq_linear
+from timing import seconds
 
 from elastocal.elastic import ElasticModel, layout
 from elastocal.identification import build, calibrate, solve
@@ -29,13 +28,7 @@ TOOL = np.array([[1.0, 0, 0, 0.15], [0, 1.0, 0, 0], [0, 0, 1.0, 0.35], [0, 0, 0,
 
 def median_ms(work: Callable[[], object], repetitions: int) -> float:
     """Return the median time of a call in ms, after one call that is not counted."""
-    work()
-    times = []
-    for _ in range(repetitions):
-        start = time.perf_counter()
-        work()
-        times.append(time.perf_counter() - start)
-    return 1e3 * statistics.median(times)
+    return 1e3 * seconds(work, repetitions)
 
 
 def full_system(problem: Problem) -> None:

@@ -5,11 +5,10 @@ would take minutes, is timed for one sweep over the pool and multiplied by the n
 Run with ``python benchmarks/search.py``.
 """
 
-import statistics
 import time
-from collections.abc import Callable
 
 import numpy as np
+from timing import seconds
 
 from elastocal.elastic import ElasticModel, layout
 from elastocal.planning.search import (
@@ -34,17 +33,6 @@ from elastocal.sim.scene import press_forces, press_poses
 
 TOOL = np.array([[1.0, 0, 0, 0.15], [0, 1.0, 0, 0], [0, 0, 1.0, 0.35], [0, 0, 0, 1.0]])
 POOL, POSES = 3000, 31
-
-
-def seconds(work: Callable[[], object], repetitions: int) -> float:
-    """Return the median time of a call, after one call that is not counted."""
-    work()
-    times = []
-    for _ in range(repetitions):
-        start = time.perf_counter()
-        work()
-        times.append(time.perf_counter() - start)
-    return statistics.median(times)
 
 
 def pressed_pool() -> Candidates:

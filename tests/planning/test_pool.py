@@ -5,7 +5,8 @@ import pytest
 
 from elastocal.errors import PlanningError
 from elastocal.planning.checks import FrictionCheck, JointLimitsCheck, WristCheck
-from elastocal.planning.pool import UNREACHABLE, Approach, contact_frames, make_pool
+from elastocal.planning.pool import UNREACHABLE, Approach, make_pool
+from elastocal.planning.surface import contact_frames
 from elastocal.robot.inverse import inverse_for
 from elastocal.sim.scene import SphericalCap
 from support.postures import FORCE_TCP, arm, pool
@@ -20,8 +21,7 @@ def made(points, normals, quick=QUICK, slow=(), **approach):
 
 def test_contact_frames_press_into_the_surface():
     points, normals = SphericalCap().spread(50, 0.3)
-    for spin in (0.0, 1.0):
-        T = contact_frames(points, normals, spin)
+    for T in np.moveaxis(contact_frames(points, normals, np.array([0.0, 1.0])), 1, 0):
         np.testing.assert_allclose(T[:, :3, 2], -normals)
         np.testing.assert_allclose(np.linalg.det(T[:, :3, :3]), 1.0)
         np.testing.assert_allclose(T[:, :3, 3], points)

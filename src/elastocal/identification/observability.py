@@ -14,7 +14,8 @@ from numpy.typing import ArrayLike
 
 from elastocal.arrays import FloatArray
 from elastocal.elastic import ElasticModel, Spring
-from elastocal.identification.least_squares import RANK_TOLERANCE, rank
+from elastocal.identification.least_squares import rank
+from elastocal.identification.problem import unit_columns
 from elastocal.identification.solve import Factored
 from elastocal.identification.sparse_basis import sparse_basis
 
@@ -83,10 +84,9 @@ def attainable_rank(model: ElasticModel, marker_offset: ArrayLike | None = None)
     rng = np.random.default_rng(_PROBE_SEED)
     q = rng.uniform(lower, upper, (_PROBES, len(lower)))
     blocks = model.observation_blocks(q[:, None], np.eye(3), marker_offset=marker_offset)
-    rows = blocks.reshape(-1, len(model.springs))
-    norms = np.linalg.norm(rows, axis=0)
-    loaded = norms > RANK_TOLERANCE * norms.max()
-    return rank(np.linalg.svd(rows[:, loaded] / norms[loaded], compute_uv=False))
+    rows = unit_columns(blocks.reshape(-1, 3, len(model.springs))).rows
+    s = np.linalg.svd(rows.reshape(-1, len(model.springs)), compute_uv=False)
+    return rank(np.asarray(s, dtype=float))
 
 
 def _readable(null_space: FloatArray, springs: Sequence[Spring]) -> tuple[tuple[Term, ...], ...]:

@@ -66,12 +66,7 @@ class Problem:
         The column of a spring that no force turns, e.g. of the last joint when the tcp is on its
         axis, is round-off that would pass for information; it becomes zero.
         """
-        rows = self.O * self.weight[..., None]
-        norms = np.sqrt(np.einsum("rin,rin->n", rows, rows))
-        largest = norms.max() or 1.0
-        loaded = norms > RANK_TOLERANCE * largest
-        rows *= np.where(loaded, 1.0 / np.where(loaded, norms, 1.0), 0.0)
-        return ScaledRows(rows, np.where(loaded, norms, largest))
+        return unit_columns(self.O * self.weight[..., None])
 
     def residuals(self, compliance: FloatArray) -> FloatArray:
         """Return ``O c - d``, unweighted, shape (reading, 3), in m."""
@@ -105,6 +100,15 @@ class Problem:
             upper=self.upper[springs],
             prior_rows=self.prior_rows[:, [*springs, -1]],
         )
+
+
+def unit_columns(rows: FloatArray) -> ScaledRows:
+    """Return observation rows, shape (reading, 3, spring), with columns of unit norm or zero."""
+    norms = np.sqrt(np.einsum("rin,rin->n", rows, rows))
+    largest = norms.max() or 1.0
+    loaded = norms > RANK_TOLERANCE * largest
+    gain = np.where(loaded, 1.0 / np.where(loaded, norms, 1.0), 0.0)
+    return ScaledRows(rows * gain, np.where(loaded, norms, largest))
 
 
 def build(

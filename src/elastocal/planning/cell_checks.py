@@ -35,8 +35,6 @@ from elastocal.planning.surface import (
 TOOLING = "tooling"
 """Name of the surface among the obstacles."""
 
-_STANDARD = 9.80665
-
 
 def quick_checks(cell: Cell, surface: Surface, points: SurfacePoints) -> list[Check]:
     """Return the checks that cost microseconds a posture.
@@ -124,7 +122,7 @@ def _sensor_check(cell: Cell, force: FloatArray) -> SensorCheck | None:
         T_sensor_tcp,
         sensor.largest_force,
         sensor.largest_moment,
-        cell.file.tool.mass * _STANDARD,
+        cell.file.tool.mass * float(np.linalg.norm(cell.gravity_base)),
         float(np.linalg.norm(centre)),
     )
 

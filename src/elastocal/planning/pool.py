@@ -19,6 +19,7 @@ from elastocal.arrays import BoolArray, FloatArray, IndexArray
 from elastocal.errors import PlanningError
 from elastocal.planning.checks import Check, Verdicts, verdicts
 from elastocal.planning.postures import Postures
+from elastocal.planning.surface import contact_frames
 from elastocal.robot.inverse import InverseKinematics
 
 UNREACHABLE = "reach"
@@ -129,33 +130,13 @@ def make_pool(
     )
 
 
-def contact_frames(points: FloatArray, normals: FloatArray, spin: float) -> FloatArray:
-    """Return T_base_tcp with z along the inward normal, turned by ``spin`` about it.
-
-    At spin 0 the x axis is as near to base x as the normal allows (to base y where the normal
-    is along x). Shape (point, 4, 4).
-    """
-    z = -normals
-    reference = np.where(np.abs(z[:, :1]) < 0.9, [[1.0, 0.0, 0.0]], [[0.0, 1.0, 0.0]])
-    x = reference - np.sum(reference * z, axis=1, keepdims=True) * z
-    x /= np.linalg.norm(x, axis=1, keepdims=True)
-    y = np.cross(z, x)
-    frames = np.zeros((len(points), 4, 4))
-    frames[:, :3, 0] = np.cos(spin) * x + np.sin(spin) * y
-    frames[:, :3, 1] = np.cos(spin) * y - np.sin(spin) * x
-    frames[:, :3, 2] = z
-    frames[:, :3, 3] = points
-    frames[:, 3, 3] = 1.0
-    return frames
-
-
 def _options(
     solver: InverseKinematics, points: FloatArray, normals: FloatArray, approach: Approach
 ) -> _Options:
     """Return all configurations that reach contact and approach pose in one branch."""
     parts: list[tuple[FloatArray, FloatArray, FloatArray, FloatArray, IndexArray, IndexArray]] = []
-    for spin in 2.0 * np.pi * np.arange(approach.spins) / approach.spins:
-        contact = contact_frames(points, normals, float(spin))
+    spins = 2.0 * np.pi * np.arange(approach.spins) / approach.spins
+    for contact in np.moveaxis(contact_frames(points, normals, spins), 1, 0):
         off = contact.copy()
         off[:, :3, 3] += approach.distance * normals
         here, there = (solver.solve_many(frames, approach.external).q for frames in (contact, off))

@@ -1,9 +1,9 @@
 """The tooling surface: read it, spread points over it, tell where a contact disk can lie."""
 
 from elastocal.planning.surface.boundary import distance_to_boundary
+from elastocal.planning.surface.contact import contact_frames, contact_poses
 from elastocal.planning.surface.findings import (
     Finding,
-    contact_poses,
     inverted_finding,
     mesh_findings,
     placement_findings,
@@ -37,6 +37,7 @@ __all__ = [
     "arm_reach",
     "arm_stands",
     "build_surface",
+    "contact_frames",
     "contact_poses",
     "distance_to_boundary",
     "fit_disk",

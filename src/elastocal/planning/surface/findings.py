@@ -7,7 +7,7 @@ import numpy as np
 from numpy.random import Generator
 
 from elastocal.arrays import BoolArray, FloatArray
-from elastocal.planning.surface.flatness import tangents
+from elastocal.planning.surface.contact import contact_poses
 from elastocal.planning.surface.sampling import sample_uniform
 from elastocal.planning.surface.surface import Surface, SurfacePoints
 
@@ -137,37 +137,6 @@ def inverted_finding(surface: Surface, reachable: Reachable, rng: Generator) -> 
         f" {front:.0%} of the points along them and {back:.0%} against them{offer}"
     )
     return (Finding("inverted", text),)
-
-
-def contact_poses(points: SurfacePoints, spin: FloatArray) -> FloatArray:
-    """Return T_base_tcp at the points, z into the surface, turned about z by each spin.
-
-    Parameters
-    ----------
-    points : SurfacePoints
-        The contact points.
-    spin : ndarray, shape (spin,)
-        In rad.
-
-    Returns
-    -------
-    ndarray, shape (point, spin, 4, 4)
-        In m. At spin 0 the x axis lies in the plane of the normal and the base's x axis, or, for
-        a normal along x, is arbitrary but always the same.
-    """
-    z = -points.normal
-    first, second = tangents(z)
-    # Of all directions square to z, the one nearest to base x: so that the spin means something.
-    lean = np.arctan2(second[:, 0], first[:, 0])
-    turn = lean[:, None] + spin
-    cosine, sine = np.cos(turn)[..., None], np.sin(turn)[..., None]
-    T = np.zeros((*turn.shape, 4, 4))
-    T[..., :3, 0] = cosine * first[:, None] + sine * second[:, None]
-    T[..., :3, 1] = cosine * second[:, None] - sine * first[:, None]
-    T[..., :3, 2] = z[:, None]
-    T[..., :3, 3] = points.position[:, None]
-    T[..., 3, 3] = 1.0
-    return T
 
 
 def _reached(points: SurfacePoints, sign: float, reachable: Reachable) -> float:
