@@ -5,7 +5,7 @@ import stat
 import pytest
 
 from elastocal.errors import FileAccessError
-from elastocal.files import read_text, replacing, sha256, write_text
+from elastocal.files import filling, read_text, replacing, sha256, write_text
 
 
 def test_text_comes_back_as_it_was_written(tmp_path):
@@ -111,3 +111,48 @@ def test_the_mark_that_windows_puts_in_front_is_dropped(tmp_path):
 def test_a_hash_is_that_of_the_utf8_bytes():
     assert sha256("µm") == hashlib.sha256("µm".encode()).hexdigest()
     assert sha256("a\n") != sha256("a\r\n")
+
+
+class TestFilling:
+    def test_a_new_folder_appears_with_all_its_files(self, tmp_path):
+        with filling(tmp_path / "deep" / "plan", "plan.json") as folder:
+            (folder / "plan.json").write_text("1")
+            (folder / "pool.nc").write_text("2")
+            assert not (tmp_path / "deep" / "plan").exists()
+        names = {entry.name for entry in (tmp_path / "deep" / "plan").iterdir()}
+        assert names == {"plan.json", "pool.nc"}
+        assert [entry.name for entry in (tmp_path / "deep").iterdir()] == ["plan"]
+
+    def test_an_error_leaves_nothing_behind(self, tmp_path):
+        def interrupted():
+            with filling(tmp_path / "plan", "plan.json") as folder:
+                (folder / "pool.nc").write_text("2")
+                raise KeyboardInterrupt
+
+        with pytest.raises(KeyboardInterrupt):
+            interrupted()
+        assert list(tmp_path.iterdir()) == []
+
+    def test_a_folder_that_holds_files_is_refused_before_the_work(self, tmp_path):
+        (tmp_path / "mine.txt").write_text("keep")
+        with (
+            pytest.raises(FileAccessError, match=r"holds files already \(mine.txt\)"),
+            filling(tmp_path, "plan.json"),
+        ):
+            pytest.fail("the block must not run")
+
+    def test_force_replaces_what_has_the_same_name_and_keeps_the_rest(self, tmp_path):
+        for name in ("mine.txt", "plan.json", "pool.nc"):
+            (tmp_path / name).write_text("old")
+        with filling(tmp_path, "plan.json", force=True) as folder:
+            (folder / "plan.json").write_text("new")
+        assert (tmp_path / "plan.json").read_text() == "new"
+        assert (tmp_path / "mine.txt").read_text() == "old"
+
+    def test_a_folder_that_cannot_be_made_is_named(self, tmp_path):
+        (tmp_path / "file").write_text("")
+        with (
+            pytest.raises(FileAccessError, match="file/plan"),
+            filling(tmp_path / "file" / "plan", "plan.json"),
+        ):
+            pytest.fail("the block must not run")

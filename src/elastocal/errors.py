@@ -49,6 +49,14 @@ class PlanningError(ElastocalError, ValueError):
     """A search for poses that cannot be made: too small a pool, missing rows, unknown technique."""
 
 
+class DeviceError(ElastocalError, RuntimeError):
+    """A device refuses a command, is not configured, or does not answer."""
+
+
+class ProcedureError(ElastocalError, RuntimeError):
+    """The calibration procedure cannot start or go on."""
+
+
 class FileAccessError(ElastocalError, OSError):
     """A file that cannot be read or written."""
 

@@ -44,6 +44,53 @@ def replacing(path: Path) -> Iterator[Path]:
         temporary.unlink(missing_ok=True)
 
 
+@contextlib.contextmanager
+def filling(folder: Path, last: str, force: bool = False) -> Iterator[Path]:
+    """Yield a temporary folder whose files move into ``folder`` when the block ends without error.
+
+    The file named ``last`` is moved last, and one of that name that is there already is removed
+    first: where it is, the files around it belong to it.
+
+    Parameters
+    ----------
+    folder : Path
+        Made if it is not there.
+    last : str
+        Name of the file by which the folder is known.
+    force : bool
+        Whether files in the folder may be replaced; those with other names stay.
+
+    Raises
+    ------
+    FileAccessError
+        If the folder holds files and ``force`` is not given, or cannot be written.
+    """
+    folder = Path(folder)
+    try:
+        holds = sorted(entry.name for entry in folder.iterdir()) if folder.exists() else []
+        if holds and not force:
+            raise FileAccessError(
+                f"{folder} holds files already ({holds[0]}{' and others' if holds[1:] else ''}):"
+                " name another folder, or give --force to replace what is in it"
+            )
+        folder.parent.mkdir(parents=True, exist_ok=True)
+        made = tempfile.TemporaryDirectory(dir=folder.parent, prefix=f".{folder.name}.")
+    except OSError as error:
+        if isinstance(error, FileAccessError):
+            raise
+        raise FileAccessError(f"cannot write {folder}: {error.strerror or error}") from error
+    with made as temporary:
+        yield Path(temporary)
+        try:
+            folder.mkdir(exist_ok=True)
+            (folder / last).unlink(missing_ok=True)
+            names = sorted(entry.name for entry in Path(temporary).iterdir())
+            for name in sorted(names, key=lambda name: name == last):
+                (Path(temporary) / name).replace(folder / name)
+        except OSError as error:
+            raise FileAccessError(f"cannot write {folder}: {error.strerror or error}") from error
+
+
 def write_text(path: Path, text: str) -> None:
     """Write ``text`` to ``path`` atomically, as UTF-8."""
     with replacing(path) as temporary:

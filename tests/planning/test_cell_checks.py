@@ -7,10 +7,10 @@ import pytest
 
 from elastocal.cell import load_cell
 from elastocal.cell.examples import write_example
-from elastocal.planning.cell_checks import TOOLING, collision_scene, quick_checks, slow_checks
-from elastocal.planning.pool import Approach, make_pool
-from elastocal.planning.surface import load_surface, sample_uniform
-from elastocal.robot.inverse import inverse_for
+from elastocal.planning.cell_checks import TOOLING, collision_scene
+from elastocal.planning.surface import sample_uniform
+from elastocal.planning.tooling import cell_surface
+from elastocal.planning.workshop import Workshop
 
 POINTS = 150
 
@@ -19,21 +19,11 @@ POINTS = 150
 def planned(like, folder):
     write_example(folder, like)
     cell = load_cell(folder / "cell.yaml")
-    entry = cell.file.surface
-    surface = load_surface(
-        cell.surface_path, entry.metres, cell.T_base_surface, entry.region, entry.crease_angle
-    )
+    surface = cell_surface(cell)
+    workshop = Workshop.of(cell, surface)
     points = sample_uniform(surface, POINTS, np.random.default_rng(0))
-    external = cell.external_positions[len(cell.external_positions) // 2]
-    approach = Approach(cell.file.engagement.approach_distance, external=tuple(external))
-    quick, slow = quick_checks(cell, surface, points), slow_checks(cell, surface)
-    solver = inverse_for(cell.robot)
-    return (
-        cell,
-        surface,
-        points,
-        make_pool(solver, points.position, points.normal, approach, quick, slow),
-    )
+    stands = workshop.rank(points.take(np.arange(32)))
+    return cell, surface, points, workshop.pool(stands, points)
 
 
 @pytest.fixture(scope="module")

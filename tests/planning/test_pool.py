@@ -4,19 +4,20 @@ import numpy as np
 import pytest
 
 from elastocal.errors import PlanningError
-from elastocal.planning.checks import FrictionCheck, JointLimitsCheck, WristCheck
-from elastocal.planning.pool import UNREACHABLE, Approach, make_pool
+from elastocal.planning.checks import Checks, EdgeCheck, FrictionCheck, JointLimitsCheck, WristCheck
+from elastocal.planning.pool import UNREACHABLE, Approach, Stand, joined, make_pool
 from elastocal.planning.surface import contact_frames
 from elastocal.robot.inverse import inverse_for
 from elastocal.sim.scene import SphericalCap
 from support.postures import FORCE_TCP, arm, pool
 
+STANDS = (Stand(),)
 QUICK = [JointLimitsCheck(arm(), 0.05), WristCheck(arm(), 0.1)]
 
 
-def made(points, normals, quick=QUICK, slow=(), **approach):
-    fields = {"distance": 0.1} | approach
-    return make_pool(inverse_for(arm()), points, normals, Approach(**fields), quick, slow)
+def made(points, normals, quick=QUICK, slow=(), point=(), stands=STANDS):
+    checks = Checks(tuple(point), tuple(quick), tuple(slow))
+    return make_pool(inverse_for(arm()), points, normals, Approach(0.1), checks, stands)
 
 
 def test_contact_frames_press_into_the_surface():
@@ -75,6 +76,71 @@ def test_a_slow_check_that_refuses_the_first_choice_gets_the_next():
     found = made(*SphericalCap().spread(40, 0.0), slow=[NotThese(FORCE_TCP, 1.0, 1.0)])
     assert len(found.postures) > 30
     assert np.all(found.postures.q[:, 5] > 0.0)
+
+
+def test_a_point_at_the_edge_is_refused_before_any_robot_is_asked():
+    points, normals = SphericalCap().spread(30, 0.0)
+    edge = EdgeCheck(np.where(np.arange(30) < 10, 0.0, 0.1), 0.025, 0.005)
+
+    class Never(FrictionCheck):
+        def margin(self, postures):
+            assert np.all(postures.point >= 10)
+            return super().margin(postures)
+
+    found = made(points, normals, quick=[Never(FORCE_TCP, 1.0, 1.0)], point=[edge])
+    assert found.refused["edge"] == 10
+    np.testing.assert_array_equal(found.refused_by[:10], 1)
+    assert found.verdicts.names == ("edge", "friction")
+    assert found.bottleneck == "edge"
+    assert "disk" in found.advice
+
+
+def test_every_point_has_a_posture_or_a_refusal():
+    points, normals = SphericalCap().spread(80, 0.0)
+    strict = [JointLimitsCheck(arm(), 0.6), WristCheck(arm(), 0.5)]
+    found = made(points, normals, quick=strict)
+    has = np.zeros(80, dtype=bool)
+    has[found.postures.point] = True
+    np.testing.assert_array_equal(found.refused_by < 0, has)
+    assert 0 < has.sum() < 80
+    assert sum(found.refused.values()) == 80 - has.sum()
+
+
+def test_a_point_counts_for_the_check_that_its_least_bad_posture_fails():
+    points, normals = SphericalCap().spread(30, 0.0)
+    never = FrictionCheck(FORCE_TCP, 0.1, 1.0)
+    also = WristCheck(arm(), 3.0)
+    found = made(points, normals, quick=[WristCheck(arm(), 0.0), never])
+    assert found.refused["friction"] == 30
+    assert made(points, normals, quick=[also, never]).refused["wrist"] == 30
+
+
+def test_branches_are_asked_in_the_order_of_the_stand():
+    points, normals = SphericalCap().spread(30, 0.0)
+    usual = made(points, normals)
+    other = (usual.branch[0] + 4) % 8
+    found = made(points, normals, stands=(Stand((), (int(other),)),))
+    assert set(found.branch.tolist()) <= {int(other)}
+
+
+def test_parts_of_the_points_make_the_same_pool_as_all_of_them():
+    points, normals = SphericalCap().spread(40, 0.0)
+    order = made(points, normals).branch
+    assert len(set(order.tolist())) == 1
+    parts = joined([made(points[:13], normals[:13]), made(points[13:], normals[13:])])
+    whole = made(points, normals)
+    np.testing.assert_array_equal(parts.postures.point, whole.postures.point)
+    np.testing.assert_array_equal(parts.refused_by, whole.refused_by)
+    assert parts.verdicts.margin.shape == whole.verdicts.margin.shape
+
+
+def test_the_first_postures_keep_the_points_up_to_the_next():
+    found = made(*SphericalCap().spread(40, 0.0))
+    few = found.first(5)
+    assert len(few.postures) == few.verdicts.margin.shape[1] == 5
+    assert few.sampled == found.postures.point[5]
+    assert np.count_nonzero(few.refused_by < 0) == 5
+    assert found.first(10_000) is found
 
 
 def test_no_points_are_refused_by_name():

@@ -4,6 +4,7 @@ from functools import cache
 
 import numpy as np
 
+from elastocal.planning.checks import Checks
 from elastocal.planning.pool import Approach, Pool, make_pool
 from elastocal.planning.postures import Postures
 from elastocal.robot import Robot, catalogue
@@ -29,7 +30,7 @@ def arm() -> Robot:
 @cache
 def pool(count: int = 60) -> Pool:
     points, normals = SphericalCap().spread(count, 0.0)
-    return make_pool(inverse_for(arm()), points, normals, Approach(0.1), [])
+    return make_pool(inverse_for(arm()), points, normals, Approach(0.1), Checks())
 
 
 def postures() -> Postures:

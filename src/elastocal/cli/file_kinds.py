@@ -7,19 +7,26 @@ from typing import Any
 
 from elastocal import dataset
 from elastocal.cell import load_cell
+from elastocal.dataset.netcdf import read_netcdf
 from elastocal.elastic.layouts import read_springs
-from elastocal.errors import RobotError, SchemaError
+from elastocal.errors import DatasetError, RobotError, SchemaError
 from elastocal.files import read_text
 from elastocal.identification.model_file import read_model
+from elastocal.planning.plan_file import read_plan
+from elastocal.planning.pool_file import read_pool
 from elastocal.robot import Robot
 from elastocal.robot.urdf import leaf_links, parse_urdf
 
 Facts = dict[str, Any]
+Described = tuple[str, Facts]
+"""The kind of a file and what it holds."""
+Describe = Callable[[Path], Described]
 
+_PLAN = re.compile(r'"schema":\s*"elastocal\.plan/')
 _SCHEMA_LINE = re.compile(r"^schema:\s*[\"']?elastocal\.cell/", re.MULTILINE)
 
 
-def describe_file(path: Path) -> tuple[str, Facts]:
+def describe_file(path: Path) -> Described:
     """Return the kind of a file and what it holds.
 
     Raises
@@ -29,24 +36,37 @@ def describe_file(path: Path) -> tuple[str, Facts]:
     ElastocalError
         If the contents are not valid.
     """
-    known = {
-        ".nc": ("dataset", _dataset),
-        ".csv": ("dataset", _dataset),
-        ".json": ("calibrated model", _model),
-        ".urdf": ("robot description", _robot),
-        ".yaml": ("settings file", _settings),
-        ".yml": ("settings file", _settings),
+    known: dict[str, Describe] = {
+        ".nc": _netcdf,
+        ".csv": _dataset,
+        ".json": _json,
+        ".urdf": _robot,
+        ".yaml": _settings,
+        ".yml": _settings,
     }
-    found: tuple[str, Callable[[Path], Facts]] | None = known.get(path.suffix.lower())
-    if found is None:
+    describe = known.get(path.suffix.lower())
+    if describe is None:
         raise SchemaError(f"{path}: suffix {path.suffix!r} is not one of {', '.join(known)}")
-    kind, describe = found
-    return kind, describe(path)
+    return describe(path)
 
 
-def _dataset(path: Path) -> Facts:
+def _netcdf(path: Path) -> Described:
+    """Describe a NetCDF file by the schema that it states."""
+    try:
+        stated = read_netcdf(path).attrs.get("schema")
+    except DatasetError as error:
+        raise DatasetError(f"{path}: {error}") from error
+    return _pool(path) if str(stated).startswith("elastocal.pool/") else _dataset(path)
+
+
+def _json(path: Path) -> Described:
+    """Describe a JSON file by the schema that it states; what states none is read as a model."""
+    return _plan(path) if _PLAN.search(read_text(path)[:200]) else _model(path)
+
+
+def _dataset(path: Path) -> Described:
     data = dataset.read(path)
-    return {
+    return "dataset", {
         "readings": len(data.readings(data.joint_names)),
         "poses": len(data.poses),
         "load_cases": list(data.load_cases),
@@ -56,10 +76,10 @@ def _dataset(path: Path) -> Facts:
     }
 
 
-def _model(path: Path) -> Facts:
+def _model(path: Path) -> Described:
     calibrated = read_model(path)
     seen = calibrated.observability
-    return {
+    return "calibrated model", {
         "robot": calibrated.model.robot.name,
         "tcp": calibrated.model.robot.tip,
         "springs": seen.springs,
@@ -69,13 +89,13 @@ def _model(path: Path) -> Facts:
     }
 
 
-def _robot(path: Path) -> Facts:
+def _robot(path: Path) -> Described:
     text = read_text(path)
     leaves = leaf_links(parse_urdf(text))
     if not leaves:
         raise RobotError(f"{path}: URDF has no link at the end of a chain")
     robots = [Robot.from_urdf(text, leaf) for leaf in leaves]
-    return {
+    return "robot description", {
         "robot": robots[0].name,
         "tips": leaves,
         "joints": list(max(robots, key=lambda robot: len(robot.joint_names)).joint_names),
@@ -83,20 +103,48 @@ def _robot(path: Path) -> Facts:
     }
 
 
-def _settings(path: Path) -> Facts:
+def _settings(path: Path) -> Described:
     """Describe a YAML file by the schema that it states."""
     if _SCHEMA_LINE.search(read_text(path)):
         return _cell(path)
     file = read_springs(path)
-    return {"schema": "elastocal.springs/1", "include": file.include, "springs": len(file.springs)}
+    facts = {
+        "schema": "elastocal.springs/1",
+        "include": file.include,
+        "springs": len(file.springs),
+    }
+    return "spring file", facts
 
 
-def _cell(path: Path) -> Facts:
+def _cell(path: Path) -> Described:
     cell = load_cell(path)
-    return {
+    return "cell file", {
         "schema": "elastocal.cell/1",
         "cell": cell.name,
         "robot": cell.robot.name,
         "load_cases": list(cell.file.load_cases.cases),
         "trackers": [tracker.name for tracker in cell.file.trackers],
+    }
+
+
+def _plan(path: Path) -> Described:
+    plan = read_plan(path)
+    return "plan", {
+        "schema": "elastocal.plan/1",
+        "cell": plan.cell.name,
+        "robot": plan.robot.name,
+        "poses": len(plan.poses),
+        "load_cases": list(plan.contact.load_cases),
+        "technique": plan.search.name,
+        "covering_radius": plan.search.covering_radius,
+    }
+
+
+def _pool(path: Path) -> Described:
+    pool = read_pool(path)
+    return "pool of candidates", {
+        "schema": "elastocal.pool/1",
+        "candidates": len(pool),
+        "sampled": len(pool.sampled),
+        "checks": list(pool.check_names),
     }

@@ -13,6 +13,7 @@ from elastocal.cli.calibrate import calibrate
 from elastocal.cli.check import check
 from elastocal.cli.demo import demo
 from elastocal.cli.init import init
+from elastocal.cli.plan import plan
 from elastocal.cli.predict import predict
 from elastocal.cli.robots import robots
 from elastocal.errors import ElastocalError
@@ -24,7 +25,7 @@ app = typer.Typer(
     add_completion=False,
     pretty_exceptions_enable=False,
 )
-for command in (robots, init, check, calibrate, predict, demo):
+for command in (robots, init, check, plan, calibrate, predict, demo):
     app.command()(command)
 
 

@@ -11,6 +11,7 @@ from elastocal.cell import Cell
 from elastocal.cell.description.shapes import Box, Cylinder, Shape, Sphere
 from elastocal.planning.checks import (
     Check,
+    Checks,
     CollisionCheck,
     EdgeCheck,
     FlatnessCheck,
@@ -23,6 +24,7 @@ from elastocal.planning.checks import (
     TorqueCheck,
     WristCheck,
 )
+from elastocal.planning.moving_solids import MovingSolids
 from elastocal.planning.scene import Body, CollisionScene, mesh_shape
 from elastocal.planning.surface import (
     Surface,
@@ -36,8 +38,10 @@ TOOLING = "tooling"
 """Name of the surface among the obstacles."""
 
 
-def quick_checks(cell: Cell, surface: Surface, points: SurfacePoints) -> list[Check]:
-    """Return the checks that cost microseconds a posture.
+def point_checks(
+    cell: Cell, surface: Surface, points: SurfacePoints
+) -> tuple[EdgeCheck, FlatnessCheck]:
+    """Return the checks that sampled points decide alone.
 
     Parameters
     ----------
@@ -48,46 +52,49 @@ def quick_checks(cell: Cell, surface: Surface, points: SurfacePoints) -> list[Ch
     points : SurfacePoints
         The sampled points that postures refer to.
     """
-    file, robot = cell.file, cell.robot
-    engagement, loads, limits = file.engagement, file.load_cases, file.limits
+    engagement = cell.file.engagement
     radius = engagement.disk_radius
-    force = loads.force_tcp
-    checks: list[Check] = [
+    return (
         EdgeCheck(distance_to_boundary(surface, points), radius, engagement.edge_margin),
         FlatnessCheck(fit_disk(surface, points, radius), engagement.normal_tolerance),
+    )
+
+
+def robot_checks(cell: Cell, surface: Surface) -> Checks:
+    """Return the checks that postures decide: quick ones, and collision."""
+    collision = CollisionCheck(collision_scene(cell, surface), cell.file.limits.clearance)
+    seen, sensed = sight_check(cell, surface), _sensor_check(cell)
+    optional: list[Check] = [check for check in (sensed, seen) if check is not None]
+    return Checks((), (*_joint_checks(cell), torque_check(cell), *optional), (collision,))
+
+
+def _joint_checks(cell: Cell) -> tuple[Check, ...]:
+    file, robot = cell.file, cell.robot
+    loads, limits = file.load_cases, file.limits
+    return (
         JointLimitsCheck(robot, cell.joint_margin),
         SingularityCheck(robot, limits.singular_value),
         WristCheck(robot, limits.wrist_angle),
-        FrictionCheck(force, loads.friction, loads.safety),
-        TorqueCheck(
-            robot,
-            force,
-            cell.torque_limits,
-            file.tool.mass,
-            cell.tool_centre_tcp,
-            tuple(cell.gravity_base.tolist()),
-        ),
-    ]
-    sensor = _sensor_check(cell, force)
-    return [*checks, sensor] if sensor else checks
+        FrictionCheck(loads.force_tcp, loads.friction, loads.safety),
+    )
 
 
-def slow_checks(cell: Cell, surface: Surface) -> list[Check]:
-    """Return the checks that ask meshes: collision and line of sight."""
-    checks: list[Check] = [
-        CollisionCheck(collision_scene(cell, surface), cell.file.limits.clearance)
-    ]
-    sight = _sight_check(cell, surface)
-    return [*checks, sight] if sight else checks
+def torque_check(cell: Cell) -> TorqueCheck:
+    """Return the check of the actuators; it knows which joints it can judge."""
+    return TorqueCheck(
+        cell.robot,
+        cell.file.load_cases.force_tcp,
+        cell.torque_limits,
+        cell.file.tool.mass,
+        cell.tool_centre_tcp,
+        tuple(cell.gravity_base.tolist()),
+    )
 
 
 def collision_scene(cell: Cell, surface: Surface) -> CollisionScene:
     """Return robot and tool among tooling and fixtures."""
     mould = mesh_shape(surface.mesh.vertices, surface.mesh.faces)
-    tool = tuple(
-        _body(cell, shape, f"tool {number}", cell.T_tcp_flange)
-        for number, shape in enumerate(cell.file.tool.shapes, start=1)
-    )
+    tool = _tool(cell)
     fixtures = tuple(
         _body(cell, shape, f"fixture {number}", np.eye(4))
         for number, shape in enumerate(cell.file.fixtures, start=1)
@@ -112,13 +119,13 @@ def _solid(cell: Cell, shape: Shape) -> coal.CollisionGeometry:
     return mesh_shape(mesh.vertices, mesh.faces)
 
 
-def _sensor_check(cell: Cell, force: FloatArray) -> SensorCheck | None:
+def _sensor_check(cell: Cell) -> SensorCheck | None:
     sensor, T_sensor_tcp = cell.file.sensor, cell.T_sensor_tcp
     if sensor is None or T_sensor_tcp is None:
         return None
     centre = T_sensor_tcp[:3, :3] @ cell.tool_centre_tcp + T_sensor_tcp[:3, 3]
     return SensorCheck(
-        force,
+        cell.file.load_cases.force_tcp,
         T_sensor_tcp,
         sensor.largest_force,
         sensor.largest_moment,
@@ -127,7 +134,8 @@ def _sensor_check(cell: Cell, force: FloatArray) -> SensorCheck | None:
     )
 
 
-def _sight_check(cell: Cell, surface: Surface) -> SightCheck | None:
+def sight_check(cell: Cell, surface: Surface) -> SightCheck | None:
+    """Return the check that a station sees the marker; None without marker or stations."""
     marker, trackers = cell.file.marker, cell.file.trackers
     if marker is None or not trackers:
         return None
@@ -149,6 +157,15 @@ def _sight_check(cell: Cell, surface: Surface) -> SightCheck | None:
         marker.axis_tcp,
         min(marker.acceptance, math.pi),
         _joined(solids),
+        MovingSolids(CollisionScene(cell.robot, _tool(cell), ()), marker.position_tcp),
+    )
+
+
+def _tool(cell: Cell) -> tuple[Body, ...]:
+    """Return the tool's shapes in the tcp frame."""
+    return tuple(
+        _body(cell, shape, f"tool {number}", cell.T_tcp_flange)
+        for number, shape in enumerate(cell.file.tool.shapes, start=1)
     )
 
 

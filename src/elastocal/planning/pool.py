@@ -1,32 +1,38 @@
 """From points on the surface to postures of the robot that pass every check.
 
 At each point the tool presses along the inward normal and may be turned freely about it. Every
-turn has up to eight configurations of the arm. Those that pass the quick checks are ranked by
-their smallest margin; the slow checks (collision, line of sight) are asked only of the best ones,
-round by round, until a point has a posture or has run out of them.
+turn has up to eight configurations of the arm, one a branch of the inverse kinematics. Branches
+are asked one after the other, the one that serves most points first, so that neighbours share a
+configuration and the arm need not flip between them; so are the positions of the external axes.
 
-Configurations are chosen branch by branch, the branch that serves most points first, so that
-neighbours share one and the arm need not flip between them.
+Checks are asked cheapest first. What a point alone decides (edge, flatness) is asked before any
+robot is; the quick checks of every posture of a branch; the slow one (collision) only of the best,
+round by round, until a point has a posture or its branch has run out of them.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
 
 from elastocal.arrays import BoolArray, FloatArray, IndexArray
 from elastocal.errors import PlanningError
-from elastocal.planning.checks import Check, Verdicts, verdicts
+from elastocal.planning.checks import Checks, Verdicts, verdicts
 from elastocal.planning.postures import Postures
 from elastocal.planning.surface import contact_frames
 from elastocal.robot.inverse import InverseKinematics
 
 UNREACHABLE = "reach"
 """Name under which points that no configuration reaches are counted."""
+REACH_ADVICE = (
+    "bring the tooling within the robot's reach, turn it towards the robot, or let the external"
+    " axes be searched"
+)
+"""What a user can move when most points are out of reach."""
 
-_ROUNDS = 6
-"""Postures of a point that the slow checks are asked about, at most."""
+ROUNDS = 6
+"""Postures of a point and branch that the slow checks are asked about, at most."""
 
 Progress = Callable[[str, int, int], None]
 """Called with a stage, how many points are done and how many there are."""
@@ -40,42 +46,80 @@ class Approach:
     """Distance of the approach pose from the surface along the normal, in m."""
     spins: int = 8
     """Number of turns of the tool about its axis that are tried."""
+
+
+@dataclass(frozen=True)
+class Stand:
+    """Where the external axes stand, and which branches are asked there, the best first."""
+
     external: tuple[float, ...] = ()
     """Positions of the external axes, in rad or m."""
+    branches: tuple[int, ...] | None = None
+    """Branches of the inverse kinematics; in their own order when not given."""
 
 
 @dataclass(frozen=True, eq=False)
 class Pool:
-    """Candidates with a posture each, and why the others have none."""
+    """Candidates with a posture each, and why the other points have none."""
 
     postures: Postures
-    """One posture for each point that has one."""
+    """One posture for each point that has one; ``postures.point`` says which."""
     branch: IndexArray
     """Inverse kinematics branch of each posture, shape (posture,)."""
     verdicts: Verdicts
     """Margins of the postures under every check."""
-    refused: dict[str, int]
-    """How many points each check left without a posture, `UNREACHABLE` among them."""
-    sampled: int
-    """Number of points that were tried."""
+    refused_by: IndexArray
+    """For each sampled point the number in `refusals` of what left it without a posture, or -1
+    where it has one, shape (point,)."""
+
+    @property
+    def sampled(self) -> int:
+        """Number of points that were tried."""
+        return len(self.refused_by)
+
+    @property
+    def refusals(self) -> tuple[str, ...]:
+        """What may refuse a point: the reach of the robot, then every check."""
+        return (UNREACHABLE, *self.verdicts.names)
+
+    @property
+    def refused(self) -> dict[str, int]:
+        """How many points each check left without a posture, `UNREACHABLE` among them.
+
+        A point is counted once, for the first check that its best posture fails: the one that
+        fails fewest.
+        """
+        counts = np.bincount(self.refused_by + 1, minlength=len(self.refusals) + 1)[1:]
+        return {name: int(count) for name, count in zip(self.refusals, counts, strict=True)}
 
     @property
     def bottleneck(self) -> str | None:
         """The check that left most points without a posture; None when none did."""
-        worst = max(self.refused, key=lambda name: self.refused[name], default=None)
-        return worst if worst is not None and self.refused[worst] else None
-
-
-@dataclass(frozen=True, eq=False)
-class _Options:
-    """Every spin and branch at every point, flat."""
-
-    postures: Postures
-    branch: IndexArray
+        refused = self.refused
+        worst = max(refused, key=lambda name: refused[name])
+        return worst if refused[worst] else None
 
     @property
-    def point(self) -> IndexArray:
-        return self.postures.point
+    def advice(self) -> str:
+        """What the bottleneck leaves to move; empty when there is none."""
+        texts = dict(zip(self.refusals, (REACH_ADVICE, *self.verdicts.advice), strict=True))
+        return texts.get(self.bottleneck or "", "")
+
+    def first(self, count: int) -> "Pool":
+        """Return the pool without the postures beyond the first ``count`` ones.
+
+        The points that lose their posture leave the pool with the points behind them, so that
+        the numbers still tell what share of the points was refused.
+        """
+        if len(self.postures) <= count:
+            return self
+        end = int(self.postures.point[count])
+        return Pool(
+            self.postures.take(np.arange(count)),
+            self.branch[:count],
+            self.verdicts.take(np.arange(count)),
+            self.refused_by[:end],
+        )
 
 
 def make_pool(
@@ -83,9 +127,8 @@ def make_pool(
     points: FloatArray,
     normals: FloatArray,
     approach: Approach,
-    quick: Sequence[Check],
-    slow: Sequence[Check] = (),
-    progress: Progress = lambda *_: None,
+    checks: Checks,
+    stands: Sequence[Stand] = (Stand(),),
 ) -> Pool:
     """Return a posture for every point that has one which passes every check.
 
@@ -97,10 +140,10 @@ def make_pool(
         Contact points in base, in m, and outward unit normals.
     approach : Approach
         How the tool comes to the surface.
-    quick, slow : sequence of Check
-        Checks asked of every posture, and of the promising ones only.
-    progress : callable, optional
-        Told of each stage.
+    checks : Checks
+        What a posture has to pass; those of points refer to these points.
+    stands : sequence of Stand
+        Where the external axes may stand, in the order in which they are tried.
 
     Raises
     ------
@@ -109,151 +152,161 @@ def make_pool(
     """
     if not len(points):
         raise PlanningError("the surface has no candidate points: is its region empty?")
-    options = _options(solver, points, normals, approach)
-    progress("inverse kinematics", len(points), len(points))
-    fast = verdicts(quick, options.postures)
-    passed = fast.passed
-    order = _preference(options, passed, fast.margin, len(points))
-    asked = _ask_slow_checks(options, order, slow, len(points), progress)
-    both = Verdicts(
-        (*fast.names, *asked.verdicts.names),
-        (*fast.units, *asked.verdicts.units),
-        (*fast.advice, *asked.verdicts.advice),
-        np.vstack([fast.margin[:, asked.chosen], asked.verdicts.margin]),
-    )
+    found = _Found(checks, len(points))
+    found.refuse_points()
+    for stand in stands:
+        waiting = found.waiting
+        if not len(waiting):
+            break
+        options = options_at(solver, points[waiting], normals[waiting], approach, stand.external)
+        options = Options(options.postures.at(waiting[options.point]), options.branch)
+        order = range(solver.branches) if stand.branches is None else stand.branches
+        for branch in order:
+            _ask_branch(options.of(branch, found.is_waiting), branch, checks, found)
+    return found.pool(len(solver.robot.joint_names))
+
+
+def joined(pools: Sequence[Pool]) -> Pool:
+    """Return one pool of several that were made of consecutive parts of the points."""
+    starts = np.cumsum([0, *(pool.sampled for pool in pools)])
+    postures = [
+        pool.postures.at(pool.postures.point + start)
+        for pool, start in zip(pools, starts[:-1], strict=True)
+    ]
     return Pool(
-        options.postures.take(asked.chosen),
-        options.branch[asked.chosen],
-        both,
-        _refused(options, fast, asked.chosen, slow, len(points)),
-        len(points),
+        Postures.joined(postures),
+        np.concatenate([pool.branch for pool in pools]),
+        Verdicts.joined([pool.verdicts for pool in pools]),
+        np.concatenate([pool.refused_by for pool in pools]),
     )
 
 
-def _options(
-    solver: InverseKinematics, points: FloatArray, normals: FloatArray, approach: Approach
-) -> _Options:
-    """Return all configurations that reach contact and approach pose in one branch."""
-    parts: list[tuple[FloatArray, FloatArray, FloatArray, FloatArray, IndexArray, IndexArray]] = []
+@dataclass(frozen=True, eq=False)
+class Options:
+    """Every turn of the tool and branch of the arm that reaches its point, flat."""
+
+    postures: Postures
+    branch: IndexArray
+    """Shape (option,)."""
+
+    @property
+    def point(self) -> IndexArray:
+        """Point of each option, shape (option,)."""
+        return self.postures.point
+
+    def of(self, branch: int, is_waiting: BoolArray) -> Postures:
+        """Return the postures of a branch at points that still wait for one."""
+        return self.postures.take((self.branch == branch) & is_waiting[self.point])
+
+
+class _Found:
+    """What the search has found so far; lives inside `make_pool` only."""
+
+    def __init__(self, checks: Checks, points: int) -> None:
+        self.checks = checks
+        self.parts: list[tuple[Postures, int, FloatArray]] = []
+        self.is_waiting = np.ones(points, dtype=bool)
+        self.failures = np.full(points, np.inf)
+        self.refused_by = np.zeros(points, dtype=np.intp)
+
+    @property
+    def waiting(self) -> IndexArray:
+        return np.flatnonzero(self.is_waiting)
+
+    def refuse_points(self) -> None:
+        """Refuse what no posture can mend."""
+        for number, check in enumerate(self.checks.point, start=1):
+            bad = self.is_waiting & ~(check.at_points > 0.0)
+            self.refused_by[bad] = number
+            self.is_waiting[bad] = False
+
+    def refuse(self, postures: Postures, margin: FloatArray, first: int, weight: float) -> None:
+        """Remember, for each point, the check that its least bad posture fails."""
+        if not len(margin):
+            return
+        fails = ~(margin > 0.0)
+        failures = weight * fails.sum(axis=0)
+        bad = np.flatnonzero(fails.any(axis=0))
+        bad = bad[np.argsort(-failures[bad], kind="stable")]
+        better = bad[failures[bad] < self.failures[postures.point[bad]]]
+        # Of several postures of a point the last written counts: the one with fewest failures.
+        self.failures[postures.point[better]] = failures[better]
+        self.refused_by[postures.point[better]] = first + fails[:, better].argmax(axis=0)
+
+    def accept(self, postures: Postures, branch: int, margin: FloatArray) -> None:
+        """Keep postures with their margins under the quick and the slow checks."""
+        of_points = [check.margin(postures) for check in self.checks.point]
+        self.parts.append((postures, branch, np.vstack([*of_points, margin])))
+        self.is_waiting[postures.point] = False
+        self.refused_by[postures.point] = -1
+
+    def pool(self, joints: int) -> Pool:
+        none = Postures.none(joints)
+        postures = Postures.joined([none, *(part for part, _, _ in self.parts)])
+        sizes = [len(part) for part, _, _ in self.parts]
+        branch = np.repeat(np.array([b for _, b, _ in self.parts], dtype=np.intp), sizes)
+        empty = verdicts(self.checks.all, none)
+        margin = np.hstack([empty.margin, *(margin for _, _, margin in self.parts)])
+        order = np.argsort(postures.point)
+        found = replace(empty, margin=margin[:, order])
+        return Pool(postures.take(order), branch[order], found, self.refused_by)
+
+
+def options_at(
+    solver: InverseKinematics,
+    points: FloatArray,
+    normals: FloatArray,
+    approach: Approach,
+    external: tuple[float, ...],
+) -> Options:
+    """Return all configurations that reach contact and approach pose in one branch.
+
+    Parameters
+    ----------
+    solver, points, normals, approach
+        As for `make_pool`.
+    external : tuple of float
+        Positions of the external axes, in rad or m.
+    """
+    parts: list[Postures] = []
+    branches: list[IndexArray] = []
     spins = 2.0 * np.pi * np.arange(approach.spins) / approach.spins
     for contact in np.moveaxis(contact_frames(points, normals, spins), 1, 0):
         off = contact.copy()
         off[:, :3, 3] += approach.distance * normals
-        here, there = (solver.solve_many(frames, approach.external).q for frames in (contact, off))
+        here, there = (solver.solve_many(frames, external).q for frames in (contact, off))
         reached = np.isfinite(here).all(axis=2) & np.isfinite(there).all(axis=2)
         point, branch = np.nonzero(reached)
-        parts.append((contact[point], normals[point], here[reached], there[reached], point, branch))
-    frames, outward, q, q_approach, point, branch = (
-        np.concatenate(column) for column in zip(*parts, strict=True)
-    )
-    return _Options(Postures(frames, outward, q, q_approach, point), branch)
+        parts.append(Postures(contact[point], normals[point], here[reached], there[reached], point))
+        branches.append(branch)
+    return Options(Postures.joined(parts), np.concatenate(branches))
 
 
-def _preference(
-    options: _Options, passed: BoolArray, margin: FloatArray, points: int
-) -> list[IndexArray]:
-    """Return each point's postures that pass the quick checks, the preferred first.
-
-    Branches are ranked by the number of points they serve that no better branch serves; within
-    a branch the posture with the largest smallest margin comes first.
-    """
-    quality = np.zeros(len(passed))
-    if margin.size:
-        typical = np.median(np.abs(margin), axis=1, keepdims=True)
-        quality = (margin / np.where(typical > 0.0, typical, 1.0)).min(axis=0)
-    rank_of = _branch_ranks(options, passed)
-    rank = rank_of[options.branch] if len(rank_of) else options.branch
-    index = np.flatnonzero(passed)
-    order = index[np.lexsort((-quality[index], rank[index], options.point[index]))]
-    starts = np.searchsorted(options.point[order], np.arange(points + 1))
-    return [order[a:b] for a, b in pairwise(starts)]
-
-
-def _branch_ranks(options: _Options, passed: BoolArray) -> IndexArray:
-    """Return the rank of each branch by greedy set cover of the points."""
-    if not np.any(passed):
-        return np.zeros(0, dtype=np.intp)
-    count = int(options.branch.max()) + 1
-    serves = [set(options.point[passed & (options.branch == b)].tolist()) for b in range(count)]
-    ranks, covered = np.zeros(count, dtype=np.intp), set[int]()
-    left = list(range(count))
-    for rank in range(count):
-        best = max(left, key=lambda b: (len(serves[b] - covered), -b))
-        ranks[best] = rank
-        covered |= serves[best]
-        left.remove(best)
-    return ranks
+def _ask_branch(postures: Postures, branch: int, checks: Checks, found: _Found) -> None:
+    """Give every waiting point the best of its postures in a branch that passes all checks."""
+    fast = verdicts(checks.quick, postures)
+    before = 1 + len(checks.point)
+    found.refuse(postures, fast.margin, before, 1.0)
+    passed = np.flatnonzero(fast.passed)
+    order = np.lexsort((-fast.quality[passed], postures.point[passed]))
+    for index in _rounds(postures.point, passed[order]):
+        asked = index[found.is_waiting[postures.point[index]]]
+        if not len(asked):
+            return
+        late = verdicts(checks.slow, postures.take(asked))
+        # One slow check failed is nearer to a posture than one quick check.
+        weight = 0.5 / (1 + len(checks.slow))
+        found.refuse(postures.take(asked), late.margin, before + len(checks.quick), weight)
+        good = asked[late.passed]
+        margin = np.vstack([fast.margin[:, good], late.margin[:, late.passed]])
+        found.accept(postures.take(good), branch, margin)
 
 
-@dataclass(frozen=True, eq=False)
-class _Asked:
-    """The postures that the slow checks let pass."""
-
-    chosen: IndexArray
-    verdicts: Verdicts
-
-
-def _ask_slow_checks(
-    options: _Options,
-    order: list[IndexArray],
-    slow: Sequence[Check],
-    points: int,
-    progress: Progress,
-) -> _Asked:
-    """Return the posture of each point that has one, asking the slow checks round by round."""
-    chosen = np.full(points, -1, dtype=np.intp)
-    margin = np.zeros((len(slow), points))
-    waiting = np.array([p for p in range(points) if len(order[p])], dtype=np.intp)
-    for attempt in range(_ROUNDS):
-        waiting = waiting[[len(order[p]) > attempt for p in waiting]]
-        if not len(waiting):
-            break
-        index = np.array([order[p][attempt] for p in waiting], dtype=np.intp)
-        found = verdicts(slow, options.postures.take(index))
-        good = found.passed
-        chosen[waiting[good]] = index[good]
-        margin[:, waiting[good]] = found.margin[:, good]
-        waiting = waiting[~good]
-        progress("collision and sight", int(np.count_nonzero(chosen >= 0)), points)
-    has = chosen >= 0
-    names = verdicts(slow, options.postures.take([]))
-    return _Asked(chosen[has], Verdicts(names.names, names.units, names.advice, margin[:, has]))
-
-
-def _refused(
-    options: _Options, fast: Verdicts, chosen: IndexArray, slow: Sequence[Check], points: int
-) -> dict[str, int]:
-    """Count the points without a posture by the check that came nearest to letting them pass.
-
-    A point's postures each fail some checks; the point is counted for the check that its best
-    posture, the one with the fewest failures, fails. Unreached points count as `UNREACHABLE`.
-    """
-    has = np.zeros(points, dtype=bool)
-    has[options.point[chosen]] = True
-    reached = np.zeros(points, dtype=bool)
-    reached[options.point] = True
-    refused = {UNREACHABLE: int(np.count_nonzero(~reached))}
-    fails = ~(fast.margin > 0.0)
-    failures = fails.sum(axis=0) if len(fails) else np.zeros(len(options.point), dtype=int)
-    counts = dict.fromkeys([*fast.names, *(check.name for check in slow)], 0)
-    open_points = np.flatnonzero(reached & ~has)
-    best = _best_of_points(options.point, failures, points)
-    nearly = [p for p in open_points if failures[best[p]] == 0]
-    for p in open_points:
-        if failures[best[p]]:
-            counts[fast.names[int(np.flatnonzero(fails[:, best[p]])[0])]] += 1
-    if nearly and slow:
-        late = verdicts(slow, options.postures.take(best[nearly]))
-        for column in range(len(nearly)):
-            failed = np.flatnonzero(~(late.margin[:, column] > 0.0))
-            counts[late.names[int(failed[0])] if len(failed) else late.names[0]] += 1
-    return refused | counts
-
-
-def _best_of_points(point: IndexArray, failures: IndexArray, points: int) -> IndexArray:
-    """Return the option with the fewest failures at each point; 0 where there is none."""
-    order = np.lexsort((failures, point))
-    best = np.zeros(points, dtype=np.intp)
-    first = np.unique(point[order], return_index=True)
-    best[first[0]] = order[first[1]]
-    return best
+def _rounds(point: IndexArray, ordered: IndexArray) -> list[IndexArray]:
+    """Return the first choice of every point, then the second, and so on."""
+    where = point[ordered]
+    starts = np.flatnonzero(np.diff(where, prepend=-1))
+    place = np.arange(len(ordered))
+    for a, b in pairwise([*starts, len(ordered)]):
+        place[a:b] -= a
+    return [ordered[place == turn] for turn in range(min(ROUNDS, int(place.max(initial=-1)) + 1))]

@@ -1,6 +1,7 @@
 """Candidates with joints: where the tool touches, and how the robot stands there."""
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -50,4 +51,30 @@ class Postures:
             self.q[rows],
             self.q_approach[rows],
             self.point[rows],
+        )
+
+    def at(self, point: IndexArray) -> "Postures":
+        """Return the same postures with their points numbered anew, shape (pose,)."""
+        return replace(self, point=point)
+
+    @staticmethod
+    def none(joints: int) -> "Postures":
+        """Return no postures of a robot with so many joints."""
+        return Postures(
+            np.zeros((0, 4, 4)),
+            np.zeros((0, 3)),
+            np.zeros((0, joints)),
+            np.zeros((0, joints)),
+            np.zeros(0, dtype=np.intp),
+        )
+
+    @staticmethod
+    def joined(parts: Sequence["Postures"]) -> "Postures":
+        """Return the postures of several, one after the other."""
+        return Postures(
+            np.concatenate([part.T_base_tcp for part in parts]),
+            np.concatenate([part.normal for part in parts]),
+            np.concatenate([part.q for part in parts]),
+            np.concatenate([part.q_approach for part in parts]),
+            np.concatenate([part.point for part in parts]),
         )

@@ -132,6 +132,37 @@ class CollisionScene:
         full[:, self._columns] = q
         return full
 
+    def moving(self, q: FloatArray) -> list[Body]:
+        """Return the links and then the tool where they are at many postures.
+
+        Parameters
+        ----------
+        q : ndarray, shape (pose, joint)
+            Joint positions in rad or m.
+
+        Returns
+        -------
+        list of Body
+            ``T_frame_body`` of each is its place in base at every posture, shape (pose, 4, 4).
+        """
+        model, data = self._model, self._model.createData()
+        base = model.frames[model.getFrameId(self.robot.base, pin.FrameType.BODY)]
+        T_world_joint = np.empty((len(q), model.njoints, 4, 4))
+        for placements, configuration in zip(T_world_joint, self._configurations(q), strict=True):
+            pin.forwardKinematics(model, data, configuration)
+            placements[:] = [T.homogeneous for T in data.oMi]
+        T_world_base = T_world_joint[:, base.parentJoint] @ base.placement.homogeneous
+        T_base_joint = np.linalg.inv(T_world_base)[:, None] @ T_world_joint
+        moving = self._geometry.ngeoms - len(self.obstacles)
+        return [
+            Body(
+                body.name,
+                body.geometry,
+                T_base_joint[:, body.parentJoint] @ body.placement.homogeneous,
+            )
+            for body in list(self._geometry.geometryObjects)[:moving]
+        ]
+
 
 def _add(
     model: pin.Model, geometry: pin.GeometryModel, link: str, bodies: Sequence[Body]

@@ -10,6 +10,7 @@ import numpy as np
 from elastocal.arrays import FloatArray
 from elastocal.cell.description.external import external_positions
 from elastocal.cell.description.file import SCHEMA, CellFile
+from elastocal.cell.description.motion import axis_speeds, home_position
 from elastocal.cell.description.pose import vector
 from elastocal.cell.description.robot import RailEntry
 from elastocal.cell.description.shapes import MeshFile, Shape
@@ -45,6 +46,10 @@ class Cell:
     """Positions of the external axes to choose from, shape (combination, external axis)."""
     torque_limits: FloatArray
     """Torques that may be used, shape (joint,), in N·m (N); NaN where not known."""
+    home: FloatArray
+    """Joint positions where the robot starts and ends, shape (joint,), in rad or m."""
+    axis_speeds: FloatArray
+    """Speeds that are used between poses, override included, shape (joint,), in rad/s or m/s."""
     process: LoadRows | None = None
     """Poses and forces of the production process."""
 
@@ -130,13 +135,15 @@ def load_cell(path: Path) -> Cell:
     robot = _at(path, "robot", lambda: _robot(path, file))
     positions = _at(path, "robot", lambda: external_positions(robot, file.robot))
     torques = _at(path, "limits.torque.values", lambda: _torque_limits(robot, file))
+    home = _at(path, "motion", lambda: home_position(robot, file.motion))
+    speeds = _at(path, "motion", lambda: axis_speeds(robot, file.motion))
     for key, mesh in _meshes(file):
         if not (path.parent / mesh.file).is_file():
             raise FileAccessError(f"{path}: {key}.file: there is no file {path.parent / mesh.file}")
     process = _at(path, "process.file", lambda: _process(path, file, robot))
-    for array in (positions, torques):
+    for array in (positions, torques, home, speeds):
         array.setflags(write=False)
-    return Cell(path, file, robot, positions, torques, process)
+    return Cell(path, file, robot, positions, torques, home, speeds, process)
 
 
 def _at(path: Path, key: str, make: Callable[[], Result]) -> Result:

@@ -5,11 +5,14 @@ from typing import Any
 
 from pydantic import Field, field_validator
 
+from elastocal.cell.description.devices import DeviceNames
 from elastocal.cell.description.engagement import Engagement
 from elastocal.cell.description.limits import Limits
 from elastocal.cell.description.loads import LoadCases
 from elastocal.cell.description.metrology import Marker, Tracker
+from elastocal.cell.description.motion import Motion
 from elastocal.cell.description.pose import IDENTITY, Pose
+from elastocal.cell.description.procedure import ProcedureSettings
 from elastocal.cell.description.robot import RobotEntry
 from elastocal.cell.description.search import Search
 from elastocal.cell.description.shapes import Shape
@@ -45,8 +48,12 @@ class CellFile(StrictModel):
     load_cases: LoadCases
     engagement: Engagement
     limits: Limits = Field(default_factory=Limits)
+    motion: Motion
+    """Required: where HOME is safe is not guessed."""
     search: Search = Field(default_factory=Search)
     process: ProcessFile | None = None
+    procedure: ProcedureSettings = Field(default_factory=ProcedureSettings)
+    devices: DeviceNames = Field(default_factory=DeviceNames)
 
     @field_validator("trackers")
     @classmethod

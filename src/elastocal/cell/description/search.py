@@ -24,6 +24,8 @@ class Search(StrictModel):
     """Cover distance at which COVER may stop, in m."""
     pool: Annotated[int, Field(ge=1)] = 3000
     """Number of candidates."""
+    sampling: Literal["blue_noise", "uniform"] = "blue_noise"
+    """How candidate points are spread: keeping their distance, or each by itself."""
     seed: Annotated[int, Field(ge=0)] = 0
     """Of everything random."""
 

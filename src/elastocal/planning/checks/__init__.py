@@ -4,7 +4,7 @@ A new check is one file here, an export, a changelog line, and an entry in
 ``tests/contracts/test_checks.py``.
 """
 
-from elastocal.planning.checks.check import Check, Verdicts, verdicts
+from elastocal.planning.checks.check import Check, Checks, PointCheck, Verdicts, verdicts
 from elastocal.planning.checks.collision import CollisionCheck
 from elastocal.planning.checks.engagement import EdgeCheck, FlatnessCheck
 from elastocal.planning.checks.friction import FrictionCheck
@@ -16,11 +16,13 @@ from elastocal.planning.checks.torque import TorqueCheck
 
 __all__ = [
     "Check",
+    "Checks",
     "CollisionCheck",
     "EdgeCheck",
     "FlatnessCheck",
     "FrictionCheck",
     "JointLimitsCheck",
+    "PointCheck",
     "SensorCheck",
     "SightCheck",
     "SingularityCheck",

@@ -6,10 +6,11 @@ neither passes nor refuses in silence.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from elastocal.arrays import BoolArray, FloatArray
 from elastocal.planning.postures import Postures
@@ -34,6 +35,31 @@ class Check(Protocol):
         """Return how far each posture is from being refused, shape (pose,); positive is fine."""
 
 
+class PointCheck(Check, Protocol):
+    """A check that the point on the surface decides alone, whatever the robot does."""
+
+    @property
+    def at_points(self) -> FloatArray:
+        """Margin of every sampled point, shape (point,)."""
+
+
+@dataclass(frozen=True, eq=False)
+class Checks:
+    """What a pose has to pass, in the order of what it costs to ask."""
+
+    point: tuple[PointCheck, ...] = ()
+    """Asked of the sampled points, before any robot."""
+    quick: tuple[Check, ...] = ()
+    """Microseconds a posture: asked of every posture."""
+    slow: tuple[Check, ...] = ()
+    """Ask meshes: asked of the most promising postures only."""
+
+    @property
+    def all(self) -> tuple[Check, ...]:
+        """Every check, in this order."""
+        return (*self.point, *self.quick, *self.slow)
+
+
 @dataclass(frozen=True, eq=False)
 class Verdicts:
     """The margins of many postures under many checks."""
@@ -44,10 +70,30 @@ class Verdicts:
     margin: FloatArray
     """Shape (check, pose), each in its check's unit."""
 
+    def take(self, index: ArrayLike) -> "Verdicts":
+        """Return the verdicts of some of the postures (a mask or indices)."""
+        return replace(self, margin=self.margin[:, np.asarray(index)])
+
+    @staticmethod
+    def joined(parts: "Sequence[Verdicts]") -> "Verdicts":
+        """Return the verdicts of several groups of postures under the same checks."""
+        return replace(parts[0], margin=np.hstack([part.margin for part in parts]))
+
     @property
     def passed(self) -> BoolArray:
         """Whether each posture passes every check, shape (pose,). NaN does not pass."""
         return np.asarray(np.all(self.margin > 0.0, axis=0))
+
+    @property
+    def quality(self) -> FloatArray:
+        """Smallest margin of each posture, each in units of its check's median, shape (pose,).
+
+        For ranking postures: margins have different units. Of no check it is 0.
+        """
+        if not self.margin.size:
+            return np.zeros(self.margin.shape[1])
+        typical = np.median(np.abs(self.margin), axis=1, keepdims=True)
+        return np.asarray((self.margin / np.where(typical > 0.0, typical, 1.0)).min(axis=0))
 
     @property
     def refused(self) -> dict[str, int]:

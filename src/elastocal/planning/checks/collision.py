@@ -33,13 +33,16 @@ class CollisionCheck:
     def margin(self, postures: Postures) -> FloatArray:
         """Return the margin of each posture, shape (pose,), in m; minus ``keep`` when none."""
         travel = postures.q_approach - postures.q
-        ways = [(postures.q, True)]
-        for part in np.linspace(1.0 / self.steps, 1.0, self.steps):
-            ways.append((postures.q + part * travel, False))
+        # The first step of the retreat comes first: it is the one that most often decides.
+        ways = [(part, False) for part in np.linspace(1.0 / self.steps, 1.0, self.steps)]
+        ways.append((0.0, True))
         margin = np.full(len(postures), -max(self.keep, SPARE[0]))
         left = np.arange(len(postures))
-        for spare in SPARE:
-            for q, in_contact in ways:
-                left = left[self.scene.keeps(q[left], self.keep + spare, in_contact)]
-            margin[left] = spare
+        for spare in reversed(SPARE):
+            kept = left
+            for part, in_contact in ways:
+                q = postures.q[kept] + part * travel[kept]
+                kept = kept[self.scene.keeps(q, self.keep + spare, in_contact)]
+            margin[kept] = spare
+            left = np.setdiff1d(left, kept, assume_unique=True)
         return margin

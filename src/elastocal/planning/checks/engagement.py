@@ -23,9 +23,14 @@ class EdgeCheck:
     unit: str = "m"
     advice: str = "use a smaller disk or margin, or a larger region of the surface"
 
+    @property
+    def at_points(self) -> FloatArray:
+        """Margin of each sampled point, shape (point,), in m."""
+        return np.asarray(self.edge_distance - self.radius - self.keep)
+
     def margin(self, postures: Postures) -> FloatArray:
         """Return the margin of each posture, shape (pose,), in m."""
-        return np.asarray(self.edge_distance[postures.point] - self.radius - self.keep)
+        return self.at_points[postures.point]
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,7 +45,11 @@ class FlatnessCheck:
     unit: str = "rad"
     advice: str = "use a smaller disk, or allow a larger angle: the surface is too curved"
 
+    @property
+    def at_points(self) -> FloatArray:
+        """Margin of each sampled point, shape (point,), in rad."""
+        return np.asarray(self.tolerance - np.where(self.fit.supported, self.fit.angle, np.pi))
+
     def margin(self, postures: Postures) -> FloatArray:
         """Return the margin of each posture, shape (pose,), in rad."""
-        angle = np.where(self.fit.supported, self.fit.angle, np.pi)
-        return np.asarray(self.tolerance - angle[postures.point])
+        return self.at_points[postures.point]

@@ -1,8 +1,11 @@
 """Check ``sight``: some tracker station sees the marker (spec section 2).
 
 A station sees the marker when the marker faces it within its acceptance angle, the distance is
-within the tracker's range, and no mesh of the cell stands between them. The arm itself is not
-among those meshes.
+within the tracker's range, and neither a mesh of the cell nor a link or the tool stands between
+them. `MovingSolids` says how a tool does not blind the marker that it carries.
+
+Postures are judged in contact. Unloaded readings are taken some 3 mm off the surface: that moves
+a beam, and the tool with it, by less than the shapes of links and tool are known.
 """
 
 from dataclasses import dataclass
@@ -11,10 +14,13 @@ import numpy as np
 import trimesh
 
 from elastocal.arrays import BoolArray, FloatArray
+from elastocal.planning.moving_solids import MovingSolids
 from elastocal.planning.postures import Postures
+from elastocal.planning.sight_lines import Beams
+from elastocal.planning.sight_solids import Triangles
 
 _OFF_THE_MARKER = 1e-3
-"""Distance from the marker at which a ray starts, in m, so that it does not hit its own seat."""
+"""Distance from the marker, in m, from which on meshes of the cell count."""
 
 
 @dataclass(frozen=True)
@@ -42,10 +48,12 @@ class SightCheck:
     acceptance: float
     """Half angle of the cone within which the marker returns the beam, in rad."""
     obstacles: trimesh.Trimesh | None = None
-    """What may stand in the way, in base."""
+    """What stands still and may be in the way, in base."""
+    moving: MovingSolids | None = None
+    """Links and tool, which may be in the way too."""
     name: str = "sight"
     unit: str = "rad"
-    advice: str = "move or add a tracker station, or turn the marker towards it"
+    advice: str = "move or add a tracker station, or turn the marker clear of arm and tool"
 
     def margin(self, postures: Postures) -> FloatArray:
         """Return the margin of each posture, shape (pose,), in rad; -pi when no station sees."""
@@ -70,17 +78,16 @@ class SightCheck:
         cosine = np.clip(np.sum((R @ self.axis_tcp) * direction, axis=1), -1.0, 1.0)
         margin = self.acceptance - np.arccos(cosine)
         possible = (station.nearest <= distance) & (distance <= station.farthest) & (margin > 0.0)
-        possible[possible] = self._clear(marker[possible], direction[possible], distance[possible])
+        beams = Beams(marker, direction, distance).take(possible)
+        possible[possible] = self._clear(postures.q[possible], beams)
         unseen = np.where(margin > 0.0, -np.pi, margin)
         return np.asarray(np.where(possible, margin, unseen), dtype=float)
 
-    def _clear(self, marker: FloatArray, direction: FloatArray, distance: FloatArray) -> BoolArray:
-        """Return whether nothing stands between markers and a station, shape (ray,)."""
-        if self.obstacles is None or not len(marker):
-            return np.ones(len(marker), dtype=bool)
-        start = marker + _OFF_THE_MARKER * direction
-        where, ray, _ = self.obstacles.ray.intersects_location(start, direction, False)
-        clear = np.ones(len(marker), dtype=bool)
-        hit = np.linalg.norm(where - start[ray], axis=1) < distance[ray] - _OFF_THE_MARKER
-        clear[ray[hit]] = False
+    def _clear(self, q: FloatArray, beams: Beams) -> BoolArray:
+        """Return whether nothing stands in the way of each posture's beam, shape (pose,)."""
+        clear = np.ones(len(beams), dtype=bool)
+        if self.obstacles is not None:
+            clear = ~Triangles(self.obstacles).crosses(beams, _OFF_THE_MARKER)
+        if self.moving is not None:
+            clear[clear] = ~self.moving.hide(q[clear], beams.take(clear))
         return clear

@@ -13,6 +13,8 @@ from elastocal.planning.surface.surface import Surface, SurfacePoints
 
 FAR = 5.0
 """A surface whose nearest point is more than this many reaches away is in the wrong unit."""
+HUGE = 50.0
+"""So is one whose bounding box is larger than this many reaches: a ship is not."""
 TINY = 0.02
 """So is one whose bounding box is smaller than this part of the reach."""
 _POINTS = 200
@@ -29,7 +31,7 @@ class Finding:
     """One thing that a user should know."""
 
     kind: str
-    """``open``, ``non-manifold``, ``winding``, ``degenerate``, ``far``, ``tiny``, ``inverted``."""
+    """``open``, ``non-manifold``, ``winding``, ``degenerate``, ``far``, ``huge``, ``tiny``, ``inverted``."""
     message: str
     """One line."""
     fatal: bool = False
@@ -97,6 +99,12 @@ def placement_findings(
         )
         return (Finding("far", text, fatal=True),)
     size = float(np.linalg.norm(np.ptp(vertices, axis=0)))
+    if not size <= HUGE * reach:
+        text = (
+            f"{surface.name} is {size:.3g} m across; the reach of the robot is {reach:.3g} m: is the"
+            " mesh in mm and read as m (surface.unit)?"
+        )
+        return (Finding("huge", text, fatal=True),)
     found: tuple[Finding, ...] = ()
     if size < TINY * reach:
         text = (

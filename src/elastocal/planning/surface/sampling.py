@@ -3,7 +3,6 @@
 import numpy as np
 from numpy.random import Generator
 
-from elastocal.arrays import FloatArray
 from elastocal.planning.surface.blue_noise import eliminate
 from elastocal.planning.surface.mesh import SurfaceError
 from elastocal.planning.surface.surface import Surface, SurfacePoints
@@ -45,7 +44,7 @@ def sample_uniform(surface: Surface, count: int, rng: Generator) -> SurfacePoint
         points = _throw(surface, int(1.1 * missing / share) + 16, rng)
         found.append(points.take(surface.in_region(points)))
         missing -= len(found[-1])
-    return _joined(found).take(np.arange(count))
+    return SurfacePoints.joined(found).take(np.arange(count))
 
 
 def sample_blue_noise(surface: Surface, count: int, rng: Generator) -> SurfacePoints:
@@ -88,14 +87,6 @@ def _throw(surface: Surface, count: int, rng: Generator) -> SurfacePoints:
     root = np.sqrt(draws[:, 1])
     weights = np.stack([1.0 - root, root * (1.0 - draws[:, 2]), root * draws[:, 2]], axis=1)
     return surface.points(face, weights)
-
-
-def _joined(parts: list[SurfacePoints]) -> SurfacePoints:
-    def joined(name: str) -> FloatArray:
-        return np.concatenate([getattr(part, name) for part in parts])
-
-    face = np.concatenate([part.face for part in parts])
-    return SurfacePoints(joined("position"), joined("normal"), face, joined("barycentric"))
 
 
 def _extent(surface: Surface) -> tuple[str, str]:

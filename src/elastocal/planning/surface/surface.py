@@ -1,6 +1,7 @@
 """The tooling surface S of the paper (2.2): triangles in base, their normals and their borders."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -43,6 +44,16 @@ class SurfacePoints:
         keep = np.asarray(chosen)
         return SurfacePoints(
             self.position[keep], self.normal[keep], self.face[keep], self.barycentric[keep]
+        )
+
+    @staticmethod
+    def joined(parts: "Sequence[SurfacePoints]") -> "SurfacePoints":
+        """Return the points of several, one after the other."""
+        return SurfacePoints(
+            np.concatenate([part.position for part in parts]),
+            np.concatenate([part.normal for part in parts]),
+            np.concatenate([part.face for part in parts]),
+            np.concatenate([part.barycentric for part in parts]),
         )
 
 

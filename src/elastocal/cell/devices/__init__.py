@@ -1,0 +1,37 @@
+"""Protocols of the devices that Procedure 1 needs; simulators and drivers implement them.
+
+A new driver is one package under ``elastocal.drivers`` and an entry in the contract tests of
+``tests/contracts/``.
+"""
+
+from dataclasses import dataclass
+
+from elastocal.cell.devices.arm import ArmState, Motion, RobotArm
+from elastocal.cell.devices.clock import Clock
+from elastocal.cell.devices.force_sensor import ForceSensor, SensorStatus, WrenchBlock
+from elastocal.cell.devices.metrology import BeamState, Metrology, PointBlock
+
+
+@dataclass(frozen=True, eq=False)
+class Devices:
+    """Everything that is switched on during a run, with the time that they share."""
+
+    arm: RobotArm
+    sensor: ForceSensor
+    metrology: Metrology
+    clock: Clock
+
+
+__all__ = [
+    "ArmState",
+    "BeamState",
+    "Clock",
+    "Devices",
+    "ForceSensor",
+    "Metrology",
+    "Motion",
+    "PointBlock",
+    "RobotArm",
+    "SensorStatus",
+    "WrenchBlock",
+]

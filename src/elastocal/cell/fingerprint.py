@@ -1,0 +1,58 @@
+"""Fingerprint of a cell: whether a plan or a run belongs to the cell as it is now."""
+
+import hashlib
+import json
+from collections.abc import Iterator
+
+from elastocal.cell.description import Cell, CellFile
+from elastocal.errors import FileAccessError
+
+
+def fingerprint(cell: Cell) -> str:
+    """Return a SHA-256 over what a cell file says and the files that it names.
+
+    It changes with every value of the cell file, defaults included, and with every byte of the
+    surface, the mesh shapes, the robot's URDF and the process file. It does not change with
+    comments, the order of keys, the way a number is written, or the place of the folder.
+
+    Parameters
+    ----------
+    cell : Cell
+        The cell.
+
+    Returns
+    -------
+    str
+        64 hexadecimal digits.
+
+    Raises
+    ------
+    FileAccessError
+        If a file that the cell names cannot be read.
+    """
+    content = json.dumps(cell.file.model_dump(mode="json"), sort_keys=True, allow_nan=False)
+    digest = hashlib.sha256(content.encode("utf-8"))
+    for name in named_files(cell.file):
+        # Digests have one length, so that no byte can move from one file to the next unseen.
+        digest.update(hashlib.sha256(_bytes_of(cell, name)).digest())
+    return digest.hexdigest()
+
+
+def named_files(file: CellFile) -> Iterator[str]:
+    """Yield the files that a cell file names, as it names them."""
+    yield file.surface.file
+    for shape in (*file.tool.shapes, *file.fixtures):
+        if shape.mesh is not None:
+            yield shape.mesh.file
+    if file.robot.urdf is not None:
+        yield file.robot.urdf
+    if file.process is not None:
+        yield file.process.file
+
+
+def _bytes_of(cell: Cell, name: str) -> bytes:
+    path = cell.find(name)
+    try:
+        return path.read_bytes()
+    except OSError as error:
+        raise FileAccessError(f"cannot read {path}: {error.strerror or error}") from error

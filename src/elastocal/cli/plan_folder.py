@@ -1,0 +1,43 @@
+"""The files of a plan."""
+
+from pathlib import Path
+
+from elastocal.cell import Cell
+from elastocal.planning.export import write_krl, write_table
+from elastocal.planning.plan import Planned
+from elastocal.planning.plan_file import write_plan
+from elastocal.planning.pool_file import write_pool
+from elastocal.report import write_plan_figure, write_plan_page
+
+
+def write_plan_folder(folder: Path, cell: Cell, planned: Planned, program: str) -> list[str]:
+    """Write every file of a plan; return their names.
+
+    Parameters
+    ----------
+    folder : Path
+        An empty folder.
+    cell : Cell
+        That the plan was made for.
+    planned : Planned
+        Plan, pool and surface.
+    program : str
+        Name of the KRL program.
+
+    Raises
+    ------
+    PlanningError
+        If the program's name is none that a KUKA controller takes.
+    FileAccessError
+        If a file cannot be written.
+    """
+    plan, pool, surface = planned.plan, planned.pool, planned.surface
+    paths = [
+        write_plan(folder, plan),
+        write_pool(folder, pool),
+        write_table(folder, plan),
+        *write_krl(folder, plan, program),
+        write_plan_page(folder / "plan.html", cell, surface, plan, pool),
+        write_plan_figure(folder / "plan.svg", surface, plan, pool),
+    ]
+    return [path.name for path in paths]

@@ -1,0 +1,148 @@
+"""Write a plan as a KRL program (hardware facts, section 2.2).
+
+Approach poses are ``PTP`` by axis values, everything near the surface is ``LIN``. The program
+stops (``HALT``) before it touches the surface and on it, so that a person or a force controller
+decides. Nothing here was tried on a real robot, and the program says so.
+"""
+
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+
+from elastocal.files import replacing
+from elastocal.planning.export.krl.names import SUFFIXES, check_name, comment_text
+from elastocal.planning.export.krl.notes import BASE, TOOL, comment, head_notes
+from elastocal.planning.export.krl.targets import PoseTargets, Target, build_targets, robot_of
+from elastocal.planning.plan_file import PlanFile, check_plan
+
+PTP_PERCENT = 10
+"""Speed of PTP moves, in percent of the axes' largest."""
+LIN_SPEED = 0.05
+"""Speed between approach pose and surface, in m/s."""
+CONTACT_SPEED = 0.005
+"""Speed of the last millimetres, in m/s."""
+
+_HEADER = (
+    "&ACCESS RVP",
+    "&REL 1",
+    r"&PARAM TEMPLATE = C:\KRC\Roboter\Template\vorgabe",
+    "&PARAM EDITMASK = *",
+)
+_INI = (
+    ";FOLD INI",
+    "  ;FOLD BASISTECH INI",
+    "    GLOBAL INTERRUPT DECL 3 WHEN $STOPMESS==TRUE DO IR_STOPM ( )",
+    "    INTERRUPT ON 3",
+    "    BAS (#INITMOV,0 )",
+    "  ;ENDFOLD (BASISTECH INI)",
+    ";ENDFOLD (INI)",
+)
+# WAIT SEC 0 keeps the interpreter from running ahead of the motion before it.
+_STOP = ("WAIT SEC 0", "HALT")
+
+
+def write_krl(folder: Path, plan: PlanFile, name: str = "calib") -> tuple[Path, Path]:
+    """Write ``<name>.src`` and ``<name>.dat`` into a folder, both or none; return their paths.
+
+    Parameters
+    ----------
+    folder : Path
+        Where to write.
+    plan : PlanFile
+        The plan.
+    name : str
+        Of the program: at most 20 letters, digits and underscores, not beginning with a digit.
+
+    Raises
+    ------
+    PlanningError
+        If the name is not allowed, the robot is not a six-axis arm, or the joints of a pose
+        contradict its frame.
+    SchemaError
+        If the plan contradicts itself.
+    FileAccessError
+        If a file cannot be written.
+    """
+    check_name(name)
+    check_plan(plan)
+    robot = robot_of(plan)
+    targets = build_targets(plan, robot)
+    positions = tuple(targets)
+    check_name(name, frozenset(target.name for target in positions))
+    program = _program(name, plan, head_notes(plan, robot), targets.poses, targets.way_home)
+    src, dat = (Path(folder) / f"{name}{suffix}" for suffix in SUFFIXES)
+    with replacing(src) as new_src, replacing(dat) as new_dat:
+        new_src.write_bytes(_text(program))
+        new_dat.write_bytes(_text(_data(name, positions)))
+    return src, dat
+
+
+def _program(
+    name: str,
+    plan: PlanFile,
+    notes: list[str],
+    poses: tuple[PoseTargets, ...],
+    way_home: tuple[Target, ...],
+) -> Iterator[str]:
+    yield from _HEADER
+    yield f"DEF {name}( )"
+    # Not in a fold: a pendant shows folds closed.
+    yield from notes
+    yield from _INI
+    yield f"$TOOL = TOOL_DATA[{TOOL}]"
+    yield f"$BASE = BASE_DATA[{BASE}]"
+    yield f"BAS (#VEL_PTP,{PTP_PERCENT} )"
+    yield "PTP XHOME"
+    cases = ", ".join(comment_text(case) for case in plan.contact.load_cases)
+    for place, stop in enumerate(poses, start=1):
+        title = (
+            f"POSE {stop.pose.id}, {place} of {len(poses)}: candidate {stop.pose.candidate},"
+            f" about {stop.pose.contact_time:.0f} s"
+        )
+        yield from _fold(title, _pose(stop, cases))
+    for target in way_home:
+        yield f"PTP {target.name}"
+    yield "PTP XHOME"
+    yield "END"
+
+
+def _pose(stop: PoseTargets, cases: str) -> Iterator[str]:
+    if stop.pose.seen_by is not None:
+        yield f"; marker seen by {comment_text(stop.pose.seen_by)}"
+    for target in (*stop.via, stop.approach):
+        yield f"PTP {target.name}"
+    yield _speed(LIN_SPEED)
+    yield f"LIN {stop.near.name}"
+    yield from comment("Near contact: take the unloaded reading. Then contact, or force control.")
+    yield from _STOP
+    yield _speed(CONTACT_SPEED)
+    yield f"LIN {stop.contact.name}"
+    yield from comment(f"In contact: apply the load cases {cases}.")
+    yield from _STOP
+    yield f"LIN {stop.near.name}"
+    yield _speed(LIN_SPEED)
+    yield f"LIN {stop.retreat.name}"
+
+
+def _speed(metres_per_second: float) -> str:
+    millimetres = 1e3 * metres_per_second
+    return f"$VEL.CP = {metres_per_second:.3f} ; m/s, {millimetres:.0f} mm/s"
+
+
+def _data(name: str, positions: tuple[Target, ...]) -> Iterator[str]:
+    yield from _HEADER
+    yield f"DEFDAT {name}"
+    yield from _fold("BASISTECH EXT", ["EXT BAS (BAS_COMMAND :IN,REAL :IN )"])
+    for target in positions:
+        yield target.declaration
+    yield "ENDDAT"
+
+
+def _fold(title: str, lines: Iterable[str]) -> Iterator[str]:
+    yield f";FOLD {title}"
+    for line in lines:
+        yield f"  {line}"
+    yield f";ENDFOLD ({title})"
+
+
+def _text(lines: Iterable[str]) -> bytes:
+    return "".join(f"{line}\r\n" for line in lines).encode("ascii")

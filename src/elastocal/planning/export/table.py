@@ -1,0 +1,90 @@
+"""Table ``plan.csv``: one row a pose in visiting order, in units that people read.
+
+The plan itself is ``plan.json``; this table is rounded and nothing reads it back.
+"""
+
+import csv
+import io
+from pathlib import Path
+
+from elastocal.files import write_text
+from elastocal.planning.plan_file import Joints, PlanFile, PoseRecord
+from elastocal.robot import Robot
+from elastocal.robot.pose import xyzabc_from_T
+from elastocal.units import factor
+
+TABLE = "plan.csv"
+"""Name of the table in its folder."""
+
+_SHOWN = {"rad": ("deg", "angle", 6), "m": ("mm", "length", 4)}
+"""Unit, dimension and decimals in which a quantity of an SI unit is shown."""
+_AXES = ("x", "y", "z")
+_ANGLES = ("a", "b", "c")
+
+
+def write_table(folder: Path, plan: PlanFile) -> Path:
+    """Write ``plan.csv`` into a folder, atomically; return its path.
+
+    Columns: pose, candidate, rank in the search, joints in contact and at the approach pose, tcp
+    in base (KUKA Z-Y'-X''), normal, station, time, and the margin of every check. Lengths in mm
+    to 1e-4, angles in deg to 1e-6.
+
+    Raises
+    ------
+    RobotError
+        If the plan's robot cannot be read.
+    FileAccessError
+        If the file cannot be written.
+    """
+    robot = Robot.from_urdf(plan.robot.urdf, plan.robot.tcp, plan.robot.base)
+    rank = {pose: number for number, pose in enumerate(plan.search.order)}
+    rows = [_row(plan, pose, rank[pose.id], robot.revolute) for pose in plan.poses]
+    buffer = io.StringIO()
+    writer = csv.DictWriter(buffer, list(dict.fromkeys(key for row in rows for key in row)))
+    writer.writeheader()
+    writer.writerows(rows)
+    path = Path(folder) / TABLE
+    write_text(path, buffer.getvalue().replace("\r\n", "\n"))
+    return path
+
+
+def _row(
+    plan: PlanFile, pose: PoseRecord, rank: int, revolute: tuple[bool, ...]
+) -> dict[str, object]:
+    units = {check.name: check.unit or "1" for check in plan.pool.checks}
+    row: dict[str, object] = {
+        "pose": pose.id,
+        "candidate": pose.candidate,
+        "search_rank": rank,
+        "seen_by": pose.seen_by or "",
+    }
+    row |= _joints(plan.robot.joints, pose.joints, revolute)
+    approach = tuple(f"approach_{name}" for name in plan.robot.joints)
+    row |= _joints(approach, pose.approach_joints, revolute)
+    xyzabc = xyzabc_from_T(pose.T_base_tcp).tolist()
+    for name, value in zip((*_AXES, *_ANGLES), xyzabc, strict=True):
+        row |= _cell(name, value, "m" if name in _AXES else "rad")
+    row |= {f"normal_{axis}": f"{n:.9f}" for axis, n in zip(_AXES, pose.normal, strict=True)}
+    row |= _cell("contact_time", pose.contact_time, "s")
+    for name, margin in pose.margins.items():
+        row |= _cell(f"margin_{name}", margin, units[name])
+    return row
+
+
+def _joints(
+    names: tuple[str, ...], values: Joints, revolute: tuple[bool, ...]
+) -> dict[str, object]:
+    cells: dict[str, object] = {}
+    for name, value, turns in zip(names, values, revolute, strict=True):
+        cells |= _cell(name, value, "rad" if turns else "m")
+    return cells
+
+
+def _cell(name: str, value: float, unit: str) -> dict[str, object]:
+    """Return a column header with its unit, and the rounded value."""
+    if unit not in _SHOWN:
+        return {f"{name}[{unit}]": f"{value:.6g}"}
+    shown, dimension, decimals = _SHOWN[unit]
+    number = round(value / factor(shown, dimension), decimals)
+    # A value that rounds to -0 would be shown as -0.000000.
+    return {f"{name}[{shown}]": f"{number + 0.0:.{decimals}f}"}

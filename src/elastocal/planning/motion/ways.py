@@ -1,0 +1,117 @@
+"""Ways between HOME and approach poses: straight in joint space, or by way of a few via poses."""
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from elastocal.arrays import FloatArray
+from elastocal.planning.motion.mover import Mover
+
+HOME = 0
+"""Number of HOME among the nodes; pose ``i`` is node ``i + 1``."""
+
+
+@dataclass(frozen=True, eq=False)
+class Way:
+    """A free way between two nodes, with a stop at each via pose."""
+
+    via: FloatArray
+    """Joint positions in between, shape (via, joint), in rad or m; read-only."""
+    duration: float
+    """In s."""
+
+    def back(self) -> "Way":
+        """Return the same way in the other direction."""
+        return Way(self.via[::-1], self.duration)
+
+
+@dataclass(eq=False)
+class Ways:
+    """The ways between nodes, found when they are asked for and remembered.
+
+    The *stem* of a pose is its free way to HOME with at most one via pose: none, the pose lifted
+    off along its normal, or another pose that leads straight to HOME. A pose without a stem
+    cannot be visited. Two poses with stems always have a way: through HOME, with at most three
+    via poses.
+    """
+
+    mover: Mover
+    q: FloatArray
+    """Joint positions of the nodes, shape (node, joint): HOME, then the approach poses."""
+    normal: FloatArray
+    """Outward unit normal of the surface at each pose, shape (pose, 3)."""
+    stems: dict[int, Way] = field(default_factory=dict, init=False)
+    _known: dict[tuple[int, int], Way] = field(default_factory=dict, init=False)
+    _lifts: dict[int, FloatArray] = field(default_factory=dict, init=False)
+
+    def __post_init__(self) -> None:
+        poses = np.arange(1, len(self.q))
+        home = np.broadcast_to(self.q[HOME], self.q[1:].shape)
+        straight = self.mover.sweep.free(self.q[1:], home)
+        gates = poses[straight].tolist()
+        for pose in poses.tolist():
+            direct = [self._none()] if straight[pose - 1] else []
+            stem = self._first_free(pose, HOME, direct)
+            stem = stem or self._first_free(pose, HOME, [v[None] for v in self._lift(pose)])
+            stem = stem or self._first_free(pose, HOME, [self.q[[gate]] for gate in gates])
+            if stem:
+                self.stems[pose] = stem
+
+    def known(self, start: int, end: int) -> Way | None:
+        """Return the way between two nodes if it has been asked for before."""
+        way = self._known.get((min(start, end), max(start, end)))
+        return way.back() if way is not None and start > end else way
+
+    def find(self, start: int, end: int) -> Way:
+        """Return the quickest free way of those tried between two nodes with stems.
+
+        Tried are, the quickest first: straight; one end lifted, or both; the mean in joint space
+        of both lifted; and, always free, through HOME.
+        """
+        first, last = min(start, end), max(start, end)
+        if (first, last) not in self._known:
+            vias = [self._none()]
+            if not self.mover.sweep.along(self.q[[first, last]]):
+                vias = [*self._lifted_vias(first, last), self._through_home(first, last)]
+            way = self._first_free(first, last, vias)
+            assert way is not None, "the stems are free"
+            self._known[first, last] = way
+        known = self.known(start, end)
+        assert known is not None
+        return known
+
+    def _none(self) -> FloatArray:
+        return self.q[:0]
+
+    def _lift(self, node: int) -> FloatArray:
+        """Return the lifted postures of a node, the least lifted first; none of HOME."""
+        if node == HOME:
+            return self._none()
+        if node not in self._lifts:
+            self._lifts[node] = self.mover.lifted(self.q[node], self.normal[node - 1])
+        return self._lifts[node]
+
+    def _lifted_vias(self, first: int, last: int) -> Iterator[FloatArray]:
+        here, there = self._lift(first), self._lift(last)
+        yield from (via[None] for via in (*here, *there))
+        for a, b in zip(here, there, strict=False):
+            yield np.array([a, b])
+            yield np.array([0.5 * (a + b)])
+
+    def _through_home(self, first: int, last: int) -> FloatArray:
+        """Return the via poses through HOME; those of the stem if HOME is an end."""
+        if first == HOME:
+            return self.stems[last].via[::-1]
+        return np.concatenate([self.stems[first].via, self.q[[HOME]], self.stems[last].via[::-1]])
+
+    def _first_free(self, start: int, end: int, vias: Iterable[FloatArray]) -> Way | None:
+        """Return the quickest of some ways that is free; ties: the one given first."""
+        chains = [np.concatenate([self.q[[start]], via, self.q[[end]]]) for via in vias]
+        durations = [self.mover.axes.along(chain) for chain in chains]
+        for index in np.argsort(durations, kind="stable"):
+            if self.mover.sweep.along(chains[index]):
+                via = chains[index][1:-1]
+                via.setflags(write=False)
+                return Way(via, durations[index])
+        return None

@@ -1,0 +1,181 @@
+"""From a cell to a plan: surface, pool, search, visiting order (paper 2.2, 3.1)."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.random import Generator
+
+from elastocal.arrays import IndexArray
+from elastocal.cell import Cell
+from elastocal.errors import PlanningError
+from elastocal.planning.cell_checks import collision_scene, sight_check, torque_check
+from elastocal.planning.choice import Searched
+from elastocal.planning.gathering import Gathered, gather
+from elastocal.planning.motion import Route, mover_for, plan_route
+from elastocal.planning.plan_file import PlanFile
+from elastocal.planning.pool import Progress
+from elastocal.planning.pool_file import PoolData
+from elastocal.planning.postures import Postures
+from elastocal.planning.records import Decisions, plan_record, pool_data
+from elastocal.planning.search import Cover, Selection, technique
+from elastocal.planning.surface import Finding, Surface
+from elastocal.planning.tooling import cell_surface, surface_findings
+
+STAGES = ("surface", "candidates", "search", "visiting order")
+"""What progress is told of, in this order."""
+_REPLACEMENTS = 10
+"""Times that poses which no way leads to are replaced by others."""
+
+
+@dataclass(frozen=True, eq=False)
+class Planned:
+    """A plan, the pool beside it, and the surface that it lies on."""
+
+    plan: PlanFile
+    pool: PoolData
+    surface: Surface
+
+
+def make_plan(
+    cell: Cell,
+    compare: str | None = None,
+    jobs: int | None = None,
+    progress: Progress = lambda *_: None,
+) -> Planned:
+    """Return the calibration poses of a cell, checked and in visiting order.
+
+    Everything random is drawn from ``search.seed`` of the cell file: the same cell gives the same
+    plan.
+
+    Parameters
+    ----------
+    cell : Cell
+        The cell.
+    compare : str, optional
+        Search technique that is to choose as many poses from the same pool, for comparison.
+    jobs : int, optional
+        Number of processes; all cores by default.
+    progress : callable, optional
+        Told the stage (one of `STAGES`), what is done of it and how much there is.
+
+    Raises
+    ------
+    PlanningError
+        If no plan can be made: the message says what refused most points and what to move.
+    SurfaceError, FileAccessError
+        If the surface cannot be read, or its region is empty.
+    """
+    technique(cell.file.search.technique)  # an unknown one is refused before the long work
+    other = None if compare is None else technique(compare)
+    for_findings, for_points, for_search = np.random.default_rng(cell.file.search.seed).spawn(3)
+    progress(STAGES[0], 0, 1)
+    surface = cell_surface(cell)
+    findings = surface_findings(cell, surface, for_findings)
+    progress(STAGES[0], 1, 1)
+    gathered = gather(
+        cell, surface, for_points, jobs, lambda _, done, total: progress(STAGES[1], done, total)
+    )
+    _refuse_empty(gathered, findings)
+    progress(STAGES[2], 0, 1)
+    searched = Searched.of(cell, surface, gathered)
+    selection, route = _choose(
+        cell,
+        searched,
+        gathered,
+        surface,
+        for_search,
+        lambda _, done, total: progress(STAGES[3], done, total),
+    )
+    progress(STAGES[2], 1, 1)
+    everyone = np.arange(len(searched.candidates))
+    comparison = (
+        None if other is None else searched.take(other, everyone, len(selection), for_search)
+    )
+    chosen = gathered.pool.postures.take(selection.order)
+    decisions = Decisions(
+        cell,
+        gathered,
+        searched,
+        selection,
+        comparison,
+        route,
+        _stations(cell, surface, chosen),
+        (
+            *(finding.message for finding in findings),
+            *_notes(cell, gathered, searched, selection),
+        ),
+    )
+    return Planned(plan_record(decisions), pool_data(decisions), surface)
+
+
+def _refuse_empty(gathered: Gathered, findings: tuple[Finding, ...]) -> None:
+    """Refuse a pool without candidates, saying what to move."""
+    pool = gathered.pool
+    if len(pool.postures):
+        return
+    refused = ", ".join(f"{name} {count}" for name, count in pool.refused.items() if count)
+    odd = [f.message for f in findings if f.kind in ("tiny", "inverted")]
+    why = "; ".join([*odd, pool.advice])
+    raise PlanningError(
+        f"0 of {pool.sampled} points on the surface can be pressed on (refused by {refused}): {why}"
+    )
+
+
+def _choose(
+    cell: Cell,
+    searched: Searched,
+    gathered: Gathered,
+    surface: Surface,
+    rng: Generator,
+    progress: Progress,
+) -> tuple[Selection, Route]:
+    """Return poses to which ways lead from HOME, replacing those to which none does."""
+    mover = mover_for(cell, collision_scene(cell, surface))
+    left: IndexArray = np.arange(len(searched.candidates))
+    for _ in range(_REPLACEMENTS):
+        selection = searched.choose(cell, left, rng)
+        postures = gathered.pool.postures.take(selection.order)
+        route = plan_route(cell.home, postures, mover, progress)
+        if not len(route.unreachable):
+            return selection, route
+        left = np.setdiff1d(left, selection.order[np.asarray(route.unreachable)])
+    raise PlanningError(
+        f"no way without collision leads from HOME to {len(route.unreachable)} of"
+        f" {len(selection)} poses, and others in their place fared no better: move motion.home or"
+        " the fixtures, or lengthen engagement.approach_distance"
+    )
+
+
+def _stations(cell: Cell, surface: Surface, chosen: Postures) -> tuple[str | None, ...]:
+    """Return the tracker station of each pose."""
+    check = sight_check(cell, surface)
+    return (None,) * len(chosen) if check is None else tuple(check.seen_by(chosen))
+
+
+def _notes(
+    cell: Cell, gathered: Gathered, searched: Searched, selection: Selection
+) -> tuple[str, ...]:
+    """Return what a user should know of how the poses were found, a line each."""
+    search, pool = cell.file.search, gathered.pool
+    notes: list[str] = []
+    if len(pool.postures) < search.pool:
+        notes.append(
+            f"only {len(pool.postures)} of {search.pool} candidates were found among"
+            f" {pool.sampled} points; most of the others were refused by {pool.bottleneck}:"
+            f" {pool.advice}"
+        )
+    radius = searched.spread(selection.order).covering_radius
+    if search.d_max is not None and not radius <= search.d_max:
+        notes.append(
+            f"d_max of {1e3 * search.d_max:.4g} mm was not reached: the worst-covered candidate is"
+            f" {1e3 * radius:.4g} mm from the nearest of {len(selection)} poses"
+        )
+    if search.d_max is not None and not isinstance(technique(search.technique), Cover):
+        notes.append(
+            f"{selection.name} knows no d_max: it chose as many poses as cover needs for it"
+        )
+    judged = torque_check(cell).judged
+    unknown = [name for name in cell.robot.joint_names if name not in judged]
+    if unknown:
+        notes.append(f"torques of {', '.join(unknown)} are not known and not judged")
+    return tuple(notes)

@@ -1,0 +1,125 @@
+"""Run folder: cell and plan as used, journal, raw streams, and what is derived from them."""
+
+import os
+import shutil
+from dataclasses import dataclass
+from pathlib import Path
+
+from elastocal.cell import Cell
+from elastocal.cell.fingerprint import named_files
+from elastocal.errors import FileAccessError
+from elastocal.files import replacing
+from elastocal.planning.plan_file import PLAN, POOL
+
+JOURNAL = "journal.jsonl"
+
+
+@dataclass(frozen=True)
+class RunFolder:
+    """Places in a run's folder."""
+
+    path: Path
+
+    @property
+    def cell(self) -> Path:
+        """Folder with the cell file and the files that it names."""
+        return self.path / "cell"
+
+    @property
+    def plan(self) -> Path:
+        """Folder with the plan."""
+        return self.path / "plan"
+
+    @property
+    def journal(self) -> Path:
+        """The journal."""
+        return self.path / JOURNAL
+
+    @property
+    def streams(self) -> Path:
+        """Folder with the raw streams."""
+        return self.path / "streams"
+
+    @property
+    def dataset(self) -> Path:
+        """The dataset, derived."""
+        return self.path / "dataset.nc"
+
+    @property
+    def summary(self) -> Path:
+        """The summary, derived."""
+        return self.path / "summary.json"
+
+    def stream(self, pose: int, attempt: int) -> Path:
+        """Return the place of the raw streams of an attempt at a pose.
+
+        >>> RunFolder(Path("run")).stream(7, 1).name
+        'pose_0007_1.mcap'
+        """
+        return self.streams / f"pose_{pose:04d}_{attempt}.mcap"
+
+
+def cell_place(cell: Cell) -> str:
+    """Return where the cell file goes in the run's folder ``cell``.
+
+    Its own folder there stands to those of the files that it names as in the original, so that
+    the copy reads like it.
+    """
+    return os.path.relpath(_absolute(cell.path), _root(cell))
+
+
+def fill(folder: RunFolder, cell: Cell, plan: Path) -> None:
+    """Put cell and plan into a run's folder, as they are now.
+
+    Files that the cell names by an absolute path stay where they are.
+
+    Parameters
+    ----------
+    folder : RunFolder
+        Made if it is not there.
+    cell : Cell
+        The cell.
+    plan : Path
+        Folder with the plan.
+
+    Raises
+    ------
+    FileAccessError
+        If something cannot be read or written.
+    """
+    root = _root(cell)
+    for source in (_absolute(cell.path), *_relative_files(cell)):
+        _copy(source, folder.cell / os.path.relpath(source, root))
+    for name in (PLAN, POOL):
+        if (plan / name).is_file():
+            _copy(plan / name, folder.plan / name)
+    _make(folder.streams)
+
+
+def _root(cell: Cell) -> str:
+    """Return the deepest folder that holds the cell file and all that it names."""
+    folders = [_absolute(cell.path).parent, *(file.parent for file in _relative_files(cell))]
+    return os.path.commonpath(folders)
+
+
+def _relative_files(cell: Cell) -> list[Path]:
+    names = dict.fromkeys(named_files(cell.file))
+    return [_absolute(cell.find(name)) for name in names if not Path(name).is_absolute()]
+
+
+def _absolute(path: Path) -> Path:
+    # Not resolve(): a link to a mesh is copied under the name that the cell file knows.
+    return Path(os.path.abspath(path))  # noqa: PTH100
+
+
+def _copy(source: Path, target: Path) -> None:
+    _make(target.parent)
+    with replacing(target) as temporary:
+        shutil.copyfile(source, temporary)
+
+
+def _make(folder: Path) -> None:
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise FileAccessError(f"cannot make {folder}: {error.strerror or error}") from error

@@ -1,0 +1,101 @@
+"""The fingerprint: changes with what a cell is, not with how or where it is written down."""
+
+import shutil
+
+import pytest
+import yaml
+
+from elastocal.cell import fingerprint, load_cell
+from elastocal.cell.examples import write_example
+from elastocal.errors import FileAccessError
+from elastocal.robot import catalogue
+
+
+@pytest.fixture
+def folder(tmp_path):
+    write_example(tmp_path / "here", "machining")
+    return tmp_path / "here"
+
+
+def of(folder, file="cell.yaml"):
+    return fingerprint(load_cell(folder / file))
+
+
+def rewritten(folder, change):
+    """The fingerprint after a change to the contents of the cell file."""
+    path = folder / "cell.yaml"
+    data = yaml.safe_load(path.read_text(encoding="utf-8"))
+    change(data)
+    path.write_text(yaml.safe_dump(data), encoding="utf-8")
+    return of(folder)
+
+
+def flip_last_byte(path):
+    data = bytearray(path.read_bytes())
+    data[-1] ^= 1
+    path.write_bytes(data)
+
+
+def test_it_is_a_sha256_and_says_the_same_twice(folder):
+    assert of(folder) == of(folder)
+    assert len(bytes.fromhex(of(folder))) == 32
+
+
+def test_comments_and_the_order_of_keys_do_not_change_it(folder):
+    before = of(folder)
+    path = folder / "cell.yaml"
+    path.write_text("# a comment\n" + path.read_text(encoding="utf-8"), encoding="utf-8")
+    assert of(folder) == before
+    assert rewritten(folder, dict) == before
+
+
+def test_another_place_and_another_name_of_the_file_do_not_change_it(folder):
+    before = of(folder)
+    shutil.move(folder, folder.with_name("there"))
+    there = folder.with_name("there")
+    (there / "cell.yaml").rename(there / "other.yaml")
+    assert of(there, "other.yaml") == before
+
+
+def test_a_number_changes_it(folder):
+    before = of(folder)
+    assert rewritten(folder, lambda data: data["load_cases"].update(fz="1501 N")) != before
+
+
+def test_a_byte_of_the_surface_changes_it(folder):
+    before = of(folder)
+    flip_last_byte(folder / "block.stl")
+    assert of(folder) != before
+
+
+def test_a_byte_of_every_other_file_changes_it(folder):
+    for name in ("tool.stl", "fixture.stl"):
+        shutil.copy(folder / "block.stl", folder / name)
+    (folder / "robot.urdf").write_text(catalogue.urdf("KR 300 R2500 ultra"))
+    joints = ",".join(f"joint_a{i}[deg]" for i in range(1, 7))
+    rows = f"{joints},force_x[N],force_y[N],force_z[N]\n0,-90,90,0,45,0,0,0,-100\n"
+    (folder / "process.csv").write_text(rows)
+
+    def name_them(data):
+        data["robot"] = {"urdf": "robot.urdf"}
+        data["process"] = {"file": "process.csv"}
+        data["tool"]["shapes"].append({"mesh": {"file": "tool.stl", "unit": "mm"}})
+        data["fixtures"].append({"mesh": {"file": "fixture.stl", "unit": "mm"}})
+
+    seen = [rewritten(folder, name_them)]
+    for name in ("tool.stl", "fixture.stl"):
+        flip_last_byte(folder / name)
+        seen.append(of(folder))
+    for name in ("robot.urdf", "process.csv"):
+        with (folder / name).open("a") as file:
+            file.write("\n")
+        seen.append(of(folder))
+    assert len(set(seen)) == 5
+
+
+def test_a_file_that_went_away_is_named(folder):
+    cell = load_cell(folder / "cell.yaml")
+    (folder / "block.stl").unlink()
+    with pytest.raises(FileAccessError, match=r"cannot read .*block\.stl: No such file") as caught:
+        fingerprint(cell)
+    assert "\n" not in str(caught.value)
