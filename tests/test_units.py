@@ -25,6 +25,8 @@ from elastocal.units import factor, parse_quantity, split_column
         ("3 kN*m", "moment", 3e3),
         ("1.1 t", "mass", 1100.0),
         ("2 min", "time", 120.0),
+        ("20 mm/s", "speed", 0.02),
+        ("180 deg/s", "angular speed", math.pi),
         ("1e-6 rad/(N*m)", "rotational compliance", 1e-6),
         ("2 um/N", "translational compliance", 2e-6),
     ],

@@ -21,6 +21,9 @@ _FACTORS: dict[str, dict[str, float]] = {
     "time": {"s": 1.0, "ms": 1e-3, "min": 60.0},
     "rotational compliance": {"rad/(N*m)": 1.0, "rad/Nm": 1.0, "rad/(N·m)": 1.0},
     "translational compliance": {"m/N": 1.0, "mm/N": 1e-3, "um/N": 1e-6},
+    "rotational stiffness": {"N*m/rad": 1.0, "Nm/rad": 1.0, "N·m/rad": 1.0},
+    "translational stiffness": {"N/m": 1.0, "N/mm": 1e3, "N/um": 1e6},
+    "frequency": {"Hz": 1.0},
 }
 
 _QUANTITY = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*([^\s\d.].*)\s*")

@@ -122,9 +122,10 @@ def test_more_poses_than_the_valid_candidates_are_refused(tmp_path):
         tmp_path,
         ("# poses: 31 ", "poses: 100 # "),
         ('  d_max: "175 mm"', '  # d_max: "175 mm"'),
-        ('joint_margin: "5 deg"', 'joint_margin: "74 deg"'),
+        ('joint_margin: "5 deg"', 'joint_margin: "64 deg"'),
     )
-    assert "100 poses are wanted (search.poses), and the pool has only" in reason
+    assert "points on the surface can be pressed on, and 100 poses are wanted" in reason
+    assert "joint_limits" in reason
 
 
 @pytest.mark.parametrize("d_max", ["0 mm", "-175 mm"])
@@ -148,6 +149,7 @@ def test_loads_beyond_the_torques_name_the_torque(tmp_path):
         tmp_path,
         ('fz: "1100 N"', 'fz: "6 kN"'),
         ('force_range: ["2500 N", "2500 N", "6250 N"]', 'force_range: ["9 kN", "9 kN", "30 kN"]'),
+        ('["400 N*m", "400 N*m", "400 N*m"]', '["9 kN*m", "9 kN*m", "9 kN*m"]'),
     )
     assert "refused by" in reason
     assert "torque" in reason

@@ -76,12 +76,12 @@ def test_progress_counts_up_to_what_is_wanted(tmp_path):
     assert [done for _, done, _ in told] == sorted(done for _, done, _ in told)
 
 
-def test_a_surface_out_of_reach_is_given_up_after_one_round(tmp_path):
+def test_a_surface_out_of_reach_is_given_up_early(tmp_path):
     cell = example(tmp_path, pool=FEW, place=('xyz: ["1.85 m"', 'xyz: ["8 m"'))
     found = gathered(cell)
     assert len(found.pool.postures) == 0
     assert found.pool.bottleneck == "reach"
-    assert found.pool.sampled < 2 * 120
+    assert 1000 <= found.pool.sampled < 20 * 120
 
 
 def test_a_region_with_nothing_in_it_is_refused(tmp_path):

@@ -7,13 +7,17 @@ from collections.abc import Iterator
 from elastocal.cell.description import Cell, CellFile
 from elastocal.errors import FileAccessError
 
+RUN_SECTIONS = ("procedure", "devices", "simulation", "faults")
+"""Sections of the cell file that say how a plan is carried out; a plan does not depend on them."""
+
 
 def fingerprint(cell: Cell) -> str:
     """Return a SHA-256 over what a cell file says and the files that it names.
 
     It changes with every value of the cell file, defaults included, and with every byte of the
     surface, the mesh shapes, the robot's URDF and the process file. It does not change with
-    comments, the order of keys, the way a number is written, or the place of the folder.
+    comments, the order of keys, the way a number is written, the place of the folder, or the
+    sections that say how a plan is carried out (`RUN_SECTIONS`).
 
     Parameters
     ----------
@@ -30,7 +34,8 @@ def fingerprint(cell: Cell) -> str:
     FileAccessError
         If a file that the cell names cannot be read.
     """
-    content = json.dumps(cell.file.model_dump(mode="json"), sort_keys=True, allow_nan=False)
+    contents = cell.file.model_dump(mode="json", exclude=set(RUN_SECTIONS))
+    content = json.dumps(contents, sort_keys=True, allow_nan=False)
     digest = hashlib.sha256(content.encode("utf-8"))
     for name in named_files(cell.file):
         # Digests have one length, so that no byte can move from one file to the next unseen.

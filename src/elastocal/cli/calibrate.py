@@ -32,7 +32,10 @@ def calibrate(  # noqa: PLR0913 - one parameter an option
         str, typer.Option(help="Lowest and highest compliance in SI units.")
     ] = "0,inf",
     marker: Annotated[
-        str | None, typer.Option(help="Marker in the tcp frame: 'x, y, z' with units.")
+        str | None,
+        typer.Option(
+            help="Marker in the tcp frame: 'x, y, z' with units; default: the dataset's, else at it."
+        ),
     ] = None,
     exclude: Annotated[
         list[str] | None, typer.Option(help="Leave out POSE or POSE:LOAD_CASE; repeatable.")
@@ -84,7 +87,7 @@ def calibrate(  # noqa: PLR0913 - one parameter an option
         readings,
         np.random.default_rng(seed),
         options,
-        marker_offset=None if marker is None else parse_point(marker),
+        marker_offset=measured.marker if marker is None else parse_point(marker),
         provenance=f"{data}; {measured.provenance}" if measured.provenance else str(data),
     )
     figures = summary(calibration)

@@ -4,7 +4,10 @@ from collections.abc import Hashable, Mapping
 from typing import Any
 
 from elastocal.dataset.layout import ATTRIBUTES, CF_ATTRIBUTES, SCHEMA
-from elastocal.errors import DatasetError, SchemaError, nearest
+from elastocal.errors import DatasetError, SchemaError, UnitError, nearest
+from elastocal.units import parse_quantity
+
+Point = tuple[float, float, float]
 
 
 def canonical_attributes(attributes: Mapping[Hashable, Any]) -> dict[str, str]:
@@ -32,8 +35,37 @@ def canonical_attributes(attributes: Mapping[Hashable, Any]) -> dict[str, str]:
             raise DatasetError(f"attribute {name!r} is {value!r:.60}: it must be a text")
         if name in ("robot_urdf", "tcp_frame") and not value:
             raise DatasetError(f"attribute {name!r} is empty: leave it out when it is not known")
+        if name == "marker":
+            read_point(name, value)
     texts = {"robot_name": "", "provenance": "", **attributes}
     return {name: str(texts[name]) for name in known if name in texts}
+
+
+def write_point(point: Point) -> str:
+    """Return the text of a point, as the command line takes it.
+
+    >>> write_point((0.0, 0.04, -0.06))
+    '0.0 m, 0.04 m, -0.06 m'
+    """
+    return ", ".join(f"{float(value)!r} m" for value in point)
+
+
+def read_point(name: str, text: str) -> Point:
+    """Return the point that an attribute states, in m.
+
+    Raises
+    ------
+    DatasetError
+        If it is not three lengths with their units.
+    """
+    try:
+        x, y, z = (parse_quantity(part.strip(), "length") for part in text.split(","))
+    except (UnitError, ValueError) as error:
+        raise DatasetError(
+            f"attribute {name!r} is {text!r:.60}: it must be three lengths, such as"
+            " '0 m, 0.04 m, -0.06 m'"
+        ) from error
+    return x, y, z
 
 
 def _storable(text: str) -> bool:

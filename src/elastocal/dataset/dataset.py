@@ -9,6 +9,7 @@ import xarray as xr
 from numpy.typing import ArrayLike
 
 from elastocal.dataset.assembly import as_array, assemble
+from elastocal.dataset.attributes import read_point, write_point
 from elastocal.dataset.layout import SCHEMA, SI_JOINT_UNITS, FloatArray, freeze
 from elastocal.dataset.plausibility import check_plausible
 from elastocal.dataset.readings import Readings
@@ -62,6 +63,7 @@ class Dataset:
         robot_name: str = "",
         robot_urdf: str | None = None,
         tcp_frame: str | None = None,
+        marker: tuple[float, float, float] | None = None,
         provenance: str = "",
     ) -> "Dataset":
         """Return the dataset of plain arrays in SI units, if it is plausible.
@@ -73,7 +75,8 @@ class Dataset:
         force : array_like, shape (pose, load_case, 3)
             Force on the robot at the TCP in base (F^m), in N.
         controller_displacement, marker_displacement : array_like, shape (pose, load_case, 3)
-            Displacements under load by controller (P^c) and tracker (P^m), in base, in m.
+            Displacements under load by controller (P^c) and tracker (P^m), in base, in m: of the
+            TCP, or both of the marker where ``marker`` is given.
         joint_names, load_cases : sequence of str
             Labels of the joints and the load cases.
         poses : sequence of int, optional
@@ -90,6 +93,8 @@ class Dataset:
             ``"rad"`` or ``"m"`` for each joint; ``"rad"`` by default.
         robot_name, robot_urdf, tcp_frame, provenance : str, optional
             Attributes of the file: the robot, its URDF text, a link of it, and where from.
+        marker : tuple of float, optional
+            Metrology marker in the frame ``tcp_frame``, in m.
 
         Raises
         ------
@@ -117,6 +122,7 @@ class Dataset:
                 "robot_name": robot_name,
                 "robot_urdf": robot_urdf,
                 "tcp_frame": tcp_frame,
+                "marker": None if marker is None else write_point(marker),
                 "provenance": provenance,
             },
         )
@@ -160,6 +166,12 @@ class Dataset:
     def tcp_frame(self) -> str | None:
         """Link of the URDF at the tool centre point; None when the file does not name one."""
         return self.data.attrs.get("tcp_frame")
+
+    @property
+    def marker(self) -> tuple[float, float, float] | None:
+        """Metrology marker in the tcp frame, in m; None: at the tcp, or the file does not say."""
+        text = self.data.attrs.get("marker")
+        return None if text is None else read_point("marker", str(text))
 
     @property
     def provenance(self) -> str:

@@ -32,7 +32,7 @@ JOINT_UNITS = {"rad": "angle", "deg": "angle", "m": "length", "mm": "length"}
 
 SI_JOINT_UNITS = {"angle": "rad", "length": "m"}
 
-ATTRIBUTES = ("schema", "robot_name", "robot_urdf", "tcp_frame", "provenance")
+ATTRIBUTES = ("schema", "robot_name", "robot_urdf", "tcp_frame", "marker", "provenance")
 """Global attributes with a meaning here, in the order in which they are written."""
 
 CF_ATTRIBUTES = (
@@ -92,7 +92,7 @@ VECTORS = (
         _READING,
         "length",
         "m",
-        "TCP displacement that the controller reports, in base",
+        "displacement of the TCP (of the marker, if one is named) by the controller, in base",
         required=True,
     ),
     Variable(

@@ -1,5 +1,6 @@
 """Merging: several datasets of one robot become one."""
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -11,6 +12,10 @@ from elastocal.errors import DatasetError
 
 _SAME_ATTRIBUTES = ("robot_name", "robot_urdf", "tcp_frame")
 
+SAME_MARKER = 1e-3
+"""Markers that are estimated closer to one another are the same, in m: the displacements of a
+tool that turns by 1 mrad under load then differ by 1 µm."""
+
 
 def merge(datasets: Sequence[Dataset], *, relabel: bool = False) -> Dataset:
     """Return all poses of several datasets of the same robot.
@@ -18,7 +23,7 @@ def merge(datasets: Sequence[Dataset], *, relabel: bool = False) -> Dataset:
     Poses keep their labels, and one that stands in two datasets is refused: whether it is the
     same pose measured again or another one is for the user to say. Load cases are the union, in
     order of first appearance; a pose that lacks one has NaN and the status missing there. Joints
-    are matched by name. Provenances are joined with ``"; "``.
+    are matched by name. Provenances are joined with ``"; "``; the marker is the first one's.
 
     Parameters
     ----------
@@ -72,6 +77,7 @@ def _check_compatible(first: Dataset, other: Dataset, index: int) -> None:
                 f"datasets 0 and {index} are not of the same robot: attribute {name!r} is"
                 f" {_short(here)} in one and {_short(there)} in the other"
             )
+    _check_marker(first, other, index)
     joints = [dict(zip(data.joint_names, data.joint_units, strict=True)) for data in (first, other)]
     if joints[0] != joints[1]:
         raise DatasetError(
@@ -82,6 +88,20 @@ def _check_compatible(first: Dataset, other: Dataset, index: int) -> None:
         raise DatasetError(
             f"dataset {lacking} has no variable {variable!r}, dataset {index - lacking} has:"
             " what was not measured cannot be filled in"
+        )
+
+
+def _check_marker(first: Dataset, other: Dataset, index: int) -> None:
+    here, there = first.marker, other.marker
+    if here is None or there is None:
+        same = here is there
+    else:
+        same = math.dist(here, there) <= SAME_MARKER
+    if not same:
+        raise DatasetError(
+            f"datasets 0 and {index} have different markers: attribute 'marker' is"
+            f" {_short(first.data.attrs.get('marker'))} in one and"
+            f" {_short(other.data.attrs.get('marker'))} in the other"
         )
 
 

@@ -34,6 +34,8 @@ _WORTH_HELP = 8000
 """Candidates from which on other processes are started: it takes them seconds to get ready."""
 _HARDEST = 20
 """Points that are tried for each candidate wanted, at most."""
+_ENOUGH = 1000
+"""Points without a single candidate after which no more are tried."""
 _SPARE = 1.03
 """Points that are sampled for each that should turn out to be missing."""
 
@@ -118,7 +120,7 @@ def _valid(pools: Sequence[Pool]) -> int:
 def _hopeless(pools: Sequence[Pool], wanted: int) -> bool:
     """Return whether points have been tried, and more of them would not help."""
     sampled = sum(pool.sampled for pool in pools)
-    return bool(pools) and (_valid(pools) == 0 or sampled >= _HARDEST * wanted)
+    return sampled >= _HARDEST * wanted or (_valid(pools) == 0 and sampled >= _ENOUGH)
 
 
 def _sample(
@@ -126,7 +128,7 @@ def _sample(
 ) -> SurfacePoints:
     """Return points of which about ``missing`` should become candidates, in no order."""
     if pools:
-        share = _valid(pools) / sum(pool.sampled for pool in pools)
+        share = max(_valid(pools) / sum(pool.sampled for pool in pools), 1.0 / _HARDEST)
     else:
         probe = sample_uniform(surface, 1000, rng)
         edge = point_checks(cell, surface, probe)[0]

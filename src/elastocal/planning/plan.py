@@ -75,7 +75,7 @@ def make_plan(
     gathered = gather(
         cell, surface, for_points, jobs, lambda _, done, total: progress(STAGES[1], done, total)
     )
-    _refuse_empty(gathered, findings)
+    _refuse_too_few(cell, gathered, findings)
     progress(STAGES[2], 0, 1)
     searched = Searched.of(cell, surface, gathered)
     selection, route = _choose(
@@ -108,16 +108,19 @@ def make_plan(
     return Planned(plan_record(decisions), pool_data(decisions), surface)
 
 
-def _refuse_empty(gathered: Gathered, findings: tuple[Finding, ...]) -> None:
-    """Refuse a pool without candidates, saying what to move."""
-    pool = gathered.pool
-    if len(pool.postures):
+def _refuse_too_few(cell: Cell, gathered: Gathered, findings: tuple[Finding, ...]) -> None:
+    """Refuse a pool that cannot give the poses wanted, saying what to move."""
+    pool, wanted = gathered.pool, cell.file.search.poses or 1
+    found = len(pool.postures)
+    if found >= wanted:
         return
     refused = ", ".join(f"{name} {count}" for name, count in pool.refused.items() if count)
     odd = [f.message for f in findings if f.kind in ("tiny", "inverted")]
     why = "; ".join([*odd, pool.advice])
+    short = f", and {wanted} poses are wanted (search.poses)" if wanted > 1 else ""
     raise PlanningError(
-        f"0 of {pool.sampled} points on the surface can be pressed on (refused by {refused}): {why}"
+        f"{found} of {pool.sampled} points on the surface can be pressed on{short};"
+        f" refused by {refused}: {why}"
     )
 
 

@@ -20,10 +20,17 @@ class _Survey:
     stand: Stand
     served: BoolArray
     """Points with a posture, shape (point,); after the quick checks only, until asked."""
+    nearness: float
+    """Mean over the points of the most checks that a posture passes; tells stands that serve no
+    point apart, so that what refuses the points at the best of them is what a user hears."""
     quality: float
     """Mean over the points of the best posture's smallest margin, in units of its median."""
     asked: bool = False
     """Whether the slow checks have been asked."""
+
+    def rank(self, left: BoolArray) -> tuple[int, float, float]:
+        """Return what counts, most important first, for points that no better stand serves."""
+        return int(np.count_nonzero(self.served & left)), self.nearness, self.quality
 
 
 def rank_stands(
@@ -66,7 +73,7 @@ def rank_stands(
     chosen: list[Stand] = []
     left = np.ones(len(points), dtype=bool)
     while surveys:
-        best = max(surveys, key=lambda one: (np.count_nonzero(one.served & left), one.quality))
+        best = max(surveys, key=lambda one: one.rank(left))
         if chosen and np.count_nonzero(best.served & left) < max(1.0, _WORTH * len(points)):
             break
         surveys.remove(best)
@@ -91,10 +98,13 @@ def _survey(
     found = verdicts(checks.quick, options.postures)
     served = np.zeros((solver.branches, len(points)), dtype=bool)
     served[options.branch[found.passed], options.point[found.passed]] = True
-    best = np.zeros(len(points))
+    best, nearest = np.zeros(len(points)), np.full(len(points), -1.0)
+    np.maximum.at(nearest, options.point, (found.margin > 0.0).sum(axis=0))
     np.maximum.at(best, options.point, np.where(found.passed, found.quality, 0.0))
     stand = Stand(external, tuple(_branch_order(served).tolist()))
-    return _Survey(stand, np.asarray(served.any(axis=0)), float(best.mean()))
+    return _Survey(
+        stand, np.asarray(served.any(axis=0)), float(nearest.mean()), float(best.mean())
+    )
 
 
 def _branch_order(served: BoolArray) -> IndexArray:

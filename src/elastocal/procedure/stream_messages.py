@@ -3,8 +3,8 @@
 One message a sample, because that is what both viewers draw: Foxglove plots ``/wrench.force.z``
 and PlotJuggler lists ``/wrench/force/z``. A block of samples as arrays would be three times as
 quick to write, but PlotJuggler makes a series of each array place, a hundred a block.
-Numbers have 12 digits, finer than any instrument and three times as quick to write as all 17; what
-is not a finite number is null, whatever the schema says.
+Numbers have 12 digits: finer than any instrument, and nearly three times as quick to write as all
+17. What is not a finite number is null, whatever the schema says.
 """
 
 import json
@@ -23,7 +23,7 @@ ARM, WRENCH, MARKER, MARKS = "/arm", "/wrench", "/marker", "/marks"
 """Topics, in the order of their channels."""
 
 _NUMBER = {"type": "number"}
-"""Not ``["number", "null"]``: Foxglove refuses a channel whose schema names several types."""
+"""Not ``["number", "null"]``: one type a field is what every viewer's schema reader knows."""
 _HERE = "\0"
 """Where a number belongs; no JSON text holds this letter."""
 _XYZ = f'{{"x":{_HERE},"y":{_HERE},"z":{_HERE}}}'
@@ -151,9 +151,7 @@ def _joined(head: str, numbers: FloatArray, tails: Sequence[str]) -> list[bytes]
     else:
         template = head.replace(_HERE, "%s")
         rows = [[_number(value) for value in row] for row in rows]
-    return [
-        (template % tuple(row) + tail).encode() for row, tail in zip(rows, tails, strict=True)
-    ]
+    return [(template % tuple(row) + tail).encode() for row, tail in zip(rows, tails, strict=True)]
 
 
 def _number(value: float) -> str:

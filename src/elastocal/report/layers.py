@@ -55,7 +55,7 @@ def still_layers(cell: Cell, surface: Surface, plan: PlanFile, pool: PoolData) -
         layers.append(Layer("Fixtures", style.FIXTURE, (trace,)))
     lift = _OFF_SURFACE * float(np.linalg.norm(np.ptp(surface.mesh.vertices, axis=0)))
     layers.append(_candidates(pool, lift))
-    layers.append(Layer("Poses, in visiting order", style.BLUE, (_poses(plan, 4.0 * lift),)))
+    layers.append(Layer("Poses, in visiting order", style.BLUE, (_poses(plan, 5.0 * lift),)))
     layers.append(Layer("Approach, along the normal", style.MUTED, (_approaches(plan),)))
     layers.append(Layer("Way of the tool from HOME to HOME", style.TOUR, _tour(cell, plan)))
     if cell.file.trackers:

@@ -24,10 +24,9 @@ from elastocal.report.view import View, plan_view
 from elastocal.report.weakest import weakest
 
 POLICY = (
-    "default-src 'none'; script-src 'unsafe-inline' 'unsafe-eval'; style-src 'unsafe-inline';"
-    " img-src data: blob:"
+    "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data: blob:"
 )
-"""What the page may load: nothing but itself. Plotly compiles shaders' helpers, hence eval."""
+"""What the page may load: nothing but what stands in it."""
 
 
 def write_plan_page(

@@ -10,14 +10,13 @@ from typing import Any
 
 import coal
 import numpy as np
-import pinocchio as pin
 import trimesh
 
-from elastocal.arrays import FloatArray, IndexArray
+from elastocal.arrays import BoolArray, FloatArray, IndexArray
 from elastocal.cell import Cell
 from elastocal.planning.cell_checks import TOOLING, collision_scene
+from elastocal.planning.scene import CollisionScene
 from elastocal.planning.surface import Surface
-from elastocal.robot import Robot
 
 _SECTIONS = 24
 """Sides of a drawn cylinder."""
@@ -55,46 +54,37 @@ class Solid:
 class RobotSolids:
     """Links and tool of a robot; `at` places them."""
 
-    robot: Robot
-    links: tuple[Solid, ...]
-    """Each in its own geometry frame, as the URDF orders them."""
-    tool: tuple[Solid, ...]
-    """In the tcp frame."""
+    scene: CollisionScene
+    parts: tuple[Solid, ...]
+    """Links, then tool, each in its own frame, as `CollisionScene.moving` orders them."""
 
     @property
-    def on_tool(self) -> np.ndarray:
+    def on_tool(self) -> BoolArray:
         """Whether each face of the joined mesh is the tool's, shape (face,)."""
-        parts = [(part, False) for part in self.links] + [(part, True) for part in self.tool]
-        return np.repeat([tool for _, tool in parts], [len(part.faces) for part, _ in parts])
+        links = len(self.parts) - len(self.scene.tool)
+        sizes = [len(part.faces) for part in self.parts]
+        return np.repeat(np.arange(len(self.parts)) >= links, sizes)
 
-    def at(self, q: Sequence[FloatArray] | FloatArray) -> list[Solid]:
+    def at(self, q: FloatArray) -> list[Solid]:
         """Return links and tool as one mesh in base, one a configuration.
 
         Parameters
         ----------
-        q : array_like, shape (pose, joint)
+        q : ndarray, shape (pose, joint)
             Joint positions in rad or m, in the order of the robot's joints.
         """
-        configurations = np.asarray(q, dtype=float)
-        tcp = self.robot.forward(configurations)
+        places = np.stack([body.T_frame_body for body in self.scene.moving(q)], axis=1)
         return [
-            joined(
-                [link.placed(T) for link, T in zip(self.links, places, strict=True)]
-                + [part.placed(T_base_tcp) for part in self.tool]
-            )
-            for places, T_base_tcp in zip(
-                _link_places(self.robot, configurations), tcp, strict=True
-            )
+            joined([part.placed(T) for part, T in zip(self.parts, row, strict=True)])
+            for row in places
         ]
 
 
 def robot_solids(cell: Cell, surface: Surface) -> RobotSolids:
     """Return the solids of a cell's robot and tool."""
-    _, geometry = _geometry(cell.robot)
-    links = tuple(solid_of(body.geometry) for body in geometry.geometryObjects)
-    parts = collision_scene(cell, surface).tool
-    tool = tuple(solid_of(part.shape).placed(part.T_frame_body) for part in parts)
-    return RobotSolids(cell.robot, links, tool)
+    scene = collision_scene(cell, surface)
+    nowhere = np.zeros((0, len(cell.robot.joint_names)))
+    return RobotSolids(scene, tuple(solid_of(body.shape) for body in scene.moving(nowhere)))
 
 
 def fixture_solids(cell: Cell, surface: Surface) -> dict[str, Solid]:
@@ -118,7 +108,9 @@ def joined(solids: Sequence[Solid]) -> Solid:
 def solid_of(shape: coal.CollisionGeometry) -> Solid:
     """Return the triangles of a collision shape; its bounding box when it is of a rare kind."""
     if isinstance(shape, coal.BVHModelBase):
-        faces = [tuple(shape.tri_indices(i)) for i in range(shape.num_tris)]
+        # A coal triangle is no sequence: it has no end.
+        triangles = map(shape.tri_indices, range(shape.num_tris))
+        faces = [(triangle[0], triangle[1], triangle[2]) for triangle in triangles]
         return Solid(np.array(shape.vertices()), np.array(faces, dtype=np.intp).reshape(-1, 3))
     mesh = _primitive(shape)
     return Solid(np.array(mesh.vertices), np.array(mesh.faces, dtype=np.intp))
@@ -137,24 +129,3 @@ def _primitive(shape: coal.CollisionGeometry) -> Any:
     shape.computeLocalAABB()
     box = trimesh.creation.box(np.ptp([shape.aabb_local.min_, shape.aabb_local.max_], axis=0))
     return box.apply_translation(shape.aabb_center)
-
-
-def _geometry(robot: Robot) -> tuple[pin.Model, pin.GeometryModel]:
-    model = pin.buildModelFromXML(robot.urdf)
-    return model, pin.buildGeomFromUrdfString(model, robot.urdf, pin.GeometryType.COLLISION)
-
-
-def _link_places(robot: Robot, q: FloatArray) -> FloatArray:
-    """Return where the robot's shapes are in base, shape (pose, shape, 4, 4)."""
-    model, geometry = _geometry(robot)
-    data, places = model.createData(), geometry.createData()
-    columns = [model.joints[model.getJointId(name)].idx_q for name in robot.joint_names]
-    full = np.tile(pin.neutral(model), (len(q), 1))
-    full[:, columns] = q
-    base = model.getFrameId(robot.base, pin.FrameType.BODY)
-    found = np.empty((len(q), geometry.ngeoms, 4, 4))
-    for row, configuration in zip(found, full, strict=True):
-        pin.updateGeometryPlacements(model, data, geometry, places, configuration)
-        T_base_world = pin.updateFramePlacement(model, data, base).inverse()
-        row[:] = [(T_base_world * placement).homogeneous for placement in places.oMg]
-    return found

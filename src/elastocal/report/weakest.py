@@ -29,7 +29,7 @@ def weakest(pool: PoolData) -> Weakest:
     """Return the smallest relative margin of each candidate of a pool."""
     if not len(pool.check_names):
         count = len(pool.contact)
-        return Weakest(np.ones(count), np.zeros(count, dtype=np.intp), ("",) * count)
+        return Weakest(np.ones(count), np.zeros(count, dtype=np.intp), ("none",) * count)
     relative = pool.margin / _typical(pool.margin)[:, None]
     check = relative.argmin(axis=0)
     column = np.arange(len(check))

@@ -79,9 +79,9 @@ def bearing_truth(
     for joint, name in enumerate(linkage.joint_names):
         axis = linkage.axis[joint]
         law = Linear(float(axial[joint]))
-        springs.append(TruthSpring(name, _triple(axis), law, linkage.revolute[joint]))
-        for direction, stiffness in zip(_across(axis), transverse[joint], strict=True):
-            springs.append(TruthSpring(name, _triple(direction), Linear(float(stiffness))))
+        springs.append(TruthSpring(name, triple(axis), law, linkage.revolute[joint]))
+        for direction, stiffness in zip(across(axis), transverse[joint], strict=True):
+            springs.append(TruthSpring(name, triple(direction), Linear(float(stiffness))))
     return ElasticArm(linkage, tuple(springs), gravity)
 
 
@@ -109,10 +109,10 @@ def with_link_bending(
     """
     hinges = []
     for joint, k in stiffness.items():
-        link = _link_vector(arm.linkage, joint)
-        at = _triple(fraction * link)
-        for direction in _across(link / np.linalg.norm(link)):
-            hinges.append(TruthSpring(joint, _triple(direction), Linear(k), distal=True, at=at))
+        link = link_vector(arm.linkage, joint)
+        at = triple(fraction * link)
+        for direction in across(link / np.linalg.norm(link)):
+            hinges.append(TruthSpring(joint, triple(direction), Linear(k), distal=True, at=at))
     return replace(arm, springs=(*arm.springs, *hinges))
 
 
@@ -155,7 +155,7 @@ def _is_axial(linkage: Linkage, spring: TruthSpring) -> bool:
     return spring.revolute and not any(spring.at) and bool(aligned)
 
 
-def _link_vector(linkage: Linkage, joint: str) -> FloatArray:
+def link_vector(linkage: Linkage, joint: str) -> FloatArray:
     """Return the next joint's origin in this joint's moving frame, shape (3,), in m."""
     index = _joint_index(linkage, joint)
     if index + 1 < len(linkage.joint_names):
@@ -173,7 +173,7 @@ def _joint_index(linkage: Linkage, joint: str) -> int:
     return names.index(joint)
 
 
-def _across(axis: FloatArray) -> list[FloatArray]:
+def across(axis: FloatArray) -> list[FloatArray]:
     """Return the coordinate axes least aligned with a unit vector, made orthonormal to it."""
     least = sorted(range(3), key=lambda k: (round(abs(float(axis[k])), 9), k))[:2]
     first, second = (np.eye(3)[k] for k in sorted(least))
@@ -183,6 +183,6 @@ def _across(axis: FloatArray) -> list[FloatArray]:
     return [first, second / np.linalg.norm(second)]
 
 
-def _triple(vector: FloatArray) -> tuple[float, float, float]:
+def triple(vector: FloatArray) -> tuple[float, float, float]:
     x, y, z = (float(value) for value in vector)
     return x, y, z

@@ -29,6 +29,7 @@ def reach(
     start: FloatArray,
     tolerance: float = 1e-11,
     iterations: int = 60,
+    locked: int = 0,
 ) -> Reached:
     """Return joint positions that bring the tip of the rigid arm to the poses.
 
@@ -48,18 +49,20 @@ def reach(
         Largest error that counts as reached, in m and rad.
     iterations : int
         When to give up.
+    locked : int
+        Number of joints, from the base on, that stand still.
     """
     q = np.array(start, dtype=float)
     error = pose_error(linkage.forward(q), T_base_tip)
     for _ in range(iterations):
         if np.all(np.abs(error) <= tolerance):
             break
-        J = linkage.jacobian(q)
+        J = linkage.jacobian(q)[:, :, locked:]
         damping = DAMPING * np.minimum(1.0, np.sum(error**2, axis=1))
         normal = J @ J.transpose(0, 2, 1) + (damping + 1e-14)[:, None, None] * np.eye(6)
         step = (J.transpose(0, 2, 1) @ np.linalg.solve(normal, error[..., None]))[..., 0]
         largest = np.abs(step).max(axis=1, keepdims=True)
-        q += step * np.minimum(1.0, MAX_STEP / np.maximum(largest, 1e-300))
+        q[:, locked:] += step * np.minimum(1.0, MAX_STEP / np.maximum(largest, 1e-300))
         error = pose_error(linkage.forward(q), T_base_tip)
     return Reached(q, np.all(np.abs(error) <= tolerance, axis=1))
 

@@ -18,6 +18,7 @@ derivative of the first, `tests/sim/test_statics.py` holds them together).
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -52,6 +53,20 @@ class EnergyState:
     """The springs' own part of the diagonal, always positive, shape (batch, spring)."""
 
 
+class SpringBank(Protocol):
+    """Laws of all springs, evaluated together."""
+
+    def evaluate(self, theta: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return the stored energy (batch,), the torques and the stiffnesses (batch, spring).
+
+        Parameters
+        ----------
+        theta : ndarray, shape (batch, spring)
+            Spring positions in rad or m.
+        """
+        ...
+
+
 @dataclass(frozen=True)
 class LoadedMechanism:
     """Screws of which some are held (the motors) and some are springs, with loads."""
@@ -59,8 +74,8 @@ class LoadedMechanism:
     screws: Screws
     springs: NDArray[np.intp]
     """Which elements are springs, ascending, shape (spring,)."""
-    laws: Sequence[TorqueLaw]
-    """Law of each spring."""
+    laws: Sequence[TorqueLaw] | SpringBank
+    """Law of each spring, or of all together."""
     held: FloatArray
     """Positions of all elements, 0 for the springs, shape (batch, element), in rad or m."""
     loads: DeadLoads
@@ -118,9 +133,11 @@ class LoadedMechanism:
 
 
 def _evaluate_laws(
-    laws: Sequence[TorqueLaw], theta: FloatArray
+    laws: Sequence[TorqueLaw] | SpringBank, theta: FloatArray
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return the springs' energy (batch,), torques and stiffnesses (batch, spring)."""
+    if not isinstance(laws, Sequence):
+        return laws.evaluate(theta)
     columns = list(zip(laws, theta.T, strict=True))
     energy = np.zeros(len(theta))
     for law, angle in columns:

@@ -1,5 +1,6 @@
 """A cell ready to compute with: the cell file with its robot made and its files found."""
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -137,6 +138,7 @@ def load_cell(path: Path) -> Cell:
     torques = _at(path, "limits.torque.values", lambda: _torque_limits(robot, file))
     home = _at(path, "motion", lambda: home_position(robot, file.motion))
     speeds = _at(path, "motion", lambda: axis_speeds(robot, file.motion))
+    _check_margins(path, robot, file)
     for key, mesh in _meshes(file):
         if not (path.parent / mesh.file).is_file():
             raise FileAccessError(f"{path}: {key}.file: there is no file {path.parent / mesh.file}")
@@ -182,6 +184,21 @@ def _torque_limits(robot: Robot, file: CellFile) -> FloatArray:
         limits[robot.joint_names.index(joint)] = value
     result: FloatArray = torque.factor * limits
     return result
+
+
+def _check_margins(path: Path, robot: Robot, file: CellFile) -> None:
+    """Refuse margins that leave a joint nothing of its range."""
+    for index, name in enumerate(robot.joint_names):
+        turns = robot.revolute[index]
+        key, unit = ("joint_margin", "deg") if turns else ("rail_margin", "m")
+        margin = getattr(file.limits, key)
+        lower, upper = robot.limits.lower[index], robot.limits.upper[index]
+        if not 2.0 * margin < upper - lower:
+            scale = 180.0 / math.pi if turns else 1.0
+            raise SchemaError(
+                f"{path}: limits.{key}: {scale * margin:g} {unit} leaves nothing of the range of"
+                f" {name}, which is {scale * lower:g} to {scale * upper:g} {unit}"
+            )
 
 
 def _meshes(file: CellFile) -> list[tuple[str, MeshFile]]:

@@ -7,6 +7,7 @@ from pydantic import Field, field_validator
 
 from elastocal.cell.description.devices import DeviceNames
 from elastocal.cell.description.engagement import Engagement
+from elastocal.cell.description.faults import Fault
 from elastocal.cell.description.limits import Limits
 from elastocal.cell.description.loads import LoadCases
 from elastocal.cell.description.metrology import Marker, Tracker
@@ -16,6 +17,7 @@ from elastocal.cell.description.procedure import ProcedureSettings
 from elastocal.cell.description.robot import RobotEntry
 from elastocal.cell.description.search import Search
 from elastocal.cell.description.shapes import Shape
+from elastocal.cell.description.simulation import Simulation
 from elastocal.cell.description.surface import SurfaceEntry
 from elastocal.cell.description.tool import ForceSensor, Tool
 from elastocal.schema import StrictModel
@@ -54,6 +56,10 @@ class CellFile(StrictModel):
     process: ProcessFile | None = None
     procedure: ProcedureSettings = Field(default_factory=ProcedureSettings)
     devices: DeviceNames = Field(default_factory=DeviceNames)
+    simulation: Simulation = Field(default_factory=Simulation)
+    """Of the simulated devices; the calibration never reads it."""
+    faults: tuple[Fault, ...] = ()
+    """What the simulated devices get wrong, and when."""
 
     @field_validator("trackers")
     @classmethod

@@ -6,17 +6,15 @@ defaults are assumptions of a plausible size, none is taken from a data sheet.
 
 from typing import Annotated
 
-from pydantic import AfterValidator, BeforeValidator, Field, FiniteFloat
+from pydantic import BeforeValidator, Field, FiniteFloat
 
-from elastocal.cell.description.motion import PositiveTime
+from elastocal.cell.description.motion import PositiveSpeed, PositiveTime
 from elastocal.cell.description.quantities import (
     Distance,
     Force,
-    Length,
     Point,
     PositiveForce,
     PositiveLength,
-    SpanAngle,
 )
 from elastocal.cell.description.simulation_truth import (
     Balancer,
@@ -38,7 +36,6 @@ Moment = Annotated[
     float,
     BeforeValidator(lambda text: parse_quantity(text, "moment")),
     Field(ge=0.0),
-    AfterValidator(float),
 ]
 """In N·m, 0 or above."""
 Rate = Annotated[
@@ -61,8 +58,8 @@ class SimulatedContact(StrictModel):
     micro_slip: Distance = 8e-6
     """Standard deviation of the slip of a load case at half the friction limit, in m; it grows
     towards the limit."""
-    slide_speed: PositiveLength = 5e-3
-    """Speed at which a contact beyond its friction limit slides: way in a second, in m."""
+    slide_speed: PositiveSpeed = 5e-3
+    """Speed at which a contact beyond its friction limit slides, in m/s."""
     tooling_stiffness: TranslationalStiffness = 2.5e7
     """Of the tooling along its normal, in N/m."""
     surface_offset: Point = (0.0, 0.0, 0.0)
@@ -138,14 +135,3 @@ class Simulation(StrictModel):
     controller: SimulatedController = SimulatedController()
     sensor: SimulatedSensor = SimulatedSensor()
     tracker: SimulatedTracker = SimulatedTracker()
-
-
-__all__ = [
-    "Length",
-    "SimulatedContact",
-    "SimulatedController",
-    "SimulatedSensor",
-    "SimulatedTracker",
-    "Simulation",
-    "SpanAngle",
-]

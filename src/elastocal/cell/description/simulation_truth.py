@@ -2,7 +2,7 @@
 
 from typing import Annotated
 
-from pydantic import AfterValidator, BeforeValidator, Field, FiniteFloat
+from pydantic import BeforeValidator, Field, FiniteFloat
 
 from elastocal.cell.description.quantities import PositiveLength, SpanAngle
 from elastocal.schema import StrictModel
@@ -12,14 +12,12 @@ RotationalStiffness = Annotated[
     float,
     BeforeValidator(lambda text: parse_quantity(text, "rotational stiffness")),
     Field(gt=0.0),
-    AfterValidator(float),
 ]
 """In N·m/rad, above 0."""
 TranslationalStiffness = Annotated[
     float,
     BeforeValidator(lambda text: parse_quantity(text, "translational stiffness")),
     Field(gt=0.0),
-    AfterValidator(float),
 ]
 """In N/m, above 0."""
 Scale = Annotated[FiniteFloat, Field(gt=0.0)]

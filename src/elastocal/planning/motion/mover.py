@@ -5,8 +5,8 @@ from dataclasses import dataclass
 from elastocal.arrays import FloatArray
 from elastocal.cell import Cell
 from elastocal.planning.motion.durations import AxisMotion
-from elastocal.planning.motion.lifts import lifted
 from elastocal.planning.motion.sweep import Sweep
+from elastocal.planning.motion.vias import detours, lifted
 from elastocal.planning.scene import CollisionScene
 from elastocal.robot.inverse import InverseKinematics, inverse_for
 
@@ -20,8 +20,12 @@ class Mover:
     solver: InverseKinematics
 
     def lifted(self, q_approach: FloatArray, normal: FloatArray) -> FloatArray:
-        """Return via postures off an approach pose, shape (lift, joint); see `lifts.lifted`."""
+        """Return via postures off an approach pose, shape (lift, joint); see `vias.lifted`."""
         return lifted(self.solver, q_approach, normal)
+
+    def detours(self, start: FloatArray, end: FloatArray) -> FloatArray:
+        """Return via postures about a way, shape (detour, joint); see `vias.detours`."""
+        return detours(self.solver.robot, start, end)
 
 
 def mover_for(cell: Cell, scene: CollisionScene) -> Mover:

@@ -11,6 +11,8 @@ from elastocal.planning.scene import CollisionScene
 COARSEST = 0.064
 """Length in m of the pieces that a move is first cut into: how far its points may move. The
 wrists of KUKA's arms keep 20 to 60 mm between links 4 and 6: longer pieces are cut anyway."""
+GLANCE = 0.5
+"""Length in m of the pieces at whose middles a move is looked at first."""
 FINEST = 1e-3
 """Length in m of a piece that is not cut any more."""
 
@@ -49,10 +51,14 @@ class Sweep:
             False also for moves that pass within half a `FINEST` of the clearance.
         """
         travel = end - start
-        pieces = np.ceil(np.abs(travel) @ self.radii / COARSEST).astype(int).clip(min=1)
-        move, middle = _cut(pieces)
-        width, length = 1.0 / pieces, COARSEST
+        bound = np.abs(travel) @ self.radii
+        # A look at a few postures first: most moves that are blocked are so for a long way.
+        move, middle, _ = _cut(bound, np.arange(len(start)), GLANCE)
+        seen = self.scene.keeps(start[move] + middle[:, None] * travel[move], self.clearance, False)
         blocked = np.zeros(len(start), dtype=bool)
+        blocked[move[~seen]] = True
+        move, middle, width = _cut(bound, np.flatnonzero(~blocked), COARSEST)
+        length = COARSEST
         while len(move):
             q = start[move] + middle[:, None] * travel[move]
             open_ = ~self.scene.keeps(q, self.clearance + 0.5 * length, in_contact=False)
@@ -61,11 +67,11 @@ class Sweep:
                 blocked[move] = True
                 break
             blocked[move[~self.scene.keeps(q, self.clearance, in_contact=False)]] = True
-            width, length = 0.5 * width, 0.5 * length
             left = ~blocked[move]
-            move, middle = move[left], middle[left]
-            middle = (middle[:, None] + 0.5 * width[move, None] * np.array([-1.0, 1.0])).ravel()
-            move = np.repeat(move, 2)
+            move, middle, width = move[left], middle[left], 0.5 * width[open_][left]
+            length *= 0.5
+            middle = (middle[:, None] + 0.5 * width[:, None] * np.array([-1.0, 1.0])).ravel()
+            move, width = np.repeat(move, 2), np.repeat(width, 2)
         return ~blocked
 
     def along(self, postures: FloatArray) -> bool:
@@ -79,8 +85,14 @@ class Sweep:
         return bool(self.free(postures[:-1], postures[1:]).all())
 
 
-def _cut(pieces: IndexArray) -> tuple[IndexArray, FloatArray]:
-    """Return move and middle (part of the move, 0 to 1) of each of so many pieces a move."""
-    move = np.repeat(np.arange(len(pieces)), pieces)
-    number = np.arange(len(move)) - np.repeat(np.cumsum(pieces) - pieces, pieces)
-    return move, (number + 0.5) / pieces[move]
+def _cut(
+    bound: FloatArray, moves: IndexArray, length: float
+) -> tuple[IndexArray, FloatArray, FloatArray]:
+    """Return move, middle and width of the pieces of some moves; the latter as parts of the move.
+
+    ``bound`` is how far the points of each move may move; no piece is longer than ``length``.
+    """
+    pieces = np.ceil(bound[moves] / length).astype(int).clip(min=1)
+    width = np.repeat(1.0 / pieces, pieces)
+    number = np.arange(len(width)) - np.repeat(np.cumsum(pieces) - pieces, pieces)
+    return np.repeat(moves, pieces), (number + 0.5) * width, width

@@ -46,15 +46,14 @@ class Ways:
     _lifts: dict[int, FloatArray] = field(default_factory=dict, init=False)
 
     def __post_init__(self) -> None:
-        poses = np.arange(1, len(self.q))
         home = np.broadcast_to(self.q[HOME], self.q[1:].shape)
-        straight = self.mover.sweep.free(self.q[1:], home)
-        gates = poses[straight].tolist()
-        for pose in poses.tolist():
-            direct = [self._none()] if straight[pose - 1] else []
-            stem = self._first_free(pose, HOME, direct)
-            stem = stem or self._first_free(pose, HOME, [v[None] for v in self._lift(pose)])
-            stem = stem or self._first_free(pose, HOME, [self.q[[gate]] for gate in gates])
+        straight = 1 + np.flatnonzero(self.mover.sweep.free(self.q[1:], home))
+        self.stems.update(
+            (int(pose), self._way(int(pose), HOME, self._none())) for pose in straight
+        )
+        for pose in sorted(set(range(1, len(self.q))) - set(self.stems)):
+            stem = self._first_free(pose, HOME, self._single_vias(pose, HOME))
+            stem = stem or self._first_free(pose, HOME, [self.q[[gate]] for gate in straight])
             if stem:
                 self.stems[pose] = stem
 
@@ -73,7 +72,11 @@ class Ways:
         if (first, last) not in self._known:
             vias = [self._none()]
             if not self.mover.sweep.along(self.q[[first, last]]):
-                vias = [*self._lifted_vias(first, last), self._through_home(first, last)]
+                vias = [
+                    *self._single_vias(first, last),
+                    *self._double_vias(first, last),
+                    self._through_home(first, last),
+                ]
             way = self._first_free(first, last, vias)
             assert way is not None, "the stems are free"
             self._known[first, last] = way
@@ -92,12 +95,14 @@ class Ways:
             self._lifts[node] = self.mover.lifted(self.q[node], self.normal[node - 1])
         return self._lifts[node]
 
-    def _lifted_vias(self, first: int, last: int) -> Iterator[FloatArray]:
+    def _single_vias(self, first: int, last: int) -> Iterator[FloatArray]:
         here, there = self._lift(first), self._lift(last)
-        yield from (via[None] for via in (*here, *there))
-        for a, b in zip(here, there, strict=False):
-            yield np.array([a, b])
-            yield np.array([0.5 * (a + b)])
+        means = [0.5 * (a + b) for a, b in zip(here, there, strict=False)]
+        about = self.mover.detours(self.q[first], self.q[last])
+        return (via[None] for via in (*here, *there, *means, *about))
+
+    def _double_vias(self, first: int, last: int) -> Iterator[FloatArray]:
+        return map(np.array, zip(self._lift(first), self._lift(last), strict=False))
 
     def _through_home(self, first: int, last: int) -> FloatArray:
         """Return the via poses through HOME; those of the stem if HOME is an end."""
@@ -105,13 +110,18 @@ class Ways:
             return self.stems[last].via[::-1]
         return np.concatenate([self.stems[first].via, self.q[[HOME]], self.stems[last].via[::-1]])
 
+    def _way(self, start: int, end: int, via: FloatArray) -> Way:
+        duration = self.mover.axes.along(self._chain(start, end, via))
+        via.setflags(write=False)
+        return Way(via, duration)
+
+    def _chain(self, start: int, end: int, via: FloatArray) -> FloatArray:
+        return np.concatenate([self.q[[start]], via, self.q[[end]]])
+
     def _first_free(self, start: int, end: int, vias: Iterable[FloatArray]) -> Way | None:
         """Return the quickest of some ways that is free; ties: the one given first."""
-        chains = [np.concatenate([self.q[[start]], via, self.q[[end]]]) for via in vias]
-        durations = [self.mover.axes.along(chain) for chain in chains]
-        for index in np.argsort(durations, kind="stable"):
-            if self.mover.sweep.along(chains[index]):
-                via = chains[index][1:-1]
-                via.setflags(write=False)
-                return Way(via, durations[index])
+        ways = [self._way(start, end, via) for via in vias]
+        for way in sorted(ways, key=lambda way: way.duration):
+            if self.mover.sweep.along(self._chain(start, end, way.via)):
+                return way
         return None

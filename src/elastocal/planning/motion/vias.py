@@ -1,13 +1,19 @@
-"""Postures farther off the surface than the approach pose: the first via poses to try."""
+"""Via poses to try: farther off the surface, or spread about the way."""
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.stats import qmc
 
 from elastocal.arrays import FloatArray
+from elastocal.robot import Robot
 from elastocal.robot.inverse import InverseKinematics, turns
 
 LIFTS = (0.1, 0.3)
 """Distances in m beyond the approach pose."""
+DETOURS = 48
+"""Number of via poses that are spread about a way."""
+WIDTH = 0.6
+"""How far they lie from the way's ends, in rad, or in m for a prismatic joint."""
 
 
 def lifted(
@@ -45,6 +51,30 @@ def lifted(
         if len(several)
     ]
     return np.array(postures).reshape(-1, len(q_approach))
+
+
+def detours(robot: Robot, start: FloatArray, end: FloatArray) -> FloatArray:
+    """Return postures spread evenly about a way: the beginning of a Halton sequence (1960).
+
+    They fill the box that the two ends span in joint space, widened by `WIDTH` within the joint
+    limits. Always the same ones, and the same there and back.
+
+    Parameters
+    ----------
+    robot : Robot
+        Whose limits hold.
+    start, end : ndarray, shape (joint,)
+        Joint positions in rad or m.
+
+    Returns
+    -------
+    ndarray, shape (`DETOURS`, joint)
+    """
+    lower = np.maximum(np.minimum(start, end) - WIDTH, robot.limits.lower)
+    upper = np.minimum(np.maximum(start, end) + WIDTH, robot.limits.upper)
+    # The first point of the sequence is the corner of the box.
+    unit = qmc.Halton(len(start), scramble=False).random(DETOURS + 1)[1:]
+    return np.asarray(lower + unit * (upper - lower))
 
 
 def _nearest(several: FloatArray, q: FloatArray) -> FloatArray:

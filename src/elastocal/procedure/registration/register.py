@@ -1,0 +1,164 @@
+"""Register the stations of a run: fit, look for what moved, part it there, fit again."""
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from elastocal.arrays import FloatArray, IndexArray
+from elastocal.procedure.registration.fit import (
+    DEFAULT_SCATTER,
+    LEVER_SIGMA,
+    Fit,
+    fit,
+)
+from elastocal.procedure.registration.geometry import determined
+from elastocal.procedure.registration.moves import Finding, find
+from elastocal.procedure.registration.readings import UnloadedReadings
+from elastocal.procedure.registration.result import (
+    Blunder,
+    Registration,
+    StationFit,
+    StationMove,
+)
+
+MOST_FINDINGS = 0.2
+"""Largest share of the readings that may be called moves or blunders."""
+UNDETERMINED = 0.5
+"""Share of the prior's standard deviation above which a direction of the lever arm is its."""
+
+
+def register(readings: UnloadedReadings, lever_prior: FloatArray) -> Registration:
+    """Return where the stations stand and where the marker sits.
+
+    Parameters
+    ----------
+    readings : UnloadedReadings
+        In the order of time.
+    lever_prior : ndarray, shape (3,)
+        Marker in the tcp frame by the cell file, in m. It is a weak prior, and the answer where
+        the orientations are too similar to tell.
+
+    Returns
+    -------
+    Registration
+        A station that saw fewer than three poses, or only poses on a line, has no transform:
+        `Registration.unregistered` says so.
+    """
+    lever_prior = np.asarray(lever_prior, dtype=float)
+    names = tuple(dict.fromkeys(readings.station))
+    bad = {name: reason for name in names if (reason := _unusable(readings, name))}
+    group = np.array([-1 if s in bad else names.index(s) for s in readings.station], dtype=np.intp)
+    if not np.any(group >= 0):
+        return _nothing(lever_prior, bad)
+    kept = group >= 0
+    findings: list[tuple[int, Finding]] = []
+    while True:
+        rows = np.flatnonzero(kept)
+        result = fit(readings.take(rows), _dense(group[rows]), lever_prior)
+        finding = find(readings.take(rows), result)
+        if finding is None or len(findings) >= MOST_FINDINGS * len(readings):
+            break
+        row = int(rows[finding.row])
+        findings.append((row, finding))
+        if finding.move:
+            group[(group == group[row]) & (np.arange(len(group)) >= row)] = group.max() + 1
+        else:
+            kept[row] = False
+    stations = _stations(readings, group, result)
+    lever_sigma = np.sqrt(np.diag(result.covariance)[result.lever_columns])
+    return Registration(
+        stations=stations,
+        lever_arm=result.lever,
+        lever_sigma=lever_sigma,
+        lever_prior=lever_prior,
+        undetermined_lever=_undetermined(lever_sigma),
+        scatter=result.scatter,
+        moves=tuple(_move(readings, stations, row, f) for row, f in findings if f.move),
+        blunders=tuple(_blunder(readings, stations, row) for row, f in findings if not f.move),
+        unregistered=bad,
+    )
+
+
+def _unusable(readings: UnloadedReadings, station: str) -> str | None:
+    """Return why a station cannot be registered; None when it can."""
+    position = readings.position[np.array(readings.station) == station]
+    if len(position) < 3:
+        return f"it saw {len(position)} of the 3 unloaded poses that its rotation needs"
+    if not determined(position, DEFAULT_SCATTER):
+        return f"the {len(position)} unloaded poses that it saw are on a line, or all in one place"
+    return None
+
+
+def _nothing(lever_prior: FloatArray, unregistered: dict[str, str]) -> Registration:
+    sigma = np.full(3, LEVER_SIGMA)
+    return Registration(
+        (), lever_prior, sigma, lever_prior, _undetermined(sigma), np.nan, (), (), unregistered
+    )
+
+
+def _dense(group: IndexArray) -> IndexArray:
+    """Return the groups numbered from 0 without gaps, in the order of their numbers."""
+    return np.unique(group, return_inverse=True)[1].astype(np.intp)
+
+
+def _undetermined(sigma: FloatArray) -> tuple[str, ...]:
+    free = sigma > UNDETERMINED * LEVER_SIGMA
+    return tuple(axis for axis, is_free in zip("xyz", free, strict=True) if is_free)
+
+
+def _stations(readings: UnloadedReadings, group: IndexArray, result: Fit) -> tuple[StationFit, ...]:
+    covariance = result.covariance
+    fits = []
+    for number, label in enumerate(np.unique(group[group >= 0]).tolist()):
+        rows = np.flatnonzero(group == label)
+        T = np.eye(4)
+        T[:3, :3], T[:3, 3] = result.R[number], result.t[number]
+        block = covariance[6 * number : 6 * number + 6, 6 * number : 6 * number + 6]
+        fits.append(
+            StationFit(
+                station=readings.station[rows[0]],
+                poses=tuple(readings.pose[rows].tolist()),
+                T_base_tracker=T,
+                rotation_sigma=float(np.sqrt(np.linalg.eigvalsh(block[:3, :3])[-1])),
+                position_sigma=np.sqrt(np.diag(block)[3:]),
+                residual=_residual(readings.take(rows), T, result.lever),
+            )
+        )
+    return tuple(fits)
+
+
+def _residual(readings: UnloadedReadings, T: FloatArray, lever: FloatArray) -> FloatArray:
+    expected = readings.T_base_tcp[:, :3, 3] + readings.T_base_tcp[:, :3, :3] @ lever
+    residual: FloatArray = readings.position @ T[:3, :3].T + T[:3, 3] - expected
+    return residual
+
+
+def _move(
+    readings: UnloadedReadings, stations: tuple[StationFit, ...], row: int, finding: Finding
+) -> StationMove:
+    """Describe a move by what old and new transform make of the same marker readings."""
+    station = readings.station[row]
+    before = max(i for i in range(row) if readings.station[i] == station)
+    old, new = (_fit_of(readings, stations, i) for i in (before, row))
+    seen = [i for i, s in enumerate(readings.station) if s == station]
+    centre = np.append(readings.position[seen].mean(axis=0), 1.0)
+    turn = new.T_base_tracker[:3, :3] @ old.T_base_tracker[:3, :3].T
+    return StationMove(
+        station,
+        int(readings.pose[before]),
+        int(readings.pose[row]),
+        float(np.linalg.norm((new.T_base_tracker - old.T_base_tracker) @ centre)),
+        float(Rotation.from_matrix(turn).magnitude()),
+        finding.improbability,
+    )
+
+
+def _blunder(readings: UnloadedReadings, stations: tuple[StationFit, ...], row: int) -> Blunder:
+    fit_there = _fit_of(readings, stations, row)
+    pose = int(readings.pose[row])
+    left = fit_there.residual[fit_there.poses.index(pose)]
+    return Blunder(pose, readings.station[row], float(np.linalg.norm(left)))
+
+
+def _fit_of(readings: UnloadedReadings, stations: tuple[StationFit, ...], row: int) -> StationFit:
+    pose, station = int(readings.pose[row]), readings.station[row]
+    return next(each for each in stations if each.station == station and pose in each.poses)

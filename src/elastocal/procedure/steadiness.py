@@ -1,0 +1,110 @@
+"""Whether a force is steady: close to what is wanted, without drift, without spread."""
+
+from collections import deque
+from dataclasses import dataclass
+
+import numpy as np
+
+from elastocal.arrays import FloatArray
+from elastocal.cell.description.procedure import ProcedureSettings
+
+SPREAD = 4.0
+"""Standard deviations that make up the width which holds 95 % of the samples."""
+LEAST_SAMPLES = 3
+"""A line and a spread about it need as many."""
+_MICROSECOND = 1e-6
+
+
+@dataclass(frozen=True, eq=False)
+class Steadiness:
+    """What a stretch of force samples looks like. Straight line ``mean + drift (t - mean t)``."""
+
+    mean: FloatArray
+    """Shape (3,), in N."""
+    drift: float
+    """Norm of the slope, in N/s."""
+    spread: float
+    """Largest over the axes of four standard deviations about the line, in N."""
+
+
+def steadiness(time: FloatArray, force: FloatArray) -> Steadiness:
+    """Return mean, drift and spread of a stretch of samples.
+
+    Parameters
+    ----------
+    time : ndarray, shape (sample,)
+        In s; at least three, not all equal.
+    force : ndarray, shape (sample, 3)
+        In N.
+    """
+    # Whole microseconds since the first sample: the same stretch at another time of day gives the
+    # same figures to the last bit, so that a run that was resumed decides as one that was not.
+    t = np.round((time - time[0]) / _MICROSECOND) * _MICROSECOND
+    t -= t.mean()
+    mean = force.mean(axis=0)
+    about = force - mean
+    slope = (t @ about) / (t @ t)
+    about -= t[:, None] * slope
+    variance = (about * about).sum(axis=0).max() / (len(t) - 2)
+    return Steadiness(mean, float(np.sqrt(slope @ slope)), SPREAD * float(np.sqrt(variance)))
+
+
+def complaint(
+    found: Steadiness, limits: ProcedureSettings, target: FloatArray | None = None
+) -> str | None:
+    """Return why a force is not steady enough, or None when it is.
+
+    Parameters
+    ----------
+    found : Steadiness
+        Of the dwell.
+    limits : ProcedureSettings
+        Tolerance, drift and spread that are allowed.
+    target : ndarray, shape (3,), optional
+        The mean that is wanted, in N; any when left out.
+    """
+    away = 0.0 if target is None else float(np.linalg.norm(found.mean - target))
+    for value, limit, what, unit in (
+        (away, limits.force_tolerance, "force is off", "N"),
+        (found.drift, limits.force_drift, "force drifts by", "N/s"),
+        (found.spread, limits.force_spread, "force spreads over", "N"),
+    ):
+        if not value <= limit:
+            return f"{what} {value:.1f} {unit}, limit {limit:g} {unit}"
+    return None
+
+
+class Stretch:
+    """The newest samples of a stream, as far back as a duration.
+
+    Parameters
+    ----------
+    duration : float
+        In s; infinite: everything since the beginning.
+    """
+
+    def __init__(self, duration: float = np.inf) -> None:
+        self._duration = duration
+        self._blocks: deque[tuple[FloatArray, FloatArray]] = deque()
+
+    def add(self, time: FloatArray, values: FloatArray) -> None:
+        """Append a block, shape (sample,) in s and (sample, 3)."""
+        if not len(time):
+            return
+        self._blocks.append((time, values))
+        while self._blocks[0][0][-1] < time[-1] - self._duration - _MICROSECOND:
+            self._blocks.popleft()
+
+    def __len__(self) -> int:
+        """Return the number of samples."""
+        return sum(len(time) for time, _ in self._blocks)
+
+    @property
+    def time(self) -> FloatArray:
+        """Shape (sample,), in s."""
+        return np.concatenate([time for time, _ in self._blocks])
+
+    @property
+    def values(self) -> FloatArray:
+        """Shape (sample, 3)."""
+        return np.concatenate([values for _, values in self._blocks])

@@ -1,0 +1,239 @@
+"""The simulated robot controller; see `elastocal.cell.devices.RobotArm` for its contract.
+
+Assumptions: joint moves are straight in joint space with trapezoidal speed; straight moves have
+one speed throughout; a stop takes no time; free motion shakes the friction out of the gears.
+"""
+
+import math
+
+import numpy as np
+
+from elastocal.arrays import FloatArray
+from elastocal.cell.description.faults import Fault
+from elastocal.cell.devices import ArmState, Motion
+from elastocal.errors import DeviceError
+from elastocal.sim.workcell.clock import MICROSECONDS, to_microseconds
+from elastocal.sim.workcell.commands import check_distance, check_vector, require
+from elastocal.sim.workcell.force_control import ForceControl
+from elastocal.sim.workcell.guarded import guarded_way, retract_way
+from elastocal.sim.workcell.plant import Plant
+from elastocal.sim.workcell.schedule import FOREVER
+from elastocal.sim.workcell.segment import Segment
+from elastocal.sim.workcell.time_laws import Uniform, joint_move
+from elastocal.sim.workcell.ways import joint_way
+
+SOURCE = "simulated arm"
+_STANDING = (Motion.IDLE,)
+_FORCED = (Motion.IDLE, Motion.HOLDING, Motion.RELEASING)
+
+
+class SimulatedArm:
+    """A robot arm that does not know how it bends."""
+
+    def __init__(self, plant: Plant, control: ForceControl) -> None:
+        """Take the arm of a cell; its drives are off."""
+        self._plant, self._control = plant, control
+        self._fault: str | None = None
+        self._refused_until = 0
+        self._approaches = 0
+        self._visiting = False
+        self._touched = False
+        self._pose: tuple[Segment, FloatArray] | None = None
+
+    @property
+    def joint_names(self) -> tuple[str, ...]:
+        """Names of the joints, in the order of every joint array."""
+        return self._plant.cell.robot.joint_names
+
+    def state(self) -> ArmState:
+        """Return the newest state."""
+        plant, segment = self._plant, self._plant.segment
+        now = plant.now
+        time = now
+        for span in plant.schedule.spans("stale_clock"):
+            time = min(time, span.begin) if span.holds(now) else time
+        done = now >= segment.end
+        if done and self._pose is not None and self._pose[0] is segment:
+            q, T = segment.knots.q[-1], self._pose[1]
+        else:
+            where = np.array([segment.progress(now)])
+            q = segment.knots.at(segment.knots.q, where)[0]
+            T = plant.statics.robot.forward(q)
+            self._pose = (segment, T) if done else None
+        motion = segment.motion_after if done else segment.motion
+        return ArmState(
+            time=time / MICROSECONDS,
+            q=q.copy(),
+            T_base_tcp=T.copy(),
+            motion=motion,
+            in_contact=self._in_contact(done),
+            fault=segment.fault_after if done else None,
+            source=SOURCE,
+        )
+
+    def enable(self) -> None:
+        """Release the arm for motion; it then is idle. Refused while a fault stands."""
+        plant = self._plant
+        if plant.now < self._refused_until:
+            raise DeviceError(f"{SOURCE} cannot be enabled: {self._fault}")
+        self._fault = None
+        if self._motion() in (Motion.DISARMED, Motion.STOPPED):
+            plant.switch(plant.standing(plant.stand(), Motion.IDLE))
+
+    def disable(self) -> None:
+        """Take the release back; the arm stands."""
+        self._freeze(Motion.DISARMED, self._fault)
+
+    def stop(self) -> None:
+        """Stop at once, in position control. Always allowed."""
+        if self._motion() is not Motion.DISARMED:
+            self._freeze(Motion.STOPPED, self._fault)
+
+    def move_joints(self, q: FloatArray, speed: float) -> None:
+        """Start a synchronous joint-space move; see `RobotArm.move_joints`."""
+        plant, linkage = self._plant, self._plant.statics.robot.layout.linkage
+        target = check_vector("joint target", q, len(self.joint_names))
+        for name, value, low, high in zip(
+            self.joint_names, target, linkage.lower, linkage.upper, strict=True
+        ):
+            require(low <= value <= high, f"joint target {name}", value, f"{low:g} to {high:g}")
+        require(0.0 < speed <= 1.0, "speed", speed, "a part of the axis speeds in (0, 1]")
+        self._allow("move_joints", _STANDING, free=True)
+        start = plant.stand()
+        plant.begin_journey(target)
+        self._visiting = False
+        end = plant.statics.free(target, plant.stop_error(), None)
+        plant.note_sag(end)
+        rise = plant.cell.file.motion.acceleration_time
+        law = joint_move(target - start.q, speed * plant.cell.axis_speeds, rise)
+        way = joint_way(plant.statics, start, end)
+        plant.run(way, law, Motion.MOVING, Motion.IDLE, start)
+
+    def approach(
+        self, direction_base: FloatArray, distance: float, speed: float, contact_force: float
+    ) -> None:
+        """Start a guarded straight move; see `RobotArm.approach`."""
+        plant = self._plant
+        direction = check_vector("approach direction", direction_base, 3, unit=True)
+        check_distance("approach", distance, speed)
+        require(contact_force > 0.0, "contact force", contact_force, "above 0 N")
+        self._allow("approach", _STANDING, in_contact=False)
+        start = plant.stand()
+        self._begin_approach()
+        guarded = guarded_way(plant, start, direction, distance, (speed, contact_force))
+        plant.contact, self._touched = guarded.contact, guarded.felt
+        if guarded.contact is None:
+            plant.note_sag(guarded.way.end)
+        after = Motion.STOPPED if guarded.fault else Motion.IDLE
+        self._fault = guarded.fault
+        law = Uniform(guarded.length / speed)
+        plant.run(guarded.way, law, Motion.APPROACHING, after, start, guarded.fault)
+        if self._approaches == 1 and not guarded.felt:
+            segment = plant.segment
+            plant.later(segment.end, lambda: self._reference(segment))
+
+    def hold(self, force_tcp: FloatArray, rate: float) -> None:
+        """Start to build up a force and hold it; see `RobotArm.hold`."""
+        wanted = check_vector("force", force_tcp, 3)
+        require(wanted[2] < 0.0, "force z", wanted[2], "below 0 N: the robot can only press")
+        require(0.0 < rate < math.inf, "force rate", rate, "above 0 N/s and finite")
+        self._allow("hold", _FORCED, in_contact=True)
+        self._control.hold(wanted, rate)
+        self._begin("hold", self._control.load)
+
+    def release(self, rate: float) -> None:
+        """Start to ramp the force to zero; see `RobotArm.release`."""
+        require(0.0 < rate < math.inf, "force rate", rate, "above 0 N/s and finite")
+        self._allow("release", _FORCED, in_contact=True)
+        self._control.release(rate)
+        self._begin("release")
+
+    def retract(self, direction_base: FloatArray, distance: float, speed: float) -> None:
+        """Start a straight move away from the surface; see `RobotArm.retract`."""
+        plant = self._plant
+        direction = check_vector("retract direction", direction_base, 3, unit=True)
+        check_distance("retract", distance, speed)
+        self._allow("retract", _FORCED)
+        if plant.contact is not None and not float(direction @ plant.contact.normal) > 0.0:
+            raise DeviceError(
+                f"{SOURCE}: retract direction {direction.tolist()} leads into the surface, whose"
+                f" normal is {np.round(plant.contact.normal, 4).tolist()}"
+            )
+        start = plant.stand()
+        way, contact = retract_way(plant, start, direction, distance)
+        plant.contact = contact
+        if contact is None:
+            plant.note_sag(way.end)
+            self._touched = self._visiting = False
+        plant.run(way, Uniform(distance / speed), Motion.RETRACTING, Motion.IDLE, start)
+        self._begin("retract")
+
+    def _motion(self) -> Motion:
+        segment = self._plant.segment
+        return segment.motion_after if self._plant.now >= segment.end else segment.motion
+
+    def _in_contact(self, done: bool) -> bool:
+        return self._touched and (done or self._plant.segment.motion is not Motion.APPROACHING)
+
+    def _allow(
+        self,
+        command: str,
+        states: tuple[Motion, ...],
+        *,
+        in_contact: bool | None = None,
+        free: bool = False,
+    ) -> None:
+        """Refuse a command that does not fit what the arm is doing."""
+        motion = self._motion()
+        if motion not in states:
+            allowed = ", ".join(state.value for state in states)
+            raise DeviceError(
+                f"{SOURCE} refuses {command}: it is {motion.value} (allowed when {allowed})"
+            )
+        if in_contact is not None and in_contact is not self._touched:
+            what = "only in contact" if in_contact else "not in contact: retract first"
+            raise DeviceError(f"{SOURCE} refuses {command}: allowed {what}")
+        if free and self._plant.contact is not None:
+            raise DeviceError(f"{SOURCE} refuses {command}: the tool is at the surface, retract")
+
+    def _freeze(self, motion: Motion, fault: str | None) -> None:
+        """Stand where the arm is."""
+        plant = self._plant
+        approaching = self._motion() is Motion.APPROACHING
+        plant.switch(plant.standing(plant.stand(), motion, fault))
+        if approaching:
+            self._touched = False
+            self._leave_a_contact_not_reached()
+
+    def _leave_a_contact_not_reached(self) -> None:
+        plant = self._plant
+        if not np.any(plant.segment.knots.force[-1]):
+            plant.contact = None
+
+    def _begin_approach(self) -> None:
+        """Count an approach; the first one after a move or a retract begins a visit."""
+        if not self._visiting:
+            self._visiting, self._approaches = True, 0
+            self._plant.begin_visit()
+            self._control.begin_visit()
+        self._approaches += 1
+        self._begin("approach" if self._approaches == 1 else "engage")
+
+    def _reference(self, segment: Segment) -> None:
+        if self._plant.segment is segment:
+            self._begin("reference")
+
+    def _begin(self, step: str, load: int = 0) -> None:
+        plant = self._plant
+        for time, fault in plant.schedule.begin(step, plant.visit, load, plant.now):
+            segment = plant.segment
+            if fault.kind == "slip":
+                plant.later(time, lambda f=fault, s=segment: self._control.let_slip(f, s))
+            else:
+                plant.later(time, lambda f=fault: self._break_down(f))
+
+    def _break_down(self, fault: Fault) -> None:
+        self._fault = "stopped by the safety controller"
+        lasts = FOREVER if fault.duration is None else to_microseconds(fault.duration)
+        self._refused_until = self._plant.now + lasts
+        self._freeze(Motion.STOPPED, self._fault)

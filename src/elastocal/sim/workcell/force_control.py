@@ -1,0 +1,157 @@
+"""Force control of the simulated arm: builds up a load case, holds it, lets it go.
+
+The force that the wrist sensor shows follows the wanted one along a straight ramp with a
+first-order lag; what is commanded moves so that robot, disk and tooling are in equilibrium under
+it. A lateral force beyond the friction limit is not reached: the contact slides.
+"""
+
+import numpy as np
+
+from elastocal.arrays import FloatArray
+from elastocal.cell.description.faults import Fault
+from elastocal.cell.devices import Motion
+from elastocal.errors import DeviceError
+from elastocal.sim.workcell.keys import generator
+from elastocal.sim.workcell.plant import Plant
+from elastocal.sim.workcell.quasistatics import ForceReading, Stand
+from elastocal.sim.workcell.segment import Ripple, Segment
+from elastocal.sim.workcell.time_laws import SettlingRamp, TimeLaw, Uniform
+from elastocal.sim.workcell.ways import force_way, pressed
+
+SLIP_TIME = 0.1
+"""Time that an injected slip takes, in s."""
+_UNREST = (7.3, 11.9)
+"""Frequencies of the unrest of a held force, in Hz. An assumption."""
+_NEVER_AT_REST = (0.9, 1.7)
+"""Frequencies of a force that never comes to rest, in Hz."""
+
+
+class ForceControl:
+    """What the controller does while it is in force control."""
+
+    def __init__(self, plant: Plant, gain: FloatArray) -> None:
+        """Control with a sensor of some gain (`ForceReading.gain`)."""
+        self._plant, self._gain = plant, gain
+        self.load = -1
+        self._wanted: FloatArray = np.zeros(3)
+        self._rate = 1.0
+        self.begin_visit()
+
+    def begin_visit(self) -> None:
+        """Zero the sensor and count load cases from 0."""
+        plant = self._plant
+        stand, statics = plant.stand(), plant.statics
+        self.load = -1
+        self._reading = ForceReading(
+            self._gain,
+            statics.robot.T_tcp_sensor[:3, :3],
+            statics.R_base_sensor(stand.q, stand.twist),
+            statics.weight,
+        )
+
+    @property
+    def reading(self) -> ForceReading:
+        """How the controller reads the sensor in this visit."""
+        return self._reading
+
+    def hold(self, wanted_tcp: FloatArray, rate: float) -> None:
+        """Build up and hold a reading of the sensor, tcp frame, in N, at a rate in N/s."""
+        plant, contact = self._plant, self._plant.contact
+        if contact is None:
+            raise DeviceError("simulated arm: no contact to hold a force in")
+        self.load += 1
+        self._wanted, self._rate = contact.law.held(wanted_tcp), rate
+        slides = contact.law.effort(wanted_tcp) > 1.0
+        slip = plant.slip(self.load) * contact.law.slip_sigma(wanted_tcp)
+        segment = self._press(slip)
+        if slides:
+            ramp = segment.law
+            assert isinstance(ramp, SettlingRamp)
+            after = segment.begin + round(1e6 * (ramp.ramp + 5.0 * ramp.tau))
+            plant.later(after, lambda: self._slide(segment))
+
+    def release(self, rate: float) -> None:
+        """Ramp the force to zero."""
+        plant, contact = self._plant, self._plant.contact
+        if contact is None:
+            raise DeviceError("simulated arm: no contact to release")
+        start = plant.stand()
+        goal = contact.tool_position(np.zeros(3))
+        end = self._unloaded(start, goal)
+        law = Uniform(float(np.linalg.norm(start.force)) / rate)
+        way = force_way(plant.statics, start, end)
+        plant.run(way, law, Motion.RELEASING, Motion.IDLE, start)
+
+    def let_slip(self, fault: Fault, held: Segment) -> None:
+        """Let the contact slip against the lateral force, unless the load case is over."""
+        if self._plant.segment is held:
+            self._press(fault.distance * self._away(), SLIP_TIME)
+
+    def _unloaded(self, start: Stand, goal: FloatArray) -> Stand:
+        """Return the robot at the surface without force, with what its gears remember."""
+        plant = self._plant
+        error, statics, contact = plant.stop_error(), plant.statics, plant.contact
+        assert contact is not None
+        reached = start
+        for _ in range(3):
+            from_here = Stand(
+                start.q, start.twist, start.force, start.springs, reached.theta, start.sag
+            )
+            reached = statics.loaded(from_here, reached.q, np.zeros(3), error)
+            aim = (goal - reached.twist[:3])[None]
+            q = statics.along(reached.q, contact.R_base_tcp, aim)[0]
+            reached = Stand(
+                q, reached.twist, reached.force, reached.springs, reached.theta, reached.sag
+            )
+        return reached
+
+    def _press(self, slip: FloatArray, least: float = 0.0) -> Segment:
+        """Go for the wanted force, the contact slipping meanwhile; tcp frame, shape (2,), in m."""
+        plant, contact = self._plant, self._plant.contact
+        assert contact is not None
+        start = plant.stand()
+        contact = contact.slipped(slip)
+        end = pressed(
+            plant.statics, start, contact, self._wanted, self._reading, plant.stop_error()
+        )
+        plant.contact = contact
+        ramp = max(float(np.linalg.norm(end.force - start.force)) / self._rate, least)
+        law: TimeLaw = SettlingRamp(ramp, plant.cell.file.simulation.controller.settling)
+        way = force_way(plant.statics, start, end)
+        ripple = self._ripple()
+        return plant.run(way, law, Motion.HOLDING, Motion.HOLDING, start, ripple=ripple)
+
+    def _slide(self, held: Segment) -> None:
+        """Slide at a steady speed until the controller has had enough."""
+        plant, entry = self._plant, self._plant.cell.file.simulation
+        contact = plant.contact
+        if plant.segment is not held or contact is None:
+            return
+        start, way = plant.stand(), entry.controller.travel_limit
+        plant.contact = contact = contact.slipped(way * self._away())
+        end = pressed(
+            plant.statics, start, contact, self._wanted, self._reading, plant.stop_error()
+        )
+        plant.run(
+            force_way(plant.statics, start, end),
+            Uniform(way / entry.contact.slide_speed),
+            Motion.HOLDING,
+            Motion.STOPPED,
+            start,
+            f"force control gave up: the contact slid by {1e3 * way:g} mm",
+        )
+
+    def _away(self) -> FloatArray:
+        """Return the direction in which the contact gives way, tcp frame, shape (2,)."""
+        lateral = self._wanted[:2]
+        length = float(np.linalg.norm(lateral))
+        return -lateral / length if length else np.array([1.0, 0.0])
+
+    def _ripple(self) -> Ripple:
+        plant = self._plant
+        amplitude, frequency = plant.cell.file.simulation.controller.ripple, _UNREST
+        for fault in plant.schedule.at(plant.visit):
+            if fault.kind == "never_stable" and fault.load == self.load:
+                amplitude, frequency = fault.amplitude, _NEVER_AT_REST
+        phase = generator(plant.seed, "ripple", plant.key, self.load).uniform(0.0, 2 * np.pi, 2)
+        return Ripple(amplitude, frequency, (float(phase[0]), float(phase[1])))

@@ -1,0 +1,133 @@
+"""All springs of the simulated robot at once: gears that stiffen, lose way and remember.
+
+The torque of a gear over its twist is
+
+    tau(x) = k x - sum_m L_m a_m atan(x / a_m) + sum_i kappa_i clip(x - s_i, -d_i, d_i)
+
+*Growth and backlash* (the sum over m): near rest the stiffness is smaller by ``L_m``, and half of
+that is back at the twist ``a_m``; see `elastocal.sim.torque_laws.TwoSlopeGear`. A small ``a_m``
+with nearly all of ``k`` is a smoothed play: beyond it the twist is larger by ``b / 2`` with
+``b = pi a_m L_m / k``, so that a torque and its opposite are ``b`` further apart.
+
+*Friction in the teeth* (the sum over i): springs ``kappa_i`` in parallel, each with a slider that
+gives way at the travel ``d_i``: the stop operators of Prandtl and Ishlinskii (A. Visintin,
+"Differential Models of Hysteresis", Springer 1994, chapter III). The torque then depends on where
+the sliders ``s_i`` stand, which is the memory; it does not depend on speed. A reversal starts stiff
+and ends ``2 sum kappa_i d_i`` below the torque of the way up; loops close at once (Masing's rule).
+
+At given sliders the torque has a potential, so that an equilibrium is a minimum; afterwards the
+sliders are drawn along. That is exact as long as no gear turns back within one step of load.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from elastocal.arrays import FloatArray, IndexArray
+from elastocal.sim.workcell.balancer import BalancerSpring
+
+
+@dataclass(frozen=True, eq=False)
+class GearLaws:
+    """What the gears have beside their stiffness at high torque."""
+
+    which: IndexArray
+    """Which springs are gears, shape (gear,)."""
+    loss: FloatArray
+    """L: stiffness that is missing at rest, shape (gear, effect), in N·m/rad."""
+    angle: FloatArray
+    """a: twist at which half of it is back, shape (gear, effect), in rad."""
+    stop_stiffness: FloatArray
+    """kappa, shape (gear, stop), in N·m/rad."""
+    stop_travel: FloatArray
+    """d, shape (gear, stop), in rad."""
+
+    @property
+    def friction(self) -> FloatArray:
+        """Torque of all stops of each gear, shape (gear,), in N·m: half the height of its loop."""
+        height: FloatArray = np.sum(self.stop_stiffness * self.stop_travel, axis=1)
+        return height
+
+
+@dataclass(frozen=True, eq=False)
+class RobotSprings:
+    """Springs of the robot with the memory of its gears; a `elastocal.sim.statics.SpringBank`."""
+
+    stiffness: FloatArray
+    """k: at high torque, shape (spring,), in N·m/rad or N/m."""
+    gears: GearLaws
+    slider: FloatArray | None
+    """s: where the sliders stand, shape (gear, stop), in rad; None: no friction at all."""
+    balancer: BalancerSpring | None
+    balanced: int
+    """Which spring the balancer lies beside."""
+    joint_angle: float
+    """Angle that the motor of the balanced joint holds, in rad."""
+
+    def evaluate(self, theta: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return energy (batch,), torques and stiffnesses (batch, spring); see the module.
+
+        Parameters
+        ----------
+        theta : ndarray, shape (batch, spring)
+            Spring positions in rad or m.
+        """
+        torque = self.stiffness * theta
+        energy = 0.5 * np.sum(torque * theta, axis=1)
+        stiffness = np.empty_like(theta)
+        stiffness[:] = self.stiffness
+        which, law = self.gears.which, self.gears
+        twist = theta[:, which, None]
+        ratio = twist / law.angle
+        bend = np.arctan(ratio)
+        square = ratio**2
+        torque[:, which] -= np.sum(law.loss * law.angle * bend, axis=2)
+        stiffness[:, which] -= np.sum(law.loss / (1.0 + square), axis=2)
+        lost = law.loss * law.angle**2 * (ratio * bend - 0.5 * np.log1p(square))
+        energy -= np.sum(lost, axis=(1, 2))
+        if self.slider is not None:
+            way = twist - self.slider
+            held = np.clip(way, -law.stop_travel, law.stop_travel)
+            torque[:, which] += np.sum(law.stop_stiffness * held, axis=2)
+            stiffness[:, which] += np.sum(law.stop_stiffness * (held == way), axis=2)
+            energy += np.sum(law.stop_stiffness * (held * way - 0.5 * held**2), axis=(1, 2))
+        if self.balancer is not None:
+            angle = self.joint_angle + theta[:, self.balanced]
+            stored, moment, rate = self.balancer.evaluate(angle)
+            energy += stored
+            torque[:, self.balanced] += moment
+            stiffness[:, self.balanced] += rate
+        return energy, torque, stiffness
+
+    def at_joint(self, angle: float) -> "RobotSprings":
+        """Return the springs with the balanced joint's motor elsewhere, in rad."""
+        return replace(self, joint_angle=angle)
+
+    def frictionless(self) -> "RobotSprings":
+        """Return the springs without friction, as in free motion, which shakes it off."""
+        return replace(self, slider=None)
+
+    def relaxed(self, theta: FloatArray) -> "RobotSprings":
+        """Return the springs with every slider drawn to where nothing strains it.
+
+        Parameters
+        ----------
+        theta : ndarray, shape (spring,)
+            Where the springs are.
+        """
+        stops = np.zeros_like(self.gears.stop_travel)
+        return replace(self, slider=theta[self.gears.which, None] + stops)
+
+    def drawn_along(self, theta: FloatArray) -> "RobotSprings":
+        """Return the springs with the sliders where the equilibrium has left them.
+
+        Parameters
+        ----------
+        theta : ndarray, shape (spring,)
+            Where the springs are now.
+        """
+        if self.slider is None:
+            return self.relaxed(theta)
+        travel = self.gears.stop_travel
+        twist = theta[self.gears.which, None]
+        return replace(self, slider=twist - np.clip(twist - self.slider, -travel, travel))

@@ -1,0 +1,87 @@
+"""The printable figure."""
+
+import pytest
+
+from elastocal.errors import FileAccessError, PlanningError
+from elastocal.report import write_plan_figure
+from elastocal.report.plan_figure import plan_figure
+
+
+def _texts(axes):
+    return [text.get_text() for text in axes.texts]
+
+
+@pytest.fixture(scope="module")
+def on_block(block, plan, pool, moved_onto):
+    return block, *moved_onto(block, plan, pool)
+
+
+@pytest.mark.parametrize("suffix", ["svg", "png", "pdf"])
+def test_same_plan_gives_the_same_bytes(tmp_path, on_block, suffix):
+    paths = [write_plan_figure(tmp_path / f"{n}.{suffix}", *on_block) for n in "ab"]
+    one, other = (path.read_bytes() for path in paths)
+    assert len(one) > 5000
+    assert one == other
+
+
+def test_svg_holds_no_date(tmp_path, on_block):
+    text = write_plan_figure(tmp_path / "f.svg", *on_block).read_text(encoding="utf-8")
+    assert "<dc:date>" not in text
+
+
+def test_two_techniques_stand_side_by_side(on_block, plan):
+    plan_axes, other_axes, bar = plan_figure(*on_block).axes
+    assert plan_axes.get_title() == "COVER (this plan)"
+    assert other_axes.get_title() == "IOOPS (for comparison)"
+    assert plan_axes.get_xlim() == other_axes.get_xlim()
+    assert bar.get_title().endswith("in mm")
+
+
+def test_without_a_comparison_there_is_one_panel(on_block):
+    surface, plan, pool = on_block
+    figure = plan_figure(surface, plan.model_copy(update={"comparison": None}), pool)
+    assert len(figure.axes) == 2
+    width, _ = figure.get_size_inches()
+    assert width < 6.0
+
+
+def test_poses_are_numbered_in_search_order(on_block):
+    panel = plan_figure(*on_block).axes[0]
+    numbers = [text for text in _texts(panel) if text.isdigit()]
+    assert numbers == [str(n) for n in range(1, len(on_block[1].poses) + 1)]
+
+
+def test_numbers_under_a_panel_carry_their_units(on_block):
+    _, plan, _ = on_block
+    texts = _texts(plan_figure(*on_block).axes[0])
+    spread = plan.search.spread
+    assert f"{1e3 * spread.covering_radius:.0f} mm" in texts
+    assert "Covering radius (euclidean)" in texts
+    assert texts[texts.index("Observability index O1 (no unit)") + 1] == f"{spread.o1:.3g}"
+
+
+def test_a_surface_without_edge_has_no_distance_from_it(ball, plan, pool, moved_onto):
+    moved, candidates = moved_onto(ball, plan, pool)
+    spread = moved.search.spread.model_copy(update={"boundary_distance": None})
+    search = moved.search.model_copy(update={"spread": spread})
+    figure = plan_figure(ball, moved.model_copy(update={"search": search}), candidates)
+    texts = _texts(figure.axes[0])
+    assert texts[texts.index("Mean distance from the edge") + 1] == "none"
+
+
+def test_a_dollar_in_a_name_is_no_formula(tmp_path, on_block):
+    surface, plan, pool = on_block
+    named = plan.model_copy(update={"cell": plan.cell.model_copy(update={"name": "a$b_$c^"})})
+    assert write_plan_figure(tmp_path / "f.svg", surface, named, pool).stat().st_size > 5000
+
+
+def test_another_suffix_is_refused(tmp_path, on_block):
+    with pytest.raises(FileAccessError, match=r"suffix '.gif' is not one of .pdf, .png, .svg"):
+        write_plan_figure(tmp_path / "f.gif", *on_block)
+
+
+def test_a_pool_of_another_run_is_refused(tmp_path, on_block, plan):
+    surface, _, candidates = on_block
+    with pytest.raises(PlanningError, match="not of one run"):
+        write_plan_figure(tmp_path / "f.svg", surface, plan, candidates)
+    assert not list(tmp_path.iterdir())

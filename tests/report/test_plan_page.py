@@ -1,0 +1,174 @@
+"""The interactive page of a plan."""
+
+import json
+import re
+import shutil
+import subprocess
+from html.parser import HTMLParser
+
+import numpy as np
+import pytest
+
+from elastocal.errors import FileAccessError, PlanningError
+from elastocal.planning.plan_file import PlanFile
+from elastocal.report import write_plan_page
+from support import plans
+
+
+class Page(HTMLParser):
+    """Collects what the tests ask of the page."""
+
+    def __init__(self, text):
+        super().__init__()
+        self.tags, self.data, self._into = [], "", None
+        self.feed(text)
+
+    def handle_starttag(self, tag, attributes):
+        found = dict(attributes)
+        self.tags.append((tag, found))
+        self._into = found.get("id")
+
+    def handle_data(self, data):
+        if self._into == "data":
+            self.data += data
+            self._into = None
+
+    def one(self, **wanted):
+        (found,) = [a for _, a in self.tags if wanted.items() <= a.items()]
+        return found
+
+    def count(self, tag):
+        return sum(name == tag for name, _ in self.tags)
+
+
+@pytest.fixture(scope="module")
+def written(tmp_path_factory, cell, block, plan, pool):
+    return write_plan_page(tmp_path_factory.mktemp("page") / "p.html", cell, block, plan, pool)
+
+
+@pytest.fixture(scope="module")
+def page(written):
+    return Page(written.read_text(encoding="utf-8"))
+
+
+@pytest.fixture(scope="module")
+def shown(page):
+    return json.loads(page.data)
+
+
+def test_page_loads_nothing(page, written):
+    for tag, attributes in page.tags:
+        assert tag not in {"link", "img", "iframe", "object", "embed", "base"}
+        assert not {"src", "srcset", "background", "action"} & attributes.keys()
+    style = re.search(r"<style>(.*?)</style>", written.read_text(encoding="utf-8"), re.S)[1]
+    assert "url(" not in style
+    assert "@import" not in style
+
+
+def test_page_forbids_itself_the_network(page):
+    policy = page.one(**{"http-equiv": "Content-Security-Policy"})["content"]
+    assert policy.startswith("default-src 'none'")
+    assert "http" not in policy
+    assert "connect-src" not in policy
+
+
+def test_slider_has_a_step_for_home_and_every_pose(page, shown, plan):
+    slider = page.one(id="posture")
+    assert (slider["type"], slider["min"], slider["max"]) == ("range", "0", str(len(plan.poses)))
+    names = [frame["name"] for frame in shown["figure"]["frames"]]
+    assert names == [str(step) for step in range(len(plan.poses) + 1)]
+    assert len(shown["postures"]) == len(names)
+    assert shown["postures"][0] == "HOME"
+    assert shown["postures"][1].startswith("Pose 0:")
+
+
+def test_every_pose_is_numbered_in_the_view_and_has_a_row(page, shown, plan):
+    (poses,) = [trace for trace in shown["figure"]["data"] if trace["name"] == "poses"]
+    assert poses["text"] == [str(pose.id) for pose in plan.poses]
+    assert page.count("tr") == 1 + len(plan.poses)
+
+
+def test_layers_switch_every_trace_once_and_refused_points_are_off(shown, pool):
+    switched = [trace for layer in shown["layers"] for trace in layer["traces"]]
+    assert switched == list(range(len(shown["figure"]["data"])))
+    off = [layer["label"] for layer in shown["layers"] if not layer["shown"]]
+    refused = [layer["label"] for layer in shown["layers"] if layer["label"].startswith("Refused")]
+    assert off == refused
+    assert f"Refused by reach ({np.count_nonzero(pool.refused_by == 0)})" in off
+
+
+def test_head_tells_the_key_figures_with_units(written, plan):
+    text = written.read_text(encoding="utf-8")
+    head = text[: text.index("</header>")]
+    radius = f"{1e3 * plan.search.covering_radius:.0f} mm"
+    for wanted in (f"<dd>{len(plan.poses)}</dd>", radius, "<dd>7 min 04 s</dd>", "wrist"):
+        assert wanted in head
+    assert plan.findings[0] in text
+
+
+def test_names_are_escaped(tmp_path, cell, block, plan, pool):
+    bad = "<b>x</b></script><script>alert(1)</script>"
+    named = plan.model_copy(
+        update={
+            "cell": plan.cell.model_copy(update={"name": bad}),
+            "findings": (bad,),
+            "poses": tuple(pose.model_copy(update={"seen_by": bad}) for pose in plan.poses),
+        }
+    )
+    text = write_plan_page(tmp_path / "p.html", cell, block, named, pool).read_text("utf-8")
+    assert "<b>x" not in text
+    assert "alert(1)</script>" not in text
+    assert "&lt;b&gt;x&lt;/b&gt;" in text
+    assert Page(text).count("script") == 3
+
+
+def test_same_plan_gives_the_same_bytes(tmp_path, written, cell, block, plan, pool):
+    again = write_plan_page(tmp_path / "p.html", cell, block, plan, pool)
+    assert again.read_bytes() == written.read_bytes()
+
+
+def test_a_pool_of_another_run_is_refused(tmp_path, cell, block, plan, moved_onto, pool):
+    _, other = moved_onto(block, plan, pool)
+    with pytest.raises(PlanningError, match="pose 0 of the plan is not where candidate"):
+        write_plan_page(tmp_path / "p.html", cell, block, plan, other)
+    assert not list(tmp_path.iterdir())
+
+
+def test_candidates_beyond_the_pool_are_refused(tmp_path, cell, block, plan, pool):
+    other = plan.comparison.model_copy(update={"candidates": (999,)})
+    wrong = plan.model_copy(update={"comparison": other})
+    with pytest.raises(PlanningError, match=f"candidate 999, the pool has {len(pool)}"):
+        write_plan_page(tmp_path / "p.html", cell, block, wrong, pool)
+
+
+def test_a_plan_without_poses_is_refused(tmp_path, cell, block, plan: PlanFile, pool):
+    empty = plan.model_copy(update={"poses": (), "comparison": None})
+    with pytest.raises(PlanningError, match="the plan of cell 'dome' has no poses to show"):
+        write_plan_page(tmp_path / "p.html", cell, block, empty, pool)
+
+
+def test_a_cell_with_another_robot_is_refused(tmp_path, cell, block):
+    with pytest.raises(PlanningError, match="the plan is for joints rail, joint_a1"):
+        write_plan_page(tmp_path / "p.html", cell, block, plans.plan(), plans.pool())
+
+
+def test_a_missing_folder_is_named(tmp_path, cell, block, plan, pool):
+    with pytest.raises(FileAccessError, match="nowhere"):
+        write_plan_page(tmp_path / "nowhere" / "p.html", cell, block, plan, pool)
+
+
+def test_page_draws_in_a_browser_without_an_error(tmp_path, written):
+    browser = next(filter(None, map(shutil.which, ("chromium", "chromium-browser"))), None)
+    if browser is None:
+        pytest.skip("no chromium on the path to draw the page with")
+    run = subprocess.run(
+        [browser, "--headless", "--no-sandbox", "--use-angle=swiftshader",
+         "--enable-unsafe-swiftshader", "--disable-background-networking", "--no-first-run",
+         f"--user-data-dir={tmp_path}", "--virtual-time-budget=6000", "--window-size=400,400",
+         "--enable-logging=stderr", "--dump-dom", written.as_uri()],
+        capture_output=True, text=True, timeout=120, check=True,
+    )  # fmt: skip
+    said = [line for line in run.stderr.splitlines() if "CONSOLE" in line]
+    assert not [line for line in said if re.search("Error|Refused|violates|Uncaught", line)]
+    assert 'data-ready="yes"' in run.stdout
+    assert re.search(r"<tr aria-current[^>]*><td><button[^>]*>0</button>", run.stdout)
