@@ -147,7 +147,7 @@ def test_too_little_friction_for_the_loads_is_refused_by_name(tmp_path):
 def test_loads_beyond_the_torques_name_the_torque(tmp_path):
     reason = refusal(
         tmp_path,
-        ('fz: "1100 N"', 'fz: "6 kN"'),
+        ('fz: "1100 N"', 'fz: "20 kN"'),
         ('force_range: ["2500 N", "2500 N", "6250 N"]', 'force_range: ["9 kN", "9 kN", "30 kN"]'),
         ('["400 N*m", "400 N*m", "400 N*m"]', '["9 kN*m", "9 kN*m", "9 kN*m"]'),
     )
@@ -224,5 +224,3 @@ def test_a_name_that_no_controller_takes_is_refused(tmp_path):
     result = elastocal("plan", path, "--out", tmp_path / "plan", "--program", "my plan")
     assert "my plan" in result.reason
     assert not (tmp_path / "plan").exists()
-
-

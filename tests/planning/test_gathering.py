@@ -81,7 +81,7 @@ def test_a_surface_out_of_reach_is_given_up_early(tmp_path):
     found = gathered(cell)
     assert len(found.pool.postures) == 0
     assert found.pool.bottleneck == "reach"
-    assert 1000 <= found.pool.sampled < 20 * 120
+    assert 1000 <= found.pool.sampled < 30 * 120
 
 
 def test_a_region_with_nothing_in_it_is_refused(tmp_path):

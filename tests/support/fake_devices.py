@@ -258,6 +258,7 @@ class FakeSensor(_Sampled):
     def __init__(self, world: World) -> None:
         super().__init__(world)
         self.forces: list[np.ndarray] = []
+        self.newest = WEIGHT
         self.status = SensorStatus.OK
         self.frozen = False
 
@@ -266,25 +267,18 @@ class FakeSensor(_Sampled):
         self.times.append(w.clock.ticks)
         force = w.force + WEIGHT + 0.5 * self.noise(1, 3)
         if w.motion is Motion.HOLDING:
-            force = force + [0.0, 0.0, w.wobble * math.sin(9.0 * w.age)]
-        if self.frozen and self.forces:
-            force = self.forces[-1]
-        self.forces.append(force)
+            force = force + np.array([0.0, 0.0, w.wobble * math.sin(9.0 * w.age)])
+        if not self.frozen:
+            self.newest = force
+        self.forces.append(self.newest)
 
     def read(self) -> WrenchBlock:
         force = np.array(self.forces).reshape(-1, 3)
         block = WrenchBlock(
             np.array(self.times) / 1e6, force, force * 0.1, 0.5, 0.05, self.status, "sensor"
         )
-        self.times, self.forces = [], self.forces[-1:] if self.frozen else []
-        if self.frozen:
-            block = self._last(block)
+        self.times, self.forces = [], []
         return block
-
-    def _last(self, block: WrenchBlock) -> WrenchBlock:
-        """The same numbers, with new times."""
-        force = block.force[-1:].repeat(len(block.time), axis=0)
-        return WrenchBlock(block.time, force, force * 0.1, 0.5, 0.05, block.status, block.source)
 
 
 class FakeTracker(_Sampled):
@@ -301,6 +295,7 @@ class FakeTracker(_Sampled):
         self.finds = True
 
     def look(self, station: str) -> None:
+        assert station in self.stations
         self.looks += 1
         if self.finds:
             self.world.beam = BeamState.LOCKED

@@ -33,9 +33,7 @@ def calibrate(  # noqa: PLR0913 - one parameter an option
     ] = "0,inf",
     marker: Annotated[
         str | None,
-        typer.Option(
-            help="Marker in the tcp frame: 'x, y, z' with units; default: the dataset's, else at it."
-        ),
+        typer.Option(help="Marker in the tcp frame: 'x, y, z' with units; default: the dataset's."),
     ] = None,
     exclude: Annotated[
         list[str] | None, typer.Option(help="Leave out POSE or POSE:LOAD_CASE; repeatable.")

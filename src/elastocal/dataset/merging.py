@@ -93,11 +93,9 @@ def _check_compatible(first: Dataset, other: Dataset, index: int) -> None:
 
 def _check_marker(first: Dataset, other: Dataset, index: int) -> None:
     here, there = first.marker, other.marker
-    if here is None or there is None:
-        same = here is there
-    else:
-        same = math.dist(here, there) <= SAME_MARKER
-    if not same:
+    if here is None and there is None:
+        return
+    if here is None or there is None or not math.dist(here, there) <= SAME_MARKER:
         raise DatasetError(
             f"datasets 0 and {index} have different markers: attribute 'marker' is"
             f" {_short(first.data.attrs.get('marker'))} in one and"

@@ -100,7 +100,7 @@ def average(streams: Streams, window: Window) -> Reading:
         "states of the arm": (int(at_arm.sum()), 1),
         "wrenches": (int(at_wrench.sum()), LEAST_SAMPLES),
     }
-    if window.station is not None:
+    if window.station:
         counts[f"points of station {window.station}"] = (int(at_point.sum()), LEAST_SAMPLES)
     marker = _mean(points.time[at_point], points.position[at_point], points.sigma[at_point])
     return Reading(_judged(window, counts), tool, marker)

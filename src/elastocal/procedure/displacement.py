@@ -108,7 +108,7 @@ def _pair(pose: PoseReadings, load: Reading, registration: Registration) -> _Pai
         return "there is no unloaded reference"
     if reference.window.status is not ReadingStatus.OK:
         return f"the unloaded reference is {reference.window.status.value}: {reference.window.note}"
-    if station is None:
+    if not station:
         return "no tracker station measured"
     if station != reference.window.station:
         return f"station {station} measured it, {reference.window.station} its unloaded reference"

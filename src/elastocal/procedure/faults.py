@@ -59,14 +59,14 @@ class FaultError(ProcedureError):
         self.fault = fault
 
 
-CAUGHT = (FaultError, DeviceError, OSError)
+CAUGHT = (ProcedureError, DeviceError, OSError)
 """What a step of the procedure can fail with. Anything else is a mistake in the program."""
 
 
-def as_fault(error: FaultError | DeviceError | OSError) -> FaultError:
+def as_fault(error: ProcedureError | DeviceError | OSError) -> FaultError:
     """Return an error as the fault that it stands for."""
     if isinstance(error, FaultError):
         return error
-    if isinstance(error, OSError):
-        return FaultError(Fault.DISK, str(error))
-    return FaultError(Fault.DEVICE, str(error))
+    if isinstance(error, DeviceError):
+        return FaultError(Fault.DEVICE, str(error))
+    return FaultError(Fault.DISK, str(error))

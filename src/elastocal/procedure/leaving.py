@@ -67,7 +67,7 @@ def retreat(supervisor: Supervisor, line: Line, guard: Guard) -> None:
         )
 
 
-def back_off(a: Attempt, fault: FaultError) -> Stand:
+def back_off(a: Attempt, ends: Ends) -> Stand:
     """Make the cell safe after a fault: no force, off the surface, stopped.
 
     Devices are no longer trusted here and their faults change nothing any more. What the arm
@@ -77,8 +77,8 @@ def back_off(a: Attempt, fault: FaultError) -> Stand:
     ----------
     a : Attempt
         The attempt, in the state in which the fault was seen.
-    fault : FaultError
-        The fault.
+    ends : Ends
+        What the fault ends. An attempt that may be tried again retracts in any case.
 
     Returns
     -------
@@ -88,7 +88,7 @@ def back_off(a: Attempt, fault: FaultError) -> Stand:
     s = a.supervisor
     s.logbook.must_write = False
     try:
-        stand = _off_the_surface(a, fault)
+        stand = _off_the_surface(a, ends)
         halt(s)
     finally:
         s.logbook.must_write = True
@@ -107,11 +107,11 @@ def halt(supervisor: Supervisor) -> None:
         supervisor.logbook.must_write = before
 
 
-def _off_the_surface(a: Attempt, fault: FaultError) -> Stand:
+def _off_the_surface(a: Attempt, ends: Ends) -> Stand:
     if a.step not in OFF_APPROACH:
         return Stand.WAY if a.step is Step.MOVE else Stand.APPROACH
     touching = a.step in TOUCHING or _says_contact(a.supervisor)
-    if not touching and fault.fault.ends is Ends.RUN:
+    if not touching and ends is Ends.RUN:
         return Stand.NEAR
     if a.in_force_control and _try(a.supervisor, Action.RELEASE, lambda: _release_blindly(a)):
         a.in_force_control = False

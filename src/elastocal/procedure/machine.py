@@ -3,7 +3,7 @@
 from collections.abc import Callable
 
 from elastocal.procedure.attempt import Attempt
-from elastocal.procedure.faults import CAUGHT, FaultError, as_fault
+from elastocal.procedure.faults import CAUGHT, Ends, FaultError, as_fault
 from elastocal.procedure.leaving import Stand, back_off, release, retract
 from elastocal.procedure.off_surface import aim, move, near, unloaded
 from elastocal.procedure.on_surface import average, engage, load, settle
@@ -60,7 +60,11 @@ def run_attempt(a: Attempt, enter: Callable[[Attempt], None], commit: Action) ->
     except CAUGHT as error:
         fault = as_fault(error)
         place = _place(a)
-        raise AttemptFailedError(fault, place, back_off(a, fault)) from error
+        raise AttemptFailedError(fault, place, back_off(a, fault.fault.ends)) from error
+    except BaseException:
+        # A mistake in the program, while a tonne of robot may press on the tooling.
+        back_off(a, Ends.RUN)
+        raise
 
 
 def _place(a: Attempt) -> str:

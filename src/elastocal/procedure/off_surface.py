@@ -1,5 +1,7 @@
 """States off the surface: the way to the approach pose, aiming, near contact, the reference."""
 
+from functools import partial
+
 import numpy as np
 
 from elastocal.arrays import FloatArray
@@ -40,7 +42,7 @@ def drive(supervisor: Supervisor, way: tuple[Joints, ...], guard: Guard) -> None
             supervisor.devices.arm.move_joints(goal, settings.override)
             supervisor.wait(
                 guard,
-                lambda seen, goal=goal: _stands_at(seen, goal),
+                partial(_stands_at, goal),
                 2.0 * expected + settings.procedure.timeout,
                 "a move",
             )
@@ -133,7 +135,7 @@ def _is_done(seen: Seen, start: FloatArray, distance: float) -> bool:
     return float(np.linalg.norm(seen.arm.T_base_tcp[:3, 3] - start)) > distance - STRAIGHT_ARRIVED
 
 
-def _stands_at(seen: Seen, goal: FloatArray) -> bool:
+def _stands_at(goal: FloatArray, seen: Seen) -> bool:
     return seen.arm.motion is Motion.IDLE and float(np.abs(seen.arm.q - goal).max()) <= ARRIVED
 
 

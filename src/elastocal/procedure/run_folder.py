@@ -96,6 +96,29 @@ def fill(folder: RunFolder, cell: Cell, plan: Path) -> None:
     _make(folder.streams)
 
 
+def refuse_foreign(folder: RunFolder) -> None:
+    """Refuse a folder that holds anything but the beginnings of a run.
+
+    A run that was killed before its first journal entry leaves such beginnings; nothing has moved
+    then.
+
+    Raises
+    ------
+    FileAccessError
+        With a name that does not belong there.
+    """
+    ours = {place.name for place in (folder.cell, folder.plan, folder.journal, folder.streams)}
+    try:
+        found = {entry.name for entry in folder.path.iterdir()} if folder.path.exists() else set()
+    except OSError as error:
+        raise FileAccessError(f"cannot read {folder.path}: {error.strerror or error}") from error
+    foreign = sorted(found - ours)
+    if foreign:
+        raise FileAccessError(
+            f"{folder.path} holds {foreign[0]!r}, which is no part of a run: name another folder"
+        )
+
+
 def _root(cell: Cell) -> str:
     """Return the deepest folder that holds the cell file and all that it names."""
     folders = [_absolute(cell.path).parent, *(file.parent for file in _relative_files(cell))]

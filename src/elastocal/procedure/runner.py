@@ -61,7 +61,13 @@ class Runner:
         """Visit all poses that are not committed and return how it went.
 
         The arm is enabled here and disabled at the end, however that comes about.
+
+        Raises
+        ------
+        ProcedureError
+            If the arm is not the one of the plan; nothing has been enabled then.
         """
+        self._check_joints()
         try:
             self._begin()
             self._visit_all()
@@ -72,11 +78,13 @@ class Runner:
         except CAUGHT as error:
             halt(self._supervisor)
             result = self._failure(as_fault(error), self._stand)
+        except BaseException:
+            halt(self._supervisor)
+            raise
         self._finish(result)
         return result
 
     def _begin(self) -> None:
-        self._check_joints()
         s = self._supervisor
         s.start()
         self._arm()

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from elastocal.arrays import FloatArray
+from elastocal.procedure.pose_log import ReadingStatus
 from elastocal.procedure.reduction import PoseReadings
 from elastocal.procedure.registration import UnloadedReadings
 from elastocal.procedure.tool_estimate import Unloaded
@@ -37,7 +38,7 @@ def marker_readings(
     seen = [
         (pose.pose, str(r.window.station), r.tool, r.marker)
         for pose in poses
-        if (r := pose.reference) and r.tool and r.marker
+        if (r := pose.reference) and r.window.status is ReadingStatus.OK and r.tool and r.marker
     ]
     q = np.array([tool.q for *_, tool, _ in seen]).reshape(len(seen), len(robot.joint_names))
     return UnloadedReadings(

@@ -31,8 +31,8 @@ class Ways:
     """The ways between nodes, found when they are asked for and remembered.
 
     The *stem* of a pose is its free way to HOME with at most one via pose: none, the pose lifted
-    off along its normal, or another pose that leads straight to HOME. A pose without a stem
-    cannot be visited. Two poses with stems always have a way: through HOME, with at most three
+    off along its normal, a point about the way, or another pose that leads straight to HOME. A
+    pose without a stem cannot be visited. Two poses with stems always have a way: through HOME, with at most three
     via poses.
     """
 
@@ -65,24 +65,24 @@ class Ways:
     def find(self, start: int, end: int) -> Way:
         """Return the quickest free way of those tried between two nodes with stems.
 
-        Tried are, the quickest first: straight; one end lifted, or both; the mean in joint space
-        of both lifted; and, always free, through HOME.
+        Tried are straight, then, the quickest first: one end lifted, or both; the mean in joint
+        space of both lifted; a point about the way; and through HOME, which is free in any case.
         """
         first, last = min(start, end), max(start, end)
         if (first, last) not in self._known:
-            vias = [self._none()]
-            if not self.mover.sweep.along(self.q[[first, last]]):
-                vias = [
-                    *self._single_vias(first, last),
-                    *self._double_vias(first, last),
-                    self._through_home(first, last),
-                ]
-            way = self._first_free(first, last, vias)
-            assert way is not None, "the stems are free"
-            self._known[first, last] = way
+            self._known[first, last] = self._find(first, last)
         known = self.known(start, end)
         assert known is not None
         return known
+
+    def _find(self, first: int, last: int) -> Way:
+        straight = self._first_free(first, last, [self._none()])
+        if straight is not None:
+            return straight
+        through_home = self._through_home(first, last)
+        vias = [*self._single_vias(first, last), *self._double_vias(first, last), through_home]
+        # Known to be free from its stems, even if rounding should tell otherwise on the way back.
+        return self._first_free(first, last, vias) or self._way(first, last, through_home)
 
     def _none(self) -> FloatArray:
         return self.q[:0]

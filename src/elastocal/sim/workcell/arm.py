@@ -107,7 +107,7 @@ class SimulatedArm:
         rise = plant.cell.file.motion.acceleration_time
         law = joint_move(target - start.q, speed * plant.cell.axis_speeds, rise)
         way = joint_way(plant.statics, start, end)
-        plant.run(way, law, Motion.MOVING, Motion.IDLE, start)
+        plant.run(way, law, (Motion.MOVING, Motion.IDLE), start)
 
     def approach(
         self, direction_base: FloatArray, distance: float, speed: float, contact_force: float
@@ -122,12 +122,11 @@ class SimulatedArm:
         self._begin_approach()
         guarded = guarded_way(plant, start, direction, distance, (speed, contact_force))
         plant.contact, self._touched = guarded.contact, guarded.felt
-        if guarded.contact is None:
-            plant.note_sag(guarded.way.end)
+        plant.note_sag(guarded.way.end)
         after = Motion.STOPPED if guarded.fault else Motion.IDLE
         self._fault = guarded.fault
         law = Uniform(guarded.length / speed)
-        plant.run(guarded.way, law, Motion.APPROACHING, after, start, guarded.fault)
+        plant.run(guarded.way, law, (Motion.APPROACHING, after), start, fault=guarded.fault)
         if self._approaches == 1 and not guarded.felt:
             segment = plant.segment
             plant.later(segment.end, lambda: self._reference(segment))
@@ -165,7 +164,7 @@ class SimulatedArm:
         if contact is None:
             plant.note_sag(way.end)
             self._touched = self._visiting = False
-        plant.run(way, Uniform(distance / speed), Motion.RETRACTING, Motion.IDLE, start)
+        plant.run(way, Uniform(distance / speed), (Motion.RETRACTING, Motion.IDLE), start)
         self._begin("retract")
 
     def _motion(self) -> Motion:

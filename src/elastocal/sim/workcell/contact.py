@@ -57,10 +57,13 @@ class ContactLaw:
         Parameters
         ----------
         force_tcp : ndarray, shape (3,)
-            Force on the robot in the tcp frame, in N; z below 0.
+            Force on the robot in the tcp frame, in N; it presses where z is below 0.
         """
         lateral = float(np.hypot(force_tcp[0], force_tcp[1]))
-        return lateral / (self.friction * -float(force_tcp[2])) if lateral else 0.0
+        if lateral == 0.0:
+            return 0.0
+        limit = self.friction * -float(force_tcp[2])
+        return lateral / limit if limit > 0.0 else np.inf
 
     def held(self, force_tcp: FloatArray) -> FloatArray:
         """Return the force that friction lets build up, shape (3,), in N."""

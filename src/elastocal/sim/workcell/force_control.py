@@ -11,6 +11,7 @@ from elastocal.arrays import FloatArray
 from elastocal.cell.description.faults import Fault
 from elastocal.cell.devices import Motion
 from elastocal.errors import DeviceError
+from elastocal.sim.workcell.contact import Contact
 from elastocal.sim.workcell.keys import generator
 from elastocal.sim.workcell.plant import Plant
 from elastocal.sim.workcell.quasistatics import ForceReading, Stand
@@ -76,34 +77,15 @@ class ForceControl:
         if contact is None:
             raise DeviceError("simulated arm: no contact to release")
         start = plant.stand()
-        goal = contact.tool_position(np.zeros(3))
-        end = self._unloaded(start, goal)
+        end = pressed(plant.statics, start, contact, lambda _: np.zeros(3), plant.stop_error())
         law = Uniform(float(np.linalg.norm(start.force)) / rate)
         way = force_way(plant.statics, start, end)
-        plant.run(way, law, Motion.RELEASING, Motion.IDLE, start)
+        plant.run(way, law, (Motion.RELEASING, Motion.IDLE), start)
 
     def let_slip(self, fault: Fault, held: Segment) -> None:
         """Let the contact slip against the lateral force, unless the load case is over."""
         if self._plant.segment is held:
             self._press(fault.distance * self._away(), SLIP_TIME)
-
-    def _unloaded(self, start: Stand, goal: FloatArray) -> Stand:
-        """Return the robot at the surface without force, with what its gears remember."""
-        plant = self._plant
-        error, statics, contact = plant.stop_error(), plant.statics, plant.contact
-        assert contact is not None
-        reached = start
-        for _ in range(3):
-            from_here = Stand(
-                start.q, start.twist, start.force, start.springs, reached.theta, start.sag
-            )
-            reached = statics.loaded(from_here, reached.q, np.zeros(3), error)
-            aim = (goal - reached.twist[:3])[None]
-            q = statics.along(reached.q, contact.R_base_tcp, aim)[0]
-            reached = Stand(
-                q, reached.twist, reached.force, reached.springs, reached.theta, reached.sag
-            )
-        return reached
 
     def _press(self, slip: FloatArray, least: float = 0.0) -> Segment:
         """Go for the wanted force, the contact slipping meanwhile; tcp frame, shape (2,), in m."""
@@ -111,15 +93,13 @@ class ForceControl:
         assert contact is not None
         start = plant.stand()
         contact = contact.slipped(slip)
-        end = pressed(
-            plant.statics, start, contact, self._wanted, self._reading, plant.stop_error()
-        )
+        end = self._equilibrium(start, contact)
         plant.contact = contact
         ramp = max(float(np.linalg.norm(end.force - start.force)) / self._rate, least)
         law: TimeLaw = SettlingRamp(ramp, plant.cell.file.simulation.controller.settling)
         way = force_way(plant.statics, start, end)
         ripple = self._ripple()
-        return plant.run(way, law, Motion.HOLDING, Motion.HOLDING, start, ripple=ripple)
+        return plant.run(way, law, (Motion.HOLDING, Motion.HOLDING), start, ripple=ripple)
 
     def _slide(self, held: Segment) -> None:
         """Slide at a steady speed until the controller has had enough."""
@@ -129,17 +109,23 @@ class ForceControl:
             return
         start, way = plant.stand(), entry.controller.travel_limit
         plant.contact = contact = contact.slipped(way * self._away())
-        end = pressed(
-            plant.statics, start, contact, self._wanted, self._reading, plant.stop_error()
-        )
+        end = self._equilibrium(start, contact)
         plant.run(
             force_way(plant.statics, start, end),
             Uniform(way / entry.contact.slide_speed),
-            Motion.HOLDING,
-            Motion.STOPPED,
+            (Motion.HOLDING, Motion.STOPPED),
             start,
-            f"force control gave up: the contact slid by {1e3 * way:g} mm",
+            fault=f"force control gave up: the contact slid by {1e3 * way:g} mm",
         )
+
+    def _equilibrium(self, start: Stand, contact: Contact) -> Stand:
+        """Return the robot where the sensor reads the wanted force."""
+        plant, wanted, reading = self._plant, self._wanted, self._reading
+
+        def force(R_base_sensor: FloatArray) -> FloatArray:
+            return reading.true_force(wanted, R_base_sensor)
+
+        return pressed(plant.statics, start, contact, force, plant.stop_error())
 
     def _away(self) -> FloatArray:
         """Return the direction in which the contact gives way, tcp frame, shape (2,)."""

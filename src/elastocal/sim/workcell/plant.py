@@ -8,15 +8,17 @@ import numpy as np
 from elastocal.arrays import FloatArray
 from elastocal.cell import Cell
 from elastocal.cell.devices import Motion
+from elastocal.robot.inverse.frames import inverse_transform
 from elastocal.sim.workcell.clock import SimClock
 from elastocal.sim.workcell.contact import Contact, ContactLaw
 from elastocal.sim.workcell.keys import generator, posture_key
 from elastocal.sim.workcell.quasistatics import Quasistatics, Stand
 from elastocal.sim.workcell.robot import TrueRobot
 from elastocal.sim.workcell.schedule import Schedule
-from elastocal.sim.workcell.segment import Segment
+from elastocal.sim.workcell.segment import Ripple, Segment
 from elastocal.sim.workcell.surface import TrueSurface
-from elastocal.sim.workcell.time_laws import Uniform
+from elastocal.sim.workcell.time_laws import TimeLaw, Uniform
+from elastocal.sim.workcell.ways import Way
 
 _DRAWS = 64
 """Random stops and slips of a visit; more begin anew."""
@@ -42,17 +44,18 @@ class Plant:
     def __init__(self, cell: Cell, seed: int, clock: SimClock) -> None:
         """Set the cell up, the arm at HOME."""
         self.cell, self.seed, self.clock = cell, seed, clock
-        self.statics = Quasistatics.of(cell, TrueRobot.of(cell))
+        self._weighed = self.statics = Quasistatics.of(cell, TrueRobot.of(cell))
         self.surface = TrueSurface.of(cell)
         self.contact_law = ContactLaw.of(cell)
         self.schedule = Schedule(cell)
         self.contact: Contact | None = None
         self.instruments: list[Instrument] = []
+        self._pressing = _unit_wrench(self.statics.robot)
         self.visit = -1
         self.key = posture_key(cell.home)
         self._stops, self._slips = np.zeros((_DRAWS, 3)), np.zeros((_DRAWS, 2))
         self._drawn = 0
-        self.new_noise()
+        self._draw()
         self._events: list[tuple[int, Callable[[], None]]] = []
         stand = self.statics.free(cell.home, self.stop_error(), None)
         self.segment = self.standing(stand, Motion.DISARMED)
@@ -78,17 +81,30 @@ class Plant:
         self._events.append((time, act))
         self._events.sort(key=lambda event: event[0])
 
-    def new_noise(self) -> None:
-        """Draw stop errors and slips of the posture that the arm was last sent to."""
+    def begin_journey(self, target: FloatArray) -> None:
+        """Set out for a posture: stop errors and slips are those that belong to it."""
+        self.key = posture_key(target)
+        self._draw()
+        self._restart_instruments("on the way to")
+
+    def begin_visit(self) -> None:
+        """Begin to approach the surface from the posture that the arm was last sent to."""
+        self.visit += 1
+        more = sum(fault.mass for fault in self.schedule.lasting("tool_weight", self.visit))
+        self.statics = self._weighed.heavier(more) if more else self._weighed
+        self._drawn = 1
+        self._restart_instruments("from")
+
+    def _draw(self) -> None:
         entry = self.cell.file.simulation.controller
         stops = generator(self.seed, "stops", self.key).standard_normal((_DRAWS, 3))
         self._stops = entry.repeatability * stops
         self._slips = generator(self.seed, "slips", self.key).standard_normal((_DRAWS, 2))
         self._drawn = 0
 
-    def restart_instruments(self, what: str) -> None:
-        """Have every instrument count its samples from now on."""
+    def _restart_instruments(self, what: str) -> None:
         for instrument in self.instruments:
+            instrument.catch_up(self.now)
             instrument.restart(self.now, f"{what} {self.key}")
 
     def stop_error(self) -> FloatArray:
@@ -105,6 +121,50 @@ class Plant:
         for instrument in self.instruments:
             instrument.catch_up(self.now)
         self.segment = segment
+
+    def run(
+        self,
+        way: Way,
+        law: TimeLaw,
+        motions: tuple[Motion, Motion],
+        start: Stand,
+        *,
+        fault: str | None = None,
+        ripple: Ripple | None = None,
+    ) -> Segment:
+        """Set out on a way and return the segment.
+
+        Parameters
+        ----------
+        way : Way
+            From ``start`` on.
+        law : TimeLaw
+            How the time goes.
+        motions : tuple of Motion
+            What the arm does on the way, and at its end.
+        start : Stand
+            Where it is.
+        fault : str, optional
+            What the controller says at the end.
+        ripple : Ripple, optional
+            Unrest of the force.
+        """
+        theta = way.end.theta
+        assert theta is not None
+        segment = Segment(
+            begin=self.now,
+            law=law,
+            knots=way.knots,
+            motion=motions[0],
+            motion_after=motions[1],
+            springs=(start.springs, way.end.springs),
+            theta=theta,
+            fault_after=fault,
+            ripple=ripple,
+            ripple_wrench=self._pressing,
+        )
+        self.switch(segment)
+        return segment
 
     def stand(self) -> Stand:
         """Return where the robot is now, with the memory that it has gathered so far."""
@@ -138,3 +198,10 @@ class Plant:
             theta=np.zeros(len(stand.springs.stiffness)) if theta is None else theta,
             fault_after=fault,
         )
+
+
+def _unit_wrench(robot: TrueRobot) -> FloatArray:
+    """Return the wrench at the sensor, in its frame, of 1 N that presses on the tool, shape (6,)."""
+    T_sensor_tcp = inverse_transform(robot.T_tcp_sensor)
+    force = -T_sensor_tcp[:3, 2]
+    return np.concatenate([force, np.cross(T_sensor_tcp[:3, 3], force)])

@@ -1,12 +1,13 @@
 """The ways that a command can take: from where the robot stands to where it will."""
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from elastocal.arrays import FloatArray
 from elastocal.sim.workcell.contact import Contact
-from elastocal.sim.workcell.quasistatics import ForceReading, Quasistatics, Stand
+from elastocal.sim.workcell.quasistatics import Quasistatics, Stand
 from elastocal.sim.workcell.segment import Knots
 
 CLOSED = 1e-8
@@ -70,11 +71,10 @@ def pressed(
     statics: Quasistatics,
     start: Stand,
     contact: Contact,
-    wanted_tcp: FloatArray,
-    reading: ForceReading,
+    force: Callable[[FloatArray], FloatArray],
     stop_error: FloatArray,
 ) -> Stand:
-    """Return the equilibrium of robot, disk and tooling at which the sensor reads a force.
+    """Return the equilibrium of robot, disk and tooling under a force.
 
     The commanded pose moves, orientation kept, until the tool is where disk and tooling hold it;
     the robot gives a little differently there, so it is done in rounds.
@@ -87,20 +87,17 @@ def pressed(
         Where it comes from, with its memory.
     contact : Contact
         The disk on the tooling.
-    wanted_tcp : ndarray, shape (3,)
-        Wanted reading, tcp frame, in N.
-    reading : ForceReading
-        How the controller reads the sensor.
+    force : callable
+        Returns the force on the robot in base, shape (3,), in N, from the true orientation of the
+        sensor in base, shape (3, 3).
     stop_error : ndarray, shape (3,)
         Error of the stop, in base, in m.
     """
     q, reached = start.q, start
     for _ in range(_ROUNDS):
-        R_sensor = statics.R_base_sensor(q, reached.twist)
-        force = reading.true_force(wanted_tcp, R_sensor)
-        from_here = Stand(q, start.twist, force, start.springs, reached.theta, start.sag)
-        reached = statics.loaded(from_here, q, force, stop_error)
-        goal = contact.tool_position(force)
+        wanted = force(statics.R_base_sensor(q, reached.twist))
+        reached = statics.loaded(replace(start, theta=reached.theta), q, wanted, stop_error)
+        goal = contact.tool_position(wanted)
         if np.linalg.norm(goal - statics.tool_position(reached)) < CLOSED:
             break
         q = statics.along(q, contact.R_base_tcp, (goal - reached.twist[:3])[None])[0]

@@ -1,0 +1,233 @@
+"""The summary of a run, for people and for the report: schema ``elastocal.run-summary/1``.
+
+Numbers are in SI units; the unit stands in the key where it is not that of a length in m, an angle
+in rad, a time in s.
+"""
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from elastocal import __version__
+from elastocal.arrays import FloatArray
+from elastocal.dataset import Dataset
+from elastocal.procedure.displacement import LoadRow
+from elastocal.procedure.entries import Entry, Event
+from elastocal.procedure.pose_log import ReadingStatus
+from elastocal.procedure.reduction import PoseReadings
+from elastocal.procedure.registration import Registration, StationFit, UnloadedReadings
+from elastocal.procedure.run_warnings import run_warnings
+from elastocal.procedure.tool_estimate import Interval, ToolEstimate
+from elastocal.procedure.tool_weight import ToolLoad
+
+SCHEMA = "elastocal.run-summary/1"
+
+
+@dataclass(frozen=True, eq=False)
+class Derivation:
+    """Everything that was found on the way to the dataset."""
+
+    poses: Sequence[PoseReadings]
+    rows: Sequence[LoadRow]
+    seen: UnloadedReadings
+    registration: Registration
+    tool: ToolLoad
+    estimate: ToolEstimate
+    dataset: Dataset
+
+
+def summarise(
+    found: Derivation, planned: Sequence[int], load_cases: Sequence[str], entries: Sequence[Entry]
+) -> dict[str, Any]:
+    """Return the summary, without a schema of its own for each part.
+
+    Parameters
+    ----------
+    found : Derivation
+        What the streams say.
+    planned : sequence of int
+        Poses of the plan.
+    load_cases : sequence of str
+        Load cases of the plan.
+    entries : sequence of Entry
+        The journal.
+    """
+    committed = [pose.pose for pose in found.poses]
+    return {
+        "schema": SCHEMA,
+        "elastocal": __version__,
+        "poses": {
+            "planned": len(planned),
+            "committed": len(committed),
+            "missing": [pose for pose in planned if pose not in committed],
+        },
+        "readings": _readings(found.rows),
+        "registration": _registration(found.registration, found.dataset),
+        "tool": _tool(found.tool, found.estimate),
+        "drift": _drift(found.poses),
+        "contact_moment": _moments(found.rows),
+        "noise": _noise(found.rows),
+        "attempts": _attempts(found.poses, entries),
+        "times": _times(found.poses, entries),
+        "warnings": run_warnings(
+            found.rows, found.registration, found.tool, found.estimate, load_cases
+        ),
+    }
+
+
+def _readings(rows: Sequence[LoadRow]) -> dict[str, Any]:
+    counts = Counter(row.status.value for row in rows)
+    not_ok = [
+        {"pose": r.pose, "load_case": r.load_case, "status": r.status.value, "note": r.note}
+        for r in rows
+        if r.status is not ReadingStatus.OK
+    ]
+    return {"counts": {s.value: counts[s.value] for s in ReadingStatus}, "not_ok": not_ok}
+
+
+def _registration(registration: Registration, dataset: Dataset) -> dict[str, Any]:
+    typical = np.linalg.norm(dataset.data["marker_displacement"].values, axis=-1)
+    displacement = float(np.nanmedian(typical))
+    return {
+        "stations": [_station(fit, displacement) for fit in registration.stations],
+        "unregistered": registration.unregistered,
+        "lever_arm": _numbers(registration.lever_arm),
+        "lever_arm_sigma": _numbers(registration.lever_sigma),
+        "lever_arm_of_cell": _numbers(registration.lever_prior),
+        "lever_arm_from_cell_along": list(registration.undetermined_lever),
+        "scatter": _number(registration.scatter),
+        "moves": [
+            {
+                "station": move.station,
+                "from_pose": move.pose,
+                "distance": move.distance,
+                "angle": move.angle,
+                "log10_probability_of_chance": move.improbability,
+            }
+            for move in registration.moves
+        ],
+        "blunders": [
+            {"pose": b.pose, "station": b.station, "distance": b.distance}
+            for b in registration.blunders
+        ],
+    }
+
+
+def _station(fit: StationFit, displacement: float) -> dict[str, Any]:
+    norms = np.linalg.norm(fit.residual, axis=1)
+    return {
+        "station": fit.station,
+        "poses": list(fit.poses),
+        "T_base_tracker": fit.T_base_tracker.tolist(),
+        "rotation_sigma": fit.rotation_sigma,
+        "position_sigma": _numbers(fit.position_sigma),
+        "residual": [_numbers(row) for row in fit.residual],
+        "residual_rms": float(np.sqrt((norms**2).mean())),
+        "residual_max": float(norms.max()),
+        "displacement_sigma": fit.rotation_sigma * displacement,
+    }
+
+
+def _tool(tool: ToolLoad, estimate: ToolEstimate) -> dict[str, Any]:
+    return {
+        "unloaded_references": estimate.count,
+        "mass_kg": _interval(estimate.mass) | {"cell": tool.mass},
+        "centre_of_mass": _interval(estimate.centre) | {"cell": _numbers(tool.centre)},
+        "force_bias_N": _interval(estimate.force_bias),
+        "moment_bias_Nm": _interval(estimate.moment_bias),
+        "force_drift_N_per_s": _interval(estimate.force_drift),
+        "moment_drift_Nm_per_s": _interval(estimate.moment_drift),
+        "force_scatter_N": _number(estimate.force_scatter),
+        "moment_scatter_Nm": _number(estimate.moment_scatter),
+        "not_determined": list(estimate.undetermined),
+    }
+
+
+def _drift(poses: Sequence[PoseReadings]) -> dict[str, Any]:
+    """Return how far the sensor is from its tare when the tool is free again, pose by pose."""
+    found = []
+    for pose in poses:
+        before = pose.reference.tool if pose.reference else None
+        after = pose.released.tool if pose.released else None
+        if before is not None and after is not None:
+            change = after.force.value - before.force.value
+            seconds = after.force.time - before.force.time
+            found.append((pose.pose, float(np.linalg.norm(change)), seconds))
+    if not found:
+        return {"released_windows": 0, "largest_N": None, "pose": None, "seconds": None}
+    pose_id, size, seconds = max(found, key=lambda each: each[1])
+    return {
+        "released_windows": len(found),
+        "largest_N": size,
+        "pose": pose_id,
+        "seconds": seconds,
+    }
+
+
+def _moments(rows: Sequence[LoadRow]) -> dict[str, Any]:
+    """Return the moments about the tcp that the dataset leaves out."""
+    sizes = [float(np.linalg.norm(row.numbers.wrench.moment)) for row in rows if row.numbers]
+    return {
+        "readings": len(sizes),
+        "median_Nm": float(np.median(sizes)) if sizes else None,
+        "largest_Nm": max(sizes, default=None),
+    }
+
+
+def _noise(rows: Sequence[LoadRow]) -> dict[str, Any]:
+    good = [r.numbers for r in rows if r.numbers is not None and r.status is ReadingStatus.OK]
+    forces = np.array([numbers.force_sigma for numbers in good])
+    markers = np.array([numbers.marker_sigma for numbers in good])
+    return {
+        "readings": len(good),
+        "force_sigma_median_N": float(np.median(forces)) if good else None,
+        "marker_sigma_median": float(np.median(markers)) if good else None,
+    }
+
+
+def _attempts(poses: Sequence[PoseReadings], entries: Sequence[Entry]) -> dict[str, Any]:
+    return {
+        "retried": {str(p.pose): p.log.attempt for p in poses if p.log.attempt > 1},
+        "given_up": [entry.pose for entry in entries if entry.event is Event.GIVEN_UP],
+        "resumed": sum(entry.event is Event.RESUME for entry in entries),
+        "faults": [
+            {"pose": e.pose, "attempt": e.attempt, "step": e.step, "text": e.text}
+            for e in entries
+            if e.event is Event.FAULT
+        ],
+    }
+
+
+def _times(poses: Sequence[PoseReadings], entries: Sequence[Entry]) -> dict[str, Any]:
+    spans = [
+        max(window.end for window in pose.log.windows)
+        - min(window.start for window in pose.log.windows)
+        for pose in poses
+        if pose.log.windows
+    ]
+    record = entries[0].run if entries else None
+    return {
+        "started": record.started if record else None,
+        "measuring_per_pose_median": float(np.median(spans)) if spans else None,
+        "total": entries[-1].time - entries[0].time if entries else None,
+    }
+
+
+def _interval(interval: Interval) -> dict[str, Any]:
+    return {"value": _plain(interval.value), "half_width_95": _plain(interval.half_width)}
+
+
+def _plain(values: FloatArray) -> Any:
+    return _numbers(values) if np.ndim(values) else _number(float(values))
+
+
+def _numbers(values: FloatArray) -> list[float | None]:
+    return [_number(float(value)) for value in values]
+
+
+def _number(value: float) -> float | None:
+    """Return a number, or None where there is none: JSON has no NaN."""
+    return value if np.isfinite(value) else None

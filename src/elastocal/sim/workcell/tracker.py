@@ -1,0 +1,149 @@
+"""Simulated laser trackers; see `elastocal.cell.devices.Metrology`.
+
+Each station stands near where the cell file puts it, turned as it happens to be; that turn is what
+the registration of a run has to find. Noise grows with the distance, the same along each axis. A
+part of it comes from moving air and changes slowly, as a first-order process of `AIR_TIME`.
+"""
+
+import math
+
+import numpy as np
+from scipy.signal import lfilter
+from scipy.spatial.transform import Rotation
+
+from elastocal.arrays import FloatArray
+from elastocal.cell.devices import BeamState, PointBlock
+from elastocal.errors import DeviceError, nearest
+from elastocal.sim.workcell.instruments import SampleGrid, Samples, held
+from elastocal.sim.workcell.keys import BLOCK, NoiseStream, generator
+from elastocal.sim.workcell.plant import Plant
+
+SOURCE = "simulated laser tracker"
+COVERAGE = 1.96
+"""Standard deviations within which 95 % of the samples lie."""
+AIR_TIME = 0.4
+"""Time constant of the slow noise, in s. An assumption."""
+
+
+class SimulatedTracker:
+    """One or several stations, of which one measures."""
+
+    def __init__(self, plant: Plant) -> None:
+        """Set the cell's stations up; the first one measures.
+
+        Raises
+        ------
+        DeviceError
+            If the cell has no station.
+        """
+        cell, entry = plant.cell, plant.cell.file.simulation.tracker
+        if not cell.file.trackers:
+            raise DeviceError(f"cell {cell.name} has no tracker to simulate (key 'trackers')")
+        self._plant, self._entry = plant, entry
+        self._names = tuple(tracker.name for tracker in cell.file.trackers)
+        self._T_base_station = {
+            tracker.name: _station(plant.seed, tracker.name, tracker.position_base, entry.placing)
+            for tracker in cell.file.trackers
+        }
+        self._station = self._names[0]
+        self._noise = NoiseStream(_draw(entry.turbulence, entry.rate), plant.seed)
+        self._grid, self._samples = SampleGrid(entry.rate, plant.now), Samples(6)
+        self.restart(plant.now, "HOME")
+
+    @property
+    def stations(self) -> tuple[str, ...]:
+        """Names of the stations."""
+        return self._names
+
+    @property
+    def rate(self) -> float:
+        """Nominal number of samples a second."""
+        return self._entry.rate
+
+    def look(self, station: str) -> None:
+        """Measure with this station from now on, and find the marker again if it was lost.
+
+        Raises
+        ------
+        DeviceError
+            If there is no such station.
+        """
+        if station not in self._names:
+            raise DeviceError(
+                f"{SOURCE} has no station {station!r}{nearest(station, self._names)}"
+                f" (stations: {', '.join(self._names)})"
+            )
+        self.catch_up(self._plant.now)
+        if station != self._station:
+            self._samples.drain()
+        self._station = station
+
+    def read(self) -> PointBlock:
+        """Return the positions since the last call; none while the beam is broken."""
+        now = self._plant.now
+        self.catch_up(now)
+        times, values = self._samples.drain()
+        broken = len(held(self._plant, "beam_break", np.array([now]), self._station))
+        return PointBlock(
+            time=times,
+            position=values[:, :3],
+            sigma=values[:, 3:],
+            beam=BeamState.BROKEN if broken else BeamState.LOCKED,
+            station=self._station,
+            source=SOURCE,
+        )
+
+    def T_base_station(self, station: str) -> FloatArray:
+        """Return where a station truly stands now, shape (4, 4), in m."""
+        T = self._T_base_station[station].copy()
+        for fault in self._plant.schedule.lasting("station_bumped", self._plant.visit):
+            if fault.station in (None, station):
+                T[:3, 3] += fault.offset
+        return T
+
+    def restart(self, now: int, key: str) -> None:
+        """Begin to count samples, with the noise that belongs to a key."""
+        self._grid.restart(now)
+        self._noise.restart("tracker", key)
+
+    def catch_up(self, now: int) -> None:
+        """Take the samples that are due."""
+        first, last = self._grid.due(now)
+        if first >= last:
+            return
+        times = self._grid.times(first, last)
+        T = self.T_base_station(self._station)
+        marker = (self._plant.segment.seen(times)[:, :3] - T[:3, 3]) @ T[:3, :3]
+        distance = np.sqrt(np.sum(marker**2, axis=1, keepdims=True))
+        sigma = (self._entry.noise + self._entry.noise_per_metre * distance) / COVERAGE
+        values = np.empty((len(times), 6))
+        values[:, :3] = marker + sigma * self._noise.take(first, last)
+        values[:, 3:] = sigma
+        if self._plant.schedule.any_span:
+            lost = held(self._plant, "beam_break", times, self._station)
+            times, values = np.delete(times, lost), np.delete(values, lost, axis=0)
+        if len(times):
+            self._samples.add(times, values)
+
+
+def _station(seed: int, name: str, position: FloatArray, placing: float) -> FloatArray:
+    """Return T_base_station, shape (4, 4): some way off, and turned at random."""
+    rng = generator(seed, "station", name)
+    T = np.eye(4)
+    T[:3, 3] = position + placing * rng.standard_normal(3)
+    T[:3, :3] = Rotation.random(random_state=rng).as_matrix()
+    return T
+
+
+def _draw(slow: float, rate: float):  # type: ignore[no-untyped-def]
+    """Return what draws a block of noise of unit size, shape (`BLOCK`, 3)."""
+    keep = math.exp(-1.0 / (rate * AIR_TIME))
+
+    def draw(rng: np.random.Generator) -> FloatArray:
+        fast, drive = rng.standard_normal((2, BLOCK, 3))
+        drive[1:] *= math.sqrt(1.0 - keep**2)
+        air = lfilter([1.0], [1.0, -keep], drive, axis=0)
+        noise: FloatArray = math.sqrt(1.0 - slow**2) * fast + slow * air
+        return noise
+
+    return draw
