@@ -142,7 +142,7 @@ def test_process_poses_are_read(folder, example):
         ("engagement.disk_radios", "25 mm", "'engagement.disk_radios'; did you mean 'disk_radius'"),
         ("trackers.0.positon", ["0 m"] * 3, "did you mean 'position'"),
         ("robot.modell", "x", "unknown key 'robot.modell'; did you mean 'model'"),
-        ("devices", {}, "unknown key 'devices'"),
+        ("gadgets", {}, "unknown key 'gadgets'"),
         ("load_cases.friction", 0, "load_cases.friction: Input should be greater than 0"),
         ("load_cases.friction", float("nan"), "finite number"),
         ("load_cases.safety", 0.9, "load_cases.safety: Input should be greater than or equal to 1"),

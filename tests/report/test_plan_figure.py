@@ -2,7 +2,7 @@
 
 import pytest
 
-from elastocal.errors import FileAccessError, PlanningError
+from elastocal.errors import FileAccessError, SchemaError
 from elastocal.report import write_plan_figure
 from elastocal.report.plan_figure import plan_figure
 
@@ -82,6 +82,6 @@ def test_another_suffix_is_refused(tmp_path, on_block):
 
 def test_a_pool_of_another_run_is_refused(tmp_path, on_block, plan):
     surface, _, candidates = on_block
-    with pytest.raises(PlanningError, match="not of one run"):
+    with pytest.raises(SchemaError, match="belongs to another plan"):
         write_plan_figure(tmp_path / "f.svg", surface, plan, candidates)
     assert not list(tmp_path.iterdir())

@@ -31,6 +31,7 @@ STIFFNESS = 1e6
 WEIGHT = np.array([3.0, -2.0, 588.0])
 """Of the tool and bias, sensor frame, in N."""
 BLOCK = 0.01
+NOISE = np.random.default_rng(7).standard_normal((9973, 3)).clip(-3.0, 3.0)
 
 
 class FakeClock:
@@ -110,7 +111,7 @@ class World:
             Motion.RELEASING: self._release,
         }
         moves.get(self.motion, lambda: None)()
-        self.largest_force = max(self.largest_force, float(np.linalg.norm(self.force)))
+        self.largest_force = max(self.largest_force, math.hypot(*self.force.tolist()))
 
     def _travel(self) -> None:
         self._step_towards()
@@ -122,7 +123,7 @@ class World:
 
     def _step_towards(self) -> None:
         way = self.target - self.q
-        length, step = float(np.linalg.norm(way)), self.speed * BLOCK
+        length, step = math.hypot(*way.tolist()), self.speed * BLOCK
         if length <= step:
             self.q = self.target.copy()
             if self.motion is Motion.RETRACTING:
@@ -153,7 +154,7 @@ class World:
 
 def _towards(value: np.ndarray, goal: np.ndarray, step: float) -> np.ndarray:
     way = goal - value
-    length = float(np.linalg.norm(way))
+    length = math.hypot(*way.tolist())
     return goal.copy() if length <= step else value + way * (step / length)
 
 
@@ -243,11 +244,11 @@ class _Sampled:
         if not self.silent:
             self.sample()
 
-    def noise(self, channel: int, count: int) -> np.ndarray:
+    def noise(self, channel: int) -> np.ndarray:
         """Numbers about 0 that depend on the pose and the time since it was chosen."""
         w = self.world
-        key = (w.clock.ticks - w.since) // 10_000 * 31 + channel * 1009 + (w.place % 9973)
-        return np.sin(np.arange(1, count + 1) * 12.9898 * (key % 104_729) + key % 997)
+        key = (w.clock.ticks - w.since) // 10_000 * 31 + channel * 1009 + w.place
+        return NOISE[key % len(NOISE)]
 
 
 class FakeSensor(_Sampled):
@@ -265,7 +266,7 @@ class FakeSensor(_Sampled):
     def sample(self) -> None:
         w = self.world
         self.times.append(w.clock.ticks)
-        force = w.force + WEIGHT + 0.5 * self.noise(1, 3)
+        force = w.force + WEIGHT + 0.5 * self.noise(1)
         if w.motion is Motion.HOLDING:
             force = force + np.array([0.0, 0.0, w.wobble * math.sin(9.0 * w.age)])
         if not self.frozen:
@@ -305,7 +306,7 @@ class FakeTracker(_Sampled):
         if w.beam is BeamState.BROKEN:
             return
         self.times.append(w.clock.ticks)
-        marker = w.q + [w.aside, 0.0, 0.1] + 1e-6 * (DOWN @ w.force) + self.sigma * self.noise(2, 3)
+        marker = w.q + [w.aside, 0.0, 0.1] + 1e-6 * (DOWN @ w.force) + self.sigma * self.noise(2)
         self.points.append(R_BASE_TRACKER.T @ marker)
 
     def read(self) -> PointBlock:

@@ -39,10 +39,10 @@ LOADS = {
 }
 QUICK = ProcedureSettings(
     cycle="40 ms",
-    approach_speed="100 mm/s",
-    contact_speed="10 mm/s",
+    approach_speed="250 mm/s",
+    contact_speed="20 mm/s",
     contact_force="20 N",
-    ramp="800 N/s",
+    ramp="1600 N/s",
     dwell="0.2 s",
     average="0.2 s",
     unloaded_average="0.2 s",

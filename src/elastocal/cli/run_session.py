@@ -16,7 +16,7 @@ from elastocal.cli.run_view import watching
 from elastocal.errors import ProcedureError
 from elastocal.files import read_text
 from elastocal.planning.plan_file import PLAN, PlanFile, read_plan
-from elastocal.procedure.derivation import derive
+from elastocal.procedure.derivation import derive, write_derived
 from elastocal.procedure.entries import Entry, Event, RunRecord
 from elastocal.procedure.job import End, Job, Result, Seams
 from elastocal.procedure.journal import Journal, read_journal
@@ -108,7 +108,7 @@ def run_session(job: Prepared, asked: Asked, console: Console) -> Result:
     if result.end is End.STOPPED:
         raise ProcedureError(f"{result.message}. The arm is {result.stand.value}")
     if result.end is End.DONE:
-        derive(job.folder.path)
+        write_derived(job.folder.path, derive(job.folder.path))
     return result
 
 

@@ -275,7 +275,8 @@ def options_at(
         off = contact.copy()
         off[:, :3, 3] += approach.distance * normals
         here, there = (solver.solve_many(frames, external).q for frames in (contact, off))
-        reached = np.isfinite(here).all(axis=2) & np.isfinite(there).all(axis=2)
+        # NaN where there is no solution. Half a turn: axes 4 and 6 may be given a turn apart.
+        reached = np.abs(there - here).max(axis=2) < np.pi
         point, branch = np.nonzero(reached)
         parts.append(Postures(contact[point], normals[point], here[reached], there[reached], point))
         branches.append(branch)

@@ -167,7 +167,8 @@ def check_pool_of(plan: PlanFile, data: PoolData, what: str = POOL) -> None:
             )
     for pose in plan.poses:
         row = pose.candidate
-        if data.pose_id[row] != pose.id or tuple(data.q[row].tolist()) != pose.joints:
+        same = data.pose_id[row] == pose.id and tuple(data.q[row].tolist()) == pose.joints
+        if not (same and np.allclose(data.contact[row], pose.tcp_position, rtol=0.0, atol=1e-6)):
             raise SchemaError(
                 f"{what} belongs to another plan: its candidate {row} is not pose {pose.id}"
             )

@@ -126,6 +126,7 @@ def _station(fit: StationFit, displacement: float) -> dict[str, Any]:
         "position_sigma": _numbers(fit.position_sigma),
         "residual": [_numbers(row) for row in fit.residual],
         "residual_rms": float(np.sqrt((norms**2).mean())),
+        "robot_accuracy": fit.accuracy,
         "residual_max": float(norms.max()),
         "displacement_sigma": fit.rotation_sigma * displacement,
     }

@@ -17,10 +17,9 @@ from elastocal.arrays import FloatArray
 from elastocal.errors import FileAccessError
 from elastocal.files import replacing
 from elastocal.planning.plan_file import PlanFile
-from elastocal.planning.pool_file import PoolData
+from elastocal.planning.pool_file import PoolData, check_pool_of
 from elastocal.planning.surface import Surface
 from elastocal.report import style
-from elastocal.report.belongs import check_belongs
 from elastocal.report.flat_map import FlatMap, flat_map
 from elastocal.report.panel import WIDTH, Choice, draw_panel
 
@@ -50,7 +49,7 @@ def write_plan_figure(path: Path, surface: Surface, plan: PlanFile, pool: PoolDa
 
     Raises
     ------
-    PlanningError
+    SchemaError
         If plan and pool are not of one run.
     FileAccessError
         If the suffix is another or the file cannot be written.
@@ -61,7 +60,7 @@ def write_plan_figure(path: Path, surface: Surface, plan: PlanFile, pool: PoolDa
         raise FileAccessError(
             f"figure {path}: suffix {path.suffix!r} is not one of {', '.join(SUFFIXES)}"
         )
-    check_belongs(plan, pool)
+    check_pool_of(plan, pool)
     with matplotlib.rc_context(style.print_settings()), replacing(path) as temporary:
         figure = plan_figure(surface, plan, pool)
         figure.savefig(temporary, format=suffix[1:], dpi=200, metadata=_UNDATED[suffix])

@@ -16,9 +16,9 @@ from plotly.offline import get_plotlyjs
 from elastocal.cell import Cell
 from elastocal.files import write_text
 from elastocal.planning.plan_file import PlanFile, PoseRecord
-from elastocal.planning.pool_file import PoolData
+from elastocal.planning.pool_file import PoolData, check_pool_of
 from elastocal.planning.surface import Surface
-from elastocal.report.belongs import check_belongs, check_robot
+from elastocal.report.belongs import check_robot
 from elastocal.report.text import duration, millimetres, readable
 from elastocal.report.view import View, plan_view
 from elastocal.report.weakest import weakest
@@ -45,12 +45,14 @@ def write_plan_page(
 
     Raises
     ------
+    SchemaError
+        If plan and pool are not of one run.
     PlanningError
-        If plan and pool are not of one run, or the robot of the cell is another.
+        If the robot of the cell is another.
     FileAccessError
         If the page cannot be written.
     """
-    check_belongs(plan, pool)
+    check_pool_of(plan, pool)
     check_robot(plan, cell)
     write_text(path, _page(plan_view(cell, surface, plan, pool), plan, pool))
     return Path(path)

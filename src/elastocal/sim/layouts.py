@@ -184,5 +184,6 @@ def across(axis: FloatArray) -> list[FloatArray]:
 
 
 def triple(vector: FloatArray) -> tuple[float, float, float]:
+    """Return a vector of three as plain numbers."""
     x, y, z = (float(value) for value in vector)
     return x, y, z

@@ -6,6 +6,7 @@ The estimator chains link frames instead, so the two share no equation.
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +25,17 @@ class Screws:
     """A point on each axis, in base with the arm at zero, shape (element, 3), in m."""
     revolute: BoolArray
     """Whether each turns (else it slides), shape (element,)."""
+
+    @cached_property
+    def wedge(self) -> FloatArray:
+        """Matrices of the cross product with the axes, shape (element, 3, 3)."""
+        return np.cross(self.axis[:, None, :], np.eye(3)).transpose(0, 2, 1)
+
+    @cached_property
+    def wedge_squared(self) -> FloatArray:
+        """Their squares, shape (element, 3, 3)."""
+        squared: FloatArray = self.wedge @ self.wedge
+        return squared
 
 
 def motions(screws: Screws, positions: FloatArray) -> FloatArray:
@@ -76,8 +88,8 @@ def _exponentials(screws: Screws, positions: FloatArray) -> FloatArray:
     """Return exp(S_e x_e) by Rodrigues' formula, shape (element, batch, 4, 4)."""
     angle = np.where(screws.revolute, positions, 0.0).T[..., None, None]
     slide = np.where(screws.revolute, 0.0, positions).T[..., None]
-    wedge = np.cross(screws.axis[:, None, :], np.eye(3)).transpose(0, 2, 1)
-    rotation = np.sin(angle) * wedge[:, None] + (1.0 - np.cos(angle)) * (wedge @ wedge)[:, None]
+    rotation = np.sin(angle) * screws.wedge[:, None]
+    rotation += (1.0 - np.cos(angle)) * screws.wedge_squared[:, None]
     steps = np.zeros((*angle.shape[:2], 4, 4))
     steps[..., :3, :3] = rotation + np.eye(3)
     steps[..., :3, 3] = -(rotation @ screws.point[:, None, :, None])[..., 0]

@@ -32,8 +32,8 @@ class Ways:
 
     The *stem* of a pose is its free way to HOME with at most one via pose: none, the pose lifted
     off along its normal, a point about the way, or another pose that leads straight to HOME. A
-    pose without a stem cannot be visited. Two poses with stems always have a way: through HOME, with at most three
-    via poses.
+    pose without a stem cannot be visited. Two poses with stems always have a way: through HOME,
+    with at most three via poses.
     """
 
     mover: Mover

@@ -16,6 +16,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from elastocal.arrays import FloatArray, IndexArray
+from elastocal.procedure.registration.geometry import align
 from elastocal.procedure.registration.readings import UnloadedReadings
 
 LEVER_SIGMA = 5e-3
@@ -41,8 +42,8 @@ class Fit:
     """Translation of each group, shape (group, 3), in m."""
     lever: FloatArray
     """Shape (3,), in m."""
-    residual: FloatArray
-    """Measured minus expected marker, robot errors not taken out, in base, shape (reading, 3)."""
+    errors: FloatArray
+    """Robot errors, in standard deviations, shape (error,)."""
     scatter: float
     """In m."""
     weight: FloatArray
@@ -122,35 +123,24 @@ def _gauss_newton(
     residual = _residual(readings, group, R, t, lever)
     e = _right_side(readings, residual, errors, weight, lever - lever_prior)
     A = _equations(readings, group, R, weight)
-    return Fit(group, R, t, lever, residual, scatter, weight, A, e)
+    return Fit(group, R, t, lever, errors, scatter, weight, A, e)
 
 
 def _start(
     readings: UnloadedReadings, group: IndexArray, lever: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Return rotations and translations for a given lever arm (Kabsch 1976)."""
-    wanted = _expected(readings, lever)
-    R, t = [], []
-    for number in range(int(group.max()) + 1):
-        mine = group == number
-        here, there = readings.position[mine], wanted[mine]
-        u, _, vt = np.linalg.svd((there - there.mean(0)).T @ (here - here.mean(0)))
-        R.append(u @ np.diag([1.0, 1.0, np.linalg.det(u @ vt)]) @ vt)
-        t.append(there.mean(0) - R[-1] @ here.mean(0))
-    return np.array(R), np.array(t)
-
-
-def _expected(readings: UnloadedReadings, lever: FloatArray) -> FloatArray:
-    """Return where the marker should be by the controller, in base, shape (reading, 3), in m."""
-    T = readings.T_base_tcp
-    return T[:, :3, 3] + T[:, :3, :3] @ lever
+    """Return rotations and translations for a given lever arm."""
+    expected = readings.expected(lever)
+    members = [group == number for number in range(int(group.max()) + 1)]
+    placed = [align(readings.position[mine], expected[mine]) for mine in members]
+    return np.array([R for R, _ in placed]), np.array([t for _, t in placed])
 
 
 def _residual(
     readings: UnloadedReadings, group: IndexArray, R: FloatArray, t: FloatArray, lever: FloatArray
 ) -> FloatArray:
     measured = np.einsum("nij,nj->ni", R[group], readings.position) + t[group]
-    residual: FloatArray = measured - _expected(readings, lever)
+    residual: FloatArray = measured - readings.expected(lever)
     return residual
 
 

@@ -27,6 +27,19 @@ def determined(position: FloatArray, scatter: float) -> bool:
     return rotation_sigma(position, scatter) <= ROTATION_SIGMA
 
 
+def align(here: FloatArray, there: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return the rotation and translation that bring points nearest to others (Kabsch 1976).
+
+    Parameters
+    ----------
+    here, there : ndarray, shape (point, 3)
+        In m.
+    """
+    u, _, vt = np.linalg.svd((there - there.mean(axis=0)).T @ (here - here.mean(axis=0)))
+    R: FloatArray = u @ np.diag([1.0, 1.0, np.linalg.det(u @ vt)]) @ vt
+    return R, there.mean(axis=0) - R @ here.mean(axis=0)
+
+
 def rotation_sigma(position: FloatArray, scatter: float) -> float:
     """Return the standard deviation of the rotation about the points' own line, in rad."""
     if len(position) < 3:

@@ -24,7 +24,7 @@ from elastocal.procedure.registration.fit import (
 from elastocal.procedure.registration.geometry import determined
 from elastocal.procedure.registration.readings import UnloadedReadings
 
-CHANCE = 1e-3
+CHANCE = 1e-4
 """Largest probability that a run without any move or blunder is said to have one."""
 LEAST_MOVE = 50e-6
 """Smallest shift of the marker that is called a move or a blunder, in m: less does no harm."""

@@ -40,6 +40,12 @@ class UnloadedReadings:
             self.robot_error[rows],
         )
 
+    def expected(self, lever: FloatArray) -> FloatArray:
+        """Return where the marker is by the controller, in base, shape (reading, 3), in m."""
+        T = self.T_base_tcp
+        place: FloatArray = T[:, :3, 3] + T[:, :3, :3] @ lever
+        return place
+
     @property
     def variance(self) -> FloatArray:
         """Variance of a coordinate of each reading, shape (reading,), in m²."""

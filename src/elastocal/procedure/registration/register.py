@@ -3,14 +3,14 @@
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from elastocal.arrays import FloatArray, IndexArray
+from elastocal.arrays import BoolArray, FloatArray, IndexArray
 from elastocal.procedure.registration.fit import (
     DEFAULT_SCATTER,
     LEVER_SIGMA,
     Fit,
     fit,
 )
-from elastocal.procedure.registration.geometry import determined
+from elastocal.procedure.registration.geometry import align, determined
 from elastocal.procedure.registration.moves import Finding, find
 from elastocal.procedure.registration.readings import UnloadedReadings
 from elastocal.procedure.registration.result import (
@@ -63,7 +63,7 @@ def register(readings: UnloadedReadings, lever_prior: FloatArray) -> Registratio
             group[(group == group[row]) & (np.arange(len(group)) >= row)] = group.max() + 1
         else:
             kept[row] = False
-    stations = _stations(readings, group, result)
+    stations = _stations(readings, group, kept, result)
     lever_sigma = np.sqrt(np.diag(result.covariance)[result.lever_columns])
     return Registration(
         stations=stations,
@@ -105,7 +105,9 @@ def _undetermined(sigma: FloatArray) -> tuple[str, ...]:
     return tuple(axis for axis, is_free in zip("xyz", free, strict=True) if is_free)
 
 
-def _stations(readings: UnloadedReadings, group: IndexArray, result: Fit) -> tuple[StationFit, ...]:
+def _stations(
+    readings: UnloadedReadings, group: IndexArray, kept: BoolArray, result: Fit
+) -> tuple[StationFit, ...]:
     covariance = result.covariance
     fits = []
     for number, label in enumerate(np.unique(group[group >= 0]).tolist()):
@@ -120,16 +122,24 @@ def _stations(readings: UnloadedReadings, group: IndexArray, result: Fit) -> tup
                 T_base_tracker=T,
                 rotation_sigma=float(np.sqrt(np.linalg.eigvalsh(block[:3, :3])[-1])),
                 position_sigma=np.sqrt(np.diag(block)[3:]),
-                residual=_residual(readings.take(rows), T, result.lever),
+                residual=_residual(readings.take(rows), T, result),
+                accuracy=_accuracy(readings.take(rows[kept[rows]]), result.lever),
             )
         )
     return tuple(fits)
 
 
-def _residual(readings: UnloadedReadings, T: FloatArray, lever: FloatArray) -> FloatArray:
-    expected = readings.T_base_tcp[:, :3, 3] + readings.T_base_tcp[:, :3, :3] @ lever
+def _residual(readings: UnloadedReadings, T: FloatArray, result: Fit) -> FloatArray:
+    expected = readings.expected(result.lever) + readings.robot_error @ result.errors
     residual: FloatArray = readings.position @ T[:3, :3].T + T[:3, 3] - expected
     return residual
+
+
+def _accuracy(readings: UnloadedReadings, lever: FloatArray) -> float:
+    expected = readings.expected(lever)
+    R, t = align(readings.position, expected)
+    off = readings.position @ R.T + t - expected
+    return float(np.sqrt((off**2).sum(axis=1).mean()))
 
 
 def _move(

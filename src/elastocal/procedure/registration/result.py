@@ -21,8 +21,11 @@ class StationFit:
     """Standard deviation of the marker's place that the transform gives, at the centre of the
     poses, in base, shape (3,), in m."""
     residual: FloatArray
-    """Measured minus expected marker position of each pose, in base, shape (pose, 3), in m; the
-    robot's own errors are in it."""
+    """Measured minus expected marker position of each pose, likely errors of the robot taken
+    out, in base, shape (pose, 3), in m."""
+    accuracy: float
+    """Root mean square distance of the marker from where the controller has it, after the best
+    rigid fit of all poses that were not set aside, in m: what the robot's own errors make."""
 
 
 @dataclass(frozen=True)

@@ -5,6 +5,7 @@ one speed throughout; a stop takes no time; free motion shakes the friction out 
 """
 
 import math
+from functools import partial
 
 import numpy as np
 
@@ -129,7 +130,7 @@ class SimulatedArm:
         plant.run(guarded.way, law, (Motion.APPROACHING, after), start, fault=guarded.fault)
         if self._approaches == 1 and not guarded.felt:
             segment = plant.segment
-            plant.later(segment.end, lambda: self._reference(segment))
+            plant.later(segment.end, partial(self._reference, segment))
 
     def hold(self, force_tcp: FloatArray, rate: float) -> None:
         """Start to build up a force and hold it; see `RobotArm.hold`."""
@@ -225,11 +226,10 @@ class SimulatedArm:
     def _begin(self, step: str, load: int = 0) -> None:
         plant = self._plant
         for time, fault in plant.schedule.begin(step, plant.visit, load, plant.now):
-            segment = plant.segment
             if fault.kind == "slip":
-                plant.later(time, lambda f=fault, s=segment: self._control.let_slip(f, s))
+                plant.later(time, partial(self._control.let_slip, fault, plant.segment))
             else:
-                plant.later(time, lambda f=fault: self._break_down(f))
+                plant.later(time, partial(self._break_down, fault))
 
     def _break_down(self, fault: Fault) -> None:
         self._fault = "stopped by the safety controller"

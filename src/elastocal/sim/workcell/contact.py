@@ -68,7 +68,8 @@ class ContactLaw:
     def held(self, force_tcp: FloatArray) -> FloatArray:
         """Return the force that friction lets build up, shape (3,), in N."""
         part = min(1.0, LIMIT / max(self.effort(force_tcp), 1e-12))
-        return force_tcp * (part, part, 1.0)
+        held: FloatArray = force_tcp * np.array([part, part, 1.0])
+        return held
 
     def shear(self, force_tcp: FloatArray) -> FloatArray:
         """Return how far the tool goes sideways, tcp frame, shape (3,), in m."""
@@ -76,7 +77,8 @@ class ContactLaw:
         if effort == 0.0:
             return np.zeros(3)
         growth = 1.5 * (1.0 - (1.0 - min(effort, LIMIT)) ** (2.0 / 3.0)) / effort
-        return -growth / self.shear_stiffness * force_tcp * (1.0, 1.0, 0.0)
+        shear: FloatArray = -growth / self.shear_stiffness * force_tcp * np.array([1.0, 1.0, 0.0])
+        return shear
 
     def slip_sigma(self, force_tcp: FloatArray) -> float:
         """Return the standard deviation of the random slip, in m."""
@@ -101,7 +103,7 @@ class Contact:
     def tool_position(self, force_base: FloatArray) -> FloatArray:
         """Return where the tool is under a force on the robot, in base, shape (3,), in m."""
         force_tcp = self.R_base_tcp.T @ force_base
-        sunk = -force_tcp * (0.0, 0.0, 1.0) / self.law.normal_stiffness
+        sunk = -force_tcp * np.array([0.0, 0.0, 1.0]) / self.law.normal_stiffness
         tooling = -self.normal * (self.normal @ force_base) / self.law.tooling_stiffness
         moved: FloatArray = self.R_base_tcp @ (sunk + self.law.shear(force_tcp)) + tooling
         return self.anchor + moved

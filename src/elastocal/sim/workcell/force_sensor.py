@@ -8,13 +8,13 @@ ranges of the axes, itself too (gain). The drift counts from the last restart.
 
 import numpy as np
 
-from elastocal.arrays import FloatArray
+from elastocal.arrays import FloatArray, IndexArray
 from elastocal.cell import Cell
 from elastocal.cell.devices import SensorStatus, WrenchBlock
 from elastocal.errors import DeviceError
 from elastocal.sim.workcell.clock import MICROSECONDS
 from elastocal.sim.workcell.instruments import SampleGrid, Samples, held
-from elastocal.sim.workcell.keys import NoiseStream, generator
+from elastocal.sim.workcell.keys import BLOCK, NoiseStream, generator
 from elastocal.sim.workcell.plant import Plant
 from elastocal.sim.workcell.segment import Segment
 
@@ -33,7 +33,7 @@ class SimulatedForceSensor:
         zero = generator(plant.seed, "sensor", "zero").standard_normal(6)
         self._zero = entry.bias * self._range * zero
         sigma = np.repeat([entry.force_noise, entry.moment_noise], 3)
-        self._noise = NoiseStream(lambda rng: sigma * rng.standard_normal((512, 6)), plant.seed)
+        self._noise = NoiseStream(lambda rng: sigma * rng.standard_normal((BLOCK, 6)), plant.seed)
         self._grid, self._samples = SampleGrid(entry.rate, plant.now), Samples(6)
         self._still: tuple[Segment, FloatArray] | None = None
         self._last = np.zeros(6)
@@ -86,31 +86,27 @@ class SimulatedForceSensor:
             self._last = values[-1]
             self._samples.add(times, values)
 
-    def _true(self, times: "np.ndarray[tuple[int], np.dtype[np.intp]]") -> FloatArray:
+    def _true(self, times: IndexArray) -> FloatArray:
         """Return readings without noise and drift, shape (sample or 1, 6)."""
         segment = self._plant.segment
         if self._still is not None and self._still[0] is segment:
             return self._still[1]
-        seen = segment.seen(times)[:, 3:]
+        seen = segment.wrench(times)
         reading: FloatArray = seen @ self._matrix.T + self._zero
         if len(seen) == 1 and times[0] >= segment.end and segment.ripple is None:
             self._still = (segment, reading)
         return reading
 
-    def _clipped(
-        self, times: "np.ndarray[tuple[int], np.dtype[np.intp]]", values: FloatArray
-    ) -> FloatArray:
+    def _clipped(self, times: IndexArray, values: FloatArray) -> FloatArray:
         """Keep the readings within the ranges, and notice when they were not."""
-        forced = held(self._plant, "ft_saturation", times)
-        values[forced, 2] = 2.0 * self._range[2]
+        if self._plant.schedule.any_span:
+            values[held(self._plant, "ft_saturation", times), 2] = 2.0 * self._range[2]
         if np.any(np.abs(values) > self._range):
             self._saturated = True
             return np.clip(values, -self._range, self._range)
         return values
 
-    def _with_faults(
-        self, times: "np.ndarray[tuple[int], np.dtype[np.intp]]", values: FloatArray
-    ) -> tuple["np.ndarray[tuple[int], np.dtype[np.intp]]", FloatArray]:
+    def _with_faults(self, times: IndexArray, values: FloatArray) -> tuple[IndexArray, FloatArray]:
         frozen = held(self._plant, "ft_frozen", times)
         if len(frozen):
             values[frozen] = values[frozen[0] - 1] if frozen[0] > 0 else self._last

@@ -110,11 +110,13 @@ class Plant:
     def stop_error(self) -> FloatArray:
         """Return the error of the next stop, shape (3,), in m."""
         self._drawn += 1
-        return self._stops[self._drawn % _DRAWS]
+        error: FloatArray = self._stops[self._drawn % _DRAWS]
+        return error
 
     def slip(self, load: int) -> FloatArray:
         """Return the random slip of a load case in standard deviations, shape (2,)."""
-        return self._slips[load % _DRAWS]
+        slip: FloatArray = self._slips[load % _DRAWS]
+        return slip
 
     def switch(self, segment: Segment) -> None:
         """Go over to another segment now."""
@@ -201,7 +203,7 @@ class Plant:
 
 
 def _unit_wrench(robot: TrueRobot) -> FloatArray:
-    """Return the wrench at the sensor, in its frame, of 1 N that presses on the tool, shape (6,)."""
+    """Return the wrench of 1 N that presses on the tool, sensor frame, shape (6,)."""
     T_sensor_tcp = inverse_transform(robot.T_tcp_sensor)
     force = -T_sensor_tcp[:3, 2]
     return np.concatenate([force, np.cross(T_sensor_tcp[:3, 3], force)])

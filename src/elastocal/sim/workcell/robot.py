@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from elastocal.arrays import FloatArray
+from elastocal.arrays import FloatArray, IndexArray
 from elastocal.cell import Cell
 from elastocal.robot.inverse.frames import inverse_transform
 from elastocal.sim.newton import minimise
@@ -50,7 +50,7 @@ class TrueRobot:
     T_tcp_sensor: FloatArray
     """Sensor in the tcp frame of the undeformed robot, shape (4, 4)."""
     _points: FloatArray = field(init=False, repr=False)
-    _after: "np.ndarray[tuple[int], np.dtype[np.intp]]" = field(init=False, repr=False)
+    _after: IndexArray = field(init=False, repr=False)
     _weights: FloatArray = field(init=False, repr=False)
 
     def __post_init__(self) -> None:

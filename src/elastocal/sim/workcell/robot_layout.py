@@ -16,7 +16,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from elastocal.arrays import FloatArray
+from elastocal.arrays import FloatArray, IndexArray
 from elastocal.cell import Cell
 from elastocal.cell.description.simulation_truth import Gears
 from elastocal.errors import DeviceError
@@ -109,9 +109,7 @@ def _robot_springs(
     return RobotSprings(stiffness, laws, None, balancer, int(which[1]), 0.0)
 
 
-def gear_laws(
-    entry: Gears, which: "np.ndarray[tuple[int], np.dtype[np.intp]]", stiffness: FloatArray
-) -> GearLaws:
+def gear_laws(entry: Gears, which: IndexArray, stiffness: FloatArray) -> GearLaws:
     """Return growth, backlash and friction of gears.
 
     Parameters
@@ -171,9 +169,7 @@ def _floor(linkage: Linkage, external: int, tilt: float) -> list[TruthSpring]:
     foot = point - axis * (axis @ point)
     at = triple(T_base_joint[:3, :3].T @ (foot - point))
     name = linkage.joint_names[external]
-    return [
-        TruthSpring(name, triple(T_base_joint[k, :3]), Linear(tilt), at=at) for k in range(3)
-    ]
+    return [TruthSpring(name, triple(T_base_joint[k, :3]), Linear(tilt), at=at) for k in range(3)]
 
 
 def _tilts(linkage: Linkage, joint: int, stiffness: FloatArray) -> list[TruthSpring]:

@@ -80,6 +80,11 @@ class Schedule:
                 moments.append((start, fault))
         return moments
 
+    @property
+    def any_span(self) -> bool:
+        """Whether there is any span to look at."""
+        return bool(self._spans)
+
     def at(self, visit: int) -> list[Fault]:
         """Return the faults of a visit."""
         return [f for f in self._faults if 0 <= visit - f.pose < f.visits]

@@ -5,10 +5,11 @@ interpolated along the progress of the movement.
 """
 
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 
-from elastocal.arrays import FloatArray
+from elastocal.arrays import FloatArray, IndexArray
 from elastocal.cell.devices import Motion
 from elastocal.sim.workcell.clock import MICROSECONDS, to_microseconds
 from elastocal.sim.workcell.springs import RobotSprings
@@ -34,6 +35,10 @@ class Knots:
 
     def at(self, array: FloatArray, progress: FloatArray) -> FloatArray:
         """Return one of the arrays between the knots, shape (time, column)."""
+        if len(self.progress) == 2:
+            part = progress[:, None]
+            direct: FloatArray = (1.0 - part) * array[0] + part * array[1]
+            return direct
         after = np.clip(
             np.searchsorted(self.progress, progress, "right"), 1, len(self.progress) - 1
         )
@@ -86,7 +91,7 @@ class Segment:
     ripple_wrench: FloatArray = field(default_factory=lambda: np.zeros(6))
     """Wrench at the sensor per N of the ripple, sensor frame, shape (6,)."""
 
-    @property
+    @cached_property
     def end(self) -> int:
         """When it is done, in µs."""
         return self.begin + to_microseconds(self.law.duration)
@@ -97,15 +102,20 @@ class Segment:
             return 1.0
         return float(self.law.at((now - self.begin) / MICROSECONDS))
 
-    def seen(self, times: "np.ndarray[tuple[int], np.dtype[np.int64]]") -> FloatArray:
-        """Return what instruments see at times in µs, shape (time or 1, 9); 1: it stands."""
-        if times[0] >= self.end and self.ripple is None:
-            return self.knots.seen[-1:]
-        since = (times - self.begin) / MICROSECONDS
+    def marker(self, times: IndexArray) -> FloatArray:
+        """Return where the marker is at times in µs, shape (time or 1, 3); 1: it stands."""
+        return self._between(times)[:, :3]
+
+    def wrench(self, times: IndexArray) -> FloatArray:
+        """Return the true wrench at the sensor, shape (time or 1, 6); 1: it does not change."""
+        wrench = self._between(times)[:, 3:]
+        if self.ripple is None:
+            return wrench
+        ripple = self.ripple.at((times - self.begin) / MICROSECONDS)
+        unrest: FloatArray = ripple[:, None] * self.ripple_wrench
+        return wrench + unrest
+
+    def _between(self, times: IndexArray) -> FloatArray:
         if times[0] >= self.end:
-            seen = np.repeat(self.knots.seen[-1:], len(times), axis=0)
-        else:
-            seen = self.knots.at(self.knots.seen, self.law.at(since))
-        if self.ripple is not None:
-            seen[:, 3:] += self.ripple.at(since)[:, None] * self.ripple_wrench
-        return seen
+            return self.knots.seen[-1:]
+        return self.knots.at(self.knots.seen, self.law.at((times - self.begin) / MICROSECONDS))

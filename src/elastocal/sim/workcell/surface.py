@@ -41,11 +41,11 @@ class TrueSurface:
         """
         path = cell.surface_path
         try:
-            mesh = trimesh.load(path, force="mesh", process=False)
+            mesh = trimesh.load_mesh(path, process=False)
         except (OSError, ValueError) as error:
             raise FileAccessError(f"cannot read {path}: {error}") from error
         T = cell.T_base_surface
-        corners = cell.file.surface.metres * np.asarray(mesh.triangles, dtype=float)
+        corners = cell.file.surface.metres * np.asarray(mesh.triangles, dtype=np.float64)
         offset = np.array(cell.file.simulation.contact.surface_offset)
         return cls(corners @ T[:3, :3].T + T[:3, 3] + offset)
 

@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike
 
 from elastocal.arrays import FloatArray
 
-SETTLED = 1e-6
+SETTLED = 1e-5
 """What is left of a settling force that counts as nothing, over its change."""
 
 

@@ -6,6 +6,7 @@ part of it comes from moving air and changes slowly, as a first-order process of
 """
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 from scipy.signal import lfilter
@@ -113,7 +114,7 @@ class SimulatedTracker:
             return
         times = self._grid.times(first, last)
         T = self.T_base_station(self._station)
-        marker = (self._plant.segment.seen(times)[:, :3] - T[:3, 3]) @ T[:3, :3]
+        marker = (self._plant.segment.marker(times) - T[:3, 3]) @ T[:3, :3]
         distance = np.sqrt(np.sum(marker**2, axis=1, keepdims=True))
         sigma = (self._entry.noise + self._entry.noise_per_metre * distance) / COVERAGE
         values = np.empty((len(times), 6))
@@ -135,7 +136,7 @@ def _station(seed: int, name: str, position: FloatArray, placing: float) -> Floa
     return T
 
 
-def _draw(slow: float, rate: float):  # type: ignore[no-untyped-def]
+def _draw(slow: float, rate: float) -> Callable[[np.random.Generator], FloatArray]:
     """Return what draws a block of noise of unit size, shape (`BLOCK`, 3)."""
     keep = math.exp(-1.0 / (rate * AIR_TIME))
 

@@ -45,9 +45,7 @@ def line_way(statics: Quasistatics, stands: list[Stand]) -> Way:
         out, but for the last.
     """
     T = statics.robot.forward(np.stack([stand.q for stand in stands]))
-    at = np.concatenate(
-        [[0.0], np.cumsum(np.linalg.norm(np.diff(T[:, :3, 3], axis=0), axis=1))]
-    )
+    at = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(T[:, :3, 3], axis=0), axis=1))])
     at = at / at[-1] if at[-1] > 0.0 else np.linspace(0.0, 1.0, len(stands))
     fine = np.unique(np.concatenate([at, np.linspace(0.0, 1.0, _STEPS + 1)]))
     columns = (
