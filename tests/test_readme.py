@@ -7,9 +7,14 @@ import re
 import shlex
 from dataclasses import dataclass
 from pathlib import Path
+from typing import get_args
 
 import pytest
+from pydantic import BaseModel
+from pydantic.fields import FieldInfo
 
+from elastocal.cell import CellFile
+from elastocal.cell.fingerprint import RUN_SECTIONS
 from support.cli import Result, elastocal
 
 ROOT = Path(__file__).parents[1]
@@ -48,14 +53,20 @@ def toured(tmp_path_factory):
 
 def test_the_tour_has_the_lines_that_a_new_user_needs():
     commands = {shlex.split(line)[1] for line in shell_lines()}
-    assert commands == {"demo", "check", "calibrate", "predict", "robots"}
+    assert commands == {"demo", "check", "calibrate", "predict", "robots", "init", "plan"}
     assert len(blocks("python")) == len(blocks("text")) == 1
 
 
 def test_every_shell_line_of_the_tour_is_done(toured):
     failed = {line: result.err for line, result in toured.results.items() if result.code != 0}
     assert not failed
-    for name in ("model.json", "six.json", "without.json", "predicted.csv"):
+    for name in (
+        "model.json",
+        "six.json",
+        "without.json",
+        "predicted.csv",
+        "afp/plan/plan.html",
+    ):
         assert (toured.folder / name).is_file(), name
 
 
@@ -121,14 +132,55 @@ def test_the_refusals_that_the_docs_quote_are_those_of_the_code():
     assert not [text for text in quoted if not any(text in message for message in known)]
 
 
-@pytest.mark.parametrize("package", ["robot", "elastic", "dataset", "identification"])
-def test_every_public_name_has_an_entry_in_the_reference(package):
+@pytest.mark.parametrize(
+    ("package", "page"),
+    [
+        ("robot", "robot"),
+        ("elastic", "elastic"),
+        ("dataset", "dataset"),
+        ("identification", "identification"),
+        ("cell", "cell"),
+        ("planning/checks", "planning"),
+        ("planning/export", "planning"),
+        ("planning/motion", "planning"),
+        ("planning/search", "planning"),
+        ("planning/surface", "planning"),
+    ],
+)
+def test_every_public_name_has_an_entry_in_the_reference(package, page):
     tree = ast.parse((ROOT / f"src/elastocal/{package}/__init__.py").read_text(encoding="utf-8"))
     (exported,) = (
         ast.literal_eval(node.value)
         for node in tree.body
         if isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) == "__all__"
     )
-    page = (ROOT / f"docs/reference/api/{package}.md").read_text(encoding="utf-8")
-    shown = re.findall(r"^\s*- (\w+)$|^::: [\w.]+\.(\w+)$", page, flags=re.MULTILINE)
+    text = (ROOT / f"docs/reference/api/{page}.md").read_text(encoding="utf-8")
+    shown = re.findall(r"^\s*- (\w+)$|^::: [\w.]+\.(\w+)$", text, flags=re.MULTILINE)
     assert set(exported) <= {name for pair in shown for name in pair}
+
+
+def test_every_key_of_the_cell_file_that_the_planner_reads_is_in_the_reference():
+    page = (ROOT / "docs/reference/files.md").read_text(encoding="utf-8")
+    section = page.split("## Cell .yaml")[1].split("\n## ")[0]
+    shown = {
+        word for code in re.findall(r"`([^`]+)`", section) for word in re.findall(r"\w+", code)
+    }
+    planned = [name for name in CellFile.model_fields if name not in RUN_SECTIONS]
+    keys = {*planned, *(key for name in planned for key in keys_in(CellFile.model_fields[name]))}
+    assert len(keys) > 60
+    assert keys <= shown
+
+
+def keys_in(field: FieldInfo) -> set[str]:
+    """Return the names of all keys below a key, without their paths."""
+    found: set[str] = set()
+    for model in models_in(field.annotation):
+        found |= set(model.model_fields)
+        found |= {key for inner in model.model_fields.values() for key in keys_in(inner)}
+    return found
+
+
+def models_in(annotation: object) -> list[type[BaseModel]]:
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        return [annotation]
+    return [model for part in get_args(annotation) for model in models_in(part)]

@@ -217,3 +217,19 @@ def test_load_rows_know_moments(tmp_path):
     rows = read_load_rows(path, {"a": "angle"})
     assert rows.moment is not None
     np.testing.assert_allclose(rows.moment, [[1.0, 0.0, 0.0]])
+
+
+def test_calibrate_takes_the_marker_of_the_dataset_unless_told_otherwise(folder, tmp_path):
+    data = dataset.read(folder / "data.nc").data.copy(deep=True)
+    data.attrs["marker"] = "0.0 m, 0.03 m, -0.02 m"
+    dataset.write(dataset.Dataset(data), tmp_path / "marked.nc")
+
+    def residual(*options: str) -> dict[str, float]:
+        out = tmp_path / "m.json"
+        result = elastocal("calibrate", tmp_path / "marked.nc", "--out", out, "--json", *options)
+        assert result.code == 0, result.err
+        return json.loads(result.out)["residual"]
+
+    told = residual("--marker", "0 mm, 30 mm, -20 mm")
+    assert residual() == told
+    assert residual("--marker", "0 mm, 0 mm, 0 mm") != told

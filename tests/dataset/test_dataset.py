@@ -165,3 +165,17 @@ def test_a_selection_that_cannot_be_made_is_refused(selection, message):
     with pytest.raises(DatasetError) as caught:
         dataset().select(**selection)
     assert str(caught.value).startswith(message)
+
+
+def test_a_marker_is_kept_to_the_last_digit():
+    marker = (0.1, -1.0 / 3.0, 1e-17)
+    assert dataset(marker=marker).marker == marker
+    assert dataset().marker is None
+
+
+@pytest.mark.parametrize("text", ["", "0 m, 1 m", "0, 0, 0.1", "0 m, 0 m, 3 kg"])
+def test_a_marker_that_is_not_three_lengths_is_refused(text):
+    data = labelled()
+    data.attrs["marker"] = text
+    with pytest.raises(DatasetError, match=r"attribute 'marker' is .* it must be three lengths"):
+        Dataset(data)

@@ -97,3 +97,17 @@ def test_datasets_of_another_kind_are_refused(changes, message):
 def test_merging_nothing_is_refused():
     with pytest.raises(DatasetError, match=r"^nothing to merge: give at least one dataset$"):
         merge([])
+
+
+def test_markers_that_are_estimated_alike_are_the_same():
+    near = [
+        dataset(marker=(0.1, 0.0, z), poses=(k, k + 3, k + 6)) for k, z in ((0, 0.05), (1, 0.0505))
+    ]
+    assert merge(near).marker == (0.1, 0.0, 0.05)
+
+
+@pytest.mark.parametrize("other", [None, (0.1, 0.0, 0.06)])
+def test_datasets_of_different_markers_are_refused(other):
+    parts = [dataset(marker=(0.1, 0.0, 0.05)), dataset(marker=other)]
+    with pytest.raises(DatasetError, match=r"datasets 0 and 1 have different markers: .*0.05 m"):
+        merge(parts, relabel=True)

@@ -9,7 +9,7 @@ from html.parser import HTMLParser
 import numpy as np
 import pytest
 
-from elastocal.errors import FileAccessError, PlanningError
+from elastocal.errors import FileAccessError, PlanningError, SchemaError
 from elastocal.report import write_plan_page
 from support import plans
 

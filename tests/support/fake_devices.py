@@ -83,6 +83,8 @@ class World:
     wobble: float = 0.0
     """Amplitude of a force that never settles, in N."""
     commands: list[str] = field(default_factory=list)
+    contacts_kept: int = 0
+    """How often a move or another approach was begun without a retract after contact."""
     largest_force: float = 0.0
     faults: list[Callable[["World"], None]] = field(default_factory=list)
     holds: int = 0
@@ -99,7 +101,7 @@ class World:
         return (self.clock.ticks - self.since) / 1e6
 
     def tick(self) -> None:
-        for change in self.faults:
+        for change in tuple(self.faults):
             change(self)
         if self.fault is not None and self.motion is not Motion.DISARMED:
             self.motion = Motion.STOPPED
@@ -188,6 +190,7 @@ class FakeArm:
     def move_joints(self, q: np.ndarray, speed: float) -> None:
         self._command("move", Motion.IDLE)
         w = self.world
+        w.contacts_kept += w.in_contact
         w.target, w.speed, w.motion = np.array(q), speed, Motion.MOVING
         w.since, w.place, w.holds = w.clock.ticks, hash(tuple(np.round(q, 9))), 0
         w.visits, w.aside = w.visits + 1, 0.0
@@ -197,6 +200,7 @@ class FakeArm:
     ) -> None:
         self._command("approach", Motion.IDLE)
         w = self.world
+        w.contacts_kept += w.in_contact
         w.target, w.speed, w.guard = w.q + distance * direction_base, speed, contact_force
         w.motion = Motion.APPROACHING
 

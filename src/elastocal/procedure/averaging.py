@@ -88,7 +88,7 @@ def average(streams: Streams, window: Window) -> Reading:
     at_arm = _inside(arm.time, window)
     at_wrench = _inside(wrench.time, window) & wrench.ok & _finite(wrench.force, wrench.moment)
     at_point = _inside(points.time, window) & _finite(points.position)
-    at_point &= np.array([name == window.station for name in points.station], dtype=bool)
+    at_point &= points.station == (window.station or "")
     stated = wrench.force_sigma[at_wrench, None]
     force = _mean(wrench.time[at_wrench], wrench.force[at_wrench], stated)
     moment = _mean(wrench.time[at_wrench], wrench.moment[at_wrench])

@@ -4,6 +4,7 @@ An entry that is on the disk is complete: a line that a crash has torn is known 
 and cut off before the next entry is written.
 """
 
+import errno
 import fcntl
 import os
 from collections.abc import Callable
@@ -80,15 +81,17 @@ class Journal:
         """
         entry = Entry(n=self._count, time=time, event=event, **fields)
         line = entry.model_dump_json(exclude_defaults=True).encode() + b"\n"
+        before = self._count, self._size
         try:
-            written = os.write(self._file, line)
-            if written < len(line):
-                raise OSError(0, "no space left for a whole line")
+            if os.write(self._file, line) < len(line):
+                raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+            # Counted before the sync: should that be interrupted, the line is there all the same.
+            self._count, self._size = self._count + 1, self._size + len(line)
             self._sync(self._file)
         except OSError as error:
+            self._count, self._size = before
             self._cut()
             raise _cannot("write", self.path, error) from error
-        self._count, self._size = self._count + 1, self._size + len(line)
         return entry
 
     def _lock(self) -> None:

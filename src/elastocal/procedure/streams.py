@@ -1,4 +1,4 @@
-"""Raw streams of one pose attempt: collected in memory, kept in one MCAP file, read as arrays."""
+"""Raw streams of one pose attempt, read as arrays."""
 
 import json
 from collections.abc import Callable, Sequence
@@ -8,43 +8,29 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 import numpy as np
-from mcap.records import Metadata
+from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from elastocal import __version__
 from elastocal.arrays import BoolArray, FloatArray
-from elastocal.cell.devices import ArmState, PointBlock, SensorStatus, WrenchBlock
-from elastocal.errors import ProcedureError, SchemaError
-from elastocal.procedure.mcap import Contents, Topic, read_mcap, write_mcap
+from elastocal.cell.devices import SensorStatus
+from elastocal.errors import SchemaError
+from elastocal.procedure.mcap import Contents, read_mcap
 from elastocal.procedure.mcap.reader import Messages
-from elastocal.procedure.stream_messages import (
-    ARM,
-    MARKER,
-    MARKS,
-    WRENCH,
-    arm_messages,
-    mark_message,
-    point_messages,
-    schemas,
-    wrench_messages,
-)
+from elastocal.procedure.pose_recorder import NANOSECONDS, RECORD, SCHEMA, Mark, PoseRecorder
+from elastocal.procedure.stream_messages import ARM, MARKER, MARKS, WRENCH
 from elastocal.schema import check_schema
 
-SCHEMA = "elastocal.streams/1"
-RECORD = "elastocal"
-"""Name of the metadata record that carries the schema."""
+__all__ = [
+    "ArmStream",
+    "Mark",
+    "PointStream",
+    "PoseRecorder",
+    "Streams",
+    "WrenchStream",
+    "read_streams",
+]
 
-_NS = 1e9
 Result = TypeVar("Result")
-
-
-@dataclass(frozen=True)
-class Mark:
-    """Something that happened."""
-
-    time: float
-    """In s of the clock."""
-    text: str
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,8 +71,8 @@ class PointStream:
     """Shape (sample, 3), in m."""
     sigma: FloatArray
     """Of one sample by the maker, shape (sample, 3), in m; NaN where not known."""
-    station: tuple[str, ...]
-    """Station of each sample."""
+    station: NDArray[np.str_]
+    """Station of each sample, shape (sample,)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,87 +84,6 @@ class Streams:
     wrench: WrenchStream
     points: PointStream
     marks: tuple[Mark, ...]
-
-
-class PoseRecorder:
-    """Collects what the devices say during one pose attempt; `save` writes it.
-
-    Make a new one for each attempt. States and blocks are kept as they are given: they must not
-    change afterwards. Empty blocks are welcome; a beam or a sensor that changes its state becomes
-    a mark.
-
-    Parameters
-    ----------
-    joint_names : sequence of str
-        Joints of the arm, in the order of ``q``.
-    """
-
-    def __init__(self, joint_names: Sequence[str]) -> None:
-        self._joint_names = tuple(joint_names)
-        self._arm: list[ArmState] = []
-        self._wrenches: list[WrenchBlock] = []
-        self._points: list[PointBlock] = []
-        self._marks: list[Mark] = []
-        self._condition: dict[str, str] = {}
-
-    def arm(self, state: ArmState) -> None:
-        """Keep a state of the arm; one that was kept last is not kept twice."""
-        if not self._arm or state.time != self._arm[-1].time:
-            self._arm.append(state)
-
-    def wrenches(self, block: WrenchBlock) -> None:
-        """Keep the samples of a force sensor."""
-        self._note("sensor", block.status.value)
-        if len(block):
-            self._wrenches.append(block)
-
-    def points(self, block: PointBlock) -> None:
-        """Keep the samples of a tracker."""
-        self._note(f"beam of station {block.station}", block.beam.value)
-        if len(block):
-            self._points.append(block)
-
-    def mark(self, time: float, text: str) -> None:
-        """Keep a remark."""
-        self._marks.append(Mark(time, text))
-
-    def save(self, path: Path) -> None:
-        """Write everything to an MCAP file, atomically and to the disk.
-
-        Raises
-        ------
-        ProcedureError
-            If a device's time is not a number, or negative.
-        FileAccessError
-            If the file cannot be written.
-        """
-        joints = json.dumps(self._joint_names)
-        note = Metadata(name=RECORD, metadata={"schema": SCHEMA, "joints": joints})
-        write_mcap(path, self._topics(), f"elastocal {__version__}", note)
-
-    def _note(self, what: str, condition: str) -> None:
-        """Mark a condition that changed; an empty block has no time, so the arm's is taken."""
-        if self._condition.get(what, "") != condition:
-            self._condition[what] = condition
-            self.mark(self._arm[-1].time if self._arm else 0.0, f"{what}: {condition}")
-
-    def _topics(self) -> list[Topic]:
-        texts = {
-            ARM: arm_messages(self._arm, self._joint_names),
-            WRENCH: wrench_messages(self._wrenches),
-            MARKER: point_messages(self._points),
-            MARKS: [mark_message(mark.text) for mark in self._marks],
-        }
-        times = {
-            ARM: np.array([state.time for state in self._arm]),
-            WRENCH: _end_to_end([block.time for block in self._wrenches]),
-            MARKER: _end_to_end([block.time for block in self._points]),
-            MARKS: np.array([mark.time for mark in self._marks]),
-        }
-        return [
-            Topic(topic, name, schema, _nanoseconds(topic, times[topic]), texts[topic])
-            for topic, (name, schema) in schemas(self._joint_names).items()
-        ]
 
 
 def read_streams(path: Path) -> Streams:
@@ -219,7 +124,7 @@ def _read(
     messages = contents.topics.get(topic, Messages())
     try:
         said = json.loads(b"[" + b",".join(messages.data) + b"]")
-        return make(np.array(messages.time, dtype=float) / _NS, said)
+        return make(np.array(messages.time, dtype=float) / NANOSECONDS, said)
     except (ValueError, TypeError, KeyError, RecursionError) as error:
         reason = f"{type(error).__name__} {' '.join(str(error).split())}"
         raise SchemaError(f"{path}: {topic} holds a message that is not ours: {reason}") from error
@@ -248,11 +153,13 @@ def _wrench_stream(time: FloatArray, said: list[Any]) -> WrenchStream:
 
 
 def _point_stream(time: FloatArray, said: list[Any]) -> PointStream:
+    station = np.array([message["station"] for message in said], dtype=np.str_)
+    station.setflags(write=False)
     return PointStream(
         _frozen(time),
         _frozen(_columns(said, "position", "xyz")),
         _frozen(_columns(said, "sigma", "xyz")),
-        tuple(str(message["station"]) for message in said),
+        station,
     )
 
 
@@ -267,17 +174,6 @@ def _columns(said: list[Any], key: str, names: Sequence[str]) -> FloatArray:
         return np.empty((len(said), len(names)))
     pick = itemgetter(*names)
     return np.array([pick(message[key]) for message in said], dtype=float).reshape(len(said), -1)
-
-
-def _nanoseconds(topic: str, time: FloatArray) -> np.ndarray:
-    wrong = time[~((time >= 0.0) & (time < 2.0**63 / _NS))]
-    if len(wrong):
-        raise ProcedureError(f"{topic}: time {wrong[0]} s cannot be recorded: it must be 0 or more")
-    return np.rint(time * _NS).astype(np.int64)
-
-
-def _end_to_end(arrays: Sequence[FloatArray]) -> FloatArray:
-    return np.concatenate(arrays) if arrays else np.empty(0)
 
 
 def _frozen(array: FloatArray) -> FloatArray:

@@ -73,7 +73,7 @@ class SimulatedController(StrictModel):
     """Time constant with which a force follows its ramp, in s."""
     ripple: Force = 0.7
     """Amplitude of the unrest of a held force, in N."""
-    reaction: PositiveTime = 0.008
+    reaction: PositiveTime = 0.004
     """From the contact force to the standstill of a guarded approach, in s."""
     repeatability: Distance = 10e-6
     """Standard deviation of a stop along each axis of base, in m; the controller knows nothing

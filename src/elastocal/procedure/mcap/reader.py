@@ -1,6 +1,7 @@
 """Read an MCAP file whole: messages by topic, in order of time."""
 
 import struct
+import zlib
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from io import BytesIO
@@ -10,7 +11,7 @@ import zstandard
 from mcap.data_stream import ReadDataStream
 from mcap.exceptions import McapError
 from mcap.opcode import Opcode
-from mcap.records import Channel, Chunk, Metadata
+from mcap.records import Channel, Chunk, DataEnd, Metadata
 from mcap.stream_reader import get_chunk_data_stream
 
 from elastocal.errors import FileAccessError, SchemaError
@@ -55,11 +56,26 @@ def read_mcap(path: Path) -> Contents:
     if not data.endswith(MAGIC) or len(data) == len(MAGIC):
         raise SchemaError(f"{path} is cut off: it does not end with the MCAP signature")
     try:
+        _check_sum(data)
         return _contents(data[len(MAGIC) : -len(MAGIC)])
     except (McapError, ValueError, struct.error, zstandard.ZstdError, RuntimeError) as error:
         # What the libraries raise for damage; to a user all of it means the same.
         reason = " ".join(str(error).split()) or type(error).__name__
         raise SchemaError(f"{path} is a damaged MCAP file: {reason}") from error
+
+
+def _check_sum(data: bytes) -> None:
+    """Refuse a file whose data section does not have the checksum that it states."""
+    position = len(MAGIC)
+    for opcode, body in _split(data[len(MAGIC) : -len(MAGIC)]):
+        if opcode == Opcode.DATA_END:
+            stated = DataEnd.read(_stream(body)).data_section_crc
+            # Tools that do not make a checksum write 0.
+            if stated not in (0, zlib.crc32(data[:position])):
+                raise ValueError("its checksum is wrong")
+            return
+        position += RECORD.size + len(body)
+    raise ValueError("its data have no end")
 
 
 def _contents(data: bytes) -> Contents:

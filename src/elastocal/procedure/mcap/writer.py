@@ -83,28 +83,27 @@ def write_mcap(path: Path, topics: Sequence[Topic], library: str, metadata: Meta
     opening = MAGIC + _records(Header(profile="", library=library))
     note = _records(metadata)
     index = MetadataIndex(offset=len(opening), length=len(note), name=metadata.name)
-    with replacing(path) as temporary, temporary.open("wb") as file:
-        file.write(opening + note)
-        messages, described = _merged(topics), _descriptions(topics)
-        chunks = []
-        for start in range(0, len(messages), CHUNK):
-            part = messages.take(slice(start, start + CHUNK))
-            data, entry = _chunk(part, described, file.tell())
-            file.write(data)
-            chunks.append(entry)
-        file.write(_records(DataEnd(data_section_crc=0)))
-        file.write(_closing(file.tell(), topics, chunks, index))
+    data, chunks = bytearray(opening + note), []
+    messages, described = _merged(topics), _descriptions(topics)
+    for start in range(0, len(messages), CHUNK):
+        chunk, entry = _chunk(messages.take(slice(start, start + CHUNK)), described, len(data))
+        data += chunk
+        chunks.append(entry)
+    data += _records(DataEnd(data_section_crc=zlib.crc32(data)))
+    with replacing(path) as temporary:
+        temporary.write_bytes(data + _closing(len(data), topics, chunks, index))
 
 
 def _merged(topics: Sequence[Topic]) -> _Messages:
     counts = [len(topic.messages) for topic in topics]
-    time = np.concatenate([topic.time for topic in topics])
+    none = np.arange(0)
+    time = np.concatenate([none, *(topic.time for topic in topics)])
     order = np.argsort(time, kind="stable")
     data = [message for topic in topics for message in topic.messages]
     return _Messages(
         time[order],
         np.repeat(np.arange(1, len(topics) + 1), counts)[order],
-        np.concatenate([np.arange(count) for count in counts])[order],
+        np.concatenate([none, *(np.arange(count) for count in counts)])[order],
         [data[row] for row in order.tolist()],
     )
 

@@ -15,6 +15,7 @@ from elastocal.cell.devices import ArmState, Motion
 from elastocal.errors import DeviceError
 from elastocal.sim.workcell.clock import MICROSECONDS, to_microseconds
 from elastocal.sim.workcell.commands import check_distance, check_vector, require
+from elastocal.sim.workcell.contact import Contact
 from elastocal.sim.workcell.force_control import ForceControl
 from elastocal.sim.workcell.guarded import guarded_way, retract_way
 from elastocal.sim.workcell.plant import Plant
@@ -39,6 +40,7 @@ class SimulatedArm:
         self._approaches = 0
         self._visiting = False
         self._touched = False
+        self._leaving: Contact | None = None
         self._pose: tuple[Segment, FloatArray] | None = None
 
     @property
@@ -161,7 +163,7 @@ class SimulatedArm:
             )
         start = plant.stand()
         way, contact = retract_way(plant, start, direction, distance)
-        plant.contact = contact
+        self._leaving, plant.contact = plant.contact, contact
         if contact is None:
             plant.note_sag(way.end)
             self._touched = self._visiting = False
@@ -199,16 +201,14 @@ class SimulatedArm:
     def _freeze(self, motion: Motion, fault: str | None) -> None:
         """Stand where the arm is."""
         plant = self._plant
-        approaching = self._motion() is Motion.APPROACHING
+        before = self._motion()
         plant.switch(plant.standing(plant.stand(), motion, fault))
-        if approaching:
+        pressing = bool(np.any(plant.segment.knots.force[-1]))
+        if before is Motion.APPROACHING:
             self._touched = False
-            self._leave_a_contact_not_reached()
-
-    def _leave_a_contact_not_reached(self) -> None:
-        plant = self._plant
-        if not np.any(plant.segment.knots.force[-1]):
-            plant.contact = None
+            plant.contact = plant.contact if pressing else None
+        elif before is Motion.RETRACTING and pressing:
+            plant.contact = self._leaving
 
     def _begin_approach(self) -> None:
         """Count an approach; the first one after a move or a retract begins a visit."""

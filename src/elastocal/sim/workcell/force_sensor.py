@@ -90,12 +90,16 @@ class SimulatedForceSensor:
         """Return readings without noise and drift, shape (sample or 1, 6)."""
         segment = self._plant.segment
         if self._still is not None and self._still[0] is segment:
-            return self._still[1]
-        seen = segment.wrench(times)
-        reading: FloatArray = seen @ self._matrix.T + self._zero
-        if len(seen) == 1 and times[0] >= segment.end and segment.ripple is None:
-            self._still = (segment, reading)
-        return reading
+            reading = self._still[1]
+        else:
+            reading = segment.seen(times)[:, 3:] @ self._matrix.T + self._zero
+            if times[0] >= segment.end:
+                self._still = (segment, reading)
+        unrest = segment.unrest(times)
+        if unrest is None:
+            return reading
+        shaken: FloatArray = reading + unrest * (self._matrix @ segment.ripple_wrench)
+        return shaken
 
     def _clipped(self, times: IndexArray, values: FloatArray) -> FloatArray:
         """Keep the readings within the ranges, and notice when they were not."""

@@ -33,6 +33,9 @@ MOVED_MASS = 850.0
 """Mass in kg that an arm of 1.1 t moves: all but its foot."""
 BALANCER_RATE = 5.5e4
 """Of the balancer's spring on such an arm, in N/m: 3 kN·m with the arm stretched out."""
+HIGH_TORQUE = 1.65
+"""Stiffness of a gear at high torque over that of a straight line through measured deflections, to
+which play, bending links and floor add. An assumption."""
 STOPS = 4
 """Number of sliders of a gear's friction."""
 PLAY_FLOOR = 0.2
@@ -73,7 +76,8 @@ def lay_out_robot(cell: Cell) -> RobotLayout:
         )
     truth, scale = cell.file.simulation, cell.file.simulation.truth
     size = _size(linkage, external)
-    stiffness = np.array(truth.gears.stiffness or size * np.array(AXIAL_STIFFNESS)) * scale.gears
+    usual = size * HIGH_TORQUE * np.array(AXIAL_STIFFNESS)
+    stiffness = scale.gears * np.array(truth.gears.stiffness or usual)
     gears = [
         _spring(linkage, external + i, linkage.axis[external + i], float(k))
         for i, k in enumerate(stiffness)

@@ -95,4 +95,6 @@ class Schedule:
 
     def spans(self, kind: str) -> list[Span]:
         """Return the spans of a kind of fault."""
+        if not self._spans:
+            return []
         return [span for span in self._spans if span.kind == kind]

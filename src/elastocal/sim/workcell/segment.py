@@ -102,20 +102,17 @@ class Segment:
             return 1.0
         return float(self.law.at((now - self.begin) / MICROSECONDS))
 
-    def marker(self, times: IndexArray) -> FloatArray:
-        """Return where the marker is at times in µs, shape (time or 1, 3); 1: it stands."""
-        return self._between(times)[:, :3]
+    def seen(self, times: IndexArray) -> FloatArray:
+        """Return what instruments see at times in µs, without unrest of the force.
 
-    def wrench(self, times: IndexArray) -> FloatArray:
-        """Return the true wrench at the sensor, shape (time or 1, 6); 1: it does not change."""
-        wrench = self._between(times)[:, 3:]
-        if self.ripple is None:
-            return wrench
-        ripple = self.ripple.at((times - self.begin) / MICROSECONDS)
-        unrest: FloatArray = ripple[:, None] * self.ripple_wrench
-        return wrench + unrest
-
-    def _between(self, times: IndexArray) -> FloatArray:
+        Shape (time, 9), or (1, 9) where nothing changes any more; see `Knots.seen`.
+        """
         if times[0] >= self.end:
             return self.knots.seen[-1:]
         return self.knots.at(self.knots.seen, self.law.at((times - self.begin) / MICROSECONDS))
+
+    def unrest(self, times: IndexArray) -> FloatArray | None:
+        """Return the unrest of the force at times in µs, shape (time, 1), in N; None: none."""
+        if self.ripple is None:
+            return None
+        return self.ripple.at((times - self.begin) / MICROSECONDS)[:, None]

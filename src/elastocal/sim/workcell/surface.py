@@ -1,13 +1,14 @@
 """Where a straight approach meets the tooling: a ray against the triangles of the cell's mesh."""
 
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 import trimesh
 
 from elastocal.arrays import FloatArray
 from elastocal.cell import Cell
-from elastocal.errors import FileAccessError
+from elastocal.errors import FileAccessError, SchemaError
 
 _GRAZING = 1e-12
 """A ray less steep to a triangle passes it by (product of its edges and the ray, in m²)."""
@@ -36,17 +37,12 @@ class TrueSurface:
 
         Raises
         ------
-        FileAccessError
+        FileAccessError, SchemaError
             If the mesh cannot be read.
         """
-        path = cell.surface_path
-        try:
-            mesh = trimesh.load_mesh(path, process=False)
-        except (OSError, ValueError) as error:
-            raise FileAccessError(f"cannot read {path}: {error}") from error
         T = cell.T_base_surface
-        corners = cell.file.surface.metres * np.asarray(mesh.triangles, dtype=np.float64)
         offset = np.array(cell.file.simulation.contact.surface_offset)
+        corners = cell.file.surface.metres * _triangles(cell.surface_path)
         return cls(corners @ T[:3, :3].T + T[:3, 3] + offset)
 
     def hit(self, origin: FloatArray, direction: FloatArray, reach: float) -> Hit | None:
@@ -84,3 +80,19 @@ class TrueSurface:
         normal = np.cross(edge_1[face], edge_2[face])
         normal *= -np.sign(normal @ direction) / np.linalg.norm(normal)
         return Hit(float(distance[face]), normal)
+
+
+def _triangles(path: Path) -> FloatArray:
+    """Return the triangles of a mesh file in its own unit, shape (face, 3, 3)."""
+    try:
+        with path.open("rb") as file:
+            mesh = trimesh.load_mesh(file, file_type=path.suffix[1:].lower(), process=False)
+    except OSError as error:
+        raise FileAccessError(f"cannot read {path}: {error.strerror or error}") from error
+    except (ValueError, IndexError, KeyError, TypeError, AttributeError) as error:
+        reason = " ".join(str(error).split()) or type(error).__name__
+        raise SchemaError(f"mesh {path} cannot be read: {reason}") from error
+    triangles: FloatArray = np.asarray(getattr(mesh, "triangles", ()), dtype=np.float64)
+    if not len(triangles):
+        raise SchemaError(f"mesh {path} has no triangle")
+    return triangles

@@ -12,12 +12,13 @@ import numpy as np
 from scipy.signal import lfilter
 from scipy.spatial.transform import Rotation
 
-from elastocal.arrays import FloatArray
+from elastocal.arrays import FloatArray, IndexArray
 from elastocal.cell.devices import BeamState, PointBlock
 from elastocal.errors import DeviceError, nearest
 from elastocal.sim.workcell.instruments import SampleGrid, Samples, held
 from elastocal.sim.workcell.keys import BLOCK, NoiseStream, generator
 from elastocal.sim.workcell.plant import Plant
+from elastocal.sim.workcell.segment import Segment
 
 SOURCE = "simulated laser tracker"
 COVERAGE = 1.96
@@ -49,6 +50,7 @@ class SimulatedTracker:
         self._station = self._names[0]
         self._noise = NoiseStream(_draw(entry.turbulence, entry.rate), plant.seed)
         self._grid, self._samples = SampleGrid(entry.rate, plant.now), Samples(6)
+        self._still: tuple[Segment, str, FloatArray, FloatArray] | None = None
         self.restart(plant.now, "HOME")
 
     @property
@@ -84,7 +86,8 @@ class SimulatedTracker:
         now = self._plant.now
         self.catch_up(now)
         times, values = self._samples.drain()
-        broken = len(held(self._plant, "beam_break", np.array([now]), self._station))
+        spans = self._plant.schedule.spans("beam_break")
+        broken = any(s.holds(now) and s.station in (None, self._station) for s in spans)
         return PointBlock(
             time=times,
             position=values[:, :3],
@@ -93,6 +96,19 @@ class SimulatedTracker:
             station=self._station,
             source=SOURCE,
         )
+
+    def _true(self, times: IndexArray) -> tuple[FloatArray, FloatArray]:
+        """Return marker in the station's frame, shape (time or 1, 3), and sigma, (.., 1)."""
+        segment = self._plant.segment
+        if self._still is not None and self._still[:2] == (segment, self._station):
+            return self._still[2:]
+        T = self.T_base_station(self._station)
+        marker = (segment.seen(times)[:, :3] - T[:3, 3]) @ T[:3, :3]
+        distance = np.sqrt(np.sum(marker**2, axis=1, keepdims=True))
+        sigma = (self._entry.noise + self._entry.noise_per_metre * distance) / COVERAGE
+        if times[0] >= segment.end:
+            self._still = (segment, self._station, marker, sigma)
+        return marker, sigma
 
     def T_base_station(self, station: str) -> FloatArray:
         """Return where a station truly stands now, shape (4, 4), in m."""
@@ -106,6 +122,7 @@ class SimulatedTracker:
         """Begin to count samples, with the noise that belongs to a key."""
         self._grid.restart(now)
         self._noise.restart("tracker", key)
+        self._still = None
 
     def catch_up(self, now: int) -> None:
         """Take the samples that are due."""
@@ -113,10 +130,7 @@ class SimulatedTracker:
         if first >= last:
             return
         times = self._grid.times(first, last)
-        T = self.T_base_station(self._station)
-        marker = (self._plant.segment.marker(times) - T[:3, 3]) @ T[:3, :3]
-        distance = np.sqrt(np.sum(marker**2, axis=1, keepdims=True))
-        sigma = (self._entry.noise + self._entry.noise_per_metre * distance) / COVERAGE
+        marker, sigma = self._true(times)
         values = np.empty((len(times), 6))
         values[:, :3] = marker + sigma * self._noise.take(first, last)
         values[:, 3:] = sigma
