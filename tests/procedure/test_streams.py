@@ -72,6 +72,15 @@ def test_streams_come_back_to_twelve_digits(path):
     assert np.all(found.wrench.ok)
 
 
+def test_only_the_spans_that_are_asked_for_are_read(path):
+    found, whole = read_streams(path, [(10.02, 10.03), (10.1, 10.1)]), read_streams(path)
+    assert found.wrench.time.tolist() == [10.02, 10.03, 10.1]
+    np.testing.assert_array_equal(found.wrench.force, whole.wrench.force[[2, 3, 10]])
+    np.testing.assert_array_equal(found.points.position, whole.points.position[[2, 3, 10]])
+    assert found.arm.time.tolist() == []
+    assert read_streams(path, []).wrench.time.tolist() == []
+
+
 def test_arrays_are_read_only(path):
     found = read_streams(path)
     with pytest.raises(ValueError, match="read-only"):
@@ -181,6 +190,10 @@ def foreign(path) -> None:
     write_mcap(path, [], "test", Metadata(name="someone", metadata={}))
 
 
+def no_joints(path) -> None:
+    write_mcap(path, [], "test", Metadata(name="elastocal", metadata={"schema": SCHEMA}))
+
+
 def odd_message(path) -> None:
     note = Metadata(name="elastocal", metadata={"schema": SCHEMA, "joints": "[]"})
     topic = Topic("/wrench", "x", "{}", np.array([5]), [b'{"force": 3}'])
@@ -200,6 +213,7 @@ def no_json(path) -> None:
             "has schema 'elastocal.streams/9'; this version reads 'elastocal.streams/1'",
         ),
         (foreign, "has schema None"),
+        (no_joints, "its metadata do not name the joints of the arm"),
         (odd_message, "/wrench holds a message that is not ours: KeyError 'status'"),
         (no_json, "/marks holds a message that is not ours: JSONDecodeError"),
     ],

@@ -82,7 +82,7 @@ def show_result(console: Console, job: Prepared, result: Result) -> None:
     console.print(
         f"{result.end.value}: {found['committed']} of {found['poses']} poses committed"
         f" ({readings or 'no readings'}), {found['seconds'] / 60.0:.1f} min,"
-        f" {found['failed_attempts']} failed attempts; the arm is {result.stand.value}",
+        f" failed attempts: {found['failed_attempts']}; the arm is {result.stand.value}",
         soft_wrap=True,
     )
     if result.message:

@@ -9,7 +9,7 @@ from elastocal.planning.plan_file import Joints, PoseRecord
 from elastocal.procedure.line import Line
 from elastocal.procedure.pose_log import PoseLog, ReadingStatus, Window
 from elastocal.procedure.settings import Settings
-from elastocal.procedure.slip import SlipWatch
+from elastocal.procedure.slip import SlideWatch, SlipWatch
 from elastocal.procedure.steps import OFF_APPROACH, Step
 from elastocal.procedure.supervisor import Supervisor
 from elastocal.procedure.watch import Guard
@@ -39,6 +39,8 @@ class Attempt:
     at_approach: FloatArray = field(default_factory=lambda: np.zeros(3))
     """Marker at the approach pose, shape (3,), in m, tracker frame."""
     slip_watch: SlipWatch | None = None
+    slide_watch: SlideWatch | None = None
+    """Of the present load case."""
     slip_origin: float = 0.0
     """Lateral movement that has been reported as slip already, in m."""
     slip: float = 0.0

@@ -14,12 +14,10 @@ import numpy as np
 
 from elastocal.arrays import BoolArray, FloatArray
 from elastocal.procedure.pose_log import ReadingStatus, Window
-from elastocal.procedure.streams import Streams
+from elastocal.procedure.streams import EDGE, Streams
 
 LEAST_SAMPLES = 5
 """Fewer good samples than this make no reading: their scatter says nothing."""
-EDGE = 1e-6
-"""Times that differ by less are equal, in s: clocks of floating point, logs of nanoseconds."""
 MOST_CORRELATED = 0.99
 """Largest lag-1 autocorrelation that is believed; beyond it the samples drift."""
 

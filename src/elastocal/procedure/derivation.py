@@ -142,7 +142,7 @@ def _latest(logs: Sequence[PoseLog]) -> list[PoseLog]:
 
 def _streams(folder: RunFolder, log: PoseLog, cell: Cell) -> Streams:
     path = folder.streams / log.streams
-    streams = read_streams(path)
+    streams = read_streams(path, [(window.start, window.end) for window in log.windows])
     if streams.joint_names != cell.robot.joint_names:
         raise SchemaError(
             f"{path}: joints are {', '.join(streams.joint_names)}, those of the cell"

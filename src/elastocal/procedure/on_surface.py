@@ -9,6 +9,7 @@ from elastocal.procedure.entries import Action
 from elastocal.procedure.faults import Fault, FaultError
 from elastocal.procedure.off_surface import go_straight
 from elastocal.procedure.pose_log import ReadingStatus
+from elastocal.procedure.slip import SlideWatch
 from elastocal.procedure.steadiness import LEAST_SAMPLES, Stretch, complaint, steadiness
 from elastocal.procedure.steps import Outcome
 from elastocal.procedure.supervisor import TIME_SLACK
@@ -37,10 +38,12 @@ def load(a: Attempt) -> Outcome:
     present = s.cycle(a.guard()).force_tcp
     change = force - present[-1] if len(present) else force
     a.in_force_control = True
+    assert a.slip_watch is not None
+    a.slide_watch = slide = SlideWatch(a.slip_watch)
     with s.actuation(Action.HOLD, name):
         s.devices.arm.hold(force, ramp)
-        for _ in s.stay(a.guard(), float(np.linalg.norm(change)) / ramp):
-            pass
+        for seen in s.stay(a.guard(), float(np.linalg.norm(change)) / ramp):
+            slide.see(seen.points.position)
     return Outcome.GOOD
 
 
@@ -50,6 +53,7 @@ def settle(a: Attempt) -> Outcome:
     stretch, begin, why = Stretch(procedure.dwell), s.now, ""
     for seen in s.stay(a.guard(), procedure.timeout):
         _refuse_other_motion(seen)
+        _see(a, seen)
         stretch.add(seen.wrenches.time, seen.force_tcp)
         if seen.time - begin < procedure.dwell - TIME_SLACK or len(stretch) < LEAST_SAMPLES:
             continue
@@ -67,6 +71,7 @@ def average(a: Attempt) -> Outcome:
     start, breaks, forces, points = s.now, s.watch.breaks, Stretch(), Stretch()
     for seen in s.stay(a.guard(), procedure.average):
         _refuse_other_motion(seen)
+        _see(a, seen)
         forces.add(seen.wrenches.time, seen.force_tcp)
         points.add(seen.points.time, seen.points.position)
         if s.watch.breaks > breaks:
@@ -96,19 +101,27 @@ def _again(a: Attempt, status: ReadingStatus, note: str) -> Outcome:
 
 def _slip(a: Attempt, positions: FloatArray, force: FloatArray) -> str:
     """Return how the marker slipped during a window or on the way to it; empty: it did not."""
-    watch, procedure = a.slip_watch, a.settings.procedure
+    watch, slide, procedure = a.slip_watch, a.slide_watch, a.settings.procedure
     assert watch is not None
+    assert slide is not None
     a.slip = watch.so_far(positions)
-    during, limit = watch.during(positions), procedure.slip_limit
-    if not during <= limit:
-        a.slip_origin = a.slip
-        return f"marker slid {during * 1e3:.2f} mm during the window, limit {limit * 1e3:g} mm"
-    limit += procedure.contact_compliance * float(np.linalg.norm(force))
-    moved = abs(a.slip - a.slip_origin)
-    if not moved <= limit:
-        a.slip_origin = a.slip
-        return f"marker is {moved * 1e3:.2f} mm aside, limit under load {limit * 1e3:.2f} mm"
+    moved, limit = abs(a.slip - a.slip_origin), procedure.slip_limit
+    expected = procedure.contact_compliance * float(np.linalg.norm(force))
+    for length, most, what in (
+        (slide.largest, limit, "slid {} at once"),
+        (watch.during(positions), limit, "slid {} during the window"),
+        (moved, limit + expected, "is {} aside under this load"),
+    ):
+        if not length <= most:
+            a.slip_origin = a.slip
+            said = what.format(f"{length * 1e3:.2f} mm")
+            return f"marker {said}, limit {most * 1e3:.2f} mm"
     return ""
+
+
+def _see(a: Attempt, seen: Seen) -> None:
+    if a.slide_watch is not None:
+        a.slide_watch.see(seen.points.position)
 
 
 def _refuse_other_motion(seen: Seen) -> None:

@@ -166,6 +166,7 @@ class Runner:
             self._stand = Stand.HOME
             return
         self._arm()
+        self._pose_start = self._supervisor.now
         drive(self._supervisor, way(self._job.plan, self._stop, end), Guard(self._free_limit))
         self._stand = Stand.HOME
 

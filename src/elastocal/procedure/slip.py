@@ -4,6 +4,7 @@ The tracker's orientation is not known during a run, but the approach shows it t
 straight way to near contact the marker moves along it. Lateral is what is at right angles to that.
 """
 
+from collections import deque
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,6 +13,8 @@ from elastocal.arrays import FloatArray
 
 LEAST_WAY = 5e-3
 """Shortest approach from which a direction is taken, in m."""
+SUDDEN = 5
+"""Cycles within which a slide is sudden: no force that is built up explains it."""
 _ENDS = 5
 """The first and the last fifth of a window are compared."""
 
@@ -53,3 +56,28 @@ class SlipWatch:
     def so_far(self, positions: FloatArray) -> float:
         """Return how far the marker is aside of where it was unloaded, in m."""
         return self.lateral(positions.mean(axis=0) - self.unloaded)
+
+
+class SlideWatch:
+    """Looks for sudden slides while a load case is built up and held.
+
+    Parameters
+    ----------
+    slip : SlipWatch
+        What the marker did before contact.
+    """
+
+    def __init__(self, slip: SlipWatch) -> None:
+        self._slip = slip
+        self._recent: deque[FloatArray] = deque(maxlen=SUDDEN)
+        self.largest = 0.0
+        """Longest sudden slide so far, in m."""
+
+    def see(self, positions: FloatArray) -> None:
+        """Take the positions of one cycle, shape (sample, 3), in m; none after a gap."""
+        if not len(positions):
+            self._recent.clear()
+            return
+        self._recent.append(positions.mean(axis=0))
+        slide = self._slip.lateral(self._recent[-1] - self._recent[0])
+        self.largest = max(self.largest, slide)

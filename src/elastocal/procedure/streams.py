@@ -1,7 +1,7 @@
 """Raw streams of one pose attempt, read as arrays."""
 
 import json
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from operator import itemgetter
 from pathlib import Path
@@ -14,7 +14,7 @@ from scipy.spatial.transform import Rotation
 from elastocal.arrays import BoolArray, FloatArray
 from elastocal.cell.devices import SensorStatus
 from elastocal.errors import SchemaError
-from elastocal.procedure.mcap import Contents, read_mcap
+from elastocal.procedure.mcap import read_mcap
 from elastocal.procedure.mcap.reader import Messages
 from elastocal.procedure.pose_recorder import NANOSECONDS, RECORD, SCHEMA, Mark, PoseRecorder
 from elastocal.procedure.stream_messages import ARM, MARKER, MARKS, WRENCH
@@ -29,6 +29,9 @@ __all__ = [
     "WrenchStream",
     "read_streams",
 ]
+
+EDGE = 1e-6
+"""Times that differ by less are equal, in s: clocks of floating point, logs of nanoseconds."""
 
 Result = TypeVar("Result")
 
@@ -86,13 +89,16 @@ class Streams:
     marks: tuple[Mark, ...]
 
 
-def read_streams(path: Path) -> Streams:
+def read_streams(path: Path, spans: Sequence[tuple[float, float]] | None = None) -> Streams:
     """Return the raw streams of a pose attempt.
 
     Parameters
     ----------
     path : Path
         A file that `PoseRecorder.save` wrote.
+    spans : sequence of (float, float), optional
+        Starts and ends in s of the clock, to read nothing else: most of the time at a pose goes
+        by between its windows. Default: everything.
 
     Raises
     ------
@@ -104,30 +110,44 @@ def read_streams(path: Path) -> Streams:
     contents = read_mcap(path)
     note = contents.metadata.get(RECORD, {})
     check_schema(note.get("schema"), SCHEMA, str(path))
-    joints = tuple(json.loads(note.get("joints", "[]")))
+    joints = _joints(path, note)
+
+    def topic(name: str, make: Callable[[FloatArray, list[Any]], Result]) -> Result:
+        try:
+            return make(*_said(contents.topics.get(name, Messages()), spans))
+        except (ValueError, TypeError, KeyError, RecursionError) as error:
+            reason = f"{type(error).__name__} {' '.join(str(error).split())}"
+            message = f"{path}: {name} holds a message that is not ours: {reason}"
+            raise SchemaError(message) from error
+
     return Streams(
         joints,
-        _read(path, contents, ARM, lambda time, said: _arm_stream(time, said, joints)),
-        _read(path, contents, WRENCH, _wrench_stream),
-        _read(path, contents, MARKER, _point_stream),
-        _read(path, contents, MARKS, _marks),
+        topic(ARM, lambda time, said: _arm_stream(time, said, joints)),
+        topic(WRENCH, _wrench_stream),
+        topic(MARKER, _point_stream),
+        topic(MARKS, _marks),
     )
 
 
-def _read(
-    path: Path,
-    contents: Contents,
-    topic: str,
-    make: Callable[[FloatArray, list[Any]], Result],
-) -> Result:
-    """Return what ``make`` makes of a topic's times in s and its parsed messages."""
-    messages = contents.topics.get(topic, Messages())
+def _joints(path: Path, note: Mapping[str, str]) -> tuple[str, ...]:
     try:
-        said = json.loads(b"[" + b",".join(messages.data) + b"]")
-        return make(np.array(messages.time, dtype=float) / NANOSECONDS, said)
-    except (ValueError, TypeError, KeyError, RecursionError) as error:
-        reason = f"{type(error).__name__} {' '.join(str(error).split())}"
-        raise SchemaError(f"{path}: {topic} holds a message that is not ours: {reason}") from error
+        return tuple(map(str, json.loads(note["joints"])))
+    except (ValueError, TypeError, KeyError) as error:
+        raise SchemaError(f"{path}: its metadata do not name the joints of the arm") from error
+
+
+def _said(
+    messages: Messages, spans: Sequence[tuple[float, float]] | None
+) -> tuple[FloatArray, list[Any]]:
+    """Return times in s and parsed messages of a topic."""
+    time, data = np.array(messages.time, dtype=float) / NANOSECONDS, messages.data
+    if spans is not None:
+        inside = np.zeros(len(time), dtype=bool)
+        for start, end in spans:
+            inside |= (time >= start - EDGE) & (time <= end + EDGE)
+        time, data = time[inside], [data[row] for row in np.flatnonzero(inside).tolist()]
+    said: list[Any] = json.loads(b"[" + b",".join(data) + b"]")
+    return time, said
 
 
 def _arm_stream(time: FloatArray, said: list[Any], joints: tuple[str, ...]) -> ArmStream:

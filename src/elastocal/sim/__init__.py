@@ -13,5 +13,6 @@ It is made by other equations than the estimator's: no Pinocchio, no `elastocal.
 `layouts`           ready-made arms
 `reach`, `scene`    calibration poses and load cases without a planner
 `measurement`       what Procedure 1 of the paper records on the true arm
+`workcell`          a whole cell in time: arm, force sensor, tracker, clock, faults
 ==================  ===========================================================================
 """

@@ -51,9 +51,9 @@ class ProcedureSettings(StrictModel):
     never more than the sensor's range allows."""
     travel_limit: PositiveLength = 15e-3
     """How far the tool may go beyond the expected contact, or aside, in m."""
-    contact_compliance: TranslationalCompliance = 1e-6
-    """Lateral movement of the marker that a lateral force on contact disk and tooling may cause
-    without slip, in m/N."""
+    contact_compliance: TranslationalCompliance = 0.5e-6
+    """Lateral movement of the marker under load that is expected without slip (disk, tooling,
+    tilt of the tool), in m/N of the load case."""
     force_tolerance: PositiveForce = 5.0
     """Largest distance of the mean force from the load case, in N."""
     force_drift: PositiveForceRate = 5.0

@@ -99,7 +99,7 @@ class SimulatedSensor(StrictModel):
     drift: Force = 0.3
     """Standard deviation of the drift of a force axis within a minute, in N; a moment axis drifts
     as much in proportion to its range."""
-    cross_talk: Share = 0.002
+    cross_talk: Share = 0.001
     """Standard deviation of what an axis reads of each axis, itself too, over the ranges."""
 
 

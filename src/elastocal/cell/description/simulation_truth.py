@@ -1,8 +1,9 @@
 """Stiffness of the simulated robot: what the calibration is to find out, and what it cannot."""
 
-from typing import Annotated
+import math
+from typing import Annotated, Any
 
-from pydantic import BeforeValidator, Field, FiniteFloat
+from pydantic import BeforeValidator, Field, FiniteFloat, field_validator
 
 from elastocal.cell.description.quantities import PositiveLength, SpanAngle
 from elastocal.schema import StrictModel
@@ -85,9 +86,17 @@ class Balancer(StrictModel):
     anchor: PositiveLength = 0.6
     """Distance of its end on the carousel from axis 2, in m."""
     lever: PositiveLength = 0.18
-    """Distance of its end on the arm from axis 2, in m."""
+    """Distance of its end on the arm from axis 2, in m; below ``anchor``."""
     fitted: bool = True
     """Whether the robot has one."""
+
+    @field_validator("lever")
+    @classmethod
+    def _below_anchor(cls, value: float, info: Any) -> float:
+        anchor = info.data.get("anchor", math.inf)
+        if not value < anchor:
+            raise ValueError(f"must be below anchor ({anchor:g} m)")
+        return value
 
 
 class Floor(StrictModel):

@@ -138,6 +138,9 @@ class SimulatedArm:
         """Start to build up a force and hold it; see `RobotArm.hold`."""
         wanted = check_vector("force", force_tcp, 3)
         require(wanted[2] < 0.0, "force z", wanted[2], "below 0 N: the robot can only press")
+        most = self._plant.cell.file.simulation.controller.collision_force
+        size = float(np.linalg.norm(wanted))
+        require(size <= most, "force", size, f"at most {most:g} N, what the drives give")
         require(0.0 < rate < math.inf, "force rate", rate, "above 0 N/s and finite")
         self._allow("hold", _FORCED, in_contact=True)
         self._control.hold(wanted, rate)
