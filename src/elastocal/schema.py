@@ -98,7 +98,9 @@ def validate(data: Any, model: type[Model], what: str) -> Model:
         elif first["type"] == "missing":
             message = f"key {path!r} is missing"
         else:
-            message = f"{path}: {first['msg']}, got {first['input']!r}"
+            # A whole section is no value that a person would recognise.
+            given = repr(first["input"])
+            message = f"{path}: {first['msg']}" + (f", got {given}" if len(given) <= 120 else "")
         raise SchemaError(f"{what}: {message}") from error
 
 

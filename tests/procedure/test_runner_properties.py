@@ -52,12 +52,16 @@ BLIND = {"sensor silent", "sensor frozen", "clock stands", "arm deaf"}
 """With one of these a force that grows by itself is seen later, or cannot be stopped."""
 
 scripts = st.lists(
-    st.tuples(st.sampled_from(sorted(MOMENTS)), st.sampled_from(sorted(CHANGES)), st.integers(1, 3)),
+    st.tuples(
+        st.sampled_from(sorted(MOMENTS)), st.sampled_from(sorted(CHANGES)), st.integers(1, 3)
+    ),
     min_size=1,
     max_size=4,
 ).filter(
-    lambda script: not (
-        {"force grows"} <= {name for _, name, _ in script} and BLIND & {n for _, n, _ in script}
+    lambda script: (
+        not (
+            {"force grows"} <= {name for _, name, _ in script} and BLIND & {n for _, n, _ in script}
+        )
     )
 )
 

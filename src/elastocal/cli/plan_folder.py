@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from elastocal.cell import Cell
-from elastocal.planning.export import write_krl, write_table
+from elastocal.planning.export import takes_krl, write_krl, write_table
 from elastocal.planning.plan import Planned
 from elastocal.planning.plan_file import write_plan
 from elastocal.planning.pool_file import write_pool
@@ -22,7 +22,7 @@ def write_plan_folder(folder: Path, cell: Cell, planned: Planned, program: str) 
     planned : Planned
         Plan, pool and surface.
     program : str
-        Name of the KRL program.
+        Name of the KRL program; none is written for an arm whose axes KRL cannot name.
 
     Raises
     ------
@@ -36,7 +36,7 @@ def write_plan_folder(folder: Path, cell: Cell, planned: Planned, program: str) 
         write_plan(folder, plan),
         write_pool(folder, pool),
         write_table(folder, plan),
-        *write_krl(folder, plan, program),
+        *(write_krl(folder, plan, program) if takes_krl(cell.robot) else ()),
         write_plan_page(folder / "plan.html", cell, surface, plan, pool),
         write_plan_figure(folder / "plan.svg", surface, plan, pool),
     ]

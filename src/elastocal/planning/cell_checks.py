@@ -33,6 +33,7 @@ from elastocal.planning.surface import (
     fit_disk,
     read_mesh,
 )
+from elastocal.robot.singularity import has_wrist
 
 TOOLING = "tooling"
 """Name of the surface among the obstacles."""
@@ -71,10 +72,11 @@ def robot_checks(cell: Cell, surface: Surface) -> Checks:
 def _joint_checks(cell: Cell) -> tuple[Check, ...]:
     file, robot = cell.file, cell.robot
     loads, limits = file.load_cases, file.limits
+    wrist = (WristCheck(robot, limits.wrist_angle),) if has_wrist(robot) else ()
     return (
         JointLimitsCheck(robot, cell.joint_margin),
         SingularityCheck(robot, limits.singular_value),
-        WristCheck(robot, limits.wrist_angle),
+        *wrist,
         FrictionCheck(loads.force_tcp, loads.friction, loads.safety),
     )
 

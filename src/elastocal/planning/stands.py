@@ -102,9 +102,7 @@ def _survey(
     np.maximum.at(nearest, options.point, (found.margin > 0.0).sum(axis=0))
     np.maximum.at(best, options.point, np.where(found.passed, found.quality, 0.0))
     stand = Stand(external, tuple(_branch_order(served).tolist()))
-    return _Survey(
-        stand, np.asarray(served.any(axis=0)), float(nearest.mean()), float(best.mean())
-    )
+    return _Survey(stand, np.asarray(served.any(axis=0)), float(nearest.mean()), float(best.mean()))
 
 
 def _branch_order(served: BoolArray) -> IndexArray:

@@ -1,6 +1,7 @@
 """What candidates are made with, and the processes that make them side by side."""
 
 import pickle
+import warnings
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
@@ -77,8 +78,11 @@ def started(cell: Cell, surface: Surface, jobs: int) -> Iterator[Workers | None]
         yield None
         return
     # Coal's shapes cannot be sent to a process: it makes its own from the cell.
-    with Parallel(n_jobs=jobs, return_as="generator") as parallel:
-        yield Workers(pickle.dumps((cell, surface)), parallel, jobs)
+    with warnings.catch_warnings():
+        # Ctrl-C leaves tasks unfinished, which is what a user wants and need not be told.
+        warnings.filterwarnings("ignore", message=r"\s*\d+ tasks (have been|which were)")
+        with Parallel(n_jobs=jobs, return_as="generator") as parallel:
+            yield Workers(pickle.dumps((cell, surface)), parallel, jobs)
 
 
 def _prepare(packed: bytes) -> None:

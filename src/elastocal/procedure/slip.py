@@ -13,7 +13,7 @@ from elastocal.arrays import FloatArray
 
 LEAST_WAY = 5e-3
 """Shortest approach from which a direction is taken, in m."""
-SUDDEN = 5
+SUDDEN = 10
 """Cycles within which a slide is sudden: no force that is built up explains it."""
 _ENDS = 5
 """The first and the last fifth of a window are compared."""

@@ -118,6 +118,12 @@ def manipulability(robot: Robot, q: ArrayLike, length: float | None = None) -> F
     return product
 
 
+def has_wrist(robot: Robot) -> bool:
+    """Return whether the arm has six joints, the fourth and the sixth revolute."""
+    arm = robot.revolute[robot.external_axes :]
+    return len(arm) == 6 and arm[3] and arm[5]
+
+
 def wrist_angle(robot: Robot, q: ArrayLike) -> FloatArray:
     """Return the angle between the lines of the arm's axes 4 and 6.
 
@@ -142,8 +148,7 @@ def wrist_angle(robot: Robot, q: ArrayLike) -> FloatArray:
     RobotError
         If the arm has no such joints, or ``q`` does not fit the robot.
     """
-    arm = robot.revolute[robot.external_axes :]
-    if len(arm) != 6 or not (arm[3] and arm[5]):
+    if not has_wrist(robot):
         raise RobotError(
             f"{robot.name} has no wrist angle: joints 4 and 6 of a six-joint arm must be revolute"
         )

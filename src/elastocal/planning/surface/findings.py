@@ -31,7 +31,8 @@ class Finding:
     """One thing that a user should know."""
 
     kind: str
-    """``open``, ``non-manifold``, ``winding``, ``degenerate``, ``far``, ``huge``, ``tiny``, ``inverted``."""
+    """``open``, ``non-manifold``, ``winding``, ``degenerate``, ``far``, ``huge``, ``tiny`` or
+    ``inverted``."""
     message: str
     """One line."""
     fatal: bool = False
@@ -101,8 +102,8 @@ def placement_findings(
     size = float(np.linalg.norm(np.ptp(vertices, axis=0)))
     if not size <= HUGE * reach:
         text = (
-            f"{surface.name} is {size:.3g} m across; the reach of the robot is {reach:.3g} m: is the"
-            " mesh in mm and read as m (surface.unit)?"
+            f"{surface.name} is {size:.3g} m across; the reach of the robot is {reach:.3g} m: is"
+            " the mesh in mm and read as m (surface.unit)?"
         )
         return (Finding("huge", text, fatal=True),)
     found: tuple[Finding, ...] = ()

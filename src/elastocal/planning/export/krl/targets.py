@@ -114,6 +114,12 @@ def build_targets(plan: PlanFile, robot: Robot) -> Targets:
     return Targets(_axes("XHOME", plan.robot.home, robot), tuple(stops), via[-1])
 
 
+def takes_krl(robot: Robot) -> bool:
+    """Return whether a robot's axes fit into KRL's A1 to A6 and E1 to E6."""
+    arm = robot.revolute[robot.external_axes :]
+    return len(arm) == ARM_AXES and all(arm) and robot.external_axes <= EXTERNAL_AXES
+
+
 def robot_of(plan: PlanFile) -> Robot:
     """Return the robot of a plan, if a KUKA controller could drive it.
 

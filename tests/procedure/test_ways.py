@@ -1,0 +1,67 @@
+"""Ways of the plan, forwards, backwards, and home from anywhere on them."""
+
+import numpy as np
+import pytest
+
+from elastocal.errors import ProcedureError
+from elastocal.procedure.ways import HOME, stop_joints, way, way_home
+from support.fake_devices import DOWN
+from support.fake_runs import HOME as HOME_JOINTS
+from support.fake_runs import plan
+
+PLAN = plan(3)
+LIMIT = 15e-3
+
+
+def home_from(q, plan=PLAN):
+    T = np.eye(4)
+    T[:3, :3], T[:3, 3] = DOWN, q
+    return way_home(plan, np.array(q), T, LIMIT)
+
+
+def approach(pose):
+    return PLAN.poses[pose].approach_joints
+
+
+def test_forwards_it_passes_the_via_poses():
+    assert way(PLAN, HOME, 1) == (approach(0), *PLAN.moves[1].via, approach(1))
+
+
+def test_backwards_it_is_the_same_way_reversed():
+    there, back = way(PLAN, HOME, 2), way(PLAN, 2, HOME)
+    assert back == (*reversed(there[:-1]), HOME_JOINTS)
+
+
+def test_after_the_last_pose_comes_home():
+    assert way(PLAN, 2, 3) == (*PLAN.moves[3].via, HOME_JOINTS)
+    assert stop_joints(PLAN, 3) == stop_joints(PLAN, HOME) == HOME_JOINTS
+
+
+def test_no_way_leads_from_a_stop_to_itself():
+    assert way(PLAN, 1, 1) == ()
+
+
+def test_at_home_there_is_nothing_to_do():
+    found = home_from(HOME_JOINTS)
+    assert (found.retreat_from, found.way) == (None, ())
+
+
+@pytest.mark.parametrize("height", [-0.01, 0.0, 0.003, 0.03, 0.05])
+def test_before_a_surface_it_retreats_first(height):
+    found = home_from((0.2, 0.001, height))
+    assert found.retreat_from == PLAN.poses[1]
+    assert found.way == (approach(1), *way(PLAN, 1, HOME))
+
+
+def test_from_the_middle_of_a_leg_it_goes_back_where_it_came_from():
+    start, end = np.array(PLAN.moves[1].via[0]), np.array(approach(1))
+    found = home_from(0.4 * start + 0.6 * end)
+    assert found.retreat_from is None
+    assert found.way == (PLAN.moves[1].via[0], approach(0), HOME_JOINTS)
+
+
+def test_from_nowhere_it_asks_for_a_hand():
+    with pytest.raises(
+        ProcedureError, match=r"neither HOME nor on a way .* move it to HOME by hand"
+    ):
+        home_from((2.0, 2.0, 2.0))
