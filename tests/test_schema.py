@@ -18,6 +18,10 @@ class Cell(StrictModel):
     stations: tuple[Station, ...] = ()
     spare: Station | None = None
     by_name: dict[str, Station] | None = None
+    count: int = 1
+    switch: bool = False
+    axis: tuple[float, float] | None = None
+    margins: dict[str, float] | None = None
 
 
 SCHEMA = "elastocal.cell/1"
@@ -51,6 +55,11 @@ def test_a_good_file_is_a_frozen_model(read):
         ({"spare": {"nam": "a", "name": "b"}}, r"'spare\.nam'; did you mean 'name'"),
         ({"by_name": {"x": {"name": "b", "size": 1}}}, r"'by_name\.x\.size' \(known: name, height"),
         ({"stations": [{"height": 1}]}, r"key 'stations\.0\.name' is missing"),
+        ({"count": True}, "count: must be a number, got True"),
+        ({"axis": [False, 1]}, r"axis: must be a number, got \[False, 1\]"),
+        ({"margins": {"a": True}}, "margins: must be a number"),
+        ({"spare": {"name": "a", "height": True}}, r"spare\.height: must be a number, got True"),
+        ({"stations": [{"name": "a", "height": True}]}, r"stations\.0\.height: must be a number"),
         ({"kind": "milling"}, "kind: .*'afp' or 'machining', got 'milling'"),
         ({"stations": [{"name": "a", "height": "tall"}]}, r"stations\.0\.height: .*got 'tall'"),
         (
@@ -65,6 +74,22 @@ def test_a_file_that_does_not_fit_is_refused_in_one_line_by_its_place(read, chan
         read(GOOD | changes)
     assert "\n" not in str(refusal.value)
     assert "cell." in str(refusal.value)
+
+
+def test_a_truth_value_stays_one_where_it_is_wanted(read):
+    assert read(GOOD | {"switch": True}).switch is True
+
+
+def test_a_long_value_is_left_out_of_the_message(read):
+    with pytest.raises(SchemaError, match=r"kind: .*'afp' or 'machining'$"):
+        read(GOOD | {"kind": "m" * 61})
+
+
+def test_a_number_of_thousands_of_digits_is_refused(tmp_path):
+    path = tmp_path / "cell.yaml"
+    path.write_text(f"schema: {SCHEMA}\nrobot: arm\nkind: 0x{'f' * 5000}\n")
+    with pytest.raises(SchemaError, match="thousands of digits"):
+        read_yaml(path, Cell, SCHEMA)
 
 
 @pytest.mark.parametrize("data", [[1, 2], "3", "null"])

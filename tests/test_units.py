@@ -35,7 +35,7 @@ def test_a_quantity_is_read_in_si(text, dimension, value):
     assert parse_quantity(text, dimension) == pytest.approx(value, rel=1e-15)
 
 
-@given(st.floats(-1e12, 1e12))
+@given(st.one_of(st.just(0.0), st.floats(1e-12, 1e3), st.floats(-1e3, -1e-12)))
 def test_a_quantity_written_in_si_is_read_back_exactly(value):
     assert parse_quantity(f"{value!r} m", "length") == value
 
@@ -57,6 +57,23 @@ def test_a_unit_of_another_dimension_is_refused(text):
 def test_an_overflowing_quantity_is_refused():
     with pytest.raises(UnitError, match="1e999 m"):
         parse_quantity("1e999 m", "length")
+
+
+@pytest.mark.parametrize(
+    ("text", "dimension", "words"),
+    [
+        ("1000.1 m", "length", "'1000.1 m' is too large: a length can be at most 1 km"),
+        ("-1e300 mm", "length", "at most 1 km"),
+        ("1e300 deg", "angle", "a angle can be at most 100 turns"),
+        ("1e300 N", "force", "10 MN"),
+        ("1e300 s", "time", "1e6 s"),
+        ("1e-300 m/s", "speed", "'1e-300 m/s' is too small: write 0, or at least 1e-12"),
+    ],
+)
+def test_what_no_robot_cell_holds_is_refused(text, dimension, words):
+    with pytest.raises(UnitError) as caught:
+        parse_quantity(text, dimension)
+    assert words in str(caught.value)
 
 
 def test_a_near_miss_is_named():

@@ -64,8 +64,11 @@ class FileAccessError(ElastocalError, OSError):
 def nearest(name: str, allowed: Iterable[str]) -> str:
     """Return ``"; did you mean 'x'?"`` for the closest allowed name, or an empty string.
 
+    Capitals and small letters count as the same.
+
     >>> nearest("bering", ["actuated", "bearing"])
     "; did you mean 'bearing'?"
     """
-    matches = difflib.get_close_matches(name, list(allowed), n=1)
-    return f"; did you mean {matches[0]!r}?" if matches else ""
+    folded = {known.casefold(): known for known in allowed}
+    matches = difflib.get_close_matches(name.casefold(), list(folded), n=1)
+    return f"; did you mean {folded[matches[0]]!r}?" if matches else ""

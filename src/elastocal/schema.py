@@ -5,23 +5,43 @@ file, for example ``springs.2.axis``.
 """
 
 import json
+from collections.abc import Iterable
+from functools import cache
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Annotated, Any, TypeVar, get_args, get_origin
 
 import yaml
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import (
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    ValidationError,
+    ValidationInfo,
+    field_validator,
+)
 
 from elastocal.errors import SchemaError, nearest
 from elastocal.files import read_text
 
 
 class StrictModel(BaseModel):
-    """Base of every model that is read from a file: frozen, no unknown keys."""
+    """Base of every model that is read from a file: frozen, no unknown keys, no yes for a 1."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
+    @field_validator("*", mode="before")
+    @classmethod
+    def _no_truth_for_a_number(cls, value: Any, info: ValidationInfo) -> Any:
+        # YAML reads yes, no, on, off as truth values, and Python counts those as 1 and 0.
+        if _holds_truth(value) and _takes_bare_numbers(cls, info.field_name or ""):
+            raise ValueError("must be a number")
+        return value
+
 
 Model = TypeVar("Model", bound=StrictModel)
+
+_LONGEST_SHOWN = 60
+"""Longer values are left out of messages."""
 
 
 class _UniqueKeyLoader(yaml.SafeLoader):
@@ -98,9 +118,12 @@ def validate(data: Any, model: type[Model], what: str) -> Model:
         elif first["type"] == "missing":
             message = f"key {path!r} is missing"
         else:
+            reason = first["msg"].removeprefix("Value error, ")
+            message = f"{path}: {reason}" if path else reason
             # A whole section is no value that a person would recognise.
-            given = repr(first["input"])
-            message = f"{path}: {first['msg']}" + (f", got {given}" if len(given) <= 120 else "")
+            given = _shown(first["input"])
+            told = given in reason or len(given) > _LONGEST_SHOWN
+            message += "" if told else f", got {given}"
         raise SchemaError(f"{what}: {message}") from error
 
 
@@ -109,6 +132,44 @@ def _checked(data: Any, path: Path, model: type[Model], schema: str) -> Model:
         raise SchemaError(f"{path} must hold keys and values, among them the schema {schema!r}")
     check_schema(data.pop("schema", None), schema, str(path))
     return validate(data, model, str(path))
+
+
+def _shown(value: Any) -> str:
+    try:
+        return repr(value)
+    except ValueError:  # an integer of more digits than Python writes
+        return "a number of thousands of digits"
+
+
+def _holds_truth(value: Any) -> bool:
+    """Return whether a value is a truth value or a list or mapping with one in it."""
+    if isinstance(value, dict):
+        value = list(value.values())
+    if isinstance(value, list | tuple):
+        return any(_holds_truth(inner) for inner in value)
+    return isinstance(value, bool)
+
+
+@cache
+def _takes_bare_numbers(model: type[BaseModel], field: str) -> bool:
+    """Return whether a field takes numbers without unit, itself or in a list, and no truth value.
+
+    What is in a section of its own is judged there.
+    """
+    info = model.model_fields[field]
+    kinds = set(_bare_kinds(info.annotation, info.metadata))
+    return bool(kinds & {int, float}) and bool not in kinds
+
+
+def _bare_kinds(annotation: Any, metadata: Iterable[Any] = ()) -> set[Any]:
+    """Return the types that an annotation is made of, without those that are read from text."""
+    if any(isinstance(item, BeforeValidator) for item in metadata):
+        return set()
+    if get_origin(annotation) is Annotated:
+        inner, *rest = get_args(annotation)
+        return _bare_kinds(inner, rest)
+    arguments = get_args(annotation)
+    return {annotation}.union(*(_bare_kinds(argument) for argument in arguments))
 
 
 def _known_keys(model: type[BaseModel], path: tuple[int | str, ...]) -> list[str]:

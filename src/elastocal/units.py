@@ -26,6 +26,21 @@ _FACTORS: dict[str, dict[str, float]] = {
     "frequency": {"Hz": 1.0},
 }
 
+_LARGEST: dict[str, tuple[float, str]] = {
+    "length": (1e3, "1 km"),
+    "angle": (200.0 * math.pi, "100 turns"),
+    "force": (1e7, "10 MN"),
+    "moment": (1e7, "10 MN·m"),
+    "mass": (1e6, "1000 t"),
+    "speed": (1e3, "1 km/s"),
+    "angular speed": (1e3, "1000 rad/s"),
+    "force rate": (1e9, "1 GN/s"),
+    "time": (1e6, "1e6 s"),
+}
+"""Largest magnitude of what belongs to a robot cell, in SI: more is a slip of the keyboard."""
+_SMALLEST = 1e-12
+"""Smallest magnitude of the same, in SI, but for 0."""
+
 _QUANTITY = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*([^\s\d.].*)\s*")
 _COLUMN = re.compile(r"\s*(?P<name>[^\[\]]+?)\s*(?:\[(?P<unit>[^\[\]]*)\])?\s*")
 
@@ -59,7 +74,8 @@ def parse_quantity(text: object, dimension: str) -> float:
     Raises
     ------
     UnitError
-        If ``text`` is not a string, has no unit, or a unit of another dimension.
+        If ``text`` is not a string, has no unit or a unit of another dimension, or is larger or
+        smaller than anything in a robot cell: a length of more than 1 km, for example.
     """
     match = _QUANTITY.fullmatch(text) if isinstance(text, str) else None
     if match is None:
@@ -68,7 +84,18 @@ def parse_quantity(text: object, dimension: str) -> float:
     value = float(match[1]) * factor(match[2].strip(), dimension)
     if not math.isfinite(value):
         raise UnitError(f"{text!r} is not a finite {dimension}")
+    _check_size(value, dimension, f"{text!r}")
     return value
+
+
+def _check_size(value: float, dimension: str, text: str) -> None:
+    if dimension not in _LARGEST:
+        return
+    largest, name = _LARGEST[dimension]
+    if not abs(value) <= largest:
+        raise UnitError(f"{text} is too large: a {dimension} can be at most {name}")
+    if not (value == 0.0 or abs(value) >= _SMALLEST):
+        raise UnitError(f"{text} is too small: write 0, or at least {_SMALLEST:g} in SI units")
 
 
 def split_column(header: str) -> tuple[str, str | None]:

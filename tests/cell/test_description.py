@@ -85,9 +85,50 @@ def test_the_rail_comes_first_and_its_frame_is_the_base(folder):
     np.testing.assert_allclose(cell.robot.forward([0.7, *q]), expected, atol=1e-12)
 
 
-def test_a_searched_rail_is_tried_every_quarter_metre(folder):
+def test_a_searched_rail_is_tried_every_quarter_metre_and_not_at_its_ends(folder):
     positions = load_cell(folder / "cell.yaml").external_positions
-    np.testing.assert_allclose(positions, np.linspace(-1.5, 1.5, 13)[:, None])
+    np.testing.assert_allclose(positions, np.linspace(-1.499, 1.499, 13)[:, None])
+
+
+def test_a_searched_rail_keeps_its_margin(folder, example):
+    cell = load(folder, changed(example, "limits.rail_margin", "50 mm"))
+    margin = np.minimum(cell.external_positions + 1.5, 1.5 - cell.external_positions) - 0.05
+    assert margin.min() == pytest.approx(1e-3)
+
+
+def test_a_margin_that_leaves_almost_nothing_still_leaves_places(folder, example):
+    cell = load(folder, changed(example, "limits.rail_margin", "1499.9 mm"))
+    assert len(cell.external_positions)
+    assert np.abs(cell.external_positions).max() < 1e-4
+
+
+@pytest.mark.parametrize(
+    ("margin", "position", "words"),
+    [
+        ("0 mm", "1.5 m", "1.5 m must be above -1500 mm and below 1500 mm"),
+        ("50 mm", "-1450 mm", "-1450 mm must be above -1450 mm and below 1450 mm"),
+        ("50 mm", "1.46 m", "its limits less limits.rail_margin of 50 mm"),
+    ],
+)
+def test_a_listed_position_where_no_pose_can_be_is_refused(
+    folder, example, margin, position, words
+):
+    data = changed(example, "limits.rail_margin", margin)
+    data = changed(data, "robot.external.rail", ["0 m", position])
+    message = refusal(folder, data)
+    assert words in message
+    assert "robot: external.rail" in message
+
+
+def test_more_combinations_than_can_be_tried_are_refused_with_their_number(folder, example):
+    data = changed(example, "robot.rail.travel", ["-125 m", "125 m"])
+    message = refusal(folder, data)
+    assert "1001 of rail are 1001 combinations of positions, at most 500" in message
+    assert "wrong unit" in message
+    data = changed(example, "robot.external.rail", [f"{i} mm" for i in range(501)])
+    assert "501 combinations" in refusal(folder, data)
+    data = changed(example, "robot.external.rail", [f"{i} mm" for i in range(500)])
+    assert len(load(folder, data).external_positions) == 500
 
 
 def test_given_rail_positions_are_taken(folder, example):
@@ -134,7 +175,7 @@ def test_process_poses_are_read(folder, example):
 @pytest.mark.parametrize(
     ("key", "value", "words"),
     [
-        ("engagement.disk_radius", 25, "engagement.disk_radius: Value error, 25 is not a length"),
+        ("engagement.disk_radius", 25, "engagement.disk_radius: 25 is not a length"),
         ("engagement.disk_radius", "25", "not a length"),
         ("engagement.disk_radius", "25 N", "unit 'N' is not a length"),
         ("engagement.disk_radius", "0 mm", "greater than 0"),
@@ -155,12 +196,12 @@ def test_process_poses_are_read(folder, example):
         ("search.d_max", "0 mm", "search.d_max: Input should be greater than 0"),
         ("search.d_max", "-175 mm", "greater than 0"),
         ("search.poses", 0, "search.poses: Input should be greater than or equal to 1"),
-        ("search.poses", 4000, "search.pool: Value error, must be at least the 4000 poses"),
-        ("trackers.0.range", ["15 m", "1 m"], "trackers.0.range: Value error, the first must be"),
-        ("robot.rail.travel", ["1 m", "-1 m"], "robot.rail.travel: Value error, the first must be"),
+        ("search.poses", 4000, "search.pool: must be at least the 4000 poses"),
+        ("trackers.0.range", ["15 m", "1 m"], "trackers.0.range: the first must be"),
+        ("robot.rail.travel", ["1 m", "-1 m"], "robot.rail.travel: the first must be"),
         ("robot.rail.axis", [0, 0, 0], "must be a direction"),
         ("robot.external.rial", "search", "no external axis 'rial'; did you mean 'rail'"),
-        ("robot.external.rail", ["2 m"], "external.rail: 2 m must be within -1.5 and 1.5"),
+        ("robot.external.rail", ["2 m"], "external.rail: 2 m must be above -1500 mm and below 15"),
         ("robot.external.rail", ["2 deg"], "not a length"),
         ("robot.external.rail", [], "at least one position"),
         ("robot.model", "KR 120 R2700 extra XA", "did you mean 'KR 120 R2700 extra HA'"),
@@ -172,6 +213,18 @@ def test_process_poses_are_read(folder, example):
         ("limits.torque.provenance", None, "say where the torque values are from"),
         ("limits.torque.values.joint_a7", "1 N*m", "no joint 'joint_a7'"),
         ("limits.torque.values.joint_a1", "0 N*m", "joint_a1 must be above 0"),
+        ("limits.torque.values.joint_a2", "8 kN", "joint_a2 turns and has a moment: unit 'kN'"),
+        ("limits.torque.values.rail", "8 kN*m", "rail slides and has a force: unit 'kN*m'"),
+        ("load_cases.friction", True, "load_cases.friction: must be a number, got True"),
+        ("robot.rail.axis", [False, True, False], "robot.rail.axis: must be a number"),
+        ("search.pool", 10_000_001, "search.pool: Input should be less than or equal to 10000000"),
+        ("search.seed", 2**64, "search.seed: Input should be less"),
+        ("engagement.disk_radius", "1001 m", "engagement.disk_radius: '1001 m' is too large"),
+        ("tcp.abc.0", "1e300 deg", "tcp.abc.0: '1e300 deg' is too large"),
+        ("motion.home.rail", "1e300 m", "home.rail: '1e300 m' is too large"),
+        ("motion.contact_speed", "1e-300 m/s", "motion.contact_speed: '1e-300 m/s' is too small"),
+        ("marker.axis", [1e-300, 0, 0], "must be a direction"),
+        ("fixtures.0.name", "tooling", "fixtures: the name 'tooling' is the surface's"),
         ("limits.joint_margin", "-1 deg", "limits.joint_margin: Input should be greater than"),
         ("marker", None, "trackers need a marker"),
         ("surface.unit", "inch", "unit 'inch' is not a length"),

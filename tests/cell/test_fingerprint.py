@@ -7,6 +7,7 @@ import yaml
 
 from elastocal.cell import fingerprint, load_cell
 from elastocal.cell.examples import write_example
+from elastocal.cell.fingerprint import named_files
 from elastocal.errors import FileAccessError
 from elastocal.robot import catalogue
 
@@ -99,3 +100,37 @@ def test_a_file_that_went_away_is_named(folder):
     with pytest.raises(FileAccessError, match=r"cannot read .*block\.stl: No such file") as caught:
         fingerprint(cell)
     assert "\n" not in str(caught.value)
+
+
+def with_mesh_arm(folder):
+    """Give the cell an arm one link of which is a mesh, named as in a ROS package."""
+    shutil.copy(folder / "block.stl", folder / "link.stl")
+    shape = '<collision><geometry><mesh filename="package://arm/link.stl" scale="1e-6 1e-6 1e-6"/>'
+    urdf = catalogue.urdf("KR 300 R2500 ultra").replace(
+        '<link name="link_4">', f'<link name="link_4">{shape}</geometry></collision>'
+    )
+    assert "package://arm" in urdf
+    (folder / "robot.urdf").write_text(urdf)
+    return rewritten(folder, lambda data: data.update(robot={"urdf": "robot.urdf"}))
+
+
+def test_a_byte_of_a_mesh_of_the_arm_changes_it_and_its_place_does_not(folder):
+    before = with_mesh_arm(folder)
+    shutil.move(folder, folder.with_name("there"))
+    assert of(folder.with_name("there")) == before
+    flip_last_byte(folder.with_name("there") / "link.stl")
+    assert of(folder.with_name("there")) != before
+
+
+def test_the_meshes_of_the_arm_are_among_the_files_of_the_cell(folder):
+    with_mesh_arm(folder)
+    cell = load_cell(folder / "cell.yaml")
+    assert "link.stl" in set(named_files(cell))
+    assert "package://arm/link.stl" in cell.robot.urdf
+
+
+def test_a_missing_mesh_of_the_arm_is_refused_by_link_and_name(folder):
+    with_mesh_arm(folder)
+    (folder / "link.stl").unlink()
+    with pytest.raises(FileAccessError, match=r"robot: link 'link_4': mesh 'package://arm/link"):
+        load_cell(folder / "cell.yaml")

@@ -197,7 +197,7 @@ def test_moves_between_poses_keep_clear(planned):
         for a, b in itertools.pairwise(corners):
             way = a + np.linspace(0.0, 1.0, 9)[:, None] * (b - a)
             assert scene.distances(way).min() >= planned.cell.file.limits.clearance - 1e-9
-            assert np.all(scene.keeps(way, planned.cell.file.limits.clearance, False))
+            assert np.all(scene.keeps(way, planned.cell.file.limits.clearance))
 
 
 def test_the_station_named_sees_the_marker(planned):

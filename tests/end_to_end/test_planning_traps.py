@@ -224,3 +224,25 @@ def test_a_name_that_no_controller_takes_is_refused(tmp_path):
     result = elastocal("plan", path, "--out", tmp_path / "plan", "--program", "my plan")
     assert "my plan" in result.reason
     assert not (tmp_path / "plan").exists()
+
+
+def test_a_home_in_collision_is_refused_before_the_long_work_and_names_the_bodies(tmp_path):
+    box = (
+        '  - {name: post, box: {size: ["0.3 m", "0.3 m", "3 m"]},'
+        ' pose: {xyz: ["1.4 m", "0 m", "1.5 m"]}}\n'
+    )
+    reason = refusal(tmp_path, ("  - {name: floor", f"{box}  - {{name: floor"))
+    assert "HOME is not free of collision" in reason
+    assert "post" in reason
+
+
+def test_a_tool_longer_than_its_stem_is_refused_by_collision(tmp_path):
+    deep = ('pose: {xyz: ["0 mm", "0 mm", "190 mm"]}', 'pose: {xyz: ["0 mm", "0 mm", "350 mm"]}')
+    assert "collision" in refusal(tmp_path, deep)
+
+
+def test_what_the_catalogue_assumes_is_said(tmp_path):
+    path, _ = cell(tmp_path, like="machining")
+    assert elastocal("plan", path, "--out", tmp_path / "plan").code == 0
+    assumed = [finding for finding in findings(tmp_path) if finding.startswith("assumed, ")]
+    assert any("taken from KR 210 R3100 ultra" in finding for finding in assumed)

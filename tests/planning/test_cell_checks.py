@@ -56,8 +56,8 @@ class TestExample:
         cell, surface, _, pool = planned(like, folders[like])
         scene = collision_scene(cell, surface)
         few = pool.postures.take(np.arange(5))
-        assert np.all(scene.keeps(few.q, 1e-3, in_contact=True))
-        assert np.all(scene.keeps(few.q_approach, 1e-3, in_contact=False))
+        assert np.all(scene.keeps(few.q, 1e-3, -np.inf))
+        assert np.all(scene.keeps(few.q_approach, 1e-3))
         assert TOOLING in {body.name for body in scene.obstacles}
 
 

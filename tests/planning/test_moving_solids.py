@@ -29,8 +29,7 @@ def example(request, tmp_path_factory):
     cell = load_cell(folder / "cell.yaml")
     entry = cell.file.surface
     surface = load_surface(cell.surface_path, entry.metres, cell.T_base_surface)
-    sight = sight_check(cell, surface)
-    return sight
+    return sight_check(cell, surface)
 
 
 def random_postures(robot, count, rng):

@@ -8,6 +8,7 @@ from elastocal.procedure.steadiness import Stretch, complaint, steadiness
 
 LIMITS = ProcedureSettings()
 TIME = np.arange(50) / 100.0
+TOOTHED = np.where(np.arange(50) % 2, 4.0, -4.0)[:, None]
 
 
 def ramp(slope, sigma=0.0, mean=(0.0, 0.0, -1100.0), seed=1):
@@ -43,7 +44,7 @@ def test_the_time_of_day_changes_no_bit():
         (ramp(0.0), (0.0, 0.0, -1106.0), "force is off 6.0 N, limit 5 N"),
         (ramp(0.0), None, None),
         (ramp(6.0), (0.0, 0.0, -1100.0), "force drifts by 6.0 N/s, limit 5 N/s"),
-        (ramp(0.0, 3.0), (0.0, 0.0, -1100.0), "force spreads over"),
+        (ramp(0.0) + TOOTHED, (0.0, 0.0, -1100.0), "force spreads over"),
         (ramp(np.nan), (0.0, 0.0, -1100.0), "force is off nan N"),
     ],
 )
@@ -58,5 +59,5 @@ def test_a_stretch_keeps_what_is_young_enough():
         time = block * 0.04 + np.arange(4) / 100.0
         stretch.add(time, np.full((4, 3), block))
     stretch.add(np.empty(0), np.empty((0, 3)))
-    assert stretch.time[-1] - stretch.time[0] == pytest.approx(0.15, abs=0.011)
+    assert stretch.time[-1] - stretch.time[0] == pytest.approx(0.11)
     assert len(stretch) == len(stretch.time) == len(stretch.values)

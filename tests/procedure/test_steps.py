@@ -44,7 +44,7 @@ def test_a_spoiled_window_settles_again():
     ]  # fmt: skip
 
 
-@pytest.mark.parametrize("outcomes", itertools.product(Outcome, repeat=4))
+@pytest.mark.parametrize("outcomes", [*itertools.product(Outcome, repeat=4)])
 def test_on_every_way_there_is_one_contact_and_one_retract_before_the_commit(outcomes):
     # SETTLE cannot spoil a window: it has none yet.
     fixed = [

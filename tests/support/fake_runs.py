@@ -68,6 +68,8 @@ def plan(poses: int = 2, loads: int = 2) -> PlanFile:
         contact=ContactRecord(
             approach_distance=APPROACH,
             near_contact=NEAR,
+            axis_override=0.2,
+            contact_speed=0.02,
             load_cases=dict(list(LOADS.items())[:loads]),
         ),
         poses=records,

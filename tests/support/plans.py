@@ -32,6 +32,8 @@ RAIL_AT = 0.3125
 """Position of the rail, in m."""
 APPROACH = 0.1
 NEAR = 0.003
+OVERRIDE = 0.2
+CONTACT_SPEED = 0.02
 LOAD_CASES = {
     "normal": (0.0, 0.0, -1100.0),
     "north": (280.0, 0.0, -1100.0),
@@ -170,6 +172,8 @@ def plan(rail: bool = True) -> PlanFile:
         contact=ContactRecord(
             approach_distance=APPROACH,
             near_contact=NEAR,
+            axis_override=OVERRIDE,
+            contact_speed=CONTACT_SPEED,
             load_cases=LOAD_CASES,
         ),
         poses=tuple(_pose(data, number, int(c)) for number, c in enumerate(visited)),

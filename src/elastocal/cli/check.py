@@ -9,7 +9,10 @@ import typer
 def check(
     file: Annotated[
         Path,
-        typer.Argument(help="Dataset (.nc, .csv), model (.json), robot (.urdf), springs (.yaml)."),
+        typer.Argument(
+            help="Cell or springs (.yaml), plan or model (.json), pool (.nc), dataset (.nc, .csv),"
+            " robot (.urdf)."
+        ),
     ],
     as_json: Annotated[
         bool, typer.Option("--json", help="Print the findings as one JSON object.")

@@ -14,12 +14,15 @@ def init(
     force: Annotated[bool, typer.Option("--force", help="Replace files that are there.")] = False,
 ) -> None:
     """Write a commented example cell with its mesh."""
+    from rich.markup import escape
+
     from elastocal.cell.examples import write_example
     from elastocal.cli.output import console
 
     cell, *meshes = write_example(folder, like, force)
     names = ", ".join(mesh.name for mesh in meshes)
     console().print(
-        f"wrote [bold]{cell}[/bold] and {names}: edit it, then `elastocal check {cell}`",
+        f"wrote [bold]{escape(str(cell))}[/bold] and {names}: edit it, then"
+        f" `elastocal check {escape(str(cell))}`",
         soft_wrap=True,
     )

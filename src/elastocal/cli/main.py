@@ -12,10 +12,12 @@ from elastocal import __version__
 from elastocal.cli.calibrate import calibrate
 from elastocal.cli.check import check
 from elastocal.cli.demo import demo
+from elastocal.cli.derive import derive
 from elastocal.cli.init import init
 from elastocal.cli.plan import plan
 from elastocal.cli.predict import predict
 from elastocal.cli.robots import robots
+from elastocal.cli.run import run as run_procedure
 from elastocal.errors import ElastocalError
 
 app = typer.Typer(
@@ -25,7 +27,10 @@ app = typer.Typer(
     add_completion=False,
     pretty_exceptions_enable=False,
 )
-for command in (robots, init, check, plan, calibrate, predict, demo):
+for command in (robots, init, check, plan):
+    app.command()(command)
+app.command(name="run")(run_procedure)
+for command in (derive, calibrate, predict, demo):
     app.command()(command)
 
 

@@ -20,7 +20,9 @@ def run(
     dry_run: Annotated[
         bool, typer.Option("--dry-run", help="List the steps with their times; nothing moves.")
     ] = False,
-    seed: Annotated[int, typer.Option(min=0, help="Seed of simulated devices.")] = 0,
+    seed: Annotated[
+        int | None, typer.Option(min=0, help="Seed of simulated devices; default: the cell's.")
+    ] = None,
     as_json: Annotated[
         bool, typer.Option("--json", help="Print the figures as one JSON object.")
     ] = False,

@@ -55,7 +55,7 @@ class Prepared:
     folder: RunFolder
 
 
-def prepare(cell: Path, plan: Path, out: Path, seed: int) -> Prepared:
+def prepare(cell: Path, plan: Path, out: Path, seed: int | None) -> Prepared:
     """Read cell and plan and refuse what does not fit; nothing is written or moved.
 
     Raises
@@ -67,6 +67,7 @@ def prepare(cell: Path, plan: Path, out: Path, seed: int) -> Prepared:
     folder = plan if plan.is_dir() else plan.parent
     now = datetime.now(UTC).isoformat(timespec="seconds")
     text = read_text(folder / PLAN)
+    seed = loaded.file.simulation.seed if seed is None else seed
     record = run_record(loaded, read, text, cell_place(loaded), seed, now)
     return Prepared(
         loaded,
@@ -98,13 +99,17 @@ def run_session(job: Prepared, asked: Asked, console: Console) -> Result:
         # Read again: between the look above and the lock another process may have been here.
         if read_journal(job.folder.journal) != entries:
             raise ProcedureError(f"{job.folder.path}: another process has just run here")
-        if not entries:
-            first = journal.write(0.0, Event.START, run=job.record)
-            entries = (first,)
-        known = last_known(entries)
-        devices = job.source.make(job.cell, job.record.seed, known.entry.time)
+        known = last_known(entries) if entries else None
+        devices = job.source.make(job.cell, job.record.seed, known.entry.time if known else 0.0)
         _confirm(job, known, devices, asked, console)
-        result = _run(job, known, devices, journal, asked, console)
+        task = _task(job, known, devices)
+        if known is None:
+            journal.write(devices.clock.now(), Event.START, run=job.record)
+        else:
+            journal.write(devices.clock.now(), Event.RESUME)
+        with interruption() as interrupted, watching(console, len(job.plan.poses)) as tell:
+            seams = Seams(lambda: PoseRecorder(job.plan.robot.joints), tell, interrupted)
+            result = Runner(task, devices, journal, seams).run()
     if result.end is End.STOPPED:
         raise ProcedureError(f"{result.message}. The arm is {result.stand.value}")
     if result.end is End.DONE:
@@ -112,29 +117,17 @@ def run_session(job: Prepared, asked: Asked, console: Console) -> Result:
     return result
 
 
-def _run(
-    job: Prepared,
-    known: LastKnown,
-    devices: Devices,
-    journal: Journal,
-    asked: Asked,
-    console: Console,
-) -> Result:
-    state = devices.arm.state()
-    limit = job.settings.procedure.travel_limit
-    task = Job(
+def _task(job: Prepared, known: LastKnown | None, devices: Devices) -> Job:
+    """Return what is left to do, and the way to HOME from where the arm stands."""
+    state, limit = devices.arm.state(), job.settings.procedure.travel_limit
+    return Job(
         job.plan,
         job.settings,
         job.folder,
-        committed=frozenset(known.committed),
-        attempts=known.attempts,
+        committed=frozenset(known.committed) if known else frozenset(),
+        attempts=known.attempts if known else {},
         home=way_home(job.plan, state.q, state.T_base_tcp, limit),
     )
-    if asked.resume:
-        journal.write(known.entry.time, Event.RESUME)
-    with interruption() as interrupted, watching(console, len(job.plan.poses)) as tell:
-        seams = Seams(lambda: PoseRecorder(job.plan.robot.joints), tell, interrupted)
-        return Runner(task, devices, journal, seams).run()
 
 
 def _entries(folder: RunFolder) -> tuple[Entry, ...]:
@@ -162,17 +155,14 @@ def _check_folder(job: Prepared, entries: tuple[Entry, ...], resume: bool) -> No
 
 
 def _confirm(
-    job: Prepared, known: LastKnown, devices: Devices, asked: Asked, console: Console
+    job: Prepared, known: LastKnown | None, devices: Devices, asked: Asked, console: Console
 ) -> None:
     """Ask a person before anything moves that was not expected to."""
-    if asked.resume:
-        for line in known.lines:
-            console.print(line, soft_wrap=True)
-        state = devices.arm.state()
-        if state.in_contact or known.may_touch:
-            said = "is in contact" if state.in_contact else "is not in contact"
-            console.print(f"the arm says that it {said}", soft_wrap=True)
-    if asked.yes or not (asked.resume or job.source.real):
+    if known is not None:
+        contact = "in contact" if devices.arm.state().in_contact else "not in contact"
+        for line in (*known.lines, f"the arm says that it is {contact}"):
+            console.print(line, soft_wrap=True, markup=False)
+    if asked.yes or not (known or job.source.real):
         return
     if not sys.stdin.isatty():
         raise ProcedureError("a person must confirm that the cell is clear: give --yes")

@@ -86,7 +86,7 @@ def show_result(console: Console, job: Prepared, result: Result) -> None:
         soft_wrap=True,
     )
     if result.message:
-        console.print(result.message, soft_wrap=True)
+        console.print(result.message, soft_wrap=True, markup=False)
     if found["dataset"]:
         console.print(
             f"wrote [bold]{job.folder.dataset}[/bold] and {job.folder.summary.name}:"

@@ -53,7 +53,8 @@ def watching(console: Console, count: int) -> Iterator[Callable[[Progress], None
             now = time.monotonic()
             if now - shown >= REFRESH:
                 shown = now
-                live.update(Text(f"{_bar(said.number, count)} {progress_text(said)}"), refresh=True)
+                done = said.number if said.pose is None else said.number - 1
+                live.update(Text(f"{_bar(done, count)} {progress_text(said)}"), refresh=True)
 
         yield show
 
@@ -68,7 +69,7 @@ class _Lines:
     def __call__(self, said: Progress) -> None:
         if (said.pose, said.attempt) != self._last:
             self._last = (said.pose, said.attempt)
-            self._console.print(progress_text(said), soft_wrap=True)
+            self._console.print(progress_text(said), soft_wrap=True, markup=False)
 
 
 def _bar(done: int, count: int) -> str:

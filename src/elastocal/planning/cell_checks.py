@@ -22,6 +22,7 @@ from elastocal.planning.checks import (
     SingularityCheck,
     Station,
     TorqueCheck,
+    TravelLimitsCheck,
     WristCheck,
 )
 from elastocal.planning.moving_solids import MovingSolids
@@ -63,18 +64,29 @@ def point_checks(
 
 def robot_checks(cell: Cell, surface: Surface) -> Checks:
     """Return the checks that postures decide: quick ones, and collision."""
-    collision = CollisionCheck(collision_scene(cell, surface), cell.file.limits.clearance)
+    engagement = cell.file.engagement
+    collision = CollisionCheck(
+        collision_scene(cell, surface),
+        cell.file.limits.clearance,
+        engagement.approach_distance,
+        engagement.near_contact,
+    )
     seen, sensed = sight_check(cell, surface), _sensor_check(cell)
-    optional: list[Check] = [check for check in (sensed, seen) if check is not None]
-    return Checks((), (*_joint_checks(cell), torque_check(cell), *optional), (collision,))
+    torque = torque_check(cell)
+    judged = torque if torque.judged else None
+    optional: list[Check] = [check for check in (judged, sensed, seen) if check is not None]
+    return Checks((), (*_joint_checks(cell), *optional), (collision,))
 
 
 def _joint_checks(cell: Cell) -> tuple[Check, ...]:
     file, robot = cell.file, cell.robot
     loads, limits = file.load_cases, file.limits
+    slides = not all(robot.revolute)
+    travel = (TravelLimitsCheck(robot, cell.joint_margin),) if slides else ()
     wrist = (WristCheck(robot, limits.wrist_angle),) if has_wrist(robot) else ()
     return (
         JointLimitsCheck(robot, cell.joint_margin),
+        *travel,
         SingularityCheck(robot, limits.singular_value),
         *wrist,
         FrictionCheck(loads.force_tcp, loads.friction, loads.safety),

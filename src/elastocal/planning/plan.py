@@ -11,7 +11,14 @@ from elastocal.errors import PlanningError
 from elastocal.planning.cell_checks import collision_scene, sight_check, torque_check
 from elastocal.planning.choice import Searched
 from elastocal.planning.gathering import Gathered, gather
-from elastocal.planning.motion import Route, mover_for, plan_route
+from elastocal.planning.motion import (
+    Mover,
+    Route,
+    clear_retreats,
+    mover_for,
+    plan_route,
+    refuse_blocked_home,
+)
 from elastocal.planning.plan_file import PlanFile
 from elastocal.planning.pool import Progress
 from elastocal.planning.pool_file import PoolData
@@ -65,12 +72,14 @@ def make_plan(
     SurfaceError, FileAccessError
         If the surface cannot be read, or its region is empty.
     """
-    technique(cell.file.search.technique)  # an unknown one is refused before the long work
     other = None if compare is None else technique(compare)
+    _refuse_before_the_long_work(cell, compare)
     for_findings, for_points, for_search = np.random.default_rng(cell.file.search.seed).spawn(3)
     progress(STAGES[0], 0, 1)
     surface = cell_surface(cell)
     findings = surface_findings(cell, surface, for_findings)
+    mover = mover_for(cell, collision_scene(cell, surface))
+    refuse_blocked_home(cell.home, mover)
     progress(STAGES[0], 1, 1)
     gathered = gather(
         cell, surface, for_points, jobs, lambda _, done, total: progress(STAGES[1], done, total)
@@ -82,7 +91,7 @@ def make_plan(
         cell,
         searched,
         gathered,
-        surface,
+        mover,
         for_search,
         lambda _, done, total: progress(STAGES[3], done, total),
     )
@@ -108,6 +117,17 @@ def make_plan(
     return Planned(plan_record(decisions), pool_data(decisions), surface)
 
 
+def _refuse_before_the_long_work(cell: Cell, compare: str | None) -> None:
+    """Refuse what needs no pool to be known as impossible."""
+    wanted = technique(cell.file.search.technique)
+    for name in (wanted.name, compare):
+        if name in ("i_optimal", "exchange-i") and cell.process is None:
+            raise PlanningError(
+                f"search technique {name!r} needs the production's poses and forces:"
+                " name their file in process.file of the cell file"
+            )
+
+
 def _refuse_too_few(cell: Cell, gathered: Gathered, findings: tuple[Finding, ...]) -> None:
     """Refuse a pool that cannot give the poses wanted, saying what to move."""
     pool, wanted = gathered.pool, cell.file.search.poses or 1
@@ -128,22 +148,24 @@ def _choose(
     cell: Cell,
     searched: Searched,
     gathered: Gathered,
-    surface: Surface,
+    mover: Mover,
     rng: Generator,
     progress: Progress,
 ) -> tuple[Selection, Route]:
-    """Return poses to which ways lead from HOME, replacing those to which none does."""
-    mover = mover_for(cell, collision_scene(cell, surface))
+    """Return poses that free ways lead to from HOME, and on to the surface; replace others."""
     left: IndexArray = np.arange(len(searched.candidates))
     for _ in range(_REPLACEMENTS):
         selection = searched.choose(cell, left, rng)
         postures = gathered.pool.postures.take(selection.order)
         route = plan_route(cell.home, postures, mover, progress)
-        if not len(route.unreachable):
+        blocked = np.union1d(
+            route.unreachable, np.flatnonzero(~clear_retreats(cell, mover, postures))
+        )
+        if not len(blocked):
             return selection, route
-        left = np.setdiff1d(left, selection.order[np.asarray(route.unreachable)])
+        left = np.setdiff1d(left, selection.order[blocked])
     raise PlanningError(
-        f"no way without collision leads from HOME to {len(route.unreachable)} of"
+        f"no way without collision leads from HOME to {len(blocked)} of"
         f" {len(selection)} poses, and others in their place fared no better: move motion.home or"
         " the fixtures, or lengthen engagement.approach_distance"
     )
@@ -177,8 +199,19 @@ def _notes(
         notes.append(
             f"{selection.name} knows no d_max: it chose as many poses as cover needs for it"
         )
+    notes.extend(f"assumed, {text}" for text in _assumptions(cell))
     judged = torque_check(cell).judged
     unknown = [name for name in cell.robot.joint_names if name not in judged]
     if unknown:
         notes.append(f"torques of {', '.join(unknown)} are not known and not judged")
     return tuple(notes)
+
+
+def _assumptions(cell: Cell) -> list[str]:
+    """Return what the robot's description assumes and the cell file does not replace."""
+    given = set()
+    if cell.file.limits.torque.values:
+        given.add("effort")
+    if cell.file.motion.speed:
+        given.add("velocity")
+    return [f"{a.field}: {a.reason}" for a in cell.robot.assumptions if a.field not in given]

@@ -54,6 +54,11 @@ class ContactRecord(StrictModel):
 
     approach_distance: float
     near_contact: float
+    axis_override: float
+    """Part of the axes' largest speeds that the times of moves are estimated for."""
+    contact_speed: float
+    """Speed of the straight motion between approach pose and contact that the times in contact
+    are estimated for, in m/s."""
     load_cases: dict[str, Vector]
     """Force on the robot in the tcp frame, in N, in the order in which they are applied."""
 

@@ -107,6 +107,8 @@ def _contact(cell: Cell) -> ContactRecord:
     return ContactRecord(
         approach_distance=engagement.approach_distance,
         near_contact=engagement.near_contact,
+        axis_override=cell.file.motion.override,
+        contact_speed=cell.file.motion.contact_speed,
         load_cases={
             name: _vector(force) for name, force in zip(loads.cases, loads.force_tcp, strict=True)
         },

@@ -10,6 +10,7 @@ import pinocchio as pin
 from elastocal.arrays import BoolArray, FloatArray, IndexArray
 from elastocal.errors import RobotError
 from elastocal.robot import Robot
+from elastocal.robot.mesh_files import collision_model
 
 NEIGHBOURS = 1
 """Links this many joints apart touch by construction and are not checked against each other."""
@@ -64,8 +65,7 @@ class CollisionScene:
     _columns: IndexArray = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
-        model = pin.buildModelFromXML(self.robot.urdf)
-        geometry = pin.buildGeomFromUrdfString(model, self.robot.urdf, pin.GeometryType.COLLISION)
+        model, geometry = collision_model(self.robot)
         if geometry.ngeoms == 0:
             raise RobotError(f"robot {self.robot.name!r} has no collision shapes in its URDF")
         links = list(range(geometry.ngeoms))
@@ -82,7 +82,7 @@ class CollisionScene:
         columns = [model.joints[model.getJointId(name)].idx_q for name in self.robot.joint_names]
         object.__setattr__(self, "_columns", np.array(columns, dtype=np.intp))
 
-    def keeps(self, q: FloatArray, distance: float, in_contact: bool) -> BoolArray:
+    def keeps(self, q: FloatArray, distance: float, pressed: float | None = None) -> BoolArray:
         """Return whether all bodies that must stay apart keep a distance.
 
         Parameters
@@ -91,8 +91,9 @@ class CollisionScene:
             Joint positions in rad or m.
         distance : float
             In m.
-        in_contact : bool
-            Whether the tool touches the tooling and is not checked against it.
+        pressed : float, optional
+            Distance that the tool keeps from what it presses on, in m; the same by default, and
+            infinitely little (``-inf``) in contact, where it is not checked.
 
         Returns
         -------
@@ -102,8 +103,10 @@ class CollisionScene:
         data, results = model.createData(), geometry.createData()
         for pair, request in enumerate(results.collisionRequests):
             request.security_margin = distance
-            if in_contact and self._tool_on_touched[pair]:
-                results.deactivateCollisionPair(pair)
+            if pressed is not None and self._tool_on_touched[pair]:
+                request.security_margin = max(pressed, 0.0)
+                if pressed < 0.0:
+                    results.deactivateCollisionPair(pair)
         near = [
             pin.computeCollisions(model, data, geometry, results, configuration, True)
             for configuration in self._configurations(q)
@@ -190,8 +193,8 @@ def _pairs(
     """Return links and tool against obstacles, and distant links against one another."""
     joint = [body.parentJoint for body in geometry.geometryObjects]
     moving = [*links, *tool]
-    # What stands on the floor may touch the tooling: that is the cell's business.
-    outside = [(a, b) for a in moving if joint[a] > NEIGHBOURS for b in obstacles]
+    # What stands still may touch the tooling or the floor: that is the cell's business.
+    outside = [(a, b) for a in moving if joint[a] > 0 for b in obstacles]
     inside = [
         (a, b)
         for i, a in enumerate(moving)

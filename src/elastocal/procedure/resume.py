@@ -14,7 +14,7 @@ from elastocal.procedure.entries import Action, Entry, Event, RunRecord
 from elastocal.procedure.journal import commits
 from elastocal.schema import StrictModel
 
-RUN_SECTIONS = ("procedure", "devices", "simulation")
+SAME_SECTIONS = ("procedure", "devices", "simulation")
 """Sections of the cell file that must not change within a run: its readings would not belong
 together. Those that the plan depends on are in the fingerprint."""
 
@@ -138,7 +138,7 @@ def check_same_settings(used: Cell, wanted: Cell) -> None:
     ProcedureError
         With the first key that differs.
     """
-    for section in RUN_SECTIONS:
+    for section in SAME_SECTIONS:
         old, new = (_dump(getattr(cell.file, section, None)) for cell in (used, wanted))
         for key in {**old, **new}:
             if old.get(key) != new.get(key):

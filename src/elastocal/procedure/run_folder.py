@@ -126,7 +126,7 @@ def _root(cell: Cell) -> str:
 
 
 def _relative_files(cell: Cell) -> list[Path]:
-    names = dict.fromkeys(named_files(cell.file))
+    names = dict.fromkeys(named_files(cell))
     return [_absolute(cell.find(name)) for name in names if not Path(name).is_absolute()]
 
 

@@ -205,7 +205,9 @@ class Runner:
         a, count = self._attempt, len(self._job.plan.poses)
         pose = None if a is None else a.pose.id
         left = self._left[count if pose is None else pose] - (seen.time - self._pose_start)
-        force = seen.force_tcp[-1] if len(seen.force_tcp) else np.zeros(3)
+        # On a move the tool turns, and what the sensor shows is its weight.
+        shown = a is not None and a.step is not Step.MOVE and len(seen.force_tcp) > 0
+        force = seen.force_tcp[-1] if shown else np.zeros(3)
         return Progress(
             time=seen.time,
             number=count if pose is None else pose + 1,

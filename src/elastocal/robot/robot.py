@@ -71,13 +71,22 @@ class Robot:
     chain: SerialChain
     assumptions: tuple[Assumption, ...] = ()
     """Numbers of the description that have no source."""
+    meshes: tuple[tuple[str, Path], ...] = ()
+    """Files of its collision shapes by their names in the URDF, where they were looked for
+    (`elastocal.robot.mesh_files`)."""
     _rigid: ChainModel = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "_rigid", build_model(self.chain))
 
     @classmethod
-    def from_urdf(cls, text: str, tip: str, base: str | None = None) -> "Robot":
+    def from_urdf(
+        cls,
+        text: str,
+        tip: str,
+        base: str | None = None,
+        meshes: tuple[tuple[str, Path], ...] = (),
+    ) -> "Robot":
         """Return the robot that a URDF text describes.
 
         Parameters
@@ -88,6 +97,8 @@ class Robot:
             Link at the tool centre point, its z axis out of the tool.
         base : str, optional
             Link that positions and forces are expressed in; the root link by default.
+        meshes : tuple of (str, Path)
+            Files of the collision shapes; see `elastocal.robot.mesh_files.find_meshes`.
 
         Raises
         ------
@@ -96,7 +107,7 @@ class Robot:
         """
         chain = read_chain(text, tip, base)
         root = parse_urdf(text)
-        return cls(robot_name(root), text, chain, assumptions(root))
+        return cls(robot_name(root), text, chain, assumptions(root), meshes)
 
     @classmethod
     def from_file(cls, path: Path, tip: str, base: str | None = None) -> "Robot":

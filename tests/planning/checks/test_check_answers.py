@@ -1,5 +1,7 @@
 """Known answers of the checks."""
 
+from dataclasses import replace
+
 import coal
 import numpy as np
 import pytest
@@ -13,9 +15,13 @@ from elastocal.planning.checks import (
     SightCheck,
     Station,
     TorqueCheck,
+    TravelLimitsCheck,
     WristCheck,
 )
+from elastocal.planning.postures import Postures
 from elastocal.planning.scene import Body, CollisionScene
+from elastocal.robot import Robot
+from elastocal.robot.mounting import Rail, on_rail
 from support.postures import FORCE_TCP, arm, postures
 
 NO_TOOL = (0.0, np.zeros(3))
@@ -75,6 +81,25 @@ def test_unknown_torques_are_not_judged_and_said_so():
     assert nothing.judged == ()
 
 
+def test_the_torque_of_the_unloaded_arm_counts_too():
+    """A push from below relieves the arm: what is worst is then its own weight."""
+    few = postures().take(np.arange(10))
+    lifting = TorqueCheck(arm(), FORCE_TCP[:1], np.full(6, 9000.0), 60.0, np.zeros(3))
+    unloaded = TorqueCheck(arm(), 0.0 * FORCE_TCP[:1], np.full(6, 9000.0), 60.0, np.zeros(3))
+    loaded_alone = 1.0 - np.abs(lifting.torques(few)).max(axis=(0, 2)) / 9000.0
+    assert np.any(unloaded.margin(few) < loaded_alone - 0.01)
+    np.testing.assert_array_less(lifting.margin(few), unloaded.margin(few) + 1e-12)
+
+
+def test_the_torque_at_the_approach_pose_counts_too():
+    few = postures().take(np.arange(5))
+    away = Postures(few.T_base_tcp, few.normal, few.q_approach, few.q_approach, few.point)
+    check = TorqueCheck(arm(), 0.0 * FORCE_TCP[:1], np.full(6, 9000.0), 0.0, np.zeros(3))
+    here = Postures(few.T_base_tcp, few.normal, few.q, few.q, few.point)
+    both = np.minimum(check.margin(here), check.margin(away))
+    np.testing.assert_allclose(check.margin(few), both)
+
+
 def test_the_sensor_feels_the_lever_arm():
     T = np.eye(4)
     T[2, 3] = 0.45
@@ -90,7 +115,7 @@ def test_a_post_in_the_way_is_a_collision_and_named():
     inside[:3, 3] = T_base_tcp[:3, :3] @ [-0.15, 0.0, -0.55] + T_base_tcp[:3, 3]
     obstacles = (Body("post", coal.Box(0.3, 0.3, 0.3), inside),)
     scene = CollisionScene(arm(), (), obstacles)
-    assert CollisionCheck(scene, 0.01).margin(one)[0] < 0.0
+    assert CollisionCheck(scene, 0.01, 0.1, 0.003).margin(one)[0] < 0.0
     assert "post" in scene.nearest(one.q[0])
 
 
@@ -101,9 +126,47 @@ def test_in_contact_the_tool_may_touch_what_it_presses_on():
     tool = (Body("disk", coal.Sphere(0.02), np.eye(4)),)
     mould = (Body("mould", coal.Sphere(0.02), here),)
     pressed = CollisionScene(arm(), tool, mould, frozenset({"mould"}))
-    assert pressed.keeps(one.q, 0.01, in_contact=True)[0]
-    assert not pressed.keeps(one.q, 0.0, in_contact=False)[0]
-    assert pressed.keeps(one.q_approach, 0.01, in_contact=False)[0]
+    assert pressed.keeps(one.q, 0.01, -np.inf)[0]
+    assert not pressed.keeps(one.q, 0.0)[0]
+    assert pressed.keeps(one.q_approach, 0.01)[0]
+
+
+def test_a_tool_that_stands_in_the_tooling_is_a_collision():
+    """Wider than the disk and longer than the stem: 20 mm deep when the tcp touches."""
+    one = postures().take([0])
+    mould = np.eye(4)
+    mould[:3, :3] = one.T_base_tcp[0, :3, :3]
+    mould[:3, 3] = one.contact[0] + 0.1 * one.T_base_tcp[0, :3, 2]
+    block = (Body("mould", coal.Box(0.4, 0.4, 0.2), mould),)
+
+    def margin(depth):
+        head = np.eye(4)
+        head[:3, 3] = (0.0, 0.0, depth - 0.05)
+        tool = (Body("head", coal.Box(0.1, 0.1, 0.1), head),)
+        scene = CollisionScene(arm(), tool, block, frozenset({"mould"}))
+        return CollisionCheck(scene, 1e-3, 0.1, 0.003).margin(one)[0]
+
+    assert margin(-0.002) > 0.0
+    assert margin(0.002) > 0.0
+    assert margin(0.020) < 0.0
+
+
+def test_what_hangs_on_the_first_joint_must_keep_clear_of_fixtures():
+    shoulder = np.eye(4)
+    shoulder[:3, 3] = (0.25, 0.0, 0.5)
+    post = (Body("post", coal.Box(0.1, 0.1, 0.1), shoulder),)
+    scene = CollisionScene(arm(), (), post)
+    assert not np.any(scene.keeps(postures().q, 0.0))
+
+
+def test_travel_limits_look_at_the_rail_alone():
+    robot = Robot.from_urdf(on_rail(arm().urdf, Rail("rail", (0.0, 1.0, 0.0), -0.3, 0.3)), "tcp")
+    few = postures().take([0, 1])
+    rail = np.array([[0.29], [-0.1]])
+    there = replace(few, q=np.hstack([rail, few.q]), q_approach=np.hstack([rail, few.q_approach]))
+    np.testing.assert_allclose(TravelLimitsCheck(robot, 0.0).margin(there), [0.01, 0.2])
+    alone = JointLimitsCheck(arm(), 0.05).margin(few)
+    np.testing.assert_allclose(JointLimitsCheck(robot, 0.05).margin(there), alone)
 
 
 def test_what_is_kept_is_the_exact_distance():
@@ -113,7 +176,7 @@ def test_what_is_kept_is_the_exact_distance():
     exact = scene.distances(postures().q).min(axis=1)
     for distance in (0.01, 0.1, 0.3):
         decided = np.abs(exact - distance) > 1e-4
-        kept = scene.keeps(postures().q, distance, in_contact=False)
+        kept = scene.keeps(postures().q, distance)
         np.testing.assert_array_equal(kept[decided], exact[decided] > distance)
 
 

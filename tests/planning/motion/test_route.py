@@ -169,7 +169,7 @@ def test_the_poses_of_an_example_are_visited(like, tmp_path):
     assert sorted(route.order) == list(range(6))
     for move in route.moves:
         way = dense(chain(move, postures, cell.home))
-        keeps = robot.sweep.scene.keeps(way, cell.file.limits.clearance, in_contact=False)
+        keeps = robot.sweep.scene.keeps(way, cell.file.limits.clearance)
         assert keeps.all()
 
 

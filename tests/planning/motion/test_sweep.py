@@ -23,7 +23,7 @@ def moves():
     )
     rng = np.random.default_rng(3)
     q = rng.uniform([-1.5, -1.8, 0.5, -1.5, -1.5, -1.5], [1.5, -0.6, 2.0, 1.5, 1.5, 1.5], (60, 6))
-    q = q[world.keeps(q, CLEARANCE + FINEST, False)]
+    q = q[world.keeps(q, CLEARANCE + FINEST)]
     half = len(q) // 2
     sweep, start, end = Sweep(world, CLEARANCE), q[:half], q[half : 2 * half]
     nearest = [

@@ -11,6 +11,7 @@ import numpy as np
 from elastocal.arrays import FloatArray
 from elastocal.cell.description.external import external_positions
 from elastocal.cell.description.file import SCHEMA, CellFile
+from elastocal.cell.description.limits import Limits
 from elastocal.cell.description.motion import axis_speeds, home_position
 from elastocal.cell.description.pose import vector
 from elastocal.cell.description.robot import RailEntry
@@ -20,6 +21,7 @@ from elastocal.errors import ElastocalError, FileAccessError, RobotError, Schema
 from elastocal.files import read_text
 from elastocal.robot import GRAVITY, Robot, catalogue
 from elastocal.robot.inverse.frames import inverse_transform
+from elastocal.robot.mesh_files import find_meshes
 from elastocal.robot.mounting import Rail, on_rail, with_tool
 from elastocal.robot.urdf import parse_urdf
 from elastocal.schema import read_yaml
@@ -106,9 +108,7 @@ class Cell:
     @property
     def joint_margin(self) -> FloatArray:
         """Least distance of each joint to its limits, shape (joint,), in rad or m."""
-        limits = self.file.limits
-        margins = (limits.joint_margin if r else limits.rail_margin for r in self.robot.revolute)
-        return vector(tuple(margins))
+        return _margins(self.robot, self.file.limits)
 
     def find(self, file: str) -> Path:
         """Return the path of a file that the cell file names."""
@@ -134,11 +134,12 @@ def load_cell(path: Path) -> Cell:
     path = Path(path)
     file = read_yaml(path, CellFile, SCHEMA)
     robot = _at(path, "robot", lambda: _robot(path, file))
-    positions = _at(path, "robot", lambda: external_positions(robot, file.robot))
+    _check_margins(path, robot, file)
+    margins = _margins(robot, file.limits)
+    positions = _at(path, "robot", lambda: external_positions(robot, file.robot, margins))
     torques = _at(path, "limits.torque.values", lambda: _torque_limits(robot, file))
     home = _at(path, "motion", lambda: home_position(robot, file.motion))
     speeds = _at(path, "motion", lambda: axis_speeds(robot, file.motion))
-    _check_margins(path, robot, file)
     for key, mesh in _meshes(file):
         if not (path.parent / mesh.file).is_file():
             raise FileAccessError(f"{path}: {key}.file: there is no file {path.parent / mesh.file}")
@@ -160,13 +161,19 @@ def _at(path: Path, key: str, make: Callable[[], Result]) -> Result:
 
 def _robot(path: Path, file: CellFile) -> Robot:
     entry = file.robot
-    urdf = read_text(path.parent / entry.urdf) if entry.urdf else catalogue.urdf(entry.model or "")
+    meshes: tuple[tuple[str, Path], ...] = ()
+    if entry.urdf is None:
+        urdf = catalogue.urdf(entry.model or "")
+    else:
+        place = path.parent / entry.urdf
+        urdf = read_text(place)
+        meshes = find_meshes(urdf, place.parent)
     links = {link.get("name") for link in parse_urdf(urdf).findall("link")}
     tip = f"cell_{TCP}" if TCP in links else TCP
     urdf = with_tool(urdf, entry.flange, tip, file.tcp.T)
     if entry.rail is not None:
         urdf = on_rail(urdf, _rail(entry.rail))
-    return Robot.from_urdf(urdf, tip)
+    return Robot.from_urdf(urdf, tip, meshes=meshes)
 
 
 def _rail(entry: RailEntry) -> Rail:
@@ -175,15 +182,20 @@ def _rail(entry: RailEntry) -> Rail:
 
 def _torque_limits(robot: Robot, file: CellFile) -> FloatArray:
     torque, limits = file.limits.torque, np.array(robot.limits.effort)
-    for joint, value in torque.figures.items():
+    for joint in torque.values:
         if joint not in robot.joint_names:
             raise RobotError(
                 f"{robot.name} has no joint {joint!r}{nearest(joint, robot.joint_names)}"
                 f" (joints: {', '.join(robot.joint_names)})"
             )
-        limits[robot.joint_names.index(joint)] = value
+        index = robot.joint_names.index(joint)
+        limits[index] = torque.figure(joint, robot.revolute[index])
     result: FloatArray = torque.factor * limits
     return result
+
+
+def _margins(robot: Robot, limits: Limits) -> FloatArray:
+    return vector(tuple(limits.joint_margin if r else limits.rail_margin for r in robot.revolute))
 
 
 def _check_margins(path: Path, robot: Robot, file: CellFile) -> None:

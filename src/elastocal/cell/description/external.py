@@ -15,10 +15,20 @@ STEP_LENGTH = 0.25
 """Largest distance between positions of a linear axis that are searched, in m."""
 STEP_ANGLE = math.radians(15.0)
 """Largest angle between positions of a turning axis that are searched, in rad."""
+INSIDE_LENGTH = 1e-3
+"""How far inside the margins of a linear axis the outermost searched positions lie, in m."""
+INSIDE_ANGLE = math.radians(0.1)
+"""The same for a turning axis, in rad."""
+_ROUNDING = 1e-9
+"""How near to the end of its range a position counts as on it, in m or rad."""
+MOST = 500
+"""Largest number of combinations of positions that are tried."""
 
 
-def external_positions(robot: Robot, entry: RobotEntry) -> FloatArray:
+def external_positions(robot: Robot, entry: RobotEntry, margin: FloatArray) -> FloatArray:
     """Return every combination of positions of the external axes.
+
+    All of them are where poses may be: farther from the limits than the margin.
 
     Parameters
     ----------
@@ -26,6 +36,8 @@ def external_positions(robot: Robot, entry: RobotEntry) -> FloatArray:
         The robot, with its rail.
     entry : RobotEntry
         What the cell file says.
+    margin : ndarray, shape (joint,)
+        Distance that each joint keeps to its limits, in rad or m; it leaves some of the range.
 
     Returns
     -------
@@ -35,8 +47,8 @@ def external_positions(robot: Robot, entry: RobotEntry) -> FloatArray:
     Raises
     ------
     RobotError
-        If a name is no external axis, a position is outside the limits, or an axis without
-        limits is to be searched.
+        If a name is no external axis, a position is not within the margins, an axis without
+        limits is to be searched, or there are more than 500 combinations.
     UnitError
         If a position has no unit or a wrong one.
     """
@@ -48,26 +60,57 @@ def external_positions(robot: Robot, entry: RobotEntry) -> FloatArray:
                 f" (it has {', '.join(names) or 'none'})"
             )
     wanted = [entry.external.get(name, "search") for name in names]
-    axes = [_positions(robot, index, choice) for index, choice in enumerate(wanted)]
+    counts = [_count(robot, index, choice, margin) for index, choice in enumerate(wanted)]
+    if math.prod(counts) > MOST:
+        each = " x ".join(f"{count} of {name}" for name, count in zip(names, counts, strict=True))
+        raise RobotError(
+            f"external: {each} are {math.prod(counts)} combinations of positions, at most {MOST}"
+            " are tried: list the positions to try instead of search, or is the travel in the"
+            " wrong unit?"
+        )
+    axes = [_positions(robot, index, choice, margin) for index, choice in enumerate(wanted)]
     combinations = list(itertools.product(*axes))
     return np.array(combinations, dtype=float).reshape(len(combinations), len(names))
 
 
-def _positions(robot: Robot, index: int, wanted: str | tuple[str, ...]) -> FloatArray:
+def _range(robot: Robot, index: int, margin: FloatArray) -> tuple[float, float]:
+    """Return the ends of what the margin leaves of an axis; poses are between, not on them."""
+    limits, keep = robot.limits, float(margin[index])
+    return float(limits.lower[index]) + keep, float(limits.upper[index]) - keep
+
+
+def _count(robot: Robot, index: int, wanted: str | tuple[str, ...], margin: FloatArray) -> int:
+    """Return how many positions of an axis are tried."""
+    if wanted != "search":
+        return len(wanted)
+    low, high = _range(robot, index, margin)
+    if not math.isfinite(high - low):
+        name = robot.joint_names[index]
+        raise RobotError(f"external.{name}: an axis without limits cannot be searched")
+    return math.ceil((high - low) / (STEP_ANGLE if robot.revolute[index] else STEP_LENGTH)) + 1
+
+
+def _positions(
+    robot: Robot, index: int, wanted: str | tuple[str, ...], margin: FloatArray
+) -> FloatArray:
     name, revolute = robot.joint_names[index], robot.revolute[index]
-    lower, upper = robot.limits.lower[index], robot.limits.upper[index]
-    unit = "rad" if revolute else "m"
+    low, high = _range(robot, index, margin)
     if wanted == "search":
-        if not math.isfinite(upper - lower):
-            raise RobotError(f"external.{name}: an axis without limits cannot be searched")
-        step = STEP_ANGLE if revolute else STEP_LENGTH
-        return np.linspace(lower, upper, math.ceil((upper - lower) / step) + 1)
+        inside = min(INSIDE_ANGLE if revolute else INSIDE_LENGTH, 0.25 * (high - low))
+        count = _count(robot, index, wanted, margin)
+        return np.linspace(low + inside, high - inside, count)
     values = np.array([parse_quantity(text, "angle" if revolute else "length") for text in wanted])
     if not len(values):
         raise RobotError(f"external.{name}: give at least one position, or 'search'")
-    outside = ~((values >= lower) & (values <= upper))
-    if outside.any():
+    within = (values > low + _ROUNDING) & (values < high - _ROUNDING)
+    if not within.all():
+        key, unit, scale = (
+            ("joint_margin", "deg", 180.0 / math.pi) if revolute else ("rail_margin", "mm", 1e3)
+        )
         raise RobotError(
-            f"external.{name}: {values[outside][0]:g} {unit} must be within {lower:g} and {upper:g}"
+            f"external.{name}: {wanted[int(np.argmin(within))]} must be above {scale * low:.6g}"
+            f" {unit} and below {scale * high:.6g} {unit}, which are its limits less"
+            f" limits.{key} of {scale * margin[index]:.6g} {unit}; the very ends are no places"
+            " for poses"
         )
     return values

@@ -23,6 +23,8 @@ from elastocal.cell.description.tool import ForceSensor, Tool
 from elastocal.schema import StrictModel
 
 SCHEMA = "elastocal.cell/1"
+TOOLING = "tooling"
+"""Name of the surface among the solids of the cell; no fixture may have it."""
 
 
 class ProcessFile(StrictModel):
@@ -75,6 +77,14 @@ class CellFile(StrictModel):
         if trackers and info.data.get("marker") is None:
             raise ValueError("trackers need a marker to look at (key 'marker')")
         return trackers
+
+    @field_validator("fixtures")
+    @classmethod
+    def _none_is_the_tooling(cls, fixtures: tuple[Shape, ...]) -> tuple[Shape, ...]:
+        # Under this name the plan knows the surface, which the tool may touch.
+        if any(fixture.name == TOOLING for fixture in fixtures):
+            raise ValueError(f"the name {TOOLING!r} is the surface's: name the fixture otherwise")
+        return fixtures
 
     @field_validator("limits")
     @classmethod

@@ -5,6 +5,7 @@ from typing import Annotated, Any
 from pydantic import Field, FiniteFloat, field_validator
 
 from elastocal.cell.description.quantities import Distance, PositiveMass, SpanAngle
+from elastocal.errors import UnitError
 from elastocal.schema import StrictModel
 from elastocal.units import parse_quantity
 
@@ -26,14 +27,31 @@ class TorqueLimits(StrictModel):
     @classmethod
     def _positive(cls, values: dict[str, str]) -> dict[str, str]:
         for joint, text in values.items():
-            if not _torque(text) > 0.0:
+            if not _either(text) > 0.0:
                 raise ValueError(f"{joint} must be above 0")
         return values
 
-    @property
-    def figures(self) -> dict[str, float]:
-        """Figure of each joint that is given, in N·m or N."""
-        return {joint: _torque(text) for joint, text in self.values.items()}
+    def figure(self, joint: str, revolute: bool) -> float:
+        """Return the figure of a joint that has one.
+
+        Parameters
+        ----------
+        joint : str
+            One of `values`.
+        revolute : bool
+            Whether it turns (a moment in N·m) or slides (a force in N).
+
+        Raises
+        ------
+        UnitError
+            If the figure is of the other kind.
+        """
+        text = self.values[joint]
+        try:
+            return parse_quantity(text, "moment" if revolute else "force")
+        except UnitError as error:
+            kind = "turns and has a moment" if revolute else "slides and has a force"
+            raise UnitError(f"{joint} {kind}: {error}") from error
 
     @field_validator("provenance")
     @classmethod
@@ -61,6 +79,6 @@ class Limits(StrictModel):
     torque: TorqueLimits = TorqueLimits()
 
 
-def _torque(text: str) -> float:
-    """Return a torque in N·m, or, for a linear axis, a force in N."""
+def _either(text: str) -> float:
+    """Return a moment in N·m or a force in N: which one a joint has, only the robot knows."""
     return parse_quantity(text, "force" if text.rstrip().endswith("N") else "moment")

@@ -30,9 +30,9 @@ class LoadCases(StrictModel):
     """Lateral force of north and south in N."""
     fy: Force = 0.0
     """Lateral force of east and west in N."""
-    friction: Annotated[FiniteFloat, Field(gt=0.0)]
+    friction: Annotated[FiniteFloat, Field(gt=0.0, le=10.0)]
     """Coefficient of static friction between disk and surface."""
-    safety: Annotated[FiniteFloat, Field(ge=1.0)] = 1.5
+    safety: Annotated[FiniteFloat, Field(ge=1.0, le=100.0)] = 1.5
     """Factor by which the friction must exceed the lateral force."""
     cases: Annotated[tuple[CaseName, ...], Field(validate_default=True)] = (
         "normal",

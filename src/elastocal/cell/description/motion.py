@@ -13,6 +13,9 @@ from elastocal.robot import Robot
 from elastocal.schema import StrictModel
 from elastocal.units import parse_quantity
 
+_SLOWEST = 1e-12
+"""A joint that is slower, in rad/s or m/s, has no speed."""
+
 
 def _finite(value: float) -> float:
     if not math.isfinite(value):
@@ -45,11 +48,11 @@ class Motion(StrictModel):
     """Largest speed of each joint, by name; those of the robot's description by default."""
     provenance: Annotated[str | None, Field(validate_default=True)] = None
     """Where the speeds are from; needed when there are any."""
-    override: Annotated[FiniteFloat, Field(gt=0.0, le=1.0)] = 0.2
-    """Part of the speeds that is used."""
+    override: Annotated[FiniteFloat, Field(ge=0.01, le=1.0)] = 0.2
+    """Part of the speeds that is used; controllers know no less than a percent."""
     acceleration_time: PositiveTime = 0.5
     """Time in which a joint reaches its full speed, in s."""
-    contact_speed: PositiveSpeed = 0.02
+    contact_speed: Annotated[PositiveSpeed, Field(ge=1e-4)] = 0.02
     """Speed of the straight motion between approach pose and contact, in m/s."""
     unloaded_time: PositiveTime = 4.0
     """Time of the unloaded reference of a pose, in s."""
@@ -133,11 +136,11 @@ def axis_speeds(robot: Robot, entry: Motion) -> FloatArray:
         if name in entry.speed:
             text = entry.speed[name]
             speeds[index] = _parse(f"speed.{name}", text, robot.revolute[index], speed=True)
-        elif not 0.0 < speeds[index] < math.inf:
+        elif not _SLOWEST <= speeds[index] < math.inf:
             raise RobotError(
                 f"speed.{name} is missing: the description of {robot.name} has no speed of it"
             )
-        if not speeds[index] > 0.0:
+        if not speeds[index] >= _SLOWEST:
             raise RobotError(f"speed.{name}: {entry.speed[name]} must be above 0")
     used: FloatArray = entry.override * speeds
     return used

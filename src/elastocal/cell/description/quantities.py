@@ -50,8 +50,9 @@ Point = tuple[Length, Length, Length]
 
 
 def _not_zero(values: tuple[float, ...]) -> tuple[float, ...]:
-    if not 0.0 < math.hypot(*values) < math.inf:
-        raise ValueError("must be a direction, not all zero")
+    # The square of a number must neither vanish nor overflow when the direction is normed.
+    if not 1e-6 <= math.hypot(*values) <= 1e6:
+        raise ValueError("must be a direction, not all zero, of a length from 1e-6 to 1e6")
     return values
 
 

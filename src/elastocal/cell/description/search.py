@@ -11,6 +11,10 @@ DEFAULT_POSES = 31
 """Number of poses of the paper's first case study."""
 
 
+MOST_CANDIDATES = 10_000_000
+"""Largest pool; with more, no memory would hold the candidates."""
+
+
 class Search(StrictModel):
     """Pool and technique; ends at ``poses`` or at ``d_max``, whichever comes first."""
 
@@ -18,15 +22,15 @@ class Search(StrictModel):
     """Name of a search technique (`elastocal.planning.search`)."""
     metric: Literal["euclidean", "geodesic"] = "euclidean"
     """How COVER measures the distance between contact points."""
-    poses: Annotated[int, Field(ge=1)] | None = None
+    poses: Annotated[int, Field(ge=1, le=MOST_CANDIDATES)] | None = None
     """Largest number of poses N."""
     d_max: PositiveLength | None = None
     """Cover distance at which COVER may stop, in m."""
-    pool: Annotated[int, Field(ge=1)] = 3000
+    pool: Annotated[int, Field(ge=1, le=MOST_CANDIDATES)] = 3000
     """Number of candidates."""
     sampling: Literal["blue_noise", "uniform"] = "blue_noise"
     """How candidate points are spread: keeping their distance, or each by itself."""
-    seed: Annotated[int, Field(ge=0)] = 0
+    seed: Annotated[int, Field(ge=0, lt=2**63)] = 0
     """Of everything random."""
 
     @field_validator("pool")

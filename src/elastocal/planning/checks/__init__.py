@@ -8,7 +8,7 @@ from elastocal.planning.checks.check import Check, Checks, PointCheck, Verdicts,
 from elastocal.planning.checks.collision import CollisionCheck
 from elastocal.planning.checks.engagement import EdgeCheck, FlatnessCheck
 from elastocal.planning.checks.friction import FrictionCheck
-from elastocal.planning.checks.joint_limits import JointLimitsCheck
+from elastocal.planning.checks.joint_limits import JointLimitsCheck, TravelLimitsCheck
 from elastocal.planning.checks.sensor import SensorCheck
 from elastocal.planning.checks.sight import SightCheck, Station
 from elastocal.planning.checks.singularity import SingularityCheck, WristCheck
@@ -28,6 +28,7 @@ __all__ = [
     "SingularityCheck",
     "Station",
     "TorqueCheck",
+    "TravelLimitsCheck",
     "Verdicts",
     "WristCheck",
     "verdicts",

@@ -95,27 +95,6 @@ class Verdicts:
         typical = np.median(np.abs(self.margin), axis=1, keepdims=True)
         return np.asarray((self.margin / np.where(typical > 0.0, typical, 1.0)).min(axis=0))
 
-    @property
-    def refused(self) -> dict[str, int]:
-        """How many postures each check refuses."""
-        return {
-            name: int(np.count_nonzero(~(margin > 0.0)))
-            for name, margin in zip(self.names, self.margin, strict=True)
-        }
-
-    @property
-    def bottleneck(self) -> str | None:
-        """The check that alone refuses the most postures; None when every posture passes.
-
-        Postures refused by a single check count first, since they would pass without it.
-        """
-        fails = ~(self.margin > 0.0)
-        if not np.any(fails):
-            return None
-        alone = (fails & (fails.sum(axis=0) == 1)).sum(axis=1)
-        counts = alone if np.any(alone) else fails.sum(axis=1)
-        return self.names[int(counts.argmax())]
-
 
 def verdicts(checks: Sequence[Check], postures: Postures) -> Verdicts:
     """Return the margins of postures under all checks."""

@@ -1,48 +1,63 @@
 """Check ``collision``: links and tool keep clear in contact, approaching and on the retreat."""
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 
 from elastocal.arrays import FloatArray
 from elastocal.planning.postures import Postures
+from elastocal.planning.retreat import on_the_way
 from elastocal.planning.scene import CollisionScene
 
 SPARE = (1e-3, 1e-2, 3e-2, 1e-1)
 """Distances in m beyond the clearance asked for that are tried. Whether bodies keep a distance
 is decided by their bounding volumes, a hundred times faster than the distance is found."""
 
+STEP = 0.035
+"""Largest distance in m between the places on the retreat that are looked at."""
+
 
 @dataclass(frozen=True, eq=False)
 class CollisionCheck:
     """Largest of the `SPARE` distances that is kept beyond the clearance asked for.
 
-    From contact to the approach pose; in contact the tool is not checked against what it presses
-    on, from the first step of the retreat on it is.
+    In contact, and at places on the straight way to the approach pose. In contact the tool is not
+    checked against what it presses on; near contact it must not touch it; from the first step of
+    the retreat on it keeps the clearance from it too.
     """
 
     scene: CollisionScene
     keep: float
     """Clearance to keep, in m."""
-    steps: int = 3
-    """Number of postures from just off the surface to the approach pose, both included."""
+    approach: float
+    """Distance of the approach pose from the surface, in m."""
+    near: float
+    """Distance from the surface at which the tool stops before contact, in m."""
     name: str = "collision"
     unit: str = "m"
     advice: str = "move fixtures away, slim the tool's collision shape, or turn the tooling"
 
     def margin(self, postures: Postures) -> FloatArray:
         """Return the margin of each posture, shape (pose,), in m; minus ``keep`` when none."""
-        travel = postures.q_approach - postures.q
-        # The first step of the retreat comes first: it is the one that most often decides.
-        ways = [(part, False) for part in np.linspace(1.0 / self.steps, 1.0, self.steps)]
-        ways.append((0.0, True))
         margin = np.full(len(postures), -max(self.keep, SPARE[0]))
         left = np.arange(len(postures))
+        places = self._places(postures)
         for spare in reversed(SPARE):
             kept = left
-            for part, in_contact in ways:
-                q = postures.q[kept] + part * travel[kept]
-                kept = kept[self.scene.keeps(q, self.keep + spare, in_contact)]
+            for q, pressed in places:
+                kept = kept[self.scene.keeps(q[kept], self.keep + spare, pressed)]
             margin[kept] = spare
             left = np.setdiff1d(left, kept, assume_unique=True)
         return margin
+
+    def _places(self, postures: Postures) -> list[tuple[FloatArray, float | None]]:
+        """Return joints at each place, with the distance of the tool from what it presses on.
+
+        The first step of the retreat comes first: it most often decides.
+        """
+        steps = max(2, math.ceil(self.approach / STEP))
+        robot = self.scene.robot
+        retreat = [on_the_way(robot, postures, step / steps) for step in range(1, steps + 1)]
+        near = on_the_way(robot, postures, self.near / self.approach)
+        return [*((q, None) for q in retreat), (near, 0.0), (postures.q, -math.inf)]

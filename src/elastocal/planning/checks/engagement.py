@@ -21,7 +21,7 @@ class EdgeCheck:
     """Distance to keep between disk and edge, in m."""
     name: str = "edge"
     unit: str = "m"
-    advice: str = "use a smaller disk or margin, or a larger region of the surface"
+    advice: str = "use a smaller disk or edge margin: so many points are too near to an edge"
 
     @property
     def at_points(self) -> FloatArray:

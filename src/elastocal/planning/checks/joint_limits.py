@@ -1,4 +1,8 @@
-"""Check ``joint_limits``: every joint keeps a margin to its limits, in contact and approaching."""
+"""Checks ``joint_limits`` and ``travel_limits``: joints keep a margin to their limits.
+
+In contact and at the approach pose. Turning and sliding joints are two checks, since their
+margins have different units.
+"""
 
 from dataclasses import dataclass
 
@@ -11,17 +15,39 @@ from elastocal.robot import Robot
 
 @dataclass(frozen=True, eq=False)
 class JointLimitsCheck:
-    """Smallest distance of any joint to its nearer limit, less the margin asked for."""
+    """Smallest distance of any revolute joint to its nearer limit, less the margin asked for."""
 
     robot: Robot
     keep: FloatArray | float
-    """Margin to keep, a number or shape (joint,), in rad (in m for prismatic joints)."""
+    """Margin to keep, a number in rad, or shape (joint,), in rad (m for prismatic joints)."""
     name: str = "joint_limits"
     unit: str = "rad"
     advice: str = "move the tooling towards the middle of the robot's reach, or mount the tool anew"
 
     def margin(self, postures: Postures) -> FloatArray:
-        """Return the margin of each posture, shape (pose,), in rad or m."""
-        limits = self.robot.limits
-        both = np.minimum(limits.margin(postures.q), limits.margin(postures.q_approach))
-        return np.asarray((both - self.keep).min(axis=1))
+        """Return the margin of each posture, shape (pose,), in rad."""
+        return _left(self.robot, postures, self.keep, np.array(self.robot.revolute))
+
+
+@dataclass(frozen=True, eq=False)
+class TravelLimitsCheck:
+    """Smallest distance of any prismatic joint to its nearer limit, less the margin asked for."""
+
+    robot: Robot
+    keep: FloatArray | float
+    """Margin to keep, a number in m, or shape (joint,), in m (rad for revolute joints)."""
+    name: str = "travel_limits"
+    unit: str = "m"
+    advice: str = "choose positions of the rail farther from its ends, or a smaller rail_margin"
+
+    def margin(self, postures: Postures) -> FloatArray:
+        """Return the margin of each posture, shape (pose,), in m."""
+        return _left(self.robot, postures, self.keep, ~np.array(self.robot.revolute))
+
+
+def _left(
+    robot: Robot, postures: Postures, keep: FloatArray | float, judged: np.ndarray
+) -> FloatArray:
+    limits = robot.limits
+    both = np.minimum(limits.margin(postures.q), limits.margin(postures.q_approach))
+    return np.asarray((both - keep)[:, judged].min(axis=1, initial=np.inf))

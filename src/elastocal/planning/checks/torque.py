@@ -1,13 +1,15 @@
 """Check ``torque``: gravity and load stay within the actuators' torques (paper section 4.1).
 
-Standing still under a force ``f`` on the robot at the tcp, the actuators supply
+In every load case, and unloaded, in contact and at the approach pose: pressing on a surface below
+it relieves an arm, so that its own weight may be the larger load. Standing still under a force
+``f`` on the robot at the tcp, the actuators supply
 
     tau = g(q) - J^T f - J_com^T (m g),
 
 with ``g`` the arm's gravity torques and ``m g`` the weight of the tool at its centre of mass.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -18,7 +20,7 @@ from elastocal.robot import GRAVITY, Robot
 
 @dataclass(frozen=True, eq=False)
 class TorqueCheck:
-    """Smallest part of a joint's allowed torque that is left, over joints and load cases."""
+    """Smallest part of a joint's allowed torque that is left, over joints, loads and places."""
 
     robot: Robot
     force_tcp: FloatArray
@@ -44,7 +46,7 @@ class TorqueCheck:
         )
 
     def torques(self, postures: Postures) -> FloatArray:
-        """Return the static torques, shape (load_case, pose, joint), in N·m (N)."""
+        """Return the static torques in contact, shape (load_case, pose, joint), in N·m (N)."""
         jacobian = self.robot.jacobian(postures.q)
         R_base_tcp = postures.T_base_tcp[:, :3, :3]
         lever = R_base_tcp @ self.tool_centre
@@ -60,5 +62,9 @@ class TorqueCheck:
         known = np.isfinite(self.allowed)
         if not np.any(known):
             return np.ones(len(postures))
-        used = np.abs(self.torques(postures)[..., known]) / self.allowed[known]
+        unloaded = replace(self, force_tcp=np.zeros((1, 3)))
+        # The tool is turned at the approach pose as it is in contact.
+        away = replace(postures, q=postures.q_approach)
+        torques = [self.torques(postures), unloaded.torques(postures), unloaded.torques(away)]
+        used = np.abs(np.concatenate(torques)[..., known]) / self.allowed[known]
         return np.asarray(1.0 - used.max(axis=(0, 2)))

@@ -4,12 +4,12 @@ import itertools
 
 import coal
 import numpy as np
-import pinocchio as pin
 
 from elastocal.arrays import FloatArray
 from elastocal.errors import PlanningError
 from elastocal.planning.scene import Body
 from elastocal.robot import Robot
+from elastocal.robot.mesh_files import collision_model
 
 
 def joint_radii(robot: Robot, tool: tuple[Body, ...]) -> FloatArray:
@@ -76,8 +76,7 @@ def _travel(name: str, lower: float, upper: float) -> float:
 
 def _corners_by_joint(robot: Robot, tool: tuple[Body, ...]) -> list[FloatArray]:
     """Return the corners of the boxes about each joint's bodies, in its frame, (corner, 3)."""
-    model = pin.buildModelFromXML(robot.urdf)
-    geometry = pin.buildGeomFromUrdfString(model, robot.urdf, pin.GeometryType.COLLISION)
+    model, geometry = collision_model(robot)
     index_of = {model.getJointId(name): i for i, name in enumerate(robot.joint_names)}
     corners: list[list[FloatArray]] = [[np.zeros((1, 3))] for _ in robot.joint_names]
     for body in geometry.geometryObjects:

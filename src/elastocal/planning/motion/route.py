@@ -84,7 +84,7 @@ def plan_route(
         If HOME is not free of collision.
     """
     home = mover.sweep.scene.robot.check_positions(home)
-    _refuse_blocked(home, mover)
+    refuse_blocked_home(home, mover)
     ways = Ways(mover, np.concatenate([home[None], postures.q_approach]), postures.normal)
     nodes = np.array([HOME, *sorted(ways.stems)], dtype=np.intp)
     cost, cuts = mover.axes.between(ways.q[nodes]), Cuts()
@@ -106,7 +106,21 @@ def plan_route(
     return Route(visited, tuple(_move(ways, *leg) for leg in legs), unreachable, tour.shortest)
 
 
-def _refuse_blocked(home: FloatArray, mover: Mover) -> None:
+def refuse_blocked_home(home: FloatArray, mover: Mover) -> None:
+    """Refuse a HOME that is not free of collision, by the two bodies that are nearest.
+
+    Parameters
+    ----------
+    home : ndarray, shape (joint,)
+        In rad or m.
+    mover : Mover
+        With the scene and the clearance.
+
+    Raises
+    ------
+    PlanningError
+        If any two bodies that must stay apart are nearer than the clearance.
+    """
     if not mover.sweep.free(home[None], home[None])[0]:
         scene, clearance = mover.sweep.scene, mover.sweep.clearance
         first, second = scene.nearest(home)

@@ -54,19 +54,19 @@ class Sweep:
         bound = np.abs(travel) @ self.radii
         # A look at a few postures first: most moves that are blocked are so for a long way.
         move, middle, _ = _cut(bound, np.arange(len(start)), GLANCE)
-        seen = self.scene.keeps(start[move] + middle[:, None] * travel[move], self.clearance, False)
+        seen = self.scene.keeps(start[move] + middle[:, None] * travel[move], self.clearance)
         blocked = np.zeros(len(start), dtype=bool)
         blocked[move[~seen]] = True
         move, middle, width = _cut(bound, np.flatnonzero(~blocked), COARSEST)
         length = COARSEST
         while len(move):
             q = start[move] + middle[:, None] * travel[move]
-            open_ = ~self.scene.keeps(q, self.clearance + 0.5 * length, in_contact=False)
+            open_ = ~self.scene.keeps(q, self.clearance + 0.5 * length)
             move, middle, q = move[open_], middle[open_], q[open_]
             if length <= FINEST:
                 blocked[move] = True
                 break
-            blocked[move[~self.scene.keeps(q, self.clearance, in_contact=False)]] = True
+            blocked[move[~self.scene.keeps(q, self.clearance)]] = True
             left = ~blocked[move]
             move, middle, width = move[left], middle[left], 0.5 * width[open_][left]
             length *= 0.5

@@ -41,8 +41,16 @@ def test_with_a_rail_the_base_is_the_rails():
 def test_load_cases_and_time_stand_in_it():
     said = text()
     assert "south: -280.0, 0.0, -1100.0 N" in said
-    assert "6 poses, about 7 min in all" in said
+    assert "6 poses, about 8 min in all" in said
     assert "LIN to 3.0 mm off the surface" in said
+
+
+def test_it_says_which_speeds_it_drives_and_for_which_the_times_hold():
+    said = text()
+    assert "PTP at 10 percent, LIN at 20 mm/s and, for the last 3.0 mm, at 5 mm/s" in said
+    assert "never faster than the cell file has it (20 percent, 20 mm/s)" in said
+    assert "The times here are for these speeds" in said
+    assert "Those of the plan's other files are for the cell file's speeds: 7 min" in said
 
 
 def test_a_tilted_tool_is_written_in_kukas_angles():

@@ -5,7 +5,7 @@ import pytest
 
 from elastocal.errors import FileAccessError, PlanningError, SchemaError
 from elastocal.planning.export import write_krl
-from elastocal.planning.export.krl.program import CONTACT_SPEED, LIN_SPEED
+from elastocal.planning.export.krl.speeds import TOUCH_SPEED
 from support import krl, plans
 
 DEG = MM = 1e-3
@@ -98,16 +98,16 @@ def test_ptp_and_lin_describe_the_same_approach_pose(program, rail):
 def test_each_pose_stops_before_contact_and_in_contact(program):
     pose = [
         ("PTP", "XAPP3"),
-        ("VEL.CP", LIN_SPEED),
+        ("VEL.CP", plans.CONTACT_SPEED),
         ("LIN", "XNEAR3"),
         ("WAIT SEC 0", None),
         ("HALT", None),
-        ("VEL.CP", CONTACT_SPEED),
+        ("VEL.CP", TOUCH_SPEED),
         ("LIN", "XCON3"),
         ("WAIT SEC 0", None),
         ("HALT", None),
         ("LIN", "XNEAR3"),
-        ("VEL.CP", LIN_SPEED),
+        ("VEL.CP", plans.CONTACT_SPEED),
         ("LIN", "XRET3"),
     ]
     start = program.orders.index(pose[0])

@@ -8,6 +8,7 @@ import numpy as np
 
 from elastocal.arrays import FloatArray
 from elastocal.planning.export.krl.names import comment_text
+from elastocal.planning.export.krl.speeds import speeds_of
 from elastocal.planning.plan_file import PlanFile
 from elastocal.robot import Robot
 from elastocal.robot.inverse.frames import arm_base
@@ -38,6 +39,7 @@ def head_notes(plan: PlanFile, robot: Robot) -> list[str]:
         *_tool_notes(plan, robot),
         *_base_notes(plan, robot),
         *_contact_notes(plan),
+        *_time_notes(plan),
     ]
     return [line for paragraph in paragraphs for line in comment(paragraph)]
 
@@ -52,7 +54,8 @@ def _origin(plan: PlanFile) -> list[str]:
         f"Calibration poses, elastocal {comment_text(plan.elastocal)}.",
         f"Cell: {comment_text(plan.cell.name)}, fingerprint {comment_text(plan.cell.fingerprint)}.",
         f"Robot: {comment_text(plan.robot.name)}.",
-        f"{len(plan.poses)} poses, about {plan.total_time / 60.0:.0f} min in all (estimated).",
+        f"{len(plan.poses)} poses, about {speeds_of(plan).total_time(plan) / 60.0:.0f} min in all"
+        " (estimated; below, for which speeds).",
     ]
 
 
@@ -116,6 +119,18 @@ def _contact_notes(plan: PlanFile) -> list[str]:
             f"{comment_text(name)}: {x:.1f}, {y:.1f}, {z:.1f} N"
             for name, (x, y, z) in contact.load_cases.items()
         ),
+    ]
+
+
+def _time_notes(plan: PlanFile) -> list[str]:
+    speeds, contact = speeds_of(plan), plan.contact
+    return [
+        f"Speeds: PTP at {speeds.ptp_percent} percent, LIN at {1e3 * speeds.lin:.4g} mm/s and, for the"
+        f" last {1e3 * contact.near_contact:.1f} mm, at {1e3 * speeds.touch:.4g} mm/s: never"
+        f" faster than the cell file has it ({100.0 * contact.axis_override:.4g} percent,"
+        f" {1e3 * contact.contact_speed:.4g} mm/s). The times here are for these speeds at an"
+        " override of 100 percent, without the waiting at HALT. Those of the plan's other files are"
+        f" for the cell file's speeds: {plan.total_time / 60.0:.0f} min in all.",
     ]
 
 

@@ -12,14 +12,8 @@ from elastocal.files import replacing
 from elastocal.planning.export.krl.names import SUFFIXES, check_name, comment_text
 from elastocal.planning.export.krl.notes import BASE, TOOL, comment, head_notes
 from elastocal.planning.export.krl.targets import PoseTargets, Target, build_targets, robot_of
+from elastocal.planning.export.krl.speeds import Speeds, speeds_of
 from elastocal.planning.plan_file import PlanFile, check_plan
-
-PTP_PERCENT = 10
-"""Speed of PTP moves, in percent of the axes' largest."""
-LIN_SPEED = 0.05
-"""Speed between approach pose and surface, in m/s."""
-CONTACT_SPEED = 0.005
-"""Speed of the last millimetres, in m/s."""
 
 _HEADER = (
     "&ACCESS RVP",
@@ -90,42 +84,43 @@ def _program(
     yield from _INI
     yield f"$TOOL = TOOL_DATA[{TOOL}]"
     yield f"$BASE = BASE_DATA[{BASE}]"
-    yield f"BAS (#VEL_PTP,{PTP_PERCENT} )"
+    speeds = speeds_of(plan)
+    yield f"BAS (#VEL_PTP,{speeds.ptp_percent} )"
     yield "PTP XHOME"
     cases = ", ".join(comment_text(case) for case in plan.contact.load_cases)
     for place, stop in enumerate(poses, start=1):
         title = (
             f"POSE {stop.pose.id}, {place} of {len(poses)}: candidate {stop.pose.candidate},"
-            f" about {stop.pose.contact_time:.0f} s"
+            f" about {speeds.contact_time(plan, stop.pose):.0f} s"
         )
-        yield from _fold(title, _pose(stop, cases))
+        yield from _fold(title, _pose(stop, cases, speeds))
     for target in way_home:
         yield f"PTP {target.name}"
     yield "PTP XHOME"
     yield "END"
 
 
-def _pose(stop: PoseTargets, cases: str) -> Iterator[str]:
+def _pose(stop: PoseTargets, cases: str, speeds: Speeds) -> Iterator[str]:
     if stop.pose.seen_by is not None:
         yield f"; marker seen by {comment_text(stop.pose.seen_by)}"
     for target in (*stop.via, stop.approach):
         yield f"PTP {target.name}"
-    yield _speed(LIN_SPEED)
+    yield _speed(speeds.lin)
     yield f"LIN {stop.near.name}"
     yield from comment("Near contact: take the unloaded reading. Then contact, or force control.")
     yield from _STOP
-    yield _speed(CONTACT_SPEED)
+    yield _speed(speeds.touch)
     yield f"LIN {stop.contact.name}"
     yield from comment(f"In contact: apply the load cases {cases}.")
     yield from _STOP
     yield f"LIN {stop.near.name}"
-    yield _speed(LIN_SPEED)
+    yield _speed(speeds.lin)
     yield f"LIN {stop.retreat.name}"
 
 
 def _speed(metres_per_second: float) -> str:
     millimetres = 1e3 * metres_per_second
-    return f"$VEL.CP = {metres_per_second:.3f} ; m/s, {millimetres:.0f} mm/s"
+    return f"$VEL.CP = {metres_per_second:.5f} ; m/s, {millimetres:.4g} mm/s"
 
 
 def _data(name: str, positions: tuple[Target, ...]) -> Iterator[str]:

@@ -1,0 +1,250 @@
+"""``elastocal run`` on the simulated cell: refusals, the dry run, a whole run, kill and resume."""
+
+import json
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from elastocal.cell import load_cell
+from elastocal.cli.device_sources import KINDS, SOURCES, DeviceSource
+from elastocal.errors import FileAccessError
+from elastocal.procedure.journal import read_commits, read_journal
+from elastocal.procedure.run_folder import RunFolder, cell_place, fill, refuse_foreign
+from support.cli import elastocal
+from support.run_cells import planned_cell
+
+VALUES = ("controller_displacement", "marker_displacement", "force", "joint_position")
+
+
+@pytest.fixture(scope="module")
+def planned(tmp_path_factory):
+    return planned_cell(tmp_path_factory.mktemp("planned"))
+
+
+@pytest.fixture(scope="module")
+def whole(planned, tmp_path_factory):
+    """An undisturbed run."""
+    out = tmp_path_factory.mktemp("runs") / "whole"
+    return out, run(planned, out, "--json")
+
+
+def run(planned, out, *more):
+    return elastocal("run", planned.cell, "--plan", planned.plan, "--out", out, *more)
+
+
+def started(planned, out):
+    """Return a process of its own that is somewhere in the second of four poses."""
+    command = [sys.executable, "-c", "from elastocal.cli.main import run; run()", "run"]
+    journal, more = RunFolder(out).journal, ["--plan", planned.plan, "--out", out]
+    process = subprocess.Popen([*command, planned.cell, *more], stderr=subprocess.PIPE, text=True)
+    while process.poll() is None and (not journal.is_file() or journal.stat().st_size < 4_000):
+        time.sleep(0.002)
+    return process
+
+
+def test_a_run_commits_every_pose_and_writes_the_dataset(whole):
+    out, result = whole
+    assert result.code == 0, result.err
+    figures = json.loads(result.out)
+    assert (figures["state"], figures["committed"], figures["given_up"]) == ("done", 4, [])
+    assert figures["readings"] == {"ok": 8}
+    folder = RunFolder(out)
+    assert folder.summary.is_file()
+    assert len(list(folder.streams.iterdir())) == 4
+    data = xr.load_dataset(folder.dataset)
+    assert dict(data.sizes) | {"pose": 4, "load_case": 2} == dict(data.sizes)
+    assert np.isfinite(data["marker_displacement"]).all()
+
+
+def test_the_live_view_names_each_pose(whole):
+    lines = whole[1].err.splitlines()
+    assert sum(line.startswith("pose ") for line in lines) == 4
+    assert lines[0].startswith("pose 1 of 4")
+
+
+def test_the_copies_in_the_folder_are_the_cell_and_the_plan(planned, whole):
+    folder = RunFolder(whole[0])
+    copy = folder.cell / read_journal(folder.journal)[0].run.cell_file
+    assert copy.read_bytes() == planned.cell.read_bytes()
+    assert load_cell(copy).file == load_cell(planned.cell).file
+    assert (folder.plan / "plan.json").read_bytes() == (planned.plan / "plan.json").read_bytes()
+
+
+def test_killed_for_real_it_goes_on_to_the_same_dataset(planned, whole, tmp_path):
+    out = tmp_path / "killed"
+    journal = RunFolder(out).journal
+    process = started(planned, out)
+    process.kill()
+    process.stderr.close()
+    assert process.wait() == -signal.SIGKILL
+    before = read_commits(journal)
+    assert len(before) < 4
+    result = run(planned, out, "--resume", "--yes")
+    assert result.code == 0, result.err
+    assert "last entry: " in result.err
+    assert read_commits(journal)[: len(before)] == before
+    ours, theirs = (xr.load_dataset(RunFolder(path).dataset) for path in (out, whole[0]))
+    for name in VALUES:
+        np.testing.assert_allclose(ours[name], theirs[name], rtol=0, atol=1e-9)
+
+
+def test_ctrl_c_leaves_the_surface_and_can_be_resumed(planned, tmp_path):
+    out = tmp_path / "run"
+    journal = RunFolder(out).journal
+    process = started(planned, out)
+    process.send_signal(signal.SIGINT)
+    said = process.communicate()[1]
+    assert process.returncode == 130, said
+    assert "interrupted: " in said
+    assert read_journal(journal)[-1].text.startswith("interrupted, ")
+    assert run(planned, out, "--resume", "--yes").code == 0
+
+
+def test_a_complete_run_may_be_resumed_without_moving(planned, whole):
+    out, _ = whole
+    commits = read_commits(RunFolder(out).journal)
+    assert run(planned, out, "--resume", "--yes").code == 0
+    assert read_commits(RunFolder(out).journal) == commits
+
+
+def test_a_dry_run_lists_the_steps_and_writes_nothing(planned, tmp_path):
+    result = run(planned, tmp_path / "dry", "--dry-run", "--json")
+    figures = json.loads(result.out)
+    assert figures["poses"] == 4
+    assert figures["seconds"] == pytest.approx(
+        sum(step["seconds"] for step in figures["steps"]), abs=0.1
+    )
+    assert not (tmp_path / "dry").exists()
+    assert "Nothing was moved." in run(planned, tmp_path / "dry", "--dry-run").err
+
+
+def test_a_folder_that_holds_a_run_is_refused(planned, whole):
+    reason = run(planned, whole[0]).reason
+    assert "holds this run already (4 of 4 poses committed): go on with --resume" in reason
+
+
+def test_a_folder_that_holds_another_run_is_refused(planned, whole):
+    for more in ((), ("--resume", "--yes")):
+        reason = run(planned, whole[0], "--seed", 5, *more).reason
+        assert "holds another run: its seed is 0, not 5" in reason
+
+
+def test_a_folder_that_holds_something_else_is_refused(planned, tmp_path):
+    (tmp_path / "thesis.tex").write_text("x")
+    assert "holds 'thesis.tex', which is no part of a run" in run(planned, tmp_path).reason
+
+
+def test_resume_without_a_run_is_refused(planned, tmp_path):
+    reason = run(planned, tmp_path / "none", "--resume").reason
+    assert "holds no run to go on with: leave --resume out" in reason
+
+
+def test_resume_asks_and_no_terminal_is_no_answer(planned, whole, monkeypatch):
+    monkeypatch.setattr(sys.stdin, "isatty", lambda: False, raising=False)
+    entries = read_journal(RunFolder(whole[0]).journal)
+    result = run(planned, whole[0], "--resume")
+    assert result.code == 1
+    assert "a person must confirm that the cell is clear: give --yes" in result.err
+    assert read_journal(RunFolder(whole[0]).journal) == entries
+
+
+def add_source(monkeypatch, name, **kinds):
+    """Make another source of devices known; nobody asks it for any."""
+    monkeypatch.setitem(SOURCES, name, DeviceSource(SOURCES["simulated"].make, real=True))
+    return f"devices: {{{', '.join(f'{kind}: {name}' for kind in kinds or KINDS)}}}"
+
+
+def test_on_a_real_machine_a_person_is_asked_before_anything_is_written(
+    planned, tmp_path, monkeypatch
+):
+    cell = planned.with_text("real.yaml", add_source(monkeypatch, "kuka"))
+    monkeypatch.setattr(sys.stdin, "isatty", lambda: False, raising=False)
+    result = run(cell, tmp_path / "run")
+    assert "a person must confirm that the cell is clear: give --yes" in result.reason
+    assert read_journal(RunFolder(tmp_path / "run").journal) == ()
+    assert run(cell, tmp_path / "run", "--yes").code == 0
+
+
+def test_devices_of_two_sources_are_refused(planned, tmp_path, monkeypatch):
+    cell = planned.with_text("mixed.yaml", add_source(monkeypatch, "kuka", arm=True))
+    assert "arm is 'kuka', sensor is 'simulated'" in run(cell, tmp_path / "run").reason
+
+
+def test_a_plan_of_another_cell_is_refused(planned, tmp_path):
+    text = planned.cell.read_text(encoding="utf-8")
+    other = planned.cell.with_name("other.yaml")
+    other.write_text(text.replace('fz: "1100 N"', 'fz: "1101 N"'), encoding="utf-8")
+    result = elastocal("run", other, "--plan", planned.plan, "--out", tmp_path / "run")
+    assert "the plan belongs to another cell: it was made for 'afp'" in result.reason
+    assert not (tmp_path / "run").exists()
+
+
+def test_a_device_that_is_not_configured_is_refused_by_name(planned, tmp_path):
+    cell = planned.with_text("kuka.yaml", "devices: {arm: simulatd}")
+    reason = run(cell, tmp_path / "run").reason
+    assert "devices.arm: 'simulatd' is not configured; did you mean 'simulated'?" in reason
+    assert "(known: simulated)" in reason
+    assert not (tmp_path / "run").exists()
+
+
+@pytest.mark.parametrize(
+    ("section", "message"),
+    [
+        ('procedure: {force_limit: "1 kN"}', "procedure.force_limit must be above 1140"),
+        ('procedure: {force_limit: "9 kN"}', "at most 6250 N (range of the sensor), got 9000 N"),
+        ('procedure: {stale: "60 ms"}', "must be above two cycles (0.08 s)"),
+        ('procedure: {dwell: "100 ms"}', "must be at least four cycles (0.16 s)"),
+        ('procedure: {ramp: "400 N"}', "is not a force rate"),
+        ("procedure: {retry: 2}", "unknown key 'procedure.retry'; did you mean 'retries'?"),
+    ],
+)
+def test_a_procedure_that_cannot_be_is_refused(planned, tmp_path, section, message):
+    cell = planned.with_text("procedure.yaml", section)
+    assert message in run(cell, tmp_path / "run").reason
+
+
+def test_other_settings_on_resume_are_refused(planned, whole):
+    cell = planned.with_text("average.yaml", 'procedure: {average: "2 s"}')
+    reason = run(cell, whole[0], "--resume", "--yes").reason
+    assert "procedure.average is 2.0, the run was started with 1.0" in reason
+
+
+def test_a_fault_ends_the_run_with_one_line_that_says_where_the_arm_is(planned, tmp_path):
+    cell = planned.with_text("fault.yaml", "faults: [{kind: ft_dropout, pose: 1, step: hold}]")
+    result = run(cell, tmp_path / "run")
+    assert result.code == 1
+    last = result.err.strip().splitlines()[-1]
+    assert last.startswith("elastocal: pose 1, attempt 1, load normal: force sensor silent")
+    assert last.endswith("The arm is retracted to the approach pose")
+    assert "Traceback" not in result.err
+    # The fault is gone, the cell is the same.
+    assert run(planned, tmp_path / "run", "--resume", "--yes").code == 0
+
+
+def test_files_above_the_cell_file_keep_their_places(planned, tmp_path):
+    (tmp_path / "cells").mkdir()
+    (tmp_path / "meshes").mkdir()
+    cell = tmp_path / "cells" / "cell.yaml"
+    text = planned.cell.read_text(encoding="utf-8")
+    cell.write_text(text.replace("dome.stl", "../meshes/dome.stl"), encoding="utf-8")
+    (tmp_path / "meshes" / "dome.stl").write_bytes(planned.cell.with_name("dome.stl").read_bytes())
+    loaded, folder = load_cell(cell), RunFolder(tmp_path / "run")
+    fill(folder, loaded, planned.plan)
+    assert cell_place(loaded) == str(Path("cells") / "cell.yaml")
+    assert load_cell(folder.cell / cell_place(loaded)).file == loaded.file
+
+
+def test_what_a_run_leaves_before_its_first_entry_is_no_hindrance(tmp_path):
+    folder = RunFolder(tmp_path)
+    folder.streams.mkdir()
+    folder.journal.touch()
+    refuse_foreign(folder)
+    (tmp_path / "other").touch()
+    with pytest.raises(FileAccessError, match="holds 'other'"):
+        refuse_foreign(folder)

@@ -1,0 +1,42 @@
+"""The example cell with a plan of a few poses, made once."""
+
+import re
+from dataclasses import dataclass
+from pathlib import Path
+
+from elastocal.cell import load_cell
+from elastocal.cell.examples import write_example
+from elastocal.planning.plan import make_plan
+from elastocal.planning.plan_file import write_plan
+
+
+@dataclass(frozen=True)
+class PlannedCell:
+    """A cell file and the folder of its plan."""
+
+    cell: Path
+    plan: Path
+
+    def with_text(self, name: str, text: str) -> "PlannedCell":
+        """Return a cell beside this one with a section added; the plan fits it as well."""
+        path = self.cell.with_name(name)
+        path.write_text(f"{self.cell.read_text(encoding='utf-8')}\n{text}\n", encoding="utf-8")
+        return PlannedCell(path, self.plan)
+
+
+def planned_cell(folder: Path, poses: int = 4) -> PlannedCell:
+    """Write the fibre placement cell with a small pool and two load cases, and plan it."""
+    cell = write_example(folder / "cell", "afp")[0]
+    text = cell.read_text(encoding="utf-8")
+    for pattern, replacement in (
+        (r"\n  d_max: .*", f"\n  poses: {poses}"),
+        (r"\n  pool: .*", "\n  pool: 40"),
+        (r"\n  cases: .*", "\n  cases: [normal, north]"),
+    ):
+        text, count = re.subn(pattern, replacement, text)
+        assert count == 1, pattern
+    cell.write_text(text, encoding="utf-8")
+    plan = folder / "plan"
+    plan.mkdir()
+    write_plan(plan, make_plan(load_cell(cell), None, 1).plan)
+    return PlannedCell(cell, plan)
