@@ -134,3 +134,14 @@ def test_a_missing_mesh_of_the_arm_is_refused_by_link_and_name(folder):
     (folder / "link.stl").unlink()
     with pytest.raises(FileAccessError, match=r"robot: link 'link_4': mesh 'package://arm/link"):
         load_cell(folder / "cell.yaml")
+
+
+def test_how_a_plan_is_carried_out_does_not_change_it(folder):
+    before = of(folder)
+
+    def change(data):
+        data["procedure"] = {"retries": 3}
+        data["faults"] = [{"kind": "robot_stop", "pose": 1, "step": "approach"}]
+        data["simulation"] = {"seed": 77}
+
+    assert rewritten(folder, change) == before

@@ -11,7 +11,7 @@ def check(
         Path,
         typer.Argument(
             help="Cell or springs (.yaml), plan or model (.json), pool (.nc), dataset (.nc, .csv),"
-            " robot (.urdf)."
+            " robot (.urdf), folder of a plan or a run."
         ),
     ],
     as_json: Annotated[

@@ -7,13 +7,16 @@ from typing import Any
 
 from elastocal import dataset
 from elastocal.cell import load_cell
+from elastocal.cli.cell_facts import cell_facts
 from elastocal.dataset.netcdf import read_netcdf
 from elastocal.elastic.layouts import read_springs
 from elastocal.errors import DatasetError, RobotError, SchemaError
 from elastocal.files import read_text
 from elastocal.identification.model_file import read_model
-from elastocal.planning.plan_file import read_plan
+from elastocal.planning.plan_file import PLAN, read_plan
 from elastocal.planning.pool_file import read_pool
+from elastocal.procedure.journal import commits, read_journal
+from elastocal.procedure.run_folder import JOURNAL, RunFolder
 from elastocal.robot import Robot
 from elastocal.robot.urdf import leaf_links, parse_urdf
 
@@ -27,15 +30,17 @@ _SCHEMA_LINE = re.compile(r"^schema:\s*[\"']?elastocal\.cell/", re.MULTILINE)
 
 
 def describe_file(path: Path) -> Described:
-    """Return the kind of a file and what it holds.
+    """Return the kind of a file, or of the folder of a plan or a run, and what it holds.
 
     Raises
     ------
     SchemaError
-        If the suffix is not one of ours.
+        If the suffix is not one of ours, or a folder holds neither plan nor run.
     ElastocalError
         If the contents are not valid.
     """
+    if path.is_dir():
+        return _folder(path)
     known: dict[str, Describe] = {
         ".nc": _netcdf,
         ".csv": _dataset,
@@ -48,6 +53,34 @@ def describe_file(path: Path) -> Described:
     if describe is None:
         raise SchemaError(f"{path}: suffix {path.suffix!r} is not one of {', '.join(known)}")
     return describe(path)
+
+
+def _folder(path: Path) -> Described:
+    """Describe the folder of a plan or of a run."""
+    if (path / PLAN).is_file():
+        return _plan(path / PLAN)
+    if (path / JOURNAL).is_file():
+        return _run(path)
+    raise SchemaError(f"{path} is a folder with neither {PLAN} nor {JOURNAL} in it")
+
+
+def _run(path: Path) -> Described:
+    """Describe a run; its cell, plan and dataset are validated, its raw streams are not."""
+    run = RunFolder(path)
+    entries = read_journal(run.journal)
+    start = entries[0].run if entries else None
+    if start is None:
+        raise SchemaError(f"{run.journal} has no entry: nothing has moved in this run")
+    cell, plan = load_cell(run.cell / start.cell_file), read_plan(run.plan)
+    return "run", {
+        "schema": start.schema_name,
+        "cell": cell.name,
+        "robot": cell.robot.name,
+        "started": start.started,
+        "poses": len(plan.poses),
+        "committed": [log.pose for log in commits(entries)],
+        "readings": _dataset(run.dataset)[1]["readings"] if run.dataset.exists() else None,
+    }
 
 
 def _netcdf(path: Path) -> Described:
@@ -117,14 +150,7 @@ def _settings(path: Path) -> Described:
 
 
 def _cell(path: Path) -> Described:
-    cell = load_cell(path)
-    return "cell file", {
-        "schema": "elastocal.cell/1",
-        "cell": cell.name,
-        "robot": cell.robot.name,
-        "load_cases": list(cell.file.load_cases.cases),
-        "trackers": [tracker.name for tracker in cell.file.trackers],
-    }
+    return "cell file", cell_facts(path)
 
 
 def _plan(path: Path) -> Described:

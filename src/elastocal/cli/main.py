@@ -1,10 +1,17 @@
 """The command line: collects the commands and turns every error into one line.
 
 Exit codes: 0 done; 1 the work could not be done, with a one-line reason; 2 usage;
-130 interrupted. Commands import what they need when they run, so that help is quick.
+130 interrupted; 143 terminated. Commands import what they need when they run: help is quick.
 """
 
+import contextlib
+import os
+import signal
 import sys
+from collections.abc import Callable
+import threading
+from collections.abc import Iterator
+from types import FrameType
 
 import typer
 
@@ -18,7 +25,7 @@ from elastocal.cli.plan import plan
 from elastocal.cli.predict import predict
 from elastocal.cli.robots import robots
 from elastocal.cli.run import run as run_procedure
-from elastocal.errors import ElastocalError
+from elastocal.errors import ElastocalError, FileAccessError
 
 app = typer.Typer(
     name="elastocal",
@@ -27,11 +34,20 @@ app = typer.Typer(
     add_completion=False,
     pretty_exceptions_enable=False,
 )
-for command in (robots, init, check, plan):
-    app.command()(command)
-app.command(name="run")(run_procedure)
-for command in (derive, calibrate, predict, demo):
-    app.command()(command)
+COMMANDS: dict[str, Callable[..., None]] = {
+    "robots": robots,
+    "init": init,
+    "check": check,
+    "plan": plan,
+    "run": run_procedure,
+    "derive": derive,
+    "calibrate": calibrate,
+    "predict": predict,
+    "demo": demo,
+}
+"""In the order in which help lists them: that of the work."""
+for name, command in COMMANDS.items():
+    app.command(name)(command)
 
 
 def _version(wanted: bool) -> None:
@@ -52,14 +68,51 @@ def _root(
 def run() -> None:
     """Run the command line and exit with its code."""
     try:
-        app()
+        _check_output()
+        with _cleaned_up_when_terminated():
+            app()
     except ElastocalError as error:
         _complain(str(error))
         sys.exit(1)
     except OSError as error:
         # Standard output that is full or gone; every file of ours has its own refusal.
         _complain(f"cannot write output: {error.strerror or error}")
+        _drop_output()
         sys.exit(1)
+
+
+def _check_output() -> None:
+    """Refuse to begin when the result could not be handed over at the end.
+
+    Python has no standard output where it was closed (``>&-``).
+    """
+    if sys.stdout is None and "--json" in sys.argv[1:]:
+        raise FileAccessError("cannot write output: standard output is closed")
+
+
+def _drop_output() -> None:
+    """Lead standard output away, so that Python does not try once more at its end."""
+    with contextlib.suppress(OSError, ValueError):
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+
+
+@contextlib.contextmanager
+def _cleaned_up_when_terminated() -> Iterator[None]:
+    """Turn SIGTERM into an exit that leaves no half-written folder; `run` has its own way."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+
+    def leave(number: int, frame: FrameType | None) -> None:  # noqa: ARG001 - signal's form
+        # A second one must not break into the cleaning up.
+        signal.signal(number, signal.SIG_IGN)
+        sys.exit(128 + number)
+
+    before = signal.signal(signal.SIGTERM, leave)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, before)
 
 
 def _complain(message: str) -> None:

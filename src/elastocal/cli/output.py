@@ -31,3 +31,5 @@ def refuse_overwriting(out: Path, *inputs: Path) -> None:
 def print_json(data: Any) -> None:
     """Print one JSON object on standard output, and nothing else there."""
     sys.stdout.write(json.dumps(data, allow_nan=False) + "\n")
+    # A disk that is full is to be known now, not when Python ends.
+    sys.stdout.flush()

@@ -67,6 +67,23 @@ def retreat(supervisor: Supervisor, line: Line, guard: Guard) -> None:
         )
 
 
+def let_go(supervisor: Supervisor) -> None:
+    """Take the arm out of force control, in which a program that died may have left it.
+
+    Raises
+    ------
+    FaultError
+        If that takes too long.
+    """
+    arm = supervisor.devices.arm
+    if arm.state().motion not in (Motion.HOLDING, Motion.RELEASING):
+        return
+    with supervisor.actuation(Action.RELEASE):
+        if arm.state().motion is Motion.HOLDING:
+            arm.release(supervisor.settings.procedure.ramp)
+        supervisor.wait(Guard(), _idle, _release_time(supervisor), "the release")
+
+
 def back_off(a: Attempt, ends: Ends) -> Stand:
     """Make the cell safe after a fault: no force, off the surface, stopped.
 

@@ -13,7 +13,7 @@ from elastocal.procedure.faults import CAUGHT, Ends, Fault, FaultError, as_fault
 from elastocal.procedure.itinerary import remaining
 from elastocal.procedure.job import End, Job, Result, Seams
 from elastocal.procedure.journal import Journal
-from elastocal.procedure.leaving import Stand, halt, retreat
+from elastocal.procedure.leaving import Stand, halt, let_go, retreat
 from elastocal.procedure.line import Line
 from elastocal.procedure.logbook import Logbook
 from elastocal.procedure.machine import AttemptFailedError, run_attempt
@@ -86,12 +86,15 @@ class Runner:
 
     def _begin(self) -> None:
         s = self._supervisor
+        home, moving = self._job.home, (Motion.MOVING, Motion.APPROACHING, Motion.RETRACTING)
+        self._stand = Stand.WAY if home.retreat_from is None else Stand.SURFACE
         s.start()
+        if self._devices.arm.state().motion in moving:
+            halt(s)
         self._arm()
-        home = self._job.home
+        let_go(s)
         if home.retreat_from is not None:
             limit = self._job.settings.procedure.travel_limit
-            self._stand = Stand.SURFACE
             retreat(s, Line.of(home.retreat_from, limit), Guard())
         self._stand = Stand.WAY
         drive(s, home.way, Guard(self._free_limit))

@@ -31,8 +31,8 @@ class Finding:
     """One thing that a user should know."""
 
     kind: str
-    """``open``, ``non-manifold``, ``winding``, ``degenerate``, ``far``, ``huge``, ``tiny`` or
-    ``inverted``."""
+    """``open``, ``non-manifold``, ``winding``, ``degenerate``, ``duplicate``, ``far``, ``huge``,
+    ``tiny`` or ``inverted``."""
     message: str
     """One line."""
     fatal: bool = False
@@ -51,6 +51,9 @@ def mesh_findings(surface: Surface) -> tuple[Finding, ...]:
     if surface.mesh.degenerate:
         text = f"{name}: {surface.mesh.degenerate} faces without area were left out"
         found.append(Finding("degenerate", text))
+    if surface.mesh.duplicate:
+        text = f"{name}: {surface.mesh.duplicate} faces stood twice and were left out once"
+        found.append(Finding("duplicate", text))
     if surface.turned:
         text = f"{name}: {surface.turned} faces were wound against their neighbours and were turned"
         found.append(Finding("winding", text))
@@ -120,7 +123,8 @@ def inverted_finding(surface: Surface, reachable: Reachable, rng: Generator) -> 
     """Return a finding when the normals point to the side where the robot cannot work.
 
     A closed mesh tells its outside by the sign of its volume. An open one has no outside: there
-    the side counts from which the robot reaches clearly more of 200 points.
+    the side counts from which the robot reaches clearly more of 200 points. A mesh that has but
+    one side cannot be turned.
 
     Parameters
     ----------
@@ -131,6 +135,8 @@ def inverted_finding(surface: Surface, reachable: Reachable, rng: Generator) -> 
     rng : Generator
         Seeded source of randomness.
     """
+    if not surface.orientable:
+        return ()
     offer = "; set surface.flip_normals: true to turn them"
     if surface.closed:
         if surface.signed_volume >= 0.0:

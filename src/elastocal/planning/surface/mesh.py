@@ -1,5 +1,6 @@
 """Read a triangle mesh: STL, OBJ or PLY, welded, in metres, without faces that have no area."""
 
+import io
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -7,17 +8,17 @@ import numpy as np
 import trimesh
 
 from elastocal.arrays import FloatArray, IndexArray
-from elastocal.errors import ElastocalError, FileAccessError
+from elastocal.errors import FileAccessError
+from elastocal.planning.surface.errors import SurfaceError
+from elastocal.planning.surface.stl import check_stl
 
 SUFFIXES = (".stl", ".obj", ".ply")
 _WELD = 1e-6
 """Vertices nearer than this part of the mesh's diagonal are one; STL carries seven digits."""
 _FLAT = 1e-10
 """A face whose area is below this part of its longest edge squared has no usable normal."""
-
-
-class SurfaceError(ElastocalError, ValueError):
-    """A tooling surface that cannot be used: unreadable mesh, no faces, empty region."""
+_FARTHEST = 1e9
+"""No vertex can be farther away than this, in m; squares of more would overflow somewhere."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,6 +31,8 @@ class TriangleMesh:
     """Vertex numbers, counter-clockwise as seen from outside, shape (face, 3)."""
     degenerate: int = 0
     """Faces without area that were left out."""
+    duplicate: int = 0
+    """Faces that stood twice, either way round, and were left out the second time."""
 
 
 def read_mesh(path: Path, unit: float) -> TriangleMesh:
@@ -55,10 +58,14 @@ def read_mesh(path: Path, unit: float) -> TriangleMesh:
             f"mesh {path}: suffix {path.suffix!r} is not one of {', '.join(SUFFIXES)}"
         )
     try:
-        with path.open("rb") as file:
-            loaded = trimesh.load_mesh(file, file_type=path.suffix[1:].lower(), process=False)
+        data = path.read_bytes()
     except OSError as error:
         raise FileAccessError(f"cannot read {path}: {error.strerror or error}") from error
+    if path.suffix.lower() == ".stl":
+        check_stl(data, f"mesh {path}")
+    try:
+        kind = path.suffix[1:].lower()
+        loaded = trimesh.load_mesh(io.BytesIO(data), file_type=kind, process=False)
     # What the readers of trimesh raise on bad contents is not documented; these were seen.
     except (ValueError, IndexError, KeyError, TypeError, AttributeError) as error:
         reason = " ".join(str(error).split()) or type(error).__name__
@@ -83,12 +90,18 @@ def weld(vertices: FloatArray, faces: IndexArray, what: str) -> TriangleMesh:
     Raises
     ------
     SurfaceError
-        If there is no face with an area, a vertex is not finite, or a number is out of range.
+        If there is no face with an area, a vertex is not finite or beyond all measure, or a
+        number is out of range.
     """
     if not len(faces):
         raise SurfaceError(f"{what} has no faces")
     if not np.isfinite(vertices).all():
         raise SurfaceError(f"{what} has a vertex that is not finite")
+    farthest = float(np.abs(vertices).max(initial=0.0))
+    if not farthest <= _FARTHEST:
+        raise SurfaceError(
+            f"{what} has a vertex {farthest:.3g} m from its origin, allowed are {_FARTHEST:g} m"
+        )
     if not (faces.min() >= 0 and faces.max() < len(vertices)):
         raise SurfaceError(
             f"{what} has a face that names vertex {faces.max()}; there are {len(vertices)}"
@@ -106,7 +119,10 @@ def weld(vertices: FloatArray, faces: IndexArray, what: str) -> TriangleMesh:
     good = has_area(vertices, faces)
     if not good.any():
         raise SurfaceError(f"{what} has no face with an area ({len(faces)} degenerate ones)")
-    return TriangleMesh(vertices, faces[good], int(np.sum(~good)))
+    faces = faces[good]
+    _, once = np.unique(np.sort(faces, axis=1), axis=0, return_index=True)
+    duplicate = len(faces) - len(once)
+    return TriangleMesh(vertices, faces[np.sort(once)], int(np.sum(~good)), duplicate)
 
 
 def has_area(vertices: FloatArray, faces: IndexArray) -> np.ndarray:

@@ -131,6 +131,11 @@ class Surface:
         return int(np.sum(self.edges.count > 2) + np.sum(~self.edges.opposed))
 
     @property
+    def orientable(self) -> bool:
+        """Whether the mesh has two sides; a Möbius strip has but one."""
+        return bool(self.edges.opposed.all())
+
+    @property
     def closed(self) -> bool:
         """Whether the mesh bounds a solid."""
         return self.open_edges == 0 and self.non_manifold_edges == 0
@@ -226,7 +231,7 @@ def build_surface(
     vertices = mesh.vertices @ T[:3, :3].T + T[:3, 3]
     for array in (T, vertices, faces):
         array.setflags(write=False)
-    placed = TriangleMesh(vertices, faces, mesh.degenerate)
+    placed = replace(mesh, vertices=vertices, faces=faces)
     return Surface(name, placed, crease_angle, T, region, turned)
 
 

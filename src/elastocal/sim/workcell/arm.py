@@ -107,8 +107,10 @@ class SimulatedArm:
         self._visiting = False
         end = plant.statics.free(target, plant.stop_error(), None)
         plant.note_sag(end)
-        rise = plant.cell.file.motion.acceleration_time
-        law = joint_move(target - start.q, speed * plant.cell.axis_speeds, rise)
+        motion = plant.cell.file.motion
+        # The cell's speeds hold its override already; a caller says its own part of them.
+        fastest = plant.cell.axis_speeds / motion.override
+        law = joint_move(target - start.q, speed * fastest, motion.acceleration_time)
         way = joint_way(plant.statics, start, end)
         plant.run(way, law, (Motion.MOVING, Motion.IDLE), start)
 
