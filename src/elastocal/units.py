@@ -93,7 +93,7 @@ def _check_size(value: float, dimension: str, text: str) -> None:
         return
     largest, name = _LARGEST[dimension]
     if not abs(value) <= largest:
-        raise UnitError(f"{text} is too large: a {dimension} can be at most {name}")
+        raise UnitError(f"{text} is too large: the largest {dimension} is {name}")
     if not (value == 0.0 or abs(value) >= _SMALLEST):
         raise UnitError(f"{text} is too small: write 0, or at least {_SMALLEST:g} in SI units")
 

@@ -16,8 +16,9 @@ import pytest
 import trimesh
 
 from elastocal.cell import load_cell
+from elastocal.cell.description.file import TOOLING
 from elastocal.cell.examples import write_example
-from elastocal.planning.cell_checks import TOOLING, collision_scene
+from elastocal.planning.cell_checks import collision_scene
 from elastocal.planning.plan_file import read_plan
 from elastocal.planning.pool_file import read_pool
 from elastocal.planning.tooling import cell_surface

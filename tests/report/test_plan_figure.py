@@ -1,8 +1,11 @@
 """The printable figure."""
 
+import numpy as np
 import pytest
+import trimesh
 
 from elastocal.errors import FileAccessError, SchemaError
+from elastocal.planning.surface import TriangleMesh, build_surface
 from elastocal.report import write_plan_figure
 from elastocal.report.plan_figure import plan_figure
 
@@ -22,6 +25,25 @@ def test_same_plan_gives_the_same_bytes(tmp_path, on_block, suffix):
     one, other = (path.read_bytes() for path in paths)
     assert len(one) > 5000
     assert one == other
+
+
+@pytest.fixture(scope="module")
+def fine(plan, pool, moved_onto):
+    """A bowl of many small faces."""
+    mesh = trimesh.creation.icosphere(6, 0.4)
+    half = mesh.faces[np.array(mesh.triangles_center)[:, 2] > 0.2]
+    surface = build_surface(TriangleMesh(mesh.vertices + np.array([1.5, 0, 0.5]), half))
+    return surface, *moved_onto(surface, plan, pool)
+
+
+def test_a_fine_mesh_is_an_image_in_the_svg_and_a_small_one_is_lines(tmp_path, fine, on_block):
+    small = write_plan_figure(tmp_path / "s.svg", *on_block).read_text(encoding="utf-8")
+    large = write_plan_figure(tmp_path / "l.svg", *fine).read_text(encoding="utf-8")
+    colour_bar = 1
+    assert small.count("<image") == colour_bar
+    assert large.count("<image") == 2 + colour_bar
+    assert len(fine[0].mesh.faces) > 10_000
+    assert len(large) < 3e6
 
 
 def test_svg_holds_no_date(tmp_path, on_block):

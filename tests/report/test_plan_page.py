@@ -64,6 +64,25 @@ def test_page_loads_nothing(page, written):
     assert "@import" not in style
 
 
+def test_a_fine_mesh_is_drawn_coarser_and_the_page_says_so(
+    tmp_path, cell, plan, pool, moved_onto, monkeypatch, ball
+):
+    monkeypatch.setattr("elastocal.report.layers.MOST_OF_TOOLING", 100)
+    monkeypatch.setattr("elastocal.report.moving.MOST_OF_LINK", 40)
+    path = write_plan_page(tmp_path / "p.html", cell, ball, *moved_onto(ball, plan, pool))
+    text = path.read_text(encoding="utf-8")
+    said = re.search(r"The tooling is drawn with (\d+) faces in place of 320\.", text)
+    assert int(said[1]) <= 100
+    assert "Parts of the robot with fine meshes are drawn coarser." in text
+    traces = json.loads(Page(text).data)["figure"]["data"]
+    (tooling,) = [trace for trace in traces if trace.get("name") == "tooling"]
+    assert len(tooling["intensity"]["bdata"]) < 4 * 2 * 4 * 100
+
+
+def test_a_mesh_that_is_drawn_whole_needs_no_words(written):
+    assert "in place of" not in written.read_text(encoding="utf-8")
+
+
 def test_page_forbids_itself_the_network(page):
     policy = page.one(**{"http-equiv": "Content-Security-Policy"})["content"]
     assert policy.startswith("default-src 'none'")

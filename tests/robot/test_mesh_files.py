@@ -90,3 +90,9 @@ def test_a_robot_with_meshes_goes_to_another_process(package):
     urdf = with_mesh("../meshes/link.stl")
     robot = Robot.from_urdf(urdf, "tcp", meshes=find_meshes(urdf, package / "urdf"))
     assert pickle.loads(pickle.dumps(robot)).meshes == robot.meshes
+
+
+def test_a_file_of_that_name_far_above_is_not_taken_for_the_packages(package):
+    (package.parent / "link.stl").write_bytes((package / "meshes" / "link.stl").read_bytes())
+    with pytest.raises(FileAccessError, match="nor one of that name in the folders above"):
+        find_meshes(with_mesh("package://other/link.stl"), package / "urdf")

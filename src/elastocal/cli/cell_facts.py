@@ -8,7 +8,7 @@ import numpy as np
 from elastocal.cell import load_cell
 from elastocal.planning.cell_checks import collision_scene
 from elastocal.planning.motion import mover_for, refuse_blocked_home
-from elastocal.planning.search import technique
+from elastocal.planning.plan import refuse_before_the_long_work
 from elastocal.planning.tooling import cell_surface, surface_findings
 
 
@@ -26,7 +26,7 @@ def cell_facts(path: Path) -> dict[str, Any]:
     """
     cell = load_cell(path)
     search = cell.file.search
-    technique(search.technique)
+    refuse_before_the_long_work(cell)
     surface = cell_surface(cell)
     findings = surface_findings(cell, surface, np.random.default_rng(search.seed))
     refuse_blocked_home(cell.home, mover_for(cell, collision_scene(cell, surface)))

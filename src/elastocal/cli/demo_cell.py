@@ -53,7 +53,7 @@ def run_demo(console: Console, out: Path, seed: int) -> None:
 
     console.rule("1. measure: 31 poses, 5 load cases, with noise and one blunder")
     dataset.write(_measured(arm, POSES, SHOP_FLOOR, rng, (BLUNDER,)), data)
-    console.print(f"dataset written to [bold]{data}[/bold]")
+    console.print(f"dataset written to {data}", markup=False, soft_wrap=True)
 
     console.rule("2. elastocal calibrate")
     calibrate(data, model)

@@ -28,5 +28,5 @@ def derive(
     counts = ", ".join(f"{n} {status}" for status, n in summary["readings"]["counts"].items() if n)
     out.print(f"{len(derived.dataset.poses)} poses, readings: {counts}")
     for warning in summary["warnings"]:
-        out.print(f"warning: {warning}")
-    out.print(f"wrote {folder.dataset} and {folder.summary.name}")
+        out.print(f"warning: {warning}", markup=False, soft_wrap=True)
+    out.print(f"wrote {folder.dataset} and {folder.summary.name}", markup=False, soft_wrap=True)

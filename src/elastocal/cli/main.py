@@ -8,9 +8,8 @@ import contextlib
 import os
 import signal
 import sys
-from collections.abc import Callable
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from types import FrameType
 
 import typer

@@ -44,5 +44,7 @@ def predict(
     else:
         console().print(
             f"{len(norms)} rows: predicted deflection {1e3 * norms.mean():.3f} mm mean,"
-            f" {1e3 * norms.max():.3f} mm max; written to {out}"
+            f" {1e3 * norms.max():.3f} mm max; written to {out}",
+            markup=False,
+            soft_wrap=True,
         )

@@ -8,6 +8,7 @@ import trimesh
 
 from elastocal.arrays import FloatArray
 from elastocal.cell import Cell
+from elastocal.cell.description.file import TOOLING
 from elastocal.cell.description.shapes import Box, Cylinder, Shape, Sphere
 from elastocal.planning.checks import (
     Check,
@@ -35,9 +36,6 @@ from elastocal.planning.surface import (
     read_mesh,
 )
 from elastocal.robot.singularity import has_wrist
-
-TOOLING = "tooling"
-"""Name of the surface among the obstacles."""
 
 
 def point_checks(

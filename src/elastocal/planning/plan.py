@@ -73,7 +73,7 @@ def make_plan(
         If the surface cannot be read, or its region is empty.
     """
     other = None if compare is None else technique(compare)
-    _refuse_before_the_long_work(cell, compare)
+    refuse_before_the_long_work(cell, compare)
     for_findings, for_points, for_search = np.random.default_rng(cell.file.search.seed).spawn(3)
     progress(STAGES[0], 0, 1)
     surface = cell_surface(cell)
@@ -117,8 +117,21 @@ def make_plan(
     return Planned(plan_record(decisions), pool_data(decisions), surface)
 
 
-def _refuse_before_the_long_work(cell: Cell, compare: str | None) -> None:
-    """Refuse what needs no pool to be known as impossible."""
+def refuse_before_the_long_work(cell: Cell, compare: str | None = None) -> None:
+    """Refuse what needs no pool to be known as impossible.
+
+    Parameters
+    ----------
+    cell : Cell
+        The cell.
+    compare : str, optional
+        Search technique to lay beside the cell's own.
+
+    Raises
+    ------
+    PlanningError
+        If a technique is unknown, or needs a process that the cell does not name.
+    """
     wanted = technique(cell.file.search.technique)
     for name in (wanted.name, compare):
         if name in ("i_optimal", "exchange-i") and cell.process is None:

@@ -16,6 +16,7 @@ from elastocal.planning.pool_file import PoolData
 from elastocal.planning.surface import Surface
 from elastocal.report import style
 from elastocal.report.camera import light
+from elastocal.report.coarse import MOST_OF_FIXTURE, MOST_OF_TOOLING, coarse
 from elastocal.report.solid_traces import single, solid_trace
 from elastocal.report.solids import Solid, fixture_solids, joined
 from elastocal.report.text import duration, millimetres, readable
@@ -37,6 +38,8 @@ class Layer:
     """Plotly traces, at least one."""
     shown: bool = True
     """Whether the layer is on when the page opens."""
+    note: str = ""
+    """What is to be said of how it is drawn."""
 
 
 def still_layers(cell: Cell, surface: Surface, plan: PlanFile, pool: PoolData) -> list[Layer]:
@@ -48,11 +51,7 @@ def still_layers(cell: Cell, surface: Surface, plan: PlanFile, pool: PoolData) -
         Which belong together.
     """
     towards_light = light(cell, surface)
-    layers = [Layer("Tooling", style.TOOLING, _tooling(surface, towards_light))]
-    fixtures = joined(list(fixture_solids(cell, surface).values()))
-    if len(fixtures.faces):
-        trace = solid_trace(fixtures, towards_light, "fixtures", (style.FIXTURE,))
-        layers.append(Layer("Fixtures", style.FIXTURE, (trace,)))
+    layers = [_tooling(surface, towards_light), *_fixtures(cell, surface, towards_light)]
     lift = _OFF_SURFACE * float(np.linalg.norm(np.ptp(surface.mesh.vertices, axis=0)))
     layers.append(_candidates(pool, lift))
     layers.append(Layer("Poses, in visiting order", style.BLUE, (_poses(plan, 5.0 * lift),)))
@@ -88,19 +87,35 @@ def tool_path(cell: Cell, plan: PlanFile, steps: int = 12) -> FloatArray:
     return path
 
 
-def _tooling(surface: Surface, towards_light: FloatArray) -> tuple[Any, ...]:
+def _tooling(surface: Surface, towards_light: FloatArray) -> Layer:
     """Return the surface and the lines at which its smooth patches end."""
     mesh = surface.mesh
-    solid = Solid(mesh.vertices, mesh.faces)
+    drawn = coarse(Solid(mesh.vertices, mesh.faces), MOST_OF_TOOLING)
     face, corner = np.divmod(surface.border_half_edges, 3)
-    ends = [mesh.vertices[mesh.faces[face, (corner + step) % 3]] for step in (0, 1)]
-    x, y, z = single(segments(list(zip(*ends, strict=True))))
+    ends = np.stack([mesh.faces[face, (corner + step) % 3] for step in (0, 1)], axis=1)
+    lines = drawn.solid.vertices[drawn.edges(ends)]
+    x, y, z = single(segments([(start, end) for start, end in lines]))
     edges = go.Scatter3d(
         x=x, y=y, z=z, mode="lines", name="edges", hoverinfo="skip",
         line={"color": style.MUTED, "width": 2},
     )  # fmt: skip
-    tooling = solid_trace(solid, towards_light, "tooling", (style.TOOLING,))
-    return (tooling, edges) if len(face) else (tooling,)
+    tooling = solid_trace(drawn.solid, towards_light, "tooling", (style.TOOLING,))
+    traces = (tooling, edges) if len(lines) else (tooling,)
+    return Layer("Tooling", style.TOOLING, traces, note=drawn.note("The tooling"))
+
+
+def _fixtures(cell: Cell, surface: Surface, towards_light: FloatArray) -> list[Layer]:
+    """Return the layer of the fixtures, if there are any."""
+    drawn = {
+        name: coarse(solid, MOST_OF_FIXTURE)
+        for name, solid in fixture_solids(cell, surface).items()
+    }
+    if not drawn:
+        return []
+    together = joined([fixture.solid for fixture in drawn.values()])
+    trace = solid_trace(together, towards_light, "fixtures", (style.FIXTURE,))
+    notes = (fixture.note(f"Fixture {name}") for name, fixture in drawn.items())
+    return [Layer("Fixtures", style.FIXTURE, (trace,), note=" ".join(filter(None, notes)))]
 
 
 def _candidates(pool: PoolData, lift: float) -> Layer:
@@ -234,4 +249,4 @@ def _trackers(cell: Cell) -> Any:
 def segments(ends: Sequence[tuple[Any, Any]]) -> FloatArray:
     """Return separate lines as one array with NaN between them, shape (3 line, 3)."""
     gap = np.full(3, np.nan)
-    return np.array([row for start, end in ends for row in (start, end, gap)])
+    return np.array([row for start, end in ends for row in (start, end, gap)]).reshape(-1, 3)

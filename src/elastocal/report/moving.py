@@ -1,6 +1,6 @@
 """What moves in the interactive view: the robot, and the line of sight to its marker."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -12,6 +12,7 @@ from elastocal.planning.plan_file import PlanFile
 from elastocal.planning.surface import Surface
 from elastocal.report import style
 from elastocal.report.camera import light
+from elastocal.report.coarse import MOST_OF_LINK, coarse
 from elastocal.report.layers import Layer, segments
 from elastocal.report.solid_traces import single, solid_trace, tones
 from elastocal.report.solids import Solid, robot_solids
@@ -32,11 +33,13 @@ class MovingParts:
     sight: tuple[FloatArray, ...]
     """From marker to station and a gap, each of shape (3, 3); NaN where no station sees. Empty in
     a cell without stations."""
+    note: str = ""
+    """What is to be said of how the robot is drawn."""
 
     def layers(self, shown: int) -> tuple[Layer, ...]:
         """Return the layers at one posture (0: HOME)."""
         robot = solid_trace(self.robot[shown], self.light, "robot", _COLOURS, self.on_tool)
-        layers = [Layer("Robot and tool", style.ARM, (robot,))]
+        layers = [Layer("Robot and tool", style.ARM, (robot,), note=self.note)]
         if self.sight:
             x, y, z = single(self.sight[shown])
             line = go.Scatter3d(
@@ -63,14 +66,18 @@ class MovingParts:
 def moving_parts(cell: Cell, surface: Surface, plan: PlanFile) -> MovingParts:
     """Return the robot at HOME and in contact at every pose of a plan."""
     q = np.array([plan.robot.home, *(pose.joints for pose in plan.poses)])
-    solids = robot_solids(cell, surface)
+    whole = robot_solids(cell, surface)
+    drawn = [coarse(part, MOST_OF_LINK) for part in whole.parts]
+    solids = replace(whole, parts=tuple(part.solid for part in drawn))
+    finer = any(part.note("A part") for part in drawn)
+    note = "Parts of the robot with fine meshes are drawn coarser." if finer else ""
     seen = [None, *(pose.seen_by for pose in plan.poses)]
     sight: tuple[FloatArray, ...] = ()
     if any(seen):
         tcp = cell.robot.forward(q)
         sight = tuple(_sight(cell, T, name) for T, name in zip(tcp, seen, strict=True))
     part = solids.on_tool.astype(np.intp)
-    return MovingParts(tuple(solids.at(q)), part, light(cell, surface), sight)
+    return MovingParts(tuple(solids.at(q)), part, light(cell, surface), sight, note)
 
 
 def _sight(cell: Cell, T_base_tcp: FloatArray, name: str | None) -> FloatArray:

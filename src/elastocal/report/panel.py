@@ -23,6 +23,8 @@ _DISC, _CROWD = 13.0, 200.0
 """Diameter of a numbered disc in points; with many it shrinks to the second over their root."""
 _MANY = 20_000
 """With more candidates than this their dots are stored as an image."""
+_FINE = 5_000
+"""With more faces or border lines than this the surface is stored as an image."""
 _NAME: dict[str, Any] = {"color": style.MUTED}
 _VALUE: dict[str, Any] = {"ha": "right", "weight": "bold"}
 
@@ -80,13 +82,19 @@ def _draw_surface(axes: Axes, surface: Surface, flat: FlatMap) -> None:
         colours = np.repeat(grey[:, None], 3, axis=1)
         axes.add_collection(
             PolyCollection(
-                list(sheet.flat(triangles)), facecolors=colours, edgecolors=colours, lw=0.3
+                list(sheet.flat(triangles)),
+                facecolors=colours,
+                edgecolors=colours,
+                lw=0.3,
+                rasterized=len(triangles) > _FINE,
             )
         )
         shown = np.isin(face, sheet.faces)
         ends = [surface.mesh.faces[face[shown], (corner[shown] + step) % 3] for step in (0, 1)]
         border = sheet.flat(surface.mesh.vertices[np.stack(ends, axis=1)])
-        axes.add_collection(LineCollection(list(border), colors=style.MUTED, lw=0.8))
+        axes.add_collection(
+            LineCollection(list(border), colors=style.MUTED, lw=0.8, rasterized=len(border) > _FINE)
+        )
 
 
 def _draw_candidates(

@@ -74,6 +74,7 @@ def _page(view: View, plan: PlanFile, pool: PoolData) -> str:
         footer=escape(
             f"Made by elastocal {plan.elastocal} from {plan.cell.file}"
             f" (fingerprint {plan.cell.fingerprint[:12]}). Times are estimates."
+            + "".join(f" {layer.note}" for layer in view.layers if layer.note)
         ),
         data=_embedded(_data(view, plan, worst)),
         plotly=get_plotlyjs(),

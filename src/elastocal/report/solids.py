@@ -14,7 +14,8 @@ import trimesh
 
 from elastocal.arrays import BoolArray, FloatArray, IndexArray
 from elastocal.cell import Cell
-from elastocal.planning.cell_checks import TOOLING, collision_scene
+from elastocal.cell.description.file import TOOLING
+from elastocal.planning.cell_checks import collision_scene
 from elastocal.planning.scene import CollisionScene
 from elastocal.planning.surface import Surface
 

@@ -27,8 +27,8 @@ def find_meshes(urdf: str, folder: Path) -> tuple[tuple[str, Path], ...]:
         The URDF.
     folder : Path
         Its folder. Relative names are relative to it; ``package://NAME/REST`` is ``NAME/REST``
-        or ``REST`` in it or in the nearest folder above; ``file://`` and absolute names are
-        taken as they are.
+        in it or in the nearest folder above, else ``REST`` in it or in the one above;
+        ``file://`` and absolute names are taken as they are.
 
     Returns
     -------
@@ -109,8 +109,10 @@ def _places(name: str, folder: Path) -> Iterator[Path]:
         package, _, rest = name.removeprefix(_PACKAGE).partition("/")
         for parent in (folder, *folder.parents):
             yield parent / package / rest
-            # The folder of a package may have been renamed, or copied without its name.
-            yield parent / rest
+        # The folder of a package may have been renamed, or copied without its name; farther up
+        # there may be a file of that name that has nothing to do with it.
+        yield folder / rest
+        yield folder.parent / rest
     elif name.startswith(_FILE):
         yield Path(unquote(name.removeprefix(_FILE)))
     else:

@@ -134,3 +134,30 @@ def _shift(metres):
     T = np.zeros((4, 4))
     T[0, 3] = metres
     return T
+
+
+def test_faces_that_stand_twice_are_said_and_do_not_make_the_mesh_non_manifold():
+    triangles = block()
+    surface = soup(np.concatenate([triangles, triangles[:5]]))
+    (found,) = mesh_findings(surface)
+    assert (found.kind, surface.closed) == ("duplicate", True)
+    assert "5 faces stood twice" in found.message
+
+
+def test_a_strip_with_one_side_is_not_offered_to_be_turned():
+    angle = np.linspace(0, 2 * np.pi, 25)
+    across = np.stack([np.cos(angle / 2) * np.cos(angle), np.cos(angle / 2) * np.sin(angle)])
+    half = 0.2 * np.stack([*across, np.sin(angle / 2)], axis=1)
+    middle = np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)
+    low, high = middle - half, middle + half
+    strip = [
+        triangle
+        for i in range(24)
+        for triangle in ((low[i], low[i + 1], high[i]), (high[i], low[i + 1], high[i + 1]))
+    ]
+    surface = soup(np.array(strip))
+    assert not surface.orientable
+    only_from_behind = lambda poses: np.arange(len(poses)) >= 0  # noqa: E731
+    calls = iter([lambda poses: np.zeros(len(poses), dtype=bool), only_from_behind])
+    found = inverted_finding(surface, lambda poses: next(calls)(poses), np.random.default_rng(0))
+    assert found == ()

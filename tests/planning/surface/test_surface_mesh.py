@@ -82,3 +82,49 @@ def test_vertices_that_are_not_finite_or_not_there_are_refused():
         weld(np.array([[0.0, 0, 0], [1, 0, np.nan], [0, 1, 0]]), face, "m")
     with pytest.raises(SurfaceError, match="names vertex 2; there are 2"):
         weld(np.zeros((2, 3)), face, "m")
+
+
+def refusal(path) -> str:
+    with pytest.raises(SurfaceError) as caught:
+        read_mesh(path, 1.0)
+    return str(caught.value)
+
+
+def test_a_binary_stl_that_is_cut_short_is_told_from_a_text_that_is_none(tmp_path):
+    path = tmp_path / "t.stl"
+    whole = binary_stl(block())
+    path.write_bytes(whole[:-1])
+    assert f"is cut short, or no STL: its head promises 12 triangles, which take {len(whole)}" in (
+        refusal(path)
+    )
+    path.write_text("# Not a mesh but a letter about one, of more bytes than a head.\n" * 4)
+    assert "is no STL: it is a text that does not begin with 'solid'" in refusal(path)
+
+
+def test_a_binary_stl_whose_head_says_solid_is_read(tmp_path):
+    path = tmp_path / "t.stl"
+    path.write_bytes(b"solid by some program".ljust(80) + binary_stl(block())[80:])
+    assert len(read_mesh(path, 1e-3).faces) == 12
+
+
+def test_a_text_stl_is_read_and_its_beginning_is_refused(tmp_path):
+    path = tmp_path / "t.stl"
+    face = "facet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex {} 0 0\nvertex 0 1 0\nendloop\n"
+    text = "solid s\n" + "".join(face.format(i) + "endfacet\n" for i in (1, 2)) + "endsolid s\n"
+    path.write_text(text)
+    assert len(read_mesh(path, 1.0).faces) == 2
+    path.write_text(text[: text.rindex("vertex")])
+    assert "is cut short: it begins 2 triangles and ends 1" in refusal(path)
+
+
+def test_faces_that_stand_twice_either_way_round_are_dropped_and_counted():
+    vertices = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
+    mesh = weld(vertices, np.array([[0, 1, 2], [0, 2, 3], [1, 2, 0], [3, 2, 0]]), "m")
+    np.testing.assert_array_equal(mesh.vertices[mesh.faces], vertices[[[0, 1, 2], [0, 2, 3]]])
+    assert mesh.duplicate == 2
+
+
+def test_a_vertex_beyond_all_measure_is_refused():
+    vertices = np.array([[0.0, 0, 0], [1e200, 0, 0], [0, 1, 0]])
+    with pytest.raises(SurfaceError, match=r"m has a vertex 1e\+200 m from its origin"):
+        weld(vertices, np.array([[0, 1, 2]]), "m")

@@ -2,6 +2,7 @@
 
 from elastocal.planning.surface.boundary import distance_to_boundary
 from elastocal.planning.surface.contact import contact_frames, contact_poses
+from elastocal.planning.surface.errors import SurfaceError
 from elastocal.planning.surface.findings import (
     Finding,
     inverted_finding,
@@ -10,7 +11,7 @@ from elastocal.planning.surface.findings import (
 )
 from elastocal.planning.surface.flatness import DiskFit, fit_disk
 from elastocal.planning.surface.geodesic import GeodesicDistance, geodesic_distance
-from elastocal.planning.surface.mesh import SurfaceError, TriangleMesh, read_mesh, weld
+from elastocal.planning.surface.mesh import TriangleMesh, read_mesh, weld
 from elastocal.planning.surface.region import Region
 from elastocal.planning.surface.robot_side import ReachableFrom, arm_reach, arm_stands
 from elastocal.planning.surface.sampling import region_share, sample_blue_noise, sample_uniform

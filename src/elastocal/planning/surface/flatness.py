@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from elastocal.arrays import BoolArray, FloatArray
-from elastocal.planning.surface.mesh import SurfaceError
+from elastocal.planning.surface.errors import SurfaceError
 from elastocal.planning.surface.surface import Surface, SurfacePoints
 
 _RINGS = ((1.0, 16), (0.5, 8))

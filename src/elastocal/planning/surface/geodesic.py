@@ -7,7 +7,7 @@ from scipy.sparse import coo_array, csr_array
 from scipy.sparse.csgraph import dijkstra
 
 from elastocal.arrays import FloatArray, IndexArray
-from elastocal.planning.surface.mesh import SurfaceError
+from elastocal.planning.surface.errors import SurfaceError
 from elastocal.planning.surface.surface import Surface, SurfacePoints
 
 _PER_DIAGONAL = 60

@@ -4,7 +4,7 @@ import numpy as np
 from numpy.random import Generator
 
 from elastocal.planning.surface.blue_noise import eliminate
-from elastocal.planning.surface.mesh import SurfaceError
+from elastocal.planning.surface.errors import SurfaceError
 from elastocal.planning.surface.surface import Surface, SurfacePoints
 
 _PROBE = 20_000

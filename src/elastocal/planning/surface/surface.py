@@ -12,7 +12,8 @@ from numpy.typing import ArrayLike
 
 from elastocal.arrays import FloatArray, IndexArray
 from elastocal.planning.surface import topology
-from elastocal.planning.surface.mesh import SurfaceError, TriangleMesh, read_mesh
+from elastocal.planning.surface.errors import SurfaceError
+from elastocal.planning.surface.mesh import TriangleMesh, read_mesh
 from elastocal.planning.surface.normals import corner_normals, face_normals_and_areas
 from elastocal.planning.surface.region import Region
 

@@ -125,8 +125,8 @@ def _contact_notes(plan: PlanFile) -> list[str]:
 def _time_notes(plan: PlanFile) -> list[str]:
     speeds, contact = speeds_of(plan), plan.contact
     return [
-        f"Speeds: PTP at {speeds.ptp_percent} percent, LIN at {1e3 * speeds.lin:.4g} mm/s and, for the"
-        f" last {1e3 * contact.near_contact:.1f} mm, at {1e3 * speeds.touch:.4g} mm/s: never"
+        f"Speeds: PTP at {speeds.ptp_percent} percent, LIN at {1e3 * speeds.lin:.4g} mm/s and, for"
+        f" the last {1e3 * contact.near_contact:.1f} mm, at {1e3 * speeds.touch:.4g} mm/s: never"
         f" faster than the cell file has it ({100.0 * contact.axis_override:.4g} percent,"
         f" {1e3 * contact.contact_speed:.4g} mm/s). The times here are for these speeds at an"
         " override of 100 percent, without the waiting at HALT. Those of the plan's other files are"

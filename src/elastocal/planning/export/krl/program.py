@@ -11,8 +11,8 @@ from pathlib import Path
 from elastocal.files import replacing
 from elastocal.planning.export.krl.names import SUFFIXES, check_name, comment_text
 from elastocal.planning.export.krl.notes import BASE, TOOL, comment, head_notes
-from elastocal.planning.export.krl.targets import PoseTargets, Target, build_targets, robot_of
 from elastocal.planning.export.krl.speeds import Speeds, speeds_of
+from elastocal.planning.export.krl.targets import PoseTargets, Target, build_targets, robot_of
 from elastocal.planning.plan_file import PlanFile, check_plan
 
 _HEADER = (

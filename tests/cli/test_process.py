@@ -1,0 +1,72 @@
+"""What only a process of its own shows: closed output, full disks, SIGTERM."""
+
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+
+from elastocal.cell.examples import write_example
+from support.cli import elastocal
+
+COMMAND = (sys.executable, "-c", "from elastocal.cli.main import run; run()")
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("cell")
+    write_example(folder, "machining")
+    return folder
+
+
+@pytest.mark.parametrize("to", [">&-", ">/dev/full"])
+def test_output_that_is_closed_or_full_is_one_line_and_exit_code_1(folder, to):
+    if to == ">/dev/full" and not sys.platform.startswith("linux"):
+        pytest.skip("/dev/full is Linux's")
+    result = subprocess.run(
+        ["sh", "-c", f'"$@" {to}', "sh", *COMMAND, "check", folder / "cell.yaml", "--json"],
+        stderr=subprocess.PIPE,
+        text=True,
+        check=False,
+    )
+    assert result.returncode == 1
+    assert len(result.stderr.splitlines()) == 1
+    assert result.stderr.startswith("elastocal: cannot write output: ")
+
+
+def test_a_closed_output_is_known_before_the_long_work(folder, tmp_path):
+    subprocess.run(
+        ["sh", "-c", '"$@" >&-', "sh", *COMMAND, "plan", folder / "cell.yaml", "--json", "--out",
+         tmp_path / "plan"],
+        stderr=subprocess.PIPE,
+        check=False,
+    )  # fmt: skip
+    assert not list(tmp_path.iterdir())
+
+
+def test_sigterm_leaves_nothing_half_written(folder, tmp_path):
+    process = subprocess.Popen(
+        [*COMMAND, "plan", folder / "cell.yaml", "--jobs", "1", "--out", tmp_path / "plan"],
+        stderr=subprocess.DEVNULL,
+    )
+    deadline = time.monotonic() + 60.0
+    while not list(tmp_path.iterdir()) and time.monotonic() < deadline:
+        time.sleep(0.02)
+    assert [path.name[:6] for path in tmp_path.iterdir()] == [".plan."]
+    process.send_signal(signal.SIGTERM)
+    assert process.wait(60) == 143
+    assert not list(tmp_path.iterdir())
+
+
+def test_sigterm_is_handled_as_before_once_a_command_has_ended(tmp_path):
+    before = signal.getsignal(signal.SIGTERM)
+    elastocal("init", tmp_path / "cell")
+    assert signal.getsignal(signal.SIGTERM) is before
+
+
+def test_a_folder_may_be_named_like_markup(tmp_path):
+    result = elastocal("init", tmp_path / "x[/red]a[bold]")
+    assert result.code == 0
+    assert "x[/red]a[bold]/cell.yaml" in result.err
+    assert (tmp_path / "x[/red]a[bold]" / "cell.yaml").is_file()
