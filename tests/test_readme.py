@@ -14,7 +14,10 @@ from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
 from elastocal.cell import CellFile
+from elastocal.cell.description.faults import Kind
+from elastocal.cell.description.procedure import ProcedureSettings
 from elastocal.cell.fingerprint import RUN_SECTIONS
+from elastocal.procedure.faults import Fault
 from support.cli import Result, elastocal
 
 ROOT = Path(__file__).parents[1]
@@ -53,7 +56,16 @@ def toured(tmp_path_factory):
 
 def test_the_tour_has_the_lines_that_a_new_user_needs():
     commands = {shlex.split(line)[1] for line in shell_lines()}
-    assert commands == {"demo", "check", "calibrate", "predict", "robots", "init", "plan"}
+    assert commands == {
+        "demo",
+        "check",
+        "calibrate",
+        "predict",
+        "robots",
+        "init",
+        "plan",
+        "run",
+    }
     assert len(blocks("python")) == len(blocks("text")) == 1
 
 
@@ -140,11 +152,14 @@ def test_the_refusals_that_the_docs_quote_are_those_of_the_code():
         ("dataset", "dataset"),
         ("identification", "identification"),
         ("cell", "cell"),
+        ("cell/devices", "devices"),
         ("planning/checks", "planning"),
         ("planning/export", "planning"),
         ("planning/motion", "planning"),
         ("planning/search", "planning"),
         ("planning/surface", "planning"),
+        ("procedure/registration", "procedure"),
+        ("sim/workcell", "devices"),
     ],
 )
 def test_every_public_name_has_an_entry_in_the_reference(package, page):
@@ -159,16 +174,62 @@ def test_every_public_name_has_an_entry_in_the_reference(package, page):
     assert set(exported) <= {name for pair in shown for name in pair}
 
 
-def test_every_key_of_the_cell_file_that_the_planner_reads_is_in_the_reference():
+def cell_file_section(heading=None):
+    """Return a part of the page about the cell file; without heading, what comes first."""
     page = (ROOT / "docs/reference/files.md").read_text(encoding="utf-8")
-    section = page.split("## Cell .yaml")[1].split("\n## ")[0]
-    shown = {
-        word for code in re.findall(r"`([^`]+)`", section) for word in re.findall(r"\w+", code)
-    }
+    page = page.split("## Cell .yaml")[1].split("\n## ")[0]
+    if heading:
+        page = page.split(f"### {heading}\n")[1]
+    return page.split("\n### ")[0]
+
+
+def shown_words(section):
+    return {word for code in re.findall(r"`([^`]+)`", section) for word in re.findall(r"\w+", code)}
+
+
+def test_every_key_of_the_cell_file_that_the_planner_reads_is_in_the_reference():
     planned = [name for name in CellFile.model_fields if name not in RUN_SECTIONS]
     keys = {*planned, *(key for name in planned for key in keys_in(CellFile.model_fields[name]))}
     assert len(keys) > 60
-    assert keys <= shown
+    assert keys <= shown_words(cell_file_section()) | shown_words(cell_file_section("Shapes"))
+
+
+@pytest.mark.parametrize("section", RUN_SECTIONS)
+def test_every_key_of_a_section_that_a_run_reads_is_in_its_table(section):
+    keys = keys_in(CellFile.model_fields[section])
+    assert keys
+    assert keys <= shown_words(cell_file_section(f"Section {section}"))
+
+
+def test_every_default_of_the_procedure_is_the_one_that_the_reference_tells():
+    rows = re.findall(
+        r"^\| `procedure\.(\w+)` \|.*\| ([^|]+) \|$",
+        cell_file_section("Section procedure"),
+        flags=re.MULTILINE,
+    )
+    told = {key: text for key, text in rows if key != "force_limit"}
+    defaults = ProcedureSettings()
+    assert set(told) == set(ProcedureSettings.model_fields) - {"force_limit"}
+    for key, text in told.items():
+        number, _, unit = text.partition(" ")
+        factors = {"ms": 1e-3, "mm/s": 1e-3, "mm": 1e-3, "µm": 1e-6, "µm/N": 1e-6}
+        value = float(number) * factors.get(unit, 1.0)
+        assert value == pytest.approx(getattr(defaults, key)), key
+
+
+def test_every_kind_of_fault_is_on_both_pages_that_list_them():
+    kinds = set(get_args(Kind))
+    page = (ROOT / "docs/explanation/simulated-cell.md").read_text(encoding="utf-8")
+    assert kinds <= shown_words(cell_file_section("Section faults"))
+    assert kinds == set(re.findall(r"^\| `(\w+)` \|", page, flags=re.MULTILINE))
+
+
+def test_every_fault_that_ends_an_attempt_or_a_run_is_explained():
+    page = (ROOT / "docs/how-to/run-the-procedure.md").read_text(encoding="utf-8")
+    table = page.split("| message begins with |")[1].split("\n\n")[0]
+    shown = set(re.findall(r"^\| `([^`]+)`", table, flags=re.MULTILINE))
+    begins = {fault.message("").rstrip(": ") for fault in Fault} - {"interrupted"}
+    assert begins <= shown
 
 
 def keys_in(field: FieldInfo) -> set[str]:

