@@ -17,6 +17,7 @@ from elastocal.planning.plan_file import PLAN, read_plan
 from elastocal.planning.pool_file import read_pool
 from elastocal.procedure.journal import commits, read_journal
 from elastocal.procedure.run_folder import JOURNAL, RunFolder
+from elastocal.procedure.summary import read_summary
 from elastocal.robot import Robot
 from elastocal.robot.urdf import leaf_links, parse_urdf
 
@@ -26,6 +27,7 @@ Described = tuple[str, Facts]
 Describe = Callable[[Path], Described]
 
 _PLAN = re.compile(r'"schema":\s*"elastocal\.plan/')
+_SUMMARY = re.compile(r'"schema":\s*"elastocal\.run-summary/')
 _SCHEMA_LINE = re.compile(r"^schema:\s*[\"']?elastocal\.cell/", re.MULTILINE)
 
 
@@ -94,7 +96,10 @@ def _netcdf(path: Path) -> Described:
 
 def _json(path: Path) -> Described:
     """Describe a JSON file by the schema that it states; what states none is read as a model."""
-    return _plan(path) if _PLAN.search(read_text(path)[:200]) else _model(path)
+    head = read_text(path)[:200]
+    if _SUMMARY.search(head):
+        return _summary(path)
+    return _plan(path) if _PLAN.search(head) else _model(path)
 
 
 def _dataset(path: Path) -> Described:
@@ -173,4 +178,13 @@ def _pool(path: Path) -> Described:
         "candidates": len(pool),
         "sampled": len(pool.sampled),
         "checks": list(pool.check_names),
+    }
+
+
+def _summary(path: Path) -> Described:
+    summary = read_summary(path)
+    return "summary of a run", {
+        "schema": summary["schema"],
+        "readings": summary["readings"]["counts"],
+        "warnings": len(summary["warnings"]),
     }

@@ -11,7 +11,7 @@ import numpy as np
 from elastocal.arrays import FloatArray
 from elastocal.cell import Cell, load_cell
 from elastocal.dataset import Dataset, write
-from elastocal.errors import DatasetError, ProcedureError, SchemaError
+from elastocal.errors import DatasetError, FileAccessError, ProcedureError, SchemaError
 from elastocal.files import write_text
 from elastocal.planning.plan_file import PlanFile, read_plan
 from elastocal.procedure.averaged_dataset import make_dataset
@@ -59,6 +59,8 @@ def derive(run: Path) -> Derived:
         If a file cannot be read.
     """
     folder = RunFolder(Path(run))
+    if not folder.journal.is_file():
+        raise FileAccessError(f"{run} is no folder of a run: it holds no {folder.journal.name}")
     entries = read_journal(folder.journal)
     logs = _latest(commits(entries))
     if not entries or entries[0].run is None or not logs:

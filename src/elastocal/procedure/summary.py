@@ -4,9 +4,11 @@ Numbers are in SI units; the unit stands in the key where it is not that of a le
 in rad, a time in s.
 """
 
+import json
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -14,6 +16,8 @@ import numpy as np
 from elastocal import __version__
 from elastocal.arrays import FloatArray
 from elastocal.dataset import Dataset
+from elastocal.errors import SchemaError
+from elastocal.files import read_text
 from elastocal.procedure.displacement import LoadRow
 from elastocal.procedure.entries import Entry, Event
 from elastocal.procedure.pose_log import ReadingStatus
@@ -22,6 +26,7 @@ from elastocal.procedure.registration import Registration, StationFit, UnloadedR
 from elastocal.procedure.run_warnings import run_warnings
 from elastocal.procedure.tool_estimate import Interval, ToolEstimate
 from elastocal.procedure.tool_weight import ToolLoad
+from elastocal.schema import check_schema
 
 SCHEMA = "elastocal.run-summary/1"
 
@@ -76,6 +81,24 @@ def summarise(
             found.rows, found.registration, found.tool, found.estimate, load_cases
         ),
     }
+
+
+def read_summary(path: Path) -> dict[str, Any]:
+    """Return the summary in a file.
+
+    Raises
+    ------
+    SchemaError
+        If it is not JSON, or of another schema.
+    FileAccessError
+        If it cannot be read.
+    """
+    try:
+        summary = json.loads(read_text(path))
+    except ValueError as error:
+        raise SchemaError(f"{path} is not valid JSON: {error}") from error
+    check_schema(summary.get("schema") if isinstance(summary, dict) else None, SCHEMA, str(path))
+    return dict(summary)
 
 
 def _readings(rows: Sequence[LoadRow]) -> dict[str, Any]:
