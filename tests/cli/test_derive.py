@@ -27,7 +27,7 @@ def test_people_are_told_counts_and_places_on_standard_error(tmp_path, capsys):
 
 
 def test_a_folder_that_is_no_run_is_refused(tmp_path):
-    with pytest.raises(FileAccessError, match=r"cannot read .*journal\.jsonl"):
+    with pytest.raises(FileAccessError, match=r"is no folder of a run: it holds no journal\.jsonl"):
         derive(tmp_path)
 
 

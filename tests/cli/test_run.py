@@ -1,6 +1,7 @@
 """``elastocal run`` on the simulated cell: refusals, the dry run, a whole run, kill and resume."""
 
 import json
+import shutil
 import signal
 import subprocess
 import sys
@@ -12,12 +13,14 @@ import pytest
 import xarray as xr
 
 from elastocal.cell import load_cell
+from elastocal.cell.fingerprint import fingerprint
 from elastocal.cli.device_sources import KINDS, SOURCES, DeviceSource
-from elastocal.errors import FileAccessError
-from elastocal.procedure.journal import read_commits, read_journal
+from elastocal.errors import DatasetError, FileAccessError
+from elastocal.planning.plan_file import read_plan, write_plan
+from elastocal.procedure.journal import Journal, read_commits, read_journal
 from elastocal.procedure.run_folder import RunFolder, cell_place, fill, refuse_foreign
 from support.cli import elastocal
-from support.run_cells import planned_cell
+from support.run_cells import PlannedCell, planned_cell
 
 VALUES = ("controller_displacement", "marker_displacement", "force", "joint_position")
 
@@ -176,6 +179,95 @@ def test_devices_of_two_sources_are_refused(planned, tmp_path, monkeypatch):
     assert "arm is 'kuka', sensor is 'simulated'" in run(cell, tmp_path / "run").reason
 
 
+def seen_once_by_another_station(planned):
+    """Return the cell with a second tracker, which sees one pose only."""
+    cell = planned.cell.with_name("two_stations.yaml")
+    first = '  - name: station_1\n    position: ["2.4 m", "-4.0 m", "2.2 m"]'
+    more = first.replace("station_1", "station_2").replace("2.4 m", "2.6 m")
+    text = planned.cell.read_text(encoding="utf-8")
+    more += '\n    range: ["1.0 m", "15 m"]\n'
+    cell.write_text(text.replace(first, more + first), encoding="utf-8")
+    plan = read_plan(planned.plan)
+    known = plan.cell.model_copy(update={"fingerprint": fingerprint(load_cell(cell))})
+    last = plan.poses[-1].model_copy(update={"seen_by": "station_2"})
+    folder = planned.plan.with_name("few")
+    folder.mkdir()
+    write_plan(folder, plan.model_copy(update={"cell": known, "poses": (*plan.poses[:-1], last)}))
+    return PlannedCell(cell, folder)
+
+
+def test_a_reading_that_derive_calls_missing_is_counted_and_warned_of(planned, tmp_path):
+    few = seen_once_by_another_station(planned)
+    assert "warning: station station_2 sees 1 of the 3" in run(few, tmp_path, "--dry-run").err
+    result = run(few, tmp_path / "run", "--json")
+    assert result.code == 0, result.err
+    figures = json.loads(result.out)
+    assert figures["readings"] == {"ok": 6, "missing": 2}
+    assert any("station_2 is not registered" in line for line in figures["warnings"])
+    assert "warning: station station_2 sees 1 of the 3" in result.err
+
+
+def test_a_run_whose_readings_cannot_be_derived_still_says_how_it_ended(
+    planned, tmp_path, monkeypatch
+):
+    def fails(_):
+        raise DatasetError("no usable reading among 8")
+
+    monkeypatch.setattr("elastocal.cli.run_session.derive", fails)
+    result = run(planned, tmp_path / "run", "--json")
+    assert result.code == 1
+    figures = json.loads(result.out)
+    assert (figures["state"], figures["given_up"], figures["dataset"]) == ("done", [], None)
+    assert figures["problem"] == "no usable reading among 8"
+    assert result.err.endswith("elastocal: no usable reading among 8\n")
+
+
+def test_a_folder_whose_journal_another_process_holds_is_not_filled(planned, tmp_path):
+    folder = RunFolder(tmp_path / "run")
+    folder.path.mkdir()
+    with Journal(folder.journal):
+        assert "is in use: another process runs here" in run(planned, folder.path).reason
+    assert not folder.plan.exists()
+    assert not folder.cell.exists()
+
+
+def test_a_plan_that_was_changed_by_hand_is_refused(planned, tmp_path):
+    changed = planned.plan.with_name("changed")
+    changed.mkdir()
+    text = (planned.plan / "plan.json").read_text(encoding="utf-8")
+    (changed / "plan.json").write_text(text.replace("-1100.0", "-4000.0", 1), encoding="utf-8")
+    reason = run(PlannedCell(planned.cell, changed), tmp_path / "run").reason
+    assert "was changed by hand: make it anew with `elastocal plan`" in reason
+
+
+def test_a_plan_that_contradicts_its_cell_is_refused_whoever_wrote_it(planned, tmp_path):
+    changed = planned.plan.with_name("contradicting")
+    changed.mkdir()
+    plan = read_plan(planned.plan)
+    contact = plan.contact.model_copy(update={"near_contact": -0.01})
+    write_plan(changed, plan.model_copy(update={"contact": contact}))
+    reason = run(PlannedCell(planned.cell, changed), tmp_path / "run").reason
+    assert "contact.near_contact is -0.01 m, engagement.near_contact of the cell 0.003 m" in reason
+
+
+def test_a_copy_that_was_changed_is_refused_on_resume(planned, whole, tmp_path):
+    shutil.copytree(whole[0], tmp_path / "run")
+    (cell,) = (tmp_path / "run" / "cell").glob("*.yaml")
+    cell.write_text(cell.read_text().replace('mass: "60 kg"', 'mass: "20 kg"'), encoding="utf-8")
+    reason = run(planned, tmp_path / "run", "--resume", "--yes").reason
+    assert "is not what the run wrote: its SHA-256 is" in reason
+
+
+def test_journal_and_streams_are_known_to_check(whole):
+    folder = RunFolder(whole[0])
+    said = json.loads(elastocal("check", folder.journal, "--json").out)
+    assert (said["kind"], said["committed"]) == ("journal of a run", [0, 1, 2, 3])
+    said = json.loads(elastocal("check", folder.stream(0, 1), "--json").out)
+    assert said["kind"] == "recording of raw streams"
+    assert said["schema"] == "elastocal.streams/1"
+    assert said["wrenches"] > 100
+
+
 def test_a_plan_of_another_cell_is_refused(planned, tmp_path):
     text = planned.cell.read_text(encoding="utf-8")
     other = planned.cell.with_name("other.yaml")
@@ -201,6 +293,25 @@ def test_a_device_that_is_not_configured_is_refused_by_name(planned, tmp_path):
         ('procedure: {stale: "60 ms"}', "must be above two cycles (0.08 s)"),
         ('procedure: {dwell: "100 ms"}', "must be at least four cycles (0.16 s)"),
         ('procedure: {ramp: "400 N"}', "is not a force rate"),
+        ('procedure: {cycle: "1 s"}', "procedure.cycle: Input should be less than or equal to 0.1"),
+        ('procedure: {cycle: "0.1 s", stale: "150 ms"}', "must be above two cycles (0.2 s)"),
+        ('procedure: {stale: "2 s"}', "procedure.stale: Input should be less than or equal to 1"),
+        ('procedure: {contact_speed: "50 mm/s"}', "procedure.contact_speed: Input should be less"),
+        ('procedure: {approach_speed: "1 mm/s"}', "contact_speed: must be at most approach_speed"),
+        ('procedure: {approach_speed: "3 m/s"}', "procedure.approach_speed: Input should be less"),
+        ('procedure: {travel_limit: "5 m"}', "procedure.travel_limit: Input should be less"),
+        (
+            "procedure: {retries: 1000}",
+            "procedure.retries: Input should be less than or equal to 5",
+        ),
+        ('procedure: {timeout: "1 s"}', "must be at least dwell and average together (1.5 s)"),
+        ('procedure: {ramp: "100 kN/s"}', "procedure.ramp: Input should be less than or equal to"),
+        (
+            'procedure: {force_tolerance: "400 N"}',
+            "procedure.force_tolerance: Input should be less",
+        ),
+        ('procedure: {contact_force: "3 N"}', "contact_force: must be above force_spread (8 N)"),
+        ('procedure: {contact_force: "1.2 kN"}', "contact_force must be below 1100 N (load case"),
         ("procedure: {retry: 2}", "unknown key 'procedure.retry'; did you mean 'retries'?"),
     ],
 )

@@ -76,6 +76,26 @@ def test_the_time_is_that_of_moves_and_contacts():
     assert plan.total_time == plan.travel_time + sum(60.0 + i for i in range(6))
 
 
+def move_home(data):
+    data["robot"]["home"][0] += 1e-6
+
+
+def swap_loads(data):
+    loads = data["contact"]["load_cases"]
+    data["contact"]["load_cases"] = dict(reversed(loads.items()))
+
+
+@pytest.mark.parametrize("change", [move_home, swap_loads])
+def test_a_plan_that_was_changed_by_hand_is_refused(written, change):
+    assert "was changed by hand: make it anew with `elastocal plan`" in refusal(
+        edited(written, change)
+    )
+
+
+def test_another_layout_of_the_same_plan_is_read(written):
+    assert read_plan(edited(written, lambda _: None)) == plans.plan()
+
+
 def test_a_folder_without_plan_is_named(tmp_path):
     message = refusal(tmp_path, FileAccessError)
     assert str(tmp_path / PLAN) in message

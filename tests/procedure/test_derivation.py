@@ -4,9 +4,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from elastocal.cell import load_cell
+from elastocal.cell.fingerprint import fingerprint
 from elastocal.dataset import read
 from elastocal.errors import DatasetError, ElastocalError, ProcedureError, SchemaError
 from elastocal.procedure.derivation import Derived, derive, write_derived
+from elastocal.procedure.journal import read_journal
 from elastocal.procedure.pose_log import ReadingStatus, Window
 from elastocal.procedure.run_folder import RunFolder
 from support.recorded_runs import Run, Truth, record_run
@@ -196,13 +199,17 @@ def no_sensor(run: Path) -> None:
     text = path.read_text()
     start, end = text.index("sensor:  "), text.index("marker:  ")
     path.write_text(text[:start] + text[end:])
+    # The run is to have begun with such a cell.
+    journal = RunFolder(run).journal
+    known = read_journal(journal)[0].run.cell
+    journal.write_text(journal.read_text().replace(known, fingerprint(load_cell(path))))
 
 
 @pytest.mark.parametrize(
     ("spoil", "error", "message"),
     [
         (no_commit, ProcedureError, "no pose is committed: there is nothing to derive"),
-        (cut_stream, SchemaError, "pose_0003_1.mcap is cut off"),
+        (cut_stream, SchemaError, "pose_0003_1.mcap is not what the run wrote"),
         (no_sensor, ProcedureError, "cell 'afp' has no force sensor (key 'sensor')"),
     ],
 )
@@ -218,3 +225,38 @@ def test_a_run_that_cannot_be_derived_is_refused_in_one_line(tmp_path, spoil, er
 def test_a_folder_that_is_no_run_is_refused(tmp_path):
     with pytest.raises(ElastocalError, match=r"journal\.jsonl"):
         derive(tmp_path)
+
+
+def test_a_tool_that_gets_heavier_is_told_with_its_pose(tmp_path):
+    run = record_run(tmp_path / "run", Truth(heavier_from=3, heavier_by=20.0))
+    found = derive(run.path).summary
+    assert found["warnings"][0].startswith("the tool weight changed near pose 3, by about +")
+    assert found["tool"]["changed"]["from_pose"] == 3
+    assert not any("kg by the cell file" in line for line in found["warnings"])
+
+
+def change_cell(run: Run) -> Path:
+    path = run.path / "cell" / "cell.yaml"
+    path.write_text(path.read_text().replace('mass: "60 kg"', 'mass: "20 kg"'))
+    return path.parent
+
+
+def change_plan(run: Run) -> Path:
+    path = run.path / "plan" / "plan.json"
+    path.write_text(path.read_text() + "\n")
+    return path
+
+
+def change_streams(run: Run) -> Path:
+    streams = run.path / "streams"
+    (streams / "pose_0001_1.mcap").write_bytes((streams / "pose_0000_1.mcap").read_bytes())
+    return streams / "pose_0001_1.mcap"
+
+
+@pytest.mark.parametrize("change", [change_cell, change_plan, change_streams])
+def test_what_was_changed_in_the_folder_since_is_refused_by_name(tmp_path, change):
+    run = record_run(tmp_path / "run")
+    changed = change(run)
+    with pytest.raises(SchemaError) as caught:
+        derive(run.path)
+    assert str(caught.value).startswith(f"{changed} is not what the run wrote: its SHA-256 is ")

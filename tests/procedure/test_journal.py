@@ -33,6 +33,14 @@ def test_what_is_written_is_read(begun):
     assert (second.pose, second.action, second.target) == (3, Action.MOVE, (0.1, 0.2))
 
 
+def test_the_first_line_carries_its_schema_and_is_refused_without(begun):
+    lines = begun.read_text().splitlines()
+    assert json.loads(lines[0])["run"]["schema_name"] == "elastocal.journal/1"
+    begun.write_text(lines[0].replace('"schema_name":"elastocal.journal/1",', "") + "\n")
+    with pytest.raises(SchemaError, match="is not the start of a run"):
+        read_journal(begun)
+
+
 def test_a_line_is_json_with_number_time_and_event(begun):
     line = json.loads(begun.read_text().splitlines()[1])
     assert line == {

@@ -7,6 +7,7 @@ from elastocal.procedure.displacement import LoadRow
 from elastocal.procedure.pose_log import ReadingStatus
 from elastocal.procedure.registration import Blunder, Registration, StationFit, StationMove
 from elastocal.procedure.run_warnings import run_warnings
+from elastocal.procedure.tool_change import ToolChange
 from elastocal.procedure.tool_estimate import Interval, ToolEstimate
 from elastocal.procedure.tool_weight import ToolLoad
 
@@ -32,7 +33,13 @@ ROWS = [LoadRow(0, "normal", ReadingStatus.OK, "", None)]
 
 def warnings(**changes: object) -> list[str]:
     given = {"rows": ROWS, "registration": REGISTRATION, "tool": TOOL, "estimate": ESTIMATE}
-    return run_warnings(**(given | changes), load_cases=("normal",))
+    return run_warnings(**(given | changes), load_cases=("normal",), weighed=(4, 7, 9))
+
+
+def test_a_step_of_the_tool_weight_is_told_in_place_of_a_wrong_mass():
+    changed = replace(mass(80.0, 9.0), change=ToolChange(1, 20.0))
+    (line,) = warnings(estimate=changed)
+    assert line.startswith("the tool weight changed near pose 7, by about +20.0 kg")
 
 
 def mass(value: float, half: float) -> ToolEstimate:

@@ -1,7 +1,7 @@
 """Run folders with made-up streams: a stiff robot, known deflections, a known tool and station."""
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cache
 from pathlib import Path
 
@@ -18,7 +18,10 @@ from elastocal.cell.devices import (
     WrenchBlock,
 )
 from elastocal.cell.examples.writing import write_example
+from elastocal.cell.fingerprint import fingerprint
+from elastocal.files import sha256
 from elastocal.planning.plan_file import PlanFile, write_plan
+from elastocal.procedure.copies import file_sha256
 from elastocal.procedure.entries import Event, RunRecord
 from elastocal.procedure.journal import Journal
 from elastocal.procedure.pose_log import PoseLog, ReadingStatus, Window
@@ -28,8 +31,8 @@ from support import plans
 
 RECORD = RunRecord(
     elastocal="0.1.0",
-    plan="a" * 64,
-    cell="b" * 64,
+    plan="",
+    cell="",
     cell_file="cell.yaml",
     seed=7,
     started="2026-01-02T03:04:05+00:00",
@@ -64,6 +67,10 @@ class Truth:
     force_noise: float = 0.5
     marker_noise: float = 10e-6
     station: str = "station_1"
+    heavier_from: int = 1_000
+    """First pose at which the tool is heavier."""
+    heavier_by: float = 0.0
+    """In kg."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,14 +110,18 @@ def record_run(
     write_example(places.cell, "afp")
     for made in (places.plan, places.streams):
         made.mkdir()
-    write_plan(places.plan, plan)
+    text = write_plan(places.plan, plan).read_text(encoding="utf-8")
     cell = _loaded(places.cell / "cell.yaml")
     wanted = np.empty((3, poses, len(plan.contact.load_cases), 3))
     with Journal(places.journal) as journal:
-        journal.write(0.0, Event.START, run=RECORD)
+        copies = {"plan": sha256(text), "cell": fingerprint(cell)}
+        journal.write(0.0, Event.START, run=RECORD.model_copy(update=copies))
         for pose in plan.poses[:poses]:
-            log, wanted[:, pose.id] = _record_pose(places, cell, plan, pose.id, truth, change, rng)
-            journal.write(log.windows[-1].end, Event.COMMIT, log=log)
+            later = pose.id >= truth.heavier_from
+            now = replace(truth, mass=truth.mass + truth.heavier_by) if later else truth
+            log, wanted[:, pose.id] = _record_pose(places, cell, plan, pose.id, now, change, rng)
+            digest = file_sha256(places.streams / log.streams)
+            journal.write(log.windows[-1].end, Event.COMMIT, log=log, streams_sha256=digest)
     return Run(folder, plan, truth, *wanted)
 
 

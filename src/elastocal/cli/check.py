@@ -10,8 +10,9 @@ def check(
     file: Annotated[
         Path,
         typer.Argument(
-            help="Cell or springs (.yaml), plan or model (.json), pool (.nc), dataset (.nc, .csv),"
-            " robot (.urdf), folder of a plan or a run."
+            help="Cell or springs (.yaml), plan, model or summary (.json), pool (.nc), dataset"
+            " (.nc, .csv), robot (.urdf), journal (.jsonl), streams (.mcap), folder of a plan or"
+            " a run."
         ),
     ],
     as_json: Annotated[

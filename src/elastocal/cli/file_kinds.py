@@ -16,7 +16,9 @@ from elastocal.identification.model_file import read_model
 from elastocal.planning.plan_file import PLAN, read_plan
 from elastocal.planning.pool_file import read_pool
 from elastocal.procedure.journal import commits, read_journal
+from elastocal.procedure.pose_recorder import SCHEMA as STREAMS
 from elastocal.procedure.run_folder import JOURNAL, RunFolder
+from elastocal.procedure.streams import read_streams
 from elastocal.procedure.summary import read_summary
 from elastocal.robot import Robot
 from elastocal.robot.urdf import leaf_links, parse_urdf
@@ -48,6 +50,8 @@ def describe_file(path: Path) -> Described:
         ".csv": _dataset,
         ".json": _json,
         ".urdf": _robot,
+        ".jsonl": _journal,
+        ".mcap": _streams,
         ".yaml": _settings,
         ".yml": _settings,
     }
@@ -82,6 +86,31 @@ def _run(path: Path) -> Described:
         "poses": len(plan.poses),
         "committed": [log.pose for log in commits(entries)],
         "readings": _dataset(run.dataset)[1]["readings"] if run.dataset.exists() else None,
+    }
+
+
+def _journal(path: Path) -> Described:
+    entries = read_journal(path)
+    start = entries[0].run if entries else None
+    if start is None:
+        raise SchemaError(f"{path} has no entry: nothing has moved in this run")
+    return "journal of a run", {
+        "schema": start.schema_name,
+        "started": start.started,
+        "entries": len(entries),
+        "committed": [log.pose for log in commits(entries)],
+        "last_entry": f"{entries[-1].event.value} at {entries[-1].time:.1f} s",
+    }
+
+
+def _streams(path: Path) -> Described:
+    streams = read_streams(path)
+    return "recording of raw streams", {
+        "schema": STREAMS,
+        "joints": list(streams.joint_names),
+        "arm_states": len(streams.arm.time),
+        "wrenches": len(streams.wrench.time),
+        "marker_points": len(streams.points.time),
     }
 
 

@@ -40,10 +40,12 @@ def run(
         else:
             show_itinerary(console(), job)
         return
-    result = run_session(job, Asked(resume=resume, yes=yes), console())
-    if as_json and result.end is End.DONE:
-        print_json(figures(job, result))
+    finished = run_session(job, Asked(resume=resume, yes=yes), console())
+    if as_json and finished.result.end is End.DONE:
+        print_json(figures(job, finished))
     else:
-        show_result(console(), job, result)
-    if result.end is End.INTERRUPTED:
+        show_result(console(), job, finished)
+    if finished.problem is not None:
+        raise finished.problem
+    if finished.result.end is End.INTERRUPTED:
         raise typer.Exit(130)

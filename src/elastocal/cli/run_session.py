@@ -1,9 +1,11 @@
 """One stretch of a run, from the command line's side: folder, confirmation, devices, result."""
 
 import sys
+from collections.abc import Mapping
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
+from typing import Any
 
 import typer
 from rich.console import Console
@@ -13,13 +15,15 @@ from elastocal.cell.devices import Devices
 from elastocal.cli.device_sources import DeviceSource, device_source
 from elastocal.cli.interruption import interruption
 from elastocal.cli.run_view import watching
-from elastocal.errors import ProcedureError
+from elastocal.errors import ElastocalError, ProcedureError
 from elastocal.files import read_text
 from elastocal.planning.plan_file import PLAN, PlanFile, read_plan
+from elastocal.procedure.copies import read_copies
 from elastocal.procedure.derivation import derive, write_derived
 from elastocal.procedure.entries import Entry, Event, RunRecord
 from elastocal.procedure.job import End, Job, Result, Seams
 from elastocal.procedure.journal import Journal, read_journal
+from elastocal.procedure.plan_fit import check_fits, registration_findings
 from elastocal.procedure.resume import (
     LastKnown,
     check_same_run,
@@ -27,7 +31,7 @@ from elastocal.procedure.resume import (
     last_known,
     run_record,
 )
-from elastocal.procedure.run_folder import RunFolder, cell_place, fill, refuse_foreign
+from elastocal.procedure.run_folder import RunFolder, cell_place, fill, make_folder, refuse_foreign
 from elastocal.procedure.runner import Runner
 from elastocal.procedure.settings import Settings, settings_of
 from elastocal.procedure.streams import PoseRecorder
@@ -53,6 +57,19 @@ class Prepared:
     source: DeviceSource
     record: RunRecord
     folder: RunFolder
+    warnings: tuple[str, ...]
+    """What a person should know of the plan before it is carried out."""
+
+
+@dataclass(frozen=True, eq=False)
+class Finished:
+    """How a stretch of a run ended, and what its streams say when it was the last one."""
+
+    result: Result
+    summary: Mapping[str, Any] | None = None
+    """See `elastocal.procedure.summary`; None where nothing was derived."""
+    problem: ElastocalError | None = None
+    """Why nothing was derived of a run that is done."""
 
 
 def prepare(cell: Path, plan: Path, out: Path, seed: int | None) -> Prepared:
@@ -61,7 +78,8 @@ def prepare(cell: Path, plan: Path, out: Path, seed: int | None) -> Prepared:
     Raises
     ------
     ElastocalError
-        If cell or plan cannot be read, do not belong together, or name unknown devices.
+        If cell or plan cannot be read, do not belong together, contradict one another, or name
+        unknown devices, or if no station could be registered.
     """
     loaded, read = load_cell(cell), read_plan(plan)
     folder = plan if plan.is_dir() else plan.parent
@@ -69,6 +87,7 @@ def prepare(cell: Path, plan: Path, out: Path, seed: int | None) -> Prepared:
     text = read_text(folder / PLAN)
     seed = loaded.file.simulation.seed if seed is None else seed
     record = run_record(loaded, read, text, cell_place(loaded), seed, now)
+    check_fits(read, loaded)
     return Prepared(
         loaded,
         read,
@@ -77,10 +96,11 @@ def prepare(cell: Path, plan: Path, out: Path, seed: int | None) -> Prepared:
         device_source(loaded),
         record,
         RunFolder(out),
+        registration_findings(read),
     )
 
 
-def run_session(job: Prepared, asked: Asked, console: Console) -> Result:
+def run_session(job: Prepared, asked: Asked, console: Console) -> Finished:
     """Run, or go on with, a run; derive its dataset when it is done.
 
     Raises
@@ -93,12 +113,13 @@ def run_session(job: Prepared, asked: Asked, console: Console) -> Result:
     """
     entries = _entries(job.folder)
     _check_folder(job, entries, asked.resume)
-    if not entries:
-        fill(job.folder, job.cell, job.plan_folder)
+    make_folder(job.folder.path)
     with Journal(job.folder.journal) as journal:
         # Read again: between the look above and the lock another process may have been here.
         if read_journal(job.folder.journal) != entries:
             raise ProcedureError(f"{job.folder.path}: another process has just run here")
+        if not entries:
+            fill(job.folder, job.cell, job.plan_folder)
         known = last_known(entries) if entries else None
         devices = job.source.make(job.cell, job.record.seed, known.entry.time if known else 0.0)
         _confirm(job, known, devices, asked, console)
@@ -112,9 +133,19 @@ def run_session(job: Prepared, asked: Asked, console: Console) -> Result:
             result = Runner(task, devices, journal, seams).run()
     if result.end is End.STOPPED:
         raise ProcedureError(f"{result.message}. The arm is {result.stand.value}")
-    if result.end is End.DONE:
-        write_derived(job.folder.path, derive(job.folder.path))
-    return result
+    return _derived(job, result)
+
+
+def _derived(job: Prepared, result: Result) -> Finished:
+    """Derive the dataset of a run that is done; what keeps it from that is no end of the run."""
+    if result.end is not End.DONE:
+        return Finished(result)
+    try:
+        derived = derive(job.folder.path)
+        write_derived(job.folder.path, derived)
+    except ElastocalError as error:
+        return Finished(result, problem=error)
+    return Finished(result, derived.summary)
 
 
 def _task(job: Prepared, known: LastKnown | None, devices: Devices) -> Job:
@@ -151,13 +182,16 @@ def _check_folder(job: Prepared, entries: tuple[Entry, ...], resume: bool) -> No
             f"{out} holds this run already ({done} of {count} poses committed):"
             " go on with --resume, or name another folder"
         )
-    check_same_settings(load_cell(job.folder.cell / record.cell_file), job.cell)
+    used, _ = read_copies(job.folder, record)
+    check_same_settings(used, job.cell)
 
 
 def _confirm(
     job: Prepared, known: LastKnown | None, devices: Devices, asked: Asked, console: Console
 ) -> None:
     """Ask a person before anything moves that was not expected to."""
+    for warning in job.warnings:
+        console.print(f"warning: {warning}", soft_wrap=True, markup=False)
     if known is not None:
         contact = "in contact" if devices.arm.state().in_contact else "not in contact"
         for line in (*known.lines, f"the arm says that it is {contact}"):

@@ -14,7 +14,7 @@ from scipy.spatial.transform import Rotation
 
 from elastocal.arrays import FloatArray
 from elastocal.errors import SchemaError
-from elastocal.files import write_text
+from elastocal.files import sha256, write_text
 from elastocal.schema import StrictModel, read_json
 
 SCHEMA = "elastocal.plan/1"
@@ -207,6 +207,24 @@ class PlanFile(StrictModel):
         return self.travel_time + sum(pose.contact_time for pose in self.poses)
 
 
+class _WrittenPlan(PlanFile):
+    """A plan as it stands in its file."""
+
+    sha256: str
+    """See `content_hash`."""
+
+
+def content_hash(plan: PlanFile) -> str:
+    """Return a SHA-256 over everything that a plan says, by which a change by hand is found.
+
+    It is taken over the numbers as they are read: line breaks and the way a number is written do
+    not count, the order of load cases does.
+    """
+    keys = set(PlanFile.model_fields)
+    data = {"schema": SCHEMA, **plan.model_dump(mode="json", include=keys)}
+    return sha256(json.dumps(data, separators=(",", ":"), allow_nan=False))
+
+
 def write_plan(folder: Path, plan: PlanFile) -> Path:
     """Write ``plan.json`` into a folder, atomically; return its path.
 
@@ -219,7 +237,7 @@ def write_plan(folder: Path, plan: PlanFile) -> Path:
     """
     path = Path(folder) / PLAN
     check_plan(plan, str(path))
-    data = {"schema": SCHEMA, **plan.model_dump(mode="json")}
+    data = {"schema": SCHEMA, "sha256": content_hash(plan), **plan.model_dump(mode="json")}
     write_text(path, json.dumps(data, indent=1, allow_nan=False) + "\n")
     return path
 
@@ -230,14 +248,18 @@ def read_plan(folder: Path) -> PlanFile:
     Raises
     ------
     SchemaError
-        If it has another schema, does not fit it or contradicts itself.
+        If it has another schema, does not fit it, contradicts itself, or was changed since it was
+        written: its parts were checked together.
     FileAccessError
         If it cannot be read.
     """
     path = Path(folder)
     path = path / PLAN if path.is_dir() else path
-    plan = read_json(path, PlanFile, SCHEMA)
+    written = read_json(path, _WrittenPlan, SCHEMA)
+    plan = PlanFile(**{key: getattr(written, key) for key in PlanFile.model_fields})
     check_plan(plan, str(path))
+    if written.sha256 != content_hash(plan):
+        raise SchemaError(f"{path} was changed by hand: make it anew with `elastocal plan`")
     return plan
 
 

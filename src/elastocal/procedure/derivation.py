@@ -9,12 +9,13 @@ from typing import Any
 import numpy as np
 
 from elastocal.arrays import FloatArray
-from elastocal.cell import Cell, load_cell
+from elastocal.cell import Cell
 from elastocal.dataset import Dataset, write
 from elastocal.errors import DatasetError, FileAccessError, ProcedureError, SchemaError
 from elastocal.files import write_text
-from elastocal.planning.plan_file import PlanFile, read_plan
+from elastocal.planning.plan_file import PlanFile
 from elastocal.procedure.averaged_dataset import make_dataset
+from elastocal.procedure.copies import check_stream, read_copies
 from elastocal.procedure.displacement import LoadRow, load_rows
 from elastocal.procedure.entries import Entry, RunRecord
 from elastocal.procedure.journal import commits, read_journal
@@ -52,7 +53,7 @@ def derive(run: Path) -> Derived:
     ProcedureError
         If no pose is committed, or the cell has no sensor or no tracker.
     SchemaError
-        If a file of the run is damaged, or of another kind.
+        If a file of the run is damaged, of another kind, or not what the run wrote.
     DatasetError
         If no reading is usable.
     FileAccessError
@@ -66,7 +67,10 @@ def derive(run: Path) -> Derived:
     if not entries or entries[0].run is None or not logs:
         raise ProcedureError(f"{folder.journal}: no pose is committed: there is nothing to derive")
     record = entries[0].run
-    cell, plan = load_cell(folder.cell / record.cell_file), read_plan(folder.plan)
+    cell, plan = read_copies(folder, record)
+    known = {e.log.streams: e.streams_sha256 for e in entries if e.log is not None}
+    for log in logs:
+        check_stream(folder.streams / log.streams, known[log.streams])
     poses = [reduce_pose(log, _streams(folder, log, cell)) for log in logs]
     try:
         return derive_poses(poses, cell, plan, entries, _provenance(folder, record))

@@ -1,6 +1,9 @@
 """What stands in a journal: one entry a line."""
 
 from enum import Enum
+from typing import Any
+
+from pydantic import SerializerFunctionWrapHandler, model_serializer
 
 from elastocal.procedure.pose_log import PoseLog
 from elastocal.schema import StrictModel
@@ -59,6 +62,11 @@ class RunRecord(StrictModel):
     started: str
     """Date and time of day, ISO 8601, UTC."""
 
+    @model_serializer(mode="wrap")
+    def _schema_first(self, rest: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        # An entry leaves out what is at its default; the schema must be there all the same.
+        return {"schema_name": self.schema_name, **rest(self)}
+
 
 class Entry(StrictModel):
     """One line of a journal."""
@@ -82,3 +90,5 @@ class Entry(StrictModel):
     """For people: what went wrong, or how a reading came about."""
     run: RunRecord | None = None
     log: PoseLog | None = None
+    streams_sha256: str | None = None
+    """Of the file with the raw streams of a finished pose."""

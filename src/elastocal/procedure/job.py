@@ -7,10 +7,10 @@ from pathlib import Path
 from typing import Protocol
 
 from elastocal.planning.plan_file import PlanFile
-from elastocal.procedure.leaving import Stand
 from elastocal.procedure.progress import Progress
 from elastocal.procedure.run_folder import RunFolder
 from elastocal.procedure.settings import Settings
+from elastocal.procedure.stand import Stand
 from elastocal.procedure.supervisor import Recorder
 from elastocal.procedure.ways import WayHome
 
@@ -18,8 +18,14 @@ from elastocal.procedure.ways import WayHome
 class SavingRecorder(Recorder, Protocol):
     """A recorder that can write what it has kept."""
 
-    def save(self, path: Path) -> None:
-        """Write everything, atomically, and wait until it is on the disk."""
+    def save(self, path: Path) -> str | None:
+        """Write everything, atomically, and wait until it is on the disk.
+
+        Returns
+        -------
+        str or None
+            SHA-256 of the file, for the journal; None from a recorder that keeps none.
+        """
 
 
 class End(Enum):

@@ -140,9 +140,15 @@ def _read(path: Path) -> tuple[tuple[Entry, ...], int]:
     whole = data.rfind(b"\n") + 1
     lines = data[:whole].splitlines()
     entries = tuple(_entry(path, number, line) for number, line in enumerate(lines))
-    if entries and (entries[0].run is None or entries[0].run.schema_name != SCHEMA):
+    if entries and not _starts(entries[0]):
         raise SchemaError(f"{path}: line 1 is not the start of a run (schema {SCHEMA!r})")
     return entries, whole
+
+
+def _starts(entry: Entry) -> bool:
+    """Return whether an entry is the start of a run, of the schema that is read here."""
+    run = entry.run
+    return run is not None and run.schema_name == SCHEMA and "schema_name" in run.model_fields_set
 
 
 def _entry(path: Path, number: int, line: bytes) -> Entry:

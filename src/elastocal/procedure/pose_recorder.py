@@ -12,6 +12,7 @@ from elastocal import __version__
 from elastocal.arrays import FloatArray
 from elastocal.cell.devices import ArmState, PointBlock, WrenchBlock
 from elastocal.errors import ProcedureError
+from elastocal.procedure.copies import file_sha256
 from elastocal.procedure.mcap import Topic, write_mcap
 from elastocal.procedure.mcap.topic import TimeArray
 from elastocal.procedure.stream_messages import (
@@ -84,8 +85,13 @@ class PoseRecorder:
         """Keep a remark."""
         self._marks.append(Mark(time, text))
 
-    def save(self, path: Path) -> None:
+    def save(self, path: Path) -> str:
         """Write everything to an MCAP file, atomically and to the disk.
+
+        Returns
+        -------
+        str
+            SHA-256 of the file.
 
         Raises
         ------
@@ -97,6 +103,7 @@ class PoseRecorder:
         joints = json.dumps(self._joint_names)
         note = Metadata(name=RECORD, metadata={"schema": SCHEMA, "joints": joints})
         write_mcap(path, self._topics(), f"elastocal {__version__}", note)
+        return file_sha256(path)
 
     def _note(self, what: str, condition: str) -> None:
         """Mark a condition that changed; an empty block has no time, so the arm's is taken."""

@@ -71,6 +71,7 @@ def cell_place(cell: Cell) -> str:
 def fill(folder: RunFolder, cell: Cell, plan: Path) -> None:
     """Put cell and plan into a run's folder, as they are now.
 
+    The journal must be locked: two runs could otherwise fill one folder with two cells.
     Files that the cell names by an absolute path stay where they are.
 
     Parameters
@@ -93,7 +94,7 @@ def fill(folder: RunFolder, cell: Cell, plan: Path) -> None:
     for name in (PLAN, POOL):
         if (plan / name).is_file():
             _copy(plan / name, folder.plan / name)
-    _make(folder.streams)
+    make_folder(folder.streams)
 
 
 def refuse_foreign(folder: RunFolder) -> None:
@@ -136,12 +137,19 @@ def _absolute(path: Path) -> Path:
 
 
 def _copy(source: Path, target: Path) -> None:
-    _make(target.parent)
+    make_folder(target.parent)
     with replacing(target) as temporary:
         shutil.copyfile(source, temporary)
 
 
-def _make(folder: Path) -> None:
+def make_folder(folder: Path) -> None:
+    """Make a folder and those above it; one that is there is left as it is.
+
+    Raises
+    ------
+    FileAccessError
+        If it cannot be made.
+    """
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:

@@ -29,6 +29,7 @@ def run_warnings(
     tool: ToolLoad,
     estimate: ToolEstimate,
     load_cases: Sequence[str],
+    weighed: Sequence[int],
 ) -> list[str]:
     """Return the warnings of a run.
 
@@ -42,12 +43,14 @@ def run_warnings(
         The tool by the cell file and by the unloaded references.
     load_cases : sequence of str
         Load cases of the plan.
+    weighed : sequence of int
+        Poses of the unloaded references that the tool was estimated from.
     """
     return [
         *_about_readings(rows, load_cases),
         *_about_stations(registration),
         *_about_lever(registration),
-        *_about_tool(tool, estimate),
+        *_about_tool(tool, estimate, weighed),
     ]
 
 
@@ -103,7 +106,14 @@ def _about_lever(registration: Registration) -> Iterator[str]:
         )
 
 
-def _about_tool(tool: ToolLoad, estimate: ToolEstimate) -> Iterator[str]:
+def _about_tool(tool: ToolLoad, estimate: ToolEstimate, weighed: Sequence[int]) -> Iterator[str]:
+    if estimate.change is not None:
+        yield (
+            f"the tool weight changed near pose {weighed[estimate.change.reading]}, by about"
+            f" {estimate.change.mass:+.1f} kg (or the sensor's zero by as much): no one mass fits"
+            " the run"
+        )
+        return
     mass, half = float(estimate.mass.value), float(estimate.mass.half_width)
     if mass + half < ZEROED * tool.mass:
         yield (

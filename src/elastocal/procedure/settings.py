@@ -57,8 +57,9 @@ def settings_of(cell: Cell, plan: PlanFile) -> Settings:
     Raises
     ------
     ProcedureError
-        If the cell has no force sensor or no tracker, or the force limit leaves no room between
-        the largest load case and the range of the sensor.
+        If the cell has no force sensor or no tracker, the force limit leaves no room between the
+        largest load case and the range of the sensor, or the contact force is not below every
+        load case (and with it below the force limit).
     """
     T_sensor_tcp = cell.T_sensor_tcp
     if T_sensor_tcp is None:
@@ -69,6 +70,7 @@ def settings_of(cell: Cell, plan: PlanFile) -> Settings:
             f"{cell.path}: pose {unseen[0]} is seen by no tracker: a run measures the marker"
         )
     loads = tuple((name, np.array(force)) for name, force in plan.contact.load_cases.items())
+    _check_contact_force(cell, loads)
     motion = cell.file.motion
     return Settings(
         procedure=cell.file.procedure,
@@ -81,6 +83,17 @@ def settings_of(cell: Cell, plan: PlanFile) -> Settings:
         approach_distance=plan.contact.approach_distance,
         loads=loads,
     )
+
+
+def _check_contact_force(cell: Cell, loads: tuple[tuple[str, FloatArray], ...]) -> None:
+    """Refuse a guarded approach that would press more than a load case does."""
+    name, least = min(((name, -float(f[2])) for name, f in loads), key=lambda load: load[1])
+    contact_force = cell.file.procedure.contact_force
+    if not contact_force < least:
+        raise ProcedureError(
+            f"{cell.path}: procedure.contact_force must be below {least:g} N (load case {name!r}"
+            f" along the normal), got {contact_force:g} N"
+        )
 
 
 def _force_limit(

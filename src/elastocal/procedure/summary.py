@@ -26,6 +26,7 @@ from elastocal.procedure.registration import Registration, StationFit, UnloadedR
 from elastocal.procedure.run_warnings import run_warnings
 from elastocal.procedure.tool_estimate import Interval, ToolEstimate
 from elastocal.procedure.tool_weight import ToolLoad
+from elastocal.procedure.unloaded import weighed_poses
 from elastocal.schema import check_schema
 
 SCHEMA = "elastocal.run-summary/1"
@@ -71,14 +72,19 @@ def summarise(
         },
         "readings": _readings(found.rows),
         "registration": _registration(found.registration, found.dataset),
-        "tool": _tool(found.tool, found.estimate),
+        "tool": _tool(found.tool, found.estimate, weighed_poses(found.poses)),
         "drift": _drift(found.poses),
         "contact_moment": _moments(found.rows),
         "noise": _noise(found.rows),
         "attempts": _attempts(found.poses, entries),
         "times": _times(found.poses, entries),
         "warnings": run_warnings(
-            found.rows, found.registration, found.tool, found.estimate, load_cases
+            found.rows,
+            found.registration,
+            found.tool,
+            found.estimate,
+            load_cases,
+            weighed_poses(found.poses),
         ),
     }
 
@@ -155,7 +161,8 @@ def _station(fit: StationFit, displacement: float) -> dict[str, Any]:
     }
 
 
-def _tool(tool: ToolLoad, estimate: ToolEstimate) -> dict[str, Any]:
+def _tool(tool: ToolLoad, estimate: ToolEstimate, weighed: Sequence[int]) -> dict[str, Any]:
+    change = estimate.change
     return {
         "unloaded_references": estimate.count,
         "mass_kg": _interval(estimate.mass) | {"cell": tool.mass},
@@ -167,6 +174,9 @@ def _tool(tool: ToolLoad, estimate: ToolEstimate) -> dict[str, Any]:
         "force_scatter_N": _number(estimate.force_scatter),
         "moment_scatter_Nm": _number(estimate.moment_scatter),
         "not_determined": list(estimate.undetermined),
+        "changed": None
+        if change is None
+        else {"from_pose": weighed[change.reading], "mass_kg": change.mass},
     }
 
 

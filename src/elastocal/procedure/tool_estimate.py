@@ -16,6 +16,7 @@ import numpy as np
 from scipy import stats
 
 from elastocal.arrays import FloatArray
+from elastocal.procedure.tool_change import ToolChange, tool_change
 
 LEVEL = 0.95
 """Of the intervals."""
@@ -83,6 +84,9 @@ class ToolEstimate:
     """The same of the moment, in N·m."""
     undetermined: tuple[str, ...]
     """Names of what the orientations and times do not tell apart."""
+    change: ToolChange | None = None
+    """Where one mass does not fit the whole run: mass, centre and biases are then those of no
+    tool."""
 
 
 def estimate_tool(unloaded: Unloaded, nominal_mass: float) -> ToolEstimate:
@@ -100,7 +104,8 @@ def estimate_tool(unloaded: Unloaded, nominal_mass: float) -> ToolEstimate:
     gravity = unloaded.gravity @ unloaded.R_base_sensor
     eye = np.broadcast_to(np.eye(3), (len(time), 3, 3))
     drift = eye * time[:, None, None]
-    force = _solve(np.concatenate([gravity[:, :, None], eye, drift], axis=2), unloaded.force)
+    blocks = np.concatenate([gravity[:, :, None], eye, drift], axis=2)
+    force = _solve(blocks, unloaded.force)
     turn = np.cross(np.eye(3)[None], gravity[:, None, :]).swapaxes(1, 2)
     moment = _solve(np.concatenate([turn, eye, drift], axis=2), unloaded.moment)
     wide_mass = not force.half_width[0] <= WIDE_MASS * max(nominal_mass, 1.0)
@@ -121,6 +126,7 @@ def estimate_tool(unloaded: Unloaded, nominal_mass: float) -> ToolEstimate:
         force_scatter=force.scatter,
         moment_scatter=moment.scatter,
         undetermined=tuple(dict.fromkeys(unknown)),
+        change=tool_change(blocks, unloaded.force, gravity, nominal_mass),
     )
 
 

@@ -81,6 +81,11 @@ def robot_errors(robot: Robot, q: FloatArray, gravity: FloatArray, lever: FloatA
     return np.concatenate([offsets, SAG * marker * (torque / largest)[:, None, :]], axis=2)
 
 
+def weighed_poses(poses: Sequence[PoseReadings]) -> list[int]:
+    """Return the poses of the readings that `tool_readings` returns, in the same order."""
+    return [pose.pose for pose in poses if pose.reference and pose.reference.tool]
+
+
 def tool_readings(poses: Sequence[PoseReadings], tool: ToolLoad) -> Unloaded:
     """Return the raw wrenches of the unloaded references.
 

@@ -1,9 +1,15 @@
-"""How Procedure 1 is carried out: speeds, limits, and when a reading is good."""
+"""How Procedure 1 is carried out: speeds, limits, and when a reading is good.
+
+The bounds are there so that a slip of the pen in the cell file is refused and not carried out. They
+are wide: what is within them may still be wrong for a machine.
+"""
 
 import math
-from typing import Annotated, Any
+from collections.abc import Iterator
+from typing import Annotated
 
-from pydantic import AfterValidator, BeforeValidator, Field, field_validator
+from pydantic import AfterValidator, BeforeValidator, Field, ValidationError, model_validator
+from pydantic_core import InitErrorDetails, PydanticCustomError
 
 from elastocal.cell.description.motion import PositiveSpeed, PositiveTime
 from elastocal.cell.description.quantities import PositiveForce, PositiveLength
@@ -36,63 +42,74 @@ TranslationalCompliance = Annotated[
 class ProcedureSettings(StrictModel):
     """Settings of `elastocal run`. Joint moves go at the speeds of the section ``motion``."""
 
-    cycle: PositiveTime = 0.04
+    cycle: Annotated[PositiveTime, Field(ge=1e-3, le=0.1)] = 0.04
     """Time between two looks at the devices, in s."""
-    approach_speed: PositiveSpeed = 0.02
+    approach_speed: Annotated[PositiveSpeed, Field(ge=1e-4, le=0.25)] = 0.02
     """Between approach pose and near contact, and back, in m/s."""
-    contact_speed: PositiveSpeed = 0.005
+    contact_speed: Annotated[PositiveSpeed, Field(ge=1e-4, le=0.02)] = 0.005
     """From near contact to the surface, in m/s."""
     contact_force: PositiveForce = 60.0
     """Force at which the guarded approach stops, in N."""
-    ramp: PositiveForceRate = 400.0
+    ramp: Annotated[PositiveForceRate, Field(ge=1.0, le=2e3)] = 400.0
     """Fastest change of the force, in N/s."""
     force_limit: PositiveForce | None = None
     """Largest force that is let happen, in N; by default 1.3 times the largest load case, and
     never more than the sensor's range allows."""
-    travel_limit: PositiveLength = 15e-3
+    travel_limit: Annotated[PositiveLength, Field(le=50e-3)] = 15e-3
     """How far the tool may go beyond the expected contact, or aside, in m."""
-    contact_compliance: TranslationalCompliance = 0.5e-6
+    contact_compliance: Annotated[TranslationalCompliance, Field(le=10e-6)] = 0.5e-6
     """Lateral movement of the marker under load that is expected without slip (disk, tooling,
     tilt of the tool), in m/N of the load case."""
-    force_tolerance: PositiveForce = 5.0
+    force_tolerance: Annotated[PositiveForce, Field(le=50.0)] = 5.0
     """Largest distance of the mean force from the load case, in N."""
-    force_drift: PositiveForceRate = 5.0
+    force_drift: Annotated[PositiveForceRate, Field(le=50.0)] = 5.0
     """Largest drift of the force over the dwell, in N/s."""
-    force_spread: PositiveForce = 8.0
+    force_spread: Annotated[PositiveForce, Field(le=50.0)] = 8.0
     """Largest width of the force about its drift that holds 95 % of the samples, each axis, in N;
     counted as four standard deviations."""
-    dwell: PositiveTime = 0.5
+    dwell: Annotated[PositiveTime, Field(le=60.0)] = 0.5
     """How long the force must be like that before it is averaged, in s."""
-    average: PositiveTime = 1.0
+    average: Annotated[PositiveTime, Field(le=60.0)] = 1.0
     """Time over which a loaded reading is averaged, in s."""
-    unloaded_average: PositiveTime = 1.0
+    unloaded_average: Annotated[PositiveTime, Field(le=60.0)] = 1.0
     """Time over which the unloaded reference is averaged, in s."""
-    marker_sigma: PositiveLength = 50e-6
+    marker_sigma: Annotated[PositiveLength, Field(le=1e-3)] = 50e-6
     """Largest standard deviation of the marker during the unloaded reference, each axis, in m."""
-    slip_limit: PositiveLength = 0.2e-3
+    slip_limit: Annotated[PositiveLength, Field(le=5e-3)] = 0.2e-3
     """Largest lateral movement of the marker that is not expected, in m."""
-    timeout: PositiveTime = 20.0
+    timeout: Annotated[PositiveTime, Field(le=600.0)] = 20.0
     """How long a load case may take to become stable after its ramp, in s; also what every other
     step may take beyond its expected time."""
-    beam_timeout: PositiveTime = 5.0
+    beam_timeout: Annotated[PositiveTime, Field(le=600.0)] = 5.0
     """How long a tracker may look for the marker, in s."""
-    stale: PositiveTime = 0.3
+    stale: Annotated[PositiveTime, Field(le=1.0)] = 0.3
     """Oldest data that are trusted, in s."""
-    retries: Annotated[int, Field(ge=0)] = 1
+    retries: Annotated[int, Field(ge=0, le=5)] = 1
     """Further attempts at a pose after one that failed."""
 
-    @field_validator("stale")
-    @classmethod
-    def _longer_than_a_cycle(cls, stale: float, info: Any) -> float:
-        cycle = info.data.get("cycle", 0.0)
-        if not stale > 2.0 * cycle:
-            raise ValueError(f"must be above two cycles ({2.0 * cycle:g} s)")
-        return stale
+    @model_validator(mode="after")
+    def _no_contradiction(self) -> "ProcedureSettings":
+        # Not a validator of a field: that is not asked where the field keeps its default.
+        for key, reason in self._contradictions():
+            error = PydanticCustomError("contradiction", "{reason}", {"reason": reason})
+            detail = InitErrorDetails(type=error, loc=(key,), input=getattr(self, key))
+            raise ValidationError.from_exception_data(type(self).__name__, [detail])
+        return self
 
-    @field_validator("dwell", "average", "unloaded_average")
-    @classmethod
-    def _several_cycles(cls, duration: float, info: Any) -> float:
-        cycle = info.data.get("cycle", 0.0)
-        if not duration >= 4.0 * cycle:
-            raise ValueError(f"must be at least four cycles ({4.0 * cycle:g} s)")
-        return duration
+    def _contradictions(self) -> Iterator[tuple[str, str]]:
+        """Yield keys whose values do not go with others."""
+        if not self.stale > 2.0 * self.cycle:
+            yield "stale", f"must be above two cycles ({2.0 * self.cycle:g} s)"
+        for key in ("dwell", "average", "unloaded_average"):
+            if not getattr(self, key) >= 4.0 * self.cycle:
+                yield key, f"must be at least four cycles ({4.0 * self.cycle:g} s)"
+        if not self.contact_speed <= self.approach_speed:
+            yield "contact_speed", f"must be at most approach_speed ({self.approach_speed:g} m/s)"
+        if not self.contact_force > self.force_spread:
+            least_felt = f"must be above force_spread ({self.force_spread:g} N)"
+            yield "contact_force", f"{least_felt}: less is felt without contact"
+        least = self.dwell + self.average
+        if not self.timeout >= least:
+            yield "timeout", f"must be at least dwell and average together ({least:g} s)"
+        if not self.beam_timeout >= self.stale:
+            yield "beam_timeout", f"must be at least stale ({self.stale:g} s)"

@@ -1,0 +1,158 @@
+"""Whether a plan may be carried out on a cell: looked at as a whole before anything moves.
+
+The fingerprint says which cell a plan was made for. It says nothing of the plan's own numbers, and
+those are what the arm is sent to and presses with.
+"""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from elastocal.cell import Cell
+from elastocal.errors import ProcedureError
+from elastocal.planning.plan_file import PlanFile
+
+LEAST_POSES = 3
+"""Unloaded marker readings that the rotation of a station needs."""
+SAME_PLACE = 1e-5
+"""Largest distance between a frame and where its joints lead, in m."""
+SAME_TURN = 1e-5
+"""Largest difference between two directions or rotations that are to be the same."""
+SAME_NUMBER = 1e-9
+"""Largest difference between a number of the cell and the same in its plan, SI."""
+
+
+def check_fits(plan: PlanFile, cell: Cell) -> None:
+    """Refuse a plan that is not the cell's, or whose numbers contradict one another.
+
+    Parameters
+    ----------
+    plan : PlanFile
+        The plan.
+    cell : Cell
+        The cell; the plan carries its fingerprint.
+
+    Raises
+    ------
+    ProcedureError
+        With the first thing that does not fit, in one line.
+    """
+    problems = (_about_robot, _about_contact, _about_limits, _about_poses)
+    for problem in problems:
+        for text in problem(plan, cell):
+            raise ProcedureError(f"the plan does not fit {cell.path}: {text}; plan again")
+
+
+def registration_findings(plan: PlanFile) -> tuple[str, ...]:
+    """Return a warning for each station that sees too few poses to be registered.
+
+    Parameters
+    ----------
+    plan : PlanFile
+        The plan.
+
+    Raises
+    ------
+    ProcedureError
+        If that holds for every station: no reading of the run would be of use.
+    """
+    seen: dict[str, list[int]] = {}
+    for pose in plan.poses:
+        if pose.seen_by is not None:
+            seen.setdefault(pose.seen_by, []).append(pose.id)
+    few = {station: poses for station, poses in seen.items() if len(poses) < LEAST_POSES}
+    if seen and len(few) == len(seen):
+        most = max(len(poses) for poses in seen.values())
+        raise ProcedureError(
+            f"no tracker station sees {LEAST_POSES} poses of the plan, {most} at most: none could"
+            " be registered, and no reading used; plan more poses"
+        )
+    return tuple(
+        f"station {station} sees {len(poses)} of the {LEAST_POSES} poses that it needs to be"
+        f" registered: the readings at pose {', '.join(map(str, poses))} will be missing"
+        for station, poses in few.items()
+    )
+
+
+def _about_robot(plan: PlanFile, cell: Cell) -> Iterator[str]:
+    if plan.robot.joints != cell.robot.joint_names:
+        yield (
+            f"robot.joints are {', '.join(plan.robot.joints)}, those of the cell"
+            f" {', '.join(cell.robot.joint_names)}"
+        )
+    elif not _same(plan.robot.home, cell.home):
+        yield f"robot.home is {_listed(plan.robot.home)}, HOME of the cell {_listed(cell.home)}"
+
+
+def _about_contact(plan: PlanFile, cell: Cell) -> Iterator[str]:
+    engagement, loads = cell.file.engagement, cell.file.load_cases
+    for key in ("approach_distance", "near_contact"):
+        found, wanted = getattr(plan.contact, key), getattr(engagement, key)
+        if not _same(found, wanted):
+            yield f"contact.{key} is {found:g} m, engagement.{key} of the cell {wanted:g} m"
+    if tuple(plan.contact.load_cases) != tuple(loads.cases):
+        yield (
+            f"contact.load_cases are {', '.join(plan.contact.load_cases)}, those of the cell"
+            f" {', '.join(loads.cases)}"
+        )
+        return
+    for name, wanted in zip(loads.cases, loads.force_tcp, strict=True):
+        if not _same(found := plan.contact.load_cases[name], wanted):
+            yield f"load case {name!r} is {_listed(found)} N, that of the cell {_listed(wanted)} N"
+
+
+def _about_limits(plan: PlanFile, cell: Cell) -> Iterator[str]:
+    """Yield joint positions outside the robot's limits."""
+    for what, joints in _all_joints(plan):
+        margin = cell.robot.limits.margin(np.array(joints))
+        worst = int(np.argmin(margin))
+        if not margin[worst] >= 0.0:
+            yield (
+                f"{what}: {cell.robot.joint_names[worst]} at {joints[worst]:.4g} is outside its"
+                " limits"
+            )
+
+
+def _all_joints(plan: PlanFile) -> Iterator[tuple[str, tuple[float, ...]]]:
+    yield "robot.home", plan.robot.home
+    for pose in plan.poses:
+        yield f"poses.{pose.id}.joints", pose.joints
+        yield f"poses.{pose.id}.approach_joints", pose.approach_joints
+    for number, move in enumerate(plan.moves):
+        for stop, joints in enumerate(move.via):
+            yield f"moves.{number}.via.{stop}", joints
+
+
+def _about_poses(plan: PlanFile, cell: Cell) -> Iterator[str]:
+    """Yield poses that name no tracker of the cell, or whose joints do not lead to their frames."""
+    stations = [tracker.name for tracker in cell.file.trackers]
+    for pose in plan.poses:
+        if pose.seen_by is not None and pose.seen_by not in stations:
+            yield (
+                f"poses.{pose.id}.seen_by: {pose.seen_by!r} is no tracker of the cell"
+                f" (known: {', '.join(stations) or 'none'})"
+            )
+        away = np.array(pose.normal)
+        if not np.abs(pose.T_base_tcp[:3, 2] + away).max() <= SAME_TURN:
+            yield f"poses.{pose.id}: z of the tcp frame is not against the normal"
+        for key, joints, distance in (
+            ("joints", pose.joints, 0.0),
+            ("approach_joints", pose.approach_joints, plan.contact.approach_distance),
+        ):
+            reached = cell.robot.forward(joints)
+            gap = np.linalg.norm(reached[:3, 3] - pose.T_base_tcp[:3, 3] - distance * away)
+            turn = np.abs(reached[:3, :3] - pose.T_base_tcp[:3, :3]).max()
+            if not (gap <= SAME_PLACE and turn <= SAME_TURN):
+                yield (
+                    f"poses.{pose.id}.{key} lead {1e3 * gap:.3g} mm and {turn:.3g} rad away from"
+                    " where its frame and normal say"
+                )
+
+
+def _same(found: object, wanted: object) -> bool:
+    a, b = np.atleast_1d(np.asarray(found, float)), np.atleast_1d(np.asarray(wanted, float))
+    return a.shape == b.shape and bool(np.all(np.abs(a - b) <= SAME_NUMBER))
+
+
+def _listed(values: object) -> str:
+    return "(" + ", ".join(f"{value:g}" for value in np.asarray(values, float)) + ")"
