@@ -16,7 +16,7 @@ def test_it_lists_every_state_of_every_pose_and_the_way_home():
     of_one = [step.step for step in steps if step.pose == 1]
     loads = 2 * [Step.LOAD, Step.SETTLE, Step.AVERAGE]
     before = [Step.MOVE, Step.AIM, Step.NEAR, Step.UNLOADED, Step.ENGAGE]
-    assert of_one == [*before, *loads, Step.RELEASE, Step.RETRACT]
+    assert of_one == [*before, *loads, Step.RELEASE, Step.LIFT, Step.RELEASED, Step.RETRACT]
     assert (steps[-1].pose, steps[-1].what) == (None, "to HOME by way of 1 via pose")
     assert steps[0].what == "from HOME to approach pose"
 

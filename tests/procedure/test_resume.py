@@ -28,6 +28,8 @@ def test_it_tells_where_the_run_was_and_what_is_done():
     known = last_known(entries(START, COMMITTED, (Event.BEGIN, HOLD)))
     assert known.committed == (0,)
     assert known.attempts == {0: 1, 1: 2}
+    assert known.uncommitted == 1
+    assert last_known(entries(START, COMMITTED)).uncommitted is None
     assert known.lines == (
         "last entry: pose 1, attempt 2, load: begin hold",
         "at 2.0 s of the run's clock",

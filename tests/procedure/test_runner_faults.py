@@ -7,8 +7,8 @@ from elastocal.errors import FileAccessError
 from elastocal.procedure.entries import Event
 from elastocal.procedure.job import End
 from elastocal.procedure.journal import read_commits, read_journal
-from elastocal.procedure.leaving import Stand
 from elastocal.procedure.pose_log import ReadingStatus
+from elastocal.procedure.stand import Stand
 from support import fake_faults as fault
 from support.fake_faults import when
 from support.fake_runs import FakeRun, MemoryRecorder
@@ -65,6 +65,8 @@ ENDING = [
      "near: force sensor silent"),
     ("sensor silent while engaging", fault.engaging, fault.silence_sensor, Stand.APPROACH,
      "force sensor silent"),
+    ("saturated in contact", fault.pressing(), fault.saturate_sensor, Stand.APPROACH,
+     "force sensor saturated in contact: sensor says: saturated"),
     ("sensor silent in retract", fault.retracting, fault.silence_sensor, Stand.APPROACH,
      "retract: force sensor silent"),
 ]  # fmt: skip
@@ -96,9 +98,9 @@ def test_a_fault_that_ends_the_run_leaves_the_cell_safe(run, moment, change, sta
 RETRIED = [
     ("beam lost for a while", fault.near, fault.break_beam(2.3), "unloaded: beam lost: station_1"),
     ("beam lost in contact", fault.pressing(), fault.break_beam(2.3), "settle normal: beam lost"),
-    ("saturated", fault.pressing(), fault.saturate_sensor, "force sensor saturated: sensor says"),
+    ("saturated", fault.near, fault.saturate_sensor, "force sensor saturated: sensor says"),
     ("contact missed", fault.approaching, fault.lower_floor,
-     "engage: contact missed: none within 15 mm beyond the expected one"),
+     "engage: contact missed: none within 14 mm beyond the expected one"),
     ("contact early", fault.approaching, fault.raise_floor,
      "near: touched the surface before near contact: 19.8 mm before"),
 ]  # fmt: skip
@@ -310,7 +312,10 @@ def test_a_mistake_in_the_program_leaves_the_surface_before_it_shows(run):
     with pytest.raises(ZeroDivisionError):
         run.start()
     assert "retract" in run.cell.world.commands
-    assert run.cell.world.commands[-1] == "stop"
+    assert run.cell.world.commands[-2:] == ["stop", "disable"]
+    assert texts(run, Event.FINISH) == [
+        "stopped, retracted to the approach pose: mistake in the program: ZeroDivisionError"
+    ]
     assert not run.cell.world.force.any()
 
 

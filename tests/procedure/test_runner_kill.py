@@ -64,7 +64,7 @@ def whole(tmp_path_factory):
     return undisturbed(tmp_path_factory.mktemp("runs"))
 
 
-ENTRIES = 40
+ENTRIES = 44
 """Of a run with two poses and two load cases; `test_the_boundaries_are_all_there` holds it."""
 
 

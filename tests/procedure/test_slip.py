@@ -52,3 +52,13 @@ def test_a_sudden_slide_is_longer_than_a_slow_one():
 
 def test_nothing_is_concluded_from_a_gap():
     assert slide([0.0, 0.0, None, 5e-4, 5e-4]) == pytest.approx(0.0, abs=1e-12)
+
+
+def test_a_jump_along_the_normal_is_seen_apart_and_kept_over_a_gap():
+    jumps = SlideWatch(WATCH, along=True)
+    for height, aside in [(0.0, 0.0), (0.0, 5e-4), (1e-3, 5e-4)]:
+        jumps.see(marker(height, aside)[None])
+    assert jumps.largest == pytest.approx(1e-3)
+    jumps.forget()
+    jumps.see(marker(0.5)[None])
+    assert jumps.largest == pytest.approx(1e-3)

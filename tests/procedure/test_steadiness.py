@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from elastocal.cell.description.procedure import ProcedureSettings
-from elastocal.procedure.steadiness import Stretch, complaint, steadiness
+from elastocal.procedure.steadiness import Stretch, complaint, shaking, steadiness
 
 LIMITS = ProcedureSettings()
 TIME = np.arange(50) / 100.0
@@ -61,3 +61,10 @@ def test_a_stretch_keeps_what_is_young_enough():
     stretch.add(np.empty(0), np.empty((0, 3)))
     assert stretch.time[-1] - stretch.time[0] == pytest.approx(0.11)
     assert len(stretch) == len(stretch.time) == len(stretch.values)
+
+
+def test_a_marker_is_shaking_by_its_worst_axis():
+    positions = np.zeros((4, 3))
+    positions[:, 1] = [0.0, 2e-4, 0.0, 2e-4]
+    assert shaking(positions, 50e-6) == "marker has a sigma of 115 um, limit 50 um"
+    assert shaking(positions, 116e-6) == ""

@@ -1,5 +1,7 @@
 """The watchdog, one look at a time; whole runs are in test_runner_faults."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -99,3 +101,18 @@ def test_a_beam_that_is_found_again_counts_as_one_break(watch):
 
 def test_between_poses_nobody_asks_for_the_beam(watch):
     assert watch.check(seen(9.0, beam=BeamState.BROKEN, points=0.0), Guard()) is False
+
+
+@pytest.mark.parametrize(
+    ("pressing", "fault"), [(True, Fault.SENSOR_OVERLOAD), (False, Fault.SENSOR_SATURATED)]
+)
+def test_an_overload_counts_as_more_where_the_tool_may_press(watch, pressing, fault):
+    what = seen(0.04)
+    block = replace(what.wrenches, status=SensorStatus.SATURATED)
+    assert fault_of(watch, replace(what, wrenches=block), Guard(pressing=pressing)) is fault
+
+
+def test_another_station_is_let_pass_only_for_a_moment(watch):
+    watch.station = "other"
+    watch.check(seen(0.2), Guard(beam=True))
+    assert fault_of(watch, seen(0.4)) is Fault.TRACKER_FAULT

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from elastocal.errors import ProcedureError
 from elastocal.procedure.ways import HOME, stop_joints, way, way_home
@@ -65,3 +66,29 @@ def test_from_nowhere_it_asks_for_a_hand():
         ProcedureError, match=r"neither HOME nor on a way .* move it to HOME by hand"
     ):
         home_from((2.0, 2.0, 2.0))
+
+
+def test_of_two_poses_close_by_the_nearer_line_is_taken_and_the_likely_pose_before_it():
+    first, second, third = PLAN.poses
+    close = second.model_copy(
+        update={
+            "joints": (0.11, 0.0, 0.0),
+            "approach_joints": (0.11, 0.0, 0.05),
+            "tcp_position": (0.11, 0.0, 0.0),
+        }
+    )
+    crowded = PLAN.model_copy(update={"poses": (first, close, third)})
+    assert home_from((0.109, 0.0, 0.0), crowded).retreat_from == close
+    assert home_from((0.101, 0.0, 0.0), crowded).retreat_from == first
+    T = np.eye(4)
+    T[:3, :3], T[:3, 3] = DOWN, (0.109, 0.0, 0.0)
+    assert way_home(crowded, T[:3, 3], T, LIMIT, likely=0).retreat_from == first
+    assert way_home(crowded, T[:3, 3], T, LIMIT, likely=2).retreat_from == close
+
+
+def test_a_tool_that_is_turned_away_from_a_surface_does_not_stand_before_it():
+    T = np.eye(4)
+    T[:3, :3] = DOWN @ Rotation.from_euler("y", 0.35).as_matrix()
+    T[:3, 3] = (0.2, 0.0, 0.001)
+    with pytest.raises(ProcedureError, match="neither HOME nor on a way"):
+        way_home(PLAN, T[:3, 3], T, LIMIT)

@@ -220,7 +220,11 @@ class FakeRun:
             committed=frozenset(known.committed),
             attempts=known.attempts,
             home=way_home(
-                self.plan, state.q, state.T_base_tcp, self.settings.procedure.travel_limit
+                self.plan,
+                state.q,
+                state.T_base_tcp,
+                self.settings.procedure.travel_limit,
+                known.uncommitted,
             ),
         )
         recorder = self.recorder or (lambda: MemoryRecorder(self.kept))

@@ -1,4 +1,4 @@
-"""Ctrl-C during a run: the arm is brought to safety first."""
+"""Ctrl-C during a run, a terminal that is closed: the arm is brought to safety first."""
 
 import contextlib
 import signal
@@ -6,13 +6,17 @@ import threading
 from collections.abc import Callable, Iterator
 from types import FrameType
 
+NAMES = ("SIGINT", "SIGTERM", "SIGHUP", "SIGQUIT", "SIGTSTP")
+"""What a person, a terminal or a system sends to end a program, or to halt it, which would leave
+the arm pressing with nobody to watch. Not every system has all of them."""
+
 
 @contextlib.contextmanager
 def interruption() -> Iterator[Callable[[], bool]]:
     """Yield a function that says whether somebody wants the run to stop.
 
-    Meanwhile SIGINT and SIGTERM do not break into the middle of a step: the runner asks once a
-    cycle, releases, retracts and stops.
+    Meanwhile the signals of `NAMES` do not break into the middle of a step: the runner asks once
+    a cycle, releases, retracts and stops.
     """
     asked = threading.Event()
 
@@ -22,7 +26,8 @@ def interruption() -> Iterator[Callable[[], bool]]:
     if threading.current_thread() is not threading.main_thread():
         yield asked.is_set
         return
-    before = {number: signal.signal(number, note) for number in (signal.SIGINT, signal.SIGTERM)}
+    numbers = [getattr(signal, name) for name in NAMES if hasattr(signal, name)]
+    before = {number: signal.signal(number, note) for number in numbers}
     try:
         yield asked.is_set
     finally:

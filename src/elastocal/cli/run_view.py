@@ -1,7 +1,9 @@
 """Live view of a run: one line that changes on a terminal, a line a reading elsewhere."""
 
 import contextlib
+import threading
 import time
+from collections import deque
 from collections.abc import Callable, Iterator
 
 from rich.console import Console
@@ -12,6 +14,8 @@ from elastocal.procedure.progress import Progress
 
 REFRESH = 0.1
 """Shortest time between two changes of the line, in s of the wall."""
+PATIENCE = 2.0
+"""How long the end of a run waits for its view to be written, in s of the wall."""
 _BAR = 20
 
 
@@ -35,6 +39,9 @@ def progress_text(said: Progress) -> str:
 def watching(console: Console, count: int) -> Iterator[Callable[[Progress], None]]:
     """Yield a function that shows progress reports.
 
+    It returns at once: a thread of its own does the writing, as a terminal that takes nothing
+    would stop whoever writes to it, and with it the watchdog. One that is gone is left alone.
+
     Parameters
     ----------
     console : Console
@@ -42,34 +49,107 @@ def watching(console: Console, count: int) -> Iterator[Callable[[Progress], None
     count : int
         Number of poses.
     """
-    if not console.is_terminal:
-        yield _Lines(console)
-        return
-    with Live(console=console, transient=True, auto_refresh=False) as live:
-        shown = 0.0
-
-        def show(said: Progress) -> None:
-            nonlocal shown
-            now = time.monotonic()
-            if now - shown >= REFRESH:
-                shown = now
-                done = said.number if said.pose is None else said.number - 1
-                live.update(Text(f"{_bar(done, count)} {progress_text(said)}"), refresh=True)
-
-        yield show
+    screen = _Terminal(console, count) if console.is_terminal else _Lines(console)
+    screen.start()
+    try:
+        yield screen.tell
+    finally:
+        screen.close()
 
 
-class _Lines:
-    """Prints a line whenever another pose is begun."""
+class _Screen(threading.Thread):
+    """Writes reports that wait to be written.
+
+    Parameters
+    ----------
+    console : Console
+        Where.
+    most : int
+        Reports that wait at most; older ones are dropped.
+    """
+
+    def __init__(self, console: Console, most: int) -> None:
+        super().__init__(name="view of the run", daemon=True)
+        self._console = console
+        self._waiting: deque[Progress] = deque(maxlen=most)
+        self._news, self._closed = threading.Event(), False
+
+    def tell(self, said: Progress) -> None:
+        """Take a report; called by the run."""
+        self._waiting.append(said)
+        self._news.set()
+
+    def close(self) -> None:
+        """Write what waits, if that can be done within `PATIENCE`."""
+        self._closed = True
+        self._news.set()
+        self.join(PATIENCE)
+
+    def run(self) -> None:
+        """Write reports until closed, or until they cannot be written."""
+        # Rich ends the program, SystemExit, when nobody reads a pipe any more, and before that
+        # it cuts standard output off, which may still be asked for data.
+        self._console.on_broken_pipe = _leave_off  # type: ignore[method-assign]
+        with contextlib.suppress(OSError, ValueError):
+            self.write()
+
+    def write(self) -> None:
+        """Write reports until closed."""
+        for said in self.reports():
+            self.show(said)
+
+    def reports(self) -> Iterator[Progress]:
+        """Yield reports until closed."""
+        while True:
+            self._news.wait()
+            self._news.clear()
+            closed = self._closed
+            while self._waiting:
+                yield self._waiting.popleft()
+            if closed:
+                return
+
+    def show(self, said: Progress) -> None:
+        """Write one report."""
+        raise NotImplementedError
+
+
+class _Terminal(_Screen):
+    """One line that changes."""
+
+    def __init__(self, console: Console, count: int) -> None:
+        super().__init__(console, most=1)
+        self._count, self._live = count, Live(console=console, transient=True, auto_refresh=False)
+
+    def write(self) -> None:
+        with self._live:
+            super().write()
+
+    def show(self, said: Progress) -> None:
+        done = said.number if said.pose is None else said.number - 1
+        line = Text(f"{_bar(done, self._count)} {progress_text(said)}")
+        self._live.update(line, refresh=True)
+        time.sleep(0.0 if self._closed else REFRESH)
+
+
+class _Lines(_Screen):
+    """A line whenever another pose is begun."""
 
     def __init__(self, console: Console) -> None:
-        self._console = console
+        super().__init__(console, most=1000)
         self._last: tuple[int | None, int] | None = None
 
-    def __call__(self, said: Progress) -> None:
+    def tell(self, said: Progress) -> None:
         if (said.pose, said.attempt) != self._last:
             self._last = (said.pose, said.attempt)
-            self._console.print(progress_text(said), soft_wrap=True, markup=False)
+            super().tell(said)
+
+    def show(self, said: Progress) -> None:
+        self._console.print(progress_text(said), soft_wrap=True, markup=False)
+
+
+def _leave_off() -> None:
+    raise OSError("nobody reads the view any more")
 
 
 def _bar(done: int, count: int) -> str:

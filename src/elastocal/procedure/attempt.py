@@ -10,9 +10,14 @@ from elastocal.procedure.line import Line
 from elastocal.procedure.pose_log import PoseLog, ReadingStatus, Window
 from elastocal.procedure.settings import Settings
 from elastocal.procedure.slip import SlideWatch, SlipWatch
-from elastocal.procedure.steps import OFF_APPROACH, Step
+from elastocal.procedure.stand import Stand
+from elastocal.procedure.steps import OFF_APPROACH, TOUCHING, Step
 from elastocal.procedure.supervisor import Supervisor
 from elastocal.procedure.watch import Guard
+
+STIFFEST = 1e6
+"""Arm and tooling against each other are not stiffer than this, in N/m: so much the force grows
+a metre before a guarded move is seen to have ended."""
 
 
 @dataclass(eq=False)
@@ -45,6 +50,10 @@ class Attempt:
     """Lateral movement that has been reported as slip already, in m."""
     slip: float = 0.0
     """Lateral movement of the marker at the last reading, in m."""
+    jump_watch: SlideWatch | None = None
+    """Along the normal, during the windows of the present load case."""
+    stand: Stand = Stand.WAY
+    """Where the arm is left after a mistake in the program."""
 
     @property
     def settings(self) -> Settings:
@@ -75,9 +84,23 @@ class Attempt:
     def guard(self, *, beam: bool = True) -> Guard:
         """Return what must hold in the present state."""
         if self.step in OFF_APPROACH:
-            return Guard(self.settings.force_limit, self.line, beam)
+            limit = self.settings.force_limit
+            if self.step is Step.ENGAGE:
+                limit = min(limit, self._engage_limit)
+            return Guard(limit, self.line, beam, self.step in TOUCHING)
         # The weight of the tool turns with its orientation: at most twice itself.
         return Guard(self.settings.force_limit + 2.0 * self.settings.tool_weight, None, beam)
+
+    @property
+    def noise(self) -> float:
+        """Force that is felt where there is none: noise, and the tool's own inertia, in N."""
+        return 2.0 * self.settings.procedure.force_spread
+
+    @property
+    def _engage_limit(self) -> float:
+        """Largest force of a guarded move that ends as it should, in N."""
+        p = self.settings.procedure
+        return p.contact_force + STIFFEST * p.contact_speed * p.cycle + self.noise
 
     def close_window(
         self,

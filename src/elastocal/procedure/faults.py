@@ -2,7 +2,7 @@
 
 from enum import Enum
 
-from elastocal.errors import DeviceError, ProcedureError
+from elastocal.errors import DeviceError, FileAccessError, ProcedureError
 
 
 class Ends(Enum):
@@ -23,14 +23,21 @@ class Fault(Enum):
     UNLOADED_NOISY = (Ends.ATTEMPT, "unloaded reference too noisy: {}")
     BEAM_LOST = (Ends.ATTEMPT, "beam lost: {}")
     SENSOR_SATURATED = (Ends.ATTEMPT, "force sensor saturated: {}")
+    UNSTABLE = (Ends.ATTEMPT, "no load case settles: {}")
+    SENSOR_OVERLOAD = (Ends.RUN, "force sensor saturated in contact: {}")
     FORCE_LIMIT = (Ends.RUN, "force limit exceeded: {}")
     TRAVEL_LIMIT = (Ends.RUN, "travel limit exceeded: {}")
     TIME_LIMIT = (Ends.RUN, "time limit exceeded: {}")
     SENSOR_FAULT = (Ends.RUN, "force sensor fault: {}")
+    DISAGREE = (Ends.RUN, "arm and force sensor disagree: {}")
+    WEIGHT = (Ends.RUN, "force sensor does not feel the tool: {}")
     SENSOR_STALE = (Ends.RUN, "force sensor silent: {}")
     SENSOR_FROZEN = (Ends.RUN, "force sensor frozen: {}")
+    TRACKER_FAULT = (Ends.RUN, "tracker fault: {}")
     TRACKER_STALE = (Ends.RUN, "tracker silent: {}")
     ARM_STOPPED = (Ends.RUN, "arm stopped: {}")
+    ARM_FAULT = (Ends.RUN, "arm fault: {}")
+    IN_CONTACT = (Ends.RUN, "no move is begun in contact: {}")
     ARM_STALE = (Ends.RUN, "arm silent: {}")
     CLOCK = (Ends.RUN, "clock out of order: {}")
     DEVICE = (Ends.RUN, "device refused: {}")
@@ -67,6 +74,7 @@ def as_fault(error: ProcedureError | DeviceError | OSError) -> FaultError:
     """Return an error as the fault that it stands for."""
     if isinstance(error, FaultError):
         return error
-    if isinstance(error, DeviceError):
-        return FaultError(Fault.DEVICE, str(error))
-    return FaultError(Fault.DISK, str(error))
+    if isinstance(error, FileAccessError | ProcedureError):
+        return FaultError(Fault.DISK, str(error))
+    # A device's own line may break with any OSError; files report a FileAccessError.
+    return FaultError(Fault.DEVICE, str(error) or type(error).__name__)

@@ -83,4 +83,6 @@ def _at_pose(settings: Settings, station: str) -> Iterator[tuple[Step, str, floa
         yield Step.AVERAGE, name, p.average
         before = force
     yield Step.RELEASE, "force to zero", float(np.linalg.norm(before)) / p.ramp
-    yield Step.RETRACT, "to the approach pose", settings.approach_distance / p.approach_speed
+    yield Step.LIFT, f"to {near * 1e3:g} mm off the surface", near / p.approach_speed
+    yield Step.RELEASED, "unloaded reference again", p.dwell + p.unloaded_average
+    yield Step.RETRACT, "to the approach pose", way_in

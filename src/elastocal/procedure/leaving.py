@@ -1,31 +1,21 @@
 """The way off the surface: in order, after a fault, and after a crash."""
 
+import contextlib
 from collections.abc import Callable
-from enum import Enum
 
 import numpy as np
 
 from elastocal.arrays import FloatArray
-from elastocal.cell.devices import Motion
-from elastocal.errors import DeviceError
+from elastocal.cell.devices import ArmState, Motion
 from elastocal.procedure.attempt import Attempt
 from elastocal.procedure.entries import Action
-from elastocal.procedure.faults import Ends, FaultError
+from elastocal.procedure.faults import Ends, Fault, FaultError
 from elastocal.procedure.line import Line
 from elastocal.procedure.off_surface import STRAIGHT_ARRIVED
+from elastocal.procedure.stand import Left, Stand
 from elastocal.procedure.steps import OFF_APPROACH, TOUCHING, Outcome, Step
-from elastocal.procedure.supervisor import Supervisor
-from elastocal.procedure.watch import Guard, Seen
-
-
-class Stand(Enum):
-    """Where the arm stands when a run or an attempt is over."""
-
-    HOME = "at HOME"
-    WAY = "on its way between poses, off every surface"
-    NEAR = "off the surface, before contact"
-    APPROACH = "retracted to the approach pose"
-    SURFACE = "AT THE SURFACE: it could not retract and may still press"
+from elastocal.procedure.supervisor import BROKEN, Supervisor
+from elastocal.procedure.watch import Guard
 
 
 def release(a: Attempt) -> Outcome:
@@ -33,19 +23,25 @@ def release(a: Attempt) -> Outcome:
     s = a.supervisor
     with s.actuation(Action.RELEASE):
         s.devices.arm.release(a.settings.procedure.ramp)
-        s.wait(a.guard(beam=False), _idle, _release_time(s), "the release")
+        s.wait(a.guard(beam=False), lambda seen: _idle(seen.arm), _release_time(s), "the release")
     a.in_force_control = False
+    return Outcome.GOOD
+
+
+def lift(a: Attempt) -> Outcome:
+    """Go straight back until near contact."""
+    retreat(a.supervisor, a.line, a.guard(beam=False), a.settings.near_contact)
     return Outcome.GOOD
 
 
 def retract(a: Attempt) -> Outcome:
     """Go straight back to the approach pose."""
-    retreat(a.supervisor, a.line, a.guard(beam=False))
+    retreat(a.supervisor, a.line, a.guard(beam=False), a.settings.approach_distance)
     return Outcome.GOOD
 
 
-def retreat(supervisor: Supervisor, line: Line, guard: Guard) -> None:
-    """Go along a line's normal until the approach distance.
+def retreat(supervisor: Supervisor, line: Line, guard: Guard, height: float) -> None:
+    """Go along a line's normal until a height above the expected contact, in m.
 
     Raises
     ------
@@ -53,7 +49,7 @@ def retreat(supervisor: Supervisor, line: Line, guard: Guard) -> None:
         See `Supervisor.wait`.
     """
     start = supervisor.cycle(guard).arm.T_base_tcp
-    distance = supervisor.settings.approach_distance - line.height(start)
+    distance = height - line.height(start)
     if distance <= 0.0:
         return
     speed = supervisor.settings.procedure.approach_speed
@@ -61,7 +57,7 @@ def retreat(supervisor: Supervisor, line: Line, guard: Guard) -> None:
         supervisor.devices.arm.retract(line.normal, distance, speed)
         supervisor.wait(
             guard,
-            lambda seen: _has_gone(seen, start[:3, 3], distance),
+            lambda seen: _has_gone(seen.arm, start[:3, 3], distance),
             _retract_time(supervisor, distance),
             "the retract",
         )
@@ -81,14 +77,16 @@ def let_go(supervisor: Supervisor) -> None:
     with supervisor.actuation(Action.RELEASE):
         if arm.state().motion is Motion.HOLDING:
             arm.release(supervisor.settings.procedure.ramp)
-        supervisor.wait(Guard(), _idle, _release_time(supervisor), "the release")
+        limit = _release_time(supervisor)
+        supervisor.wait(Guard(), lambda seen: _idle(seen.arm), limit, "the release")
 
 
-def back_off(a: Attempt, ends: Ends) -> Stand:
+def back_off(a: Attempt, ends: Ends) -> Left:
     """Make the cell safe after a fault: no force, off the surface, stopped.
 
-    Devices are no longer trusted here and their faults change nothing any more. What the arm
-    refuses is left out; the stop at the end is always sent.
+    Devices are no longer trusted here and their faults change nothing any more: only the arm is
+    asked, and one that does not answer is still told. What it refuses is left out; the stop at
+    the end is always sent.
 
     Parameters
     ----------
@@ -99,101 +97,143 @@ def back_off(a: Attempt, ends: Ends) -> Stand:
 
     Returns
     -------
-    Stand
-        Where the arm is left.
+    Left
+        Where the arm is left, and why if that is at the surface.
     """
     s = a.supervisor
     s.logbook.must_write = False
     try:
-        stand = _off_the_surface(a, ends)
+        left = _off_the_surface(a, ends)
         halt(s)
     finally:
         s.logbook.must_write = True
-    return stand
+    return left
 
 
 def halt(supervisor: Supervisor) -> None:
     """Stop the arm; one that does not answer any more cannot be helped from here."""
-    supervisor.logbook.must_write, before = False, supervisor.logbook.must_write
+    _send(supervisor, Action.STOP, supervisor.devices.arm.stop)
+
+
+def disarm(supervisor: Supervisor) -> None:
+    """Take the release for motion back, as `halt` does."""
+    _send(supervisor, Action.DISABLE, supervisor.devices.arm.disable)
+
+
+def _send(supervisor: Supervisor, action: Action, command: Callable[[], None]) -> None:
+    """Send a last command, once, whatever else is out of order."""
+    logbook = supervisor.logbook
+    logbook.must_write, before = False, logbook.must_write
+    sent = False
     try:
-        with supervisor.actuation(Action.STOP):
-            supervisor.devices.arm.stop()
-    except DeviceError:
-        pass
+        with contextlib.suppress(*BROKEN), supervisor.actuation(action):
+            sent = True
+            command()
+        if not sent:  # The journal's time is the clock's: it may be that which failed.
+            with contextlib.suppress(*BROKEN):
+                command()
     finally:
-        supervisor.logbook.must_write = before
+        logbook.must_write = before
 
 
-def _off_the_surface(a: Attempt, ends: Ends) -> Stand:
+def _off_the_surface(a: Attempt, ends: Ends) -> Left:
     if a.step not in OFF_APPROACH:
-        return Stand.WAY if a.step is Step.MOVE else Stand.APPROACH
+        return _between_surfaces(a)
     touching = a.step in TOUCHING or _says_contact(a.supervisor)
     if not touching and ends is Ends.RUN:
-        return Stand.NEAR
-    if a.in_force_control and _try(a.supervisor, Action.RELEASE, lambda: _release_blindly(a)):
+        return Left(Stand.NEAR)
+    if a.in_force_control and not _try(a.supervisor, Action.RELEASE, lambda: _release_blindly(a)):
         a.in_force_control = False
-    if _try(a.supervisor, Action.RETRACT, lambda: _retract_blindly(a)):
-        return Stand.APPROACH
-    return Stand.SURFACE if touching else Stand.NEAR
+    why = _try(a.supervisor, Action.RETRACT, lambda: _retract_blindly(a))
+    if not why:
+        return Left(Stand.APPROACH)
+    return Left(Stand.SURFACE if touching else Stand.NEAR, why)
 
 
-def _try(supervisor: Supervisor, action: Action, do: Callable[[], bool]) -> bool:
-    """Do something that the arm may refuse or never finish; return whether it did it."""
+def _between_surfaces(a: Attempt) -> Left:
+    said = a.supervisor.arm
+    if said is not None and said.in_contact:
+        return Left(Stand.SURFACE, f"{said.source} says that it is in contact, nobody knows where")
+    return Left(Stand.WAY if a.step is Step.MOVE else Stand.APPROACH)
+
+
+def _try(supervisor: Supervisor, action: Action, do: Callable[[], None]) -> str:
+    """Do something that the arm may refuse or never finish; return why not, empty: it did."""
     try:
         with supervisor.actuation(action):
-            return do()
-    except (DeviceError, FaultError):
-        return False
+            do()
+    except BROKEN as error:
+        return str(error) or type(error).__name__
+    return ""
 
 
-def _release_blindly(a: Attempt) -> bool:
+def _release_blindly(a: Attempt) -> None:
     s = a.supervisor
-    if s.devices.arm.state().motion is not Motion.RELEASING:
+    said = s.ask_arm()
+    if said is None or said.motion is not Motion.RELEASING:
         s.devices.arm.release(a.settings.procedure.ramp)
-    return _wait_blindly(s, _idle, _release_time(s))
+    _wait_blindly(s, _idle, _release_time(s))
 
 
-def _retract_blindly(a: Attempt) -> bool:
+def _retract_blindly(a: Attempt) -> None:
     s = a.supervisor
-    if s.devices.arm.state().motion in (Motion.APPROACHING, Motion.RETRACTING):
+    said = s.ask_arm()
+    if said is not None and said.motion in (Motion.APPROACHING, Motion.RETRACTING):
         # An arm need not take a command while it carries out another; it always takes a stop.
         s.devices.arm.stop()
-        s.look_blindly()
+        s.look_at_arm()
         s.devices.arm.enable()
-    start = s.devices.arm.state().T_base_tcp
+    last = s.arm
+    if last is None:
+        raise FaultError(Fault.ARM_STALE, "it has never said where it is")
+    start = last.T_base_tcp
     distance = a.settings.approach_distance - a.line.height(start)
     if distance <= 0.0:
-        return True
+        return
     s.devices.arm.retract(a.line.normal, distance, a.settings.procedure.approach_speed)
-    done: Callable[[Seen], bool] = lambda seen: _has_gone(seen, start[:3, 3], distance)  # noqa: E731
-    return _wait_blindly(s, done, _retract_time(s, distance))
+    done: Callable[[ArmState], bool] = lambda arm: _has_gone(arm, start[:3, 3], distance)  # noqa: E731
+    _wait_blindly(s, done, _retract_time(s, distance))
 
 
-def _wait_blindly(supervisor: Supervisor, done: Callable[[Seen], bool], limit: float) -> bool:
-    # Counted in cycles, as the clock may be what is out of order.
-    for _ in range(int(limit / supervisor.settings.procedure.cycle) + 1):
-        seen = supervisor.look_blindly()
-        if done(seen):
-            return True
-        if seen.arm.motion in (Motion.STOPPED, Motion.DISARMED):
-            return False
-    return False
+def _wait_blindly(supervisor: Supervisor, done: Callable[[ArmState], bool], limit: float) -> None:
+    """Let cycles pass until the arm says that it is done.
+
+    Raises
+    ------
+    FaultError
+        If it stops, or does not say so in time.
+    """
+    procedure = supervisor.settings.procedure
+    # Counted in cycles, as the clock may be what is out of order. An arm that does not answer may
+    # still do what it was told: it is given the time that this takes.
+    patience = int((limit - procedure.timeout) / procedure.cycle) + 1
+    for _ in range(int(limit / procedure.cycle) + 1):
+        arm = supervisor.look_at_arm()
+        if arm is None:
+            patience -= 1
+            if not patience:
+                raise FaultError(Fault.ARM_STALE, "it does not answer")
+            continue
+        if done(arm):
+            return
+        if arm.motion in (Motion.STOPPED, Motion.DISARMED):
+            said = arm.fault or f"it is {arm.motion.value}"
+            raise FaultError(Fault.ARM_STOPPED, f"{arm.source} says: {said}")
+    raise FaultError(Fault.TIME_LIMIT, f"not done after {limit:.1f} s")
 
 
 def _says_contact(supervisor: Supervisor) -> bool:
-    try:
-        return supervisor.devices.arm.state().in_contact
-    except DeviceError:
-        return True
+    said = supervisor.ask_arm()
+    return said is None or said.in_contact
 
 
-def _idle(seen: Seen) -> bool:
-    return seen.arm.motion is Motion.IDLE
+def _idle(arm: ArmState) -> bool:
+    return arm.motion is Motion.IDLE
 
 
-def _has_gone(seen: Seen, start: FloatArray, distance: float) -> bool:
-    gone = float(np.linalg.norm(seen.arm.T_base_tcp[:3, 3] - start))
-    return _idle(seen) and gone > distance - STRAIGHT_ARRIVED
+def _has_gone(arm: ArmState, start: FloatArray, distance: float) -> bool:
+    gone = float(np.linalg.norm(arm.T_base_tcp[:3, 3] - start))
+    return _idle(arm) and gone > distance - STRAIGHT_ARRIVED
 
 
 def _release_time(supervisor: Supervisor) -> float:

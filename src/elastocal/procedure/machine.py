@@ -4,9 +4,10 @@ from collections.abc import Callable
 
 from elastocal.procedure.attempt import Attempt
 from elastocal.procedure.faults import CAUGHT, Ends, FaultError, as_fault
-from elastocal.procedure.leaving import Stand, back_off, release, retract
-from elastocal.procedure.off_surface import aim, move, near, unloaded
+from elastocal.procedure.leaving import back_off, lift, release, retract
+from elastocal.procedure.off_surface import aim, move, near, released, unloaded
 from elastocal.procedure.on_surface import average, engage, load, settle
+from elastocal.procedure.stand import Left, Stand
 from elastocal.procedure.steps import Outcome, Step, following
 
 Action = Callable[[Attempt], Outcome]
@@ -21,6 +22,8 @@ ACTIONS: dict[Step, Action] = {
     Step.SETTLE: settle,
     Step.AVERAGE: average,
     Step.RELEASE: release,
+    Step.LIFT: lift,
+    Step.RELEASED: released,
     Step.RETRACT: retract,
 }
 
@@ -28,10 +31,11 @@ ACTIONS: dict[Step, Action] = {
 class AttemptFailedError(FaultError):
     """An attempt that ended with a fault; the arm has been made safe."""
 
-    def __init__(self, cause: FaultError, place: str, stand: Stand) -> None:
+    def __init__(self, cause: FaultError, place: str, left: Left) -> None:
         super().__init__(cause.fault)
-        self.args = (f"{place}: {cause}",)
-        self.stand = stand
+        more = left.why if left.stand is Stand.SURFACE and left.why != str(cause) else ""
+        self.args = (f"{place}: {cause}" + (f"; no retract: {more}" if more else ""),)
+        self.stand = left.stand
 
 
 def run_attempt(a: Attempt, enter: Callable[[Attempt], None], commit: Action) -> None:
@@ -63,7 +67,7 @@ def run_attempt(a: Attempt, enter: Callable[[Attempt], None], commit: Action) ->
         raise AttemptFailedError(fault, place, back_off(a, fault.fault.ends)) from error
     except BaseException:
         # A mistake in the program, while a tonne of robot may press on the tooling.
-        back_off(a, Ends.RUN)
+        a.stand = back_off(a, Ends.RUN).stand
         raise
 
 

@@ -10,8 +10,9 @@ from elastocal.planning.plan_file import Joints
 from elastocal.procedure.attempt import Attempt
 from elastocal.procedure.entries import Action
 from elastocal.procedure.faults import Fault, FaultError
+from elastocal.procedure.settings import Settings
 from elastocal.procedure.slip import SlipWatch
-from elastocal.procedure.steadiness import LEAST_SAMPLES, Stretch, complaint, steadiness
+from elastocal.procedure.steadiness import LEAST_SAMPLES, Stretch, complaint, shaking, steadiness
 from elastocal.procedure.steps import Outcome
 from elastocal.procedure.supervisor import TIME_SLACK, Supervisor
 from elastocal.procedure.watch import Guard, Seen
@@ -20,6 +21,8 @@ ARRIVED = 5e-3
 """A joint that is closer to its target than this has arrived, in rad or m."""
 STRAIGHT_ARRIVED = 1e-3
 """The same of a straight motion, in m."""
+BIAS = 0.1
+"""Bias of a sensor that is let pass, as a part of the force limit."""
 
 
 def drive(supervisor: Supervisor, way: tuple[Joints, ...], guard: Guard) -> None:
@@ -31,11 +34,15 @@ def drive(supervisor: Supervisor, way: tuple[Joints, ...], guard: Guard) -> None
         See `Supervisor.wait`.
     """
     settings = supervisor.settings
-    for target in way:
+    for leg, target in enumerate(way):
         seen = supervisor.cycle(Guard())
-        # Legs turn the tool: its weight is taken out anew at each.
-        if len(seen.wrenches):
-            supervisor.tare(seen.wrenches.force.mean(axis=0))
+        if seen.arm.in_contact:
+            raise FaultError(Fault.IN_CONTACT, f"{seen.arm.source} says that it is")
+        # Once: a tare at each leg would hide a force that grows from leg to leg.
+        if leg == 0 and len(seen.wrenches):
+            force = seen.wrenches.force.mean(axis=0)
+            refuse_other_weight(force, settings)
+            supervisor.tare(force)
         goal = np.array(target)
         expected = float(settings.axes.duration(seen.arm.q, goal))
         with supervisor.actuation(Action.MOVE, target):
@@ -60,7 +67,7 @@ def aim(a: Attempt) -> Outcome:
     s.aim(a.station)
     s.wait(
         a.guard(),
-        lambda seen: s.watch.sees and len(seen.points) > 0,
+        lambda seen: s.watch.sees and len(seen.points) > 0 and seen.points.station == a.station,
         procedure.beam_timeout + 1.0,
         f"{a.station}: looking for the marker",
     )
@@ -69,6 +76,7 @@ def aim(a: Attempt) -> Outcome:
         forces.add(seen.wrenches.time, seen.wrenches.force)
         points.add(seen.points.time, seen.points.position)
     _refuse_empty(a, forces, points)
+    refuse_other_weight(forces.values.mean(axis=0), a.settings)
     s.tare(forces.values.mean(axis=0))
     a.at_approach = points.values.mean(axis=0)
     return Outcome.GOOD
@@ -79,8 +87,9 @@ def near(a: Attempt) -> Outcome:
     procedure = a.settings.procedure
     seen = a.supervisor.cycle(a.guard())
     distance = a.line.height(seen.arm.T_base_tcp) - a.settings.near_contact
-    seen = go_straight(a, distance, procedure.approach_speed)
-    if seen.arm.in_contact:
+    most = procedure.contact_force + a.noise
+    seen = go_straight(a, distance, procedure.approach_speed, most)
+    if seen.arm.in_contact or felt(seen) > most:
         height = a.line.height(seen.arm.T_base_tcp)
         raise FaultError(Fault.CONTACT_EARLY, f"{height * 1e3:.1f} mm before the expected contact")
     return Outcome.GOOD
@@ -113,15 +122,58 @@ def unloaded(a: Attempt) -> Outcome:
     raise FaultError(Fault.UNLOADED_NOISY, noisy)
 
 
-def go_straight(a: Attempt, distance: float, speed: float) -> Seen:
-    """Make a guarded linear move along the inward normal; return what is seen at its end."""
+def released(a: Attempt) -> Outcome:
+    """Average once more, after the loads: how far the sensor is from its tare then.
+
+    Nothing depends on it but what the summary says of the drift, so it cannot fail.
+    """
+    s, procedure = a.supervisor, a.settings.procedure
+    for _ in s.stay(a.guard(beam=False), procedure.dwell):
+        pass
+    start = s.now
+    for _ in s.stay(a.guard(beam=False), procedure.unloaded_average):
+        pass
+    a.close_window(None, start)
+    return Outcome.GOOD
+
+
+def refuse_other_weight(force: FloatArray, settings: Settings) -> None:
+    """Refuse a force in free air, shape (3,), in N, that is not about the tool's weight.
+
+    Half the weight is left for a mass that is only roughly known, and `BIAS` of the force limit
+    for a sensor that has not been set to zero. Without a mass in the cell nothing is refused.
+
+    Raises
+    ------
+    FaultError
+        With both.
+    """
+    weight = settings.tool_weight
+    if not weight > 0.0:
+        return
+    size, tolerance = float(np.linalg.norm(force)), 0.5 * weight + BIAS * settings.force_limit
+    if not abs(size - weight) <= tolerance:
+        text = f"{size:.0f} N in free air, it weighs {weight:.0f} N, tolerance {tolerance:.0f} N"
+        raise FaultError(Fault.WEIGHT, text)
+
+
+def felt(seen: Seen) -> float:
+    """Return the largest force of a cycle, tared, in N; 0 when nothing has come."""
+    return float(np.linalg.norm(seen.force_tcp, axis=1).max(initial=0.0))
+
+
+def go_straight(a: Attempt, distance: float, speed: float, most: float = np.inf) -> Seen:
+    """Make a guarded linear move along the inward normal; return what is seen at its end.
+
+    It also ends, with the arm still moving, when a force above ``most`` N is felt.
+    """
     s, procedure = a.supervisor, a.settings.procedure
     start = s.cycle(a.guard()).arm.T_base_tcp[:3, 3]
     with s.actuation(Action.APPROACH, (distance,)):
         s.devices.arm.approach(-a.line.normal, distance, speed, procedure.contact_force)
         return s.wait(
             a.guard(),
-            lambda seen: _is_done(seen, start, distance),
+            lambda seen: _is_done(seen, start, distance) or felt(seen) > most,
             2.0 * distance / speed + procedure.timeout,
             "an approach",
         )
@@ -150,11 +202,9 @@ def _wait_for_beam(a: Attempt) -> None:
 
 def _noise(a: Attempt, forces: Stretch, positions: FloatArray) -> str:
     """Return why a window is too noisy for a reference; empty when it is not."""
-    limit = a.settings.procedure.marker_sigma
-    sigma = float(positions.std(axis=0, ddof=1).max())
-    if not sigma <= limit:
-        return f"marker has a sigma of {sigma * 1e6:.0f} um, limit {limit * 1e6:g} um"
-    return complaint(steadiness(forces.time, forces.values), a.settings.procedure) or ""
+    procedure = a.settings.procedure
+    why = shaking(positions, procedure.marker_sigma)
+    return why or complaint(steadiness(forces.time, forces.values), procedure) or ""
 
 
 def _refuse_empty(a: Attempt, forces: Stretch, points: Stretch) -> None:

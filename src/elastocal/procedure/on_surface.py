@@ -7,14 +7,18 @@ from elastocal.cell.devices import Motion
 from elastocal.procedure.attempt import Attempt
 from elastocal.procedure.entries import Action
 from elastocal.procedure.faults import Fault, FaultError
-from elastocal.procedure.off_surface import go_straight
+from elastocal.procedure.off_surface import felt, go_straight
 from elastocal.procedure.pose_log import ReadingStatus
 from elastocal.procedure.slip import SlideWatch
-from elastocal.procedure.steadiness import LEAST_SAMPLES, Stretch, complaint, steadiness
+from elastocal.procedure.steadiness import LEAST_SAMPLES, Stretch, complaint, shaking, steadiness
 from elastocal.procedure.steps import Outcome
 from elastocal.procedure.supervisor import TIME_SLACK
 from elastocal.procedure.watch import Seen
 
+AGREES = 0.5
+"""Smallest part of a force of the arm that its sensor must feel."""
+REACH_MARGIN = 1e-3
+"""How much earlier than at the travel limit the surface counts as missed, in m."""
 WINDOW_TRIES = 3
 """Windows of one load case that may be spoiled before it is given up."""
 
@@ -23,11 +27,14 @@ def engage(a: Attempt) -> Outcome:
     """Go on until the contact force is felt."""
     procedure = a.settings.procedure
     seen = a.supervisor.cycle(a.guard())
-    distance = a.line.height(seen.arm.T_base_tcp) + procedure.travel_limit
+    # Less than the limit: a place that is noisy must not turn a miss into something worse.
+    reach = max(procedure.travel_limit - REACH_MARGIN, 0.5 * procedure.travel_limit)
+    distance = a.line.height(seen.arm.T_base_tcp) + reach
     seen = go_straight(a, distance, procedure.contact_speed)
     if not seen.arm.in_contact:
-        text = f"none within {procedure.travel_limit * 1e3:g} mm beyond the expected one"
+        text = f"none within {reach * 1e3:g} mm beyond the expected one"
         raise FaultError(Fault.CONTACT_MISSED, text)
+    _refuse_contact_unfelt(a, seen)
     return Outcome.GOOD
 
 
@@ -40,6 +47,7 @@ def load(a: Attempt) -> Outcome:
     a.in_force_control = True
     assert a.slip_watch is not None
     a.slide_watch = slide = SlideWatch(a.slip_watch)
+    a.jump_watch = SlideWatch(a.slip_watch, along=True)
     with s.actuation(Action.HOLD, name):
         s.devices.arm.hold(force, ramp)
         for seen in s.stay(a.guard(), float(np.linalg.norm(change)) / ramp):
@@ -57,9 +65,12 @@ def settle(a: Attempt) -> Outcome:
         stretch.add(seen.wrenches.time, seen.force_tcp)
         if seen.time - begin < procedure.dwell - TIME_SLACK or len(stretch) < LEAST_SAMPLES:
             continue
-        why = complaint(steadiness(stretch.time, stretch.values), procedure, force) or ""
+        found = steadiness(stretch.time, stretch.values)
+        why = complaint(found, procedure, force) or ""
         if not why and s.watch.sees:
             return Outcome.GOOD
+        if seen.time - begin > 2.0 * procedure.dwell and not complaint(found, procedure):
+            _refuse_unfollowed(found.mean, force)
     note = f"not stable within {procedure.timeout:g} s: {why or 'the beam is broken'}"
     a.close_window(name, s.now, ReadingStatus.UNSTABLE, note)
     return Outcome.LOST
@@ -69,9 +80,13 @@ def average(a: Attempt) -> Outcome:
     """Take one reading, or find that it cannot be taken."""
     s, (name, force), procedure = a.supervisor, a.load, a.settings.procedure
     start, breaks, forces, points = s.now, s.watch.breaks, Stretch(), Stretch()
+    if a.jump_watch is not None:
+        a.jump_watch.forget()
     for seen in s.stay(a.guard(), procedure.average):
         _refuse_other_motion(seen)
         _see(a, seen)
+        if a.jump_watch is not None:
+            a.jump_watch.see(seen.points.position)
         forces.add(seen.wrenches.time, seen.force_tcp)
         points.add(seen.points.time, seen.points.position)
         if s.watch.breaks > breaks:
@@ -81,6 +96,7 @@ def average(a: Attempt) -> Outcome:
         note = f"{len(forces)} samples of the force and {len(points)} of the marker"
         return _again(a, ReadingStatus.ABORTED, note)
     why = complaint(steadiness(forces.time, forces.values), procedure, force)
+    why = why or shaking(points.values, procedure.marker_sigma)
     if why:
         note = f"not stable in {WINDOW_TRIES} windows: {why}"
         return _again(a, ReadingStatus.UNSTABLE, note)
@@ -101,15 +117,17 @@ def _again(a: Attempt, status: ReadingStatus, note: str) -> Outcome:
 
 def _slip(a: Attempt, positions: FloatArray, force: FloatArray) -> str:
     """Return how the marker slipped during a window or on the way to it; empty: it did not."""
-    watch, slide, procedure = a.slip_watch, a.slide_watch, a.settings.procedure
+    watch, slide, jump, procedure = a.slip_watch, a.slide_watch, a.jump_watch, a.settings.procedure
     assert watch is not None
     assert slide is not None
+    assert jump is not None
     a.slip = watch.so_far(positions)
     moved, limit = abs(a.slip - a.slip_origin), procedure.slip_limit
     expected = procedure.contact_compliance * float(np.linalg.norm(force))
     for length, most, what in (
         (slide.largest, limit, "slid {} at once"),
         (watch.during(positions), limit, "slid {} during the window"),
+        (jump.largest, limit, "jumped {} along the normal"),
         (moved, limit + expected, "is {} aside under this load"),
     ):
         if not length <= most:
@@ -117,6 +135,32 @@ def _slip(a: Attempt, positions: FloatArray, force: FloatArray) -> str:
             said = what.format(f"{length * 1e3:.2f} mm")
             return f"marker {said}, limit {most * 1e3:.2f} mm"
     return ""
+
+
+def _refuse_contact_unfelt(a: Attempt, seen: Seen) -> None:
+    """Refuse a contact that the arm has felt and the sensor has not, within ``stale`` seconds."""
+    s, procedure, largest = a.supervisor, a.settings.procedure, felt(seen)
+    wanted = AGREES * procedure.contact_force
+    if largest >= wanted:
+        return
+    for later in s.stay(a.guard(), procedure.stale):
+        largest = max(largest, felt(later))
+        if largest >= wanted:
+            return
+    text = (
+        f"{seen.arm.source} feels {procedure.contact_force:g} N of contact,"
+        f" {seen.wrenches.source} at most {largest:.0f} N"
+    )
+    raise FaultError(Fault.DISAGREE, text)
+
+
+def _refuse_unfollowed(mean: FloatArray, force: FloatArray) -> None:
+    """Refuse a force that is steady and has hardly come nearer to what was asked."""
+    asked = float(np.linalg.norm(force))
+    along = float(mean @ force) / asked
+    if not along >= AGREES * asked:
+        text = f"{asked:.0f} N are asked for, the sensor feels {along:.0f} N in that direction"
+        raise FaultError(Fault.DISAGREE, text)
 
 
 def _see(a: Attempt, seen: Seen) -> None:

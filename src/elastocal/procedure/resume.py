@@ -35,6 +35,8 @@ class LastKnown:
     """Attempts that each pose has seen."""
     may_touch: bool
     """Whether the tool may have been at the surface when the journal ends."""
+    uncommitted: int | None = None
+    """The pose that was worked on last, if it was not finished."""
 
     @property
     def lines(self) -> tuple[str, ...]:
@@ -70,6 +72,7 @@ def last_known(entries: tuple[Entry, ...]) -> LastKnown:
     for entry in entries:
         if entry.pose is not None and entry.attempt is not None:
             attempts[entry.pose] = max(attempts[entry.pose], entry.attempt)
+    worked_on = next((e.pose for e in reversed(entries) if e.pose is not None), None)
     lost = {e.pose for e in entries if e.event is Event.GIVEN_UP and e.pose is not None}
     return LastKnown(
         entry=entries[-1],
@@ -77,6 +80,7 @@ def last_known(entries: tuple[Entry, ...]) -> LastKnown:
         given_up=tuple(sorted(lost - set(committed))),
         attempts=attempts,
         may_touch=_may_touch(entries),
+        uncommitted=None if worked_on in committed else worked_on,
     )
 
 

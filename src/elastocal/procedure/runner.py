@@ -1,24 +1,27 @@
 """Procedure 1 over all poses: visit each, commit it, go HOME (paper 2.2)."""
 
 import contextlib
+from pathlib import Path
 
 import numpy as np
 
 from elastocal.cell.devices import Devices, Motion
-from elastocal.errors import DeviceError, ProcedureError
+from elastocal.errors import ProcedureError
 from elastocal.planning.plan_file import Joints, PoseRecord
 from elastocal.procedure.attempt import Attempt
 from elastocal.procedure.entries import Action, Event
 from elastocal.procedure.faults import CAUGHT, Ends, Fault, FaultError, as_fault
 from elastocal.procedure.itinerary import remaining
-from elastocal.procedure.job import End, Job, Result, Seams
+from elastocal.procedure.job import End, Job, Result, SavingRecorder, Seams
 from elastocal.procedure.journal import Journal
-from elastocal.procedure.leaving import Stand, halt, let_go, retreat
+from elastocal.procedure.leaving import disarm, halt, let_go, retreat
 from elastocal.procedure.line import Line
 from elastocal.procedure.logbook import Logbook
 from elastocal.procedure.machine import AttemptFailedError, run_attempt
 from elastocal.procedure.off_surface import drive
+from elastocal.procedure.pose_log import ReadingStatus
 from elastocal.procedure.progress import Progress
+from elastocal.procedure.stand import Stand
 from elastocal.procedure.steps import Outcome, Step
 from elastocal.procedure.supervisor import Observers, Supervisor
 from elastocal.procedure.watch import Guard, Seen
@@ -56,6 +59,7 @@ class Runner:
         self._given_up: list[int] = []
         self._failed, self._cycles, self._pose_start = 0, 0, 0.0
         self._stand, self._stop = Stand.WAY, HOME
+        self._watched = True
 
     def run(self) -> Result:
         """Visit all poses that are not committed and return how it went.
@@ -78,8 +82,10 @@ class Runner:
         except CAUGHT as error:
             halt(self._supervisor)
             result = self._failure(as_fault(error), self._stand)
-        except BaseException:
+        except BaseException as error:
             halt(self._supervisor)
+            said = f"mistake in the program: {type(error).__name__}"
+            self._finish(self._result(End.STOPPED, self._stand, said))
             raise
         self._finish(result)
         return result
@@ -87,15 +93,21 @@ class Runner:
     def _begin(self) -> None:
         s = self._supervisor
         home, moving = self._job.home, (Motion.MOVING, Motion.APPROACHING, Motion.RETRACTING)
-        self._stand = Stand.WAY if home.retreat_from is None else Stand.SURFACE
         s.start()
-        if self._devices.arm.state().motion in moving:
+        state = self._devices.arm.state()
+        touches = state.in_contact or home.retreat_from is not None
+        self._stand = Stand.SURFACE if touches else Stand.WAY
+        if state.in_contact and home.retreat_from is None:
+            text = f"{state.source} says that it is, before no pose: free it by hand"
+            raise FaultError(Fault.IN_CONTACT, text)
+        if state.motion in moving:
             halt(s)
         self._arm()
         let_go(s)
         if home.retreat_from is not None:
             limit = self._job.settings.procedure.travel_limit
-            retreat(s, Line.of(home.retreat_from, limit), Guard())
+            height = self._job.settings.approach_distance
+            retreat(s, Line.of(home.retreat_from, limit), Guard(), height)
         self._stand = Stand.WAY
         drive(s, home.way, Guard(self._free_limit))
 
@@ -129,23 +141,41 @@ class Runner:
         path = self._job.folder.streams / a.streams
 
         def commit(a: Attempt) -> Outcome:
-            recorder.save(path)
-            self._log.write(Event.COMMIT, log=a.log())
+            _refuse_nothing(a)
+            digest = _save(recorder, path)
+            # The arm stands at the approach pose: the time that a disk takes is nobody's fault.
+            self._supervisor.pause()
+            self._log.write(Event.COMMIT, log=a.log(), streams_sha256=digest)
             return Outcome.GOOD
 
         try:
             run_attempt(a, self._enter, commit)
         except AttemptFailedError as error:
-            self._failed += 1
-            if error.fault is not Fault.DISK:
-                self._log.write(Event.FAULT, text=str(error))
-                recorder.save(path)
+            # First of all: what fails from here on must not change where the arm is said to stand.
+            self._stand = error.stand
+            self._failed += error.fault is not Fault.INTERRUPTED
+            self._keep(error, recorder, path)
             if error.fault.ends is Ends.RUN or error.stand is not Stand.APPROACH:
                 raise
             return error
+        except BaseException:
+            self._stand = a.stand
+            raise
         finally:
             self._supervisor.recorder = None
         return None
+
+    def _keep(self, error: AttemptFailedError, recorder: SavingRecorder, path: Path) -> None:
+        """Write down a fault and what led to it; a disk that fails as well must not hide it."""
+        if error.fault is Fault.DISK:
+            return
+        self._log.must_write = False
+        with contextlib.suppress(*CAUGHT):
+            self._log.write(Event.FAULT, text=str(error))
+        with contextlib.suppress(*CAUGHT):
+            _save(recorder, path)
+        self._log.must_write = True
+        self._supervisor.pause()
 
     def _new_attempt(self, pose: PoseRecord, legs: tuple[Joints, ...]) -> Attempt:
         number = self._attempts[pose.id] = self._attempts.get(pose.id, 0) + 1
@@ -201,8 +231,12 @@ class Runner:
 
     def _tell(self, seen: Seen) -> None:
         self._cycles += 1
-        if self._cycles % TELL_EVERY == 0:
-            self._seams.tell(self._progress(seen))
+        if self._watched and self._cycles % TELL_EVERY == 0:
+            try:
+                self._seams.tell(self._progress(seen))
+            except OSError:
+                # A terminal that is gone is no reason to stop, and no device's fault.
+                self._watched = False
 
     def _progress(self, seen: Seen) -> Progress:
         a, count = self._attempt, len(self._job.plan.poses)
@@ -238,9 +272,24 @@ class Runner:
         return Result(end, stand, message, tuple(self._given_up), self._failed)
 
     def _finish(self, result: Result) -> None:
+        disarm(self._supervisor)
         self._log.must_write = False
-        # An arm that does not answer any more has been told to stop already.
-        with contextlib.suppress(DeviceError), self._supervisor.actuation(Action.DISABLE):
-            self._devices.arm.disable()
         text = f"{result.end.value}, {result.stand.value}"
-        self._log.write(Event.FINISH, text=f"{text}: {result.message}" if result.message else text)
+        text = f"{text}: {result.message}" if result.message else text
+        with contextlib.suppress(*CAUGHT):
+            self._log.write(Event.FINISH, text=text)
+
+
+def _save(recorder: SavingRecorder, path: Path) -> str | None:
+    """Write the streams and return their digest; what a disk refuses is no device's fault."""
+    try:
+        return recorder.save(path)
+    except OSError as error:
+        raise FaultError(Fault.DISK, str(error)) from error
+
+
+def _refuse_nothing(a: Attempt) -> None:
+    """Refuse a pose of which no load case has settled: it is not the load case then."""
+    loaded = [window for window in a.windows if window.load_case is not None]
+    if loaded and all(window.status is ReadingStatus.UNSTABLE for window in loaded):
+        raise FaultError(Fault.UNSTABLE, loaded[-1].note)

@@ -48,6 +48,10 @@ class SlipWatch:
             movement = movement - (movement @ self.normal) * self.normal
         return float(np.linalg.norm(movement))
 
+    def along(self, movement: FloatArray) -> float:
+        """Return the length of a movement's part along the normal, in m; 0 without a normal."""
+        return 0.0 if self.normal is None else abs(float(movement @ self.normal))
+
     def during(self, positions: FloatArray) -> float:
         """Return how far the marker moved sideways within a window, shape (sample, 3), in m."""
         ends = max(len(positions) // _ENDS, 1)
@@ -65,13 +69,19 @@ class SlideWatch:
     ----------
     slip : SlipWatch
         What the marker did before contact.
+    along : bool, default False
+        Look for jumps along the normal in place of slides aside.
     """
 
-    def __init__(self, slip: SlipWatch) -> None:
-        self._slip = slip
+    def __init__(self, slip: SlipWatch, along: bool = False) -> None:
+        self._length = slip.along if along else slip.lateral
         self._recent: deque[FloatArray] = deque(maxlen=SUDDEN)
         self.largest = 0.0
         """Longest sudden slide so far, in m."""
+
+    def forget(self) -> None:
+        """Begin anew after a gap; the longest slide is kept."""
+        self._recent.clear()
 
     def see(self, positions: FloatArray) -> None:
         """Take the positions of one cycle, shape (sample, 3), in m; none after a gap."""
@@ -79,5 +89,5 @@ class SlideWatch:
             self._recent.clear()
             return
         self._recent.append(positions.mean(axis=0))
-        slide = self._slip.lateral(self._recent[-1] - self._recent[0])
+        slide = self._length(self._recent[-1] - self._recent[0])
         self.largest = max(self.largest, slide)

@@ -74,6 +74,22 @@ def complaint(
     return None
 
 
+def shaking(positions: FloatArray, limit: float) -> str:
+    """Return why a marker is not quiet enough; empty when it is.
+
+    Parameters
+    ----------
+    positions : ndarray, shape (sample, 3)
+        In m; at least two.
+    limit : float
+        Largest standard deviation, each axis, in m.
+    """
+    sigma = float(positions.std(axis=0, ddof=1).max())
+    if not sigma <= limit:
+        return f"marker has a sigma of {sigma * 1e6:.0f} um, limit {limit * 1e6:g} um"
+    return ""
+
+
 class Stretch:
     """The newest samples of a stream, as far back as a duration.
 

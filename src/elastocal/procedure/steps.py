@@ -24,8 +24,12 @@ class Step(Enum):
     """14-21: one reading."""
     RELEASE = "release"
     """24: ramp to zero, back in position control."""
+    LIFT = "lift"
+    """25: straight back, until near contact."""
+    RELEASED = "released"
+    """The unloaded reference once more: how far the sensor has drifted since."""
     RETRACT = "retract"
-    """25: straight back to the approach pose A_i."""
+    """25: straight on to the approach pose A_i."""
     COMMIT = "commit"
     """The streams and then the journal are on the disk: the pose counts."""
     DONE = "done"
@@ -50,7 +54,9 @@ _NEXT = {
     Step.ENGAGE: Step.LOAD,
     Step.LOAD: Step.SETTLE,
     Step.SETTLE: Step.AVERAGE,
-    Step.RELEASE: Step.RETRACT,
+    Step.RELEASE: Step.LIFT,
+    Step.LIFT: Step.RELEASED,
+    Step.RELEASED: Step.RETRACT,
     Step.RETRACT: Step.COMMIT,
     Step.COMMIT: Step.DONE,
 }
@@ -63,11 +69,13 @@ OFF_APPROACH = frozenset(
         Step.SETTLE,
         Step.AVERAGE,
         Step.RELEASE,
+        Step.LIFT,
+        Step.RELEASED,
         Step.RETRACT,
     }
 )
 """States in which the tool is on the line between approach pose and surface."""
-TOUCHING = OFF_APPROACH - {Step.NEAR, Step.UNLOADED}
+TOUCHING = OFF_APPROACH - {Step.NEAR, Step.UNLOADED, Step.RELEASED}
 """States in which the tool may touch the surface."""
 
 

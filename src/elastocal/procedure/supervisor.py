@@ -10,14 +10,18 @@ import numpy as np
 
 from elastocal.arrays import FloatArray
 from elastocal.cell.devices import ArmState, Devices, PointBlock, WrenchBlock
+from elastocal.errors import DeviceError
 from elastocal.procedure.entries import Action
 from elastocal.procedure.faults import Fault, FaultError
+from elastocal.procedure.form import check_arm, check_points, check_wrenches
 from elastocal.procedure.logbook import Logbook
 from elastocal.procedure.settings import Settings
 from elastocal.procedure.watch import Guard, Seen, Watch
 
 TIME_SLACK = 1e-6
 """Times that differ by less are equal, in s: sums of cycles are not exact."""
+BROKEN = (DeviceError, FaultError, OSError)
+"""What a device that is out of order may raise."""
 
 
 class Recorder(Protocol):
@@ -73,6 +77,10 @@ class Supervisor:
         self._tare = np.zeros(3)
         self._R_sensor_tcp = settings.R_tcp_sensor.T
         self._still = 0
+        self._joints = len(devices.arm.joint_names)
+        self._last_end: float | None = None
+        self.arm: ArmState | None = None
+        """The last that the arm has said; None before the first."""
 
     @property
     def now(self) -> float:
@@ -84,6 +92,11 @@ class Supervisor:
         self.devices.sensor.read()
         self.devices.metrology.read()
         self.watch.restart(self.now)
+        self.pause()
+
+    def pause(self) -> None:
+        """Say that until the next cycle nobody needs to watch: the arm stands off the surface."""
+        self._last_end = None
 
     def tare(self, force_sensor: FloatArray) -> None:
         """Take a force in the sensor's frame, shape (3,), as that of the free tool, in N."""
@@ -91,7 +104,7 @@ class Supervisor:
 
     def aim(self, station: str) -> None:
         """Let a tracker station look for the marker."""
-        self.station = station
+        self.station = self.watch.station = station
         self.devices.metrology.look(station)
         self.watch.expect_points(self.now)
 
@@ -105,7 +118,7 @@ class Supervisor:
         DeviceError
             If a device does not answer.
         """
-        seen = self.look_blindly()
+        seen = self._look()
         self._observers.tell(seen)
         if self._observers.interrupted():
             raise FaultError(Fault.INTERRUPTED)
@@ -113,17 +126,61 @@ class Supervisor:
             self.devices.metrology.look(self.station)
         return seen
 
-    def look_blindly(self) -> Seen:
-        """Let one cycle pass and return what the devices say, right or wrong."""
-        devices, recorder = self.devices, self.recorder
+    def look_at_arm(self) -> ArmState | None:
+        """Let one cycle pass and return what the arm says; None when it does not answer.
+
+        For the way off the surface after a fault: the other devices and the clock may be what is
+        out of order, so what they do changes nothing.
+        """
+        self.pause()
+        with contextlib.suppress(*BROKEN):
+            self._pass_time()
+        for look in (self._look_at_sensor, self._look_at_points):
+            with contextlib.suppress(*BROKEN):
+                look()
+        return self.ask_arm()
+
+    def ask_arm(self) -> ArmState | None:
+        """Return what the arm says now; None when it does not answer."""
+        with contextlib.suppress(*BROKEN):
+            return self._look_at_arm()
+        return None
+
+    def _look(self) -> Seen:
+        """Let one cycle pass and return what the devices say."""
         self._pass_time()
-        arm, wrenches, points = devices.arm.state(), devices.sensor.read(), devices.metrology.read()
-        if recorder is not None:
-            recorder.arm(arm)
-            recorder.wrenches(wrenches)
-            recorder.points(points)
+        arm, wrenches, points = (
+            self._look_at_arm(),
+            self._look_at_sensor(),
+            self._look_at_points(),
+        )
         force_tcp = (wrenches.force - self._tare) @ self._R_sensor_tcp
-        return Seen(devices.clock.now(), arm, wrenches, points, force_tcp)
+        # What happens from here to the next cycle, nobody watches.
+        self._last_end = now = self.devices.clock.now()
+        return Seen(now, arm, wrenches, points, force_tcp)
+
+    # What has no form is not recorded either: it could not be written.
+    def _look_at_arm(self) -> ArmState:
+        state = self.devices.arm.state()
+        check_arm(state, self._joints)
+        self.arm = state
+        if self.recorder is not None:
+            self.recorder.arm(state)
+        return state
+
+    def _look_at_sensor(self) -> WrenchBlock:
+        block = self.devices.sensor.read()
+        check_wrenches(block)
+        if self.recorder is not None:
+            self.recorder.wrenches(block)
+        return block
+
+    def _look_at_points(self) -> PointBlock:
+        block = self.devices.metrology.read()
+        check_points(block)
+        if self.recorder is not None:
+            self.recorder.points(block)
+        return block
 
     def wait(self, guard: Guard, done: Callable[[Seen], bool], limit: float, what: str) -> Seen:
         """Let cycles pass until something is done; return what was seen then.
@@ -158,11 +215,14 @@ class Supervisor:
 
     def _pass_time(self) -> None:
         clock, procedure = self.devices.clock, self.settings.procedure
-        before = clock.now()
+        before, longest = clock.now(), max(procedure.stale, procedure.cycle * 5)
+        if self._last_end is not None and not before - self._last_end <= longest:
+            text = f"{before - self._last_end:.2f} s passed between two cycles"
+            raise FaultError(Fault.CLOCK, text)
         clock.sleep(procedure.cycle)
         passed = clock.now() - before
         self._still = 0 if passed > 0.0 else self._still + 1
         if not self._still * procedure.cycle <= procedure.stale:
             raise FaultError(Fault.CLOCK, f"it stands at {before:.3f} s")
-        if not 0.0 <= passed <= max(procedure.stale, procedure.cycle * 5):
+        if not 0.0 <= passed <= longest:
             raise FaultError(Fault.CLOCK, f"{passed:.2f} s passed in a cycle")

@@ -1,5 +1,6 @@
 """Watchdog: looks at what the devices say each cycle and refuses to go on when it is wrong."""
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -42,6 +43,8 @@ class Guard:
     """Line that the tool must keep to."""
     beam: bool = False
     """Whether the marker must be seen."""
+    pressing: bool = False
+    """Whether the tool may press: a sensor that is overloaded then ends the run."""
 
 
 class Watch:
@@ -61,6 +64,8 @@ class Watch:
         self._row: tuple[float, ...] = ()
         self._lost_at: float | None = None
         self._looked_at = -np.inf
+        self.station: str | None = None
+        """Which station is to measure; None: any."""
         self.breaks = 0
         """How often the beam was found broken so far."""
 
@@ -87,7 +92,7 @@ class Watch:
             With what is wrong.
         """
         self._check_arm(seen.arm, seen.time)
-        self._check_sensor(seen.wrenches, seen.time)
+        self._check_sensor(seen.wrenches, seen.time, guard.pressing)
         self._check_force(seen.force_tcp, guard.force)
         if guard.line is not None:
             guard.line.check(seen.arm.T_base_tcp)
@@ -99,12 +104,15 @@ class Watch:
             raise FaultError(Fault.ARM_STOPPED, f"{state.source} says: {said}")
         self._check_age(Fault.ARM_STALE, state.source, state.time, now)
 
-    def _check_sensor(self, block: WrenchBlock, now: float) -> None:
+    def _check_sensor(self, block: WrenchBlock, now: float, pressing: bool) -> None:
         if block.status is not SensorStatus.OK:
-            saturated = block.status is SensorStatus.SATURATED
-            fault = Fault.SENSOR_SATURATED if saturated else Fault.SENSOR_FAULT
+            fault = Fault.SENSOR_FAULT
+            if block.status is SensorStatus.SATURATED:
+                fault = Fault.SENSOR_OVERLOAD if pressing else Fault.SENSOR_SATURATED
             raise FaultError(fault, f"{block.source} says: {block.status.value}")
         if len(block):
+            if not math.isfinite(block.moment.sum()):
+                raise FaultError(Fault.SENSOR_FAULT, f"{block.source}: its moment is not finite")
             first = float(block.time[0])
             if not first >= self._sensor_time - self._stale:
                 text = f"{block.source}: {first:.3f} s after {self._sensor_time:.3f} s"
@@ -131,6 +139,7 @@ class Watch:
         if block.beam is BeamState.LOCKED:
             self._lost_at = None
             if len(block):
+                self._check_points(block, now)
                 self._point_time = float(block.time[-1])
             self._check_age(Fault.TRACKER_STALE, block.source, self._point_time, now)
             return False
@@ -145,6 +154,16 @@ class Watch:
             self._looked_at = now
             return True
         return False
+
+    def _check_points(self, block: PointBlock, now: float) -> None:
+        if not math.isfinite(block.position.sum()):
+            text = f"{block.source} is locked, but its positions are not finite"
+            raise FaultError(Fault.TRACKER_FAULT, text)
+        # Another station may still deliver for a moment after it was told to leave off.
+        late = now - self._looked_at > self._stale
+        if late and self.station is not None and block.station != self.station:
+            text = f"{block.source}: {block.station} measures, not {self.station}"
+            raise FaultError(Fault.TRACKER_FAULT, text)
 
     def _check_age(self, fault: Fault, source: str, time: float, now: float) -> None:
         if not now - time <= self._stale:

@@ -3,6 +3,7 @@
 Stops are numbered: -1 is HOME, 0 the first pose, and the number of poses HOME again.
 """
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 
@@ -18,6 +19,9 @@ AT_HOME = 0.01
 """A joint that is closer to HOME than this is there, in rad or m."""
 ON_THE_WAY = 0.02
 """A joint that is closer to a leg than this is on it, in rad or m."""
+TILTED = 0.2
+"""A tool whose z axis is turned from the inward normal by more does not stand before that
+surface, in rad."""
 SAME_POSTURE = 0.5
 """Joints of one posture differ by less between approach pose and contact, in rad or m."""
 
@@ -62,7 +66,13 @@ class WayHome:
     """Joint positions to pass then; none when the arm is at HOME."""
 
 
-def way_home(plan: PlanFile, q: FloatArray, T_base_tcp: FloatArray, travel_limit: float) -> WayHome:
+def way_home(
+    plan: PlanFile,
+    q: FloatArray,
+    T_base_tcp: FloatArray,
+    travel_limit: float,
+    likely: int | None = None,
+) -> WayHome:
     """Return the way to HOME, over legs that the arm may have come along.
 
     Parameters
@@ -75,6 +85,9 @@ def way_home(plan: PlanFile, q: FloatArray, T_base_tcp: FloatArray, travel_limit
         Its tool frame.
     travel_limit : float
         How far the tool may be beyond the contact or aside, in m.
+    likely : int, optional
+        The pose that the journal says the arm was at. Of several poses that the arm may stand
+        before it is the one; without it, the one whose line is nearest.
 
     Raises
     ------
@@ -83,10 +96,13 @@ def way_home(plan: PlanFile, q: FloatArray, T_base_tcp: FloatArray, travel_limit
     """
     if float(np.abs(q - plan.robot.home).max()) <= AT_HOME:
         return WayHome(None, ())
-    for pose in plan.poses:
-        if _stands_before(plan, pose, q, T_base_tcp, travel_limit):
-            here = (pose.approach_joints,)
-            return WayHome(pose, here + way(plan, pose.id, HOME))
+    before = [p for p in plan.poses if _stands_before(plan, p, q, T_base_tcp, travel_limit)]
+    if before:
+        pose = min(
+            before,
+            key=lambda pose: (pose.id != likely, Line.of(pose, travel_limit).aside(T_base_tcp)),
+        )
+        return WayHome(pose, (pose.approach_joints, *way(plan, pose.id, HOME)))
     distance, back = min(_legs(plan, q), key=lambda leg: leg[0])
     if not distance <= ON_THE_WAY:
         raise ProcedureError(
@@ -105,6 +121,7 @@ def _stands_before(
     return (
         float(posture.max()) <= SAME_POSTURE
         and line.aside(T_base_tcp) <= travel_limit
+        and -float(T_base_tcp[:3, 2] @ line.normal) >= math.cos(TILTED)
         and -travel_limit <= height <= plan.contact.approach_distance + 1e-3
     )
 

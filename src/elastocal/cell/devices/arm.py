@@ -64,7 +64,7 @@ class RobotArm(Protocol):
         """Names of the joints, in the order of every joint array."""
 
     def state(self) -> ArmState:
-        """Return the newest state."""
+        """Return the newest state, within a supervision cycle; it does not wait for a newer one."""
 
     def enable(self) -> None:
         """Release the arm for motion; it then is idle. Refused while a fault stands."""

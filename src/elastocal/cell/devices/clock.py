@@ -10,4 +10,4 @@ class Clock(Protocol):
         """Return the time in s since an origin of the clock's own."""
 
     def sleep(self, seconds: float) -> None:
-        """Let time pass; devices go on meanwhile."""
+        """Let time pass, and no more than that; devices go on meanwhile."""

@@ -51,4 +51,7 @@ class ForceSensor(Protocol):
         """Nominal number of samples a second."""
 
     def read(self) -> WrenchBlock:
-        """Return the samples since the last call; the newest few hundred when there are more."""
+        """Return the samples since the last call; the newest few hundred when there are more.
+
+        Returns at once, empty when nothing has come.
+        """

@@ -48,7 +48,10 @@ class Metrology(Protocol):
         """Nominal number of samples a second."""
 
     def look(self, station: str) -> None:
-        """Measure with this station from now on, and find the marker again if it was lost."""
+        """Measure with this station from now on, and find the marker again if it was lost.
+
+        Returns at once; `read` says whether it was found.
+        """
 
     def read(self) -> PointBlock:
-        """Return the positions since the last call; none while the beam is broken."""
+        """Return the positions since the last call, at once; none while the beam is broken."""
