@@ -151,13 +151,14 @@ def _derived(job: Prepared, result: Result) -> Finished:
 def _task(job: Prepared, known: LastKnown | None, devices: Devices) -> Job:
     """Return what is left to do, and the way to HOME from where the arm stands."""
     state, limit = devices.arm.state(), job.settings.procedure.travel_limit
+    likely = known.uncommitted if known else None
     return Job(
         job.plan,
         job.settings,
         job.folder,
         committed=frozenset(known.committed) if known else frozenset(),
         attempts=known.attempts if known else {},
-        home=way_home(job.plan, state.q, state.T_base_tcp, limit),
+        home=way_home(job.plan, state.q, state.T_base_tcp, limit, likely),
     )
 
 
