@@ -5,11 +5,14 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from elastocal.cli.posture_option import START_HELP, parse_frame, parse_posture, written_posture
-
 if TYPE_CHECKING:
     from elastocal.compensation.offline import KrlResult, Tally
     from elastocal.robot import Robot
+
+START_HELP = (
+    "Posture before the first row, a quantity a joint from base to tip:"
+    " '0 deg, -90 deg, 90 deg, 0 deg, 45 deg, 0 deg'."
+)
 
 
 def compensate(
@@ -36,6 +39,7 @@ def compensate(
     """Correct a programmed path so that the loaded tool is where it was programmed."""
     from elastocal.cli.coverage import NOT_COVERED, covered
     from elastocal.cli.output import console, print_json, refuse_overwriting
+    from elastocal.cli.posture_option import parse_frame, parse_posture
     from elastocal.cli.progress import progress_bars
     from elastocal.compensation.offline import Settings, compensate_krl, compensate_path
     from elastocal.errors import FileAccessError, UnitError
@@ -89,6 +93,8 @@ def _lines(tally: "Tally", out: Path) -> list[str]:
 
 
 def _path_notes(tally: "Tally", robot: "Robot", start: str | None) -> list[str]:
+    from elastocal.cli.posture_option import written_posture
+
     notes = []
     if tally.jumps:
         notes.append(

@@ -10,11 +10,6 @@ from elastocal.robot import Robot
 from elastocal.robot.pose import T_from_xyzabc
 from elastocal.units import parse_quantity
 
-START_HELP = (
-    "Posture before the first row, a quantity a joint from base to tip:"
-    " '0 deg, -90 deg, 90 deg, 0 deg, 45 deg, 0 deg'."
-)
-
 
 def parse_posture(robot: Robot, text: str | None) -> FloatArray | None:
     """Return joint positions, shape (joint,), in rad or m; None for no text.
