@@ -103,7 +103,7 @@ def test_a_program_is_corrected_with_a_table_of_forces(folder):
 @pytest.mark.parametrize(
     ("arguments", "why"),
     [
-        (("--limit", "1 mm"), "row 2: a correction of 2.0"),
+        (("--limit", "1 mm"), "row 2: a deflection of 2.0"),
         (("--limit", "-1 mm"), "--limit '-1 mm' must be above 0"),
         (("--start", "0 deg"), "has 1 values"),
         (("--start", ", ".join(["200 deg"] * 6)), "joint_1 at 200 deg is outside its limits"),

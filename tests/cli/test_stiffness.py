@@ -6,11 +6,18 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from elastocal.elastic import ElasticModel, layout
-from elastocal.identification import CalibratedModel, Observability, write_model
+from elastocal.identification import write_model
 from elastocal.robot.pose import xyzabc_from_T
 from support.cli import elastocal
-from support.paths import calibrated, dome_course, euler_columns, read_csv, start_text, write_csv
+from support.paths import (
+    calibrated,
+    dome_course,
+    euler_columns,
+    made_up,
+    read_csv,
+    start_text,
+    write_csv,
+)
 from support.simulated import example_cell, places
 
 FILES = {"postures.csv", "choice.csv", "stiffness.svg", "stiffness.png", "stiffness.json"}
@@ -91,11 +98,7 @@ def test_what_cannot_be_done_is_one_line(folder, arguments, why):
 
 def test_a_cell_brings_its_rail_its_margins_and_its_tooling(folder):
     cell = example_cell("afp")
-    model = ElasticModel(cell.robot, layout(cell.robot, "bearing"))
-    n = len(model.springs)
-    c = np.full(n, 1e-6)
-    seen = Observability(n, n, 1.0, (True,) * n, ())
-    write_model(folder / "afp.json", CalibratedModel(model, c, np.tile(c, (40, 1)), seen), {})
+    write_model(folder / "afp.json", made_up(cell.robot), {})
     q = np.array([place.q for place in places("afp", 2)])
     pose = xyzabc_from_T(cell.robot.forward(q)) * np.array([1e3] * 3 + [180.0 / np.pi] * 3)
     names = ("x[mm]", "y[mm]", "z[mm]", "a[deg]", "b[deg]", "c[deg]")

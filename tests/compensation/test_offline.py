@@ -14,8 +14,8 @@ from elastocal.compensation.offline import (
 )
 from elastocal.compensation.offline.follow import jumps
 from elastocal.compensation.path import PathError
-from elastocal.elastic import ElasticModel, layout
-from elastocal.identification import CalibratedModel, Observability
+from elastocal.elastic import ElasticModel
+from elastocal.identification import CalibratedModel
 from elastocal.robot import Robot
 from elastocal.robot.inverse import inverse_for
 from elastocal.sim.scene import START
@@ -27,6 +27,7 @@ from support.paths import (
     euler_columns,
     force_columns,
     joint_columns,
+    made_up,
     quaternion_columns,
     read_csv,
     write_csv,
@@ -53,13 +54,6 @@ def programmed() -> tuple[np.ndarray, np.ndarray]:
 def corrected(**changes):
     q, force = programmed()
     return correct(SOLVER, calibrated(), q, COURSE, (force, None), named, **changes)
-
-
-def made_up(robot: Robot, compliance: float = 1e-6) -> CalibratedModel:
-    model = ElasticModel(robot, layout(robot, "bearing"))
-    n = len(model.springs)
-    c = np.full(n, compliance)
-    return CalibratedModel(model, c, np.tile(c, (40, 1)), Observability(n, n, 1.0, (True,) * n, ()))
 
 
 class TestCorrect:
@@ -295,9 +289,12 @@ class TestPathFile:
         )
         assert [path.name for path in tmp_path.iterdir()] == ["path.csv"]
 
-    def test_a_correction_too_large_to_be_meant_is_refused(self, tmp_path):
+    def test_a_deflection_too_large_to_be_meant_is_refused(self, tmp_path):
         columns = euler_columns(COURSE[:3]) | {f"force_{a}[kN]": [0.0, 0.0, 30.0] for a in "xyz"}
-        with pytest.raises(PathError, match=r"row 4: a correction of .* is the force in another"):
+        huge = {f"force_{a}[N]": [1e200, 0.0, 0.0] for a in "xyz"}
+        with pytest.raises(PathError, match=r"row 2: a deflection of (inf|nan) mm"):
+            self.run(tmp_path, euler_columns(COURSE[:3]) | huge)
+        with pytest.raises(PathError, match=r"row 4: a deflection of .* is the force in another"):
             self.run(tmp_path, columns)
 
     def test_a_rail_stands_where_its_column_or_the_start_has_it(self, tmp_path):

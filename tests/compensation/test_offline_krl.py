@@ -1,17 +1,21 @@
 """KUKA programs: what comes back byte for byte, what is corrected, what is refused by line."""
 
+import re
+
 import numpy as np
 import pytest
 
 from elastocal.compensation.offline import Settings, compensate_krl, correct, follow
 from elastocal.compensation.path import PathError
 from elastocal.errors import FileAccessError
+from elastocal.robot import Robot
 from elastocal.robot.inverse import inverse_for
 from elastocal.robot.pose import T_from_xyzabc, xyzabc_from_T
 from elastocal.sim.scene import START
 from support import krl
 from support.cells import robot
-from support.paths import FORCE_TCP, calibrated, dome_course
+from support.paths import FORCE_TCP, calibrated, dome_course, made_up
+from support.urdfs import KR_LIKE, opw_arm_urdf
 
 COURSE = dome_course(4)
 BASE = T_from_xyzabc(0.8, -0.1, 0.2, 0.3, 0.0, 0.1)
@@ -242,3 +246,32 @@ def test_a_program_without_its_dat_file_is_refused(tmp_path):
     (tmp_path / "a.src").write_text("DEF a( )\nEND\n")
     with pytest.raises(FileAccessError, match="must be beside"):
         compensate_krl(calibrated(), tmp_path / "a.src", tmp_path / "f.csv", tmp_path / "b.src")
+
+
+def test_the_rail_stands_where_e1_has_it_else_where_it_stood(tmp_path):
+    arm = Robot.from_urdf(opw_arm_urdf(**KR_LIKE, rail=(-2.0, 2.0)), "tcp")
+    q = np.array([[0.5, 0.1, 0.6, 0.9, 0.2, 0.8, 0.0], [0.7, 0.1, 0.6, 0.9, 0.2, 0.8, 0.0]])
+    names = ("X", "Y", "Z", "A", "B", "C")
+    poses = xyzabc_from_T(arm.forward(q)) * np.array([1e3] * 3 + [180.0 / np.pi] * 3)
+    values = [",".join(f"{k} {v:.6f}" for k, v in zip(names, pose, strict=True)) for pose in poses]
+    axes = ",".join(f"A{i} {v:.6f}" for i, v in enumerate(np.degrees(q[0, 1:]), start=1))
+    data = [
+        f"DECL E6AXIS XAPP={{{axes},E1 500.0}}",
+        f"DECL FRAME XP1={{{values[0]}}}",
+        f"DECL E6POS XP2={{{values[1]},S 2,T 10,E1 700.0,E2 0.0}}",
+    ]
+    (tmp_path / "a.src").write_text("PTP XAPP\nLIN XP1\nLIN XP2\n")
+    (tmp_path / "a.dat").write_text("\n".join(data) + "\n")
+    (tmp_path / "f.csv").write_text(
+        "point,force_x[N],force_y[N],force_z[N]\nXP1,0,300,900\nxp2,0,300,900\n"
+    )
+    model = made_up(arm)
+    out = tmp_path / "b.src"
+    compensate_krl(model, tmp_path / "a.src", tmp_path / "f.csv", out)
+    load = (np.tile([0.0, 300.0, 900.0], (2, 1)), None)
+    expected = correct(inverse_for(arm), model, q, arm.forward(q), load, str)
+    for row, name in enumerate(("XP1", "XP2")):
+        (line,) = [line for line in (tmp_path / "b.dat").read_text().splitlines() if name in line]
+        found = [float(re.search(rf"\b{key} (\S+?),", line)[1]) / 1e3 for key in "XYZ"]
+        np.testing.assert_allclose(found, expected.T_base_tcp[row, :3, 3], atol=2e-7)
+    assert "S 2,T 10,E1 700.0,E2 0.0}" in (tmp_path / "b.dat").read_text()

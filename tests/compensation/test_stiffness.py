@@ -17,14 +17,13 @@ from elastocal.compensation.stiffness import (
     survey,
     within_limits,
 )
-from elastocal.elastic import ElasticModel, layout
 from elastocal.errors import RobotError
-from elastocal.identification import CalibratedModel, Observability
+from elastocal.identification import CalibratedModel
 from elastocal.robot import Robot
 from elastocal.robot.inverse import NumericalInverse, inverse_for
 from elastocal.sim.scene import START
 from support.cells import rich_truth, robot
-from support.paths import calibrated, dome_course, euler_columns, write_csv
+from support.paths import calibrated, dome_course, euler_columns, made_up, write_csv
 from support.simulated import example_cell, places
 from support.urdfs import KR_LIKE, opw_arm_urdf
 
@@ -40,13 +39,6 @@ BEAM = {
 NOWHERE = np.zeros((1, 0))
 SPINS = np.radians(np.arange(0.0, 360.0, 30.0))
 Q = np.array([[0.1, -1.2, 1.9, 0.4, 0.9, 0.3], [0.5, -0.9, 1.5, -0.4, -0.9, 1.3]])
-
-
-def made_up(robot: Robot) -> CalibratedModel:
-    model = ElasticModel(robot, layout(robot, "bearing"))
-    n = len(model.springs)
-    c = np.full(n, 1e-6)
-    return CalibratedModel(model, c, np.tile(c, (40, 1)), Observability(n, n, 1.0, (True,) * n, ()))
 
 
 @pytest.fixture(scope="module")

@@ -6,7 +6,9 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from elastocal.identification import CalibratedModel, calibrate
+from elastocal.elastic import ElasticModel, layout
+from elastocal.identification import CalibratedModel, Observability, calibrate
+from elastocal.robot import Robot
 from elastocal.robot.pose import xyzabc_from_T
 from elastocal.sim.scene import START, SphericalCap
 from support.cells import TRACKED, Cell, rich_truth, robot
@@ -21,6 +23,14 @@ def calibrated() -> CalibratedModel:
     """Return the model calibrated on the arm with bending links, from noisy readings."""
     readings = Cell(rich_truth(), noise=TRACKED).readings()
     return calibrate(elastic(), readings, np.random.default_rng(0)).calibrated
+
+
+def made_up(robot: Robot) -> CalibratedModel:
+    """Return a model of any robot, all springs equal, without a calibration."""
+    model = ElasticModel(robot, layout(robot, "bearing"))
+    n = len(model.springs)
+    c = np.full(n, 1e-6)
+    return CalibratedModel(model, c, np.tile(c, (40, 1)), Observability(n, n, 1.0, (True,) * n, ()))
 
 
 def dome_course(count: int = 40, width: float = 0.4) -> np.ndarray:

@@ -30,7 +30,7 @@ def compensate(
     ] = None,
     start: Annotated[str | None, typer.Option(help=START_HELP)] = None,
     largest: Annotated[
-        str, typer.Option("--limit", help="Largest correction that is taken for one.")
+        str, typer.Option("--limit", help="Largest deflection that is taken for one.")
     ] = "20 mm",
     as_json: Annotated[
         bool, typer.Option("--json", help="Print the figures as one JSON object.")

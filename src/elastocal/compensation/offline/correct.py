@@ -25,6 +25,8 @@ from elastocal.robot.inverse.limits import TURN
 Where = Callable[[int], str]
 """Names a row for a person, e.g. ``row 12``."""
 
+LARGEST = 0.02
+"""Largest deflection that is taken for one, in m."""
 TOLERANCE = 1e-9
 """What is left of position (m) and orientation (rad); the contract is 1e-7 m."""
 _STEPS = 12
@@ -65,6 +67,7 @@ def correct(
     wrench: tuple[FloatArray, FloatArray | None],
     where: Where,
     may_turn: bool = False,
+    largest: float = LARGEST,
 ) -> Correction:
     """Return the corrected rows of a path.
 
@@ -85,16 +88,20 @@ def correct(
     may_turn : bool
         Whether a joint that the correction takes over its limit may stand a whole turn elsewhere:
         in a path of poses the controller chooses the turn, in a path of joints it would rotate.
+    largest : float
+        Largest deflection that is taken for one, in m.
 
     Raises
     ------
     PathError
-        If a programmed or corrected row is outside the joint limits or out of reach.
+        If a programmed or corrected row is outside the joint limits or out of reach, or deflects
+        farther than can be meant.
     """
     robot = calibrated.model.robot
     check_limits(robot, q, where, "is programmed")
     load = _Load(calibrated, *wrench)
     deflection = load.deflection(q, np.arange(len(q)))
+    _check_size(deflection, largest, where)
     first = uncorrected = deflection.copy()
     q, reached = q.copy(), T_base_tcp.copy()
     error = _error(T_base_tcp, deflection, T_base_tcp)
@@ -182,7 +189,22 @@ class _Load:
     def deflection(self, q: FloatArray, rows: IndexArray) -> FloatArray:
         model, c = self.calibrated.model, self.calibrated.compliance
         moment = None if self.moment is None else self.moment[rows]
-        return model.deflection(c, q, self.force[rows], moment)
+        # What overflows is refused by its size.
+        with np.errstate(over="ignore", invalid="ignore"):
+            return model.deflection(c, q, self.force[rows], moment)
+
+
+def _check_size(deflection: FloatArray, largest: float, where: Where) -> None:
+    """Refuse deflections that cannot be meant."""
+    with np.errstate(over="ignore"):
+        length = np.linalg.norm(deflection, axis=1)
+    fits = length <= largest
+    if not fits.all():
+        row = int(np.argmin(fits))
+        raise PathError(
+            f"{where(row)}: a deflection of {1e3 * length[row]:.4g} mm is above the limit of"
+            f" {1e3 * largest:.4g} mm: is the force in another unit or frame?"
+        )
 
 
 def _error(T: FloatArray, deflection: FloatArray, T_wanted: FloatArray) -> FloatArray:

@@ -9,7 +9,7 @@ from typing import Any, TextIO
 import numpy as np
 
 from elastocal.arrays import FloatArray
-from elastocal.compensation.offline.correct import Correction, Where, check_limits, correct
+from elastocal.compensation.offline.correct import LARGEST, Correction, Where, check_limits, correct
 from elastocal.compensation.offline.follow import follow, jumps, nearest_zero_posture
 from elastocal.compensation.offline.tally import Tally
 from elastocal.compensation.path import (
@@ -32,8 +32,6 @@ from elastocal.robot.inverse import InverseKinematics, inverse_for
 
 PIECE = 2000
 """Rows corrected at a time; bounds memory."""
-LARGEST = 0.02
-"""Largest correction that is taken for one, in m."""
 _ADDED = tuple(f"deflection_{axis}{end}[m]" for end in ("", "_low", "_high") for axis in "xyz")
 
 
@@ -44,7 +42,7 @@ class Settings:
     start: FloatArray | None = None
     """Posture before the first row of a path of poses, shape (joint,), in rad or m."""
     largest: float = LARGEST
-    """Largest correction that is taken for one, in m."""
+    """Largest deflection that is taken for one, in m."""
 
 
 def compensate_path(
@@ -107,7 +105,6 @@ def _run(
         q, T = programmed(job.solver, values, previous, labels.__getitem__)
         found = _corrected(job, values, q, T, labels.__getitem__)
         shift = found.T_base_tcp[:, :3, 3] - T[:, :3, 3]
-        check_size(shift, job.settings.largest, labels)
         turned: list[int] = []
         if job.columns.by_pose:
             # How the first row is reached is not the path's.
@@ -170,34 +167,9 @@ def _corrected(
     moment = turned_to_base(values.moment, job.columns.moment, T)
     if force is None:
         raise PathError("path has no forces")
-    return correct(job.solver, job.calibrated, q, T, (force, moment), where, job.columns.by_pose)
-
-
-def check_size(shift: FloatArray, largest: float, labels: list[str]) -> None:
-    """Refuse corrections that cannot be meant.
-
-    Parameters
-    ----------
-    shift : ndarray, shape (row, 3)
-        Corrected minus programmed position, in m.
-    largest : float
-        In m.
-    labels : list of str
-        Names of the rows.
-
-    Raises
-    ------
-    PathError
-        If one is larger.
-    """
-    length = np.linalg.norm(shift, axis=1)
-    fits = length <= largest
-    if not fits.all():
-        row = int(np.argmin(fits))
-        raise PathError(
-            f"{labels[row]}: a correction of {1e3 * length[row]:.4g} mm is above the limit of"
-            f" {1e3 * largest:.4g} mm: is the force in another unit or frame?"
-        )
+    wrench, largest = (force, moment), job.settings.largest
+    by_pose = job.columns.by_pose
+    return correct(job.solver, job.calibrated, q, T, wrench, where, by_pose, largest)
 
 
 def _write(writer: Any, job: _Job, piece: Piece, kept: list[int], found: Correction) -> None:

@@ -12,7 +12,7 @@ from elastocal.compensation.offline.krl.moves import Program, read_program
 from elastocal.compensation.offline.krl.points import Point, read_points, replaced
 from elastocal.compensation.offline.krl.text import read_lines
 from elastocal.compensation.offline.krl.walk import Walk
-from elastocal.compensation.offline.path_file import Settings, check_size
+from elastocal.compensation.offline.path_file import Settings
 from elastocal.compensation.offline.tally import Tally
 from elastocal.compensation.path import PathError, in_file, turned_to_base
 from elastocal.errors import FileAccessError, nearest
@@ -148,7 +148,6 @@ def _corrected(
     # An E6AXIS means its joints as they stand; the turn of a frame is the controller's.
     frames = not any(walk.points[name].by_axes for name in postures)
     wrench = (force, moment)
-    found = correct(walk.solver, calibrated, q, T, wrench, labels.__getitem__, frames)
+    found = correct(walk.solver, calibrated, q, T, wrench, labels.__getitem__, frames, largest)
     shift = found.T_base_tcp[:, :3, 3] - T[:, :3, 3]
-    check_size(shift, largest, labels)
     return found, Tally().plus(found, shift, labels, [])
