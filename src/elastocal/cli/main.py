@@ -11,11 +11,15 @@ import typer
 from elastocal import __version__
 from elastocal.cli.calibrate import calibrate
 from elastocal.cli.check import check
+from elastocal.cli.compensate import compensate
 from elastocal.cli.demo import demo
+from elastocal.cli.export import export
 from elastocal.cli.init import init
 from elastocal.cli.plan import plan
 from elastocal.cli.predict import predict
 from elastocal.cli.robots import robots
+from elastocal.cli.stiffness import stiffness
+from elastocal.cli.tool import tool
 from elastocal.errors import ElastocalError
 
 app = typer.Typer(
@@ -25,7 +29,19 @@ app = typer.Typer(
     add_completion=False,
     pretty_exceptions_enable=False,
 )
-for command in (robots, init, check, plan, calibrate, predict, demo):
+for command in (
+    robots,
+    init,
+    check,
+    plan,
+    calibrate,
+    predict,
+    tool,
+    compensate,
+    stiffness,
+    export,
+    demo,
+):
     app.command()(command)
 
 
