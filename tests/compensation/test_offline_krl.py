@@ -163,6 +163,20 @@ def test_a_frame_without_posture_needs_one(program):
     assert program(src, settings=Settings(start=posture())).tally.rows == 4
 
 
+def test_axis_values_in_the_motion_itself_tell_the_posture(program):
+    values = ", ".join(f"A{i} {v:.6f}" for i, v in enumerate(np.degrees(posture()), start=1))
+    expected = program()
+    corrected = expected.files[1].read_bytes()
+    found = program(changed("PTP XHOME", f"PTP {{E6AXIS: {values}}} C_PTP", SRC))
+    assert found.files[1].read_bytes() == corrected
+    assert found.assumed == expected.assumed == ()
+
+
+def test_a_motion_after_a_ptp_that_tells_no_posture_is_named(program):
+    src = changed("LIN XP4", "PTP XELSEWHERE\r\nLIN XP4", SRC)
+    assert program(src).assumed == ("line 17, LIN XP4",)
+
+
 @pytest.mark.parametrize(
     ("old", "new", "why"),
     [

@@ -119,6 +119,11 @@ def _program_notes(program: "KrlResult", base: str | None) -> list[str]:
         f" {tool} for its tcp",
         f"{src.name} is the program as it was, {dat.name} has the corrected points",
     ]
+    if program.assumed:
+        notes.append(
+            f"{len(program.assumed)} motions (first: {program.assumed[0]}) come from a PTP that does"
+            " not tell its posture (no E6AXIS of the .dat file): the last one known is taken"
+        )
     if program.name and program.name.lower() != src.stem.lower():
         notes.append(f"the program inside is {program.name}: a controller wants {program.name}.src")
     return notes

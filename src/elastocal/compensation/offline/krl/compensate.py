@@ -33,6 +33,8 @@ class KrlResult:
     """What the program calls itself; empty when it does not say."""
     files: tuple[Path, Path]
     """``.src`` and ``.dat``."""
+    assumed: tuple[str, ...]
+    """Motions that come from a ``PTP`` which does not tell its posture: the last known is taken."""
 
 
 def compensate_krl(
@@ -78,7 +80,8 @@ def compensate_krl(
     with in_file(src):
         program = read_program(lines, data)
         targets = _targets(program, points, table, forces)
-        postures = walk.postures(program.moves, targets, settings.start)
+        reached = walk.postures(program.moves, targets, settings.start)
+    postures = reached.postures
     with in_file(dat):
         found, tally = _corrected(calibrated, walk, table, postures, settings.largest)
     for row, name in enumerate(postures):
@@ -88,7 +91,8 @@ def compensate_krl(
     with replacing(out) as new_src, replacing(out_dat) as new_dat:
         new_src.write_bytes("".join(lines).encode("latin-1"))
         new_dat.write_bytes("".join(data).encode("latin-1"))
-    return KrlResult(tally, program.base, program.tool, program.name, (Path(out), out_dat))
+    files = (Path(out), out_dat)
+    return KrlResult(tally, program.base, program.tool, program.name, files, reached.assumed)
 
 
 def _dat_of(src: Path) -> Path:

@@ -4,6 +4,7 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
+from elastocal.compensation.offline.krl.points import Point, read_axes
 from elastocal.compensation.offline.krl.text import code_of
 from elastocal.compensation.path.errors import PathError
 
@@ -35,7 +36,9 @@ class Move:
     """LIN or SLIN, else PTP or SPTP."""
     order: str
     name: str | None
-    """The point, in capitals; None: axis or frame values, or an expression (PTP only)."""
+    """The point, in capitals; None: values or an expression (PTP only)."""
+    axes: Point | None = None
+    """Axis values that stand in the motion itself (PTP only)."""
 
 
 @dataclass(frozen=True)
@@ -104,7 +107,8 @@ def _move(code: str, number: int) -> Move | None:
             )
         return Move(number, True, order, named[1].upper())
     if order in ("PTP", "SPTP"):
-        return Move(number, False, order, named[1].upper() if named else None)
+        axes = None if named else read_axes(target, number - 1)
+        return Move(number, False, order, named[1].upper() if named else None, axes)
     raise PathError(
         f"line {number}: {order} cannot be corrected: allowed are LIN and SLIN to named points,"
         " PTP and SPTP"

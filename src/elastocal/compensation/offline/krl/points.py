@@ -13,6 +13,7 @@ _DECLARED = re.compile(
     r"(?:=\s*\{(?:\s*(?:E6POS|POS|FRAME|E6AXIS|AXIS)\s*:)?(?P<body>[^{}]*)\}\s*)?",
     re.IGNORECASE,
 )
+_LITERAL_AXES = re.compile(r"\{\s*(?:E6AXIS\s*:|AXIS\s*:)?\s*(A1\s[^{}]*)\}", re.IGNORECASE)
 _COMPONENT = re.compile(
     r"\s*([A-Z]\d?)\s+([-+]?(?:\d+\.?\d*|\.\d+)(?:E[-+]?\d+)?)\s*", re.IGNORECASE
 )
@@ -85,6 +86,27 @@ def read_points(lines: Sequence[str]) -> dict[str, Point]:
         components = _components(match["body"], match.start("body") + offset, number, match[2])
         points[name] = Point(match[2], match[1].upper(), number, components)
     return points
+
+
+def read_axes(text: str, number: int) -> Point | None:
+    """Return axis positions that stand in a motion itself, ``{A1 0.0, …}``; None if it is not such.
+
+    Parameters
+    ----------
+    text : str
+        What the motion goes to.
+    number : int
+        Index of the line, from 0.
+
+    Raises
+    ------
+    PathError
+        If a component is not a name and a number.
+    """
+    match = _LITERAL_AXES.match(text)
+    if match is None:
+        return None
+    return Point("", "E6AXIS", number, _components(match[1], 0, number, "the motion"))
 
 
 def replaced(line: str, point: Point, values: Mapping[str, float]) -> str:

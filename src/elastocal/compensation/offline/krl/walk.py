@@ -21,6 +21,16 @@ _SAME = 1e-3
 """Postures nearer than this in every joint (rad or m) are one."""
 
 
+@dataclass(frozen=True)
+class Reached:
+    """Postures at the targets of a program."""
+
+    postures: dict[str, FloatArray]
+    """Joints by the name of the target in capitals, each of shape (joint,), in rad or m."""
+    assumed: tuple[str, ...]
+    """Motions that come from a ``PTP`` which does not tell its posture."""
+
+
 @dataclass(frozen=True, eq=False)
 class Walk:
     """A robot that goes from point to point."""
@@ -32,7 +42,7 @@ class Walk:
 
     def postures(
         self, moves: tuple[Move, ...], targets: frozenset[str], start: FloatArray | None
-    ) -> dict[str, FloatArray]:
+    ) -> Reached:
         """Return the joints at each target, in the order in which they are first reached.
 
         Points that are no targets count for the posture from which the next is reached.
@@ -53,18 +63,21 @@ class Walk:
             says in which posture.
         """
         reached: dict[str, FloatArray] = {}
-        previous = start
+        assumed: list[str] = []
+        previous, told = start, True
         for move in moves:
-            point = self.points.get(move.name or "")
+            point = move.axes or self.points.get(move.name or "")
             if point is None or not (move.name in targets or point.by_axes):
+                # A PTP to a frame, or to a point declared elsewhere: S and T are not read.
+                told = False
                 continue
             here = self._reached(move, point, previous)
             if move.name in targets:
                 check_limits(self.solver.robot, here[None], _naming(move), "is programmed")
-                before = reached.setdefault(point.name.upper(), here)
-                self._check_same(move, before, here)
-            previous = here
-        return reached
+                self._check_same(move, reached.setdefault(point.name.upper(), here), here)
+                assumed += [] if told or point.by_axes else [_label(move)]
+            previous, told = here, True
+        return Reached(reached, tuple(assumed))
 
     def pose(self, point: Point, q: FloatArray) -> FloatArray:
         """Return T_base_tcp of a point that is reached with joints ``q``, shape (4, 4)."""
