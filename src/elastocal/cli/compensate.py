@@ -121,8 +121,8 @@ def _program_notes(program: "KrlResult", base: str | None) -> list[str]:
     ]
     if program.assumed:
         notes.append(
-            f"{len(program.assumed)} motions (first: {program.assumed[0]}) come from a PTP that does"
-            " not tell its posture (no E6AXIS of the .dat file): the last one known is taken"
+            f"{len(program.assumed)} motions (first: {program.assumed[0]}) come from a PTP that"
+            " does not tell its posture (no E6AXIS of the .dat file): the last one known is taken"
         )
     if program.name and program.name.lower() != src.stem.lower():
         notes.append(f"the program inside is {program.name}: a controller wants {program.name}.src")
