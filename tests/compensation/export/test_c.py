@@ -65,14 +65,24 @@ def test_golden_robot_at_a_hundred_thousand_states(tmp_path):
     assert_deflections_agree(executable, calibrated, STATES)
 
 
+@pytest.mark.parametrize(
+    "count", [10_000, pytest.param(STATES, marks=pytest.mark.slow, id="hundred thousand")]
+)
 @pytest.mark.parametrize("like", ["afp", "machining"])
-def test_example_robots_at_a_hundred_thousand_states(tmp_path, like):
+def test_example_robots_one_of_them_on_a_rail(tmp_path, like, count):
     calibrated = compensated.calibrated(compensated.example_robot(like, tmp_path / "cell"))
     executable = build(written(tmp_path / "c", design(calibrated)), "-O2")
-    assert_deflections_agree(executable, calibrated, STATES)
+    assert_deflections_agree(executable, calibrated, count)
 
 
-@pytest.mark.parametrize("name", ARMS)
+@pytest.mark.parametrize(
+    "name",
+    [
+        "on a rail",
+        "axes between the coordinate axes",
+        *(pytest.param(name, marks=pytest.mark.slow) for name in ARMS if name != "on a rail"),
+    ],
+)
 def test_every_arm_with_springs_of_every_kind(tmp_path, name):
     robot = Robot.from_urdf(ARMS[name], "tcp")
     calibrated = compensated.calibrated(robot, soft_everywhere(robot))
@@ -82,7 +92,7 @@ def test_every_arm_with_springs_of_every_kind(tmp_path, name):
     assert executable.selftest() == 0
 
 
-def course(rng, joints, count=3000):
+def course(rng, joints, count=2000):
     """Return readings as rows: mostly sound, with NaN, infinities, jumps and a bad clock."""
     time = 0.004 * np.arange(1, count + 1)
     time[rng.random(count) < 0.02] *= -3.0
@@ -98,8 +108,9 @@ def course(rng, joints, count=3000):
     return rows
 
 
-@pytest.mark.parametrize("frame", ["base", "tcp", {"abc": ["30 deg", "-20 deg", "170 deg"]}])
-@pytest.mark.parametrize("median", [1, 3, 5])
+@pytest.mark.parametrize(
+    ("frame", "median"), [("base", 3), ("tcp", 1), ({"abc": ["30 deg", "-20 deg", "170 deg"]}, 5)]
+)
 def test_steps_are_those_of_python_and_clean_under_the_sanitizers(tmp_path, frame, median):
     filters = {
         "median": median,
@@ -128,14 +139,15 @@ def test_every_way_of_the_step_is_taken_by_that_course(tmp_path):
     assert seen & ~32 == 1023 & ~32
 
 
-class TestSelfTest:
-    @pytest.fixture(scope="class")
-    def folder(self, tmp_path_factory):
-        numbers = design(compensated.arm(), compensated.settings(), compensated.load())
-        return written(tmp_path_factory.mktemp("c"), numbers)
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    numbers = design(compensated.arm(), compensated.settings(), compensated.load())
+    return written(tmp_path_factory.mktemp("c"), numbers)
 
+
+class TestSelfTest:
     def test_it_is_zero_at_every_level_of_optimisation(self, folder):
-        for level in ("-O0", "-O2", "-O3"):
+        for level in ("-O0", "-O3"):
             assert build(folder, level, name=f"run{level}").selftest() == 0
 
     def test_it_is_zero_with_fused_products_allowed(self, folder):
@@ -147,7 +159,7 @@ class TestSelfTest:
         literals = list(re.finditer(r"(?<![\w.])-?\d[\d.]*(?:e[-+]?\d+)?(?=[,;\n}])", definitions))
         assert len(literals) > 150
         rng = np.random.default_rng(0)
-        chosen = [literals[k] for k in rng.choice(len(literals), 10, replace=False)]
+        chosen = [literals[k] for k in rng.choice(len(literals), 5, replace=False)]
         (tmp_path / "elastocal_model.h").write_bytes((folder / "elastocal_model.h").read_bytes())
         for literal in chosen:
             number = float(literal[0])
@@ -163,7 +175,6 @@ class TestSelfTest:
     @pytest.mark.parametrize(
         ("old", "new", "code"),
         [
-            ("(sine", "(-sine", None),
             ("s = x + ((x * y) * s)", "s = x - ((x * y) * s)", 2),
             ("- weight[i]", "+ weight[i]", 3),
             ("share = LARGEST_CORRECTION / length", "share = 1.0", 3),
@@ -174,16 +185,13 @@ class TestSelfTest:
     )
     def test_a_change_of_the_code_is_found(self, folder, tmp_path, old, new, code):
         text = (folder / "elastocal_model.c").read_text()
-        if code is None:
-            pytest.skip("nothing of that name")
         assert old in text
         (tmp_path / "elastocal_model.h").write_bytes((folder / "elastocal_model.h").read_bytes())
         (tmp_path / "elastocal_model.c").write_text(text.replace(old, new))
         assert build(tmp_path, "-O0", "-Wno-error").selftest() == code
 
 
-def test_sine_and_cosine_are_good_to_two_ulp_over_many_turns(tmp_path):
-    folder = written(tmp_path, design(compensated.arm()))
+def test_sine_and_cosine_are_good_to_two_ulp_over_many_turns(folder, tmp_path):
     source = tmp_path / "sines.c"
     source.write_text(
         '#include "elastocal_model.c"\n#include <stdio.h>\nint main(void){double a,o[2];'

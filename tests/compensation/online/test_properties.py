@@ -28,7 +28,7 @@ course = strategies.lists(
 
 @pytest.mark.parametrize("frame", ["base", "tcp"])
 @given(course)
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=30, deadline=None)
 def test_the_correction_never_exceeds_its_limit_nor_jumps(frame, course):
     chosen = compensated.settings(frame=frame)
     compensator = Compensator.of(compensated.arm(), chosen, compensated.load())
@@ -47,16 +47,16 @@ def test_the_correction_never_exceeds_its_limit_nor_jumps(frame, course):
 
 
 @given(course)
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=10, deadline=None)
 def test_whatever_came_before_good_readings_are_corrected_again(course):
     compensator = Compensator.of(compensated.arm(), compensated.settings())
     state, time = compensator.start(), 0.0
     for (dt, q, force, moment, ok), _ in course:
         state, _ = compensator.step(state, Reading(time + dt, q, force, moment, ok))
     good = Reading(0.0, [0.1, -0.8, 1.2, 0.3, 0.6, 0.2], (100.0, 0.0, -800.0), (0.0, 5.0, 0.0))
-    for k in range(400):
+    for k in range(250):
         state, told = compensator.step(state, good._replace(time=0.004 * k))
     other = compensator.start()
-    for k in range(400):
+    for k in range(250):
         other, expected = compensator.step(other, good._replace(time=0.004 * k))
     np.testing.assert_allclose(told.correction, expected.correction, atol=1e-9)

@@ -23,6 +23,8 @@ _TURNED = np.radians(15.0)
 """Least spread of the postures for that verdict, in rad."""
 _FARTHEST = 3.0
 """Largest distance of a centre of mass from its sensor that is believed, in m."""
+_CLEAR = 10.0
+"""How many times its scatter the moment must change for that."""
 _CLOSE = 0.3
 """How near the centre of mass must come to where another point would put it, as a share."""
 
@@ -58,7 +60,7 @@ def refuse_mistakes(
     _refuse_base(postures, fit)
     _refuse_other_forces(postures, fit, R_nominal)
     _refuse_other_moments(postures, fit)
-    _refuse_far_centre(fit)
+    _refuse_far_centre(postures, fit)
     if expected_centre is not None:
         _refuse_other_point(fit, expected_centre, points or {})
 
@@ -135,11 +137,12 @@ def _refuse_other_moments(postures: StaticPostures, fit: ToolFit) -> None:
         )
 
 
-def _refuse_far_centre(fit: ToolFit) -> None:
+def _refuse_far_centre(postures: StaticPostures, fit: ToolFit) -> None:
+    """Refuse a centre of mass far away, where a moment in N·mm that is called N·m puts it."""
     distance = float(np.linalg.norm(fit.centre))
-    if not any(name.startswith(("mass", "centre")) for name in fit.undetermined) and (
-        distance > _FARTHEST
-    ):
+    turning = _rms(postures.moment - postures.moment.mean(axis=0))
+    seen = turning > _CLEAR * fit.moment_scatter and "mass" not in fit.undetermined
+    if seen and distance > _FARTHEST:
         raise CompensationError(
             f"centre of mass comes out {distance:.3g} m from the sensor: moments in another unit"
             " than stated, or about a point far away"

@@ -13,6 +13,7 @@ from elastocal.compensation.online.state import Reading
 LOADS = 8
 _SEED = 20240623
 _MOST_TIMES = 400
+_DIRECTIONS = 20
 
 
 @dataclass(frozen=True)
@@ -55,28 +56,26 @@ def episodes(numbers: Design) -> list[Episode]:
     """Return a course that passes through every way of the step.
 
     Loads that make a deflection within the deadband, a middle one and more than the limit;
-    readings that fail until the correction fades; a reading that is good again, one beyond the
-    range, one that is NaN's, one from a clock that was set back.
+    readings that fail until the correction fades; readings beyond the range, a good one, one from
+    a clock that was set back, and good ones again.
     """
     rng = np.random.default_rng(_SEED + 1)
     limits, settings = numbers.settings.limits, numbers.settings
     configurations = _configurations(numbers, rng, 3).tolist()
     small = max(1.5 * settings.deadband, 0.05 * limits.correction)
-    readings = [
-        _reading(numbers, configurations[0], small, rng),
-        _reading(numbers, configurations[1], 0.5 * limits.correction, rng),
-        _reading(numbers, configurations[2], 3.0 * limits.correction, rng),
-    ]
-    middle, large = readings[1], readings[2]
-    full = min(_MOST_TIMES, int(2.0 * limits.correction / numbers.largest_step) + 60)
-    beyond = [2.0 * x for x in settings.sensor.force]
+    sizes = (small, 0.5 * limits.correction, 1.5 * limits.correction)
+    first, middle, large = (
+        _reading(numbers, q, size, rng) for q, size in zip(configurations, sizes, strict=True)
+    )
+    arriving = min(_MOST_TIMES, int(2.0 * limits.correction / numbers.largest_step) + 60)
     course = [
-        *((times, reading) for reading in readings[:2] for times in (1, 2, 5)),
-        (full, large),
-        (1, middle._replace(ok=False)),
-        (settings.hold_cycles, middle._replace(time=-1e3)),
-        (3, middle._replace(force=beyond)),
+        *((times, reading) for reading in (first, middle) for times in (1, 2, 5)),
+        (arriving, large),
+        (settings.hold_cycles, middle._replace(ok=False)),
+        (3, middle._replace(force=[2.0 * x for x in settings.sensor.force])),
         (1, large),
+        (1, middle._replace(time=-1e3)),
+        (2, middle),
         (4, middle),
     ]
     return _played(numbers, course)
@@ -94,21 +93,36 @@ def _played(numbers: Design, course: list[tuple[int, Reading]]) -> list[Episode]
 
 
 def _reading(numbers: Design, q: list[float], size: float, rng: np.random.Generator) -> Reading:
-    """Return a raw reading whose load makes a deflection of a size, in m."""
-    load, model = numbers.load, numbers.calibrated.model
-    f, m = rng.normal(size=3), 0.1 * rng.normal(size=3)
-    T = model.robot.forward(q)
-    R = T[:3, :3]
-    made = model.deflection(numbers.calibrated.compliance, q, R @ f, R @ m)
-    scale = min(size / max(float(np.linalg.norm(made)), 1e-12), 3e4)
-    f, m = scale * f, scale * m
-    # The conditioner's steps backwards.
-    weight = numbers.weight @ R
-    S = numbers.sensor_rotation
+    """Return a raw reading whose load makes a deflection of a size, in m.
+
+    Where the sensor's range does not allow so much, of the most that it allows.
+    """
+    model, R = numbers.calibrated.model, numbers.calibrated.model.robot.forward(q)[:3, :3]
+    wrenches = rng.normal(size=(_DIRECTIONS, 6)) * [1.0, 1.0, 1.0, 0.03, 0.03, 0.03]
+    turned = wrenches[:, :3] @ R.T, wrenches[:, 3:] @ R.T
+    made = model.deflection(numbers.calibrated.compliance, np.array([q] * _DIRECTIONS), *turned)
+    lengths = np.maximum(np.linalg.norm(made, axis=1), 1e-12)
+    # The softest direction needs the least force.
+    best = int(np.argmax(lengths / np.linalg.norm(wrenches[:, :3], axis=1)))
+    wrench = wrenches[best] * (size / lengths[best])
+    settings = numbers.settings.sensor
+    within = 0.9 * np.array([*settings.force, *settings.moment])
+    for _ in range(60):
+        raw = _raw(numbers, wrench, R)
+        if np.all(np.abs(raw) < within):
+            break
+        wrench = 0.8 * wrench
+    return Reading(0.0, q, raw[:3].tolist(), raw[3:].tolist())
+
+
+def _raw(numbers: Design, wrench: FloatArray, R_base_tcp: FloatArray) -> FloatArray:
+    """Return what the sensor reads of a wrench in the tcp frame: the conditioner backwards."""
+    f, m, weight = wrench[:3], wrench[3:], numbers.weight @ R_base_tcp
     at_sensor = m - np.cross(numbers.sensor_origin, f) + np.cross(numbers.centre, weight)
-    force = S.T @ (f + weight) + load.force_bias
-    moment = S.T @ at_sensor + load.moment_bias
-    return Reading(0.0, q, force.tolist(), moment.tolist())
+    S = numbers.sensor_rotation
+    return np.concatenate(
+        [(f + weight) @ S + numbers.load.force_bias, at_sensor @ S + numbers.load.moment_bias]
+    )
 
 
 def _configurations(numbers: Design, rng: np.random.Generator, count: int) -> FloatArray:
