@@ -208,6 +208,7 @@ def test_a_line_that_is_not_understood_is_refused(program, tmp_path, old, new, w
         ("DECL E6POS XP2=", "DECL E6POS XP1=", "line 9: XP1 is declared twice"),
         (",A ", ",Q ", "has no A"),
         ("{X ", "{X 1.0,X ", "has X twice"),
+        ("{X ", "{X " + 400 * "9", "and a finite number"),
         ("DECL REAL DEPTH=1.5", "DECL FDAT FP1={TOOL_NO 1,BASE_NO 2,IPO_FRAME #TCP}", "FP1"),
     ],
 )

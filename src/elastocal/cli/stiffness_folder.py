@@ -212,7 +212,9 @@ def _curve(calibrated: CalibratedModel, found: Answer, hold: Hold) -> Curve:
     k = directional(calibrated, hold.q[there], found.direction[there])
     stiffness, low, high = (np.full(len(hold.q), np.nan) for _ in range(3))
     stiffness[there], low[there], high[there] = k.stiffness, k.low, k.high
-    return Curve(hold.name, stiffness, low, high, hold.spin)
+    railed = calibrated.model.robot.external_axes > 0
+    rail = hold.q[:, 0] if railed else np.full(len(hold.q), np.nan)
+    return Curve(hold.name, stiffness, low, high, hold.spin, rail)
 
 
 def _jumps(robot: Robot, hold: Hold) -> int:

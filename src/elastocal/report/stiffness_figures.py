@@ -47,6 +47,8 @@ class Curve:
     high: FloatArray
     spin: FloatArray
     """Shape (station,), in rad."""
+    rail: FloatArray
+    """Position of the first external axis, shape (station,), in m or rad; NaN without one."""
 
 
 def write_stiffness_figure(
@@ -96,22 +98,21 @@ def stiffness_figure(
     figure.text(0.5, 1.0 - 0.1 / size[1], title.replace("$", r"\$"), ha="center", va="top", size=11)
     boxes = _boxes(size, heights)
     axes = [figure.add_axes(box) for box in boxes]
-    maps = [(np.degrees(survey.grid.spins), survey.best_by_spin, "Spin of the tool in °")]
-    if rail:
-        maps.append((survey.grid.external[:, 0], survey.best_by_stand, "Rail in m"))
     along = _along(stations)
-    k = _PER_MICROMETRE * survey.best_by_spin
-    finite = k[np.isfinite(k)]
-    ends = (float(finite.min()), float(finite.max())) if len(finite) else (0.0, 1.0)
-    colours: Any = None
-    for place, (values, best, label) in zip(axes, maps, strict=False):
-        colours = _draw_map(place, along, values, best, ends)
+    degrees = [np.degrees(curve.spin) for curve in curves]
+    maps = [("Spin of the tool in °", np.degrees(survey.grid.spins), survey.best_by_spin, degrees)]
+    if rail:
+        held = [curve.rail for curve in curves]
+        maps.append(("Rail in m", survey.grid.external[:, 0], survey.best_by_stand, held))
+    for place, box, (label, values, best, chosen) in zip(axes, boxes, maps, strict=False):
+        drawn = _draw_map(place, along, values, best)
         place.set_ylabel(label)
-    _mark_spins(axes[0], along, curves)
+        _mark(place, along, chosen, wrap=180.0 if place is axes[0] else np.inf)
+        left, bottom, width, height = box
+        bar = figure.add_axes((left + width + 0.015, bottom, 0.02, height))
+        figure.colorbar(drawn, cax=bar).set_label("Stiffest allowed posture in N/µm", size=8)
     _draw_curves(axes[-1], along, curves)
-    left, bottom, width, height = boxes[0]
-    bar = figure.add_axes((left + width + 0.015, bottom, 0.02, height))
-    figure.colorbar(colours, cax=bar).set_label("Stiffest allowed posture in N/µm", size=8)
+    axes[-1].set_xlim(axes[0].get_xlim())
     return figure
 
 
@@ -127,29 +128,24 @@ def _boxes(
     return boxes
 
 
-def _draw_map(
-    axes: Axes, along: FloatArray, values: FloatArray, best: FloatArray, ends: tuple[float, float]
-) -> Any:
+def _draw_map(axes: Axes, along: FloatArray, values: FloatArray, best: FloatArray) -> Any:
     axes.set_facecolor(style.PAPER)
     axes.patch.set(hatch="////", edgecolor=style.FAINT)
     masked = np.ma.masked_invalid(_PER_MICROMETRE * best.T)
-    drawn = axes.pcolormesh(
-        _edges(along), _edges(values), masked, cmap=style.SEQUENTIAL, vmin=ends[0],
-        vmax=ends[1], rasterized=True,
-    )  # fmt: skip
     axes.set_xlabel("Way along the path in mm")
-    return drawn
+    return axes.pcolormesh(
+        _edges(along), _edges(values), masked, cmap=style.SEQUENTIAL, rasterized=True
+    )
 
 
-def _mark_spins(axes: Axes, along: FloatArray, curves: Sequence[Curve]) -> None:
-    """Draw the spin of each choice over the map, white under colour so that it shows on all."""
-    for curve, colour, line in zip(curves, _COLOURS, _LINES, strict=False):
-        spin = np.degrees(curve.spin)
-        steps = np.abs(np.diff(spin, prepend=spin[:1]))
+def _mark(axes: Axes, along: FloatArray, chosen: Sequence[FloatArray], wrap: float) -> None:
+    """Draw what each choice takes over the map, on white so that it shows on every colour."""
+    for taken, colour, line in zip(chosen, _COLOURS, _LINES, strict=False):
+        steps = np.abs(np.diff(taken, prepend=taken[:1]))
         # A turn over 0° is no line across the map.
-        spin = np.where(steps > 180.0, np.nan, spin)
-        axes.plot(along, spin, color=style.PAPER, lw=3.0)
-        axes.plot(along, spin, color=colour, lw=1.5, ls=line)
+        shown = np.where(steps > wrap, np.nan, taken)
+        axes.plot(along, shown, color=style.PAPER, lw=3.0)
+        axes.plot(along, shown, color=colour, lw=1.5, ls=line)
 
 
 def _draw_curves(axes: Axes, along: FloatArray, curves: Sequence[Curve]) -> None:
@@ -160,7 +156,6 @@ def _draw_curves(axes: Axes, along: FloatArray, curves: Sequence[Curve]) -> None
         axes.plot(along, k, color=colour, ls=line, marker=marker, label=curve.name)
     axes.set_xlabel("Way along the path in mm")
     axes.set_ylabel("Stiffness in N/µm")
-    axes.margins(x=0.0)
     axes.set_ylim(bottom=0.0)
     axes.spines[["top", "right"]].set_visible(False)
     axes.legend(frameon=False, fontsize=8, loc="lower left")

@@ -1,5 +1,6 @@
 """Positions that a ``.dat`` file declares."""
 
+import math
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -140,10 +141,10 @@ def _components(body: str, offset: int, number: int, name: str) -> dict[str, Com
     place = offset
     for part in body.split(","):
         match = _COMPONENT.fullmatch(part)
-        if match is None:
+        if match is None or not math.isfinite(float(match[2])):
             raise PathError(
-                f"line {number + 1}: {name} has a component {part.strip()!r}: it must be a name"
-                " and a number"
+                f"line {number + 1}: {name} has a component {part.strip()!r:.60}: it must be a name"
+                " and a finite number"
             )
         if match[1].upper() in components:
             raise PathError(f"line {number + 1}: {name} has {match[1]} twice")
