@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 from elastocal.identification import write_model
-from elastocal.robot.pose import xyzabc_from_T
 from support.cli import elastocal
 from support.paths import (
     calibrated,
@@ -83,6 +82,30 @@ def test_people_are_told_the_choice(folder):
         assert text in words
 
 
+def test_a_survey_in_which_nothing_is_allowed_is_told_and_drawn(folder):
+    beams = [
+        {
+            "name": f"beam {number}",
+            "box": {"size": ["0.3 m", "9 m", "0.3 m"]},
+            "pose": {"xyz": ["0.9 m", "0 m", f"{height} m"]},
+        }
+        for number, height in enumerate((1.4, 1.7, 2.0))
+    ]
+    cell = example_cell("afp", fixtures=beams)
+    write_model(folder / "tight.json", made_up(cell.robot), {})
+    q = np.array([place.q for place in places("afp", 2)])
+    pose = euler_columns(cell.robot.forward(q))
+    write_csv(folder / "tight.csv", pose | {f"{cell.robot.joint_names[0]}[m]": q[:, 0]})
+    result = elastocal(
+        "stiffness", folder / "tight.json", folder / "tight.csv", "--out", folder / "tight",
+        "--spins", 2, "--cell", cell.path,
+    )  # fmt: skip
+    assert result.code == 0, result.err
+    words = " ".join(result.err.split())
+    assert "of which 0 are allowed" in words
+    assert "no single posture is allowed at every station" in words
+
+
 @pytest.mark.parametrize(
     ("arguments", "why"),
     [
@@ -100,10 +123,8 @@ def test_a_cell_brings_its_rail_its_margins_and_its_tooling(folder):
     cell = example_cell("afp")
     write_model(folder / "afp.json", made_up(cell.robot), {})
     q = np.array([place.q for place in places("afp", 2)])
-    pose = xyzabc_from_T(cell.robot.forward(q)) * np.array([1e3] * 3 + [180.0 / np.pi] * 3)
-    names = ("x[mm]", "y[mm]", "z[mm]", "a[deg]", "b[deg]", "c[deg]")
     rail = {f"{cell.robot.joint_names[0]}[m]": q[:, 0]}
-    write_csv(folder / "afp.csv", dict(zip(names, pose.T, strict=True)) | rail)
+    write_csv(folder / "afp.csv", euler_columns(cell.robot.forward(q)) | rail)
     result = elastocal(
         "stiffness", folder / "afp.json", folder / "afp.csv", "--out", folder / "afp", "--spins",
         3, "--cell", cell.path, "--json",

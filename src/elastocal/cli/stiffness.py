@@ -34,7 +34,8 @@ def stiffness(  # noqa: PLR0913 (a command has as many options as it has)
     from elastocal.cli.output import console, print_json
     from elastocal.cli.posture_option import parse_posture
     from elastocal.cli.progress import progress_bars
-    from elastocal.cli.stiffness_folder import Question, answer, write_folder
+    from elastocal.cli.stiffness_answer import Question, answer
+    from elastocal.cli.stiffness_folder import write_folder
     from elastocal.files import filling
     from elastocal.identification import read_model
 

@@ -9,21 +9,18 @@ out of the derivative, ``d(C f)/dq``, is a deflection per metre, some 1e-3, so t
 three digits. The first step alone is what is usually done; its residual is told.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
 from elastocal.arrays import BoolArray, FloatArray, IndexArray
+from elastocal.compensation.offline.limits import Where, check_limits, turned_inside
 from elastocal.compensation.path.errors import PathError
 from elastocal.identification import CalibratedModel
 from elastocal.robot import Robot
 from elastocal.robot.inverse import InverseKinematics
 from elastocal.robot.inverse.branch_solver import pose_error
 from elastocal.robot.inverse.limits import TURN
-
-Where = Callable[[int], str]
-"""Names a row for a person, e.g. ``row 12``."""
 
 LARGEST = 0.02
 """Largest deflection that is taken for one, in m."""
@@ -32,7 +29,6 @@ TOLERANCE = 1e-9
 _STEPS = 12
 _DAMPING = 1e-6
 """Of the Newton step, so that a straight wrist does not stop the rows beside it."""
-_ON_LIMIT = 1e-9
 _SMALL_TURN = 1.0
 """Largest step of a joint (rad or m) that still is one of a correction."""
 
@@ -120,7 +116,7 @@ def correct(
         reached[row] = robot.forward(q[row])
         deflection[row] = load.deflection(q[row : row + 1], np.array([row]))[0]
     if may_turn:
-        q = _turned_inside(robot, q)
+        q = turned_inside(robot, q)
     check_limits(robot, q, where, "would be corrected")
     commanded = T_base_tcp.copy()
     commanded[:, :3, 3] = reached[:, :3, 3]
@@ -136,48 +132,6 @@ def correct(
         np.linalg.norm(first - uncorrected, axis=1),
         np.linalg.norm(residual, axis=1),
     )
-
-
-def check_limits(robot: Robot, q: FloatArray, where: Where, what: str) -> None:
-    """Refuse joints outside their limits, the first by name.
-
-    Parameters
-    ----------
-    robot : Robot
-        Whose limits hold.
-    q : ndarray, shape (row, joint)
-        Positions of the robot's first joints (all, or the external axes), in rad or m.
-    where : callable
-        Names a row.
-    what : str
-        What is the matter with the joint.
-
-    Raises
-    ------
-    PathError
-        If there is one.
-    """
-    count = q.shape[1]
-    low, high = robot.limits.lower[:count], robot.limits.upper[:count]
-    inside = (q >= low - _ON_LIMIT) & (q <= high + _ON_LIMIT)
-    if inside.all():
-        return
-    row, joint = np.argwhere(~inside)[0]
-    turns = robot.revolute[joint]
-    scale, unit = (180.0 / np.pi, "deg") if turns else (1e3, "mm")
-    lower, upper = scale * low[joint], scale * high[joint]
-    raise PathError(
-        f"{where(int(row))}: {robot.joint_names[joint]} {what} to {scale * q[row, joint]:.4g}"
-        f" {unit}, outside its limits {lower:.4g} to {upper:.4g} {unit}"
-    )
-
-
-def _turned_inside(robot: Robot, q: FloatArray) -> FloatArray:
-    """Return joints that are outside their limits a whole turn elsewhere, if that is inside."""
-    limits, revolute = robot.limits, np.array(robot.revolute)
-    turned = q - TURN * np.sign(q)
-    swap = revolute & (limits.margin(q) < -_ON_LIMIT) & (limits.margin(turned) >= -_ON_LIMIT)
-    return np.where(swap, turned, q)
 
 
 @dataclass(frozen=True, eq=False)

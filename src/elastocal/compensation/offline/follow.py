@@ -3,7 +3,7 @@
 import numpy as np
 
 from elastocal.arrays import FloatArray, IndexArray
-from elastocal.compensation.offline.correct import Where
+from elastocal.compensation.offline.limits import Where
 from elastocal.compensation.path.errors import PathError
 from elastocal.robot import Robot
 from elastocal.robot.inverse import InverseKinematics

@@ -9,8 +9,9 @@ from typing import Any, TextIO
 import numpy as np
 
 from elastocal.arrays import FloatArray
-from elastocal.compensation.offline.correct import LARGEST, Correction, Where, check_limits, correct
+from elastocal.compensation.offline.correct import LARGEST, Correction, correct
 from elastocal.compensation.offline.follow import follow, jumps, nearest_zero_posture
+from elastocal.compensation.offline.limits import Where, check_limits
 from elastocal.compensation.offline.tally import Tally
 from elastocal.compensation.path import (
     PathColumns,

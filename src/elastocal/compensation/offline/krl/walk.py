@@ -6,10 +6,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from elastocal.arrays import FloatArray
-from elastocal.compensation.offline.correct import Where, check_limits
 from elastocal.compensation.offline.follow import follow
 from elastocal.compensation.offline.krl.moves import Move
 from elastocal.compensation.offline.krl.points import Point
+from elastocal.compensation.offline.limits import Where, check_limits
 from elastocal.compensation.path import PathError
 from elastocal.robot.inverse import InverseKinematics
 from elastocal.robot.inverse.frames import inverse_transform
