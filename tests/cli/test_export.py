@@ -109,3 +109,10 @@ def test_a_nan_in_the_model_is_refused(tmp_path, model):
     damaged = tmp_path / "model.json"
     damaged.write_text(json.dumps(data))
     assert "compliance.4" in elastocal("export", damaged, "--c", tmp_path / "c").reason
+
+
+def test_check_knows_tool_files_and_settings(tmp_path, tool):
+    settings = tmp_path / "online.yaml"
+    settings.write_text("schema: elastocal.compensator/1\n")
+    assert "settings of a compensator" in elastocal("check", settings).err
+    assert "tool file" in elastocal("check", tool).err

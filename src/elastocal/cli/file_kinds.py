@@ -7,6 +7,8 @@ from typing import Any
 
 from elastocal import dataset
 from elastocal.cell import load_cell
+from elastocal.compensation.conditioning.tool_file import read_tool
+from elastocal.compensation.settings import read_settings
 from elastocal.dataset.netcdf import read_netcdf
 from elastocal.elastic.layouts import read_springs
 from elastocal.errors import DatasetError, RobotError, SchemaError
@@ -23,6 +25,8 @@ Described = tuple[str, Facts]
 Describe = Callable[[Path], Described]
 
 _PLAN = re.compile(r'"schema":\s*"elastocal\.plan/')
+_TOOL = re.compile(r'"schema":\s*"elastocal\.tool/')
+_COMPENSATOR_LINE = re.compile(r"^schema:\s*[\"']?elastocal\.compensator/", re.MULTILINE)
 _SCHEMA_LINE = re.compile(r"^schema:\s*[\"']?elastocal\.cell/", re.MULTILINE)
 
 
@@ -61,7 +65,10 @@ def _netcdf(path: Path) -> Described:
 
 def _json(path: Path) -> Described:
     """Describe a JSON file by the schema that it states; what states none is read as a model."""
-    return _plan(path) if _PLAN.search(read_text(path)[:200]) else _model(path)
+    start = read_text(path)[:200]
+    if _TOOL.search(start):
+        return _tool(path)
+    return _plan(path) if _PLAN.search(start) else _model(path)
 
 
 def _dataset(path: Path) -> Described:
@@ -105,8 +112,11 @@ def _robot(path: Path) -> Described:
 
 def _settings(path: Path) -> Described:
     """Describe a YAML file by the schema that it states."""
-    if _SCHEMA_LINE.search(read_text(path)):
+    text = read_text(path)
+    if _SCHEMA_LINE.search(text):
         return _cell(path)
+    if _COMPENSATOR_LINE.search(text):
+        return _compensator(path)
     file = read_springs(path)
     facts = {
         "schema": "elastocal.springs/1",
@@ -147,4 +157,26 @@ def _pool(path: Path) -> Described:
         "candidates": len(pool),
         "sampled": len(pool.sampled),
         "checks": list(pool.check_names),
+    }
+
+
+def _tool(path: Path) -> Described:
+    record = read_tool(path)
+    return "tool file", {
+        "schema": "elastocal.tool/1",
+        "flange": record.flange,
+        "mass": record.mass,
+        "postures": record.postures,
+        "undetermined": list(record.undetermined),
+    }
+
+
+def _compensator(path: Path) -> Described:
+    settings = read_settings(path)
+    return "settings of a compensator", {
+        "schema": "elastocal.compensator/1",
+        "cycle": settings.cycle,
+        "filter_delay": float(settings.chain.delay()),
+        "correction": settings.limits.correction,
+        "rate": settings.limits.rate,
     }

@@ -100,3 +100,8 @@ def test_moments_about_another_point_are_named(postures, point):
 def test_moments_in_another_unit_are_named(postures):
     with pytest.raises(CompensationError, match=r"centre of mass comes out .* another unit"):
         check(postures.read_as(moment=1e3 * postures.moment))
+
+
+def test_equal_postures_with_a_bias_upward_are_undetermined_and_no_mistake():
+    tool, rng = PlantedTool(force_bias=np.array([0.0, 0.0, -900.0])), np.random.default_rng(3)
+    check(tool.raw(np.repeat(turned(1, rng), 5, axis=0), rng))

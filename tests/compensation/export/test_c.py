@@ -122,6 +122,10 @@ def test_steps_are_those_of_python_and_clean_under_the_sanitizers(tmp_path, fram
     executable = build(written(tmp_path, numbers), "-O1", *SANITIZED)
     rows = course(np.random.default_rng(median), numbers.joints)
     found = executable.numbers("steps", rows)
+    lengths = np.linalg.norm(found[:, :3], axis=1)
+    moves = np.linalg.norm(np.diff(found[:, :3], axis=0, prepend=0.0), axis=1)
+    assert lengths.max() <= chosen.limits.correction * (1.0 + 1e-12)
+    assert moves.max() <= numbers.largest_step * (1.0 + 1e-12)
     compensator, n = Compensator(numbers), numbers.joints
     state = compensator.start()
     for row, got in zip(rows.tolist(), found, strict=True):

@@ -1,9 +1,7 @@
-import importlib.util
-from pathlib import Path
-
 import numpy as np
 import pytest
 
+from contracts.test_layouts import CASES
 from elastocal.compensation.kernel import compiled, deflection, observation_block, orientation
 from elastocal.compensation.kernel.compiled import python_text
 from elastocal.compensation.kernel.program import (
@@ -19,12 +17,6 @@ from elastocal.compensation.kernel.text import sum_text, value_text
 from elastocal.elastic import ElasticModel
 from elastocal.robot import Robot
 from support.virtual_chain import ARMS
-
-_LAYOUTS = Path(__file__).parents[2] / "contracts" / "test_layouts.py"
-_SPEC = importlib.util.spec_from_file_location("layout_contract", _LAYOUTS)
-_MODULE = importlib.util.module_from_spec(_SPEC)
-_SPEC.loader.exec_module(_MODULE)
-CASES = _MODULE.CASES
 
 
 @pytest.mark.parametrize("arm", ARMS)

@@ -112,7 +112,7 @@ def _refuse_other_forces(
     as_mounted = np.eye(3) if R_nominal is None else R_nominal
     # With gravity turning in one plane both signs fit; where the sensor sits tells them apart.
     fits_both = left[turned] <= 1.5 * stated + _NOTICEABLE * _rms(postures.force)
-    if fit.mass < 0.0 or (
+    if (fit.mass < 0.0 and "mass" not in fit.undetermined) or (
         fits_both
         and _angle(fit.R_flange_sensor, as_mounted) > 0.5 * np.pi
         and _angle(fits[turned].R_flange_sensor, as_mounted) < 0.25 * np.pi
