@@ -1,5 +1,6 @@
 """What a posture must pass to be chosen: margins to limits and singularity, collision."""
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -60,7 +61,7 @@ def cell_permit(cell: Cell) -> tuple[Permit, ...]:
                 smallest_singular_value(robot, q, length) >= limits.singular_value
             ),
         ),
-        Permit("collision", lambda q: scene.keeps(q, limits.clearance, in_contact=True)),
+        Permit("collision", lambda q: scene.keeps(q, limits.clearance, -math.inf)),
     )
 
 
