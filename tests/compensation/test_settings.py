@@ -47,7 +47,7 @@ def test_the_tcp_frame_has_no_fixed_rotation():
     ("old", "new", "reason"),
     [
         ('"2 mm"', '"0 mm"', "limits.correction: Input should be greater than 0"),
-        ('"20 mm/s"', '"-1 mm/s"', "limits.rate: Value error, must be above 0"),
+        ('"20 mm/s"', '"-1 mm/s"', "limits.rate: must be above 0"),
         ('"5 mm/s"', '"50 mm/s"', "fade 0.05 m/s is above rate 0.02 m/s"),
         ('"4 ms"', "0.004", "0.004 is not a time with its unit"),
         ("notches", "notchs", "did you mean 'notches'"),
