@@ -26,6 +26,7 @@ from elastocal.cli.plan import plan
 from elastocal.cli.predict import predict
 from elastocal.cli.robots import robots
 from elastocal.cli.run import run as run_procedure
+from elastocal.cli.simulate_process import simulate_process
 from elastocal.cli.stiffness import stiffness
 from elastocal.cli.tool import tool
 from elastocal.errors import ElastocalError, FileAccessError
@@ -50,6 +51,7 @@ COMMANDS: dict[str, Callable[..., None]] = {
     "compensate": compensate,
     "stiffness": stiffness,
     "export": export,
+    "simulate-process": simulate_process,
     "demo": demo,
 }
 """In the order in which help lists them: that of the work."""

@@ -132,7 +132,7 @@ def air_shifts(cell: TrueCell, course: Course) -> FloatArray:
     return np.array([cell.free_shift(q) for q in course.q])
 
 
-def run_course(  # noqa: PLR0913 (each is a part of the loop)
+def run_course(
     cell: TrueCell,
     robot: Robot,
     course: Course,
@@ -214,7 +214,7 @@ def _into_joints(robot: Robot, q: FloatArray) -> FloatArray:
     return turned
 
 
-def _readings(  # noqa: PLR0913
+def _readings(
     cell: TrueCell,
     course: Course,
     controller: Controller,
@@ -239,4 +239,5 @@ def _passage(course: Course, controller: Controller, cycles: int, shift: FloatAr
     rows = np.arange(len(course.q))
     direction = np.stack([np.interp(at, rows, course.direction[:, k]) for k in range(3)], axis=1)
     deviation = np.einsum("ck,ck->c", shift, direction)
-    return Passage(course, controller.cycle * np.arange(1, len(shift) + 1), shift, deviation)
+    time = np.arange(1.0, len(shift) + 1.0) * controller.cycle
+    return Passage(course, time, shift, deviation)

@@ -17,7 +17,6 @@ from elastocal.compensation.process.variation import engaged, swing
 from elastocal.errors import CompensationError
 from elastocal.planning.surface import Surface
 
-
 _RAYS = 400
 """Points across the surface, before they are spaced evenly."""
 
@@ -47,9 +46,7 @@ class Placement:
     """Time in which the roller comes down, in s."""
 
 
-def placement_courses(
-    surface: Surface, settings: Placement, rng: Generator
-) -> tuple[Course, ...]:
+def placement_courses(surface: Surface, settings: Placement, rng: Generator) -> tuple[Course, ...]:
     """Return courses across the surface, along y of its frame; deviations count aside.
 
     Parameters
@@ -91,7 +88,7 @@ def _course(
     normal = normal / np.linalg.norm(normal, axis=1, keepdims=True)
     forward = travel(kept)
     T = frames(kept, forward, -normal)
-    time = settings.step * np.arange(len(kept))
+    time = np.arange(float(len(kept))) * settings.step
     share = engaged(time, settings.rise)
     press = settings.compaction * (1.0 + settings.compaction_swing * swing(time, rng))
     mean = rng.choice([-1.0, 1.0]) * rng.uniform(*settings.lateral)
@@ -117,7 +114,7 @@ def _hits(surface: Surface, where: tuple[float, float, float, float]) -> FloatAr
     order = np.argsort(index)
     points, face = np.asarray(points)[order], np.asarray(face)[order]
     corners = surface.mesh.vertices[surface.mesh.faces[face]]
-    weights = trimesh.triangles.points_to_barycentric(corners, points)
+    weights = trimesh.triangles.points_to_barycentric(corners, points)  # type: ignore[no-untyped-call]
     return np.hstack([points, surface.normals_at(face, weights)])
 
 
@@ -127,4 +124,5 @@ def _within(rows: FloatArray, border: float) -> FloatArray:
         return rows[:0]
     steps = np.linalg.norm(np.diff(rows[:, :3], axis=0), axis=1)
     way = np.concatenate([[0.0], np.cumsum(steps)])
-    return rows[(way > border) & (way < way[-1] - border)]
+    kept: FloatArray = rows[(way > border) & (way < way[-1] - border)]
+    return kept

@@ -70,9 +70,7 @@ def with_postures(cell: Cell, courses: tuple[Course, ...]) -> tuple[Course, ...]
     margins = [min(margin for margin, _ in stands) for stands in found]
     best = int(np.argmax(margins))
     if not margins[best] > 0.0:
-        reached = [
-            any(stands[k][0] > 0.0 for stands in found) for k in range(len(courses))
-        ]
+        reached = [any(stands[k][0] > 0.0 for stands in found) for k in range(len(courses))]
         worst = courses[reached.index(False)].name if False in reached else "all courses at once"
         raise CompensationError(
             f"{cell.robot.name} cannot follow {worst} within joint_margin and wrist_angle, however"

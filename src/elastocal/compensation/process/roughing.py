@@ -74,7 +74,7 @@ def roughing_rings(surface: Surface, settings: Roughing, rng: Generator) -> tupl
     )
 
 
-def _ring(  # noqa: PLR0913 (where the ring lies is three of them)
+def _ring(
     name: str,
     T_base_surface: FloatArray,
     apex: FloatArray,
@@ -93,7 +93,7 @@ def _ring(  # noqa: PLR0913 (where the ring lies is three of them)
     normal = (path - centre) / sphere
     forward = travel(path)
     across = np.cross(normal, forward)
-    time = settings.step * np.arange(len(path))
+    time = np.arange(float(len(path))) * settings.step
     cut = rng.uniform(*settings.engagement) * (1.0 + settings.swing * swing(time, rng))
     cut *= engaged(time, settings.roll_in / settings.speed)
     force = cut[:, None] * (

@@ -47,9 +47,7 @@ class Comparison:
         return mean, largest, deviation
 
 
-def compare(
-    name: str, before: Sequence[FloatArray], after: Sequence[FloatArray]
-) -> Comparison:
+def compare(name: str, before: Sequence[FloatArray], after: Sequence[FloatArray]) -> Comparison:
     """Return a line of the table over all points of some courses.
 
     Parameters
@@ -59,9 +57,7 @@ def compare(
     before, after : sequence of ndarray, shape (point,)
         Signed deviations of each course, in m.
     """
-    return Comparison(
-        name, Figures.of(np.concatenate(before)), Figures.of(np.concatenate(after))
-    )
+    return Comparison(name, Figures.of(np.concatenate(before)), Figures.of(np.concatenate(after)))
 
 
 def pooled(name: str, lines: Sequence[Comparison]) -> Comparison:

@@ -12,7 +12,9 @@ PERIODS = (1.0, 2.3, 5.1)
 def swing(time: FloatArray, rng: Generator) -> FloatArray:
     """Return a slow swing between -1 and 1, shape (row,): three sines of random phase."""
     phase = rng.uniform(0.0, 2.0 * np.pi, len(PERIODS))
-    sines = [np.sin(2.0 * np.pi * time / period + p) for period, p in zip(PERIODS, phase, strict=True)]
+    sines = [
+        np.sin(2.0 * np.pi * time / period + p) for period, p in zip(PERIODS, phase, strict=True)
+    ]
     mean: FloatArray = np.mean(sines, axis=0)
     return mean
 

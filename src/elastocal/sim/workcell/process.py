@@ -96,9 +96,9 @@ class ProcessCell:
         rest = statics.robot.rest(q, force_base, before.springs, before.theta)
         twist = statics.twist(q, rest)
         self._stand = Stand(q, twist, force_base, rest.springs, rest.theta, before.sag)
-        both = (np.stack([a, a]) for a in (q, twist))
+        joints, twists = (np.stack([a, a]) for a in (q, twist))
         forces = np.stack([force_base, np.zeros(3)])
-        seen = statics.knots(np.array([0.0, 1.0]), *both, forces).seen[:, 3:]
+        seen = statics.knots(np.array([0.0, 1.0]), joints, twists, forces).seen[:, 3:]
         return Pressed(twist[:3] + self._stop, seen[0], seen[0] - seen[1])
 
     def read(self, since: FloatArray, wrench: FloatArray) -> FloatArray:
