@@ -8,6 +8,7 @@ Assumptions, beside those of `elastocal.sim.workcell.quasistatics`:
   arm with a mode at 10 Hz moves (10/200)² = 0.25 % of what it would at rest;
 * what counts is how far a path under force lies from the same path run in the air, as a tracker
   on the tool measures it: sag under weight is in both;
+* the controller takes out a part of the sag as it was where the course began;
 * the path as a whole is off by the error of one stop, drawn anew for every course.
 """
 
@@ -76,10 +77,19 @@ class ProcessCell:
         self._warm = self._stand.theta
 
     def free_shift(self, q: FloatArray) -> FloatArray:
-        """Return the shift of the tool in the air, shape (3,), in m; nothing is remembered."""
+        """Return the shift of the tool in the air, shape (3,), in m.
+
+        The gears remember nothing of it. `lift` comes first.
+        """
         stand = self._statics.free(q, np.zeros(3), self._warm)
         self._warm = stand.theta
-        return stand.sag[:3]
+        return self._left(stand.sag)[:3]
+
+    def _left(self, twist: FloatArray) -> FloatArray:
+        """Take out what the controller does of the sag, as it was where the course began."""
+        assert self._stand is not None, "lift comes first"
+        left: FloatArray = twist - self._statics.compensation * self._stand.sag
+        return left
 
     def press(self, q: FloatArray, force_base: FloatArray) -> Pressed:
         """Go on to joints and a force on the robot.
@@ -92,14 +102,13 @@ class ProcessCell:
             On the robot at the tool centre point, in base, in N.
         """
         assert self._stand is not None, "lift comes first"
-        statics, before = self._statics, self._stand
-        rest = statics.robot.rest(q, force_base, before.springs, before.theta)
-        twist = statics.twist(q, rest)
-        self._stand = Stand(q, twist, force_base, rest.springs, rest.theta, before.sag)
+        statics = self._statics
+        stand = statics.loaded(self._stand, q, force_base, self._stop)
+        self._stand, twist = stand, stand.twist
         joints, twists = (np.stack([a, a]) for a in (q, twist))
         forces = np.stack([force_base, np.zeros(3)])
         seen = statics.knots(np.array([0.0, 1.0]), joints, twists, forces).seen[:, 3:]
-        return Pressed(twist[:3] + self._stop, seen[0], seen[0] - seen[1])
+        return Pressed(twist[:3], seen[0], seen[0] - seen[1])
 
     def read(self, since: FloatArray, wrench: FloatArray) -> FloatArray:
         """Return what the sensor says: cross-talk, zero, drift, noise, end of its range.
