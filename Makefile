@@ -28,6 +28,7 @@ bench: $(VENV)/installed-dev
 	$(BIN)/python benchmarks/run.py
 	$(BIN)/python benchmarks/search.py
 	$(BIN)/python benchmarks/pool.py
+	$(BIN)/python benchmarks/compensation.py
 
 clean:
 	rm -rf $(VENV) demo site

@@ -57,6 +57,10 @@ class ProcedureError(ElastocalError, RuntimeError):
     """The calibration procedure cannot start or go on."""
 
 
+class CompensationError(ElastocalError, ValueError):
+    """A correction that cannot be made: bad limits, a filter beyond Nyquist, an unknown tool."""
+
+
 class FileAccessError(ElastocalError, OSError):
     """A file that cannot be read or written."""
 

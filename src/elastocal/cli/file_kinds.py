@@ -8,6 +8,8 @@ from typing import Any
 from elastocal import dataset
 from elastocal.cell import load_cell
 from elastocal.cli.cell_facts import cell_facts
+from elastocal.compensation.conditioning.tool_file import read_tool
+from elastocal.compensation.settings import read_settings
 from elastocal.dataset.netcdf import read_netcdf
 from elastocal.elastic.layouts import read_springs
 from elastocal.errors import DatasetError, RobotError, SchemaError
@@ -30,6 +32,8 @@ Describe = Callable[[Path], Described]
 
 _PLAN = re.compile(r'"schema":\s*"elastocal\.plan/')
 _SUMMARY = re.compile(r'"schema":\s*"elastocal\.run-summary/')
+_TOOL = re.compile(r'"schema":\s*"elastocal\.tool/')
+_COMPENSATOR_LINE = re.compile(r"^schema:\s*[\"']?elastocal\.compensator/", re.MULTILINE)
 _SCHEMA_LINE = re.compile(r"^schema:\s*[\"']?elastocal\.cell/", re.MULTILINE)
 
 
@@ -126,9 +130,10 @@ def _netcdf(path: Path) -> Described:
 def _json(path: Path) -> Described:
     """Describe a JSON file by the schema that it states; what states none is read as a model."""
     head = read_text(path)[:200]
-    if _SUMMARY.search(head):
-        return _summary(path)
-    return _plan(path) if _PLAN.search(head) else _model(path)
+    for stated, describe in ((_PLAN, _plan), (_SUMMARY, _summary), (_TOOL, _tool)):
+        if stated.search(head):
+            return describe(path)
+    return _model(path)
 
 
 def _dataset(path: Path) -> Described:
@@ -172,8 +177,11 @@ def _robot(path: Path) -> Described:
 
 def _settings(path: Path) -> Described:
     """Describe a YAML file by the schema that it states."""
-    if _SCHEMA_LINE.search(read_text(path)):
+    text = read_text(path)
+    if _SCHEMA_LINE.search(text):
         return _cell(path)
+    if _COMPENSATOR_LINE.search(text):
+        return _compensator(path)
     file = read_springs(path)
     facts = {
         "schema": "elastocal.springs/1",
@@ -216,4 +224,26 @@ def _summary(path: Path) -> Described:
         "schema": summary["schema"],
         "readings": summary["readings"]["counts"],
         "warnings": len(summary["warnings"]),
+    }
+
+
+def _tool(path: Path) -> Described:
+    record = read_tool(path)
+    return "tool file", {
+        "schema": "elastocal.tool/1",
+        "flange": record.flange,
+        "mass": record.mass,
+        "postures": record.postures,
+        "undetermined": list(record.undetermined),
+    }
+
+
+def _compensator(path: Path) -> Described:
+    settings = read_settings(path)
+    return "settings of a compensator", {
+        "schema": "elastocal.compensator/1",
+        "cycle": settings.cycle,
+        "filter_delay": float(settings.chain.delay()),
+        "correction": settings.limits.correction,
+        "rate": settings.limits.rate,
     }

@@ -17,13 +17,18 @@ import typer
 from elastocal import __version__
 from elastocal.cli.calibrate import calibrate
 from elastocal.cli.check import check
+from elastocal.cli.compensate import compensate
 from elastocal.cli.demo import demo
 from elastocal.cli.derive import derive
+from elastocal.cli.export import export
 from elastocal.cli.init import init
 from elastocal.cli.plan import plan
 from elastocal.cli.predict import predict
 from elastocal.cli.robots import robots
 from elastocal.cli.run import run as run_procedure
+from elastocal.cli.simulate_process import simulate_process
+from elastocal.cli.stiffness import stiffness
+from elastocal.cli.tool import tool
 from elastocal.errors import ElastocalError, FileAccessError
 
 app = typer.Typer(
@@ -42,6 +47,11 @@ COMMANDS: dict[str, Callable[..., None]] = {
     "derive": derive,
     "calibrate": calibrate,
     "predict": predict,
+    "tool": tool,
+    "compensate": compensate,
+    "stiffness": stiffness,
+    "export": export,
+    "simulate-process": simulate_process,
     "demo": demo,
 }
 """In the order in which help lists them: that of the work."""

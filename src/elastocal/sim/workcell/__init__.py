@@ -15,6 +15,7 @@
 `balancer`            gravity balancer of axis 2
 `contact`, `surface`  disk, friction, tooling; ray against its mesh
 `schedule`            injected faults
+`process`             the cell at work, under forces that are given
 `segment`             a stretch of time; `time_laws`: how the time goes
 `keys`, `clock`       noise without history; time in µs
 ====================  =========================================================================

@@ -30,8 +30,7 @@ class SimulatedForceSensor:
         self._plant, self._entry = plant, entry
         self._range = sensor_range(cell)
         self._matrix = sensor_matrix(cell, plant.seed)
-        zero = generator(plant.seed, "sensor", "zero").standard_normal(6)
-        self._zero = entry.bias * self._range * zero
+        self._zero = sensor_zero(cell, plant.seed)
         sigma = np.repeat([entry.force_noise, entry.moment_noise], 3)
         self._noise = NoiseStream(lambda rng: sigma * rng.standard_normal((BLOCK, 6)), plant.seed)
         self._grid, self._samples = SampleGrid(entry.rate, plant.now), Samples(6)
@@ -130,6 +129,13 @@ def sensor_range(cell: Cell) -> FloatArray:
     if sensor is None:
         raise DeviceError(f"cell {cell.name} has no force sensor to simulate (key 'sensor')")
     return np.concatenate([sensor.largest_force, sensor.largest_moment])
+
+
+def sensor_zero(cell: Cell, seed: int) -> FloatArray:
+    """Return what the sensor reads under nothing, shape (6,), in N and N·m."""
+    zero = generator(seed, "sensor", "zero").standard_normal(6)
+    bias: FloatArray = cell.file.simulation.sensor.bias * sensor_range(cell) * zero
+    return bias
 
 
 def sensor_matrix(cell: Cell, seed: int) -> FloatArray:

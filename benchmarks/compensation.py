@@ -1,0 +1,148 @@
+"""Print how fast the compensator is: the exported C beside Pinocchio, and the Python step.
+
+Machines differ and are noisy, so the ratio to Pinocchio's own Jacobian of the same 18-spring
+model, in the same run, is what counts. Needs gcc. Run with ``python benchmarks/compensation.py``.
+"""
+
+import shutil
+import subprocess
+import tempfile
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pinocchio as pin
+
+from elastocal.compensation.export import write_c
+from elastocal.compensation.online import Compensator, Design, Reading, design
+from elastocal.compensation.settings import CompensatorSettings
+from elastocal.elastic import ElasticModel, layout
+from elastocal.identification import CalibratedModel, Observability
+from elastocal.robot import Robot, catalogue
+from elastocal.robot.chain import ChainModel, InsertedJoint, build_model
+from elastocal.robot.mounting import with_tool
+
+HARNESS = Path(__file__).parents[1] / "tests" / "support" / "export_harness.c"
+TOOL = np.array([[0.0, 0, 1, 0.15], [0, 1, 0, 0], [-1, 0, 0, 0.35], [0, 0, 0, 1]])
+ROWS, REPEATS = 1000, 5
+SETTINGS = CompensatorSettings(
+    filter={
+        "median": 3,
+        "notches": [{"frequency": "50 Hz", "width": "10 Hz"}],
+        "low_pass": {"cutoff": "15 Hz", "order": 2},
+    }
+)
+
+
+def calibrated() -> CalibratedModel:
+    """Return an 18-spring KUKA arm with made-up compliances and 200 draws."""
+    urdf = with_tool(catalogue.urdf("KR 120 R2700 extra HA"), "flange", "tcp", TOOL)
+    robot = Robot.from_urdf(urdf, "tcp")
+    model = ElasticModel(robot, layout(robot, "bearing"))
+    rng, n = np.random.default_rng(0), len(model.springs)
+    compliance = rng.uniform(1e-7, 1e-6, n)
+    draws = compliance * (1.0 + 0.1 * rng.normal(size=(200, n)))
+    return CalibratedModel(model, compliance, draws, Observability(n, n, 1.0, (True,) * n, ()))
+
+
+def rows(model: ElasticModel) -> np.ndarray:
+    """Return joints, forces and moments."""
+    rng, limits = np.random.default_rng(1), model.robot.limits
+    q = rng.uniform(limits.lower, limits.upper, (ROWS, len(limits.lower)))
+    return np.hstack([q, 500.0 * rng.normal(size=(ROWS, 3)), 50.0 * rng.normal(size=(ROWS, 3))])
+
+
+def c_seconds(numbers: Design, data: np.ndarray) -> tuple[float, float]:
+    """Return seconds a call of the exported deflection and step, compiled with -O2."""
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name) / "c"
+        write_c(folder, numbers)
+        program = folder / "timing"
+        sources = [folder / "elastocal_model.c", HARNESS, f"-I{folder}"]
+        subprocess.run(["gcc", "-std=c99", "-O2", *sources, "-o", program, "-lm"], check=True)
+        runs = [
+            subprocess.run(
+                [program, "timing"], input=data.tobytes(), capture_output=True, check=True
+            )
+            for _ in range(REPEATS)
+        ]
+    times = np.array([run.stdout.split()[:2] for run in runs], dtype=float)
+    deflection, step = np.median(times, axis=0)
+    return float(deflection), float(step)
+
+
+def pinocchio_seconds(model: ElasticModel, data: np.ndarray) -> tuple[float, float]:
+    """Return seconds a call of Pinocchio's Jacobian with all 18 springs as joints.
+
+    The second number is the same without what a call on a chain of one joint takes: nearly all of
+    that is Python's, not Pinocchio's.
+    """
+    robot, joints = model.robot, len(model.robot.joint_names)
+    names = robot.joint_names
+    inserted = [
+        InsertedJoint(
+            s.name, names.index(s.joint), np.array(s.axis), s.revolute, s.distal, np.array(s.offset)
+        )
+        for s in model.springs[joints:]
+    ]
+    whole = jacobian_seconds(build_model(robot.chain, inserted), data[:, :joints])
+    single = replace(robot.chain, joints=robot.chain.joints[:1])
+    return whole, whole - jacobian_seconds(build_model(single), data[:, :1])
+
+
+def jacobian_seconds(chain: ChainModel, joints: np.ndarray) -> float:
+    """Return the median over some rounds of the mean time of a Jacobian."""
+    workspace, frame = chain.model.createData(), chain.tip_frame
+    axes, jacobian = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED, pin.computeFrameJacobian
+    configurations = np.zeros((len(joints), chain.model.nq))
+    configurations[:, chain.joint_columns] = joints
+    means = []
+    for _ in range(REPEATS):
+        start = time.perf_counter()
+        for q in configurations:
+            jacobian(chain.model, workspace, q, frame, axes)
+        means.append((time.perf_counter() - start) / len(joints))
+    return float(np.median(means))
+
+
+def python_seconds(numbers: Design, data: np.ndarray) -> np.ndarray:
+    """Return seconds of each Python step."""
+    compensator, taken = Compensator(numbers), []
+    state = compensator.start()
+    n = numbers.joints
+    for k, row in enumerate(data.tolist()):
+        reading = Reading(0.004 * k, row[:n], row[n : n + 3], row[n + 3 :])
+        start = time.perf_counter()
+        state, _ = compensator.step(state, reading)
+        taken.append(time.perf_counter() - start)
+    return np.array(taken)
+
+
+def main() -> None:
+    """Measure and print."""
+    model = calibrated()
+    numbers, data = design(model, SETTINGS), rows(model.model)
+    steps = python_seconds(numbers, np.tile(data, (3, 1)))
+    print(
+        f"Python step, 18 springs, median, notch and low-pass: {1e6 * np.median(steps):.1f} us"
+        f" median, {1e6 * np.percentile(steps, 99):.1f} us 99 %"
+    )
+    called, own = pinocchio_seconds(model.model, data)
+    print(
+        f"Pinocchio's Jacobian of the same 18 springs: {1e6 * called:.2f} us from Python,"
+        f" {1e6 * own:.2f} us without the call"
+    )
+    if shutil.which("gcc") is None:
+        print("no gcc: the C is not timed")
+        return
+    deflection, step = c_seconds(numbers, data)
+    print(
+        f"C deflection, -O2: {1e6 * deflection:.3f} us, {deflection / called:.2f} and"
+        f" {deflection / own:.2f} of these;"
+        f" C step with filters and interval: {1e6 * step:.2f} us"
+    )
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,67 @@
+"""Options that a person types for a posture, a limit or a frame."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from elastocal.arrays import FloatArray
+from elastocal.errors import RobotError, UnitError
+from elastocal.robot import Robot
+from elastocal.robot.pose import T_from_xyzabc
+from elastocal.units import parse_quantity
+
+
+def parse_posture(robot: Robot, text: str | None) -> FloatArray | None:
+    """Return joint positions, shape (joint,), in rad or m; None for no text.
+
+    Raises
+    ------
+    RobotError
+        If there is not one quantity a joint, or one is outside its limits.
+    UnitError
+        If a unit is missing or wrong.
+    """
+    if text is None:
+        return None
+    parts, names = [part.strip() for part in text.split(",")], robot.joint_names
+    if len(parts) != len(names):
+        raise RobotError(
+            f"posture {text!r} has {len(parts)} values: it must have one a joint of {robot.name}"
+            f" ({', '.join(names)})"
+        )
+    kinds = ["angle" if turns else "length" for turns in robot.revolute]
+    q = np.array([parse_quantity(part, kind) for part, kind in zip(parts, kinds, strict=True)])
+    outside = ~(robot.limits.margin(q) >= 0.0)
+    if outside.any():
+        joint = int(np.argmax(outside))
+        raise RobotError(
+            f"posture {text!r}: {names[joint]} at {parts[joint]} is outside its limits"
+        )
+    return q
+
+
+def parse_frame(text: str | None) -> FloatArray | None:
+    """Return a frame, shape (4, 4), from ``"x, y, z, a, b, c"`` (KUKA Z-Y'-X''); None for no text.
+
+    Raises
+    ------
+    UnitError
+        If the text is not three lengths and three angles.
+    """
+    if text is None:
+        return None
+    parts = [part.strip() for part in text.split(",")]
+    if len(parts) != 6:
+        raise UnitError(
+            f"frame {text!r} must be six quantities, e.g. '0 mm, 0 mm, 565 mm, 0 deg, 0 deg, 0 deg'"
+        )
+    kinds = ("length",) * 3 + ("angle",) * 3
+    return T_from_xyzabc(*(parse_quantity(p, kind) for p, kind in zip(parts, kinds, strict=True)))
+
+
+def written_posture(robot: Robot, q: Sequence[float]) -> str:
+    """Return a posture as `parse_posture` reads it, to 0.1 deg and 0.1 mm."""
+    return ", ".join(
+        f"{np.degrees(value):.1f} deg" if turns else f"{1e3 * value:.1f} mm"
+        for value, turns in zip(q, robot.revolute, strict=True)
+    )

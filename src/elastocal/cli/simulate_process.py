@@ -1,0 +1,65 @@
+"""``elastocal simulate-process``: the paper's Table 1 of a simulated cell."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+
+def simulate_process(  # noqa: PLR0913 (a command has as many options as it has)
+    cell: Annotated[Path, typer.Argument(help="Cell file, .yaml.")],
+    model: Annotated[
+        list[Path],
+        typer.Option(help="Model of this cell from calibrate; once, or once for each --seed."),
+    ],
+    process: Annotated[str, typer.Option(help="afp (courses) or machining (rings of a dome).")],
+    out: Annotated[Path, typer.Option(metavar="DIR", help="Folder to write into.")],
+    *,
+    tool: Annotated[
+        list[Path] | None,
+        typer.Option(help="Tool file from `elastocal tool`; as --model. Default: the cell's."),
+    ] = None,
+    seed: Annotated[
+        list[int] | None,
+        typer.Option(min=0, help="Of forces and devices; as for run. Repeat it for more."),
+    ] = None,
+    settings: Annotated[
+        Path | None, typer.Option(help="Settings of the compensator (.yaml).")
+    ] = None,
+    courses: Annotated[
+        int | None, typer.Option(min=1, help="Courses or rings; default: 5.")
+    ] = None,
+    budget: Annotated[
+        bool, typer.Option("--budget", help="Switch each effect off in turn, for the first seed.")
+    ] = False,
+    force: Annotated[bool, typer.Option("--force", help="Replace files that are there.")] = False,
+    as_json: Annotated[
+        bool, typer.Option("--json", help="Print the figures as one JSON object.")
+    ] = False,
+) -> None:
+    """Run a process on the simulated cell without and with correction: how much is left."""
+    from elastocal.cell import load_cell
+    from elastocal.cli.output import console, print_json
+    from elastocal.cli.process_answer import Question, answer, paired
+    from elastocal.cli.process_folder import LAST, show, write_folder
+    from elastocal.cli.progress import progress_bars
+    from elastocal.files import filling
+
+    seeds = seed or [0]
+    runs = list(
+        zip(
+            seeds,
+            paired("--model", model, seeds),
+            paired("--tool", tool or [], seeds),
+            strict=True,
+        )
+    )
+    made = load_cell(cell)
+    with filling(out, LAST, force) as folder, progress_bars(console()) as report:
+        found = answer(Question(made, process, runs, settings, courses, budget), report)
+        write_folder(folder, found.figures, found.lines, found.budget, found.outcomes)
+    if as_json:
+        print_json(found.figures | {"folder": str(out)})
+    else:
+        show(console(), f"{made.name}, {process}", found.lines, found.budget)
+        console().print(f"written to {out}")

@@ -1,0 +1,53 @@
+"""``elastocal stiffness``: which posture is stiffest along a path (paper section 4.3.1)."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from elastocal.cli.compensate import START_HELP
+
+
+def stiffness(  # noqa: PLR0913 (a command has as many options as it has)
+    model: Annotated[Path, typer.Argument(help="Model file from calibrate.")],
+    path: Annotated[Path, typer.Argument(help="CSV as for compensate; forces are not needed.")],
+    out: Annotated[Path, typer.Option(metavar="DIR", help="Folder to write into.")],
+    *,
+    direction: Annotated[
+        str, typer.Option(help="'normal' (axis of the tool) or a vector in base: '1,0,0'.")
+    ] = "normal",
+    spins: Annotated[int, typer.Option(min=1, help="Turns about the tool's axis to try.")] = 36,
+    stands: Annotated[
+        int, typer.Option(min=1, help="Positions of each external axis to try (with --cell: its).")
+    ] = 9,
+    stations: Annotated[int, typer.Option(min=1, help="Rows of the path to look at.")] = 60,
+    cell: Annotated[
+        Path | None, typer.Option(help="Cell file: its margins, tooling and fixtures.")
+    ] = None,
+    start: Annotated[str | None, typer.Option(help=START_HELP)] = None,
+    force: Annotated[bool, typer.Option("--force", help="Replace files that are there.")] = False,
+    as_json: Annotated[
+        bool, typer.Option("--json", help="Print the key figures as one JSON object.")
+    ] = False,
+) -> None:
+    """Map the stiffness over spin, rail and path; choose the stiffest posture."""
+    from elastocal.cli.output import console, print_json
+    from elastocal.cli.posture_option import parse_posture
+    from elastocal.cli.progress import progress_bars
+    from elastocal.cli.stiffness_answer import Question, answer
+    from elastocal.cli.stiffness_folder import write_folder
+    from elastocal.files import filling
+    from elastocal.identification import read_model
+
+    calibrated = read_model(model)
+    posture = parse_posture(calibrated.model.robot, start)
+    question = Question(path, direction, spins, stands, stations, cell, posture)
+    with filling(out, "stiffness.json", force) as folder, progress_bars(console()) as report:
+        found = answer(calibrated, question, report)
+        figures = write_folder(folder, calibrated, found)
+    if as_json:
+        print_json(figures | {"folder": str(out)})
+    else:
+        for line in found.lines(figures):
+            console().print(line)
+        console().print(f"written to {out}: {', '.join(figures['files'])}")

@@ -1,0 +1,170 @@
+"""What ``elastocal stiffness`` is asked, and what it finds."""
+
+import itertools
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from elastocal.arrays import FloatArray
+from elastocal.cell import load_cell
+from elastocal.cli.coverage import NOT_COVERED, covered
+from elastocal.compensation.path import PathError
+from elastocal.compensation.stiffness import (
+    Choice,
+    Grid,
+    Hold,
+    Permit,
+    Stations,
+    Survey,
+    cell_permit,
+    choose,
+    read_stations,
+    same_robot,
+    survey,
+)
+from elastocal.identification import CalibratedModel
+from elastocal.robot import Robot
+from elastocal.robot.inverse import inverse_for
+
+
+@dataclass(frozen=True, eq=False)
+class Question:
+    """What is asked."""
+
+    path: Path
+    direction: str
+    spins: int
+    stands: int
+    stations: int
+    cell: Path | None
+    start: FloatArray | None
+
+
+@dataclass(frozen=True, eq=False)
+class Answer:
+    """What was found."""
+
+    question: Question
+    stations: Stations
+    direction: FloatArray
+    """Shape (station, 3), in base."""
+    survey: Survey
+    choice: Choice
+    covered: bool
+
+    @property
+    def along(self) -> str:
+        """The direction in words."""
+        text = self.question.direction
+        return "the tool's axis (normal)" if text == "normal" else f"({text}) in base"
+
+    @property
+    def holds(self) -> list[Hold]:
+        """Postures as programmed, and those chosen."""
+        programmed = Hold("as programmed", self.stations.q, np.zeros(len(self.stations)))
+        one = [] if self.choice.one is None else [self.choice.one]
+        return [programmed, *one, self.choice.each]
+
+    def lines(self, figures: dict[str, Any]) -> list[str]:
+        """Return what to tell a person."""
+        lines = [
+            f"{len(self.stations)} stations, {self.survey.stiffness.size} postures, of which"
+            f" {figures['postures']['allowed']} are allowed; stiffness along"
+            f" {self.along} in N/µm"
+        ]
+        for choice in figures["choices"]:
+            spin = "" if choice["spin"] is None else f", spin {np.degrees(choice['spin']):.0f} deg"
+            lines.append(
+                f"  {choice['name'] + ':':28} softest {1e-6 * choice['softest']:.3g}, mean"
+                f" {1e-6 * choice['mean']:.3g} at {choice['stations']} stations{spin}"
+            )
+        one = [c for c in figures["choices"] if c["spin"] is not None and c["posture_jumps"]]
+        lines += [
+            f"Note: {c['name']}: at {c['posture_jumps']} stations a joint turns by more than 90 deg"
+            for c in one
+        ]
+        if self.choice.one is None:
+            lines.append("Note: no single posture is allowed at every station")
+        return lines + ([] if self.covered else [f"Note: {NOT_COVERED}"])
+
+
+def answer(
+    calibrated: CalibratedModel, question: Question, report: Callable[[str, int, int], None]
+) -> Answer:
+    """Return the postures along the path and which to choose.
+
+    Raises
+    ------
+    PathError
+        If the path, the direction or the size of the survey is refused.
+    RobotError
+        If the cell has another robot.
+    """
+    robot = calibrated.model.robot
+    solver = inverse_for(robot)
+    permits: tuple[Permit, ...] = ()
+    external = grid_of_external(robot, question.stands)
+    if question.cell is not None:
+        cell = load_cell(question.cell)
+        same_robot(robot, cell.robot)
+        permits, external = cell_permit(cell), cell.external_positions
+    stations = read_stations(question.path, solver, question.stations, question.start)
+    towards = parse_direction(question.direction, stations)
+    turns = np.linspace(0.0, 2.0 * np.pi, question.spins, endpoint=False)
+    count = len(stations)
+    found = survey(
+        calibrated,
+        solver,
+        stations.T_base_tcp,
+        towards,
+        Grid(turns, external),
+        permits,
+        lambda done: report("stations", done, count),
+    )
+    choice = choose(found, solver)
+    return Answer(question, stations, towards, found, choice, covered(calibrated))
+
+
+def grid_of_external(robot: Robot, count: int) -> FloatArray:
+    """Return evenly spread positions of the external axes, shape (stand, external axis).
+
+    Raises
+    ------
+    PathError
+        If an external axis has no limits to spread them over.
+    """
+    ends = zip(robot.limits.lower, robot.limits.upper, strict=True)
+    axes = []
+    for name, (low, high) in itertools.islice(
+        zip(robot.joint_names, ends, strict=True), robot.external_axes
+    ):
+        if not (np.isfinite(low) and np.isfinite(high)):
+            raise PathError(f"external axis {name} has no limits: give a --cell with its positions")
+        axes.append(np.linspace(low, high, count))
+    grid = list(itertools.product(*axes))
+    return np.array(grid, dtype=float).reshape(len(grid), robot.external_axes)
+
+
+def parse_direction(text: str, stations: Stations) -> FloatArray:
+    """Return unit vectors in base, shape (station, 3).
+
+    Raises
+    ------
+    PathError
+        If the text is neither ``normal`` nor three numbers.
+    """
+    if text == "normal":
+        return stations.normal
+    try:
+        vector = np.array([float(part) for part in text.split(",")])
+    except ValueError:
+        vector = np.zeros(0)
+    length = float(np.linalg.norm(vector))
+    if vector.shape != (3,) or not 0.0 < length < np.inf:
+        raise PathError(
+            f"direction {text!r} must be 'normal' or three numbers, not all 0, e.g. '1,0,0'"
+        )
+    return np.tile(vector / length, (len(stations), 1))

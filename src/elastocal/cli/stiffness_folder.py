@@ -1,0 +1,91 @@
+"""The files that ``elastocal stiffness`` writes."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from elastocal.cli.stiffness_answer import Answer
+from elastocal.compensation.offline.follow import jumps
+from elastocal.compensation.stiffness import Hold, directional, write_choice, write_survey
+from elastocal.files import write_text
+from elastocal.identification import CalibratedModel
+from elastocal.report.stiffness_figures import Curve, write_stiffness_figure
+from elastocal.robot import Robot
+
+SCHEMA = "elastocal.stiffness/1"
+
+
+def write_folder(folder: Path, calibrated: CalibratedModel, found: Answer) -> dict[str, Any]:
+    """Write tables, figures and key figures; return the last.
+
+    Raises
+    ------
+    FileAccessError
+        If a file cannot be written.
+    """
+    robot = calibrated.model.robot
+    curves = [_curve(calibrated, found, hold) for hold in found.holds]
+    paths = [
+        write_survey(folder / "postures.csv", robot, found.stations, found.survey),
+        write_choice(
+            folder / "choice.csv", calibrated, found.stations, found.direction, found.holds
+        ),
+    ]
+    for name in ("stiffness.svg", "stiffness.png"):
+        title = f"{robot.name}: stiffness along {found.along}"
+        paths.append(
+            write_stiffness_figure(folder / name, title, found.stations, found.survey, curves)
+        )
+    figures = _figures(robot, found, curves) | {
+        "files": [*(path.name for path in paths), "stiffness.json"]
+    }
+    write_text(folder / "stiffness.json", json.dumps(figures, indent=1, allow_nan=False) + "\n")
+    return figures
+
+
+def _curve(calibrated: CalibratedModel, found: Answer, hold: Hold) -> Curve:
+    there = np.flatnonzero(np.isfinite(hold.q).all(axis=1))
+    k = directional(calibrated, hold.q[there], found.direction[there])
+    stiffness, low, high = (np.full(len(hold.q), np.nan) for _ in range(3))
+    stiffness[there], low[there], high[there] = k.stiffness, k.low, k.high
+    railed = calibrated.model.robot.external_axes > 0
+    rail = hold.q[:, 0] if railed else np.full(len(hold.q), np.nan)
+    return Curve(hold.name, stiffness, low, high, hold.spin, rail)
+
+
+def _jumps(robot: Robot, hold: Hold) -> int:
+    """Return at how many stations a joint turns by more than 90 deg from the one before."""
+    q = hold.q[np.isfinite(hold.q).all(axis=1)]
+    return len(jumps(robot, q, q[0])) if len(q) else 0
+
+
+def _figures(robot: Robot, found: Answer, curves: list[Curve]) -> dict[str, Any]:
+    return {
+        "schema": SCHEMA,
+        "direction": found.question.direction,
+        "stations": len(found.stations),
+        "postures": {
+            "tried": found.survey.stiffness.size,
+            "allowed": int(np.sum(~np.isnan(found.survey.stiffness))),
+            "refused": found.survey.refused,
+        },
+        "choices": [
+            _choice(curve, _jumps(robot, hold))
+            for curve, hold in zip(curves, found.holds, strict=True)
+        ],
+    }
+
+
+def _choice(curve: Curve, turns: int) -> dict[str, Any]:
+    k = curve.stiffness[np.isfinite(curve.stiffness)]
+    spins = np.unique(curve.spin[np.isfinite(curve.spin)])
+    return {
+        "name": curve.name,
+        "stations": len(k),
+        "softest": float(k.min()) if len(k) else 0.0,
+        "mean": float(k.mean()) if len(k) else 0.0,
+        "spin": float(spins[0]) if len(spins) == 1 else None,
+        "posture_jumps": turns,
+    }

@@ -1,0 +1,1 @@
+"""Compensation of the predicted deflection: online, offline, and on a real-time target."""

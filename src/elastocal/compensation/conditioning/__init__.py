@@ -1,0 +1,1 @@
+"""Force conditioning: what hangs on the sensor, found from static postures, and taken away."""

@@ -1,0 +1,149 @@
+
+/* ---- From the wrench to the correction ------------------------------------------------ */
+
+double elastocal_half_width(const double q[], const double force[3], const double moment[3])
+{
+    double block[3][ELASTOCAL_SPRINGS];
+    double largest = 0.0;
+    int row;
+    int direction;
+    int spring;
+    elastocal_block(q, force, moment, block);
+    for (row = 0; row < 3; row++) {
+        double variance = 0.0;
+        for (direction = 0; direction < DIRECTIONS; direction++) {
+            double part = 0.0;
+            for (spring = 0; spring < ELASTOCAL_SPRINGS; spring++) {
+                part += block[row][spring] * SPREAD[spring][direction];
+            }
+            variance += part * part;
+        }
+        largest = (variance > largest) ? variance : largest;
+    }
+    return sqrt(largest);
+}
+
+/* Move the correction towards a target by no more than a step; whether it came late. */
+static unsigned int move(double correction[3], const double target[3], double step)
+{
+    const double x = target[0] - correction[0];
+    const double y = target[1] - correction[1];
+    const double z = target[2] - correction[2];
+    const double distance = sqrt((x * x) + (y * y) + (z * z));
+    unsigned int late = 0U;
+    if (distance > step) {
+        const double share = step / distance;
+        correction[0] += share * x;
+        correction[1] += share * y;
+        correction[2] += share * z;
+        late = ELASTOCAL_RATE;
+    } else {
+        correction[0] = target[0];
+        correction[1] = target[1];
+        correction[2] = target[2];
+    }
+    return late;
+}
+
+/* Minus the deflection in the correction's frame, within deadband and limit. */
+static unsigned int aim(const double d[3], const double rotation[9], double target[3])
+{
+    const double length = sqrt((d[0] * d[0]) + (d[1] * d[1]) + (d[2] * d[2]));
+    double share = (length - DEADBAND) * DEADBAND_SLOPE;
+    const double *const r = (FRAME_IS_TCP != 0) ? rotation : FRAME;
+    unsigned int status = 0U;
+    int i;
+    if (share < 1.0) {
+        status |= ELASTOCAL_DEADBAND;
+    }
+    share = (share > 0.0) ? share : 0.0;
+    share = ((share < 1.0) ? share : 1.0) * GAIN;
+    if ((length * share) > LARGEST_CORRECTION) {
+        share = LARGEST_CORRECTION / length;
+        status |= ELASTOCAL_LIMITED;
+    }
+    for (i = 0; i < 3; i++) {
+        target[i] = -share * ((r[i] * d[0]) + (r[i + 3] * d[1]) + (r[i + 6] * d[2]));
+    }
+    return status;
+}
+
+static unsigned int follow(elastocal_state *state, const double q[])
+{
+    double r[9];
+    double force[3];
+    double moment[3];
+    double target[3];
+    unsigned int status;
+    int i;
+    orientation(q, r);
+    for (i = 0; i < 3; i++) {
+        const double *const w = state->wrench;
+        const double *const row = &r[3 * i];
+        force[i] = (row[0] * w[0]) + (row[1] * w[1]) + (row[2] * w[2]);
+        moment[i] = (row[0] * w[3]) + (row[1] * w[4]) + (row[2] * w[5]);
+    }
+    elastocal_deflection(q, force, moment, state->deflection);
+    state->half_width = elastocal_half_width(q, force, moment);
+    status = aim(state->deflection, r, target);
+    if (state->half_width > UNCERTAIN_ABOVE) {
+        status |= ELASTOCAL_UNCERTAIN;
+    }
+    status |= move(state->correction, target, LARGEST_STEP);
+    state->missed = 0;
+    return status;
+}
+
+/* Hold, then fade. */
+static unsigned int go_without(elastocal_state *state)
+{
+    static const double nothing[3] = {0.0, 0.0, 0.0};
+    unsigned int status = ELASTOCAL_HELD;
+    if (state->missed <= HOLD_CYCLES) {
+        state->missed += 1;
+    }
+    if (state->missed > HOLD_CYCLES) {
+        (void)move(state->correction, nothing, FADE_STEP);
+        status = ELASTOCAL_FADED;
+    }
+    return status;
+}
+
+void elastocal_correct(elastocal_state *state, const double q[], elastocal_correction *out)
+{
+    int usable = state->fresh;
+    int i;
+    for (i = 0; i < ELASTOCAL_JOINTS; i++) {
+        if (!((q[i] > -JOINT_RANGE) && (q[i] < JOINT_RANGE))) {
+            usable = 0;
+        }
+    }
+    out->status = state->problem;
+    if (usable != 0) {
+        out->status |= follow(state, q);
+    } else {
+        out->status |= go_without(state);
+    }
+    state->fresh = 0;
+    for (i = 0; i < 3; i++) {
+        out->correction[i] = state->correction[i];
+        out->deflection[i] = state->deflection[i];
+    }
+    out->half_width = state->half_width;
+}
+
+void elastocal_step(elastocal_state *state, const elastocal_reading *reading,
+                    elastocal_correction *out)
+{
+    elastocal_condition(state, reading);
+    elastocal_correct(state, reading->q, out);
+}
+
+void elastocal_rkorr(const double correction[3], double rkorr[6])
+{
+    int i;
+    for (i = 0; i < 3; i++) {
+        rkorr[i] = 1000.0 * correction[i];
+        rkorr[i + 3] = 0.0;
+    }
+}

@@ -1,0 +1,112 @@
+/*
+ * Deflection of a robot under load, and its compensation.
+ *
+@ABOUT@
+ *
+ * Written by elastocal @VERSION@; do not edit: export again instead. C99, no allocation, no
+ * variables that live between calls but those of the caller. SI units and radians.
+ *
+ * Force and moment are those ON the robot at the tool centre point, in the base of the model.
+ * Deflection is the real minus the commanded position of the tool centre point.
+ */
+#ifndef ELASTOCAL_MODEL_H
+#define ELASTOCAL_MODEL_H
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+#define ELASTOCAL_JOINTS @JOINTS@
+#define ELASTOCAL_SPRINGS @SPRINGS@
+#define ELASTOCAL_SECTIONS @SECTIONS@ /* second-order filter sections */
+#define ELASTOCAL_MEDIAN @MEDIAN@ /* readings that the median takes */
+
+#define ELASTOCAL_CYCLE @CYCLE@ /* s between two calls of elastocal_correct */
+#define ELASTOCAL_SAMPLE @SAMPLE@ /* s between two calls of elastocal_condition */
+#define ELASTOCAL_DELAY @DELAY@ /* s by which median and filters delay a slow wrench */
+
+/* Joints, in the order of every array q:
+@JOINT_NAMES@
+ */
+
+/* What a correction is to be read with: flags of `status`. */
+#define ELASTOCAL_OK 0U
+#define ELASTOCAL_HELD 1U /* no usable reading: the last correction is held */
+#define ELASTOCAL_FADED 2U /* none for longer: the correction fades to zero, or has */
+#define ELASTOCAL_LIMITED 4U /* the deflection asks for more than the largest correction */
+#define ELASTOCAL_RATE 8U /* the correction is still on its way */
+#define ELASTOCAL_DEADBAND 16U /* the deflection is small: not corrected, or not fully */
+#define ELASTOCAL_UNCERTAIN 32U /* the interval of the deflection is too wide */
+#define ELASTOCAL_STALE 64U /* the reading's time stood still, went back or jumped ahead */
+#define ELASTOCAL_SATURATED 128U /* the reading is beyond the sensor's range */
+#define ELASTOCAL_INVALID 256U /* the reading holds a NaN, an infinity or no joint position */
+#define ELASTOCAL_SENSOR 512U /* the sensor called the reading bad */
+
+/* What arm and sensor say. */
+typedef struct {
+    double time; /* by the sensor's clock, s; must advance */
+    double q[ELASTOCAL_JOINTS]; /* measured joint positions, rad or m */
+    double force[3]; /* raw, sensor frame, N */
+    double moment[3]; /* raw, sensor frame, about its origin, N m */
+    int ok; /* not 0: the sensor calls the reading good */
+} elastocal_reading;
+
+/* What is remembered from one call to the next; the caller owns it. */
+typedef struct {
+    double time;
+    int fresh;
+    unsigned int problem;
+    int missed;
+    double window[5][6];
+    double z1[ELASTOCAL_SECTIONS + 1][6];
+    double z2[ELASTOCAL_SECTIONS + 1][6];
+    double wrench[6]; /* conditioned, tcp frame: force in N, moment in N m */
+    double correction[3];
+    double deflection[3];
+    double half_width;
+} elastocal_state;
+
+/* What the controller is told. */
+typedef struct {
+    double correction[3]; /* to add to the commanded position, m, in axes of @FRAME@ */
+    double deflection[3]; /* predicted, base, m; the last one while held */
+    double half_width; /* half the 95 % interval of its most uncertain component, m */
+    unsigned int status;
+} elastocal_correction;
+
+/* Deflection at joints q under force and moment on the robot at the tcp, all in base. */
+void elastocal_deflection(const double q[], const double force[3], const double moment[3],
+                          double deflection[3]);
+
+/* Block O of the same load: deflection[i] is the sum over s of O[i][s] * compliance[s]. */
+void elastocal_block(const double q[], const double force[3], const double moment[3],
+                     double block[3][ELASTOCAL_SPRINGS]);
+
+/* Half the 95 % interval of the deflection's most uncertain component, m. */
+double elastocal_half_width(const double q[], const double force[3], const double moment[3]);
+
+/* Before the first reading: no correction, filters at rest. */
+void elastocal_start(elastocal_state *state);
+
+/* Take a reading: every ELASTOCAL_SAMPLE seconds. */
+void elastocal_condition(elastocal_state *state, const elastocal_reading *reading);
+
+/* Give a correction: every ELASTOCAL_CYCLE seconds. */
+void elastocal_correct(elastocal_state *state, const double q[], elastocal_correction *out);
+
+/* Both, where sensor and controller have the same cycle. */
+void elastocal_step(elastocal_state *state, const elastocal_reading *reading,
+                    elastocal_correction *out);
+
+/* A correction as KUKA's RKorr: X, Y, Z in mm, A, B, C in degrees (always 0). */
+void elastocal_rkorr(const double correction[3], double rkorr[6]);
+
+/* 0: constants, compiler and processor give the numbers that elastocal gave.
+ * 1: a constant differs. 2: a deflection differs. 3: the compensator differs. */
+int elastocal_selftest(void);
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif

@@ -1,0 +1,113 @@
+
+/* ---- Self-test ------------------------------------------------------------------------ */
+
+/* A load, with the deflection and the half width that elastocal gave. */
+typedef struct {
+    double q[ELASTOCAL_JOINTS];
+    double force[3];
+    double moment[3];
+    double deflection[3];
+    double half_width;
+} load_case;
+
+/* A reading that comes some times in a row, with the last correction that elastocal gave. */
+typedef struct {
+    int times;
+    elastocal_reading reading;
+    double correction[3];
+    unsigned int status;
+} episode;
+
+static const load_case LOADS[@LOADS@] = {
+@LOAD_DATA@
+};
+
+static const episode EPISODES[@EPISODES@] = {
+@EPISODE_DATA@
+};
+
+/* FNV-1a over the bits of a number. */
+static uint64_t mixed(uint64_t sum, double number)
+{
+    uint64_t bits;
+    (void)memcpy(&bits, &number, sizeof bits);
+    return (sum ^ bits) * UINT64_C(1099511628211);
+}
+
+static uint64_t sum_of_constants(void)
+{
+    uint64_t sum = UINT64_C(14695981039346656037);
+    int i;
+    int k;
+@MIXING@
+    return sum;
+}
+
+/* Whether two numbers agree within a tolerance; a NaN never does. */
+static int agree(double found, double expected, double tolerance)
+{
+    return (fabs(found - expected) <= tolerance) ? 1 : 0;
+}
+
+static int loads_agree(void)
+{
+    int all = 1;
+    int k;
+    int i;
+    for (k = 0; k < @LOADS@; k++) {
+        const load_case *const load = &LOADS[k];
+        double found[3];
+        double size = 0.0;
+        elastocal_deflection(load->q, load->force, load->moment, found);
+        for (i = 0; i < 3; i++) {
+            size += fabs(load->deflection[i]);
+        }
+        for (i = 0; i < 3; i++) {
+            all &= agree(found[i], load->deflection[i], TOLERANCE * size);
+        }
+        all &= agree(elastocal_half_width(load->q, load->force, load->moment), load->half_width,
+                     TOLERANCE * (load->half_width + size));
+    }
+    return all;
+}
+
+static int episodes_agree(void)
+{
+    elastocal_state state;
+    elastocal_correction out;
+    double time = 0.0;
+    int all = 1;
+    int k;
+    int i;
+    elastocal_start(&state);
+    for (k = 0; k < @EPISODES@; k++) {
+        elastocal_reading reading = EPISODES[k].reading;
+        for (i = 0; i < EPISODES[k].times; i++) {
+            time += ELASTOCAL_SAMPLE;
+            reading.time += time;
+            elastocal_step(&state, &reading, &out);
+            reading.time = EPISODES[k].reading.time;
+        }
+        for (i = 0; i < 3; i++) {
+            all &= agree(out.correction[i], EPISODES[k].correction[i],
+                         TOLERANCE * LARGEST_CORRECTION);
+        }
+        all &= (out.status == EPISODES[k].status) ? 1 : 0;
+    }
+    return all;
+}
+
+int elastocal_selftest(void)
+{
+    int result = 0;
+    if (sum_of_constants() != UINT64_C(@CHECKSUM@)) {
+        result = 1;
+    } else if (loads_agree() == 0) {
+        result = 2;
+    } else if (episodes_agree() == 0) {
+        result = 3;
+    } else {
+        result = 0;
+    }
+    return result;
+}

@@ -1,0 +1,198 @@
+"""Straight-line programs: one list of statements, printed as C and compiled as Python.
+
+The deflection of an elastic model at given joints is a fixed sequence of products and sums. Sums
+of products read the same in C and in Python, so both come from one list, with the same arithmetic
+in the same order; products with 0 and 1, of which the transforms of a robot are full, are left
+out when the list is made.
+"""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+
+_SNAP = 4e-16
+"""Numbers nearer than this to 0, 1 or -1 are these: ``rpy="0 1.5707963267948966 0"`` of a URDF
+means a right angle."""
+
+
+@dataclass(frozen=True)
+class Value:
+    """0, 1 or the value of a name, with a sign."""
+
+    sign: int
+    """-1, 0 or 1."""
+    name: str = ""
+    """Empty: the number ``sign`` itself."""
+
+    def __neg__(self) -> "Value":
+        return Value(-self.sign, self.name)
+
+
+ZERO, ONE = Value(0), Value(1)
+Vector = tuple[Value, Value, Value]
+Matrix = tuple[Vector, Vector, Vector]
+"""Rows."""
+Product = tuple[Value, ...]
+
+
+@dataclass(frozen=True)
+class Assignment:
+    """``name = ± a * b ± c * d …``."""
+
+    name: str
+    terms: tuple[tuple[int, tuple[str, ...]], ...]
+    """Sign and factors of each product."""
+
+    def uses(self) -> set[str]:
+        """Return the names that it reads."""
+        return {factor for _, factors in self.terms for factor in factors}
+
+
+@dataclass(frozen=True)
+class Turn:
+    """``sine, cosine = sin(angle), cos(angle)``."""
+
+    sine: str
+    cosine: str
+    angle: str
+
+
+@dataclass(frozen=True)
+class Remark:
+    """A line for the reader."""
+
+    text: str
+
+
+Statement = Assignment | Turn | Remark
+
+
+@dataclass
+class Program:
+    """A list of statements under construction."""
+
+    constants: dict[str, float] = field(default_factory=dict)
+    """Numbers of the model, by name."""
+    statements: list[Statement] = field(default_factory=list)
+
+    def remark(self, text: str) -> None:
+        """Add a line for the reader."""
+        self.statements.append(Remark(text))
+
+    def constant(self, name: str, number: float) -> Value:
+        """Return a constant as a value; 0, 1 and -1 need no name.
+
+        Parameters
+        ----------
+        name : str
+            Of the constant.
+        number : float
+            Finite.
+        """
+        for nearest in (0, 1, -1):
+            if abs(number - nearest) <= _SNAP:
+                return Value(nearest)
+        return self.quantity(name, number)
+
+    def quantity(self, name: str, number: float) -> Value:
+        """Return a constant that keeps its name whatever its number is."""
+        self.constants[name] = number
+        return Value(1, name)
+
+    def turn(self, index: int, angle: str) -> tuple[Value, Value]:
+        """Return sine and cosine of an angle."""
+        sine, cosine = f"s{index}", f"c{index}"
+        self.statements.append(Turn(sine, cosine, angle))
+        return Value(1, sine), Value(1, cosine)
+
+    def total(self, name: str, products: Iterable[Product]) -> Value:
+        """Return a sum of products, left to right; a plain one needs no statement.
+
+        Parameters
+        ----------
+        name : str
+            Of the sum, where it needs one.
+        products : iterable of tuples of Value
+            The summands.
+        """
+        terms = []
+        for product in products:
+            sign = 1
+            for value in product:
+                sign *= value.sign
+            if sign:
+                terms.append((sign, tuple(value.name for value in product if value.name)))
+        if not terms:
+            return ZERO
+        if len(terms) == 1 and len(terms[0][1]) <= 1:
+            return Value(terms[0][0], *terms[0][1])
+        self.statements.append(Assignment(name, tuple(terms)))
+        return Value(1, name)
+
+    # -- vectors ----------------------------------------------------------------------------
+
+    def add(self, name: str, *vectors: Vector) -> Vector:
+        """Return the sum of vectors."""
+        return _vector(
+            self.total(f"{name}_{axis}", [(vector[i],) for vector in vectors])
+            for i, axis in enumerate("xyz")
+        )
+
+    def transformed(self, name: str, matrix: Matrix, vector: Vector, start: Vector) -> Vector:
+        """Return ``start + matrix @ vector``."""
+        return _vector(
+            self.total(f"{name}_{axis}", [(start[i],), *zip(matrix[i], vector, strict=True)])
+            for i, axis in enumerate("xyz")
+        )
+
+    def product(self, name: str, left: Matrix, right: Matrix) -> Matrix:
+        """Return ``left @ right``."""
+        rows = []
+        for row, a in zip(left, "xyz", strict=True):
+            columns = zip(*right, strict=True)
+            rows.append(
+                _vector(
+                    self.total(f"{name}_{a}{b}", list(zip(row, column, strict=True)))
+                    for column, b in zip(columns, "xyz", strict=True)
+                )
+            )
+        return rows[0], rows[1], rows[2]
+
+    def cross(self, name: str, a: Vector, b: Vector, start: Vector = (ZERO, ZERO, ZERO)) -> Vector:
+        """Return ``start + a x b``."""
+        pairs = ((1, 2), (2, 0), (0, 1))
+        return _vector(
+            self.total(f"{name}_{axis}", [(start[i],), (a[j], b[k]), (-a[k], b[j])])
+            for (i, axis), (j, k) in zip(enumerate("xyz"), pairs, strict=True)
+        )
+
+    def dot(self, name: str, a: Vector, b: Vector) -> Value:
+        """Return the scalar product."""
+        return self.total(name, list(zip(a, b, strict=True)))
+
+
+def needed(statements: Sequence[Statement], outputs: Iterable[Value]) -> tuple[Statement, ...]:
+    """Return the statements that the outputs depend on, in their order, remarks kept."""
+    wanted = {value.name for value in outputs}
+    kept: list[Statement] = []
+    for statement in reversed(statements):
+        match statement:
+            case Remark():
+                kept.append(statement)
+            case Turn() if {statement.sine, statement.cosine} & wanted:
+                kept.append(statement)
+            case Assignment() if statement.name in wanted:
+                wanted |= statement.uses()
+                kept.append(statement)
+    return tuple(_without_idle_remarks(kept[::-1]))
+
+
+def _without_idle_remarks(statements: Sequence[Statement]) -> Iterable[Statement]:
+    """Drop the remarks that nothing follows before the next one."""
+    for here, after in zip(statements, [*statements[1:], None], strict=True):
+        if not isinstance(here, Remark) or not (after is None or isinstance(after, Remark)):
+            yield here
+
+
+def _vector(values: Iterable[Value]) -> Vector:
+    x, y, z = values
+    return x, y, z

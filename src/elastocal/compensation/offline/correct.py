@@ -1,0 +1,215 @@
+"""The true inverse of a deflection: which pose to command so that the loaded tcp is the programmed.
+
+With programmed tcp position ``p``, orientation ``R`` and force ``f``, find ``q`` with
+
+    p(q) + C(q) f = p,    R(q) = R,    C(q) = J diag(c) J^T      (paper Eq. 10)
+
+by Newton steps of the rigid arm: ``J_arm dq = [p - p(q) - C(q) f; log(R R(q)^T)]``. What is left
+out of the derivative, ``d(C f)/dq``, is a deflection per metre, some 1e-3, so that each step gains
+three digits. The first step alone is what is usually done; its residual is told.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from elastocal.arrays import BoolArray, FloatArray, IndexArray
+from elastocal.compensation.offline.limits import Where, check_limits, turned_inside
+from elastocal.compensation.path.errors import PathError
+from elastocal.identification import CalibratedModel
+from elastocal.robot import Robot
+from elastocal.robot.inverse import InverseKinematics
+from elastocal.robot.inverse.branch_solver import pose_error
+from elastocal.robot.inverse.limits import TURN
+
+LARGEST = 0.02
+"""Largest deflection that is taken for one, in m."""
+TOLERANCE = 1e-9
+"""What is left of position (m) and orientation (rad); the contract is 1e-7 m."""
+_STEPS = 12
+_DAMPING = 1e-6
+"""Of the Newton step, so that a straight wrist does not stop the rows beside it."""
+_SMALL_TURN = 1.0
+"""Largest step of a joint (rad or m) that still is one of a correction."""
+
+
+@dataclass(frozen=True, eq=False)
+class Correction:
+    """Corrected rows."""
+
+    q: FloatArray
+    """Joints to command, shape (row, joint), in rad or m."""
+    T_base_tcp: FloatArray
+    """Poses to command, orientation as programmed, shape (row, 4, 4), in m."""
+    deflection: FloatArray
+    """Predicted at the corrected row, in base, shape (row, 3), in m."""
+    low: FloatArray
+    """Lower ends of its 95 % intervals, shape (row, 3), in m."""
+    high: FloatArray
+    """Upper ends, shape (row, 3), in m."""
+    uncorrected: FloatArray
+    """Predicted deflection at the programmed row, shape (row, 3), in m."""
+    first_order: FloatArray
+    """Distance that one step would leave, predicted, shape (row,), in m."""
+    residual: FloatArray
+    """Distance that is left, predicted, shape (row,), in m."""
+
+
+def correct(
+    solver: InverseKinematics,
+    calibrated: CalibratedModel,
+    q: FloatArray,
+    T_base_tcp: FloatArray,
+    wrench: tuple[FloatArray, FloatArray | None],
+    where: Where,
+    may_turn: bool = False,
+    largest: float = LARGEST,
+) -> Correction:
+    """Return the corrected rows of a path.
+
+    Parameters
+    ----------
+    solver : InverseKinematics
+        Of the model's robot; used where a Newton step fails.
+    calibrated : CalibratedModel
+        The model.
+    q : ndarray, shape (row, joint)
+        Programmed joints, in rad or m; external axes stay.
+    T_base_tcp : ndarray, shape (row, 4, 4)
+        Programmed poses, which ``q`` reaches.
+    wrench : tuple of ndarray, shape (row, 3)
+        Force and moment on the robot at the tcp in base, in N and N·m; no moment: None.
+    where : callable
+        Names a row in a refusal.
+    may_turn : bool
+        Whether a joint that the correction takes over its limit may stand a whole turn elsewhere:
+        in a path of poses the controller chooses the turn, in a path of joints it would rotate.
+    largest : float
+        Largest deflection that is taken for one, in m.
+
+    Raises
+    ------
+    PathError
+        If a programmed or corrected row is outside the joint limits or out of reach, or deflects
+        farther than can be meant.
+    """
+    robot = calibrated.model.robot
+    check_limits(robot, q, where, "is programmed")
+    load = _Load(calibrated, *wrench)
+    deflection = load.deflection(q, np.arange(len(q)))
+    _check_size(deflection, largest, where)
+    first = uncorrected = deflection.copy()
+    q, reached = q.copy(), T_base_tcp.copy()
+    error = _error(T_base_tcp, deflection, T_base_tcp)
+    for step in range(_STEPS):
+        open_rows = np.flatnonzero(~_small(error))
+        if not len(open_rows):
+            break
+        q[open_rows] += _newton_step(robot, q[open_rows], error[open_rows])
+        reached[open_rows] = robot.forward(q[open_rows])
+        deflection[open_rows] = load.deflection(q[open_rows], open_rows)
+        error[open_rows] = _error(reached[open_rows], deflection[open_rows], T_base_tcp[open_rows])
+        if step == 0:
+            first = deflection.copy()
+    for row in np.flatnonzero(~_small(error)).tolist():
+        q[row] = _by_solver(solver, load, q_start=q[row], T=T_base_tcp[row], row=row, where=where)
+        reached[row] = robot.forward(q[row])
+        deflection[row] = load.deflection(q[row : row + 1], np.array([row]))[0]
+    if may_turn:
+        q = turned_inside(robot, q)
+    check_limits(robot, q, where, "would be corrected")
+    commanded = T_base_tcp.copy()
+    commanded[:, :3, 3] = reached[:, :3, 3]
+    residual = reached[:, :3, 3] + deflection - T_base_tcp[:, :3, 3]
+    predicted = calibrated.predict(q, *wrench)
+    return Correction(
+        q,
+        commanded,
+        deflection,
+        predicted.low,
+        predicted.high,
+        uncorrected,
+        np.linalg.norm(first - uncorrected, axis=1),
+        np.linalg.norm(residual, axis=1),
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _Load:
+    calibrated: CalibratedModel
+    force: FloatArray
+    moment: FloatArray | None
+
+    def deflection(self, q: FloatArray, rows: IndexArray) -> FloatArray:
+        model, c = self.calibrated.model, self.calibrated.compliance
+        moment = None if self.moment is None else self.moment[rows]
+        # What overflows is refused by its size.
+        with np.errstate(over="ignore", invalid="ignore"):
+            return model.deflection(c, q, self.force[rows], moment)
+
+
+def _check_size(deflection: FloatArray, largest: float, where: Where) -> None:
+    """Refuse deflections that cannot be meant."""
+    with np.errstate(over="ignore"):
+        length = np.linalg.norm(deflection, axis=1)
+    fits = length <= largest
+    if not fits.all():
+        row = int(np.argmin(fits))
+        raise PathError(
+            f"{where(row)}: a deflection of {1e3 * length[row]:.4g} mm is above the limit of"
+            f" {1e3 * largest:.4g} mm: is the force in another unit or frame?"
+        )
+
+
+def _error(T: FloatArray, deflection: FloatArray, T_wanted: FloatArray) -> FloatArray:
+    loaded = T.copy()
+    loaded[:, :3, 3] += deflection
+    return pose_error(loaded, T_wanted)
+
+
+def _small(error: FloatArray) -> BoolArray:
+    position = np.linalg.norm(error[:, :3], axis=1)
+    turn = np.linalg.norm(error[:, 3:], axis=1)
+    return np.asarray((position <= TOLERANCE) & (turn <= TOLERANCE))
+
+
+def _newton_step(robot: Robot, q: FloatArray, error: FloatArray) -> FloatArray:
+    """Return a damped step of the arm's joints; external axes do not move."""
+    jacobian = robot.jacobian(q)
+    J = np.concatenate([jacobian.translation, jacobian.rotation], axis=-2)
+    J = J[..., robot.external_axes :]
+    Jt = np.swapaxes(J, -1, -2)
+    weights = np.linalg.solve(J @ Jt + _DAMPING**2 * np.eye(6), error[..., None])
+    step = np.zeros_like(q)
+    step[:, robot.external_axes :] = np.clip((Jt @ weights)[..., 0], -_SMALL_TURN, _SMALL_TURN)
+    return step
+
+
+def _by_solver(
+    solver: InverseKinematics,
+    load: _Load,
+    *,
+    q_start: FloatArray,
+    T: FloatArray,
+    row: int,
+    where: Where,
+) -> FloatArray:
+    """Return one row by exact inverse kinematics: beside a singularity Newton steps go astray."""
+    robot, q, wanted = solver.robot, q_start, T.copy()
+    for _ in range(_STEPS):
+        options = solver.solve(wanted, q_start[: robot.external_axes])
+        if not len(options):
+            break
+        gap = options - q
+        gap = np.where(robot.revolute, gap - TURN * np.round(gap / TURN), gap)
+        q = options[np.abs(gap).max(axis=1).argmin()]
+        deflection = load.deflection(q[None], np.array([row]))[0]
+        before, wanted = wanted, T.copy()
+        wanted[:3, 3] -= deflection
+        if np.linalg.norm(wanted[:3, 3] - before[:3, 3]) <= TOLERANCE:
+            return np.asarray(q, dtype=float)
+    x, y, z = 1e3 * wanted[:3, 3]
+    raise PathError(
+        f"{where(row)}: no posture reaches the corrected position ({x:.1f}, {y:.1f}, {z:.1f}) mm"
+        " within the joint limits"
+    )

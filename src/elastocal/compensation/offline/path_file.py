@@ -1,0 +1,193 @@
+"""``PATH.csv`` to ``OUT.csv``: rows corrected piece by piece, everything else as it stood."""
+
+import csv
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, TextIO
+
+import numpy as np
+
+from elastocal.arrays import FloatArray
+from elastocal.compensation.offline.correct import LARGEST, Correction, correct
+from elastocal.compensation.offline.follow import follow, jumps, nearest_zero_posture
+from elastocal.compensation.offline.limits import Where, check_limits
+from elastocal.compensation.offline.tally import Tally
+from elastocal.compensation.path import (
+    PathColumns,
+    PathError,
+    PathValues,
+    Piece,
+    TextLayout,
+    count_lines,
+    find_columns,
+    in_file,
+    pieces,
+    read_layout,
+    read_values,
+    turned_to_base,
+)
+from elastocal.files import replacing
+from elastocal.identification import CalibratedModel
+from elastocal.robot.inverse import InverseKinematics, inverse_for
+
+PIECE = 2000
+"""Rows corrected at a time; bounds memory."""
+_ADDED = tuple(f"deflection_{axis}{end}[m]" for end in ("", "_low", "_high") for axis in "xyz")
+
+
+@dataclass(frozen=True, eq=False)
+class Settings:
+    """How a path is corrected."""
+
+    start: FloatArray | None = None
+    """Posture before the first row of a path of poses, shape (joint,), in rad or m."""
+    largest: float = LARGEST
+    """Largest deflection that is taken for one, in m."""
+
+
+def compensate_path(
+    calibrated: CalibratedModel,
+    path: Path,
+    out: Path,
+    settings: Settings | None = None,
+    report: Callable[[str, int, int], None] = lambda *_: None,
+) -> Tally:
+    """Correct a path file; write the same columns corrected, and the predicted deflection.
+
+    Parameters
+    ----------
+    calibrated : CalibratedModel
+        The model.
+    path, out : Path
+        The file as programmed, and the one to write, atomically.
+    settings : Settings, optional
+        How.
+    report : callable
+        Told a stage, how many rows are done and how many there are.
+
+    Raises
+    ------
+    PathError
+        If the file is not of the contract, or a row cannot be corrected; by its line.
+    FileAccessError
+        If a file cannot be read or written.
+    """
+    settings = Settings() if settings is None else settings
+    with in_file(path):
+        layout = read_layout(path)
+        columns = find_columns(layout.header, calibrated.model.robot)
+        solver = inverse_for(calibrated.model.robot)
+        job = _Job(calibrated, solver, columns, settings)
+        total = count_lines(path) - len(layout.preamble) - 1
+        with replacing(out) as temporary, temporary.open("w", encoding="utf-8", newline="") as file:
+            return _run(job, path, layout, file, lambda done: report("rows", done, total))
+
+
+@dataclass(frozen=True, eq=False)
+class _Job:
+    calibrated: CalibratedModel
+    solver: InverseKinematics
+    columns: PathColumns
+    settings: Settings
+
+
+def _run(
+    job: _Job, path: Path, layout: TextLayout, file: TextIO, done: Callable[[int], None]
+) -> Tally:
+    kept = [i for i, name in enumerate(layout.header) if name.strip() not in _ADDED]
+    file.writelines(layout.preamble)
+    writer = csv.writer(file, delimiter=layout.delimiter, lineterminator=layout.line_end)
+    writer.writerow([*(layout.header[i] for i in kept), *_ADDED])
+    tally, previous = Tally(), job.settings.start
+    for piece in pieces(path, layout, PIECE):
+        values = read_values(piece, job.columns)
+        labels = [f"row {line}" for line in piece.lines]
+        q, T = programmed(job.solver, values, previous, labels.__getitem__)
+        found = _corrected(job, values, q, T, labels.__getitem__)
+        shift = found.T_base_tcp[:, :3, 3] - T[:, :3, 3]
+        turned: list[int] = []
+        if job.columns.by_pose:
+            # How the first row is reached is not the path's.
+            before = previous if tally.rows and previous is not None else q[0]
+            turned = jumps(job.solver.robot, q, before).tolist()
+            tally = tally if tally.rows else replace(tally, start=tuple(q[0].tolist()))
+        tally = tally.plus(found, shift, labels, turned)
+        previous = q[-1]
+        _write(writer, job, piece, kept, found)
+        done(tally.rows)
+    return tally
+
+
+def programmed(
+    solver: InverseKinematics,
+    values: PathValues,
+    previous: FloatArray | None,
+    where: Where,
+) -> tuple[FloatArray, FloatArray]:
+    """Return joints and poses as programmed, shapes (row, joint) and (row, 4, 4).
+
+    Parameters
+    ----------
+    solver : InverseKinematics
+        Of the robot.
+    values : PathValues
+        What the file says.
+    previous : ndarray, shape (joint,), or None
+        Joints before the first row, in rad or m; a rail without columns stays there. None: the
+        posture nearest to zero.
+    where : callable
+        Names a row in a refusal.
+
+    Raises
+    ------
+    PathError
+        If a row is out of reach, or nothing says where the external axes stand.
+    """
+    robot = solver.robot
+    if values.T_base_tcp is None:
+        return values.joints, robot.forward(values.joints)
+    external, names = values.joints, robot.joint_names[: robot.external_axes]
+    if names and not external.shape[1]:
+        if previous is None:
+            raise PathError(
+                f"nothing says where {', '.join(names)} stands: give its column"
+                f" ({names[0]}[…]), or hold it where --start has it"
+            )
+        held = previous[: robot.external_axes]
+        external = np.broadcast_to(held, (len(values.T_base_tcp), len(names)))
+    check_limits(robot, external, where, "is programmed")
+    before = nearest_zero_posture(robot) if previous is None else previous
+    return follow(solver, values.T_base_tcp, external, before, where), values.T_base_tcp
+
+
+def _corrected(
+    job: _Job, values: PathValues, q: FloatArray, T: FloatArray, where: Where
+) -> Correction:
+    force = turned_to_base(values.force, job.columns.force, T)
+    moment = turned_to_base(values.moment, job.columns.moment, T)
+    if force is None:
+        raise PathError("path has no forces")
+    wrench, largest = (force, moment), job.settings.largest
+    by_pose = job.columns.by_pose
+    return correct(job.solver, job.calibrated, q, T, wrench, where, by_pose, largest)
+
+
+def _write(writer: Any, job: _Job, piece: Piece, kept: list[int], found: Correction) -> None:
+    """Write rows; only the cells that were corrected are new text."""
+    columns, robot = job.columns, job.solver.robot
+    new: list[tuple[int, list[str]]] = []
+    if columns.by_pose:
+        # The orientation is kept, and so is its text.
+        position = found.T_base_tcp[:, :3, 3]
+        pairs = list(zip(columns.position, position.T, strict=True))
+    else:
+        pairs = list(zip(columns.joints, found.q.T, strict=True))[robot.external_axes :]
+    for column, numbers in pairs:
+        new.append((column.index, list(map(repr, (numbers / column.scale).tolist()))))
+    deflection = np.hstack([found.deflection, found.low, found.high])
+    ends = [list(map(repr, row)) for row in deflection.tolist()]
+    for row, (cells, end) in enumerate(zip(piece.cells, ends, strict=True)):
+        for index, text in new:
+            cells[index] = text[row]
+        writer.writerow([*(cells[i] for i in kept), *end])

@@ -1,0 +1,171 @@
+"""The online compensator: a pure step from state and reading to state and correction."""
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from elastocal.compensation.conditioning.tool_load import SensorLoad
+from elastocal.compensation.kernel import compiled
+from elastocal.compensation.online.conditioner import Conditioner
+from elastocal.compensation.online.design import JOINT_RANGE, LONG_AGO, Design, design
+from elastocal.compensation.online.state import Correction, Reading, State, Status, Triple
+from elastocal.compensation.settings import CompensatorSettings
+from elastocal.identification import CalibratedModel
+
+_ORIGIN: Triple = (0.0, 0.0, 0.0)
+
+
+class Compensator:
+    """Corrects the deflection that a model predicts from joints and measured wrench (Fig. 5).
+
+    The length of the correction never exceeds its limit, and from one step to the next it never
+    moves farther than the rate allows, whatever the readings are. The C export does the same
+    arithmetic in the same order.
+    """
+
+    def __init__(self, numbers: Design) -> None:
+        self.design = numbers
+        joints, limits = numbers.joints, numbers.settings.limits
+        self._conditioner = Conditioner(numbers)
+        self._deflection = compiled(numbers.deflection, joints)
+        self._block = compiled(numbers.block, joints)
+        self._orientation = compiled(numbers.orientation, joints, loaded=False)
+        self._spread = np.ascontiguousarray(numbers.spread)
+        self._shape = (3, len(numbers.spread))
+        self._frame = tuple(numbers.frame.ravel().tolist())
+        self._in_tcp = numbers.in_tcp
+        self._largest, self._step = limits.correction, numbers.largest_step
+        self._fade, self._hold = numbers.fade_step, numbers.settings.hold_cycles
+        self._deadband, self._slope = numbers.settings.deadband, numbers.deadband_slope
+        self._gain, self._uncertain = numbers.settings.gain, numbers.settings.uncertain_above
+
+    @classmethod
+    def of(
+        cls,
+        calibrated: CalibratedModel,
+        settings: CompensatorSettings | None = None,
+        load: SensorLoad | None = None,
+    ) -> "Compensator":
+        """Return the compensator of a model; see `elastocal.compensation.online.design.design`."""
+        return cls(design(calibrated, settings, load))
+
+    def start(self) -> State:
+        """Return the state before the first reading: no correction, filters at rest."""
+        still = (0.0,) * 6
+        filters = self.design.filters
+        return State(
+            time=LONG_AGO,
+            fresh=False,
+            problem=Status.STALE.value,
+            missed=self._hold + 1,
+            window=(still,) * (filters.median - 1),
+            memory=tuple(([0.0] * 6, [0.0] * 6) for _ in filters.sections),
+            wrench=still,
+            correction=_ORIGIN,
+            deflection=_ORIGIN,
+            half_width=0.0,
+        )
+
+    def step(self, state: State, reading: Reading) -> tuple[State, Correction]:
+        """Take a reading and return the correction: `condition`, then `correct`."""
+        return self.correct(self._conditioner.step(state, reading), reading.q)
+
+    def condition(self, state: State, reading: Reading) -> State:
+        """Take a reading only: for a sensor that is quicker than the controller's cycle."""
+        return self._conditioner.step(state, reading)
+
+    def correct(self, state: State, q: Sequence[float]) -> tuple[State, Correction]:
+        """Return the correction of a cycle.
+
+        Parameters
+        ----------
+        state : State
+            After the readings of the cycle.
+        q : sequence of float
+            Joint positions, in rad or m.
+        """
+        usable = state.fresh and _are_joints(q)
+        if not usable:
+            return self._without_reading(state)
+        rotation = self._orientation(q)
+        deflection, half_width = self._predicted(q, rotation, state.wrench)
+        target, status = self._target(deflection, rotation)
+        if half_width > self._uncertain:
+            status |= Status.UNCERTAIN.value
+        correction, late = _towards(state.correction, target, self._step)
+        status |= late | state.problem
+        told = Correction(correction, deflection, half_width, status)
+        return State(
+            state.time, False, state.problem, 0, *state[4:7], correction, deflection, half_width
+        ), told
+
+    def _predicted(
+        self, q: Sequence[float], rotation: tuple[float, ...], wrench: tuple[float, ...]
+    ) -> tuple[Triple, float]:
+        rxx, rxy, rxz, ryx, ryy, ryz, rzx, rzy, rzz = rotation
+        ax, ay, az, nx, ny, nz = wrench
+        force = (
+            rxx * ax + rxy * ay + rxz * az,
+            ryx * ax + ryy * ay + ryz * az,
+            rzx * ax + rzy * ay + rzz * az,
+        )
+        moment = (
+            rxx * nx + rxy * ny + rxz * nz,
+            ryx * nx + ryy * ny + ryz * nz,
+            rzx * nx + rzy * ny + rzz * nz,
+        )
+        dx, dy, dz = self._deflection(q, force, moment)
+        rows = np.array(self._block(q, force, moment)).reshape(self._shape) @ self._spread
+        variance = max(np.einsum("ij,ij->i", rows, rows).tolist())
+        return (dx, dy, dz), math.sqrt(variance)
+
+    def _target(self, deflection: Triple, rotation: tuple[float, ...]) -> tuple[Triple, int]:
+        """Return minus the deflection in the correction's frame, within deadband and limit."""
+        dx, dy, dz = deflection
+        length = math.sqrt(dx * dx + dy * dy + dz * dz)
+        share = (length - self._deadband) * self._slope
+        status = 0
+        if share < 1.0:
+            status |= Status.DEADBAND.value
+        share = min(max(share, 0.0), 1.0) * self._gain
+        if length * share > self._largest:
+            share = self._largest / length
+            status |= Status.LIMITED.value
+        fxx, fxy, fxz, fyx, fyy, fyz, fzx, fzy, fzz = rotation if self._in_tcp else self._frame
+        return (
+            -share * (fxx * dx + fyx * dy + fzx * dz),
+            -share * (fxy * dx + fyy * dy + fzy * dz),
+            -share * (fxz * dx + fyz * dy + fzz * dz),
+        ), status
+
+    def _without_reading(self, state: State) -> tuple[State, Correction]:
+        """Hold, then fade."""
+        missed = min(state.missed + 1, self._hold + 1)
+        if missed <= self._hold:
+            correction, status = state.correction, Status.HELD.value
+        else:
+            correction, _ = _towards(state.correction, _ORIGIN, self._fade)
+            status = Status.FADED.value
+        told = Correction(correction, state.deflection, state.half_width, status | state.problem)
+        after = State(state.time, False, state.problem, missed, *state[4:7], correction, *state[8:])
+        return after, told
+
+
+def _are_joints(q: Sequence[float]) -> bool:
+    """Return whether positions can be a joint's; a NaN cannot."""
+    for x in q:  # noqa: SIM110, a generator takes twice the time
+        if not -JOINT_RANGE < x < JOINT_RANGE:
+            return False
+    return True
+
+
+def _towards(here: Triple, target: Triple, largest: float) -> tuple[Triple, int]:
+    """Return the point on the way to a target that is no farther than a step, and whether late."""
+    x, y, z = here
+    dx, dy, dz = target[0] - x, target[1] - y, target[2] - z
+    distance = math.sqrt(dx * dx + dy * dy + dz * dz)
+    if distance > largest:
+        share = largest / distance
+        return (x + share * dx, y + share * dy, z + share * dz), Status.RATE.value
+    return target, 0

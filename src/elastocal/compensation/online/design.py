@@ -1,0 +1,159 @@
+"""Every number of a compensator, worked out once: what the Python and the C step both read."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import stats
+
+from elastocal.arrays import FloatArray
+from elastocal.compensation.conditioning.tool_load import SensorLoad
+from elastocal.compensation.filters import FilterChain
+from elastocal.compensation.kernel import Routine, deflection, observation_block, orientation
+from elastocal.compensation.settings import CompensatorSettings
+from elastocal.errors import CompensationError
+from elastocal.identification import CalibratedModel
+
+LONG_AGO = -1.0e300
+"""Time of a reading that never was, in s."""
+JOINT_RANGE = 1000.0
+"""Positions beyond it are no joint's, in rad or m."""
+LARGEST_COMPLIANCE = 1.0
+"""In rad/(N·m) or m/N: a spring that yields a metre under a newton is a broken file."""
+_NEGLIGIBLE = 1e-9
+"""Share of the largest standard deviation below which a direction of the draws is left out."""
+_Z = float(stats.norm.ppf(0.975))
+
+
+@dataclass(frozen=True, eq=False)
+class Design:
+    """A compensator as numbers."""
+
+    calibrated: CalibratedModel
+    settings: CompensatorSettings
+    load: SensorLoad
+    deflection: Routine
+    block: Routine
+    orientation: Routine
+    filters: FilterChain
+    spread: FloatArray
+    """``L`` with ``L L^T`` the covariance of the draws times 1.96², shape (spring, direction)."""
+    weight: FloatArray
+    """Of the tool, in base, shape (3,), in N."""
+    sensor_rotation: FloatArray
+    """R_tcp_sensor, shape (3, 3)."""
+    sensor_origin: FloatArray
+    """In the tcp frame, shape (3,), in m."""
+    centre: FloatArray
+    """From the sensor's origin to the tool's centre of mass, in tcp axes, shape (3,), in m."""
+    frame: FloatArray
+    """R_base_frame of the correction, shape (3, 3); the identity where it is the tcp's."""
+
+    @property
+    def joints(self) -> int:
+        """Number of joints."""
+        return len(self.calibrated.model.robot.joint_names)
+
+    @property
+    def in_tcp(self) -> bool:
+        """Whether the correction is expressed in the tcp frame."""
+        return self.settings.frame == "tcp"
+
+    @property
+    def largest_step(self) -> float:
+        """Of the correction in one cycle, in m."""
+        return self.settings.limits.rate * self.settings.cycle
+
+    @property
+    def fade_step(self) -> float:
+        """Of the correction in one cycle while it fades, in m."""
+        return self.settings.limits.fade * self.settings.cycle
+
+    @property
+    def deadband_slope(self) -> float:
+        """1 / deadband, in 1/m: from the deadband to twice it the share corrected goes to 1."""
+        return 1.0 / max(self.settings.deadband, 1e-300)
+
+
+def design(
+    calibrated: CalibratedModel,
+    settings: CompensatorSettings | None = None,
+    load: SensorLoad | None = None,
+) -> Design:
+    """Work out a compensator.
+
+    Parameters
+    ----------
+    calibrated : CalibratedModel
+        The model.
+    settings : CompensatorSettings, optional
+        How it corrects; by default as the settings' own defaults say.
+    load : SensorLoad, optional
+        Tool weight, bias and place of the sensor; by default wrenches are taken as measured at
+        the tool centre point with both removed.
+
+    Raises
+    ------
+    CompensationError
+        If a compliance is not finite or senseless, or a filter cannot be made.
+    """
+    settings, load = settings or CompensatorSettings(), load or SensorLoad()
+    _check_compliances(calibrated)
+    filters = settings.chain
+    if not filters.sample < settings.hold:
+        raise CompensationError(
+            f"hold {settings.hold:g} s is not longer than the time between readings,"
+            f" {filters.sample:g} s: every reading would come too late"
+        )
+    R, frame = load.T_tcp_sensor[:3, :3], settings.R_base_frame
+    model = calibrated.model
+    return Design(
+        calibrated=calibrated,
+        settings=settings,
+        load=load,
+        deflection=deflection(model, calibrated.compliance.tolist()),
+        block=observation_block(model),
+        orientation=orientation(model),
+        filters=filters,
+        spread=_Z * draws_factor(calibrated.draws),
+        weight=load.mass * load.gravity,
+        sensor_rotation=R,
+        sensor_origin=load.T_tcp_sensor[:3, 3],
+        centre=R @ load.centre,
+        frame=np.eye(3) if frame is None else frame,
+    )
+
+
+def draws_factor(draws: FloatArray) -> FloatArray:
+    """Return ``L`` with ``L L^T`` the covariance of bootstrap draws.
+
+    The variance of a predicted deflection ``O c`` is then the squared length of the rows of
+    ``O L``: a fixed number of products, where percentiles would need a sort.
+
+    Parameters
+    ----------
+    draws : ndarray, shape (draw, spring)
+        In rad/(N·m) or m/N.
+
+    Returns
+    -------
+    ndarray, shape (spring, direction)
+        At least one direction.
+    """
+    centred = (draws - draws.mean(axis=0)) / np.sqrt(max(len(draws) - 1, 1))
+    _, s, vt = np.linalg.svd(centred, full_matrices=False)
+    kept = s > _NEGLIGIBLE * s[0]
+    kept[0] = True
+    factor: FloatArray = vt[kept].T * s[kept]
+    return factor
+
+
+def _check_compliances(calibrated: CalibratedModel) -> None:
+    names = calibrated.model.spring_names
+    for what, values in (("compliance", calibrated.compliance[None]), ("a draw", calibrated.draws)):
+        bad = np.argwhere(~(np.abs(values) <= LARGEST_COMPLIANCE))
+        if len(bad):
+            row, column = bad[0]
+            raise CompensationError(
+                f"{what} of spring {names[column]} is {values[row, column]:g}: it must be finite"
+                f" and at most {LARGEST_COMPLIANCE:g} in size"
+            )

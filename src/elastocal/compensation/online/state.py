@@ -1,0 +1,89 @@
+"""What goes into a step of the compensator, what it remembers, and what comes out.
+
+Plain tuples of floats: a step takes microseconds, and an array of three costs one.
+"""
+
+from collections.abc import Sequence
+from enum import IntFlag
+from typing import NamedTuple
+
+Triple = tuple[float, float, float]
+
+
+class Status(IntFlag):
+    """What a correction is to be read with; the C header has the same numbers."""
+
+    OK = 0
+    HELD = 1
+    """No usable reading in this cycle: the last correction is held."""
+    FADED = 2
+    """None for longer than the hold: the correction fades to zero, or has."""
+    LIMITED = 4
+    """The deflection asks for more than the largest correction."""
+    RATE = 8
+    """The correction is still on its way."""
+    DEADBAND = 16
+    """The deflection is so small that it is not corrected, or not fully."""
+    UNCERTAIN = 32
+    """The interval of the predicted deflection is wider than the settings allow."""
+    STALE = 64
+    """The time of the last reading did not advance, went back, or jumped ahead."""
+    SATURATED = 128
+    """The last reading is beyond the sensor's range."""
+    INVALID = 256
+    """The last reading holds a NaN or an infinity, or a joint far beyond any travel."""
+    SENSOR = 512
+    """The sensor called the last reading bad."""
+
+
+class Reading(NamedTuple):
+    """What arm and sensor say."""
+
+    time: float
+    """Of the reading by the sensor's clock, in s; it must advance."""
+    q: Sequence[float]
+    """Joint positions, measured, in rad or m."""
+    force: Sequence[float]
+    """Raw, in the sensor's frame, in N."""
+    moment: Sequence[float]
+    """Raw, in the sensor's frame, about its origin, in N·m."""
+    ok: bool = True
+    """Whether the sensor calls it good."""
+
+
+class State(NamedTuple):
+    """What a compensator remembers from one step to the next."""
+
+    time: float
+    """Of the last reading, in s."""
+    fresh: bool
+    """Whether a usable reading came since the last correction."""
+    problem: int
+    """Status flags of the last reading."""
+    missed: int
+    """Corrections since a usable reading, at most one more than are held."""
+    window: tuple[tuple[float, ...], ...]
+    """The last wrenches, newest first, one fewer than the median takes."""
+    memory: tuple[tuple[list[float], list[float]], ...]
+    """z1 and z2 of each section, by component; never changed in place."""
+    wrench: tuple[float, ...]
+    """Conditioned wrench in the tcp frame: force in N, moment in N·m."""
+    correction: Triple
+    """Last correction, in m."""
+    deflection: Triple
+    """Last predicted deflection, in base, in m."""
+    half_width: float
+    """Half its 95 % interval, in m."""
+
+
+class Correction(NamedTuple):
+    """What the controller is told."""
+
+    correction: Triple
+    """What the commanded position is to be changed by, in the settings' frame, in m."""
+    deflection: Triple
+    """Predicted deflection, in base, in m; the last one while the correction is held."""
+    half_width: float
+    """Half the 95 % interval of its most uncertain component, in m."""
+    status: int
+    """`Status` flags."""

@@ -1,0 +1,243 @@
+"""The closed loop, cycle by cycle: readings, correction, delay of the controller, deviation.
+
+The truth costs milliseconds, so it is asked at the rows of the course only (every 20 or 40 ms, in
+which the forces change by a few percent) and taken as linear in between; readings, correction and
+deviation go at their own rates. A row is asked with the correction of the row before: the robot
+stands at most 0.1 mm elsewhere, by which its compliance changes less than one part in 10^4.
+"""
+
+from collections import deque
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from elastocal.arrays import FloatArray
+from elastocal.compensation.process.correctors import Corrector
+from elastocal.compensation.process.course import Course
+from elastocal.errors import CompensationError
+from elastocal.robot import Robot
+
+
+class Pressed(Protocol):
+    """The robot under a process force."""
+
+    @property
+    def shift(self) -> FloatArray:
+        """Of the tool from where the undeformed robot has it, in base, shape (3,), in m."""
+        ...
+
+    @property
+    def wrench(self) -> FloatArray:
+        """True, in the sensor's frame, shape (6,), in N and N·m."""
+        ...
+
+    @property
+    def felt(self) -> FloatArray:
+        """The part of it that the process makes, shape (6,)."""
+        ...
+
+
+class TrueCell(Protocol):
+    """What a cell does; `elastocal.sim.workcell.process.ProcessCell` is one."""
+
+    def lift(self, course: str, q: FloatArray) -> None:
+        """Begin a course in the air."""
+        ...
+
+    def free_shift(self, q: FloatArray) -> FloatArray:
+        """Return the shift of the tool in the air, shape (3,), in m."""
+        ...
+
+    def press(self, q: FloatArray, force_base: FloatArray) -> Pressed:
+        """Go on to joints and a force on the robot."""
+        ...
+
+    def read(self, since: FloatArray, wrench: FloatArray) -> FloatArray:
+        """Return what the sensor says of true wrenches, shape (sample, 6)."""
+        ...
+
+
+@dataclass(frozen=True)
+class Controller:
+    """How a robot controller follows corrections. Assumed; no data sheet says it."""
+
+    cycle: float = 0.004
+    """In s."""
+    sample: float = 0.004
+    """Time between readings of the sensor, in s."""
+    dead_cycles: int = 3
+    """Cycles from a correction that is sent to the first motion by it."""
+    lag: float = 0.01
+    """Time constant with which the drives follow it, in s."""
+
+    def __post_init__(self) -> None:
+        parts = self.cycle / self.sample
+        if not (parts >= 1.0 and abs(parts - round(parts)) < 1e-9):
+            raise CompensationError(
+                f"filter.sample {self.sample:g} s does not divide the cycle, {self.cycle:g} s"
+            )
+
+    @property
+    def readings(self) -> int:
+        """In a cycle."""
+        return round(self.cycle / self.sample)
+
+    @property
+    def gain(self) -> float:
+        """Share of what is missing that the drives make up in a cycle."""
+        return 1.0 - float(np.exp(-self.cycle / self.lag)) if self.lag > 0.0 else 1.0
+
+
+@dataclass(frozen=True, eq=False)
+class Passage:
+    """What a course has come to."""
+
+    course: Course
+    time: FloatArray
+    """Of the cycles, shape (cycle,), in s."""
+    shift: FloatArray
+    """Of the tool from the same path in the air, in base, shape (cycle, 3), in m."""
+    deviation: FloatArray
+    """The part of it that counts, signed, shape (cycle,), in m."""
+
+
+class _Drives:
+    """Correction that the robot carries out: late by dead cycles, then with a lag."""
+
+    def __init__(self, controller: Controller) -> None:
+        self.done = np.zeros(3)
+        self._gain = controller.gain
+        self._line = deque(np.zeros(3) for _ in range(controller.dead_cycles))
+
+    def told(self, correction: FloatArray) -> None:
+        """Take the correction of a cycle."""
+        self._line.append(correction)
+        self.done = self.done + self._gain * (self._line.popleft() - self.done)
+
+
+class _Between:
+    """A row and the next, with what lies between them."""
+
+    def __init__(self, here: FloatArray, there: FloatArray) -> None:
+        self._here, self._way = here, there - here
+
+    def at(self, part: float) -> FloatArray:
+        return self._here + part * self._way
+
+
+def air_shifts(cell: TrueCell, course: Course) -> FloatArray:
+    """Return where the tool is on the programmed path in the air, shape (row, 3), in m."""
+    cell.lift(course.name, course.q[0])
+    return np.array([cell.free_shift(q) for q in course.q])
+
+
+def run_course(
+    cell: TrueCell,
+    robot: Robot,
+    course: Course,
+    air: FloatArray,
+    controller: Controller,
+    corrector: Corrector | None,
+) -> Passage:
+    """Run a course and return what the tool does.
+
+    Parameters
+    ----------
+    cell : TrueCell
+        The truth.
+    robot : Robot
+        As the controller knows it: turns a correction into joints.
+    course : Course
+        With joints.
+    air : ndarray, shape (row, 3)
+        See `air_shifts`.
+    controller : Controller
+        Cycle and delays.
+    corrector : Corrector, optional
+        Without one the path is run as programmed.
+    """
+    cell.lift(course.name, course.q[0])
+    if corrector is not None:
+        corrector.start()
+    cycles = _cycles(course, controller)
+    drives = _Drives(controller)
+    into_joints = _into_joints(robot, course.q)
+    before = cell.press(course.q[0], course.force[0])
+    shifts = []
+    for row in range(1, len(course.q)):
+        offset = into_joints[row] @ drives.done
+        now = cell.press(course.q[row] + offset, course.force[row])
+        raw = _readings(cell, course, controller, (row, cycles), before, now)
+        shift = _Between(before.shift - air[row - 1], now.shift - air[row])
+        joints = _Between(course.q[row - 1], course.q[row])
+        for n in range(cycles):
+            part = (n + 1) / cycles
+            deflection = shift.at(part)
+            if corrector is not None:
+                q = joints.at(part) + into_joints[row] @ drives.done
+                drives.told(corrector.correct(*raw.of(n, q), deflection))
+            shifts.append(deflection + drives.done)
+        before = now
+    return _passage(course, controller, cycles, np.array(shifts))
+
+
+@dataclass(frozen=True, eq=False)
+class _Raw:
+    time: FloatArray
+    values: FloatArray
+    a_cycle: int
+
+    def of(self, cycle: int, q: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return times, joints and readings of a cycle."""
+        rows = slice(cycle * self.a_cycle, (cycle + 1) * self.a_cycle)
+        return self.time[rows], q, self.values[rows]
+
+
+def _cycles(course: Course, controller: Controller) -> int:
+    cycles = round(course.step / controller.cycle)
+    if not (cycles >= 1 and abs(cycles * controller.cycle - course.step) < 1e-9):
+        raise CompensationError(
+            f"cycle {controller.cycle:g} s does not divide the {course.step:g} s between the rows"
+            f" of {course.name}"
+        )
+    return cycles
+
+
+def _into_joints(robot: Robot, q: FloatArray) -> FloatArray:
+    """Return joint changes per shift of the tool, orientation kept, shape (row, joint, 3)."""
+    arm = slice(robot.external_axes, None)
+    J = robot.jacobian(q)
+    both = np.concatenate([J.translation, J.rotation], axis=-2)[..., arm]
+    turned = np.zeros((*q.shape, 3))
+    turned[:, arm] = np.linalg.pinv(both)[..., :3]
+    return turned
+
+
+def _readings(
+    cell: TrueCell,
+    course: Course,
+    controller: Controller,
+    where: tuple[int, int],
+    before: Pressed,
+    now: Pressed,
+) -> _Raw:
+    """Return what the sensor says between two rows; the ripple swings in all its axes alike."""
+    row, cycles = where
+    count = cycles * controller.readings
+    part = np.arange(1, count + 1)[:, None] / count
+    time = course.step * (row - 1 + part[:, 0])
+    swing = sum(r.share * np.sin(2.0 * np.pi * r.frequency * time) for r in course.ripple)
+    true = before.wrench + part * (now.wrench - before.wrench)
+    if course.ripple:
+        true = true + np.asarray(swing)[:, None] * (before.felt + part * (now.felt - before.felt))
+    return _Raw(time, cell.read(time, true), controller.readings)
+
+
+def _passage(course: Course, controller: Controller, cycles: int, shift: FloatArray) -> Passage:
+    at = np.arange(1, len(shift) + 1) / cycles
+    rows = np.arange(len(course.q))
+    direction = np.stack([np.interp(at, rows, course.direction[:, k]) for k in range(3)], axis=1)
+    deviation = np.einsum("ck,ck->c", shift, direction)
+    time = np.arange(1.0, len(shift) + 1.0) * controller.cycle
+    return Passage(course, time, shift, deviation)

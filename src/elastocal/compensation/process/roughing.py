@@ -1,0 +1,104 @@
+"""Rings of a dome that is roughed from the top of a block (paper section 4.3, Fig. 13).
+
+Feed 70 mm/s and 12 000 rpm are the paper's; a cutter of two teeth then passes 400 teeth a second
+over a run-out line at 200 Hz. The paper gives neither the dome nor the forces: both are assumed,
+the forces within the load cases of its Fig. 12 (500 N aside, 1500 N along the tool).
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.random import Generator
+
+from elastocal.arrays import FloatArray
+from elastocal.compensation.process.course import Course, Ripple, along, frames, travel
+from elastocal.compensation.process.variation import engaged, swing
+from elastocal.planning.surface import Surface
+
+SPINDLE = 12_000.0 / 60.0
+"""In Hz."""
+
+
+@dataclass(frozen=True)
+class Roughing:
+    """How the dome is roughed."""
+
+    rings: int = 5
+    radius: float = 0.14
+    """Of the lowest ring, in m."""
+    disk: float = 0.05
+    """Radius of the disk on top that is not machined (Fig. 13), in m."""
+    height: float = 0.06
+    """From the lowest ring to the top of the dome, in m."""
+    speed: float = 0.07
+    """In m/s."""
+    step: float = 0.02
+    """Time between rows, in s."""
+    tangential: float = 350.0
+    """Against the feed, in N."""
+    normal: float = 350.0
+    """Away from the part, in N."""
+    across: float = 120.0
+    """Along the part, square to the feed, in N."""
+    engagement: tuple[float, float] = (0.7, 1.2)
+    """Factor of a ring on all forces, drawn between these."""
+    swing: float = 0.25
+    """Share by which the depth of the cut, and with it the force, changes along a ring."""
+    roll_in: float = 0.02
+    """Way over which the cutter rolls in and out, in m."""
+    ripple: tuple[Ripple, ...] = (Ripple(2.0 * SPINDLE, 0.4), Ripple(SPINDLE, 0.15))
+
+
+def roughing_rings(surface: Surface, settings: Roughing, rng: Generator) -> tuple[Course, ...]:
+    """Return rings about the middle of the block's top; deviations count normal to the dome.
+
+    The tool's axis stays square to the top. Frames: the block's z points up, as in its file.
+
+    Parameters
+    ----------
+    surface : Surface
+        The block, in base.
+    settings : Roughing
+        How it is roughed.
+    rng : Generator
+        Seeded source of randomness, for the forces.
+    """
+    T = surface.T_base_surface
+    own = (surface.mesh.vertices - T[:3, 3]) @ T[:3, :3]
+    middle, top = 0.5 * (own.min(axis=0) + own.max(axis=0)), own[:, 2].max()
+    apex = np.array([middle[0], middle[1], top])
+    radii = np.linspace(settings.disk, settings.radius, settings.rings + 1)[1:]
+    return tuple(
+        _ring(f"ring {n + 1}", T, apex, float(radius), settings, rng)
+        for n, radius in enumerate(radii)
+    )
+
+
+def _ring(
+    name: str,
+    T_base_surface: FloatArray,
+    apex: FloatArray,
+    radius: float,
+    settings: Roughing,
+    rng: Generator,
+) -> Course:
+    R = T_base_surface[:3, :3]
+    sphere = (settings.radius**2 + settings.height**2) / (2.0 * settings.height)
+    angle = np.linspace(0.0, 2.0 * np.pi, 721)
+    flat = np.stack([np.cos(angle), np.sin(angle), np.zeros(len(angle))], axis=1)
+    depth = np.sqrt(sphere**2 - radius**2) - sphere
+    own = apex + radius * flat + (0.0, 0.0, depth)
+    path = along(own @ R.T + T_base_surface[:3, 3], settings.speed, settings.step)
+    centre = R @ (apex - (0.0, 0.0, sphere)) + T_base_surface[:3, 3]
+    normal = (path - centre) / sphere
+    forward = travel(path)
+    across = np.cross(normal, forward)
+    time = np.arange(float(len(path))) * settings.step
+    cut = rng.uniform(*settings.engagement) * (1.0 + settings.swing * swing(time, rng))
+    cut *= engaged(time, settings.roll_in / settings.speed)
+    force = cut[:, None] * (
+        settings.normal * normal - settings.tangential * forward + settings.across * across
+    )
+    still = np.ones((len(path), 1))
+    T = frames(path, still * R[:, 0], -still * R[:, 2])
+    return Course(name, settings.step, T, force, normal, settings.ripple)

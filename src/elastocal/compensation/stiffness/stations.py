@@ -1,0 +1,97 @@
+"""The tool poses of a path at which postures are compared."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from elastocal.arrays import FloatArray
+from elastocal.compensation.offline.path_file import programmed
+from elastocal.compensation.path import (
+    PathError,
+    Piece,
+    find_columns,
+    in_file,
+    pieces,
+    read_layout,
+    read_values,
+)
+from elastocal.robot.inverse import InverseKinematics
+
+_PIECE = 20_000
+
+
+@dataclass(frozen=True, eq=False)
+class Stations:
+    """Rows of a path, evenly taken."""
+
+    lines: tuple[int, ...]
+    """Of the file, from 1."""
+    T_base_tcp: FloatArray
+    """Shape (station, 4, 4), in m."""
+    q: FloatArray
+    """As programmed, or on the branch nearest to the row before, shape (station, joint)."""
+
+    def __len__(self) -> int:
+        return len(self.lines)
+
+    @property
+    def way(self) -> FloatArray:
+        """Length of the path up to each station, straight from one to the next, in m."""
+        steps = np.linalg.norm(np.diff(self.T_base_tcp[:, :3, 3], axis=0), axis=1)
+        return np.concatenate([[0.0], np.cumsum(steps)])
+
+    @property
+    def normal(self) -> FloatArray:
+        """Axis of the tool, into the surface, shape (station, 3)."""
+        return self.T_base_tcp[:, :3, 2]
+
+
+def read_stations(
+    path: Path, solver: InverseKinematics, most: int, start: FloatArray | None
+) -> Stations:
+    """Return up to ``most`` rows of a path, evenly spread; forces are not needed.
+
+    Parameters
+    ----------
+    path : Path
+        CSV as for `elastocal.compensation.offline.compensate_path`.
+    solver : InverseKinematics
+        Of the model's robot.
+    most : int
+        Number of stations.
+    start : ndarray, shape (joint,), or None
+        Posture before the first row of a path of poses, in rad or m.
+
+    Raises
+    ------
+    PathError
+        If the path is not of the contract, or a station is out of reach; by its line.
+    FileAccessError
+        If the file cannot be read.
+    """
+    if not most >= 1:
+        raise PathError(f"{most} stations: there must be at least 1")
+    with in_file(path):
+        layout = read_layout(path)
+        columns = find_columns(layout.header, solver.robot, forces=False)
+        count = sum(len(piece.lines) for piece in pieces(path, layout, _PIECE))
+        wanted = np.unique(np.linspace(0, count - 1, min(most, count)).round().astype(int))
+        piece = _rows(path, wanted)
+        values = read_values(piece, columns)
+        labels = [f"row {line}" for line in piece.lines]
+        q, T = programmed(solver, values, start, labels.__getitem__)
+    return Stations(tuple(piece.lines), T, q)
+
+
+def _rows(path: Path, wanted: np.ndarray) -> Piece:
+    """Return some rows of a file by their numbers, in ascending order."""
+    cells: list[list[str]] = []
+    lines: list[int] = []
+    first = 0
+    for piece in pieces(path, read_layout(path), _PIECE):
+        for row in wanted[(wanted >= first) & (wanted < first + len(piece.lines))]:
+            cells.append(piece.cells[row - first])
+            lines.append(piece.lines[row - first])
+        first += len(piece.lines)
+    return Piece(cells, lines)

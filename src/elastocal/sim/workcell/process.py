@@ -1,0 +1,127 @@
+"""The simulated cell at work: a robot that bends under process forces, and what its sensor reads.
+
+Assumptions, beside those of `elastocal.sim.workcell.quasistatics`:
+
+* the robot is at rest at every instant: the forces that it follows change within tenths of a
+  second, its first mode lies above 8 Hz;
+* a ripple at hundreds of Hz reaches the sensor whole and moves the arm not at all: at 200 Hz an
+  arm with a mode at 10 Hz moves (10/200)² = 0.25 % of what it would at rest;
+* what counts is how far a path under force lies from the same path run in the air, as a tracker
+  on the tool measures it: sag under weight is in both;
+* the controller takes out a part of the sag as it was where the course began;
+* the path as a whole is off by the error of one stop, drawn anew for every course.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from elastocal.arrays import FloatArray
+from elastocal.cell import Cell
+from elastocal.sim.workcell.assembly import SimulatedCell
+from elastocal.sim.workcell.force_sensor import sensor_matrix, sensor_range, sensor_zero
+from elastocal.sim.workcell.keys import generator
+from elastocal.sim.workcell.quasistatics import Stand
+
+
+@dataclass(frozen=True, eq=False)
+class Pressed:
+    """The robot under a process force."""
+
+    shift: FloatArray
+    """How far the tool is from where the undeformed robot would have it, in base, shape (3,), m."""
+    wrench: FloatArray
+    """True wrench at the sensor in its frame, weight in, shape (6,), in N and N·m."""
+    felt: FloatArray
+    """The part of the wrench that the process force makes, shape (6,)."""
+
+
+class ProcessCell:
+    """The hidden truth of a cell, for a process. Its gears remember what happened since `lift`."""
+
+    def __init__(self, cell: Cell, seed: int) -> None:
+        """Take the cell of the same seed as a run of the procedure: its sensor has its faults.
+
+        Raises
+        ------
+        DeviceError
+            If the cell has no sensor or no tracker, or its robot fewer than six joints.
+        """
+        self._statics = SimulatedCell.of(cell, seed).plant.statics
+        self._entry = cell.file.simulation.sensor
+        self._repeatability = cell.file.simulation.controller.repeatability
+        self._range, self._matrix = sensor_range(cell), sensor_matrix(cell, seed)
+        self._zero = sensor_zero(cell, seed)
+        self._seed = seed
+        self._stand: Stand | None = None
+        self._warm: FloatArray | None = None
+        self._stop = np.zeros(3)
+        self._rng = generator(seed, "process", "")
+        self._slope = np.zeros(6)
+
+    def lift(self, course: str, q: FloatArray) -> None:
+        """Begin a course in the air: gears relaxed, noise, drift and stop error of its own.
+
+        Parameters
+        ----------
+        course : str
+            Name; the random numbers belong to it.
+        q : ndarray, shape (joint,)
+            In rad or m.
+        """
+        self._rng = generator(self._seed, "process", course)
+        self._stop = self._repeatability * self._rng.standard_normal(3)
+        share = self._entry.drift / 60.0 / self._range[0]
+        self._slope = share * self._range * self._rng.standard_normal(6)
+        self._stand = self._statics.free(q, np.zeros(3), None)
+        self._warm = self._stand.theta
+
+    def free_shift(self, q: FloatArray) -> FloatArray:
+        """Return the shift of the tool in the air, shape (3,), in m.
+
+        The gears remember nothing of it. `lift` comes first.
+        """
+        stand = self._statics.free(q, np.zeros(3), self._warm)
+        self._warm = stand.theta
+        return self._left(stand.sag)[:3]
+
+    def _left(self, twist: FloatArray) -> FloatArray:
+        """Take out what the controller does of the sag, as it was where the course began."""
+        assert self._stand is not None, "lift comes first"
+        left: FloatArray = twist - self._statics.compensation * self._stand.sag
+        return left
+
+    def press(self, q: FloatArray, force_base: FloatArray) -> Pressed:
+        """Go on to joints and a force on the robot.
+
+        Parameters
+        ----------
+        q : ndarray, shape (joint,)
+            In rad or m, near those before.
+        force_base : ndarray, shape (3,)
+            On the robot at the tool centre point, in base, in N.
+        """
+        assert self._stand is not None, "lift comes first"
+        statics = self._statics
+        stand = statics.loaded(self._stand, q, force_base, self._stop)
+        self._stand, twist = stand, stand.twist
+        joints, twists = (np.stack([a, a]) for a in (q, twist))
+        forces = np.stack([force_base, np.zeros(3)])
+        seen = statics.knots(np.array([0.0, 1.0]), joints, twists, forces).seen[:, 3:]
+        return Pressed(twist[:3], seen[0], seen[0] - seen[1])
+
+    def read(self, since: FloatArray, wrench: FloatArray) -> FloatArray:
+        """Return what the sensor says: cross-talk, zero, drift, noise, end of its range.
+
+        Parameters
+        ----------
+        since : ndarray, shape (sample,)
+            Time since `lift`, in s.
+        wrench : ndarray, shape (sample, 6)
+            True, in the sensor's frame.
+        """
+        sigma = np.repeat([self._entry.force_noise, self._entry.moment_noise], 3)
+        noise = sigma * self._rng.standard_normal(wrench.shape)
+        values = wrench @ self._matrix.T + self._zero + np.outer(since, self._slope) + noise
+        clipped: FloatArray = np.clip(values, -self._range, self._range)
+        return clipped

@@ -1,0 +1,73 @@
+"""`elastocal simulate-process` as a user meets it."""
+
+import csv
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from elastocal.identification import write_model
+from support.cli import elastocal
+from support.paths import made_up
+from support.simulated import example_cell
+
+FILES = {"table.json", "table.csv", "deviations.csv"}
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory) -> Path:
+    folder = tmp_path_factory.mktemp("process")
+    write_model(folder / "model.json", made_up(example_cell("afp").robot), {})
+    write_model(folder / "other.json", made_up(example_cell("machining").robot), {})
+    return folder
+
+
+def run(folder: Path, out: str, *arguments: object, model: str = "model.json"):
+    return elastocal(
+        "simulate-process", example_cell("afp").path, "--process", "afp", "--model",
+        folder / model, "--out", folder / out, "--courses", 1, *arguments,
+    )  # fmt: skip
+
+
+def test_it_writes_the_table_and_every_point_of_it(folder):
+    result = run(folder, "all", "--seed", 2, "--json")
+    assert result.code == 0, result.err
+    figures = json.loads(result.out)
+    assert {path.name for path in (folder / "all").iterdir()} == FILES
+    (line,) = figures["lines"]
+    assert line["name"] == "seed 2"
+    with (folder / "all/deviations.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    assert len(rows) == line["points"]
+    before = np.abs([float(row["before[mm]"]) for row in rows])
+    after = np.abs([float(row["after[mm]"]) for row in rows])
+    assert before.mean() == pytest.approx(1e3 * line["before"]["mean"], abs=1e-6)
+    assert after.max() == pytest.approx(1e3 * line["after"]["max"], abs=1e-6)
+    assert line["reduction"]["mean"] == pytest.approx(1.0 - after.mean() / before.mean(), abs=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "model", "reason"),
+    [
+        (("--seed", 1, "--seed", 1), "model.json", "each seed counts once"),
+        ((), "other.json", "the model's robot has the joints"),
+    ],
+)
+def test_what_does_not_fit_is_refused_in_one_line(folder, arguments, model, reason):
+    result = run(folder, "refused", *arguments, model=model)
+    assert reason in result.reason
+    assert not (folder / "refused").exists()
+
+
+def test_an_unknown_process_is_refused(folder):
+    result = elastocal(
+        "simulate-process", example_cell("afp").path, "--process", "milling", "--model",
+        folder / "model.json", "--out", folder / "no",
+    )  # fmt: skip
+    assert "'milling' is not one of afp, machining" in result.reason
+
+
+def test_files_for_some_seeds_only_are_refused(folder):
+    result = run(folder, "some", "--seed", 1, "--seed", 2, "--seed", 3, "--model", folder / "x")
+    assert "--model is given 2 times for 3 seeds" in result.reason

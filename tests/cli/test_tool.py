@@ -1,0 +1,99 @@
+import json
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from support.cli import elastocal
+from support.recorded_runs import record_run
+from support.static_postures import PlantedTool, turned
+
+TOOL = PlantedTool()
+
+
+def table(path, postures, flip=1.0):
+    angles = Rotation.from_matrix(postures.R_base_flange).as_euler("ZYX", degrees=True)
+    header = "a[deg],b[deg],c[deg]," + ",".join(
+        f"{what}_{axis}[{unit}]"
+        for what, unit in (("force", "N"), ("moment", "N*m"))
+        for axis in "xyz"
+    )
+    rows = np.hstack([angles, flip * postures.force, flip * postures.moment])
+    np.savetxt(path, rows, delimiter=",", header=header, comments="")
+    return path
+
+
+@pytest.fixture
+def postures():
+    rng = np.random.default_rng(0)
+    return TOOL.raw(turned(10, rng), rng)
+
+
+def test_a_table_gives_the_planted_tool_within_its_intervals(tmp_path, postures):
+    out = tmp_path / "tool.json"
+    result = elastocal(
+        "tool",
+        table(tmp_path / "s.csv", postures),
+        "--out",
+        out,
+        "--json",
+        "--sensor",
+        "0 mm, 0 mm, 80 mm, 30 deg, 0 deg, 0 deg",
+    )
+    assert result.code == 0, result.err
+    found = json.loads(result.out)
+    assert abs(found["mass"] - TOOL.mass) < found["half_width"]["mass"]
+    assert found["sensor_origin"] == [0.0, 0.0, 0.08]
+    assert json.loads(out.read_text())["schema"] == "elastocal.tool/1"
+
+
+def test_people_see_the_intervals(tmp_path, postures):
+    out = tmp_path / "tool.json"
+    result = elastocal("tool", table(tmp_path / "s.csv", postures), "--out", out)
+    assert "10 static postures" in result.err
+    assert "mass" in result.err
+
+
+def test_too_few_directions_are_named(tmp_path):
+    rng = np.random.default_rng(0)
+    same = TOOL.raw(np.repeat(turned(1, rng), 4, axis=0), rng)
+    result = elastocal("tool", table(tmp_path / "s.csv", same), "--out", tmp_path / "t.json")
+    assert result.code == 0
+    assert "not determined: mass" in " ".join(result.err.split())
+
+
+@pytest.mark.parametrize(
+    ("options", "reason"),
+    [
+        (["--sensor", "0 mm"], "sensor '0 mm' must be six quantities"),
+        (["--down", "0, 0"], "direction '0, 0' must be three numbers"),
+        (["--down", "0, 0, 0"], "must not be zero"),
+    ],
+)
+def test_options_that_do_not_fit_are_refused(tmp_path, postures, options, reason):
+    data = table(tmp_path / "s.csv", postures)
+    result = elastocal("tool", data, "--out", tmp_path / "t.json", *options)
+    assert reason in result.reason
+
+
+def test_a_turned_sign_writes_nothing(tmp_path, postures):
+    out = tmp_path / "tool.json"
+    result = elastocal("tool", table(tmp_path / "s.csv", postures, flip=-1.0), "--out", out)
+    assert "sign of the wrenches is turned" in result.reason
+    assert not out.exists()
+
+
+def test_a_run_gives_the_tool_from_its_unloaded_references(tmp_path):
+    run = record_run(tmp_path / "run", poses=6)
+    result = elastocal("tool", run.path, "--out", tmp_path / "tool.json", "--json")
+    assert result.code == 0, result.err
+    found = json.loads(result.out)
+    assert found["postures"] == 6
+    assert "mass" not in found["undetermined"]
+    assert found["mass"] == pytest.approx(run.truth.mass, abs=found["half_width"]["mass"])
+
+
+def test_a_folder_that_is_no_run_is_refused(tmp_path):
+    (tmp_path / "empty").mkdir()
+    result = elastocal("tool", tmp_path / "empty", "--out", tmp_path / "tool.json")
+    assert "journal.jsonl" in result.reason

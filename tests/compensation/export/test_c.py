@@ -1,0 +1,245 @@
+"""The exported C against the Python that it was made from."""
+
+import re
+import shutil
+import subprocess
+
+import numpy as np
+import pytest
+
+from elastocal.compensation.online import Compensator, Reading, design
+from elastocal.elastic.layouts import custom
+from elastocal.elastic.layouts.custom import SpringEntry
+from elastocal.elastic.springs import axial
+from elastocal.robot import Robot
+from support import compensated, exported
+from support.exported import SANITIZED, build, needs_gcc, written
+from support.shared import GOLDEN, needs_shared
+from support.virtual_chain import ARMS
+
+pytestmark = needs_gcc
+STATES = 100_000
+
+
+def random_rows(model, count, seed=0):
+    """Return joints within their limits, forces and moments, a row each."""
+    rng, limits = np.random.default_rng(seed), model.robot.limits
+    lower, upper = np.maximum(limits.lower, -7.0), np.minimum(limits.upper, 7.0)
+    q = rng.uniform(lower, upper, (count, len(lower)))
+    return np.hstack([q, 1e3 * rng.normal(size=(count, 3)), 1e2 * rng.normal(size=(count, 3))])
+
+
+def assert_deflections_agree(executable, calibrated, count):
+    rows = random_rows(calibrated.model, count)
+    found = executable.numbers("loads", rows)
+    n = len(calibrated.model.robot.joint_names)
+    q, force, moment = rows[:, :n], rows[:, n : n + 3], rows[:, n + 3 :]
+    expected = calibrated.model.deflection(calibrated.compliance, q, force, moment)
+    off = np.linalg.norm(found[:, :3] - expected, axis=1) / np.linalg.norm(expected, axis=1)
+    assert off.max() < 1e-12
+    block = calibrated.model.observation_blocks(q[:100], force[:100], moment[:100])
+    deviation = (block @ calibrated.draws.T).std(axis=-1, ddof=1).max(axis=1)
+    np.testing.assert_allclose(found[:100, 3], 1.959963984540054 * deviation, rtol=1e-6)
+
+
+def soft_everywhere(robot):
+    """Return axial springs and a custom list: linear, distal, off the axis, askew."""
+    entries = tuple(
+        SpringEntry(joint=joint, axis=axis, kind=kind, frame=frame, offset=offset)
+        for joint in robot.joint_names[::2]
+        for axis in ("x", (1.0, -2.0, 0.5))
+        for kind in ("revolute", "prismatic")
+        for frame, offset in (
+            ("proximal", ("0 mm", "0 mm", "0 mm")),
+            ("distal", ("30 mm", "-1 m", "2 mm")),
+        )
+    )
+    return (*(axial(joint) for joint in robot.chain.joints), *custom(robot, entries))
+
+
+@needs_shared
+def test_golden_robot_at_a_hundred_thousand_states(tmp_path):
+    robot = Robot.from_file(GOLDEN / "golden_6r.urdf", "tcp")
+    calibrated = compensated.calibrated(robot)
+    executable = build(written(tmp_path, design(calibrated)), "-O2")
+    assert_deflections_agree(executable, calibrated, STATES)
+
+
+@pytest.mark.parametrize(
+    "count", [10_000, pytest.param(STATES, marks=pytest.mark.slow, id="hundred thousand")]
+)
+@pytest.mark.parametrize("like", ["afp", "machining"])
+def test_example_robots_one_of_them_on_a_rail(tmp_path, like, count):
+    calibrated = compensated.calibrated(compensated.example_robot(like, tmp_path / "cell"))
+    executable = build(written(tmp_path / "c", design(calibrated)), "-O2")
+    assert_deflections_agree(executable, calibrated, count)
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "on a rail",
+        "axes between the coordinate axes",
+        *(pytest.param(name, marks=pytest.mark.slow) for name in ARMS if name != "on a rail"),
+    ],
+)
+def test_every_arm_with_springs_of_every_kind(tmp_path, name):
+    robot = Robot.from_urdf(ARMS[name], "tcp")
+    calibrated = compensated.calibrated(robot, soft_everywhere(robot))
+    numbers = design(calibrated, compensated.settings(), compensated.load())
+    executable = build(written(tmp_path, numbers), "-O1", *SANITIZED)
+    assert_deflections_agree(executable, calibrated, 2000)
+    assert executable.selftest() == 0
+
+
+def course(rng, joints, count=2000):
+    """Return readings as rows: mostly sound, with NaN, infinities, jumps and a bad clock."""
+    time = 0.004 * np.arange(1, count + 1)
+    time[rng.random(count) < 0.02] *= -3.0
+    time[rng.random(count) < 0.02] = np.nan
+    q = rng.uniform(-1.5, 1.5, joints) + 0.002 * rng.normal(size=(count, joints)).cumsum(axis=0)
+    wrench = (rng.normal(size=(count, 6)) * [40, 40, 40, 4, 4, 4]).cumsum(axis=0)
+    ok = rng.random((count, 1)) > 0.02
+    rows = np.hstack([time[:, None], q, wrench, ok])
+    for bad in (np.nan, np.inf, -np.inf, 1e308, 1e5):
+        rows[rng.integers(0, count, 10), rng.integers(1, rows.shape[1] - 1, 10)] = bad
+    gap = rng.integers(0, count - 100)
+    rows[gap : gap + 60, -1] = 0.0
+    return rows
+
+
+@pytest.mark.parametrize(
+    ("frame", "median"), [("base", 3), ("tcp", 1), ({"abc": ["30 deg", "-20 deg", "170 deg"]}, 5)]
+)
+def test_steps_are_those_of_python_and_clean_under_the_sanitizers(tmp_path, frame, median):
+    filters = {
+        "median": median,
+        "notches": [{"frequency": "50 Hz", "width": "10 Hz"}] if median == 3 else [],
+        "low_pass": {"cutoff": "15 Hz", "order": 3} if median > 1 else None,
+    }
+    chosen = compensated.settings(frame=frame, filter=filters)
+    numbers = design(compensated.arm("on a rail"), chosen, compensated.load())
+    executable = build(written(tmp_path, numbers), "-O1", *SANITIZED)
+    rows = course(np.random.default_rng(median), numbers.joints)
+    found = executable.numbers("steps", rows)
+    lengths = np.linalg.norm(found[:, :3], axis=1)
+    moves = np.linalg.norm(np.diff(found[:, :3], axis=0, prepend=0.0), axis=1)
+    assert lengths.max() <= chosen.limits.correction * (1.0 + 1e-12)
+    assert moves.max() <= numbers.largest_step * (1.0 + 1e-12)
+    compensator, n = Compensator(numbers), numbers.joints
+    state = compensator.start()
+    for row, got in zip(rows.tolist(), found, strict=True):
+        reading = Reading(row[0], row[1 : n + 1], row[n + 1 : n + 4], row[n + 4 : n + 7], row[-1])
+        state, told = compensator.step(state, reading)
+        expected = [*told.correction, *told.deflection, told.half_width, told.status]
+        np.testing.assert_allclose(got, expected, rtol=1e-12, atol=1e-15)
+
+
+def test_every_way_of_the_step_is_taken_by_that_course(tmp_path):
+    numbers = design(compensated.arm("on a rail"), compensated.settings(), compensated.load())
+    executable = build(written(tmp_path, numbers), "-O2")
+    rows = course(np.random.default_rng(3), numbers.joints)
+    seen = np.bitwise_or.reduce(executable.numbers("steps", rows)[:, 7].astype(int))
+    assert seen & ~32 == 1023 & ~32
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    numbers = design(compensated.arm(), compensated.settings(), compensated.load())
+    return written(tmp_path_factory.mktemp("c"), numbers)
+
+
+class TestSelfTest:
+    def test_it_is_zero_at_every_level_of_optimisation(self, folder):
+        for level in ("-O0", "-O3"):
+            assert build(folder, level, name=f"run{level}").selftest() == 0
+
+    def test_it_is_zero_with_fused_products_allowed(self, folder):
+        assert build(folder, "-O2", "-ffp-contract=fast", name="fused").selftest() == 0
+
+    def test_a_change_of_any_one_constant_is_found(self, folder, tmp_path):
+        text = (folder / "elastocal_model.c").read_text()
+        head, definitions, rest = re.split(r"(?m)^(?=/\* ---- (?:Constants|Sine))", text)
+        literals = list(re.finditer(r"(?<![\w.])-?\d[\d.]*(?:e[-+]?\d+)?(?=[,;\n}])", definitions))
+        assert len(literals) > 150
+        rng = np.random.default_rng(0)
+        chosen = [literals[k] for k in rng.choice(len(literals), 5, replace=False)]
+        (tmp_path / "elastocal_model.h").write_bytes((folder / "elastocal_model.h").read_bytes())
+        for literal in chosen:
+            number = float(literal[0])
+            changed = (
+                str(int(number) + 1)
+                if "." not in literal[0] and "e" not in literal[0]
+                else (repr(number * (1 + 1e-12) if number else 1e-300))
+            )
+            damaged = definitions[: literal.start()] + changed + definitions[literal.end() :]
+            (tmp_path / "elastocal_model.c").write_text(head + damaged + rest)
+            assert build(tmp_path, "-O0").selftest() == 1, literal[0]
+
+    @pytest.mark.parametrize(
+        ("old", "new", "code"),
+        [
+            ("s = x + ((x * y) * s)", "s = x - ((x * y) * s)", 2),
+            ("- weight[i]", "+ weight[i]", 3),
+            ("share = LARGEST_CORRECTION / length", "share = 1.0", 3),
+            ("(passed > 0.0) && ", "", 3),
+            ("move(state->correction, nothing, FADE_STEP)", "0", 3),
+            ("state->missed += 1", "state->missed += 2", 3),
+        ],
+    )
+    def test_a_change_of_the_code_is_found(self, folder, tmp_path, old, new, code):
+        text = (folder / "elastocal_model.c").read_text()
+        assert old in text
+        (tmp_path / "elastocal_model.h").write_bytes((folder / "elastocal_model.h").read_bytes())
+        (tmp_path / "elastocal_model.c").write_text(text.replace(old, new))
+        assert build(tmp_path, "-O0", "-Wno-error").selftest() == code
+
+
+def test_sine_and_cosine_are_good_to_two_ulp_over_many_turns(folder, tmp_path):
+    source = tmp_path / "sines.c"
+    source.write_text(
+        '#include "elastocal_model.c"\n#include <stdio.h>\nint main(void){double a,o[2];'
+        "while(fread(&a,8,1,stdin)==1){sin_cos(a,&o[0],&o[1]);fwrite(o,8,2,stdout);}return 0;}"
+    )
+    command = [exported.GCC, "-std=c99", "-O2", f"-I{folder}", source, "-o", tmp_path / "s", "-lm"]
+    subprocess.run(command, check=True)
+    rng = np.random.default_rng(0)
+    quarter = 0.25 * np.pi * np.arange(-64, 65)
+    angles = np.concatenate([rng.uniform(-4, 4, 20000), rng.uniform(-999, 999, 20000), quarter])
+    done = subprocess.run([tmp_path / "s"], input=angles.tobytes(), capture_output=True, check=True)
+    found = np.frombuffer(done.stdout).reshape(-1, 2)
+    for column, expected in zip(found.T, (np.sin(angles), np.cos(angles)), strict=True):
+        assert (np.abs(column - expected) <= 2.0 * np.spacing(np.abs(expected)) + 1e-19).all()
+
+
+@pytest.mark.skipif(shutil.which("valgrind") is None, reason="valgrind is not on this machine")
+def test_instructions_do_not_depend_on_the_input(tmp_path):
+    calibrated = compensated.arm()
+    numbers = design(calibrated, compensated.settings(), compensated.load())
+    executable = build(written(tmp_path, numbers), "-O2", "-DCOUNT", name="count")
+    rows = random_rows(calibrated.model, 40)
+    rows[:, -6:] *= 0.1
+    output = tmp_path / "callgrind.out"
+    command = ["valgrind", "--tool=callgrind", f"--callgrind-out-file={output}", executable.path]
+    subprocess.run([*command, "count"], input=rows.tobytes(), capture_output=True, check=True)
+    counts = {"deflection": [], "step": []}
+    for dump in sorted(tmp_path.glob("callgrind.out.*"), key=lambda p: int(p.suffix[1:])):
+        text = dump.read_text()
+        what = re.search(r"Client Request: (\w+)", text)
+        if what:
+            counts[what[1]].append(int(re.search(r"(?m)^totals: (\d+)", text)[1]))
+    assert len(counts["deflection"]) == len(rows)
+    assert len(set(counts["deflection"])) == 1
+    # The first reading has no time before it and is not used.
+    steps = np.array(counts["step"][1:])
+    assert np.ptp(steps) < 0.01 * steps.max()
+
+
+def test_cmake_builds_it_and_runs_the_self_test(tmp_path):
+    cmake = shutil.which("cmake")
+    if cmake is None:
+        pytest.skip("cmake is not on this machine")
+    folder = written(tmp_path / "c", design(compensated.arm("one joint")))
+    for command in (["-S", folder, "-B", tmp_path / "b"], ["--build", tmp_path / "b"]):
+        subprocess.run([cmake, *command], check=True, capture_output=True)
+    assert subprocess.run([tmp_path / "b" / "elastocal_selftest"], check=False).returncode == 0

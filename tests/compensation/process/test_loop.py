@@ -1,0 +1,125 @@
+"""The loop with a cell whose answer is known: a spring of 1 N/µm in every direction."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+
+from elastocal.compensation.process.correctors import PerfectCorrector
+from elastocal.compensation.process.course import Course, Ripple
+from elastocal.compensation.process.loop import Controller, air_shifts, run_course
+from elastocal.errors import CompensationError
+from elastocal.sim.scene import START
+from support.cells import robot
+
+COMPLIANCE = 1e-6
+PROMPT = Controller(dead_cycles=0, lag=0.0)
+
+
+@dataclass(frozen=True)
+class Pressed:
+    shift: np.ndarray
+    wrench: np.ndarray
+    felt: np.ndarray
+
+
+class Spring:
+    """A cell that yields in proportion, sags by a millimetre, and tells what it was asked."""
+
+    def __init__(self) -> None:
+        self.joints: list[np.ndarray] = []
+
+    def lift(self, course, q):  # noqa: ARG002
+        self.joints.clear()
+
+    def free_shift(self, q):  # noqa: ARG002
+        return np.array([0.0, 0.0, -1e-3])
+
+    def press(self, q, force):
+        self.joints.append(q)
+        felt = np.concatenate([force, np.zeros(3)])
+        return Pressed(self.free_shift(q) + COMPLIANCE * force, felt + 5.0, felt)
+
+    def read(self, since, wrench):  # noqa: ARG002
+        return wrench
+
+
+class Listener(PerfectCorrector):
+    """Corrects nothing, and keeps what it was told."""
+
+    def __init__(self) -> None:
+        super().__init__(0)
+        self.time, self.raw = [], []
+
+    def correct(self, time, q, raw, deflection):  # noqa: ARG002
+        self.time.append(time)
+        self.raw.append(raw)
+        return np.zeros(3)
+
+
+def course(force: np.ndarray, ripple: tuple[Ripple, ...] = ()) -> Course:
+    """A course that stands still, pressed along x; the deviation counts along x."""
+    rows = len(force)
+    q = np.tile(np.asarray(START, dtype=float), (rows, 1))
+    along_x = np.tile([1.0, 0.0, 0.0], (rows, 1))
+    T = robot().forward(q)
+    return Course("made up", 0.04, T, force[:, None] * along_x, along_x, ripple, q)
+
+
+def run(controller, corrector, force=None, ripple=()):
+    cell, made = Spring(), course(np.linspace(0.0, 500.0, 26) if force is None else force, ripple)
+    return run_course(cell, robot(), made, air_shifts(cell, made), controller, corrector), cell
+
+
+def test_without_correction_the_deviation_is_the_deflection_without_the_sag():
+    passage, _ = run(PROMPT, None)
+    np.testing.assert_allclose(passage.deviation, COMPLIANCE * 500.0 * passage.time, rtol=1e-9)
+    assert len(passage.time) == 250
+
+
+def test_a_perfect_corrector_without_delay_leaves_nothing():
+    passage, _ = run(PROMPT, PerfectCorrector(0))
+    np.testing.assert_allclose(passage.deviation, 0.0, atol=1e-12)
+
+
+@pytest.mark.parametrize(("filters", "dead"), [(0, 3), (4, 0), (4, 3)])
+def test_delay_leaves_the_slope_times_the_delay(filters, dead):
+    passage, _ = run(Controller(dead_cycles=dead, lag=0.0), PerfectCorrector(filters))
+    slope = COMPLIANCE * 500.0
+    np.testing.assert_allclose(passage.deviation[20:], slope * 0.004 * (filters + dead), rtol=1e-9)
+
+
+def test_a_lag_leaves_the_slope_times_its_time_constant():
+    lag = 0.05
+    passage, _ = run(Controller(dead_cycles=0, lag=lag), PerfectCorrector(0))
+    cycle = 0.004
+    steady = cycle * np.exp(-cycle / lag) / (1.0 - np.exp(-cycle / lag))
+    np.testing.assert_allclose(passage.deviation[-20:], COMPLIANCE * 500.0 * steady, rtol=1e-3)
+
+
+def test_the_robot_is_commanded_to_where_the_correction_says():
+    _, cell = run(PROMPT, PerfectCorrector(0), force=np.full(10, 400.0))
+    moved = robot().forward(cell.joints[-1]) - robot().forward(cell.joints[0])
+    np.testing.assert_allclose(moved[:3, 3], [-400.0 * COMPLIANCE, 0.0, 0.0], atol=1e-7)
+    np.testing.assert_allclose(moved[:3, :3], 0.0, atol=1e-6)
+
+
+def test_readings_come_four_times_a_cycle_with_the_ripple_on_the_process_part_only():
+    listener = Listener()
+    run(Controller(sample=0.001), listener, np.full(6, 100.0), (Ripple(100.0, 0.5),))
+    time, raw = np.concatenate(listener.time), np.concatenate(listener.raw)
+    np.testing.assert_allclose(np.diff(time), 0.001, rtol=1e-9)
+    assert {len(block) for block in listener.raw} == {4}
+    expected = 5.0 + 100.0 * (1.0 + 0.5 * np.sin(2.0 * np.pi * 100.0 * time))
+    np.testing.assert_allclose(raw[:, 0], expected, rtol=1e-9)
+    np.testing.assert_allclose(raw[:, 1], 5.0)
+
+
+def test_a_sample_time_that_does_not_divide_the_cycle_is_refused():
+    with pytest.raises(CompensationError, match=r"filter.sample 0.003 s does not divide"):
+        Controller(sample=0.003)
+
+
+def test_a_cycle_that_does_not_divide_the_rows_is_refused():
+    with pytest.raises(CompensationError, match=r"cycle 0.007 s does not divide the 0.04 s"):
+        run(Controller(cycle=0.007, sample=0.007), None)

@@ -1,0 +1,84 @@
+"""The simulated cell at work."""
+
+import numpy as np
+import pytest
+
+from elastocal.sim.workcell import SimulatedCell
+from elastocal.sim.workcell.process import ProcessCell
+from support.simulated import QUIET, example_cell, places
+
+FORCE = np.array([150.0, -120.0, 900.0])
+
+
+@pytest.fixture(scope="module")
+def q():
+    return places("afp", 1)[0].q
+
+
+def quiet(**gears: object) -> ProcessCell:
+    section = QUIET | ({"gears": gears} if gears else {})
+    return ProcessCell(example_cell("afp", simulation=section), 0)
+
+
+def shift(cell: ProcessCell, q, forces) -> np.ndarray:
+    cell.lift("a", q)
+    return np.array([cell.press(q, f).shift for f in forces])
+
+
+def test_a_quiet_cell_without_force_is_where_it_is_in_the_air(q):
+    cell = quiet()
+    np.testing.assert_allclose(shift(cell, q, [np.zeros(3)])[0], cell.free_shift(q), atol=1e-9)
+
+
+def test_the_gears_remember_the_way_to_a_force(q):
+    straight = shift(quiet(), q, [0.5 * FORCE, FORCE])[-1]
+    beyond = shift(quiet(), q, [0.5 * FORCE, FORCE, 1.5 * FORCE, FORCE])[-1]
+    assert np.linalg.norm(beyond - straight) > 5e-6
+    easy = [quiet(backlash="0 rad", hysteresis=0.0) for _ in range(2)]
+    a = shift(easy[0], q, [0.5 * FORCE, FORCE])[-1]
+    b = shift(easy[1], q, [0.5 * FORCE, FORCE, 1.5 * FORCE, FORCE])[-1]
+    np.testing.assert_allclose(a, b, atol=1e-9)
+
+
+def test_lifting_shakes_the_memory_off(q):
+    cell = quiet()
+    first = shift(cell, q, [FORCE, 2.0 * FORCE, FORCE])
+    np.testing.assert_allclose(shift(cell, q, [FORCE, 2.0 * FORCE, FORCE]), first, atol=1e-9)
+
+
+def test_the_sensor_feels_the_force_and_the_weight(q):
+    cell = quiet()
+    cell.lift("a", q)
+    pressed = cell.press(q, FORCE)
+    assert np.linalg.norm(pressed.felt[:3]) == pytest.approx(np.linalg.norm(FORCE))
+    weight = pressed.wrench[:3] - pressed.felt[:3]
+    assert np.linalg.norm(weight) == pytest.approx(60.0 * 9.80665, rel=1e-3)
+
+
+def test_the_sensor_has_the_zero_that_a_run_of_the_same_seed_meets(q):
+    described = example_cell("afp", simulation=QUIET)
+    cell, run = ProcessCell(described, 3), SimulatedCell.of(described, 3)
+    cell.lift("a", described.home)
+    read = cell.read(np.zeros(1), cell.press(described.home, np.zeros(3)).wrench[None])[0]
+    run.devices.clock.sleep(0.1)
+    block = run.sensor.read()
+    np.testing.assert_allclose(read[:3], block.force[-1], atol=1e-6)
+    np.testing.assert_allclose(read[3:], block.moment[-1], atol=1e-6)
+
+
+def test_noise_belongs_to_seed_and_course(q):
+    def read(seed: int, course: str) -> np.ndarray:
+        cell = ProcessCell(example_cell("afp"), seed)
+        cell.lift(course, q)
+        return cell.read(np.zeros(4), np.zeros((4, 6)))
+
+    np.testing.assert_array_equal(read(1, "a"), read(1, "a"))
+    assert np.abs(read(1, "a") - read(1, "b")).max() > 0.1
+
+
+def test_readings_end_at_the_range_of_the_sensor(q):
+    cell = quiet()
+    cell.lift("a", q)
+    assert cell.read(np.zeros(1), np.full((1, 6), 1e6))[0].tolist() == [
+        2500.0, 2500.0, 6250.0, 400.0, 400.0, 400.0,
+    ]  # fmt: skip

@@ -1,0 +1,136 @@
+/* Runs an exported model over rows of doubles from standard input; see support/exported.py. */
+#include "elastocal_model.h"
+
+#include <stdio.h>
+#include <string.h>
+#include <time.h>
+#ifdef COUNT
+#include <valgrind/callgrind.h>
+#endif
+
+#define N ELASTOCAL_JOINTS
+
+static int loads(void)
+{
+    double row[N + 6];
+    double out[4];
+    while (fread(row, sizeof(double), N + 6, stdin) == N + 6) {
+        elastocal_deflection(row, &row[N], &row[N + 3], out);
+        out[3] = elastocal_half_width(row, &row[N], &row[N + 3]);
+        (void)fwrite(out, sizeof(double), 4, stdout);
+    }
+    return 0;
+}
+
+static int steps(void)
+{
+    double row[N + 8];
+    double out[8];
+    elastocal_state state;
+    elastocal_start(&state);
+    while (fread(row, sizeof(double), N + 8, stdin) == N + 8) {
+        elastocal_reading reading;
+        elastocal_correction told;
+        reading.time = row[0];
+        (void)memcpy(reading.q, &row[1], sizeof reading.q);
+        (void)memcpy(reading.force, &row[N + 1], sizeof reading.force);
+        (void)memcpy(reading.moment, &row[N + 4], sizeof reading.moment);
+        reading.ok = (row[N + 7] != 0.0) ? 1 : 0;
+        elastocal_step(&state, &reading, &told);
+        (void)memcpy(out, told.correction, sizeof told.correction);
+        (void)memcpy(&out[3], told.deflection, sizeof told.deflection);
+        out[6] = told.half_width;
+        out[7] = (double)told.status;
+        (void)fwrite(out, sizeof(double), 8, stdout);
+    }
+    return 0;
+}
+
+static double now(void)
+{
+    return (double)clock() / CLOCKS_PER_SEC;
+}
+
+/* Prints seconds a call of deflection and step, over rows of loads. */
+static int timing(void)
+{
+    static double rows[1000][N + 6];
+    const size_t read = fread(rows, sizeof rows[0], 1000, stdin);
+    double out[3];
+    double sum = 0.0;
+    elastocal_state state;
+    double start = now();
+    long i;
+    const long calls = 1000000;
+    for (i = 0; i < calls; i++) {
+        const double *const row = rows[(size_t)i % read];
+        elastocal_deflection(row, &row[N], &row[N + 3], out);
+        sum += out[0];
+    }
+    printf("%.6g ", (now() - start) / (double)calls);
+    elastocal_start(&state);
+    start = now();
+    for (i = 0; i < calls / 10; i++) {
+        const double *const row = rows[(size_t)i % read];
+        elastocal_reading reading;
+        elastocal_correction told;
+        reading.time = ELASTOCAL_SAMPLE * (double)i;
+        (void)memcpy(reading.q, row, sizeof reading.q);
+        (void)memcpy(reading.force, &row[N], sizeof reading.force);
+        (void)memcpy(reading.moment, &row[N + 3], sizeof reading.moment);
+        reading.ok = 1;
+        elastocal_step(&state, &reading, &told);
+        sum += told.correction[0];
+    }
+    printf("%.6g %.3g\n", 10.0 * (now() - start) / (double)calls, sum);
+    return 0;
+}
+
+#ifdef COUNT
+/* Leaves a callgrind dump for every call. */
+static int count(void)
+{
+    double row[N + 6];
+    double time = 0.0;
+    double out[3];
+    elastocal_state state;
+    elastocal_start(&state);
+    while (fread(row, sizeof(double), N + 6, stdin) == N + 6) {
+        elastocal_reading reading;
+        elastocal_correction told;
+        CALLGRIND_ZERO_STATS;
+        elastocal_deflection(row, &row[N], &row[N + 3], out);
+        CALLGRIND_DUMP_STATS_AT("deflection");
+        time += ELASTOCAL_SAMPLE;
+        reading.time = time;
+        (void)memcpy(reading.q, row, sizeof reading.q);
+        (void)memcpy(reading.force, &row[N], sizeof reading.force);
+        (void)memcpy(reading.moment, &row[N + 3], sizeof reading.moment);
+        reading.ok = 1;
+        CALLGRIND_ZERO_STATS;
+        elastocal_step(&state, &reading, &told);
+        CALLGRIND_DUMP_STATS_AT("step");
+    }
+    return 0;
+}
+#endif
+
+int main(int argc, char **argv)
+{
+    int result = 2;
+    const char *const mode = (argc > 1) ? argv[1] : "selftest";
+    if (strcmp(mode, "loads") == 0) {
+        result = loads();
+    } else if (strcmp(mode, "steps") == 0) {
+        result = steps();
+    } else if (strcmp(mode, "timing") == 0) {
+        result = timing();
+#ifdef COUNT
+    } else if (strcmp(mode, "count") == 0) {
+        result = count();
+#endif
+    } else {
+        result = elastocal_selftest();
+    }
+    return result;
+}

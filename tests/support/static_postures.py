@@ -1,0 +1,39 @@
+"""Static postures of a known tool."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from elastocal.compensation.conditioning.postures import StaticPostures, static_postures
+
+GRAVITY = np.array([0.0, 0.0, -9.80665])
+
+
+@dataclass(frozen=True, eq=False)
+class PlantedTool:
+    """What a fit should find."""
+
+    mass: float = 40.0
+    centre: np.ndarray = field(default_factory=lambda: np.array([0.01, -0.02, 0.15]))
+    force_bias: np.ndarray = field(default_factory=lambda: np.array([20.0, -30.0, 50.0]))
+    moment_bias: np.ndarray = field(default_factory=lambda: np.array([1.0, 2.0, -3.0]))
+    R_flange_sensor: np.ndarray = field(
+        default_factory=lambda: Rotation.from_euler("ZYX", [30, 2, -3], degrees=True).as_matrix()
+    )
+
+    def raw(
+        self, R_base_flange: np.ndarray, rng: np.random.Generator, noise: float = 1.0
+    ) -> StaticPostures:
+        """Return raw wrenches; noise 1 is 0.5 N and 0.05 N m."""
+        weight = self.mass * (GRAVITY @ R_base_flange @ self.R_flange_sensor)
+        force = weight + self.force_bias + 0.5 * noise * rng.normal(size=weight.shape)
+        moment = np.cross(self.centre, weight) + self.moment_bias
+        moment = moment + 0.05 * noise * rng.normal(size=weight.shape)
+        return static_postures(R_base_flange, force, moment, GRAVITY)
+
+
+def turned(count: int, rng: np.random.Generator, angle: float = 1.0) -> np.ndarray:
+    """Return rotations about the horizontal by about an angle (rad), shape (count, 3, 3)."""
+    down = Rotation.from_euler("y", np.pi).as_matrix()
+    return down @ Rotation.from_rotvec(angle * rng.normal(size=(count, 3))).as_matrix()
