@@ -7,6 +7,7 @@ from typing import Any
 
 from elastocal import dataset
 from elastocal.cell import load_cell
+from elastocal.codec import read_codec, read_verdicts
 from elastocal.dataset.netcdf import read_netcdf
 from elastocal.elastic.layouts import read_springs
 from elastocal.errors import DatasetError, RobotError, SchemaError
@@ -23,6 +24,7 @@ Described = tuple[str, Facts]
 Describe = Callable[[Path], Described]
 
 _PLAN = re.compile(r'"schema":\s*"elastocal\.plan/')
+_CODEC = re.compile(r'"schema":\s*"elastocal\.codec_verdicts/')
 _SCHEMA_LINE = re.compile(r"^schema:\s*[\"']?elastocal\.cell/", re.MULTILINE)
 
 
@@ -56,12 +58,17 @@ def _netcdf(path: Path) -> Described:
         stated = read_netcdf(path).attrs.get("schema")
     except DatasetError as error:
         raise DatasetError(f"{path}: {error}") from error
+    if str(stated).startswith("elastocal.codec/"):
+        return _codec(path)
     return _pool(path) if str(stated).startswith("elastocal.pool/") else _dataset(path)
 
 
 def _json(path: Path) -> Described:
     """Describe a JSON file by the schema that it states; what states none is read as a model."""
-    return _plan(path) if _PLAN.search(read_text(path)[:200]) else _model(path)
+    start = read_text(path)[:200]
+    if _CODEC.search(start):
+        return _verdicts(path)
+    return _plan(path) if _PLAN.search(start) else _model(path)
 
 
 def _dataset(path: Path) -> Described:
@@ -147,4 +154,26 @@ def _pool(path: Path) -> Described:
         "candidates": len(pool),
         "sampled": len(pool.sampled),
         "checks": list(pool.check_names),
+    }
+
+
+def _codec(path: Path) -> Described:
+    data = read_codec(path)
+    return "codec", {
+        "schema": "elastocal.codec/1",
+        "robot": data.robot,
+        "variants": [each.name for each in data.variants],
+        "poses": len(data.contact),
+        "splits": len(data.seed_pose),
+        "training": len(data.n_train),
+    }
+
+
+def _verdicts(path: Path) -> Described:
+    record = read_verdicts(path)
+    return "verdicts of a codec", {
+        "schema": "elastocal.codec_verdicts/1",
+        "robot": record.robot,
+        "variants": list(record.variants),
+        "saturation": record.saturation,
     }

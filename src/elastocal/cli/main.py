@@ -11,6 +11,7 @@ import typer
 from elastocal import __version__
 from elastocal.cli.calibrate import calibrate
 from elastocal.cli.check import check
+from elastocal.cli.codec import codec
 from elastocal.cli.demo import demo
 from elastocal.cli.init import init
 from elastocal.cli.plan import plan
@@ -25,7 +26,7 @@ app = typer.Typer(
     add_completion=False,
     pretty_exceptions_enable=False,
 )
-for command in (robots, init, check, plan, calibrate, predict, demo):
+for command in (robots, init, check, plan, calibrate, codec, predict, demo):
     app.command()(command)
 
 

@@ -10,7 +10,8 @@ from numpy.typing import ArrayLike
 
 from elastocal.arrays import IndexArray
 from elastocal.codec.campaign import make_campaign
-from elastocal.codec.data import NONE, CodecData, CodecOptions, SpringLabels
+from elastocal.codec.data import NONE, CodecData, SpringLabels
+from elastocal.codec.options import CodecOptions
 from elastocal.codec.splits import Split, make_splits, split_sizes
 from elastocal.codec.training import Outcome, Trainee, train
 from elastocal.codec.variants import Variant
@@ -145,9 +146,7 @@ def _run(
     return [list(column) for column in zip(*found, strict=True)]
 
 
-def _run_split(
-    trainees: Sequence[Trainee], split: Split, most: int, seed: int
-) -> list[Outcome]:
+def _run_split(trainees: Sequence[Trainee], split: Split, most: int, seed: int) -> list[Outcome]:
     return [_run_one(trainee, split, most, seed) for trainee in trainees]
 
 
@@ -179,5 +178,5 @@ def _padded(chosen: Sequence[IndexArray]) -> IndexArray:
     return filled
 
 
-def _silent(stage: str, done: int, total: int) -> None:  # noqa: ARG001 - a Report
+def _silent(stage: str, done: int, total: int) -> None:
     """Report to nobody."""

@@ -97,7 +97,7 @@ class CodecData:
     @property
     def training_poses(self) -> int:
         """Poses on the training side of a split, ``N_c``."""
-        return len(self.contact) - self.verification.shape[1]
+        return len(self.contact) - int(self.verification.shape[1])
 
     def index(self, variant: str) -> int:
         """Return the number of a variant.

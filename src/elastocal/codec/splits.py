@@ -9,6 +9,7 @@ from elastocal.codec.options import RATIO
 from elastocal.errors import CodecError
 from elastocal.planning.search import Candidates, Cover
 
+
 @dataclass(frozen=True, eq=False)
 class Split:
     """One verification set and what is left to train with."""

@@ -35,7 +35,11 @@ class Trainee:
 
     @classmethod
     def of(
-        cls, variant: Variant, model: ElasticModel, campaign: Campaign, marker_offset: ArrayLike | None
+        cls,
+        variant: Variant,
+        model: ElasticModel,
+        campaign: Campaign,
+        marker_offset: ArrayLike | None,
     ) -> "Trainee":
         """Return a variant prepared for a campaign.
 

@@ -85,7 +85,8 @@ def read_comparison(text: str) -> tuple[str, tuple[str, ...]]:
         )
     if not all(values) or len(set(values)) < len(values):
         raise CodecError(
-            f"comparison {text!r} must be KEY=A,B with different values, e.g. springs=actuated,bearing"
+            f"comparison {text!r} must be KEY=A,B with different values,"
+            " e.g. springs=actuated,bearing"
         )
     return key, values
 

@@ -74,7 +74,7 @@ class PoseTriangles:
             if not np.array_equal(choice[: len(before)], before):
                 known, before = known[:0], before[:0]
             stacked = np.concatenate([known, *self.rows[choice[len(before) :]]])
-            known, before = np.linalg.qr(stacked, mode="r"), choice
+            known, before = np.asarray(np.linalg.qr(stacked, mode="r"), dtype=float), choice
             triangle[: len(known)] = known
         return _minimised(triangles, self.lower, self.upper)
 
@@ -92,7 +92,7 @@ def _minimised(triangles: FloatArray, lower: FloatArray, upper: FloatArray) -> F
     return np.array(
         [
             _certified(*system, lower * size, upper * size) / size
-            for *system, size in zip(s, Vt, y, scale, strict=True)
+            for system, size in zip(zip(s, Vt, y, strict=True), scale, strict=True)
         ]
     ).clip(lower, upper)
 
