@@ -25,6 +25,9 @@ Report = Callable[[str, int, int], None]
 """Told a stage, how much of it is done and how much there is."""
 STAGE = "splits"
 
+_WORTH_PROCESSES = 2000
+"""Fits behind a search of their own, or by a robust loss, from which on all cores are used."""
+
 _PACKAGES = ("elastocal", "numpy", "scipy")
 
 
@@ -56,8 +59,8 @@ def cross_validate(
     provenance : str
         Where the readings came from; kept with the arrays.
     jobs : int, optional
-        Processes; default: one, but all cores where a variant searches anew for every size or
-        fits by a robust loss. The numbers do not depend on it.
+        Processes; default: one, but all cores for long work, where variants search anew for
+        every size or fit by a robust loss. The numbers do not depend on it.
     report : callable, optional
         Told of each split that is done.
 
@@ -87,7 +90,7 @@ def cross_validate(
             f"training sets end at {most} of {training} poses: the others have no reading of the"
             " load cases that a variant trains with"
         )
-    processes = _processes(jobs, variants)
+    processes = _processes(jobs, variants, most * len(splits))
     outcomes = _run(trainees, splits, most, options.seed, processes, report or _silent)
     for trainee, found in zip(trainees, outcomes, strict=True):
         _refuse_nothing_fitted(trainee, found)
@@ -122,10 +125,10 @@ def _most(trainee: Trainee, splits: Sequence[Split]) -> int:
     return most
 
 
-def _processes(jobs: int | None, variants: Sequence[Variant]) -> int:
-    """Return the number of processes; starting one costs more than a quick codec."""
-    slow = any(not technique(v.search).nested or v.options.loss != "linear" for v in variants)
-    return jobs or ((os.cpu_count() or 1) if slow else 1)
+def _processes(jobs: int | None, variants: Sequence[Variant], fits: int) -> int:
+    """Return the number of processes; starting them takes as long as a thousand slow fits."""
+    slow = sum(not technique(v.search).nested or v.options.loss != "linear" for v in variants)
+    return jobs or ((os.cpu_count() or 1) if slow * fits > _WORTH_PROCESSES else 1)
 
 
 def _run(
