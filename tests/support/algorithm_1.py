@@ -42,7 +42,7 @@ def cover_from_centroid(points, count):
     return cover(points, int(np.argmin(away)), count)
 
 
-def algorithm_1(
+def algorithm_1(  # noqa: PLR0913 - what a codec may vary
     robot: Robot,
     readings: Readings,
     n_splits: int,
@@ -70,7 +70,9 @@ def algorithm_1(
         training = [pose for pose in range(N) if pose not in verification]
         rows = [[], [], [], []]
         for j in sizes or range(1, N_c + 1):
-            picks = choose(search, j, N_c, (seed, i), training, points, problem, readings, may_train)
+            picks = choose(
+                search, j, N_c, (seed, i), training, points, problem, readings, may_train
+            )
             train = may_train & np.isin(readings.pose, [labels[pose] for pose in picks])
             compliance = solve(problem.take(train), options.loss).compliance
             absolute = []
@@ -91,7 +93,9 @@ def algorithm_1(
     return found
 
 
-def choose(search, j, most, seeds, training, points, problem, readings, may_train):
+def choose(  # noqa: PLR0913 - what a technique may look at
+    search, j, most, seeds, training, points, problem, readings, may_train
+):
     """Return j training poses as the technique chooses them from the training side."""
     if search == "cover":
         return [training[k] for k in cover_from_centroid(points[training], j)]

@@ -2,9 +2,10 @@
 
 The sets are all drawn from the same N poses, so that their spread, taken for that of independent
 ones, is too small. C. Nadeau and Y. Bengio ("Inference for the generalization error", Machine
-Learning 52, 2003, section 3) correct the variance of a mean over J splits from ``S^2 / J`` to
-``(1 / J + n_2 / n_1) S^2``, with ``n_1`` training and ``n_2`` verification items; items are poses
-here. What this covers in simulation, and what it does not: docs/decisions/0030-codec.md.
+Learning 52, 2003, section 3) give the mean over J sets whose figures are correlated by ``rho`` the
+variance ``(1 / J + rho / (1 - rho)) S^2``, and take for ``rho`` what two sets are expected to
+share: ``n_2 / (n_1 + n_2)`` for random ones. COVER sets share more, so ``rho`` is counted here.
+What this covers in simulation: docs/decisions/0030-codec.md.
 """
 
 from dataclasses import dataclass
@@ -13,17 +14,55 @@ import numpy as np
 from numpy.random import Generator
 from scipy.stats import norm, t
 
-from elastocal.arrays import FloatArray
+from elastocal.arrays import FloatArray, IndexArray
 from elastocal.identification.bootstrap import CONFIDENCE
 
 DRAWS = 1000
 """Bootstrap draws."""
 _TAIL = 0.5 * (1.0 + CONFIDENCE)
+_SMALLEST = np.finfo(float).tiny
+_ALL = 1.0 - 1e-9
+
+
+@dataclass(frozen=True)
+class Overlap:
+    """How far verification sets are from independent."""
+
+    sets: int
+    """Number of sets, J."""
+    rho: float
+    """Part of its poses that a set shares with another one, mean over all pairs."""
+
+    @classmethod
+    def of(cls, verification: IndexArray) -> "Overlap":
+        """Return the overlap of verification sets, given by pose numbers, shape (cv, N_v)."""
+        sets, size = verification.shape
+        if sets < 2:
+            return cls(sets, 1.0)
+        member = np.zeros((sets, int(verification.max()) + 1))
+        np.put_along_axis(member, verification, 1.0, axis=1)
+        shared = (member @ member.T).sum() / size - sets
+        return cls(sets, float(shared / (sets * (sets - 1))))
+
+    @property
+    def known(self) -> bool:
+        """Whether the sets show any spread: several, and not all the same."""
+        return self.sets > 1 and self.rho < _ALL
+
+    @property
+    def variance(self) -> float:
+        """Variance of a mean over the sets, in units of the sample variance."""
+        return 1.0 / self.sets + self.rho / (1.0 - self.rho)
+
+    @property
+    def student(self) -> float:
+        """Quantile of Student's distribution for the 95 % interval."""
+        return float(t.ppf(_TAIL, self.sets - 1))
 
 
 @dataclass(frozen=True, eq=False)
 class MeanOverSets:
-    """A mean over verification sets with its 95 % interval; the ends are NaN for one set."""
+    """A mean over verification sets with its 95 % interval; NaN ends: no spread is known."""
 
     mean: FloatArray
     """Shape (n,)."""
@@ -31,47 +70,50 @@ class MeanOverSets:
     high: FloatArray
 
 
-def corrected_mean(values: FloatArray, shared: float) -> MeanOverSets:
+def corrected_mean(values: FloatArray, overlap: Overlap) -> MeanOverSets:
     """Return the mean over verification sets by the corrected resampled t.
 
     Parameters
     ----------
     values : ndarray, shape (cv, n)
         A figure of each verification set, for each number of training poses.
-    shared : float
-        Verification poses over training poses of a split, ``N_v / N_c``.
+    overlap : Overlap
+        Of the sets.
     """
-    sets, mean = len(values), values.mean(axis=0)
-    if sets < 2:
+    mean = values.mean(axis=0)
+    if not overlap.known:
         unknown = np.full_like(mean, np.nan)
         return MeanOverSets(mean, unknown, unknown)
-    variance = (1.0 / sets + shared) * values.var(axis=0, ddof=1)
-    half = float(t.ppf(_TAIL, sets - 1)) * np.sqrt(variance)
+    half = overlap.student * np.sqrt(overlap.variance * values.var(axis=0, ddof=1))
     return MeanOverSets(mean, mean - half, mean + half)
 
 
-def median_draws(values: FloatArray, shared: float, rng: Generator) -> FloatArray:
+def median_draws(values: FloatArray, overlap: Overlap, rng: Generator) -> FloatArray:
     """Return bootstrap draws of the median over verification sets, shape (draw, n).
 
-    Whole sets are drawn, so that all sizes of one set stay together; the draws are stretched
-    about the median to the variance of `corrected_mean` and to Student's quantile. There are
-    none for a single set, which shows no spread.
+    Whole sets are drawn, so that all sizes of one set stay together. The draws are stretched
+    about the median to the variance and the quantile of `corrected_mean`, in logarithms, which
+    keeps errors positive. There are none where no spread is known.
 
     Parameters
     ----------
     values : ndarray, shape (cv, n)
-        A figure of each verification set, for each number of training poses.
-    shared : float
-        Verification poses over training poses of a split, ``N_v / N_c``.
+        A figure above 0 of each verification set, for each number of training poses.
+    overlap : Overlap
+        Of the sets.
     rng : Generator
         Source of randomness.
     """
-    sets, estimate = len(values), np.median(values, axis=0)
-    if sets < 2:
+    sets, estimate = len(values), _log_median(values)
+    if not overlap.known:
         return np.empty((0, len(estimate)))
     chosen = rng.integers(sets, size=(DRAWS, sets))
-    drawn = np.array([np.median(values[draw], axis=0) for draw in chosen])
-    student = float(t.ppf(_TAIL, sets - 1) / norm.ppf(_TAIL))
-    # Draws spread as the population of the sets does, 1 - 1 / J of the variance in the formula.
-    corrected = (1.0 + sets * shared) * sets / (sets - 1.0)
-    return np.asarray(estimate + student * np.sqrt(corrected) * (drawn - estimate))
+    drawn = np.array([_log_median(values[draw]) for draw in chosen])
+    # Draws spread as the population of the sets does, (1 - 1 / J) / J of the sample variance.
+    by = np.sqrt(overlap.variance * sets * sets / (sets - 1.0))
+    by *= overlap.student / float(norm.ppf(_TAIL))
+    return np.asarray(np.exp(estimate + by * (drawn - estimate)))
+
+
+def _log_median(values: FloatArray) -> FloatArray:
+    return np.asarray(np.log(np.maximum(np.median(values, axis=0), _SMALLEST)))

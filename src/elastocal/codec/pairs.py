@@ -5,7 +5,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from elastocal.arrays import BoolArray, FloatArray
-from elastocal.codec.overlap import corrected_mean
+from elastocal.codec.overlap import Overlap, corrected_mean
+
+_ROUND_OFF = 1e-9
+"""Part of an error below which a difference is round-off: techniques that choose the same poses
+in another order."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -14,40 +18,45 @@ class Pair:
 
     a: str
     b: str
+    at: int
+    """Number of training poses at which the pair is judged: both variants have saturated."""
     difference: FloatArray
     """Mean over the verification sets of the mean error norm of ``a`` minus that of ``b`` on the
     same set, shape (n_train,), in m; positive: b is better."""
     low: FloatArray
-    """Lower ends of the 95 % intervals, in m; NaN where one verification set tells no spread."""
+    """Lower ends of the 95 % intervals, in m; NaN where no spread is known."""
     high: FloatArray
     """Upper ends."""
 
     @property
     def better(self) -> str | None:
-        """The variant that is better with the largest training set; None: cannot be told."""
-        if self.low[-1] > 0.0:
+        """The variant that is better at `at` training poses; None: cannot be told."""
+        if self.low[self.at - 1] > 0.0:
             return self.b
-        return self.a if self.high[-1] < 0.0 else None
+        return self.a if self.high[self.at - 1] < 0.0 else None
 
     @property
     def proved_from(self) -> int | None:
-        """Smallest training set from which on every interval says so."""
+        """Smallest training set from which on, up to `at`, every interval says so."""
         if self.better is None:
             return None
         clear = self.low > 0.0 if self.better == self.b else self.high < 0.0
-        return _since(clear)
+        return _since(clear[: self.at])
 
     @property
     def crossing(self) -> int | None:
-        """Smallest training set from which on the difference keeps the sign of the last.
+        """Smallest training set from which on, up to `at`, the difference keeps its sign.
 
-        None when it has that sign from the first set on, or the last difference is zero.
+        None when it has that sign from the first set on, or no difference is left at `at`.
         """
-        since = _since(np.sign(self.difference) == np.sign(self.difference[-1]))
-        return None if since == 1 or self.difference[-1] == 0.0 else since
+        sign = np.sign(self.difference[: self.at])
+        since = _since(sign == sign[-1])
+        return None if since == 1 or sign[-1] == 0.0 else since
 
 
-def paired(a: str, b: str, errors_a: FloatArray, errors_b: FloatArray, shared: float) -> Pair:
+def paired(
+    a: str, b: str, errors_a: FloatArray, errors_b: FloatArray, overlap: Overlap, at: int
+) -> Pair:
     """Return the paired difference of two variants.
 
     Parameters
@@ -56,11 +65,15 @@ def paired(a: str, b: str, errors_a: FloatArray, errors_b: FloatArray, shared: f
         Names.
     errors_a, errors_b : ndarray, shape (cv, n_train)
         Mean error norm of each verification set, in m.
-    shared : float
-        Verification poses over training poses of a split.
+    overlap : Overlap
+        Of the verification sets.
+    at : int
+        Number of training poses at which the pair is judged.
     """
-    found = corrected_mean(errors_a - errors_b, shared)
-    return Pair(a, b, found.mean, found.low, found.high)
+    difference = errors_a - errors_b
+    round_off = np.abs(difference) <= _ROUND_OFF * np.maximum(errors_a, errors_b)
+    found = corrected_mean(np.where(round_off, 0.0, difference), overlap)
+    return Pair(a, b, at, found.mean, found.low, found.high)
 
 
 def _since(holds: BoolArray) -> int:

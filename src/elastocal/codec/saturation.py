@@ -6,7 +6,7 @@ import numpy as np
 from numpy.random import Generator
 
 from elastocal.arrays import BoolArray, FloatArray, IndexArray
-from elastocal.codec.overlap import median_draws
+from elastocal.codec.overlap import Overlap, median_draws
 from elastocal.errors import CodecError
 from elastocal.identification.bootstrap import CONFIDENCE
 
@@ -51,9 +51,10 @@ class Saturation:
     n_train: int
     """Smallest number of training poses whose error is within the tolerance of the last."""
     low: int | None
-    """Lower end of its 95 % interval; None where one verification set tells no spread."""
+    """Lower end of its 95 % interval: with fewer poses, 97.5 % of the bootstrap draws leave the
+    tolerance again; None where no spread is known."""
     high: int | None
-    """Upper end."""
+    """Upper end: by then, 97.5 % of the draws have come within the tolerance."""
     error: float
     """Median over the verification sets of the mean error norm there, in m."""
     last_error: float
@@ -71,7 +72,7 @@ class Saturation:
 
 
 def saturation(
-    variant: str, errors: FloatArray, tolerance: Tolerance, shared: float, rng: Generator
+    variant: str, errors: FloatArray, tolerance: Tolerance, overlap: Overlap, rng: Generator
 ) -> Saturation:
     """Return from how many training poses on the median error is that of the last.
 
@@ -83,21 +84,21 @@ def saturation(
         Mean error norm of each verification set, in m.
     tolerance : Tolerance
         How near is near.
-    shared : float
-        Verification poses over training poses of a split.
+    overlap : Overlap
+        Of the verification sets.
     rng : Generator
         Draws the verification sets of the interval.
     """
     curve = np.median(errors, axis=0)
     n = _first(tolerance.reached(curve))
-    draws = median_draws(errors, shared, rng)
+    draws = median_draws(errors, overlap, rng)
     low, high = None, None
     if len(draws):
-        tail = 50.0 * (1.0 - CONFIDENCE)
-        found = _first(tolerance.reached(draws))
-        # Whole numbers of poses: the ends are drawn values, no averages of two.
-        low = int(np.percentile(found, tail, method="lower"))
-        high = int(np.percentile(found, 100.0 - tail, method="higher"))
+        tail, reached = 50.0 * (1.0 - CONFIDENCE), tolerance.reached(draws)
+        # A noisy draw dips into the tolerance early, and leaves it again late; neither is news
+        # of saturation. Whole numbers of poses: the ends are drawn values, no averages of two.
+        low = min(int(n), int(np.percentile(_for_good(reached), tail, method="lower")))
+        high = max(int(n), int(np.percentile(_first(reached), 100.0 - tail, method="higher")))
     return Saturation(
         variant, int(n), low, high, float(curve[n - 1]), float(curve[-1]), errors.shape[1]
     )
@@ -106,3 +107,9 @@ def saturation(
 def _first(reached: BoolArray) -> IndexArray:
     """Return the size, from 1, of the first training set that has reached the last error."""
     return np.asarray(np.argmax(reached, axis=-1) + 1)
+
+
+def _for_good(reached: BoolArray) -> IndexArray:
+    """Return the size, from 1, of the training set from which on all are within the tolerance."""
+    outside = ~reached[..., ::-1]
+    return np.where(outside.any(axis=-1), reached.shape[-1] - outside.argmax(axis=-1) + 1, 1)

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from elastocal.codec.data import CodecData
+from elastocal.codec.overlap import Overlap
 from elastocal.codec.variants import KEYS
 from elastocal.codec.verdicts import Verdicts
 from elastocal.files import write_text
@@ -58,6 +59,8 @@ class CrossingRecord(StrictModel):
 
     a: str
     b: str
+    at: int
+    """Number of training poses at which the pair is judged: both have saturated."""
     better: str | None
     proved_from: int | None
     crossing: int | None
@@ -70,6 +73,8 @@ class Settings(StrictModel):
     training: int
     verification: int
     splits: int
+    overlap: float
+    """Part of its poses that a verification set shares with another one, mean over pairs."""
     ratio: float
     seed: int
     tolerance: float
@@ -156,6 +161,7 @@ def _settings(data: CodecData, verdicts: Verdicts) -> Settings:
         training=data.training_poses,
         verification=size,
         splits=sets,
+        overlap=Overlap.of(data.verification).rho,
         ratio=data.options.ratio,
         seed=data.options.seed,
         tolerance=verdicts.tolerance.relative,

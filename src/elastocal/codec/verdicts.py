@@ -6,6 +6,7 @@ from itertools import combinations
 import numpy as np
 
 from elastocal.codec.data import CodecData
+from elastocal.codec.overlap import Overlap
 from elastocal.codec.pairs import Pair, paired
 from elastocal.codec.saturation import Saturation, Tolerance, saturation
 
@@ -37,13 +38,17 @@ def judge(data: CodecData, tolerance: Tolerance | None = None) -> Verdicts:
     """
     tolerance = tolerance or Tolerance()
     sets, size = data.verification.shape
-    shared = size / data.training_poses
+    overlap = Overlap.of(data.verification)
     errors = {each.name: data.errors(each.name) for each in data.variants}
     found = tuple(
-        saturation(name, values, tolerance, shared, np.random.default_rng(data.options.seed))
+        saturation(name, values, tolerance, overlap, np.random.default_rng(data.options.seed))
         for name, values in errors.items()
     )
-    pairs = tuple(paired(a, b, errors[a], errors[b], shared) for a, b in combinations(errors, 2))
+    sizes = {each.variant: each.n_train for each in found}
+    pairs = tuple(
+        paired(a, b, errors[a], errors[b], overlap, max(sizes[a], sizes[b]))
+        for a, b in combinations(errors, 2)
+    )
     where = f"{sets} verification set{'s' if sets > 1 else ''} of {size} held-out poses"
     sentences = (
         *(_saturation_sentence(each, tolerance, where) for each in found),
@@ -53,7 +58,7 @@ def judge(data: CodecData, tolerance: Tolerance | None = None) -> Verdicts:
 
 
 def _saturation_sentence(found: Saturation, tolerance: Tolerance, where: str) -> str:
-    between = "no interval from one set"
+    between = "these sets tell no interval"
     if found.low is not None and found.high is not None:
         between = f"95 % interval {found.low} to {found.high}"
     reach = f"within {tolerance.relative:.0%} or {_um(tolerance.floor)} of the last"
@@ -73,28 +78,28 @@ def _saturation_sentence(found: Saturation, tolerance: Tolerance, where: str) ->
 
 
 def _pair_sentence(pair: Pair, where: str) -> str:
-    last = len(pair.difference)
-    difference, low, high = (float(each[-1]) for each in (pair.difference, pair.low, pair.high))
+    at = pair.at
+    difference, low, high = (float(each[at - 1]) for each in (pair.difference, pair.low, pair.high))
+    smaller, larger = (pair.a, pair.b) if difference < 0.0 else (pair.b, pair.a)
     if np.isnan(low):
-        better, worse = (pair.a, pair.b) if difference < 0.0 else (pair.b, pair.a)
         return (
-            f"{better} against {worse}: smaller by {_um(abs(difference))} with {last} training"
-            f" poses; one verification set tells no interval ({where})"
+            f"{smaller} against {larger}: smaller by {_um(abs(difference))} with {at} training"
+            f" poses; the verification sets tell no interval ({where})"
         )
     if pair.better is None:
         return (
-            f"{pair.a} against {pair.b}: no difference can be told with {last} training poses"
-            f" ({_um(difference)}, 95 % interval {_um(low)} to {_um(high)}; {where})"
+            f"{pair.a} against {pair.b}: no difference can be told where both have saturated, with"
+            f" {at} training poses ({_um(difference)}, 95 % interval {_um(low)} to {_um(high)};"
+            f" {where})"
         )
-    worse = pair.a if pair.better == pair.b else pair.b
     ends = sorted((abs(low), abs(high)))
     text = (
-        f"{pair.better} is better than {worse} by {_um(abs(difference))} (95 % interval"
-        f" {_um(ends[0])} to {_um(ends[1])}) with {last} training poses, clearly so from"
-        f" {pair.proved_from} on"
+        f"{smaller} is better than {larger} by {_um(abs(difference))} (95 % interval"
+        f" {_um(ends[0])} to {_um(ends[1])}) where both have saturated, with {at} training poses,"
+        f" clearly so from {pair.proved_from} on"
     )
     if pair.crossing is not None:
-        text += f"; with fewer than {pair.crossing} it is not"
+        text += f"; with fewer than {pair.crossing} it is not always so"
     return f"{text} ({where})"
 
 
