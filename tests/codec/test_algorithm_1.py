@@ -21,7 +21,9 @@ def readings() -> Readings:
     return Cell(rich_truth(), poses=12, seed=4).readings()
 
 
-def compare(data: CodecData, wanted: Reference, readings: Readings, sizes=None) -> None:
+def compare(
+    data: CodecData, wanted: Reference, readings: Readings, sizes=None, within: float = 1e-10
+) -> None:
     """Choices exactly; errors, and the deflections that compliances predict, to round-off.
 
     A compliance that cannot be told from others is not compared by itself: it is defined to
@@ -35,12 +37,12 @@ def compare(data: CodecData, wanted: Reference, readings: Readings, sizes=None) 
     O = build(ElasticModel(robot(), layout(robot(), springs)), readings).O  # noqa: E741
     found, expected = data.compliance[0][:, rows], np.array(wanted.compliance)
     seen = np.einsum("rin,ckn->ckri", O, found), np.einsum("rin,ckn->ckri", O, expected)
-    assert relative(data.error_mean[0][:, rows], np.array(wanted.error_mean)) < 1e-10
-    assert relative(data.error_max[0][:, rows], np.array(wanted.error_max)) < 1e-10
+    assert relative(data.error_mean[0][:, rows], np.array(wanted.error_mean)) < within
+    assert relative(data.error_max[0][:, rows], np.array(wanted.error_max)) < within
     size = np.abs(seen[1]).max(axis=(2, 3))
-    assert np.max(np.abs(seen[0] - seen[1]).max(axis=(2, 3)) / size) < 1e-10
+    assert np.max(np.abs(seen[0] - seen[1]).max(axis=(2, 3)) / size) < within
     if springs == "actuated":
-        assert relative(found, expected) < 1e-10
+        assert relative(found, expected) < within
 
 
 def relative(found: np.ndarray, expected: np.ndarray) -> float:
@@ -138,4 +140,5 @@ def test_thirty_one_poses_eighteen_springs_by_exchange():
     data = cross_validate(robot(), readings, [Variant(search="ioops")])
     sizes = (1, 2, 5, 11, 22)
     wanted = algorithm_1(robot(), readings, 31, search="ioops", sizes=sizes)
-    compare(data, wanted, readings, sizes)
+    # Conditions up to 1e6, the tolerance of the rank, times round-off.
+    compare(data, wanted, readings, sizes, within=1e-9)

@@ -8,7 +8,7 @@ from elastocal.arrays import IndexArray
 from elastocal.planning.search.candidates import Candidates
 from elastocal.planning.search.exchange import ExchangeSearch
 from elastocal.planning.search.information import build_information
-from elastocal.planning.search.technique import SearchTechnique
+from elastocal.planning.search.technique import SearchTechnique, check_count
 
 
 def growing_choices(
@@ -35,6 +35,7 @@ def growing_choices(
     PlanningError
         If the pool is smaller, or lacks what the technique needs.
     """
+    check_count(candidates, most)
     if wanted.nested:
         order = wanted.search(candidates, most, rng_of(most)).order
         return [order[:count] for count in range(1, most + 1)]
