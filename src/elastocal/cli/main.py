@@ -17,6 +17,7 @@ from elastocal.cli.init import init
 from elastocal.cli.plan import plan
 from elastocal.cli.predict import predict
 from elastocal.cli.robots import robots
+from elastocal.cli.study import study
 from elastocal.errors import ElastocalError
 
 app = typer.Typer(
@@ -26,7 +27,7 @@ app = typer.Typer(
     add_completion=False,
     pretty_exceptions_enable=False,
 )
-for command in (robots, init, check, plan, calibrate, codec, predict, demo):
+for command in (robots, init, check, plan, calibrate, codec, study, predict, demo):
     app.command()(command)
 
 

@@ -11,6 +11,7 @@ import numpy as np
 from elastocal.arrays import FloatArray
 from elastocal.cell import Cell
 from elastocal.cell.fingerprint import fingerprint
+from elastocal.cli.study_choice import Chosen, StudyPool, choose, study_poses
 from elastocal.codec.study import (
     Condition,
     ConditionRecord,
@@ -23,11 +24,10 @@ from elastocal.codec.study import (
     Verification,
     calibrated,
 )
-from elastocal.cli.study_choice import Chosen, StudyPool, choose, study_pool
-from elastocal.codec.variants import training_cases
+from elastocal.codec.variants import ALL_LOADS, training_cases
 from elastocal.elastic import ElasticModel, layout
-from elastocal.errors import DeviceError
-from elastocal.sim.workcell.quick import Places, QuickCell
+from elastocal.errors import CodecError, DeviceError, nearest
+from elastocal.sim.workcell.quick import QuickCell
 from elastocal.sim.workcell.quick_errors import ErrorDraws, QuickErrors, Scales
 
 _PACKAGES = ("elastocal", "numpy", "scipy", "pin")
@@ -140,24 +140,35 @@ def prepare(
         for name in dict.fromkeys(each.springs for each in conditions)
     }
     for each in conditions:
-        training_cases(each.load_cases, loads.cases)
+        _check_load_cases(each.load_cases, loads.cases)
     if cell.file.marker is None or not cell.file.trackers:
         raise DeviceError(f"cell {cell.name} has no tracker to simulate (key 'trackers')")
     truth, errors = QuickCell.of(cell), QuickErrors.of(cell)
-    pool = study_pool(cell, verification, jobs)
-    settings = _settings(cell, conditions, models, pool, seed)
+    poses = study_poses(cell, verification, jobs)
+    chosen = choose(cell, poses, conditions)
+    settings = _settings(cell, conditions, models, poses.pool, seed)
     simulate = StudySimulation(
         conditions=tuple(conditions),
-        chosen=choose(cell, pool, conditions),
+        chosen=chosen,
         models=models,
         truth=truth,
         errors=errors,
-        pool=pool,
+        pool=poses.pool,
         load_cases=loads.cases,
         force_tcp=loads.force_tcp,
         marker=np.array(cell.file.marker.position_tcp),
     )
     return Prepared(settings, simulate)
+
+
+def _check_load_cases(spec: str, known: Sequence[str]) -> None:
+    """Refuse a set of load cases that the cell lacks."""
+    for name in spec.split("+"):
+        if spec != ALL_LOADS and name.strip() not in known:
+            raise CodecError(
+                f"load_cases={spec}: the cell has no load case {name.strip()!r}"
+                f"{nearest(name.strip(), known)} (known: {', '.join(known)}, or {ALL_LOADS})"
+            )
 
 
 def _settings(

@@ -17,7 +17,7 @@ from elastocal.report.looks import Look, looks_of
 from elastocal.report.printed import new_figure, plain
 
 _LEFT, _RIGHT, _HEAD, _FOOT = 1.25, 0.2, 0.98, 1.05
-_FOREST, _GAP = 2.75, 0.15
+_FOREST, _GAP = 2.65, 0.25
 """Width of a panel of correlations and room between two, in inches."""
 _COLUMNS, _SMALL, _SIDE, _OVER = 5, 1.25, 0.45, 0.42
 """Panels of an index: columns, height, and room at their left and above them, in inches."""
@@ -106,7 +106,7 @@ def _draw_forest(axes: Axes, found: Sequence[Correlation], looks: Sequence[Look]
     axes.set_ylim(len(INDICES) - 0.5, -0.5)
     axes.set_yticks(range(len(INDICES)), [NAMES[name].title for name in INDICES])
     axes.tick_params(length=0)
-    axes.set_xticks([-1.0, -0.5, 0.0, 0.5, 1.0])
+    axes.set_xticks([-1.0, -0.5, 0.0, 0.5, 1.0], ["−1", "−0.5", "0", "0.5", "1"])
     axes.grid(axis="x", color="#dcdcd8", lw=0.5)
     axes.set_axisbelow(True)
     axes.spines[["top", "right", "left"]].set_visible(False)
@@ -125,9 +125,9 @@ def _draw_growth(
     values = np.concatenate(curves)
     if reads_better_in_decades(float(values.min()), float(values.max())):
         axes.set_yscale("log")
-    better = "more" if shown.more_is_better else "less"
-    axes.set_title(shown.label, loc="left", fontsize=8.5, weight="bold", pad=4)
-    axes.set_title(f"{better} is better", loc="right", fontsize=7.0, color=style.MUTED, pad=4)
+    better = "↑" if shown.more_is_better else "↓"
+    axes.set_title(shown.label, loc="left", fontsize=7.8, weight="bold", pad=4)
+    axes.set_title(f"{better} better", loc="right", fontsize=7.0, color=style.MUTED, pad=4)
     axes.set_xlim(0.5, data.n_train[-1] + 0.5)
     axes.tick_params(labelsize=7.0, length=2, pad=2)
     axes.tick_params(which="minor", labelleft=False, length=1)

@@ -21,7 +21,7 @@ class IndexName:
     @property
     def label(self) -> str:
         """Return the title with its unit."""
-        return f"{self.title} in {self.unit}" if self.unit else self.title
+        return f"{self.title}, {self.unit}" if self.unit else self.title
 
     def shown(self, values: FloatArray) -> FloatArray:
         """Return values as they are shown."""

@@ -175,10 +175,8 @@ class QuickCell:
             q = self._along(q, statics.robot.forward(q), missed)
         return reached
 
-    def _touch(
-        self, places: Places, T: FloatArray, near: _Stands
-    ) -> tuple[_Stands, list[Contact]]:
-        """Return the robot with its tool truly at the tooling, without force; see `ways.touching`."""
+    def _touch(self, places: Places, T: FloatArray, near: _Stands) -> tuple[_Stands, list[Contact]]:
+        """Return the robot touching the tooling without force; see `ways.touching`."""
         beside = self._tool(near) - (T[:, :3, 3] + self.offset)
         height = np.sum(beside * places.normal, axis=1, keepdims=True)
         anchor = self._tool(near) - height * places.normal
@@ -254,9 +252,11 @@ def _stack(parts: list[FloatArray]) -> FloatArray:
 
 def _turn(R: FloatArray, vectors: FloatArray) -> FloatArray:
     """Return ``R v`` of each place."""
-    return np.einsum("pij,pj->pi", R, vectors)
+    turned: FloatArray = np.einsum("pij,pj->pi", R, vectors)
+    return turned
 
 
 def _turn_back(R: FloatArray, vectors: FloatArray) -> FloatArray:
     """Return ``R^T v`` of each place."""
-    return np.einsum("pji,pj->pi", R, vectors)
+    turned: FloatArray = np.einsum("pji,pj->pi", R, vectors)
+    return turned

@@ -174,4 +174,5 @@ def _gain(cell: Cell, ranges: FloatArray) -> FloatArray:
     assert T_sensor_tcp is not None
     wrench = np.vstack([np.eye(3), np.cross(T_sensor_tcp[:3, 3], np.eye(3)).T])
     ratio = np.divide.outer(ranges, ranges)
-    return np.einsum("ik,kl,lj->ijkl", np.eye(3, 6), ratio, wrench)
+    gain: FloatArray = np.einsum("ik,kl,lj->ijkl", np.eye(3, 6), ratio, wrench)
+    return gain
