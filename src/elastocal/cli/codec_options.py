@@ -45,8 +45,8 @@ def parse_ratio(text: str) -> float:
 def parse_tolerance(text: str) -> Tolerance:
     """Return a tolerance from ``"PART %, LENGTH"``; the length may be left out.
 
-    >>> parse_tolerance("5 %, 5 um")
-    Tolerance(relative=0.05, floor=5e-06)
+    >>> parse_tolerance("5 %, 0.01 mm")
+    Tolerance(relative=0.05, floor=1e-05)
     >>> parse_tolerance("0.1").relative
     0.1
 
