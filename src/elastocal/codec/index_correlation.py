@@ -141,13 +141,13 @@ def _spearman(a: FloatArray, b: FloatArray) -> FloatArray:
 
 def _pearson(a: FloatArray, b: FloatArray) -> FloatArray:
     a, b = _centred(a), _centred(b)
-    size = np.sqrt(np.square(a).sum(axis=1) * np.square(b).sum(axis=1))
+    size: FloatArray = np.sqrt(np.square(a).sum(axis=1) * np.square(b).sum(axis=1))
     varies = size > 1e-9 * a.shape[1]
     return np.where(varies, (a * b).sum(axis=1) / np.where(varies, size, 1.0), np.nan)
 
 
 def _centred(rows: FloatArray) -> FloatArray:
-    return rows - rows.mean(axis=1, keepdims=True)
+    return np.asarray(rows - rows.mean(axis=1, keepdims=True))
 
 
 def _mean(values: FloatArray) -> float:

@@ -12,6 +12,7 @@ from elastocal.arrays import BoolArray, FloatArray
 from elastocal.report import style
 from elastocal.report.boxes import Boxes
 from elastocal.report.looks import Look, tint
+from elastocal.report.printed import plain
 
 BAND = "#f4f4f1"
 """Behind every second number of training poses: shows which boxes belong together."""
@@ -54,7 +55,9 @@ def draw_boxes(axes: Axes, boxes: Boxes, look: Look, hollow: BoolArray | None = 
         PolyCollection(list(corners), facecolors=faces, edgecolors=edges, lw=0.8, zorder=3)
     )
     line = np.stack([_points(left, boxes.median), _points(right, boxes.median)], axis=1)
-    inks = [style.REFUSED if each else style.INK for each in empty]
+    # A box without height shows nothing but its median, which then has to tell the variant.
+    full = np.where(boxes.q3 > boxes.q1, style.INK, look.colour)
+    inks = np.where(empty, style.REFUSED, full).tolist()
     axes.add_collection(LineCollection(list(line), colors=inks, lw=1.3, zorder=4))
     axes.scatter(
         x[boxes.outlier_box], boxes.outlier, s=4.0, linewidths=0, zorder=3, clip_on=True,
@@ -87,7 +90,8 @@ def finish_axes(axes: Axes, last: int, low: float, high: float, log: bool) -> No
         axes.yaxis.set_minor_formatter(NullFormatter())
     else:
         margin = 0.05 * (high - min(low, 0.0)) or 1.0
-        axes.set_ylim(min(0.0, low - margin * (low < 0.0)), high + margin)
+        # A box at zero, where bounded fits put many springs, would hide under the axis.
+        axes.set_ylim(min(0.0, low - margin * (low <= 0.0)), high + margin)
     axes.grid(axis="y", color="#dcdcd8", lw=0.5, zorder=0.5)
     axes.set_axisbelow(True)
     axes.spines[["top", "right"]].set_visible(False)
@@ -131,8 +135,7 @@ def reads_better_in_decades(low: float, high: float) -> bool:
 def legend_handles(looks: Sequence[Look]) -> list[Patch]:
     """Return what a legend shows of variants."""
     return [
-        Patch(facecolor=look.fill, edgecolor=look.colour, label=look.name.replace("$", r"\$"))
-        for look in looks
+        Patch(facecolor=look.fill, edgecolor=look.colour, label=plain(look.name)) for look in looks
     ]
 
 
@@ -144,7 +147,9 @@ def round_values(low: float, high: float) -> list[float]:
     """
     exponents = np.arange(np.floor(np.log10(low)), np.ceil(np.log10(high)) + 1)
     factors = (1.0, 2.0, 5.0) if high < 2e3 * low else (1.0,)
-    values = (float(f"{factor * 10.0**exponent:.3g}") for exponent in exponents for factor in factors)
+    values = (
+        float(f"{factor * 10.0**exponent:.3g}") for exponent in exponents for factor in factors
+    )
     return [value for value in values if low <= value <= high]
 
 

@@ -16,10 +16,10 @@ from elastocal.report.box_panel import (
     draw_boxes,
     finish_axes,
     label_sizes,
-    legend_handles,
     reads_better_in_decades,
 )
 from elastocal.report.boxes import Boxes, make_boxes
+from elastocal.report.legend import draw_legend, legend_height
 from elastocal.report.looks import Look, looks_of
 from elastocal.report.printed import new_figure, plain
 
@@ -29,7 +29,6 @@ _LEFT, _RIGHT, _BOTTOM, _GAP = 0.75, 0.2, 0.95, 0.2
 _PANEL, _ROW = 2.9, 0.34
 """Heights of a panel and of a row of the saturation strip, in inches."""
 _HEADLINE, _STRIP_TITLE = 0.42, 0.22
-_LEGEND_ROW = 0.22
 PANELS = {"mean": "Mean error", "max": "Maximum error"}
 
 
@@ -54,17 +53,14 @@ def codec_chart(data: CodecData, verdicts: Verdicts, axis: str = "norm") -> Figu
     panels = {which: error_boxes(data, which, axis) for which in PANELS}
     last = int(data.n_train[-1])
     across = panel_width(last, len(looks))
-    rows = _legend_rows(looks, across)
     strip = _ROW * len(looks) if axis == "norm" else 0.0
     over_strip = _STRIP_TITLE + strip + _GAP if strip else 0.0
-    head = _HEADLINE + rows * _LEGEND_ROW + (0.02 if strip else 0.12)
+    head = _HEADLINE + legend_height(looks, across) + (0.02 if strip else 0.12)
     width, height = _LEFT + across + _RIGHT, head + over_strip + 2 * _PANEL + _GAP + _BOTTOM
     figure = new_figure(width, height)
     bottom = _BOTTOM
     for which in reversed(PANELS):
-        axes = figure.add_axes(
-            (_LEFT / width, bottom / height, across / width, _PANEL / height)
-        )
+        axes = figure.add_axes((_LEFT / width, bottom / height, across / width, _PANEL / height))
         _draw_panel(axes, panels[which], looks, last, f"{PANELS[which]}{_of(axis)} in mm")
         label_sizes(axes, last, across, shown=which == "max")
         bottom += _PANEL + _GAP
@@ -75,7 +71,7 @@ def codec_chart(data: CodecData, verdicts: Verdicts, axis: str = "norm") -> Figu
     if strip:
         box = (_LEFT / width, bottom / height, across / width, strip / height)
         _draw_strip(figure.add_axes(box), verdicts, looks, last)
-    _draw_frame(figure, data, looks, head, _legend_columns(looks, across))
+    _draw_frame(figure, data, looks)
     return figure
 
 
@@ -117,26 +113,20 @@ def _draw_panel(
     axes.set_ylabel(f"{label} (log scale)" if log else label)
 
 
-def _mark_saturation(
-    axes: Axes, found: Sequence[Saturation], looks: Sequence[Look]
-) -> None:
+def _mark_saturation(axes: Axes, found: Sequence[Saturation], looks: Sequence[Look]) -> None:
     for each, look in zip(found, looks, strict=True):
-        axes.axvline(
-            each.n_train + look.place, color=look.colour, lw=0.9, ls=(0, (5, 4)), zorder=1
-        )
+        axes.axvline(each.n_train + look.place, color=look.colour, lw=0.9, ls=(0, (5, 4)), zorder=1)
 
 
-def _draw_strip(
-    axes: Axes, verdicts: Verdicts, looks: Sequence[Look], last: int
-) -> None:
+def _draw_strip(axes: Axes, verdicts: Verdicts, looks: Sequence[Look], last: int) -> None:
     """Draw a row for each variant: its saturation point, the interval, and both in words."""
     axes.set_xlim(0.5, last + 0.5)
     axes.set_ylim(len(looks), 0.0)
     axes.set_axis_off()
     axes.set_title(
         "Saturation of the mean error: median within"
-        f" {100.0 * verdicts.tolerance.relative:g} % or {1e6 * verdicts.tolerance.floor:g} µm of the"
-        " last (dashed line below)",
+        f" {100.0 * verdicts.tolerance.relative:g} % or {1e6 * verdicts.tolerance.floor:g} µm of"
+        " the last (dashed line below)",
         loc="left", fontsize=9.0, pad=4, weight="bold",
     )  # fmt: skip
     for row, (found, look) in enumerate(zip(verdicts.saturation, looks, strict=True)):
@@ -162,29 +152,14 @@ def saturation_words(found: Saturation) -> str:
     return f"{found.variant}: from {found.n_train} training poses on ({between})"
 
 
-def _legend_columns(looks: Sequence[Look], across: float) -> int:
-    longest = max(len(look.name) for look in looks)
-    return max(1, min(len(looks), int(across / (0.075 * longest + 0.55))))
-
-
-def _legend_rows(looks: Sequence[Look], across: float) -> int:
-    return -(-len(looks) // _legend_columns(looks, across))
-
-
-def _draw_frame(
-    figure: Figure, data: CodecData, looks: Sequence[Look], head: float, columns: int
-) -> None:
+def _draw_frame(figure: Figure, data: CodecData, looks: Sequence[Look]) -> None:
     """Draw what belongs to all panels: title, legend, how to read it."""
     width, height = figure.get_size_inches()
     figure.text(
         _LEFT / width, 1.0 - 0.1 / height, plain(headline(data)), va="top", fontsize=11.5,
         weight="bold",
     )  # fmt: skip
-    figure.legend(
-        handles=legend_handles(looks), loc="upper left", ncols=columns, frameon=False,
-        bbox_to_anchor=(_LEFT / width, 1.0 - (_HEADLINE - 0.02) / height), borderpad=0.0,
-        borderaxespad=0.0, handlelength=1.4, columnspacing=1.6, fontsize=9.0,
-    )  # fmt: skip
+    draw_legend(figure, looks, _LEFT, _HEADLINE - 0.02, width - _LEFT - _RIGHT)
     figure.text(
         _LEFT / width, 0.1 / height, how_to_read(data), va="bottom", fontsize=7.8,
         color=style.MUTED, linespacing=1.35,
@@ -193,17 +168,25 @@ def _draw_frame(
 
 def headline(data: CodecData) -> str:
     """Return the title of a codec's charts."""
-    sets = len(data.seed_pose)
-    robot = data.robot or "Robot"
-    return f"{robot}: error at held-out poses, {len(data.contact)} poses, {sets} splits"
+    poses, splits = counted(len(data.contact), "pose"), counted(len(data.seed_pose), "split")
+    return f"{data.robot or 'Robot'}: error at held-out poses, {poses}, {splits}"
+
+
+def counted(number: int, what: str) -> str:
+    """Return a number of things.
+
+    >>> counted(1, "split"), counted(31, "split")
+    ('1 split', '31 splits')
+    """
+    return f"{number} {what}{'s' * (number != 1)}"
 
 
 def how_to_read(data: CodecData) -> str:
     """Return what boxes are, in two lines."""
     sets, size = data.verification.shape
     return (
-        f"Each box: {sets} verification set{'s' * (sets > 1)} of {size} held-out poses under load"
-        f" cases {', '.join(data.load_cases)}.\n"
+        f"Each box: {counted(sets, 'verification set')} of {counted(size, 'held-out pose')} under"
+        f" load cases {', '.join(data.load_cases)}.\n"
         "Line: median; box: quartiles; whiskers: farthest value within 1.5 box heights; dots:"
         " single sets beyond."
     )

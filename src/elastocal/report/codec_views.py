@@ -7,7 +7,7 @@ import numpy as np
 
 from elastocal.codec import AXES, CodecData, Verdicts
 from elastocal.codec.observed import Observed
-from elastocal.report.box_panel import reads_better_in_decades
+from elastocal.report.box_panel import reads_better_in_decades, round_values
 from elastocal.report.boxes import Boxes
 from elastocal.report.codec_chart import PANELS, error_boxes
 from elastocal.report.compliance_chart import SpringBoxes, only_in_combination, spring_boxes, top_of
@@ -16,7 +16,12 @@ from elastocal.report.screen_boxes import Trace, box_traces, layout_of
 
 View = dict[str, Any]
 """A figure as plotly reads it, with its name and what it shows in words."""
-AXIS_NAMES = {"norm": "Norm", "x": "Along x of base", "y": "Along y of base", "z": "Along z of base"}
+AXIS_NAMES = {
+    "norm": "Norm",
+    "x": "Along x of base",
+    "y": "Along y of base",
+    "z": "Along z of base",
+}
 
 
 def error_views(data: CodecData, verdicts: Verdicts) -> list[View]:
@@ -40,7 +45,9 @@ def compliance_views(data: CodecData, seen: Sequence[Observed]) -> list[View]:
         If a variant has no compliance to draw, by its name.
     """
     looks = looks_of([each.name for each in data.variants])
-    return [_compliance_view(each, looks, int(data.n_train[-1])) for each in spring_boxes(data, seen)]
+    return [
+        _compliance_view(each, looks, int(data.n_train[-1])) for each in spring_boxes(data, seen)
+    ]
 
 
 def _error_view(data: CodecData, verdicts: Verdicts, axis: str) -> View:
@@ -50,15 +57,15 @@ def _error_view(data: CodecData, verdicts: Verdicts, axis: str) -> View:
     for k, (which, title) in enumerate(PANELS.items()):
         found = error_boxes(data, which, axis)
         for number, (boxes, look) in enumerate(zip(found, looks, strict=True)):
-            traces += box_traces(boxes, look, number, "mm", "2" if k else "")
+            traces += box_traces(boxes, look, number, title.lower(), "mm", "2" if k else "")
         panels.append({"title": {"text": f"{title} in mm"}, **_scale(found)})
     layout = layout_of(int(data.n_train[-1]), panels)
     if axis == "norm":
         traces += _saturation_traces(verdicts, looks, layout)
     return {
         "name": AXIS_NAMES[axis],
-        "told": f"Box plots of mean and maximum error at held-out poses ({AXIS_NAMES[axis].lower()})"
-        " over the number of training poses; the table below has the medians",
+        "told": "Box plots of mean and maximum error at held-out poses over the number of training"
+        f" poses ({AXIS_NAMES[axis].lower()}); the table below has the medians of the norm",
         "figure": {"data": traces, "layout": layout},
     }
 
@@ -84,10 +91,12 @@ def _compliance_view(each: SpringBoxes, looks: Sequence[Look], last: int) -> Vie
     for number, look in enumerate(looks):
         if look.name in each.boxes:
             boxes, hollow = each.boxes[look.name], each.hollow[look.name]
-            traces += box_traces(boxes, look, number, each.unit, hollow=hollow)
+            traces += box_traces(boxes, look, number, "", each.unit, hollow=hollow)
     low = min(boxes.extent()[0] for boxes in each.boxes.values())
     top = top_of(list(each.boxes.values()), last)
-    scale = {"type": "linear", "range": [min(0.0, 1.05 * low), 1.05 * top or 1.0]}
+    margin = 0.05 * (top - min(low, 0.0)) or 1.0
+    bottom = low - margin if low <= 0.0 else 0.0
+    scale = {"type": "linear", "range": [bottom, top + margin]}
     mark = only_in_combination(each)
     return {
         "name": f"{each.spring} ({mark})" if mark else each.spring,
@@ -104,6 +113,12 @@ def _scale(found: Sequence[Boxes]) -> dict[str, Any]:
     extents = np.array([each.extent() for each in found])
     low, high = float(extents.min()), float(extents.max())
     if reads_better_in_decades(low, high):
-        ends = [float(np.log10(low / 1.12)), float(np.log10(high * 1.12))]
-        return {"type": "log", "range": ends, "dtick": "D2" if high < 200.0 * low else 1}
+        low, high = low / 1.12, high * 1.12
+        ticks = round_values(low, high)
+        return {
+            "type": "log",
+            "range": [float(np.log10(low)), float(np.log10(high))],
+            "tickvals": ticks,
+            "ticktext": [f"{tick:g}" for tick in ticks],
+        }
     return {"type": "linear", "range": [0.0, 1.05 * high or 1.0]}

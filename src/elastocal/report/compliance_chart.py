@@ -12,8 +12,10 @@ from elastocal.codec import CodecData
 from elastocal.codec.observed import Observed
 from elastocal.identification.observability import describe
 from elastocal.report import style
-from elastocal.report.box_panel import draw_boxes, finish_axes, label_sizes, legend_handles
+from elastocal.report.box_panel import draw_boxes, finish_axes, label_sizes
 from elastocal.report.boxes import Boxes, make_boxes
+from elastocal.report.codec_chart import counted
+from elastocal.report.legend import ROW, draw_legend, legend_height
 from elastocal.report.looks import Look, looks_of
 from elastocal.report.printed import new_figure, plain
 from elastocal.report.wrapping import wrapped
@@ -28,6 +30,8 @@ _HEAD, _FOOT, _LINE = 0.62, 0.75, 0.155
 _SETTLED = 0.25
 """Part of the largest training set from which on boxes set the scale; those of fewer poses may
 be cut, which is marked."""
+_SHORT = 26
+"""Characters of variants' names that fit beside the name of a spring."""
 _ROOMY = 1.8
 """Factor by which the scale may grow so that nothing is cut."""
 
@@ -72,12 +76,13 @@ def compliance_chart(data: CodecData, seen: Sequence[Observed]) -> Figure:
     width = columns * (_LEFT + across) + _RIGHT
     notes = _notes(seen, int(width * 15))
     foot = _FOOT + _LINE * len(notes)
-    height = _HEAD + rows * (_OVER + _PANEL) + foot
+    head = _HEAD + legend_height(tuple(looks.values()), width - _LEFT - _RIGHT) - ROW
+    height = head + rows * (_OVER + _PANEL) + foot
     figure = new_figure(width, height)
     for number, each in enumerate(springs):
         row, column = divmod(number, columns)
         left = _LEFT + column * (_LEFT + across)
-        bottom = height - _HEAD - row * (_OVER + _PANEL) - _OVER - _PANEL
+        bottom = height - head - row * (_OVER + _PANEL) - _OVER - _PANEL
         axes = figure.add_axes((left / width, bottom / height, across / width, _PANEL / height))
         _draw_panel(axes, each, looks, last)
         lowest = number + columns >= len(springs)
@@ -127,7 +132,7 @@ def _spring_boxes(
 
 def columns_of(springs: Sequence[SpringBoxes]) -> int:
     """Return the number of columns: one joint a row where all have as many springs."""
-    counts = {}
+    counts: dict[str, int] = {}
     for each in springs:
         counts[_joint(each.spring)] = counts.get(_joint(each.spring), 0) + 1
     same = set(counts.values())
@@ -138,8 +143,12 @@ def only_in_combination(each: SpringBoxes) -> str:
     """Return the mark of a spring that is not told apart, empty for one that is."""
     if not each.never:
         return ""
-    which = "" if len(each.never) == len(each.boxes) else f" ({'; '.join(each.never)})"
-    return f"not told apart{which}"
+    if len(each.never) == len(each.boxes):
+        return "not told apart"
+    names = "; ".join(each.never)
+    if len(names) > _SHORT:
+        names = f"{len(each.never)} of {len(each.boxes)} variants"
+    return f"not told apart ({names})"
 
 
 def top_of(boxes: Sequence[Boxes], last: int) -> float:
@@ -207,16 +216,12 @@ def _draw_frame(
     figure.text(
         _LEFT / width, 1.0 - 0.1 / height, plain(title), va="top", fontsize=11.5, weight="bold"
     )
-    figure.legend(
-        handles=legend_handles(looks), loc="upper left", ncols=min(len(looks), 6), frameon=False,
-        bbox_to_anchor=(_LEFT / width, 1.0 - 0.42 / height), borderpad=0.0, borderaxespad=0.0,
-        handlelength=1.4, columnspacing=1.6,
-    )  # fmt: skip
+    draw_legend(figure, looks, _LEFT, 0.42, width - _LEFT - _RIGHT)
     sets = len(data.seed_pose)
     lines = [
         *notes,
-        f"Each box: {sets} training sets. Hollow pale box: these training sets do not tell the spring"
-        " apart from others; its value is no finding. Arrow: beyond the scale.",
+        f"Each box: {counted(sets, 'training set')}. Hollow pale box: these training sets do not"
+        " tell the spring apart from others; its value is no finding. Arrow: beyond the scale.",
     ]
     figure.text(
         _LEFT / width, 0.1 / height, plain("\n".join(lines)), va="bottom", fontsize=7.5,

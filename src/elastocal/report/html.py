@@ -6,10 +6,10 @@ from typing import Any
 
 
 def embedded(data: dict[str, Any]) -> str:
-    """Return JSON that no HTML parser takes for markup.
+    r"""Return JSON that no HTML parser takes for markup.
 
     >>> embedded({"name": "</script>"})
-    '{"name":"\\\\u003c/script\\\\u003e"}'
+    '{"name":"\\u003c/script\\u003e"}'
 
     Raises
     ------

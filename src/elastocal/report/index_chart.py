@@ -1,6 +1,6 @@
 """Do indices foretell accuracy: rank correlations, and how each index grows (paper 4.2.3)."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -11,15 +11,17 @@ from elastocal.codec.index_correlation import Correlation
 from elastocal.codec.indices import INDICES, IndexValues
 from elastocal.errors import CodecError
 from elastocal.report import style
-from elastocal.report.box_panel import legend_handles, reads_better_in_decades
+from elastocal.report.box_panel import label_sizes, reads_better_in_decades
+from elastocal.report.codec_chart import counted
 from elastocal.report.index_names import KIND_TITLES, NAMES
+from elastocal.report.legend import ROW, draw_legend, legend_height
 from elastocal.report.looks import Look, looks_of
 from elastocal.report.printed import new_figure, plain
 
 _LEFT, _RIGHT, _HEAD, _FOOT = 1.25, 0.2, 0.98, 1.05
 _FOREST, _GAP = 2.65, 0.25
 """Width of a panel of correlations and room between two, in inches."""
-_COLUMNS, _SMALL, _SIDE, _OVER = 5, 1.25, 0.45, 0.42
+_COLUMNS, _SMALL, _SIDE, _OVER = 5, 1.25, 0.48, 0.42
 """Panels of an index: columns, height, and room at their left and above them, in inches."""
 _BETWEEN = 0.75
 
@@ -44,21 +46,23 @@ def index_chart(
         If a variant has no indices.
     """
     names = [each.name for each in data.variants]
-    check_indices(names, indices, correlations)
+    check_indices(names, [each.variant for each in indices])
+    check_indices(names, [each.variant for each in correlations])
     looks = looks_of(names)
     forest = len(INDICES) * max(0.26, 0.11 * len(looks) + 0.06)
     rows = -(-len(INDICES) // _COLUMNS)
     width = _LEFT + len(KIND_TITLES) * (_FOREST + _GAP) + _RIGHT
-    height = _HEAD + forest + _BETWEEN + rows * (_OVER + _SMALL) + _FOOT
+    head = _HEAD + legend_height(looks, width - 0.3 - _RIGHT) - ROW
+    height = head + forest + _BETWEEN + rows * (_OVER + _SMALL) + _FOOT
     figure = new_figure(width, height)
     for column, kind in enumerate(KIND_TITLES):
         left = _LEFT + column * (_FOREST + _GAP)
-        bottom = (height - _HEAD - forest) / height
+        bottom = (height - head - forest) / height
         axes = figure.add_axes((left / width, bottom, _FOREST / width, forest / height))
         _draw_forest(axes, [each for each in correlations if each.kind == kind], looks)
         axes.tick_params(axis="y", labelleft=not column)
         axes.set_title(KIND_TITLES[kind], fontsize=9.0, weight="bold", pad=5)
-    start = height - _HEAD - forest - _BETWEEN
+    start = height - head - forest - _BETWEEN
     across = (width - _RIGHT - _COLUMNS * _SIDE - 0.1) / _COLUMNS
     for number, name in enumerate(INDICES):
         row, column = divmod(number, _COLUMNS)
@@ -66,25 +70,22 @@ def index_chart(
         bottom = start - row * (_OVER + _SMALL) - _OVER - _SMALL
         axes = figure.add_axes((left / width, bottom / height, across / width, _SMALL / height))
         _draw_growth(axes, data, indices, name, looks)
-        axes.tick_params(axis="x", labelbottom=row == rows - 1)
+        label_sizes(axes, int(data.n_train[-1]), across, shown=row == rows - 1)
     _draw_frame(figure, data, looks, start)
     return figure
 
 
-def check_indices(
-    names: Sequence[str], indices: Sequence[IndexValues], correlations: Sequence[Correlation]
-) -> None:
-    """Refuse a variant without indices or correlations.
+def check_indices(variants: Iterable[str], known: Iterable[str]) -> None:
+    """Refuse a variant of which no indices are known.
 
     Raises
     ------
     CodecError
         By its name.
     """
-    known = {each.variant for each in indices} & {each.variant for each in correlations}
-    for name in names:
-        if name not in known:
-            raise CodecError(f"variant {name!r} has no indices: there is nothing to draw")
+    lacking = [name for name in variants if name not in set(known)]
+    if lacking:
+        raise CodecError(f"variant {lacking[0]!r} has no indices: there is nothing to draw")
 
 
 def _draw_forest(axes: Axes, found: Sequence[Correlation], looks: Sequence[Look]) -> None:
@@ -120,14 +121,16 @@ def _draw_growth(
     for each, look in zip(indices, looks, strict=True):
         low, middle, high = np.percentile(shown.shown(each.values[name]), (25, 50, 75), axis=0)
         axes.fill_between(data.n_train, low, high, color=look.fill, lw=0, alpha=0.6)
-        axes.plot(data.n_train, middle, color=look.colour, lw=1.2)
+        dashes = "--" if look.fill == style.PAPER else "-"
+        axes.plot(data.n_train, middle, color=look.colour, lw=1.2, ls=dashes)
         curves += [low, high]
     values = np.concatenate(curves)
     if reads_better_in_decades(float(values.min()), float(values.max())):
         axes.set_yscale("log")
     better = "↑" if shown.more_is_better else "↓"
-    axes.set_title(shown.label, loc="left", fontsize=7.8, weight="bold", pad=4)
+    axes.set_title(shown.title, loc="left", fontsize=7.8, weight="bold", pad=4)
     axes.set_title(f"{better} better", loc="right", fontsize=7.0, color=style.MUTED, pad=4)
+    axes.set_ylabel(shown.unit, fontsize=7.0, labelpad=1)
     axes.set_xlim(0.5, data.n_train[-1] + 0.5)
     axes.tick_params(labelsize=7.0, length=2, pad=2)
     axes.tick_params(which="minor", labelleft=False, length=1)
@@ -140,11 +143,7 @@ def _draw_frame(figure: Figure, data: CodecData, looks: Sequence[Look], start: f
     left = 0.3 / width
     title = f"{data.robot or 'Robot'}: do indices foretell the error at held-out poses?"
     figure.text(left, 1.0 - 0.1 / height, plain(title), va="top", fontsize=11.5, weight="bold")
-    figure.legend(
-        handles=legend_handles(looks), loc="upper left", ncols=min(len(looks), 6), frameon=False,
-        bbox_to_anchor=(left, 1.0 - 0.42 / height), borderpad=0.0, borderaxespad=0.0,
-        handlelength=1.4, columnspacing=1.6,
-    )  # fmt: skip
+    draw_legend(figure, looks, 0.3, 0.42, width - 0.3 - _RIGHT)
     middle = (_LEFT + 0.5 * len(KIND_TITLES) * (_FOREST + _GAP)) / width
     figure.text(
         middle, (start + _BETWEEN - 0.24) / height,
@@ -158,8 +157,8 @@ def _draw_frame(figure: Figure, data: CodecData, looks: Sequence[Look], start: f
     sets, size = data.verification.shape
     figure.text(
         left, 0.1 / height,
-        f"Above: {sets} splits, {size} held-out poses each; bars: 95 % intervals, jackknife over"
-        " splits, widened for the poses that splits share.\n"
+        f"Above: {counted(sets, 'split')}, {counted(size, 'held-out pose')} each; bars: 95 %"
+        " intervals, jackknife over splits, widened for the poses that splits share.\n"
         "All sizes of a split: nearly everything grows with the number of poses. Equal size: over"
         " splits at one number of training poses. Beyond its split: the same,\n"
         "after the mean rank of each split was taken off. At equal size O1 ranks as D, and O3 as"

@@ -18,11 +18,6 @@ class IndexName:
     more_is_better: bool = True
     """Of what is shown."""
 
-    @property
-    def label(self) -> str:
-        """Return the title with its unit."""
-        return f"{self.title}, {self.unit}" if self.unit else self.title
-
     def shown(self, values: FloatArray) -> FloatArray:
         """Return values as they are shown."""
         return np.asarray(self.factor * values)

@@ -3,6 +3,8 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
 from elastocal.arrays import FloatArray, IndexArray
 from elastocal.report import style
 
@@ -35,7 +37,7 @@ class Look:
 
     def at(self, n: IndexArray) -> FloatArray:
         """Return where its boxes stand, shape (box,)."""
-        return n + self.place
+        return np.asarray(n + self.place, dtype=float)
 
 
 def looks_of(names: Sequence[str]) -> tuple[Look, ...]:

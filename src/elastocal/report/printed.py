@@ -54,10 +54,10 @@ def new_figure(width: float, height: float) -> Figure:
 
 
 def plain(text: str) -> str:
-    """Return a text whose dollar signs begin no formula.
+    r"""Return a text whose dollar signs begin no formula.
 
     >>> plain("a$b")
-    'a\\\\$b'
+    'a\\$b'
     """
     return text.replace("$", r"\$")
 

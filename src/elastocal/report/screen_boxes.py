@@ -16,12 +16,18 @@ _PALE = 0.55
 
 
 def box_traces(
-    boxes: Boxes, look: Look, number: int, unit: str, axes: str = "", hollow: BoolArray | None = None
+    boxes: Boxes,
+    look: Look,
+    number: int,
+    what: str,
+    unit: str,
+    axes: str = "",
+    hollow: BoolArray | None = None,
 ) -> list[Trace]:
     """Return the traces of one variant in one panel.
 
-    The same numbers as in print. What a box holds is told by an unseen point at its number of
-    training poses, so that all variants of one number are told together.
+    The same numbers as in print. What a box holds stands as text in an unseen trace that has a
+    point at each number of training poses; the page shows it beside the chart.
 
     Parameters
     ----------
@@ -31,8 +37,8 @@ def box_traces(
         Of the variant.
     number : int
         Of the variant; kept as ``meta``, by which the page switches it on and off.
-    unit : str
-        Of the values.
+    what, unit : str
+        What the values are, and their unit.
     axes : str
         Which axes of the figure: empty for the first, ``2`` for the second.
     hollow : ndarray, shape (box,), optional
@@ -61,9 +67,8 @@ def box_traces(
         "x": boxes.n.tolist(),
         "y": _listed(boxes.median),
         "marker": {"color": look.colour, "symbol": look.symbol, "opacity": 0.0},
-        "name": look.name,
-        "text": _told(boxes, unit, empty),
-        "hovertemplate": "%{text}",
+        "text": _told(boxes, what, unit, empty),
+        "hoverinfo": "none",
     }
     return [*traces, dots | on, told | on]
 
@@ -83,10 +88,9 @@ def layout_of(last: int, panels: Sequence[dict[str, Any]]) -> dict[str, Any]:
         "font": {"family": "system-ui, sans-serif", "size": 13, "color": style.INK},
         "paper_bgcolor": style.PAPER,
         "plot_bgcolor": style.PAPER,
-        "margin": {"l": 58, "r": 10, "t": 12, "b": 48},
+        "margin": {"l": 58, "r": 10, "t": 34, "b": 48},
         "boxmode": "overlay",
-        "hovermode": "x unified",
-        "hoverlabel": {"font": {"size": 12}, "bgcolor": style.PAPER},
+        "hovermode": "x",
         "dragmode": "zoom",
         "shapes": [
             _band(n, f"y{_axis(k)}") for k in range(len(panels)) for n in range(2, last + 1, 2)
@@ -116,7 +120,11 @@ def layout_of(last: int, panels: Sequence[dict[str, Any]]) -> dict[str, Any]:
             "tick0": 1,
             "tickangle": 0,
             "showticklabels": lowest,
-            "unifiedhovertitle": {"text": "%{x} training poses"},
+            "showspikes": True,
+            "spikemode": "across",
+            "spikethickness": 1,
+            "spikecolor": style.MUTED,
+            "spikedash": "dot",
             "title": {"text": "Number of training poses" if lowest else "", "standoff": 8},
         }
     return layout
@@ -151,15 +159,15 @@ def _boxes(boxes: Boxes, look: Look, which: BoolArray, colour: str, fill: str) -
     }
 
 
-def _told(boxes: Boxes, unit: str, empty: BoolArray) -> list[str]:
-    """Return what the page tells of each box: median, quartiles, and how far values go."""
+def _told(boxes: Boxes, what: str, unit: str, empty: BoolArray) -> list[str]:
+    """Return the median of each box in words, its quartiles, and how far values go."""
     lowest, highest = boxes.low.copy(), boxes.high.copy()
     np.minimum.at(lowest, boxes.outlier_box, boxes.outlier)
     np.maximum.at(highest, boxes.outlier_box, boxes.outlier)
     return [
-        f"{boxes.median[k]:.3g} {unit} (quartiles {boxes.q1[k]:.3g}, {boxes.q3[k]:.3g};"
-        f"<br>all {lowest[k]:.3g} to {highest[k]:.3g}, {boxes.count[k]} sets)"
-        + ("<br>not told apart" if empty[k] else "")
+        f"{what} {boxes.median[k]:.3g} {unit} (quartiles {boxes.q1[k]:.3g} and {boxes.q3[k]:.3g};"
+        f" {boxes.count[k]} sets, {lowest[k]:.3g} to {highest[k]:.3g})"
+        + (", not told apart" if empty[k] else "")
         for k in range(len(boxes.n))
     ]
 
