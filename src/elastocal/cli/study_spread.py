@@ -1,7 +1,9 @@
 """Where the samples of a study are simulated: on the cores of this machine, or on a Dask cluster.
 
 Both through joblib. Every worker keeps its linear algebra to one thread: the systems are small,
-and the processes already use all cores.
+the processes already use all cores, and sums split over threads would be rounded otherwise. For
+the same reason nothing is simulated in the process of the command itself, whose linear algebra
+may use all cores.
 """
 
 import os
@@ -29,10 +31,12 @@ def over_cores(batches: Iterable[Work], jobs: int | None = None) -> Results:
     CodecError
         If a process dies.
     """
-    backend: dict[str, Any] = {"n_jobs": jobs or _cores(), "inner_max_num_threads": 1}
-    with parallel_config("loky", **backend):
+    processes = jobs or _cores()
+    # With one job joblib would start no process, so one of two gets all the work.
+    at_once = 1 if processes == 1 else 3 * processes
+    with parallel_config("loky", n_jobs=max(processes, 2), inner_max_num_threads=1):
         try:
-            yield from _unordered(batches)
+            yield from _unordered(batches, at_once)
         except BrokenProcessPool as error:
             raise CodecError(
                 "a process of the study died (out of memory?); finished samples are kept: give the"
@@ -61,7 +65,7 @@ def over_cluster(batches: Iterable[Work], address: str) -> Results:
         from distributed.comm.core import CommClosedError
 
         try:
-            yield from _unordered(batches)
+            yield from _unordered(batches, "3*n_jobs")
         except (CommClosedError, KilledWorker, TimeoutError) as error:
             raise CodecError(
                 f"--dask {address}: the cluster was lost or has no worker"
@@ -93,8 +97,8 @@ def connected(address: str) -> Any:
         ) from error
 
 
-def _unordered(batches: Iterable[Work]) -> Results:
-    parallel = Parallel(batch_size=1, pre_dispatch="3*n_jobs", return_as="generator_unordered")
+def _unordered(batches: Iterable[Work], at_once: int | str) -> Results:
+    parallel = Parallel(batch_size=1, pre_dispatch=at_once, return_as="generator_unordered")
     found: Results = parallel(delayed(_do)(work) for work in batches)
     return found
 

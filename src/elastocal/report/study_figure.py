@@ -6,15 +6,15 @@ from pathlib import Path
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.patches import Patch
 
 from elastocal.arrays import FloatArray
 from elastocal.codec.study import SampleResult, StudyRecord, StudySettings
-from elastocal.codec.study.settings import name_of
+from elastocal.codec.study.settings import name_of, written
 from elastocal.report import style
 from elastocal.report.box_panel import (
     draw_boxes,
     finish_axes,
-    legend_handles,
     reads_better_in_decades,
 )
 from elastocal.report.boxes import make_boxes
@@ -84,8 +84,9 @@ def study_figure(
         bottom += _PANEL + _GAP
     _draw_frame(figure, record, height)
     if rows:
+        handles = [Patch(fc=each.fill, ec=each.colour, label=plain(each.name)) for each in looks]
         figure.legend(
-            handles=legend_handles(looks), loc="upper left", frameon=False, fontsize=9.0,
+            handles=handles, loc="upper left", frameon=False, fontsize=9.0,
             bbox_to_anchor=(_LEFT / _WIDTH, 1.0 - 0.35 / height), borderaxespad=0.0,
         )  # fmt: skip
     return figure
@@ -115,13 +116,13 @@ def _grouped(
         for error in _PANELS:
             errors = [getattr(each.outcomes[number].accuracy, error) for each in results]
             values[error][beside.index(names[number])][:, column] = errors
-    return along, [str(each) for each in groups], beside, values
+    return along, [written(each) for each in groups], beside, values
 
 
 def _label_groups(axes: Axes, along: str, groups: Sequence[str], shown: bool) -> None:
     axes.set_xticks(range(1, len(groups) + 1), groups if shown else [""] * len(groups))
     if shown:
-        axes.set_xlabel("Number of calibration poses" if along == "poses" else along)
+        axes.set_xlabel("Number of calibration poses" if along == "poses" else along.replace("_", " "))
 
 
 def _draw_frame(figure: Figure, record: StudyRecord, height: float) -> None:

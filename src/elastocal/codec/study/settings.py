@@ -7,6 +7,8 @@ from elastocal.errors import CodecError
 from elastocal.schema import StrictModel
 
 SCHEMA = "elastocal.study_settings/1"
+_LONGEST = 60
+"""Letters of a setting that a refusal still quotes whole; fingerprints are longer."""
 
 
 class ConditionRecord(StrictModel):
@@ -75,7 +77,7 @@ class StudySettings(StrictModel):
 
 def name_of(factors: Sequence[str], condition: Condition) -> str:
     """Return a name of some factors' values, e.g. ``"poses 10, springs bearing"``."""
-    values = (f"{key} {written(condition.value(key))}" for key in factors)
+    values = (f"{key.replace('_', ' ')} {written(condition.value(key))}" for key in factors)
     return ", ".join(values) or f"poses {condition.poses}"
 
 
@@ -96,14 +98,16 @@ def check_same(found: StudySettings, wanted: StudySettings, where: str) -> None:
     for key in before:
         if before[key] != now[key]:
             raise CodecError(
-                f"{where} holds another study: its {key.replace('_', ' ')} {_short(before[key])},"
-                f" not {_short(now[key])}; name another folder"
+                f"{where} holds another study ({key.replace('_', ' ')}: {_short(before[key])}, not"
+                f" {_short(now[key])}): name another folder"
             )
 
 
 def _short(value: object) -> str:
-    if isinstance(value, str | int):
-        text = str(value)
-        return f"is {text[:12]}{'…' if len(text) > 12 else ''}"
+    """Return a setting in so few letters that the difference is in sight."""
+    if isinstance(value, list):
+        return "; ".join(_short(each) for each in value)
+    if isinstance(value, dict):
+        return " ".join(str(each) for each in value.values())
     text = str(value)
-    return f"are {text[:160]}{'…' if len(text) > 160 else ''}"
+    return text if len(text) < _LONGEST else f"{text[:12]}…"
