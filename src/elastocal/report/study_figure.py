@@ -122,7 +122,9 @@ def _grouped(
 def _label_groups(axes: Axes, along: str, groups: Sequence[str], shown: bool) -> None:
     axes.set_xticks(range(1, len(groups) + 1), groups if shown else [""] * len(groups))
     if shown:
-        axes.set_xlabel("Number of calibration poses" if along == "poses" else along.replace("_", " "))
+        axes.set_xlabel(
+            "Number of calibration poses" if along == "poses" else along.replace("_", " ")
+        )
 
 
 def _draw_frame(figure: Figure, record: StudyRecord, height: float) -> None:
