@@ -29,6 +29,7 @@ bench: $(VENV)/installed-dev
 	$(BIN)/python benchmarks/search.py
 	$(BIN)/python benchmarks/pool.py
 	$(BIN)/python benchmarks/compensation.py
+	$(BIN)/python benchmarks/codec.py
 
 clean:
 	rm -rf $(VENV) demo site

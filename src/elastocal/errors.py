@@ -49,6 +49,10 @@ class PlanningError(ElastocalError, ValueError):
     """A search for poses that cannot be made: too small a pool, missing rows, unknown technique."""
 
 
+class CodecError(ElastocalError, ValueError):
+    """A cross-validation that cannot be made: too few poses, unknown variant, nothing fitted."""
+
+
 class DeviceError(ElastocalError, RuntimeError):
     """A device refuses a command, is not configured, or does not answer."""
 

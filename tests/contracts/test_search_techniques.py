@@ -56,6 +56,12 @@ def test_an_unknown_technique_is_refused_with_the_nearest_and_all_known_ones():
 
 
 class TestEveryTechnique:
+    def test_nested_choices_begin_with_the_smaller_ones(self, searcher, pool):
+        orders = [searcher.search(pool, count, _rng()).order.tolist() for count in (3, 4, 9)]
+        if searcher.nested:
+            assert orders[2][:4] == orders[1]
+            assert orders[1][:3] == orders[0]
+
     @pytest.mark.parametrize("count", [1, 2, 7, 29, 30])
     def test_the_number_of_poses_wanted_is_chosen_none_twice(self, searcher, pool, count):
         order = searcher.search(pool, count, _rng()).order

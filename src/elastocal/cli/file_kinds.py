@@ -8,6 +8,7 @@ from typing import Any
 from elastocal import dataset
 from elastocal.cell import load_cell
 from elastocal.cli.cell_facts import cell_facts
+from elastocal.codec import read_codec, read_verdicts
 from elastocal.compensation.conditioning.tool_file import read_tool
 from elastocal.compensation.settings import read_settings
 from elastocal.dataset.netcdf import read_netcdf
@@ -34,6 +35,7 @@ _PLAN = re.compile(r'"schema":\s*"elastocal\.plan/')
 _SUMMARY = re.compile(r'"schema":\s*"elastocal\.run-summary/')
 _TOOL = re.compile(r'"schema":\s*"elastocal\.tool/')
 _COMPENSATOR_LINE = re.compile(r"^schema:\s*[\"']?elastocal\.compensator/", re.MULTILINE)
+_CODEC = re.compile(r'"schema":\s*"elastocal\.codec_verdicts/')
 _SCHEMA_LINE = re.compile(r"^schema:\s*[\"']?elastocal\.cell/", re.MULTILINE)
 
 
@@ -124,13 +126,20 @@ def _netcdf(path: Path) -> Described:
         stated = read_netcdf(path).attrs.get("schema")
     except DatasetError as error:
         raise DatasetError(f"{path}: {error}") from error
+    if str(stated).startswith("elastocal.codec/"):
+        return _codec(path)
     return _pool(path) if str(stated).startswith("elastocal.pool/") else _dataset(path)
 
 
 def _json(path: Path) -> Described:
     """Describe a JSON file by the schema that it states; what states none is read as a model."""
     head = read_text(path)[:200]
-    for stated, describe in ((_PLAN, _plan), (_SUMMARY, _summary), (_TOOL, _tool)):
+    for stated, describe in (
+        (_PLAN, _plan),
+        (_SUMMARY, _summary),
+        (_TOOL, _tool),
+        (_CODEC, _verdicts),
+    ):
         if stated.search(head):
             return describe(path)
     return _model(path)
@@ -246,4 +255,26 @@ def _compensator(path: Path) -> Described:
         "filter_delay": float(settings.chain.delay()),
         "correction": settings.limits.correction,
         "rate": settings.limits.rate,
+    }
+
+
+def _codec(path: Path) -> Described:
+    data = read_codec(path)
+    return "codec", {
+        "schema": "elastocal.codec/1",
+        "robot": data.robot,
+        "variants": [each.name for each in data.variants],
+        "poses": len(data.contact),
+        "splits": len(data.seed_pose),
+        "training": len(data.n_train),
+    }
+
+
+def _verdicts(path: Path) -> Described:
+    record = read_verdicts(path)
+    return "verdicts of a codec", {
+        "schema": "elastocal.codec_verdicts/1",
+        "robot": record.robot,
+        "variants": list(record.variants),
+        "saturation": record.saturation,
     }

@@ -17,6 +17,7 @@ import typer
 from elastocal import __version__
 from elastocal.cli.calibrate import calibrate
 from elastocal.cli.check import check
+from elastocal.cli.codec import codec
 from elastocal.cli.compensate import compensate
 from elastocal.cli.demo import demo
 from elastocal.cli.derive import derive
@@ -28,6 +29,7 @@ from elastocal.cli.robots import robots
 from elastocal.cli.run import run as run_procedure
 from elastocal.cli.simulate_process import simulate_process
 from elastocal.cli.stiffness import stiffness
+from elastocal.cli.study import study
 from elastocal.cli.tool import tool
 from elastocal.errors import ElastocalError, FileAccessError
 
@@ -46,6 +48,8 @@ COMMANDS: dict[str, Callable[..., None]] = {
     "run": run_procedure,
     "derive": derive,
     "calibrate": calibrate,
+    "codec": codec,
+    "study": study,
     "predict": predict,
     "tool": tool,
     "compensate": compensate,

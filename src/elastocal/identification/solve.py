@@ -10,7 +10,7 @@ from elastocal.identification.least_squares import kkt_violation, minimise
 from elastocal.identification.losses import LOSSES, MEDIAN_NORM, check_loss
 from elastocal.identification.problem import Problem
 
-_OPTIMALITY = 1e-7
+OPTIMALITY = 1e-7
 """Largest accepted violation of the optimality conditions, relative to the start."""
 _ITERATIONS = 50
 _SETTLED = 1e-6
@@ -109,7 +109,7 @@ def _solve_linear(problem: Problem, reading_weight: FloatArray) -> Solution:
     lower, upper = problem.lower * system.scale, problem.upper * system.scale
     x = minimise(system.s, system.Vt, system.y, lower, upper)
     violation = kkt_violation(system.s, system.Vt, system.y, x, lower, upper)
-    if not violation <= _OPTIMALITY:
+    if not violation <= OPTIMALITY:
         raise IdentificationError(
             f"the solver stopped short of the optimum (violation {violation:.1e})"
         )

@@ -13,6 +13,7 @@ from elastocal.planning.search.cover import Cover, CoverSelection
 from elastocal.planning.search.criteria import CRITERIA, Criterion, o1
 from elastocal.planning.search.detmax import Exchange
 from elastocal.planning.search.exchange import ExchangeSearch, ExchangeSelection
+from elastocal.planning.search.growth import growing_choices
 from elastocal.planning.search.information import EPSILON, Information, build_information
 from elastocal.planning.search.random_choice import RandomChoice
 from elastocal.planning.search.spread import covering_radius, nearest_neighbour
@@ -64,6 +65,7 @@ __all__ = [
     "build_information",
     "check_count",
     "covering_radius",
+    "growing_choices",
     "nearest_neighbour",
     "o1",
     "technique",

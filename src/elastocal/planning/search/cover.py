@@ -86,6 +86,11 @@ class Cover:
         """Name of the technique."""
         return "cover"
 
+    @property
+    def nested(self) -> bool:
+        """Whether smaller choices are prefixes of larger ones: they are."""
+        return True
+
     def search(
         self,
         candidates: Candidates,

@@ -8,7 +8,7 @@ from elastocal.errors import PlanningError
 from elastocal.planning.search.candidates import Candidates
 from elastocal.planning.search.criteria import criterion_class
 from elastocal.planning.search.detmax import Exchange, exchange, greedy_order
-from elastocal.planning.search.information import build_information
+from elastocal.planning.search.information import Information, build_information
 from elastocal.planning.search.technique import Selection, check_count
 
 
@@ -70,6 +70,11 @@ class ExchangeSearch:
         """Name of the technique."""
         return self.label or f"exchange-{self.criterion}"
 
+    @property
+    def nested(self) -> bool:
+        """Whether smaller choices are prefixes of larger ones: each is a search of its own."""
+        return False
+
     def search(
         self, candidates: Candidates, count: int, rng: np.random.Generator | None = None
     ) -> ExchangeSelection:
@@ -81,10 +86,30 @@ class ExchangeSearch:
             If the count does not fit the pool, or it lacks the rows that the criterion needs.
         """
         check_count(candidates, count)
+        return self.choose(build_information(candidates), count, rng)
+
+    def choose(
+        self, information: Information, count: int, rng: np.random.Generator | None = None
+    ) -> ExchangeSelection:
+        """Return the choice of `search` from a pool whose information is known already.
+
+        Parameters
+        ----------
+        information : Information
+            Of the whole pool; one serves searches for any number of poses.
+        count : int
+            Number of poses wanted, from 1 to the size of the pool.
+        rng : numpy.random.Generator, optional
+            Draws the starts; one seeded with 0 when there is none.
+
+        Raises
+        ------
+        PlanningError
+            If the pool lacks the rows that the criterion needs.
+        """
         rng = np.random.default_rng(0) if rng is None else rng
-        information = build_information(candidates)
         criterion = criterion_class(self.criterion).of(information)
-        starts = [rng.permutation(len(candidates))[:count] for _ in range(self.starts)]
+        starts = [rng.permutation(len(information))[:count] for _ in range(self.starts)]
         runs = tuple(exchange(information, criterion, start, self.cap) for start in starts)
         best = int(np.argmax([run.value for run in runs]))
         order, values = greedy_order(information, criterion, runs[best].chosen)

@@ -17,6 +17,11 @@ class RandomChoice:
         """Name of the technique."""
         return "random"
 
+    @property
+    def nested(self) -> bool:
+        """Whether smaller choices are prefixes of larger ones: from equal generators they are."""
+        return True
+
     def search(
         self, candidates: Candidates, count: int, rng: np.random.Generator | None = None
     ) -> Selection:

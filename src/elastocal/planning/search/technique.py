@@ -44,6 +44,10 @@ class SearchTechnique(Protocol):
     def name(self) -> str:
         """Name in plans and reports, e.g. ``cover``."""
 
+    @property
+    def nested(self) -> bool:
+        """Whether the choice of n poses always begins with that of n - 1."""
+
     def search(
         self, candidates: Candidates, count: int, rng: np.random.Generator | None = None
     ) -> Selection:

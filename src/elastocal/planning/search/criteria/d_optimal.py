@@ -30,6 +30,8 @@ class DOptimal(Criterion):
 
     def after_adding(self, matrix: FloatArray, information: Information) -> FloatArray:
         """Return the values by the determinant lemma."""
+        if not information.updates_pay:
+            return super().after_adding(matrix, information)
         gain = log_determinant_gain(matrix, information.rows)
         whole = np.linalg.slogdet(matrix)[1] + gain
         return np.asarray(np.exp(whole / (2 * information.rank)))

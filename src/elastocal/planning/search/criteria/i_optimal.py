@@ -49,6 +49,8 @@ class IOptimal(Criterion):
 
     def after_adding(self, matrix: FloatArray, information: Information) -> FloatArray:
         """Return the values by Woodbury's identity."""
+        if not information.updates_pay:
+            return super().after_adding(matrix, information)
         eigenvalues, vectors = np.linalg.eigh(self.process)
         root = vectors * np.sqrt(np.maximum(eigenvalues, 0.0))
         return self.value(matrix) + inverse_trace_loss(matrix, information.rows, root)

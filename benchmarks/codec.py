@@ -1,0 +1,94 @@
+"""Print how fast a codec is, beside scikit-learn's learning curve of the same run.
+
+31 poses, 31 verification sets, 22 training sizes, 18 springs, bounded. Machines differ and are
+noisy, so the ratios are what counts. scikit-learn is no dependency: install it, or put the folder
+of a ``pip install --target`` on PYTHONPATH. Run with ``python benchmarks/codec.py``.
+"""
+
+import importlib.util
+import os
+import time
+import warnings
+
+import numpy as np
+from timing import seconds
+
+from elastocal.codec import CodecData, Variant, cross_validate
+from elastocal.dataset import Readings
+from elastocal.elastic import ElasticModel, layout
+from elastocal.identification import build
+from elastocal.robot import Robot, catalogue
+from elastocal.robot.mounting import with_tool
+from elastocal.sim.layouts import bearing_truth
+from elastocal.sim.linkage import Linkage
+from elastocal.sim.measurement import SHOP_FLOOR, measure
+from elastocal.sim.scene import press_forces, press_poses
+
+TOOL = np.array([[1.0, 0, 0, 0.15], [0, 1.0, 0, 0], [0, 0, 1.0, 0.35], [0, 0, 0, 1.0]])
+POSES = 31
+
+
+def measured() -> tuple[Robot, Readings]:
+    """Return a KUKA arm and its readings at 31 poses under five load cases."""
+    urdf = with_tool(catalogue.urdf("KR 120 R2700 extra HA"), "flange", "tcp", TOOL)
+    robot, linkage = Robot.from_urdf(urdf, "tcp"), Linkage.from_urdf(urdf, "tcp")
+    rng = np.random.default_rng(0)
+    pressed = press_poses(linkage, POSES, rng)
+    forces = press_forces(pressed.T_base_tcp)
+    data = measure(bearing_truth(linkage), pressed.joints, forces, SHOP_FLOOR, rng)
+    return robot, data.readings(robot.joint_names)
+
+
+def learning_curve_seconds(robot: Robot, readings: Readings, data: CodecData) -> float | None:
+    """Return the time of scikit-learn on the codec's own splits, or None without it."""
+    if importlib.util.find_spec("sklearn") is None:
+        return None
+    from sklearn.linear_model import LinearRegression
+    from sklearn.model_selection import learning_curve
+
+    problem = build(ElasticModel(robot, layout(robot, "bearing")), readings)
+    rows = np.arange(problem.d.size).reshape(POSES, -1)
+    splits = [
+        (rows[chosen[-1]].ravel(), rows[held_out].ravel())
+        for chosen, held_out in zip(data.chosen[0], data.verification, strict=True)
+    ]
+    model = LinearRegression(positive=True, fit_intercept=False)
+    sizes = rows.shape[1] * data.n_train
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        return seconds(
+            lambda: learning_curve(
+                model,
+                problem.O.reshape(-1, problem.springs),
+                problem.d.ravel(),
+                train_sizes=sizes,
+                cv=splits,
+            ),
+            3,
+        )
+
+
+def main() -> None:
+    """Measure and print."""
+    robot, readings = measured()
+    data = cross_validate(robot, readings)
+    fits = data.error_mean[..., 0].size
+    taken = seconds(lambda: cross_validate(robot, readings), 7)
+    print(
+        f"codec, {POSES} poses, {len(data.seed_pose)} sets, COVER, 18 springs, bounded,"
+        f" {fits} fits, one process: {taken:.3f} s"
+    )
+    usual = learning_curve_seconds(robot, readings, data)
+    if usual is None:
+        print("  scikit-learn's learning_curve: left out, scikit-learn is not installed")
+    else:
+        print(f"  scikit-learn's learning_curve: {usual:.3f} s; ratio {usual / taken:.1f}")
+    ioops = [Variant(search="ioops")]
+    for jobs in (1, os.cpu_count() or 1):
+        start = time.perf_counter()
+        cross_validate(robot, readings, ioops, jobs=jobs)
+        print(f"  with IOOPS, {jobs} processes: {time.perf_counter() - start:.1f} s")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,67 @@
+"""Options of ``codec`` that a person types."""
+
+from collections.abc import Sequence
+
+from elastocal.codec import Tolerance, read_comparison
+from elastocal.errors import CodecError, UnitError
+from elastocal.units import parse_quantity
+
+
+def comparisons(texts: Sequence[str]) -> dict[str, tuple[str, ...]]:
+    """Return the values to compare by key, from texts ``KEY=A,B``.
+
+    Raises
+    ------
+    CodecError
+        If a text does not fit, or a key stands twice.
+    """
+    found: dict[str, tuple[str, ...]] = {}
+    for text in texts:
+        key, values = read_comparison(text)
+        if key in found:
+            raise CodecError(f"--compare {text!r}: {key} stands twice; name all its values at once")
+        found[key] = values
+    return found
+
+
+def parse_ratio(text: str) -> float:
+    """Return training over verification poses from ``"A/B"`` or a number.
+
+    >>> parse_ratio("70/30") == 70 / 30
+    True
+
+    Raises
+    ------
+    CodecError
+        If the text is neither.
+    """
+    above, _, below = text.partition("/")
+    try:
+        return float(above) / float(below or 1.0)
+    except (ValueError, ZeroDivisionError) as error:
+        raise CodecError(f"ratio {text!r} must be two numbers above 0, e.g. '70/30'") from error
+
+
+def parse_tolerance(text: str) -> Tolerance:
+    """Return a tolerance from ``"PART %, LENGTH"``; the length may be left out.
+
+    >>> parse_tolerance("5 %, 0.01 mm")
+    Tolerance(relative=0.05, floor=1e-05)
+    >>> parse_tolerance("0.1").relative
+    0.1
+
+    Raises
+    ------
+    CodecError
+        If the text does not fit.
+    """
+    part, _, length = (each.strip() for each in text.partition(","))
+    percent = part.endswith("%")
+    try:
+        relative = float(part.removesuffix("%")) / (100.0 if percent else 1.0)
+        floor = parse_quantity(length, "length") if length else Tolerance.floor
+    except (ValueError, UnitError) as error:
+        raise CodecError(
+            f"tolerance {text!r} must be a part and a length, e.g. '5 %, 5 um'"
+        ) from error
+    return Tolerance(relative, floor)

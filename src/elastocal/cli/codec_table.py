@@ -1,0 +1,44 @@
+"""What ``codec`` prints for a person: the verdicts in words, and a small table."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+from rich.console import Console
+from rich.markup import escape
+from rich.table import Table
+
+from elastocal.codec.verdict_file import VerdictRecord
+
+_MOST_ROWS = 12
+
+
+def show_codec(console: Console, record: VerdictRecord, out: Path, names: Sequence[str]) -> None:
+    """Print the verdicts of a codec."""
+    split = record.settings
+    console.print(
+        f"[bold]{escape(record.robot)}[/bold]: {split.poses} poses, {split.splits} splits into up"
+        f" to {split.training} training and {split.verification} verification poses"
+    )
+    console.print(_table(record))
+    for sentence in record.sentences:
+        console.print(sentence, markup=False)
+    for finding in record.findings:
+        console.print(f"[yellow]note:[/yellow] {escape(finding)}")
+    console.print(f"\n{', '.join(names)} written to [bold]{escape(str(out))}[/bold]")
+
+
+def _table(record: VerdictRecord) -> Table:
+    """Return the median errors at held-out poses, for some numbers of training poses."""
+    table = Table(box=None, pad_edge=False, title="error norm at held-out poses, um: mean / max")
+    table.add_column("training poses", justify="right")
+    for name in record.variants:
+        table.add_column(escape(name), justify="right")
+    curves = list(record.variants.values())
+    sizes = len(curves[0].n_train)
+    for k in np.unique(np.linspace(0, sizes - 1, min(sizes, _MOST_ROWS)).round().astype(int)):
+        cells = [
+            f"{1e6 * each.error_mean[k]:.1f} / {1e6 * each.error_max[k]:.1f}" for each in curves
+        ]
+        table.add_row(str(curves[0].n_train[k]), *cells)
+    return table

@@ -1,0 +1,157 @@
+"""The arrays of Algorithm 1, for every variant."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from elastocal.arrays import FloatArray, IndexArray
+from elastocal.codec.options import CodecOptions
+from elastocal.codec.training import AXES
+from elastocal.codec.variants import Variant
+from elastocal.elastic import Spring
+from elastocal.errors import CodecError, nearest
+
+NONE = -1
+"""Fills `CodecData.chosen` behind the last chosen pose."""
+
+
+@dataclass(frozen=True)
+class SpringLabels:
+    """Names and units of the springs of a variant."""
+
+    names: tuple[str, ...]
+    units: tuple[str, ...]
+    """SI unit of each compliance."""
+
+    @classmethod
+    def of(cls, springs: Sequence[Spring]) -> "SpringLabels":
+        """Return the labels of springs."""
+        return cls(
+            tuple(spring.name for spring in springs), tuple(spring.unit for spring in springs)
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class CodecData:
+    """Everything that a repeated cross-validation found; arrays are read-only copies.
+
+    Sizes of training sets are 1, 2, … ``n_train``. Poses are numbered from 0; what they are
+    called in the dataset stands in ``pose_labels``.
+
+    Raises
+    ------
+    CodecError
+        If shapes contradict each other.
+    """
+
+    variants: tuple[Variant, ...]
+    springs: tuple[SpringLabels, ...]
+    """Of each variant."""
+    pose_labels: tuple[tuple[int, ...], ...]
+    """Labels of each physical pose; several where one was measured more than once."""
+    contact: FloatArray
+    """Tcp position of each pose in base, shape (pose, 3), in m."""
+    seed_pose: IndexArray
+    """Pose that each verification set was grown from, shape (cv,)."""
+    verification: IndexArray
+    """Poses of each verification set in the order of choice, shape (cv, N_v)."""
+    chosen: IndexArray
+    """Training poses in the order of choice, `NONE` behind the last, shape
+    (variant, cv, n_train, n_train)."""
+    compliance: tuple[FloatArray, ...]
+    """Of each variant, shape (cv, n_train, spring), in the units of ``springs``."""
+    error_mean: FloatArray
+    """Mean absolute residual at the verification poses under all load cases, shape
+    (variant, cv, n_train, 4), in m; the last axis is x, y, z in base, and the norm."""
+    error_max: FloatArray
+    """Largest absolute residual, likewise."""
+    load_cases: tuple[str, ...]
+    """Load cases that are verified with."""
+    options: CodecOptions
+    robot: str = ""
+    """Name of the robot."""
+    provenance: str = ""
+    """Where the readings came from."""
+    findings: tuple[str, ...] = ()
+    """What a user should know of the data."""
+    versions: dict[str, str] = field(default_factory=dict)
+    """Version of each package that the numbers come from."""
+
+    def __post_init__(self) -> None:
+        for name in ("contact", "error_mean", "error_max"):
+            self._own(name, np.array(getattr(self, name), dtype=float))
+        for name in ("seed_pose", "verification", "chosen"):
+            self._own(name, np.array(getattr(self, name), dtype=np.intp))
+        compliance = tuple(np.array(each, dtype=float) for each in self.compliance)
+        for each in compliance:
+            each.flags.writeable = False
+        object.__setattr__(self, "compliance", compliance)
+        self._check()
+
+    @property
+    def n_train(self) -> IndexArray:
+        """Sizes of the training sets, 1 to the largest."""
+        return np.arange(1, self.error_mean.shape[2] + 1)
+
+    @property
+    def training_poses(self) -> int:
+        """Poses on the training side of a split, ``N_c``."""
+        return len(self.contact) - int(self.verification.shape[1])
+
+    def index(self, variant: str) -> int:
+        """Return the number of a variant.
+
+        Raises
+        ------
+        CodecError
+            If there is none of that name.
+        """
+        names = [each.name for each in self.variants]
+        if variant not in names:
+            raise CodecError(
+                f"unknown variant {variant!r}{nearest(variant, names)} (known: {', '.join(names)})"
+            )
+        return names.index(variant)
+
+    def errors(self, variant: str, which: str = "mean", axis: str = "norm") -> FloatArray:
+        """Return the ``mean`` or ``max`` errors of a variant, shape (cv, n_train), in m.
+
+        Raises
+        ------
+        CodecError
+            If variant, error or axis are unknown.
+        """
+        for name, known in ((which, ("mean", "max")), (axis, AXES)):
+            if name not in known:
+                raise CodecError(f"unknown {name!r} of an error (allowed: {', '.join(known)})")
+        array = self.error_mean if which == "mean" else self.error_max
+        return array[self.index(variant), :, :, AXES.index(axis)]
+
+    def _own(self, name: str, array: FloatArray | IndexArray) -> None:
+        array.flags.writeable = False
+        object.__setattr__(self, name, array)
+
+    def _check(self) -> None:
+        v, cv, n = len(self.variants), len(self.seed_pose), self.error_mean.shape[2]
+        poses = len(self.pose_labels)
+        expected = {
+            "contact": (poses, 3),
+            "chosen": (v, cv, n, n),
+            "error_mean": (v, cv, n, len(AXES)),
+            "error_max": (v, cv, n, len(AXES)),
+            "verification": (cv, self.verification.shape[-1]),
+        }
+        found = {name: getattr(self, name).shape for name in expected}
+        for k, (array, springs) in enumerate(zip(self.compliance, self.springs, strict=True)):
+            expected[f"compliance of variant {k}"] = (cv, n, len(springs.names))
+            found[f"compliance of variant {k}"] = array.shape
+        for name, shape in expected.items():
+            if found[name] != shape:
+                raise CodecError(f"{name} has shape {found[name]}, not {shape}")
+        if not v or len(self.compliance) != v or len({each.name for each in self.variants}) != v:
+            raise CodecError("variants must be at least one, each with a name of its own")
+        for name in ("seed_pose", "verification", "chosen"):
+            outside = getattr(self, name)
+            if np.any((outside < NONE) | (outside >= poses)):
+                raise CodecError(f"{name} names a pose that is not one of the {poses}")

@@ -1,0 +1,87 @@
+"""The indices of each training set: how good it ought to be, by what is known beforehand."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from elastocal.arrays import BoolArray, FloatArray
+from elastocal.codec.data import CodecData
+from elastocal.codec.training import Trainee
+from elastocal.planning.search import Candidates, build_information, covering_radius
+from elastocal.planning.search.criteria import CRITERIA, IOptimal
+
+COVERING_RADIUS = "covering_radius"
+INDICES = ("o1", "o2", "o3", "o4", "o5", "d", "a", "e", "i", COVERING_RADIUS)
+"""Names, in the order of tables."""
+_PLAIN = ("o2", "o3", "o4", "o5", "d", "a", "e")
+"""Those that need the information matrix alone."""
+
+
+@dataclass(frozen=True, eq=False)
+class IndexValues:
+    """Indices of the training sets of one variant."""
+
+    variant: str
+    values: dict[str, FloatArray]
+    """By the names of `INDICES`, each of shape (cv, n_train). Values as their criteria define
+    them, larger is better; only of the covering radius, in m, less is better."""
+
+    def goodness(self, name: str) -> FloatArray:
+        """Return an index turned so that more is better, shape (cv, n_train)."""
+        sign = -1.0 if name == COVERING_RADIUS else 1.0
+        return sign * self.values[name]
+
+
+def index_values(data: CodecData, trainee: Trainee) -> IndexValues:
+    """Return the indices of all training sets of a variant.
+
+    All sets are measured by one rule: over the directions that all poses together observe under
+    the variant's load cases, columns scaled over all poses (spec section 2, trap 2). O1 is
+    Eq. 20 of the paper. For ``i``, the verification poses of the split under all load cases
+    stand for the production. The covering radius is that over all poses of the codec.
+
+    Parameters
+    ----------
+    data : CodecData
+        The codec.
+    trainee : Trainee
+        Of the variant; from `trainees_of`.
+
+    Raises
+    ------
+    PlanningError
+        If the forces load no spring.
+    """
+    number = data.index(trainee.variant.name)
+    poses, everything = np.arange(len(data.contact)), np.ones_like(trainee.trains)
+    rows = trainee.rows(poses, everything)
+    pool = Candidates(data.contact, trainee.rows(poses, trainee.trains))
+    information = build_information(pool)
+    member = _members(data, number)
+    flat = information.gram.reshape(len(poses), -1)
+    shape = (*member.shape[:2], information.rank, information.rank)
+    matrix = (member.astype(float) @ flat).reshape(shape) + information.matrix([])
+    values = {name: CRITERIA[name]().value(matrix) for name in _PLAIN}
+    values["o1"] = values["d"] / np.sqrt(information.rows_per_pose * data.n_train)
+    values["i"] = np.stack(
+        [
+            IOptimal(_process(rows[held_out], information.scale, information.basis)).value(sets)
+            for held_out, sets in zip(data.verification, matrix, strict=True)
+        ]
+    )
+    values[COVERING_RADIUS] = np.array(
+        [[covering_radius(pool, np.flatnonzero(one)) for one in sets] for sets in member]
+    )
+    return IndexValues(trainee.variant.name, {name: values[name] for name in INDICES})
+
+
+def _process(rows: FloatArray, scale: FloatArray, basis: FloatArray) -> FloatArray:
+    """Return the mean of ``z z^T`` over the rows of some poses, scaled and projected."""
+    seen = (rows.reshape(-1, rows.shape[2]) / scale) @ basis
+    return np.asarray(seen.T @ seen / len(seen))
+
+
+def _members(data: CodecData, number: int) -> BoolArray:
+    """Return which poses are in each training set, shape (cv, n_train, pose)."""
+    chosen = data.chosen[number]
+    return np.asarray((chosen[..., None] == np.arange(len(data.contact))).any(axis=2))

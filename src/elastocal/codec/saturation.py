@@ -1,0 +1,115 @@
+"""From how many training poses on the error no longer falls."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.random import Generator
+
+from elastocal.arrays import BoolArray, FloatArray, IndexArray
+from elastocal.codec.overlap import Overlap, median_draws
+from elastocal.errors import CodecError
+from elastocal.identification.bootstrap import CONFIDENCE
+
+
+@dataclass(frozen=True)
+class Tolerance:
+    """How near to the last error counts as saturated.
+
+    Raises
+    ------
+    CodecError
+        If a part is negative or not finite.
+    """
+
+    relative: float = 0.05
+    """Part of the last error."""
+    floor: float = 5e-6
+    """Least tolerance, in m: below what a laser tracker repeats, a difference is of no use."""
+
+    def __post_init__(self) -> None:
+        for name, value in (("tolerance", self.relative), ("floor of the tolerance", self.floor)):
+            if not 0.0 <= value < np.inf:
+                raise CodecError(f"{name} {value:g}: must be 0 or above, and finite")
+
+    def reached(self, error: FloatArray) -> BoolArray:
+        """Return whether each error of a curve is within the tolerance of its last.
+
+        Parameters
+        ----------
+        error : ndarray, shape (..., n_train)
+            In m.
+        """
+        last = error[..., -1:]
+        return np.asarray(error - last <= np.maximum(self.relative * last, self.floor))
+
+
+@dataclass(frozen=True)
+class Saturation:
+    """The verdict on one variant."""
+
+    variant: str
+    n_train: int
+    """Smallest number of training poses whose error is within the tolerance of the last."""
+    low: int | None
+    """Lower end of its 95 % interval: with fewer poses, 97.5 % of the bootstrap draws leave the
+    tolerance again; None where no spread is known."""
+    high: int | None
+    """Upper end: by then, 97.5 % of the draws have come within the tolerance."""
+    error: float
+    """Median over the verification sets of the mean error norm there, in m."""
+    last_error: float
+    """The same with the largest training set, in m."""
+    last: int
+    """Size of the largest training set."""
+
+    @property
+    def settled(self) -> bool:
+        """Whether the interval ends below the largest training set.
+
+        Where it does not, the error may still be falling: nothing is known beyond the last.
+        """
+        return self.high is not None and self.high < self.last
+
+
+def saturation(
+    variant: str, errors: FloatArray, tolerance: Tolerance, overlap: Overlap, rng: Generator
+) -> Saturation:
+    """Return from how many training poses on the median error is that of the last.
+
+    Parameters
+    ----------
+    variant : str
+        Name.
+    errors : ndarray, shape (cv, n_train)
+        Mean error norm of each verification set, in m.
+    tolerance : Tolerance
+        How near is near.
+    overlap : Overlap
+        Of the verification sets.
+    rng : Generator
+        Draws the verification sets of the interval.
+    """
+    curve = np.median(errors, axis=0)
+    n = _first(tolerance.reached(curve))
+    draws = median_draws(errors, overlap, rng)
+    low, high = None, None
+    if len(draws):
+        tail, reached = 50.0 * (1.0 - CONFIDENCE), tolerance.reached(draws)
+        # A noisy draw dips into the tolerance early, and leaves it again late; neither is news
+        # of saturation. Whole numbers of poses: the ends are drawn values, no averages of two.
+        low = min(int(n), int(np.percentile(_for_good(reached), tail, method="lower")))
+        high = max(int(n), int(np.percentile(_first(reached), 100.0 - tail, method="higher")))
+    return Saturation(
+        variant, int(n), low, high, float(curve[n - 1]), float(curve[-1]), errors.shape[1]
+    )
+
+
+def _first(reached: BoolArray) -> IndexArray:
+    """Return the size, from 1, of the first training set that has reached the last error."""
+    return np.asarray(np.argmax(reached, axis=-1) + 1)
+
+
+def _for_good(reached: BoolArray) -> IndexArray:
+    """Return the size, from 1, of the training set from which on all are within the tolerance."""
+    outside = ~reached[..., ::-1]
+    return np.where(outside.any(axis=-1), reached.shape[-1] - outside.argmax(axis=-1) + 1, 1)

@@ -1,0 +1,107 @@
+"""What a codec says: saturation of each variant, difference of each pair, and both in words."""
+
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+
+from elastocal.codec.data import CodecData
+from elastocal.codec.overlap import Overlap
+from elastocal.codec.pairs import Pair, paired
+from elastocal.codec.saturation import Saturation, Tolerance, saturation
+
+
+@dataclass(frozen=True, eq=False)
+class Verdicts:
+    """The verdicts on a codec."""
+
+    saturation: tuple[Saturation, ...]
+    """Of each variant, in order."""
+    pairs: tuple[Pair, ...]
+    """Every two variants."""
+    tolerance: Tolerance
+    sentences: tuple[str, ...]
+    """One for each variant, then one for each pair."""
+
+
+def judge(data: CodecData, tolerance: Tolerance | None = None) -> Verdicts:
+    """Return the verdicts on a codec, by the mean error norm of each verification set.
+
+    Intervals are seeded with the codec's own seed.
+
+    Parameters
+    ----------
+    data : CodecData
+        The arrays.
+    tolerance : Tolerance, optional
+        How near to the last error counts as saturated.
+    """
+    tolerance = tolerance or Tolerance()
+    sets, size = data.verification.shape
+    overlap = Overlap.of(data.verification)
+    errors = {each.name: data.errors(each.name) for each in data.variants}
+    found = tuple(
+        saturation(name, values, tolerance, overlap, np.random.default_rng(data.options.seed))
+        for name, values in errors.items()
+    )
+    sizes = {each.variant: each.n_train for each in found}
+    pairs = tuple(
+        paired(a, b, errors[a], errors[b], overlap, max(sizes[a], sizes[b]))
+        for a, b in combinations(errors, 2)
+    )
+    where = f"{sets} verification set{'s' if sets > 1 else ''} of {size} held-out poses"
+    sentences = (
+        *(_saturation_sentence(each, tolerance, where) for each in found),
+        *(_pair_sentence(each, where) for each in pairs),
+    )
+    return Verdicts(found, pairs, tolerance, sentences)
+
+
+def _saturation_sentence(found: Saturation, tolerance: Tolerance, where: str) -> str:
+    between = "these sets tell no interval"
+    if found.low is not None and found.high is not None:
+        between = f"95 % interval {found.low} to {found.high}"
+    reach = f"within {tolerance.relative:.0%} or {_um(tolerance.floor)} of the last"
+    if found.n_train == found.last:
+        return (
+            f"{found.variant}: the error still falls at {found.last} training poses"
+            f" ({_um(found.last_error)}): more poses would help ({where})"
+        )
+    text = (
+        f"{found.variant}: saturated from {found.n_train} training poses on ({between}):"
+        f" {_um(found.error)} there, {_um(found.last_error)} with {found.last}, {reach};"
+        f" medians of the mean error over {where}"
+    )
+    if found.settled or found.high is None:
+        return text
+    return f"{text}; that it still falls at {found.last} cannot be ruled out"
+
+
+def _pair_sentence(pair: Pair, where: str) -> str:
+    at = pair.at
+    difference, low, high = (float(each[at - 1]) for each in (pair.difference, pair.low, pair.high))
+    smaller, larger = (pair.a, pair.b) if difference < 0.0 else (pair.b, pair.a)
+    if np.isnan(low):
+        return (
+            f"{smaller} against {larger}: smaller by {_um(abs(difference))} with {at} training"
+            f" poses; the verification sets tell no interval ({where})"
+        )
+    if pair.better is None:
+        return (
+            f"{pair.a} against {pair.b}: no difference can be told where both have saturated, with"
+            f" {at} training poses ({_um(difference)}, 95 % interval {_um(low)} to {_um(high)};"
+            f" {where})"
+        )
+    ends = sorted((abs(low), abs(high)))
+    text = (
+        f"{smaller} is better than {larger} by {_um(abs(difference))} (95 % interval"
+        f" {_um(ends[0])} to {_um(ends[1])}) where both have saturated, with {at} training poses,"
+        f" clearly so from {pair.proved_from} on"
+    )
+    if pair.crossing is not None:
+        text += f"; with fewer than {pair.crossing} it is not always so"
+    return f"{text} ({where})"
+
+
+def _um(metres: float) -> str:
+    return f"{1e6 * metres:.1f} um"

@@ -1,0 +1,72 @@
+"""Figures on paper: the same figure has the same bytes, and says in words what it shows."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import matplotlib
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+
+from elastocal.errors import FileAccessError
+from elastocal.files import replacing
+from elastocal.report import style
+
+SUFFIXES = (".pdf", ".png", ".svg")
+_DPI = 200
+
+
+def write_figure(path: Path, draw: Callable[[], Figure], title: str, description: str) -> Path:
+    """Write a figure, atomically; return its path.
+
+    Parameters
+    ----------
+    path : Path
+        Its suffix decides the kind: SVG, PNG or PDF.
+    draw : callable
+        Returns the figure; called with the settings of print.
+    title, description : str
+        What it is and shows, for readers that cannot see it; kept in the file.
+
+    Raises
+    ------
+    FileAccessError
+        If the suffix is another or the file cannot be written.
+    """
+    path = Path(path)
+    suffix = path.suffix.lower()
+    if suffix not in SUFFIXES:
+        raise FileAccessError(
+            f"figure {path}: suffix {path.suffix!r} is not one of {', '.join(SUFFIXES)}"
+        )
+    with matplotlib.rc_context(style.print_settings()), replacing(path) as temporary:
+        draw().savefig(
+            temporary, format=suffix[1:], dpi=_DPI, metadata=_notes(suffix, title, description)
+        )
+    return path
+
+
+def new_figure(width: float, height: float) -> Figure:
+    """Return an empty figure of a size in inches, without a window."""
+    figure = Figure((width, height))
+    FigureCanvasAgg(figure)
+    return figure
+
+
+def plain(text: str) -> str:
+    r"""Return a text whose dollar signs begin no formula.
+
+    >>> plain("a$b")
+    'a\\$b'
+    """
+    return text.replace("$", r"\$")
+
+
+def _notes(suffix: str, title: str, description: str) -> dict[str, Any]:
+    """Return what the file says about itself; no date, or its bytes would change."""
+    if suffix == ".pdf":
+        return {"Title": title, "Subject": description, "CreationDate": None}
+    said = {"Title": title, "Description": description}
+    if suffix == ".png":
+        return {**said, "Software": "elastocal"}
+    return {**said, "Creator": "elastocal", "Date": None}

@@ -1,0 +1,262 @@
+"""Readings of a plan straight from the hidden truth, without stepping the devices through time.
+
+All places are computed side by side: near contact, touch, and the load cases one after the other,
+so that the gears remember. Robot, contact and controller are those of `simulated_devices`. What
+is left out moves a deflection by well under a micrometre: the force of the guarded touch (a larger
+one wipes it from the gears' memory), the curvature of the tooling within the few millimetres
+beside a touch, and what stop errors do to the place that is touched. No fault is injected.
+"""
+
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from elastocal.arrays import FloatArray
+from elastocal.cell import Cell
+from elastocal.errors import DeviceError
+from elastocal.sim.reach import reach
+from elastocal.sim.workcell.contact import Contact, ContactLaw
+from elastocal.sim.workcell.quasistatics import Quasistatics
+from elastocal.sim.workcell.quick_rest import Rests, rest_side_by_side
+from elastocal.sim.workcell.robot import TrueRobot
+
+CLOSED = 1e-6
+"""How far a tool may end from where the contact holds it, in m: nanometres of deflection."""
+_ROUNDS = 8
+
+
+class Places(NamedTuple):
+    """Where to press."""
+
+    q: FloatArray
+    """Planned joints in contact, shape (place, joint), in rad or m."""
+    normal: FloatArray
+    """Outward unit normals of the tooling in base, shape (place, 3)."""
+
+
+@dataclass(frozen=True, eq=False)
+class Settled:
+    """What is true where the arm stands still: near contact without load, and under each load."""
+
+    q: FloatArray
+    """Joints of the controller under load, shape (place, load, joint), in rad or m."""
+    force: FloatArray
+    """Force on the robot in base, shape (place, load, 3), in N."""
+    deflection: FloatArray
+    """Of the tool in base, against touching without force, shape (place, load, 3), in m."""
+    controller_displacement: FloatArray
+    """Of the marker by the controller, against near contact, shape (place, load, 3), in m."""
+    marker_displacement: FloatArray
+    """True one of the marker, likewise."""
+    marker: FloatArray
+    """Marker near contact in base, shape (place, 3), in m."""
+    felt: FloatArray
+    """Change of the force at the sensor against near contact, with the weight that has turned,
+    in the sensor's true frame, shape (place, load, 3), in N."""
+    R_base_sensor: FloatArray
+    """Orientation of the sensor by the controller, shape (place, 3, 3)."""
+
+
+class _Stands(NamedTuple):
+    """The robot at all places."""
+
+    q: FloatArray
+    twist: FloatArray
+    """What the controller is off by; see `quasistatics.Knots.twist`, shape (place, 9)."""
+    rests: Rests
+    force: FloatArray
+    """On the robot in base, shape (place, 3), in N."""
+
+
+@dataclass(frozen=True, eq=False)
+class QuickCell:
+    """The truth of a cell; make one with `of`. It can be sent to another process."""
+
+    statics: Quasistatics
+    law: ContactLaw
+    near: float
+    """Height of near contact, in m."""
+    offset: FloatArray
+    """How far the tooling stands from where the cell file puts it, shape (3,), in m."""
+
+    @classmethod
+    def of(cls, cell: Cell) -> "QuickCell":
+        """Return the truth of a cell.
+
+        Raises
+        ------
+        DeviceError, RobotError
+            If the simulator has no arm for it.
+        """
+        return cls(
+            Quasistatics.of(cell, TrueRobot.of(cell)),
+            ContactLaw.of(cell),
+            cell.file.engagement.near_contact,
+            np.array(cell.file.simulation.contact.surface_offset),
+        )
+
+    @property
+    def springs(self) -> int:
+        """Number of springs of the robot, the balancer not counted."""
+        return len(self.statics.robot.springs.stiffness)
+
+    def stiffened(self, factor: FloatArray, balancer: float = 1.0) -> "QuickCell":
+        """Return the cell with another arm of the same make.
+
+        Parameters
+        ----------
+        factor : ndarray, shape (spring,)
+            On the stiffness of each spring; friction and play of a gear change with it.
+        balancer : float
+            On the rate of the balancer.
+        """
+        robot = self.statics.robot
+        springs, gears, pull = robot.springs, robot.springs.gears, robot.springs.balancer
+        own = factor[gears.which, None]
+        scaled = replace(
+            springs,
+            stiffness=springs.stiffness * factor,
+            gears=replace(gears, loss=gears.loss * own, stop_stiffness=gears.stop_stiffness * own),
+            balancer=None if pull is None else replace(pull, rate=balancer * pull.rate),
+        )
+        layout = replace(robot.layout, springs=scaled)
+        return replace(self, statics=replace(self.statics, robot=replace(robot, layout=layout)))
+
+    def settle(self, places: Places, force_tcp: FloatArray) -> Settled:
+        """Return what is true at every place under every load case, in this order.
+
+        Parameters
+        ----------
+        places : Places
+            Where.
+        force_tcp : ndarray, shape (load, 3)
+            Wanted readings of the sensor, tcp frame, in N.
+
+        Raises
+        ------
+        DeviceError
+            If the arm cannot follow.
+        EquilibriumError
+            If the robot cannot carry a load.
+        """
+        T = self.statics.robot.forward(places.q)
+        near = self._free(self._along(places.q, T, self.near * places.normal), None)
+        touch, contacts = self._touch(places, T, near)
+        zero, weight = self._sensor(near), self.statics.weight
+        stand, stands = touch, []
+        for wanted in force_tcp:
+            # The controller has zeroed the sensor near contact; the arm turns it under load.
+            held = self.statics.robot.T_tcp_sensor[:3, :3].T @ self.law.held(wanted)
+            stand = self._press(stand, touch, contacts, held + weight @ zero)
+            stands.append(stand)
+        return self._settled(near, touch, stands)
+
+    def _press(
+        self, start: _Stands, touch: _Stands, contacts: list[Contact], reading: FloatArray
+    ) -> _Stands:
+        """Return the robot where the sensor reads a force, shape (place, 3), sensor frame.
+
+        See `ways.pressed`.
+        """
+        statics, weight = self.statics, self.statics.weight
+        q, reached = start.q, start
+        for _ in range(_ROUNDS):
+            force = _turn(self._sensor(reached), reading) - weight
+            theta, slider = reached.rests.theta, start.rests.slider
+            rests = rest_side_by_side(statics.robot, q, force, slider, theta)
+            twist = rests.twist - statics.compensation * touch.rests.twist
+            reached = _Stands(q, twist, rests, force)
+            goal = [c.tool_position(f) for c, f in zip(contacts, force, strict=True)]
+            missed = np.array(goal) - self._tool(reached)
+            if np.linalg.norm(missed, axis=1).max() < CLOSED:
+                break
+            q = self._along(q, statics.robot.forward(q), missed)
+        return reached
+
+    def _touch(self, places: Places, T: FloatArray, near: _Stands) -> tuple[_Stands, list[Contact]]:
+        """Return the robot touching the tooling without force; see `ways.touching`."""
+        beside = self._tool(near) - (T[:, :3, 3] + self.offset)
+        height = np.sum(beside * places.normal, axis=1, keepdims=True)
+        anchor = self._tool(near) - height * places.normal
+        reached = near
+        for _ in range(_ROUNDS):
+            missed = anchor - self._tool(reached)
+            if np.linalg.norm(missed, axis=1).max() < CLOSED:
+                break
+            forward = self.statics.robot.forward(reached.q)
+            reached = self._free(self._along(reached.q, forward, missed), reached.rests.theta)
+        each = zip(anchor, T[:, :3, :3], places.normal, reached.q, strict=True)
+        return reached, [Contact(self.law, *parts) for parts in each]
+
+    def _free(self, q: FloatArray, start: FloatArray | None) -> _Stands:
+        """Return the robot free of contact, its gears relaxed; see `Quasistatics.free`."""
+        nothing = np.zeros((len(q), 3))
+        rests = rest_side_by_side(self.statics.robot, q, nothing, None, start)
+        return _Stands(q, (1.0 - self.statics.compensation) * rests.twist, rests, nothing)
+
+    def _along(self, q: FloatArray, T: FloatArray, way: FloatArray) -> FloatArray:
+        """Return joints that move the undeformed tool from T by a way, orientation kept."""
+        layout, goal = self.statics.robot.layout, T.copy()
+        goal[:, :3, 3] += way
+        found = reach(layout.linkage, goal, q, tolerance=1e-10, locked=layout.external)
+        if not found.ok.all():
+            place = int(np.flatnonzero(~found.ok)[0])
+            raise DeviceError(
+                f"the arm cannot follow to {np.round(goal[place, :3, 3], 4).tolist()} m:"
+                " a singularity or the end of its reach"
+            )
+        return found.q
+
+    def _tool(self, stand: _Stands) -> FloatArray:
+        """Return where the tool centre points truly are, in base, shape (place, 3), in m."""
+        at: FloatArray = self.statics.robot.forward(stand.q)[:, :3, 3] + stand.twist[:, :3]
+        return at
+
+    def _sensor(self, stand: _Stands) -> FloatArray:
+        """Return the true orientations of the sensor, shape (place, 3, 3)."""
+        nominal = self.statics.robot.forward(stand.q)[:, :3, :3]
+        nominal = nominal @ self.statics.robot.T_tcp_sensor[:3, :3]
+        turned: FloatArray = Rotation.from_rotvec(stand.twist[:, 6:]).as_matrix() @ nominal
+        return turned
+
+    def _markers(self, stand: _Stands) -> tuple[FloatArray, FloatArray]:
+        """Return the marker by the controller and where it truly is, each (place, 3), in m."""
+        T = self.statics.robot.forward(stand.q)
+        lever = T[:, :3, :3] @ self.statics.marker_tcp
+        turned = Rotation.from_rotvec(stand.twist[:, 3:6]).apply(lever)
+        return T[:, :3, 3] + lever, T[:, :3, 3] + stand.twist[:, :3] + turned
+
+    def _settled(self, near: _Stands, touch: _Stands, stands: list[_Stands]) -> Settled:
+        weight, statics = self.statics.weight, self.statics
+        unloaded, markers = self._markers(near), [self._markers(stand) for stand in stands]
+        tare = weight @ self._sensor(near)
+        felt = [_turn_back(self._sensor(stand), stand.force + weight) - tare for stand in stands]
+        R = statics.robot.forward(near.q)[:, :3, :3] @ statics.robot.T_tcp_sensor[:3, :3]
+        return Settled(
+            q=_stack([stand.q for stand in stands]),
+            force=_stack([stand.force for stand in stands]),
+            deflection=_stack([stand.twist[:, :3] - touch.twist[:, :3] for stand in stands]),
+            controller_displacement=_stack([each[0] - unloaded[0] for each in markers]),
+            marker_displacement=_stack([each[1] - unloaded[1] for each in markers]),
+            marker=unloaded[1],
+            felt=_stack(felt),
+            R_base_sensor=R,
+        )
+
+
+def _stack(parts: list[FloatArray]) -> FloatArray:
+    return np.stack(parts, axis=1)
+
+
+def _turn(R: FloatArray, vectors: FloatArray) -> FloatArray:
+    """Return ``R v`` of each place."""
+    turned: FloatArray = np.einsum("pij,pj->pi", R, vectors)
+    return turned
+
+
+def _turn_back(R: FloatArray, vectors: FloatArray) -> FloatArray:
+    """Return ``R^T v`` of each place."""
+    turned: FloatArray = np.einsum("pji,pj->pi", R, vectors)
+    return turned

@@ -1,0 +1,193 @@
+"""`elastocal study` on a small pool of the fibre placement cell."""
+
+import csv
+import json
+from functools import cache
+
+import numpy as np
+import pytest
+
+from elastocal.cell import load_cell
+from elastocal.cli import study_spread
+from elastocal.cli.study_options import study_conditions
+from elastocal.cli.study_simulation import prepare
+from elastocal.codec.study import Sample, StudyStore, one_after_the_other, run_study
+from elastocal.elastic import ElasticModel, layout
+from elastocal.identification import calibrate
+from elastocal.sim.workcell.quick_errors import ErrorDraws, Scales
+from support.cli import elastocal
+from support.simulated import example_cell
+from support.studies import numbers
+
+POOL = 60
+SEARCH = {"technique": "cover", "pool": POOL, "seed": 1}
+
+
+def cell_path(**sections):
+    return example_cell("afp", search=SEARCH, **sections).path
+
+
+@cache
+def prepared(*vary, cell=None):
+    cell = load_cell(cell or cell_path())
+    return prepare(cell, study_conditions(cell, vary), seed=0, verification=12, jobs=1)
+
+
+def errors(simulation, samples, which="error_mean"):
+    """Errors of some samples, shape (sample, condition)."""
+    found = [simulation(Sample(0, number)) for number in range(samples)]
+    return np.array([[getattr(o.accuracy, which) for o in each.outcomes] for each in found])
+
+
+def study(out, *options, cell=None):
+    return elastocal("study", cell or cell_path(), "--out", out, "--verification", 12, *options)
+
+
+def test_the_command_writes_tables_record_and_charts(tmp_path):
+    options = ("--samples", 3, "--vary", "poses=5,12", "--vary", "springs=actuated,bearing",
+               "--target", "0.1 mm", "--jobs", 1)  # fmt: skip
+    found = study(tmp_path / "study", *options, "--json")
+    assert found.code == 0, found.err
+    said = json.loads(found.out)
+    assert [each["name"] for each in said["conditions"]][:2] == [
+        "poses 5, springs actuated", "poses 5, springs bearing",
+    ]  # fmt: skip
+    with (tmp_path / "study" / "study.csv").open() as file:
+        assert len(list(csv.DictReader(file))) == 12
+    assert all((tmp_path / "study" / name).is_file() for name in said["files"])
+    assert "study.svg" in said["files"]
+    again = study(tmp_path / "study", *options)
+    assert again.code == 0
+    assert "no condition is shown" in " ".join(again.err.split())
+
+
+def test_a_sample_is_calibrated_as_the_dataset_of_a_run_would_be():
+    study = prepared("poses=12", "springs=bearing")
+    simulate, sample = study.simulate, Sample(0, 0)
+    found = simulate(sample).outcomes[0]
+    rng = sample.generator(0)
+    stiffness, balancer = rng.standard_normal(simulate.truth.springs), rng.standard_normal()
+    arm = simulate.truth.stiffened(np.exp(0.2 * stiffness), np.exp(0.2 * balancer))
+    poses = np.sort(simulate.chosen[0].order)
+    draws = ErrorDraws.of(POOL, 5, sample.generator(1)).take(poses, np.arange(5))
+    settled = arm.settle(simulate.pool.places(poses), simulate.force_tcp)
+    readings = simulate.errors.readings(
+        settled, draws, Scales(), simulate.pool.station[poses], simulate.load_cases
+    )
+    robot = load_cell(cell_path()).robot
+    model = ElasticModel(robot, layout(robot, "bearing"))
+    full = calibrate(model, readings, np.random.default_rng(0), marker_offset=simulate.marker)
+    assert full.used.all()
+    np.testing.assert_allclose(full.calibrated.compliance, found.compliance, rtol=1e-9)
+
+
+def test_verification_poses_are_never_chosen():
+    simulate = prepared("poses=12,48", "search=cover,ioops,random").simulate
+    aside = set(simulate.pool.verification.tolist())
+    assert len(aside) == 12
+    for number in range(3):
+        rng = Sample(0, number).generator(2)
+        for chosen, condition in zip(simulate.chosen, simulate.conditions, strict=True):
+            poses = chosen.of(rng).tolist()
+            assert len(set(poses)) == condition.poses
+            assert not aside & set(poses)
+
+
+def test_only_random_chooses_anew_for_every_sample():
+    simulate = prepared("poses=12", "search=cover,random").simulate
+    cover, drawn = simulate.chosen
+    rngs = [Sample(0, number).generator(2) for number in (0, 1)]
+    assert np.array_equal(*(cover.of(rng) for rng in rngs))
+    assert not np.array_equal(*(drawn.of(rng) for rng in rngs))
+
+
+def test_conditions_of_a_sample_share_arm_and_noise():
+    one = prepared("poses=12").simulate(Sample(0, 4)).outcomes[0]
+    two = prepared("poses=6,12").simulate(Sample(0, 4)).outcomes[1]
+    assert one.accuracy.deflection_mean == two.accuracy.deflection_mean
+    assert one.accuracy.error_mean == pytest.approx(two.accuracy.error_mean, rel=1e-6)
+
+
+def test_more_noise_of_either_instrument_is_worse():
+    for factor in ("tracker_noise", "force_noise"):
+        found = errors(prepared("poses=6", f"{factor}=0,30").simulate, 4)
+        assert np.all(found[:, 1] > found[:, 0])
+
+
+def test_arms_of_no_spread_are_the_cell_files():
+    found = errors(prepared("poses=6", "truth=0,0.3").simulate, 3, "deflection_mean")
+    assert np.ptp(found[:, 0]) == 0.0
+    assert np.ptp(found[:, 1]) > 1e-5
+
+
+def test_loads_that_press_only_show_less():
+    found = errors(prepared("poses=12", "load_cases=normal,all").simulate, 4)
+    assert found[:, 0].mean() > found[:, 1].mean()
+
+
+@pytest.mark.parametrize(
+    ("options", "reason"),
+    [
+        (("--vary", "pose=3"), "unknown factor 'pose'; did you mean 'poses'? (known: poses, "),
+        (("--vary", "poses=many"), "'many' is not a number of calibration poses"),
+        (("--vary", "springs=bering"), "unknown spring layout 'bering'; did you mean 'bearing'?"),
+        (("--vary", "load_cases=norml"), "no load case 'norml'; did you mean 'normal'?"),
+        (("--vary", "poses=10,49"), "poses=49: the pool has 48 valid poses"),
+        (("--samples", "0"), "0 samples: must be at least 1"),
+        (("--target", "0.05"), "is not a length with its unit"),
+        (("--target", "0 mm"), "must be above 0"),
+    ],
+)
+def test_what_cannot_be_studied_is_refused_in_one_line_and_nothing_is_written(
+    tmp_path, options, reason
+):
+    assert reason in study(tmp_path / "study", *options).reason
+    assert not (tmp_path / "study").exists()
+
+
+def test_more_verification_poses_than_the_pool_holds_are_refused(tmp_path):
+    found = elastocal("study", cell_path(), "--out", tmp_path / "s", "--verification", 60)
+    assert "60 verification poses: must be at least 1, and fewer than the 60" in found.reason
+
+
+def test_another_truth_in_the_same_folder_is_refused(tmp_path):
+    options = ("--samples", 2, "--vary", "poses=5", "--jobs", 1)
+    assert study(tmp_path / "s", *options).code == 0
+    other = cell_path(simulation={"truth": {"gears": 1.1}})
+    assert "another study (simulation fingerprint" in study(
+        tmp_path / "s", *options, cell=other
+    ).reason  # fmt: skip
+
+
+def test_a_scheduler_that_does_not_answer_is_refused(tmp_path, monkeypatch):
+    pytest.importorskip("distributed")
+    monkeypatch.setattr(study_spread, "PATIENCE", 0.3)
+    for address in ("tcp://127.0.0.1:9", "nonsense://x"):
+        found = study(tmp_path / "study", "--dask", address)
+        assert f"--dask {address}: no Dask scheduler answers there" in found.reason
+    assert not (tmp_path / "study").exists()
+
+
+def test_a_missing_extra_says_how_to_install_it(tmp_path, monkeypatch):
+    monkeypatch.setitem(__import__("sys").modules, "distributed", None)
+    found = study(tmp_path / "study", "--dask", "tcp://127.0.0.1:9")
+    assert found.reason.endswith("pip install 'elastocal[dask]'")
+
+
+@pytest.mark.slow
+def test_cores_and_a_dask_cluster_give_the_same_numbers_bit_for_bit(tmp_path):
+    distributed = pytest.importorskip("distributed")
+    made = prepared("poses=8,20", "search=cover,random", "springs=actuated,bearing")
+
+    def run(name, spread):
+        store = StudyStore(tmp_path / name)
+        return numbers(run_study(store, made.settings, 12, made.simulate, spread))
+
+    here = run("here", one_after_the_other)
+    assert run("one", lambda batches: study_spread.over_cores(batches, 1)) == here
+    assert run("two", lambda batches: study_spread.over_cores(batches, 2)) == here
+    with distributed.LocalCluster(
+        n_workers=2, threads_per_worker=1, dashboard_address=None
+    ) as cluster:
+        address = cluster.scheduler_address
+        assert run("dask", lambda batches: study_spread.over_cluster(batches, address)) == here

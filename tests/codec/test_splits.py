@@ -1,0 +1,44 @@
+"""Verification sets: sizes, seeds, refusals."""
+
+import numpy as np
+import pytest
+
+from elastocal.codec import CodecOptions, make_splits, split_sizes
+from elastocal.errors import CodecError
+from elastocal.planning.search import Candidates, Cover
+
+
+@pytest.mark.parametrize(
+    ("poses", "ratio", "sizes"),
+    [(31, 70 / 30, (22, 9)), (43, 70 / 30, (30, 13)), (3, 70 / 30, (2, 1)), (10, 1.0, (5, 5))],
+)
+def test_sizes_are_those_of_the_spec(poses, ratio, sizes):
+    assert split_sizes(poses, ratio) == sizes
+
+
+@pytest.mark.parametrize(("poses", "ratio"), [(3, 0.1), (10, 100.0), (1, 1.0)])
+def test_a_side_without_a_pose_is_refused_with_the_numbers(poses, ratio):
+    with pytest.raises(CodecError, match=rf"{poses} poses split .* at least 1 of each"):
+        split_sizes(poses, ratio)
+
+
+@pytest.mark.parametrize("ratio", [0.0, -1.0, np.inf, np.nan])
+def test_a_ratio_that_is_none_is_refused(ratio):
+    with pytest.raises(CodecError, match="ratio"):
+        CodecOptions(ratio=ratio)
+
+
+def test_each_set_is_a_cover_set_of_its_own_seed_and_training_is_the_rest():
+    contact = np.random.default_rng(0).normal(size=(12, 3))
+    splits = make_splits(contact, None, 4)
+    assert [split.seed_pose for split in splits] == list(range(12))
+    for split in splits:
+        wanted = Cover(first=split.seed_pose).search(Candidates(contact), 4).order
+        assert split.verification.tolist() == wanted.tolist()
+        assert sorted([*split.verification, *split.training]) == list(range(12))
+
+
+@pytest.mark.parametrize("count", [0, 13, -1])
+def test_more_sets_than_poses_are_refused(count):
+    with pytest.raises(CodecError, match=rf"{count} splits .* from 1 to the 12 poses"):
+        make_splits(np.random.default_rng(0).normal(size=(12, 3)), count, 4)

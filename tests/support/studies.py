@@ -1,0 +1,55 @@
+"""A small study without a cell: settings, and a stand-in for the simulator."""
+
+import numpy as np
+
+from elastocal.codec.study import (
+    Accuracy,
+    Condition,
+    ConditionRecord,
+    Outcome,
+    Purpose,
+    Sample,
+    SampleResult,
+    SpringRecord,
+    StudySettings,
+)
+
+SPRINGS = (SpringRecord(name="joint_1.axial", unit="rad/(N*m)"),)
+
+
+def settings(*poses: int, **changes: object) -> StudySettings:
+    """Return the settings of a study of some pose counts."""
+    conditions = tuple(ConditionRecord.of(Condition(poses=count)) for count in poses or (5, 10))
+    values = {
+        "cell": "cell",
+        "cell_fingerprint": "a" * 64,
+        "simulation_fingerprint": "b" * 64,
+        "seed": 3,
+        "pool": 100,
+        "verification": 20,
+        "load_cases": ("normal",),
+        "conditions": conditions,
+        "springs": {"bearing": SPRINGS},
+        "versions": {"elastocal": "0"},
+    }
+    return StudySettings(**(values | changes))
+
+
+def simulate(sample: Sample) -> SampleResult:
+    """Return numbers that only the sample's own generators decide."""
+    error = sample.generator(Purpose.ERRORS).uniform(1e-5, 9e-5, 2)
+    compliance = sample.generator(Purpose.TRUTH).uniform(1e-7, 2e-7, (2, 1))
+    outcomes = tuple(
+        Outcome(Accuracy(float(e), float(3 * e), 1e-3), np.array(c))
+        for e, c in zip(error, compliance, strict=True)
+    )
+    return SampleResult(sample.number, outcomes)
+
+
+def numbers(results: object) -> list[tuple[object, ...]]:
+    """Return results as plain numbers, to be compared bit for bit."""
+    return [
+        (result.number, each.accuracy, tuple(each.compliance.tolist()))
+        for result in results  # type: ignore[attr-defined]
+        for each in result.outcomes
+    ]
