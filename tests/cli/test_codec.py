@@ -35,6 +35,22 @@ def test_arrays_and_figures_are_written_and_printed(data, tmp_path):
     assert str(data) in arrays.provenance
 
 
+def test_pictures_and_indices_are_written_when_asked_for(data, tmp_path):
+    out = tmp_path / "c"
+    result = elastocal("codec", data, "--out", out, "--indices", "--per-axis", "--splits", "4")
+    assert result.code == 0, result.err
+    names = {path.name for path in out.iterdir()}
+    figures = {
+        f"{name}.{kind}"
+        for name in ("codec", "codec-x", "compliances", "indices")
+        for kind in ("svg", "png")
+    }
+    assert names >= figures | {"codec.html", "indices.csv"}
+    kept = json.loads((out / "codec.json").read_text())["indices"]
+    assert {each["index"] for each in kept} >= {"o1", "i", "covering_radius"}
+    assert {each["kind"] for each in kept} == {"growth", "size", "size_and_split"}
+
+
 def test_without_a_comparison_the_default_stands_alone(data, tmp_path):
     result = elastocal("codec", data, "--out", tmp_path / "c", "--splits", "3")
     assert result.code == 0, result.err

@@ -59,6 +59,15 @@ def codec(  # noqa: PLR0913 - one parameter an option
             " a length.",
         ),
     ] = "5 %, 5 um",
+    indices: Annotated[
+        bool,
+        typer.Option(
+            "--indices", help="Correlate observability indices and covering radius with accuracy."
+        ),
+    ] = False,
+    per_axis: Annotated[
+        bool, typer.Option("--per-axis", help="Also print the errors along x, y and z.")
+    ] = False,
     jobs: Annotated[
         int | None, typer.Option(min=1, help="Processes; default: all cores for long work.")
     ] = None,
@@ -80,6 +89,7 @@ def codec(  # noqa: PLR0913 - one parameter an option
     from elastocal.cli.robot_source import find_robot
     from elastocal.cli.selection import without
     from elastocal.codec import CodecOptions, cross_validate, judge, make_variants, verdict_record
+    from elastocal.codec.insight import look_into
     from elastocal.codec.verdict_file import VERDICTS, figures
     from elastocal.files import filling
 
@@ -89,20 +99,23 @@ def codec(  # noqa: PLR0913 - one parameter an option
     measured = datasets.read(data)
     arm = find_robot(robot, tcp, tool, measured)
     readings = without(measured.readings(arm.joint_names), exclude or [])
+    offset = measured.marker if marker is None else parse_point(marker)
     with filling(out, VERDICTS, force) as folder, progress_bars(console()) as report:
         found = cross_validate(
             arm,
             readings,
             variants,
             options,
-            marker_offset=measured.marker if marker is None else parse_point(marker),
+            marker_offset=offset,
             provenance=f"{data}; {measured.provenance}" if measured.provenance else str(data),
             jobs=jobs,
             report=report,
         )
         verdicts = judge(found, near)
-        names = write_codec_folder(folder, found, verdicts)
-    record = verdict_record(found, verdicts)
+        insight = look_into(arm, readings, found, marker_offset=offset, with_indices=indices)
+        record = verdict_record(found, verdicts, insight.correlations)
+        axes = ("x", "y", "z") if per_axis else ()
+        names = write_codec_folder(folder, found, verdicts, record, insight, axes)
     if as_json:
         print_json({"folder": str(out), "files": names, **figures(record)})
     else:

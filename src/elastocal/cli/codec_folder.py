@@ -1,11 +1,23 @@
 """The files of a codec's folder."""
 
+from collections.abc import Sequence
 from pathlib import Path
 
-from elastocal.codec import CodecData, Verdicts, verdict_record, write_codec, write_verdicts
+from elastocal.codec import CodecData, Verdicts, write_codec, write_verdicts
+from elastocal.codec.index_file import write_index_table
+from elastocal.codec.insight import Insight
+from elastocal.codec.verdict_file import VerdictRecord
+from elastocal.report.codec_figures import write_codec_figures
 
 
-def write_codec_folder(folder: Path, data: CodecData, verdicts: Verdicts) -> list[str]:
+def write_codec_folder(
+    folder: Path,
+    data: CodecData,
+    verdicts: Verdicts,
+    record: VerdictRecord,
+    insight: Insight,
+    axes: Sequence[str] = (),
+) -> list[str]:
     """Write everything that a codec leaves behind; return the names of the files.
 
     Parameters
@@ -14,13 +26,20 @@ def write_codec_folder(folder: Path, data: CodecData, verdicts: Verdicts) -> lis
         An existing folder.
     data : CodecData
         The arrays.
-    verdicts : Verdicts
-        What they say.
+    verdicts, record : Verdicts, VerdictRecord
+        What they say, and its file.
+    insight : Insight
+        What the readings tell beyond; its indices are written if there are any.
+    axes : sequence of str
+        Axes of which a printed figure is wanted beside that of the norm.
 
     Raises
     ------
     FileAccessError
         If a file cannot be written.
     """
-    paths = [write_codec(folder, data), write_verdicts(folder, verdict_record(data, verdicts))]
+    paths = [write_codec(folder, data), write_verdicts(folder, record)]
+    if insight.indices:
+        paths.append(write_index_table(folder, data, insight.indices))
+    paths += write_codec_figures(folder, data, verdicts, insight, axes)
     return [path.name for path in paths]

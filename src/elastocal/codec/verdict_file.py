@@ -1,12 +1,15 @@
 """Verdict file ``codec.json``: the figures of a codec, for people's scripts (spec section 4)."""
 
 import json
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from elastocal.codec.data import CodecData
+from elastocal.codec.index_correlation import Correlation
+from elastocal.codec.index_file import IndexRecord, index_records
 from elastocal.codec.overlap import Overlap
 from elastocal.codec.variants import KEYS
 from elastocal.codec.verdicts import Verdicts
@@ -93,13 +96,17 @@ class VerdictRecord(StrictModel):
     saturation_interval: dict[str, SaturationRecord]
     paired: tuple[PairRecord, ...]
     crossings: tuple[CrossingRecord, ...]
+    indices: tuple[IndexRecord, ...] = ()
+    """Where they were asked for."""
     sentences: tuple[str, ...]
     findings: tuple[str, ...]
     versions: dict[str, str]
 
 
-def verdict_record(data: CodecData, verdicts: Verdicts) -> VerdictRecord:
-    """Return the figures of a codec and its verdicts."""
+def verdict_record(
+    data: CodecData, verdicts: Verdicts, correlations: Sequence[Correlation] = ()
+) -> VerdictRecord:
+    """Return the figures of a codec, its verdicts, and correlations of indices if there are."""
     return VerdictRecord(
         robot=data.robot,
         provenance=data.provenance,
@@ -117,6 +124,7 @@ def verdict_record(data: CodecData, verdicts: Verdicts) -> VerdictRecord:
             CrossingRecord(**{name: getattr(each, name) for name in CrossingRecord.model_fields})
             for each in verdicts.pairs
         ),
+        indices=index_records(correlations),
         sentences=verdicts.sentences,
         findings=data.findings,
         versions=data.versions,
