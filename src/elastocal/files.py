@@ -7,10 +7,12 @@ half a file (spec section 3).
 
 import contextlib
 import hashlib
+import json
 import os
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 from elastocal.errors import FileAccessError
 
@@ -95,6 +97,19 @@ def write_text(path: Path, text: str) -> None:
     """Write ``text`` to ``path`` atomically, as UTF-8."""
     with replacing(path) as temporary:
         temporary.write_text(text, encoding="utf-8", newline="")
+
+
+def write_json(path: Path, data: Any) -> None:
+    """Write ``data`` to ``path`` atomically as JSON, one key or item a line.
+
+    Raises
+    ------
+    ValueError
+        If a number is not finite: JSON has no sign for it.
+    FileAccessError
+        If the file cannot be written.
+    """
+    write_text(path, json.dumps(data, indent=1, allow_nan=False) + "\n")
 
 
 def read_text(path: Path) -> str:

@@ -59,6 +59,39 @@ def test_sigterm_leaves_nothing_half_written(folder, tmp_path):
     assert not list(tmp_path.iterdir())
 
 
+DROPPED = """
+import os, signal, sys, time
+from elastocal.cli import main
+
+class Finalised:
+    def __del__(self):
+        os.kill(os.getpid(), signal.{name})
+        time.sleep(0.01)
+
+def work():
+    finalised = Finalised()
+    del finalised
+    time.sleep(10.0)
+    print("went on")
+
+main.app = work
+main.run()
+"""
+
+
+@pytest.mark.parametrize(("name", "code"), [("SIGTERM", 143), ("SIGINT", -signal.SIGINT)])
+def test_a_signal_that_arrives_in_a_finaliser_still_ends_the_command(name, code):
+    result = subprocess.run(
+        [sys.executable, "-c", DROPPED.format(name=name)],
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=60,
+    )
+    assert result.returncode == code
+    assert "went on" not in result.stdout
+
+
 def test_sigterm_is_handled_as_before_once_a_command_has_ended(tmp_path):
     before = signal.getsignal(signal.SIGTERM)
     elastocal("init", tmp_path / "cell")

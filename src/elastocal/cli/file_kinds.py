@@ -31,12 +31,8 @@ Described = tuple[str, Facts]
 """The kind of a file and what it holds."""
 Describe = Callable[[Path], Described]
 
-_PLAN = re.compile(r'"schema":\s*"elastocal\.plan/')
-_SUMMARY = re.compile(r'"schema":\s*"elastocal\.run-summary/')
-_TOOL = re.compile(r'"schema":\s*"elastocal\.tool/')
-_COMPENSATOR_LINE = re.compile(r"^schema:\s*[\"']?elastocal\.compensator/", re.MULTILINE)
-_CODEC = re.compile(r'"schema":\s*"elastocal\.codec_verdicts/')
-_SCHEMA_LINE = re.compile(r"^schema:\s*[\"']?elastocal\.cell/", re.MULTILINE)
+_IN_JSON = re.compile(r'"schema":\s*"(elastocal\.[\w-]+)/')
+_IN_YAML = re.compile(r"^schema:\s*[\"']?(elastocal\.[\w-]+)/", re.MULTILINE)
 
 
 def describe_file(path: Path) -> Described:
@@ -126,23 +122,25 @@ def _netcdf(path: Path) -> Described:
         stated = read_netcdf(path).attrs.get("schema")
     except DatasetError as error:
         raise DatasetError(f"{path}: {error}") from error
-    if str(stated).startswith("elastocal.codec/"):
-        return _codec(path)
-    return _pool(path) if str(stated).startswith("elastocal.pool/") else _dataset(path)
+    kinds: dict[str, Describe] = {"elastocal.codec": _codec, "elastocal.pool": _pool}
+    return kinds.get(str(stated).partition("/")[0], _dataset)(path)
 
 
 def _json(path: Path) -> Described:
     """Describe a JSON file by the schema that it states; what states none is read as a model."""
-    head = read_text(path)[:200]
-    for stated, describe in (
-        (_PLAN, _plan),
-        (_SUMMARY, _summary),
-        (_TOOL, _tool),
-        (_CODEC, _verdicts),
-    ):
-        if stated.search(head):
-            return describe(path)
-    return _model(path)
+    kinds: dict[str, Describe] = {
+        "elastocal.plan": _plan,
+        "elastocal.run-summary": _summary,
+        "elastocal.tool": _tool,
+        "elastocal.codec_verdicts": _verdicts,
+    }
+    return kinds.get(_stated(_IN_JSON, read_text(path)[:200]), _model)(path)
+
+
+def _stated(pattern: re.Pattern[str], text: str) -> str:
+    """Return the schema that a text states, without its version; empty when it states none."""
+    found = pattern.search(text)
+    return found[1] if found else ""
 
 
 def _dataset(path: Path) -> Described:
@@ -186,18 +184,20 @@ def _robot(path: Path) -> Described:
 
 def _settings(path: Path) -> Described:
     """Describe a YAML file by the schema that it states."""
-    text = read_text(path)
-    if _SCHEMA_LINE.search(text):
-        return _cell(path)
-    if _COMPENSATOR_LINE.search(text):
-        return _compensator(path)
+    kinds: dict[str, Describe] = {
+        "elastocal.cell": _cell,
+        "elastocal.compensator": _compensator,
+    }
+    return kinds.get(_stated(_IN_YAML, read_text(path)), _springs)(path)
+
+
+def _springs(path: Path) -> Described:
     file = read_springs(path)
-    facts = {
+    return "spring file", {
         "schema": "elastocal.springs/1",
         "include": file.include,
         "springs": len(file.springs),
     }
-    return "spring file", facts
 
 
 def _cell(path: Path) -> Described:

@@ -4,6 +4,7 @@ Exit codes: 0 done; 1 the work could not be done, with a one-line reason; 2 usag
 130 interrupted; 143 terminated. Commands import what they need when they run: help is quick.
 """
 
+import _thread
 import contextlib
 import os
 import signal
@@ -111,7 +112,11 @@ def _drop_output() -> None:
 
 @contextlib.contextmanager
 def _cleaned_up_when_terminated() -> Iterator[None]:
-    """Turn SIGTERM into an exit that leaves no half-written folder; `run` has its own way."""
+    """Turn SIGTERM into an exit that leaves no half-written folder; `run` has its own way.
+
+    Python drops what a signal raises while it runs a finaliser or a weak reference's callback,
+    of which every import has some. Such an exit or Ctrl-C is sent once more.
+    """
     if threading.current_thread() is not threading.main_thread():
         yield
         return
@@ -121,11 +126,29 @@ def _cleaned_up_when_terminated() -> Iterator[None]:
         signal.signal(number, signal.SIG_IGN)
         sys.exit(128 + number)
 
-    before = signal.signal(signal.SIGTERM, leave)
+    def again(dropped: "sys.UnraisableHookArgs") -> None:
+        if issubclass(dropped.exc_type, SystemExit):
+            signal.signal(signal.SIGTERM, leave)
+            _interrupt_soon(signal.SIGTERM)
+        elif issubclass(dropped.exc_type, KeyboardInterrupt):
+            _interrupt_soon(signal.SIGINT)
+        else:
+            reported(dropped)
+
+    before, reported = signal.signal(signal.SIGTERM, leave), sys.unraisablehook
+    sys.unraisablehook = again
     try:
         yield
     finally:
+        sys.unraisablehook = reported
         signal.signal(signal.SIGTERM, before)
+
+
+def _interrupt_soon(number: int) -> None:
+    """Send a signal when the finaliser that dropped the last one is over."""
+    timer = threading.Timer(0.05, _thread.interrupt_main, (number,))
+    timer.daemon = True
+    timer.start()
 
 
 def _complain(message: str) -> None:

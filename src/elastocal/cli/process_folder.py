@@ -1,7 +1,6 @@
 """The files and the table that ``elastocal simulate-process`` makes."""
 
 import csv
-import json
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -11,7 +10,7 @@ from rich.table import Table
 
 from elastocal.cli.process_bench import Outcome
 from elastocal.compensation.process.table import Comparison, Figures
-from elastocal.files import write_text
+from elastocal.files import write_json
 
 SCHEMA = "elastocal.process/1"
 LAST = "table.json"
@@ -61,7 +60,7 @@ def write_folder(
                 writer.writerows(
                     [seed, name, f"{t:.3f}", f"{1e3 * b:.6f}", f"{1e3 * a:.6f}"] for t, b, a in rows
                 )
-    write_text(folder / LAST, json.dumps(found, indent=1, allow_nan=False) + "\n")
+    write_json(folder / LAST, found)
 
 
 def show(

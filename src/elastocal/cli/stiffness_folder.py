@@ -1,6 +1,5 @@
 """The files that ``elastocal stiffness`` writes."""
 
-import json
 from pathlib import Path
 from typing import Any
 
@@ -9,7 +8,7 @@ import numpy as np
 from elastocal.cli.stiffness_answer import Answer
 from elastocal.compensation.offline.follow import jumps
 from elastocal.compensation.stiffness import Hold, directional, write_choice, write_survey
-from elastocal.files import write_text
+from elastocal.files import write_json
 from elastocal.identification import CalibratedModel
 from elastocal.report.stiffness_figures import Curve, write_stiffness_figure
 from elastocal.robot import Robot
@@ -41,7 +40,7 @@ def write_folder(folder: Path, calibrated: CalibratedModel, found: Answer) -> di
     figures = _figures(robot, found, curves) | {
         "files": [*(path.name for path in paths), "stiffness.json"]
     }
-    write_text(folder / "stiffness.json", json.dumps(figures, indent=1, allow_nan=False) + "\n")
+    write_json(folder / "stiffness.json", figures)
     return figures
 
 

@@ -16,9 +16,8 @@ from elastocal.codec.data import CodecData, SpringLabels
 from elastocal.codec.options import CodecOptions
 from elastocal.codec.training import AXES
 from elastocal.codec.variants import KEYS, Variant
-from elastocal.dataset.netcdf import read_netcdf, write_netcdf
-from elastocal.errors import CodecError, DatasetError, SchemaError
-from elastocal.schema import check_schema
+from elastocal.dataset.netcdf import read_stated, write_netcdf
+from elastocal.errors import CodecError, SchemaError
 
 SCHEMA = "elastocal.codec/1"
 ARRAYS = "codec.nc"
@@ -68,11 +67,7 @@ def read_codec(folder: Path) -> CodecData:
     """
     path = Path(folder)
     path = path / ARRAYS if path.is_dir() else path
-    try:
-        found = read_netcdf(path)
-    except DatasetError as error:
-        raise SchemaError(f"{path}: {error}") from error
-    check_schema(found.attrs.get("schema"), SCHEMA, str(path))
+    found = read_stated(path, SCHEMA)
     try:
         return _data_of(found)
     except (CodecError, KeyError, TypeError, ValueError) as error:

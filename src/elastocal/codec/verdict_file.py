@@ -1,6 +1,5 @@
 """Verdict file ``codec.json``: the figures of a codec, for people's scripts (spec section 4)."""
 
-import json
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -13,7 +12,7 @@ from elastocal.codec.index_file import IndexRecord, index_records
 from elastocal.codec.overlap import Overlap
 from elastocal.codec.variants import KEYS
 from elastocal.codec.verdicts import Verdicts
-from elastocal.files import write_text
+from elastocal.files import write_json
 from elastocal.schema import StrictModel, read_json
 
 SCHEMA = "elastocal.codec_verdicts/1"
@@ -145,7 +144,7 @@ def write_verdicts(folder: Path, record: VerdictRecord) -> Path:
         If it cannot be written.
     """
     path = Path(folder) / VERDICTS
-    write_text(path, json.dumps(figures(record), indent=1, allow_nan=False) + "\n")
+    write_json(path, figures(record))
     return path
 
 

@@ -5,8 +5,9 @@ from typing import Literal
 
 import xarray as xr
 
-from elastocal.errors import DatasetError, FileAccessError
+from elastocal.errors import DatasetError, FileAccessError, SchemaError
 from elastocal.files import replacing
+from elastocal.schema import check_schema
 
 _ENGINE: Literal["h5netcdf"] = "h5netcdf"
 _SIGNATURE = b"\x89HDF\r\n\x1a\n"
@@ -32,6 +33,24 @@ def read_netcdf(path: Path) -> xr.Dataset:
         # What the libraries raise for damaged files; their own text is the only diagnosis.
         reason = " ".join(str(error).split())
         raise DatasetError(f"not a readable NetCDF4 file: {reason}") from error
+
+
+def read_stated(path: Path, schema: str) -> xr.Dataset:
+    """Return the contents of a NetCDF4 file that states a schema, not validated otherwise.
+
+    Raises
+    ------
+    SchemaError
+        If it is not NetCDF4, or states another schema.
+    FileAccessError
+        If the file is missing, unreadable or empty.
+    """
+    try:
+        found = read_netcdf(path)
+    except DatasetError as error:
+        raise SchemaError(f"{path}: {error}") from error
+    check_schema(found.attrs.get("schema"), schema, str(path))
+    return found
 
 
 def write_netcdf(data: xr.Dataset, path: Path) -> None:

@@ -1,6 +1,5 @@
 """Model file ``*.json``: a calibrated model with its draws, observability and provenance."""
 
-import json
 from pathlib import Path
 from typing import Any
 
@@ -9,7 +8,7 @@ from pydantic import JsonValue
 
 from elastocal.elastic import ElasticModel, Spring
 from elastocal.errors import SchemaError
-from elastocal.files import sha256, write_text
+from elastocal.files import sha256, write_json
 from elastocal.identification.calibrated import CalibratedModel
 from elastocal.identification.observability import Observability, Term
 from elastocal.identification.options import MINIMUM_DRAWS
@@ -114,7 +113,7 @@ def write_model(path: Path, calibrated: CalibratedModel, calibration: dict[str, 
         calibration=calibration,
     )
     data = {"schema": SCHEMA, **record.model_dump(mode="json")}
-    write_text(path, json.dumps(data, indent=1, allow_nan=False) + "\n")
+    write_json(path, data)
 
 
 def read_model(path: Path) -> CalibratedModel:

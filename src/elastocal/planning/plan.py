@@ -10,6 +10,7 @@ from elastocal.cell import Cell
 from elastocal.errors import PlanningError
 from elastocal.planning.cell_checks import collision_scene, sight_check, torque_check
 from elastocal.planning.choice import Searched
+from elastocal.planning.gathering import STAGE as CANDIDATES
 from elastocal.planning.gathering import Gathered, gather
 from elastocal.planning.motion import (
     Mover,
@@ -19,7 +20,8 @@ from elastocal.planning.motion import (
     plan_route,
     refuse_blocked_home,
 )
-from elastocal.planning.plan_file import PlanFile
+from elastocal.planning.motion.route import STAGE as VISITING
+from elastocal.planning.plan_file import PlanFile, SpreadRecord
 from elastocal.planning.pool import Progress
 from elastocal.planning.pool_file import PoolData
 from elastocal.planning.postures import Postures
@@ -28,7 +30,7 @@ from elastocal.planning.search import Cover, Selection, technique
 from elastocal.planning.surface import Finding, Surface
 from elastocal.planning.tooling import cell_surface, surface_findings
 
-STAGES = ("surface", "candidates", "search", "visiting order")
+STAGES = ("surface", CANDIDATES, "search", VISITING)
 """What progress is told of, in this order."""
 _REPLACEMENTS = 10
 """Times that poses which no way leads to are replaced by others."""
@@ -81,20 +83,12 @@ def make_plan(
     mover = mover_for(cell, collision_scene(cell, surface))
     refuse_blocked_home(cell.home, mover)
     progress(STAGES[0], 1, 1)
-    gathered = gather(
-        cell, surface, for_points, jobs, lambda _, done, total: progress(STAGES[1], done, total)
-    )
+    gathered = gather(cell, surface, for_points, jobs, progress)
     _refuse_too_few(cell, gathered, findings)
     progress(STAGES[2], 0, 1)
     searched = Searched.of(cell, surface, gathered)
-    selection, route = _choose(
-        cell,
-        searched,
-        gathered,
-        mover,
-        for_search,
-        lambda _, done, total: progress(STAGES[3], done, total),
-    )
+    selection, route = _choose(cell, searched, gathered, mover, for_search, progress)
+    spread = searched.spread(selection.order)
     progress(STAGES[2], 1, 1)
     everyone = np.arange(len(searched.candidates))
     comparison = (
@@ -106,12 +100,13 @@ def make_plan(
         gathered,
         searched,
         selection,
+        spread,
         comparison,
         route,
         _stations(cell, surface, chosen),
         (
             *(finding.message for finding in findings),
-            *_notes(cell, gathered, searched, selection),
+            *_notes(cell, gathered, selection, spread),
         ),
     )
     return Planned(plan_record(decisions), pool_data(decisions), surface)
@@ -191,7 +186,7 @@ def _stations(cell: Cell, surface: Surface, chosen: Postures) -> tuple[str | Non
 
 
 def _notes(
-    cell: Cell, gathered: Gathered, searched: Searched, selection: Selection
+    cell: Cell, gathered: Gathered, selection: Selection, spread: SpreadRecord
 ) -> tuple[str, ...]:
     """Return what a user should know of how the poses were found, a line each."""
     search, pool = cell.file.search, gathered.pool
@@ -202,7 +197,7 @@ def _notes(
             f" {pool.sampled} points; most of the others were refused by {pool.bottleneck}:"
             f" {pool.advice}"
         )
-    radius = searched.spread(selection.order).covering_radius
+    radius = spread.covering_radius
     if search.d_max is not None and not radius <= search.d_max:
         notes.append(
             f"d_max of {1e3 * search.d_max:.4g} mm was not reached: the worst-covered candidate is"

@@ -14,7 +14,7 @@ from scipy.spatial.transform import Rotation
 
 from elastocal.arrays import FloatArray
 from elastocal.errors import SchemaError
-from elastocal.files import sha256, write_text
+from elastocal.files import sha256, write_json
 from elastocal.schema import StrictModel, read_json
 
 SCHEMA = "elastocal.plan/1"
@@ -238,7 +238,7 @@ def write_plan(folder: Path, plan: PlanFile) -> Path:
     path = Path(folder) / PLAN
     check_plan(plan, str(path))
     data = {"schema": SCHEMA, "sha256": content_hash(plan), **plan.model_dump(mode="json")}
-    write_text(path, json.dumps(data, indent=1, allow_nan=False) + "\n")
+    write_json(path, data)
     return path
 
 

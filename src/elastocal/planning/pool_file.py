@@ -12,10 +12,9 @@ import numpy as np
 import xarray as xr
 
 from elastocal.arrays import FloatArray, IndexArray
-from elastocal.dataset.netcdf import read_netcdf, write_netcdf
-from elastocal.errors import DatasetError, PlanningError, SchemaError
+from elastocal.dataset.netcdf import read_stated, write_netcdf
+from elastocal.errors import PlanningError, SchemaError
 from elastocal.planning.plan_file import POOL, PlanFile
-from elastocal.schema import check_schema
 
 SCHEMA = "elastocal.pool/1"
 NOT_CHOSEN = -1
@@ -127,11 +126,7 @@ def read_pool(folder: Path) -> PoolData:
     """
     path = Path(folder)
     path = path / POOL if path.is_dir() else path
-    try:
-        found = read_netcdf(path)
-    except DatasetError as error:
-        raise SchemaError(f"{path}: {error}") from error
-    check_schema(found.attrs.get("schema"), SCHEMA, str(path))
+    found = read_stated(path, SCHEMA)
     try:
         return _pool_of(found)
     except PlanningError as error:

@@ -23,6 +23,7 @@ from elastocal.planning.plan_file import (
     PoseRecord,
     RobotRecord,
     SearchRecord,
+    SpreadRecord,
     Vector,
 )
 from elastocal.planning.pool import REACH_ADVICE, Pool
@@ -39,6 +40,8 @@ class Decisions:
     searched: Searched
     selection: Selection
     """Numbers in the pool, in search order."""
+    spread: SpreadRecord
+    """How the selection lies in the pool."""
     comparison: Selection | None
     route: Route
     """Numbers in the selection, in visiting order."""
@@ -166,7 +169,7 @@ def _moves(route: Route) -> tuple[MoveRecord, ...]:
 
 def _search(made: Decisions) -> SearchRecord:
     search, selection = made.cell.file.search, made.selection
-    spread = made.searched.spread(selection.order)
+    spread = made.spread
     covers = selection if isinstance(selection, CoverSelection) else None
     place = np.empty(len(selection), dtype=np.intp)
     place[made.route.order] = np.arange(len(selection))

@@ -1,6 +1,5 @@
 """From a run folder's journal and raw streams to its dataset and summary."""
 
-import json
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,7 +11,7 @@ from elastocal.arrays import FloatArray
 from elastocal.cell import Cell
 from elastocal.dataset import Dataset, write
 from elastocal.errors import DatasetError, FileAccessError, ProcedureError, SchemaError
-from elastocal.files import write_text
+from elastocal.files import write_json
 from elastocal.planning.plan_file import PlanFile
 from elastocal.procedure.averaged_dataset import make_dataset
 from elastocal.procedure.copies import check_stream, read_copies
@@ -88,7 +87,7 @@ def write_derived(run: Path, derived: Derived) -> None:
     """
     folder = RunFolder(Path(run))
     write(derived.dataset, folder.dataset)
-    write_text(folder.summary, json.dumps(derived.summary, indent=1, allow_nan=False) + "\n")
+    write_json(folder.summary, derived.summary)
 
 
 def derive_poses(

@@ -19,11 +19,10 @@ from elastocal.codec.observed import Observed
 from elastocal.files import write_text
 from elastocal.report.codec_chart import PANELS, error_boxes, how_to_read
 from elastocal.report.codec_views import compliance_views, error_views
-from elastocal.report.html import embedded, template
+from elastocal.report.html import POLICY, embedded, template
 from elastocal.report.index_chart import check_indices
 from elastocal.report.index_names import KIND_TITLES, NAMES
 from elastocal.report.looks import looks_of
-from elastocal.report.plan_page import POLICY
 
 _MANY_PAIRS = 3
 """Pairs of variants from which on their verdicts fold."""

@@ -4,6 +4,11 @@ import importlib.resources
 import json
 from typing import Any
 
+POLICY = (
+    "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data: blob:"
+)
+"""What the page may load: nothing but what stands in it."""
+
 
 def embedded(data: dict[str, Any]) -> str:
     r"""Return JSON that no HTML parser takes for markup.

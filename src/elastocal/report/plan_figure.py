@@ -8,27 +8,18 @@ small distance from the edge and a small distance between neighbours.
 from pathlib import Path
 from typing import Any
 
-import matplotlib
 import numpy as np
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from elastocal.arrays import FloatArray
-from elastocal.errors import FileAccessError
-from elastocal.files import replacing
 from elastocal.planning.plan_file import PlanFile
 from elastocal.planning.pool_file import PoolData, check_pool_of
 from elastocal.planning.surface import Surface
 from elastocal.report import style
 from elastocal.report.flat_map import FlatMap, flat_map
 from elastocal.report.panel import WIDTH, Choice, draw_panel
+from elastocal.report.printed import new_figure, write_figure
 
-SUFFIXES = (".pdf", ".png", ".svg")
-_UNDATED: dict[str, dict[str, Any]] = {
-    ".svg": {"Date": None, "Creator": "elastocal"},
-    ".pdf": {"CreationDate": None, "Creator": "elastocal"},
-    ".png": {"Software": "elastocal"},
-}
 _HEAD, _FOOT, _SIDE = 0.7, 1.95, 0.25
 """Room above, below and beside the panels, in inches."""
 _FLATTEST, _TALLEST = 0.25, 1.3
@@ -54,17 +45,8 @@ def write_plan_figure(path: Path, surface: Surface, plan: PlanFile, pool: PoolDa
     FileAccessError
         If the suffix is another or the file cannot be written.
     """
-    path = Path(path)
-    suffix = path.suffix.lower()
-    if suffix not in SUFFIXES:
-        raise FileAccessError(
-            f"figure {path}: suffix {path.suffix!r} is not one of {', '.join(SUFFIXES)}"
-        )
     check_pool_of(plan, pool)
-    with matplotlib.rc_context(style.print_settings()), replacing(path) as temporary:
-        figure = plan_figure(surface, plan, pool)
-        figure.savefig(temporary, format=suffix[1:], dpi=200, metadata=_UNDATED[suffix])
-    return path
+    return write_figure(path, lambda: plan_figure(surface, plan, pool))
 
 
 def plan_figure(surface: Surface, plan: PlanFile, pool: PoolData) -> Figure:
@@ -74,8 +56,7 @@ def plan_figure(surface: Surface, plan: PlanFile, pool: PoolData) -> Figure:
     low, high = _extent(surface, flat)
     height = WIDTH * float((high - low)[1] / (high - low)[0])
     size = (len(choices) * (WIDTH + _SIDE) + _SIDE, _HEAD + height + _FOOT)
-    figure = Figure(size)
-    FigureCanvasAgg(figure)
+    figure = new_figure(*size)
     farthest = max(float(choice.distance(pool).max()) for choice in choices)
     dots = None
     for number, choice in enumerate(choices):

@@ -4,7 +4,6 @@ It holds all that it needs, the drawing library included, and asks the network f
 content security policy forbids it to.
 """
 
-import importlib.resources
 import json
 from html import escape
 from pathlib import Path
@@ -19,14 +18,10 @@ from elastocal.planning.plan_file import PlanFile, PoseRecord
 from elastocal.planning.pool_file import PoolData, check_pool_of
 from elastocal.planning.surface import Surface
 from elastocal.report.belongs import check_robot
+from elastocal.report.html import POLICY, embedded, template
 from elastocal.report.text import duration, millimetres, readable
 from elastocal.report.view import View, plan_view
 from elastocal.report.weakest import weakest
-
-POLICY = (
-    "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data: blob:"
-)
-"""What the page may load: nothing but what stands in it."""
 
 
 def write_plan_page(
@@ -61,11 +56,11 @@ def write_plan_page(
 def _page(view: View, plan: PlanFile, pool: PoolData) -> str:
     worst = weakest(pool).label
     made = f"{len(plan.poses)} poses chosen by {plan.search.name} for {plan.robot.name}"
-    return Template(_file("plan.html")).substitute(
+    return Template(template("plan.html")).substitute(
         policy=escape(POLICY),
         title=escape(f"Calibration plan: {plan.cell.name}"),
         subtitle=escape(f"{made}. Lengths in the base frame of the robot."),
-        css=_file("plan.css"),
+        css=template("plan.css"),
         figures="".join(_figure(name, value) for name, value in key_figures(plan)),
         findings=_findings(plan),
         last=len(plan.poses),
@@ -76,9 +71,9 @@ def _page(view: View, plan: PlanFile, pool: PoolData) -> str:
             f" (fingerprint {plan.cell.fingerprint[:12]}). Times are estimates."
             + "".join(f" {layer.note}" for layer in view.layers if layer.note)
         ),
-        data=_embedded(_data(view, plan, worst)),
+        data=embedded(_data(view, plan, worst)),
         plotly=get_plotlyjs(),
-        script=_file("plan.js"),
+        script=template("plan.js"),
     )
 
 
@@ -143,14 +138,3 @@ def _data(view: View, plan: PlanFile, worst: tuple[str, ...]) -> dict[str, Any]:
         "cameras": view.cameras,
         "postures": ["HOME", *poses],
     }
-
-
-def _embedded(data: dict[str, Any]) -> str:
-    """Return JSON that no HTML parser takes for markup."""
-    text = json.dumps(data, ensure_ascii=True, separators=(",", ":"), allow_nan=False)
-    return text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")
-
-
-def _file(name: str) -> str:
-    folder = importlib.resources.files(__package__).joinpath("templates")
-    return folder.joinpath(name).read_text(encoding="utf-8")

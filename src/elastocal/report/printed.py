@@ -14,9 +14,17 @@ from elastocal.report import style
 
 SUFFIXES = (".pdf", ".png", ".svg")
 _DPI = 200
+_UNDATED: dict[str, dict[str, Any]] = {
+    ".svg": {"Date": None, "Creator": "elastocal"},
+    ".pdf": {"CreationDate": None, "Creator": "elastocal"},
+    ".png": {"Software": "elastocal"},
+}
+"""No date, or the bytes of a figure would change."""
 
 
-def write_figure(path: Path, draw: Callable[[], Figure], title: str, description: str) -> Path:
+def write_figure(
+    path: Path, draw: Callable[[], Figure], title: str = "", description: str = ""
+) -> Path:
     """Write a figure, atomically; return its path.
 
     Parameters
@@ -25,7 +33,7 @@ def write_figure(path: Path, draw: Callable[[], Figure], title: str, description
         Its suffix decides the kind: SVG, PNG or PDF.
     draw : callable
         Returns the figure; called with the settings of print.
-    title, description : str
+    title, description : str, optional
         What it is and shows, for readers that cannot see it; kept in the file.
 
     Raises
@@ -63,10 +71,6 @@ def plain(text: str) -> str:
 
 
 def _notes(suffix: str, title: str, description: str) -> dict[str, Any]:
-    """Return what the file says about itself; no date, or its bytes would change."""
-    if suffix == ".pdf":
-        return {"Title": title, "Subject": description, "CreationDate": None}
-    said = {"Title": title, "Description": description}
-    if suffix == ".png":
-        return {**said, "Software": "elastocal"}
-    return {**said, "Creator": "elastocal", "Date": None}
+    """Return what the file says about itself; what is empty is left out."""
+    said = {"Title": title, "Subject" if suffix == ".pdf" else "Description": description}
+    return _UNDATED[suffix] | {key: text for key, text in said.items() if text}

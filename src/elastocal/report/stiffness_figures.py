@@ -9,24 +9,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from elastocal.arrays import FloatArray
 from elastocal.compensation.stiffness import Stations, Survey
-from elastocal.errors import FileAccessError
-from elastocal.files import replacing
 from elastocal.report import style
-
-SUFFIXES = (".pdf", ".png", ".svg")
-_UNDATED: dict[str, dict[str, Any]] = {
-    ".svg": {"Date": None, "Creator": "elastocal"},
-    ".pdf": {"CreationDate": None, "Creator": "elastocal"},
-    ".png": {"Software": "elastocal"},
-}
+from elastocal.report.printed import new_figure, write_figure
 
 _WIDTH, _MAP, _CURVES = 6.6, 2.3, 2.3
 """In inches: of the figure, height of a map and of the curves."""
@@ -74,16 +64,7 @@ def write_stiffness_figure(
     FileAccessError
         If the suffix is another or the file cannot be written.
     """
-    path = Path(path)
-    suffix = path.suffix.lower()
-    if suffix not in SUFFIXES:
-        raise FileAccessError(
-            f"figure {path}: suffix {path.suffix!r} is not one of {', '.join(SUFFIXES)}"
-        )
-    with matplotlib.rc_context(style.print_settings()), replacing(path) as temporary:
-        figure = stiffness_figure(title, stations, survey, curves)
-        figure.savefig(temporary, format=suffix[1:], dpi=200, metadata=_UNDATED[suffix])
-    return path
+    return write_figure(path, lambda: stiffness_figure(title, stations, survey, curves))
 
 
 def stiffness_figure(
@@ -93,8 +74,7 @@ def stiffness_figure(
     rail = survey.grid.external.shape[1] == 1 and len(survey.grid.external) > 1
     heights = [_MAP] * (1 + rail) + [_CURVES]
     size = (_WIDTH, _HEAD + sum(heights) + _BETWEEN * (len(heights) - 1) + _FOOT)
-    figure = Figure(size)
-    FigureCanvasAgg(figure)
+    figure = new_figure(*size)
     figure.text(0.5, 1.0 - 0.1 / size[1], title.replace("$", r"\$"), ha="center", va="top", size=11)
     boxes = _boxes(size, heights)
     axes = [figure.add_axes(box) for box in boxes]

@@ -2,7 +2,6 @@
 
 import csv
 import io
-import json
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
@@ -11,7 +10,7 @@ from elastocal.codec.study.samples import SampleResult
 from elastocal.codec.study.settings import StudySettings, written
 from elastocal.codec.study.summary import ConditionSummary, advice, summarise
 from elastocal.errors import CodecError
-from elastocal.files import write_text
+from elastocal.files import write_json, write_text
 from elastocal.schema import StrictModel, read_json
 
 SCHEMA = "elastocal.study/1"
@@ -109,7 +108,7 @@ def write_study(
     )
     write_text(folder / COMPLIANCES, _csv(header, table))
     contents = {"schema": SCHEMA, **record.model_dump(mode="json")}
-    write_text(folder / RECORD, json.dumps(contents, allow_nan=False, indent=1) + "\n")
+    write_json(folder / RECORD, contents)
     return [TABLE, COMPLIANCES, RECORD]
 
 

@@ -1,6 +1,5 @@
 """Tool file ``*.json``: what hangs on the sensor and how the sensor sits, with intervals."""
 
-import json
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -11,7 +10,7 @@ from elastocal.compensation.conditioning.tool_fit import ToolFit
 from elastocal.compensation.conditioning.tool_load import SensorLoad
 from elastocal.compensation.conditioning.tool_model import NAMES
 from elastocal.errors import CompensationError, nearest
-from elastocal.files import write_text
+from elastocal.files import write_json
 from elastocal.robot import Robot
 from elastocal.robot.inverse.frames import inverse_transform
 from elastocal.robot.urdf import parse_urdf
@@ -98,7 +97,7 @@ def tool_record(fit: ToolFit, mount: SensorMount, source: str) -> ToolRecord:
 def write_tool(path: Path, record: ToolRecord) -> None:
     """Write a tool file atomically."""
     data = {"schema": SCHEMA, **record.model_dump(mode="json")}
-    write_text(path, json.dumps(data, indent=1, allow_nan=False) + "\n")
+    write_json(path, data)
 
 
 def read_tool(path: Path) -> ToolRecord:
