@@ -8,7 +8,7 @@ or another cell count as unusable.
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TypeVar
 
 from elastocal import dataset as datasets
 from elastocal.cell import Cell, load_cell
@@ -22,7 +22,6 @@ from elastocal.files import read_text
 from elastocal.identification.model_file import read_model, read_record
 from elastocal.planning.plan_file import PLAN, POOL, PlanFile, read_plan
 from elastocal.planning.pool_file import PoolData, check_pool_of, read_pool
-from elastocal.planning.surface import Surface
 from elastocal.planning.tooling import cell_surface
 from elastocal.procedure.copies import file_sha256
 from elastocal.procedure.entries import Entry

@@ -20,7 +20,10 @@ def verdict_html(parts: Parts, verdict: Verdict) -> str:
     """Return the verdict as HTML."""
     again = parts.again
     unseen = again.unseen if again is not None and again.same else None
-    text = _light(verdict) + paragraph(verdict.sentence, "sentence")
+    text = _light(verdict)
+    if parts.simulated:
+        text += paragraph("A simulated cell: no real robot was measured.", "banner")
+    text += paragraph(verdict.sentence, "sentence")
     if unseen is not None:
         text += _figures(unseen)
     if verdict.reasons:
@@ -56,7 +59,7 @@ def _figures(unseen: Unseen) -> str:
         ]
     ) + paragraph(
         f"Every pose was left out of the fit once ({unseen.folds} refits) and predicted by the"
-        " others. Intervals: whole poses drawn with replacement. Of errors like these, one more"
-        f" pose would have a larger one than the largest here in at most 1 of {unseen.poses + 1}"
-        " cases.", "sub",
+        " others. Intervals: whole poses drawn with replacement. If one more pose were drawn"
+        " like these, the chance that its error is larger than the largest here is at most 1 in"
+        f" {unseen.poses + 1}.", "sub",
     )  # fmt: skip

@@ -49,7 +49,7 @@ def _counts(dataset: Dataset, summary: Figures | None) -> str:
     if summary is None:
         return html
     counts = summary["readings"]["counts"]
-    html += table("Readings by status", tuple(counts), [tuple(counts.values())], texts=0)
+    html += table("Readings by status", ("Status", "Readings"), list(counts.items()))
     lost = [
         f"pose {each['pose']} {each['load_case']}: {each['status']}"
         + (f" ({each['note']})" if each["note"] else "")
@@ -148,7 +148,7 @@ def _suspicious(parts: Parts) -> str:
         for each in found
     ]
     heads = ("Reading", "Off by", "Robust score", "Leverage", "What was done")
-    return heading("Suspicious readings") + table("Readings that look wrong", heads, rows)
+    return table("Readings that look wrong", heads, rows)
 
 
 def _worst(parts: Parts) -> str:
@@ -161,9 +161,7 @@ def _worst(parts: Parts) -> str:
         (f"pose {unseen.pose[k]} {unseen.load_case[k]}", mm(float(unseen.error[k]))) for k in order
     ]
     heads = ("Reading", "Error")
-    return heading("Where the model errs most") + table(
-        "Largest errors at left-out poses", heads, rows
-    )
+    return table("Largest errors, each at a left-out pose", heads, rows)
 
 
 def _of_run(parts: Parts) -> Iterator[Finding]:
