@@ -16,6 +16,7 @@ from elastocal.elastic.layouts import read_springs
 from elastocal.errors import DatasetError, RobotError, SchemaError
 from elastocal.files import read_text
 from elastocal.identification.model_file import read_model
+from elastocal.identification.recertification import read_comparison
 from elastocal.planning.plan_file import PLAN, read_plan
 from elastocal.planning.pool_file import read_pool
 from elastocal.procedure.journal import commits, read_journal
@@ -133,6 +134,7 @@ def _json(path: Path) -> Described:
         "elastocal.run-summary": _summary,
         "elastocal.tool": _tool,
         "elastocal.codec_verdicts": _verdicts,
+        "elastocal.comparison": _comparison,
     }
     return kinds.get(_stated(_IN_JSON, read_text(path)[:200]), _model)(path)
 
@@ -277,4 +279,17 @@ def _verdicts(path: Path) -> Described:
         "robot": record.robot,
         "variants": list(record.variants),
         "saturation": record.saturation,
+    }
+
+
+def _comparison(path: Path) -> Described:
+    record = read_comparison(path)
+    return "comparison of two calibrations", {
+        "schema": "elastocal.comparison/1",
+        "robot": record.robot,
+        "compared": len(record.springs),
+        "moved": list(record.moved),
+        "rows": 0 if record.deflection is None else record.deflection.rows,
+        "limit": record.limit,
+        "verdict": record.verdict,
     }

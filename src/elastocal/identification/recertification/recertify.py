@@ -7,12 +7,17 @@ from elastocal.arrays import FloatArray
 from elastocal.elastic.model import check_vectors
 from elastocal.errors import IdentificationError, SpringError
 from elastocal.identification.calibrated import CalibratedModel
+from elastocal.identification.recertification.caveats import caveats
 from elastocal.identification.recertification.comparable import common_springs
 from elastocal.identification.recertification.judgement import judge
 from elastocal.identification.recertification.result import Recertification
 from elastocal.identification.recertification.rows import compare_rows
-from elastocal.identification.recertification.springs import compare_springs
+from elastocal.identification.recertification.same_robot import (
+    check_same_robot,
+    outside_limits,
+)
 from elastocal.identification.recertification.spread import Spread
+from elastocal.identification.recertification.springs import compare_springs
 
 
 def recertify(
@@ -23,6 +28,7 @@ def recertify(
     moment: ArrayLike | None = None,
     *,
     limit: float | None = None,
+    names: tuple[str, str] = ("the old model", "the new model"),
 ) -> Recertification:
     """Compare two calibrations of one cell.
 
@@ -39,6 +45,8 @@ def recertify(
         Moment on the robot about the tcp in base, in N·m.
     limit : float, optional
         Largest change of predicted deflection that is accepted at these rows, in m.
+    names : tuple of str
+        What to call the models in a refusal.
 
     Raises
     ------
@@ -50,6 +58,11 @@ def recertify(
     """
     if limit is not None and not 0.0 < limit < np.inf:
         raise IdentificationError(f"limit {limit:g} m: a largest accepted change is above 0")
+    check_same_robot(old.model.robot, new.model.robot, names)
+    if _is_one(old, new):
+        raise IdentificationError(
+            f"{names[0]} and {names[1]} are one and the same calibration: nothing to compare"
+        )
     spread = Spread.of(old, new)
     loads = None if q is None else _checked(new, q, force, moment)
     deflection = None if loads is None else compare_rows(old, new, spread, *loads)
@@ -57,6 +70,10 @@ def recertify(
     springs = compare_springs(old, new, spread)
     common = [spring.name for spring in common_springs(old, new)]
     told = {term.spring for change in springs for term in change.terms}
+    only_old, only_new = (
+        tuple(name for name in each.model.spring_names if name not in common) for each in (old, new)
+    )
+    outside = 0 if loads is None else outside_limits(new.model.robot, loads[0])
     return Recertification(
         robot=new.model.robot.name,
         tcp=new.model.robot.tip,
@@ -64,14 +81,18 @@ def recertify(
         new_provenance=new.provenance,
         springs=springs,
         not_compared=tuple(name for name in common if name not in told),
-        only_old=tuple(name for name in old.model.spring_names if name not in common),
-        only_new=tuple(name for name in new.model.spring_names if name not in common),
+        only_old=only_old,
+        only_new=only_new,
         deflection=deflection,
         limit=limit,
         verdict=verdict,
         reason=reason,
-        notes=(),
+        notes=caveats(old, new, not only_old and not only_new, outside),
     )
+
+
+def _is_one(old: CalibratedModel, new: CalibratedModel) -> bool:
+    return np.array_equal(old.compliance, new.compliance) and np.array_equal(old.draws, new.draws)
 
 
 def _checked(

@@ -12,7 +12,7 @@ from elastocal.identification.observability import Term
 class Verdict(StrEnum):
     """The largest change of predicted deflection against a limit."""
 
-    PASS = "pass"  # noqa: S105 - the word, not a password
+    PASS = "pass"
     """The upper end of its interval is within the limit."""
     FAIL = "fail"
     """The lower end is beyond the limit."""
@@ -85,6 +85,8 @@ class DeflectionChange:
     """Lower end of the 95 % interval of each row's `size`, shape (row,), in m; not below 0."""
     high: FloatArray
     """Upper end, shape (row,), in m."""
+    old_share: FloatArray
+    """Part of the variance of `change` that the old calibration brings, shape (row,), 0 to 1."""
     mean: Estimate
     """Mean of `size` over the rows, in m."""
     largest: Estimate
@@ -131,14 +133,17 @@ class Recertification:
     verdict: Verdict | None
     """None without a limit, or without rows to judge it by."""
     reason: str
-    """One sentence: why this verdict, or why none; for `Verdict.UNDECIDED` what would decide."""
+    """One sentence: why this verdict, or why none; if undecided, what would decide."""
     notes: tuple[str, ...]
     """What a reader has to know beside the figures, a sentence each."""
 
     @property
     def same_springs(self) -> bool:
-        """Whether both models have the same springs; if not, a difference of one spring may come
-        from the others in its model rather than from the robot."""
+        """Whether both models have the same springs.
+
+        If not, a difference of one spring may come from the others in its model rather than
+        from the robot.
+        """
         return not self.only_old and not self.only_new
 
     @property

@@ -51,24 +51,23 @@ def compare_rows(
     """
     count = len(q)
     deflection = np.empty((2, count, 3))
-    below, above, scale = np.empty((3, count))
-    farthest = np.zeros(len(spread.first))
-    total = np.zeros(len(spread.first))
+    below, above, scale, share = np.empty((4, count))
+    farthest, total = np.zeros((2, len(spread.first)))
     for start in range(0, count, _CHUNK):
         rows = slice(start, start + _CHUNK)
         m = None if moment is None else moment[rows]
         blocks = [each.model.observation_blocks(q[rows], force[rows], m) for each in (old, new)]
-        for k, each in enumerate((old, new)):
-            deflection[k, rows] = blocks[k] @ each.compliance
+        deflection[0, rows] = blocks[0] @ old.compliance
+        deflection[1, rows] = blocks[1] @ new.compliance
         norms = np.linalg.norm(spread.noise(*blocks), axis=2)
         scale[rows] = np.sqrt(np.mean(np.square(norms), axis=0))
         below[rows] = np.percentile(norms, _ONE_SIDE, axis=0)
-        above[rows] = _NORMAL * _widest(blocks, spread)
-        farthest = np.maximum(farthest, _over(norms, scale[rows]).max(axis=1))
+        above[rows], share[rows] = _widest(blocks, spread)
+        farthest = np.maximum(farthest, over(norms, scale[rows]).max(axis=1))
         total += norms.sum(axis=1)
     size = np.linalg.norm(deflection[1] - deflection[0], axis=1)
+    high = size + _NORMAL * above
     t = np.percentile(farthest, _ONE_SIDE)
-    lowest = float(np.max(size - t * scale))
     off = float(np.percentile(total / count, 100.0 * CONFIDENCE))
     mean = float(size.mean())
     return DeflectionChange(
@@ -79,20 +78,31 @@ def compare_rows(
         old=deflection[0],
         new=deflection[1],
         low=np.maximum(size - below, 0.0),
-        high=size + above,
+        high=high,
+        old_share=share,
         mean=Estimate(mean, max(mean - off, 0.0), mean + off),
-        largest=Estimate(float(size.max()), max(lowest, 0.0), float(np.max(size + above))),
+        largest=Estimate(
+            float(size.max()), max(float(np.max(size - t * scale)), 0.0), float(high.max())
+        ),
     )
 
 
-def _widest(blocks: list[FloatArray], spread: Spread) -> FloatArray:
-    """Return the standard error in the direction in which it is largest, shape (row,)."""
-    covariance = sum(
-        O @ S @ np.swapaxes(O, -1, -2) for O, S in zip(blocks, spread.covariance(), strict=True)
-    )
-    return np.asarray(np.sqrt(np.maximum(np.linalg.eigvalsh(covariance)[:, -1], 0.0)))
+def _widest(blocks: list[FloatArray], spread: Spread) -> tuple[FloatArray, FloatArray]:
+    """Return the standard error in the direction in which it is largest, and the old one's part.
+
+    Both of shape (row,): in m, and as a part of the variance in that direction.
+    """
+    parts = [
+        rows @ S @ np.swapaxes(rows, -1, -2)
+        for rows, S in zip(blocks, spread.covariance(), strict=True)
+    ]
+    variance, axes = np.linalg.eigh(parts[0] + parts[1])
+    widest, axis = np.maximum(variance[:, -1], 0.0), axes[:, :, -1]
+    old = np.einsum("ri,rij,rj->r", axis, parts[0], axis)
+    share = over(old, widest)
+    return np.sqrt(widest), np.clip(share, 0.0, 1.0)
 
 
-def _over(norms: FloatArray, scale: FloatArray) -> FloatArray:
-    """Return norms over their scale; 0 where nothing varies."""
-    return np.divide(norms, scale, out=np.zeros_like(norms), where=scale > 0.0)
+def over(numbers: FloatArray, scale: FloatArray) -> FloatArray:
+    """Return numbers over their scale; 0 where the scale is 0."""
+    return np.divide(numbers, scale, out=np.zeros_like(numbers), where=scale > 0.0)
