@@ -10,10 +10,11 @@ _SHAPES = {
     Light.GREEN: '<circle cx="24" cy="24" r="21"/><path class="sign" d="M14 25l7 7 14-15"/>',
     Light.YELLOW: '<path d="M24 3L46 44H2z"/><path class="sign" d="M24 18v13M24 36v3"/>',
     Light.RED: (
-        '<path d="M15 3h18l12 12v18L33 45H15L3 33V15z"/><path class="sign" d="M16 16l16 16M32 16L16 32"/>'
+        '<path d="M15 3h18l12 12v18L33 45H15L3 33V15z"/>'
+        '<path class="sign" d="M16 16l16 16M32 16L16 32"/>'
     ),
 }
-"""Of the light: a disc with a tick, a triangle with an exclamation mark, an octagon with a cross."""
+"""Of the light: a disc with a tick, a triangle with a mark, an octagon with a cross."""
 
 
 def verdict_html(parts: Parts, verdict: Verdict) -> str:

@@ -87,7 +87,7 @@ def _findings(codec: Codec) -> Iterator[Finding]:
     else:
         yield Finding(
             f"the error no longer fell from {counted(best.n_train, 'training pose')} on"
-            f" ({best.variant}, 95 % interval {best.low} to {best.high}): more poses would not help",
+            f" ({best.variant}, 95 % interval {best.low} to {best.high}): more would not help",
             holds_back=False,
         )
 

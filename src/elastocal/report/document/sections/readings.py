@@ -64,8 +64,8 @@ def _residuals(again: Calibration) -> str:
     residual = np.linalg.norm(again.residual, axis=1)
     used = again.used
     told = (
-        f"Commanded displacement {mm(float(commanded.mean()))} on average, {mm(float(commanded.max()))}"
-        f" at most; residual of the fit {mm(float(residual[used].mean()))} on average,"
+        f"Commanded displacement {mm(float(commanded.mean()))} on average,"
+        f" {mm(float(commanded.max()))} at most; residual of the fit {mm(float(residual[used].mean()))} on average,"
         f" {mm(float(residual[used].max()))} at most ({counted(int(used.sum()), 'reading')} that"
         " were fitted, so not held out)"
     )
@@ -169,9 +169,9 @@ def _of_run(parts: Parts) -> Iterator[Finding]:
         missing = sorted({pose.id for pose in parts.plan.poses} - set(parts.dataset.poses))
         if missing:
             yield Finding(
-                f"the run is partial: {len(missing)} of {counted(len(parts.plan.poses), 'planned pose')}"
-                f" {'has' if len(missing) == 1 else 'have'} no reading (pose {spans(missing)})",
-                advice="Finish the run: `elastocal run --resume` measures the poses that are missing.",
+                f"the run is partial: {len(missing)} of"
+                f" {counted(len(parts.plan.poses), 'planned pose')} {'has' if len(missing) == 1 else 'have'} no reading (pose {spans(missing)})",
+                advice="Finish the run: `elastocal run --resume` measures the missing poses.",
             )
     lost = parts.summary["readings"]["not_ok"] if parts.summary else []
     if lost:
