@@ -152,7 +152,7 @@ def _options(settings: dict[str, Any]) -> FitOptions:
 
 
 def _same_deflections(calibration: Calibration, found: CalibratedModel) -> bool:
-    """Return whether both predict the same at the readings; single springs may not be determined."""
+    """Return whether both predict the same; single springs may not be determined."""
     readings = calibration.readings
     blocks = found.model.observation_blocks(
         readings.joint_position, readings.force, readings.moment
