@@ -195,6 +195,7 @@ class TestSelfTest:
             ("state->correction[i] *= share", "state->correction[i] *= 0.5", 3),
             ("state->z1[s][i] *= share", "state->z1[s][i] *= 1.0", 3),
             ("state->missed += 1", "state->missed += 2", 3),
+            ("1000.0 * correction[i]", "1001.0 * correction[i]", 3),
         ],
     )
     def test_a_change_of_the_code_is_found(self, folder, tmp_path, old, new, code):

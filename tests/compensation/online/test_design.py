@@ -6,7 +6,7 @@ import pytest
 from elastocal.compensation.online import design
 from elastocal.compensation.online.design import draws_factor
 from elastocal.errors import CompensationError
-from support.compensated import arm, settings
+from support.compensated import arm
 
 
 def test_the_factor_squared_is_the_draws_covariance():
