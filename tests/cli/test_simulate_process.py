@@ -7,7 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from elastocal.compensation.process.folder import read_process
+from elastocal.files import sha256
 from elastocal.identification import write_model
+from elastocal.planning.tooling import cell_surface
 from support.cli import elastocal
 from support.paths import made_up
 from support.simulated import example_cell
@@ -45,6 +48,36 @@ def test_it_writes_the_table_and_every_point_of_it(folder):
     assert before.mean() == pytest.approx(1e3 * line["before"]["mean"], abs=1e-6)
     assert after.max() == pytest.approx(1e3 * line["after"]["max"], abs=1e-6)
     assert line["reduction"]["mean"] == pytest.approx(1.0 - after.mean() / before.mean(), abs=1e-4)
+    (source,) = figures["runs"]
+    model = (folder / "model.json").read_text(encoding="utf-8")
+    assert source["model_sha256"] == sha256(model)
+    assert figures["settings"]["cycle"] == 0.004
+    assert not figures["budget"]
+
+
+def test_check_knows_the_table_and_the_folder(folder):
+    result = run(folder, "checked", "--seed", 4)
+    assert result.code == 0, result.err
+    for path in (folder / "checked/table.json", folder / "checked"):
+        told = json.loads(elastocal("check", path, "--json").out)
+        assert told["kind"] == "simulated process"
+        assert told["seeds"] == [4]
+    assert told["courses"] == 1
+
+
+def test_the_place_of_every_deviation_lies_on_the_course(folder):
+    result = run(folder, "placed", "--seed", 4)
+    assert result.code == 0, result.err
+    (trace,) = read_process(folder / "placed").traces
+    surface = cell_surface(example_cell("afp"))
+    some = trace.position[::50]
+    down = np.repeat(-surface.T_base_surface[None, :3, 2], len(some), axis=0)
+    hits, index, _ = surface.rays.ray.intersects_location(
+        some - 0.1 * down, down, multiple_hits=False
+    )
+    np.testing.assert_allclose(hits[np.argsort(index)], some, atol=1e-3)
+    steps = np.linalg.norm(np.diff(trace.position, axis=0), axis=1)
+    np.testing.assert_allclose(steps, 0.1 * 0.004, rtol=0.02)
 
 
 @pytest.mark.parametrize(

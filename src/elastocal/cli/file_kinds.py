@@ -10,6 +10,7 @@ from elastocal.cell import load_cell
 from elastocal.cli.cell_facts import cell_facts
 from elastocal.codec import read_codec, read_verdicts
 from elastocal.compensation.conditioning.tool_file import read_tool
+from elastocal.compensation.process.folder import TABLE, read_process, read_table
 from elastocal.compensation.settings import read_settings
 from elastocal.dataset.netcdf import read_netcdf
 from elastocal.elastic.layouts import read_springs
@@ -36,12 +37,12 @@ _IN_YAML = re.compile(r"^schema:\s*[\"']?(elastocal\.[\w-]+)/", re.MULTILINE)
 
 
 def describe_file(path: Path) -> Described:
-    """Return the kind of a file, or of the folder of a plan or a run, and what it holds.
+    """Return the kind of a file, or of a folder that a command made, and what it holds.
 
     Raises
     ------
     SchemaError
-        If the suffix is not one of ours, or a folder holds neither plan nor run.
+        If the suffix is not one of ours, or a folder holds nothing of ours.
     ElastocalError
         If the contents are not valid.
     """
@@ -64,12 +65,16 @@ def describe_file(path: Path) -> Described:
 
 
 def _folder(path: Path) -> Described:
-    """Describe the folder of a plan or of a run."""
+    """Describe the folder of a plan, of a run or of a simulated process."""
     if (path / PLAN).is_file():
         return _plan(path / PLAN)
     if (path / JOURNAL).is_file():
         return _run(path)
-    raise SchemaError(f"{path} is a folder with neither {PLAN} nor {JOURNAL} in it")
+    if (path / TABLE).is_file():
+        record = read_process(path)
+        kind, facts = _process(path / TABLE)
+        return kind, {**facts, "courses": len(record.traces)}
+    raise SchemaError(f"{path} is a folder with none of {PLAN}, {JOURNAL}, {TABLE} in it")
 
 
 def _run(path: Path) -> Described:
@@ -133,6 +138,7 @@ def _json(path: Path) -> Described:
         "elastocal.run-summary": _summary,
         "elastocal.tool": _tool,
         "elastocal.codec_verdicts": _verdicts,
+        "elastocal.process": _process,
     }
     return kinds.get(_stated(_IN_JSON, read_text(path)[:200]), _model)(path)
 
@@ -277,4 +283,18 @@ def _verdicts(path: Path) -> Described:
         "robot": record.robot,
         "variants": list(record.variants),
         "saturation": record.saturation,
+    }
+
+
+def _process(path: Path) -> Described:
+    table = read_table(path)
+    last = table.lines[-1]
+    return "simulated process", {
+        "schema": "elastocal.process/1",
+        "cell": table.cell,
+        "process": table.process,
+        "seeds": [run.seed for run in table.runs],
+        "points": last.points,
+        "mean_after": last.after.mean,
+        "max_after": last.after.max,
     }

@@ -2,8 +2,8 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from importlib.metadata import version
 from pathlib import Path
-from typing import Any
 
 from elastocal.cell import Cell
 from elastocal.cli.process_bench import (
@@ -11,18 +11,31 @@ from elastocal.cli.process_bench import (
     BUDGET,
     MACHINING_SETTINGS,
     Bench,
-    Outcome,
     Report,
     process_courses,
+    require_same_robot,
     run_effect,
     run_process,
 )
-from elastocal.cli.process_folder import figures
 from elastocal.compensation.conditioning.tool_file import read_tool, sensor_load
+from elastocal.compensation.process.record import ProcessRecord, Source, Table, lines_of
 from elastocal.compensation.process.table import Comparison, pooled
+from elastocal.compensation.process.trace import Trace
 from elastocal.compensation.settings import CompensatorSettings, read_settings
 from elastocal.errors import CompensationError
+from elastocal.files import read_text, sha256
 from elastocal.identification import read_model
+
+_PACKAGES = ("elastocal", "numpy", "scipy")
+
+
+@dataclass(frozen=True)
+class Run:
+    """What a line of the table is made with."""
+
+    seed: int
+    model: Path
+    tool: Path | None
 
 
 @dataclass(frozen=True)
@@ -31,36 +44,28 @@ class Question:
 
     cell: Cell
     process: str
-    runs: Sequence[tuple[int, Path | None, Path | None]]
-    """Seed, model and tool file of each line."""
+    runs: Sequence[Run]
     settings: Path | None = None
     courses: int | None = None
     budget: bool = False
 
 
-@dataclass(frozen=True, eq=False)
-class Answer:
-    """What was found."""
-
-    lines: tuple[Comparison, ...]
-    """One a seed; with several seeds a last one over all."""
-    budget: tuple[Comparison, ...]
-    outcomes: dict[int, Outcome]
-    figures: dict[str, Any]
-
-
-def paired(option: str, files: Sequence[Path], seeds: Sequence[int]) -> list[Path | None]:
-    """Return a file for each seed: none, the only one, or one each.
+def runs_of(models: Sequence[Path], tools: Sequence[Path], seeds: Sequence[int]) -> list[Run]:
+    """Return a run for each seed.
 
     Raises
     ------
     CompensationError
-        If there are as many as neither, or a seed is given twice.
+        If there are files for some seeds only, or a seed is given twice.
     """
     if len(set(seeds)) < len(seeds):
         raise CompensationError(f"--seed {', '.join(map(str, seeds))}: each seed counts once")
-    if not files:
-        return [None] * len(seeds)
+    each_model = _each("--model", models, seeds)
+    each_tool = _each("--tool", tools, seeds) if tools else [None] * len(seeds)
+    return [Run(*parts) for parts in zip(seeds, each_model, each_tool, strict=True)]
+
+
+def _each(option: str, files: Sequence[Path], seeds: Sequence[int]) -> list[Path]:
     if len(files) not in (1, len(seeds)):
         raise CompensationError(
             f"{option} is given {len(files)} times for {len(seeds)} seeds: give it once, or once"
@@ -69,7 +74,7 @@ def paired(option: str, files: Sequence[Path], seeds: Sequence[int]) -> list[Pat
     return [*files] * (len(seeds) // len(files))
 
 
-def answer(question: Question, report: Report) -> Answer:
+def answer(question: Question, report: Report) -> ProcessRecord:
     """Run the process for every seed.
 
     Raises
@@ -78,26 +83,63 @@ def answer(question: Question, report: Report) -> Answer:
         If the process is not known, the robot cannot follow, or the model is of another cell.
     """
     settings = _settings(question)
+    benches = [_bench(question.cell, settings, run) for run in question.runs]
     lines: list[Comparison] = []
-    outcomes: dict[int, Outcome] = {}
+    traces: list[Trace] = []
     budget: tuple[Comparison, ...] = ()
-    for seed, model, tool in question.runs:
-        assert model is not None  # the command demands it
-        calibrated = read_model(model)
-        load = None if tool is None else sensor_load(read_tool(tool), calibrated.model.robot)
-        bench = Bench(question.cell, calibrated, load, settings, seed)
-        courses = process_courses(question.process, question.cell, seed, question.courses)
-        outcomes[seed] = run_process(bench, courses, report)
-        lines.append(outcomes[seed].line(f"seed {seed}"))
+    for bench in benches:
+        courses = process_courses(question.process, question.cell, bench.seed, question.courses)
+        outcome = run_process(bench, courses, report)
+        lines.append(outcome.line(f"seed {bench.seed}"))
+        pairs = zip(outcome.before, outcome.after, strict=True)
+        traces += [Trace.of(bench.seed, before, after) for before, after in pairs]
         if question.budget and not budget:
             budget = tuple(
                 run_effect(bench, courses, effect, report).line(effect.name) for effect in BUDGET
             )
     if len(lines) > 1:
         lines.append(pooled("all seeds", lines))
-    facts = {"cell": question.cell.name, "process": question.process}
-    found = figures(facts, lines, budget)
-    return Answer(tuple(lines), budget, outcomes, found)
+    return ProcessRecord(_table(question, settings, lines, budget), tuple(traces))
+
+
+def _table(
+    question: Question,
+    settings: CompensatorSettings,
+    lines: Sequence[Comparison],
+    budget: Sequence[Comparison],
+) -> Table:
+    return Table(
+        cell=question.cell.name,
+        process=question.process,
+        runs=tuple(_source(run) for run in question.runs),
+        settings=settings.model_dump(mode="json"),
+        versions={name: version(name) for name in _PACKAGES},
+        lines=lines_of(lines),
+        budget=lines_of(budget),
+    )
+
+
+def _bench(cell: Cell, settings: CompensatorSettings, run: Run) -> Bench:
+    calibrated = read_model(run.model)
+    require_same_robot(cell, calibrated, str(run.model))
+    load = None
+    if run.tool is not None:
+        try:
+            load = sensor_load(read_tool(run.tool), calibrated.model.robot)
+        except CompensationError as error:
+            raise CompensationError(f"{run.tool}: {error}") from error
+    return Bench(cell, calibrated, load, settings, run.seed)
+
+
+def _source(run: Run) -> Source:
+    tool = run.tool
+    return Source(
+        seed=run.seed,
+        model=str(run.model),
+        model_sha256=sha256(read_text(run.model)),
+        tool=None if tool is None else str(tool),
+        tool_sha256=None if tool is None else sha256(read_text(tool)),
+    )
 
 
 def _settings(question: Question) -> CompensatorSettings:

@@ -136,7 +136,6 @@ def run_process(bench: Bench, courses: tuple[Course, ...], report: Report) -> Ou
     DeviceError, EquilibriumError
         If the cell cannot be simulated, or not under these forces.
     """
-    require_same_robot(bench.cell, bench.model)
     return _passages(bench, courses, lambda truth: _corrector(bench, courses, truth), report)
 
 
@@ -162,8 +161,8 @@ def run_effect(
     )
 
 
-def require_same_robot(cell: Cell, model: CalibratedModel) -> None:
-    """Refuse a model of another robot.
+def require_same_robot(cell: Cell, model: CalibratedModel, name: str) -> None:
+    """Refuse a model of another robot; ``name`` is its file.
 
     Raises
     ------
@@ -173,13 +172,13 @@ def require_same_robot(cell: Cell, model: CalibratedModel) -> None:
     robot, known = cell.robot, model.model.robot
     if known.joint_names != robot.joint_names:
         raise CompensationError(
-            f"the model's robot has the joints {', '.join(known.joint_names)}, the cell's"
-            f" {', '.join(robot.joint_names)}"
+            f"{name}: the model's robot has the joints {', '.join(known.joint_names)}, that of"
+            f" cell {cell.name} {', '.join(robot.joint_names)}"
         )
     apart = np.abs(known.forward(cell.home) - robot.forward(cell.home)).max()
     if not apart <= 1e-6:
         raise CompensationError(
-            f"the model's tool centre point lies {1e3 * apart:.3g} mm from that of cell"
+            f"{name}: the model's tool centre point lies {1e3 * apart:.3g} mm from that of cell"
             f" {cell.name} at HOME: it is a model of another cell or tool"
         )
 

@@ -40,26 +40,19 @@ def simulate_process(  # noqa: PLR0913 (a command has as many options as it has)
     """Run a process on the simulated cell without and with correction: how much is left."""
     from elastocal.cell import load_cell
     from elastocal.cli.output import console, print_json
-    from elastocal.cli.process_answer import Question, answer, paired
-    from elastocal.cli.process_folder import LAST, show, write_folder
+    from elastocal.cli.process_answer import Question, answer, runs_of
+    from elastocal.cli.process_table import show
     from elastocal.cli.progress import progress_bars
+    from elastocal.compensation.process.folder import TABLE, process_figures, write_process
     from elastocal.files import filling
 
-    seeds = seed or [0]
-    runs = list(
-        zip(
-            seeds,
-            paired("--model", model, seeds),
-            paired("--tool", tool or [], seeds),
-            strict=True,
-        )
-    )
+    runs = runs_of(model, tool or [], seed or [0])
     made = load_cell(cell)
-    with filling(out, LAST, force) as folder, progress_bars(console()) as report:
+    with filling(out, TABLE, force) as folder, progress_bars(console()) as report:
         found = answer(Question(made, process, runs, settings, courses, budget), report)
-        write_folder(folder, found.figures, found.lines, found.budget, found.outcomes)
+        write_process(folder, found)
     if as_json:
-        print_json(found.figures | {"folder": str(out)})
+        print_json(process_figures(found.table) | {"folder": str(out)})
     else:
-        show(console(), f"{made.name}, {process}", found.lines, found.budget)
+        show(console(), found.table)
         console().print(f"written to {out}")

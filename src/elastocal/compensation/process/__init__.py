@@ -9,6 +9,10 @@
 `correctors`   what corrects: the online compensator, or a perfect one with delay
 `loop`         cycle by cycle: readings, correction, delay, deviation
 `table`        mean, max and standard deviation; reduction
+`trace`        a course at every cycle: place, deviation before and after
+`record`       what it has come to, as a folder keeps it
+`deviations`   the traces in a CSV
+`folder`       written and read: `read_process`, `write_process`
 =============  ====================================================================
 
 Nothing here knows what the cell truly does: it comes in as a `loop.TrueCell`.

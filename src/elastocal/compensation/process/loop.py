@@ -98,6 +98,8 @@ class Passage:
     """Of the cycles, shape (cycle,), in s."""
     shift: FloatArray
     """Of the tool from the same path in the air, in base, shape (cycle, 3), in m."""
+    position: FloatArray
+    """Programmed tool centre point in base, shape (cycle, 3), in m."""
     deviation: FloatArray
     """The part of it that counts, signed, shape (cycle,), in m."""
 
@@ -237,7 +239,10 @@ def _readings(
 def _passage(course: Course, controller: Controller, cycles: int, shift: FloatArray) -> Passage:
     at = np.arange(1, len(shift) + 1) / cycles
     rows = np.arange(len(course.q))
-    direction = np.stack([np.interp(at, rows, course.direction[:, k]) for k in range(3)], axis=1)
-    deviation = np.einsum("ck,ck->c", shift, direction)
+
+    def between(values: FloatArray) -> FloatArray:
+        return np.stack([np.interp(at, rows, column) for column in values.T], axis=1)
+
+    deviation = np.einsum("ck,ck->c", shift, between(course.direction))
     time = np.arange(1.0, len(shift) + 1.0) * controller.cycle
-    return Passage(course, time, shift, deviation)
+    return Passage(course, time, shift, between(course.T_base_tcp[:, :3, 3]), deviation)
