@@ -98,7 +98,7 @@ def test_predict_adds_the_deflection_with_its_interval_and_keeps_the_rest(folder
     assert result.code == 0, result.err
     header = out.read_text().splitlines()[0].split(",")
     assert header[0] == "note"
-    assert header[-9:-6] == ["deflection_x[m]", "deflection_y[m]", "deflection_z[m]"]
+    assert header[-15:-12] == ["deflection_x[m]", "deflection_y[m]", "deflection_z[m]"]
     truth = unseen(linear_truth()).deflection
     found = columns(out, *(f"deflection_{axis}[m]" for axis in "xyz"))
     low = columns(out, *(f"deflection_{axis}_low[m]" for axis in "xyz"))
@@ -108,6 +108,18 @@ def test_predict_adds_the_deflection_with_its_interval_and_keeps_the_rest(folder
     )
     assert np.all(low < high)
     assert np.mean((low <= truth) & (truth <= high)) > 0.75
+    widest = columns(out, *(f"deflection_{axis}_measured_high[m]" for axis in "xyz"))
+    assert np.all(widest >= high)
+
+
+def test_predict_with_a_model_that_does_not_know_its_misfit_says_what_is_missing(folder):
+    data = json.loads((folder / "model.json").read_text()) | {"misfit": None}
+    (folder / "older.json").write_text(json.dumps(data))
+    out = folder / "older.csv"
+    result = elastocal("predict", folder / "older.json", folder / "rows.csv", "--out", out)
+    assert result.code == 0
+    assert "calibrate again" in result.err
+    assert "measured" not in out.read_text().splitlines()[0]
 
 
 def test_predict_reads_degrees_and_kilonewtons_by_their_header(folder):

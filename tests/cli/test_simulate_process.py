@@ -15,7 +15,7 @@ from support.cli import elastocal
 from support.paths import made_up
 from support.simulated import example_cell
 
-FILES = {"table.json", "table.csv", "deviations.csv"}
+FILES = {"table.json", "table.csv", "deviations.csv", "path.csv"}
 
 
 @pytest.fixture(scope="module")
@@ -78,6 +78,23 @@ def test_the_place_of_every_deviation_lies_on_the_course(folder):
     np.testing.assert_allclose(hits[np.argsort(index)], some, atol=1e-3)
     steps = np.linalg.norm(np.diff(trace.position, axis=0), axis=1)
     np.testing.assert_allclose(steps, 0.1 * 0.004, rtol=0.02)
+
+
+def test_its_programmed_path_is_one_that_compensate_takes(folder):
+    result = run(folder, "programme", "--seed", 2)
+    assert result.code == 0, result.err
+    path, corrected = folder / "programme/path.csv", folder / "corrected.csv"
+    result = elastocal("compensate", folder / "model.json", path, "--out", corrected, "--json")
+    assert result.code == 0, result.err
+    tables = []
+    for name in (path, corrected):
+        with name.open() as file:
+            tables.append(list(csv.DictReader(file)))
+    programmed, left = tables
+    assert json.loads(result.out)["rows"] == len(programmed)
+    assert [row["time[s]"] for row in programmed] == [row["time[s]"] for row in left]
+    pressed = [np.hypot(*(float(row[f"force_{a}[N]"]) for a in "xy")) for row in programmed]
+    assert max(pressed) > 100.0
 
 
 @pytest.mark.parametrize(

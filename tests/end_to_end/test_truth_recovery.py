@@ -57,6 +57,18 @@ def test_the_truth_that_was_planted_is_never_reproduced_exactly():
     assert calibration.residual_norm.mean() > 1e-8
 
 
+@pytest.mark.parametrize("arm", [linear_truth, rich_truth])
+def test_intervals_of_a_measurement_hold_what_is_measured_at_poses_of_another_campaign(arm):
+    inside = []
+    for seed in range(4):
+        calibration = fitted(Cell(arm(), seed=seed))
+        other = Cell(arm(), seed=30_000 + seed).readings()
+        found = calibration.calibrated.predict(other.joint_position, other.force)
+        low, high = found.measured_low, found.measured_high
+        inside.append((low <= other.deflection) & (other.deflection <= high))
+    assert 0.92 < np.mean(inside) < 0.985
+
+
 @pytest.mark.slow
 def test_95_percent_intervals_cover_about_95_percent_of_200_campaigns():
     truth = unseen(linear_truth())

@@ -52,6 +52,31 @@ def test_held_out_errors_exceed_those_of_the_fit():
     assert leave_poses_out(problem).mean > fit
 
 
+def test_the_misfit_is_what_95_percent_of_the_errors_along_an_axis_stay_below():
+    problem, _ = noisy(blocks=8)
+    found = leave_poses_out(problem)
+    predicted = np.einsum("rin,rn->ri", problem.O, found.compliance[found.fold])
+    shares = [
+        abs(value) / np.sqrt(sum(predicted[row] ** 2))
+        for row in range(len(predicted))
+        for value in predicted[row] - problem.d[row]
+    ]
+    above = sum(share > found.misfit for share in shares)
+    assert above / len(shares) < 0.05
+    assert (above + 2) / (len(shares) + 1) > 0.05
+    assert any(share == pytest.approx(found.misfit, rel=1e-12) for share in shares)
+
+
+def test_the_misfit_of_too_few_errors_is_not_known():
+    found = leave_poses_out(noisy(blocks=8)[0])
+    assert np.isnan(replace(found, share=found.share[:6]).misfit)
+
+
+def test_the_misfit_where_nothing_is_predicted_is_not_known():
+    found = leave_poses_out(noisy(blocks=8)[0])
+    assert np.isnan(replace(found, share=np.full_like(found.share, np.inf)).misfit)
+
+
 def test_mean_and_max_are_those_of_the_errors():
     found = leave_poses_out(noisy(blocks=4)[0])
     assert (found.mean, found.max) == (found.error.mean(), found.error.max())

@@ -78,6 +78,21 @@ def test_it_predicts_the_same(path):
         np.testing.assert_array_equal(getattr(after, field.name), getattr(before, field.name))
 
 
+def test_a_file_that_does_not_know_its_misfit_has_no_interval_of_a_measurement(path, tmp_path):
+    data = json.loads(path.read_text())
+    del data["misfit"]
+    (tmp_path / "older.json").write_text(json.dumps(data))
+    assert np.isnan(read_model(tmp_path / "older.json").misfit)
+
+
+@pytest.mark.parametrize("value", [-0.1, 1e999])
+def test_a_misfit_that_is_no_share_is_refused(path, tmp_path, value):
+    data = json.loads(path.read_text()) | {"misfit": value}
+    (tmp_path / "edited.json").write_text(json.dumps(data))
+    with pytest.raises(SchemaError, match="misfit"):
+        read_model(tmp_path / "edited.json")
+
+
 def test_a_model_written_again_is_the_same_file(path, tmp_path):
     again = tmp_path / "again.json"
     write_model(again, read_model(path), summary(calibration()))

@@ -9,8 +9,9 @@ from elastocal.cell.description import Cell
 from elastocal.errors import FileAccessError
 from elastocal.robot.mesh_files import is_relative
 
-RUN_SECTIONS = ("procedure", "devices", "simulation", "faults")
-"""Sections of the cell file that say how a plan is carried out; a plan does not depend on them."""
+RUN_SECTIONS = ("acceptance", "procedure", "devices", "simulation", "faults")
+"""Sections of the cell file that say how a plan is carried out and its result is judged; a plan
+does not depend on them."""
 
 
 def fingerprint(cell: Cell) -> str:

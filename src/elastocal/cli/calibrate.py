@@ -61,7 +61,7 @@ def calibrate(  # noqa: PLR0913 - one parameter an option
     from elastocal.cli.output import console, print_json, refuse_overwriting
     from elastocal.cli.parsing import parse_bounds, parse_point
     from elastocal.cli.robot_source import find_robot
-    from elastocal.cli.selection import without
+    from elastocal.dataset.selection import without
     from elastocal.elastic import ElasticModel, layout
     from elastocal.identification import FitOptions, summary, write_model
     from elastocal.identification import calibrate as identify
@@ -89,6 +89,19 @@ def calibrate(  # noqa: PLR0913 - one parameter an option
         provenance=f"{data}; {measured.provenance}" if measured.provenance else str(data),
     )
     figures = summary(calibration)
+    # With these a report makes the calibration again and sees whether it comes out the same.
+    figures["settings"] = {
+        "springs": springs,
+        "loss": loss,
+        "weights": weights,
+        "bounds": bounds,
+        "marker": None if marker is None else list(parse_point(marker)),
+        "exclude": exclude or [],
+        "keep_blunders": keep_blunders,
+        "trust_conventions": trust_conventions,
+        "draws": draws,
+        "seed": seed,
+    }
     write_model(out, calibration.calibrated, figures)
     if as_json:
         print_json(figures)

@@ -1,4 +1,4 @@
-"""``elastocal demo``: a calibration on a simulated cell, from readings to predictions."""
+"""``elastocal demo``: the whole story on a simulated cell, command by command."""
 
 from pathlib import Path
 from typing import Annotated
@@ -7,11 +7,35 @@ import typer
 
 
 def demo(
-    out: Annotated[Path, typer.Option(help="Folder for the results.")] = Path("demo"),
+    kind: Annotated[
+        str,
+        typer.Argument(
+            metavar="afp|machining", help="Fibre placement on a dome, or roughing of a block."
+        ),
+    ] = "afp",
+    out: Annotated[Path, typer.Option(metavar="DIR", help="Folder for the results.")] = Path(
+        "demo"
+    ),
+    *,
     seed: Annotated[int, typer.Option(min=0, help="Seed of the simulated cell.")] = 0,
+    force: Annotated[
+        bool, typer.Option("--force", help="Remove an earlier demo from the folder first.")
+    ] = False,
 ) -> None:
-    """Calibrate a simulated KUKA KR 120 HA and predict deflections at poses it has not seen."""
-    from elastocal.cli.demo_cell import run_demo
+    """Show the whole story on a simulated cell: from an empty folder to a signed-off report."""
+    from elastocal.cli.demo_display import display
+    from elastocal.cli.demo_folder import LOG, begin, finish
+    from elastocal.cli.demo_story import chapters, closing_lines
     from elastocal.cli.output import console
 
-    run_demo(console(), out, seed)
+    story = chapters(kind, out, seed)
+    begin(out, kind, force)
+    screen = console()
+    with display(screen, out / LOG, story) as tell:
+        for chapter in story:
+            code = tell(chapter)
+            if code:
+                raise typer.Exit(code)
+    finish(out, kind, seed, story)
+    for line in closing_lines(out):
+        screen.print(line, soft_wrap=True, markup=False)

@@ -26,6 +26,7 @@ from elastocal.cli.export import export
 from elastocal.cli.init import init
 from elastocal.cli.plan import plan
 from elastocal.cli.predict import predict
+from elastocal.cli.report import report
 from elastocal.cli.robots import robots
 from elastocal.cli.run import run as run_procedure
 from elastocal.cli.simulate_process import simulate_process
@@ -57,6 +58,7 @@ COMMANDS: dict[str, Callable[..., None]] = {
     "stiffness": stiffness,
     "export": export,
     "simulate-process": simulate_process,
+    "report": report,
     "demo": demo,
 }
 """In the order in which help lists them: that of the work."""

@@ -1,7 +1,10 @@
 """Where output goes: people read standard error, programs read standard output."""
 
+import contextlib
 import json
 import sys
+from collections.abc import Iterator
+from contextvars import ContextVar
 from pathlib import Path
 from typing import Any
 
@@ -9,10 +12,22 @@ from rich.console import Console
 
 from elastocal.errors import FileAccessError
 
+_CONSOLE: ContextVar[Console | None] = ContextVar("console", default=None)
+
 
 def console() -> Console:
     """Return the console that people read; standard output stays free for data."""
-    return Console(stderr=True, highlight=False, soft_wrap=False)
+    return _CONSOLE.get() or Console(stderr=True, highlight=False, soft_wrap=False)
+
+
+@contextlib.contextmanager
+def printing_to(listener: Console) -> Iterator[None]:
+    """Have commands print for people on another console meanwhile."""
+    token = _CONSOLE.set(listener)
+    try:
+        yield
+    finally:
+        _CONSOLE.reset(token)
 
 
 def refuse_overwriting(out: Path, *inputs: Path) -> None:

@@ -14,7 +14,7 @@ def predict(
         bool, typer.Option("--json", help="Print a summary as one JSON object.")
     ] = False,
 ) -> None:
-    """Predict the deflection of each row, with its 95 % interval."""
+    """Predict the deflection of each row, with 95 % intervals of the fit and of a measurement."""
     import numpy as np
 
     from elastocal.cli.output import console, print_json, refuse_overwriting
@@ -26,11 +26,17 @@ def predict(
     robot = calibrated.model.robot
     loads = read_load_rows(rows, joint_dimensions(robot.joint_names, robot.revolute))
     prediction = calibrated.predict(loads.joint_position, loads.force, loads.moment)
-    parts = (
+    known = bool(np.isfinite(calibrated.misfit))
+    parts = [
         ("", prediction.deflection),
         ("_low", prediction.low),
         ("_high", prediction.high),
-    )
+    ]
+    if known:
+        parts += [
+            ("_measured_low", prediction.measured_low),
+            ("_measured_high", prediction.measured_high),
+        ]
     added = {
         f"deflection_{axis}{suffix}[m]": values[:, index]
         for suffix, values in parts
@@ -38,7 +44,11 @@ def predict(
     }
     write_load_rows(out, loads, added)
     norms = np.linalg.norm(prediction.deflection, axis=1)
-    figures = {"rows": len(norms), "deflection": {"mean": norms.mean(), "max": norms.max()}}
+    figures = {
+        "rows": len(norms),
+        "deflection": {"mean": norms.mean(), "max": norms.max()},
+        "misfit": calibrated.misfit if known else None,
+    }
     if as_json:
         print_json(figures)
     else:
@@ -48,3 +58,9 @@ def predict(
             markup=False,
             soft_wrap=True,
         )
+        if not known:
+            console().print(
+                "Note: the model does not know its errors at left-out poses, so that there are no"
+                " intervals of what would be measured; calibrate again to have them",
+                soft_wrap=True,
+            )

@@ -18,6 +18,7 @@ from elastocal.cli.process_bench import (
     run_process,
 )
 from elastocal.compensation.conditioning.tool_file import read_tool, sensor_load
+from elastocal.compensation.process.course import Course
 from elastocal.compensation.process.record import ProcessRecord, Source, Table, lines_of
 from elastocal.compensation.process.table import Comparison, pooled
 from elastocal.compensation.process.trace import Trace
@@ -50,6 +51,15 @@ class Question:
     budget: bool = False
 
 
+@dataclass(frozen=True, eq=False)
+class Answer:
+    """What was found."""
+
+    record: ProcessRecord
+    programme: tuple[Course, ...]
+    """What was programmed, with the forces of the first seed."""
+
+
 def runs_of(models: Sequence[Path], tools: Sequence[Path], seeds: Sequence[int]) -> list[Run]:
     """Return a run for each seed.
 
@@ -74,7 +84,7 @@ def _each(option: str, files: Sequence[Path], seeds: Sequence[int]) -> list[Path
     return [*files] * (len(seeds) // len(files))
 
 
-def answer(question: Question, report: Report) -> ProcessRecord:
+def answer(question: Question, report: Report) -> Answer:
     """Run the process for every seed.
 
     Raises
@@ -87,8 +97,10 @@ def answer(question: Question, report: Report) -> ProcessRecord:
     lines: list[Comparison] = []
     traces: list[Trace] = []
     budget: tuple[Comparison, ...] = ()
+    programme: tuple[Course, ...] = ()
     for bench in benches:
         courses = process_courses(question.process, question.cell, bench.seed, question.courses)
+        programme = programme or courses
         outcome = run_process(bench, courses, report)
         lines.append(outcome.line(f"seed {bench.seed}"))
         pairs = zip(outcome.before, outcome.after, strict=True)
@@ -99,7 +111,8 @@ def answer(question: Question, report: Report) -> ProcessRecord:
             )
     if len(lines) > 1:
         lines.append(pooled("all seeds", lines))
-    return ProcessRecord(_table(question, settings, lines, budget), tuple(traces))
+    record = ProcessRecord(_table(question, settings, lines, budget), tuple(traces))
+    return Answer(record, programme)
 
 
 def _table(

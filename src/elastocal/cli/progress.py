@@ -2,12 +2,31 @@
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from typing import TextIO
 
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
 Report = Callable[[str, int, int], None]
 """Told a stage, how much of it is done and how much there is."""
+
+
+class Overheard(Console):
+    """A console that writes to a file while somebody else shows the progress.
+
+    Parameters
+    ----------
+    report : callable
+        Told what a bar would show.
+    file : TextIO
+        Takes what is printed.
+    width : int
+        Columns.
+    """
+
+    def __init__(self, report: Report, file: TextIO, width: int) -> None:
+        super().__init__(file=file, width=width, highlight=False, force_terminal=False)
+        self.report = report
 
 
 @contextmanager
@@ -19,6 +38,9 @@ def progress_bars(console: Console) -> Iterator[Report]:
     console : Console
         Where bars are drawn when it is a terminal.
     """
+    if isinstance(console, Overheard):
+        yield console.report
+        return
     bars = Progress(
         TextColumn("{task.description}"),
         BarColumn(),

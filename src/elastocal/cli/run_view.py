@@ -1,5 +1,6 @@
 """Live view of a run: one line that changes on a terminal, a line a reading elsewhere."""
 
+import abc
 import contextlib
 import threading
 import time
@@ -10,6 +11,7 @@ from rich.console import Console
 from rich.live import Live
 from rich.text import Text
 
+from elastocal.cli.progress import Overheard
 from elastocal.procedure.progress import Progress
 
 REFRESH = 0.1
@@ -49,7 +51,7 @@ def watching(console: Console, count: int) -> Iterator[Callable[[Progress], None
     count : int
         Number of poses.
     """
-    screen = _Terminal(console, count) if console.is_terminal else _Lines(console)
+    screen = _screen(console, count)
     screen.start()
     try:
         yield screen.tell
@@ -57,7 +59,13 @@ def watching(console: Console, count: int) -> Iterator[Callable[[Progress], None
         screen.close()
 
 
-class _Screen(threading.Thread):
+def _screen(console: Console, count: int) -> "_Screen":
+    if isinstance(console, Overheard):
+        return _Told(console, count)
+    return _Terminal(console, count) if console.is_terminal else _Lines(console)
+
+
+class _Screen(threading.Thread, abc.ABC):
     """Writes reports that wait to be written.
 
     Parameters
@@ -109,9 +117,9 @@ class _Screen(threading.Thread):
             if closed:
                 return
 
+    @abc.abstractmethod
     def show(self, said: Progress) -> None:
         """Write one report."""
-        raise NotImplementedError
 
 
 class _Terminal(_Screen):
@@ -146,6 +154,18 @@ class _Lines(_Screen):
 
     def show(self, said: Progress) -> None:
         self._console.print(progress_text(said), soft_wrap=True, markup=False)
+
+
+class _Told(_Lines):
+    """Lines in a log, while another display shows how far the run is."""
+
+    def __init__(self, console: Overheard, count: int) -> None:
+        super().__init__(console)
+        self._report, self._count = console.report, count
+
+    def show(self, said: Progress) -> None:
+        super().show(said)
+        self._report("poses measured", said.number - 1, self._count)
 
 
 def _leave_off() -> None:

@@ -44,15 +44,20 @@ def simulate_process(  # noqa: PLR0913 (a command has as many options as it has)
     from elastocal.cli.process_table import show
     from elastocal.cli.progress import progress_bars
     from elastocal.compensation.process.folder import TABLE, process_figures, write_process
+    from elastocal.compensation.process.programme import PROGRAMME, write_programme
+    from elastocal.dataset.load_rows import joint_dimensions
     from elastocal.files import filling
 
     runs = runs_of(model, tool or [], seed or [0])
     made = load_cell(cell)
     with filling(out, TABLE, force) as folder, progress_bars(console()) as report:
         found = answer(Question(made, process, runs, settings, courses, budget), report)
-        write_process(folder, found)
+        units = joint_dimensions(made.robot.joint_names, made.robot.revolute)
+        write_programme(folder / PROGRAMME, found.programme, units)
+        write_process(folder, found.record)
+    table = found.record.table
     if as_json:
-        print_json(process_figures(found.table) | {"folder": str(out)})
+        print_json(process_figures(table) | {"folder": str(out)})
     else:
-        show(console(), found.table)
+        show(console(), table)
         console().print(f"written to {out}")

@@ -18,14 +18,19 @@ _CHUNK = 2000
 
 @dataclass(frozen=True)
 class Prediction:
-    """Predicted deflections with their 95 % intervals (bootstrap draws of the model)."""
+    """Predicted deflections with 95 % intervals: of the fit, and of what would be measured."""
 
     deflection: FloatArray
     """Real minus commanded tcp position in base, shape (row, 3), in m."""
     low: FloatArray
-    """Lower ends, shape (row, 3), in m."""
+    """Lower ends of what another campaign would predict (bootstrap draws), shape (row, 3), in m."""
     high: FloatArray
-    """Upper ends, shape (row, 3), in m."""
+    """Upper ends of that, shape (row, 3), in m."""
+    measured_low: FloatArray
+    """Lower ends of what would be measured, shape (row, 3), in m: with what the springs cannot
+    express, and the noise of a measurement. NaN where the model does not know its misfit."""
+    measured_high: FloatArray
+    """Upper ends of that, shape (row, 3), in m."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,6 +45,9 @@ class CalibratedModel:
     observability: Observability
     provenance: str = ""
     """Where the data came from."""
+    misfit: float = float("nan")
+    """Share of a predicted deflection that 95 % of the errors along an axis stayed below at
+    left-out poses; NaN: not known. See `HeldOut.misfit`."""
 
     def __post_init__(self) -> None:
         for name in ("compliance", "draws"):
@@ -88,4 +96,14 @@ class CalibratedModel:
             blocks = self.model.observation_blocks(q[rows], force[rows], m)
             result[0, rows] = blocks @ self.compliance
             result[1:, rows] = interval(np.moveaxis(blocks @ self.draws.T, -1, 0))
-        return Prediction(*result)
+        deflection, low, high = result
+        return Prediction(deflection, low, high, *self._measured(deflection, low, high))
+
+    def _measured(
+        self, deflection: FloatArray, low: FloatArray, high: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """Widen the intervals of the fit by the misfit, as independent errors add up."""
+        error = self.misfit * np.linalg.norm(deflection, axis=1, keepdims=True)
+        # The point estimate may lie outside the draws when a spring is at its bound.
+        below, above = np.maximum(deflection - low, 0.0), np.maximum(high - deflection, 0.0)
+        return deflection - np.hypot(below, error), deflection + np.hypot(above, error)

@@ -115,6 +115,7 @@ def calibrate(
         # A prior makes nothing observable: what was believed before is not measured.
         observability(factor(weighted.without_prior()), model.springs),
         provenance,
+        held_out.misfit,
     )
     offset = force_offset(model, readings.take(used), weighted, solution.compliance, marker_offset)
     reach = max(attainable_rank(model, marker_offset), calibrated.observability.rank)

@@ -27,6 +27,24 @@ class HeldOut:
     """Which refit predicted each reading, shape (reading,)."""
     compliance: FloatArray
     """Compliances of each refit, shape (fold, spring)."""
+    share: FloatArray
+    """Size of the error along each axis as a share of the predicted deflection's norm, shape
+    (reading, 3); infinite where no deflection was predicted."""
+
+    @property
+    def misfit(self) -> float:
+        """Share of the predicted deflection that 95 % of the errors along an axis stay below.
+
+        It holds what no springs of the layout can express, and measurement noise with it. The
+        quantile is the one of split-conformal prediction, which counts the next error too (V.
+        Vovk, A. Gammerman and G. Shafer, "Algorithmic Learning in a Random World", 2005). NaN
+        where there are too few errors for it, or too many without a deflection.
+        """
+        sizes = np.sort(self.share, axis=None)
+        rank = int(np.ceil(0.95 * (len(sizes) + 1)))
+        if rank > len(sizes) or not np.isfinite(sizes[rank - 1]):
+            return float("nan")
+        return float(sizes[rank - 1])
 
     @property
     def mean(self) -> float:
@@ -72,7 +90,9 @@ def leave_poses_out(problem: Problem) -> HeldOut:
     compliance = PoseGrams.of(problem).refit(kept.astype(float))
     fold = fold_of_block[index]
     predicted = np.einsum("rin,rn->ri", problem.O, compliance[fold])
-    return HeldOut(np.linalg.norm(predicted - problem.d, axis=1), fold, compliance)
+    error, norm = predicted - problem.d, np.linalg.norm(predicted, axis=1, keepdims=True)
+    share = np.divide(np.abs(error), norm, out=np.full_like(error, np.inf), where=norm > 0.0)
+    return HeldOut(np.linalg.norm(error, axis=1), fold, compliance, share)
 
 
 def compare(

@@ -64,6 +64,8 @@ class ModelRecord(StrictModel):
     draws: tuple[tuple[float, ...], ...]
     observability: ObservabilityRecord
     provenance: str
+    misfit: float | None = None
+    """See `CalibratedModel.misfit`; none where it is not known, as in files of elastocal 0.1.0."""
     calibration: dict[str, JsonValue]
     """The figures of the calibration that made the model; see `summary`."""
 
@@ -110,6 +112,7 @@ def write_model(path: Path, calibrated: CalibratedModel, calibration: dict[str, 
             ),
         ),
         provenance=calibrated.provenance,
+        misfit=calibrated.misfit if np.isfinite(calibrated.misfit) else None,
         calibration=calibration,
     )
     data = {"schema": SCHEMA, **record.model_dump(mode="json")}
@@ -136,6 +139,8 @@ def read_model(path: Path) -> CalibratedModel:
     for name, rows in (("compliance", (record.compliance,)), ("draws", record.draws)):
         if any(len(row) != n for row in rows) or not rows:
             raise SchemaError(f"{path}: {name} must have one number for each of {n} springs")
+    if record.misfit is not None and not 0.0 <= record.misfit < np.inf:
+        raise SchemaError(f"{path}: misfit {record.misfit:g} must be 0 or more")
     seen = record.observability
     if len(seen.observable) != n or not 0 <= seen.rank <= n:
         raise SchemaError(f"{path}: observability (rank {seen.rank}) does not fit {n} springs")
@@ -155,6 +160,7 @@ def read_model(path: Path) -> CalibratedModel:
             ),
         ),
         record.provenance,
+        float("nan") if record.misfit is None else record.misfit,
     )
 
 

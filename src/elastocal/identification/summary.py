@@ -92,6 +92,7 @@ def _held_out(held_out: HeldOut) -> dict[str, Any]:
         "max": held_out.max,
         "readings": len(held_out.error),
         "folds": held_out.folds,
+        "misfit": held_out.misfit if np.isfinite(held_out.misfit) else None,
         "split": "leave-poses-out",
     }
 

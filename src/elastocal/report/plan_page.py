@@ -71,9 +71,9 @@ def _page(view: View, plan: PlanFile, pool: PoolData) -> str:
             f" (fingerprint {plan.cell.fingerprint[:12]}). Times are estimates."
             + "".join(f" {layer.note}" for layer in view.layers if layer.note)
         ),
-        data=embedded(_data(view, plan, worst)),
+        data=embedded(view_data(view, plan, pool)),
         plotly=get_plotlyjs(),
-        script=template("plan.js"),
+        script=template("view.js") + template("plan.js"),
     )
 
 
@@ -117,8 +117,17 @@ def _row(plan: PlanFile, pose: PoseRecord, worst: str) -> str:
     return f"<tr>{first}{''.join(f'<td>{escape(cell)}</td>' for cell in cells)}</tr>"
 
 
-def _data(view: View, plan: PlanFile, worst: tuple[str, ...]) -> dict[str, Any]:
-    """Return what the script reads."""
+def view_data(view: View, plan: PlanFile, pool: PoolData) -> dict[str, Any]:
+    """Return what the script of a page reads to show a view.
+
+    Parameters
+    ----------
+    view : View
+        From `plan_view`.
+    plan, pool : PlanFile, PoolData
+        That it shows.
+    """
+    worst = weakest(pool).label
     layers, start = [], 0
     for layer in view.layers:
         traces = list(range(start, start + len(layer.traces)))

@@ -49,7 +49,7 @@ def write_figure(
         )
     with matplotlib.rc_context(style.print_settings()), replacing(path) as temporary:
         draw().savefig(
-            temporary, format=suffix[1:], dpi=_DPI, metadata=_notes(suffix, title, description)
+            temporary, format=suffix[1:], dpi=_DPI, metadata=notes(suffix, title, description)
         )
     return path
 
@@ -70,7 +70,7 @@ def plain(text: str) -> str:
     return text.replace("$", r"\$")
 
 
-def _notes(suffix: str, title: str, description: str) -> dict[str, Any]:
+def notes(suffix: str, title: str = "", description: str = "") -> dict[str, Any]:
     """Return what the file says about itself; what is empty is left out."""
     said = {"Title": title, "Subject" if suffix == ".pdf" else "Description": description}
     return _UNDATED[suffix] | {key: text for key, text in said.items() if text}

@@ -5,6 +5,7 @@ from typing import Any
 
 from pydantic import Field, field_validator
 
+from elastocal.cell.description.acceptance import Acceptance
 from elastocal.cell.description.devices import DeviceNames
 from elastocal.cell.description.engagement import Engagement
 from elastocal.cell.description.faults import Fault
@@ -56,6 +57,8 @@ class CellFile(StrictModel):
     """Required: where HOME is safe is not guessed."""
     search: Search = Field(default_factory=Search)
     process: ProcessFile | None = None
+    acceptance: Acceptance = Field(default_factory=Acceptance)
+    """What the result is judged by; neither plan nor run depends on it."""
     procedure: ProcedureSettings = Field(default_factory=ProcedureSettings)
     devices: DeviceNames = Field(default_factory=DeviceNames)
     simulation: Simulation = Field(default_factory=Simulation)

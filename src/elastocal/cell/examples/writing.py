@@ -29,6 +29,20 @@ EXAMPLES = {
 """Fibre placement on a dome section, and machining of a block: the paper's two case studies."""
 
 
+def check_like(like: str) -> None:
+    """Refuse the name of an example that there is not.
+
+    Raises
+    ------
+    SchemaError
+        Which lists the examples.
+    """
+    if like not in EXAMPLES:
+        raise SchemaError(
+            f"no example cell {like!r}{nearest(like, EXAMPLES)} (examples: {', '.join(EXAMPLES)})"
+        )
+
+
 def write_example(folder: Path, like: str, force: bool = False) -> tuple[Path, ...]:
     """Write an example cell and return the paths of its files, the cell file first.
 
@@ -48,10 +62,7 @@ def write_example(folder: Path, like: str, force: bool = False) -> tuple[Path, .
     FileAccessError
         If a file is there already, or the folder cannot be written.
     """
-    if like not in EXAMPLES:
-        raise SchemaError(
-            f"no example cell {like!r}{nearest(like, EXAMPLES)} (examples: {', '.join(EXAMPLES)})"
-        )
+    check_like(like)
     example = EXAMPLES[like]
     paths = (folder / CELL_FILE, *(folder / name for name in example.meshes))
     for path in paths:

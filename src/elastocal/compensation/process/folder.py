@@ -5,6 +5,7 @@
 ``table.csv``       the same lines for a spreadsheet, in mm and %
 ``budget.csv``      the error budget, where it was asked for
 ``deviations.csv``  a row a cycle: seed, course, time, place, deviation
+``path.csv``        the programmed path with its expected forces: `programme`
 ==================  ==============================================================
 """
 

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from elastocal.dataset import Readings
+from elastocal.dataset.readings import Readings
 from elastocal.errors import DatasetError, nearest
 
 

@@ -1,0 +1,82 @@
+"""The folder of a demo: made, emptied when it holds an earlier one, explained at the end."""
+
+import shutil
+from collections.abc import Sequence
+from pathlib import Path
+
+from elastocal import __version__
+from elastocal.cli.demo_story import Chapter
+from elastocal.errors import FileAccessError
+from elastocal.files import write_text
+
+LOG = "log.txt"
+README = "README.md"
+_FIRST = "# A demo of elastocal"
+"""How a README begins that tells an earlier demo from somebody's own folder."""
+
+_FILES = (
+    ("report.html", "the report: open it in a browser; it needs no network"),
+    ("cell.yaml", "the cell: robot, tool, sensor, trackers, tooling, load cases, limits"),
+    ("plan/plan.html", "the chosen poses in three dimensions; plan.json holds them for programs"),
+    ("run/", "cell and plan as used, journal, raw streams (.mcap), dataset.nc, summary.json"),
+    ("model.json", "the calibrated model: compliances, their bootstrap draws, what is observable"),
+    ("tool.json", "mass, centre of mass, sensor bias and rotation, from the unloaded poses"),
+    ("codec/", "were there enough poses: one folder a comparison, with codec.html"),
+    ("process/", "the process without and with correction in real time: the paper's Table 1"),
+    ("process/path.csv", "the programmed path with the forces that are expected"),
+    ("corrected.csv", "the same path, corrected offline"),
+    ("c/", "C99 of the model and its compensator, for the real-time target"),
+    (LOG, "every command as it was given, and what it printed"),
+)
+
+
+def begin(out: Path, kind: str, force: bool) -> None:
+    """Make the folder, without an earlier demo.
+
+    Raises
+    ------
+    FileAccessError
+        If it holds files, unless they are those of a demo and ``force`` is given.
+    """
+    try:
+        holds = sorted(entry.name for entry in out.iterdir()) if out.exists() else []
+        if holds:
+            _refuse_foreign(out, holds, force)
+            shutil.rmtree(out)
+        out.mkdir(parents=True)
+        # Written first: a demo that is interrupted can be removed like a finished one.
+        write_text(out / README, f"{_FIRST}: {kind}\n\nNot finished.\n")
+    except OSError as error:
+        if isinstance(error, FileAccessError):
+            raise
+        raise FileAccessError(f"cannot use folder {out}: {error.strerror or error}") from error
+
+
+def finish(out: Path, kind: str, seed: int, story: Sequence[Chapter]) -> None:
+    """Write what each file is, and how to make all of them again.
+
+    Raises
+    ------
+    FileAccessError
+        If it cannot be written.
+    """
+    rows = "".join(f"| [{name}]({name}) | {text} |\n" for name, text in _FILES)
+    commands = "".join(f"{chapter.line}\n" for chapter in story)
+    write_text(
+        out / README,
+        f"{_FIRST}: {kind}\n\n"
+        f"Made by elastocal {__version__} on a simulated cell, seed {seed}. Every measurement in"
+        " it was simulated, with a truth that the model cannot express; nothing was measured on a"
+        " robot.\n\n"
+        f"| file | what it is |\n|---|---|\n{rows}\n"
+        f"## How it was made\n\n```sh\n{commands}```\n",
+    )
+
+
+def _refuse_foreign(out: Path, holds: list[str], force: bool) -> None:
+    readme = out / README
+    ours = readme.is_file() and readme.read_text("utf-8", "replace").startswith(_FIRST)
+    if not ours:
+        raise FileAccessError(f"{out} holds files that are no demo's ({holds[0]}): name another")
+    if not force:
+        raise FileAccessError(f"{out} holds a demo already: name another, or give --force")

@@ -1,0 +1,112 @@
+"""``elastocal report``: the document that stays when the engineer has left."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+if TYPE_CHECKING:
+    from elastocal.report.document import Parts, Written
+
+
+def report(  # noqa: PLR0913 - one parameter an option
+    run: Annotated[
+        Path,
+        typer.Argument(
+            metavar="RUN", help="Folder of a run, a folder that holds one, or a model file."
+        ),
+    ],
+    out: Annotated[Path, typer.Option(metavar="REPORT.html", help="HTML file to write.")],
+    *,
+    model: Annotated[
+        Path | None, typer.Option(help="Model file; default: model.json beside the run.")
+    ] = None,
+    tool: Annotated[
+        Path | None, typer.Option(help="Tool file; default: tool.json beside the run.")
+    ] = None,
+    codec: Annotated[
+        Path | None, typer.Option(metavar="DIR", help="Codec; default: codec beside the run.")
+    ] = None,
+    process: Annotated[
+        Path | None,
+        typer.Option(metavar="DIR", help="Simulated process; default: process beside the run."),
+    ] = None,
+    tolerance: Annotated[
+        str | None,
+        typer.Option(
+            metavar="LENGTH",
+            help="Largest error at unseen poses, e.g. '0.3 mm'; default: the cell file's.",
+        ),
+    ] = None,
+    pdf: Annotated[
+        bool, typer.Option("--pdf", help="Also print a PDF beside it; needs a Chromium.")
+    ] = False,
+    force: Annotated[bool, typer.Option("--force", help="Replace a report that is there.")] = False,
+    as_json: Annotated[
+        bool, typer.Option("--json", help="Print the verdict as one JSON object.")
+    ] = False,
+) -> None:
+    """Write the report of a calibration: one HTML file that an inspector can sign."""
+    from datetime import UTC, datetime
+
+    from elastocal.cli.output import console, print_json
+    from elastocal.report.document import Options, find_browser, gather, write_pdf, write_report
+    from elastocal.units import parse_quantity
+
+    paper = out.with_suffix(".pdf") if pdf else None
+    refuse_existing(out, paper, force)
+    browser = find_browser() if pdf else ""
+    limit = None if tolerance is None else parse_quantity(tolerance, "length")
+    made = datetime.now(UTC).isoformat(timespec="seconds")
+    parts = gather(Options(run, model, tool, codec, process, limit), made)
+    written = write_report(out, parts)
+    if paper is not None:
+        write_pdf(out, paper, browser)
+    if as_json:
+        print_json(_figures(parts, written, paper))
+        return
+    shown = console()
+    verdict = written.verdict
+    light = f" ({verdict.light.value} light)" if verdict.light else ""
+    shown.print(f"[bold]{verdict.word}[/bold]{light}: {verdict.sentence}")
+    for reason in verdict.reasons:
+        shown.print(f"   {reason}", markup=False)
+    shown.print(f"written to {out}{f' and {paper}' if paper else ''}", markup=False)
+
+
+def refuse_existing(out: Path, paper: Path | None, force: bool) -> None:
+    """Refuse to replace a report that is there.
+
+    Raises
+    ------
+    FileAccessError
+        With its name.
+    """
+    from elastocal.errors import FileAccessError
+
+    for path in (out, paper):
+        if path is not None and path.exists() and not force:
+            raise FileAccessError(f"{path} is there already: name another file, or give --force")
+
+
+def _figures(parts: "Parts", written: "Written", paper: Path | None) -> dict[str, Any]:
+    verdict, again = written.verdict, parts.again
+    unseen = again.unseen if again is not None and again.same else None
+    return {
+        "report": str(written.path),
+        "pdf": str(paper) if paper else None,
+        "light": verdict.light.value if verdict.light else None,
+        "verdict": verdict.sentence,
+        "reasons": list(verdict.reasons),
+        "advice": list(verdict.advice),
+        "tolerance": parts.limits.tolerance,
+        "unseen": None if unseen is None else {
+            "mean": _estimate(unseen.mean), "p95": _estimate(unseen.p95), "max": unseen.max,
+            "poses": unseen.poses, "readings": len(unseen.error),
+        },
+        "missing": [each.name for each in parts.absent],
+    }  # fmt: skip
+
+
+def _estimate(found: Any) -> dict[str, float]:
+    return {"value": found.value, "low": found.low, "high": found.high}

@@ -1,0 +1,169 @@
+"""The calibration once more: the report believes no figure that it cannot make again.
+
+From the dataset and the settings that stand in the model file, the fit is repeated. When it gives
+the compliances and the held-out errors of the model file, model and data belong together, and the
+errors of single readings are known, from which intervals follow.
+"""
+
+from dataclasses import dataclass
+from typing import Any, cast
+
+import numpy as np
+from numpy.random import Generator
+
+from elastocal.arrays import FloatArray, IndexArray
+from elastocal.dataset import Dataset
+from elastocal.dataset.selection import without
+from elastocal.identification import CalibratedModel, Calibration, FitOptions, calibrate
+from elastocal.identification.bootstrap import interval
+from elastocal.identification.options import MINIMUM_DRAWS, Weights
+
+DRAWS = 2000
+"""Of whole poses, for the intervals of the errors."""
+_SAME = 1e-6
+"""Relative difference below which two results of one computation are the same."""
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """A figure with its 95 % interval, in m."""
+
+    value: float
+    low: float
+    high: float
+
+
+@dataclass(frozen=True, eq=False)
+class Unseen:
+    """Errors of predicted deflections at poses that were left out of the fit."""
+
+    error: FloatArray
+    """Norm of the error of each reading, shape (reading,), in m."""
+    pose: IndexArray
+    load_case: tuple[str, ...]
+    folds: int
+    """Number of refits."""
+    mean: Estimate
+    p95: Estimate
+    """Largest error but for the worst 5 % of the readings."""
+
+    @property
+    def max(self) -> float:
+        """Largest error in m."""
+        return float(self.error.max())
+
+    @property
+    def poses(self) -> int:
+        """Number of poses that were left out, one after the other."""
+        return len(np.unique(self.pose))
+
+    def beyond(self, tolerance: float) -> int:
+        """Return how many readings have a larger error."""
+        return int(np.count_nonzero(~(self.error <= tolerance)))
+
+
+@dataclass(frozen=True, eq=False)
+class Again:
+    """A calibration made once more."""
+
+    calibration: Calibration
+    unseen: Unseen
+    same: bool
+    """Whether compliances and held-out errors are those of the model file."""
+
+
+def calibrate_again(found: CalibratedModel, figures: dict[str, Any], dataset: Dataset) -> Again:
+    """Return the calibration of a dataset with the settings of a model file.
+
+    Parameters
+    ----------
+    found : CalibratedModel
+        The model.
+    figures : dict
+        Its figures; without ``settings`` among them, defaults are taken.
+    dataset : Dataset
+        The readings that it should be made from.
+
+    Raises
+    ------
+    ElastocalError
+        If these readings give no calibration of this robot.
+    """
+    settings = figures.get("settings") or {}
+    readings = dataset.readings(found.model.robot.joint_names)
+    calibration = calibrate(
+        found.model,
+        without(readings, settings.get("exclude", ())),
+        np.random.default_rng(0),
+        _options(settings),
+        marker_offset=settings.get("marker") or dataset.marker,
+    )
+    same = _alike(calibration.calibrated.compliance, found.compliance) and _same_errors(
+        calibration, figures
+    )
+    return Again(calibration, unseen_of(calibration, np.random.default_rng(0)), same)
+
+
+def unseen_of(calibration: Calibration, rng: Generator) -> Unseen:
+    """Return the errors at left-out poses with intervals over resampled poses.
+
+    The readings at one pose share what the model gets wrong there, so that whole poses are drawn
+    (see `elastocal.identification.bootstrap`).
+
+    Parameters
+    ----------
+    calibration : Calibration
+        Whose poses were left out.
+    rng : Generator
+        Source of randomness.
+    """
+    held, used = calibration.held_out, calibration.used
+    pose = np.asarray(calibration.readings.pose[used])
+    cases = calibration.readings.load_case[used]
+    blocks = [held.error[held.fold == fold] for fold in np.unique(held.fold)]
+    chosen = rng.integers(len(blocks), size=(DRAWS, len(blocks)))
+    drawn = [np.concatenate([blocks[k] for k in row]) for row in chosen]
+    return Unseen(
+        error=held.error,
+        pose=pose,
+        load_case=tuple(map(str, cases.tolist())),
+        folds=held.folds,
+        mean=_estimate(held.mean, np.array([each.mean() for each in drawn])),
+        p95=_estimate(
+            float(np.percentile(held.error, 95)), np.array([np.percentile(e, 95) for e in drawn])
+        ),
+    )
+
+
+def _estimate(value: float, draws: FloatArray) -> Estimate:
+    low, high = interval(draws)
+    return Estimate(value, float(low), float(high))
+
+
+def _options(settings: dict[str, Any]) -> FitOptions:
+    lower, upper = (float(part) for part in str(settings.get("bounds", "0,inf")).split(","))
+    return FitOptions(
+        lower=lower,
+        upper=upper,
+        weights=cast("Weights", settings.get("weights", "none")),
+        loss=str(settings.get("loss", "linear")),
+        set_blunders_aside=not settings.get("keep_blunders", False),
+        trust_conventions=bool(settings.get("trust_conventions", False)),
+        draws=MINIMUM_DRAWS,
+    )
+
+
+def _same_errors(calibration: Calibration, figures: dict[str, Any]) -> bool:
+    stated = figures.get("held_out") or {}
+    held = calibration.held_out
+    return _alike(
+        np.array([held.mean, held.max, len(held.error)]),
+        np.array([stated.get(key, np.nan) for key in ("mean", "max", "readings")], dtype=float),
+    )
+
+
+def _alike(a: FloatArray, b: FloatArray) -> bool:
+    scale = float(np.abs(b).max(initial=0.0)) if a.shape == b.shape else 0.0
+    return a.shape == b.shape and bool(
+        np.all(np.abs(a - b) <= _SAME * np.maximum(scale, np.abs(b)))
+    )

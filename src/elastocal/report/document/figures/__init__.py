@@ -1,0 +1,1 @@
+"""Printed figures of the report that no other page has."""

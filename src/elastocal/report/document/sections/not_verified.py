@@ -1,0 +1,73 @@
+"""What this report does not show. The list is never empty."""
+
+from collections.abc import Iterator
+
+from elastocal.report.document.markup import heading, listed, paragraph
+from elastocal.report.document.parts import Parts
+from elastocal.report.document.section import Content, Finding, Section
+from elastocal.report.document.words import mm
+
+ALWAYS = (
+    "Geometric calibration and the sag under the arm's own weight: only deflection under a force"
+    " is modelled, and both must be corrected before it.",
+    "Absolute accuracy: deflections are differences to the unloaded reading at the same pose.",
+    "Temperature: nothing corrects for a warm arm.",
+    "Payloads and tools other than the one of this run.",
+    "Poses outside the region of the pool, and forces beyond those that were applied.",
+    "Dynamic effects: readings were taken while the arm stood still.",
+    "The controller that will apply the correction, and its delay.",
+    "Safety: a calibrated model is not a safety function.",
+)
+ESSENTIAL = ("run", "journal", "cell", "plan", "summary of the run", "dataset", "calibrated model",
+             "calibration made again")  # fmt: skip
+"""Parts without which no light is green; the codec has a finding of its own."""
+
+
+def body(parts: Parts) -> Content:
+    """Return the section."""
+    html = paragraph("Whatever the light says, this was not verified:") + listed(_always(parts))
+    absent = [
+        f"{each.name[0].upper()}{each.name[1:]}{' (cannot be used)' if each.damaged else ''}:"
+        f" {each.reason}"
+        for each in parts.absent
+    ]
+    html += heading("Missing in this report")
+    html += listed(absent) or paragraph("No part of the report is missing.")
+    if parts.doubts:
+        html += heading("What does not fit together") + listed(parts.doubts)
+    return Content(html, findings=tuple(_findings(parts)))
+
+
+def _always(parts: Parts) -> Iterator[str]:
+    if parts.simulated:
+        yield "A real robot: all devices of this run are simulated."
+    yield from ALWAYS
+    if parts.calibrated is not None and parts.calibrated.model.observability.unobservable:
+        yield (
+            "Single springs that no reading tells apart (see Compliances): their numbers are not"
+            " findings."
+        )
+    if parts.plan is not None:
+        yield (
+            "Places on the surface farther than"
+            f" {mm(parts.plan.search.covering_radius, 1)} from every pose; that is how far the"
+            " worst covered candidate is from one."
+        )
+
+
+def _findings(parts: Parts) -> Iterator[Finding]:
+    for each in parts.absent:
+        if each.name == "codec" and not each.damaged:
+            continue
+        word = "cannot be used" if each.damaged else "is missing"
+        advice = ""
+        if each.name == "tool file" and not each.damaged:
+            advice = (
+                "Run `elastocal tool`: without it the compensation relies on the cell file's tool."
+            )
+        yield Finding(f"the {each.name} {word}: {each.reason}", each.name in ESSENTIAL, advice)
+    for doubt in parts.doubts:
+        yield Finding(doubt)
+
+
+SECTION = Section("not-verified", "What was not verified", body)

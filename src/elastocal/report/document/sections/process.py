@@ -1,0 +1,152 @@
+"""The process path before and after correction (paper Fig. 11 and 13, Table 1)."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+
+from elastocal.compensation.process.record import Line, ProcessRecord, Values
+from elastocal.compensation.process.trace import Trace
+from elastocal.report.document.figures.process_maps import course_figure, process_maps
+from elastocal.report.document.markup import folded, paragraph, table
+from elastocal.report.document.parts import Parts
+from elastocal.report.document.pictures import picture
+from elastocal.report.document.section import Content, Finding, Section
+from elastocal.report.document.words import counted, mm
+
+
+@dataclass(frozen=True)
+class Published:
+    """A case of the paper's Table 1, in mm and parts of 1."""
+
+    title: str
+    before: tuple[float, float, float]
+    after: tuple[float, float, float]
+    reduction: tuple[float, float, float]
+
+
+PAPER = {
+    "afp": Published(
+        "Robotized AFP processing of a 3D thermoplastic aerostructure",
+        (0.570, 0.956, 0.100), (0.061, 0.285, 0.046), (0.8930, 0.7019, 0.5400),
+    ),
+    "machining": Published(
+        "Robotized roughing of an Al-7075 aerospace part",
+        (0.597, 2.050, 0.725), (0.101, 0.520, 0.342), (0.8308, 0.7463, 0.5283),
+    ),
+}  # fmt: skip
+"""Table 1 of Monsarrat et al., RCIM 2024: mean, maximum and standard deviation."""
+_WHAT = {
+    "afp": "Absolute value of lateral deviation",
+    "machining": "Absolute value of the error normal to the part",
+}
+_HEADS = ("", "Mean", "Max", "St. dev.")
+
+
+def body(parts: Parts) -> Content:
+    """Return the section."""
+    record = parts.process
+    if record is None:
+        return Content(
+            paragraph("No process path was run, so the effect of the correction was not verified.")
+        )
+    table_ = record.table
+    html = paragraph(
+        "Simulated: the simulated robot followed the path under process forces, once as programmed"
+        " and once with the online compensator of a calibrated model.", "banner",
+    ) + _table_1(record)  # fmt: skip
+    seed = record.traces[0].seed
+    own = [trace for trace in record.traces if trace.seed == seed]
+    html += _pictures(own, parts.limits.tolerance)
+    if table_.budget:
+        html += folded("Error budget", _lines("Error budget of the first seed", table_.budget))
+    settings = [(key, str(value)) for key, value in table_.settings.items()]
+    html += folded(
+        "Settings of the compensator", table("Settings, SI units", ("Key", "Value"), settings, 2)
+    )
+    return Content(html, findings=tuple(_findings(record, parts.limits.tolerance)))
+
+
+def _table_1(record: ProcessRecord) -> str:
+    what = _WHAT.get(record.table.process, "Absolute deviation")
+    rows: list[tuple[str, ...]] = []
+    for line in record.table.lines:
+        head = f"{what}, {line.name} ({line.points} points)"
+        rows += [
+            (f"{head}, without correction in mm", *_mm(line.before)),
+            ("With correction in mm", *_mm(line.after)),
+            ("Reduction", *(f"{share:.2%}" for share in _three(line.reduction))),
+        ]
+    paper = PAPER.get(record.table.process)
+    if paper is not None:
+        rows += [
+            ("Paper, without correction in mm", *(f"{value:.3f}" for value in paper.before)),
+            ("Paper, with correction in mm", *(f"{value:.3f}" for value in paper.after)),
+            ("Paper, reduction", *(f"{share:.2%}" for share in paper.reduction)),
+        ]
+    note = paragraph(
+        "The paper's figures are of its real cell; those above them of the simulated one. They are"
+        " set side by side for their size, not as a repetition.", "sub",
+    )  # fmt: skip
+    return table("In the form of the paper's Table 1", _HEADS, rows) + (note if paper else "")
+
+
+def _lines(title: str, lines: tuple[Line, ...]) -> str:
+    rows = [
+        (
+            line.name,
+            *(
+                f"{1e3 * b:.3f} to {1e3 * a:.3f} ({r:.1%})"
+                for b, a, r in zip(
+                    _three(line.before), _three(line.after), _three(line.reduction), strict=True
+                )
+            ),
+        )
+        for line in lines
+    ]
+    return table(f"{title}, before to after in mm (reduction)", _HEADS, rows)
+
+
+def _pictures(traces: list[Trace], tolerance: float | None) -> str:
+    worst = max(traces, key=lambda trace: float(np.abs(trace.before).max()))
+    before, after = (
+        np.concatenate([getattr(t, key) for t in traces]) for key in ("before", "after")
+    )
+    told = (
+        f"mean {mm(float(np.abs(before).mean()))} without and {mm(float(np.abs(after).mean()))}"
+        f" with correction, over {counted(len(traces), 'course')}"
+    )
+    return picture(
+        partial(process_maps, traces),
+        f"Two maps of the path, coloured by absolute deviation: {told}",
+        f"After the paper's Fig. 11e, 11f and 13b, 13c, in the plane that fits the path best:"
+        f" {told}.", ".png",
+    ) + picture(
+        partial(course_figure, worst, tolerance),
+        f"Deviation over time of course {worst.course}, without and with correction",
+        f"After the paper's Fig. 11g: the course with the largest deviation, {worst.course}.",
+    )  # fmt: skip
+
+
+def _findings(record: ProcessRecord, tolerance: float | None) -> Iterator[Finding]:
+    line = record.table.lines[-1]
+    told = (
+        f"on the simulated process path the mean deviation fell by {line.reduction.mean:.1%}, from"
+        f" {mm(line.before.mean)} to {mm(line.after.mean)}; largest left {mm(line.after.max)}"
+    )
+    if tolerance is not None and not line.after.max <= tolerance:
+        yield Finding(f"{told}, beyond the tolerance of {mm(tolerance)}")
+    else:
+        yield Finding(told, holds_back=False)
+
+
+def _three(values: Values) -> tuple[float, float, float]:
+    return values.mean, values.max, values.standard_deviation
+
+
+def _mm(values: Values) -> tuple[str, ...]:
+    return tuple(f"{1e3 * value:.3f}" for value in _three(values))
+
+
+SECTION = Section("process", "The process path, before and after", body)

@@ -1,0 +1,126 @@
+"""Where everything comes from: versions, hashes, seeds, every setting."""
+
+import platform
+from collections.abc import Iterator
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import PurePath
+
+from elastocal import __version__
+from elastocal.report.document.content import BYTES
+from elastocal.report.document.markup import (
+    Markup,
+    folded,
+    heading,
+    html,
+    paragraph,
+    stamp,
+    table,
+    verbatim,
+)
+from elastocal.report.document.parts import Parts
+from elastocal.report.document.section import Content, Section
+
+PACKAGES = ("numpy", "scipy", "pin", "xarray", "matplotlib", "plotly")
+
+
+def body(parts: Parts) -> Content:
+    """Return the section."""
+    text = table("Times", ("What", "When"), _times(parts), texts=2)
+    text += table("Versions", ("What", "Version"), _versions(parts), texts=2)
+    text += table("Seeds and fingerprints", ("What", "Value"), _seeds(parts), texts=2)
+    text += _files(parts) + _settings(parts)
+    if parts.cell_text is not None:
+        text += folded("The cell file as it stands", verbatim(parts.cell_text), "long")
+    if parts.cell is not None:
+        values = sorted(_flattened("", parts.cell.file.model_dump(mode="json")))
+        text += folded(
+            "Every setting of the cell, defaults included, in SI units",
+            table("Settings of the cell", ("Key", "Value"), values, texts=2),
+        )
+    return Content(text)
+
+
+def _times(parts: Parts) -> Iterator[tuple[object, object]]:
+    started = parts.summary["times"]["started"] if parts.summary else None
+    if started is None and parts.journal:
+        started = parts.journal[0].run.started if parts.journal[0].run else None
+    yield "Run began", stamp(str(started)) if started else "not known"
+    total = parts.summary["times"]["total"] if parts.summary else None
+    if total is not None:
+        yield "Run took", f"{total / 60:.1f} min of the cell's clock"
+    yield "Report made", stamp(parts.made)
+
+
+def _versions(parts: Parts) -> Iterator[tuple[str, str]]:
+    yield "elastocal, this report", __version__
+    record = parts.journal[0].run if parts.journal else None
+    if record is not None:
+        yield "elastocal, run", record.elastocal
+    if parts.plan is not None:
+        yield "elastocal, plan", parts.plan.elastocal
+    if parts.codec is not None:
+        for name, number in parts.codec.data.versions.items():
+            yield f"{name}, codec", number
+    yield "Python", platform.python_version()
+    for name in PACKAGES:
+        try:
+            yield name, version(name)
+        except PackageNotFoundError:
+            yield name, "not known"
+
+
+def _seeds(parts: Parts) -> Iterator[tuple[str, str]]:
+    record = parts.journal[0].run if parts.journal else None
+    if record is not None:
+        yield "Seed of the simulated devices", str(record.seed)
+        yield "Fingerprint of the cell", record.cell
+    if parts.plan is not None:
+        yield "Seed of the search", str(parts.plan.search.seed)
+        yield "Fingerprint of the cell in the plan", parts.plan.cell.fingerprint
+    if parts.codec is not None:
+        yield "Seed of the codec", str(parts.codec.data.options.seed)
+    if parts.process is not None:
+        yield "Seeds of the process", ", ".join(str(run.seed) for run in parts.process.table.runs)
+    if parts.calibrated is not None:
+        yield "SHA-256 of the robot's URDF", parts.calibrated.urdf_sha256
+
+
+def _files(parts: Parts) -> str:
+    rows = [
+        (each.name, Markup(f"<code>{html(each.sha256)}</code>"), each.of) for each in parts.files
+    ]
+    note = paragraph(
+        f"Hashes of {BYTES} are those of `sha256sum`. Files that carry the time of the run, or"
+        " the folder it was started in, are hashed without those, so that equal runs have equal"
+        " hashes. The raw streams are hashed in the journal.", "sub",
+    )  # fmt: skip
+    return heading("Files") + table("Files", ("File", "SHA-256", "Of"), rows, texts=3) + note
+
+
+def _settings(parts: Parts) -> str:
+    if parts.calibrated is None:
+        return ""
+    settings = parts.calibrated.figures.get("settings")
+    if not isinstance(settings, dict):
+        return paragraph("The model file does not tell the settings of its calibration.")
+    rows = [
+        (key, PurePath(str(value)).name if key == "springs" else str(value))
+        for key, value in settings.items()
+    ]
+    return heading("Settings") + table(
+        "Settings of the calibration", ("Key", "Value"), rows, texts=2
+    )
+
+
+def _flattened(prefix: str, value: object) -> Iterator[tuple[str, str]]:
+    if isinstance(value, dict):
+        for key, each in value.items():
+            yield from _flattened(f"{prefix}.{key}" if prefix else str(key), each)
+    elif isinstance(value, list) and any(isinstance(each, dict) for each in value):
+        for number, each in enumerate(value):
+            yield from _flattened(f"{prefix}.{number}", each)
+    else:
+        yield prefix, str(value)
+
+
+SECTION = Section("provenance", "Provenance", body)

@@ -1,0 +1,126 @@
+"""`elastocal demo`: the whole story, and what can go wrong before it."""
+
+import json
+import re
+import shlex
+
+import pytest
+
+from elastocal.cli import demo_display, demo_story
+from elastocal.cli.demo_folder import README, begin
+from elastocal.cli.main import COMMANDS
+from elastocal.errors import FileAccessError
+from support.cli import elastocal
+from support.demos import demo_result, finished_demo
+
+
+@pytest.fixture(scope="module")
+def base(tmp_path_factory):
+    return tmp_path_factory.getbasetemp()
+
+
+def test_a_demo_says_what_it_does_and_what_came_of_it(base):
+    told = demo_result("afp", base).err
+    folder = finished_demo("afp", base)
+    for chapter in demo_story.chapters("afp", folder, 0):
+        assert chapter.line in told
+    table = json.loads((folder / "process/table.json").read_text())
+    (line,) = table["lines"]
+    assert f"-{100 * line['reduction']['mean']:.1f} %" in told
+    assert str(folder / "report.html") in told
+
+
+def test_every_file_that_the_demos_readme_names_is_there(base):
+    folder = finished_demo("afp", base)
+    text = (folder / README).read_text(encoding="utf-8")
+    named = re.findall(r"\]\(([^)]+)\)", text)
+    assert len(named) > 10
+    assert not [name for name in named if not (folder / name).exists()]
+    top = {path.name for path in folder.iterdir()}
+    assert top <= {name.split("/")[0] for name in named} | {README, "dome.stl"}
+
+
+def test_the_log_of_a_demo_holds_every_command_with_its_output(base):
+    log = (finished_demo("afp", base) / "log.txt").read_text(encoding="utf-8")
+    commands = re.findall(r"^\$ elastocal (\S+)", log, flags=re.MULTILINE)
+    assert commands == [c.words[0] for c in demo_story.chapters("afp", base, 0)]
+    assert "rank 17 of 21" in log
+
+
+def test_a_demo_reaches_the_papers_reductions_in_its_own_table(base):
+    table = json.loads((finished_demo("afp", base) / "process/table.json").read_text())
+    reduction = table["lines"][-1]["reduction"]
+    assert reduction["mean"] >= 0.89
+    assert reduction["max"] >= 0.70
+    assert table["lines"][-1]["after"]["max"] <= 0.3e-3
+
+
+@pytest.mark.slow
+def test_the_machining_demo_reaches_the_papers_reductions(base):
+    table = json.loads((finished_demo("machining", base) / "process/table.json").read_text())
+    reduction = table["lines"][-1]["reduction"]
+    assert reduction["mean"] >= 0.83
+    assert reduction["max"] >= 0.74
+
+
+@pytest.mark.parametrize("kind", ["afp", "machining"])
+def test_every_chapter_is_a_public_command(kind, tmp_path):
+    for chapter in demo_story.chapters(kind, tmp_path, 3):
+        assert chapter.words[0] in COMMANDS
+        assert shlex.split(chapter.line)[1:] == list(chapter.words)
+
+
+def test_an_unknown_demo_is_refused_by_name(tmp_path):
+    reason = elastocal("demo", "machning", "--out", tmp_path / "demo").reason
+    assert "'machning'" in reason
+    assert "machining" in reason
+    assert not (tmp_path / "demo").exists()
+
+
+def test_a_folder_of_ones_own_is_never_emptied(tmp_path):
+    (tmp_path / "thesis.tex").write_text("years of work")
+    for more in ((), ("--force",)):
+        assert "thesis.tex" in elastocal("demo", "--out", tmp_path, *more).reason
+    assert (tmp_path / "thesis.tex").read_text() == "years of work"
+
+
+def test_a_folder_with_somebody_elses_readme_is_never_emptied(tmp_path):
+    (tmp_path / README).write_text("# My work")
+    assert README in elastocal("demo", "--out", tmp_path, "--force").reason
+
+
+def test_an_earlier_demo_is_removed_only_when_told(tmp_path):
+    begin(tmp_path / "demo", "afp", force=False)
+    (tmp_path / "demo" / "old.txt").write_text("")
+    with pytest.raises(FileAccessError, match="holds a demo already"):
+        begin(tmp_path / "demo", "afp", force=False)
+    begin(tmp_path / "demo", "afp", force=True)
+    assert [path.name for path in (tmp_path / "demo").iterdir()] == [README]
+
+
+def test_a_file_in_the_place_of_the_folder_is_refused(tmp_path):
+    (tmp_path / "demo").write_text("")
+    assert str(tmp_path / "demo") in elastocal("demo", "--out", tmp_path / "demo").reason
+
+
+def test_a_chapter_that_fails_ends_the_demo_with_its_reason(tmp_path, monkeypatch):
+    story = (
+        demo_story.Chapter("look", ("robots",)),
+        demo_story.Chapter("fail", ("check", str(tmp_path / "none.yaml"))),
+        demo_story.Chapter("never", ("robots",)),
+    )
+    monkeypatch.setattr(demo_story, "chapters", lambda *_: story)
+    result = elastocal("demo", "--out", tmp_path / "demo")
+    assert result.code == 1
+    assert result.err.splitlines()[-1].startswith("elastocal: cannot read")
+    assert "never" not in result.err
+    assert "Not finished" in (tmp_path / "demo" / README).read_text()
+
+
+def test_a_chapter_that_is_interrupted_ends_the_demo_with_its_code(tmp_path, monkeypatch):
+    story = (demo_story.Chapter("look", ("robots",)), demo_story.Chapter("never", ("robots",)))
+    monkeypatch.setattr(demo_story, "chapters", lambda *_: story)
+    monkeypatch.setattr(demo_display, "_carry_out", lambda *_: 130)
+    result = elastocal("demo", "--out", tmp_path / "demo")
+    assert result.code == 130
+    assert "never" not in result.err
