@@ -1,9 +1,9 @@
 """Figures of the site are made by its build: from fixed seeds, on simulated cells.
 
-What is drawn and how stands in the package ``gallery`` beside this file; each of its parts runs in
-a process of its own. Figures are kept in ``.cache/figures``, under a hash of everything that they
-are made by, so that a build without changes to the sources takes them from there. Nothing that is
-made is committed.
+What is drawn and how stands in the package ``gallery`` beside this file, which runs in two
+processes. Figures are kept in ``.cache/figures``, under a hash of everything that they are made
+by, so that a build without changes to the sources takes them from there. Nothing that is made is
+committed.
 
 A comment ``<!-- told: NAME -->`` in a page becomes the sentence with the figures that belong to
 the picture of that name.
@@ -26,8 +26,8 @@ from mkdocs.structure.files import File, Files
 
 ROOT = Path(__file__).resolve().parents[2]
 CACHE = ROOT / ".cache" / "figures"
-PARTS = ("placement", "machining", "small")
-"""Modules of ``gallery``, run side by side."""
+PROCESSES = (("placement",), ("machining", "small"))
+"""Modules of ``gallery``, by the process that runs them."""
 TOLD = "told.json"
 _PACKAGES = ("numpy", "scipy", "pin", "matplotlib", "plotly")
 _MARK = re.compile(r"<!-- told: (\S+) -->")
@@ -77,16 +77,17 @@ def _make(folder: Path) -> None:
         # Several threads a process would only get into each other's way.
         environment = os.environ | {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
         running = {
-            part: subprocess.Popen(
-                [sys.executable, "-m", "gallery", part, str(Path(made) / part)],
+            parts: subprocess.Popen(
+                [sys.executable, "-m", "gallery", made, *parts],
                 cwd=Path(__file__).parent, env=environment, stderr=subprocess.PIPE, text=True,
             )
-            for part in PARTS
+            for parts in PROCESSES
         }  # fmt: skip
-        wrong = {part: process.communicate()[1] for part, process in running.items()}
-        for part, process in running.items():
+        wrong = {parts: process.communicate()[1] for parts, process in running.items()}
+        for parts, process in running.items():
             if process.returncode != 0:
-                raise PluginError(f"figures of {part!r} could not be made:\n{wrong[part]}")
+                what = " and ".join(parts)
+                raise PluginError(f"figures of {what} could not be made:\n{wrong[parts]}")
         for old in CACHE.iterdir():
             shutil.rmtree(old)
         Path(made).rename(folder)

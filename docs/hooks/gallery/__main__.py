@@ -1,11 +1,13 @@
-"""Make one part of the figures: ``python -m gallery PART FOLDER``."""
+"""Make parts of the figures: ``python -m gallery FOLDER PART …``."""
 
 import importlib
 import json
 import sys
 from pathlib import Path
 
-part, folder = sys.argv[1], Path(sys.argv[2])
-folder.mkdir(parents=True)
-told = importlib.import_module(f"gallery.{part}").make(folder)
-(folder / "told.json").write_text(json.dumps(told), encoding="utf-8")
+folder, *parts = sys.argv[1:]
+for part in parts:
+    own = Path(folder) / part
+    own.mkdir(parents=True)
+    told = importlib.import_module(f"gallery.{part}").make(own)
+    (own / "told.json").write_text(json.dumps(told), encoding="utf-8")

@@ -11,8 +11,8 @@ from elastocal.report.printed import write_figure
 from gallery.campaign import accuracy, campaign, example_cell, process, reduction
 from gallery.placement import draw_displacements
 
-RINGS = 2
-SMALLER = {"pool: 3000": "pool: 600"}
+RINGS = 1
+SMALLER = {"pool: 3000": "pool: 300"}
 """Fifteen poses are found in a small pool as well."""
 
 

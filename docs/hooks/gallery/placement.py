@@ -19,7 +19,7 @@ from elastocal.report.plan_page import write_plan_page
 from elastocal.report.printed import write_figure
 from gallery.campaign import Campaign, accuracy, campaign, example_cell, process, reduction
 
-COURSES = 3
+COURSES = 2
 TOLERANCE = 0.3e-3
 """The paper's, of the side deviation, in m."""
 CODECS = {
