@@ -8,7 +8,7 @@ BIN := $(VENV)/bin
 .PHONY: demo test nightly docs bench clean
 
 demo: $(VENV)/installed
-	$(BIN)/elastocal demo --out demo
+	$(BIN)/elastocal demo afp --out demo --force
 
 test: $(VENV)/installed-dev
 	$(BIN)/ruff check .

@@ -17,6 +17,7 @@ from elastocal.elastic.layouts import read_springs
 from elastocal.errors import DatasetError, RobotError, SchemaError
 from elastocal.files import read_text
 from elastocal.identification.model_file import read_model
+from elastocal.identification.recertification import read_comparison
 from elastocal.planning.plan_file import PLAN, read_plan
 from elastocal.planning.pool_file import read_pool
 from elastocal.procedure.journal import commits, read_journal
@@ -139,6 +140,7 @@ def _json(path: Path) -> Described:
         "elastocal.tool": _tool,
         "elastocal.codec_verdicts": _verdicts,
         "elastocal.process": _process,
+        "elastocal.comparison": _comparison,
     }
     return kinds.get(_stated(_IN_JSON, read_text(path)[:200]), _model)(path)
 
@@ -297,4 +299,17 @@ def _process(path: Path) -> Described:
         "points": last.points,
         "mean_after": last.after.mean,
         "max_after": last.after.max,
+    }
+
+
+def _comparison(path: Path) -> Described:
+    record = read_comparison(path)
+    return "comparison of two calibrations", {
+        "schema": "elastocal.comparison/1",
+        "robot": record.robot,
+        "compared": len(record.springs),
+        "moved": list(record.moved),
+        "rows": 0 if record.deflection is None else record.deflection.rows,
+        "limit": record.limit,
+        "verdict": record.verdict,
     }

@@ -19,6 +19,7 @@ from elastocal import __version__
 from elastocal.cli.calibrate import calibrate
 from elastocal.cli.check import check
 from elastocal.cli.codec import codec
+from elastocal.cli.compare import compare
 from elastocal.cli.compensate import compensate
 from elastocal.cli.demo import demo
 from elastocal.cli.derive import derive
@@ -58,6 +59,7 @@ COMMANDS: dict[str, Callable[..., None]] = {
     "stiffness": stiffness,
     "export": export,
     "simulate-process": simulate_process,
+    "compare": compare,
     "report": report,
     "demo": demo,
 }

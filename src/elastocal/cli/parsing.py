@@ -38,3 +38,23 @@ def parse_point(text: str) -> tuple[float, float, float]:
         raise UnitError(f"{text!r} must be three lengths, e.g. '0 mm, 0 mm, 35 mm'")
     x, y, z = (parse_quantity(part.strip(), "length") for part in parts)
     return x, y, z
+
+
+def parse_limit(text: str, option: str = "--limit") -> float:
+    """Return a limit in m from a length with its unit.
+
+    >>> parse_limit("0.1 mm")
+    0.0001
+
+    Raises
+    ------
+    UnitError
+        If the text is not a length above 0.
+    """
+    try:
+        limit = parse_quantity(text, "length")
+    except UnitError as error:
+        raise UnitError(f"{option}: {error}") from error
+    if not limit > 0.0:
+        raise UnitError(f"{option}: {text!r} is not above 0")
+    return limit

@@ -157,5 +157,11 @@ def _source(run: Run) -> Source:
 
 def _settings(question: Question) -> CompensatorSettings:
     if question.settings is not None:
-        return read_settings(question.settings)
+        settings = read_settings(question.settings)
+        if settings.frame != "base":
+            raise CompensationError(
+                f"{question.settings}: frame is {settings.frame!r}: a simulated process is"
+                " corrected in base"
+            )
+        return settings
     return MACHINING_SETTINGS if question.process == "machining" else AFP_SETTINGS

@@ -31,11 +31,21 @@ def report(  # noqa: PLR0913 - one parameter an option
         Path | None,
         typer.Option(metavar="DIR", help="Simulated process; default: process beside the run."),
     ] = None,
+    old: Annotated[
+        Path | None, typer.Option(metavar="MODEL", help="Model file of an earlier calibration.")
+    ] = None,
     tolerance: Annotated[
         str | None,
         typer.Option(
             metavar="LENGTH",
             help="Largest error at unseen poses, e.g. '0.3 mm'; default: the cell file's.",
+        ),
+    ] = None,
+    limit: Annotated[
+        str | None,
+        typer.Option(
+            metavar="LENGTH",
+            help="Largest change since --old, e.g. '0.1 mm'; default: the cell file's drift.",
         ),
     ] = None,
     pdf: Annotated[
@@ -50,15 +60,16 @@ def report(  # noqa: PLR0913 - one parameter an option
     from datetime import UTC, datetime
 
     from elastocal.cli.output import console, print_json
+    from elastocal.cli.parsing import parse_limit
     from elastocal.report.document import Options, find_browser, gather, write_pdf, write_report
-    from elastocal.units import parse_quantity
 
     paper = out.with_suffix(".pdf") if pdf else None
     refuse_existing(out, paper, force)
     browser = find_browser() if pdf else ""
-    limit = None if tolerance is None else parse_quantity(tolerance, "length")
+    accepted = None if tolerance is None else parse_limit(tolerance, "--tolerance")
+    drift = None if limit is None else parse_limit(limit)
     made = datetime.now(UTC).isoformat(timespec="seconds")
-    parts = gather(Options(run, model, tool, codec, process, limit), made)
+    parts = gather(Options(run, model, tool, codec, process, old, accepted, drift), made)
     written = write_report(out, parts)
     if paper is not None:
         write_pdf(out, paper, browser)

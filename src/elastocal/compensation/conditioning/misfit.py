@@ -110,7 +110,8 @@ def _left(postures: StaticPostures, fit: ToolFit) -> FloatArray:
 
 
 def _allowed(postures: StaticPostures) -> FloatArray:
-    return np.maximum(_POOR * _turning(postures), _NOISE)
+    allowed: FloatArray = np.maximum(_POOR * _turning(postures), _NOISE)
+    return allowed
 
 
 def _turning(postures: StaticPostures) -> FloatArray:

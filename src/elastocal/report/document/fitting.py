@@ -105,7 +105,8 @@ def _doubts(parts: Parts) -> Iterator[str]:
             " file: the model is of other data or other settings"
         )
     if parts.process is not None and parts.calibrated is not None:
-        if parts.calibrated.sha256 not in {run.model_sha256 for run in parts.process.table.runs}:
+        used = {run.model_sha256 for run in parts.process.table.runs}
+        if parts.calibrated.sha256 not in used:
             yield "the process was run with another model than the one of this report"
     if plan is not None and dataset is not None:
         planned = {pose.id for pose in plan.poses}

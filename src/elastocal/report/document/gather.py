@@ -8,21 +8,22 @@ or another cell count as unusable.
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TypeVar
 
 from elastocal import dataset as datasets
+from elastocal.arrays import FloatArray
 from elastocal.cell import Cell, load_cell
 from elastocal.codec import judge, read_codec
 from elastocal.compensation.conditioning.tool_file import ToolRecord, read_tool
 from elastocal.compensation.process.folder import TABLE, read_process
 from elastocal.compensation.process.record import ProcessRecord
 from elastocal.dataset import Dataset
-from elastocal.errors import ElastocalError, FileAccessError
+from elastocal.errors import ElastocalError
 from elastocal.files import read_text
 from elastocal.identification.model_file import read_model, read_record
+from elastocal.identification.recertification import recertify_files
 from elastocal.planning.plan_file import PLAN, POOL, PlanFile, read_plan
 from elastocal.planning.pool_file import PoolData, check_pool_of, read_pool
-from elastocal.planning.surface import Surface
 from elastocal.planning.tooling import cell_surface
 from elastocal.procedure.copies import file_sha256
 from elastocal.procedure.entries import Entry
@@ -69,6 +70,8 @@ class Options:
     tool: Path | None = None
     codec: Path | None = None
     process: Path | None = None
+    old: Path | None = None
+    """Model file of an earlier calibration of the cell; there is no default name."""
     tolerance: float | None = None
     """In m; in place of that of the cell file."""
     drift: float | None = None
@@ -139,11 +142,12 @@ def gather(options: Options, made: str) -> Parts:
     search = _Search(find_places(options.run))
     parts = _with_run(Parts(made=made), search)
     parts = _with_model(parts, search, options)
+    parts = replace(parts, limits=_limits(parts.cell, options))
     parts = _with_rest(parts, search, options)
+    parts = _with_old(parts, search, options)
     return replace(
         parts,
         name=parts.cell.name if parts.cell else parts.robot or "robot",
-        limits=_limits(parts.cell, options),
         files=tuple(search.files),
         absent=tuple(search.absent),
         doubts=doubts(parts),
@@ -252,6 +256,34 @@ def _with_rest(parts: Parts, search: _Search, options: Options) -> Parts:
     )  # fmt: skip
 
 
+def _with_old(parts: Parts, search: _Search, options: Options) -> Parts:
+    """Return the parts with a comparison to an earlier model, where one is named."""
+    old = options.old
+    new = options.model or search.places.model or search.places.default(MODEL)
+    if old is None:
+        reason = "no earlier calibration was given (--old), so nothing is known of any change"
+        search.absent.append(Absence("earlier calibration", reason))
+        return parts
+    if new is None or parts.calibrated is None:
+        reason = "there is no calibrated model to compare it with"
+        search.absent.append(Absence("comparison with the earlier calibration", reason))
+        return parts
+    q, force = _rows_that_matter(parts)
+    found = recertify_files(old, new, q, force, limit=parts.limits.drift)
+    search.use(old)
+    return replace(parts, recertification=found)
+
+
+def _rows_that_matter(parts: Parts) -> tuple[FloatArray | None, FloatArray | None]:
+    """Return joints and forces of production, else those of the run."""
+    if parts.cell is not None and parts.cell.process is not None:
+        return parts.cell.process.joint_position, parts.cell.process.force
+    if parts.dataset is None or parts.calibrated is None:
+        return None, None
+    readings = parts.dataset.readings(parts.calibrated.model.model.robot.joint_names)
+    return readings.joint_position, readings.force
+
+
 def _limits(cell: Cell | None, options: Options) -> Limits:
     stated = cell.file.acceptance if cell is not None else None
     drift = options.drift or (stated.drift if stated else None)
@@ -268,6 +300,3 @@ def _files_of(path: Path) -> list[Path]:
         return [path]
     read = ("codec.nc", "codec.json", TABLE, "deviations.csv")
     return [path / name for name in read if (path / name).is_file()]
-
-
-__all__ = ["FileAccessError", "Options", "gather"]

@@ -10,17 +10,21 @@ _SHAPES = {
     Light.GREEN: '<circle cx="24" cy="24" r="21"/><path class="sign" d="M14 25l7 7 14-15"/>',
     Light.YELLOW: '<path d="M24 3L46 44H2z"/><path class="sign" d="M24 18v13M24 36v3"/>',
     Light.RED: (
-        '<path d="M15 3h18l12 12v18L33 45H15L3 33V15z"/><path class="sign" d="M16 16l16 16M32 16L16 32"/>'
+        '<path d="M15 3h18l12 12v18L33 45H15L3 33V15z"/>'
+        '<path class="sign" d="M16 16l16 16M32 16L16 32"/>'
     ),
 }
-"""Of the light: a disc with a tick, a triangle with an exclamation mark, an octagon with a cross."""
+"""Of the light: a disc with a tick, a triangle with a mark, an octagon with a cross."""
 
 
 def verdict_html(parts: Parts, verdict: Verdict) -> str:
     """Return the verdict as HTML."""
     again = parts.again
     unseen = again.unseen if again is not None and again.same else None
-    text = _light(verdict) + paragraph(verdict.sentence, "sentence")
+    text = _light(verdict)
+    if parts.simulated:
+        text += paragraph("A simulated cell: no real robot was measured.", "banner")
+    text += paragraph(verdict.sentence, "sentence")
     if unseen is not None:
         text += _figures(unseen)
     if verdict.reasons:
@@ -56,7 +60,7 @@ def _figures(unseen: Unseen) -> str:
         ]
     ) + paragraph(
         f"Every pose was left out of the fit once ({unseen.folds} refits) and predicted by the"
-        " others. Intervals: whole poses drawn with replacement. Of errors like these, one more"
-        f" pose would have a larger one than the largest here in at most 1 of {unseen.poses + 1}"
-        " cases.", "sub",
+        " others. Intervals: whole poses drawn with replacement. If one more pose were drawn"
+        " like these, the chance that its error is larger than the largest here is at most 1 in"
+        f" {unseen.poses + 1}.", "sub",
     )  # fmt: skip

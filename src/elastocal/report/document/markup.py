@@ -73,8 +73,9 @@ def table(
         + "</tr>"
         for row in rows
     )
+    label = escape(plain(caption), quote=True)
     return (
-        f'<div class="wide" tabindex="0" role="region" aria-label="{escape(plain(caption), quote=True)}">'
+        f'<div class="wide" tabindex="0" role="region" aria-label="{label}">'
         f"<table><caption>{html(caption)}</caption><thead><tr>{top}</tr></thead>"
         f"<tbody>{body}</tbody></table></div>"
     )

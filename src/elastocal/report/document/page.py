@@ -10,6 +10,7 @@ from plotly.offline import get_plotlyjs
 
 from elastocal import __version__
 from elastocal.files import write_text
+from elastocal.report.document.advice import advised
 from elastocal.report.document.heading import verdict_html
 from elastocal.report.document.markup import stamp
 from elastocal.report.document.parts import Parts
@@ -44,7 +45,7 @@ def write_report(path: Path, parts: Parts) -> Written:
     """
     contents = {section.identifier: section.body(parts) for section in SECTIONS}
     findings = [finding for content in contents.values() for finding in content.findings]
-    verdict = judge(parts, findings)
+    verdict = judge(parts, [*findings, *advised(parts)])
     write_text(path, _page(parts, verdict, contents))
     return Written(Path(path), verdict)
 
@@ -63,8 +64,8 @@ def _page(parts: Parts, verdict: Verdict, contents: dict[str, Content]) -> str:
         ),
         sections="".join(
             f'<section aria-labelledby="{section.identifier}"><h2 id="{section.identifier}">'
-            f"{escape(section.title)}</h2>{contents[section.identifier].html}</section>"
-            for section in SECTIONS
+            f"{number}. {escape(section.title)}</h2>{contents[section.identifier].html}</section>"
+            for number, section in enumerate(SECTIONS, start=1)
         ),
         footer=f"Made by elastocal {escape(__version__)}, {stamp(parts.made)}.",
         data=embedded(data),

@@ -9,6 +9,7 @@ from elastocal.compensation.conditioning.tool_file import ToolRecord
 from elastocal.compensation.process.record import ProcessRecord
 from elastocal.dataset import Dataset
 from elastocal.identification import CalibratedModel
+from elastocal.identification.recertification import Recertification
 from elastocal.planning.plan_file import PlanFile
 from elastocal.planning.pool_file import PoolData
 from elastocal.planning.surface import Surface
@@ -95,6 +96,8 @@ class Parts:
     tool: ToolRecord | None = None
     codec: Codec | None = None
     process: ProcessRecord | None = None
+    recertification: Recertification | None = None
+    """This calibration against an earlier one."""
     limits: Limits = field(default_factory=Limits)
     files: tuple[UsedFile, ...] = ()
     absent: tuple[Absence, ...] = ()

@@ -12,7 +12,7 @@ from elastocal.report import style
 from elastocal.report.document.markup import html
 from elastocal.report.printed import notes
 
-_DPI = 170
+_DPI = 130
 """Of figures with thousands of points, which would be large as SVG."""
 _TYPES = {".svg": "image/svg+xml", ".png": "image/png"}
 

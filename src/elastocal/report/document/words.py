@@ -37,7 +37,9 @@ def point(values: Sequence[float | None], scale: float = 1e3, digits: int = 1) -
     >>> point([0.1, 0.0, -0.0905])
     '100.0, 0.0, -90.5'
     """
-    return ", ".join("?" if v is None else f"{scale * v + 0.0:.{digits}f}" for v in values)
+    return ", ".join(
+        "?" if v is None else f"{round(scale * v, digits) + 0.0:.{digits}f}" for v in values
+    )
 
 
 def spans(numbers: Sequence[int]) -> str:

@@ -3,6 +3,8 @@
 from collections.abc import Sequence
 
 import numpy as np
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 
 from elastocal.arrays import FloatArray
@@ -32,15 +34,15 @@ def process_maps(traces: Sequence[Trace]) -> Figure:
     tall = float(np.clip(across * (high - low)[1] / max((high - low)[0], 1e-9), 1.5, 4.5))
     height = tall + 1.5
     figure = new_figure(_WIDTH, height)
-    dots = None
+    largest = max(float(each.max()) for each in sides.values())
     for number, (title, size) in enumerate(sides.items()):
         left = 0.65 + number * (across + 0.15)
         axes = figure.add_axes((left / _WIDTH, 1.1 / height, across / _WIDTH, tall / height))
         # The largest are drawn last, so that none hides.
         order = np.argsort(size, kind="stable")
-        dots = axes.scatter(
-            *place[order].T, c=size[order], s=4, lw=0, cmap=style.SEQUENTIAL, vmin=0.0,
-            vmax=max(float(each.max()) for each in sides.values()), rasterized=True,
+        axes.scatter(
+            place[order, 0], place[order, 1], c=size[order], s=4, lw=0, cmap=style.SEQUENTIAL, vmin=0.0,
+            vmax=largest, rasterized=True,
         )  # fmt: skip
         axes.set_title(f"{title}: mean {size.mean():.3f}, largest {size.max():.3f} mm", fontsize=9)
         axes.set_aspect("equal", adjustable="box", anchor="C")
@@ -48,7 +50,9 @@ def process_maps(traces: Sequence[Trace]) -> Figure:
         axes.tick_params(length=2, labelsize=7, labelleft=number == 0)
         axes.spines[["top", "right"]].set_visible(False)
     bar = figure.add_axes((0.3, 0.4 / height, 0.4, 0.12 / height))
-    figure.colorbar(dots, cax=bar, orientation="horizontal")
+    figure.colorbar(
+        ScalarMappable(Normalize(0.0, largest), style.SEQUENTIAL), cax=bar, orientation="horizontal"
+    )
     bar.set_xlabel("absolute deviation in mm", fontsize=8)
     bar.tick_params(labelsize=7, length=2)
     return figure

@@ -10,6 +10,9 @@ from matplotlib.figure import Figure
 from elastocal.report import style
 from elastocal.report.printed import new_figure, plain
 
+_ROW, _FOOT = 0.23, 0.75
+"""Heights of a spring and of what stands below a panel, in inches."""
+
 
 @dataclass(frozen=True)
 class SpringBar:
@@ -32,14 +35,13 @@ def spring_figure(panels: Sequence[tuple[str, Sequence[SpringBar]]]) -> Figure:
         Unit and its springs; none is empty.
     """
     rows = [len(bars) for _, bars in panels]
-    height = 0.23 * sum(rows) + 0.85 * len(panels)
+    height = _ROW * sum(rows) + _FOOT * len(panels)
     figure = new_figure(9.0, height)
-    all_axes = figure.subplots(len(panels), 1, height_ratios=rows, squeeze=False)[:, 0]
-    for axes, (unit, bars) in zip(all_axes, panels, strict=True):
-        _draw(axes, unit, bars)
-    figure.subplots_adjust(
-        left=0.14, right=0.98, top=1.0 - 0.15 / height, bottom=0.5 / height, hspace=0.35
-    )
+    bottom = height
+    for (unit, bars), count in zip(panels, rows, strict=True):
+        bottom -= _ROW * count + _FOOT
+        box = (0.14, (bottom + _FOOT - 0.1) / height, 0.84, _ROW * count / height)
+        _draw(figure.add_axes(box), unit, bars)
     return figure
 
 
@@ -59,13 +61,15 @@ def _draw(axes: Axes, unit: str, bars: Sequence[SpringBar]) -> None:
             axes.scatter(
                 bar.value, k, s=26, facecolors="none", edgecolors=style.REFUSED, marker="D"
             )
+            left = bar.value > 0.75 * top
             axes.text(
-                bar.value + 0.012 * top, k, f"not by itself, group {bar.group}",
+                bar.value + (-0.015 if left else 0.015) * top, k,
+                f"not by itself, group {bar.group}", ha="right" if left else "left",
                 va="center", fontsize=7.5, color=style.MUTED, style="italic",
             )  # fmt: skip
     axes.set_yticks(range(len(bars)), [plain(bar.name) for bar in bars], fontsize=8)
     axes.set_ylim(len(bars) - 0.4, -0.6)
-    axes.set_xlim(-0.02 * top, 1.12 * top)
+    axes.set_xlim(-0.02 * top, 1.05 * top)
     axes.set_xlabel(f"compliance in {unit}; band: 95 % interval")
     axes.grid(axis="both", color="#e6e6e2", lw=0.5)
     axes.set_axisbelow(True)

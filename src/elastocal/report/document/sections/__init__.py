@@ -11,6 +11,7 @@ from elastocal.report.document.sections import (
     process,
     provenance,
     readings,
+    recertification,
 )
 
 SECTIONS: tuple[Section, ...] = (
@@ -21,6 +22,7 @@ SECTIONS: tuple[Section, ...] = (
     compliances.SECTION,
     codecs.SECTION,
     process.SECTION,
+    recertification.SECTION,
     provenance.SECTION,
     not_verified.SECTION,
 )

@@ -35,17 +35,22 @@ def body(parts: Parts) -> Content:
             ("Training poses", f"1 to {data.n_train[-1]}"),
         ]
     )
-    html += listed(verdicts.sentences, "verdicts")
+    html += listed(_micro(each) for each in verdicts.sentences)
     try:
         html += picture(
             partial(codec_chart, data, verdicts),
             f"{headline(data)}: box plots of mean and maximum error at held-out poses over the"
-            f" number of training poses. {' '.join(verdicts.sentences)}",
+            f" number of training poses. {_micro(' '.join(verdicts.sentences))}",
             f"After the paper's Fig. 7, 9 and 10. {how_to_read(data)}",
         )
     except CodecError as error:
         html += paragraph(f"No chart: {error}.")
     return Content(html + _table(parts.codec), findings=tuple(_findings(parts.codec)))
+
+
+def _micro(sentence: str) -> str:
+    """Return a sentence with the sign that terminals may lack."""
+    return sentence.replace(" um", " µm")
 
 
 def _table(codec: Codec) -> str:
@@ -82,7 +87,7 @@ def _findings(codec: Codec) -> Iterator[Finding]:
     else:
         yield Finding(
             f"the error no longer fell from {counted(best.n_train, 'training pose')} on"
-            f" ({best.variant}, 95 % interval {best.low} to {best.high}): more poses would not help",
+            f" ({best.variant}, 95 % interval {best.low} to {best.high}): more would not help",
             holds_back=False,
         )
 

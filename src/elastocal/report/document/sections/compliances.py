@@ -38,8 +38,8 @@ def body(parts: Parts) -> Content:
         "Filled: known by itself, with its 95 % interval. Hollow: not known by itself; the number"
         " is the smallest one that explains the readings.",
     )
-    heads = ("Spring", "Compliance", "95 % interval", "Unit", "Stiffness", "Known?")
-    html += table("Compliances", heads, [_row(each) for each in springs])
+    heads = ("Spring", "Known?", "Compliance", "95 % interval", "Unit", "Stiffness")
+    html += table("Compliances", heads, [_row(each) for each in springs], texts=2)
     return Content(html + _told(parts.calibrated), findings=tuple(_findings(parts.calibrated)))
 
 
@@ -68,28 +68,15 @@ def _bar(each: Figures) -> SpringBar:
 
 
 def _row(each: Figures) -> tuple[str, ...]:
-    unit, value = UNITS[each["kind"]], each["value"]
+    name, unit, value = each["name"], UNITS[each["kind"]], each["value"]
     if each["group"] is not None:
-        return (
-            each["name"],
-            f"({value:.4f})",
-            "none",
-            unit,
-            "",
-            f"not by itself, group {each['group']}",
-        )
+        return name, f"not by itself, group {each['group']}", f"({value:.4f})", "none", unit, "none"
     stiff = f"{1.0 / value:.3f} {_STIFF[each['kind']]}" if value > 0.0 else "rigid"
-    known = (
-        "at its bound" if not value > 0.0 else f"±{(each['high'] - each['low']) / 2 / value:.0%}"
-    )
-    return (
-        each["name"],
-        f"{value:.4f}",
-        f"{each['low']:.3f} to {each['high']:.3f}",
-        unit,
-        stiff,
-        known,
-    )
+    known = "at its bound"
+    if value > 0.0:
+        known = f"±{(each['high'] - each['low']) / 2 / value:.0%}"
+    span = f"{each['low']:.3f} to {each['high']:.3f}"
+    return name, known, f"{value:.4f}", span, unit, stiff
 
 
 def _head(found: Calibrated, observable: int) -> str:

@@ -43,7 +43,7 @@ def _stations(registration: Figures) -> str:
     ]
     heads = ("Station", "Poses", "Residual, rms", "Residual, largest", "Rotation known to",
              "Effect on a displacement")  # fmt: skip
-    html = heading("Tracker stations") + table("Registration", heads, rows, texts=2)
+    html = table("Tracker stations, registered from the unloaded readings", heads, rows, texts=2)
     if stations:
         html += picture(
             partial(station_figure, stations),
@@ -84,7 +84,7 @@ def _noise(summary: Figures) -> str:
          f"{_or_unknown(moment['median_Nm'], '{:.2f}'.format)} and"
          f" {_or_unknown(moment['largest_Nm'], '{:.2f}'.format)} N·m"),
     ]  # fmt: skip
-    return heading("Noise and drift") + table("Noise and drift", ("What", "Value"), rows)
+    return table("Noise and drift", ("What", "Value"), rows, texts=2)
 
 
 def _tool(tool: Figures) -> str:
@@ -98,7 +98,7 @@ def _tool(tool: Figures) -> str:
         ),
     ]
     heads = ("What", "Measured", "± (95 %)", "Cell file")
-    html = heading("Tool weight") + table(
+    html = table(
         f"Tool weight from {counted(tool['unloaded_references'], 'unloaded reference')}",
         heads,
         rows,
@@ -138,7 +138,7 @@ def _tool_file(parts: Parts) -> str:
         ("Static postures", str(tool.postures)),
         ("Not determined", ", ".join(tool.undetermined) or "nothing"),
     ]
-    return table("Tool file, for the compensation", ("What", "Value"), rows)
+    return table("Tool file, for the compensation", ("What", "Value"), rows, texts=2)
 
 
 def _findings(summary: Figures) -> Iterator[Finding]:

@@ -21,6 +21,8 @@ ALWAYS = (
 ESSENTIAL = ("run", "journal", "cell", "plan", "summary of the run", "dataset", "calibrated model",
              "calibration made again")  # fmt: skip
 """Parts without which no light is green; the codec has a finding of its own."""
+TOLD_ELSEWHERE = ("codec", "earlier calibration")
+"""A codec has a finding of its own; a first calibration has no earlier one."""
 
 
 def body(parts: Parts) -> Content:
@@ -57,7 +59,7 @@ def _always(parts: Parts) -> Iterator[str]:
 
 def _findings(parts: Parts) -> Iterator[Finding]:
     for each in parts.absent:
-        if each.name == "codec" and not each.damaged:
+        if each.name in TOLD_ELSEWHERE and not each.damaged:
             continue
         word = "cannot be used" if each.damaged else "is missing"
         advice = ""

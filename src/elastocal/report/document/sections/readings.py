@@ -49,7 +49,7 @@ def _counts(dataset: Dataset, summary: Figures | None) -> str:
     if summary is None:
         return html
     counts = summary["readings"]["counts"]
-    html += table("Readings by status", tuple(counts), [tuple(counts.values())], texts=0)
+    html += table("Readings by status", ("Status", "Readings"), list(counts.items()))
     lost = [
         f"pose {each['pose']} {each['load_case']}: {each['status']}"
         + (f" ({each['note']})" if each["note"] else "")
@@ -64,8 +64,8 @@ def _residuals(again: Calibration) -> str:
     residual = np.linalg.norm(again.residual, axis=1)
     used = again.used
     told = (
-        f"Commanded displacement {mm(float(commanded.mean()))} on average, {mm(float(commanded.max()))}"
-        f" at most; residual of the fit {mm(float(residual[used].mean()))} on average,"
+        f"Commanded displacement {mm(float(commanded.mean()))} on average,"
+        f" {mm(float(commanded.max()))} at most; residual of the fit {mm(float(residual[used].mean()))} on average,"
         f" {mm(float(residual[used].max()))} at most ({counted(int(used.sum()), 'reading')} that"
         " were fitted, so not held out)"
     )
@@ -148,7 +148,7 @@ def _suspicious(parts: Parts) -> str:
         for each in found
     ]
     heads = ("Reading", "Off by", "Robust score", "Leverage", "What was done")
-    return heading("Suspicious readings") + table("Readings that look wrong", heads, rows)
+    return table("Readings that look wrong", heads, rows)
 
 
 def _worst(parts: Parts) -> str:
@@ -161,9 +161,7 @@ def _worst(parts: Parts) -> str:
         (f"pose {unseen.pose[k]} {unseen.load_case[k]}", mm(float(unseen.error[k]))) for k in order
     ]
     heads = ("Reading", "Error")
-    return heading("Where the model errs most") + table(
-        "Largest errors at left-out poses", heads, rows
-    )
+    return table("Largest errors, each at a left-out pose", heads, rows)
 
 
 def _of_run(parts: Parts) -> Iterator[Finding]:
@@ -171,9 +169,9 @@ def _of_run(parts: Parts) -> Iterator[Finding]:
         missing = sorted({pose.id for pose in parts.plan.poses} - set(parts.dataset.poses))
         if missing:
             yield Finding(
-                f"the run is partial: {len(missing)} of {counted(len(parts.plan.poses), 'planned pose')}"
-                f" {'has' if len(missing) == 1 else 'have'} no reading (pose {spans(missing)})",
-                advice="Finish the run: `elastocal run --resume` measures the poses that are missing.",
+                f"the run is partial: {len(missing)} of"
+                f" {counted(len(parts.plan.poses), 'planned pose')} {'has' if len(missing) == 1 else 'have'} no reading (pose {spans(missing)})",
+                advice="Finish the run: `elastocal run --resume` measures the missing poses.",
             )
     lost = parts.summary["readings"]["not_ok"] if parts.summary else []
     if lost:

@@ -1,0 +1,131 @@
+"""What ``elastocal compare`` shows: which springs moved, what it does, and the verdict."""
+
+from pathlib import Path
+
+import numpy as np
+from rich.console import Console
+from rich.markup import escape
+from rich.table import Table
+
+from elastocal.identification.recertification import (
+    DeflectionChange,
+    Estimate,
+    Recertification,
+    SpringChange,
+    Verdict,
+)
+
+_COLOURS = {Verdict.PASS: "green", Verdict.FAIL: "red", Verdict.UNDECIDED: "yellow"}
+
+
+def show_comparison(console: Console, found: Recertification, hint: Path | None = None) -> None:
+    """Print a comparison for a person.
+
+    Parameters
+    ----------
+    console : Console
+        Where.
+    found : Recertification
+        The comparison.
+    hint : Path, optional
+        A dataset that could serve as rows.
+    """
+    console.print(f"[bold]{escape(found.robot)}[/bold]: {_moved(found)}")
+    if found.springs:
+        sums = {each.name: f"sum {n}" for n, each in enumerate(_sums(found), start=1)}
+        console.print(_spring_table(found, sums))
+        for name, short in sums.items():
+            console.print(f"   {short}: {name}", markup=False, soft_wrap=True)
+        console.print(
+            f"the interval holds for all {len(found.springs)} comparisons at once with 95 %; what"
+            " has 0 outside it moved",
+            soft_wrap=True,
+        )
+    for names, which in ((found.only_old, "old"), (found.only_new, "new")):
+        if names:
+            console.print(f"only in the {which} model: {', '.join(names)}", markup=False)
+    if found.not_compared:
+        console.print(f"determined by neither: {', '.join(found.not_compared)}", markup=False)
+    if found.deflection is not None:
+        _show_deflection(console, found.deflection)
+    _show_verdict(console, found, hint)
+    for note in found.notes:
+        console.print(f"[yellow]note:[/yellow] {escape(note)}", soft_wrap=True)
+
+
+def _moved(found: Recertification) -> str:
+    moved, count = found.moved, len(found.springs)
+    if not count:
+        return "no spring is determined by both calibrations"
+    verb = "moved" if found.same_springs else "differ"
+    if not moved:
+        return f"none of {count} compared springs and sums of springs {verb} beyond its interval"
+    names = ", ".join(
+        each.name if np.isnan(each.relative) else f"{each.name} ({each.relative:+.0%})"
+        for each in moved
+    )
+    return f"[bold red]{verb}[/bold red]: {escape(names)}"
+
+
+def _sums(found: Recertification) -> list[SpringChange]:
+    return [each for each in found.springs if len(each.terms) > 1]
+
+
+def _spring_table(found: Recertification, sums: dict[str, str]) -> Table:
+    """Return a row a spring; linear springs, rare, name their own unit."""
+    table = Table(box=None, pad_edge=False)
+    table.add_column("spring", no_wrap=True)
+    headings = ("old\nµrad/(N·m)", "new\nµrad/(N·m)", "change\nµrad/(N·m)", "95 %, all\nat once")
+    for heading in headings:
+        table.add_column(heading, justify="right", no_wrap=True)
+    table.add_column("", no_wrap=True)
+    word = "moved" if found.same_springs else "differs"
+    for change in found.springs:
+        unit = "" if change.unit.startswith("rad") else " µm/N"
+        table.add_row(
+            escape(sums.get(change.name, change.name)),
+            f"{1e6 * change.old.value:.4f}{unit}",
+            f"{1e6 * change.new.value:.4f}{unit}",
+            f"{1e6 * change.difference.value:+.4f}",
+            _between(change.together),
+            f"[red]{word}[/red]" if change.moved else "",
+        )
+    return table
+
+
+def _between(estimate: Estimate) -> str:
+    return f"{1e6 * estimate.low:+.3f} … {1e6 * estimate.high:+.3f}"
+
+
+def _show_deflection(console: Console, change: DeflectionChange) -> None:
+    place = ", ".join(f"{1e3 * x:.0f}" for x in change.tcp_position[change.where])
+    before = 1e3 * np.linalg.norm(change.old, axis=1)
+    console.print(
+        f"\npredicted deflection over {len(change.q)} rows: {before.mean():.3f} mm mean,"
+        f" {before.max():.3f} mm max by the old model\n"
+        f"   change: {_mm(change.mean)} mean, {_mm(change.largest)} max\n"
+        f"   largest at row {change.where + 1}, tcp at ({place}) mm in base",
+        soft_wrap=True,
+    )
+
+
+def _mm(estimate: Estimate) -> str:
+    low, high = 1e3 * estimate.low, 1e3 * estimate.high
+    return f"{1e3 * estimate.value:.3f} mm ({low:.3f} to {high:.3f}, 95 %)"
+
+
+def _show_verdict(console: Console, found: Recertification, hint: Path | None) -> None:
+    if found.limit is None:
+        return
+    if found.verdict is None:
+        asked = "give them with --rows"
+        if hint is not None:
+            asked += f", e.g. {hint}, which the new model states it was calibrated on"
+        console.print(f"[yellow]no verdict:[/yellow] {escape(found.reason)}; {escape(asked)}",
+                      soft_wrap=True)  # fmt: skip
+        return
+    colour = _COLOURS[found.verdict]
+    console.print(
+        f"[bold {colour}]{found.verdict.value}[/bold {colour}]: {escape(found.reason)}",
+        soft_wrap=True,
+    )

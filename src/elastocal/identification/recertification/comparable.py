@@ -1,0 +1,96 @@
+"""What two calibrations can be compared in.
+
+A calibration does not tell all springs apart: adding any multiple of one of its unobservable
+combinations ``v`` changes no deflection that was measured. A weighted sum ``w . c`` is
+determined when ``w . v = 0`` for every such ``v``. So compared are the springs that stand in no
+``v`` of either model, and a sparse basis of the sums that both models determine.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from elastocal.arrays import FloatArray
+from elastocal.elastic import Spring
+from elastocal.identification.calibrated import CalibratedModel
+from elastocal.identification.observability import Term, describe
+from elastocal.identification.sparse_basis import sparse_basis
+
+_SAME = 1e-4
+"""Singular value, over the largest, below which unobservable combinations of the two models
+count as the same."""
+
+
+def common_springs(old: CalibratedModel, new: CalibratedModel) -> tuple[Spring, ...]:
+    """Return the springs that both models have, same axis and place, in the new one's order."""
+    known = set(old.model.springs)
+    return tuple(spring for spring in new.model.springs if spring in known)
+
+
+def comparable_sums(old: CalibratedModel, new: CalibratedModel) -> tuple[tuple[Term, ...], ...]:
+    """Return the sums of compliances that both models determine.
+
+    Parameters
+    ----------
+    old, new : CalibratedModel
+        Two calibrations of one robot.
+
+    Returns
+    -------
+    tuple of tuple of Term
+        Single springs with weight 1, and sums of several; in the order of the springs. Springs
+        of one model only stand in none.
+    """
+    springs = common_springs(old, new)
+    unseen = np.vstack([_unobservable(each, springs) for each in (old, new)])
+    mixed = np.flatnonzero(np.any(unseen != 0.0, axis=0))
+    sums: dict[int, list[tuple[Term, ...]]]
+    sums = {i: [(Term(spring.name, 1.0),)] for i, spring in enumerate(springs)}
+    for i in mixed:
+        sums[int(i)] = []
+    joints = list(dict.fromkeys(spring.joint for spring in springs))
+    determined = _complement(unseen[:, mixed])
+    for vector in sparse_basis(determined, [joints.index(springs[i].joint) for i in mixed]):
+        members = np.flatnonzero(vector)
+        terms = tuple(Term(springs[mixed[m]].name, float(vector[m])) for m in members)
+        sums[int(mixed[members[0]])].append(terms)
+    return tuple(each for i in sorted(sums) for each in sums[i])
+
+
+def written(terms: Sequence[Term]) -> str:
+    """Return a sum as a person would write it.
+
+    >>> written([Term("a4.axial", 1.0), Term("a5.x", 1.0)])
+    'a4.axial + a5.x'
+    """
+    text = describe(terms)
+    bare = len(terms) > 1 and all(term.weight > 0.0 for term in terms)
+    return text[1:-1] if bare else text
+
+
+def weights(sums: Sequence[Sequence[Term]], names: Sequence[str]) -> FloatArray:
+    """Return the weights of sums over the springs of a model, shape (sum, spring)."""
+    table = np.zeros((len(sums), len(names)))
+    for row, terms in zip(table, sums, strict=True):
+        for term in terms:
+            row[list(names).index(term.spring)] = term.weight
+    return table
+
+
+def _unobservable(calibrated: CalibratedModel, springs: Sequence[Spring]) -> FloatArray:
+    """Return the part of a model's unobservable combinations that lies in some springs."""
+    names = [spring.name for spring in springs]
+    kept = [
+        [term for term in group if term.spring in names]
+        for group in calibrated.observability.unobservable
+    ]
+    return weights(kept, names)
+
+
+def _complement(rows: FloatArray) -> FloatArray:
+    """Return an orthonormal basis of what is orthogonal to some rows, shape (n, k)."""
+    if not rows.shape[1]:
+        return np.zeros((0, 0))
+    _, s, Vt = np.linalg.svd(rows, full_matrices=True)
+    rank = int(np.sum(s > _SAME * s[0]))
+    return np.asarray(Vt[rank:].T, dtype=float)

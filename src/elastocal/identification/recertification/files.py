@@ -1,0 +1,59 @@
+"""Compare two model files."""
+
+from dataclasses import replace
+from pathlib import Path
+
+from numpy.typing import ArrayLike
+
+from elastocal.errors import IdentificationError
+from elastocal.identification.model_file import read_model, read_record
+from elastocal.identification.recertification.caveats import load_caveat
+from elastocal.identification.recertification.recertify import recertify
+from elastocal.identification.recertification.result import Recertification
+
+
+def recertify_files(
+    old: Path,
+    new: Path,
+    q: ArrayLike | None = None,
+    force: ArrayLike | None = None,
+    moment: ArrayLike | None = None,
+    *,
+    limit: float | None = None,
+) -> Recertification:
+    """Compare two model files; as `recertify`, with a note where the loads were others.
+
+    Parameters
+    ----------
+    old, new : Path
+        Model files of `elastocal calibrate`.
+    q, force, moment, limit
+        As for `recertify`.
+
+    Raises
+    ------
+    SchemaError, FileAccessError
+        If a file is no model or cannot be read.
+    IdentificationError, SpringError, RobotError
+        See `recertify`.
+    """
+    if Path(old).resolve() == Path(new).resolve():
+        raise IdentificationError(f"{old} and {new} are one and the same file: nothing to compare")
+    found = recertify(
+        read_model(old),
+        read_model(new),
+        q,
+        force,
+        moment,
+        limit=limit,
+        names=(str(old), str(new)),
+    )
+    note = load_caveat(*(_measured_deflection(path) for path in (old, new)))
+    return found if note is None else replace(found, notes=(*found.notes, note))
+
+
+def _measured_deflection(path: Path) -> float | None:
+    """Return the mean measured deflection that a model file states, in m; None: none."""
+    stated = read_record(path).calibration.get("deflection")
+    mean = stated.get("mean") if isinstance(stated, dict) else None
+    return float(mean) if isinstance(mean, int | float) else None
