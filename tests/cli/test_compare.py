@@ -145,3 +145,9 @@ def test_an_input_is_not_overwritten(folder, option):
     before = (folder / "old.json").read_bytes()
     assert "is an input of this command" in run(folder, option, folder / "old.json").reason
     assert (folder / "old.json").read_bytes() == before
+
+
+def test_a_figure_of_another_kind_is_refused_and_nothing_is_written(folder, tmp_path):
+    result = run(folder, "--out", tmp_path / "c.json", "--figure", tmp_path / "c.bmp")
+    assert "suffix '.bmp' is not one of .pdf, .png, .svg" in result.reason
+    assert list(tmp_path.iterdir()) == []

@@ -3,7 +3,9 @@
 import numpy as np
 import pytest
 
+from elastocal.elastic import ElasticModel
 from elastocal.errors import IdentificationError, RobotError, SpringError
+from elastocal.identification import CalibratedModel, Observability
 from elastocal.identification.recertification import Verdict, recertify
 from support.cells import linear_truth, rich_truth, unseen
 from support.recertified import calibrated, made_up, soft_truth, softened
@@ -42,12 +44,16 @@ def test_it_is_found_on_an_arm_that_no_springs_express(loads):
 
 @pytest.mark.parametrize("arm", [linear_truth, rich_truth])
 def test_of_unchanged_cells_few_are_called_moved(arm, loads):
-    """No campaign stands in two pairs, or an odd one would count twice; the rate is below."""
+    """At a rate of 5 %, more than 2 of 6 pairs would be called so once in 450 times.
+
+    No campaign stands in two pairs, or an odd one would count twice. The rate itself is counted
+    by the slow test below.
+    """
     pairs = [
         recertify(calibrated(arm(), n), calibrated(arm(), n + 1), *loads, limit=0.4e-3)
         for n in range(0, 12, 2)
     ]
-    assert sum(bool(each.moved) for each in pairs) <= 1
+    assert sum(bool(each.moved) for each in pairs) <= 2
     assert all(each.deflection.largest.low < 20e-6 for each in pairs)
     assert all(each.verdict is Verdict.PASS for each in pairs)
 
@@ -92,6 +98,20 @@ def test_models_with_other_springs_share_some_and_say_so(loads):
     assert found.not_compared == ("joint_4.axial", "joint_5.axial", "joint_6.axial")
     assert any("depends on which others" in note for note in found.notes)
     assert found.deflection is not None
+
+
+def test_models_without_a_common_spring_are_compared_by_their_predictions(loads):
+    old, new = _only(0, slice(0, 3)), _only(1, slice(3, 6))
+    found = recertify(old, new, *loads, limit=1e-6)
+    assert found.springs == ()
+    assert found.verdict is Verdict.FAIL
+
+
+def _only(seed: int, kept: slice) -> CalibratedModel:
+    whole = made_up(seed)
+    seen = Observability(3, 3, 10.0, (True,) * 3, ())
+    model = ElasticModel(whole.model.robot, whole.model.springs[kept])
+    return CalibratedModel(model, whole.compliance[kept], whole.draws[:, kept], seen)
 
 
 def test_one_calibration_with_itself_is_refused():
