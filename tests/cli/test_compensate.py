@@ -75,6 +75,14 @@ def test_json_is_one_object_and_nothing_else(folder):
     assert len(figures["notes"]) >= 1
 
 
+def test_forces_that_pull_the_tool_out_are_doubted(folder):
+    pulling = {name: -np.asarray(values) for name, values in FORCE.items()}
+    write_csv(folder / "pulling.csv", euler_columns(COURSE) | pulling)
+    words = " ".join(run(folder, path="pulling.csv", out="pulled.csv").err.split())
+    assert "at 12 of 12 rows the force on the robot draws the tool out" in words
+    assert "draws the tool out" not in run(folder).err
+
+
 def test_a_program_is_corrected_with_a_table_of_forces(folder):
     (folder / "out").mkdir()
     line = "DECL FRAME XP1={X 1600.0,Y 0.0,Z 750.0,A 0.0,B -16.699,C 180.0}"

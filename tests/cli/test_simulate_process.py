@@ -118,6 +118,32 @@ def test_an_unknown_process_is_refused(folder):
     assert "'milling' is not one of afp, machining" in result.reason
 
 
+def test_settings_in_another_frame_are_refused_by_file(folder):
+    (folder / "tcp.yaml").write_text("schema: elastocal.compensator/1\nframe: tcp\n")
+    result = run(folder, "framed", "--settings", folder / "tcp.yaml")
+    assert "tcp.yaml: frame is 'tcp'" in result.reason
+
+
+def test_people_see_before_after_and_reduction_within_80_columns(folder):
+    result = run(folder, "told", "--seed", 2)
+    lines = result.err.splitlines()
+    assert "before > after, reduction" in result.err
+    assert any("seed 2" in line and line.count(" > ") == 3 for line in lines)
+    assert max(map(len, lines)) <= 80
+
+
 def test_files_for_some_seeds_only_are_refused(folder):
     result = run(folder, "some", "--seed", 1, "--seed", 2, "--seed", 3, "--model", folder / "x")
     assert "--model is given 2 times for 3 seeds" in result.reason
+
+
+def test_the_figures_do_not_depend_on_the_number_of_processes(folder):
+    two = ("--courses", 2, "--seed", 2)
+    for jobs in (1, 2):
+        result = elastocal(
+            "simulate-process", example_cell("afp").path, "--process", "afp", "--model",
+            folder / "model.json", "--out", folder / f"jobs{jobs}", "--jobs", jobs, *two,
+        )  # fmt: skip
+        assert result.code == 0, result.err
+    one, other = ((folder / f"jobs{n}/deviations.csv").read_bytes() for n in (1, 2))
+    assert one == other

@@ -78,7 +78,7 @@ def test_the_same_question_gives_the_same_picture(folder):
 
 def test_people_are_told_the_choice(folder):
     words = " ".join(run(folder, "told", "--stations", "1").err.split())
-    for text in ("1 stations, 48 postures", "one posture for the path: softest", "N/µm"):
+    for text in ("48 of 48 postures are allowed", "one posture for the path", "in N/µm", "deg"):
         assert text in words
 
 
@@ -102,7 +102,8 @@ def test_a_survey_in_which_nothing_is_allowed_is_told_and_drawn(folder):
     )  # fmt: skip
     assert result.code == 0, result.err
     words = " ".join(result.err.split())
-    assert "of which 0 are allowed" in words
+    assert "0 of 416 postures are allowed; refused:" in words
+    assert "none" in words
     assert "no single posture is allowed at every station" in words
 
 

@@ -67,7 +67,7 @@ def test_too_few_directions_are_named(tmp_path):
     [
         (["--sensor", "0 mm"], "sensor '0 mm' must be six quantities"),
         (["--down", "0, 0"], "direction '0, 0' must be three numbers"),
-        (["--down", "0, 0, 0"], "must not be zero"),
+        (["--down", "0, 0, 0"], "must be finite and not zero"),
     ],
 )
 def test_options_that_do_not_fit_are_refused(tmp_path, postures, options, reason):

@@ -86,7 +86,7 @@ class TestCorrect:
     def test_a_moment_is_corrected_too(self):
         q, force = programmed()
         moment = np.tile([0.0, 150.0, 0.0], (len(q), 1))
-        found = correct(SOLVER, calibrated(), q, COURSE, (force, moment), named, True)
+        found = correct(SOLVER, calibrated(), q, COURSE, (force, moment), named, may_turn=True)
         without = corrected(may_turn=True)
         assert np.linalg.norm(found.deflection - without.deflection, axis=1).min() > 1e-5
         assert found.residual.max() < 1e-7
@@ -101,7 +101,7 @@ class TestCorrect:
         q = np.array([[0.0, -1.75, 1.9, 0.2, 1e-12, 0.1], [0.1, -1.75, 1.9, 0.2, 0.8, 0.1]])
         T = robot().forward(q)
         force = np.tile([0.0, 700.0, 700.0], (2, 1))
-        found = correct(SOLVER, calibrated(), q, T, (force, None), named, True)
+        found = correct(SOLVER, calibrated(), q, T, (force, None), named, may_turn=True)
         assert found.residual.max() < 1e-7
         np.testing.assert_allclose(robot().forward(found.q)[:, :3, :3], T[:, :3, :3], atol=1e-8)
 
@@ -125,10 +125,10 @@ class TestCorrect:
         q[0, 5] = start
         T = robot().forward(q)
         load = (force[7:8], None)
-        turned = correct(SOLVER, calibrated(), q, T, load, named, True).q[0, 5]
+        turned = correct(SOLVER, calibrated(), q, T, load, named, may_turn=True).q[0, 5]
         assert abs(turned - start) > 6.0
         with pytest.raises(PathError, match="row 0: joint_6 would be corrected to"):
-            correct(SOLVER, calibrated(), q, T, load, named, False)
+            correct(SOLVER, calibrated(), q, T, load, named, may_turn=False)
 
     def test_a_joint_programmed_outside_its_limits_is_refused_by_row(self):
         q, force = programmed()

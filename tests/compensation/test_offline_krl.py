@@ -107,7 +107,7 @@ def test_points_are_corrected_in_the_programs_frame_to_a_tenth_of_a_micrometre(p
     solver = inverse_for(robot())
     q = follow(solver, COURSE, np.zeros((4, 0)), posture(), str)
     load = (COURSE[:, :3, :3] @ FORCE_TCP, None)
-    expected = correct(solver, calibrated(), q, COURSE, load, str, True)
+    expected = correct(solver, calibrated(), q, COURSE, load, str, may_turn=True)
     shift = np.linalg.norm(expected.T_base_tcp[:, :3, 3] - COURSE[:, :3, 3], axis=1)
     assert shift.min() > 1e-3
     for row in range(4):

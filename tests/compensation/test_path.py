@@ -154,3 +154,11 @@ class TestValues:
         columns["qw"] = columns["qw"] + 0.1
         with pytest.raises(PathError, match="row 2: quaternion"):
             values_of(write_csv(tmp_path / "p.csv", columns))
+
+
+def test_degrees_in_a_column_of_radians_are_refused_by_row(tmp_path):
+    columns = euler_columns(dome_course(3)) | force_columns(np.zeros((3, 3)))
+    in_rad = {name.replace("deg", "rad"): values for name, values in columns.items()}
+    path = write_csv(tmp_path / "path.csv", in_rad)
+    with pytest.raises(PathError, match=r"row 2, column 'b\[rad\]': .* more than a turn: is it in"):
+        values_of(path)

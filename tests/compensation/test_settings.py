@@ -51,6 +51,13 @@ def test_the_tcp_frame_has_no_fixed_rotation():
         ('"5 mm/s"', '"50 mm/s"', "fade 0.05 m/s is above rate 0.02 m/s"),
         ('"4 ms"', "0.004", "0.004 is not a time with its unit"),
         ("notches", "notchs", "did you mean 'notches'"),
+        ('"2 mm"', '"51 mm"', "limits.correction: Input should be less than or equal to 0.05"),
+        ('"20 mm/s"', '"2 m/s"', "limits.rate: Input should be less than or equal to 1"),
+        ("limits:", 'hold: "2 s"\nlimits:', "hold: Input should be less than or equal to 1"),
+        ("limits:", 'hold: "1 ms"\nlimits:', "not longer than the time between readings"),
+        ("limits:", 'deadband: "2 mm"\nlimits:', "deadband 2 mm must be below limits.correction"),
+        (', "0 deg"]', "]", r"frame\.turned\.abc"),
+        ('"90 deg"', '"90"', r"frame\.turned\.abc\.0: '90' is not an? angle"),
     ],
 )
 def test_settings_that_do_not_fit_are_refused(read, old, new, reason):
@@ -68,3 +75,9 @@ def test_an_unknown_frame_is_refused_by_name(read, frame):
 def test_a_filter_beyond_half_the_rate_is_refused_with_the_file(read):
     with pytest.raises(CompensationError, match=r"online.yaml: notch 200 Hz must be .* below 125"):
         read(TEXT.replace('  sample: "1 ms"\n', ""))
+
+
+def test_filters_that_are_late_by_seconds_are_refused_with_the_file(read):
+    slow = TEXT + '  low_pass: {cutoff: "0.1 Hz"}\n'
+    with pytest.raises(CompensationError, match=r"online.yaml: the filters delay a slow wrench by"):
+        read(slow)

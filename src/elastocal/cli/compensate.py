@@ -68,6 +68,12 @@ def compensate(
         with progress_bars(console()) as report:
             tally = compensate_path(calibrated, path, out, settings, report)
         notes += _path_notes(tally, calibrated.model.robot, start)
+    if 2 * tally.pulled > tally.rows:
+        notes.append(
+            f"at {tally.pulled} of {tally.rows} rows the force on the robot draws the tool out"
+            " (along +z of the tcp), which a surface cannot: is it the force on the part? Then turn"
+            " its sign"
+        )
     if as_json:
         print_json(tally.figures() | {"notes": notes})
     else:
@@ -98,8 +104,8 @@ def _path_notes(tally: "Tally", robot: "Robot", start: str | None) -> list[str]:
     notes = []
     if tally.jumps:
         notes.append(
-            f"the posture changes at {tally.jumps} rows (first: {tally.first_jump}): a joint turns"
-            " by more than 90 deg from the row before"
+            f"the posture changes at {tally.jumps} {'row' if tally.jumps == 1 else 'rows'} (first:"
+            f" {tally.first_jump}): a joint turns by more than 90 deg from the row before"
         )
     if tally.start and start is None:
         shown = written_posture(robot, tally.start)

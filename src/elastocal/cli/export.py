@@ -9,6 +9,7 @@ import typer
 def export(
     model: Annotated[Path, typer.Argument(help="Model file from calibrate.")],
     c: Annotated[Path, typer.Option("--c", help="Folder to write the C files into.")],
+    *,
     settings: Annotated[
         Path | None, typer.Option(help="Settings of the compensator (.yaml).")
     ] = None,
@@ -33,7 +34,10 @@ def export(
 
     calibrated = read_model(model)
     chosen = None if settings is None else read_settings(settings)
-    load = None if tool is None else sensor_load(read_tool(tool), calibrated.model.robot)
+    try:
+        load = None if tool is None else sensor_load(read_tool(tool), calibrated.model.robot)
+    except CompensationError as error:
+        raise CompensationError(f"{tool}: {error}") from error
     try:
         numbers = design(calibrated, chosen, load)
     except CompensationError as error:

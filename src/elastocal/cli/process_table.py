@@ -10,19 +10,23 @@ from elastocal.compensation.process.record import Line, Table, Values
 
 def show(console: Console, table: Table) -> None:
     """Print the table in mm, and the budget below it."""
-    title = f"{table.cell}, {table.process}: absolute deviation in mm, before > after (reduction)"
-    _show(console, title, table.lines)
+    points = f"{table.lines[-1].points} points"
+    title = f"{table.cell}, {table.process}: absolute deviation in mm at {points}"
+    console.print(_printed(title, table.lines))
     if table.budget:
-        _show(console, f"error budget of seed {table.runs[0].seed}", table.budget)
+        console.print(_printed(f"error budget of seed {table.runs[0].seed}", table.budget))
 
 
-def _show(console: Console, title: str, lines: Sequence[Line]) -> None:
-    printed = Printed("", "mean", "max", "st. dev.", "points", title=title)
+def _printed(title: str, lines: Sequence[Line]) -> Printed:
+    """Return a table with two lines of text a line: before and after, reduction below."""
+    printed = Printed("before > after, reduction", title=title, show_lines=True)
+    for name in ("mean", "max", "st. dev."):
+        printed.add_column(name, justify="right", no_wrap=True)
     for line in lines:
         triples = zip(*map(_three, (line.before, line.after, line.reduction)), strict=True)
-        cells = [f"{1e3 * b:.3f} > {1e3 * a:.3f} ({100 * r:.1f} %)" for b, a, r in triples]
-        printed.add_row(line.name, *cells, str(line.points))
-    console.print(printed)
+        cells = [f"{1e3 * b:.3f} > {1e3 * a:.3f}\n{100 * r:.1f} %" for b, a, r in triples]
+        printed.add_row(line.name, *cells)
+    return printed
 
 
 def _three(values: Values) -> tuple[float, float, float]:

@@ -36,6 +36,7 @@ def stiffness(  # noqa: PLR0913 (a command has as many options as it has)
     from elastocal.cli.progress import progress_bars
     from elastocal.cli.stiffness_answer import Question, answer
     from elastocal.cli.stiffness_folder import write_folder
+    from elastocal.cli.stiffness_table import show
     from elastocal.files import filling
     from elastocal.identification import read_model
 
@@ -48,6 +49,5 @@ def stiffness(  # noqa: PLR0913 (a command has as many options as it has)
     if as_json:
         print_json(figures | {"folder": str(out)})
     else:
-        for line in found.lines(figures):
-            console().print(line)
+        show(console(), found, figures)
         console().print(f"written to {out}: {', '.join(figures['files'])}")

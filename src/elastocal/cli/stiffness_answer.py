@@ -4,13 +4,12 @@ import itertools
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from elastocal.arrays import FloatArray
 from elastocal.cell import load_cell
-from elastocal.cli.coverage import NOT_COVERED, covered
+from elastocal.cli.coverage import covered
 from elastocal.compensation.path import PathError
 from elastocal.compensation.stiffness import (
     Choice,
@@ -67,28 +66,6 @@ class Answer:
         programmed = Hold("as programmed", self.stations.q, np.zeros(len(self.stations)))
         one = [] if self.choice.one is None else [self.choice.one]
         return [programmed, *one, self.choice.each]
-
-    def lines(self, figures: dict[str, Any]) -> list[str]:
-        """Return what to tell a person."""
-        lines = [
-            f"{len(self.stations)} stations, {self.survey.stiffness.size} postures, of which"
-            f" {figures['postures']['allowed']} are allowed; stiffness along"
-            f" {self.along} in N/µm"
-        ]
-        for choice in figures["choices"]:
-            spin = "" if choice["spin"] is None else f", spin {np.degrees(choice['spin']):.0f} deg"
-            lines.append(
-                f"  {choice['name'] + ':':28} softest {1e-6 * choice['softest']:.3g}, mean"
-                f" {1e-6 * choice['mean']:.3g} at {choice['stations']} stations{spin}"
-            )
-        one = [c for c in figures["choices"] if c["spin"] is not None and c["posture_jumps"]]
-        lines += [
-            f"Note: {c['name']}: at {c['posture_jumps']} stations a joint turns by more than 90 deg"
-            for c in one
-        ]
-        if self.choice.one is None:
-            lines.append("Note: no single posture is allowed at every station")
-        return lines + ([] if self.covered else [f"Note: {NOT_COVERED}"])
 
 
 def answer(

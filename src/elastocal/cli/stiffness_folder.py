@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from elastocal.arrays import FloatArray
 from elastocal.cli.stiffness_answer import Answer
 from elastocal.compensation.offline.follow import jumps
 from elastocal.compensation.stiffness import Hold, directional, write_choice, write_survey
@@ -65,6 +66,10 @@ def _figures(robot: Robot, found: Answer, curves: list[Curve]) -> dict[str, Any]
         "schema": SCHEMA,
         "direction": found.question.direction,
         "stations": len(found.stations),
+        "external_axes": [
+            {"name": name, "unit": "rad" if turns else "m"}
+            for name, turns in zip(robot.joint_names, robot.revolute, strict=True)
+        ][: robot.external_axes],
         "postures": {
             "tried": found.survey.stiffness.size,
             "allowed": int(np.sum(~np.isnan(found.survey.stiffness))),
@@ -79,12 +84,17 @@ def _figures(robot: Robot, found: Answer, curves: list[Curve]) -> dict[str, Any]
 
 def _choice(curve: Curve, turns: int) -> dict[str, Any]:
     k = curve.stiffness[np.isfinite(curve.stiffness)]
-    spins = np.unique(curve.spin[np.isfinite(curve.spin)])
+
+    def only(values: FloatArray) -> float | None:
+        found = np.unique(values[np.isfinite(values)])
+        return float(found[0]) if len(found) == 1 else None
+
     return {
         "name": curve.name,
         "stations": len(k),
         "softest": float(k.min()) if len(k) else 0.0,
         "mean": float(k.mean()) if len(k) else 0.0,
-        "spin": float(spins[0]) if len(spins) == 1 else None,
+        "spin": only(curve.spin),
+        "stand": only(curve.rail),
         "posture_jumps": turns,
     }

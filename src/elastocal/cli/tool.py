@@ -11,6 +11,7 @@ def tool(
         Path, typer.Argument(help="CSV of postures with raw wrenches, or the folder of a run.")
     ],
     out: Annotated[Path, typer.Option(help="Tool file (.json) to write.")],
+    *,
     robot: Annotated[
         str | None,
         typer.Option(help="URDF, catalogue name or model (.json), for a CSV with joints."),

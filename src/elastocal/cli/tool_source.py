@@ -53,7 +53,7 @@ def from_table(
     """
     length = float(np.linalg.norm(down))
     if not 0.0 < length < np.inf:
-        raise CompensationError(f"direction of gravity {down.tolist()} must not be zero")
+        raise CompensationError(f"direction of gravity {down.tolist()} must be finite and not zero")
     gravity = down * (-GRAVITY[2] / length)
     arm = None if robot is None else Robot.from_urdf(robot.urdf, flange, robot.base)
     R, origin = T_flange_sensor[:3, :3], T_flange_sensor[:3, 3]

@@ -22,7 +22,14 @@ from pathlib import Path
 from typing import Annotated, Literal
 
 import numpy as np
-from pydantic import AfterValidator, BeforeValidator, Field, model_validator
+from pydantic import (
+    AfterValidator,
+    BeforeValidator,
+    Discriminator,
+    Field,
+    Tag,
+    model_validator,
+)
 
 from elastocal.arrays import FloatArray
 from elastocal.cell.description.quantities import (
@@ -42,6 +49,14 @@ SCHEMA = "elastocal.compensator/1"
 
 LARGEST_FORCE, LARGEST_MOMENT = 1e5, 1e5
 """In N and N·m: what no sensor on a robot reads. Beyond, a number is no reading."""
+LARGEST_CORRECTION = 0.05
+"""In m: no arm that is worth calibrating yields so far."""
+LARGEST_RATE = 1.0
+"""In m/s."""
+LONGEST_HOLD = 1.0
+"""In s: what was measured before is not what acts now."""
+LONGEST_DELAY = 0.5
+"""Of the filters, in s."""
 
 
 def _positive(value: float) -> float:
@@ -68,9 +83,9 @@ RangeMoment = Annotated[PositiveMoment, Field(le=LARGEST_MOMENT)]
 class Limits(StrictModel):
     """What the correction never exceeds."""
 
-    correction: PositiveLength = 3e-3
+    correction: Annotated[PositiveLength, Field(le=LARGEST_CORRECTION)] = 3e-3
     """Length of the correction, in m."""
-    rate: PositiveSpeed = 0.03
+    rate: Annotated[PositiveSpeed, Field(le=LARGEST_RATE)] = 0.03
     """Speed at which it changes, in m/s."""
     fade: PositiveSpeed = 0.005
     """Speed at which it goes to zero when readings fail, in m/s; at most `rate`."""
@@ -127,20 +142,38 @@ class CompensatorSettings(StrictModel):
 
     cycle: Duration = 0.004
     """Time between two corrections, in s."""
-    frame: Literal["base", "tcp"] | Turned = "base"
+    frame: Annotated[
+        Annotated[Literal["base", "tcp"], Tag("name")] | Annotated[Turned, Tag("turned")],
+        Discriminator(lambda given: "turned" if isinstance(given, dict | Turned) else "name"),
+    ] = "base"
     """Axes that the correction is expressed in."""
     gain: Annotated[float, Field(ge=0.0, le=1.0)] = 1.0
     """Share of the deflection that is corrected; below 1 while a cell is put into service."""
     limits: Limits = Limits()
     deadband: Distance = 0.0
     """Deflections below it are not corrected, above twice it fully, in m."""
-    hold: Duration = 0.04
+    hold: Annotated[Duration, Field(le=LONGEST_HOLD)] = 0.04
     """How long the correction is held when readings fail before it fades, in s; a reading that
     comes later than this after the one before it is not used either."""
     filter: Filters = Filters()
     sensor: SensorRange = SensorRange()
     uncertain_above: PositiveLength = 2e-4
     """Half the 95 % interval of the predicted deflection beyond which it warns, in m."""
+
+    @model_validator(mode="after")
+    def _can_correct(self) -> "CompensatorSettings":
+        if not self.deadband < self.limits.correction:
+            raise ValueError(
+                f"deadband {1e3 * self.deadband:g} mm must be below limits.correction,"
+                f" {1e3 * self.limits.correction:g} mm"
+            )
+        sample = self.filter.sample or self.cycle
+        if not sample < self.hold:
+            raise ValueError(
+                f"hold {self.hold:g} s is not longer than the time between readings, {sample:g} s:"
+                " every reading would come too late"
+            )
+        return self
 
     @property
     def chain(self) -> FilterChain:
@@ -149,13 +182,20 @@ class CompensatorSettings(StrictModel):
         Raises
         ------
         CompensationError
-            If a frequency is not below half the rate of readings.
+            If a frequency is not below half the rate of readings, or they delay a wrench too long.
         """
         sample = self.filter.sample or self.cycle
         sections = [s for n in self.filter.notches for s in notch(n.frequency, n.width, sample)]
         if self.filter.low_pass is not None:
             sections += low_pass(self.filter.low_pass.cutoff, self.filter.low_pass.order, sample)
-        return FilterChain(sample, self.filter.median, tuple(sections))
+        chain = FilterChain(sample, self.filter.median, tuple(sections))
+        delay = float(chain.delay())
+        if not delay <= LONGEST_DELAY:
+            raise CompensationError(
+                f"the filters delay a slow wrench by {delay:.4g} s: at most {LONGEST_DELAY:g} s,"
+                " after that it no longer is what acts"
+            )
+        return chain
 
     @property
     def hold_cycles(self) -> int:

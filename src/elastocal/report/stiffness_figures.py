@@ -20,10 +20,14 @@ from elastocal.report.printed import new_figure, write_figure
 
 _WIDTH, _MAP, _CURVES = 6.6, 2.3, 2.3
 """In inches: of the figure, height of a map and of the curves."""
-_HEAD, _FOOT, _BETWEEN, _LEFT, _RIGHT = 0.55, 0.6, 0.75, 0.75, 1.05
+_HEAD, _FOOT, _BETWEEN, _LEFT, _RIGHT = 0.75, 0.6, 0.75, 0.75, 1.05
 _PER_MICROMETRE = 1e-6
 _COLOURS = (style.INK, style.BLUE, style.VERMILLION)
 _LINES = ("-", "--", ":")
+_WIDTHS = (2.6, 1.9, 1.3)
+_SIZES = (10.0, 7.0, 4.0)
+"""Of lines and of the dots of a single station, in points: each shows under the next one."""
+_CASING = 2.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,8 +95,19 @@ def stiffness_figure(
         left, bottom, width, height = box
         bar = figure.add_axes((left + width + 0.015, bottom, 0.02, height))
         figure.colorbar(drawn, cax=bar).set_label("Stiffest allowed posture in N/µm", size=8)
+    axes[0].set_yticks(range(0, 361, 90))
+    low, *_, high = _edges(maps[0][1]).tolist()
+    axes[0].set_ylim(low, high)
     _draw_curves(axes[-1], along, curves)
     axes[-1].set_xlim(axes[0].get_xlim())
+    if len(along) == 1:
+        for place in axes:
+            place.set_xticks(along)
+    lines, names = axes[-1].get_legend_handles_labels()
+    height = 1.0 - 0.32 / size[1]
+    figure.legend(
+        lines, names, ncol=3, frameon=False, loc="upper center", bbox_to_anchor=(0.5, height)
+    )
     return figure
 
 
@@ -120,25 +135,43 @@ def _draw_map(axes: Axes, along: FloatArray, values: FloatArray, best: FloatArra
 
 def _mark(axes: Axes, along: FloatArray, chosen: Sequence[FloatArray], wrap: float) -> None:
     """Draw what each choice takes over the map, on white so that it shows on every colour."""
-    for taken, colour, line in zip(chosen, _COLOURS, _LINES, strict=False):
+    shown = []
+    for taken in chosen:
         steps = np.abs(np.diff(taken, prepend=taken[:1]))
         # A turn over 0° is no line across the map.
-        shown = np.where(steps > wrap, np.nan, taken)
-        axes.plot(along, shown, color=style.PAPER, lw=3.0)
-        axes.plot(along, shown, color=colour, lw=1.5, ls=line)
+        shown.append(np.where(steps > wrap, np.nan, taken))
+    for taken, style_of in zip(shown, _styles(along), strict=False):
+        under = {"lw": style_of["lw"] + _CASING, "ms": style_of["ms"] + _CASING}
+        axes.plot(along, taken, **(style_of | under | {"color": style.PAPER, "ls": "-"}))
+    for taken, style_of in zip(shown, _styles(along), strict=False):
+        axes.plot(along, taken, **style_of)
 
 
 def _draw_curves(axes: Axes, along: FloatArray, curves: Sequence[Curve]) -> None:
-    for curve, colour, line in zip(curves, _COLOURS, _LINES, strict=False):
+    for curve, style_of in zip(curves, _styles(along), strict=False):
         k, low, high = (_PER_MICROMETRE * each for each in (curve.stiffness, curve.low, curve.high))
-        axes.fill_between(along, low, high, color=colour, alpha=0.15, lw=0)
-        marker = "o" if len(along) == 1 else None
-        axes.plot(along, k, color=colour, ls=line, marker=marker, label=curve.name)
+        axes.fill_between(along, low, high, color=style_of["color"], alpha=0.15, lw=0)
+        axes.plot(along, k, label=curve.name, **style_of)
     axes.set_xlabel("Way along the path in mm")
     axes.set_ylabel("Stiffness in N/µm")
     axes.set_ylim(bottom=0.0)
     axes.spines[["top", "right"]].set_visible(False)
-    axes.legend(frameon=False, fontsize=8, loc="lower left")
+
+
+def _styles(along: FloatArray) -> list[dict[str, Any]]:
+    """Return how each choice is drawn; a single station is a dot."""
+    marker = "o" if len(along) == 1 else None
+    return [
+        {
+            "color": colour,
+            "ls": line,
+            "lw": width,
+            "marker": marker,
+            "ms": size,
+            "clip_on": marker is None,
+        }
+        for colour, line, width, size in zip(_COLOURS, _LINES, _WIDTHS, _SIZES, strict=True)
+    ]
 
 
 def _along(stations: Stations) -> FloatArray:

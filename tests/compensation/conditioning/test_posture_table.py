@@ -51,7 +51,7 @@ def test_joints(read):
     ("header", "row", "reason"),
     [
         ("j[deg]", "1", "no orientation of the flange .* give --robot"),
-        ("qx,qy,qz,qw", "1,1,0,0", "quaternion .* of reading 1 has not length 1"),
+        ("qx,qy,qz,qw", "1,1,0,0", "quaternion .* of posture 1 has not length 1"),
         ("qx,qy,qz,qw", "1,x,0,0", "a quaternion is not four numbers"),
         ("a[mm],b[deg],c[deg]", "0,0,0", "'mm' is not a angle"),
         ("a,b[deg],c[deg]", "0,0,0", "column 'a' has no unit"),
@@ -72,3 +72,9 @@ def test_forces_without_moments_are_refused(tmp_path):
     path.write_text("a[deg],b[deg],c[deg],force_x[N],force_y[N],force_z[N]\n" + "0,0,0,1,2,3\n" * 3)
     with pytest.raises(CompensationError, match=r"columns moment_x\[N\*m\] … are missing"):
         read_postures(path)
+
+
+def test_degrees_in_a_column_of_radians_are_refused_by_posture(read):
+    rows = [f"{a},{b},{c},{VALUES}" for a, b, c in np.degrees(ANGLES)]
+    with pytest.raises(CompensationError, match=r"posture 1: a of 573 deg is more than a turn"):
+        read("a[rad],b[rad],c[rad]", rows)

@@ -176,6 +176,15 @@ class TestSelfTest:
             (tmp_path / "elastocal_model.c").write_text(head + damaged + rest)
             assert build(tmp_path, "-O0").selftest() == 1, literal[0]
 
+    @pytest.mark.parametrize("name", ["CYCLE", "SAMPLE", "DELAY"])
+    def test_a_time_that_is_changed_in_the_header_is_found(self, folder, tmp_path, name):
+        header = (folder / "elastocal_model.h").read_text()
+        changed = re.sub(rf"(#define ELASTOCAL_{name}) [\d.]+", r"\1 0.001", header)
+        assert changed != header
+        (tmp_path / "elastocal_model.h").write_text(changed)
+        (tmp_path / "elastocal_model.c").write_bytes((folder / "elastocal_model.c").read_bytes())
+        assert build(tmp_path, "-O0").selftest() == 1
+
     @pytest.mark.parametrize(
         ("old", "new", "code"),
         [
@@ -183,8 +192,10 @@ class TestSelfTest:
             ("- weight[i]", "+ weight[i]", 3),
             ("share = LARGEST_CORRECTION / length", "share = 1.0", 3),
             ("(passed > 0.0) && ", "", 3),
-            ("move(state->correction, nothing, FADE_STEP)", "0", 3),
+            ("state->correction[i] *= share", "state->correction[i] *= 0.5", 3),
+            ("state->z1[s][i] *= share", "state->z1[s][i] *= 1.0", 3),
             ("state->missed += 1", "state->missed += 2", 3),
+            ("1000.0 * correction[i]", "1001.0 * correction[i]", 3),
         ],
     )
     def test_a_change_of_the_code_is_found(self, folder, tmp_path, old, new, code):

@@ -117,7 +117,8 @@ class TestLimits:
         free = plain()
         _, told = fed(free, free.start(), pushed(), 100)
         length = float(np.linalg.norm(told[-1].deflection))
-        band = plain(deadband=f"{1e3 * length / share:.12f} mm")
+        wide = {"correction": "10 mm", "rate": "100 mm/s"}
+        band = plain(deadband=f"{1e3 * length / share:.12f} mm", limits=wide)
         _, told = fed(band, band.start(), pushed(), 100)
         assert np.linalg.norm(told[-1].correction) == pytest.approx(corrected * length, rel=1e-6)
         assert bool(told[-1].status & Status.DEADBAND) == (corrected < 1.0)
@@ -197,7 +198,7 @@ class TestFailure:
         state = compensator.condition(state, pushed()._replace(time=state.time + CYCLE))
         _, told = compensator.correct(state, [np.nan] * 6)
         assert told.correction == held
-        assert told.status == Status.HELD
+        assert told.status == Status.HELD | Status.INVALID
 
     def test_the_start_corrects_nothing(self):
         compensator = plain()
@@ -243,3 +244,36 @@ def test_a_sensor_load_must_be_finite():
 
     with pytest.raises(CompensationError, match="force_bias of the tool must be finite"):
         SensorLoad(force_bias=np.array([np.nan, 0.0, 0.0]))
+
+
+class TestAfterAGap:
+    """Filters remember the wrench before a gap; once that correction has faded, so must they."""
+
+    @pytest.fixture
+    def filtered(self):
+        compensator = Compensator.of(arm(), settings())
+        state, _ = fed(compensator, compensator.start(), pushed(), 400)
+        return compensator, state
+
+    def test_no_correction_comes_back_when_the_force_has_gone(self, filtered):
+        compensator, state = filtered
+        state, told = fed(compensator, state, pushed()._replace(ok=False), 400)
+        assert told[-1].correction == (0.0, 0.0, 0.0)
+        _, told = fed(compensator, state, pushed((0.0, 0.0, 0.0), (0.0, 0.0, 0.0)), 50)
+        assert max(np.linalg.norm(each.correction) for each in told) == 0.0
+
+    def test_what_the_filters_say_fades_with_the_correction(self, filtered):
+        compensator, state = filtered
+        before = np.linalg.norm(state.correction)
+        after, told = fed(compensator, state, pushed()._replace(ok=False), 30)
+        share = np.linalg.norm(told[-1].correction) / before
+        assert 0.1 < share < 0.9
+        np.testing.assert_allclose(after.wrench, share * np.array(state.wrench), rtol=1e-9)
+        for old, new in zip(state.memory, after.memory, strict=True):
+            np.testing.assert_allclose(new, share * np.array(old), rtol=1e-9)
+
+    def test_a_gap_that_is_held_changes_nothing(self, filtered):
+        compensator, state = filtered
+        after, told = fed(compensator, state, pushed()._replace(ok=False), 5)
+        assert told[-1].status & Status.HELD
+        assert (after.wrench, after.memory) == (state.wrench, state.memory)

@@ -6,7 +6,7 @@ import pytest
 from elastocal.compensation.online import design
 from elastocal.compensation.online.design import draws_factor
 from elastocal.errors import CompensationError
-from support.compensated import arm, settings
+from support.compensated import arm
 
 
 def test_the_factor_squared_is_the_draws_covariance():
@@ -36,8 +36,3 @@ def test_a_draw_that_is_none_is_refused_by_spring():
     draws[7, 2] = np.nan
     with pytest.raises(CompensationError, match=r"a draw of spring joint_3\.axial is nan"):
         design(replace(arm(), draws=draws))
-
-
-def test_a_hold_shorter_than_the_time_between_readings_is_refused():
-    with pytest.raises(CompensationError, match=r"hold 0.004 s is not longer .* 0.004 s"):
-        design(arm(), settings(hold="4 ms"))

@@ -9,6 +9,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from elastocal.arrays import FloatArray
+from elastocal.compensation.conditioning.misfit import refuse_misfit
 from elastocal.compensation.conditioning.postures import StaticPostures
 from elastocal.compensation.conditioning.tool_fit import ToolFit, fit_tool, residual
 from elastocal.errors import CompensationError
@@ -61,6 +62,7 @@ def refuse_mistakes(
     _refuse_other_forces(postures, fit, R_nominal)
     _refuse_other_moments(postures, fit)
     _refuse_far_centre(postures, fit)
+    refuse_misfit(postures, fit, R_nominal)
     if expected_centre is not None:
         _refuse_other_point(fit, expected_centre, points or {})
 
@@ -112,7 +114,9 @@ def _refuse_other_forces(
     as_mounted = np.eye(3) if R_nominal is None else R_nominal
     # With gravity turning in one plane both signs fit; where the sensor sits tells them apart.
     fits_both = left[turned] <= 1.5 * stated + _NOTICEABLE * _rms(postures.force)
-    if (fit.mass < 0.0 and "mass" not in fit.undetermined) or (
+    weight = abs(fit.mass) * float(np.linalg.norm(postures.gravity))
+    weighs = weight > _NOTICEABLE * _rms(postures.force)
+    if (fit.mass < 0.0 and weighs and "mass" not in fit.undetermined) or (
         fits_both
         and _angle(fit.R_flange_sensor, as_mounted) > 0.5 * np.pi
         and _angle(fits[turned].R_flange_sensor, as_mounted) < 0.25 * np.pi
@@ -154,7 +158,12 @@ def _refuse_other_point(
 ) -> None:
     if any(name.startswith("centre") for name in fit.undetermined):
         return
-    off = float(np.linalg.norm(fit.centre - expected))
+    off, lever = (float(np.linalg.norm(v)) for v in (fit.centre - expected, expected))
+    if off > lever > 0.0 and float(np.linalg.norm(fit.centre + expected)) < _CLOSE * lever:
+        raise CompensationError(
+            "the sign of the moments is turned: the centre of mass comes out opposite to where it"
+            f" should be, {1e3 * lever:.0f} mm from the sensor's origin"
+        )
     for name, point in points.items():
         arm = float(np.linalg.norm(point))
         # About a point p the weight's lever is c - p.

@@ -11,6 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from elastocal.arrays import FloatArray
 from elastocal.compensation.conditioning.postures import StaticPostures, static_postures
+from elastocal.compensation.path.angles import beyond_a_turn
 from elastocal.dataset.load_rows import LoadRows, joint_dimensions, read_load_rows
 from elastocal.errors import CompensationError
 from elastocal.files import read_text
@@ -40,7 +41,7 @@ def read_postures(
     Raises
     ------
     CompensationError
-        If there is neither joints nor orientations, or too few rows.
+        If there is neither joints nor orientations, too few rows, or an orientation that is none.
     DatasetError, FileAccessError
         If the file cannot be read.
     """
@@ -50,6 +51,14 @@ def read_postures(
         R = _from_quaternions(path, rows, header)
     elif set(_ANGLES) <= set(header):
         rows = read_load_rows(path, dict.fromkeys(_ANGLES, "angle"))
+        found = beyond_a_turn(rows.joint_position)
+        if found is not None:
+            row, k = found
+            raise CompensationError(
+                f"{path}: posture {row + 1}: {_ANGLES[k]} of"
+                f" {np.degrees(rows.joint_position[row, k]):.4g} deg is more than a turn: is it in"
+                " degrees?"
+            )
         zero = np.zeros(len(rows.force))
         R = T_from_xyzabc(zero, zero, zero, *rows.joint_position.T)[:, :3, :3]
     elif robot is not None:
@@ -88,7 +97,7 @@ def _from_quaternions(path: Path, rows: LoadRows, header: list[str]) -> FloatArr
     if not off.max() <= _UNIT:
         row = int(np.argmax(np.where(np.isnan(off), np.inf, off)))
         raise CompensationError(
-            f"{path}: quaternion {quaternions[row].tolist()} of reading {row + 1} has not length 1"
+            f"{path}: quaternion {quaternions[row].tolist()} of posture {row + 1} has not length 1"
         )
     rotations: FloatArray = Rotation.from_quat(quaternions).as_matrix()
     return rotations

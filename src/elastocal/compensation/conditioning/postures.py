@@ -40,6 +40,16 @@ class StaticPostures:
         directions = self.gravity_flange / np.linalg.norm(self.gravity)
         return float(np.arccos(np.clip((directions @ directions.T).min(), -1.0, 1.0)))
 
+    def without(self, row: int) -> "StaticPostures":
+        """Return the other postures."""
+        kept = np.arange(len(self)) != row
+        return replace(
+            self,
+            R_base_flange=self.R_base_flange[kept],
+            force=self.force[kept],
+            moment=self.moment[kept],
+        )
+
     def read_as(
         self,
         force: FloatArray | None = None,

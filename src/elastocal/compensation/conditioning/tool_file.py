@@ -78,7 +78,8 @@ def tool_record(fit: ToolFit, mount: SensorMount, source: str) -> ToolRecord:
     x, y, z = (triple(row) for row in fit.R_flange_sensor)
     return ToolRecord(
         flange=mount.flange,
-        mass=fit.mass,
+        # Without a tool it comes out a rounding error below nothing; more is refused as a mistake.
+        mass=max(fit.mass, 0.0),
         centre=triple(fit.centre),
         force_bias=triple(fit.force_bias),
         moment_bias=triple(fit.moment_bias),

@@ -72,6 +72,8 @@ class ToolFit:
     """Standard deviation of what is left of a force component, in N; NaN: nothing is left over."""
     moment_scatter: float
     """The same of the moment, in N·m."""
+    rotation_known: bool = False
+    """Whether the rotation was taken as it is."""
 
 
 def fit_tool(
@@ -211,6 +213,7 @@ def _result(
         count=len(postures),
         force_scatter=float(scatter[0]),
         moment_scatter=float(scatter[1]),
+        rotation_known=not free[1],
     )
 
 

@@ -13,6 +13,7 @@ from elastocal.compensation.online.design import JOINT_RANGE, LONG_AGO, Design
 
 _FNV_START, _FNV_PRIME = 14695981039346656037, 1099511628211
 """FNV-1a, 64 bits (Fowler, Noll and Vo)."""
+_COUNTS = ("JOINTS", "SPRINGS", "SECTIONS", "MEDIAN")
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,6 +26,8 @@ class Constant:
     comment: str = ""
     whole: bool = False
     """Whether it is an ``int`` in C."""
+    in_header: bool = False
+    """Whether the header defines it; the C file then has no definition of it."""
 
     def definition(self) -> str:
         """Return its C definition."""
@@ -73,8 +76,32 @@ def checksum(constants: Sequence[Constant]) -> int:
 
 
 def constants_of(numbers: Design) -> list[Constant]:
-    """Return every constant of a compensator's C file, in the order of the file."""
-    return [*_trigonometry(), *_model(numbers), *_conditioning(numbers), *_compensation(numbers)]
+    """Return every constant of a compensator's C files, in the order of the self-test's sum."""
+    return [
+        *_header(numbers),
+        *_trigonometry(),
+        *_model(numbers),
+        *_conditioning(numbers),
+        *_compensation(numbers),
+    ]
+
+
+def _header(numbers: Design) -> list[Constant]:
+    """Return what the header defines: edited there, nothing would follow it."""
+    filters = numbers.filters
+    values = {
+        "JOINTS": numbers.joints,
+        "SPRINGS": len(numbers.calibrated.model.springs),
+        "SECTIONS": len(filters.sections),
+        "MEDIAN": filters.median,
+        "CYCLE": numbers.settings.cycle,
+        "SAMPLE": filters.sample,
+        "DELAY": float(filters.delay()),
+    }
+    return [
+        Constant(f"ELASTOCAL_{name}", np.array(float(value)), whole=name in _COUNTS, in_header=True)
+        for name, value in values.items()
+    ]
 
 
 def _one(name: str, number: float, comment: str = "", whole: bool = False) -> Constant:

@@ -4,6 +4,21 @@ import numpy as np
 
 from elastocal.compensation.online.design import Design
 
+_RAW = "N, N m; raw, as the sensor gives them | sensor"
+_AT_TCP = (
+    "N, N m; **on** the robot, bias and tool weight removed, about the tool centre point | tcp"
+)
+_REMOVED_HERE = (
+    "The sensor's bias, a tool of {mass:g} kg, and the way from sensor to tool centre point are"
+    " taken care of by `elastocal_condition`. Do not zero the sensor after the export: its bias is"
+    " among the constants. With another tool, or after a crash, identify and export again."
+)
+_REMOVED = (
+    "**No tool file was given to this export.** Readings must come with the sensor's bias and the"
+    " tool's weight removed, moved to the tool centre point and turned into its axes. A raw wrench"
+    " that goes in is corrected as if the tool's weight were a process force."
+)
+
 
 def readme_values(numbers: Design) -> dict[str, str]:
     """Return the values of the README's places."""
@@ -26,6 +41,7 @@ def readme_values(numbers: Design) -> dict[str, str]:
         "RATE_MM": f"{1e3 * limits.rate:g}",
         "FADE_MM": f"{1e3 * limits.fade:g}",
         "HOLD_MS": f"{1e3 * settings.hold:g}",
-        "MASS": f"{numbers.load.mass:g}",
+        "SENSOR": _REMOVED_HERE.format(mass=numbers.load.mass) if numbers.weighs else _REMOVED,
+        "RAW": _RAW if numbers.weighs else _AT_TCP,
         "DELAYS": "\n".join(rows),
     }

@@ -49,7 +49,7 @@ def c_files(numbers: Design) -> dict[str, str]:
     mixing = "\n".join(line for constant in constants for line in constant.mixing())
     values |= data | {"MIXING": mixing, "CHECKSUM": str(checksum(constants))}
     head, sin_cos, condition, correct, selftest = (_filled(part, values) for part in PARTS)
-    definitions = "\n".join(constant.definition() for constant in constants) + "\n"
+    definitions = "".join(f"{each.definition()}\n" for each in constants if not each.in_header)
     model = "".join([head, definitions, sin_cos, c_routines(numbers), condition, correct, selftest])
     return {
         "elastocal_model.c": model,

@@ -53,6 +53,9 @@ class Correction:
     """Distance that one step would leave, predicted, shape (row,), in m."""
     residual: FloatArray
     """Distance that is left, predicted, shape (row,), in m."""
+    pulled: BoolArray
+    """Whether the force draws the tool out, along +z of the tcp, rather than aside or against it;
+    a surface cannot: shape (row,)."""
 
 
 def correct(
@@ -62,6 +65,7 @@ def correct(
     T_base_tcp: FloatArray,
     wrench: tuple[FloatArray, FloatArray | None],
     where: Where,
+    *,
     may_turn: bool = False,
     largest: float = LARGEST,
 ) -> Correction:
@@ -131,6 +135,7 @@ def correct(
         uncorrected,
         np.linalg.norm(first - uncorrected, axis=1),
         np.linalg.norm(residual, axis=1),
+        _pulled(T_base_tcp, wrench[0]),
     )
 
 
@@ -146,6 +151,11 @@ class _Load:
         # What overflows is refused by its size.
         with np.errstate(over="ignore", invalid="ignore"):
             return model.deflection(c, q, self.force[rows], moment)
+
+
+def _pulled(T_base_tcp: FloatArray, force: FloatArray) -> BoolArray:
+    along = np.einsum("ri,ri->r", T_base_tcp[:, :3, 2], force)
+    return np.asarray(along > 0.5 * np.linalg.norm(force, axis=1))
 
 
 def _check_size(deflection: FloatArray, largest: float, where: Where) -> None:

@@ -169,8 +169,16 @@ def _corrected(
     if force is None:
         raise PathError("path has no forces")
     wrench, largest = (force, moment), job.settings.largest
-    by_pose = job.columns.by_pose
-    return correct(job.solver, job.calibrated, q, T, wrench, where, by_pose, largest)
+    return correct(
+        job.solver,
+        job.calibrated,
+        q,
+        T,
+        wrench,
+        where,
+        may_turn=job.columns.by_pose,
+        largest=largest,
+    )
 
 
 def _write(writer: Any, job: _Job, piece: Piece, kept: list[int], found: Correction) -> None:

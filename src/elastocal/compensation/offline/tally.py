@@ -45,6 +45,8 @@ class Tally:
     jumps: int = 0
     """Rows at which the posture changes from the row before."""
     first_jump: str = ""
+    pulled: int = 0
+    """Rows at which the force draws the tool out, which a surface cannot."""
     start: tuple[float, ...] = ()
     """Joints that were found for the first row of a path of poses, in rad or m."""
 
@@ -74,6 +76,7 @@ class Tally:
             correction=self.correction.plus(np.linalg.norm(shift, axis=1), labels),
             jumps=self.jumps + len(jumps),
             first_jump=first,
+            pulled=self.pulled + int(correction.pulled.sum()),
         )
 
     def figures(self) -> dict[str, object]:
@@ -87,4 +90,8 @@ class Tally:
                 "max": figure.largest,
                 "at": figure.label,
             }
-        return figures | {"posture_jumps": self.jumps, "first_jump": self.first_jump}
+        return figures | {
+            "posture_jumps": self.jumps,
+            "first_jump": self.first_jump,
+            "pulled": self.pulled,
+        }

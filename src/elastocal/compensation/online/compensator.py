@@ -85,9 +85,10 @@ class Compensator:
         q : sequence of float
             Joint positions, in rad or m.
         """
-        usable = state.fresh and _are_joints(q)
-        if not usable:
-            return self._without_reading(state)
+        if not _are_joints(q):
+            return self._without_reading(state, state.problem | Status.INVALID.value)
+        if not state.fresh:
+            return self._without_reading(state, state.problem)
         rotation = self._orientation(q)
         deflection, half_width = self._predicted(q, rotation, state.wrench)
         target, status = self._target(deflection, rotation)
@@ -139,16 +140,26 @@ class Compensator:
             -share * (fxz * dx + fyz * dy + fzz * dz),
         ), status
 
-    def _without_reading(self, state: State) -> tuple[State, Correction]:
-        """Hold, then fade."""
+    def _without_reading(self, state: State, problem: int) -> tuple[State, Correction]:
+        """Hold, then fade: the correction, and with it what the filters remember.
+
+        Otherwise the first readings after a gap would be corrected by the wrench before it.
+        """
         missed = min(state.missed + 1, self._hold + 1)
-        if missed <= self._hold:
-            correction, status = state.correction, Status.HELD.value
-        else:
-            correction, _ = _towards(state.correction, _ORIGIN, self._fade)
-            status = Status.FADED.value
-        told = Correction(correction, state.deflection, state.half_width, status | state.problem)
-        after = State(state.time, False, state.problem, missed, *state[4:7], correction, *state[8:])
+        faded = missed > self._hold
+        share = _faded_share(state.correction, self._fade) if faded else 1.0
+        x, y, z = state.correction
+        correction = (share * x, share * y, share * z)
+        remembered = state[4:7]
+        if faded:
+            remembered = (
+                tuple([_scaled(values, share) for values in state.window]),
+                tuple([([*_scaled(a, share)], [*_scaled(b, share)]) for a, b in state.memory]),
+                _scaled(state.wrench, share),
+            )
+        status = (Status.FADED if faded else Status.HELD).value | problem
+        told = Correction(correction, state.deflection, state.half_width, status)
+        after = State(state.time, False, state.problem, missed, *remembered, correction, *state[8:])
         return after, told
 
 
@@ -158,6 +169,17 @@ def _are_joints(q: Sequence[float]) -> bool:
         if not -JOINT_RANGE < x < JOINT_RANGE:
             return False
     return True
+
+
+def _faded_share(here: Triple, largest: float) -> float:
+    """Return the share of a correction that is left when it fades by a step; 0 at the end."""
+    x, y, z = here
+    distance = math.sqrt(x * x + y * y + z * z)
+    return (distance - largest) / distance if distance > largest else 0.0
+
+
+def _scaled(values: Sequence[float], share: float) -> tuple[float, ...]:
+    return tuple([share * value for value in values])
 
 
 def _towards(here: Triple, target: Triple, largest: float) -> tuple[Triple, int]:

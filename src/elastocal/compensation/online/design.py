@@ -54,6 +54,13 @@ class Design:
         return len(self.calibrated.model.robot.joint_names)
 
     @property
+    def weighs(self) -> bool:
+        """Whether readings are raw: bias and weight are taken away, or the wrench is moved."""
+        load = self.load
+        moved = not np.array_equal(load.T_tcp_sensor, np.eye(4))
+        return bool(load.mass > 0.0 or load.force_bias.any() or load.moment_bias.any() or moved)
+
+    @property
     def in_tcp(self) -> bool:
         """Whether the correction is expressed in the tcp frame."""
         return self.settings.frame == "tcp"
@@ -99,11 +106,6 @@ def design(
     settings, load = settings or CompensatorSettings(), load or SensorLoad()
     _check_compliances(calibrated)
     filters = settings.chain
-    if not filters.sample < settings.hold:
-        raise CompensationError(
-            f"hold {settings.hold:g} s is not longer than the time between readings,"
-            f" {filters.sample:g} s: every reading would come too late"
-        )
     R, frame = load.T_tcp_sensor[:3, :3], settings.R_base_frame
     model = calibrated.model
     return Design(

@@ -7,7 +7,8 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from elastocal.arrays import FloatArray
-from elastocal.compensation.path.columns import PathColumns, Wrench
+from elastocal.compensation.path.angles import beyond_a_turn
+from elastocal.compensation.path.columns import EULER, PathColumns, Wrench
 from elastocal.compensation.path.errors import PathError
 from elastocal.compensation.path.text import Piece
 from elastocal.dataset.table_header import Column
@@ -37,7 +38,8 @@ def read_values(piece: Piece, columns: PathColumns) -> PathValues:
     Raises
     ------
     PathError
-        If a cell is not a finite number, or a quaternion is not of unit length.
+        If a cell is not a finite number, a quaternion is not of unit length, or an angle is more
+        than a turn.
     """
 
     def numbers(some: Sequence[Column]) -> FloatArray:
@@ -46,6 +48,8 @@ def read_values(piece: Piece, columns: PathColumns) -> PathValues:
     pose = None
     if columns.by_pose:
         position, orientation = numbers(columns.position), numbers(columns.orientation)
+        if len(columns.orientation) == len(EULER):
+            _check_angles(piece, columns.orientation, orientation)
         pose = _poses(piece, position, orientation)
     wrenches = [
         None if each is None else numbers(each.columns) for each in (columns.force, columns.moment)
@@ -98,6 +102,16 @@ def _or_nan(cell: str) -> float:
 
 def _named(column: Column) -> str:
     return column.header if column.unit else column.name
+
+
+def _check_angles(piece: Piece, columns: Sequence[Column], angles: FloatArray) -> None:
+    found = beyond_a_turn(angles)
+    if found is not None:
+        row, k = found
+        raise PathError(
+            f"row {piece.lines[row]}, column {_named(columns[k])!r}: an orientation of"
+            f" {np.degrees(angles[row, k]):.4g} deg is more than a turn: is it in degrees?"
+        )
 
 
 def _poses(piece: Piece, position: FloatArray, orientation: FloatArray) -> FloatArray:

@@ -94,16 +94,39 @@ static unsigned int follow(elastocal_state *state, const double q[])
     return status;
 }
 
+/* Let the correction, and with it what the filters remember, shrink by a step: otherwise the first
+ * readings after a gap would be corrected by the wrench before it. */
+static void fade(elastocal_state *state)
+{
+    const double *const c = state->correction;
+    const double distance = sqrt((c[0] * c[0]) + (c[1] * c[1]) + (c[2] * c[2]));
+    const double share = (distance > FADE_STEP) ? ((distance - FADE_STEP) / distance) : 0.0;
+    int i;
+    int s;
+    for (i = 0; i < 3; i++) {
+        state->correction[i] *= share;
+    }
+    for (i = 0; i < 6; i++) {
+        state->wrench[i] *= share;
+        for (s = 0; s < 5; s++) {
+            state->window[s][i] *= share;
+        }
+        for (s = 0; s <= ELASTOCAL_SECTIONS; s++) {
+            state->z1[s][i] *= share;
+            state->z2[s][i] *= share;
+        }
+    }
+}
+
 /* Hold, then fade. */
 static unsigned int go_without(elastocal_state *state)
 {
-    static const double nothing[3] = {0.0, 0.0, 0.0};
     unsigned int status = ELASTOCAL_HELD;
     if (state->missed <= HOLD_CYCLES) {
         state->missed += 1;
     }
     if (state->missed > HOLD_CYCLES) {
-        (void)move(state->correction, nothing, FADE_STEP);
+        fade(state);
         status = ELASTOCAL_FADED;
     }
     return status;
@@ -113,12 +136,13 @@ void elastocal_correct(elastocal_state *state, const double q[], elastocal_corre
 {
     int usable = state->fresh;
     int i;
+    out->status = state->problem;
     for (i = 0; i < ELASTOCAL_JOINTS; i++) {
         if (!((q[i] > -JOINT_RANGE) && (q[i] < JOINT_RANGE))) {
             usable = 0;
+            out->status |= ELASTOCAL_INVALID;
         }
     }
-    out->status = state->problem;
     if (usable != 0) {
         out->status |= follow(state, q);
     } else {

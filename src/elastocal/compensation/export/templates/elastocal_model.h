@@ -74,7 +74,8 @@ typedef struct {
     unsigned int status;
 } elastocal_correction;
 
-/* Deflection at joints q under force and moment on the robot at the tcp, all in base. */
+/* Deflection at joints q under force and moment on the robot at the tcp, all in base. Checks nothing:
+ * a NaN that goes in comes out. */
 void elastocal_deflection(const double q[], const double force[3], const double moment[3],
                           double deflection[3]);
 
@@ -85,13 +86,15 @@ void elastocal_block(const double q[], const double force[3], const double momen
 /* Half the 95 % interval of the deflection's most uncertain component, m. */
 double elastocal_half_width(const double q[], const double force[3], const double moment[3]);
 
-/* Before the first reading: no correction, filters at rest. */
+/* Before the first reading: no correction, filters at rest. The correction is zero at once: call it
+ * only while corrections are switched off, never to recover in motion. */
 void elastocal_start(elastocal_state *state);
 
 /* Take a reading: every ELASTOCAL_SAMPLE seconds. */
 void elastocal_condition(elastocal_state *state, const elastocal_reading *reading);
 
-/* Give a correction: every ELASTOCAL_CYCLE seconds. */
+/* Give a correction: every ELASTOCAL_CYCLE seconds, also when no reading came: hold and fade count
+ * these calls. */
 void elastocal_correct(elastocal_state *state, const double q[], elastocal_correction *out);
 
 /* Both, where sensor and controller have the same cycle. */

@@ -97,6 +97,20 @@ static int episodes_agree(void)
     return all;
 }
 
+static int rkorr_agrees(void)
+{
+    static const double correction[3] = {0.001, -0.002, 0.003};
+    static const double expected[6] = {1.0, -2.0, 3.0, 0.0, 0.0, 0.0};
+    double found[6];
+    int all = 1;
+    int i;
+    elastocal_rkorr(correction, found);
+    for (i = 0; i < 6; i++) {
+        all &= agree(found[i], expected[i], TOLERANCE);
+    }
+    return all;
+}
+
 int elastocal_selftest(void)
 {
     int result = 0;
@@ -104,7 +118,7 @@ int elastocal_selftest(void)
         result = 1;
     } else if (loads_agree() == 0) {
         result = 2;
-    } else if (episodes_agree() == 0) {
+    } else if ((episodes_agree() == 0) || (rkorr_agrees() == 0)) {
         result = 3;
     } else {
         result = 0;

@@ -152,6 +152,8 @@ def _corrected(
     # An E6AXIS means its joints as they stand; the turn of a frame is the controller's.
     frames = not any(walk.points[name].by_axes for name in postures)
     wrench = (force, moment)
-    found = correct(walk.solver, calibrated, q, T, wrench, labels.__getitem__, frames, largest)
+    found = correct(
+        walk.solver, calibrated, q, T, wrench, labels.__getitem__, may_turn=frames, largest=largest
+    )
     shift = found.T_base_tcp[:, :3, 3] - T[:, :3, 3]
     return found, Tally().plus(found, shift, labels, [])

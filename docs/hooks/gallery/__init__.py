@@ -1,0 +1,9 @@
+"""Figures of the documentation, made by its build; see ``docs/hooks/figures.py``.
+
+===========  ====================================================================
+`campaign`   a cell that is planned, measured in simulation, and calibrated
+`placement`  figures of the fibre placement example
+`machining`  figures of the machining example
+`small`      the k-centre problem, and the streams of one pose
+===========  ====================================================================
+"""

@@ -1,0 +1,133 @@
+"""Small figures: the k-centre problem (paper Fig. 4), and the streams of one pose (Procedure 1)."""
+
+import shutil
+from functools import partial
+from itertools import combinations
+from pathlib import Path
+
+import numpy as np
+from matplotlib.figure import Figure
+from matplotlib.patches import Circle
+
+from elastocal.cell import Cell
+from elastocal.planning.plan import make_plan
+from elastocal.planning.search import Candidates, Cover
+from elastocal.procedure.entries import Event, RunRecord
+from elastocal.procedure.job import Job, Seams
+from elastocal.procedure.journal import Journal, read_commits
+from elastocal.procedure.pose_log import PoseLog
+from elastocal.procedure.pose_recorder import PoseRecorder
+from elastocal.procedure.run_folder import RunFolder
+from elastocal.procedure.runner import Runner
+from elastocal.procedure.settings import settings_of
+from elastocal.procedure.streams import Streams, read_streams
+from elastocal.report import style
+from elastocal.report.printed import new_figure, write_figure
+from elastocal.sim.workcell import simulated_devices
+from gallery.campaign import example_cell
+
+POINTS, CENTRES = 60, 4
+ONE_POSE = {"pool: 3000": "pool: 20", 'd_max: "175 mm"': "poses: 1"}
+
+
+def make(folder: Path) -> dict[str, str]:
+    """Make the figures; return what is told of each."""
+    return _k_centre(folder) | _streams(folder)
+
+
+def _k_centre(folder: Path) -> dict[str, str]:
+    """Set the choice of COVER beside the best choice there is."""
+    points = np.random.default_rng(7).uniform(0.0, 1.0, (POINTS, 2)) * (1.4, 1.0)
+    pool = Candidates(np.column_stack([points, np.zeros(POINTS)]))
+    cover = Cover().search(pool, CENTRES)
+    distance = np.linalg.norm(points[:, None] - points[None], axis=2)
+    choices = np.array(list(combinations(range(POINTS), CENTRES)))
+    radius = distance[choices].min(axis=1).max(axis=1)
+    best = int(radius.argmin())
+    found = {
+        "COVER": (cover.order, cover.covering_radius),
+        f"Best of {len(choices)} choices": (choices[best], float(radius[best])),
+    }
+    write_figure(folder / "k-centre.svg", partial(_draw_k_centre, points, found))
+    ratio = cover.covering_radius / float(radius[best])
+    return {
+        "k-centre": f"The distance of COVER is {ratio:.2f} times the best one; never over 2 times"
+    }
+
+
+def _draw_k_centre(points: np.ndarray, found: dict[str, tuple[np.ndarray, float]]) -> Figure:
+    figure = new_figure(9.0, 3.6)
+    panels = figure.subplots(1, 2)
+    for axes, (name, (chosen, radius)) in zip(panels, found.items(), strict=True):
+        axes.scatter(*points.T, s=18, c=style.SKY, lw=0)
+        axes.scatter(*points[chosen].T, s=45, c=style.INK, lw=0, zorder=3)
+        for centre in points[chosen]:
+            axes.add_patch(Circle(centre, radius, fill=False, color=style.VERMILLION, lw=1.0))
+        axes.set_title(f"{name}: largest distance {radius:.3f}")
+        axes.set(xlim=(-0.35, 1.75), ylim=(-0.3, 1.3))
+        axes.set_aspect("equal")
+        axes.set_axis_off()
+    figure.subplots_adjust(left=0.01, right=0.99, top=0.9, bottom=0.01, wspace=0.02)
+    return figure
+
+
+def _streams(folder: Path) -> dict[str, str]:
+    """Visit one pose of the simulated cell and draw what was recorded."""
+    cell = example_cell(folder / "cell", "afp", ONE_POSE)
+    streams, commit = _visit(cell, RunFolder(folder / "run"))
+    write_figure(folder / "pose-streams.svg", partial(_draw_streams, cell, streams, commit))
+    shutil.rmtree(folder / "cell")
+    shutil.rmtree(folder / "run")
+    seconds = streams.arm.time[-1] - streams.arm.time[0]
+    samples = len(streams.wrench.time)
+    return {"pose-streams": f"{seconds:.0f} s of the cell's time, {samples} samples of the sensor"}
+
+
+def _visit(cell: Cell, run: RunFolder) -> tuple[Streams, PoseLog]:
+    plan = make_plan(cell, jobs=1).plan
+    run.streams.mkdir(parents=True)
+    devices = simulated_devices(cell, seed=1)
+    record = RunRecord(
+        elastocal=plan.elastocal, plan="", cell="", cell_file=cell.path.name, seed=1, started=""
+    )
+    with Journal(run.journal) as journal:
+        journal.write(devices.clock.now(), Event.START, run=record)
+        seams = Seams(lambda: PoseRecorder(plan.robot.joints))
+        Runner(Job(plan, settings_of(cell, plan), run), devices, journal, seams).run()
+    (commit,) = read_commits(run.journal)
+    return read_streams(run.stream(commit.pose, commit.attempt)), commit
+
+
+def _draw_streams(cell: Cell, streams: Streams, commit: PoseLog) -> Figure:
+    figure = new_figure(9.0, 5.2)
+    upper, lower = figure.subplots(2, 1, sharex=True)
+    unloaded, start = commit.windows[0], streams.arm.time[0]
+
+    def since(time: np.ndarray, values: np.ndarray) -> np.ndarray:
+        inside = (time >= unloaded.start) & (time <= unloaded.end)
+        return values - values[inside].mean(axis=0)
+
+    wrench, points, arm = streams.wrench, streams.points, streams.arm
+    force = since(wrench.time, wrench.force)
+    colours = (style.BLUE, style.VERMILLION, style.GREEN)
+    for axis, colour, dashes, row in zip("xyz", colours, ("-", "--", "-."), force.T, strict=True):
+        upper.plot(wrench.time - start, row, dashes, color=colour, lw=1.3, label=f"force {axis}")
+    marker = 1e3 * np.linalg.norm(since(points.time, points.position), axis=1)
+    T = arm.T_base_tcp
+    place = T[:, :3, 3] + T[:, :3, :3] @ np.array(cell.file.marker.position_tcp)
+    told = 1e3 * np.linalg.norm(since(arm.time, place), axis=1)
+    lower.plot(points.time - start, marker, color=style.GREEN, lw=1.3, label="by the tracker")
+    lower.plot(arm.time - start, told, "--", color=style.PURPLE, lw=1.5, label="by the controller")
+    for window in commit.windows:
+        middle = 0.5 * (window.start + window.end) - start
+        for axes in (upper, lower):
+            axes.axvspan(window.start - start, window.end - start, color="#f3e3c3", lw=0)
+        upper.text(middle, 520.0, window.load_case or "unloaded", ha="center", fontsize=8)
+    upper.set(ylim=(-1250, 650), ylabel="force on the sensor in N")
+    lower.set(ylim=(-0.2, 5.5), ylabel="marker displacement in mm")
+    lower.set(xlabel="time since the pose was begun in s", xlim=(0.0, arm.time[-1] - start))
+    for axes, place_ in ((upper, "lower left"), (lower, "lower right")):
+        axes.spines[["top", "right"]].set_visible(False)
+        axes.legend(loc=place_, fontsize=8, framealpha=1.0)
+    figure.subplots_adjust(left=0.08, right=0.99, top=0.97, bottom=0.1, hspace=0.08)
+    return figure

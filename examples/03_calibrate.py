@@ -1,0 +1,68 @@
+"""From a dataset to a calibrated model.
+
+You learn how to calibrate, and where the answers to a user's first questions are: how large is the
+error at poses that were left out, are 18 springs better than 6, which springs are known, which
+readings look wrong. The readings are those of a simulated arm with bending links and stiffening
+gears, which no springs at the joints can express; one reading is spoilt on purpose.
+"""
+
+import sys
+import tempfile
+from pathlib import Path
+
+import numpy as np
+
+from elastocal.dataset import read, write
+from elastocal.elastic import ElasticModel, layout
+from elastocal.identification import calibrate, summary, write_model
+from elastocal.robot import Robot, catalogue
+from elastocal.robot.mounting import with_tool
+from elastocal.robot.pose import T_from_xyzabc
+from elastocal.sim.layouts import (
+    LINK_BENDING,
+    bearing_truth,
+    with_link_bending,
+    with_stiffening_gears,
+)
+from elastocal.sim.linkage import Linkage
+from elastocal.sim.measurement import SHOP_FLOOR, Blunder, measure
+from elastocal.sim.scene import press_forces, press_poses
+
+folder = Path(sys.argv[1]) if len(sys.argv) > 1 else Path(tempfile.mkdtemp(prefix="elastocal-"))
+folder.mkdir(parents=True, exist_ok=True)
+
+urdf = catalogue.urdf("KR 120 R2700 extra HA")
+urdf = with_tool(urdf, "flange", "tcp", T_from_xyzabc(0.15, 0.0, 0.35, 0.0, 0.0, 0.0))
+linkage = Linkage.from_urdf(urdf, "tcp")
+bending = dict.fromkeys(linkage.joint_names[1:3], LINK_BENDING)
+arm = with_stiffening_gears(with_link_bending(bearing_truth(linkage), bending))
+
+rng = np.random.default_rng(1)
+pressed = press_poses(linkage, 31, rng)
+forces = press_forces(pressed.T_base_tcp)
+spoilt = (Blunder(12, "north", (0.0, 4e-3, 0.0)),)
+write(measure(arm, pressed.joints, forces, SHOP_FLOOR, rng, blunders=spoilt), folder / "dataset.nc")
+
+# From here on it is as with your own data. The dataset carries the URDF and the tcp's name.
+data = read(folder / "dataset.nc")
+robot = Robot.from_urdf(data.robot_urdf, data.tcp_frame)
+model = ElasticModel(robot, layout(robot, "bearing"))
+calibration = calibrate(model, data.readings(robot.joint_names), np.random.default_rng(0))
+told = summary(calibration)
+write_model(folder / "model.json", calibration.calibrated, told)
+mm = 1e3
+print(f"{told['readings']} readings at {told['poses']} poses")
+print(f"deflection measured: {mm * told['deflection']['mean']:.3f} mm mean")
+print(f"error at left-out poses: {mm * told['held_out']['mean']:.3f} mm mean")
+difference = told["comparison"]["difference"]
+print(
+    f"6 springs miss by {mm * difference['mean']:.3f} mm more"
+    f" (95 %: {mm * difference['low']:.3f} to {mm * difference['high']:.3f} mm)"
+)
+for spring in told["springs"][:6]:
+    known = "" if spring["observable"] else "  (only in sum with others)"
+    print(f"{spring['name']:14s} {1e6 * spring['compliance']:6.3f} µrad/(N·m){known}")
+for reading in told["suspicious"]:
+    aside = "set aside" if reading["set_aside"] else "kept"
+    print(f"looks wrong: pose {reading['pose']} {reading['load_case']}, {aside}")
+print("written: dataset.nc, model.json")

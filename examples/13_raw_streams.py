@@ -1,0 +1,77 @@
+"""One pose of Procedure 1 on the simulated cell, and the raw streams that it leaves.
+
+You learn how a plan is carried out from Python, which files come out of it, and how to read the raw
+samples again: what arm, force sensor and tracker said, and which stretches became readings. The
+command `elastocal run` does the same for all poses, and derives the dataset.
+"""
+
+import sys
+import tempfile
+from pathlib import Path
+
+import numpy as np
+
+from elastocal.cell import load_cell
+from elastocal.cell.examples import write_example
+from elastocal.planning.plan import make_plan
+from elastocal.procedure.entries import Event, RunRecord
+from elastocal.procedure.job import Job, Seams
+from elastocal.procedure.journal import Journal, read_commits
+from elastocal.procedure.pose_recorder import PoseRecorder
+from elastocal.procedure.run_folder import RunFolder
+from elastocal.procedure.runner import Runner
+from elastocal.procedure.settings import settings_of
+from elastocal.procedure.streams import read_streams
+from elastocal.sim.workcell import simulated_devices
+
+folder = Path(sys.argv[1]) if len(sys.argv) > 1 else Path(tempfile.mkdtemp(prefix="elastocal-"))
+folder.mkdir(parents=True, exist_ok=True)
+
+# A plan of a single pose: this is about the streams, not about the calibration.
+cell_file, *_ = write_example(folder / "cell", "afp")
+text = cell_file.read_text(encoding="utf-8")
+text = text.replace("pool: 3000", "pool: 20").replace('d_max: "175 mm"', "poses: 1")
+cell_file.write_text(text, encoding="utf-8")
+cell = load_cell(cell_file)
+plan = make_plan(cell, jobs=1).plan
+
+run = RunFolder(folder / "run")
+run.streams.mkdir(parents=True, exist_ok=True)
+devices = simulated_devices(cell, seed=1)
+record = RunRecord(
+    elastocal=plan.elastocal,
+    plan="made in memory",
+    cell=plan.cell.fingerprint,
+    cell_file=cell_file.name,
+    seed=1,
+    started="not noted",
+)
+with Journal(run.journal) as journal:
+    journal.write(devices.clock.now(), Event.START, run=record)
+    seams = Seams(lambda: PoseRecorder(plan.robot.joints))
+    result = Runner(Job(plan, settings_of(cell, plan), run), devices, journal, seams).run()
+print(
+    f"{result.end.value}, arm {result.stand.value}, {devices.clock.now():.1f} s of the cell's time"
+)
+
+(commit,) = read_commits(run.journal)
+streams = read_streams(run.stream(commit.pose, commit.attempt))
+print(f"arm {len(streams.arm.time)}, wrench {len(streams.wrench.time)},", end=" ")
+print(f"marker {len(streams.points.time)} samples")
+for mark in streams.marks[:4]:
+    print(f"  {mark.time:7.2f} s  {mark.text}")
+
+# The stretches that became readings, averaged by hand: raw, in the sensor's and tracker's frames.
+print(f"{'reading':10s} {'samples':>8s} {'raw force':>26s}   {'marker moved':>12s}")
+unloaded = None
+for window in commit.windows:
+    inside = (streams.wrench.time >= window.start) & (streams.wrench.time <= window.end)
+    seen = (streams.points.time >= window.start) & (streams.points.time <= window.end)
+    force = streams.wrench.force[inside].mean(axis=0)
+    marker = streams.points.position[seen].mean(axis=0)
+    unloaded = marker if unloaded is None else unloaded
+    moved = 1e3 * np.linalg.norm(marker - unloaded)
+    print(
+        f"{window.load_case or 'unloaded':10s} {inside.sum():8d}"
+        f" {np.array2string(force, precision=1, floatmode='fixed'):>24s} N   {moved:9.3f} mm"
+    )
