@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 
 from elastocal.report.document.again import Unseen
+from elastocal.report.document.leading import leading
 from elastocal.report.document.parts import Parts
 from elastocal.report.document.section import Finding
 from elastocal.report.document.words import counted, mm, um
@@ -69,10 +70,10 @@ def _largest(unseen: Unseen) -> Iterator[Finding]:
 
 def _spare_poses(parts: Parts) -> Iterator[Finding]:
     """Tell how many poses the next such robot needs."""
-    if parts.codec is None:
+    best = leading(parts)
+    if best is None:
         return
-    best = min(parts.codec.verdicts.saturation, key=lambda each: each.last_error)
-    measured = len(parts.codec.data.contact)
+    measured = len(parts.codecs[0].data.contact)
     if best.settled and best.high is not None and best.high < measured:
         yield Finding(
             f"{counted(best.high, 'training pose')} would have been enough for this accuracy",

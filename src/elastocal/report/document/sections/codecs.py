@@ -3,18 +3,23 @@
 from collections.abc import Iterator
 from functools import partial
 
+from elastocal.codec import CodecData, Saturation
 from elastocal.errors import CodecError
 from elastocal.report.codec_chart import codec_chart, headline, how_to_read
-from elastocal.report.document.markup import facts, listed, paragraph, table
+from elastocal.report.document.leading import leading
+from elastocal.report.document.markup import facts, heading, listed, paragraph, table
 from elastocal.report.document.parts import Codec, Parts
 from elastocal.report.document.pictures import picture
 from elastocal.report.document.section import Content, Finding, Section
 from elastocal.report.document.words import counted, mm
 
+_FIGURES = {"search": "Fig. 7", "springs": "Fig. 9", "load_cases": "Fig. 10"}
+"""Of the paper, by what the codec compares."""
+
 
 def body(parts: Parts) -> Content:
     """Return the section."""
-    if parts.codec is None:
+    if not parts.codecs:
         return Content(
             paragraph("There is no codec, so it is not known whether there were enough poses."),
             findings=(
@@ -25,7 +30,7 @@ def body(parts: Parts) -> Content:
                 ),
             ),
         )
-    data, verdicts = parts.codec.data, parts.codec.verdicts
+    data = parts.codecs[0].data
     sets, size = data.verification.shape
     html = facts(
         [
@@ -35,17 +40,35 @@ def body(parts: Parts) -> Content:
             ("Training poses", f"1 to {data.n_train[-1]}"),
         ]
     )
-    html += listed(_micro(each) for each in verdicts.sentences)
+    html += "".join(_codec(codec) for codec in parts.codecs)
+    best = leading(parts)
+    return Content(html, findings=() if best is None else tuple(_findings(best)))
+
+
+def _codec(codec: Codec) -> str:
+    data, verdicts = codec.data, codec.verdicts
+    names = [each.name for each in data.variants]
+    title = " against ".join(names) if len(names) > 1 else f"Variant {names[0]}"
+    html = heading(title) + listed(_micro(each) for each in verdicts.sentences)
     try:
         html += picture(
             partial(codec_chart, data, verdicts),
             f"{headline(data)}: box plots of mean and maximum error at held-out poses over the"
             f" number of training poses. {_micro(' '.join(verdicts.sentences))}",
-            f"After the paper's Fig. 7, 9 and 10. {how_to_read(data)}",
+            f"After the paper's {_like(data)}. {how_to_read(data)}",
+            ".png",
         )
     except CodecError as error:
         html += paragraph(f"No chart: {error}.")
-    return Content(html + _table(parts.codec), findings=tuple(_findings(parts.codec)))
+    return html + _table(codec)
+
+
+def _like(data: CodecData) -> str:
+    """Return the figure of the paper that compares the same."""
+    for key, figure in _FIGURES.items():
+        if len({getattr(each, key) for each in data.variants}) > 1:
+            return figure
+    return "codecs (Fig. 7, 9 and 10)"
 
 
 def _micro(sentence: str) -> str:
@@ -70,8 +93,7 @@ def _table(codec: Codec) -> str:
     return table("Saturation: training poses from which on more do not help", heads, rows)
 
 
-def _findings(codec: Codec) -> Iterator[Finding]:
-    best = min(codec.verdicts.saturation, key=lambda each: each.last_error)
+def _findings(best: Saturation) -> Iterator[Finding]:
     if best.n_train == best.last:
         yield Finding(
             f"the codec has not saturated: the error of {best.variant} still falls at"
