@@ -13,8 +13,12 @@ from elastocal.report.document.pictures import picture
 from elastocal.report.document.section import Content, Finding, Section
 from elastocal.report.document.words import counted, mm
 
-_FIGURES = {"search": "Fig. 7", "springs": "Fig. 9", "load_cases": "Fig. 10"}
-"""Of the paper, by what the codec compares."""
+_FIGURES = {
+    "search": ("Search", "Fig. 7"),
+    "springs": ("Springs", "Fig. 9"),
+    "load_cases": ("Load cases", "Fig. 10"),
+}
+"""What a codec may compare: in words, and the figure of the paper that does; in its order."""
 
 
 def body(parts: Parts) -> Content:
@@ -40,16 +44,14 @@ def body(parts: Parts) -> Content:
             ("Training poses", f"1 to {data.n_train[-1]}"),
         ]
     )
-    html += "".join(_codec(codec) for codec in parts.codecs)
+    html += "".join(_codec(codec) for codec in sorted(parts.codecs, key=_order))
     best = leading(parts)
     return Content(html, findings=() if best is None else tuple(_findings(best)))
 
 
 def _codec(codec: Codec) -> str:
     data, verdicts = codec.data, codec.verdicts
-    names = [each.name for each in data.variants]
-    title = " against ".join(names) if len(names) > 1 else f"Variant {names[0]}"
-    html = heading(title) + listed(_micro(each) for each in verdicts.sentences)
+    html = heading(_title(data)) + listed(_micro(each) for each in verdicts.sentences)
     try:
         html += picture(
             partial(codec_chart, data, verdicts),
@@ -63,12 +65,29 @@ def _codec(codec: Codec) -> str:
     return html + _table(codec)
 
 
+def _title(data: CodecData) -> str:
+    names = " against ".join(each.name for each in data.variants)
+    key = _compared(data)
+    return f"{_FIGURES[key][0]}: {names}" if key else names
+
+
 def _like(data: CodecData) -> str:
     """Return the figure of the paper that compares the same."""
-    for key, figure in _FIGURES.items():
+    key = _compared(data)
+    return _FIGURES[key][1] if key else "codecs (Fig. 7, 9 and 10)"
+
+
+def _compared(data: CodecData) -> str | None:
+    """Return what the variants differ in, as far as the paper compares it."""
+    for key in _FIGURES:
         if len({getattr(each, key) for each in data.variants}) > 1:
-            return figure
-    return "codecs (Fig. 7, 9 and 10)"
+            return key
+    return None
+
+
+def _order(codec: Codec) -> int:
+    key = _compared(codec.data)
+    return list(_FIGURES).index(key) if key else len(_FIGURES)
 
 
 def _micro(sentence: str) -> str:
@@ -94,22 +113,21 @@ def _table(codec: Codec) -> str:
 
 
 def _findings(best: Saturation) -> Iterator[Finding]:
+    last = counted(best.last, "training pose")
     if best.n_train == best.last:
         yield Finding(
-            f"the codec has not saturated: the error of {best.variant} still falls at"
-            f" {counted(best.last, 'training pose')}",
+            f"the codec has not saturated: the error still falls at {last}",
             advice="Measure more poses: the error still falls with every one.",
         )
     elif not best.settled:
         yield Finding(
-            f"the codec does not show that {best.variant} has saturated: its interval reaches"
-            f" {counted(best.last, 'training pose')}",
+            f"the codec does not show that the error has saturated: its interval reaches {last}",
             advice="Measure some more poses to see that the error no longer falls.",
         )
     else:
         yield Finding(
-            f"the error no longer fell from {counted(best.n_train, 'training pose')} on"
-            f" ({best.variant}, 95 % interval {best.low} to {best.high}): more would not help",
+            f"the error no longer fell from {counted(best.n_train, 'training pose')} on (95 %"
+            f" interval {best.low} to {best.high}), so there were enough poses",
             holds_back=False,
         )
 
