@@ -68,53 +68,49 @@ def test_settings_in_the_model_file_are_followed(copied):
     )
 
 
-@pytest.mark.parametrize(
-    ("name", "told"),
-    [
-        ("model.json", "calibrated model"),
-        ("tool.json", "tool file"),
-        ("codec", "codec"),
-        ("process", "process"),
-    ],
-)
-def test_what_is_not_there_is_missing_with_the_command_that_makes_it(copied, name, told):
-    folder = copied()
-    (shutil.rmtree if (folder / name).is_dir() else (folder / name).unlink)(
-        *([folder / name] if (folder / name).is_dir() else [])
-    )
-    reason = absent(gather(Options(folder), MADE))[told]
-    assert f"there is no {name}; `elastocal " in reason
+MADE_BY = {
+    "calibrated model": ("model.json", "calibrate"),
+    "tool file": ("tool.json", "tool"),
+    "codec": ("codec", "codec"),
+    "process": ("process", "simulate-process"),
+}
+
+
+def test_what_is_not_there_is_missing_with_the_command_that_makes_it(copied):
+    reasons = absent(gather(Options(copied("run")), MADE))
+    for told, (name, command) in MADE_BY.items():
+        assert f"there is no {name}; `elastocal {command}`" in reasons[told]
 
 
 @pytest.mark.parametrize(
-    ("name", "told"),
+    "damaged",
     [
-        ("run/journal.jsonl", "journal"),
-        ("run/cell/cell.yaml", "cell"),
-        ("run/cell/dome.stl", "surface"),
-        ("run/plan/plan.json", "plan"),
-        ("run/plan/pool.nc", "pool"),
-        ("run/dataset.nc", "dataset"),
-        ("run/summary.json", "summary of the run"),
-        ("model.json", "calibrated model"),
-        ("tool.json", "tool file"),
-        ("codec/codec.nc", "codec"),
-        ("process/table.json", "process"),
-        ("process/deviations.csv", "process"),
+        {
+            "run/cell/dome.stl": "surface",
+            "run/plan/pool.nc": "pool",
+            "run/summary.json": "summary of the run",
+            "model.json": "calibrated model",
+            "tool.json": "tool file",
+            "codec/codec.nc": "codec",
+            "process/table.json": "process",
+        },
+        {"run/journal.jsonl": "journal", "process/deviations.csv": "process"},
+        {"run/cell/cell.yaml": "cell", "run/plan/plan.json": "plan", "run/dataset.nc": "dataset"},
     ],
 )
-def test_what_is_damaged_is_told_without_the_folder_that_it_lies_in(copied, name, told):
+def test_what_is_damaged_is_told_without_the_folder_that_it_lies_in(copied, damaged):
     folder = copied()
-    path = folder / name
-    if name.endswith("journal.jsonl"):
-        path.write_text("nonsense\n" + path.read_text())
-    else:
-        damage(path)
-    parts = gather(Options(folder), MADE)
-    found = {each.name: each for each in parts.absent if each.damaged}
-    assert set(found) == {told}
-    assert str(folder) not in found[told].reason
-    assert len(found[told].reason.splitlines()) == 1
+    for name in damaged:
+        path = folder / name
+        if name.endswith("journal.jsonl"):
+            path.write_text("nonsense\n" + path.read_text())
+        else:
+            damage(path)
+    found = {each.name: each for each in gather(Options(folder), MADE).absent if each.damaged}
+    assert set(found) == set(damaged.values())
+    for each in found.values():
+        assert str(folder) not in each.reason
+        assert len(each.reason.splitlines()) == 1
 
 
 @pytest.mark.parametrize("key", ["model", "tool", "codec", "process"])

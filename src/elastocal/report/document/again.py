@@ -18,7 +18,7 @@ from elastocal.identification import CalibratedModel, Calibration, FitOptions, c
 from elastocal.identification.bootstrap import interval
 from elastocal.identification.options import MINIMUM_DRAWS, Weights
 
-DRAWS = 2000
+DRAWS = 1000
 """Of whole poses, for the intervals of the errors."""
 _SAME = 1e-4
 """Relative difference below which two results are of one computation, be it on other machines."""
