@@ -1,7 +1,7 @@
 """The head of the report: light, key figures, reasons, advice."""
 
 from elastocal.report.document.again import Unseen
-from elastocal.report.document.markup import facts, heading, html, listed, paragraph
+from elastocal.report.document.markup import coded, facts, heading, html, listed, paragraph
 from elastocal.report.document.parts import Parts
 from elastocal.report.document.verdict import Light, Verdict
 from elastocal.report.document.words import mm
@@ -29,10 +29,12 @@ def verdict_html(parts: Parts, verdict: Verdict) -> str:
         text += _figures(unseen)
     if verdict.reasons:
         why = "Why it is not green" if verdict.light else "What has to be known"
-        text += heading(why) + listed(verdict.reasons, "reasons")
+        text += heading(why) + listed(map(coded, verdict.reasons), "reasons")
     if verdict.notes:
-        text += heading("Good to know") + listed(verdict.notes)
-    advice = listed(verdict.advice) or paragraph("Nothing in these data asks for a change.")
+        text += heading("Good to know") + listed(map(coded, verdict.notes))
+    advice = listed(map(coded, verdict.advice)) or paragraph(
+        "Nothing in these data asks for a change."
+    )
     return text + heading("What would improve the result") + advice
 
 

@@ -1,5 +1,6 @@
 """Pieces of the page: tables that scroll, lists, pictures with words for them."""
 
+import re
 from collections.abc import Iterable, Iterator, Sequence
 from html import escape
 
@@ -20,6 +21,15 @@ def html(value: object) -> str:
     ('a &lt; b', '<b>c</b>')
     """
     return str(value) if isinstance(value, Markup) else escape(str(value))
+
+
+def coded(text: str) -> Markup:
+    """Return a text as HTML, with what stands in backticks as code.
+
+    >>> coded("run `elastocal tool` & see")
+    'run <code>elastocal tool</code> &amp; see'
+    """
+    return Markup(re.sub(r"`([^`]+)`", r"<code>\1</code>", escape(text)))
 
 
 def paragraph(text: object, kind: str = "") -> str:

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 
-from elastocal.report.document.markup import heading, listed, paragraph
+from elastocal.report.document.markup import coded, heading, listed, paragraph
 from elastocal.report.document.parts import Parts
 from elastocal.report.document.section import Content, Finding, Section
 from elastocal.report.document.words import mm
@@ -34,7 +34,7 @@ def body(parts: Parts) -> Content:
         for each in parts.absent
     ]
     html += heading("Missing in this report")
-    html += listed(absent) or paragraph("No part of the report is missing.")
+    html += listed(map(coded, absent)) or paragraph("No part of the report is missing.")
     if parts.doubts:
         html += heading("What does not fit together") + listed(parts.doubts)
     return Content(html, findings=tuple(_findings(parts)))

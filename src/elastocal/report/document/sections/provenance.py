@@ -94,7 +94,7 @@ def _files(parts: Parts) -> str:
         (each.name, Markup(f"<code>{html(each.sha256)}</code>"), each.of) for each in parts.files
     ]
     note = paragraph(
-        f"Hashes of {BYTES} are those of `sha256sum`. Files that carry the time of the run, or"
+        f"Hashes of {BYTES} are what sha256sum gives. Files that carry the time of the run, or"
         " the folder it was started in, are hashed without those, so that equal runs have equal"
         " hashes. The raw streams are hashed in the journal.", "sub",
     )  # fmt: skip
