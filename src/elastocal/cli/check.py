@@ -11,7 +11,7 @@ def check(
         Path,
         typer.Argument(
             help="Any file of ours (.yaml, .json, .nc, .jsonl, .mcap), a dataset (.nc, .csv), a"
-            " robot (.urdf), or the folder of a plan, a run or a simulated process."
+            " robot (.urdf), or the folder of a plan, run, process, codec or study."
         ),
     ],
     as_json: Annotated[
