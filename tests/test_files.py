@@ -156,3 +156,13 @@ class TestFilling:
             filling(tmp_path / "file" / "plan", "plan.json"),
         ):
             pytest.fail("the block must not run")
+
+
+def test_what_is_wrong_with_another_file_is_told_of_that_file(tmp_path):
+    def copied():
+        with replacing(tmp_path / "out.txt") as temporary:
+            temporary.write_text(read_text(tmp_path / "gone.txt"))
+
+    with pytest.raises(FileAccessError, match=r"^cannot read .*gone\.txt: "):
+        copied()
+    assert not list(tmp_path.iterdir())

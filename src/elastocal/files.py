@@ -40,6 +40,8 @@ def replacing(path: Path) -> Iterator[Path]:
         _flush_to_disk(temporary)
         temporary.chmod(0o666 & ~_umask())
         temporary.replace(path)
+    except FileAccessError:
+        raise  # of another file: it says so itself
     except OSError as error:
         raise FileAccessError(f"cannot write {path}: {error.strerror or error}") from error
     finally:

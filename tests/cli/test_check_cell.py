@@ -70,7 +70,7 @@ def test_the_folder_of_a_plan_is_its_plan(tmp_path):
 
 
 def test_a_folder_of_something_else_is_refused(tmp_path):
-    with pytest.raises(SchemaError, match=r"neither plan\.json nor journal\.jsonl"):
+    with pytest.raises(SchemaError, match=r"none of plan\.json, journal\.jsonl, table\.json"):
         describe_file(tmp_path)
 
 

@@ -135,3 +135,15 @@ def test_people_see_before_after_and_reduction_within_80_columns(folder):
 def test_files_for_some_seeds_only_are_refused(folder):
     result = run(folder, "some", "--seed", 1, "--seed", 2, "--seed", 3, "--model", folder / "x")
     assert "--model is given 2 times for 3 seeds" in result.reason
+
+
+def test_the_figures_do_not_depend_on_the_number_of_processes(folder):
+    two = ("--courses", 2, "--seed", 2)
+    for jobs in (1, 2):
+        result = elastocal(
+            "simulate-process", example_cell("afp").path, "--process", "afp", "--model",
+            folder / "model.json", "--out", folder / f"jobs{jobs}", "--jobs", jobs, *two,
+        )  # fmt: skip
+        assert result.code == 0, result.err
+    one, other = ((folder / f"jobs{n}/deviations.csv").read_bytes() for n in (1, 2))
+    assert one == other

@@ -51,12 +51,12 @@ def compare(
     loads = (None, None, None) if rows is None else read_rows(rows, new)
     found = recertify_files(old, new, *loads, limit=accepted)
     record = comparison_record(found)
-    if out is not None:
-        write_comparison(out, record)
     if figure is not None:
         from elastocal.report.recertification_figure import write_recertification_figure
 
         write_recertification_figure(figure, found)
+    if out is not None:
+        write_comparison(out, record)
     if as_json:
         print_json(figures(record))
         return

@@ -57,7 +57,8 @@ def _of_table(path: Path, robot: Robot) -> Loads:
 def _of_dataset(path: Path, robot: Robot, model: Path) -> Loads:
     data = dataset.read(path)
     if data.robot_urdf is not None and data.tcp_frame is not None:
-        measured = Robot.from_urdf(data.robot_urdf, data.tcp_frame, robot.base)
+        base = robot.base if data.robot_urdf == robot.urdf else None
+        measured = Robot.from_urdf(data.robot_urdf, data.tcp_frame, base)
         check_same_robot(measured, robot, (str(path), str(model)))
     try:
         readings = data.readings(robot.joint_names)

@@ -43,9 +43,11 @@ def show_comparison(console: Console, found: Recertification, hint: Path | None 
         )
     for names, which in ((found.only_old, "old"), (found.only_new, "new")):
         if names:
-            console.print(f"only in the {which} model: {', '.join(names)}", markup=False)
+            console.print(
+                f"only in the {which} model: {', '.join(names)}", markup=False, soft_wrap=True
+            )
     if found.not_compared:
-        console.print(f"determined by neither: {', '.join(found.not_compared)}", markup=False)
+        console.print(f"not determined by both: {', '.join(found.not_compared)}", markup=False)
     if found.deflection is not None:
         _show_deflection(console, found.deflection)
     _show_verdict(console, found, hint)

@@ -49,6 +49,8 @@ class Question:
     settings: Path | None = None
     courses: int | None = None
     budget: bool = False
+    jobs: int | None = None
+    """Processes; by default all cores."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,7 +95,7 @@ def answer(question: Question, report: Report) -> Answer:
         If the process is not known, the robot cannot follow, or the model is of another cell.
     """
     settings = _settings(question)
-    benches = [_bench(question.cell, settings, run) for run in question.runs]
+    benches = [_bench(question, settings, run) for run in question.runs]
     lines: list[Comparison] = []
     traces: list[Trace] = []
     budget: tuple[Comparison, ...] = ()
@@ -132,16 +134,16 @@ def _table(
     )
 
 
-def _bench(cell: Cell, settings: CompensatorSettings, run: Run) -> Bench:
+def _bench(question: Question, settings: CompensatorSettings, run: Run) -> Bench:
     calibrated = read_model(run.model)
-    require_same_robot(cell, calibrated, str(run.model))
+    require_same_robot(question.cell, calibrated, str(run.model))
     load = None
     if run.tool is not None:
         try:
             load = sensor_load(read_tool(run.tool), calibrated.model.robot)
         except CompensationError as error:
             raise CompensationError(f"{run.tool}: {error}") from error
-    return Bench(cell, calibrated, load, settings, run.seed)
+    return Bench(question.cell, calibrated, load, settings, run.seed, jobs=question.jobs)
 
 
 def _source(run: Run) -> Source:

@@ -3,10 +3,12 @@
 Beside the demo the only place that brings simulator and estimator together.
 """
 
+import os
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+from joblib import Parallel, delayed
 
 from elastocal.arrays import FloatArray
 from elastocal.cell import Cell
@@ -57,6 +59,8 @@ class Bench:
     settings: CompensatorSettings
     seed: int
     controller: Controller = field(default_factory=Controller)
+    jobs: int | None = None
+    """Processes; by default all cores."""
 
     @property
     def clocked(self) -> Controller:
@@ -136,7 +140,7 @@ def run_process(bench: Bench, courses: tuple[Course, ...], report: Report) -> Ou
     DeviceError, EquilibriumError
         If the cell cannot be simulated, or not under these forces.
     """
-    return _passages(bench, courses, lambda truth: _corrector(bench, courses, truth), report)
+    return _passages(bench, courses, None, report)
 
 
 def run_effect(
@@ -154,11 +158,7 @@ def run_effect(
             controller=replace(bench.controller, dead_cycles=0, lag=0.0),
         )
         courses = tuple(replace(course, ripple=()) for course in courses)
-    if effect.exact:
-        return _passages(changed, courses, lambda _: PerfectCorrector(late), report, effect.name)
-    return _passages(
-        changed, courses, lambda truth: _corrector(changed, courses, truth), report, effect.name
-    )
+    return _passages(changed, courses, late if effect.exact else None, report, effect.name)
 
 
 def require_same_robot(cell: Cell, model: CalibratedModel, name: str) -> None:
@@ -186,24 +186,36 @@ def require_same_robot(cell: Cell, model: CalibratedModel, name: str) -> None:
 def _passages(
     bench: Bench,
     courses: tuple[Course, ...],
-    corrector: Callable[[ProcessCell], Corrector],
+    late: int | None,
     report: Report,
     stage: str = "courses",
 ) -> Outcome:
+    """Run every course twice; ``late`` is that of a perfect corrector, None: the model corrects."""
+    jobs = min(bench.jobs or os.cpu_count() or 1, len(courses))
+    zeroed_at = courses[0].q[0]
+    pairs: list[tuple[Passage, Passage]] = []
+    report(stage, 0, len(courses))
+    with Parallel(n_jobs=jobs, return_as="generator") as parallel:
+        for pair in parallel(delayed(_twice)(bench, c, zeroed_at, late) for c in courses):
+            pairs.append(pair)
+            report(stage, len(pairs), len(courses))
+    before, after = zip(*pairs, strict=True)
+    return Outcome(before, after)
+
+
+def _twice(
+    bench: Bench, course: Course, zeroed_at: FloatArray, late: int | None
+) -> tuple[Passage, Passage]:
+    """Return a course without and with correction; courses know nothing of one another."""
     truth, robot = ProcessCell(bench.cell, bench.seed), bench.cell.robot
-    corrects = corrector(truth)
-    before, after = [], []
-    for number, course in enumerate(courses):
-        report(stage, number, len(courses))
-        air = air_shifts(truth, course)
-        before.append(run_course(truth, robot, course, air, bench.clocked, None))
-        after.append(run_course(truth, robot, course, air, bench.clocked, corrects))
-    report(stage, len(courses), len(courses))
-    return Outcome(tuple(before), tuple(after))
+    corrects = _corrector(bench, truth, zeroed_at) if late is None else PerfectCorrector(late)
+    air = air_shifts(truth, course)
+    before = run_course(truth, robot, course, air, bench.clocked, None)
+    return before, run_course(truth, robot, course, air, bench.clocked, corrects)
 
 
-def _corrector(bench: Bench, courses: tuple[Course, ...], truth: ProcessCell) -> Corrector:
-    load = bench.load or _zeroed(bench.cell, truth, courses[0].q[0])
+def _corrector(bench: Bench, truth: ProcessCell, zeroed_at: FloatArray) -> Corrector:
+    load = bench.load or _zeroed(bench.cell, truth, zeroed_at)
     return ModelCorrector(Compensator.of(bench.model, bench.settings, load))
 
 

@@ -59,12 +59,14 @@ def report(  # noqa: PLR0913 - one parameter an option
     """Write the report of a calibration: one HTML file that an inspector can sign."""
     from datetime import UTC, datetime
 
+    from rich.markup import escape
+
     from elastocal.cli.output import console, print_json
     from elastocal.cli.parsing import parse_limit
     from elastocal.report.document import Options, find_browser, gather, write_pdf, write_report
 
     paper = out.with_suffix(".pdf") if pdf else None
-    refuse_existing(out, paper, force)
+    check_places(out, paper, force)
     browser = find_browser() if pdf else ""
     accepted = None if tolerance is None else parse_limit(tolerance, "--tolerance")
     drift = None if limit is None else parse_limit(limit)
@@ -79,22 +81,27 @@ def report(  # noqa: PLR0913 - one parameter an option
     shown = console()
     verdict = written.verdict
     light = f" ({verdict.light.value} light)" if verdict.light else ""
-    shown.print(f"[bold]{verdict.word}[/bold]{light}: {verdict.sentence}")
+    shown.print(f"[bold]{verdict.word}[/bold]{light}: {escape(verdict.sentence)}")
     for reason in verdict.reasons:
         shown.print(f"   {reason}", markup=False)
     shown.print(f"written to {out}{f' and {paper}' if paper else ''}", markup=False)
 
 
-def refuse_existing(out: Path, paper: Path | None, force: bool) -> None:
-    """Refuse to replace a report that is there.
+def check_places(out: Path, paper: Path | None, force: bool) -> None:
+    """Refuse places for a report before the work, so that none is done in vain.
 
     Raises
     ------
     FileAccessError
-        With its name.
+        If a file is there and is not to be replaced, or the name is not that of a page: it could
+        be that of a model.
     """
     from elastocal.errors import FileAccessError
 
+    if out.suffix.lower() not in (".html", ".htm"):
+        raise FileAccessError(f"--out {out}: the report is a page, its name must end in .html")
+    if not out.parent.is_dir():
+        raise FileAccessError(f"cannot write {out}: there is no folder {out.parent}")
     for path in (out, paper):
         if path is not None and path.exists() and not force:
             raise FileAccessError(f"{path} is there already: name another file, or give --force")

@@ -32,6 +32,7 @@ def simulate_process(  # noqa: PLR0913 (a command has as many options as it has)
     budget: Annotated[
         bool, typer.Option("--budget", help="Switch each effect off in turn, for the first seed.")
     ] = False,
+    jobs: Annotated[int | None, typer.Option(min=1, help="Processes; default: all cores.")] = None,
     force: Annotated[bool, typer.Option("--force", help="Replace files that are there.")] = False,
     as_json: Annotated[
         bool, typer.Option("--json", help="Print the figures as one JSON object.")
@@ -51,7 +52,7 @@ def simulate_process(  # noqa: PLR0913 (a command has as many options as it has)
     runs = runs_of(model, tool or [], seed or [0])
     made = load_cell(cell)
     with filling(out, TABLE, force) as folder, progress_bars(console()) as report:
-        found = answer(Question(made, process, runs, settings, courses, budget), report)
+        found = answer(Question(made, process, runs, settings, courses, budget, jobs), report)
         units = joint_dimensions(made.robot.joint_names, made.robot.revolute)
         write_programme(folder / PROGRAMME, found.programme, units)
         write_process(folder, found.record)

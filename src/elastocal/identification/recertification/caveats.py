@@ -29,7 +29,8 @@ def caveats(
     if not same_springs:
         notes.append(
             "the models have different springs: a spring's value depends on which others are in the"
-            " model, so only predictions tell whether the robot changed"
+            " model, so the springs do not tell whether the robot changed; predictions do, as far"
+            " as both models can express the arm"
         )
     if old.provenance and old.provenance == new.provenance:
         notes.append(

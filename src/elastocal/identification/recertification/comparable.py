@@ -12,6 +12,7 @@ import numpy as np
 
 from elastocal.arrays import FloatArray
 from elastocal.elastic import Spring
+from elastocal.errors import IdentificationError
 from elastocal.identification.calibrated import CalibratedModel
 from elastocal.identification.observability import Term, describe
 from elastocal.identification.sparse_basis import sparse_basis
@@ -40,6 +41,11 @@ def comparable_sums(old: CalibratedModel, new: CalibratedModel) -> tuple[tuple[T
     tuple of tuple of Term
         Single springs with weight 1, and sums of several; in the order of the springs. Springs
         of one model only stand in none.
+
+    Raises
+    ------
+    IdentificationError
+        If an unobservable combination names a spring that its model does not have.
     """
     springs = common_springs(old, new)
     unseen = np.vstack([_unobservable(each, springs) for each in (old, new)])
@@ -80,6 +86,13 @@ def weights(sums: Sequence[Sequence[Term]], names: Sequence[str]) -> FloatArray:
 def _unobservable(calibrated: CalibratedModel, springs: Sequence[Spring]) -> FloatArray:
     """Return the part of a model's unobservable combinations that lies in some springs."""
     names = [spring.name for spring in springs]
+    own = calibrated.model.spring_names
+    for term in (term for group in calibrated.observability.unobservable for term in group):
+        if term.spring not in own:
+            raise IdentificationError(
+                f"unobservable combination names spring {term.spring!r}, which the model does not"
+                f" have (springs: {', '.join(own)})"
+            )
     kept = [
         [term for term in group if term.spring in names]
         for group in calibrated.observability.unobservable

@@ -5,7 +5,8 @@ from pathlib import Path
 
 from numpy.typing import ArrayLike
 
-from elastocal.errors import IdentificationError
+from elastocal.errors import IdentificationError, RobotError, SpringError
+from elastocal.identification.calibrated import CalibratedModel
 from elastocal.identification.model_file import read_model, read_record
 from elastocal.identification.recertification.caveats import load_caveat
 from elastocal.identification.recertification.recertify import recertify
@@ -40,8 +41,8 @@ def recertify_files(
     if Path(old).resolve() == Path(new).resolve():
         raise IdentificationError(f"{old} and {new} are one and the same file: nothing to compare")
     found = recertify(
-        read_model(old),
-        read_model(new),
+        _model(old),
+        _model(new),
         q,
         force,
         moment,
@@ -50,6 +51,14 @@ def recertify_files(
     )
     note = load_caveat(*(_measured_deflection(path) for path in (old, new)))
     return found if note is None else replace(found, notes=(*found.notes, note))
+
+
+def _model(path: Path) -> CalibratedModel:
+    """Return the model of a file; of two files, a refusal has to say which."""
+    try:
+        return read_model(path)
+    except (SpringError, RobotError) as error:
+        raise type(error)(f"{path}: {error}") from error
 
 
 def _measured_deflection(path: Path) -> float | None:

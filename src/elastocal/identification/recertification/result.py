@@ -43,7 +43,7 @@ class SpringChange:
     terms: tuple[Term, ...]
     """The sum that is compared, ``sum(weight * compliance)``; one term for a single spring."""
     unit: str
-    """``rad/(N*m)`` or ``m/N``."""
+    """``rad/(N*m)`` or ``m/N``: of the first spring; the weights bring the others to it."""
     old: Estimate
     """Of the old calibration, in `unit`."""
     new: Estimate
@@ -121,7 +121,7 @@ class Recertification:
     springs: tuple[SpringChange, ...]
     """Springs and combinations that both calibrations determine, in the order of the model."""
     not_compared: tuple[str, ...]
-    """Common springs that stand in no comparison: neither alone nor in a combination."""
+    """Common springs that stand in no comparison: not determined by both, alone or in a sum."""
     only_old: tuple[str, ...]
     """Springs that only the old model has."""
     only_new: tuple[str, ...]

@@ -57,6 +57,7 @@ from elastocal.report.document.places import (
     find_places,
     run_files,
 )
+from elastocal.report.document.shapes import checked_figures, checked_summary
 
 Part = TypeVar("Part")
 
@@ -167,7 +168,12 @@ def _with_run(parts: Parts, search: _Search) -> Parts:
         surface = search.read("surface", cell.path, lambda: cell_surface(cell), named=False)
         parts = replace(parts, surface=surface, cell_text=read_text(cell.path))
     parts = _with_plan(parts, search, run)
-    summary = _derived(search, "summary of the run", run.summary, read_summary)
+    summary = _derived(
+        search,
+        "summary of the run",
+        run.summary,
+        lambda path: checked_summary(read_summary(path), str(path)),
+    )
     parts = replace(parts, dataset=_derived(search, "dataset", run.dataset, datasets.read))
     for file in run_files(run):
         search.use(file)
@@ -230,7 +236,8 @@ def _with_model(parts: Parts, search: _Search, options: Options) -> Parts:
 def _calibrated(path: Path, dataset: Dataset | None) -> Calibrated:
     record, model = read_record(path), read_model(path)
     check_model(model, dataset, path)
-    return Calibrated(model, dict(record.calibration), record.robot.urdf_sha256, file_sha256(path))
+    figures = checked_figures(dict(record.calibration), f"{path}: calibration")
+    return Calibrated(model, figures, record.robot.urdf_sha256, file_sha256(path))
 
 
 def _with_rest(parts: Parts, search: _Search, options: Options) -> Parts:
@@ -242,7 +249,7 @@ def _with_rest(parts: Parts, search: _Search, options: Options) -> Parts:
         return Codec(data, judge(data))
 
     def process(path: Path) -> ProcessRecord:
-        folder = path if path.is_dir() else path.parent
+        folder = path.parent if path.name == TABLE else path
         return check_process(read_process(folder), parts, folder / TABLE)
 
     return replace(

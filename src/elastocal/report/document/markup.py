@@ -1,7 +1,10 @@
 """Pieces of the page: tables that scroll, lists, pictures with words for them."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from html import escape
+
+_SHORT = 24
+"""Lines of a table up to which it is kept together on paper."""
 
 
 class Markup(str):
@@ -62,6 +65,7 @@ def table(
     top = "".join(
         f'<th scope="col"{_side(k, texts)}>{html(head)}</th>' for k, head in enumerate(heads)
     )
+    lines = list(rows)
     body = "".join(
         "<tr>"
         + "".join(
@@ -71,11 +75,13 @@ def table(
             for k, cell in enumerate(row)
         )
         + "</tr>"
-        for row in rows
+        for row in lines
     )
+    # A table of a few lines stays on one sheet of paper.
+    kind = "wide short" if len(lines) <= _SHORT else "wide"
     label = escape(plain(caption), quote=True)
     return (
-        f'<div class="wide" tabindex="0" role="region" aria-label="{label}">'
+        f'<div class="{kind}" tabindex="0" role="region" aria-label="{label}">'
         f"<table><caption>{html(caption)}</caption><thead><tr>{top}</tr></thead>"
         f"<tbody>{body}</tbody></table></div>"
     )
@@ -84,6 +90,30 @@ def table(
 def folded(summary: object, inner: str, kind: str = "") -> str:
     """Return what a reader may open; of the kind ``long``, it stays folded on paper."""
     return f"<details{_kind(kind)}><summary>{html(summary)}</summary>{inner}</details>"
+
+
+def flattened(value: object, prefix: str = "") -> Iterator[tuple[str, str]]:
+    """Yield every leaf of nested settings with its path.
+
+    >>> list(flattened({"a": {"b": 0.5, "c": [1, 2]}, "d": None}))
+    [('a.b', '0.5'), ('a.c', '1, 2'), ('d', 'none')]
+    """
+    if isinstance(value, dict):
+        for key, each in value.items():
+            yield from flattened(each, f"{prefix}.{key}" if prefix else str(key))
+    elif isinstance(value, list) and any(isinstance(each, dict) for each in value):
+        for number, each in enumerate(value):
+            yield from flattened(each, f"{prefix}.{number}")
+    else:
+        yield prefix, _leaf(value)
+
+
+def _leaf(value: object) -> str:
+    if isinstance(value, list | tuple):
+        return ", ".join(map(_leaf, value)) or "none"
+    if isinstance(value, float):
+        return f"{value:.10g}"
+    return "none" if value is None else str(value)
 
 
 def verbatim(text: str) -> str:

@@ -33,7 +33,8 @@ def picture(draw: Callable[[], Figure], alt: str, caption: object, kind: str = "
     """
     data = base64.b64encode(_bytes(draw, kind)).decode("ascii")
     return (
-        f'<figure><img src="data:{_TYPES[kind]};base64,{data}" alt="{escape(alt, quote=True)}">'
+        '<figure><div class="pan" tabindex="0" role="group" aria-label="Figure">'
+        f'<img src="data:{_TYPES[kind]};base64,{data}" alt="{escape(alt, quote=True)}"></div>'
         f"<figcaption>{html(caption)}</figcaption></figure>"
     )
 

@@ -24,7 +24,7 @@
   function keepStill(figure) {
     const still = document.getElementById("still");
     const plain = { data: figure.data, layout: figure.layout, config: {} };
-    return Plotly.toImage(plain, { format: "png", width: 1400, height: 800 }).then((source) => {
+    return Plotly.toImage(plain, { format: "png", width: 1100, height: 620 }).then((source) => {
       still.src = source;
       still.hidden = false;
     });

@@ -12,7 +12,7 @@ Assumptions, beside those of `elastocal.sim.workcell.quasistatics`:
 * the path as a whole is off by the error of one stop, drawn anew for every course.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -36,6 +36,26 @@ class Pressed:
     """The part of the wrench that the process force makes, shape (6,)."""
 
 
+class _Trail:
+    """Spring positions along a course: where they are likely to be next."""
+
+    def __init__(self, stand: Stand | None = None) -> None:
+        self._theta = self._before = np.zeros(0)
+        if stand is not None:
+            self.went(stand)
+            self._before = self._theta
+
+    def next(self) -> FloatArray:
+        """Return the positions that go on as they came; a third fewer iterations start there."""
+        ahead: FloatArray = 2.0 * self._theta - self._before
+        return ahead
+
+    def went(self, stand: Stand) -> None:
+        """Take the positions that were found."""
+        assert stand.theta is not None, "they were sought"
+        self._before, self._theta = self._theta, stand.theta
+
+
 class ProcessCell:
     """The hidden truth of a cell, for a process. Its gears remember what happened since `lift`."""
 
@@ -54,7 +74,7 @@ class ProcessCell:
         self._zero = sensor_zero(cell, seed)
         self._seed = seed
         self._stand: Stand | None = None
-        self._warm: FloatArray | None = None
+        self._pressed = self._free = _Trail()
         self._stop = np.zeros(3)
         self._rng = generator(seed, "process", "")
         self._slope = np.zeros(6)
@@ -74,15 +94,16 @@ class ProcessCell:
         share = self._entry.drift / 60.0 / self._range[0]
         self._slope = share * self._range * self._rng.standard_normal(6)
         self._stand = self._statics.free(q, np.zeros(3), None)
-        self._warm = self._stand.theta
+        self._pressed, self._free = _Trail(self._stand), _Trail(self._stand)
 
     def free_shift(self, q: FloatArray) -> FloatArray:
         """Return the shift of the tool in the air, shape (3,), in m.
 
         The gears remember nothing of it. `lift` comes first.
         """
-        stand = self._statics.free(q, np.zeros(3), self._warm)
-        self._warm = stand.theta
+        assert self._stand is not None, "lift comes first"
+        stand = self._statics.free(q, np.zeros(3), self._free.next())
+        self._free.went(stand)
         return self._left(stand.sag)[:3]
 
     def _left(self, twist: FloatArray) -> FloatArray:
@@ -103,7 +124,9 @@ class ProcessCell:
         """
         assert self._stand is not None, "lift comes first"
         statics = self._statics
-        stand = statics.loaded(self._stand, q, force_base, self._stop)
+        stand = replace(self._stand, theta=self._pressed.next())
+        stand = statics.loaded(stand, q, force_base, self._stop)
+        self._pressed.went(stand)
         self._stand, twist = stand, stand.twist
         joints, twists = (np.stack([a, a]) for a in (q, twist))
         forces = np.stack([force_base, np.zeros(3)])

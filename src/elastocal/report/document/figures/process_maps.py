@@ -41,8 +41,8 @@ def process_maps(traces: Sequence[Trace]) -> Figure:
         # The largest are drawn last, so that none hides.
         order = np.argsort(size, kind="stable")
         axes.scatter(
-            place[order, 0], place[order, 1], c=size[order], s=4, lw=0, cmap=style.SEQUENTIAL, vmin=0.0,
-            vmax=largest, rasterized=True,
+            place[order, 0], place[order, 1], c=size[order], s=4, lw=0, cmap=style.SEQUENTIAL,
+            vmin=0.0, vmax=largest, rasterized=True,
         )  # fmt: skip
         axes.set_title(f"{title}: mean {size.mean():.3f}, largest {size.max():.3f} mm", fontsize=9)
         axes.set_aspect("equal", adjustable="box", anchor="C")

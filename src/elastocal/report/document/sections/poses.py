@@ -1,12 +1,11 @@
 """Surface, pool and chosen poses (paper Fig. 2 and 3)."""
 
-import json
 from functools import partial
 from html import escape
 from typing import Any
 
 from elastocal.planning.plan_file import PlanFile
-from elastocal.report.document.markup import facts, folded, paragraph, table
+from elastocal.report.document.markup import Markup, facts, folded, paragraph, table
 from elastocal.report.document.parts import Parts
 from elastocal.report.document.pictures import picture
 from elastocal.report.document.section import Content, Section
@@ -14,7 +13,6 @@ from elastocal.report.document.words import counted, mm
 from elastocal.report.html import template
 from elastocal.report.plan_figure import plan_figure
 from elastocal.report.plan_page import key_figures, view_data
-from elastocal.report.text import millimetres
 from elastocal.report.view import plan_view
 
 
@@ -25,23 +23,10 @@ def body(parts: Parts) -> Content:
         return Content(
             paragraph("The plan is not known, so nothing is said of how the poses were chosen.")
         )
-    rows = [
-        (
-            str(pose.id),
-            str(plan.search.order.index(pose.id) + 1),
-            *(f"{1e3 * value + 0.0:.1f}" for value in pose.tcp_position),
-            pose.seen_by or "no station",
-        )
-        for pose in plan.poses
-    ]
-    heads = ("Pose", "Chosen as no.", "x in mm", "y in mm", "z in mm", "Seen by")
-    end = folded(
-        f"The {counted(len(plan.poses), 'pose')} in visiting order",
-        table("Poses in visiting order, contact point in base", heads, rows),
-    )
     html = facts(key_figures(plan)) + _choice(plan)
     if pool is None or parts.surface is None or parts.cell is None:
-        return Content(html + paragraph("Without cell, mesh and pool there is no picture.") + end)
+        told = paragraph("Without cell, mesh and pool there is no picture.")
+        return Content(html + told + _notes(plan) + _poses(plan))
     view = plan_view(parts.cell, parts.surface, plan, pool)
     data: dict[str, Any] = view_data(view, plan, pool)
     labels = {"last": str(len(plan.poses)), "first": str(min(1, len(plan.poses)))}
@@ -53,7 +38,28 @@ def body(parts: Parts) -> Content:
         " from its nearest chosen pose.",
         ".png",
     )
-    return Content(html + _notes(plan) + end, json.loads(json.dumps(data)))
+    return Content(html + _notes(plan) + _poses(plan, shown=True), data)
+
+
+def _poses(plan: PlanFile, shown: bool = False) -> str:
+    """Return the table of the poses, with buttons where there is a view that shows them."""
+    rows = [
+        (
+            _button(pose.id) if shown else str(pose.id),
+            str(plan.search.order.index(pose.id) + 1),
+            *(f"{1e3 * value + 0.0:.1f}" for value in pose.tcp_position),
+            pose.seen_by or "no station",
+        )
+        for pose in plan.poses
+    ]
+    heads = ("Pose", "Chosen as no.", "x in mm", "y in mm", "z in mm", "Seen by")
+    inner = table("Poses in visiting order, contact point in base", heads, rows)
+    told = f"The {counted(len(plan.poses), 'pose')} in visiting order"
+    return folded(told, f'<div id="pose-table">{inner}</div>')
+
+
+def _button(pose: int) -> Markup:
+    return Markup(f'<button type="button" aria-label="Show pose {pose}">{pose}</button>')
 
 
 def _choice(plan: PlanFile) -> str:
@@ -99,4 +105,3 @@ def _filled(text: str, values: dict[str, str]) -> str:
 
 
 SECTION = Section("poses", "Surface, pool and poses", body)
-__all__ = ["SECTION", "millimetres"]

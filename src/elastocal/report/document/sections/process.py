@@ -9,7 +9,7 @@ import numpy as np
 from elastocal.compensation.process.record import Line, ProcessRecord, Values
 from elastocal.compensation.process.trace import Trace
 from elastocal.report.document.figures.process_maps import course_figure, process_maps
-from elastocal.report.document.markup import folded, paragraph, table
+from elastocal.report.document.markup import flattened, folded, paragraph, table
 from elastocal.report.document.parts import Parts
 from elastocal.report.document.pictures import picture
 from elastocal.report.document.section import Content, Finding, Section
@@ -61,7 +61,7 @@ def body(parts: Parts) -> Content:
     html += _pictures(own, parts.limits.tolerance)
     if table_.budget:
         html += folded("Error budget", _lines("Error budget of the first seed", table_.budget))
-    settings = [(key, str(value)) for key, value in table_.settings.items()]
+    settings = flattened(table_.settings)
     html += folded(
         "Settings of the compensator", table("Settings, SI units", ("Key", "Value"), settings, 2)
     )

@@ -9,6 +9,7 @@ from elastocal import __version__
 from elastocal.report.document.content import BYTES
 from elastocal.report.document.markup import (
     Markup,
+    flattened,
     folded,
     heading,
     html,
@@ -30,12 +31,13 @@ def body(parts: Parts) -> Content:
     text += table("Seeds and fingerprints", ("What", "Value"), _seeds(parts), texts=2)
     text += _files(parts) + _settings(parts)
     if parts.cell_text is not None:
-        text += folded("The cell file as it stands", verbatim(parts.cell_text), "long")
+        text += folded("The cell file as it stands", verbatim(parts.cell_text))
     if parts.cell is not None:
-        values = sorted(_flattened("", parts.cell.file.model_dump(mode="json")))
+        values = sorted(flattened(parts.cell.file.model_dump(mode="json")))
         text += folded(
             "Every setting of the cell, defaults included, in SI units",
             table("Settings of the cell", ("Key", "Value"), values, texts=2),
+            "long",
         )
     return Content(text)
 
@@ -104,23 +106,12 @@ def _settings(parts: Parts) -> str:
     if not isinstance(settings, dict):
         return paragraph("The model file does not tell the settings of its calibration.")
     rows = [
-        (key, PurePath(str(value)).name if key == "springs" else str(value))
-        for key, value in settings.items()
+        (key, PurePath(value).name if key == "springs" else value)
+        for key, value in flattened(settings)
     ]
     return heading("Settings") + table(
         "Settings of the calibration", ("Key", "Value"), rows, texts=2
     )
-
-
-def _flattened(prefix: str, value: object) -> Iterator[tuple[str, str]]:
-    if isinstance(value, dict):
-        for key, each in value.items():
-            yield from _flattened(f"{prefix}.{key}" if prefix else str(key), each)
-    elif isinstance(value, list) and any(isinstance(each, dict) for each in value):
-        for number, each in enumerate(value):
-            yield from _flattened(f"{prefix}.{number}", each)
-    else:
-        yield prefix, str(value)
 
 
 SECTION = Section("provenance", "Provenance", body)

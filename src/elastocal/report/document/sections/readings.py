@@ -65,9 +65,9 @@ def _residuals(again: Calibration) -> str:
     used = again.used
     told = (
         f"Commanded displacement {mm(float(commanded.mean()))} on average,"
-        f" {mm(float(commanded.max()))} at most; residual of the fit {mm(float(residual[used].mean()))} on average,"
-        f" {mm(float(residual[used].max()))} at most ({counted(int(used.sum()), 'reading')} that"
-        " were fitted, so not held out)"
+        f" {mm(float(commanded.max()))} at most; residual of the fit"
+        f" {mm(float(residual[used].mean()))} on average, {mm(float(residual[used].max()))} at most"
+        f" ({counted(int(used.sum()), 'reading')} that were fitted, so not held out)"
     )
     return picture(
         partial(displacement_figure, readings.pose, commanded, residual, used),
@@ -170,14 +170,10 @@ def _of_run(parts: Parts) -> Iterator[Finding]:
         if missing:
             yield Finding(
                 f"the run is partial: {len(missing)} of"
-                f" {counted(len(parts.plan.poses), 'planned pose')} {'has' if len(missing) == 1 else 'have'} no reading (pose {spans(missing)})",
+                f" {counted(len(parts.plan.poses), 'planned pose')}"
+                f" {'has' if len(missing) == 1 else 'have'} no reading (pose {spans(missing)})",
                 advice="Finish the run: `elastocal run --resume` measures the missing poses.",
             )
-    lost = parts.summary["readings"]["not_ok"] if parts.summary else []
-    if lost:
-        yield Finding(
-            f"{counted(len(lost), 'reading')} of the run {'is' if len(lost) == 1 else 'are'} not ok"
-        )
 
 
 def _of_readings(parts: Parts) -> Iterator[Finding]:

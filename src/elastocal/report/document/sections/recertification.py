@@ -1,4 +1,4 @@
-"""This calibration against an earlier one of the same cell."""
+"""The calibration against an earlier one of the same cell."""
 
 from collections.abc import Iterator
 from functools import partial
@@ -35,8 +35,8 @@ def body(parts: Parts) -> Content:
         partial(recertification_figure, found),
         f"Springs of both calibrations with their intervals, and the change of deflection."
         f" {_moved(found)} {found.reason}",
-        "Filled and open marks: old and new. What lies outside the grey band moved beyond what both"
-        " calibrations leave open.",
+        "Round: the earlier calibration; diamonds: this one. What lies outside the grey band moved"
+        " beyond what both calibrations leave open.",
     )
     return Content(html + listed(_notes(found)), findings=tuple(_findings(found)))
 

@@ -1,0 +1,111 @@
+"""What every section of the report keeps: it copes with every subset of the parts."""
+
+import re
+from dataclasses import fields, replace
+from html.parser import HTMLParser
+from itertools import combinations
+
+import pytest
+
+from elastocal.report.document import Options, Parts, gather
+from elastocal.report.document import pictures as drawing
+from elastocal.report.document.sections import SECTIONS
+from elastocal.report.html import embedded
+from support import reported
+
+KEPT = {"made", "name", "limits", "files", "absent", "doubts"}
+NAMES = [field.name for field in fields(Parts) if field.name not in KEPT]
+VOID = {"br", "img", "input", "path", "circle", "meta", "hr"}
+
+
+class Balanced(HTMLParser):
+    """Fails when a tag is closed that is not open; collects what the tests ask."""
+
+    def __init__(self, text):
+        super().__init__()
+        self.open, self.text, self.pictures, self.heads = [], "", [], []
+        self.feed(text)
+        self.close()
+        assert self.open == []
+
+    def handle_starttag(self, tag, attributes):
+        found = dict(attributes)
+        if tag == "img":
+            self.pictures.append(found)
+        if re.fullmatch(r"h\d", tag):
+            self.heads.append(tag)
+        if tag not in VOID:
+            self.open.append(tag)
+
+    def handle_endtag(self, tag):
+        if tag not in VOID:
+            assert self.open.pop() == tag
+
+    def handle_data(self, data):
+        self.text += data
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory):
+    """All parts, an earlier calibration among them."""
+    from support.cli import elastocal
+
+    folder = reported.finished(tmp_path_factory)
+    old = tmp_path_factory.mktemp("old") / "old.json"
+    data = folder / "run" / "dataset.nc"
+    made = elastocal("calibrate", data, "--out", old, "--exclude", 0, "--draws", 40)
+    assert made.code == 0, made.err
+    parts = gather(Options(folder, old=old), reported.MADE)
+    assert all(getattr(parts, name) is not None for name in NAMES)
+    return parts
+
+
+@pytest.fixture
+def undrawn(monkeypatch):
+    """Leave the drawing out where only the rest of a section is looked at."""
+    monkeypatch.setattr(drawing, "_bytes", lambda *_: b"")
+
+
+def only(parts, names):
+    return replace(parts, **{name: None for name in NAMES if name not in names})
+
+
+def check(content):
+    page = Balanced(content.html)
+    assert page.text.strip()
+    assert not re.search(r"\b(nan|None|inf)\b", page.text)
+    assert set(page.heads) <= {"h3"}
+    for picture in page.pictures:
+        assert picture["alt"].strip()
+    embedded(content.data)
+    for finding in content.findings:
+        assert finding.text == finding.text.strip() != ""
+    return page
+
+
+@pytest.mark.parametrize("section", SECTIONS, ids=lambda section: section.identifier)
+class TestEverySection:
+    def test_it_shows_all_that_is_there(self, section, whole):
+        page = check(section.body(whole))
+        for picture in page.pictures:
+            # The still picture is drawn by the browser.
+            assert picture.get("id") == "still" or len(picture["src"]) > 2000
+
+    def test_without_any_part_it_says_so_in_a_sentence(self, section, whole):
+        page = check(section.body(only(whole, ())))
+        assert re.search(r"[a-z]{2}.*[.:]", page.text)
+
+    @pytest.mark.usefixtures("undrawn")
+    def test_it_copes_with_up_to_two_parts_and_without_up_to_two(self, section, whole):
+        for few in (*combinations(NAMES, 1), *combinations(NAMES, 2)):
+            check(section.body(only(whole, few)))
+            check(section.body(only(whole, set(NAMES) - set(few))))
+
+    def test_the_same_parts_give_the_same_html(self, section, whole):
+        assert section.body(whole) == section.body(whole)
+
+
+def test_identifiers_can_be_linked_to_and_stand_once_like_titles():
+    assert all(re.fullmatch(r"[a-z-]+", section.identifier) for section in SECTIONS)
+    assert len({section.identifier for section in SECTIONS}) == len(SECTIONS)
+    assert len({section.title for section in SECTIONS}) == len(SECTIONS)

@@ -1,0 +1,63 @@
+import json
+from pathlib import Path
+
+import pytest
+
+from elastocal.errors import IdentificationError, RobotError, SchemaError, SpringError
+from elastocal.identification import write_model
+from elastocal.identification.recertification import recertify, recertify_files
+from support.recertified import made_up
+
+
+@pytest.fixture
+def paths(tmp_path) -> tuple[Path, Path]:
+    for n, name in enumerate(("old", "new")):
+        figures = {"deflection": {"mean": 1e-3, "max": 2e-3}}
+        write_model(tmp_path / f"{name}.json", made_up(n), figures)
+    return tmp_path / "old.json", tmp_path / "new.json"
+
+
+def change(path: Path, edit) -> None:
+    data = json.loads(path.read_text())
+    edit(data)
+    path.write_text(json.dumps(data))
+
+
+def test_files_are_compared_as_their_models(paths):
+    assert recertify_files(*paths).springs == recertify(made_up(0), made_up(1)).springs
+
+
+def test_one_file_under_two_names_is_refused(paths):
+    again = paths[0].parent / "." / ".." / paths[0].parent.name / "old.json"
+    with pytest.raises(IdentificationError, match="one and the same file"):
+        recertify_files(paths[0], again)
+
+
+def test_a_copy_of_a_file_is_refused(paths):
+    paths[1].write_bytes(paths[0].read_bytes())
+    with pytest.raises(
+        IdentificationError, match=r"old\.json and .*new\.json are one and the same"
+    ):
+        recertify_files(*paths)
+
+
+@pytest.mark.parametrize(
+    ("edit", "error"),
+    [
+        (lambda data: data["robot"].update(tcp="nowhere"), RobotError),
+        (lambda data: data["springs"][1].update(joint="nowhere"), SpringError),
+        (lambda data: data["compliance"].pop(), SchemaError),
+        (lambda data: data.update(schema="elastocal.model/9"), SchemaError),
+    ],
+)
+def test_a_damaged_file_is_named(paths, edit, error):
+    change(paths[1], edit)
+    with pytest.raises(error, match=r"new\.json"):
+        recertify_files(*paths)
+
+
+@pytest.mark.parametrize("stated", [{"mean": 3e-3}, {}, 5, {"mean": "3"}, None])
+def test_other_loads_are_noted_where_the_files_state_them(paths, stated):
+    change(paths[1], lambda data: data["calibration"].update(deflection=stated))
+    noted = any("was deflected by" in note for note in recertify_files(*paths).notes)
+    assert noted == (stated == {"mean": 3e-3})

@@ -1,0 +1,129 @@
+"""The whole document: self-contained, in order, the same for equal runs."""
+
+import re
+from dataclasses import replace
+from html.parser import HTMLParser
+from itertools import pairwise
+
+import pytest
+
+from elastocal.errors import FileAccessError
+from elastocal.report.document import Absence, Options, Parts, gather, write_report
+from elastocal.report.document.sections import SECTIONS
+from support.reported import MADE
+
+LATER = "2027-08-09T10:11:12+00:00"
+STAMP = re.compile(r"\d{4}-\d\d-\d\dT[\d:]+\+00:00")
+
+
+class Page(HTMLParser):
+    """Collects tags and the order of headings."""
+
+    def __init__(self, text):
+        super().__init__()
+        self.tags = []
+        self.feed(text)
+
+    def handle_starttag(self, tag, attributes):
+        self.tags.append((tag, dict(attributes)))
+
+    def named(self, name):
+        return [attributes for tag, attributes in self.tags if tag == name]
+
+
+@pytest.fixture(scope="module")
+def text(parts, tmp_path_factory):
+    path = tmp_path_factory.mktemp("page") / "report.html"
+    return write_report(path, parts).path.read_text(encoding="utf-8")
+
+
+@pytest.fixture(scope="module")
+def page(text):
+    return Page(text)
+
+
+def test_page_loads_nothing_and_forbids_itself_the_network(page):
+    for tag, attributes in page.tags:
+        assert tag not in {"link", "iframe", "object", "embed", "base"}
+        assert attributes.get("src", "data:").startswith("data:")
+        assert not {"srcset", "background", "action"} & attributes.keys()
+    assert all(each["href"].startswith("#") for each in page.named("a"))
+    (policy,) = [each["content"] for each in page.named("meta") if "http-equiv" in each]
+    assert policy.startswith("default-src 'none'")
+
+
+def test_file_is_below_eight_megabytes(text):
+    assert len(text.encode()) < 8e6
+
+
+def test_headings_follow_in_order_below_one_title(page):
+    levels = [int(tag[1]) for tag, _ in page.tags if re.fullmatch(r"h\d", tag)]
+    assert levels[0] == 1
+    assert levels.count(1) == 1
+    assert all(b - a <= 1 for a, b in pairwise(levels))
+
+
+def test_every_link_of_the_contents_leads_somewhere(page):
+    ids = [attributes["id"] for _, attributes in page.tags if "id" in attributes]
+    assert len(set(ids)) == len(ids)
+    links = {each["href"][1:] for each in page.named("a")}
+    assert links <= set(ids)
+    assert links >= {section.identifier for section in SECTIONS} | {"verdict", "signature"}
+
+
+def test_landmarks_and_pictures_have_names(page):
+    assert len(page.named("main")) == len(page.named("header")) == len(page.named("footer")) == 1
+    ids = {attributes.get("id") for _, attributes in page.tags}
+    for tag in ("section", "nav"):
+        for each in page.named(tag):
+            assert each["aria-labelledby"] in ids
+    for each in page.named("img"):
+        assert len(each["alt"]) > 20
+    assert page.named("html")[0]["lang"] == "en"
+
+
+def test_the_verdict_comes_first_and_the_signature_last(text):
+    places = [text.index(f'id="{name}"') for name in ("verdict", "cell", "provenance", "signature")]
+    assert places == sorted(places)
+
+
+def test_equal_runs_give_equal_reports_but_for_times(text, copied, tmp_path):
+    folder = copied()
+    for name in ("journal.jsonl", "summary.json"):
+        path = folder / "run" / name
+        found = path.read_text()
+        assert STAMP.search(found)
+        path.write_text(STAMP.sub(LATER, found))
+    again = write_report(tmp_path / "b.html", gather(Options(folder), LATER))
+    other = again.path.read_text(encoding="utf-8")
+    assert other != text
+    assert STAMP.sub("T", other) == STAMP.sub("T", text)
+
+
+def test_times_are_marked_as_such(page):
+    stamps = [each for each in page.named("time") if each.get("class") == "stamp"]
+    assert len(stamps) == 3
+    assert MADE in {each["datetime"] for each in stamps}
+
+
+def test_names_are_escaped(parts, tmp_path):
+    bad = '</script><script>alert(1)</script><img src="http://x">'
+    spoilt = replace(
+        parts, name=bad, cell=None, plan=None, cell_text=bad, absent=(Absence(bad, bad),)
+    )
+    text = write_report(tmp_path / "p.html", spoilt).path.read_text(encoding="utf-8")
+    assert "alert(1)</script>" not in text
+    assert "<img src=" not in text.replace('<img src="data:', "")
+    assert len(Page(text).named("script")) == 3
+
+
+def test_without_a_view_the_drawing_library_is_left_out(tmp_path):
+    path = write_report(tmp_path / "p.html", Parts(made=MADE)).path
+    assert path.stat().st_size < 60_000
+    assert "What was not verified" in path.read_text(encoding="utf-8")
+
+
+def test_a_report_that_cannot_be_written_leaves_nothing(tmp_path):
+    with pytest.raises(FileAccessError, match="cannot write"):
+        write_report(tmp_path / "no" / "p.html", Parts(made=MADE))
+    assert not list(tmp_path.iterdir())

@@ -1,0 +1,237 @@
+"""What the sections say: the numbers of the files, and what is odd about them."""
+
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from elastocal.identification.observability import describe
+from elastocal.report.document import Absence
+from elastocal.report.document.markup import Markup, plain
+from elastocal.report.document.sections import (
+    cell,
+    codecs,
+    compliances,
+    instruments,
+    not_verified,
+    poses,
+    process,
+    provenance,
+    readings,
+)
+
+
+def words(section, parts):
+    """Return the text of a section, without tags."""
+    return " ".join(plain(Markup(section.SECTION.body(parts).html.replace("<", " <"))).split())
+
+
+def findings(section, parts, holds_back=True):
+    return [
+        each.text for each in section.SECTION.body(parts).findings if each.holds_back is holds_back
+    ]
+
+
+def with_figures(parts, **changes):
+    calibrated = replace(parts.calibrated, figures={**parts.calibrated.figures, **changes})
+    return replace(parts, calibrated=calibrated)
+
+
+def with_summary(parts, **changes):
+    return replace(parts, summary={**parts.summary, **changes})
+
+
+SUSPICIOUS = {
+    "pose": 3, "load_case": "north", "score": 9.5, "residual": 0.4e-3, "leverage": 0.2,
+}  # fmt: skip
+
+
+def test_the_cell_is_told_with_units(parts):
+    text = words(cell, parts)
+    for told in ("KR 120 R2700 extra HA", "60 kg", "2500, 2500, 6250 N", "1 to 15 m", "25.0 mm"):
+        assert told in text
+    assert "no real robot" in text
+
+
+def test_poses_stand_with_their_places_and_the_other_technique(parts):
+    text = words(poses, parts)
+    assert "ioops (not used)" in text
+    x = 1e3 * parts.plan.poses[0].tcp_position[0]
+    assert f"{x:.1f}" in text
+    data = poses.SECTION.body(parts).data
+    assert len(data["postures"]) == len(parts.plan.poses) + 1
+    assert str(parts.plan.cell.file).rpartition("/")[0] not in text
+
+
+def test_readings_are_counted_and_the_worst_is_named(parts):
+    text = words(readings, parts)
+    unseen = parts.again.unseen
+    worst = int(unseen.error.argmax())
+    assert f"pose {unseen.pose[worst]} {unseen.load_case[worst]} {1e3 * unseen.max:.3f} mm" in text
+    assert "No reading looks wrong" in text or "looks wrong" in text
+    deflection = np.linalg.norm(parts.again.calibration.readings.deflection, axis=1)
+    assert f"{1e3 * deflection.max():.3f} mm" in text
+
+
+def test_a_suspicious_reading_that_was_kept_holds_back_by_name(parts):
+    found = with_figures(parts, suspicious=[{**SUSPICIOUS, "set_aside": False}])
+    assert findings(readings, found)[0] == (
+        "reading pose 3 north looks wrong and was kept in the fit (0.400 mm off)"
+    )
+    assert "--exclude 3:north" in readings.SECTION.body(found).findings[0].advice
+    assert "pose 3 north 0.400 mm 9.5 0.20 kept in the fit" in words(readings, found)
+
+
+def test_a_blunder_that_was_set_aside_is_told_and_holds_nothing_back(parts):
+    found = with_figures(parts, suspicious=[{**SUSPICIOUS, "set_aside": True}], warnings=[])
+    assert findings(readings, found) == []
+    assert "set aside as a blunder" in findings(readings, found, holds_back=False)[0]
+
+
+def test_a_warning_of_the_calibration_holds_back(parts):
+    found = with_figures(parts, suspicious=[], warnings=["the springs leave much"])
+    assert findings(readings, found) == ["calibration: the springs leave much"]
+
+
+def test_a_partial_run_holds_back_and_names_the_poses(parts):
+    some = replace(parts, dataset=parts.dataset.select(poses=parts.dataset.poses[2:]))
+    (told, *_) = findings(readings, some)
+    total = len(parts.plan.poses)
+    assert told == f"the run is partial: 2 of {total} planned poses have no reading (pose 0, 1)"
+
+
+def test_registration_tool_and_noise_are_those_of_the_summary(parts):
+    text = words(instruments, parts)
+    registration = parts.summary["registration"]
+    assert f"{1e6 * registration['stations'][0]['residual_rms']:.1f} µm" in text
+    assert f"{parts.summary['tool']['mass_kg']['value']:.2f}" in text
+    assert "No station moved" in text
+    assert f"{parts.tool.mass:.2f} kg" in text
+
+
+def test_a_station_that_moved_holds_back_with_advice(parts):
+    move = {"station": "station_1", "from_pose": 4, "distance": 2e-3, "angle": 0.0}
+    registration = {**parts.summary["registration"], "moves": [move]}
+    warning = "station station_1 moved between poses 3 and 4: the marker seemed to jump"
+    found = with_summary(parts, registration=registration, warnings=[warning])
+    assert f"run: {warning}" in findings(instruments, found)
+    assert "Fix the tracker's stand" in instruments.SECTION.body(found).findings[0].advice
+    assert "moved before pose 4: the marker seemed to jump by 2.000 mm" in words(instruments, found)
+
+
+def test_no_spring_that_is_not_observable_is_shown_without_saying_so(parts):
+    text = words(compliances, parts)
+    model = parts.calibrated.model
+    for spring, seen in zip(model.model.springs, model.observability.observable, strict=True):
+        row = re.search(rf"{re.escape(spring.name)} (.{{0,60}})", text)[1]
+        assert ("not by itself" in row) is not seen
+    for group in model.observability.unobservable:
+        assert describe(group) in text
+
+
+def test_axial_springs_alone_are_advised_to_be_compared_with_more(parts):
+    few = tuple(s for s in parts.calibrated.model.model.springs if s.name.endswith(".axial"))
+    model = parts.calibrated.model
+    keep = [spring in few for spring in model.model.springs]
+    seen = replace(model.observability, springs=len(few), observable=(True,) * len(few),
+                   unobservable=(), rank=len(few))  # fmt: skip
+    smaller = replace(
+        model, model=replace(model.model, springs=few), compliance=model.compliance[keep],
+        draws=model.draws[:, keep], observability=seen,
+    )  # fmt: skip
+    found = replace(parts, calibrated=replace(parts.calibrated, model=smaller))
+    (told,) = [each for each in compliances.SECTION.body(found).findings if each.advice]
+    assert "--springs bearing" in told.advice
+
+
+def test_more_springs_that_predict_worse_hold_back(parts):
+    split = {"mean": 1e-5, "max": 2e-5, "readings": 9, "folds": 3}
+    worse = {"springs": "actuated", "held_out": split,
+             "difference": {"mean": -2e-5, "low": -3e-5, "high": -1e-5}}  # fmt: skip
+    assert "axial springs alone" in findings(compliances, with_figures(parts, comparison=worse))[0]
+
+
+def saturated(parts, n_train, high, last=20):
+    (first, *rest) = parts.codec.verdicts.saturation
+    changed = replace(first, n_train=n_train, low=1, high=high, last=last, last_error=1e-9)
+    verdicts = replace(parts.codec.verdicts, saturation=(changed, *rest))
+    return replace(parts, codec=replace(parts.codec, verdicts=verdicts))
+
+
+@pytest.mark.parametrize(
+    ("n_train", "high", "told", "holds_back"),
+    [
+        (20, 20, "has not saturated", True),
+        (12, 20, "does not show that", True),
+        (12, None, "does not show that", True),
+        (12, 14, "no longer fell from 12 training poses on", False),
+    ],
+)
+def test_a_codec_holds_back_unless_it_has_settled(parts, n_train, high, told, holds_back):
+    found = saturated(parts, n_train, high)
+    (text,) = findings(codecs, found, holds_back)
+    assert told in text
+    assert findings(codecs, found, not holds_back) == []
+
+
+def test_without_a_codec_the_number_of_poses_is_not_verified(parts):
+    assert "not verified (no codec)" in findings(codecs, replace(parts, codec=None))[0]
+
+
+def test_table_1_has_the_figures_of_the_process_beside_those_of_the_paper(parts):
+    text = words(process, parts)
+    line = parts.process.table.lines[-1]
+    assert f"{1e3 * line.before.mean:.3f} {1e3 * line.before.max:.3f}" in text
+    assert f"Reduction {line.reduction.mean:.2%}" in text
+    assert "Paper, reduction 89.30% 70.19% 54.00%" in text
+
+
+def test_reductions_of_the_paper_are_those_of_its_own_deviations():
+    for case in process.PAPER.values():
+        for before, after, share in zip(case.before, case.after, case.reduction, strict=True):
+            assert share == pytest.approx(1.0 - after / before, abs=3e-3)
+
+
+def test_a_process_beyond_the_tolerance_holds_back(parts):
+    limits = replace(parts.limits, tolerance=1e-6)
+    assert "beyond the tolerance" in findings(process, replace(parts, limits=limits))[0]
+    assert findings(process, replace(parts, limits=replace(limits, tolerance=None))) == []
+
+
+def test_provenance_has_versions_hashes_seeds_and_every_setting(parts):
+    text = words(provenance, parts)
+    for file in parts.files:
+        assert file.name in text
+        assert file.sha256 in text
+    for told in ("numpy", "pin", "Seed of the search", "engagement.disk_radius 0.025", "seed 0"):
+        assert told in text
+    assert "schema: elastocal.cell/1" in text
+    assert parts.journal[0].run.cell in text
+
+
+def test_what_was_not_verified_is_never_empty(parts):
+    text = words(not_verified, parts)
+    for told in ("Geometric calibration", "Temperature", "safety function", "A real robot"):
+        assert told in text
+    assert "Earlier calibration: no earlier calibration was given" in text
+
+
+@pytest.mark.parametrize(
+    ("absence", "holds_back"),
+    [
+        (Absence("dataset", "gone"), True),
+        (Absence("calibrated model", "gone"), True),
+        (Absence("tool file", "gone"), False),
+        (Absence("process", "gone"), False),
+        (Absence("codec", "torn", damaged=True), False),
+    ],
+)
+def test_only_what_is_essential_holds_back_when_it_is_missing(parts, absence, holds_back):
+    found = replace(parts, absent=(absence,))
+    assert len(findings(not_verified, found, holds_back)) == 1
+    assert findings(not_verified, found, not holds_back) == []
+
+
+def test_doubts_hold_back(parts):
+    assert findings(not_verified, replace(parts, absent=(), doubts=("odd",))) == ["odd"]

@@ -1,0 +1,68 @@
+"""A small cell taken through every command, once, as a user would: what reports are made from."""
+
+import fcntl
+import os
+import shutil
+from pathlib import Path
+
+import pytest
+
+from elastocal.cell import load_cell
+from elastocal.planning.plan import make_plan
+from elastocal.planning.plan_file import write_plan
+from elastocal.planning.pool_file import write_pool
+from support.cli import elastocal
+from support.run_cells import planned_cell
+
+POSES = 7
+MADE = "2026-01-02T03:04:05+00:00"
+
+
+def finished(factory: pytest.TempPathFactory) -> Path:
+    """Return a folder with ``run``, ``model.json``, ``tool.json``, ``codec`` and ``process``.
+
+    All processes of a test run share it: copy what is to be changed.
+    """
+    base = factory.getbasetemp()
+    shared = base.parent if "PYTEST_XDIST_WORKER" in os.environ else base
+    folder, ready = shared / "reported", shared / "reported.ready"
+    with (shared / "reported.lock").open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        if not ready.exists():
+            folder.mkdir()
+            _make(folder)
+            ready.touch()
+    return folder
+
+
+def _make(folder: Path) -> None:
+    made = planned_cell(folder, POSES)
+    planned = make_plan(load_cell(made.cell), "ioops", 1)
+    write_plan(made.plan, planned.plan)
+    write_pool(made.plan, planned.pool)
+    run, model, tool = folder / "run", folder / "model.json", folder / "tool.json"
+    data = run / "dataset.nc"
+    _done("run", made.cell, "--plan", made.plan, "--out", run)
+    _done("calibrate", data, "--out", model, "--draws", 40)
+    _done("tool", run, "--out", tool)
+    _done("codec", data, "--compare", "springs=actuated,bearing", "--out", folder / "codec")
+    _done(
+        *("simulate-process", made.cell, "--model", model, "--tool", tool, "--process", "afp"),
+        *("--courses", 1, "--out", folder / "process"),
+    )
+
+
+def copied(source: Path, target: Path, *names: str) -> Path:
+    """Copy parts of the finished cell (all of them by default) into a new folder; return it."""
+    target.mkdir(parents=True, exist_ok=True)
+    for name in names or ("run", "model.json", "tool.json", "codec", "process"):
+        if (source / name).is_dir():
+            shutil.copytree(source / name, target / name)
+        else:
+            shutil.copy(source / name, target / name)
+    return target
+
+
+def _done(*arguments: object) -> None:
+    result = elastocal(*arguments)
+    assert result.code == 0, (arguments, result.err)
