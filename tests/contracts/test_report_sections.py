@@ -14,7 +14,8 @@ from elastocal.report.html import embedded
 from support import reported
 
 KEPT = {"made", "name", "limits", "files", "absent", "doubts"}
-NAMES = [field.name for field in fields(Parts) if field.name not in KEPT]
+EMPTY = {field.name: field.default for field in fields(Parts) if field.name not in KEPT}
+NAMES = list(EMPTY)
 VOID = {"br", "img", "input", "path", "circle", "meta", "hr"}
 
 
@@ -56,7 +57,7 @@ def whole(tmp_path_factory):
     made = elastocal("calibrate", data, "--out", old, "--exclude", 0, "--draws", 40)
     assert made.code == 0, made.err
     parts = gather(Options(folder, old=old), reported.MADE)
-    assert all(getattr(parts, name) is not None for name in NAMES)
+    assert all(getattr(parts, name) != empty for name, empty in EMPTY.items())
     return parts
 
 
@@ -67,7 +68,7 @@ def undrawn(monkeypatch):
 
 
 def only(parts, names):
-    return replace(parts, **{name: None for name in NAMES if name not in names})
+    return replace(parts, **{name: each for name, each in EMPTY.items() if name not in names})
 
 
 def check(content):

@@ -123,16 +123,24 @@ def test_advice_weighs_the_tracker_against_the_errors(parts):
         registration = {**parts.summary["registration"], "scatter": scatter}
         noise = {**parts.summary["noise"], "marker_sigma_median": None}
         summary = {**parts.summary, "registration": registration, "noise": noise}
-        return " ".join(each.advice for each in advised(replace(parts, summary=summary)))
+        return " ".join(advised(replace(parts, summary=summary)))
 
     mean = parts.again.unseen.mean.value
     assert "Average longer" in told(0.5 * mean)
     assert "quieter tracker would not help" in told(0.1 * mean)
-    assert "tracker" not in told(None)
+    assert "its readings scatter" not in told(None)
 
 
 def test_advice_names_the_pose_of_the_largest_error_when_it_stands_out(parts):
     again = replace(parts.again, unseen=errors(worst=0.5, low=0.1, high=0.2))
-    found = [each.text for each in advised(replace(parts, again=again))]
-    assert "the largest error is at pose 19 normal, 0.500 mm" in found
-    assert not any(each.holds_back for each in advised(parts))
+    found = " ".join(advised(replace(parts, again=again)))
+    assert "Look at pose 19 normal first" in found
+    assert "0.500 mm" in found
+
+
+def test_advice_stands_behind_that_of_the_findings_and_holds_nothing_back(parts):
+    again = replace(parts.again, unseen=errors(0.2, 0.1, 0.2))
+    findings = (Finding("a note", holds_back=False, advice="One."),)
+    verdict = judge(replace(parts, again=again), findings, ("Two.", "One."))
+    assert verdict.light is Light.GREEN
+    assert verdict.advice == ("One.", "Two.")

@@ -3,16 +3,16 @@
 from collections.abc import Iterator
 
 from elastocal.report.document.again import Unseen
+from elastocal.report.document.leading import leading
 from elastocal.report.document.parts import Parts
-from elastocal.report.document.section import Finding
 from elastocal.report.document.words import counted, mm, um
 
 _LOUD = 0.3
 """Part of the mean error from which on the noise of a reading is worth less of it."""
 
 
-def advised(parts: Parts) -> Iterator[Finding]:
-    """Yield advice that no single section can give; none of it holds a green light back.
+def advised(parts: Parts) -> Iterator[str]:
+    """Yield advice that no single section can give, a sentence or two each.
 
     Parameters
     ----------
@@ -27,8 +27,8 @@ def advised(parts: Parts) -> Iterator[Finding]:
     yield from _spare_poses(parts)
 
 
-def _noise(parts: Parts, unseen: Unseen) -> Iterator[Finding]:
-    """Tell how much of the error the instruments explain."""
+def _noise(parts: Parts, unseen: Unseen) -> Iterator[str]:
+    """Tell how much of the error the tracker explains."""
     if parts.summary is None:
         return
     sigma = parts.summary["noise"]["marker_sigma_median"]
@@ -36,47 +36,34 @@ def _noise(parts: Parts, unseen: Unseen) -> Iterator[Finding]:
     known = [value for value in (sigma, scatter) if value is not None]
     if not known:
         return
-    worst, mean = max(known), unseen.mean.value
-    if worst > _LOUD * mean:
-        yield Finding(
-            f"the tracker's readings scatter by {um(worst)}, the errors are {um(mean)} on average",
-            holds_back=False,
-            advice="Average longer or bring the tracker nearer: its scatter is a good part of the"
-            " error.",
-        )
+    told = f"its readings scatter by {um(max(known))}, the errors are {um(unseen.mean.value)}"
+    if max(known) > _LOUD * unseen.mean.value:
+        yield f"Average longer or bring the tracker nearer: {told} on average."
     else:
-        yield Finding(
-            f"the tracker's readings scatter by {um(worst)}, little beside errors of {um(mean)} on"
-            " average: most of the error is what springs cannot express, such as play, friction in"
-            " the gears and links that bend",
-            holds_back=False,
-            advice="A quieter tracker would not help much: the rest of the error is what springs"
-            " cannot express.",
+        yield (
+            f"A quieter tracker would not help much: {told} on average. Most of the error is what"
+            " springs cannot express, such as play, friction in the gears and links that bend."
         )
 
 
-def _largest(unseen: Unseen) -> Iterator[Finding]:
+def _largest(unseen: Unseen) -> Iterator[str]:
     """Name the pose at which the model errs most when it stands out."""
     k = int(unseen.error.argmax())
     if unseen.max > 2.0 * unseen.mean.value:
-        yield Finding(
-            f"the largest error is at pose {unseen.pose[k]} {unseen.load_case[k]},"
-            f" {mm(unseen.max)}",
-            holds_back=False,
-            advice=f"Look at pose {unseen.pose[k]} first: contact, stand and line of sight there.",
+        yield (
+            f"Look at pose {unseen.pose[k]} {unseen.load_case[k]} first, contact, stand and line of"
+            f" sight: it has the largest error, {mm(unseen.max)}."
         )
 
 
-def _spare_poses(parts: Parts) -> Iterator[Finding]:
+def _spare_poses(parts: Parts) -> Iterator[str]:
     """Tell how many poses the next such robot needs."""
-    if parts.codec is None:
+    best = leading(parts)
+    if best is None:
         return
-    best = min(parts.codec.verdicts.saturation, key=lambda each: each.last_error)
-    measured = len(parts.codec.data.contact)
+    measured = len(parts.codecs[0].data.contact)
     if best.settled and best.high is not None and best.high < measured:
-        yield Finding(
-            f"{counted(best.high, 'training pose')} would have been enough for this accuracy",
-            holds_back=False,
-            advice=f"The next robot of this kind needs {best.high} poses rather than {measured}:"
-            " the codec has saturated by then.",
+        yield (
+            f"The next robot of this kind needs {counted(best.high, 'pose')} rather than"
+            f" {measured}: the error no longer falls from there on."
         )

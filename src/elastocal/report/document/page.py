@@ -45,7 +45,7 @@ def write_report(path: Path, parts: Parts) -> Written:
     """
     contents = {section.identifier: section.body(parts) for section in SECTIONS}
     findings = [finding for content in contents.values() for finding in content.findings]
-    verdict = judge(parts, [*findings, *advised(parts)])
+    verdict = judge(parts, findings, tuple(advised(parts)))
     write_text(path, _page(parts, verdict, contents))
     return Written(Path(path), verdict)
 

@@ -94,7 +94,8 @@ class Parts:
     again: Again | None = None
     """The calibration made once more from the dataset."""
     tool: ToolRecord | None = None
-    codec: Codec | None = None
+    codecs: tuple[Codec, ...] = ()
+    """One a comparison."""
     process: ProcessRecord | None = None
     recertification: Recertification | None = None
     """This calibration against an earlier one."""

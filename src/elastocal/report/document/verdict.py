@@ -40,7 +40,7 @@ class Verdict:
     """What would improve the result."""
 
 
-def judge(parts: Parts, findings: Sequence[Finding]) -> Verdict:
+def judge(parts: Parts, findings: Sequence[Finding], advice: Sequence[str] = ()) -> Verdict:
     """Return the verdict on a calibration.
 
     Parameters
@@ -49,17 +49,19 @@ def judge(parts: Parts, findings: Sequence[Finding]) -> Verdict:
         With the errors at unseen poses, where they are known.
     findings : sequence of Finding
         Of all sections.
+    advice : sequence of str
+        What no single section can say; it follows that of the findings.
     """
     unseen, tolerance = _unseen(parts), parts.limits.tolerance
     held = list(dict.fromkeys(each.text for each in findings if each.holds_back))
     notes = list(dict.fromkeys(each.text for each in findings if not each.holds_back))
-    advice = list(dict.fromkeys(each.advice for each in findings if each.advice))
+    told = dict.fromkeys((*(each.advice for each in findings if each.advice), *advice))
     light, own = _light(unseen, tolerance, bool(held))
     if parts.calibrated is None:
         light, own = None, ["there is no calibrated model, so there is no accuracy to judge"]
     word = _word(light, bool(own))
     sentence = _sentence(parts, unseen, light)
-    return Verdict(light, word, sentence, (*own, *held), tuple(notes), tuple(advice))
+    return Verdict(light, word, sentence, (*own, *held), tuple(notes), tuple(told))
 
 
 def _word(light: Light | None, by_the_errors: bool) -> str:

@@ -3,18 +3,27 @@
 from collections.abc import Iterator
 from functools import partial
 
+from elastocal.codec import CodecData, Saturation
 from elastocal.errors import CodecError
 from elastocal.report.codec_chart import codec_chart, headline, how_to_read
-from elastocal.report.document.markup import facts, listed, paragraph, table
+from elastocal.report.document.leading import leading
+from elastocal.report.document.markup import facts, heading, listed, paragraph, table
 from elastocal.report.document.parts import Codec, Parts
 from elastocal.report.document.pictures import picture
 from elastocal.report.document.section import Content, Finding, Section
 from elastocal.report.document.words import counted, mm
 
+_FIGURES = {
+    "search": ("Search", "Fig. 7"),
+    "springs": ("Springs", "Fig. 9"),
+    "load_cases": ("Load cases", "Fig. 10"),
+}
+"""What a codec may compare: in words, and the figure of the paper that does; in its order."""
+
 
 def body(parts: Parts) -> Content:
     """Return the section."""
-    if parts.codec is None:
+    if not parts.codecs:
         return Content(
             paragraph("There is no codec, so it is not known whether there were enough poses."),
             findings=(
@@ -25,7 +34,7 @@ def body(parts: Parts) -> Content:
                 ),
             ),
         )
-    data, verdicts = parts.codec.data, parts.codec.verdicts
+    data = parts.codecs[0].data
     sets, size = data.verification.shape
     html = facts(
         [
@@ -35,17 +44,50 @@ def body(parts: Parts) -> Content:
             ("Training poses", f"1 to {data.n_train[-1]}"),
         ]
     )
-    html += listed(_micro(each) for each in verdicts.sentences)
+    html += "".join(_codec(codec) for codec in sorted(parts.codecs, key=_order))
+    best = leading(parts)
+    return Content(html, findings=() if best is None else tuple(_findings(best)))
+
+
+def _codec(codec: Codec) -> str:
+    data, verdicts = codec.data, codec.verdicts
+    html = heading(_title(data)) + listed(_micro(each) for each in verdicts.sentences)
     try:
         html += picture(
             partial(codec_chart, data, verdicts),
             f"{headline(data)}: box plots of mean and maximum error at held-out poses over the"
             f" number of training poses. {_micro(' '.join(verdicts.sentences))}",
-            f"After the paper's Fig. 7, 9 and 10. {how_to_read(data)}",
+            f"After the paper's {_like(data)}. {how_to_read(data)}",
+            ".png",
         )
     except CodecError as error:
         html += paragraph(f"No chart: {error}.")
-    return Content(html + _table(parts.codec), findings=tuple(_findings(parts.codec)))
+    return html + _table(codec)
+
+
+def _title(data: CodecData) -> str:
+    names = " against ".join(each.name for each in data.variants)
+    key = _compared(data)
+    return f"{_FIGURES[key][0]}: {names}" if key else names
+
+
+def _like(data: CodecData) -> str:
+    """Return the figure of the paper that compares the same."""
+    key = _compared(data)
+    return _FIGURES[key][1] if key else "codecs (Fig. 7, 9 and 10)"
+
+
+def _compared(data: CodecData) -> str | None:
+    """Return what the variants differ in, as far as the paper compares it."""
+    for key in _FIGURES:
+        if len({getattr(each, key) for each in data.variants}) > 1:
+            return key
+    return None
+
+
+def _order(codec: Codec) -> int:
+    key = _compared(codec.data)
+    return list(_FIGURES).index(key) if key else len(_FIGURES)
 
 
 def _micro(sentence: str) -> str:
@@ -70,24 +112,22 @@ def _table(codec: Codec) -> str:
     return table("Saturation: training poses from which on more do not help", heads, rows)
 
 
-def _findings(codec: Codec) -> Iterator[Finding]:
-    best = min(codec.verdicts.saturation, key=lambda each: each.last_error)
+def _findings(best: Saturation) -> Iterator[Finding]:
+    last = counted(best.last, "training pose")
     if best.n_train == best.last:
         yield Finding(
-            f"the codec has not saturated: the error of {best.variant} still falls at"
-            f" {counted(best.last, 'training pose')}",
+            f"the codec has not saturated: the error still falls at {last}",
             advice="Measure more poses: the error still falls with every one.",
         )
     elif not best.settled:
         yield Finding(
-            f"the codec does not show that {best.variant} has saturated: its interval reaches"
-            f" {counted(best.last, 'training pose')}",
+            f"the codec does not show that the error has saturated: its interval reaches {last}",
             advice="Measure some more poses to see that the error no longer falls.",
         )
     else:
         yield Finding(
-            f"the error no longer fell from {counted(best.n_train, 'training pose')} on"
-            f" ({best.variant}, 95 % interval {best.low} to {best.high}): more would not help",
+            f"the error no longer fell from {counted(best.n_train, 'training pose')} on (95 %"
+            f" interval {best.low} to {best.high}), so there were enough poses",
             holds_back=False,
         )
 

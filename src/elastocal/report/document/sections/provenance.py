@@ -60,9 +60,10 @@ def _versions(parts: Parts) -> Iterator[tuple[str, str]]:
         yield "elastocal, run", record.elastocal
     if parts.plan is not None:
         yield "elastocal, plan", parts.plan.elastocal
-    if parts.codec is not None:
-        for name, number in parts.codec.data.versions.items():
-            yield f"{name}, codec", number
+    for name, number in dict(
+        pair for codec in parts.codecs for pair in codec.data.versions.items()
+    ).items():
+        yield f"{name}, codec", number
     yield "Python", platform.python_version()
     for name in PACKAGES:
         try:
@@ -79,8 +80,9 @@ def _seeds(parts: Parts) -> Iterator[tuple[str, str]]:
     if parts.plan is not None:
         yield "Seed of the search", str(parts.plan.search.seed)
         yield "Fingerprint of the cell in the plan", parts.plan.cell.fingerprint
-    if parts.codec is not None:
-        yield "Seed of the codec", str(parts.codec.data.options.seed)
+    if parts.codecs:
+        seeds = dict.fromkeys(str(codec.data.options.seed) for codec in parts.codecs)
+        yield "Seed of the codecs", ", ".join(seeds)
     if parts.process is not None:
         yield "Seeds of the process", ", ".join(str(run.seed) for run in parts.process.table.runs)
     if parts.calibrated is not None:
