@@ -97,7 +97,7 @@ def _reached(found: Saturation, tolerance: Tolerance) -> str:
             f" from {found.stays} on"
         )
     return (
-        f"{found.variant}: {from_on}: mean error {_um(found.error)} there,"
+        f"{found.variant}: {from_on}: mean error (median set) {_um(found.error)} there,"
         f" {_um(found.last_error)} with {found.last} (tolerance"
         f" {100.0 * tolerance.relative:.3g} % of that, or {_um(tolerance.floor)})"
     )
