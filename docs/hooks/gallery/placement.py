@@ -87,7 +87,7 @@ def _codec(folder: Path, done: Campaign, name: str, key: str, values: tuple[str,
 
 def _sentence(verdicts: Verdicts) -> str:
     """Return the verdict on the pair of variants."""
-    text = verdicts.sentences[-1].replace(" um", " µm")
+    text = verdicts.sentences[-1]
     return text[0].upper() + text[1:]
 
 
