@@ -29,6 +29,7 @@ TOLD = {
     "11_own_springs.py": (r"difference (\S+) µm", 1.0, 30.0),
     "12_own_search_technique.py": (r"median +(?:\d+ +)*(\d+)\n", 40, 90),
     "13_raw_streams.py": (r"normal +\d+ .* N +(\S+) mm", 2.5, 4.0),
+    "14_sensor_logs.py": (r"error at left-out poses: (\S+) mm", 0.01, 0.1),
 }
 """Of each example: what is looked for in its output, and the range of the number found."""
 

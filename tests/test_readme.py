@@ -18,6 +18,7 @@ from elastocal.cell import CellFile
 from elastocal.cell.description.faults import Kind
 from elastocal.cell.description.procedure import ProcedureSettings
 from elastocal.cell.fingerprint import RUN_SECTIONS
+from elastocal.cli.demo_story import chapters
 from elastocal.procedure.faults import Fault
 from support.cli import Result, elastocal
 from support.demos import demo_result, finished_demo
@@ -268,3 +269,21 @@ def models_in(annotation: object) -> list[type[BaseModel]]:
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
         return [annotation]
     return [model for part in get_args(annotation) for model in models_in(part)]
+
+
+def test_the_output_that_the_tutorial_quotes_is_that_of_the_demo(tmp_path_factory):
+    base = tmp_path_factory.getbasetemp()
+    folder = finished_demo("afp", base)
+    log = (folder / "log.txt").read_text(encoding="utf-8", errors="replace")
+    words = f"{log}\n{demo_result('afp', base).err}".replace(str(folder), "demo").split()
+    page = (ROOT / "docs/tutorial.md").read_text(encoding="utf-8")
+    quoted = re.findall(r"^```text\n(.*?)^```", page, flags=re.MULTILINE | re.DOTALL)
+    assert len(quoted) > 5
+    for block in quoted:
+        after(block.split(), words)
+
+
+def test_the_commands_that_the_tutorial_explains_are_those_of_the_demo():
+    page = (ROOT / "docs/tutorial.md").read_text(encoding="utf-8")
+    typed = set(re.findall(r"^elastocal (\w[\w-]*)", page, flags=re.MULTILINE))
+    assert typed == {"demo", *(each.words[0] for each in chapters("afp", Path("demo"), 0))}

@@ -31,6 +31,7 @@ PROCESSES = (("placement",), ("machining", "small"))
 TOLD = "told.json"
 _PACKAGES = ("numpy", "scipy", "pin", "matplotlib", "plotly")
 _MARK = re.compile(r"<!-- told: (\S+) -->")
+_IMAGE = re.compile(r'(<img [^>]*src="([^"]*figures/[^"]+)"[^>]*>)')
 _told: dict[str, str] = {}
 
 
@@ -52,6 +53,11 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
 def on_page_markdown(markdown: str, **_: object) -> str:
     """Return the page with what was measured in place of its marks."""
     return _MARK.sub(lambda mark: _said(mark[1]), markdown)
+
+
+def on_page_content(html: str, **_: object) -> str:
+    """Return the page with every figure a link to itself: text in it is small on a phone."""
+    return _IMAGE.sub(r'<a class="figure" href="\2">\1</a>', html)
 
 
 def _said(name: str) -> str:

@@ -59,7 +59,7 @@ def factor(unit: str, dimension: str) -> float:
     table = _FACTORS[dimension]
     if unit not in table:
         raise UnitError(
-            f"unit {unit!r} is not a {dimension}: allowed are {', '.join(table)}"
+            f"unit {unit!r} is not {_a(dimension)}: allowed are {', '.join(table)}"
             f"{nearest(unit, table)}"
         )
     return table[unit]
@@ -80,12 +80,16 @@ def parse_quantity(text: object, dimension: str) -> float:
     match = _QUANTITY.fullmatch(text) if isinstance(text, str) else None
     if match is None:
         units = ", ".join(_FACTORS[dimension])
-        raise UnitError(f"{text!r} is not a {dimension} with its unit (one of {units})")
+        raise UnitError(f"{text!r} is not {_a(dimension)} with its unit (one of {units})")
     value = float(match[1]) * factor(match[2].strip(), dimension)
     if not math.isfinite(value):
         raise UnitError(f"{text!r} is not a finite {dimension}")
     _check_size(value, dimension, f"{text!r}")
     return value
+
+
+def _a(dimension: str) -> str:
+    return f"{'an' if dimension[0] in 'aeiou' else 'a'} {dimension}"
 
 
 def _check_size(value: float, dimension: str, text: str) -> None:

@@ -76,7 +76,7 @@ def test_options_reach_the_codec(data, tmp_path):
 
 def test_both_files_pass_the_check(data, tmp_path):
     elastocal("codec", data, "--out", tmp_path / "c", "--splits", "2")
-    for name, kind in (("codec.nc", "codec"), ("codec.json", "verdicts of a codec")):
+    for name, kind in (("codec.nc", "codec"), ("codec.json", "verdict file of a codec")):
         result = elastocal("check", tmp_path / "c" / name, "--json")
         assert json.loads(result.out)["kind"] == kind
 

@@ -77,19 +77,57 @@ def work():
 main.app = work
 main.run()
 """
+CAUGHT = """
+import os, sys, time
+from elastocal.cli import main
+
+def work():
+    sys.path.insert(0, {folder!r})
+    import catches_everything
+    time.sleep(10.0)
+    print("went on")
+
+main.app = work
+main.run()
+"""
+CATCHES_EVERYTHING = """
+import os, signal, time
+try:
+    os.kill(os.getpid(), signal.{name})
+    time.sleep(0.01)
+except BaseException:
+    pass
+"""
+ENDS = [("SIGTERM", 143), ("SIGHUP", 129), ("SIGINT", -signal.SIGINT)]
 
 
-@pytest.mark.parametrize(("name", "code"), [("SIGTERM", 143), ("SIGINT", -signal.SIGINT)])
-def test_a_signal_that_arrives_in_a_finaliser_still_ends_the_command(name, code):
+def ended(script):
     result = subprocess.run(
-        [sys.executable, "-c", DROPPED.format(name=name)],
-        capture_output=True,
-        text=True,
-        check=False,
-        timeout=60,
+        [sys.executable, "-c", script], capture_output=True, text=True, check=False, timeout=60
     )
-    assert result.returncode == code
     assert "went on" not in result.stdout
+    return result.returncode
+
+
+@pytest.mark.parametrize(("name", "code"), ENDS)
+def test_a_signal_that_arrives_in_a_finaliser_still_ends_the_command(name, code):
+    assert ended(DROPPED.format(name=name)) == code
+
+
+@pytest.mark.parametrize(("name", "code"), ENDS)
+def test_a_signal_that_arrives_in_an_import_that_catches_everything_ends_it(tmp_path, name, code):
+    (tmp_path / "catches_everything.py").write_text(CATCHES_EVERYTHING.format(name=name))
+    assert ended(CAUGHT.format(folder=str(tmp_path))) == code
+
+
+def test_what_nohup_ignores_is_ignored():
+    script = "import signal, os; signal.signal(signal.SIGHUP, signal.SIG_IGN)\n" + (
+        DROPPED.format(name="SIGHUP").replace("10.0", "0.2")
+    )
+    result = subprocess.run(
+        [sys.executable, "-c", script], capture_output=True, text=True, check=False, timeout=60
+    )
+    assert "went on" in result.stdout
 
 
 def test_sigterm_is_handled_as_before_once_a_command_has_ended(tmp_path):

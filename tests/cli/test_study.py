@@ -56,6 +56,16 @@ def test_the_command_writes_tables_record_and_charts(tmp_path):
         assert len(list(csv.DictReader(file))) == 12
     assert all((tmp_path / "study" / name).is_file() for name in said["files"])
     assert "study.svg" in said["files"]
+    for path in (*(tmp_path / "study").rglob("*.[cj]s*"), tmp_path / "study"):
+        assert elastocal("check", path).code == 0, path
+    part = min((tmp_path / "study" / "samples").iterdir())
+    held = json.loads(elastocal("check", part, "--json").out)
+    assert (held["samples"], held["conditions"]) == ([0, 1], 4)
+    held = json.loads(elastocal("check", tmp_path / "study", "--json").out)
+    assert (held["kind"], held["samples"]) == ("study", 3)
+    part.write_text(part.read_text().replace('"error_max": 0', '"error_max": 1', 1))
+    assert "was edited" in elastocal("check", tmp_path / "study").reason
+    part.unlink()
     again = study(tmp_path / "study", *options)
     assert again.code == 0
     assert "no condition is shown" in " ".join(again.err.split())
@@ -157,21 +167,6 @@ def test_another_truth_in_the_same_folder_is_refused(tmp_path):
     assert "another study (simulation fingerprint" in study(
         tmp_path / "s", *options, cell=other
     ).reason  # fmt: skip
-
-
-def test_a_scheduler_that_does_not_answer_is_refused(tmp_path, monkeypatch):
-    pytest.importorskip("distributed")
-    monkeypatch.setattr(study_spread, "PATIENCE", 0.3)
-    for address in ("tcp://127.0.0.1:9", "nonsense://x"):
-        found = study(tmp_path / "study", "--dask", address)
-        assert f"--dask {address}: no Dask scheduler answers there" in found.reason
-    assert not (tmp_path / "study").exists()
-
-
-def test_a_missing_extra_says_how_to_install_it(tmp_path, monkeypatch):
-    monkeypatch.setitem(__import__("sys").modules, "distributed", None)
-    found = study(tmp_path / "study", "--dask", "tcp://127.0.0.1:9")
-    assert found.reason.endswith("pip install 'elastocal[dask]'")
 
 
 @pytest.mark.slow

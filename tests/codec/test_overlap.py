@@ -12,14 +12,20 @@ def rng() -> np.random.Generator:
 
 
 def test_overlap_counts_what_two_sets_share():
-    assert Overlap.of(np.array([[0, 1], [1, 2], [3, 4]])) == Overlap(3, 1 / 6)
-    assert Overlap.of(np.array([[0, 1], [1, 0]])).rho == 1.0
+    assert Overlap.of(np.array([[0, 1], [1, 2], [3, 4]]), 8) == Overlap(3, 1 / 6, 1 / 4)
+    assert Overlap.of(np.array([[0, 1], [1, 0]]), 8).rho == 1.0
+
+
+def test_sets_that_share_nothing_are_no_more_independent_than_random_ones():
+    disjoint = Overlap.of(np.array([[0, 1], [2, 3], [4, 5]]), 10)
+    assert (disjoint.shared, disjoint.rho) == (0.0, 0.2)
+    assert disjoint.variance == pytest.approx(1 / 3 + 2 / 8)
 
 
 def test_random_sets_share_what_nadeau_and_bengio_expect():
     random = rng()
     sets = np.array([random.permutation(31)[:9] for _ in range(300)])
-    assert Overlap.of(sets).rho == pytest.approx(9 / 31, rel=0.03)
+    assert Overlap.of(sets, 31).shared == pytest.approx(9 / 31, rel=0.03)
 
 
 def test_sets_without_overlap_give_students_interval():
@@ -59,6 +65,6 @@ def test_the_interval_covers_the_mean_of_sets_correlated_by_their_overlap():
     for _ in range(2000):
         poses = random.normal(size=31)
         sets = np.array([random.permutation(31)[:9] for _ in range(31)])
-        found = corrected_mean(poses[sets].mean(axis=1)[:, None], Overlap.of(sets))
+        found = corrected_mean(poses[sets].mean(axis=1)[:, None], Overlap.of(sets, 31))
         covered.append(found.low[0] <= 0.0 <= found.high[0])
     assert 0.92 <= np.mean(covered) <= 1.0

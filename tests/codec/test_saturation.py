@@ -29,14 +29,22 @@ def test_the_first_error_within_five_per_cent_of_the_last_is_saturation():
 
 
 @pytest.mark.parametrize(
-    ("relative", "floor", "n"), [(0.15, 0.0, 4), (0.0, 0.0, 7), (0.0, 12e-6, 4), (20.0, 0.0, 1)]
+    ("relative", "floor", "n"),
+    [(0.15, 0.0, 4), (0.0, 0.0, 7), (0.0, 12e-6, 4), (0.99, 0.0, 4), (0.0, 1e-3, 1)],
 )
 def test_the_larger_of_part_and_floor_decides(relative, floor, n):
     assert verdict(np.tile(CURVE, (9, 1)), tolerance=Tolerance(relative, floor)).n_train == n
 
 
-def test_an_error_below_the_last_has_saturated():
-    assert verdict(np.tile([50e-6, 100e-6, 100e-6], (4, 1))).n_train == 1
+def test_an_error_that_rises_again_is_told_and_never_settled():
+    found = verdict(np.tile([300e-6, 50e-6, 90e-6, 100e-6, 100e-6, 100e-6], (4, 1)))
+    assert (found.n_train, found.least, found.rises, found.settled) == (2, 2, True, False)
+    assert found.least_error == pytest.approx(50e-6)
+
+
+def test_an_error_that_leaves_the_tolerance_again_stays_from_later_on():
+    found = verdict(np.tile([300e-6, 101e-6, 150e-6, 102e-6, 100e-6, 100e-6], (4, 1)))
+    assert (found.n_train, found.stays, found.rises) == (2, 4, False)
 
 
 def test_a_curve_that_still_falls_is_not_settled():
@@ -59,7 +67,9 @@ def test_one_set_has_no_interval():
     assert (found.low, found.high, found.settled) == (None, None, False)
 
 
-@pytest.mark.parametrize(("relative", "floor"), [(-0.1, 0.0), (np.nan, 0.0), (0.1, np.inf)])
+@pytest.mark.parametrize(
+    ("relative", "floor"), [(-0.1, 0.0), (np.nan, 0.0), (1.0, 0.0), (5.0, 0.0), (0.1, np.inf)]
+)
 def test_a_tolerance_that_is_none_is_refused(relative, floor):
     with pytest.raises(CodecError, match="tolerance"):
         Tolerance(relative, floor)

@@ -1,9 +1,11 @@
 """Variants: names, combinations, refusals that list what is known."""
 
+import dataclasses
+
 import pytest
 
 from elastocal.codec import Variant, make_variants, read_comparison
-from elastocal.codec.variants import training_cases
+from elastocal.codec.variants import check_different, training_cases
 from elastocal.errors import CodecError, DatasetError, PlanningError
 
 
@@ -58,3 +60,20 @@ def test_a_load_case_may_be_called_as_it_likes():
     assert training_cases("all", ["all", "pull"]) == ("all",)
     assert training_cases("a+b", ["a+b", "a"]) == ("a+b",)
     assert training_cases("all", ["pull", "push"]) == ("pull", "push")
+
+
+@pytest.mark.parametrize("other", ["normal+north", "north+normal", "all"])
+def test_two_names_of_one_variant_are_refused(other):
+    variants = make_variants({"load_cases": ("normal+north", other)})
+    variants = (variants[0], dataclasses.replace(variants[1], name="other"))
+    with pytest.raises(CodecError, match="'normal\\+north' and 'other' are the same"):
+        check_different(variants, ("normal", "north"))
+
+
+def test_variants_that_differ_are_let_through():
+    check_different(make_variants({"load_cases": ("all", "normal")}), ("normal", "north"))
+
+
+def test_a_load_case_that_stands_twice_is_refused():
+    with pytest.raises(DatasetError, match="stands twice"):
+        training_cases("normal+normal", ("normal", "north"))

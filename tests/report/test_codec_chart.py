@@ -98,7 +98,9 @@ def test_saturation_is_told_with_its_interval(known):
     for found in known.verdicts.saturation:
         assert saturation_words(found) in text
     first = replace(known.verdicts.saturation[0], n_train=3, low=2, high=5, last=7)
-    assert saturation_words(first) == "actuated: from 3 training poses on (95 % interval 2 to 5)"
+    assert saturation_words(first) == (
+        "actuated: from 3 training poses on, steadily from 4 (95 % interval 2 to 5)"
+    )
     assert "no interval" in saturation_words(replace(first, low=None))
     assert (
         saturation_words(replace(first, n_train=7)) == "actuated: still falls at 7 training poses"

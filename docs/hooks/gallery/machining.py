@@ -8,7 +8,7 @@ from elastocal.cli.process_bench import MACHINING_SETTINGS
 from elastocal.compensation.process.trace import Trace
 from elastocal.report.document.figures.process_maps import process_maps
 from elastocal.report.printed import write_figure
-from gallery.campaign import accuracy, campaign, example_cell, process, reduction
+from gallery.campaign import SEED, accuracy, campaign, example_cell, process, reduction
 from gallery.placement import draw_displacements
 
 RINGS = 1
@@ -22,7 +22,7 @@ def make(folder: Path) -> dict[str, str]:
     draw_displacements(folder / "displacements-machining.svg", done)
     outcome = process(done, "machining", MACHINING_SETTINGS, RINGS)
     pairs = zip(outcome.before, outcome.after, strict=True)
-    traces = [Trace.of(1, *pair) for pair in pairs]
+    traces = [Trace.of(SEED, *pair) for pair in pairs]
     write_figure(folder / "maps-machining.png", partial(process_maps, traces))
     shutil.rmtree(folder / "cell")
     return {

@@ -17,7 +17,7 @@ from elastocal.report.index_chart import index_chart
 from elastocal.report.plan_figure import write_plan_figure
 from elastocal.report.plan_page import write_plan_page
 from elastocal.report.printed import write_figure
-from gallery.campaign import Campaign, accuracy, campaign, example_cell, process, reduction
+from gallery.campaign import SEED, Campaign, accuracy, campaign, example_cell, process, reduction
 
 COURSES = 2
 TOLERANCE = 0.3e-3
@@ -37,7 +37,7 @@ def make(folder: Path) -> dict[str, str]:
     for name, (key, values) in CODECS.items():
         told[name] = _codec(folder, done, name, key, values)
     outcome = process(done, "afp", AFP_SETTINGS, COURSES)
-    traces = [Trace.of(1, *pair) for pair in zip(outcome.before, outcome.after, strict=True)]
+    traces = [Trace.of(SEED, *pair) for pair in zip(outcome.before, outcome.after, strict=True)]
     write_figure(folder / "maps-placement.png", partial(process_maps, traces))
     longest = max(traces, key=lambda trace: float(np.abs(trace.before).max()))
     write_figure(folder / "course-placement.svg", partial(course_figure, longest, TOLERANCE))
@@ -87,7 +87,7 @@ def _codec(folder: Path, done: Campaign, name: str, key: str, values: tuple[str,
 
 def _sentence(verdicts: Verdicts) -> str:
     """Return the verdict on the pair of variants."""
-    text = verdicts.sentences[-1].replace(" um", " µm")
+    text = verdicts.sentences[-1]
     return text[0].upper() + text[1:]
 
 

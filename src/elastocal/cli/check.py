@@ -10,9 +10,8 @@ def check(
     file: Annotated[
         Path,
         typer.Argument(
-            help="Cell or springs (.yaml), plan, model or summary (.json), pool (.nc), dataset"
-            " (.nc, .csv), robot (.urdf), journal (.jsonl), streams (.mcap), folder of a plan or"
-            " a run."
+            help="Any file of ours (.yaml, .json, .nc, .jsonl, .mcap), a dataset (.nc, .csv), a"
+            " robot (.urdf), or the folder of a plan, run, process, codec or study."
         ),
     ],
     as_json: Annotated[

@@ -30,7 +30,7 @@ def show_codec(console: Console, record: VerdictRecord, out: Path, names: Sequen
 
 def _table(record: VerdictRecord) -> Table:
     """Return the median errors at held-out poses, for some numbers of training poses."""
-    table = Table(box=None, pad_edge=False, title="error norm at held-out poses, um: mean / max")
+    table = Table(box=None, pad_edge=False, title="error norm at held-out poses, µm: mean / max")
     table.add_column("training poses", justify="right")
     for name in record.variants:
         table.add_column(escape(name), justify="right")

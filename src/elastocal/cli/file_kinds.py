@@ -7,8 +7,8 @@ from typing import Any
 
 from elastocal import dataset
 from elastocal.cell import load_cell
+from elastocal.cli import codec_kinds, study_kinds
 from elastocal.cli.cell_facts import cell_facts
-from elastocal.codec import read_codec, read_verdicts
 from elastocal.compensation.conditioning.tool_file import read_tool
 from elastocal.compensation.process.folder import TABLE, read_process, read_table
 from elastocal.compensation.settings import read_settings
@@ -51,7 +51,7 @@ def describe_file(path: Path) -> Described:
         return _folder(path)
     known: dict[str, Describe] = {
         ".nc": _netcdf,
-        ".csv": _dataset,
+        ".csv": _table,
         ".json": _json,
         ".urdf": _robot,
         ".jsonl": _journal,
@@ -66,7 +66,7 @@ def describe_file(path: Path) -> Described:
 
 
 def _folder(path: Path) -> Described:
-    """Describe the folder of a plan, of a run or of a simulated process."""
+    """Describe the folder of a plan, a run, a simulated process, a codec or a study."""
     if (path / PLAN).is_file():
         return _plan(path / PLAN)
     if (path / JOURNAL).is_file():
@@ -75,7 +75,14 @@ def _folder(path: Path) -> Described:
         record = read_process(path)
         kind, facts = _process(path / TABLE)
         return kind, {**facts, "courses": len(record.traces)}
-    raise SchemaError(f"{path} is a folder with none of {PLAN}, {JOURNAL}, {TABLE} in it")
+    if study_kinds.is_study(path):
+        return study_kinds.study_folder(path)
+    if codec_kinds.is_codec(path):
+        return codec_kinds.codec_folder(path)
+    raise SchemaError(
+        f"{path} is a folder with none of {PLAN}, {JOURNAL}, {TABLE} in it, nor the files of a"
+        " codec or a study"
+    )
 
 
 def _run(path: Path) -> Described:
@@ -128,7 +135,7 @@ def _netcdf(path: Path) -> Described:
         stated = read_netcdf(path).attrs.get("schema")
     except DatasetError as error:
         raise DatasetError(f"{path}: {error}") from error
-    kinds: dict[str, Describe] = {"elastocal.codec": _codec, "elastocal.pool": _pool}
+    kinds: dict[str, Describe] = {"elastocal.codec": codec_kinds.arrays, "elastocal.pool": _pool}
     return kinds.get(str(stated).partition("/")[0], _dataset)(path)
 
 
@@ -138,11 +145,18 @@ def _json(path: Path) -> Described:
         "elastocal.plan": _plan,
         "elastocal.run-summary": _summary,
         "elastocal.tool": _tool,
-        "elastocal.codec_verdicts": _verdicts,
+        "elastocal.codec_verdicts": codec_kinds.verdicts,
+        "elastocal.study": study_kinds.study_record,
+        "elastocal.study_settings": study_kinds.study_settings,
+        "elastocal.study_samples": study_kinds.study_samples,
         "elastocal.process": _process,
         "elastocal.comparison": _comparison,
     }
     return kinds.get(_stated(_IN_JSON, read_text(path)[:200]), _model)(path)
+
+
+def _table(path: Path) -> Described:
+    return codec_kinds.table(path) if codec_kinds.is_table(path) else _dataset(path)
 
 
 def _stated(pattern: re.Pattern[str], text: str) -> str:
@@ -263,28 +277,6 @@ def _compensator(path: Path) -> Described:
         "filter_delay": float(settings.chain.delay()),
         "correction": settings.limits.correction,
         "rate": settings.limits.rate,
-    }
-
-
-def _codec(path: Path) -> Described:
-    data = read_codec(path)
-    return "codec", {
-        "schema": "elastocal.codec/1",
-        "robot": data.robot,
-        "variants": [each.name for each in data.variants],
-        "poses": len(data.contact),
-        "splits": len(data.seed_pose),
-        "training": len(data.n_train),
-    }
-
-
-def _verdicts(path: Path) -> Described:
-    record = read_verdicts(path)
-    return "verdicts of a codec", {
-        "schema": "elastocal.codec_verdicts/1",
-        "robot": record.robot,
-        "variants": list(record.variants),
-        "saturation": record.saturation,
     }
 
 

@@ -4,14 +4,10 @@ Exit codes: 0 done; 1 the work could not be done, with a one-line reason; 2 usag
 130 interrupted; 143 terminated. Commands import what they need when they run: help is quick.
 """
 
-import _thread
 import contextlib
 import os
-import signal
 import sys
-import threading
-from collections.abc import Callable, Iterator
-from types import FrameType
+from collections.abc import Callable
 
 import typer
 
@@ -33,6 +29,7 @@ from elastocal.cli.run import run as run_procedure
 from elastocal.cli.simulate_process import simulate_process
 from elastocal.cli.stiffness import stiffness
 from elastocal.cli.study import study
+from elastocal.cli.termination import ended_cleanly
 from elastocal.cli.tool import tool
 from elastocal.errors import ElastocalError, FileAccessError
 
@@ -87,7 +84,7 @@ def run() -> None:
     """Run the command line and exit with its code."""
     try:
         _check_output()
-        with _cleaned_up_when_terminated():
+        with ended_cleanly():
             app()
     except ElastocalError as error:
         _complain(str(error))
@@ -112,47 +109,6 @@ def _drop_output() -> None:
     """Lead standard output away, so that Python does not try once more at its end."""
     with contextlib.suppress(OSError, ValueError):
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-
-
-@contextlib.contextmanager
-def _cleaned_up_when_terminated() -> Iterator[None]:
-    """Turn SIGTERM into an exit that leaves no half-written folder; `run` has its own way.
-
-    Python drops what a signal raises while it runs a finaliser or a weak reference's callback,
-    of which every import has some. Such an exit or Ctrl-C is sent once more.
-    """
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
-
-    def leave(number: int, frame: FrameType | None) -> None:  # noqa: ARG001 - signal's form
-        # A second one must not break into the cleaning up.
-        signal.signal(number, signal.SIG_IGN)
-        sys.exit(128 + number)
-
-    def again(dropped: "sys.UnraisableHookArgs") -> None:
-        if issubclass(dropped.exc_type, SystemExit):
-            signal.signal(signal.SIGTERM, leave)
-            _interrupt_soon(signal.SIGTERM)
-        elif issubclass(dropped.exc_type, KeyboardInterrupt):
-            _interrupt_soon(signal.SIGINT)
-        else:
-            reported(dropped)
-
-    before, reported = signal.signal(signal.SIGTERM, leave), sys.unraisablehook
-    sys.unraisablehook = again
-    try:
-        yield
-    finally:
-        sys.unraisablehook = reported
-        signal.signal(signal.SIGTERM, before)
-
-
-def _interrupt_soon(number: int) -> None:
-    """Send a signal when the finaliser that dropped the last one is over."""
-    timer = threading.Timer(0.05, _thread.interrupt_main, (number,))
-    timer.daemon = True
-    timer.start()
 
 
 def _complain(message: str) -> None:

@@ -39,14 +39,12 @@ def study(  # noqa: PLR0913 - one parameter an option
     ] = False,
 ) -> None:
     """Simulate many calibrations of a cell: what reaches which accuracy."""
-    from functools import partial
-
     from elastocal.cell import load_cell
     from elastocal.cli.output import console, print_json
     from elastocal.cli.progress import progress_bars
     from elastocal.cli.study_options import parse_target, study_conditions
     from elastocal.cli.study_simulation import prepare
-    from elastocal.cli.study_spread import connected, over_cluster, over_cores
+    from elastocal.cli.study_spread import spread_over
     from elastocal.cli.study_table import show_study
     from elastocal.codec.study import (
         StudyStore,
@@ -61,10 +59,7 @@ def study(  # noqa: PLR0913 - one parameter an option
     good_enough = parse_target(target)
     read = load_cell(cell)
     conditions = study_conditions(read, vary or [])
-    if dask is not None:
-        connected(dask).close()  # refused before the long work
-    spread = partial(over_cores, jobs=jobs) if dask is None else partial(over_cluster, address=dask)
-    with progress_bars(console()) as report:
+    with spread_over(jobs, dask) as spread, progress_bars(console()) as report:
         prepared = prepare(read, conditions, seed, verification, jobs)
         store = StudyStore(out)
         results = run_study(store, prepared.settings, samples, prepared.simulate, spread, report)

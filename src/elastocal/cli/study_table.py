@@ -41,7 +41,8 @@ def _table(record: StudyRecord) -> Table:
     titles += ["mean", "95 %", "largest", "95 %"]
     titles += [] if record.target is None else ["mean good", "largest good"]
     for number, title in enumerate(titles):
-        table.add_column(title, justify="right", no_wrap=number >= len(factors))
+        longest = max(map(len, title.split()))
+        table.add_column(title, justify="right", no_wrap=number >= len(factors), min_width=longest)
     for each in record.conditions[:MOST_ROWS]:
         condition = each.factors.condition
         cells = [written(condition.value(key)) for key in factors]

@@ -14,7 +14,7 @@ from elastocal.codec.data import NONE, CodecData, SpringLabels
 from elastocal.codec.options import CodecOptions
 from elastocal.codec.splits import Split, make_splits, split_sizes
 from elastocal.codec.training import Outcome, Trainee, train
-from elastocal.codec.variants import Variant
+from elastocal.codec.variants import Variant, check_different
 from elastocal.dataset import Readings
 from elastocal.elastic import ElasticModel, layout
 from elastocal.errors import CodecError, IdentificationError
@@ -67,7 +67,8 @@ def cross_validate(
     Raises
     ------
     CodecError
-        If there are too few poses for a split or as many splits, or a variant fits nothing.
+        If there are too few poses for a split or as many splits, two variants are the same, or
+        one fits nothing.
     DatasetError
         If the data lack a load case, or joints are not this robot's.
     IdentificationError
@@ -78,6 +79,7 @@ def cross_validate(
     layouts = {each.springs: layout(robot, each.springs) for each in variants}
     models = {name: ElasticModel(robot, springs) for name, springs in layouts.items()}
     campaign = make_campaign(list(models.values()), readings, options, marker_offset)
+    check_different(variants, campaign.load_cases)
     training, verification = split_sizes(len(campaign), options.ratio)
     splits = make_splits(campaign.contact, options.splits, verification)
     trainees = [

@@ -94,7 +94,7 @@ def correlate(data: CodecData, indices: IndexValues) -> tuple[Correlation, ...]:
     indices : IndexValues
         Of one of its variants.
     """
-    overlap = Overlap.of(data.verification)
+    overlap = Overlap.of(data.verification, len(data.contact))
     found = []
     for error in ERRORS:
         accuracy = -data.errors(indices.variant, error)

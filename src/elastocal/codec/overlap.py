@@ -4,7 +4,9 @@ The sets are all drawn from the same N poses, so that their spread, taken for th
 ones, is too small. C. Nadeau and Y. Bengio ("Inference for the generalization error", Machine
 Learning 52, 2003, section 3) give the mean over J sets whose figures are correlated by ``rho`` the
 variance ``(1 / J + rho / (1 - rho)) S^2``, and take for ``rho`` what two sets are expected to
-share: ``n_2 / (n_1 + n_2)`` for random ones. COVER sets share more, so ``rho`` is counted here.
+share: ``n_2 / (n_1 + n_2)`` for random ones. COVER sets share more, so what they share is counted.
+Few sets may share less, even nothing, but their training sets are then nearly the same poses;
+so ``rho`` is never taken below that of random sets.
 What this covers in simulation: docs/decisions/0030-codec.md.
 """
 
@@ -30,24 +32,39 @@ class Overlap:
 
     sets: int
     """Number of sets, J."""
-    rho: float
+    shared: float
     """Part of its poses that a set shares with another one, mean over all pairs."""
+    part: float = 0.0
+    """Part of all poses that is in a set, ``N_v / N``: what random sets share."""
 
     @classmethod
-    def of(cls, verification: IndexArray) -> "Overlap":
-        """Return the overlap of verification sets, given by pose numbers, shape (cv, N_v)."""
+    def of(cls, verification: IndexArray, poses: int) -> "Overlap":
+        """Return the overlap of verification sets.
+
+        Parameters
+        ----------
+        verification : ndarray of int, shape (cv, N_v)
+            Pose numbers.
+        poses : int
+            Number of all poses.
+        """
         sets, size = verification.shape
         if sets < 2:
-            return cls(sets, 1.0)
+            return cls(sets, 1.0, size / poses)
         member = np.zeros((sets, int(verification.max()) + 1))
         np.put_along_axis(member, verification, 1.0, axis=1)
         shared = (member @ member.T).sum() / size - sets
-        return cls(sets, float(shared / (sets * (sets - 1))))
+        return cls(sets, float(shared / (sets * (sets - 1))), size / poses)
+
+    @property
+    def rho(self) -> float:
+        """Correlation that is taken between the figures of two sets."""
+        return max(self.shared, self.part)
 
     @property
     def known(self) -> bool:
         """Whether the sets show any spread: several, and not all the same."""
-        return self.sets > 1 and self.rho < _ALL
+        return self.sets > 1 and self.shared < _ALL
 
     @property
     def variance(self) -> float:

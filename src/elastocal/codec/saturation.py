@@ -18,7 +18,7 @@ class Tolerance:
     Raises
     ------
     CodecError
-        If a part is negative or not finite.
+        If the part is not from 0 to below 1, or the floor negative or not finite.
     """
 
     relative: float = 0.05
@@ -27,9 +27,15 @@ class Tolerance:
     """Least tolerance, in m: below what a laser tracker repeats, a difference is of no use."""
 
     def __post_init__(self) -> None:
-        for name, value in (("tolerance", self.relative), ("floor of the tolerance", self.floor)):
-            if not 0.0 <= value < np.inf:
-                raise CodecError(f"{name} {value:g}: must be 0 or above, and finite")
+        if not 0.0 <= self.relative < 1.0:
+            raise CodecError(
+                f"tolerance {self.relative:g}: must be a part of the last error from 0 to below 1,"
+                " e.g. 0.05 or '5 %'"
+            )
+        if not 0.0 <= self.floor < np.inf:
+            raise CodecError(
+                f"floor of the tolerance {self.floor:g} m: must be 0 or above, and finite"
+            )
 
     def reached(self, error: FloatArray) -> BoolArray:
         """Return whether each error of a curve is within the tolerance of its last.
@@ -40,7 +46,11 @@ class Tolerance:
             In m.
         """
         last = error[..., -1:]
-        return np.asarray(error - last <= np.maximum(self.relative * last, self.floor))
+        return np.asarray(error - last <= self.of(last))
+
+    def of(self, last: FloatArray) -> FloatArray:
+        """Return the tolerance about last errors, in m."""
+        return np.maximum(self.relative * last, self.floor)
 
 
 @dataclass(frozen=True)
@@ -61,14 +71,23 @@ class Saturation:
     """The same with the largest training set, in m."""
     last: int
     """Size of the largest training set."""
+    stays: int
+    """Number of training poses from which on no error leaves the tolerance again; `n_train` or
+    more."""
+    least: int
+    """Number of training poses with the smallest error."""
+    least_error: float
+    """Median over the verification sets there, in m."""
+    rises: bool
+    """Whether that is below the last error by more than the tolerance: more poses did harm."""
 
     @property
     def settled(self) -> bool:
-        """Whether the interval ends below the largest training set.
+        """Whether the interval ends below the largest training set, and the error does not rise.
 
-        Where it does not, the error may still be falling: nothing is known beyond the last.
+        Where it ends there, the error may still be falling: nothing is known beyond the last.
         """
-        return self.high is not None and self.high < self.last
+        return self.high is not None and self.high < self.last and not self.rises
 
 
 def saturation(
@@ -99,8 +118,19 @@ def saturation(
         # of saturation. Whole numbers of poses: the ends are drawn values, no averages of two.
         low = min(int(n), int(np.percentile(_for_good(reached), tail, method="lower")))
         high = max(int(n), int(np.percentile(_first(reached), 100.0 - tail, method="higher")))
+    least = int(np.argmin(curve))
     return Saturation(
-        variant, int(n), low, high, float(curve[n - 1]), float(curve[-1]), errors.shape[1]
+        variant=variant,
+        n_train=int(n),
+        low=low,
+        high=high,
+        error=float(curve[n - 1]),
+        last_error=float(curve[-1]),
+        last=len(curve),
+        stays=int(_for_good(tolerance.reached(curve))),
+        least=least + 1,
+        least_error=float(curve[least]),
+        rises=bool(curve[-1] - curve[least] > tolerance.of(curve[-1])),
     )
 
 

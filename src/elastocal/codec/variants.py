@@ -128,7 +128,7 @@ def training_cases(spec: str, known: Sequence[str]) -> tuple[str, ...]:
     Raises
     ------
     DatasetError
-        If the dataset lacks one of them.
+        If the dataset lacks one of them, or one stands twice.
     """
     if spec in known:
         return (spec,)
@@ -141,4 +141,35 @@ def training_cases(spec: str, known: Sequence[str]) -> tuple[str, ...]:
                 f"load case {name!r} has no usable reading in the dataset{nearest(name, known)}"
                 f" (known: {', '.join(known)}, or {ALL_LOADS})"
             )
+    if len(set(names)) < len(names):
+        raise DatasetError(f"load cases {spec!r}: one of them stands twice")
     return names
+
+
+def check_different(variants: Sequence[Variant], known: Sequence[str]) -> None:
+    """Refuse variants of different names that are the same: they would be compared with themselves.
+
+    Parameters
+    ----------
+    variants : sequence of Variant
+        What is compared.
+    known : sequence of str
+        Load cases of the dataset.
+
+    Raises
+    ------
+    CodecError
+        With the names of the two.
+    DatasetError
+        If the dataset lacks a load case.
+    """
+    seen: dict[tuple[str, str, frozenset[str], str], str] = {}
+    for each in variants:
+        cases = frozenset(training_cases(each.load_cases, known))
+        key = (each.search, each.springs, cases, each.solver)
+        if key in seen:
+            raise CodecError(
+                f"variants {seen[key]!r} and {each.name!r} are the same: both train with load cases"
+                f" {', '.join(case for case in known if case in cases)}"
+            )
+        seen[key] = each.name

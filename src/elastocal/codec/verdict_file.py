@@ -42,6 +42,13 @@ class SaturationRecord(StrictModel):
     settled: bool
     error: float
     last_error: float
+    stays: int
+    """Number of training poses from which on no error leaves the tolerance again."""
+    least: int
+    """Number of training poses with the smallest error."""
+    least_error: float
+    rises: bool
+    """Whether the last error is above the smallest by more than the tolerance."""
 
 
 class PairRecord(StrictModel):
@@ -168,7 +175,7 @@ def _settings(data: CodecData, verdicts: Verdicts) -> Settings:
         training=data.training_poses,
         verification=size,
         splits=sets,
-        overlap=Overlap.of(data.verification).rho,
+        overlap=Overlap.of(data.verification, len(data.contact)).shared,
         ratio=data.options.ratio,
         seed=data.options.seed,
         tolerance=verdicts.tolerance.relative,

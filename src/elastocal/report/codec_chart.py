@@ -149,7 +149,8 @@ def saturation_words(found: Saturation) -> str:
     between = "no interval"
     if found.low is not None and found.high is not None:
         between = f"95 % interval {found.low} to {found.high}"
-    return f"{found.variant}: from {found.n_train} training poses on ({between})"
+    steadily = f", steadily from {found.stays}" if found.stays > found.n_train else ""
+    return f"{found.variant}: from {found.n_train} training poses on{steadily} ({between})"
 
 
 def _draw_frame(figure: Figure, data: CodecData, looks: Sequence[Look]) -> None:

@@ -110,14 +110,23 @@ def test_a_damaged_part_is_refused_by_name(tmp_path):
         run(tmp_path, 2)
 
 
-def test_a_part_of_other_springs_is_refused(tmp_path):
+def test_a_part_whose_figures_were_edited_is_refused(tmp_path):
     run(tmp_path, 2)
     part = next((tmp_path / PARTS).glob("*.json"))
     contents = json.loads(part.read_text())
-    contents["samples"][0]["outcomes"][0]["compliance"] *= 2
+    contents["samples"][0]["outcomes"][0]["error_mean"] = 1e-6
     part.write_text(json.dumps(contents))
-    with pytest.raises(SchemaError, match="does not fit the conditions"):
+    with pytest.raises(SchemaError, match=rf"{part.name} was edited, or belongs to a study"):
         run(tmp_path, 2)
+
+
+def test_a_part_of_a_study_with_another_seed_is_refused(tmp_path):
+    run(tmp_path / "a", 2)
+    run(tmp_path / "b", 4, seed=4)
+    foreign = sorted((tmp_path / "b" / PARTS).glob("*.json"))[-1]
+    (tmp_path / "a" / PARTS / foreign.name).write_text(foreign.read_text())
+    with pytest.raises(SchemaError, match="with other settings: delete it"):
+        run(tmp_path / "a", 4)
 
 
 def test_settings_of_an_unknown_version_are_refused(tmp_path):

@@ -53,7 +53,7 @@ def test_joints(read):
         ("j[deg]", "1", "no orientation of the flange .* give --robot"),
         ("qx,qy,qz,qw", "1,1,0,0", "quaternion .* of posture 1 has not length 1"),
         ("qx,qy,qz,qw", "1,x,0,0", "a quaternion is not four numbers"),
-        ("a[mm],b[deg],c[deg]", "0,0,0", "'mm' is not a angle"),
+        ("a[mm],b[deg],c[deg]", "0,0,0", "'mm' is not an angle"),
         ("a,b[deg],c[deg]", "0,0,0", "column 'a' has no unit"),
     ],
 )

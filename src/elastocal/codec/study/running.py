@@ -62,7 +62,7 @@ def run_study(
         work = [partial(_simulated, simulate, settings.seed, part) for part in parts]
         done = samples - len(missing)
         for results in spread(work):
-            store.keep(results)
+            store.keep(settings, results)
             done += len(results)
             report(STAGE, done, samples)
             found |= {result.number: result for result in results}

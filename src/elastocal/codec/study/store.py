@@ -1,7 +1,9 @@
 """Folder of a study: settings first, then finished samples in parts, each written whole or not.
 
-A part is named after its samples. Its contents depend on nothing else, so a part that two
-processes write is the same; a study that is killed goes on with what is missing.
+A part is named after its samples. Its contents depend on nothing else but the settings, so a part
+that two processes write is the same; a study that is killed goes on with what is missing. A part
+carries a digest over the settings and its samples: one of another study, or one that was edited,
+is refused.
 """
 
 import json
@@ -14,7 +16,7 @@ from pydantic import FiniteFloat
 from elastocal.codec.study.samples import Accuracy, Outcome, SampleResult
 from elastocal.codec.study.settings import SCHEMA, StudySettings, check_same
 from elastocal.errors import FileAccessError, SchemaError
-from elastocal.files import write_text
+from elastocal.files import sha256, write_text
 from elastocal.schema import StrictModel, read_json
 
 SETTINGS = "settings.json"
@@ -43,6 +45,8 @@ class SampleRecord(StrictModel):
 class Part(StrictModel):
     """Some finished samples."""
 
+    digest: str
+    """SHA-256 over the settings of the study and these samples."""
     samples: tuple[SampleRecord, ...]
 
 
@@ -82,8 +86,8 @@ class StudyStore:
             raise FileAccessError(f"cannot write {self.folder}: {error.strerror}") from error
         write_text(path, _text(SCHEMA, settings))
 
-    def keep(self, results: Sequence[SampleResult]) -> None:
-        """Write finished samples; they are on the disk when this returns.
+    def keep(self, settings: StudySettings, results: Sequence[SampleResult]) -> None:
+        """Write finished samples of a study; they are on the disk when this returns.
 
         Raises
         ------
@@ -91,8 +95,9 @@ class StudyStore:
             If they cannot be written.
         """
         records = tuple(_record(result) for result in results)
+        part = Part(digest=_digest(settings, records), samples=records)
         name = "-".join(f"{number:06d}" for number in (records[0].number, records[-1].number))
-        write_text(self.folder / PARTS / f"{name}.json", _text(PART_SCHEMA, Part(samples=records)))
+        write_text(self.folder / PARTS / f"{name}.json", _text(PART_SCHEMA, part))
 
     def finished(self, settings: StudySettings) -> dict[int, SampleResult]:
         """Return the finished samples by number, rising.
@@ -100,18 +105,12 @@ class StudyStore:
         Raises
         ------
         SchemaError
-            If a part is damaged, or does not fit the settings.
+            If a part is damaged, was edited, or is one of another study.
         """
         found: dict[int, SampleResult] = {}
-        sizes = tuple(len(settings.springs[each.springs]) for each in settings.conditions)
         for path in sorted((self.folder / PARTS).glob("*.json")):
-            for record in read_json(path, Part, PART_SCHEMA).samples:
-                if tuple(len(each.compliance) for each in record.outcomes) != sizes:
-                    raise SchemaError(
-                        f"{path}: sample {record.number} does not fit the conditions of"
-                        f" {self.folder / SETTINGS}"
-                    )
-                found[record.number] = _result(record)
+            for result in read_part(path, settings):
+                found[result.number] = result
         return dict(sorted(found.items()))
 
 
@@ -128,6 +127,30 @@ def read_settings(path: Path) -> StudySettings:
     if missing or not settings.conditions:
         raise SchemaError(f"{path}: springs of {', '.join(sorted(missing)) or 'any'} are missing")
     return settings
+
+
+def read_part(path: Path, settings: StudySettings) -> tuple[SampleResult, ...]:
+    """Return some finished samples of a study from their file.
+
+    Raises
+    ------
+    SchemaError
+        If the file holds none, was edited, or belongs to a study with other settings.
+    FileAccessError
+        If it cannot be read.
+    """
+    part = read_json(path, Part, PART_SCHEMA)
+    if part.digest != _digest(settings, part.samples):
+        raise SchemaError(
+            f"{path} was edited, or belongs to a study with other settings: delete it to have its"
+            " samples simulated again"
+        )
+    return tuple(_result(record) for record in part.samples)
+
+
+def _digest(settings: StudySettings, samples: Sequence[SampleRecord]) -> str:
+    contents = [settings.model_dump(mode="json"), [s.model_dump(mode="json") for s in samples]]
+    return sha256(json.dumps(contents, sort_keys=True, allow_nan=False))
 
 
 def _text(schema: str, model: StrictModel) -> str:

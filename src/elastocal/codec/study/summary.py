@@ -159,7 +159,10 @@ def advice(conditions: Sequence[ConditionSummary], target: float | None) -> str:
         )
     shares = [(c.mean_reaches.share, c) for c in conditions if c.mean_reaches]
     most, best = max(shares, key=lambda each: each[0])
-    return (
+    text = (
         f"no condition is shown to bring {RELIABLE:.0%} of the arms to {wanted}; the best,"
         f" {best.name}, brings {most:.0%} of {best.n}"
     )
+    if most >= RELIABLE:
+        return f"{text}: too few arms to prove it, take more --samples"
+    return text

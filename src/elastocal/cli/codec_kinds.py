@@ -1,0 +1,89 @@
+"""The files of a codec, and the tables of codec and study, as ``elastocal check`` tells of them."""
+
+import csv
+from pathlib import Path
+from typing import Any
+
+from elastocal.codec import read_codec, read_verdicts
+from elastocal.codec.data_file import ARRAYS
+from elastocal.codec.data_file import SCHEMA as ARRAYS_SCHEMA
+from elastocal.codec.verdict_file import SCHEMA, VERDICTS
+from elastocal.errors import SchemaError
+from elastocal.files import read_text
+
+Described = tuple[str, dict[str, Any]]
+
+_TABLES: dict[tuple[str, ...], str] = {
+    ("variant", "seed_pose", "n_train"): "table of the indices of a codec",
+    ("sample", "poses", "search"): "table of a study",
+}
+"""What a table is, by its first columns."""
+
+
+def is_codec(folder: Path) -> bool:
+    """Return whether a folder is that of a codec."""
+    return (folder / ARRAYS).is_file() and (folder / VERDICTS).is_file()
+
+
+def codec_folder(path: Path) -> Described:
+    """Describe the folder of a codec; arrays and verdicts are validated and belong together.
+
+    Raises
+    ------
+    ElastocalError
+        If a file is damaged, or the two are not of one codec.
+    """
+    data, record = read_codec(path), read_verdicts(path / VERDICTS)
+    names = [each.name for each in data.variants]
+    if names != list(record.variants) or len(data.contact) != record.settings.poses:
+        raise SchemaError(f"{path}: {ARRAYS} and {VERDICTS} are of different codecs")
+    return "folder of a codec", {**arrays(path)[1], "saturation": record.saturation}
+
+
+def arrays(path: Path) -> Described:
+    """Describe the arrays of a codec."""
+    data = read_codec(path)
+    return "codec", {
+        "schema": ARRAYS_SCHEMA,
+        "robot": data.robot,
+        "variants": [each.name for each in data.variants],
+        "poses": len(data.contact),
+        "splits": len(data.seed_pose),
+        "training": len(data.n_train),
+    }
+
+
+def verdicts(path: Path) -> Described:
+    """Describe the verdicts of a codec."""
+    record = read_verdicts(path)
+    return "verdict file of a codec", {
+        "schema": SCHEMA,
+        "robot": record.robot,
+        "variants": list(record.variants),
+        "saturation": record.saturation,
+    }
+
+
+def is_table(path: Path) -> bool:
+    """Return whether a CSV file begins as a table that a codec or a study writes."""
+    return _first_columns(read_text(path)) in _TABLES
+
+
+def table(path: Path) -> Described:
+    """Describe a table of results.
+
+    Raises
+    ------
+    SchemaError
+        If a row has more or fewer cells than the header.
+    """
+    text = read_text(path)
+    header, *rows = csv.reader(text.splitlines())
+    for number, row in enumerate(rows, start=2):
+        if len(row) != len(header):
+            raise SchemaError(f"{path}, line {number}: {len(row)} cells, not {len(header)}")
+    return _TABLES[_first_columns(text)], {"rows": len(rows), "columns": header}
+
+
+def _first_columns(text: str) -> tuple[str, ...]:
+    return tuple(text.partition("\n")[0].strip().split(",")[:3])

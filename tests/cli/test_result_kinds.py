@@ -1,0 +1,55 @@
+"""`elastocal check` of what codec and study leave behind; damaged ones are refused by name."""
+
+import json
+
+import pytest
+
+from elastocal.cli.file_kinds import describe_file
+from elastocal.codec.study import (
+    StudyStore,
+    one_after_the_other,
+    run_study,
+    study_record,
+    write_study,
+)
+from elastocal.errors import SchemaError
+from support.studies import settings, simulate
+
+
+@pytest.fixture
+def study(tmp_path):
+    folder = tmp_path / "study"
+    found = run_study(StudyStore(folder), settings(), 3, simulate, one_after_the_other)
+    write_study(folder, settings(), found, study_record(settings(), found, 5e-5))
+    return folder
+
+
+def test_every_file_of_a_study_is_known_and_says_what_it_holds(study):
+    kind, facts = describe_file(study)
+    assert (kind, facts["samples"], facts["conditions"]) == ("study", 3, ["poses 5", "poses 10"])
+    kind, facts = describe_file(study / "study.json")
+    assert (kind, facts["samples"]) == ("record of a study", 3)
+    assert list(facts["median_error_m"]) == ["poses 5", "poses 10"]
+    assert describe_file(study / "settings.json")[1]["schema"] == "elastocal.study_settings/1"
+    assert describe_file(study / "samples" / "000002-000002.json")[1]["samples"] == [2]
+    assert describe_file(study / "study.csv")[1]["rows"] == 6
+    assert describe_file(study / "compliance.csv")[0] == "table of a study"
+
+
+def test_an_edited_part_is_refused_in_its_folder_and_by_itself(study):
+    part = study / "samples" / "000000-000001.json"
+    contents = json.loads(part.read_text())
+    contents["samples"][1]["number"] = 7
+    part.write_text(json.dumps(contents))
+    for path in (study, part):
+        with pytest.raises(SchemaError, match=r"000000-000001\.json was edited"):
+            describe_file(path)
+
+
+def test_a_row_that_lacks_a_cell_is_refused_by_its_line(study):
+    table = study / "study.csv"
+    lines = table.read_text().splitlines()
+    lines[2] = lines[2].rpartition(",")[0]
+    table.write_text("\n".join(lines))
+    with pytest.raises(SchemaError, match=r"study\.csv, line 3: 10 cells, not 11"):
+        describe_file(table)
