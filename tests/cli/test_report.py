@@ -5,7 +5,7 @@ import shutil
 
 import pytest
 
-from elastocal.report.document import pdf
+from elastocal.report.document import chromium
 from support import reported
 from support.cli import elastocal
 
@@ -198,11 +198,11 @@ def test_a_pdf_that_is_there_is_not_replaced_without_force(finished, tmp_path, m
 def test_a_pdf_without_a_browser_is_refused_with_what_was_looked_for(
     finished, tmp_path, monkeypatch
 ):
-    monkeypatch.setattr(pdf.shutil, "which", lambda _: None)
+    monkeypatch.setattr(chromium.shutil, "which", lambda _: None)
     reason = elastocal(
         "report", finished / "model.json", "--out", tmp_path / "r.html", "--pdf"
     ).reason
-    for name in pdf.BROWSERS:
+    for name in chromium.BROWSERS:
         assert name in reason
     assert not list(tmp_path.iterdir())
 
@@ -212,11 +212,11 @@ def test_a_browser_that_fails_is_told_in_a_line(finished, tmp_path, monkeypatch,
     fake = tmp_path / "chromium"
     fake.write_text(f"#!/bin/sh\n{script}\n")
     fake.chmod(0o755)
-    monkeypatch.setattr(pdf.shutil, "which", lambda _: str(fake))
+    monkeypatch.setattr(chromium.shutil, "which", lambda _: str(fake))
     folder = tmp_path / "out"
     folder.mkdir()
     reason = elastocal(
         "report", finished / "model.json", "--out", folder / "r.html", "--pdf"
     ).reason
-    assert "print" in reason
+    assert "did not show the page: it ended" in reason
     assert {path.name for path in folder.iterdir()} == {"r.html"}

@@ -1,4 +1,4 @@
-// Measures the page that it is put into and says so on the console, in one line.
+// Measures the page; the value is a promise of what was found.
 (() => {
   const number = (text) => (text.match(/[\d.]+/g) ?? []).map(Number);
   const luminance = (rgb) => {
@@ -64,15 +64,10 @@
       text: weakestText(),
       images: images.map((image) => ({ id: image.id, alt: image.alt, width: image.naturalWidth, colours: image.naturalWidth ? colours(image) : 0 })),
       view: viewed(),
-      failures: window.failures,
       focusable: document.querySelectorAll("a[href], button, input, summary, [tabindex='0']").length,
     };
   }
 
-  function wait() {
-    if (document.documentElement.dataset.ready !== "yes") return void setTimeout(wait, 50);
-    // What fails late is to be heard as well.
-    setTimeout(() => measured().then((found) => console.log(`PROBE:${JSON.stringify(found)}`)), 300);
-  }
-  wait();
+  // What a change of colours sets off, and what fails late, is waited for.
+  return new Promise((done) => setTimeout(() => done(measured()), 400));
 })();

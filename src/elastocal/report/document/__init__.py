@@ -10,10 +10,11 @@
 ================  ==================================================================
 """
 
+from elastocal.report.document.chromium import find_browser
 from elastocal.report.document.gather import Options, gather
 from elastocal.report.document.page import Written, write_report
 from elastocal.report.document.parts import Absence, Parts
-from elastocal.report.document.pdf import find_browser, write_pdf
+from elastocal.report.document.pdf import write_pdf
 
 __all__ = [
     "Absence",

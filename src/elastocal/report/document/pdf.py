@@ -1,33 +1,10 @@
 """The report on paper: printed by a Chromium, where one is present."""
 
-import shutil
-import subprocess
-import tempfile
+import base64
 from pathlib import Path
 
-from elastocal.errors import FileAccessError
 from elastocal.files import replacing
-
-BROWSERS = ("chromium", "chromium-browser", "google-chrome", "chrome")
-"""Names that are looked for on the search path, in order."""
-_SECONDS = 120.0
-_BUDGET = 20_000
-"""Milliseconds of the page's own clock before it is printed; the 3-D view must be drawn."""
-
-
-def find_browser() -> str:
-    """Return the path of a Chromium.
-
-    Raises
-    ------
-    FileAccessError
-        If there is none.
-    """
-    for name in BROWSERS:
-        found = shutil.which(name)
-        if found is not None:
-            return found
-    raise FileAccessError(f"--pdf needs a Chromium: none of {', '.join(BROWSERS)} is on the path")
+from elastocal.report.document.chromium import open_tab
 
 
 def write_pdf(page: Path, path: Path, browser: str) -> Path:
@@ -36,7 +13,7 @@ def write_pdf(page: Path, path: Path, browser: str) -> Path:
     Parameters
     ----------
     page : Path
-        HTML file.
+        HTML file that sets ``data-ready`` of its root to ``yes`` when it is drawn.
     path : Path
         PDF file.
     browser : str
@@ -47,35 +24,8 @@ def write_pdf(page: Path, path: Path, browser: str) -> Path:
     FileAccessError
         If the browser fails or the file cannot be written.
     """
-    with (
-        tempfile.TemporaryDirectory(prefix="elastocal-") as profile,
-        replacing(path) as temporary,
-    ):
-        target = Path(profile) / "report.pdf"
-        _run([browser, *flags(Path(profile)), "--no-pdf-header-footer",
-              f"--print-to-pdf={target}", page.resolve().as_uri()])  # fmt: skip
-        if not target.is_file() or not target.stat().st_size:
-            raise FileAccessError(f"cannot write {path}: {browser} printed nothing")
-        shutil.copyfile(target, temporary)
+    with replacing(path) as temporary, open_tab(browser) as tab:
+        tab.open(page)
+        printed = tab.call("Page.printToPDF", preferCSSPageSize=True, printBackground=True)
+        temporary.write_bytes(base64.b64decode(printed["data"]))
     return path
-
-
-def flags(profile: Path) -> list[str]:
-    """Return the options of a browser that nobody sees and that asks the network for nothing."""
-    return [
-        "--headless", "--no-sandbox", "--disable-gpu", "--use-gl=angle",
-        "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--disable-extensions",
-        "--disable-background-networking", "--disable-component-update", "--disable-sync",
-        "--no-first-run", "--no-default-browser-check", "--force-prefers-reduced-motion",
-        f"--user-data-dir={profile / 'profile'}", f"--virtual-time-budget={_BUDGET}",
-    ]  # fmt: skip
-
-
-def _run(command: list[str]) -> None:
-    try:
-        done = subprocess.run(command, capture_output=True, timeout=_SECONDS, check=False)
-    except (OSError, subprocess.TimeoutExpired) as error:
-        raise FileAccessError(f"{command[0]} did not print the report: {error}") from error
-    if done.returncode != 0:
-        last = done.stderr.decode("utf-8", "replace").strip().splitlines()[-1:] or ["no reason"]
-        raise FileAccessError(f"{command[0]} did not print the report: {last[0]}")

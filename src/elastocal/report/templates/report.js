@@ -20,6 +20,11 @@
     return { paper_bgcolor: card, "font.color": ink, "hoverlabel.bgcolor": card, "hoverlabel.font.color": ink, ...axis("x"), ...axis("y"), ...axis("z") };
   }
 
+  function put(target, [key, ...rest], value) {
+    if (!rest.length) target[key] = value;
+    else put(target[key] ??= {}, rest, value);
+  }
+
   // Paper has no depth to turn: it gets a picture, always in the light colours.
   function keepStill(figure) {
     const still = document.getElementById("still");
@@ -36,8 +41,9 @@
     const first = figure.frames[1] ?? figure.frames[0];
     (first.traces ?? []).forEach((place, k) => Object.assign(figure.data[place], first.data[k]));
     const rows = document.querySelectorAll("#pose-table tbody tr");
+    // In its colours from the start: drawing it twice takes a second where there is no graphics card.
+    Object.entries(palette()).forEach(([path, value]) => put(data.poses.figure.layout, path.split("."), value));
     showView(data.poses, rows)
-      .then(() => Plotly.relayout(view, palette()))
       .then(() => { dark.addEventListener("change", () => Plotly.relayout(view, palette())); })
       .then(() => keepStill(figure))
       .then(ready);
