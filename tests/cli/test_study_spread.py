@@ -12,15 +12,10 @@ import pytest
 
 from elastocal.cli import study_cluster
 from elastocal.cli.study_spread import _deaf_to_ctrl_c, spread_over
-from elastocal.codec.study import Sample
 from elastocal.errors import CodecError
 from support.cli import elastocal
 from support.simulated import example_cell
-from support.studies import numbers, simulate
-
-
-def batch(number):
-    return [simulate(Sample(3, number))]
+from support.studies import batch, numbers
 
 
 @contextlib.contextmanager

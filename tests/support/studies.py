@@ -53,3 +53,8 @@ def numbers(results: object) -> list[tuple[object, ...]]:
         for result in results  # type: ignore[attr-defined]
         for each in result.outcomes
     ]
+
+
+def batch(number):
+    """Return a batch of one sample; processes find it here, not in a module of tests."""
+    return [simulate(Sample(3, number))]

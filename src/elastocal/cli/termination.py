@@ -8,7 +8,6 @@ and one that was dropped is sent once more. `elastocal run`, which has an arm to
 has a way of its own: `elastocal.cli.interruption`.
 """
 
-import _thread
 import contextlib
 import signal
 import sys
@@ -91,6 +90,7 @@ def _number_of(raised: BaseException | None) -> int | None:
 
 
 def _send_soon(number: int) -> None:
-    timer = threading.Timer(_PAUSE, _thread.interrupt_main, (number,))
+    # Sent to the main thread itself, or it would not wake up from what it waits for.
+    timer = threading.Timer(_PAUSE, signal.pthread_kill, (threading.main_thread().ident, number))
     timer.daemon = True
     timer.start()
