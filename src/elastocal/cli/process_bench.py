@@ -193,13 +193,17 @@ def _passages(
     """Run every course twice; ``late`` is that of a perfect corrector, None: the model corrects."""
     jobs = min(bench.jobs or os.cpu_count() or 1, len(courses))
     zeroed_at = courses[0].q[0]
-    pairs: list[tuple[Passage, Passage]] = []
+    pairs: dict[int, tuple[Passage, Passage]] = {}
+    # The longest first, or the last one would be run while the other processes wait.
+    order = sorted(range(len(courses)), key=lambda number: -len(courses[number].q))
     report(stage, 0, len(courses))
     with Parallel(n_jobs=jobs, return_as="generator") as parallel:
-        for pair in parallel(delayed(_twice)(bench, c, zeroed_at, late) for c in courses):
-            pairs.append(pair)
+        found = parallel(delayed(_twice)(bench, courses[n], zeroed_at, late) for n in order)
+        for number, pair in zip(order, found, strict=True):
+            pairs[number] = pair
             report(stage, len(pairs), len(courses))
-    before, after = zip(*pairs, strict=True)
+    ranked = [pairs[number] for number in range(len(courses))]
+    before, after = zip(*ranked, strict=True)
     return Outcome(before, after)
 
 

@@ -12,7 +12,7 @@ from elastocal.report.codec_chart import codec_chart, headline
 from elastocal.report.codec_page import write_codec_page
 from elastocal.report.compliance_chart import compliance_chart
 from elastocal.report.index_chart import index_chart
-from elastocal.report.printed import write_figure
+from elastocal.report.printed import write_kinds
 
 KINDS = (".svg", ".png")
 """In which kinds every figure is written."""
@@ -60,10 +60,9 @@ def write_codec_figures(
         figures["compliances"] = partial(compliance_chart, data, found.seen)
     if found.indices:
         figures["indices"] = partial(index_chart, data, found.indices, found.correlations)
-    paths = [
-        write_figure(folder / f"{name}{kind}", draw, f"{headline(data)} ({name})", told)
-        for name, draw in figures.items()
-        for kind in KINDS
-    ]
+    paths: list[Path] = []
+    for name, draw in figures.items():
+        kinds = [folder / f"{name}{kind}" for kind in KINDS]
+        paths += write_kinds(kinds, draw, f"{headline(data)} ({name})", told)
     page = write_codec_page(folder / PAGE, data, verdicts, found.seen, found.correlations)
     return [*paths, page]

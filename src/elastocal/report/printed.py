@@ -1,6 +1,7 @@
 """Figures on paper: the same figure has the same bytes, and says in words what it shows."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
@@ -25,33 +26,43 @@ _UNDATED: dict[str, dict[str, Any]] = {
 def write_figure(
     path: Path, draw: Callable[[], Figure], title: str = "", description: str = ""
 ) -> Path:
-    """Write a figure, atomically; return its path.
+    """Write a figure, atomically; return its path. See `write_kinds`."""
+    return write_kinds([path], draw, title, description)[0]
+
+
+def write_kinds(
+    paths: Sequence[Path], draw: Callable[[], Figure], title: str = "", description: str = ""
+) -> list[Path]:
+    """Write one figure in several kinds, each atomically; return their paths.
 
     Parameters
     ----------
-    path : Path
-        Its suffix decides the kind: SVG, PNG or PDF.
+    paths : sequence of Path
+        The suffix decides the kind: SVG, PNG or PDF.
     draw : callable
-        Returns the figure; called with the settings of print.
+        Returns the figure; called once, with the settings of print.
     title, description : str, optional
         What it is and shows, for readers that cannot see it; kept in the file.
 
     Raises
     ------
     FileAccessError
-        If the suffix is another or the file cannot be written.
+        If a suffix is another or a file cannot be written.
     """
-    path = Path(path)
-    suffix = path.suffix.lower()
-    if suffix not in SUFFIXES:
-        raise FileAccessError(
-            f"figure {path}: suffix {path.suffix!r} is not one of {', '.join(SUFFIXES)}"
-        )
-    with matplotlib.rc_context(style.print_settings()), replacing(path) as temporary:
-        draw().savefig(
-            temporary, format=suffix[1:], dpi=_DPI, metadata=notes(suffix, title, description)
-        )
-    return path
+    paths = [Path(path) for path in paths]
+    for path in paths:
+        if path.suffix.lower() not in SUFFIXES:
+            raise FileAccessError(
+                f"figure {path}: suffix {path.suffix!r} is not one of {', '.join(SUFFIXES)}"
+            )
+    with matplotlib.rc_context(style.print_settings()), ExitStack() as files:
+        temporary = [files.enter_context(replacing(path)) for path in paths]
+        figure = draw()
+        for path, place in zip(paths, temporary, strict=True):
+            suffix = path.suffix.lower()
+            said = notes(suffix, title, description)
+            figure.savefig(place, format=suffix[1:], dpi=_DPI, metadata=said)
+    return paths
 
 
 def new_figure(width: float, height: float) -> Figure:

@@ -19,7 +19,7 @@ from elastocal.report.box_panel import (
 )
 from elastocal.report.boxes import make_boxes
 from elastocal.report.looks import looks_of
-from elastocal.report.printed import new_figure, plain, write_figure
+from elastocal.report.printed import new_figure, plain, write_kinds
 
 FIGURES = ("study.svg", "study.png")
 """Names of the files in a study's folder."""
@@ -46,10 +46,8 @@ def write_study_figures(
         f"{each.name}: median mean error {_MM * each.error_mean.median:.4f} mm"
         for each in record.conditions
     )
-    for name in FIGURES:
-        write_figure(
-            Path(folder) / name, lambda: study_figure(settings, results, record), title, said
-        )
+    places = [Path(folder) / name for name in FIGURES]
+    write_kinds(places, lambda: study_figure(settings, results, record), title, said)
     return list(FIGURES)
 
 
