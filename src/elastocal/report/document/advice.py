@@ -57,13 +57,14 @@ def _largest(unseen: Unseen) -> Iterator[str]:
 
 
 def _spare_poses(parts: Parts) -> Iterator[str]:
-    """Tell how many poses the next such robot needs."""
+    """Tell how many poses would have been enough."""
     best = leading(parts)
     if best is None:
         return
     measured = len(parts.codecs[0].data.contact)
     if best.settled and best.high is not None and best.high < measured:
         yield (
-            f"The next robot of this kind needs {counted(best.high, 'pose')} rather than"
-            f" {measured}: the error no longer falls from there on."
+            f"{counted(best.high, 'pose')} would have done here in place of {measured}: the error"
+            " no longer falls from there on. A next robot of this kind may do with about as many;"
+            " its own codec tells."
         )

@@ -79,7 +79,7 @@ def course_figure(trace: Trace, tolerance: float | None) -> Figure:
         axes.text(float(trace.time[0]), _MM * tolerance, " tolerance", va="bottom", fontsize=7.5)
     axes.axhline(0.0, color=style.FAINT, lw=0.6, zorder=0)
     axes.set(xlabel="time in s", ylabel="deviation in mm")
-    axes.set_title(plain(f"Course {trace.course}, seed {trace.seed}"), loc="left", fontsize=9)
+    axes.set_title(plain(f"{trace.course}, seed {trace.seed}"), loc="left", fontsize=9)
     axes.legend(loc="upper right", bbox_to_anchor=(1.0, 1.16), ncols=2, frameon=False)
     axes.spines[["top", "right"]].set_visible(False)
     figure.subplots_adjust(left=0.07, right=0.99, bottom=0.17, top=0.88)

@@ -107,13 +107,17 @@ def _settings(parts: Parts) -> str:
     settings = parts.calibrated.figures.get("settings")
     if not isinstance(settings, dict):
         return paragraph("The model file does not tell the settings of its calibration.")
-    rows = [
-        (key, PurePath(value).name if key == "springs" else value)
-        for key, value in flattened(settings)
-    ]
+    rows = [(key, _setting(key, value)) for key, value in flattened(settings)]
     return heading("Settings") + table(
         "Settings of the calibration", ("Key", "Value"), rows, texts=2
     )
+
+
+def _setting(key: str, value: str) -> str:
+    """Return a setting as a reader without the command line understands it."""
+    if key == "springs":
+        return PurePath(value).name
+    return "that of the dataset" if key == "marker" and value == "none" else value
 
 
 SECTION = Section("provenance", "Provenance", body)
