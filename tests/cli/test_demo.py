@@ -120,7 +120,7 @@ def test_a_chapter_that_fails_ends_the_demo_with_its_reason(tmp_path, monkeypatc
 def test_a_chapter_that_is_interrupted_ends_the_demo_with_its_code(tmp_path, monkeypatch):
     story = (demo_story.Chapter("look", ("robots",)), demo_story.Chapter("never", ("robots",)))
     monkeypatch.setattr(demo_story, "chapters", lambda *_: story)
-    monkeypatch.setattr(demo_display, "_carry_out", lambda *_: 130)
+    monkeypatch.setattr(demo_display._Stage, "carry_out", lambda *_: 130)
     result = elastocal("demo", "--out", tmp_path / "demo")
     assert result.code == 130
     assert "never" not in result.err

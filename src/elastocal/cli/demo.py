@@ -7,6 +7,7 @@ import typer
 
 
 def demo(
+    context: typer.Context,
     kind: Annotated[
         str,
         typer.Argument(
@@ -28,10 +29,16 @@ def demo(
     from elastocal.cli.demo_story import chapters, closing_lines
     from elastocal.cli.output import console
 
+    root = context.find_root().command
+
+    def command(words: list[str]) -> int | None:
+        code: int | None = root.main(words, prog_name="elastocal", standalone_mode=False)
+        return code
+
     story = chapters(kind, out, seed)
     begin(out, kind, force)
     screen = console()
-    with display(screen, out / LOG, story) as tell:
+    with display(screen, out / LOG, story, command) as tell:
         for chapter in story:
             code = tell(chapter)
             if code:

@@ -3,6 +3,7 @@
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TextIO
 
@@ -18,9 +19,13 @@ _WIDTH = 100
 """Columns of the log."""
 
 
+Command = Callable[[list[str]], int | None]
+"""Carries out a command by its words, as the command line does; returns its exit code."""
+
+
 @contextmanager
 def display(
-    console: Console, log: Path, story: Sequence[Chapter]
+    console: Console, log: Path, story: Sequence[Chapter], command: Command
 ) -> Iterator[Callable[[Chapter], int]]:
     """Yield a function that carries a chapter out and returns its exit code.
 
@@ -32,6 +37,8 @@ def display(
         Takes every command and what it prints.
     story : sequence of Chapter
         What is to come.
+    command : callable
+        Carries a chapter's words out.
 
     Raises
     ------
@@ -43,17 +50,35 @@ def display(
     except OSError as error:
         raise FileAccessError(f"cannot write {log}: {error.strerror or error}") from error
     with file:
+        stage = _Stage(file, command)
         if console.is_terminal:
-            with _Bars(console, story) as bars:
-                yield lambda chapter: bars.show(chapter, file)
+            with _Bars(console, story, stage) as bars:
+                yield bars.show
         else:
-            yield lambda chapter: _line(console, story, chapter, file)
+            yield lambda chapter: _line(console, story, chapter, stage)
+
+
+@dataclass(frozen=True)
+class _Stage:
+    """Where commands are carried out: what they print goes into the log."""
+
+    log: TextIO
+    command: Command
+
+    def carry_out(self, chapter: Chapter, report: Callable[[str, int, int], None]) -> int:
+        self.log.write(f"$ {chapter.line}\n")
+        with printing_to(Overheard(report, file=self.log, width=_WIDTH)):
+            code = self.command(list(chapter.words))
+        self.log.write("\n")
+        self.log.flush()
+        return int(code or 0)
 
 
 class _Bars:
     """A bar a chapter; the one at work moves with what its command reports."""
 
-    def __init__(self, console: Console, story: Sequence[Chapter]) -> None:
+    def __init__(self, console: Console, story: Sequence[Chapter], stage: _Stage) -> None:
+        self._stage = stage
         self._progress = Progress(
             TextColumn("{task.description}"),
             BarColumn(bar_width=24),
@@ -73,7 +98,7 @@ class _Bars:
     def __exit__(self, *_: object) -> None:
         self._progress.stop()
 
-    def show(self, chapter: Chapter, log: TextIO) -> int:
+    def show(self, chapter: Chapter) -> int:
         task = self._tasks[chapter.title]
         self._progress.start_task(task)
         self._progress.update(task, total=None, stage=chapter.words[0])
@@ -81,31 +106,18 @@ class _Bars:
         def report(stage: str, done: int, total: int) -> None:
             self._progress.update(task, completed=done, total=total, stage=stage)
 
-        code = _carry_out(chapter, log, report)
+        code = self._stage.carry_out(chapter, report)
         mark = "" if code == 0 else "not done"
         self._progress.update(task, completed=1.0, total=1.0, stage=mark)
         self._progress.stop_task(task)
         return code
 
 
-def _line(console: Console, story: Sequence[Chapter], chapter: Chapter, log: TextIO) -> int:
+def _line(console: Console, story: Sequence[Chapter], chapter: Chapter, stage: _Stage) -> int:
     number = list(story).index(chapter) + 1
     head = f"{number} of {len(story)}  {chapter.title}: {chapter.line}"
     console.print(head, soft_wrap=True, markup=False)
     began = time.monotonic()
-    code = _carry_out(chapter, log, lambda _stage, _done, _total: None)
+    code = stage.carry_out(chapter, lambda _stage, _done, _total: None)
     console.print(f"    {time.monotonic() - began:.1f} s", markup=False)
     return code
-
-
-def _carry_out(chapter: Chapter, log: TextIO, report: Callable[[str, int, int], None]) -> int:
-    """Run a command as the command line would, and return its exit code."""
-    from elastocal.cli.main import app  # which knows this command, too
-
-    log.write(f"$ {chapter.line}\n")
-    listener = Overheard(report, file=log, width=_WIDTH)
-    with printing_to(listener):
-        code = app(list(chapter.words), standalone_mode=False)
-    log.write("\n")
-    log.flush()
-    return int(code or 0)

@@ -11,7 +11,6 @@
 
 import csv
 import io
-import json
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -20,7 +19,7 @@ from elastocal.compensation.process.deviations import DEVIATIONS, read_traces, w
 from elastocal.compensation.process.record import SCHEMA, Line, ProcessRecord, Table, Values
 from elastocal.compensation.process.table import Figures, compare
 from elastocal.errors import CompensationError
-from elastocal.files import write_text
+from elastocal.files import write_json, write_text
 from elastocal.schema import read_json
 
 TABLE = "table.json"
@@ -54,8 +53,7 @@ def write_process(folder: Path, record: ProcessRecord) -> None:
     if record.table.budget:
         write_text(folder / "budget.csv", _lines(record.table.budget))
     write_traces(folder / DEVIATIONS, record.traces)
-    told = json.dumps(process_figures(record.table), indent=1, allow_nan=False)
-    write_text(folder / TABLE, told + "\n")
+    write_json(folder / TABLE, process_figures(record.table))
 
 
 def read_table(path: Path) -> Table:
