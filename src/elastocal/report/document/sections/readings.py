@@ -172,7 +172,8 @@ def _of_run(parts: Parts) -> Iterator[Finding]:
             yield Finding(
                 f"the run is partial: {len(missing)} of"
                 f" {counted(len(parts.plan.poses), 'planned pose')}"
-                f" {'has' if len(missing) == 1 else 'have'} no usable reading (pose {spans(missing)})",
+                f" {'has' if len(missing) == 1 else 'have'} no usable reading"
+                f" (pose {spans(missing)})",
                 advice="Finish the run: `elastocal run --resume` measures the missing poses.",
             )
 
