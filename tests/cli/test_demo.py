@@ -91,11 +91,39 @@ def test_a_folder_with_somebody_elses_readme_is_never_emptied(tmp_path):
 
 def test_an_earlier_demo_is_removed_only_when_told(tmp_path):
     begin(tmp_path / "demo", "afp", force=False)
-    (tmp_path / "demo" / "old.txt").write_text("")
+    (tmp_path / "demo" / "codec").mkdir()
+    (tmp_path / "demo" / "codec" / "old.txt").write_text("")
     with pytest.raises(FileAccessError, match="holds a demo already"):
         begin(tmp_path / "demo", "afp", force=False)
     begin(tmp_path / "demo", "afp", force=True)
     assert [path.name for path in (tmp_path / "demo").iterdir()] == [README]
+
+
+def test_what_somebody_put_into_a_demo_is_never_removed(tmp_path):
+    begin(tmp_path, "afp", force=False)
+    (tmp_path / "thesis.tex").write_text("years of work")
+    with pytest.raises(FileAccessError, match=r"thesis\.tex"):
+        begin(tmp_path, "afp", force=True)
+    assert (tmp_path / "thesis.tex").read_text() == "years of work"
+
+
+def test_an_empty_folder_and_a_link_to_one_are_taken(tmp_path):
+    (tmp_path / "real").mkdir()
+    (tmp_path / "link").symlink_to("real")
+    for force in (False, True):
+        begin(tmp_path / "link", "afp", force)
+    assert (tmp_path / "link").is_symlink()
+    assert [path.name for path in (tmp_path / "real").iterdir()] == [README]
+
+
+def test_a_link_in_a_demo_is_removed_without_what_it_leads_to(tmp_path):
+    (tmp_path / "mine").mkdir()
+    (tmp_path / "mine" / "thesis.tex").write_text("years of work")
+    begin(tmp_path / "demo", "afp", force=False)
+    (tmp_path / "demo" / "codec").symlink_to(tmp_path / "mine")
+    begin(tmp_path / "demo", "afp", force=True)
+    assert not (tmp_path / "demo" / "codec").exists()
+    assert (tmp_path / "mine" / "thesis.tex").exists()
 
 
 def test_a_file_in_the_place_of_the_folder_is_refused(tmp_path):

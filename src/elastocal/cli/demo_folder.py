@@ -11,7 +11,7 @@ from elastocal.files import write_text
 
 LOG = "log.txt"
 README = "README.md"
-_FIRST = "# A demo of elastocal"
+_FIRST = "# A demo of elastocal:"
 """How a README begins that tells an earlier demo from somebody's own folder."""
 
 _FILES = (
@@ -36,16 +36,16 @@ def begin(out: Path, kind: str, force: bool) -> None:
     Raises
     ------
     FileAccessError
-        If it holds files, unless they are those of a demo and ``force`` is given.
+        If it holds files, unless all are those of a demo and ``force`` is given.
     """
     try:
         holds = sorted(entry.name for entry in out.iterdir()) if out.exists() else []
         if holds:
             _refuse_foreign(out, holds, force)
-            shutil.rmtree(out)
-        out.mkdir(parents=True)
+            _empty(out)
+        out.mkdir(parents=True, exist_ok=True)
         # Written first: a demo that is interrupted can be removed like a finished one.
-        write_text(out / README, f"{_FIRST}: {kind}\n\nNot finished.\n")
+        write_text(out / README, f"{_FIRST} {kind}\n\nNot finished.\n")
     except OSError as error:
         if isinstance(error, FileAccessError):
             raise
@@ -64,7 +64,7 @@ def finish(out: Path, kind: str, seed: int, story: Sequence[Chapter]) -> None:
     commands = "".join(f"{chapter.line}\n" for chapter in story)
     write_text(
         out / README,
-        f"{_FIRST}: {kind}\n\n"
+        f"{_FIRST} {kind}\n\n"
         f"Made by elastocal {__version__} on a simulated cell, seed {seed}. Every measurement in"
         " it was simulated, with a truth that the model cannot express; nothing was measured on a"
         " robot.\n\n"
@@ -76,7 +76,22 @@ def finish(out: Path, kind: str, seed: int, story: Sequence[Chapter]) -> None:
 def _refuse_foreign(out: Path, holds: list[str], force: bool) -> None:
     readme = out / README
     ours = readme.is_file() and readme.read_text("utf-8", "replace").startswith(_FIRST)
-    if not ours:
-        raise FileAccessError(f"{out} holds files that are no demo's ({holds[0]}): name another")
+    known = {name.partition("/")[0] for name, _ in _FILES} | {README}
+    foreign = [name for name in holds if name not in known and not name.endswith(".stl")]
+    if foreign or not ours:
+        first = (foreign or holds)[0]
+        raise FileAccessError(f"{out} holds files that are no demo's ({first}): name another")
     if not force:
         raise FileAccessError(f"{out} holds a demo already: name another, or give --force")
+
+
+def _empty(out: Path) -> None:
+    """Remove what a folder holds, the README last: what is left then is known as a demo's.
+
+    The folder itself stays: it may be a link, or the one that somebody stands in.
+    """
+    for entry in sorted(out.iterdir(), key=lambda each: each.name == README):
+        if entry.is_dir() and not entry.is_symlink():
+            shutil.rmtree(entry)
+        else:
+            entry.unlink()

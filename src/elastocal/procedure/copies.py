@@ -29,11 +29,31 @@ def read_copies(folder: RunFolder, record: RunRecord) -> tuple[Cell, PlanFile]:
     FileAccessError
         If a file cannot be read.
     """
-    plan = folder.plan / PLAN
-    _refuse_changed(plan, sha256(read_text(plan)), record.plan)
+    check_plan(folder, record)
     cell = load_cell(folder.cell / record.cell_file)
     _refuse_changed(folder.cell, fingerprint(cell), record.cell)
-    return cell, read_plan(plan)
+    return cell, read_plan(folder.plan / PLAN)
+
+
+def check_plan(folder: RunFolder, record: RunRecord) -> None:
+    """Refuse a plan that is not the one that the run was made with.
+
+    Parameters
+    ----------
+    folder : RunFolder
+        Folder of the run.
+    record : RunRecord
+        First entry of its journal.
+
+    Raises
+    ------
+    SchemaError
+        If it was changed since the run began.
+    FileAccessError
+        If it cannot be read.
+    """
+    plan = folder.plan / PLAN
+    _refuse_changed(plan, sha256(read_text(plan)), record.plan)
 
 
 def check_stream(path: Path, known: str | None) -> None:

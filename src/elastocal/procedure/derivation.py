@@ -188,7 +188,4 @@ def _reasons(rows: Sequence[LoadRow], registration: Registration) -> str:
 
 
 def _provenance(folder: RunFolder, record: RunRecord) -> str:
-    return (
-        f"elastocal run {folder.path.resolve().name}, started {record.started} with elastocal"
-        f" {record.elastocal}, plan {record.plan[:12]}, cell {record.cell[:12]}, seed {record.seed}"
-    )
+    return f"elastocal run {folder.path.resolve().name}, {record.origin}"

@@ -62,6 +62,14 @@ class RunRecord(StrictModel):
     started: str
     """Date and time of day, ISO 8601, UTC."""
 
+    @property
+    def origin(self) -> str:
+        """What a dataset says of the run that it comes from."""
+        return (
+            f"started {self.started} with elastocal {self.elastocal}, plan {self.plan[:12]}, cell"
+            f" {self.cell[:12]}, seed {self.seed}"
+        )
+
     @model_serializer(mode="wrap")
     def _schema_first(self, rest: SerializerFunctionWrapHandler) -> dict[str, Any]:
         # An entry leaves out what is at its default; the schema must be there all the same.

@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from elastocal import dataset
 from elastocal.codec import read_codec, write_codec
 from elastocal.elastic import ElasticModel, layout
 from elastocal.errors import IdentificationError
@@ -83,3 +84,84 @@ def test_a_cell_file_that_was_changed_after_the_plan_is_doubted(copied):
     path = folder / "run" / "cell" / "cell.yaml"
     path.write_text(path.read_text().replace('disk_radius: "25 mm"', 'disk_radius: "24 mm"'))
     assert any("fingerprint" in doubt for doubt in gather(Options(folder), MADE).doubts)
+
+
+def doubts(folder):
+    return " | ".join(gather(Options(folder), MADE).doubts)
+
+
+def edited(path, change):
+    """Change a JSON file in place."""
+    record = json.loads(path.read_text())
+    change(record)
+    path.write_text(json.dumps(record))
+
+
+def test_parts_of_one_run_raise_no_doubt(finished):
+    assert gather(Options(finished), MADE).doubts == ()
+
+
+def test_a_dataset_of_another_run_is_doubted(copied):
+    folder = copied("run")
+    path = folder / "run" / "dataset.nc"
+    data = dataset.read(path).data.copy()
+    data.attrs["provenance"] = data.attrs["provenance"].replace("seed 0", "seed 2")
+    dataset.write(dataset.Dataset(data), path)
+    assert "the dataset does not say that it is of the run" in doubts(folder)
+
+
+def test_readings_that_were_struck_out_after_the_run_are_doubted(copied):
+    folder = copied("run")
+    path = folder / "run" / "dataset.nc"
+    data = dataset.read(path).data.copy(deep=True)
+    data["status"].values[0] = 1
+    usable = int((data["status"].values == 0).sum())
+    dataset.write(dataset.Dataset(data), path)
+    assert f"the dataset has {usable} usable readings, the summary" in doubts(folder)
+
+
+def test_a_journal_that_was_cut_is_doubted(copied):
+    folder = copied("run")
+    path = folder / "run" / "journal.jsonl"
+    lines = path.read_text().splitlines(keepends=True)
+    path.write_text("".join(lines[: len(lines) // 2]))
+    assert "of which the journal tells no measurement" in doubts(folder)
+
+
+def test_a_summary_of_another_run_is_doubted(copied):
+    folder = copied("run")
+    edited(
+        folder / "run" / "summary.json",
+        lambda record: record["times"].update(started="2020-01-01T00:00:00+00:00"),
+    )
+    assert "the summary is of a run that began at another time" in doubts(folder)
+
+
+def test_a_codec_of_another_run_is_doubted(copied):
+    folder = copied("run", "codec")
+    data = read_codec(folder / "codec")
+    write_codec(folder / "codec", replace(data, provenance=data.provenance + "0"))
+    assert "a codec does not say" not in doubts(folder)
+    write_codec(folder / "codec", replace(data, provenance="another/dataset.nc"))
+    assert "a codec does not say" in doubts(folder)
+
+
+@pytest.mark.parametrize(
+    ("change", "told"),
+    [({"tool_sha256": "0" * 64}, "another tool file"), ({"seed": 7}, "seed 7")],
+)
+def test_a_process_with_another_tool_or_on_another_cell_is_doubted(copied, change, told):
+    folder = copied()
+    edited(folder / "process" / "table.json", lambda record: record["runs"][0].update(**change))
+    if "seed" in change:
+        path = folder / "process" / "deviations.csv"
+        head, *rows = path.read_text().splitlines()
+        path.write_text("\n".join([head, *("7" + row[1:] for row in rows)]) + "\n")
+    assert told in doubts(folder)
+
+
+def test_a_plan_that_was_changed_since_the_run_began_is_no_part_of_it(copied):
+    folder = copied("run")
+    path = folder / "run" / "plan" / "plan.json"
+    path.write_text(path.read_text() + "\n")
+    assert "plan.json" in absent(gather(Options(folder), MADE))["plan"]

@@ -7,6 +7,8 @@ from itertools import pairwise
 
 import pytest
 
+from elastocal import dataset
+from elastocal.codec import read_codec, write_codec
 from elastocal.errors import FileAccessError
 from elastocal.report.document import Absence, Options, Parts, gather, write_report
 from elastocal.report.document.sections import SECTIONS
@@ -94,6 +96,11 @@ def test_equal_runs_give_equal_reports_but_for_times(text, copied, tmp_path):
         found = path.read_text()
         assert STAMP.search(found)
         path.write_text(STAMP.sub(LATER, found))
+    data = dataset.read(folder / "run" / "dataset.nc").data.copy()
+    data.attrs["provenance"] = STAMP.sub(LATER, data.attrs["provenance"])
+    dataset.write(dataset.Dataset(data), folder / "run" / "dataset.nc")
+    codec = read_codec(folder / "codec")
+    write_codec(folder / "codec", replace(codec, provenance=STAMP.sub(LATER, codec.provenance)))
     again = write_report(tmp_path / "b.html", gather(Options(folder), LATER))
     other = again.path.read_text(encoding="utf-8")
     assert other != text

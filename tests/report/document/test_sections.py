@@ -98,7 +98,22 @@ def test_a_partial_run_holds_back_and_names_the_poses(parts):
     some = replace(parts, dataset=parts.dataset.select(poses=parts.dataset.poses[2:]))
     (told, *_) = findings(readings, some)
     total = len(parts.plan.poses)
-    assert told == f"the run is partial: 2 of {total} planned poses have no reading (pose 0, 1)"
+    assert (
+        told == f"the run is partial: 2 of {total} planned poses have no usable reading (pose 0, 1)"
+    )
+
+
+def test_a_pose_without_a_usable_reading_counts_as_missing(parts):
+    data = parts.dataset.data.copy(deep=True)
+    data["status"].values[0] = 1
+    (told, *_) = findings(readings, replace(parts, dataset=type(parts.dataset)(data)))
+    assert told.startswith("the run is partial: 1 of")
+
+
+def test_readings_that_were_left_out_by_hand_hold_back_by_name(parts):
+    settings = {**parts.calibrated.figures["settings"], "exclude": ["2", "3:north"]}
+    (told, *_) = findings(readings, with_figures(parts, settings=settings, suspicious=[]))
+    assert told.startswith("2, 3:north (pose, or pose:load case) was left out by hand")
 
 
 def test_registration_tool_and_noise_are_those_of_the_summary(parts):

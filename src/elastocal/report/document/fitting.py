@@ -12,6 +12,7 @@ from elastocal.compensation.process.record import ProcessRecord
 from elastocal.dataset import Dataset
 from elastocal.errors import CodecError, CompensationError, IdentificationError
 from elastocal.identification import CalibratedModel
+from elastocal.report.document.origins import origin_doubts
 from elastocal.report.document.parts import Parts
 from elastocal.robot.urdf import parse_urdf
 
@@ -104,10 +105,7 @@ def _doubts(parts: Parts) -> Iterator[str]:
             "the calibration made again from the dataset does not give the figures of the model"
             " file: the model is of other data or other settings"
         )
-    if parts.process is not None and parts.calibrated is not None:
-        used = {run.model_sha256 for run in parts.process.table.runs}
-        if parts.calibrated.sha256 not in used:
-            yield "the process was run with another model than the one of this report"
+    yield from origin_doubts(parts)
     if plan is not None and dataset is not None:
         planned = {pose.id for pose in plan.poses}
         foreign = sorted(set(dataset.poses) - planned)

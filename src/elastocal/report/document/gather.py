@@ -127,9 +127,12 @@ def _with_rest(parts: Parts, search: Search, options: Options) -> Parts:
         folder = path.parent if path.name == TABLE else path
         return check_process(read_process(folder), parts, folder / TABLE)
 
+    place = options.tool or search.places.default(TOOL)
+    found = search.find("tool file", options.tool, TOOL, tool, "`elastocal tool` makes one")
     return replace(
         parts,
-        tool=search.find("tool file", options.tool, TOOL, tool, "`elastocal tool` makes one"),
+        tool=found,
+        tool_sha256=file_sha256(place) if found is not None and place is not None else None,
         codecs=_codecs(parts, search, options.codec),
         process=search.find(
             "process", options.process, PROCESS, process,

@@ -94,6 +94,8 @@ class Parts:
     again: Again | None = None
     """The calibration made once more from the dataset."""
     tool: ToolRecord | None = None
+    tool_sha256: str | None = None
+    """Of the tool file."""
     codecs: tuple[Codec, ...] = ()
     """One a comparison."""
     process: ProcessRecord | None = None

@@ -10,6 +10,7 @@ from elastocal.files import read_text
 from elastocal.planning.plan_file import PLAN, POOL, PlanFile, read_plan
 from elastocal.planning.pool_file import PoolData, check_pool_of, read_pool
 from elastocal.planning.tooling import cell_surface
+from elastocal.procedure.copies import check_plan
 from elastocal.procedure.entries import Entry
 from elastocal.procedure.journal import read_journal
 from elastocal.procedure.run_folder import RunFolder
@@ -42,7 +43,7 @@ def with_run(parts: Parts, search: Search) -> Parts:
     if cell is not None:
         surface = search.read("surface", cell.path, lambda: cell_surface(cell), named=False)
         parts = replace(parts, surface=surface, cell_text=read_text(cell.path))
-    parts = _with_plan(parts, search, run)
+    parts = _with_plan(parts, search, run, journal)
     summary = _derived(
         search,
         "summary of the run",
@@ -61,11 +62,15 @@ def _cell(search: Search, run: RunFolder, journal: tuple[Entry, ...] | None) -> 
     return search.read("cell", path, lambda: load_cell(path), named=False)
 
 
-def _with_plan(parts: Parts, search: Search, run: RunFolder) -> Parts:
-    cell = parts.cell
+def _with_plan(
+    parts: Parts, search: Search, run: RunFolder, journal: tuple[Entry, ...] | None
+) -> Parts:
+    cell, record = parts.cell, journal[0].run if journal else None
 
     def plan_of_cell() -> PlanFile:
         plan = read_plan(run.plan)
+        if record is not None:
+            check_plan(run, record)
         if cell is not None:
             check_robot(plan, cell)
         return plan

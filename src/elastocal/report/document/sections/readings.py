@@ -166,12 +166,14 @@ def _worst(parts: Parts) -> str:
 
 def _of_run(parts: Parts) -> Iterator[Finding]:
     if parts.plan is not None and parts.dataset is not None:
-        missing = sorted({pose.id for pose in parts.plan.poses} - set(parts.dataset.poses))
+        usable = parts.dataset.readings(parts.dataset.joint_names).pose
+        missing = sorted({pose.id for pose in parts.plan.poses} - set(map(int, usable)))
         if missing:
             yield Finding(
                 f"the run is partial: {len(missing)} of"
                 f" {counted(len(parts.plan.poses), 'planned pose')}"
-                f" {'has' if len(missing) == 1 else 'have'} no reading (pose {spans(missing)})",
+                f" {'has' if len(missing) == 1 else 'have'} no usable reading"
+                f" (pose {spans(missing)})",
                 advice="Finish the run: `elastocal run --resume` measures the missing poses.",
             )
 
@@ -192,6 +194,13 @@ def _of_readings(parts: Parts) -> Iterator[Finding]:
                 advice=f"Look at {name}, and leave it out with `--exclude"
                 f" {each['pose']}:{each['load_case']}` if it is wrong.",
             )
+    excluded = (figures.get("settings") or {}).get("exclude", ())
+    if excluded:
+        yield Finding(
+            f"{', '.join(map(str, excluded))} (pose, or pose:load case) was left out by hand: no"
+            " figure of this report speaks of it",
+            advice="Measure again what was left out, so that nothing has to be.",
+        )
     for warning in figures.get("warnings", []):
         yield Finding(f"calibration: {warning}")
 
