@@ -5,7 +5,6 @@ import re
 import shutil
 import subprocess
 from dataclasses import replace
-from html.parser import HTMLParser
 
 import numpy as np
 import plotly.graph_objects as go
@@ -16,25 +15,7 @@ from elastocal.report.codec_figures import write_codec_figures
 from elastocal.report.codec_page import write_codec_page
 from elastocal.report.printed import write_figure
 from support.codecs import judged, renamed, without_errors
-
-
-class Page(HTMLParser):
-    """Collects what the tests ask of the page."""
-
-    def __init__(self, text):
-        super().__init__()
-        self.tags, self.data, self._into = [], "", None
-        self.feed(text)
-
-    def handle_starttag(self, tag, attributes):
-        found = dict(attributes)
-        self.tags.append((tag, found))
-        self._into = found.get("id")
-
-    def handle_data(self, data):
-        if self._into == "data":
-            self.data += data
-            self._into = None
+from support.pages import Page
 
 
 @pytest.fixture(scope="module")

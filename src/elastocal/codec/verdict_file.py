@@ -139,7 +139,7 @@ def verdict_record(
 
 def figures(record: VerdictRecord) -> dict[str, Any]:
     """Return a record as JSON-ready data, with its schema."""
-    return {"schema": SCHEMA, **record.model_dump(mode="json")}
+    return record.stated(SCHEMA)
 
 
 def write_verdicts(folder: Path, record: VerdictRecord) -> Path:

@@ -115,7 +115,7 @@ def write_model(path: Path, calibrated: CalibratedModel, calibration: dict[str, 
         misfit=calibrated.misfit if np.isfinite(calibrated.misfit) else None,
         calibration=calibration,
     )
-    data = {"schema": SCHEMA, **record.model_dump(mode="json")}
+    data = record.stated(SCHEMA)
     write_json(path, data)
 
 

@@ -107,7 +107,7 @@ def write_study(
         for spring, value in zip(springs[number], outcome.compliance.tolist(), strict=True)
     )
     write_text(folder / COMPLIANCES, _csv(header, table))
-    contents = {"schema": SCHEMA, **record.model_dump(mode="json")}
+    contents = record.stated(SCHEMA)
     write_json(folder / RECORD, contents)
     return [TABLE, COMPLIANCES, RECORD]
 

@@ -154,7 +154,7 @@ def _digest(settings: StudySettings, samples: Sequence[SampleRecord]) -> str:
 
 
 def _text(schema: str, model: StrictModel) -> str:
-    return json.dumps({"schema": schema, **model.model_dump(mode="json")}, allow_nan=False) + "\n"
+    return json.dumps(model.stated(schema), allow_nan=False) + "\n"
 
 
 def _record(result: SampleResult) -> SampleRecord:

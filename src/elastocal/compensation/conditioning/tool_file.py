@@ -97,7 +97,7 @@ def tool_record(fit: ToolFit, mount: SensorMount, source: str) -> ToolRecord:
 
 def write_tool(path: Path, record: ToolRecord) -> None:
     """Write a tool file atomically."""
-    data = {"schema": SCHEMA, **record.model_dump(mode="json")}
+    data = record.stated(SCHEMA)
     write_json(path, data)
 
 

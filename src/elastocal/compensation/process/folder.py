@@ -30,7 +30,7 @@ _ALIKE = 1e-8
 
 def process_figures(table: Table) -> dict[str, Any]:
     """Return a table as JSON-ready data, with its schema."""
-    return {"schema": SCHEMA, **table.model_dump(mode="json")}
+    return table.stated(SCHEMA)
 
 
 def write_process(folder: Path, record: ProcessRecord) -> None:

@@ -1,0 +1,29 @@
+"""Pages as tests ask them."""
+
+from html.parser import HTMLParser
+
+
+class Page(HTMLParser):
+    """Collects what the tests ask of the page."""
+
+    def __init__(self, text):
+        super().__init__()
+        self.tags, self.data, self._into = [], "", None
+        self.feed(text)
+
+    def handle_starttag(self, tag, attributes):
+        found = dict(attributes)
+        self.tags.append((tag, found))
+        self._into = found.get("id")
+
+    def handle_data(self, data):
+        if self._into == "data":
+            self.data += data
+            self._into = None
+
+    def one(self, **wanted):
+        (found,) = [a for _, a in self.tags if wanted.items() <= a.items()]
+        return found
+
+    def count(self, tag):
+        return sum(name == tag for name, _ in self.tags)
