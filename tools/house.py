@@ -1,0 +1,283 @@
+"""Measure the house: how many files, how long, how connected, and what goes round a face.
+
+Usage: ``python tools/house.py [SRC]``; ``make house`` runs it on ``src``. The figures follow the
+table "Measures of the good houses" that the project holds itself to:
+
+* code lines: neither blank, nor comment, nor docstring;
+* an importer is another module that imports a name of this one, directly or through the face of a
+  package (a face itself is not one);
+* a face is the ``__init__`` of a package: a module goes round it when it imports from a module of
+  a package that it does not live in.
+"""
+
+import ast
+import statistics
+import sys
+import tokenize
+from collections import defaultdict
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+
+SHORT = 60
+"""A file with fewer lines than this needs a reason."""
+LONG = 400
+"""A file with more lines than this, too."""
+LONG_FUNCTION = 50
+"""Most lines of code of a function."""
+
+
+@dataclass(frozen=True)
+class Module:
+    """A file of Python."""
+
+    name: str
+    path: Path
+    is_face: bool
+
+    @cached_property
+    def text(self) -> str:
+        """The file's text."""
+        return self.path.read_text("utf-8")
+
+    @cached_property
+    def tree(self) -> ast.Module:
+        """The file's syntax."""
+        return ast.parse(self.text)
+
+    @property
+    def package(self) -> str:
+        """The package that the module lives in; a face lives in its own."""
+        return self.name if self.is_face else self.name.rpartition(".")[0]
+
+    @cached_property
+    def lines(self) -> int:
+        """Lines in the file."""
+        return self.text.count("\n")
+
+    @cached_property
+    def code(self) -> frozenset[int]:
+        """Numbers of the lines of code."""
+        return code_lines(self.path, self.tree)
+
+    def imports(self, faces: dict[str, dict[str, str]]) -> Iterator[tuple[str, str]]:
+        """Yield what is imported: the module that is named, and the one that it leads to."""
+        for node in ast.walk(self.tree):
+            if isinstance(node, ast.Import):
+                for alias in node.names:
+                    yield alias.name, alias.name
+            elif isinstance(node, ast.ImportFrom):
+                named = _absolute(node, self.package)
+                for alias in node.names:
+                    yield named, faces.get(named, {}).get(alias.name, f"{named}.{alias.name}")
+
+
+@dataclass
+class House:
+    """What was measured."""
+
+    modules: dict[str, Module]
+    importers: dict[str, set[str]] = field(default_factory=lambda: defaultdict(set))
+    bypasses: list[str] = field(default_factory=list)
+
+
+def code_lines(path: Path, tree: ast.Module) -> frozenset[int]:
+    """Return the numbers of the lines that hold code: no blank, no comment, no docstring."""
+    held: set[int] = set()
+    with path.open("rb") as file:
+        for token in tokenize.tokenize(file.readline):
+            if token.type not in _NO_CODE:
+                held.update(range(token.start[0], token.end[0] + 1))
+    for node in ast.walk(tree):
+        body = getattr(node, "body", ())
+        for inner in body if isinstance(body, list) else ():
+            value = getattr(inner, "value", None)
+            if isinstance(inner, ast.Expr) and isinstance(value, ast.Constant):
+                held.difference_update(range(inner.lineno, (inner.end_lineno or 0) + 1))
+    return frozenset(held)
+
+
+_NO_CODE = {
+    tokenize.COMMENT,
+    tokenize.NL,
+    tokenize.NEWLINE,
+    tokenize.INDENT,
+    tokenize.DEDENT,
+    tokenize.ENCODING,
+    tokenize.ENDMARKER,
+}
+
+
+def _absolute(node: ast.ImportFrom, package: str) -> str:
+    """Return the module that a statement imports from, also where it is written relatively."""
+    if not node.level:
+        return node.module or ""
+    parts = package.split(".")
+    parts = parts[: len(parts) - node.level + 1]
+    return ".".join([*parts, node.module] if node.module else parts)
+
+
+def find_modules(source: Path) -> dict[str, Module]:
+    """Return the modules below a folder by their full names."""
+    found = {}
+    for path in sorted(source.rglob("*.py")):
+        parts = path.relative_to(source).with_suffix("").parts
+        is_face = parts[-1] == "__init__"
+        name = ".".join(parts[:-1] if is_face else parts)
+        found[name] = Module(name, path, is_face)
+    return found
+
+
+def find_faces(modules: dict[str, Module]) -> dict[str, dict[str, str]]:
+    """Return, for each package, the module that each name of its face comes from."""
+    faces: dict[str, dict[str, str]] = {}
+    for module in modules.values():
+        if not module.is_face:
+            continue
+        stub = module.path.with_suffix(".pyi")
+        tree = ast.parse(stub.read_text("utf-8")) if stub.is_file() else module.tree
+        names = faces.setdefault(module.name, {})
+        for node in tree.body:
+            if isinstance(node, ast.ImportFrom):
+                named = _absolute(node, module.name)
+                for alias in node.names:
+                    full = f"{named}.{alias.name}"
+                    names[alias.asname or alias.name] = full if full in modules else named
+    return _followed(faces)
+
+
+def _followed(faces: dict[str, dict[str, str]]) -> dict[str, dict[str, str]]:
+    """Return faces in which a name that comes from another face leads on to its module."""
+    for names in faces.values():
+        for name, source in names.items():
+            seen = set()
+            while name in faces.get(source, {}) and source not in seen:
+                seen.add(source)
+                source = faces[source][name]  # noqa: PLW2901 - the chain is followed to its end
+            names[name] = source
+    return faces
+
+
+def measure(source: Path) -> House:
+    """Return the modules below a folder, who imports each, and what goes round a face."""
+    house = House(find_modules(source))
+    faces = find_faces(house.modules)
+    for module in house.modules.values():
+        for named, leads in module.imports(faces):
+            target = leads if leads in house.modules else leads.rpartition(".")[0]
+            if target not in house.modules:
+                continue
+            if not module.is_face and target != module.name:
+                house.importers[target].add(module.name)
+            if _goes_round(module, house.modules, named, leads):
+                house.bypasses.append(f"{module.name}: {named}")
+    return house
+
+
+def _goes_round(module: Module, modules: dict[str, Module], named: str, leads: str) -> bool:
+    """Return whether an import names a module inside a package that the importer is not in."""
+    if leads in modules and leads.rpartition(".")[0] == named:
+        named = leads
+    if named not in modules or modules[named].is_face:
+        return False
+    home = modules[named].package
+    top = named.split(".")[0]
+    return home != top and not f"{module.name}.".startswith(f"{home}.")
+
+
+def functions(module: Module) -> Iterator[tuple[str, int]]:
+    """Yield each function with its lines of code, signature and docstring not among them."""
+    for node in ast.walk(module.tree):
+        if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
+            first = node.body[0].lineno
+            lines = range(first, (node.end_lineno or first) + 1)
+            yield f"{module.name}.{node.name}", sum(line in module.code for line in lines)
+
+
+def public_names(module: Module) -> Iterator[str]:
+    """Yield the public names that a module defines at its top level."""
+    if any(part.startswith("_") for part in module.name.split(".")):
+        return
+    for node in module.tree.body:
+        names: list[str] = []
+        if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef):
+            names = [node.name]
+        elif isinstance(node, ast.Assign):
+            names = [each.id for each in node.targets if isinstance(each, ast.Name)]
+        elif isinstance(node, ast.AnnAssign) and isinstance(node.target, ast.Name):
+            names = [node.target.id]
+        yield from (name for name in names if not name.startswith("_"))
+
+
+def _is_dict_of_any(node: ast.AST) -> bool:
+    return isinstance(node, ast.Subscript) and ast.unparse(node) == "dict[str, Any]"
+
+
+def main() -> None:
+    """Print the figures, and by name what stands out."""
+    words = [word for word in sys.argv[1:] if not word.startswith("-")]
+    house = measure(Path(words[0] if words else "src"))
+    modules = list(house.modules.values())
+    rooms = [module for module in modules if not module.is_face]
+    sizes = [module.lines for module in rooms]
+    every = [found for module in modules for found in functions(module)]
+    lengths = [length for _, length in every]
+    single = sorted(
+        f"{module.name} <- {next(iter(house.importers[module.name]))}"
+        for module in rooms
+        if len(house.importers[module.name]) == 1
+    )
+    faces = find_faces(house.modules)
+    exported = {(source, name) for names in faces.values() for name, source in names.items()}
+    public = [(module.name, name) for module in rooms for name in public_names(module)]
+    hidden = sorted(f"{module}.{name}" for module, name in public if (module, name) not in exported)
+    loose = [
+        f"{module.path}:{node.lineno}"
+        for module in modules
+        for node in ast.walk(module.tree)
+        if _is_dict_of_any(node)
+    ]
+    long_functions = [f"{name} ({length})" for name, length in every if length > LONG_FUNCTION]
+    long_files = [f"{module.path} ({module.lines})" for module in rooms if module.lines > LONG]
+    comments = sum(
+        line.lstrip().startswith("#") for module in modules for line in module.text.splitlines()
+    )
+    classes = sum(isinstance(n, ast.ClassDef) for m in modules for n in ast.walk(m.tree))
+    rows: list[tuple[str, object]] = [
+        ("files", len(modules)),
+        ("of them faces", len(modules) - len(rooms)),
+        ("lines of code", sum(len(module.code) for module in modules)),
+        ("lines of a file, median (faces aside)", statistics.median(sizes)),
+        (f"files under {SHORT} lines (faces aside)", sum(size < SHORT for size in sizes)),
+        (f"files over {LONG} lines", len(long_files)),
+        ("classes", classes),
+        ("public names at top level", len(public)),
+        ("of them not exported by a face", len(hidden)),
+        ("modules with exactly one importer", len(single)),
+        ("imports that go round a face", len(house.bypasses)),
+        ("dict[str, Any]", len(loose)),
+        ("lines of code of a function, median", statistics.median(lengths)),
+        (f"functions over {LONG_FUNCTION} lines of code", len(long_functions)),
+        ("comment lines", comments),
+    ]
+    for name, figure in rows:
+        print(f"{name:45} {figure}")
+    if "--names" in sys.argv:
+        for title, names in (
+            ("one importer", single),
+            ("round a face", sorted(set(house.bypasses))),
+            ("public, not exported", hidden),
+            ("dict[str, Any]", loose),
+            ("long functions", long_functions),
+            ("long files", long_files),
+            (
+                f"under {SHORT} lines",
+                [f"{m.path} ({m.lines})" for m in rooms if m.lines < SHORT],
+            ),
+        ):
+            print(f"\n{title}:", *names, sep="\n  ")
+
+
+if __name__ == "__main__":
+    main()
