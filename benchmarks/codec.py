@@ -17,8 +17,7 @@ from elastocal.codec import CodecData, Variant, cross_validate
 from elastocal.dataset import Readings
 from elastocal.elastic import ElasticModel, layout
 from elastocal.identification import build
-from elastocal.robot import Robot, catalogue
-from elastocal.robot.mounting import with_tool
+from elastocal.robot import Robot, catalogue, with_tool
 from elastocal.sim.layouts import bearing_truth
 from elastocal.sim.linkage import Linkage
 from elastocal.sim.measurement import SHOP_FLOOR, measure

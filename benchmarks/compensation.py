@@ -14,14 +14,12 @@ from pathlib import Path
 import numpy as np
 import pinocchio as pin
 
+from elastocal.compensation import CompensatorSettings
 from elastocal.compensation.export import write_c
 from elastocal.compensation.online import Compensator, Design, Reading, design
-from elastocal.compensation.settings import CompensatorSettings
 from elastocal.elastic import ElasticModel, layout
 from elastocal.identification import CalibratedModel, Observability
-from elastocal.robot import Robot, catalogue
-from elastocal.robot.chain import ChainModel, InsertedJoint, build_model
-from elastocal.robot.mounting import with_tool
+from elastocal.robot import ChainModel, InsertedJoint, Robot, build_model, catalogue, with_tool
 
 HARNESS = Path(__file__).parents[1] / "tests" / "support" / "export_harness.c"
 TOOL = np.array([[0.0, 0, 1, 0.15], [0, 1, 0, 0], [-1, 0, 0, 0.35], [0, 0, 0, 1]])

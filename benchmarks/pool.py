@@ -14,8 +14,8 @@ import numpy as np
 
 from elastocal.cell import load_cell
 from elastocal.cell.examples import write_example
-from elastocal.planning.gathering import Gathered, gather
-from elastocal.planning.tooling import cell_surface
+from elastocal.planning import cell_surface, gather
+from elastocal.planning.gathering import Gathered
 
 SIZES = (1000, 3000, 10_000)
 LARGE = (*SIZES, 30_000, 100_000)

@@ -14,10 +14,8 @@ from scipy.optimize import lsq_linear
 from timing import seconds
 
 from elastocal.elastic import ElasticModel, layout
-from elastocal.identification import build, calibrate, solve
-from elastocal.identification.problem import Problem
-from elastocal.robot import Robot, catalogue
-from elastocal.robot.mounting import with_tool
+from elastocal.identification import Problem, build, calibrate, solve
+from elastocal.robot import Robot, catalogue, with_tool
 from elastocal.sim.layouts import bearing_truth
 from elastocal.sim.linkage import Linkage
 from elastocal.sim.measurement import SHOP_FLOOR, measure

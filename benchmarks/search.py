@@ -26,8 +26,7 @@ from elastocal.planning.search import (
     technique,
 )
 from elastocal.planning.search.fields import PlainField
-from elastocal.robot import Robot, catalogue
-from elastocal.robot.mounting import with_tool
+from elastocal.robot import Robot, catalogue, with_tool
 from elastocal.sim.linkage import Linkage
 from elastocal.sim.scene import press_forces, press_poses
 

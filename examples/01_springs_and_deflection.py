@@ -8,9 +8,7 @@ deflection of its tool centre point, and see that the deflection is linear in th
 import numpy as np
 
 from elastocal.elastic import ElasticModel, layout
-from elastocal.robot import Robot, catalogue
-from elastocal.robot.mounting import with_tool
-from elastocal.robot.pose import T_from_xyzabc
+from elastocal.robot import Robot, T_from_xyzabc, catalogue, with_tool
 
 # A tool that stands 350 mm out of the flange and 150 mm aside; its z axis points out of it.
 urdf = catalogue.urdf("KR 120 R2700 extra HA")

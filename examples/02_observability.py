@@ -9,9 +9,7 @@ import numpy as np
 
 from elastocal.elastic import ElasticModel, layout
 from elastocal.identification import build, describe, observability, solve
-from elastocal.robot import Robot, catalogue
-from elastocal.robot.mounting import with_tool
-from elastocal.robot.pose import T_from_xyzabc
+from elastocal.robot import Robot, T_from_xyzabc, catalogue, with_tool
 from elastocal.sim.layouts import bearing_truth
 from elastocal.sim.linkage import Linkage
 from elastocal.sim.measurement import SHOP_FLOOR, measure

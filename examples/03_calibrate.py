@@ -15,9 +15,7 @@ import numpy as np
 from elastocal.dataset import read, write
 from elastocal.elastic import ElasticModel, layout
 from elastocal.identification import calibrate, summary, write_model
-from elastocal.robot import Robot, catalogue
-from elastocal.robot.mounting import with_tool
-from elastocal.robot.pose import T_from_xyzabc
+from elastocal.robot import Robot, T_from_xyzabc, catalogue, with_tool
 from elastocal.sim.layouts import (
     LINK_BENDING,
     bearing_truth,

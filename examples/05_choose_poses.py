@@ -14,7 +14,7 @@ import numpy as np
 from elastocal.cell import load_cell
 from elastocal.cell.examples import write_example
 from elastocal.elastic import ElasticModel, layout
-from elastocal.planning.gathering import gather
+from elastocal.planning import gather
 from elastocal.planning.search import (
     Candidates,
     Cover,

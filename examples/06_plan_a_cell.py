@@ -10,9 +10,7 @@ from pathlib import Path
 
 from elastocal.cell import load_cell
 from elastocal.cell.examples import write_example
-from elastocal.planning.plan import make_plan
-from elastocal.planning.plan_file import read_plan, write_plan
-from elastocal.planning.pool_file import write_pool
+from elastocal.planning import make_plan, read_plan, write_plan, write_pool
 
 folder = Path(sys.argv[1]) if len(sys.argv) > 1 else Path(tempfile.mkdtemp(prefix="elastocal-"))
 folder.mkdir(parents=True, exist_ok=True)

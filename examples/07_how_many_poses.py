@@ -13,9 +13,7 @@ import numpy as np
 from elastocal.codec import cross_validate, judge, make_variants
 from elastocal.report.codec_chart import codec_chart
 from elastocal.report.printed import write_figure
-from elastocal.robot import Robot, catalogue
-from elastocal.robot.mounting import with_tool
-from elastocal.robot.pose import T_from_xyzabc
+from elastocal.robot import Robot, T_from_xyzabc, catalogue, with_tool
 from elastocal.sim.layouts import (
     LINK_BENDING,
     bearing_truth,

@@ -7,8 +7,7 @@ of an unloaded arm, what intervals they have, and what happens when all postures
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from elastocal.compensation.conditioning.postures import static_postures
-from elastocal.compensation.conditioning.tool_fit import fit_tool
+from elastocal.compensation.conditioning import fit_tool, static_postures
 
 MASS, CENTRE = 60.0, np.array([0.01, -0.02, 0.18])  # kg, m: a placement head
 BIAS, MOMENT_BIAS = np.array([12.0, -7.0, 30.0]), np.array([1.0, 0.4, -0.6])  # N, N·m

@@ -14,14 +14,12 @@ from pathlib import Path
 
 import numpy as np
 
-from elastocal.compensation.export.writer import write_c
+from elastocal.compensation import CompensatorSettings
+from elastocal.compensation.export import write_c
 from elastocal.compensation.online import Compensator, Reading, Status
-from elastocal.compensation.settings import CompensatorSettings
 from elastocal.elastic import ElasticModel, layout
 from elastocal.identification import calibrate
-from elastocal.robot import Robot, catalogue
-from elastocal.robot.mounting import with_tool
-from elastocal.robot.pose import T_from_xyzabc
+from elastocal.robot import Robot, T_from_xyzabc, catalogue, with_tool
 from elastocal.sim.layouts import bearing_truth
 from elastocal.sim.linkage import Linkage
 from elastocal.sim.measurement import SHOP_FLOOR, measure

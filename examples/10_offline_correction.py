@@ -14,10 +14,8 @@ import numpy as np
 from elastocal.compensation.offline import compensate_path, follow
 from elastocal.elastic import ElasticModel, layout
 from elastocal.identification import calibrate
-from elastocal.robot import Robot, catalogue
+from elastocal.robot import Robot, T_from_xyzabc, catalogue, with_tool
 from elastocal.robot.inverse import inverse_for
-from elastocal.robot.mounting import with_tool
-from elastocal.robot.pose import T_from_xyzabc
 from elastocal.sim.layouts import (
     LINK_BENDING,
     bearing_truth,

@@ -11,9 +11,7 @@ import numpy as np
 
 from elastocal.elastic import ElasticModel, Spring, layout
 from elastocal.identification import build, calibrate, leave_poses_out
-from elastocal.robot import Robot, catalogue
-from elastocal.robot.mounting import with_tool
-from elastocal.robot.pose import T_from_xyzabc
+from elastocal.robot import Robot, T_from_xyzabc, catalogue, with_tool
 from elastocal.sim.layouts import bearing_truth
 from elastocal.sim.linkage import Linkage
 from elastocal.sim.measurement import SHOP_FLOOR, measure

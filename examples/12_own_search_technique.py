@@ -9,9 +9,7 @@ import numpy as np
 
 from elastocal.codec import CodecOptions, cross_validate, judge, make_variants
 from elastocal.planning.search import TECHNIQUES, Candidates, Selection, check_count
-from elastocal.robot import Robot, catalogue
-from elastocal.robot.mounting import with_tool
-from elastocal.robot.pose import T_from_xyzabc
+from elastocal.robot import Robot, T_from_xyzabc, catalogue, with_tool
 from elastocal.sim.layouts import (
     LINK_BENDING,
     bearing_truth,

@@ -13,15 +13,20 @@ import numpy as np
 
 from elastocal.cell import load_cell
 from elastocal.cell.examples import write_example
-from elastocal.planning.plan import make_plan
-from elastocal.procedure.entries import Event, RunRecord
-from elastocal.procedure.job import Job, Seams
-from elastocal.procedure.journal import Journal, read_commits
+from elastocal.planning import make_plan
+from elastocal.procedure import (
+    Event,
+    Job,
+    Journal,
+    RunFolder,
+    Runner,
+    RunRecord,
+    Seams,
+    read_streams,
+    settings_of,
+)
+from elastocal.procedure.journal import read_commits
 from elastocal.procedure.pose_recorder import PoseRecorder
-from elastocal.procedure.run_folder import RunFolder
-from elastocal.procedure.runner import Runner
-from elastocal.procedure.settings import settings_of
-from elastocal.procedure.streams import read_streams
 from elastocal.sim.workcell import simulated_devices
 
 folder = Path(sys.argv[1]) if len(sys.argv) > 1 else Path(tempfile.mkdtemp(prefix="elastocal-"))

@@ -16,9 +16,7 @@ from elastocal.elastic import ElasticModel, layout
 from elastocal.identification import calibrate, summary
 from elastocal.procedure.registration import UnloadedReadings, register
 from elastocal.procedure.tool_weight import ToolLoad
-from elastocal.robot import GRAVITY, Robot, catalogue
-from elastocal.robot.mounting import with_tool
-from elastocal.robot.pose import T_from_xyzabc
+from elastocal.robot import GRAVITY, Robot, T_from_xyzabc, catalogue, with_tool
 from elastocal.sim.layouts import bearing_truth
 from elastocal.sim.linkage import Linkage
 from elastocal.sim.measurement import SHOP_FLOOR, measure

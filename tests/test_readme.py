@@ -15,8 +15,8 @@ from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
 from elastocal.cell import CellFile
+from elastocal.cell.description import ProcedureSettings
 from elastocal.cell.description.faults import Kind
-from elastocal.cell.description.procedure import ProcedureSettings
 from elastocal.cell.fingerprint import RUN_SECTIONS
 from elastocal.cli.demo_story import chapters
 from elastocal.procedure.faults import Fault

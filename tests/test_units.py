@@ -1,8 +1,7 @@
 import math
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from elastocal.errors import UnitError
 from elastocal.units import factor, parse_quantity, split_column

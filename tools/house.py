@@ -154,7 +154,7 @@ def _followed(faces: dict[str, dict[str, str]]) -> dict[str, dict[str, str]]:
             seen = set()
             while name in faces.get(source, {}) and source not in seen:
                 seen.add(source)
-                source = faces[source][name]  # noqa: PLW2901 - the chain is followed to its end
+                source = faces[source][name]
             names[name] = source
     return faces
 

@@ -5,9 +5,8 @@ import shutil
 import pytest
 import yaml
 
-from elastocal.cell import fingerprint, load_cell
+from elastocal.cell import fingerprint, load_cell, named_files
 from elastocal.cell.examples import write_example
-from elastocal.cell.fingerprint import named_files
 from elastocal.errors import FileAccessError
 from elastocal.robot import catalogue
 

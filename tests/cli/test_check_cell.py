@@ -8,7 +8,7 @@ import yaml
 from elastocal.cell.examples import write_example
 from elastocal.cli.file_kinds import describe_file
 from elastocal.errors import SchemaError
-from elastocal.planning.plan_file import write_plan
+from elastocal.planning import write_plan
 from support import plans
 from support.cli import elastocal
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from elastocal import dataset
-from elastocal.dataset.load_rows import read_load_rows
+from elastocal.dataset import read_load_rows
 from support.cells import Cell, linear_truth, robot, unseen, urdf
 from support.cli import elastocal
 

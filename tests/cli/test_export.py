@@ -3,11 +3,9 @@ import json
 import numpy as np
 import pytest
 
-from elastocal.compensation.conditioning.tool_file import SensorMount, tool_record, write_tool
-from elastocal.compensation.conditioning.tool_fit import fit_tool
+from elastocal.compensation.conditioning import SensorMount, fit_tool, tool_record, write_tool
 from elastocal.identification import write_model
-from elastocal.robot import Robot, catalogue
-from elastocal.robot.mounting import with_tool
+from elastocal.robot import Robot, catalogue, with_tool
 from support.cli import elastocal
 from support.compensated import calibrated
 from support.exported import build, needs_gcc

@@ -12,13 +12,12 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from elastocal.cell import load_cell
-from elastocal.cell.fingerprint import fingerprint
+from elastocal.cell import fingerprint, load_cell
 from elastocal.cli.device_sources import KINDS, SOURCES, DeviceSource
 from elastocal.errors import DatasetError, FileAccessError
-from elastocal.planning.plan_file import read_plan, write_plan
-from elastocal.procedure.journal import Journal, read_commits, read_journal
-from elastocal.procedure.run_folder import RunFolder, cell_place, fill, refuse_foreign
+from elastocal.planning import read_plan, write_plan
+from elastocal.procedure import Journal, RunFolder, cell_place, fill, read_journal, refuse_foreign
+from elastocal.procedure.journal import read_commits
 from support.cli import elastocal
 from support.run_cells import PlannedCell, planned_cell
 

@@ -8,7 +8,7 @@ from rich.console import Console
 
 from elastocal.cli import run_view
 from elastocal.cli.run_view import watching
-from elastocal.procedure.progress import Progress
+from elastocal.procedure import Progress
 from elastocal.procedure.steps import Step
 
 

@@ -7,10 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from elastocal.compensation.process.folder import read_process
+from elastocal.compensation.process import read_process
 from elastocal.files import sha256
 from elastocal.identification import write_model
-from elastocal.planning.tooling import cell_surface
+from elastocal.planning import cell_surface
 from support.cli import elastocal
 from support.paths import made_up
 from support.simulated import example_cell

@@ -14,7 +14,7 @@ from elastocal.cli.study_simulation import prepare
 from elastocal.codec.study import Sample, StudyStore, one_after_the_other, run_study
 from elastocal.elastic import ElasticModel, layout
 from elastocal.identification import calibrate
-from elastocal.sim.workcell.quick_errors import ErrorDraws, Scales
+from elastocal.sim.workcell import ErrorDraws, Scales
 from support.cli import elastocal
 from support.simulated import example_cell
 from support.studies import numbers

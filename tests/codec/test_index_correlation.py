@@ -7,7 +7,14 @@ import numpy as np
 import pytest
 from scipy.stats import spearmanr
 
-from elastocal.codec import Variant, cross_validate
+from elastocal.codec import (
+    INDICES,
+    IndexValues,
+    Variant,
+    cross_validate,
+    look_into,
+    write_index_table,
+)
 from elastocal.codec.again import trainees_of
 from elastocal.codec.index_correlation import (
     KINDS,
@@ -16,13 +23,11 @@ from elastocal.codec.index_correlation import (
     correlate,
     growth,
 )
-from elastocal.codec.index_file import index_records, write_index_table
-from elastocal.codec.indices import INDICES, IndexValues, index_values
-from elastocal.codec.insight import look_into
+from elastocal.codec.index_file import index_records
+from elastocal.codec.indices import index_values
 from elastocal.elastic import layout
 from elastocal.errors import CodecError
-from elastocal.identification.observability import observability
-from elastocal.identification.solve import factor
+from elastocal.identification import factor, observability
 from elastocal.planning.search import Candidates, build_information, o1
 from support.cells import Cell, rich_truth, robot
 from support.codecs import POSES, judged

@@ -10,9 +10,9 @@ from elastocal.compensation.offline import (
     compensate_path,
     correct,
     follow,
+    jumps,
     nearest_zero_posture,
 )
-from elastocal.compensation.offline.follow import jumps
 from elastocal.compensation.path import PathError
 from elastocal.elastic import ElasticModel
 from elastocal.identification import CalibratedModel

@@ -8,9 +8,8 @@ import pytest
 from elastocal.compensation.offline import Settings, compensate_krl, correct, follow
 from elastocal.compensation.path import PathError
 from elastocal.errors import FileAccessError
-from elastocal.robot import Robot
+from elastocal.robot import Robot, T_from_xyzabc, xyzabc_from_T
 from elastocal.robot.inverse import inverse_for
-from elastocal.robot.pose import T_from_xyzabc, xyzabc_from_T
 from elastocal.sim.scene import START
 from support import krl
 from support.cells import robot

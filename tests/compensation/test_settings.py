@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from elastocal.compensation.settings import CompensatorSettings, read_settings
+from elastocal.compensation import CompensatorSettings, read_settings
 from elastocal.errors import CompensationError, SchemaError
 
 TEXT = """

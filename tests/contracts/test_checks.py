@@ -7,6 +7,7 @@ import coal
 import numpy as np
 import pytest
 
+from elastocal.planning import CollisionScene
 from elastocal.planning.checks import (
     CollisionCheck,
     EdgeCheck,
@@ -22,10 +23,9 @@ from elastocal.planning.checks import (
     WristCheck,
     verdicts,
 )
-from elastocal.planning.scene import Body, CollisionScene
+from elastocal.planning.scene import Body
 from elastocal.planning.surface import DiskFit
-from elastocal.robot import Robot
-from elastocal.robot.mounting import Rail, on_rail
+from elastocal.robot import Rail, Robot, on_rail
 from support.postures import FORCE_TCP, arm, postures
 
 

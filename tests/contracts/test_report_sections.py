@@ -7,8 +7,7 @@ from itertools import combinations
 
 import pytest
 
-from elastocal.report.document import Options, Parts, gather
-from elastocal.report.document import pictures as drawing
+from elastocal.report.document import Options, Parts, gather, pictures as drawing
 from elastocal.report.document.sections import SECTIONS
 from elastocal.report.html import embedded
 from support import reported

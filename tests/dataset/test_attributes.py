@@ -1,7 +1,7 @@
 import pytest
 
+from elastocal.dataset import SCHEMA
 from elastocal.dataset.attributes import canonical_attributes
-from elastocal.dataset.layout import SCHEMA
 from elastocal.errors import DatasetError, SchemaError
 
 

@@ -3,8 +3,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from elastocal.dataset import Dataset
-from elastocal.dataset.netcdf import read_netcdf, write_netcdf
+from elastocal.dataset import Dataset, read_netcdf, write_netcdf
 from elastocal.errors import DatasetError, FileAccessError, SchemaError
 from support.datasets import full_keywords
 

@@ -2,8 +2,7 @@ import dataclasses
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from elastocal.elastic import ElasticModel, Spring, layout
 from elastocal.elastic.springs import as_axis, axial, check_springs, is_axial, orthogonal_axes

@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 from scipy.stats import t
 
-from elastocal.codec import Verdicts, cross_validate, judge, make_variants
-from elastocal.codec.pairs import Pair
+from elastocal.codec import Pair, Verdicts, cross_validate, judge, make_variants
 from support.cells import Cell, linear_truth, rich_truth, robot
 from support.cli import elastocal
 from support.shared import FANUC, needs_shared

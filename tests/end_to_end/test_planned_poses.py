@@ -16,12 +16,9 @@ import pytest
 import trimesh
 
 from elastocal.cell import load_cell
-from elastocal.cell.description.file import TOOLING
+from elastocal.cell.description import TOOLING
 from elastocal.cell.examples import write_example
-from elastocal.planning.cell_checks import collision_scene
-from elastocal.planning.plan_file import read_plan
-from elastocal.planning.pool_file import read_pool
-from elastocal.planning.tooling import cell_surface
+from elastocal.planning import cell_surface, collision_scene, read_plan, read_pool
 from support.cli import elastocal
 
 POOL = 600

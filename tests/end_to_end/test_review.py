@@ -8,8 +8,7 @@ import pytest
 from elastocal import dataset
 from elastocal.elastic import ElasticModel, layout
 from elastocal.errors import RobotError
-from elastocal.identification import FitOptions, calibrate
-from elastocal.identification.observability import attainable_rank
+from elastocal.identification import FitOptions, attainable_rank, calibrate
 from elastocal.robot import Robot
 from support.cells import TRACKED, Cell, linear_truth, robot, urdf
 from support.cli import elastocal

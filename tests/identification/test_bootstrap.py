@@ -3,8 +3,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from elastocal.identification import solve
-from elastocal.identification.bootstrap import bootstrap, interval
+from elastocal.identification import interval, solve
+from elastocal.identification.bootstrap import bootstrap
 from elastocal.identification.grams import PoseGrams
 from support.problems import made_up, planted
 

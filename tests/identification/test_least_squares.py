@@ -3,12 +3,8 @@ import pytest
 from scipy.optimize import lsq_linear
 
 from elastocal.errors import IdentificationError
-from elastocal.identification.least_squares import (
-    RANK_TOLERANCE,
-    kkt_violation,
-    minimise,
-    rank,
-)
+from elastocal.identification import RANK_TOLERANCE, rank
+from elastocal.identification.least_squares import kkt_violation, minimise
 
 BOUNDS = ["lower", "upper", "box", "some fixed", "mixed", "free"]
 OPTIMAL = 1e-9

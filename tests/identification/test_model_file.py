@@ -12,10 +12,11 @@ from elastocal.identification import (
     Observability,
     calibrate,
     read_model,
+    read_record,
     summary,
     write_model,
 )
-from elastocal.identification.model_file import SCHEMA, read_record
+from elastocal.identification.model_file import SCHEMA
 from support.problems import campaign, elastic
 
 

@@ -8,10 +8,17 @@ import pytest
 from elastocal.dataset import Readings
 from elastocal.elastic import ElasticModel, layout
 from elastocal.elastic.layouts import bearing
-from elastocal.identification import build, calibrate, describe, observability, solve
-from elastocal.identification.observability import Term
-from elastocal.identification.options import FitOptions, Prior
-from elastocal.identification.solve import factor
+from elastocal.identification import (
+    FitOptions,
+    Prior,
+    Term,
+    build,
+    calibrate,
+    describe,
+    factor,
+    observability,
+    solve,
+)
 from elastocal.robot import Robot
 from support.problems import campaign, elastic
 from support.shared import GOLDEN, needs_shared

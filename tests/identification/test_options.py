@@ -2,8 +2,8 @@ import numpy as np
 import pytest
 
 from elastocal.errors import IdentificationError
-from elastocal.identification import FitOptions
-from elastocal.identification.options import MINIMUM_DRAWS, bounds
+from elastocal.identification import MINIMUM_DRAWS, FitOptions
+from elastocal.identification.options import bounds
 
 
 def test_the_default_is_the_papers_bounded_least_squares():

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from elastocal.errors import IdentificationError
-from elastocal.identification.poses import MINIMUM_BLOCKS, pose_blocks, same_configuration
+from elastocal.identification import pose_blocks, same_configuration
+from elastocal.identification.poses import MINIMUM_BLOCKS
 from support.problems import campaign
 
 

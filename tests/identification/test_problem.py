@@ -5,8 +5,7 @@ import pytest
 
 from elastocal.elastic import ElasticModel, layout
 from elastocal.errors import IdentificationError
-from elastocal.identification import FitOptions, Prior, build, observability, solve
-from elastocal.identification.solve import factor
+from elastocal.identification import FitOptions, Prior, build, factor, observability, solve
 from elastocal.robot import Robot
 from support.cells import urdf
 from support.problems import campaign, elastic, linear_readings, made_up, planted

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from elastocal.errors import IdentificationError
-from elastocal.identification import FitOptions, Prior, build, solve
-from elastocal.identification.solve import factor, normalised_residuals
+from elastocal.identification import FitOptions, Prior, build, factor, solve
+from elastocal.identification.solve import normalised_residuals
 from support.problems import elastic, linear_readings, made_up, planted
 
 

@@ -3,9 +3,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from elastocal.identification import build, solve
-from elastocal.identification.solve import factor
-from elastocal.identification.suspicious import BLUNDER_SCORE, leverage, screen
+from elastocal.identification import build, factor, screen, solve
+from elastocal.identification.suspicious import BLUNDER_SCORE, leverage
 from elastocal.sim.measurement import Blunder
 from support.cells import Cell, linear_truth
 from support.problems import campaign, elastic, made_up, planted

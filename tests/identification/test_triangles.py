@@ -5,8 +5,7 @@ import pytest
 from scipy.optimize import nnls
 
 from elastocal.errors import IdentificationError
-from elastocal.identification import FitOptions, solve
-from elastocal.identification.triangles import PoseTriangles
+from elastocal.identification import FitOptions, PoseTriangles, solve
 from support.problems import made_up, planted
 
 

@@ -6,11 +6,10 @@ import numpy as np
 import pytest
 
 from elastocal.cell import load_cell
-from elastocal.cell.description.file import TOOLING
+from elastocal.cell.description import TOOLING
 from elastocal.cell.examples import write_example
-from elastocal.planning.cell_checks import collision_scene
+from elastocal.planning import cell_surface, collision_scene
 from elastocal.planning.surface import sample_uniform
-from elastocal.planning.tooling import cell_surface
 from elastocal.planning.workshop import Workshop
 
 POINTS = 150

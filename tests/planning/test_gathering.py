@@ -6,10 +6,8 @@ import pytest
 from elastocal.cell import load_cell
 from elastocal.cell.examples import write_example
 from elastocal.errors import PlanningError
-from elastocal.planning import gathering
-from elastocal.planning.gathering import gather
+from elastocal.planning import cell_surface, gather, gathering
 from elastocal.planning.surface import SurfaceError
-from elastocal.planning.tooling import cell_surface
 
 
 def example(folder, like="afp", **changes):

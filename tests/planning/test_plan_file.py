@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from elastocal.errors import FileAccessError, SchemaError
-from elastocal.planning.plan_file import PLAN, SCHEMA, PlanFile, check_plan, read_plan, write_plan
+from elastocal.planning import PLAN, PlanFile, read_plan, write_plan
+from elastocal.planning.plan_file import SCHEMA, check_plan
 from support import plans
 
 

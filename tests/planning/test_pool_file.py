@@ -7,8 +7,8 @@ import pytest
 import xarray as xr
 
 from elastocal.errors import FileAccessError, PlanningError, SchemaError
-from elastocal.planning.plan_file import POOL
-from elastocal.planning.pool_file import SCHEMA, PoolData, check_pool_of, read_pool, write_pool
+from elastocal.planning import POOL, PoolData, check_pool_of, read_pool, write_pool
+from elastocal.planning.pool_file import SCHEMA
 from support import plans
 
 

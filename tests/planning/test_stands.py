@@ -6,9 +6,8 @@ import pytest
 from elastocal.planning.checks import Checks, JointLimitsCheck
 from elastocal.planning.pool import Approach
 from elastocal.planning.stands import rank_stands
-from elastocal.robot import Robot, catalogue
+from elastocal.robot import Rail, Robot, catalogue, on_rail, with_tool
 from elastocal.robot.inverse import inverse_for
-from elastocal.robot.mounting import Rail, on_rail, with_tool
 from elastocal.sim.scene import SphericalCap
 from support.postures import T_FLANGE_TCP
 

@@ -6,7 +6,7 @@ import pytest
 from elastocal.cell import load_cell
 from elastocal.cell.examples import write_example
 from elastocal.errors import PlanningError
-from elastocal.planning.tooling import cell_surface, surface_findings
+from elastocal.planning import cell_surface, surface_findings
 
 
 def example(folder, *changes, like="afp"):

@@ -4,14 +4,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from elastocal.cell import load_cell
-from elastocal.cell.fingerprint import fingerprint
+from elastocal.cell import fingerprint, load_cell
 from elastocal.dataset import read
 from elastocal.errors import DatasetError, ElastocalError, ProcedureError, SchemaError
-from elastocal.procedure.derivation import Derived, derive, write_derived
-from elastocal.procedure.journal import read_journal
+from elastocal.procedure import RunFolder, derive, read_journal, write_derived
+from elastocal.procedure.derivation import Derived
 from elastocal.procedure.pose_log import ReadingStatus, Window
-from elastocal.procedure.run_folder import RunFolder
 from support.recorded_runs import Run, Truth, record_run
 
 

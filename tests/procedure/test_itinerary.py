@@ -2,8 +2,8 @@
 
 import pytest
 
-from elastocal.procedure.itinerary import itinerary, remaining
-from elastocal.procedure.job import End
+from elastocal.procedure import End, itinerary
+from elastocal.procedure.itinerary import remaining
 from elastocal.procedure.steps import Step
 from support.fake_runs import FakeRun, plan, settings
 

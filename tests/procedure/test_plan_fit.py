@@ -5,8 +5,8 @@ import pytest
 
 from elastocal.cell import load_cell
 from elastocal.errors import ProcedureError
-from elastocal.planning.plan_file import read_plan
-from elastocal.procedure.plan_fit import check_fits, registration_findings
+from elastocal.planning import read_plan
+from elastocal.procedure import check_fits, registration_findings
 from support.run_cells import planned_cell
 
 

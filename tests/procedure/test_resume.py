@@ -3,9 +3,8 @@
 import pytest
 
 from elastocal.errors import ProcedureError
-from elastocal.procedure.entries import Action, Entry, Event
-from elastocal.procedure.pose_log import PoseLog
-from elastocal.procedure.resume import check_same_run, last_known
+from elastocal.procedure import Entry, Event, PoseLog, check_same_run, last_known
+from elastocal.procedure.entries import Action
 from support.fake_runs import RECORD, FakeRun
 
 
@@ -77,7 +76,7 @@ def test_another_start_or_version_is_the_same_run():
 def test_the_last_entry_of_a_run_says_how_it_ended(tmp_path):
     run = FakeRun(tmp_path / "run")
     run.start()
-    from elastocal.procedure.journal import read_journal
+    from elastocal.procedure import read_journal
 
     assert last_known(read_journal(run.journal)).lines[0] == (
         "last entry: between poses: finish (done, at HOME)"

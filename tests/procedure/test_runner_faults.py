@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 
 from elastocal.errors import FileAccessError
-from elastocal.procedure.entries import Event
-from elastocal.procedure.job import End
-from elastocal.procedure.journal import read_commits, read_journal
+from elastocal.procedure import End, Event, read_journal
+from elastocal.procedure.journal import read_commits
 from elastocal.procedure.pose_log import ReadingStatus
 from elastocal.procedure.stand import Stand
 from support import fake_faults as fault

@@ -7,9 +7,8 @@ import numpy as np
 import pytest
 
 from elastocal.cell.devices import Motion
-from elastocal.procedure.entries import Event
-from elastocal.procedure.job import End
-from elastocal.procedure.journal import read_commits, read_journal
+from elastocal.procedure import End, Event, read_journal
+from elastocal.procedure.journal import read_commits
 from support.fake_devices import FakeCell
 from support.fake_runs import FakeRun
 

@@ -4,13 +4,10 @@ import numpy as np
 import pytest
 
 from elastocal.errors import DeviceError
-from elastocal.procedure.entries import Event
-from elastocal.procedure.job import End
-from elastocal.procedure.journal import read_commits, read_journal
+from elastocal.procedure import End, Event, PoseRecorder, read_journal
+from elastocal.procedure.journal import read_commits
 from elastocal.procedure.stand import Stand
-from elastocal.procedure.streams import PoseRecorder
-from support import fake_faults as fault
-from support import fake_lies as lie
+from support import fake_faults as fault, fake_lies as lie
 from support.fake_devices import R_BASE_TRACKER, Motion, fake_cell
 from support.fake_faults import when
 from support.fake_runs import HOME, FakeRun, MemoryRecorder, plan, replace

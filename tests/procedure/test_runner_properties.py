@@ -7,13 +7,12 @@ import tracemalloc
 from pathlib import Path
 
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
 from elastocal.cell.devices import Motion
-from elastocal.procedure.entries import Action, Event
-from elastocal.procedure.job import End
-from elastocal.procedure.journal import read_commits, read_journal
+from elastocal.procedure import End, Event, read_journal
+from elastocal.procedure.entries import Action
+from elastocal.procedure.journal import read_commits
 from support import fake_faults as fault
 from support.fake_faults import when
 from support.fake_runs import FakeRun, MemoryRecorder, plan

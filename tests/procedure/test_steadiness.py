@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from elastocal.cell.description.procedure import ProcedureSettings
+from elastocal.cell.description import ProcedureSettings
 from elastocal.procedure.steadiness import Stretch, complaint, shaking, steadiness
 
 LIMITS = ProcedureSettings()

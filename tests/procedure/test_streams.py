@@ -14,10 +14,10 @@ from elastocal.cell.devices import (
     WrenchBlock,
 )
 from elastocal.errors import ProcedureError, SchemaError
+from elastocal.procedure import SCHEMA, PoseRecorder, read_streams
 from elastocal.procedure.mcap import Topic, write_mcap
-from elastocal.procedure.pose_recorder import SCHEMA
 from elastocal.procedure.stream_messages import schemas
-from elastocal.procedure.streams import Mark, PoseRecorder, read_streams
+from elastocal.procedure.streams import Mark
 from support.stations import station
 
 JOINTS = ("rail", "joint 100%s")

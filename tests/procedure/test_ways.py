@@ -5,10 +5,10 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from elastocal.errors import ProcedureError
-from elastocal.procedure.ways import HOME, stop_joints, way, way_home
+from elastocal.procedure import way_home
+from elastocal.procedure.ways import HOME, stop_joints, way
 from support.fake_devices import DOWN
-from support.fake_runs import HOME as HOME_JOINTS
-from support.fake_runs import plan
+from support.fake_runs import HOME as HOME_JOINTS, plan
 
 PLAN = plan(3)
 LIMIT = 15e-3

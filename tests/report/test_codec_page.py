@@ -11,7 +11,7 @@ import plotly.graph_objects as go
 import pytest
 
 from elastocal.errors import CodecError, FileAccessError
-from elastocal.report.codec_figures import write_codec_figures
+from elastocal.report import write_codec_figures
 from elastocal.report.codec_page import write_codec_page
 from elastocal.report.printed import write_figure
 from support.codecs import judged, renamed, without_errors

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from elastocal.compensation.stiffness import Grid, Stations, Survey
-from elastocal.report import style
-from elastocal.report.stiffness_figures import Curve, stiffness_figure
+from elastocal.report import Curve, style
+from elastocal.report.stiffness_figures import stiffness_figure
 
 NAMES = ("as programmed", "one posture for the path", "stiffest at each station")
 

@@ -1,8 +1,8 @@
 import numpy as np
 
-from elastocal.codec.study import ConditionRecord, Sample, study_record
-from elastocal.codec.study.factors import Condition
-from elastocal.report.study_figure import study_figure, write_study_figures
+from elastocal.codec.study import Condition, ConditionRecord, Sample, study_record
+from elastocal.report import write_study_figures
+from elastocal.report.study_figure import study_figure
 from support.studies import settings, simulate
 
 RESULTS = [simulate(Sample(3, number)) for number in range(6)]

@@ -12,8 +12,8 @@ import yaml
 
 from elastocal.errors import RobotError, SchemaError
 from elastocal.robot import catalogue
-from elastocal.robot.catalogue import table
-from elastocal.robot.catalogue.entry import LINKS, CatalogueEntry
+from elastocal.robot.catalogue import CatalogueEntry, table
+from elastocal.robot.catalogue.entry import LINKS
 
 NAMES = catalogue.names()
 TRANSPORT = np.radians([0.0, -90.0, 90.0, 0.0, 45.0, 0.0])

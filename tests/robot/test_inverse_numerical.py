@@ -7,8 +7,8 @@ import pytest
 
 from elastocal.errors import RobotError
 from elastocal.robot import Robot
-from elastocal.robot.inverse import NumericalInverse, OpwInverse
-from elastocal.robot.inverse.branch_solver import BranchSolver, distinct, pose_error
+from elastocal.robot.inverse import NumericalInverse, OpwInverse, pose_error
+from elastocal.robot.inverse.branch_solver import BranchSolver, distinct
 from support.urdfs import KR_LIKE, offset_wrist_urdf, opw_arm_urdf, planar_arm_urdf
 
 ARM = Robot.from_urdf(opw_arm_urdf(**KR_LIKE), "tcp")

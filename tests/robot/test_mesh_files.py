@@ -7,8 +7,7 @@ import pytest
 import trimesh
 
 from elastocal.errors import FileAccessError, RobotError
-from elastocal.robot import Robot
-from elastocal.robot.mesh_files import collision_model, find_meshes
+from elastocal.robot import Robot, collision_model, find_meshes
 from support.urdfs import KR_LIKE, opw_arm_urdf
 
 SIZE = (0.1, 0.2, 0.3)

@@ -6,9 +6,7 @@ import numpy as np
 import pytest
 
 from elastocal.errors import RobotError
-from elastocal.robot import Robot, catalogue
-from elastocal.robot.mounting import Rail, on_rail, with_tool
-from elastocal.robot.pose import T_from_xyzabc
+from elastocal.robot import Rail, Robot, T_from_xyzabc, catalogue, on_rail, with_tool
 from support.urdfs import KR_LIKE, opw_arm_urdf
 
 ARM = opw_arm_urdf(**KR_LIKE)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from elastocal.robot.pose import T_from_xyzabc, xyzabc_from_T
+from elastocal.robot import T_from_xyzabc, xyzabc_from_T
 
 
 def random_poses(rng: np.random.Generator, count: int) -> np.ndarray:

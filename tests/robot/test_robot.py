@@ -8,9 +8,7 @@ import pytest
 
 from elastocal.errors import FileAccessError, RobotError
 from elastocal.files import sha256
-from elastocal.robot import GRAVITY, Robot, catalogue
-from elastocal.robot.chain import InsertedJoint, build_model
-from elastocal.robot.mounting import Rail, on_rail
+from elastocal.robot import GRAVITY, InsertedJoint, Rail, Robot, build_model, catalogue, on_rail
 from support.shared import GOLDEN, needs_shared
 from support.urdfs import FLOOR, KR_LIKE, WALL, opw_arm_urdf
 

@@ -5,14 +5,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from elastocal.errors import RobotError
-from elastocal.robot import Robot
-from elastocal.robot.singularity import (
-    characteristic_length,
-    manipulability,
-    scaled_singular_values,
-    smallest_singular_value,
-    wrist_angle,
-)
+from elastocal.robot import Robot, characteristic_length, smallest_singular_value, wrist_angle
+from elastocal.robot.singularity import manipulability, scaled_singular_values
 from support.urdfs import (
     KR_LIKE,
     offset_wrist_urdf,

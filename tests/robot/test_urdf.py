@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from elastocal.errors import RobotError
-from elastocal.robot import Robot
-from elastocal.robot.urdf import Assumption, assumptions, leaf_links, parse_urdf, read_chain
+from elastocal.robot import Robot, leaf_links, parse_urdf
+from elastocal.robot.urdf import Assumption, assumptions, read_chain
 
 
 def joint(

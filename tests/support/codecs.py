@@ -5,9 +5,16 @@ from functools import cache
 
 import numpy as np
 
-from elastocal.codec import CodecData, Verdicts, cross_validate, judge, make_variants
+from elastocal.codec import (
+    CodecData,
+    Insight,
+    Verdicts,
+    cross_validate,
+    judge,
+    look_into,
+    make_variants,
+)
 from elastocal.codec.again import trainees_of
-from elastocal.codec.insight import Insight, look_into
 from elastocal.codec.training import Trainee
 from elastocal.dataset import Readings
 from support.cells import Cell, rich_truth, robot

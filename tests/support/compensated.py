@@ -5,9 +5,9 @@ from functools import cache
 import numpy as np
 
 from elastocal.cell import load_cell
-from elastocal.cell.examples.writing import write_example
-from elastocal.compensation.conditioning.tool_load import SensorLoad
-from elastocal.compensation.settings import CompensatorSettings
+from elastocal.cell.examples import write_example
+from elastocal.compensation import CompensatorSettings
+from elastocal.compensation.conditioning import SensorLoad
 from elastocal.elastic import ElasticModel, Spring, layout
 from elastocal.identification import CalibratedModel, Observability
 from elastocal.robot import Robot

@@ -7,27 +7,31 @@ from typing import Any
 
 import numpy as np
 
-from elastocal.cell.description.procedure import ProcedureSettings
-from elastocal.planning.motion.durations import AxisMotion
+from elastocal.cell.description import ProcedureSettings
+from elastocal.planning import PlanFile, PoseRecord, SpreadRecord
+from elastocal.planning.motion import AxisMotion
 from elastocal.planning.plan_file import (
     CellRecord,
     ContactRecord,
     MoveRecord,
-    PlanFile,
     PoolRecord,
-    PoseRecord,
     RobotRecord,
     SearchRecord,
-    SpreadRecord,
 )
-from elastocal.procedure.entries import Event, RunRecord
-from elastocal.procedure.job import Job, Result, Seams
-from elastocal.procedure.journal import Journal, read_journal
-from elastocal.procedure.resume import last_known
-from elastocal.procedure.run_folder import RunFolder
-from elastocal.procedure.runner import Runner
-from elastocal.procedure.settings import Settings
-from elastocal.procedure.ways import way_home
+from elastocal.procedure import (
+    Event,
+    Job,
+    Journal,
+    Result,
+    RunFolder,
+    Runner,
+    RunRecord,
+    Seams,
+    Settings,
+    last_known,
+    read_journal,
+    way_home,
+)
 from support.fake_devices import DOWN, FakeCell, fake_cell
 
 HOME = (0.0, 0.0, 0.5)

@@ -6,9 +6,10 @@ import coal
 import numpy as np
 
 from elastocal.arrays import FloatArray
+from elastocal.planning import CollisionScene
 from elastocal.planning.motion import AxisMotion, Mover, Sweep
 from elastocal.planning.postures import Postures
-from elastocal.planning.scene import Body, CollisionScene
+from elastocal.planning.scene import Body
 from elastocal.robot.inverse import inverse_for
 from support.postures import arm
 

@@ -6,25 +6,21 @@ from functools import cache
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from elastocal.planning import PlanFile, PoolData, PoseRecord, SpreadRecord
 from elastocal.planning.plan_file import (
     CellRecord,
     CheckRecord,
     ComparisonRecord,
     ContactRecord,
     MoveRecord,
-    PlanFile,
     PoolRecord,
-    PoseRecord,
     RobotRecord,
     SearchRecord,
-    SpreadRecord,
 )
-from elastocal.planning.pool_file import PoolData
 from elastocal.planning.search import Candidates, covering_radius, nearest_neighbour, technique
 from elastocal.planning.surface import contact_frames
-from elastocal.robot import Robot, catalogue
+from elastocal.robot import Rail, Robot, catalogue, on_rail, with_tool
 from elastocal.robot.inverse import inverse_for
-from elastocal.robot.mounting import Rail, on_rail, with_tool
 from elastocal.sim.scene import SphericalCap
 
 MODEL = "KR 120 R2700 extra HA"

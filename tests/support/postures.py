@@ -7,9 +7,8 @@ import numpy as np
 from elastocal.planning.checks import Checks
 from elastocal.planning.pool import Approach, Pool, make_pool
 from elastocal.planning.postures import Postures
-from elastocal.robot import Robot, catalogue
+from elastocal.robot import Robot, catalogue, with_tool
 from elastocal.robot.inverse import inverse_for
-from elastocal.robot.mounting import with_tool
 from elastocal.sim.scene import SphericalCap
 
 T_FLANGE_TCP = np.array(

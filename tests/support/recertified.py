@@ -6,8 +6,7 @@ from functools import cache
 import numpy as np
 
 from elastocal.elastic import ElasticModel, layout
-from elastocal.identification import CalibratedModel, Observability, calibrate
-from elastocal.identification.observability import Term
+from elastocal.identification import CalibratedModel, Observability, Term, calibrate
 from elastocal.sim.torque_laws import CubicGear, Linear
 from elastocal.sim.truth import ElasticArm
 from support.cells import Cell, linear_truth, robot

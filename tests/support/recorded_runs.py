@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from elastocal.cell import Cell, load_cell
+from elastocal.cell import Cell, fingerprint, load_cell
 from elastocal.cell.devices import (
     ArmState,
     BeamState,
@@ -17,16 +17,19 @@ from elastocal.cell.devices import (
     SensorStatus,
     WrenchBlock,
 )
-from elastocal.cell.examples.writing import write_example
-from elastocal.cell.fingerprint import fingerprint
+from elastocal.cell.examples import write_example
 from elastocal.files import sha256
-from elastocal.planning.plan_file import PlanFile, write_plan
-from elastocal.procedure.copies import file_sha256
-from elastocal.procedure.entries import Event, RunRecord
-from elastocal.procedure.journal import Journal
-from elastocal.procedure.pose_log import PoseLog, ReadingStatus, Window
-from elastocal.procedure.run_folder import RunFolder
-from elastocal.procedure.streams import PoseRecorder
+from elastocal.planning import PlanFile, write_plan
+from elastocal.procedure import (
+    Event,
+    Journal,
+    PoseLog,
+    PoseRecorder,
+    RunFolder,
+    RunRecord,
+    file_sha256,
+)
+from elastocal.procedure.pose_log import ReadingStatus, Window
 from support import plans
 
 RECORD = RunRecord(

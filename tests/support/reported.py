@@ -8,9 +8,7 @@ from pathlib import Path
 import pytest
 
 from elastocal.cell import load_cell
-from elastocal.planning.plan import make_plan
-from elastocal.planning.plan_file import write_plan
-from elastocal.planning.pool_file import write_pool
+from elastocal.planning import make_plan, write_plan, write_pool
 from support.cli import elastocal
 from support.run_cells import planned_cell
 

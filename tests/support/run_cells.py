@@ -6,8 +6,7 @@ from pathlib import Path
 
 from elastocal.cell import load_cell
 from elastocal.cell.examples import write_example
-from elastocal.planning.plan import make_plan
-from elastocal.planning.plan_file import write_plan
+from elastocal.planning import make_plan, write_plan
 
 
 @dataclass(frozen=True)

@@ -11,8 +11,8 @@ import yaml
 from elastocal.cell import Cell, load_cell
 from elastocal.cell.devices import ArmState, Devices, Motion
 from elastocal.cell.examples import write_example
+from elastocal.planning import cell_surface
 from elastocal.planning.surface import contact_frames, sample_uniform
-from elastocal.planning.tooling import cell_surface
 from elastocal.robot.inverse import inverse_for
 from elastocal.sim.workcell import SimulatedCell
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from elastocal.compensation.conditioning.postures import StaticPostures, static_postures
+from elastocal.compensation.conditioning import StaticPostures, static_postures
 
 GRAVITY = np.array([0.0, 0.0, -9.80665])
 

@@ -12,14 +12,13 @@ import numpy as np
 from elastocal.cell import Cell, load_cell
 from elastocal.cell.examples import write_example
 from elastocal.cli.process_bench import Bench, Outcome, process_courses, run_process
-from elastocal.compensation.process.table import Comparison
-from elastocal.compensation.settings import CompensatorSettings
+from elastocal.compensation import CompensatorSettings
+from elastocal.compensation.process import Comparison
 from elastocal.dataset import Readings
 from elastocal.elastic import ElasticModel, layout
 from elastocal.identification import Calibration, calibrate, summary
-from elastocal.planning.plan import Planned, make_plan
-from elastocal.sim.workcell.quick import Places, QuickCell
-from elastocal.sim.workcell.quick_errors import ErrorDraws, QuickErrors, Scales
+from elastocal.planning import Planned, make_plan
+from elastocal.sim.workcell import ErrorDraws, Places, QuickCell, QuickErrors, Scales
 
 SEED = 0
 

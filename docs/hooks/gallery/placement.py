@@ -7,15 +7,12 @@ from pathlib import Path
 import numpy as np
 
 from elastocal.cli.process_bench import AFP_SETTINGS
-from elastocal.codec import CodecData, Verdicts, cross_validate, judge, make_variants
-from elastocal.codec.insight import look_into
-from elastocal.compensation.process.trace import Trace
+from elastocal.codec import CodecData, Verdicts, cross_validate, judge, look_into, make_variants
+from elastocal.compensation.process import Trace
+from elastocal.report import write_plan_figure, write_plan_page
 from elastocal.report.codec_chart import codec_chart
-from elastocal.report.document.figures.displacements import displacement_figure
-from elastocal.report.document.figures.process_maps import course_figure, process_maps
+from elastocal.report.document.figures import course_figure, displacement_figure, process_maps
 from elastocal.report.index_chart import index_chart
-from elastocal.report.plan_figure import write_plan_figure
-from elastocal.report.plan_page import write_plan_page
 from elastocal.report.printed import write_figure
 from gallery.campaign import SEED, Campaign, accuracy, campaign, example_cell, process, reduction
 

@@ -10,17 +10,23 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Circle
 
 from elastocal.cell import Cell
-from elastocal.planning.plan import make_plan
+from elastocal.planning import make_plan
 from elastocal.planning.search import Candidates, Cover
-from elastocal.procedure.entries import Event, RunRecord
-from elastocal.procedure.job import Job, Seams
-from elastocal.procedure.journal import Journal, read_commits
-from elastocal.procedure.pose_log import PoseLog
+from elastocal.procedure import (
+    Event,
+    Job,
+    Journal,
+    PoseLog,
+    RunFolder,
+    Runner,
+    RunRecord,
+    Seams,
+    read_streams,
+    settings_of,
+)
+from elastocal.procedure.journal import read_commits
 from elastocal.procedure.pose_recorder import PoseRecorder
-from elastocal.procedure.run_folder import RunFolder
-from elastocal.procedure.runner import Runner
-from elastocal.procedure.settings import settings_of
-from elastocal.procedure.streams import Streams, read_streams
+from elastocal.procedure.streams import Streams
 from elastocal.report import style
 from elastocal.report.printed import new_figure, write_figure
 from elastocal.sim.workcell import simulated_devices

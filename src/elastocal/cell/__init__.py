@@ -1,6 +1,5 @@
 """The cell: its description; the procedure and the devices that carry it out."""
 
-from elastocal.cell.description import Cell, CellFile, load_cell
-from elastocal.cell.fingerprint import fingerprint
+import lazy_loader
 
-__all__ = ["Cell", "CellFile", "fingerprint", "load_cell"]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 from elastocal.cell.description import Cell
 from elastocal.errors import FileAccessError
-from elastocal.robot.mesh_files import is_relative
+from elastocal.robot import is_relative
 
 RUN_SECTIONS = ("acceptance", "procedure", "devices", "simulation", "faults")
 """Sections of the cell file that say how a plan is carried out and its result is judged; a plan

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated, cast
 import typer
 
 if TYPE_CHECKING:
-    from elastocal.identification.options import Weights
+    from elastocal.identification import Weights
 
 
 def calibrate(  # noqa: PLR0913 - one parameter an option
@@ -61,10 +61,9 @@ def calibrate(  # noqa: PLR0913 - one parameter an option
     from elastocal.cli.output import console, print_json, refuse_overwriting
     from elastocal.cli.parsing import parse_bounds, parse_point
     from elastocal.cli.robot_source import find_robot
-    from elastocal.dataset.selection import without
+    from elastocal.dataset import without
     from elastocal.elastic import ElasticModel, layout
-    from elastocal.identification import FitOptions, summary, write_model
-    from elastocal.identification import calibrate as identify
+    from elastocal.identification import FitOptions, calibrate as identify, summary, write_model
 
     lower, upper = parse_bounds(bounds)
     options = FitOptions(

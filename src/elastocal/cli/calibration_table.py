@@ -11,8 +11,7 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from elastocal.identification import describe
-from elastocal.identification.observability import Term
+from elastocal.identification import Term, describe
 
 Figures = dict[str, Any]
 _MOST_SUSPICIOUS = 10

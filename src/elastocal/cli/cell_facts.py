@@ -6,10 +6,13 @@ from typing import Any
 import numpy as np
 
 from elastocal.cell import load_cell
-from elastocal.planning.cell_checks import collision_scene
+from elastocal.planning import (
+    cell_surface,
+    collision_scene,
+    refuse_before_the_long_work,
+    surface_findings,
+)
 from elastocal.planning.motion import mover_for, refuse_blocked_home
-from elastocal.planning.plan import refuse_before_the_long_work
-from elastocal.planning.tooling import cell_surface, surface_findings
 
 
 def cell_facts(path: Path) -> dict[str, Any]:

@@ -87,10 +87,17 @@ def codec(  # noqa: PLR0913 - one parameter an option
     from elastocal.cli.parsing import parse_point
     from elastocal.cli.progress import progress_bars
     from elastocal.cli.robot_source import find_robot
-    from elastocal.codec import CodecOptions, cross_validate, judge, make_variants, verdict_record
-    from elastocal.codec.insight import look_into
-    from elastocal.codec.verdict_file import VERDICTS, figures
-    from elastocal.dataset.selection import without
+    from elastocal.codec import (
+        VERDICTS,
+        CodecOptions,
+        cross_validate,
+        figures,
+        judge,
+        look_into,
+        make_variants,
+        verdict_record,
+    )
+    from elastocal.dataset import without
     from elastocal.files import filling
 
     variants = make_variants(comparisons(compare or []))

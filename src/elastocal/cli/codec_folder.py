@@ -3,11 +3,16 @@
 from collections.abc import Sequence
 from pathlib import Path
 
-from elastocal.codec import CodecData, Verdicts, write_codec, write_verdicts
-from elastocal.codec.index_file import write_index_table
-from elastocal.codec.insight import Insight
-from elastocal.codec.verdict_file import VerdictRecord
-from elastocal.report.codec_figures import write_codec_figures
+from elastocal.codec import (
+    CodecData,
+    Insight,
+    VerdictRecord,
+    Verdicts,
+    write_codec,
+    write_index_table,
+    write_verdicts,
+)
+from elastocal.report import write_codec_figures
 
 
 def write_codec_folder(

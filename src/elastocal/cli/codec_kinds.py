@@ -4,10 +4,14 @@ import csv
 from pathlib import Path
 from typing import Any
 
-from elastocal.codec import read_codec, read_verdicts
-from elastocal.codec.data_file import ARRAYS
-from elastocal.codec.data_file import SCHEMA as ARRAYS_SCHEMA
-from elastocal.codec.verdict_file import SCHEMA, VERDICTS
+from elastocal.codec import (
+    ARRAYS,
+    ARRAYS_SCHEMA,
+    VERDICTS,
+    VERDICTS_SCHEMA,
+    read_codec,
+    read_verdicts,
+)
 from elastocal.errors import SchemaError
 from elastocal.files import read_text
 
@@ -57,7 +61,7 @@ def verdicts(path: Path) -> Described:
     """Describe the verdicts of a codec."""
     record = read_verdicts(path)
     return "verdict file of a codec", {
-        "schema": SCHEMA,
+        "schema": VERDICTS_SCHEMA,
         "robot": record.robot,
         "variants": list(record.variants),
         "saturation": record.saturation,

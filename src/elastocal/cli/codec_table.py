@@ -8,7 +8,7 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from elastocal.codec.verdict_file import VerdictRecord
+from elastocal.codec import VerdictRecord
 
 _MOST_ROWS = 12
 

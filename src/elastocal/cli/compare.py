@@ -38,10 +38,10 @@ def compare(
     from elastocal.cli.parsing import parse_limit
     from elastocal.identification.recertification import (
         comparison_record,
+        figures,
         recertify_files,
         write_comparison,
     )
-    from elastocal.identification.recertification.record import figures
 
     accepted = None if limit is None else parse_limit(limit)
     inputs = [old, new] if rows is None else [old, new, rows]
@@ -52,7 +52,7 @@ def compare(
     found = recertify_files(old, new, *loads, limit=accepted)
     record = comparison_record(found)
     if figure is not None:
-        from elastocal.report.recertification_figure import write_recertification_figure
+        from elastocal.report import write_recertification_figure
 
         write_recertification_figure(figure, found)
     if out is not None:

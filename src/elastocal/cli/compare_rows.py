@@ -4,10 +4,10 @@ from pathlib import Path
 
 from elastocal import dataset
 from elastocal.arrays import FloatArray
-from elastocal.dataset.load_rows import joint_dimensions, read_load_rows
+from elastocal.dataset import joint_dimensions, read_load_rows
 from elastocal.errors import DatasetError
 from elastocal.identification import read_model
-from elastocal.identification.recertification.same_robot import check_same_robot
+from elastocal.identification.recertification import check_same_robot
 from elastocal.robot import Robot
 
 Loads = tuple[FloatArray, FloatArray, FloatArray | None]

@@ -1,7 +1,6 @@
 """Whether a calibration saw all that a prediction may need."""
 
-from elastocal.identification import CalibratedModel
-from elastocal.identification.observability import attainable_rank
+from elastocal.identification import CalibratedModel, attainable_rank
 
 NOT_COVERED = (
     "the calibration saw fewer combinations of springs than a force can load: predictions away from"

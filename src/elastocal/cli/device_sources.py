@@ -4,7 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from elastocal.cell import Cell
-from elastocal.cell.description.devices import SIMULATED, DeviceNames
+from elastocal.cell.description import SIMULATED, DeviceNames
 from elastocal.cell.devices import Devices
 from elastocal.errors import DeviceError, nearest
 

@@ -25,10 +25,10 @@ def export(
     import numpy as np
 
     from elastocal.cli.output import console, print_json
-    from elastocal.compensation.conditioning.tool_file import read_tool, sensor_load
+    from elastocal.compensation import read_settings
+    from elastocal.compensation.conditioning import read_tool, sensor_load
     from elastocal.compensation.export import write_c
     from elastocal.compensation.online import design
-    from elastocal.compensation.settings import read_settings
     from elastocal.errors import CompensationError
     from elastocal.identification import read_model
 

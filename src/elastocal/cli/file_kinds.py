@@ -6,12 +6,12 @@ from pathlib import Path
 from typing import Any
 
 from elastocal.cli import codec_kinds, model_kinds, run_kinds, study_kinds
-from elastocal.compensation.process.folder import TABLE
-from elastocal.dataset.netcdf import read_netcdf
+from elastocal.compensation.process import TABLE
+from elastocal.dataset import read_netcdf
 from elastocal.errors import DatasetError, SchemaError
 from elastocal.files import read_text
-from elastocal.planning.plan_file import PLAN
-from elastocal.procedure.run_folder import JOURNAL
+from elastocal.planning import PLAN
+from elastocal.procedure import JOURNAL
 
 Facts = dict[str, Any]
 Described = tuple[str, Facts]

@@ -3,16 +3,15 @@
 from pathlib import Path
 from typing import Any
 
-from elastocal.compensation.conditioning.tool_file import read_tool
-from elastocal.compensation.process.folder import TABLE, read_process, read_table
-from elastocal.compensation.settings import read_settings
+from elastocal.compensation import read_settings
+from elastocal.compensation.conditioning import read_tool
+from elastocal.compensation.process import TABLE, read_process, read_table
 from elastocal.elastic.layouts import read_springs
 from elastocal.errors import RobotError
 from elastocal.files import read_text
-from elastocal.identification.model_file import read_model
+from elastocal.identification import read_model
 from elastocal.identification.recertification import read_comparison
-from elastocal.robot import Robot
-from elastocal.robot.urdf import leaf_links, parse_urdf
+from elastocal.robot import Robot, leaf_links, parse_urdf
 
 Described = tuple[str, dict[str, Any]]
 """The kind of a file and what it holds."""

@@ -35,9 +35,8 @@ def plan(
     from elastocal.cli.plan_table import key_figures, show_plan
     from elastocal.cli.progress import progress_bars
     from elastocal.files import filling
+    from elastocal.planning import PLAN, make_plan
     from elastocal.planning.export import check_name
-    from elastocal.planning.plan import make_plan
-    from elastocal.planning.plan_file import PLAN
 
     check_name(program)
     loaded = load_cell(cell)

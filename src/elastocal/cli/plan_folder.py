@@ -3,10 +3,8 @@
 from pathlib import Path
 
 from elastocal.cell import Cell
+from elastocal.planning import Planned, write_plan, write_pool
 from elastocal.planning.export import takes_krl, write_krl, write_table
-from elastocal.planning.plan import Planned
-from elastocal.planning.plan_file import write_plan
-from elastocal.planning.pool_file import write_pool
 from elastocal.report import write_plan_figure, write_plan_page
 
 

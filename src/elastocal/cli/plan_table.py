@@ -7,7 +7,7 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table
 
-from elastocal.planning.plan_file import PlanFile, SpreadRecord
+from elastocal.planning import PlanFile, SpreadRecord
 
 
 def key_figures(plan: PlanFile) -> dict[str, Any]:

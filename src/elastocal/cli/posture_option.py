@@ -6,8 +6,7 @@ import numpy as np
 
 from elastocal.arrays import FloatArray
 from elastocal.errors import RobotError, UnitError
-from elastocal.robot import Robot
-from elastocal.robot.pose import T_from_xyzabc
+from elastocal.robot import Robot, T_from_xyzabc
 from elastocal.units import parse_quantity
 
 

@@ -18,7 +18,7 @@ def predict(
     import numpy as np
 
     from elastocal.cli.output import console, print_json, refuse_overwriting
-    from elastocal.dataset.load_rows import joint_dimensions, read_load_rows, write_load_rows
+    from elastocal.dataset import joint_dimensions, read_load_rows, write_load_rows
     from elastocal.identification import read_model
 
     refuse_overwriting(out, model, rows)

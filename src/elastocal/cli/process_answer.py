@@ -17,12 +17,18 @@ from elastocal.cli.process_bench import (
     run_effect,
     run_process,
 )
-from elastocal.compensation.conditioning.tool_file import read_tool, sensor_load
-from elastocal.compensation.process.course import Course
-from elastocal.compensation.process.record import ProcessRecord, Source, Table, lines_of
-from elastocal.compensation.process.table import Comparison, pooled
-from elastocal.compensation.process.trace import Trace
-from elastocal.compensation.settings import CompensatorSettings, read_settings
+from elastocal.compensation import CompensatorSettings, read_settings
+from elastocal.compensation.conditioning import read_tool, sensor_load
+from elastocal.compensation.process import (
+    Comparison,
+    Course,
+    ProcessRecord,
+    Source,
+    Table,
+    Trace,
+    lines_of,
+    pooled,
+)
 from elastocal.errors import CompensationError
 from elastocal.files import read_text, sha256
 from elastocal.identification import read_model

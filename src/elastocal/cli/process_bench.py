@@ -12,21 +12,32 @@ from joblib import Parallel, delayed
 
 from elastocal.arrays import FloatArray
 from elastocal.cell import Cell
-from elastocal.compensation.conditioning.tool_load import SensorLoad
+from elastocal.compensation import CompensatorSettings
+from elastocal.compensation.conditioning import SensorLoad
 from elastocal.compensation.online import Compensator
-from elastocal.compensation.process.correctors import Corrector, ModelCorrector, PerfectCorrector
-from elastocal.compensation.process.course import Course
-from elastocal.compensation.process.loop import Controller, Passage, air_shifts, run_course
-from elastocal.compensation.process.placement import Placement, placement_courses
-from elastocal.compensation.process.posture import with_postures
-from elastocal.compensation.process.roughing import SPINDLE, Roughing, roughing_rings
-from elastocal.compensation.process.table import Comparison, compare
-from elastocal.compensation.settings import CompensatorSettings
+from elastocal.compensation.process import (
+    SPINDLE,
+    Comparison,
+    Controller,
+    Corrector,
+    Course,
+    ModelCorrector,
+    Passage,
+    PerfectCorrector,
+    Placement,
+    Roughing,
+    air_shifts,
+    compare,
+    placement_courses,
+    roughing_rings,
+    run_course,
+    with_postures,
+)
 from elastocal.errors import CompensationError
 from elastocal.identification import CalibratedModel
-from elastocal.planning.tooling import cell_surface
-from elastocal.robot.inverse.frames import inverse_transform
-from elastocal.sim.workcell.process import ProcessCell
+from elastocal.planning import cell_surface
+from elastocal.robot.inverse import inverse_transform
+from elastocal.sim.workcell import ProcessCell
 
 Report = Callable[[str, int, int], None]
 _ZEROING = 250

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from rich.console import Console
 from rich.table import Table as Printed
 
-from elastocal.compensation.process.record import Line, Table, Values
+from elastocal.compensation.process import Line, Table, Values
 
 
 def show(console: Console, table: Table) -> None:

@@ -5,10 +5,7 @@ from pathlib import Path
 from elastocal.dataset import Dataset
 from elastocal.errors import RobotError
 from elastocal.files import read_text
-from elastocal.robot import Robot, catalogue
-from elastocal.robot.mounting import with_tool
-from elastocal.robot.pose import T_from_xyzabc
-from elastocal.robot.urdf import leaf_links, parse_urdf
+from elastocal.robot import Robot, T_from_xyzabc, catalogue, leaf_links, parse_urdf, with_tool
 from elastocal.units import parse_quantity
 
 TOOL_LINK = "tcp"

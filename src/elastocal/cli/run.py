@@ -31,7 +31,7 @@ def run(
     from elastocal.cli.output import console, print_json
     from elastocal.cli.run_session import Asked, prepare, run_session
     from elastocal.cli.run_table import dry_figures, figures, show_itinerary, show_result
-    from elastocal.procedure.job import End
+    from elastocal.procedure import End
 
     job = prepare(cell, plan, out, seed)
     if dry_run:

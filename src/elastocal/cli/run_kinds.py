@@ -7,13 +7,15 @@ from elastocal import dataset
 from elastocal.cell import load_cell
 from elastocal.cli.cell_facts import cell_facts
 from elastocal.errors import SchemaError
-from elastocal.planning.plan_file import read_plan
-from elastocal.planning.pool_file import read_pool
-from elastocal.procedure.journal import commits, read_journal
-from elastocal.procedure.pose_recorder import SCHEMA as STREAMS
-from elastocal.procedure.run_folder import RunFolder
-from elastocal.procedure.streams import read_streams
-from elastocal.procedure.summary import read_summary
+from elastocal.planning import read_plan, read_pool
+from elastocal.procedure import (
+    SCHEMA as STREAMS,
+    RunFolder,
+    commits,
+    read_journal,
+    read_streams,
+    read_summary,
+)
 
 Described = tuple[str, dict[str, Any]]
 """The kind of a file and what it holds."""

@@ -17,25 +17,38 @@ from elastocal.cli.interruption import interruption
 from elastocal.cli.run_view import watching
 from elastocal.errors import ElastocalError, ProcedureError
 from elastocal.files import read_text
-from elastocal.planning.plan_file import PLAN, PlanFile, read_plan
-from elastocal.procedure.copies import read_copies
-from elastocal.procedure.derivation import derive, write_derived
-from elastocal.procedure.entries import Entry, Event, RunRecord
-from elastocal.procedure.job import End, Job, Result, Seams
-from elastocal.procedure.journal import Journal, read_journal
-from elastocal.procedure.plan_fit import check_fits, registration_findings
-from elastocal.procedure.resume import (
+from elastocal.planning import PLAN, PlanFile, read_plan
+from elastocal.procedure import (
+    End,
+    Entry,
+    Event,
+    Job,
+    Journal,
     LastKnown,
+    PoseRecorder,
+    Result,
+    RunFolder,
+    Runner,
+    RunRecord,
+    Seams,
+    Settings,
+    cell_place,
+    check_fits,
     check_same_run,
     check_same_settings,
+    derive,
+    fill,
     last_known,
+    make_folder,
+    read_copies,
+    read_journal,
+    refuse_foreign,
+    registration_findings,
     run_record,
+    settings_of,
+    way_home,
+    write_derived,
 )
-from elastocal.procedure.run_folder import RunFolder, cell_place, fill, make_folder, refuse_foreign
-from elastocal.procedure.runner import Runner
-from elastocal.procedure.settings import Settings, settings_of
-from elastocal.procedure.streams import PoseRecorder
-from elastocal.procedure.ways import way_home
 
 
 @dataclass(frozen=True)

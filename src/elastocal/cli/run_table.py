@@ -8,10 +8,7 @@ from rich.console import Console
 from rich.table import Table
 
 from elastocal.cli.run_session import Finished, Prepared
-from elastocal.procedure.entries import Event
-from elastocal.procedure.itinerary import itinerary
-from elastocal.procedure.journal import commits, read_journal
-from elastocal.procedure.pose_log import PoseLog
+from elastocal.procedure import Event, PoseLog, commits, itinerary, read_journal
 
 
 def dry_figures(job: Prepared) -> dict[str, Any]:

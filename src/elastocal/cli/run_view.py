@@ -12,7 +12,7 @@ from rich.live import Live
 from rich.text import Text
 
 from elastocal.cli.progress import Overheard
-from elastocal.procedure.progress import Progress
+from elastocal.procedure import Progress
 
 REFRESH = 0.1
 """Shortest time between two changes of the line, in s of the wall."""

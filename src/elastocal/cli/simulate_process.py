@@ -44,9 +44,14 @@ def simulate_process(  # noqa: PLR0913 (a command has as many options as it has)
     from elastocal.cli.process_answer import Question, answer, runs_of
     from elastocal.cli.process_table import show
     from elastocal.cli.progress import progress_bars
-    from elastocal.compensation.process.folder import TABLE, process_figures, write_process
-    from elastocal.compensation.process.programme import PROGRAMME, write_programme
-    from elastocal.dataset.load_rows import joint_dimensions
+    from elastocal.compensation.process import (
+        PROGRAMME,
+        TABLE,
+        process_figures,
+        write_process,
+        write_programme,
+    )
+    from elastocal.dataset import joint_dimensions
     from elastocal.files import filling
 
     runs = runs_of(model, tool or [], seed or [0])

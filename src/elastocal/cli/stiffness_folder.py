@@ -7,11 +7,11 @@ import numpy as np
 
 from elastocal.arrays import FloatArray
 from elastocal.cli.stiffness_answer import Answer
-from elastocal.compensation.offline.follow import jumps
+from elastocal.compensation.offline import jumps
 from elastocal.compensation.stiffness import Hold, directional, write_choice, write_survey
 from elastocal.files import write_json
 from elastocal.identification import CalibratedModel
-from elastocal.report.stiffness_figures import Curve, write_stiffness_figure
+from elastocal.report import Curve, write_stiffness_figure
 from elastocal.robot import Robot
 
 SCHEMA = "elastocal.stiffness/1"

@@ -53,7 +53,7 @@ def study(  # noqa: PLR0913 - one parameter an option
         study_record,
         write_study,
     )
-    from elastocal.report.study_figure import write_study_figures
+    from elastocal.report import write_study_figures
 
     check_samples(samples)
     good_enough = parse_target(target)

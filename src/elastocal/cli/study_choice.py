@@ -8,15 +8,12 @@ from numpy.random import Generator
 
 from elastocal.arrays import FloatArray, IndexArray
 from elastocal.cell import Cell
+from elastocal.codec import training_cases
 from elastocal.codec.study import Condition
-from elastocal.codec.variants import training_cases
 from elastocal.errors import CodecError
-from elastocal.planning.cell_checks import sight_check
-from elastocal.planning.choice import Searched
-from elastocal.planning.gathering import gather
+from elastocal.planning import Searched, cell_surface, gather, sight_check
 from elastocal.planning.search import Candidates, RandomChoice, technique
-from elastocal.planning.tooling import cell_surface
-from elastocal.sim.workcell.quick import Places
+from elastocal.sim.workcell import Places
 
 
 @dataclass(frozen=True, eq=False)

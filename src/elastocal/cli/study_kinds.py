@@ -3,10 +3,18 @@
 from pathlib import Path
 from typing import Any
 
-from elastocal.codec.study import StudySettings, StudyStore, read_study
-from elastocal.codec.study.files import SCHEMA
-from elastocal.codec.study.settings import SCHEMA as SETTINGS_SCHEMA
-from elastocal.codec.study.store import PART_SCHEMA, PARTS, SETTINGS, read_part, read_settings
+from elastocal.codec.study import (
+    PART_SCHEMA,
+    PARTS,
+    SETTINGS,
+    SETTINGS_SCHEMA,
+    STUDY_SCHEMA,
+    StudySettings,
+    StudyStore,
+    read_part,
+    read_settings,
+    read_study,
+)
 
 Described = tuple[str, dict[str, Any]]
 
@@ -48,7 +56,7 @@ def study_record(path: Path) -> Described:
     """Describe the results of a study."""
     record = read_study(path)
     return "record of a study", {
-        "schema": SCHEMA,
+        "schema": STUDY_SCHEMA,
         "cell": record.cell,
         "samples": record.samples,
         "verification": record.verification,

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 
 from elastocal.cell import Cell
-from elastocal.cell.description.search import DEFAULT_POSES
+from elastocal.cell.description import DEFAULT_POSES
 from elastocal.codec.study import Condition, make_conditions, read_variations
 from elastocal.errors import CodecError, UnitError
 from elastocal.units import parse_quantity

@@ -9,9 +9,9 @@ from importlib.metadata import version
 import numpy as np
 
 from elastocal.arrays import FloatArray
-from elastocal.cell import Cell
-from elastocal.cell.fingerprint import fingerprint
+from elastocal.cell import Cell, fingerprint
 from elastocal.cli.study_choice import Chosen, StudyPool, choose, study_poses
+from elastocal.codec import ALL_LOADS, training_cases
 from elastocal.codec.study import (
     Condition,
     ConditionRecord,
@@ -24,11 +24,9 @@ from elastocal.codec.study import (
     Verification,
     calibrated,
 )
-from elastocal.codec.variants import ALL_LOADS, training_cases
 from elastocal.elastic import ElasticModel, layout
 from elastocal.errors import CodecError, DeviceError, nearest
-from elastocal.sim.workcell.quick import QuickCell
-from elastocal.sim.workcell.quick_errors import ErrorDraws, QuickErrors, Scales
+from elastocal.sim.workcell import ErrorDraws, QuickCell, QuickErrors, Scales
 
 _PACKAGES = ("elastocal", "numpy", "scipy", "pin")
 

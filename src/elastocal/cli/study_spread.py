@@ -19,8 +19,7 @@ from functools import partial
 from joblib import Parallel, delayed, parallel_config
 
 from elastocal.cli.study_cluster import PATIENCE, check_scheduler, connected
-from elastocal.codec.study.running import Spread, Work
-from elastocal.codec.study.samples import SampleResult
+from elastocal.codec.study import SampleResult, Spread, Work
 from elastocal.errors import CodecError, ElastocalError
 
 Results = Iterator[list[SampleResult]]

@@ -8,9 +8,7 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from elastocal.codec.study import StudyRecord
-from elastocal.codec.study.settings import written
-from elastocal.codec.study.summary import Share
+from elastocal.codec.study import Share, StudyRecord, written
 
 MOST_ROWS = 40
 _CAPTION = (

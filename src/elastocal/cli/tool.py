@@ -35,9 +35,12 @@ def tool(
     from elastocal.cli.tool_inputs import posture_robot, three_numbers, transform
     from elastocal.cli.tool_source import from_run, from_table
     from elastocal.cli.tool_table import show_tool
-    from elastocal.compensation.conditioning.mistakes import refuse_mistakes
-    from elastocal.compensation.conditioning.tool_file import tool_record, write_tool
-    from elastocal.compensation.conditioning.tool_fit import fit_tool
+    from elastocal.compensation.conditioning import (
+        fit_tool,
+        refuse_mistakes,
+        tool_record,
+        write_tool,
+    )
 
     refuse_overwriting(out, data)
     if data.is_dir():

@@ -8,8 +8,7 @@ from elastocal.arrays import FloatArray
 from elastocal.cli.robot_source import find_robot
 from elastocal.errors import CompensationError
 from elastocal.identification import read_model
-from elastocal.robot import Robot
-from elastocal.robot.pose import T_from_xyzabc
+from elastocal.robot import Robot, T_from_xyzabc
 from elastocal.units import parse_quantity
 
 

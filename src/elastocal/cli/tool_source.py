@@ -7,16 +7,22 @@ import numpy as np
 
 from elastocal.arrays import FloatArray
 from elastocal.cell import Cell, load_cell
-from elastocal.compensation.conditioning.posture_table import read_postures
-from elastocal.compensation.conditioning.postures import StaticPostures, static_postures
-from elastocal.compensation.conditioning.tool_file import SensorMount
+from elastocal.compensation.conditioning import (
+    SensorMount,
+    StaticPostures,
+    read_postures,
+    static_postures,
+)
 from elastocal.errors import CompensationError, ProcedureError
-from elastocal.procedure.journal import commits, read_journal
-from elastocal.procedure.reduction import PoseReadings, reduce_pose
-from elastocal.procedure.run_folder import RunFolder
-from elastocal.procedure.streams import read_streams
-from elastocal.robot import Robot
-from elastocal.robot.robot import GRAVITY
+from elastocal.procedure import (
+    PoseReadings,
+    RunFolder,
+    commits,
+    read_journal,
+    read_streams,
+    reduce_pose,
+)
+from elastocal.robot import GRAVITY, Robot
 
 
 @dataclass(frozen=True, eq=False)

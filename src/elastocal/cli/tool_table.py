@@ -7,8 +7,7 @@ from rich.console import Console
 from rich.table import Table
 from scipy.spatial.transform import Rotation
 
-from elastocal.compensation.conditioning.tool_file import ToolRecord
-from elastocal.compensation.conditioning.tool_model import NAMES
+from elastocal.compensation.conditioning import NAMES, ToolRecord
 
 _SHOWN = {"mass": ("kg", 1.0), "sensor": ("deg", 180.0 / np.pi), "force": ("N", 1.0)}
 _SHOWN |= {"centre": ("mm", 1e3), "moment": ("N*m", 1.0)}

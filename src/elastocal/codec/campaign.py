@@ -11,11 +11,14 @@ from elastocal.codec.options import CodecOptions
 from elastocal.dataset import Readings
 from elastocal.elastic import ElasticModel
 from elastocal.errors import ConventionError
-from elastocal.identification.conventions import check_conventions
-from elastocal.identification.joint_check import check_joints
-from elastocal.identification.poses import pose_blocks, same_configuration
-from elastocal.identification.problem import build
-from elastocal.identification.suspicious import screen
+from elastocal.identification import (
+    build,
+    check_conventions,
+    check_joints,
+    pose_blocks,
+    same_configuration,
+    screen,
+)
 from elastocal.robot import Robot
 
 

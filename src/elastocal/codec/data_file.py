@@ -16,10 +16,10 @@ from elastocal.codec.data import CodecData, SpringLabels
 from elastocal.codec.options import CodecOptions
 from elastocal.codec.training import AXES
 from elastocal.codec.variants import KEYS, Variant
-from elastocal.dataset.netcdf import read_stated, write_netcdf
+from elastocal.dataset import read_stated, write_netcdf
 from elastocal.errors import CodecError, SchemaError
 
-SCHEMA = "elastocal.codec/1"
+ARRAYS_SCHEMA = "elastocal.codec/1"
 ARRAYS = "codec.nc"
 """Name of the file in a codec's folder."""
 
@@ -67,7 +67,7 @@ def read_codec(folder: Path) -> CodecData:
     """
     path = Path(folder)
     path = path / ARRAYS if path.is_dir() else path
-    found = read_stated(path, SCHEMA)
+    found = read_stated(path, ARRAYS_SCHEMA)
     try:
         return _data_of(found)
     except (CodecError, KeyError, TypeError, ValueError) as error:
@@ -106,7 +106,7 @@ def _attributes(data: CodecData) -> dict[str, Any]:
     options = {name: getattr(data.options, name) for name in _OPTIONS}
     splits = data.options.splits
     return {
-        "schema": SCHEMA,
+        "schema": ARRAYS_SCHEMA,
         "robot_name": data.robot,
         "provenance": data.provenance,
         "options": json.dumps(options | {"splits": splits}),

@@ -13,10 +13,7 @@ from elastocal.arrays import BoolArray, FloatArray
 from elastocal.codec.data import NONE, CodecData
 from elastocal.codec.training import Trainee
 from elastocal.elastic import layout
-from elastocal.identification.least_squares import rank
-from elastocal.identification.observability import Term, observability
-from elastocal.identification.problem import unit_columns
-from elastocal.identification.solve import factor
+from elastocal.identification import Term, factor, observability, rank, unit_columns
 from elastocal.robot import Robot
 
 _SHARE = 1e-6

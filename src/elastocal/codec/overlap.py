@@ -17,7 +17,7 @@ from numpy.random import Generator
 from scipy.stats import norm, t
 
 from elastocal.arrays import FloatArray, IndexArray
-from elastocal.identification.bootstrap import CONFIDENCE
+from elastocal.identification import CONFIDENCE
 
 DRAWS = 1000
 """Bootstrap draws."""

@@ -8,7 +8,7 @@ from numpy.random import Generator
 from elastocal.arrays import BoolArray, FloatArray, IndexArray
 from elastocal.codec.overlap import Overlap, median_draws
 from elastocal.errors import CodecError
-from elastocal.identification.bootstrap import CONFIDENCE
+from elastocal.identification import CONFIDENCE
 
 
 @dataclass(frozen=True)

@@ -11,8 +11,7 @@ from elastocal.codec.campaign import Campaign
 from elastocal.codec.splits import Split
 from elastocal.codec.variants import Variant, training_cases
 from elastocal.elastic import ElasticModel
-from elastocal.identification import Problem, build, solve
-from elastocal.identification.triangles import PoseTriangles
+from elastocal.identification import PoseTriangles, Problem, build, solve
 from elastocal.planning.search import Candidates, growing_choices, technique
 
 AXES = ("x", "y", "z", "norm")

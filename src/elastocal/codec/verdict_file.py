@@ -15,7 +15,7 @@ from elastocal.codec.verdicts import Verdicts
 from elastocal.files import write_json
 from elastocal.schema import StrictModel, read_json
 
-SCHEMA = "elastocal.codec_verdicts/1"
+VERDICTS_SCHEMA = "elastocal.codec_verdicts/1"
 VERDICTS = "codec.json"
 """Name of the file in a codec's folder."""
 
@@ -139,7 +139,7 @@ def verdict_record(
 
 def figures(record: VerdictRecord) -> dict[str, Any]:
     """Return a record as JSON-ready data, with its schema."""
-    return record.stated(SCHEMA)
+    return record.stated(VERDICTS_SCHEMA)
 
 
 def write_verdicts(folder: Path, record: VerdictRecord) -> Path:
@@ -165,7 +165,7 @@ def read_verdicts(path: Path) -> VerdictRecord:
     FileAccessError
         If it cannot be read.
     """
-    return read_json(path, VerdictRecord, SCHEMA)
+    return read_json(path, VerdictRecord, VERDICTS_SCHEMA)
 
 
 def _settings(data: CodecData, verdicts: Verdicts) -> Settings:

@@ -32,7 +32,7 @@ from pydantic import (
 )
 
 from elastocal.arrays import FloatArray
-from elastocal.cell.description.quantities import (
+from elastocal.cell.description import (
     Angle,
     Distance,
     PositiveForce,
@@ -41,7 +41,7 @@ from elastocal.cell.description.quantities import (
 )
 from elastocal.compensation.filters import FilterChain, low_pass, notch
 from elastocal.errors import CompensationError
-from elastocal.robot.pose import T_from_xyzabc
+from elastocal.robot import T_from_xyzabc
 from elastocal.schema import StrictModel, read_yaml
 from elastocal.units import parse_quantity
 

@@ -19,9 +19,14 @@ from numpy.typing import ArrayLike
 from elastocal.arrays import FloatArray, IndexArray
 from elastocal.elastic.springs import Spring, check_springs, is_axial
 from elastocal.errors import SpringError
-from elastocal.robot import Jacobian, Robot
-from elastocal.robot.chain import ChainModel, InsertedJoint, build_model
-from elastocal.robot.robot import evaluate_jacobian
+from elastocal.robot import (
+    ChainModel,
+    InsertedJoint,
+    Jacobian,
+    Robot,
+    build_model,
+    evaluate_jacobian,
+)
 
 
 @dataclass(frozen=True)

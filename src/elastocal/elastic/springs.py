@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from elastocal.arrays import FloatArray
 from elastocal.errors import SpringError, nearest
-from elastocal.robot.chain import ChainJoint
+from elastocal.robot import ChainJoint
 
 AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 _ALIGNED = 1.0 - 1e-9

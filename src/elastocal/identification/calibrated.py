@@ -6,8 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from elastocal.arrays import FloatArray
-from elastocal.elastic import ElasticModel
-from elastocal.elastic.model import check_vectors
+from elastocal.elastic import ElasticModel, check_vectors
 from elastocal.errors import SpringError
 from elastocal.identification.bootstrap import interval
 from elastocal.identification.observability import Observability

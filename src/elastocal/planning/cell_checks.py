@@ -8,8 +8,7 @@ import trimesh
 
 from elastocal.arrays import FloatArray
 from elastocal.cell import Cell
-from elastocal.cell.description.file import TOOLING
-from elastocal.cell.description.shapes import Box, Cylinder, Shape, Sphere
+from elastocal.cell.description import TOOLING, Box, Cylinder, Shape, Sphere
 from elastocal.planning.checks import (
     Check,
     Checks,
@@ -35,7 +34,7 @@ from elastocal.planning.surface import (
     fit_disk,
     read_mesh,
 )
-from elastocal.robot.singularity import has_wrist
+from elastocal.robot import has_wrist
 
 
 def point_checks(

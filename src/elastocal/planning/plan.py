@@ -10,9 +10,9 @@ from elastocal.cell import Cell
 from elastocal.errors import PlanningError
 from elastocal.planning.cell_checks import collision_scene, sight_check, torque_check
 from elastocal.planning.choice import Searched
-from elastocal.planning.gathering import STAGE as CANDIDATES
-from elastocal.planning.gathering import Gathered, gather
+from elastocal.planning.gathering import STAGE as CANDIDATES, Gathered, gather
 from elastocal.planning.motion import (
+    STAGE as VISITING,
     Mover,
     Route,
     clear_retreats,
@@ -20,7 +20,6 @@ from elastocal.planning.motion import (
     plan_route,
     refuse_blocked_home,
 )
-from elastocal.planning.motion.route import STAGE as VISITING
 from elastocal.planning.plan_file import PlanFile, SpreadRecord
 from elastocal.planning.pool import Progress
 from elastocal.planning.pool_file import PoolData

@@ -12,7 +12,7 @@ import numpy as np
 import xarray as xr
 
 from elastocal.arrays import FloatArray, IndexArray
-from elastocal.dataset.netcdf import read_stated, write_netcdf
+from elastocal.dataset import read_stated, write_netcdf
 from elastocal.errors import PlanningError, SchemaError
 from elastocal.planning.plan_file import POOL, PlanFile
 

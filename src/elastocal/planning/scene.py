@@ -9,8 +9,7 @@ import pinocchio as pin
 
 from elastocal.arrays import BoolArray, FloatArray, IndexArray
 from elastocal.errors import RobotError
-from elastocal.robot import Robot
-from elastocal.robot.mesh_files import collision_model
+from elastocal.robot import Robot, collision_model
 
 NEIGHBOURS = 1
 """Links this many joints apart touch by construction and are not checked against each other."""

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from elastocal.arrays import FloatArray
-from elastocal.planning.plan_file import Joints, PoseRecord
+from elastocal.planning import Joints, PoseRecord
 from elastocal.procedure.line import Line
 from elastocal.procedure.pose_log import PoseLog, ReadingStatus, Window
 from elastocal.procedure.settings import Settings

@@ -6,8 +6,7 @@ from typing import Any
 import numpy as np
 
 from elastocal.arrays import FloatArray
-from elastocal.dataset import Dataset
-from elastocal.dataset.layout import STATUSES
+from elastocal.dataset import STATUSES, Dataset
 from elastocal.procedure.displacement import LoadRow, Numbers
 from elastocal.procedure.pose_log import ReadingStatus
 from elastocal.robot import Robot

@@ -3,11 +3,10 @@
 import hashlib
 from pathlib import Path
 
-from elastocal.cell import Cell, load_cell
-from elastocal.cell.fingerprint import fingerprint
+from elastocal.cell import Cell, fingerprint, load_cell
 from elastocal.errors import FileAccessError, SchemaError
 from elastocal.files import read_text, sha256
-from elastocal.planning.plan_file import PLAN, PlanFile, read_plan
+from elastocal.planning import PLAN, PlanFile, read_plan
 from elastocal.procedure.entries import RunRecord
 from elastocal.procedure.run_folder import RunFolder
 

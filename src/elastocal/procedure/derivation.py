@@ -12,7 +12,7 @@ from elastocal.cell import Cell
 from elastocal.dataset import Dataset, write
 from elastocal.errors import DatasetError, FileAccessError, ProcedureError, SchemaError
 from elastocal.files import write_json
-from elastocal.planning.plan_file import PlanFile
+from elastocal.planning import PlanFile
 from elastocal.procedure.averaged_dataset import make_dataset
 from elastocal.procedure.copies import check_stream, read_copies
 from elastocal.procedure.displacement import LoadRow, load_rows
@@ -27,7 +27,7 @@ from elastocal.procedure.summary import Derivation, summarise
 from elastocal.procedure.tool_estimate import estimate_tool
 from elastocal.procedure.tool_weight import ToolLoad
 from elastocal.procedure.unloaded import marker_readings, tool_readings
-from elastocal.robot.inverse.frames import inverse_transform
+from elastocal.robot.inverse import inverse_transform
 
 
 @dataclass(frozen=True, eq=False)

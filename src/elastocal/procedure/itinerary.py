@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from elastocal.arrays import FloatArray
-from elastocal.planning.plan_file import Joints, PlanFile
+from elastocal.planning import Joints, PlanFile
 from elastocal.procedure.settings import Settings
 from elastocal.procedure.steps import Step
 from elastocal.procedure.ways import HOME, stop_joints, way

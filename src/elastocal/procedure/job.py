@@ -6,7 +6,7 @@ from enum import Enum
 from pathlib import Path
 from typing import Protocol
 
-from elastocal.planning.plan_file import PlanFile
+from elastocal.planning import PlanFile
 from elastocal.procedure.progress import Progress
 from elastocal.procedure.run_folder import RunFolder
 from elastocal.procedure.settings import Settings

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from elastocal.arrays import FloatArray
-from elastocal.planning.plan_file import PoseRecord
+from elastocal.planning import PoseRecord
 from elastocal.procedure.faults import Fault, FaultError
 
 

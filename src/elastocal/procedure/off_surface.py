@@ -6,7 +6,7 @@ import numpy as np
 
 from elastocal.arrays import FloatArray
 from elastocal.cell.devices import Motion
-from elastocal.planning.plan_file import Joints
+from elastocal.planning import Joints
 from elastocal.procedure.attempt import Attempt
 from elastocal.procedure.entries import Action
 from elastocal.procedure.faults import Fault, FaultError

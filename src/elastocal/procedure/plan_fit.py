@@ -10,7 +10,7 @@ import numpy as np
 
 from elastocal.cell import Cell
 from elastocal.errors import ProcedureError
-from elastocal.planning.plan_file import PlanFile
+from elastocal.planning import PlanFile
 
 LEAST_POSES = 3
 """Unloaded marker readings that the rotation of a station needs."""

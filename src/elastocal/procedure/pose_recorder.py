@@ -13,8 +13,7 @@ from elastocal.arrays import FloatArray
 from elastocal.cell.devices import ArmState, PointBlock, WrenchBlock
 from elastocal.errors import ProcedureError
 from elastocal.procedure.copies import file_sha256
-from elastocal.procedure.mcap import Topic, write_mcap
-from elastocal.procedure.mcap.topic import TimeArray
+from elastocal.procedure.mcap import TimeArray, Topic, write_mcap
 from elastocal.procedure.stream_messages import (
     ARM,
     MARKER,

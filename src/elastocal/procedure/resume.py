@@ -5,11 +5,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from elastocal.cell import Cell
-from elastocal.cell.fingerprint import fingerprint
+from elastocal.cell import Cell, fingerprint
 from elastocal.errors import ProcedureError
 from elastocal.files import sha256
-from elastocal.planning.plan_file import PlanFile
+from elastocal.planning import PlanFile
 from elastocal.procedure.entries import Action, Entry, Event, RunRecord
 from elastocal.procedure.journal import commits
 from elastocal.schema import StrictModel

@@ -5,11 +5,10 @@ import shutil
 from dataclasses import dataclass
 from pathlib import Path
 
-from elastocal.cell import Cell
-from elastocal.cell.fingerprint import named_files
+from elastocal.cell import Cell, named_files
 from elastocal.errors import FileAccessError
 from elastocal.files import replacing
-from elastocal.planning.plan_file import PLAN, POOL
+from elastocal.planning import PLAN, POOL
 
 JOURNAL = "journal.jsonl"
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from elastocal.cell.devices import Devices, Motion
 from elastocal.errors import ProcedureError
-from elastocal.planning.plan_file import Joints, PoseRecord
+from elastocal.planning import Joints, PoseRecord
 from elastocal.procedure.attempt import Attempt
 from elastocal.procedure.entries import Action, Event
 from elastocal.procedure.faults import CAUGHT, Ends, Fault, FaultError, as_fault

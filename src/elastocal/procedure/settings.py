@@ -6,10 +6,10 @@ import numpy as np
 
 from elastocal.arrays import FloatArray
 from elastocal.cell import Cell
-from elastocal.cell.description.procedure import ProcedureSettings
+from elastocal.cell.description import ProcedureSettings
 from elastocal.errors import ProcedureError
-from elastocal.planning.motion.durations import AxisMotion
-from elastocal.planning.plan_file import PlanFile
+from elastocal.planning import PlanFile
+from elastocal.planning.motion import AxisMotion
 from elastocal.robot import GRAVITY
 
 LIMIT_PER_LOAD = 1.3

@@ -14,8 +14,7 @@ from scipy.spatial.transform import Rotation
 from elastocal.arrays import BoolArray, FloatArray
 from elastocal.cell.devices import SensorStatus
 from elastocal.errors import SchemaError
-from elastocal.procedure.mcap import read_mcap
-from elastocal.procedure.mcap.reader import Messages
+from elastocal.procedure.mcap import Messages, read_mcap
 from elastocal.procedure.pose_recorder import NANOSECONDS, RECORD, SCHEMA, Mark, PoseRecorder
 from elastocal.procedure.stream_messages import ARM, MARKER, MARKS, WRENCH
 from elastocal.schema import check_schema

@@ -11,7 +11,7 @@ import numpy as np
 
 from elastocal.arrays import FloatArray
 from elastocal.errors import ProcedureError
-from elastocal.planning.plan_file import Joints, PlanFile, PoseRecord
+from elastocal.planning import Joints, PlanFile, PoseRecord
 from elastocal.procedure.line import Line
 
 HOME = -1

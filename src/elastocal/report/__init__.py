@@ -1,6 +1,5 @@
 """Pictures and pages for people; nothing below this package draws."""
 
-from elastocal.report.plan_figure import write_plan_figure
-from elastocal.report.plan_page import write_plan_page
+import lazy_loader
 
-__all__ = ["write_plan_figure", "write_plan_page"]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

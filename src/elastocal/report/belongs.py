@@ -2,7 +2,7 @@
 
 from elastocal.cell import Cell
 from elastocal.errors import PlanningError
-from elastocal.planning.plan_file import PlanFile
+from elastocal.planning import PlanFile
 
 
 def check_robot(plan: PlanFile, cell: Cell) -> None:

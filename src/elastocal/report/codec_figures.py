@@ -6,8 +6,7 @@ from pathlib import Path
 
 from matplotlib.figure import Figure
 
-from elastocal.codec import CodecData, Verdicts
-from elastocal.codec.insight import Insight
+from elastocal.codec import CodecData, Insight, Verdicts
 from elastocal.report.codec_chart import codec_chart, headline
 from elastocal.report.codec_page import write_codec_page
 from elastocal.report.compliance_chart import compliance_chart

@@ -12,10 +12,7 @@ from string import Template
 import numpy as np
 from plotly.offline import get_plotlyjs
 
-from elastocal.codec import CodecData, Verdicts
-from elastocal.codec.index_correlation import Correlation
-from elastocal.codec.indices import INDICES
-from elastocal.codec.observed import Observed
+from elastocal.codec import INDICES, CodecData, Correlation, Observed, Verdicts
 from elastocal.files import write_text
 from elastocal.report.codec_chart import PANELS, error_boxes, how_to_read
 from elastocal.report.codec_views import compliance_views, error_views

@@ -5,8 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from elastocal.codec import AXES, CodecData, Verdicts
-from elastocal.codec.observed import Observed
+from elastocal.codec import AXES, CodecData, Observed, Verdicts
 from elastocal.report.box_panel import reads_better_in_decades, round_values
 from elastocal.report.boxes import Boxes
 from elastocal.report.codec_chart import PANELS, error_boxes

@@ -8,9 +8,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from elastocal.arrays import BoolArray
-from elastocal.codec import CodecData
-from elastocal.codec.observed import Observed
-from elastocal.identification.observability import describe
+from elastocal.codec import CodecData, Observed
+from elastocal.identification import describe
 from elastocal.report import style
 from elastocal.report.box_panel import draw_boxes, finish_axes, label_sizes
 from elastocal.report.boxes import Boxes, make_boxes

@@ -6,9 +6,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from elastocal.codec import CodecData
-from elastocal.codec.index_correlation import Correlation
-from elastocal.codec.indices import INDICES, IndexValues
+from elastocal.codec import INDICES, CodecData, Correlation, IndexValues
 from elastocal.errors import CodecError
 from elastocal.report import style
 from elastocal.report.box_panel import label_sizes, reads_better_in_decades

@@ -11,8 +11,7 @@ import plotly.graph_objects as go
 
 from elastocal.arrays import FloatArray
 from elastocal.cell import Cell
-from elastocal.planning.plan_file import PlanFile, PoseRecord
-from elastocal.planning.pool_file import PoolData
+from elastocal.planning import PlanFile, PoolData, PoseRecord
 from elastocal.planning.surface import Surface
 from elastocal.report import style
 from elastocal.report.camera import light

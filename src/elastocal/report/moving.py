@@ -8,7 +8,7 @@ import plotly.graph_objects as go
 
 from elastocal.arrays import FloatArray, IndexArray
 from elastocal.cell import Cell
-from elastocal.planning.plan_file import PlanFile
+from elastocal.planning import PlanFile
 from elastocal.planning.surface import Surface
 from elastocal.report import style
 from elastocal.report.camera import light

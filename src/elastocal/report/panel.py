@@ -9,8 +9,7 @@ from matplotlib.collections import LineCollection, PolyCollection
 from scipy.spatial import cKDTree
 
 from elastocal.arrays import FloatArray
-from elastocal.planning.plan_file import SpreadRecord
-from elastocal.planning.pool_file import PoolData
+from elastocal.planning import PoolData, SpreadRecord
 from elastocal.planning.surface import Surface
 from elastocal.report import style
 from elastocal.report.flat_map import FlatMap

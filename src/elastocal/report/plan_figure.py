@@ -12,8 +12,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from elastocal.arrays import FloatArray
-from elastocal.planning.plan_file import PlanFile
-from elastocal.planning.pool_file import PoolData, check_pool_of
+from elastocal.planning import PlanFile, PoolData, check_pool_of
 from elastocal.planning.surface import Surface
 from elastocal.report import style
 from elastocal.report.flat_map import FlatMap, flat_map

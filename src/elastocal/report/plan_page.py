@@ -14,8 +14,7 @@ from plotly.offline import get_plotlyjs
 
 from elastocal.cell import Cell
 from elastocal.files import write_text
-from elastocal.planning.plan_file import PlanFile, PoseRecord
-from elastocal.planning.pool_file import PoolData, check_pool_of
+from elastocal.planning import PlanFile, PoolData, PoseRecord, check_pool_of
 from elastocal.planning.surface import Surface
 from elastocal.report.belongs import check_robot
 from elastocal.report.html import POLICY, embedded, template

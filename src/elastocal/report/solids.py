@@ -14,9 +14,8 @@ import trimesh
 
 from elastocal.arrays import BoolArray, FloatArray, IndexArray
 from elastocal.cell import Cell
-from elastocal.cell.description.file import TOOLING
-from elastocal.planning.cell_checks import collision_scene
-from elastocal.planning.scene import CollisionScene
+from elastocal.cell.description import TOOLING
+from elastocal.planning import CollisionScene, collision_scene
 from elastocal.planning.surface import Surface
 
 _SECTIONS = 24

@@ -9,8 +9,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
 from elastocal.arrays import FloatArray
-from elastocal.codec.study import SampleResult, StudyRecord, StudySettings
-from elastocal.codec.study.settings import name_of, written
+from elastocal.codec.study import SampleResult, StudyRecord, StudySettings, name_of, written
 from elastocal.report import style
 from elastocal.report.box_panel import (
     draw_boxes,

@@ -7,8 +7,7 @@ import numpy as np
 import plotly.graph_objects as go
 
 from elastocal.cell import Cell
-from elastocal.planning.plan_file import PlanFile
-from elastocal.planning.pool_file import PoolData
+from elastocal.planning import PlanFile, PoolData
 from elastocal.planning.surface import Surface
 from elastocal.report import style
 from elastocal.report.camera import Bounds, bounds_of, cameras_of

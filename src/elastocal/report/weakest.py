@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from elastocal.arrays import FloatArray, IndexArray
-from elastocal.planning.pool_file import PoolData
+from elastocal.planning import PoolData
 from elastocal.report.text import readable
 
 

@@ -1,5 +1,5 @@
 """The rigid robot: model, inverse kinematics, singularities, catalogue."""
 
-from elastocal.robot.robot import GRAVITY, Jacobian, JointLimits, Robot
+import lazy_loader
 
-__all__ = ["GRAVITY", "Jacobian", "JointLimits", "Robot"]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -2,8 +2,7 @@ import csv
 
 import pytest
 
-from elastocal.codec.study import read_study, study_record, write_study
-from elastocal.codec.study.samples import Sample
+from elastocal.codec.study import Sample, read_study, study_record, write_study
 from elastocal.errors import CodecError, SchemaError
 from support.studies import settings, simulate
 

@@ -3,9 +3,8 @@ from pathlib import Path
 
 import pytest
 
-from elastocal.codec.study import StudyStore, one_after_the_other, run_study
+from elastocal.codec.study import PARTS, SETTINGS, StudyStore, one_after_the_other, run_study
 from elastocal.codec.study.running import BATCH
-from elastocal.codec.study.store import PARTS, SETTINGS
 from elastocal.errors import CodecError, FileAccessError, SchemaError
 from support.studies import numbers, settings, simulate
 

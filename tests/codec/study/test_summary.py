@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from elastocal.codec.study.samples import Accuracy, Outcome, SampleResult
+from elastocal.codec.study import Accuracy, Outcome, SampleResult
 from elastocal.codec.study.summary import advice, distribution, share, summarise
 from support.studies import settings
 

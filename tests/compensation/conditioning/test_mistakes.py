@@ -2,8 +2,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from elastocal.compensation.conditioning.mistakes import refuse_mistakes
-from elastocal.compensation.conditioning.tool_fit import fit_tool
+from elastocal.compensation.conditioning import fit_tool, refuse_mistakes
 from elastocal.errors import CompensationError
 from support.static_postures import PlantedTool, turned
 

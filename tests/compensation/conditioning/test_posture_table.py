@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from elastocal.compensation.conditioning.posture_table import read_postures
+from elastocal.compensation.conditioning import read_postures
 from elastocal.errors import CompensationError, DatasetError
 from elastocal.robot import Robot
 from support.virtual_chain import ARMS

@@ -3,17 +3,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from elastocal.compensation.conditioning.tool_file import (
+from elastocal.compensation.conditioning import (
     SensorMount,
+    fit_tool,
     read_tool,
     sensor_load,
     tool_record,
     write_tool,
 )
-from elastocal.compensation.conditioning.tool_fit import fit_tool
 from elastocal.errors import CompensationError, SchemaError
-from elastocal.robot import Robot, catalogue
-from elastocal.robot.mounting import with_tool
+from elastocal.robot import Robot, catalogue, with_tool
 from support.static_postures import GRAVITY, PlantedTool, turned
 
 TOOL = PlantedTool()

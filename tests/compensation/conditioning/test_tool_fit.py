@@ -2,9 +2,9 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from elastocal.compensation.conditioning.postures import static_postures
-from elastocal.compensation.conditioning.tool_fit import fit_tool, residual
-from elastocal.compensation.conditioning.tool_model import NAMES, derivatives, wrenches
+from elastocal.compensation.conditioning import NAMES, fit_tool, static_postures
+from elastocal.compensation.conditioning.tool_fit import residual
+from elastocal.compensation.conditioning.tool_model import derivatives, wrenches
 from elastocal.errors import CompensationError
 from support.static_postures import PlantedTool, turned
 

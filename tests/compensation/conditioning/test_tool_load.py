@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from elastocal.compensation.conditioning.tool_load import SensorLoad
+from elastocal.compensation.conditioning import SensorLoad
 from elastocal.errors import CompensationError
 from elastocal.procedure.tool_weight import RawWrench, ToolLoad, wrench_on_robot
 from support.compensated import load

@@ -2,18 +2,19 @@ import numpy as np
 import pytest
 
 from contracts.test_layouts import CASES
-from elastocal.compensation.kernel import compiled, deflection, observation_block, orientation
-from elastocal.compensation.kernel.compiled import python_text
-from elastocal.compensation.kernel.program import (
-    ONE,
-    ZERO,
+from elastocal.compensation.kernel import (
     Assignment,
-    Program,
     Remark,
     Value,
-    needed,
+    compiled,
+    deflection,
+    observation_block,
+    orientation,
+    sum_text,
+    value_text,
 )
-from elastocal.compensation.kernel.text import sum_text, value_text
+from elastocal.compensation.kernel.compiled import python_text
+from elastocal.compensation.kernel.program import ONE, ZERO, Program, needed
 from elastocal.elastic import ElasticModel
 from elastocal.robot import Robot
 from support.virtual_chain import ARMS

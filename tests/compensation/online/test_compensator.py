@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from elastocal.compensation.conditioning.tool_load import SensorLoad
+from elastocal.compensation.conditioning import SensorLoad
 from elastocal.compensation.online import Compensator, Reading, Status, rkorr
 from support.compensated import arm, load, settings
 

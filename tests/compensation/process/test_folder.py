@@ -3,10 +3,18 @@
 import numpy as np
 import pytest
 
-from elastocal.compensation.process.folder import read_process, read_table, write_process
-from elastocal.compensation.process.record import ProcessRecord, Source, Table, lines_of
-from elastocal.compensation.process.table import compare, pooled
-from elastocal.compensation.process.trace import Trace
+from elastocal.compensation.process import (
+    ProcessRecord,
+    Source,
+    Table,
+    Trace,
+    compare,
+    lines_of,
+    pooled,
+    read_process,
+    read_table,
+    write_process,
+)
 from elastocal.errors import CompensationError, FileAccessError, SchemaError
 
 

@@ -5,9 +5,14 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from elastocal.compensation.process.correctors import PerfectCorrector
-from elastocal.compensation.process.course import Course, Ripple
-from elastocal.compensation.process.loop import Controller, air_shifts, run_course
+from elastocal.compensation.process import (
+    Controller,
+    Course,
+    PerfectCorrector,
+    air_shifts,
+    run_course,
+)
+from elastocal.compensation.process.course import Ripple
 from elastocal.errors import CompensationError
 from elastocal.sim.scene import START
 from support.cells import robot

@@ -3,12 +3,16 @@
 import numpy as np
 import pytest
 
-from elastocal.compensation.process.placement import Placement, placement_courses
-from elastocal.compensation.process.posture import with_postures
-from elastocal.compensation.process.roughing import Roughing, roughing_rings
+from elastocal.compensation.process import (
+    Placement,
+    Roughing,
+    placement_courses,
+    roughing_rings,
+    with_postures,
+)
 from elastocal.compensation.process.variation import engaged, swing
 from elastocal.errors import CompensationError
-from elastocal.planning.tooling import cell_surface
+from elastocal.planning import cell_surface
 from support.simulated import example_cell
 
 

@@ -1,7 +1,8 @@
 import numpy as np
 import pytest
 
-from elastocal.compensation.process.table import Figures, compare, pooled
+from elastocal.compensation.process import compare, pooled
+from elastocal.compensation.process.table import Figures
 
 
 def test_figures_are_those_of_absolute_deviations():

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from elastocal.errors import IdentificationError
-from elastocal.identification.observability import Term
+from elastocal.identification import Term
 from elastocal.identification.recertification.comparable import (
     common_springs,
     comparable_sums,

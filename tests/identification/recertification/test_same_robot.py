@@ -2,7 +2,8 @@ import numpy as np
 import pytest
 
 from elastocal.errors import IdentificationError
-from elastocal.identification.recertification.same_robot import check_same_robot, outside_limits
+from elastocal.identification.recertification import check_same_robot
+from elastocal.identification.recertification.same_robot import outside_limits
 from elastocal.robot import Robot, catalogue
 from support.cells import robot, urdf
 

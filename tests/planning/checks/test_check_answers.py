@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 import trimesh
 
+from elastocal.planning import CollisionScene
 from elastocal.planning.checks import (
     CollisionCheck,
     FrictionCheck,
@@ -19,9 +20,8 @@ from elastocal.planning.checks import (
     WristCheck,
 )
 from elastocal.planning.postures import Postures
-from elastocal.planning.scene import Body, CollisionScene
-from elastocal.robot import Robot
-from elastocal.robot.mounting import Rail, on_rail
+from elastocal.planning.scene import Body
+from elastocal.robot import Rail, Robot, on_rail
 from support.postures import FORCE_TCP, arm, postures
 
 NO_TOOL = (0.0, np.zeros(3))

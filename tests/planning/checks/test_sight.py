@@ -5,9 +5,10 @@ import numpy as np
 import pytest
 import trimesh
 
+from elastocal.planning import CollisionScene
 from elastocal.planning.checks import SightCheck, Station
 from elastocal.planning.moving_solids import MovingSolids
-from elastocal.planning.scene import Body, CollisionScene
+from elastocal.planning.scene import Body
 from support.postures import arm, postures
 
 MARKER = np.array([0.2, 0.0, -0.1])

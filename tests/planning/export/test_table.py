@@ -8,7 +8,7 @@ import pytest
 
 from elastocal.errors import FileAccessError
 from elastocal.planning.export import write_table
-from elastocal.robot.pose import T_from_xyzabc
+from elastocal.robot import T_from_xyzabc
 from elastocal.units import split_column
 from support import plans
 

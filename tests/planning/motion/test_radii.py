@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from elastocal.errors import PlanningError
+from elastocal.planning import CollisionScene
 from elastocal.planning.motion.radii import joint_radii
-from elastocal.planning.scene import Body, CollisionScene
-from elastocal.robot import Robot, catalogue
-from elastocal.robot.mounting import Rail, on_rail, with_tool
+from elastocal.planning.scene import Body
+from elastocal.robot import Rail, Robot, catalogue, on_rail, with_tool
 from support.moving import BALL, scene
 from support.postures import T_FLANGE_TCP, arm
 

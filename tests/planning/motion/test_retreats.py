@@ -5,11 +5,10 @@ import pytest
 
 from elastocal.cell import load_cell
 from elastocal.cell.examples import write_example
-from elastocal.planning.cell_checks import collision_scene
+from elastocal.planning import cell_surface, collision_scene
 from elastocal.planning.motion import clear_retreats, mover_for
 from elastocal.planning.retreat import on_the_way
 from elastocal.planning.surface import sample_uniform
-from elastocal.planning.tooling import cell_surface
 from elastocal.planning.workshop import Workshop
 
 

@@ -9,12 +9,11 @@ import pytest
 from elastocal.cell import load_cell
 from elastocal.cell.examples import write_example
 from elastocal.errors import PlanningError, RobotError
-from elastocal.planning.cell_checks import collision_scene
+from elastocal.planning import cell_surface, collision_scene
 from elastocal.planning.motion import contact_time, mover_for, plan_route
 from elastocal.planning.motion.ways import Ways
 from elastocal.planning.postures import Postures
 from elastocal.planning.surface import sample_uniform
-from elastocal.planning.tooling import cell_surface
 from elastocal.planning.workshop import Workshop
 from support.moving import BALL, CLEARANCE, HOME, box, chain, dense, mover, pressed
 from support.postures import arm

@@ -6,9 +6,10 @@ import coal
 import numpy as np
 import pytest
 
+from elastocal.planning import CollisionScene
 from elastocal.planning.motion import Sweep
 from elastocal.planning.motion.sweep import FINEST
-from elastocal.planning.scene import Body, CollisionScene
+from elastocal.planning.scene import Body
 from support.moving import BALL, CLEARANCE, box, dense, scene
 from support.postures import arm
 

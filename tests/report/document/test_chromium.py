@@ -3,8 +3,7 @@
 import pytest
 
 from elastocal.errors import FileAccessError
-from elastocal.report.document import chromium
-from elastocal.report.document.pdf import write_pdf
+from elastocal.report.document import chromium, write_pdf
 
 
 @pytest.fixture

@@ -10,8 +10,7 @@ from elastocal import dataset
 from elastocal.codec import read_codec, write_codec
 from elastocal.elastic import ElasticModel, layout
 from elastocal.errors import IdentificationError
-from elastocal.identification import calibrate
-from elastocal.identification.model_file import write_model
+from elastocal.identification import calibrate, write_model
 from elastocal.report.document import Options, gather
 from support.cells import Cell, linear_truth, robot
 from support.reported import MADE

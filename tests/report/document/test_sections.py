@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from elastocal.identification.observability import describe
+from elastocal.identification import describe
 from elastocal.report.document import Absence
 from elastocal.report.document.markup import Markup, plain
 from elastocal.report.document.sections import (

@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from elastocal.sim.workcell import SimulatedCell
-from elastocal.sim.workcell.process import ProcessCell
+from elastocal.sim.workcell import ProcessCell, SimulatedCell
 from support.simulated import QUIET, example_cell, places
 
 FORCE = np.array([150.0, -120.0, 900.0])

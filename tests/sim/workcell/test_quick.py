@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from elastocal.cell.devices import Motion
+from elastocal.sim.workcell import ErrorDraws, Places, QuickCell, QuickErrors, Scales
 from elastocal.sim.workcell.force_sensor import force_gain
 from elastocal.sim.workcell.keys import generator
-from elastocal.sim.workcell.quick import Places, QuickCell, Settled
-from elastocal.sim.workcell.quick_errors import ErrorDraws, QuickErrors, Scales
+from elastocal.sim.workcell.quick import Settled
 from elastocal.sim.workcell.tracker import _draw
 from support.simulated import QUIET, Session, example_cell, marker_by_controller, places
 

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from elastocal.errors import DeviceError
-from elastocal.planning.plan import make_plan
+from elastocal.planning import make_plan
 from elastocal.robot import catalogue
 from elastocal.sim.workcell.robot import TrueRobot
 from elastocal.sim.workcell.robot_layout import lay_out_robot

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from elastocal.cell.description.simulation_truth import Gears
+from elastocal.cell.description import Gears
 from elastocal.sim.workcell.balancer import BalancerSpring
 from elastocal.sim.workcell.robot_layout import gear_laws
 from elastocal.sim.workcell.springs import RobotSprings

@@ -1,7 +1,5 @@
 """The description of a cell: the YAML file that an engineer writes, and what it says."""
 
-from elastocal.cell.description.cell import Cell, load_cell
-from elastocal.cell.description.file import SCHEMA, CellFile
-from elastocal.cell.description.loads import DIRECTIONS
+import lazy_loader
 
-__all__ = ["DIRECTIONS", "SCHEMA", "Cell", "CellFile", "load_cell"]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

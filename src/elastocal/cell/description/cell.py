@@ -16,14 +16,20 @@ from elastocal.cell.description.motion import axis_speeds, home_position
 from elastocal.cell.description.pose import vector
 from elastocal.cell.description.robot import RailEntry
 from elastocal.cell.description.shapes import MeshFile, Shape
-from elastocal.dataset.load_rows import LoadRows, joint_dimensions, read_load_rows
+from elastocal.dataset import LoadRows, joint_dimensions, read_load_rows
 from elastocal.errors import ElastocalError, FileAccessError, RobotError, SchemaError, nearest
 from elastocal.files import read_text
-from elastocal.robot import GRAVITY, Robot, catalogue
-from elastocal.robot.inverse.frames import inverse_transform
-from elastocal.robot.mesh_files import find_meshes
-from elastocal.robot.mounting import Rail, on_rail, with_tool
-from elastocal.robot.urdf import parse_urdf
+from elastocal.robot import (
+    GRAVITY,
+    Rail,
+    Robot,
+    catalogue,
+    find_meshes,
+    on_rail,
+    parse_urdf,
+    with_tool,
+)
+from elastocal.robot.inverse import inverse_transform
 from elastocal.schema import read_yaml
 
 TCP = "tcp"

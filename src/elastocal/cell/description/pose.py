@@ -4,7 +4,7 @@ import numpy as np
 
 from elastocal.arrays import FloatArray
 from elastocal.cell.description.quantities import Angle, Point
-from elastocal.robot.pose import T_from_xyzabc
+from elastocal.robot import T_from_xyzabc
 from elastocal.schema import StrictModel
 
 

@@ -9,34 +9,6 @@ A new driver is one package under ``elastocal.drivers`` and an entry in the cont
 ``tests/contracts/``.
 """
 
-from dataclasses import dataclass
+import lazy_loader
 
-from elastocal.cell.devices.arm import ArmState, Motion, RobotArm
-from elastocal.cell.devices.clock import Clock
-from elastocal.cell.devices.force_sensor import ForceSensor, SensorStatus, WrenchBlock
-from elastocal.cell.devices.metrology import BeamState, Metrology, PointBlock
-
-
-@dataclass(frozen=True, eq=False)
-class Devices:
-    """Everything that is switched on during a run, with the time that they share."""
-
-    arm: RobotArm
-    sensor: ForceSensor
-    metrology: Metrology
-    clock: Clock
-
-
-__all__ = [
-    "ArmState",
-    "BeamState",
-    "Clock",
-    "Devices",
-    "ForceSensor",
-    "Metrology",
-    "Motion",
-    "PointBlock",
-    "RobotArm",
-    "SensorStatus",
-    "WrenchBlock",
-]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -1,5 +1,5 @@
 """Example cells that ``elastocal init`` writes: a commented cell file and its mesh."""
 
-from elastocal.cell.examples.writing import EXAMPLES, check_like, write_example
+import lazy_loader
 
-__all__ = ["EXAMPLES", "check_like", "write_example"]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

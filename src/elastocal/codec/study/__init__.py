@@ -15,50 +15,6 @@ spreads batches. `elastocal.cli.study_simulation` and `elastocal.cli.study_sprea
 ==============  =================================================================================
 """
 
-from elastocal.codec.study.calibrating import Verification, calibrated
-from elastocal.codec.study.factors import (
-    FACTORS,
-    Condition,
-    make_conditions,
-    read_variation,
-    read_variations,
-)
-from elastocal.codec.study.files import StudyRecord, read_study, study_record, write_study
-from elastocal.codec.study.running import check_samples, one_after_the_other, run_study
-from elastocal.codec.study.samples import (
-    Accuracy,
-    Outcome,
-    Purpose,
-    Sample,
-    SampleResult,
-    Simulate,
-)
-from elastocal.codec.study.settings import ConditionRecord, SpringRecord, StudySettings
-from elastocal.codec.study.store import StudyStore
+import lazy_loader
 
-__all__ = [
-    "FACTORS",
-    "Accuracy",
-    "Condition",
-    "ConditionRecord",
-    "Outcome",
-    "Purpose",
-    "Sample",
-    "SampleResult",
-    "Simulate",
-    "SpringRecord",
-    "StudyRecord",
-    "StudySettings",
-    "StudyStore",
-    "Verification",
-    "calibrated",
-    "check_samples",
-    "make_conditions",
-    "one_after_the_other",
-    "read_study",
-    "read_variation",
-    "read_variations",
-    "run_study",
-    "study_record",
-    "write_study",
-]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

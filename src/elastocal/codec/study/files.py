@@ -13,7 +13,7 @@ from elastocal.errors import CodecError
 from elastocal.files import write_json, write_text
 from elastocal.schema import StrictModel, read_json
 
-SCHEMA = "elastocal.study/1"
+STUDY_SCHEMA = "elastocal.study/1"
 RECORD, TABLE, COMPLIANCES = "study.json", "study.csv", "compliance.csv"
 """Names of the files in a study's folder."""
 
@@ -107,7 +107,7 @@ def write_study(
         for spring, value in zip(springs[number], outcome.compliance.tolist(), strict=True)
     )
     write_text(folder / COMPLIANCES, _csv(header, table))
-    contents = record.stated(SCHEMA)
+    contents = record.stated(STUDY_SCHEMA)
     write_json(folder / RECORD, contents)
     return [TABLE, COMPLIANCES, RECORD]
 
@@ -121,7 +121,7 @@ def read_study(path: Path) -> StudyRecord:
         If the file holds none.
     """
     path = Path(path)
-    return read_json(path / RECORD if path.is_dir() else path, StudyRecord, SCHEMA)
+    return read_json(path / RECORD if path.is_dir() else path, StudyRecord, STUDY_SCHEMA)
 
 
 def _factors(settings: StudySettings, number: int) -> tuple[str, ...]:

@@ -6,7 +6,7 @@ from elastocal.codec.study.factors import FACTORS, Condition, Value
 from elastocal.errors import CodecError
 from elastocal.schema import StrictModel
 
-SCHEMA = "elastocal.study_settings/1"
+SETTINGS_SCHEMA = "elastocal.study_settings/1"
 _LONGEST = 60
 """Letters of a setting that a refusal still quotes whole; fingerprints are longer."""
 

@@ -14,7 +14,7 @@ import numpy as np
 from pydantic import FiniteFloat
 
 from elastocal.codec.study.samples import Accuracy, Outcome, SampleResult
-from elastocal.codec.study.settings import SCHEMA, StudySettings, check_same
+from elastocal.codec.study.settings import SETTINGS_SCHEMA, StudySettings, check_same
 from elastocal.errors import FileAccessError, SchemaError
 from elastocal.files import sha256, write_text
 from elastocal.schema import StrictModel, read_json
@@ -84,7 +84,7 @@ class StudyStore:
             raise
         except OSError as error:
             raise FileAccessError(f"cannot write {self.folder}: {error.strerror}") from error
-        write_text(path, _text(SCHEMA, settings))
+        write_text(path, _text(SETTINGS_SCHEMA, settings))
 
     def keep(self, settings: StudySettings, results: Sequence[SampleResult]) -> None:
         """Write finished samples of a study; they are on the disk when this returns.
@@ -122,7 +122,7 @@ def read_settings(path: Path) -> StudySettings:
     SchemaError, FileAccessError
         If the file holds none.
     """
-    settings = read_json(path, StudySettings, SCHEMA)
+    settings = read_json(path, StudySettings, SETTINGS_SCHEMA)
     missing = {each.springs for each in settings.conditions} - set(settings.springs)
     if missing or not settings.conditions:
         raise SchemaError(f"{path}: springs of {', '.join(sorted(missing)) or 'any'} are missing")

@@ -9,7 +9,7 @@ from scipy.stats import binom, norm
 from elastocal.arrays import FloatArray
 from elastocal.codec.study.samples import SampleResult
 from elastocal.codec.study.settings import ConditionRecord, StudySettings
-from elastocal.identification.bootstrap import CONFIDENCE
+from elastocal.identification import CONFIDENCE
 from elastocal.schema import StrictModel
 
 RELIABLE = 0.9

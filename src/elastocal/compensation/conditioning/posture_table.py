@@ -11,12 +11,11 @@ from scipy.spatial.transform import Rotation
 
 from elastocal.arrays import FloatArray
 from elastocal.compensation.conditioning.postures import StaticPostures, static_postures
-from elastocal.compensation.path.angles import beyond_a_turn
-from elastocal.dataset.load_rows import LoadRows, joint_dimensions, read_load_rows
+from elastocal.compensation.path import beyond_a_turn
+from elastocal.dataset import LoadRows, joint_dimensions, read_load_rows
 from elastocal.errors import CompensationError
 from elastocal.files import read_text
-from elastocal.robot import Robot
-from elastocal.robot.pose import T_from_xyzabc
+from elastocal.robot import Robot, T_from_xyzabc
 
 _ANGLES = ("a", "b", "c")
 _QUATERNION = ("qx", "qy", "qz", "qw")

@@ -6,7 +6,7 @@ import numpy as np
 
 from elastocal.arrays import FloatArray
 from elastocal.errors import CompensationError
-from elastocal.robot.robot import GRAVITY
+from elastocal.robot import GRAVITY
 
 LEAST = 3
 """Postures; with fewer nothing is left to tell whether the numbers fit."""

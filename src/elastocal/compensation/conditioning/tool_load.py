@@ -6,7 +6,7 @@ import numpy as np
 
 from elastocal.arrays import FloatArray
 from elastocal.errors import CompensationError
-from elastocal.robot.robot import GRAVITY
+from elastocal.robot import GRAVITY
 
 _RIGID = 1e-6
 """How far R R^T may be from identity."""

@@ -1,5 +1,5 @@
 """C99 for a real-time target: the model as constants, and the steps of the compensator."""
 
-from elastocal.compensation.export.writer import c_files, write_c
+import lazy_loader
 
-__all__ = ["c_files", "write_c"]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

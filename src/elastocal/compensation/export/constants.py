@@ -9,7 +9,7 @@ import numpy as np
 
 from elastocal.arrays import FloatArray
 from elastocal.compensation.export.comments import remark
-from elastocal.compensation.online.design import JOINT_RANGE, LONG_AGO, Design
+from elastocal.compensation.online import JOINT_RANGE, LONG_AGO, Design
 
 _FNV_START, _FNV_PRIME = 14695981039346656037, 1099511628211
 """FNV-1a, 64 bits (Fowler, Noll and Vo)."""

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from elastocal.compensation.online.design import Design
+from elastocal.compensation.online import Design
 
 _RAW = "N, N m; raw, as the sensor gives them | sensor"
 _AT_TCP = (

@@ -3,10 +3,18 @@
 from collections.abc import Mapping, Sequence
 
 from elastocal.compensation.export.comments import remark
-from elastocal.compensation.kernel.program import Assignment, Remark, Statement, Turn, Value
-from elastocal.compensation.kernel.statics import Routine
-from elastocal.compensation.kernel.text import Naming, sum_text, value_text
-from elastocal.compensation.online.design import Design
+from elastocal.compensation.kernel import (
+    Assignment,
+    Naming,
+    Remark,
+    Routine,
+    Statement,
+    Turn,
+    Value,
+    sum_text,
+    value_text,
+)
+from elastocal.compensation.online import Design
 
 _VECTORS = {"f": "force", "m": "moment"}
 

@@ -6,9 +6,7 @@ import numpy as np
 
 from elastocal.arrays import FloatArray
 from elastocal.compensation.kernel import compiled
-from elastocal.compensation.online.compensator import Compensator
-from elastocal.compensation.online.design import Design
-from elastocal.compensation.online.state import Reading
+from elastocal.compensation.online import Compensator, Design, Reading
 
 LOADS = 8
 _SEED = 20240623

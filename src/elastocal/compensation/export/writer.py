@@ -11,7 +11,7 @@ from elastocal.compensation.export.constants import checksum, constants_of
 from elastocal.compensation.export.readme import readme_values
 from elastocal.compensation.export.routines import c_routines
 from elastocal.compensation.export.vectors import episodes, load_cases
-from elastocal.compensation.online.design import Design
+from elastocal.compensation.online import Design
 from elastocal.files import filling
 
 PARTS = ("head.c", "sin_cos.c", "condition.c", "correct.c", "selftest.c")

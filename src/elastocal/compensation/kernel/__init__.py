@@ -1,11 +1,5 @@
 """The elastic model as straight-line arithmetic: the one source of the Python and the C step."""
 
-from elastocal.compensation.kernel.compiled import compiled
-from elastocal.compensation.kernel.statics import (
-    Routine,
-    deflection,
-    observation_block,
-    orientation,
-)
+import lazy_loader
 
-__all__ = ["Routine", "compiled", "deflection", "observation_block", "orientation"]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -7,7 +7,7 @@ from numpy.typing import ArrayLike
 
 from elastocal.arrays import FloatArray
 from elastocal.compensation.kernel.program import ONE, ZERO, Matrix, Program, Value, Vector
-from elastocal.robot.chain import ChainJoint, SerialChain
+from elastocal.robot import ChainJoint, SerialChain
 
 NOTHING: Vector = (ZERO, ZERO, ZERO)
 IDENTITY: Matrix = ((ONE, ZERO, ZERO), (ZERO, ONE, ZERO), (ZERO, ZERO, ONE))

@@ -15,12 +15,10 @@ import numpy as np
 
 from elastocal.arrays import BoolArray, FloatArray, IndexArray
 from elastocal.compensation.offline.limits import Where, check_limits, turned_inside
-from elastocal.compensation.path.errors import PathError
+from elastocal.compensation.path import PathError
 from elastocal.identification import CalibratedModel
 from elastocal.robot import Robot
-from elastocal.robot.inverse import InverseKinematics
-from elastocal.robot.inverse.branch_solver import pose_error
-from elastocal.robot.inverse.limits import TURN
+from elastocal.robot.inverse import TURN, InverseKinematics, pose_error
 
 LARGEST = 0.02
 """Largest deflection that is taken for one, in m."""

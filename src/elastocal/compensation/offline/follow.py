@@ -4,10 +4,9 @@ import numpy as np
 
 from elastocal.arrays import FloatArray, IndexArray
 from elastocal.compensation.offline.limits import Where
-from elastocal.compensation.path.errors import PathError
+from elastocal.compensation.path import PathError
 from elastocal.robot import Robot
-from elastocal.robot.inverse import InverseKinematics
-from elastocal.robot.inverse.limits import TURN
+from elastocal.robot.inverse import TURN, InverseKinematics
 
 JUMP = 0.5 * np.pi
 """A joint that turns farther than this from one row to the next has changed its posture, in rad."""

@@ -5,9 +5,9 @@ from collections.abc import Callable
 import numpy as np
 
 from elastocal.arrays import FloatArray
-from elastocal.compensation.path.errors import PathError
+from elastocal.compensation.path import PathError
 from elastocal.robot import Robot
-from elastocal.robot.inverse.limits import TURN
+from elastocal.robot.inverse import TURN
 
 Where = Callable[[int], str]
 """Names a row for a person, e.g. ``row 12``."""

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from elastocal.compensation.conditioning.tool_load import SensorLoad
+from elastocal.compensation.conditioning import SensorLoad
 from elastocal.compensation.kernel import compiled
 from elastocal.compensation.online.conditioner import Conditioner
 from elastocal.compensation.online.design import JOINT_RANGE, LONG_AGO, Design, design

@@ -6,7 +6,7 @@ import numpy as np
 from scipy import stats
 
 from elastocal.arrays import FloatArray
-from elastocal.compensation.conditioning.tool_load import SensorLoad
+from elastocal.compensation.conditioning import SensorLoad
 from elastocal.compensation.filters import FilterChain
 from elastocal.compensation.kernel import Routine, deflection, observation_block, orientation
 from elastocal.compensation.settings import CompensatorSettings

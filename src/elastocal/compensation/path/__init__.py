@@ -1,23 +1,5 @@
 """Programmed paths with their forces: ``PATH.csv`` (spec section 4), read and written in pieces."""
 
-from elastocal.compensation.path.columns import PathColumns, Wrench, find_columns, find_wrenches
-from elastocal.compensation.path.errors import PathError, in_file
-from elastocal.compensation.path.text import Piece, TextLayout, count_lines, pieces, read_layout
-from elastocal.compensation.path.values import PathValues, read_values, turned_to_base
+import lazy_loader
 
-__all__ = [
-    "PathColumns",
-    "PathError",
-    "PathValues",
-    "Piece",
-    "TextLayout",
-    "Wrench",
-    "count_lines",
-    "find_columns",
-    "find_wrenches",
-    "in_file",
-    "pieces",
-    "read_layout",
-    "read_values",
-    "turned_to_base",
-]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -4,8 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from elastocal.compensation.path.errors import PathError
-from elastocal.dataset.load_rows import joint_dimensions
-from elastocal.dataset.table_header import Column
+from elastocal.dataset import Column, joint_dimensions
 from elastocal.errors import UnitError, nearest
 from elastocal.robot import Robot
 from elastocal.units import factor, split_column

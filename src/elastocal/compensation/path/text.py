@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TextIO
 
 from elastocal.compensation.path.errors import PathError
-from elastocal.dataset.table_text import DELIMITERS
+from elastocal.dataset import DELIMITERS
 from elastocal.errors import FileAccessError
 
 _BLOCK = 1 << 20

@@ -6,8 +6,8 @@ import numpy as np
 
 from elastocal.arrays import FloatArray
 from elastocal.cell import Cell
-from elastocal.compensation.offline.follow import follow, jumps
-from elastocal.compensation.path.errors import PathError
+from elastocal.compensation.offline import follow, jumps
+from elastocal.compensation.path import PathError
 from elastocal.compensation.process.course import Course
 from elastocal.errors import CompensationError
 from elastocal.robot.inverse import InverseKinematics, inverse_for

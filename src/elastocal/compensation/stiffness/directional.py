@@ -17,8 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from elastocal.arrays import FloatArray
-from elastocal.identification import CalibratedModel
-from elastocal.identification.bootstrap import interval
+from elastocal.identification import CalibratedModel, interval
 
 
 @dataclass(frozen=True, eq=False)

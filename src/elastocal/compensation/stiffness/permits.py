@@ -9,10 +9,8 @@ import numpy as np
 from elastocal.arrays import BoolArray, FloatArray
 from elastocal.cell import Cell
 from elastocal.errors import RobotError
-from elastocal.planning.cell_checks import collision_scene
-from elastocal.planning.tooling import cell_surface
-from elastocal.robot import Robot
-from elastocal.robot.singularity import characteristic_length, smallest_singular_value
+from elastocal.planning import cell_surface, collision_scene
+from elastocal.robot import Robot, characteristic_length, smallest_singular_value
 
 _SAMPLES = 5
 _SAME = 1e-6

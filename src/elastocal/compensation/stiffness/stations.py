@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from elastocal.arrays import FloatArray
-from elastocal.compensation.offline.path_file import programmed
+from elastocal.compensation.offline import programmed
 from elastocal.compensation.path import (
     PathError,
     Piece,

@@ -17,8 +17,7 @@ from pydantic import BeforeValidator, Field
 
 from elastocal.elastic.springs import AXES, Spring, as_axis, axial
 from elastocal.errors import SpringError
-from elastocal.robot import Robot
-from elastocal.robot.chain import ChainJoint
+from elastocal.robot import ChainJoint, Robot
 from elastocal.schema import StrictModel, read_yaml
 from elastocal.units import parse_quantity
 

@@ -1,31 +1,5 @@
 """Recertification: whether a cell has changed between two calibrations, and whether it matters."""
 
-from elastocal.identification.recertification.files import recertify_files
-from elastocal.identification.recertification.recertify import recertify
-from elastocal.identification.recertification.record import (
-    ComparisonRecord,
-    comparison_record,
-    read_comparison,
-    write_comparison,
-)
-from elastocal.identification.recertification.result import (
-    DeflectionChange,
-    Estimate,
-    Recertification,
-    SpringChange,
-    Verdict,
-)
+import lazy_loader
 
-__all__ = [
-    "ComparisonRecord",
-    "DeflectionChange",
-    "Estimate",
-    "Recertification",
-    "SpringChange",
-    "Verdict",
-    "comparison_record",
-    "read_comparison",
-    "recertify",
-    "recertify_files",
-    "write_comparison",
-]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

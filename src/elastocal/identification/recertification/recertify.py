@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from elastocal.arrays import FloatArray
-from elastocal.elastic.model import check_vectors
+from elastocal.elastic import check_vectors
 from elastocal.errors import IdentificationError, SpringError
 from elastocal.identification.calibrated import CalibratedModel
 from elastocal.identification.recertification.caveats import caveats

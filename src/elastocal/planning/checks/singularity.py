@@ -6,8 +6,7 @@ import numpy as np
 
 from elastocal.arrays import FloatArray
 from elastocal.planning.postures import Postures
-from elastocal.robot import Robot
-from elastocal.robot.singularity import smallest_singular_value, wrist_angle
+from elastocal.robot import Robot, smallest_singular_value, wrist_angle
 
 
 @dataclass(frozen=True)

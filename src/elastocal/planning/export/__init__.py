@@ -1,6 +1,5 @@
 """Plans for people and controllers: a table for spreadsheets, a program for KUKA robots."""
 
-from elastocal.planning.export.krl import check_name, takes_krl, write_krl
-from elastocal.planning.export.table import write_table
+import lazy_loader
 
-__all__ = ["check_name", "takes_krl", "write_krl", "write_table"]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -9,8 +9,7 @@ from pathlib import Path
 
 from elastocal.files import write_text
 from elastocal.planning.plan_file import Joints, PlanFile, PoseRecord
-from elastocal.robot import Robot
-from elastocal.robot.pose import xyzabc_from_T
+from elastocal.robot import Robot, xyzabc_from_T
 from elastocal.units import factor
 
 TABLE = "plan.csv"

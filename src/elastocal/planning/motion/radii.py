@@ -8,8 +8,7 @@ import numpy as np
 from elastocal.arrays import FloatArray
 from elastocal.errors import PlanningError
 from elastocal.planning.scene import Body
-from elastocal.robot import Robot
-from elastocal.robot.mesh_files import collision_model
+from elastocal.robot import Robot, collision_model
 
 
 def joint_radii(robot: Robot, tool: tuple[Body, ...]) -> FloatArray:

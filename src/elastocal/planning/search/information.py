@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from elastocal.arrays import BoolArray, FloatArray
 from elastocal.errors import PlanningError
-from elastocal.identification.least_squares import RANK_TOLERANCE, rank
+from elastocal.identification import RANK_TOLERANCE, rank
 from elastocal.planning.search.candidates import Candidates
 
 EPSILON = 1e-6

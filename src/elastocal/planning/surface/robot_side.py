@@ -6,8 +6,7 @@ import numpy as np
 
 from elastocal.arrays import BoolArray, FloatArray
 from elastocal.robot import Robot
-from elastocal.robot.inverse import InverseKinematics
-from elastocal.robot.inverse.frames import arm_base
+from elastocal.robot.inverse import InverseKinematics, arm_base
 
 
 def arm_reach(robot: Robot) -> float:

@@ -5,8 +5,6 @@ package `mcap` are used as they are; only the messages of a chunk are framed her
 because its writer and its reader take as long again for each sample as the JSON itself.
 """
 
-from elastocal.procedure.mcap.reader import Contents, read_mcap
-from elastocal.procedure.mcap.topic import Topic
-from elastocal.procedure.mcap.writer import write_mcap
+import lazy_loader
 
-__all__ = ["Contents", "Topic", "read_mcap", "write_mcap"]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

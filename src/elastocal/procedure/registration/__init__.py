@@ -1,19 +1,5 @@
 """Tracker registration: where the stations stand, where the marker sits, what has moved."""
 
-from elastocal.procedure.registration.readings import UnloadedReadings
-from elastocal.procedure.registration.register import register
-from elastocal.procedure.registration.result import (
-    Blunder,
-    Registration,
-    StationFit,
-    StationMove,
-)
+import lazy_loader
 
-__all__ = [
-    "Blunder",
-    "Registration",
-    "StationFit",
-    "StationMove",
-    "UnloadedReadings",
-    "register",
-]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

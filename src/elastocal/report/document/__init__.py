@@ -10,19 +10,6 @@
 ================  ==================================================================
 """
 
-from elastocal.report.document.chromium import find_browser
-from elastocal.report.document.gather import Options, gather
-from elastocal.report.document.page import Written, write_report
-from elastocal.report.document.parts import Absence, Parts
-from elastocal.report.document.pdf import write_pdf
+import lazy_loader
 
-__all__ = [
-    "Absence",
-    "Options",
-    "Parts",
-    "Written",
-    "find_browser",
-    "gather",
-    "write_pdf",
-    "write_report",
-]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

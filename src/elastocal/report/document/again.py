@@ -12,11 +12,16 @@ import numpy as np
 from numpy.random import Generator
 
 from elastocal.arrays import FloatArray, IndexArray
-from elastocal.dataset import Dataset
-from elastocal.dataset.selection import without
-from elastocal.identification import CalibratedModel, Calibration, FitOptions, calibrate
-from elastocal.identification.bootstrap import interval
-from elastocal.identification.options import MINIMUM_DRAWS, Weights
+from elastocal.dataset import Dataset, without
+from elastocal.identification import (
+    MINIMUM_DRAWS,
+    CalibratedModel,
+    Calibration,
+    FitOptions,
+    Weights,
+    calibrate,
+    interval,
+)
 
 DRAWS = 1000
 """Of whole poses, for the intervals of the errors."""

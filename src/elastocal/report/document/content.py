@@ -13,10 +13,10 @@ from typing import Any
 
 import numpy as np
 
-from elastocal.dataset.netcdf import read_netcdf
+from elastocal.dataset import read_netcdf
 from elastocal.errors import ElastocalError
 from elastocal.files import read_text
-from elastocal.procedure.copies import file_sha256
+from elastocal.procedure import file_sha256
 
 BYTES, CONTENT = "bytes", "content without times and folders"
 LEFT_OUT = (

@@ -5,16 +5,16 @@ from pathlib import Path
 
 import numpy as np
 
-from elastocal.cell.fingerprint import fingerprint
+from elastocal.cell import fingerprint
 from elastocal.codec import CodecData
-from elastocal.compensation.conditioning.tool_file import ToolRecord
-from elastocal.compensation.process.record import ProcessRecord
+from elastocal.compensation.conditioning import ToolRecord
+from elastocal.compensation.process import ProcessRecord
 from elastocal.dataset import Dataset
 from elastocal.errors import CodecError, CompensationError, IdentificationError
 from elastocal.identification import CalibratedModel
 from elastocal.report.document.origins import origin_doubts
 from elastocal.report.document.parts import Parts
-from elastocal.robot.urdf import parse_urdf
+from elastocal.robot import parse_urdf
 
 _SAME_PLACE = 20e-3
 """Largest distance of contact points, loaded and unloaded, that are one pose, in m."""

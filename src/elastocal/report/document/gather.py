@@ -11,16 +11,14 @@ from pathlib import Path
 
 from elastocal.arrays import FloatArray
 from elastocal.cell import Cell
-from elastocal.codec import judge, read_codec
-from elastocal.codec.data_file import ARRAYS
-from elastocal.compensation.conditioning.tool_file import ToolRecord, read_tool
-from elastocal.compensation.process.folder import TABLE, read_process
-from elastocal.compensation.process.record import ProcessRecord
+from elastocal.codec import ARRAYS, judge, read_codec
+from elastocal.compensation.conditioning import ToolRecord, read_tool
+from elastocal.compensation.process import TABLE, ProcessRecord, read_process
 from elastocal.dataset import Dataset
 from elastocal.errors import ElastocalError
-from elastocal.identification.model_file import read_model, read_record
+from elastocal.identification import read_model, read_record
 from elastocal.identification.recertification import recertify_files
-from elastocal.procedure.copies import file_sha256
+from elastocal.procedure import file_sha256
 from elastocal.report.document.again import Again, calibrate_again
 from elastocal.report.document.fitting import (
     check_codec,

@@ -1,7 +1,6 @@
 """Which of all variants in the codecs is the one that the calibration was made like."""
 
-from elastocal.codec import Saturation
-from elastocal.codec.variants import ALL_LOADS, Variant
+from elastocal.codec import ALL_LOADS, Saturation, Variant
 from elastocal.report.document.parts import Parts
 
 

@@ -6,7 +6,7 @@ what the files say of their origin tells that it is not the run whose journal is
 
 from collections.abc import Iterator
 
-from elastocal.procedure.journal import commits
+from elastocal.procedure import commits
 from elastocal.report.document.parts import Parts
 
 

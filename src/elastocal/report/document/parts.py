@@ -5,15 +5,14 @@ from typing import Any
 
 from elastocal.cell import Cell
 from elastocal.codec import CodecData, Verdicts
-from elastocal.compensation.conditioning.tool_file import ToolRecord
-from elastocal.compensation.process.record import ProcessRecord
+from elastocal.compensation.conditioning import ToolRecord
+from elastocal.compensation.process import ProcessRecord
 from elastocal.dataset import Dataset
 from elastocal.identification import CalibratedModel
 from elastocal.identification.recertification import Recertification
-from elastocal.planning.plan_file import PlanFile
-from elastocal.planning.pool_file import PoolData
+from elastocal.planning import PlanFile, PoolData
 from elastocal.planning.surface import Surface
-from elastocal.procedure.entries import Entry
+from elastocal.procedure import Entry
 from elastocal.report.document.again import Again
 
 

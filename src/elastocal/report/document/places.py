@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from elastocal.errors import FileAccessError
-from elastocal.procedure.run_folder import JOURNAL, RunFolder
+from elastocal.procedure import JOURNAL, RunFolder
 
 MODEL, TOOL, CODEC, PROCESS = "model.json", "tool.json", "codec", "process"
 """Default names of what is not part of the run's own folder."""

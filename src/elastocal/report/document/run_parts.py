@@ -7,14 +7,17 @@ from pathlib import Path
 from elastocal import dataset as datasets
 from elastocal.cell import Cell, load_cell
 from elastocal.files import read_text
-from elastocal.planning.plan_file import PLAN, POOL, PlanFile, read_plan
-from elastocal.planning.pool_file import PoolData, check_pool_of, read_pool
-from elastocal.planning.tooling import cell_surface
-from elastocal.procedure.copies import check_plan
-from elastocal.procedure.entries import Entry
-from elastocal.procedure.journal import read_journal
-from elastocal.procedure.run_folder import RunFolder
-from elastocal.procedure.summary import read_summary
+from elastocal.planning import (
+    PLAN,
+    POOL,
+    PlanFile,
+    PoolData,
+    cell_surface,
+    check_pool_of,
+    read_plan,
+    read_pool,
+)
+from elastocal.procedure import Entry, RunFolder, check_plan, read_journal, read_summary
 from elastocal.report.belongs import check_robot
 from elastocal.report.document.parts import Absence, Parts
 from elastocal.report.document.places import run_files

@@ -5,10 +5,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TypeVar
 
-from elastocal.codec.data_file import ARRAYS
-from elastocal.codec.verdict_file import VERDICTS
-from elastocal.compensation.process.deviations import DEVIATIONS
-from elastocal.compensation.process.folder import TABLE
+from elastocal.codec import ARRAYS, VERDICTS
+from elastocal.compensation.process import DEVIATIONS, TABLE
 from elastocal.errors import ElastocalError
 from elastocal.report.document.content import hash_of
 from elastocal.report.document.parts import Absence, UsedFile

@@ -1,26 +1,5 @@
 """Inverse kinematics: every joint configuration that reaches a pose."""
 
-from elastocal.robot.inverse.choice import inverse_for
-from elastocal.robot.inverse.limits import turns
-from elastocal.robot.inverse.numerical import NumericalInverse
-from elastocal.robot.inverse.opw import OpwInverse
-from elastocal.robot.inverse.opw_geometry import (
-    NotOrthoParallelError,
-    OpwGeometry,
-    OpwParameters,
-    derive_opw,
-)
-from elastocal.robot.inverse.protocol import InverseKinematics, InverseSolutions
+import lazy_loader
 
-__all__ = [
-    "InverseKinematics",
-    "InverseSolutions",
-    "NotOrthoParallelError",
-    "NumericalInverse",
-    "OpwGeometry",
-    "OpwInverse",
-    "OpwParameters",
-    "derive_opw",
-    "inverse_for",
-    "turns",
-]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

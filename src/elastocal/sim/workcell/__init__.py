@@ -21,7 +21,6 @@
 ====================  =========================================================================
 """
 
-from elastocal.sim.workcell.assembly import SimulatedCell, simulated_devices
-from elastocal.sim.workcell.clock import SimClock
+import lazy_loader
 
-__all__ = ["SimClock", "SimulatedCell", "simulated_devices"]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

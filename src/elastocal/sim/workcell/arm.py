@@ -10,7 +10,7 @@ from functools import partial
 import numpy as np
 
 from elastocal.arrays import FloatArray
-from elastocal.cell.description.faults import Fault
+from elastocal.cell.description import Fault
 from elastocal.cell.devices import ArmState, Motion
 from elastocal.errors import DeviceError
 from elastocal.sim.workcell.clock import MICROSECONDS, to_microseconds

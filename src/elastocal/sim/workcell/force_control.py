@@ -8,7 +8,7 @@ it. A lateral force beyond the friction limit is not reached: the contact slides
 import numpy as np
 
 from elastocal.arrays import FloatArray
-from elastocal.cell.description.faults import Fault
+from elastocal.cell.description import Fault
 from elastocal.cell.devices import Motion
 from elastocal.errors import DeviceError
 from elastocal.sim.workcell.contact import Contact

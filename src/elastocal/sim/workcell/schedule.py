@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from elastocal.cell import Cell
-from elastocal.cell.description.faults import Fault
+from elastocal.cell.description import Fault
 from elastocal.errors import DeviceError, nearest
 from elastocal.sim.workcell.clock import to_microseconds
 

@@ -1,5 +1,5 @@
 """KRL in and out: points of a ``.src``/``.dat`` pair corrected, all other bytes as they were."""
 
-from elastocal.compensation.offline.krl.compensate import KrlResult, compensate_krl
+import lazy_loader
 
-__all__ = ["KrlResult", "compensate_krl"]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -11,9 +11,8 @@ from elastocal.compensation.offline.krl.moves import Move
 from elastocal.compensation.offline.krl.points import Point
 from elastocal.compensation.offline.limits import Where, check_limits
 from elastocal.compensation.path import PathError
-from elastocal.robot.inverse import InverseKinematics
-from elastocal.robot.inverse.frames import inverse_transform
-from elastocal.robot.pose import T_from_xyzabc
+from elastocal.robot import T_from_xyzabc
+from elastocal.robot.inverse import InverseKinematics, inverse_transform
 
 _FRAME = ("X", "Y", "Z", "A", "B", "C")
 _ARM = tuple(f"A{number}" for number in range(1, 7))

@@ -1,7 +1,5 @@
 """KRL: the plan as a program for a KUKA controller, ``.src`` and ``.dat``."""
 
-from elastocal.planning.export.krl.names import check_name
-from elastocal.planning.export.krl.program import write_krl
-from elastocal.planning.export.krl.targets import takes_krl
+import lazy_loader
 
-__all__ = ["check_name", "takes_krl", "write_krl"]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

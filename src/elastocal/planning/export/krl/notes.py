@@ -10,10 +10,8 @@ from elastocal.arrays import FloatArray
 from elastocal.planning.export.krl.names import comment_text
 from elastocal.planning.export.krl.speeds import speeds_of
 from elastocal.planning.plan_file import PlanFile
-from elastocal.robot import Robot
-from elastocal.robot.inverse.frames import arm_base
-from elastocal.robot.pose import T_from_xyzabc, xyzabc_from_T
-from elastocal.robot.urdf import parse_urdf
+from elastocal.robot import Robot, T_from_xyzabc, parse_urdf, xyzabc_from_T
+from elastocal.robot.inverse import arm_base
 
 TOOL = BASE = 1
 """Numbers of TOOL_DATA and BASE_DATA that the program uses."""

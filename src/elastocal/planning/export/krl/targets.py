@@ -13,8 +13,7 @@ import numpy as np
 from elastocal.arrays import FloatArray
 from elastocal.errors import PlanningError
 from elastocal.planning.plan_file import Joints, PlanFile, PoseRecord
-from elastocal.robot import Robot
-from elastocal.robot.pose import xyzabc_from_T
+from elastocal.robot import Robot, xyzabc_from_T
 
 ARM_AXES = 6
 EXTERNAL_AXES = 6

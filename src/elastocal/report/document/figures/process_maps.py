@@ -8,7 +8,7 @@ from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 
 from elastocal.arrays import FloatArray
-from elastocal.compensation.process.trace import Trace
+from elastocal.compensation.process import Trace
 from elastocal.report import style
 from elastocal.report.printed import new_figure, plain
 

@@ -4,9 +4,8 @@ from collections.abc import Iterator
 from functools import partial
 from typing import Any
 
-from elastocal.identification import describe
-from elastocal.identification.observability import Term
-from elastocal.report.document.figures.springs import SpringBar, spring_figure
+from elastocal.identification import Term, describe
+from elastocal.report.document.figures import SpringBar, spring_figure
 from elastocal.report.document.markup import facts, heading, listed, paragraph, table
 from elastocal.report.document.parts import Calibrated, Parts
 from elastocal.report.document.pictures import picture

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from elastocal.report.document.figures.stations import station_figure
+from elastocal.report.document.figures import station_figure
 from elastocal.report.document.markup import heading, listed, paragraph, table
 from elastocal.report.document.parts import Parts
 from elastocal.report.document.pictures import picture

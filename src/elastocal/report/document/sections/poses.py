@@ -4,7 +4,7 @@ from functools import partial
 from html import escape
 from typing import Any
 
-from elastocal.planning.plan_file import PlanFile
+from elastocal.planning import PlanFile
 from elastocal.report.document.markup import Markup, facts, folded, paragraph, table
 from elastocal.report.document.parts import Parts
 from elastocal.report.document.pictures import picture

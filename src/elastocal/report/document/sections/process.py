@@ -6,9 +6,8 @@ from functools import partial
 
 import numpy as np
 
-from elastocal.compensation.process.record import Line, ProcessRecord, Values
-from elastocal.compensation.process.trace import Trace
-from elastocal.report.document.figures.process_maps import course_figure, process_maps
+from elastocal.compensation.process import Line, ProcessRecord, Trace, Values
+from elastocal.report.document.figures import course_figure, process_maps
 from elastocal.report.document.markup import flattened, folded, paragraph, table
 from elastocal.report.document.parts import Parts
 from elastocal.report.document.pictures import picture

@@ -10,8 +10,7 @@ from elastocal.arrays import FloatArray
 from elastocal.dataset import Dataset
 from elastocal.identification import Calibration
 from elastocal.report.document.again import Again
-from elastocal.report.document.figures.displacements import displacement_figure
-from elastocal.report.document.figures.grid import pose_grid
+from elastocal.report.document.figures import displacement_figure, pose_grid
 from elastocal.report.document.markup import facts, folded, heading, listed, paragraph, table
 from elastocal.report.document.parts import Parts
 from elastocal.report.document.pictures import picture

@@ -1,0 +1,2 @@
+from .description import Cell as Cell, CellFile as CellFile, load_cell as load_cell
+from .fingerprint import fingerprint as fingerprint, named_files as named_files

@@ -1,0 +1,1 @@
+from .compensate import KrlResult as KrlResult, compensate_krl as compensate_krl

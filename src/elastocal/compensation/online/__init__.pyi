@@ -1,0 +1,9 @@
+from .compensator import Compensator as Compensator
+from .design import (
+    JOINT_RANGE as JOINT_RANGE,
+    LONG_AGO as LONG_AGO,
+    Design as Design,
+    design as design,
+)
+from .rkorr import rkorr as rkorr
+from .state import Correction as Correction, Reading as Reading, State as State, Status as Status

@@ -1,0 +1,36 @@
+from .bootstrap import CONFIDENCE as CONFIDENCE, interval as interval
+from .calibrated import CalibratedModel as CalibratedModel, Prediction as Prediction
+from .calibration import Calibration as Calibration, calibrate as calibrate
+from .conventions import check_conventions as check_conventions
+from .held_out import (
+    Comparison as Comparison,
+    HeldOut as HeldOut,
+    leave_poses_out as leave_poses_out,
+)
+from .joint_check import check_joints as check_joints
+from .least_squares import RANK_TOLERANCE as RANK_TOLERANCE, rank as rank
+from .losses import LOSSES as LOSSES
+from .model_file import (
+    read_model as read_model,
+    read_record as read_record,
+    write_model as write_model,
+)
+from .observability import (
+    Observability as Observability,
+    Term as Term,
+    attainable_rank as attainable_rank,
+    describe as describe,
+    observability as observability,
+)
+from .options import (
+    MINIMUM_DRAWS as MINIMUM_DRAWS,
+    FitOptions as FitOptions,
+    Prior as Prior,
+    Weights as Weights,
+)
+from .poses import pose_blocks as pose_blocks, same_configuration as same_configuration
+from .problem import Problem as Problem, build as build, unit_columns as unit_columns
+from .solve import Solution as Solution, factor as factor, solve as solve
+from .summary import summary as summary
+from .suspicious import screen as screen
+from .triangles import PoseTriangles as PoseTriangles

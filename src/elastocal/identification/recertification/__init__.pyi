@@ -1,0 +1,17 @@
+from .files import recertify_files as recertify_files
+from .recertify import recertify as recertify
+from .record import (
+    ComparisonRecord as ComparisonRecord,
+    comparison_record as comparison_record,
+    figures as figures,
+    read_comparison as read_comparison,
+    write_comparison as write_comparison,
+)
+from .result import (
+    DeflectionChange as DeflectionChange,
+    Estimate as Estimate,
+    Recertification as Recertification,
+    SpringChange as SpringChange,
+    Verdict as Verdict,
+)
+from .same_robot import check_same_robot as check_same_robot

@@ -1,0 +1,18 @@
+from .check import (
+    Check as Check,
+    Checks as Checks,
+    PointCheck as PointCheck,
+    Verdicts as Verdicts,
+    verdicts as verdicts,
+)
+from .collision import CollisionCheck as CollisionCheck
+from .engagement import EdgeCheck as EdgeCheck, FlatnessCheck as FlatnessCheck
+from .friction import FrictionCheck as FrictionCheck
+from .joint_limits import (
+    JointLimitsCheck as JointLimitsCheck,
+    TravelLimitsCheck as TravelLimitsCheck,
+)
+from .sensor import SensorCheck as SensorCheck
+from .sight import SightCheck as SightCheck, Station as Station
+from .singularity import SingularityCheck as SingularityCheck, WristCheck as WristCheck
+from .torque import TorqueCheck as TorqueCheck

@@ -1,0 +1,36 @@
+"""Criteria of the exchange search, one file each.
+
+A new criterion is one file here, an entry in `CRITERIA`, a changelog line, and an entry in
+``tests/contracts/test_criteria.py``.
+"""
+
+from elastocal.errors import PlanningError, nearest
+from elastocal.planning.search.criteria.a_optimal import AOptimal
+from elastocal.planning.search.criteria.criterion import Criterion
+from elastocal.planning.search.criteria.d_optimal import DOptimal
+from elastocal.planning.search.criteria.e_optimal import EOptimal
+from elastocal.planning.search.criteria.i_optimal import IOptimal
+from elastocal.planning.search.criteria.o2 import O2
+from elastocal.planning.search.criteria.o3 import O3
+from elastocal.planning.search.criteria.o4 import O4
+from elastocal.planning.search.criteria.o5 import O5
+
+CRITERIA: dict[str, type[Criterion]] = {
+    criterion.name: criterion
+    for criterion in (DOptimal, AOptimal, EOptimal, O2, O3, O4, O5, IOptimal)
+}
+
+
+def criterion_class(name: str) -> type[Criterion]:
+    """Return a criterion by name.
+
+    Raises
+    ------
+    PlanningError
+        If there is none of that name.
+    """
+    if name not in CRITERIA:
+        raise PlanningError(
+            f"unknown criterion {name!r}{nearest(name, CRITERIA)} (allowed: {', '.join(CRITERIA)})"
+        )
+    return CRITERIA[name]
