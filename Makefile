@@ -5,7 +5,7 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 
-.PHONY: demo test nightly docs bench clean
+.PHONY: demo test nightly docs bench house clean
 
 demo: $(VENV)/installed
 	$(BIN)/elastocal demo afp --out demo --force
@@ -30,6 +30,9 @@ bench: $(VENV)/installed-dev
 	$(BIN)/python benchmarks/pool.py
 	$(BIN)/python benchmarks/compensation.py
 	$(BIN)/python benchmarks/codec.py
+
+house:
+	$(PYTHON) tools/house.py
 
 clean:
 	rm -rf $(VENV) demo site

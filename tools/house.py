@@ -5,7 +5,7 @@ table "Measures of the good houses" that the project holds itself to:
 
 * code lines: neither blank, nor comment, nor docstring;
 * an importer is another module that imports a name of this one, directly or through the face of a
-  package (a face itself is not one);
+  package; a module that a face exports has users outside and is not counted among those with one;
 * a face is the ``__init__`` of a package: a module goes round it when it imports from a module of
   a package that it does not live in.
 """
@@ -62,7 +62,7 @@ class Module:
         return code_lines(self.path, self.tree)
 
     def imports(self, faces: dict[str, dict[str, str]]) -> Iterator[tuple[str, str]]:
-        """Yield what is imported: the module that is named, and the one that it leads to."""
+        """Yield what is imported: the name as written, in full, and the module it comes from."""
         for node in ast.walk(self.tree):
             if isinstance(node, ast.Import):
                 for alias in node.names:
@@ -70,7 +70,8 @@ class Module:
             elif isinstance(node, ast.ImportFrom):
                 named = _absolute(node, self.package)
                 for alias in node.names:
-                    yield named, faces.get(named, {}).get(alias.name, f"{named}.{alias.name}")
+                    written = f"{named}.{alias.name}"
+                    yield written, faces.get(named, {}).get(alias.name, written)
 
 
 @dataclass
@@ -164,26 +165,23 @@ def measure(source: Path) -> House:
     house = House(find_modules(source))
     faces = find_faces(house.modules)
     for module in house.modules.values():
-        for named, leads in module.imports(faces):
-            target = leads if leads in house.modules else leads.rpartition(".")[0]
+        for written, source in module.imports(faces):
+            target = source if source in house.modules else source.rpartition(".")[0]
             if target not in house.modules:
                 continue
             if not module.is_face and target != module.name:
                 house.importers[target].add(module.name)
-            if _goes_round(module, house.modules, named, leads):
-                house.bypasses.append(f"{module.name}: {named}")
+            package, _, name = written.rpartition(".")
+            if name not in faces.get(package, {}) and _goes_round(module, house.modules[target]):
+                house.bypasses.append(f"{module.name}: {written}")
     return house
 
 
-def _goes_round(module: Module, modules: dict[str, Module], named: str, leads: str) -> bool:
-    """Return whether an import names a module inside a package that the importer is not in."""
-    if leads in modules and leads.rpartition(".")[0] == named:
-        named = leads
-    if named not in modules or modules[named].is_face:
-        return False
-    home = modules[named].package
-    top = named.split(".")[0]
-    return home != top and not f"{module.name}.".startswith(f"{home}.")
+def _goes_round(module: Module, target: Module) -> bool:
+    """Return whether a module names another one inside a package that it is not in itself."""
+    home = target.package
+    top_level = "." not in home
+    return not target.is_face and not top_level and not f"{module.name}.".startswith(f"{home}.")
 
 
 def functions(module: Module) -> Iterator[tuple[str, int]]:
@@ -223,12 +221,13 @@ def main() -> None:
     sizes = [module.lines for module in rooms]
     every = [found for module in modules for found in functions(module)]
     lengths = [length for _, length in every]
+    faces = find_faces(house.modules)
+    shown = {source for names in faces.values() for source in names.values()}
     single = sorted(
         f"{module.name} <- {next(iter(house.importers[module.name]))}"
         for module in rooms
-        if len(house.importers[module.name]) == 1
+        if len(house.importers[module.name]) == 1 and module.name not in shown
     )
-    faces = find_faces(house.modules)
     exported = {(source, name) for names in faces.values() for name, source in names.items()}
     public = [(module.name, name) for module in rooms for name in public_names(module)]
     hidden = sorted(f"{module}.{name}" for module, name in public if (module, name) not in exported)
