@@ -13,7 +13,7 @@ import yaml
 from elastocal.errors import RobotError, SchemaError
 from elastocal.robot import catalogue
 from elastocal.robot.catalogue import CatalogueEntry, table
-from elastocal.robot.catalogue.entry import LINKS
+from elastocal.robot.catalogue.record import LINKS
 
 NAMES = catalogue.names()
 TRANSPORT = np.radians([0.0, -90.0, 90.0, 0.0, 45.0, 0.0])

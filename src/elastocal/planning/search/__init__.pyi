@@ -9,11 +9,11 @@ from .information import (
     Information as Information,
     build_information as build_information,
 )
-from .random_choice import RandomChoice as RandomChoice
-from .spread import covering_radius as covering_radius, nearest_neighbour as nearest_neighbour
-from .technique import (
+from .named import TECHNIQUES as TECHNIQUES, technique as technique
+from .protocol import (
     SearchTechnique as SearchTechnique,
     Selection as Selection,
     check_count as check_count,
 )
-from .techniques import TECHNIQUES as TECHNIQUES, technique as technique
+from .random_choice import RandomChoice as RandomChoice
+from .spread import covering_radius as covering_radius, nearest_neighbour as nearest_neighbour

@@ -8,7 +8,7 @@ from elastocal.errors import PlanningError
 from elastocal.planning.search.candidates import Candidates
 from elastocal.planning.search.cells import CellField
 from elastocal.planning.search.fields import DistanceField, MetricField, PlainField
-from elastocal.planning.search.technique import Selection, check_count
+from elastocal.planning.search.protocol import Selection, check_count
 
 _LARGE_POOL = 50_000
 _MANY_PICKS = 100

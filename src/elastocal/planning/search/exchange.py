@@ -9,7 +9,7 @@ from elastocal.planning.search.candidates import Candidates
 from elastocal.planning.search.criteria import criterion_class
 from elastocal.planning.search.detmax import Exchange, exchange, greedy_order
 from elastocal.planning.search.information import Information, build_information
-from elastocal.planning.search.technique import Selection, check_count
+from elastocal.planning.search.protocol import Selection, check_count
 
 
 @dataclass(frozen=True, eq=False)

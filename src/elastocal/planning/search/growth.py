@@ -8,7 +8,7 @@ from elastocal.arrays import IndexArray
 from elastocal.planning.search.candidates import Candidates
 from elastocal.planning.search.exchange import ExchangeSearch
 from elastocal.planning.search.information import build_information
-from elastocal.planning.search.technique import SearchTechnique, check_count
+from elastocal.planning.search.protocol import SearchTechnique, check_count
 
 
 def growing_choices(

@@ -1,3 +1,3 @@
 from .catalogue import entry as entry, load as load, names as names, urdf as urdf
-from .entry import CatalogueEntry as CatalogueEntry
+from .record import CatalogueEntry as CatalogueEntry
 from .writer import urdf_of as urdf_of

@@ -4,7 +4,7 @@ The table `kuka.yaml` beside this file is the only copy of the numbers; the URDF
 on demand. What has no source says so in `Robot.assumptions`.
 """
 
-from elastocal.robot.catalogue.entry import CatalogueEntry
+from elastocal.robot.catalogue.record import CatalogueEntry
 from elastocal.robot.catalogue.table import entries, find
 from elastocal.robot.catalogue.writer import urdf_of
 from elastocal.robot.robot import Robot

@@ -1,6 +1,6 @@
 """Estimate the masses of a robot from those of a sister with sourced ones."""
 
-from elastocal.robot.catalogue.entry import CatalogueEntry, Dimensions, Inertias, LinkInertia
+from elastocal.robot.catalogue.record import CatalogueEntry, Dimensions, Inertias, LinkInertia
 
 
 def inertias_like(sister: CatalogueEntry, arm: Dimensions) -> Inertias:

@@ -7,7 +7,7 @@ drawings: whoever checks collisions close to the arm brings the maker's meshes.
 from dataclasses import dataclass
 from typing import Literal
 
-from elastocal.robot.catalogue.entry import Dimensions
+from elastocal.robot.catalogue.record import Dimensions
 
 REASON = "boxes and cylinders sized from the dimensions, not from drawings"
 

@@ -10,7 +10,7 @@ import xml.etree.ElementTree as ElementTree
 from collections.abc import Sequence
 
 from elastocal.robot.catalogue import shapes
-from elastocal.robot.catalogue.entry import LINKS, CatalogueEntry, LinkInertia
+from elastocal.robot.catalogue.record import LINKS, CatalogueEntry, LinkInertia
 from elastocal.robot.catalogue.shapes import Box, Shape
 
 AXES = ((0, 0, -1), (0, 1, 0), (0, 1, 0), (-1, 0, 0), (0, 1, 0), (-1, 0, 0))

@@ -11,8 +11,8 @@ from elastocal.errors import PlanningError, nearest
 from elastocal.planning.search.cover import Cover
 from elastocal.planning.search.criteria import CRITERIA
 from elastocal.planning.search.exchange import ExchangeSearch
+from elastocal.planning.search.protocol import SearchTechnique
 from elastocal.planning.search.random_choice import RandomChoice
-from elastocal.planning.search.technique import SearchTechnique
 
 TECHNIQUES: dict[str, Callable[[], SearchTechnique]] = {
     "cover": Cover,
