@@ -25,8 +25,8 @@ from elastocal.procedure import (
     read_streams,
     settings_of,
 )
-from elastocal.procedure.journal import read_commits
-from elastocal.procedure.pose_recorder import PoseRecorder
+from elastocal.procedure.record.journal import read_commits
+from elastocal.procedure.record.streams import PoseRecorder
 from elastocal.sim.workcell import simulated_devices
 
 folder = Path(sys.argv[1]) if len(sys.argv) > 1 else Path(tempfile.mkdtemp(prefix="elastocal-"))

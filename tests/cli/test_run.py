@@ -17,7 +17,7 @@ from elastocal.cli.device_sources import KINDS, SOURCES, DeviceSource
 from elastocal.errors import DatasetError, FileAccessError
 from elastocal.planning import read_plan, write_plan
 from elastocal.procedure import Journal, RunFolder, cell_place, fill, read_journal, refuse_foreign
-from elastocal.procedure.journal import read_commits
+from elastocal.procedure.record.journal import read_commits
 from support.cli import elastocal
 from support.run_cells import PlannedCell, planned_cell
 

@@ -3,9 +3,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from elastocal.procedure.averaging import average
-from elastocal.procedure.pose_log import ReadingStatus, Window
-from elastocal.procedure.streams import ArmStream, PointStream, Streams, WrenchStream
+from elastocal.procedure.derive.readings import average
+from elastocal.procedure.record.journal import ReadingStatus, Window
+from elastocal.procedure.record.streams import ArmStream, PointStream, Streams, WrenchStream
 from support.stations import station
 
 COUNT = 200

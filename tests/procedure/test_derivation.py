@@ -8,8 +8,8 @@ from elastocal.cell import fingerprint, load_cell
 from elastocal.dataset import read
 from elastocal.errors import DatasetError, ElastocalError, ProcedureError, SchemaError
 from elastocal.procedure import RunFolder, derive, read_journal, write_derived
-from elastocal.procedure.derivation import Derived
-from elastocal.procedure.pose_log import ReadingStatus, Window
+from elastocal.procedure.derive.derivation import Derived
+from elastocal.procedure.record.journal import ReadingStatus, Window
 from support.recorded_runs import Run, Truth, record_run
 
 

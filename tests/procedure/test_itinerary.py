@@ -3,8 +3,8 @@
 import pytest
 
 from elastocal.procedure import End, itinerary
-from elastocal.procedure.itinerary import remaining
-from elastocal.procedure.steps import Step
+from elastocal.procedure.run.routes import remaining
+from elastocal.procedure.run.steps import Step
 from support.fake_runs import FakeRun, plan, settings
 
 PLAN = plan(3)

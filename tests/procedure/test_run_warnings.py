@@ -3,13 +3,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from elastocal.procedure.displacement import LoadRow
-from elastocal.procedure.pose_log import ReadingStatus
+from elastocal.procedure.derive.displacement import LoadRow
+from elastocal.procedure.derive.summary import run_warnings
+from elastocal.procedure.derive.tool import Interval, ToolChange, ToolEstimate, ToolLoad
+from elastocal.procedure.record.journal import ReadingStatus
 from elastocal.procedure.registration import Blunder, Registration, StationFit, StationMove
-from elastocal.procedure.run_warnings import run_warnings
-from elastocal.procedure.tool_change import ToolChange
-from elastocal.procedure.tool_estimate import Interval, ToolEstimate
-from elastocal.procedure.tool_weight import ToolLoad
 
 TOOL = ToolLoad(60.0, np.array([0.0, 0.0, 0.15]), np.array([0.0, 0.0, -9.8]), np.eye(4))
 SMALL = Interval(np.zeros(3), np.ones(3))

@@ -5,9 +5,8 @@ import pytest
 
 from elastocal.errors import FileAccessError
 from elastocal.procedure import End, Event, read_journal
-from elastocal.procedure.journal import read_commits
-from elastocal.procedure.pose_log import ReadingStatus
-from elastocal.procedure.stand import Stand
+from elastocal.procedure.record.journal import ReadingStatus, read_commits
+from elastocal.procedure.run.steps import Stand
 from support import fake_faults as fault
 from support.fake_faults import when
 from support.fake_runs import FakeRun, MemoryRecorder

@@ -5,8 +5,8 @@ import pytest
 
 from elastocal.errors import DeviceError
 from elastocal.procedure import End, Event, PoseRecorder, read_journal
-from elastocal.procedure.journal import read_commits
-from elastocal.procedure.stand import Stand
+from elastocal.procedure.record.journal import read_commits
+from elastocal.procedure.run.steps import Stand
 from support import fake_faults as fault, fake_lies as lie
 from support.fake_devices import R_BASE_TRACKER, Motion, fake_cell
 from support.fake_faults import when

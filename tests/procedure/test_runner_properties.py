@@ -11,8 +11,7 @@ from hypothesis import given, settings, strategies as st
 
 from elastocal.cell.devices import Motion
 from elastocal.procedure import End, Event, read_journal
-from elastocal.procedure.entries import Action
-from elastocal.procedure.journal import read_commits
+from elastocal.procedure.record.journal import Action, read_commits
 from support import fake_faults as fault
 from support.fake_faults import when
 from support.fake_runs import FakeRun, MemoryRecorder, plan

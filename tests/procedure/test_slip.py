@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from elastocal.procedure.slip import SlideWatch, SlipWatch
+from elastocal.procedure.run._stability import SlideWatch, SlipWatch
 
 R = Rotation.from_euler("xyz", [0.4, -1.1, 2.0]).as_matrix()
 """From base to tracker."""

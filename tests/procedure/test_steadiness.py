@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from elastocal.cell.description import ProcedureSettings
-from elastocal.procedure.steadiness import Stretch, complaint, shaking, steadiness
+from elastocal.procedure.run._stability import Stretch, complaint, shaking, steadiness
 
 LIMITS = ProcedureSettings()
 TIME = np.arange(50) / 100.0

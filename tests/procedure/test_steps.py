@@ -4,9 +4,9 @@ import itertools
 
 import pytest
 
-from elastocal.procedure.faults import Ends, Fault
-from elastocal.procedure.machine import ACTIONS
-from elastocal.procedure.steps import OFF_APPROACH, TOUCHING, Outcome, Step, following
+from elastocal.procedure.run._sequence import ACTIONS
+from elastocal.procedure.run.faults import Ends, Fault
+from elastocal.procedure.run.steps import OFF_APPROACH, TOUCHING, Outcome, Step, following
 
 READING = [Step.LOAD, Step.SETTLE, Step.AVERAGE]
 AFTER = [Step.RELEASE, Step.LIFT, Step.RELEASED, Step.RETRACT, Step.COMMIT]

@@ -14,10 +14,13 @@ from elastocal.cell.devices import (
     WrenchBlock,
 )
 from elastocal.errors import ProcedureError, SchemaError
-from elastocal.procedure import SCHEMA, PoseRecorder, read_streams
-from elastocal.procedure.mcap import Topic, write_mcap
-from elastocal.procedure.stream_messages import schemas
-from elastocal.procedure.streams import Mark
+from elastocal.procedure import STREAMS_SCHEMA, PoseRecorder, read_streams
+from elastocal.procedure.record._mcap import (
+    Topic,
+    write_mcap,
+)
+from elastocal.procedure.record._messages import schemas
+from elastocal.procedure.record.streams import Mark
 from support.stations import station
 
 JOINTS = ("rail", "joint 100%s")
@@ -191,17 +194,17 @@ def foreign(path) -> None:
 
 
 def no_joints(path) -> None:
-    write_mcap(path, [], "test", Metadata(name="elastocal", metadata={"schema": SCHEMA}))
+    write_mcap(path, [], "test", Metadata(name="elastocal", metadata={"schema": STREAMS_SCHEMA}))
 
 
 def odd_message(path) -> None:
-    note = Metadata(name="elastocal", metadata={"schema": SCHEMA, "joints": "[]"})
+    note = Metadata(name="elastocal", metadata={"schema": STREAMS_SCHEMA, "joints": "[]"})
     topic = Topic("/wrench", "x", "{}", np.array([5]), [b'{"force": 3}'])
     write_mcap(path, [topic], "test", note)
 
 
 def no_json(path) -> None:
-    note = Metadata(name="elastocal", metadata={"schema": SCHEMA, "joints": "[]"})
+    note = Metadata(name="elastocal", metadata={"schema": STREAMS_SCHEMA, "joints": "[]"})
     write_mcap(path, [Topic("/marks", "x", "{}", np.array([5]), [b"hello"])], "test", note)
 
 

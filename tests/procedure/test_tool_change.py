@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from elastocal.procedure.tool_estimate import Unloaded, estimate_tool
+from elastocal.procedure.derive.tool import Unloaded, estimate_tool
 
 GRAVITY = np.array([0.0, 0.0, -9.80665])
 

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from elastocal.procedure.tool_estimate import ToolEstimate, Unloaded, estimate_tool
+from elastocal.procedure.derive.tool import ToolEstimate, Unloaded, estimate_tool
 
 GRAVITY = np.array([0.0, 0.0, -9.80665])
 MASS, CENTRE = 62.5, np.array([0.01, -0.02, 0.15])

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from elastocal.procedure.tool_weight import RawWrench, ToolLoad, turned_sigma, wrench_on_robot
+from elastocal.procedure.derive.tool import RawWrench, ToolLoad, turned_sigma, wrench_on_robot
 from support.stations import station
 
 GRAVITY = np.array([0.0, 0.0, -9.80665])

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from elastocal.procedure.unloaded import JOINT_ERROR, SAG, robot_errors
+from elastocal.procedure.derive.readings import JOINT_ERROR, SAG, robot_errors
 from elastocal.robot import GRAVITY, Robot
 from support import plans
 from support.urdfs import opw_arm_urdf

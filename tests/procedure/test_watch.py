@@ -13,8 +13,8 @@ from elastocal.cell.devices import (
     SensorStatus,
     WrenchBlock,
 )
-from elastocal.procedure.faults import Fault, FaultError
-from elastocal.procedure.watch import Guard, Seen, Watch
+from elastocal.procedure.run._watchdog import Guard, Seen, Watch
+from elastocal.procedure.run.faults import Fault, FaultError
 
 STALE, BEAM = 0.3, 2.0
 

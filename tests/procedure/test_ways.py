@@ -6,7 +6,7 @@ from scipy.spatial.transform import Rotation
 
 from elastocal.errors import ProcedureError
 from elastocal.procedure import way_home
-from elastocal.procedure.ways import HOME, stop_joints, way
+from elastocal.procedure.run.routes import HOME, stop_joints, way
 from support.fake_devices import DOWN
 from support.fake_runs import HOME as HOME_JOINTS, plan
 

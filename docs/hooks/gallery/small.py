@@ -24,9 +24,8 @@ from elastocal.procedure import (
     read_streams,
     settings_of,
 )
-from elastocal.procedure.journal import read_commits
-from elastocal.procedure.pose_recorder import PoseRecorder
-from elastocal.procedure.streams import Streams
+from elastocal.procedure.record.journal import read_commits
+from elastocal.procedure.record.streams import PoseRecorder, Streams
 from elastocal.report import style
 from elastocal.report.printed import new_figure, write_figure
 from elastocal.sim.workcell import simulated_devices

@@ -80,7 +80,7 @@ class Finished:
 
     result: Result
     summary: Mapping[str, Any] | None = None
-    """See `elastocal.procedure.summary`; None where nothing was derived."""
+    """See `elastocal.procedure.derive.summary`; None where nothing was derived."""
     problem: ElastocalError | None = None
     """Why nothing was derived of a run that is done."""
 

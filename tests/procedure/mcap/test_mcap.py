@@ -10,8 +10,12 @@ from mcap.stream_reader import StreamReader
 from mcap.writer import CompressionType, Writer
 
 from elastocal.errors import FileAccessError, SchemaError
-from elastocal.procedure.mcap import Topic, read_mcap, write_mcap
-from elastocal.procedure.mcap.writer import CHUNK
+from elastocal.procedure.record._mcap import (
+    CHUNK,
+    Topic,
+    read_mcap,
+    write_mcap,
+)
 
 SCHEMA = json.dumps({"type": "object", "properties": {"x": {"type": "number"}}})
 

@@ -1,0 +1,242 @@
+"""What a journal says of a run that is to go on: whose it is, how far it came, where it ended."""
+
+from collections import Counter
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from enum import Enum
+from pathlib import Path
+from typing import Any, Protocol
+
+from elastocal.cell import Cell, fingerprint
+from elastocal.errors import ProcedureError
+from elastocal.files import sha256
+from elastocal.planning import PlanFile
+from elastocal.procedure.record.folder import RunFolder
+from elastocal.procedure.record.journal import Action, Entry, Event, RunRecord, commits
+from elastocal.procedure.run._supervisor import Recorder
+from elastocal.procedure.run.routes import WayHome
+from elastocal.procedure.run.settings import Settings
+from elastocal.procedure.run.steps import Progress, Stand
+from elastocal.schema import StrictModel
+
+SAME_SECTIONS = ("procedure", "devices", "simulation")
+"""Sections of the cell file that must not change within a run: its readings would not belong
+together. Those that the plan depends on are in the fingerprint."""
+
+_TOUCHES = frozenset({Action.APPROACH, Action.HOLD, Action.RELEASE, Action.RETRACT})
+
+
+@dataclass(frozen=True)
+class LastKnown:
+    """How far a run came."""
+
+    entry: Entry
+    """The last one."""
+    committed: tuple[int, ...]
+    """Poses that are finished, in the order in which they were."""
+    given_up: tuple[int, ...]
+    """Poses that could not be had."""
+    attempts: Mapping[int, int]
+    """Attempts that each pose has seen."""
+    may_touch: bool
+    """Whether the tool may have been at the surface when the journal ends."""
+    uncommitted: int | None = None
+    """The pose that was worked on last, if it was not finished."""
+
+    @property
+    def lines(self) -> tuple[str, ...]:
+        """What a person should know before the run goes on."""
+        entry = self.entry
+        done = ", ".join(map(str, self.committed)) or "none"
+        where = "between poses" if entry.pose is None else f"pose {entry.pose}"
+        what = entry.action.value if entry.action else entry.event.value
+        attempt = "" if entry.attempt is None else f", attempt {entry.attempt}"
+        step = f", {entry.step}" if entry.step else ""
+        text = f" ({entry.text})" if entry.text else ""
+        return (
+            f"last entry: {where}{attempt}{step}: {entry.event.value} {what}{text}"
+            if entry.action
+            else f"last entry: {where}{attempt}{step}: {what}{text}",
+            f"at {entry.time:.1f} s of the run's clock",
+            f"poses committed: {done}",
+            *((f"poses given up: {', '.join(map(str, self.given_up))}",) if self.given_up else ()),
+            *(("the tool may have been at the surface",) if self.may_touch else ()),
+        )
+
+
+def last_known(entries: tuple[Entry, ...]) -> LastKnown:
+    """Return how far a run came.
+
+    Parameters
+    ----------
+    entries : tuple of Entry
+        All of its journal; at least the first.
+    """
+    committed = tuple(log.pose for log in commits(entries))
+    attempts: Counter[int] = Counter()
+    for entry in entries:
+        if entry.pose is not None and entry.attempt is not None:
+            attempts[entry.pose] = max(attempts[entry.pose], entry.attempt)
+    worked_on = next((e.pose for e in reversed(entries) if e.pose is not None), None)
+    lost = {e.pose for e in entries if e.event is Event.GIVEN_UP and e.pose is not None}
+    return LastKnown(
+        entry=entries[-1],
+        committed=committed,
+        given_up=tuple(sorted(lost - set(committed))),
+        attempts=attempts,
+        may_touch=_may_touch(entries),
+        uncommitted=None if worked_on in committed else worked_on,
+    )
+
+
+def run_record(
+    cell: Cell, plan: PlanFile, plan_text: str, cell_file: str, seed: int, started: str
+) -> RunRecord:
+    """Return the record by which a run is known again.
+
+    Raises
+    ------
+    ProcedureError
+        If the plan was made for another cell.
+    """
+    found = fingerprint(cell)
+    if plan.cell.fingerprint != found:
+        raise ProcedureError(
+            f"the plan belongs to another cell: it was made for {plan.cell.name!r} with"
+            f" fingerprint {plan.cell.fingerprint[:12]}, {cell.path} has {found[:12]};"
+            " plan again, or run the cell that it was made for"
+        )
+    from elastocal import __version__
+
+    return RunRecord(
+        elastocal=__version__,
+        plan=sha256(plan_text),
+        cell=found,
+        cell_file=cell_file,
+        seed=seed,
+        started=started,
+    )
+
+
+def check_same_run(record: RunRecord, wanted: RunRecord, where: str) -> None:
+    """Refuse to go on with another run than the one that is in a folder.
+
+    Raises
+    ------
+    ProcedureError
+        With what differs.
+    """
+    for key, what in (("plan", "plan"), ("cell", "cell"), ("seed", "seed")):
+        found, asked = getattr(record, key), getattr(wanted, key)
+        if found != asked:
+            raise ProcedureError(
+                f"{where} holds another run: its {what} is {_short(found)}, not {_short(asked)}"
+            )
+
+
+def check_same_settings(used: Cell, wanted: Cell) -> None:
+    """Refuse to go on with other settings than a run was started with.
+
+    Parameters
+    ----------
+    used, wanted : Cell
+        As it stands in the run's folder, and as it is now.
+
+    Raises
+    ------
+    ProcedureError
+        With the first key that differs.
+    """
+    for section in SAME_SECTIONS:
+        old, new = (_dump(getattr(cell.file, section, None)) for cell in (used, wanted))
+        for key in {**old, **new}:
+            if old.get(key) != new.get(key):
+                raise ProcedureError(
+                    f"{wanted.path}: {section}.{key} is {new.get(key)!r}, the run was started"
+                    f" with {old.get(key)!r}: set it back, or start another run"
+                )
+
+
+def _may_touch(entries: tuple[Entry, ...]) -> bool:
+    for entry in reversed(entries):
+        if entry.action is Action.RETRACT and entry.event is Event.END:
+            return False
+        if entry.event is Event.COMMIT or entry.action is Action.MOVE:
+            return False
+        if entry.action in _TOUCHES:
+            return True
+    return False
+
+
+def _dump(section: object) -> dict[str, Any]:
+    if isinstance(section, StrictModel):
+        return section.model_dump(mode="json")
+    return {} if section is None else {"": section}
+
+
+def _short(value: object) -> str:
+    return value[:12] if isinstance(value, str) else str(value)
+
+
+class SavingRecorder(Recorder, Protocol):
+    """A recorder that can write what it has kept."""
+
+    def save(self, path: Path) -> str | None:
+        """Write everything, atomically, and wait until it is on the disk.
+
+        Returns
+        -------
+        str or None
+            SHA-256 of the file, for the journal; None from a recorder that keeps none.
+        """
+
+
+class End(Enum):
+    """How a run ended."""
+
+    DONE = "done"
+    """Every pose was tried; the arm is at HOME."""
+    STOPPED = "stopped"
+    """By a fault."""
+    INTERRUPTED = "interrupted"
+    """By a person."""
+
+
+@dataclass(frozen=True)
+class Result:
+    """How a run, or a stretch of it, ended."""
+
+    end: End
+    stand: Stand
+    """Where the arm stands."""
+    message: str
+    """Why; empty when all went well."""
+    given_up: tuple[int, ...]
+    """Poses of this stretch that could not be had."""
+    failed_attempts: int
+    """Attempts of this stretch that failed."""
+
+
+@dataclass(frozen=True, eq=False)
+class Job:
+    """What is to be done."""
+
+    plan: PlanFile
+    settings: Settings
+    folder: RunFolder
+    committed: frozenset[int] = frozenset()
+    """Poses that are finished already."""
+    attempts: Mapping[int, int] = field(default_factory=dict)
+    """Attempts that each pose has seen already."""
+    home: WayHome = field(default_factory=lambda: WayHome(None, ()))
+    """The way to HOME, which comes first."""
+
+
+@dataclass(frozen=True)
+class Seams:
+    """What a run needs from outside, beside devices."""
+
+    recorder: Callable[[], SavingRecorder]
+    """Makes the recorder of one attempt."""
+    tell: Callable[[Progress], None] = lambda _: None
+    interrupted: Callable[[], bool] = lambda: False
