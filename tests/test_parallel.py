@@ -76,6 +76,8 @@ def test_an_error_of_ours_waits_for_processes_that_have_just_been_started():
     assert list(map_in_processes(square, range(3), 2)) == [0, 1, 4]
 
 
+# Loky's own thread may complain of a process that it has just ended itself.
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnhandledThreadExceptionWarning")
 def test_ctrl_c_in_the_middle_of_the_work_leaves_a_pool_without_a_word():
     with pytest.raises(KeyboardInterrupt), process_pool(2, nothing) as pool:
         interrupt(pool.map(square, range(100)))

@@ -10,7 +10,7 @@ run one thread each, and so do the workflows with `one_blas_thread`.
 import importlib
 import signal
 import warnings
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Generator, Iterable, Iterator
 from contextlib import contextmanager
 from typing import Any, TypeVar
 
@@ -78,7 +78,7 @@ def map_in_processes(
 
     with _one_thread_each(processes):
         parallel = Parallel(return_as="generator")
-    yield from parallel(delayed(function)(task) for task in tasks)
+    yield from _to_the_end(parallel(delayed(function)(task) for task in tasks))
 
 
 class ProcessPool:
@@ -119,7 +119,7 @@ class ProcessPool:
         # Joblib runs one set of tasks at a time without a loss; these take a second or two.
         self.wait()
         at_once = 1 if self._processes == 1 else 3 * self._processes
-        yield from self._run(function, tasks, at_once, ordered)
+        yield from _to_the_end(self._run(function, tasks, at_once, ordered))
 
     def wait(self) -> None:
         """Wait until all processes are ready.
@@ -200,7 +200,7 @@ def map_on_cluster(
 
     with parallel_config("dask", client=client, wait_for_workers_timeout=patience):
         parallel = Parallel(batch_size=1, pre_dispatch="3*n_jobs", return_as="generator_unordered")
-    yield from parallel(delayed(function)(task) for task in tasks)
+    yield from _to_the_end(parallel(delayed(function)(task) for task in tasks))
 
 
 @contextmanager
@@ -232,6 +232,17 @@ def _one_thread_each(processes: int) -> Any:
     from joblib import parallel_config
 
     return parallel_config("loky", n_jobs=processes, inner_max_num_threads=1)
+
+
+def _to_the_end(results: Generator[Result]) -> Iterator[Result]:
+    """Yield results; whoever does not want the rest of them is told nothing about it."""
+    try:
+        for result in results:  # noqa: UP028 - `yield from` would close them with complaints
+            yield result
+    except GeneratorExit:
+        with _without_complaints():
+            results.close()
+        raise
 
 
 @contextmanager
