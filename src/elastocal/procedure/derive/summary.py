@@ -23,7 +23,7 @@ from elastocal.procedure.derive.readings import PoseReadings, weighed_poses
 from elastocal.procedure.derive.tool import Interval, ToolEstimate, ToolLoad
 from elastocal.procedure.record.journal import Entry, Event, ReadingStatus
 from elastocal.procedure.registration import Registration, StationFit, UnloadedReadings
-from elastocal.schema import check_schema
+from elastocal.records import check_schema
 
 MASS_SHARE = 0.1
 """Difference from the cell file's mass that is told, as a share of it; the sensor's own half

@@ -17,7 +17,7 @@ from pydantic import SerializerFunctionWrapHandler, ValidationError, model_seria
 
 from elastocal.cell.devices import Clock
 from elastocal.errors import FileAccessError, SchemaError
-from elastocal.schema import StrictModel
+from elastocal.records import StrictModel
 
 
 class ReadingStatus(Enum):

@@ -35,7 +35,7 @@ from elastocal.procedure.record._messages import (
     wrench_messages,
 )
 from elastocal.procedure.record.folder import file_sha256
-from elastocal.schema import check_schema
+from elastocal.records import check_schema
 
 STREAMS_SCHEMA = "elastocal.streams/1"
 RECORD = "elastocal"

@@ -17,7 +17,7 @@ from elastocal.procedure.run._supervisor import Recorder
 from elastocal.procedure.run.routes import WayHome
 from elastocal.procedure.run.settings import Settings
 from elastocal.procedure.run.steps import Progress, Stand
-from elastocal.schema import StrictModel
+from elastocal.records import StrictModel
 
 SAME_SECTIONS = ("procedure", "devices", "simulation")
 """Sections of the cell file that must not change within a run: its readings would not belong
