@@ -14,15 +14,15 @@ from elastocal.planning import make_plan
 from elastocal.planning.search import Candidates, Cover
 from elastocal.procedure import (
     Event,
-    Job,
     Journal,
     PoseLog,
     RunFolder,
     Runner,
     RunRecord,
-    Seams,
+    Session,
+    SessionHooks,
     read_streams,
-    settings_of,
+    run_settings,
 )
 from elastocal.procedure.record.journal import read_commits
 from elastocal.procedure.record.streams import PoseRecorder, Streams
@@ -97,8 +97,8 @@ def _visit(cell: Cell, run: RunFolder) -> tuple[Streams, PoseLog]:
     )
     with Journal(run.journal) as journal:
         journal.write(devices.clock.now(), Event.START, run=record)
-        seams = Seams(lambda: PoseRecorder(plan.robot.joints))
-        Runner(Job(plan, settings_of(cell, plan), run), devices, journal, seams).run()
+        hooks = SessionHooks(lambda: PoseRecorder(plan.robot.joints))
+        Runner(Session(plan, run_settings(cell, plan), run), devices, journal, hooks).run()
     (commit,) = read_commits(run.journal)
     return read_streams(run.stream(commit.pose, commit.attempt)), commit
 

@@ -1,4 +1,4 @@
-"""DESCRIBE THIS PACKAGE."""
+"""From journal and raw streams to the dataset and the summary of a run."""
 
 import lazy_loader
 

@@ -20,7 +20,7 @@ from elastocal.procedure.derive.readings import (
     reduce_pose,
     tool_readings,
 )
-from elastocal.procedure.derive.summary import Derivation, summarise
+from elastocal.procedure.derive.summary import RunFindings, summarise
 from elastocal.procedure.derive.tool import ToolLoad, estimate_tool
 from elastocal.procedure.record.folder import RunFolder, check_stream, read_copies
 from elastocal.procedure.record.journal import (
@@ -37,7 +37,7 @@ from elastocal.robot.inverse import inverse_transform
 
 
 @dataclass(frozen=True, eq=False)
-class Derived:
+class DerivedRun:
     """What a run's raw streams say."""
 
     dataset: Dataset
@@ -45,7 +45,7 @@ class Derived:
     """Plain numbers, texts, lists and mappings; see `elastocal.procedure.derive.summary`."""
 
 
-def derive(run: Path) -> Derived:
+def derive_run(run: Path) -> DerivedRun:
     """Return dataset and summary of the poses that a run has committed.
 
     Parameters
@@ -83,7 +83,7 @@ def derive(run: Path) -> Derived:
         raise type(error)(f"{folder.path}: {error}") from error
 
 
-def write_derived(run: Path, derived: Derived) -> None:
+def write_derived(run: Path, derived: DerivedRun) -> None:
     """Write ``dataset.nc`` and ``summary.json`` of a run, each whole or not at all.
 
     Raises
@@ -102,7 +102,7 @@ def derive_poses(
     plan: PlanFile,
     entries: Sequence[Entry],
     provenance: str,
-) -> Derived:
+) -> DerivedRun:
     """Return dataset and summary of reduced poses.
 
     Parameters
@@ -140,9 +140,11 @@ def derive_poses(
         {"marker": tuple(registration.lever_arm.tolist()), "provenance": provenance},
     )
     estimate = estimate_tool(tool_readings(poses, tool), tool.mass)
-    findings = Derivation(poses, rows, seen, registration, tool, estimate, dataset)
+    findings = RunFindings(poses, rows, seen, registration, tool, estimate, dataset)
     cases = tuple(plan.contact.load_cases)
-    return Derived(dataset, summarise(findings, [pose.id for pose in plan.poses], cases, entries))
+    return DerivedRun(
+        dataset, summarise(findings, [pose.id for pose in plan.poses], cases, entries)
+    )
 
 
 def _latest(logs: Sequence[PoseLog]) -> list[PoseLog]:

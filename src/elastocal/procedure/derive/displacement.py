@@ -41,12 +41,12 @@ class LoadRow:
     status: ReadingStatus
     note: str
     """Why it is not ok."""
-    numbers: "Numbers | None"
+    numbers: "LoadValues | None"
     """None where something that they need is missing."""
 
 
 @dataclass(frozen=True, eq=False)
-class Numbers:
+class LoadValues:
     """The numbers of a reading, in base and SI units."""
 
     q: FloatArray
@@ -85,7 +85,7 @@ def load_rows(
 
 
 @dataclass(frozen=True, eq=False)
-class _Pair:
+class _LoadAndReference:
     """A load and its reference, with nothing missing."""
 
     load: ToolState
@@ -98,7 +98,7 @@ class _Pair:
 def _row(pose: PoseReadings, load: Reading, registration: Registration, tool: ToolLoad) -> LoadRow:
     window, case = load.window, str(load.window.load_case)
     pair = _pair(pose, load, registration)
-    if isinstance(pair, _Pair):
+    if isinstance(pair, _LoadAndReference):
         numbers = _numbers(pair, registration.lever_arm, tool)
         return LoadRow(pose.pose, case, window.status, window.note, numbers)
     if window.status is not ReadingStatus.OK:
@@ -106,7 +106,7 @@ def _row(pose: PoseReadings, load: Reading, registration: Registration, tool: To
     return LoadRow(pose.pose, case, ReadingStatus.MISSING, pair, None)
 
 
-def _pair(pose: PoseReadings, load: Reading, registration: Registration) -> _Pair | str:
+def _pair(pose: PoseReadings, load: Reading, registration: Registration) -> _LoadAndReference | str:
     """Return load and reference, or why a reading has no numbers."""
     reference, station = pose.reference, load.window.station
     if reference is None:
@@ -123,13 +123,13 @@ def _pair(pose: PoseReadings, load: Reading, registration: Registration) -> _Pai
     means = (load.tool, load.marker, reference.tool, reference.marker)
     if means[0] is None or means[1] is None or means[2] is None or means[3] is None:
         return load.window.note or "a stream says too little"
-    return _Pair(means[0], means[1], means[2], means[3], fit.T_base_tracker[:3, :3])
+    return _LoadAndReference(means[0], means[1], means[2], means[3], fit.T_base_tracker[:3, :3])
 
 
-def _numbers(pair: _Pair, lever: FloatArray, tool: ToolLoad) -> Numbers:
+def _numbers(pair: _LoadAndReference, lever: FloatArray, tool: ToolLoad) -> LoadValues:
     load, reference, R = pair.load, pair.reference, pair.R_base_tracker
     T, T_0 = load.T_base_tcp, reference.T_base_tcp
-    return Numbers(
+    return LoadValues(
         q=load.q,
         controller_displacement=T[:3, 3] - T_0[:3, 3] + (T[:3, :3] - T_0[:3, :3]) @ lever,
         marker_displacement=R @ (pair.load_marker.value - pair.reference_marker.value),
@@ -209,7 +209,7 @@ def make_dataset(
     )
 
 
-def _values(numbers: Numbers | None) -> dict[str, FloatArray]:
+def _values(numbers: LoadValues | None) -> dict[str, FloatArray]:
     if numbers is None:
         return {}
     return {

@@ -14,15 +14,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from elastocal.arrays import BoolArray, FloatArray
-from elastocal.procedure.derive.tool import ToolLoad, Unloaded
+from elastocal.procedure.derive.tool import ToolLoad, UnloadedWrenches
 from elastocal.procedure.record.journal import PoseLog, ReadingStatus, Window
-from elastocal.procedure.record.streams import EDGE, Streams
+from elastocal.procedure.record.streams import SAME_TIME, Streams
 from elastocal.procedure.registration import UnloadedReadings
 from elastocal.robot import Robot
 
 LEAST_SAMPLES = 5
 """Fewer good samples than this make no reading: their scatter says nothing."""
-MOST_CORRELATED = 0.99
+_MOST_CORRELATED = 0.99
 """Largest lag-1 autocorrelation that is believed; beyond it the samples drift."""
 
 
@@ -120,7 +120,7 @@ def _judged(window: Window, counts: dict[str, tuple[int, int]]) -> Window:
 
 
 def _inside(time: FloatArray, window: Window) -> BoolArray:
-    inside: BoolArray = (time >= window.start - EDGE) & (time <= window.end + EDGE)
+    inside: BoolArray = (time >= window.start - SAME_TIME) & (time <= window.end + SAME_TIME)
     return inside
 
 
@@ -145,7 +145,7 @@ def _inflation(centred: FloatArray) -> FloatArray:
     power = (centred**2).sum(axis=0)
     lagged = (centred[1:] * centred[:-1]).sum(axis=0)
     r = np.divide(lagged, power, out=np.zeros_like(power), where=power > 0)
-    r = np.clip(r, 0.0, MOST_CORRELATED)
+    r = np.clip(r, 0.0, _MOST_CORRELATED)
     inflation: FloatArray = (1.0 + r) / (1.0 - r)
     return inflation
 
@@ -270,7 +270,7 @@ def weighed_poses(poses: Sequence[PoseReadings]) -> list[int]:
     return [pose.pose for pose in poses if pose.reference and pose.reference.tool]
 
 
-def tool_readings(poses: Sequence[PoseReadings], tool: ToolLoad) -> Unloaded:
+def tool_readings(poses: Sequence[PoseReadings], tool: ToolLoad) -> UnloadedWrenches:
     """Return the raw wrenches of the unloaded references.
 
     Parameters
@@ -282,7 +282,7 @@ def tool_readings(poses: Sequence[PoseReadings], tool: ToolLoad) -> Unloaded:
     """
     states = [r.tool for pose in poses if (r := pose.reference) and r.tool]
     T = np.array([state.T_base_tcp for state in states]).reshape(-1, 4, 4)
-    return Unloaded(
+    return UnloadedWrenches(
         time=np.array([state.force.time for state in states]),
         force=np.array([state.force.value for state in states]).reshape(-1, 3),
         moment=np.array([state.moment.value for state in states]).reshape(-1, 3),

@@ -25,16 +25,16 @@ from elastocal.procedure.record.journal import Entry, Event, ReadingStatus
 from elastocal.procedure.registration import Registration, StationFit, UnloadedReadings
 from elastocal.records import check_schema
 
-MASS_SHARE = 0.1
+_MASS_SHARE = 0.1
 """Difference from the cell file's mass that is told, as a share of it; the sensor's own half
 that does not hang on it is within."""
-CENTRE = 20e-3
+_CENTRE = 20e-3
 """Difference from the cell file's centre of mass that is told, along an axis, in m."""
-ZEROED = 0.2
+_ZEROED = 0.2
 """Share of the tool's mass below which the sensor seems to take the tool weight away itself."""
-LEVER = 5e-3
+_LEVER = 5e-3
 """Difference from the cell file's lever arm that is told, in m."""
-LARGE_ROTATION = 5e-3
+_LARGE_ROTATION = 5e-3
 """Standard deviation of a station's rotation that is told, in rad: 5 µm for each mm."""
 
 
@@ -98,7 +98,7 @@ def _about_stations(registration: Registration) -> Iterator[str]:
             f" {1e3 * blunder.distance:.2f} mm off: its displacements are doubtful"
         )
     for fit in registration.stations:
-        if not fit.rotation_sigma <= LARGE_ROTATION:
+        if not fit.rotation_sigma <= _LARGE_ROTATION:
             yield (
                 f"station {fit.station}: its rotation is known to"
                 f" {1e3 * fit.rotation_sigma:.1f} mrad only, an error of"
@@ -114,7 +114,7 @@ def _about_lever(registration: Registration) -> Iterator[str]:
             " file's"
         )
     away = float(np.linalg.norm(registration.lever_arm - registration.lever_prior))
-    if not away <= LEVER:
+    if not away <= _LEVER:
         yield (
             f"the marker is {1e3 * away:.1f} mm from where the cell file has it"
             f" ({_millimetres(registration.lever_arm)} in the tcp frame)"
@@ -130,18 +130,18 @@ def _about_tool(tool: ToolLoad, estimate: ToolEstimate, weighed: Sequence[int]) 
         )
         return
     mass, half = float(estimate.mass.value), float(estimate.mass.half_width)
-    if mass + half < ZEROED * tool.mass:
+    if mass + half < _ZEROED * tool.mass:
         yield (
             f"the sensor shows {mass:.1f} ± {half:.1f} kg of the tool's {tool.mass:.1f} kg: it"
             " seems to take the tool weight away itself"
         )
-    elif abs(mass - tool.mass) > max(half, MASS_SHARE * tool.mass):
+    elif abs(mass - tool.mass) > max(half, _MASS_SHARE * tool.mass):
         yield (
             f"the tool weighs {mass:.1f} ± {half:.1f} kg by {estimate.count} unloaded references,"
             f" {tool.mass:.1f} kg by the cell file"
         )
     away = np.abs(estimate.centre.value - tool.centre)
-    far = away > np.maximum(estimate.centre.half_width, CENTRE)
+    far = away > np.maximum(estimate.centre.half_width, _CENTRE)
     if np.any(far):
         axis = int(np.argmax(np.where(far, away, 0.0)))
         yield (
@@ -154,11 +154,11 @@ def _millimetres(point: np.ndarray) -> str:
     return ", ".join(f"{1e3 * value:.1f} mm" for value in point)
 
 
-SCHEMA = "elastocal.run-summary/1"
+_SCHEMA = "elastocal.run-summary/1"
 
 
 @dataclass(frozen=True, eq=False)
-class Derivation:
+class RunFindings:
     """Everything that was found on the way to the dataset."""
 
     poses: Sequence[PoseReadings]
@@ -171,13 +171,13 @@ class Derivation:
 
 
 def summarise(
-    found: Derivation, planned: Sequence[int], load_cases: Sequence[str], entries: Sequence[Entry]
+    found: RunFindings, planned: Sequence[int], load_cases: Sequence[str], entries: Sequence[Entry]
 ) -> dict[str, Any]:
     """Return the summary, without a schema of its own for each part.
 
     Parameters
     ----------
-    found : Derivation
+    found : RunFindings
         What the streams say.
     planned : sequence of int
         Poses of the plan.
@@ -188,7 +188,7 @@ def summarise(
     """
     committed = [pose.pose for pose in found.poses]
     return {
-        "schema": SCHEMA,
+        "schema": _SCHEMA,
         "elastocal": __version__,
         "poses": {
             "planned": len(planned),
@@ -228,7 +228,7 @@ def read_summary(path: Path) -> dict[str, Any]:
         summary = json.loads(read_text(path))
     except ValueError as error:
         raise SchemaError(f"{path} is not valid JSON: {error}") from error
-    check_schema(summary.get("schema") if isinstance(summary, dict) else None, SCHEMA, str(path))
+    check_schema(summary.get("schema") if isinstance(summary, dict) else None, _SCHEMA, str(path))
     return dict(summary)
 
 

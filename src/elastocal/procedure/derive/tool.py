@@ -76,7 +76,7 @@ def wrench_on_robot(loaded: RawWrench, tare: RawWrench, tool: ToolLoad) -> Robot
     loaded : RawWrench
         Under load.
     tare : RawWrench
-        Unloaded, at the same pose.
+        UnloadedWrenches, at the same pose.
     tool : ToolLoad
         Its weight, and the sensor's place.
     """
@@ -101,12 +101,10 @@ def turned_sigma(R: FloatArray, *sigmas: FloatArray) -> FloatArray:
     return turned
 
 
-CHANCE = 1e-4
+_CHANCE_OF_STEP = 1e-4
 """Probability of a step that is only chance, over all places, below which it is believed."""
-SHARE = 0.05
+_SHARE = 0.05
 """Smallest step that is told, as a share of the tool's mass."""
-_STEP_DEPENDENT = 1e-8
-"""Part of a column that the others leave over, below which it says nothing of its own."""
 
 
 @dataclass(frozen=True)
@@ -140,43 +138,43 @@ def tool_change(
         return None
     A, b = blocks.reshape(force.size, -1), force.ravel()
     u, s, _ = np.linalg.svd(A / np.maximum(np.linalg.norm(A, axis=0), 1e-300), full_matrices=False)
-    basis = u[:, s > _STEP_DEPENDENT * s[0]]
+    basis = u[:, s > _DEPENDENT * s[0]]
     after = np.arange(count)[:, None] >= np.arange(1, count)
     steps = (gravity[:, :, None] * after[:, None, :]).reshape(force.size, -1)
     own = steps - basis @ (basis.T @ steps)
     left = b - basis @ (basis.T @ b)
     squares = (own**2).sum(axis=0)
-    told = squares > _STEP_DEPENDENT * (steps**2).sum(axis=0)
+    told = squares > _DEPENDENT * (steps**2).sum(axis=0)
     change = np.where(told, own.T @ left / np.where(told, squares, 1.0), 0.0)
     gain = change**2 * squares
     best = int(np.argmax(gain))
     rest = max(float(left @ left - gain[best]), np.finfo(float).tiny)
     chance = (count - 1) * stats.f.sf(gain[best] / (rest / free), 1, free)
-    if not (chance < CHANCE and abs(change[best]) > SHARE * nominal_mass):
+    if not (chance < _CHANCE_OF_STEP and abs(change[best]) > _SHARE * nominal_mass):
         return None
     return ToolChange(best + 1, float(change[best]))
 
 
-LEVEL = 0.95
+_LEVEL = 0.95
 """Of the intervals."""
-WIDE_MASS = 0.2
+_WIDE_MASS = 0.2
 """Half interval of the mass, as a share of it, beyond which it counts as not determined."""
-WIDE_CENTRE = 0.05
+_WIDE_CENTRE = 0.05
 """Half interval of a coordinate of the centre of mass beyond which it is not determined, in m."""
 _DEPENDENT = 1e-8
 """Ratio of singular values, columns scaled, below which columns depend on one another."""
 
-NAMES = (
+_NAMES = (
     "mass",
     *(f"{what} {axis}" for what in ("force bias", "force drift") for axis in "xyz"),
 )
-MOMENT_NAMES = tuple(
+_MOMENT_NAMES = tuple(
     f"{what} {axis}" for what in ("centre of mass", "moment bias", "moment drift") for axis in "xyz"
 )
 
 
 @dataclass(frozen=True, eq=False)
-class Unloaded:
+class UnloadedWrenches:
     """Raw wrenches of unloaded references, in the order of time."""
 
     time: FloatArray
@@ -204,7 +202,7 @@ class ToolEstimate:
     """What the unloaded references say of tool and sensor."""
 
     count: int
-    """Unloaded references."""
+    """UnloadedWrenches references."""
     mass: Interval
     """Shape (), in kg."""
     centre: Interval
@@ -228,12 +226,12 @@ class ToolEstimate:
     tool."""
 
 
-def estimate_tool(unloaded: Unloaded, nominal_mass: float) -> ToolEstimate:
+def estimate_tool(unloaded: UnloadedWrenches, nominal_mass: float) -> ToolEstimate:
     """Return what the unloaded references say of tool and sensor.
 
     Parameters
     ----------
-    unloaded : Unloaded
+    unloaded : UnloadedWrenches
         At least none; with few or similar orientations little is determined.
     nominal_mass : float
         Mass of the tool by the cell file, in kg: the scale of what is too wide, and the divisor
@@ -247,13 +245,13 @@ def estimate_tool(unloaded: Unloaded, nominal_mass: float) -> ToolEstimate:
     force = _solve(blocks, unloaded.force)
     turn = np.cross(np.eye(3)[None], gravity[:, None, :]).swapaxes(1, 2)
     moment = _solve(np.concatenate([turn, eye, drift], axis=2), unloaded.moment)
-    wide_mass = not force.half_width[0] <= WIDE_MASS * max(nominal_mass, 1.0)
-    mass = nominal_mass if wide_mass else max(float(force.value[0]), WIDE_MASS * nominal_mass)
+    wide_mass = not force.half_width[0] <= _WIDE_MASS * max(nominal_mass, 1.0)
+    mass = nominal_mass if wide_mass else max(float(force.value[0]), _WIDE_MASS * nominal_mass)
     centre = Interval(moment.value[:3] / mass, moment.half_width[:3] / mass)
-    wide_centre = ~(centre.half_width <= WIDE_CENTRE)
-    unknown = [*_named(NAMES, force.half_width), *_named(MOMENT_NAMES, moment.half_width)]
+    wide_centre = ~(centre.half_width <= _WIDE_CENTRE)
+    unknown = [*_named(_NAMES, force.half_width), *_named(_MOMENT_NAMES, moment.half_width)]
     unknown += ["mass"] * wide_mass
-    unknown += [MOMENT_NAMES[axis] for axis in np.flatnonzero(wide_centre)]
+    unknown += [_MOMENT_NAMES[axis] for axis in np.flatnonzero(wide_centre)]
     return ToolEstimate(
         count=len(time),
         mass=_masked(force.value[0], force.half_width[0], np.array(wide_mass)),
@@ -290,7 +288,7 @@ def _solve(blocks: FloatArray, readings: FloatArray) -> _Solution:
     left = b - A @ value
     scatter = float(np.sqrt(left @ left / (free + int((~kept).sum()))))
     sigma = scatter * np.sqrt(((vt[kept] / s[kept, None]) ** 2).sum(axis=0)) / scale
-    half = stats.t.ppf(0.5 + LEVEL / 2, free) * sigma
+    half = stats.t.ppf(0.5 + _LEVEL / 2, free) * sigma
     loose = np.linalg.norm(vt[~kept], axis=0) > np.sqrt(_DEPENDENT)
     return _Solution(np.where(loose, np.nan, value), np.where(loose, np.nan, half), scatter)
 

@@ -1,4 +1,4 @@
-"""DESCRIBE THIS PACKAGE."""
+"""What a run keeps on the disk: folder, journal, raw streams, and the record of its result."""
 
 import lazy_loader
 

@@ -1,4 +1,7 @@
-"""Run folder: cell and plan as used, journal, raw streams, and what is derived from them."""
+"""The run folder: cell and plan as used, journal, raw streams, and what is derived from them.
+
+Cell, plan and streams are known by their SHA-256 in the journal: what was changed since is refused.
+"""
 
 import hashlib
 import os
@@ -60,7 +63,7 @@ class RunFolder:
         return self.streams / f"pose_{pose:04d}_{attempt}.mcap"
 
 
-def cell_place(cell: Cell) -> str:
+def cell_path_in_run(cell: Cell) -> str:
     """Return where the cell file goes in the run's folder ``cell``.
 
     Its own folder there stands to those of the files that it names as in the original, so that
@@ -69,7 +72,7 @@ def cell_place(cell: Cell) -> str:
     return os.path.relpath(_absolute(cell.path), _root(cell))
 
 
-def fill(folder: RunFolder, cell: Cell, plan: Path) -> None:
+def fill_folder(folder: RunFolder, cell: Cell, plan: Path) -> None:
     """Put cell and plan into a run's folder, as they are now.
 
     The journal must be locked: two runs could otherwise fill one folder with two cells.
@@ -98,7 +101,7 @@ def fill(folder: RunFolder, cell: Cell, plan: Path) -> None:
     make_folder(folder.streams)
 
 
-def refuse_foreign(folder: RunFolder) -> None:
+def refuse_foreign_files(folder: RunFolder) -> None:
     """Refuse a folder that holds anything but the beginnings of a run.
 
     A run that was killed before its first journal entry leaves such beginnings; nothing has moved

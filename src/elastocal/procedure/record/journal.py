@@ -58,7 +58,7 @@ class PoseLog(StrictModel):
     windows: tuple[Window, ...]
 
 
-JOURNAL_SCHEMA = "elastocal.journal/1"
+_JOURNAL_SCHEMA = "elastocal.journal/1"
 
 
 class Event(Enum):
@@ -98,7 +98,7 @@ class Action(Enum):
 class RunRecord(StrictModel):
     """Which run a journal belongs to."""
 
-    schema_name: str = JOURNAL_SCHEMA
+    schema_name: str = _JOURNAL_SCHEMA
     elastocal: str
     """Version that started it."""
     plan: str
@@ -276,7 +276,7 @@ def _read(path: Path) -> tuple[tuple[Entry, ...], int]:
     lines = data[:whole].splitlines()
     entries = tuple(_entry(path, number, line) for number, line in enumerate(lines))
     if entries and not _starts(entries[0]):
-        raise SchemaError(f"{path}: line 1 is not the start of a run (schema {JOURNAL_SCHEMA!r})")
+        raise SchemaError(f"{path}: line 1 is not the start of a run (schema {_JOURNAL_SCHEMA!r})")
     return entries, whole
 
 
@@ -285,7 +285,7 @@ def _starts(entry: Entry) -> bool:
     run = entry.run
     return (
         run is not None
-        and run.schema_name == JOURNAL_SCHEMA
+        and run.schema_name == _JOURNAL_SCHEMA
         and "schema_name" in run.model_fields_set
     )
 

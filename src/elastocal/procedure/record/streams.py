@@ -1,11 +1,15 @@
-"""Raw streams of one pose attempt, read as arrays."""
+"""Raw streams of one attempt at a pose: recorded to an MCAP file, and read again as arrays.
+
+Raw means as the devices said it: forces in the sensor's frame with bias and tool weight still in,
+marker positions in the frame of the station that measured.
+"""
 
 import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from operator import itemgetter
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, Protocol, TypeVar
 
 import numpy as np
 from mcap.records import Metadata
@@ -38,10 +42,14 @@ from elastocal.procedure.record.folder import file_sha256
 from elastocal.records import check_schema
 
 STREAMS_SCHEMA = "elastocal.streams/1"
-RECORD = "elastocal"
+SAME_TIME = 1e-6
+"""Times that differ by less are equal, in s: clocks of floating point, logs of nanoseconds."""
+_METADATA = "elastocal"
 """Name of the metadata record that carries the schema."""
-NANOSECONDS = 1e9
+_NANOSECONDS = 1e9
 """In a second."""
+
+_Stream = TypeVar("_Stream")
 
 
 @dataclass(frozen=True)
@@ -51,6 +59,31 @@ class Mark:
     time: float
     """In s of the clock."""
     text: str
+
+
+class StreamRecorder(Protocol):
+    """Keeps the raw streams of one attempt; `PoseRecorder` is one."""
+
+    def arm(self, state: ArmState) -> None:
+        """Keep a state of the arm."""
+
+    def wrenches(self, block: WrenchBlock) -> None:
+        """Keep a block of the force sensor."""
+
+    def points(self, block: PointBlock) -> None:
+        """Keep a block of the tracker."""
+
+    def mark(self, time: float, text: str) -> None:
+        """Keep a remark."""
+
+    def save(self, path: Path) -> str | None:
+        """Write everything, atomically, and wait until it is on the disk.
+
+        Returns
+        -------
+        str or None
+            SHA-256 of the file, for the journal; None from a recorder that keeps none.
+        """
 
 
 class PoseRecorder:
@@ -111,7 +144,7 @@ class PoseRecorder:
             If the file cannot be written.
         """
         joints = json.dumps(self._joint_names)
-        note = Metadata(name=RECORD, metadata={"schema": STREAMS_SCHEMA, "joints": joints})
+        note = Metadata(name=_METADATA, metadata={"schema": STREAMS_SCHEMA, "joints": joints})
         write_mcap(path, self._topics(), f"elastocal {__version__}", note)
         return file_sha256(path)
 
@@ -130,8 +163,8 @@ class PoseRecorder:
         }
         times = {
             ARM: np.array([state.time for state in self._arm]),
-            WRENCH: _end_to_end([block.time for block in self._wrenches]),
-            MARKER: _end_to_end([block.time for block in self._points]),
+            WRENCH: _joined([block.time for block in self._wrenches]),
+            MARKER: _joined([block.time for block in self._points]),
             MARKS: np.array([mark.time for mark in self._marks]),
         }
         return [
@@ -141,30 +174,14 @@ class PoseRecorder:
 
 
 def _nanoseconds(topic: str, time: FloatArray) -> TimeArray:
-    wrong = time[~((time >= 0.0) & (time < 2.0**63 / NANOSECONDS))]
+    wrong = time[~((time >= 0.0) & (time < 2.0**63 / _NANOSECONDS))]
     if len(wrong):
         raise ProcedureError(f"{topic}: time {wrong[0]} s cannot be recorded: it must be 0 or more")
-    return np.rint(time * NANOSECONDS).astype(np.int64)
+    return np.rint(time * _NANOSECONDS).astype(np.int64)
 
 
-def _end_to_end(arrays: Sequence[FloatArray]) -> FloatArray:
+def _joined(arrays: Sequence[FloatArray]) -> FloatArray:
     return np.concatenate(arrays) if arrays else np.empty(0)
-
-
-__all__ = [
-    "ArmStream",
-    "Mark",
-    "PointStream",
-    "PoseRecorder",
-    "Streams",
-    "WrenchStream",
-    "read_streams",
-]
-
-EDGE = 1e-6
-"""Times that differ by less are equal, in s: clocks of floating point, logs of nanoseconds."""
-
-Result = TypeVar("Result")
 
 
 @dataclass(frozen=True, eq=False)
@@ -211,7 +228,7 @@ class PointStream:
 
 @dataclass(frozen=True, eq=False)
 class Streams:
-    """Everything that the devices said during one pose attempt; the arrays are read-only."""
+    """Everything that the devices messages during one pose attempt; the arrays are read-only."""
 
     joint_names: tuple[str, ...]
     arm: ArmStream
@@ -239,13 +256,13 @@ def read_streams(path: Path, spans: Sequence[tuple[float, float]] | None = None)
         If it is no such file, cut off or damaged.
     """
     contents = read_mcap(path)
-    note = contents.metadata.get(RECORD, {})
+    note = contents.metadata.get(_METADATA, {})
     check_schema(note.get("schema"), STREAMS_SCHEMA, str(path))
     joints = _joints(path, note)
 
-    def topic(name: str, make: Callable[[FloatArray, list[Any]], Result]) -> Result:
+    def topic(name: str, make: Callable[[FloatArray, list[Any]], _Stream]) -> _Stream:
         try:
-            return make(*_said(contents.topics.get(name, Messages()), spans))
+            return make(*_parsed(contents.topics.get(name, Messages()), spans))
         except (ValueError, TypeError, KeyError, RecursionError) as error:
             reason = f"{type(error).__name__} {' '.join(str(error).split())}"
             message = f"{path}: {name} holds a message that is not ours: {reason}"
@@ -253,7 +270,7 @@ def read_streams(path: Path, spans: Sequence[tuple[float, float]] | None = None)
 
     return Streams(
         joints,
-        topic(ARM, lambda time, said: _arm_stream(time, said, joints)),
+        topic(ARM, lambda time, messages: _arm_stream(time, messages, joints)),
         topic(WRENCH, _wrench_stream),
         topic(MARKER, _point_stream),
         topic(MARKS, _marks),
@@ -267,64 +284,59 @@ def _joints(path: Path, note: Mapping[str, str]) -> tuple[str, ...]:
         raise SchemaError(f"{path}: its metadata do not name the joints of the arm") from error
 
 
-def _said(
+def _parsed(
     messages: Messages, spans: Sequence[tuple[float, float]] | None
 ) -> tuple[FloatArray, list[Any]]:
     """Return times in s and parsed messages of a topic."""
-    time, data = np.array(messages.time, dtype=float) / NANOSECONDS, messages.data
+    time, data = np.array(messages.time, dtype=float) / _NANOSECONDS, messages.data
     if spans is not None:
         inside = np.zeros(len(time), dtype=bool)
         for start, end in spans:
-            inside |= (time >= start - EDGE) & (time <= end + EDGE)
+            inside |= (time >= start - SAME_TIME) & (time <= end + SAME_TIME)
         time, data = time[inside], [data[row] for row in np.flatnonzero(inside).tolist()]
-    said: list[Any] = json.loads(b"[" + b",".join(data) + b"]")
-    return time, said
+    # One parse of all of them is several times as quick as one each.
+    parsed: list[Any] = json.loads(b"[" + b",".join(data) + b"]")
+    return time, parsed
 
 
-def _arm_stream(time: FloatArray, said: list[Any], joints: tuple[str, ...]) -> ArmStream:
-    T = np.zeros((len(said), 4, 4))
+def _arm_stream(time: FloatArray, messages: list[Any], joints: tuple[str, ...]) -> ArmStream:
+    T = np.zeros((len(messages), 4, 4))
     T[:, 3, 3] = 1.0
-    T[:, :3, 3] = _columns(said, "position", "xyz")
-    if said:
-        quaternions = _columns(said, "orientation", "xyzw")
+    T[:, :3, 3] = _columns(messages, "position", "xyz")
+    if messages:
+        quaternions = _columns(messages, "orientation", "xyzw")
         T[:, :3, :3] = Rotation.from_quat(quaternions).as_matrix()
-    return ArmStream(_frozen(time), _frozen(_columns(said, "q", joints)), _frozen(T))
+    return ArmStream(_frozen(time), _frozen(_columns(messages, "q", joints)), _frozen(T))
 
 
-def _wrench_stream(time: FloatArray, said: list[Any]) -> WrenchStream:
-    ok = np.array([message["status"] == SensorStatus.OK.value for message in said], dtype=bool)
+def _wrench_stream(time: FloatArray, messages: list[Any]) -> WrenchStream:
+    ok = np.array([message["status"] == SensorStatus.OK.value for message in messages], dtype=bool)
     ok.setflags(write=False)
-    return WrenchStream(
-        _frozen(time),
-        _frozen(_columns(said, "force", "xyz")),
-        _frozen(_columns(said, "moment", "xyz")),
-        _frozen(np.array([message["force_sigma"] for message in said], dtype=float)),
-        ok,
-    )
+    sigma = np.array([message["force_sigma"] for message in messages], dtype=float)
+    force, moment = (_columns(messages, key, "xyz") for key in ("force", "moment"))
+    return WrenchStream(_frozen(time), _frozen(force), _frozen(moment), _frozen(sigma), ok)
 
 
-def _point_stream(time: FloatArray, said: list[Any]) -> PointStream:
-    station = np.array([message["station"] for message in said], dtype=np.str_)
+def _point_stream(time: FloatArray, messages: list[Any]) -> PointStream:
+    station = np.array([message["station"] for message in messages], dtype=np.str_)
     station.setflags(write=False)
-    return PointStream(
-        _frozen(time),
-        _frozen(_columns(said, "position", "xyz")),
-        _frozen(_columns(said, "sigma", "xyz")),
-        station,
-    )
+    position, sigma = (_columns(messages, key, "xyz") for key in ("position", "sigma"))
+    return PointStream(_frozen(time), _frozen(position), _frozen(sigma), station)
 
 
-def _marks(time: FloatArray, said: list[Any]) -> tuple[Mark, ...]:
-    texts = (str(message["text"]) for message in said)
+def _marks(time: FloatArray, messages: list[Any]) -> tuple[Mark, ...]:
+    texts = (str(message["text"]) for message in messages)
     return tuple(Mark(*mark) for mark in zip(time.tolist(), texts, strict=True))
 
 
-def _columns(said: list[Any], key: str, names: Sequence[str]) -> FloatArray:
+def _columns(messages: list[Any], key: str, names: Sequence[str]) -> FloatArray:
     """Return the numbers under a key, shape (message, name); null becomes NaN."""
-    if not said or not names:
-        return np.empty((len(said), len(names)))
+    if not messages or not names:
+        return np.empty((len(messages), len(names)))
     pick = itemgetter(*names)
-    return np.array([pick(message[key]) for message in said], dtype=float).reshape(len(said), -1)
+    return np.array([pick(message[key]) for message in messages], dtype=float).reshape(
+        len(messages), -1
+    )
 
 
 def _frozen(array: FloatArray) -> FloatArray:

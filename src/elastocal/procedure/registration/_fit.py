@@ -64,7 +64,7 @@ class UnloadedReadings:
         return np.nan_to_num(self.sigma, nan=0.0) ** 2
 
 
-ROTATION_SIGMA = 0.02
+_ROTATION_SIGMA = 0.02
 """Largest standard deviation of a rotation that is of use, in rad: it turns a displacement of
 1 mm into one that is off by 20 µm, as much as a tracker's own noise."""
 
@@ -82,7 +82,7 @@ def determined(position: FloatArray, scatter: float) -> bool:
     scatter : float
         Standard deviation of a coordinate, in m.
     """
-    return rotation_sigma(position, scatter) <= ROTATION_SIGMA
+    return rotation_sigma(position, scatter) <= _ROTATION_SIGMA
 
 
 def align(here: FloatArray, there: FloatArray) -> tuple[FloatArray, FloatArray]:

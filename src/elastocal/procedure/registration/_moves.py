@@ -24,9 +24,9 @@ from elastocal.procedure.registration._fit import (
     motion_columns,
 )
 
-CHANCE = 1e-4
+_CHANCE = 1e-4
 """Largest probability that a run without any move or blunder is said to have one."""
-LEAST_MOVE = 50e-6
+_LEAST_MOVE = 50e-6
 """Smallest shift of the marker that is called a move or a blunder, in m: less does no harm."""
 
 
@@ -88,7 +88,7 @@ def _judge(
     log10 = float(stats.f.logsf(f, max(rank, 1), free - rank)) / math.log(10.0)
     log10 += math.log10(tried)
     size = np.sqrt((np.square(hypothesis.columns @ shift)).sum(axis=1).mean())
-    if not (log10 < math.log10(CHANCE) and size >= LEAST_MOVE):
+    if not (log10 < math.log10(_CHANCE) and size >= _LEAST_MOVE):
         return None
     return Finding(hypothesis.row, hypothesis.move, log10)
 

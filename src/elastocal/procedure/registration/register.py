@@ -92,15 +92,13 @@ class Registration:
 
     def station_of(self, station: str, pose: int) -> StationFit | None:
         """Return where a station stood at a pose; None where that is not known."""
-        for fit in self.stations:
-            if fit.station == station and pose in fit.poses:
-                return fit
-        return None
+        stood = (each for each in self.stations if each.station == station and pose in each.poses)
+        return next(stood, None)
 
 
-MOST_FINDINGS = 0.2
+_MOST_FINDINGS = 0.2
 """Largest share of the readings that may be called moves or blunders."""
-UNDETERMINED = 0.5
+_UNDETERMINED = 0.5
 """Share of the prior's standard deviation above which a direction of the lever arm is its."""
 
 
@@ -133,7 +131,7 @@ def register(readings: UnloadedReadings, lever_prior: FloatArray) -> Registratio
         rows = np.flatnonzero(kept)
         result = fit(readings.take(rows), _dense(group[rows]), lever_prior)
         finding = find(readings.take(rows), result)
-        if finding is None or len(findings) >= MOST_FINDINGS * len(readings):
+        if finding is None or len(findings) >= _MOST_FINDINGS * len(readings):
             break
         row = int(rows[finding.row])
         findings.append((row, finding))
@@ -179,7 +177,7 @@ def _dense(group: IndexArray) -> IndexArray:
 
 
 def _undetermined(sigma: FloatArray) -> tuple[str, ...]:
-    free = sigma > UNDETERMINED * LEVER_SIGMA
+    free = sigma > _UNDETERMINED * LEVER_SIGMA
     return tuple(axis for axis, is_free in zip("xyz", free, strict=True) if is_free)
 
 

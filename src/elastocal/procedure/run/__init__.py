@@ -1,4 +1,4 @@
-"""DESCRIBE THIS PACKAGE."""
+"""Carry a plan out on devices: runner, sessions, states of an attempt, supervisor, watchdog."""
 
 import lazy_loader
 

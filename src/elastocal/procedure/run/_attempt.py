@@ -1,4 +1,4 @@
-"""What is known during one attempt at a pose."""
+"""State of one attempt at a pose: what its steps have found, and what they must keep to."""
 
 from dataclasses import dataclass, field
 
@@ -7,28 +7,28 @@ import numpy as np
 from elastocal.arrays import FloatArray
 from elastocal.planning import Joints, PoseRecord
 from elastocal.procedure.record.journal import PoseLog, ReadingStatus, Window
-from elastocal.procedure.run._stability import SlideWatch, SlipWatch
+from elastocal.procedure.run._stability import SlideDetector, SlipReference
 from elastocal.procedure.run._supervisor import Supervisor
 from elastocal.procedure.run._watchdog import Guard
-from elastocal.procedure.run.routes import Line
-from elastocal.procedure.run.settings import Settings
-from elastocal.procedure.run.steps import OFF_APPROACH, TOUCHING, Stand, Step
+from elastocal.procedure.run.routes import ApproachLine
+from elastocal.procedure.run.settings import RunSettings
+from elastocal.procedure.run.steps import MAY_TOUCH, ON_APPROACH_LINE, ArmLocation, Step
 
-STIFFEST = 1e6
+_STIFFEST = 1e6
 """Arm and tooling against each other are not stiffer than this, in N/m: so much the force grows
 a metre before a guarded move is seen to have ended."""
 
 
 @dataclass(eq=False)
 class Attempt:
-    """State of one attempt; changes as it goes."""
+    """One attempt at a pose; changes as it goes."""
 
     supervisor: Supervisor
     pose: PoseRecord
     station: str
     number: int
     """From 1, over all stretches of the run."""
-    way: tuple[Joints, ...]
+    legs: tuple[Joints, ...]
     """Joint positions to pass on the way to the approach pose, which is the last."""
     streams: str
     """Name of the file with the raw streams."""
@@ -42,27 +42,27 @@ class Attempt:
     windows: list[Window] = field(default_factory=list)
     at_approach: FloatArray = field(default_factory=lambda: np.zeros(3))
     """Marker at the approach pose, shape (3,), in m, tracker frame."""
-    slip_watch: SlipWatch | None = None
-    slide_watch: SlideWatch | None = None
+    slip_reference: SlipReference | None = None
+    slide: SlideDetector | None = None
     """Of the present load case."""
     slip_origin: float = 0.0
     """Lateral movement that has been reported as slip already, in m."""
     slip: float = 0.0
     """Lateral movement of the marker at the last reading, in m."""
-    jump_watch: SlideWatch | None = None
+    jump: SlideDetector | None = None
     """Along the normal, during the windows of the present load case."""
-    stand: Stand = Stand.WAY
+    location: ArmLocation = ArmLocation.BETWEEN_POSES
     """Where the arm is left after a mistake in the program."""
 
     @property
-    def settings(self) -> Settings:
+    def settings(self) -> RunSettings:
         """Figures of the run."""
         return self.supervisor.settings
 
     @property
-    def line(self) -> Line:
+    def line(self) -> ApproachLine:
         """Straight way to the surface."""
-        return Line.of(self.pose, self.settings.procedure.travel_limit)
+        return ApproachLine.of_pose(self.pose, self.settings.procedure.travel_limit)
 
     @property
     def load(self) -> tuple[str, FloatArray]:
@@ -82,11 +82,11 @@ class Attempt:
 
     def guard(self, *, beam: bool = True) -> Guard:
         """Return what must hold in the present state."""
-        if self.step in OFF_APPROACH:
+        if self.step in ON_APPROACH_LINE:
             limit = self.settings.force_limit
             if self.step is Step.ENGAGE:
                 limit = min(limit, self._engage_limit)
-            return Guard(limit, self.line, beam, self.step in TOUCHING)
+            return Guard(limit, self.line, beam, self.step in MAY_TOUCH)
         # The weight of the tool turns with its orientation: at most twice itself.
         return Guard(self.settings.force_limit + 2.0 * self.settings.tool_weight, None, beam)
 
@@ -99,7 +99,7 @@ class Attempt:
     def _engage_limit(self) -> float:
         """Largest force of a guarded move that ends as it should, in N."""
         p = self.settings.procedure
-        return p.contact_force + STIFFEST * p.contact_speed * p.cycle + self.noise
+        return p.contact_force + _STIFFEST * p.contact_speed * p.cycle + self.noise
 
     def close_window(
         self,

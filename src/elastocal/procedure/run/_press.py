@@ -1,359 +1,306 @@
-"""States off the surface: the way to the approach pose, aiming, near contact, the reference."""
+"""The states of one attempt, in the order of Procedure 1: one action each.
 
-from functools import partial
+The order is what makes a reading worth something, and the cell safe. The sensor is tared in free
+air just before contact, so that its drift since the last pose and the weight of the tool are not
+taken for load; the reference of the tracker is taken there too, so that only what happens between
+it and the load counts as deflection. Contact is made in position control, slowly and up to a small
+force; only then is force control switched on. It is switched off, with the force ramped to zero,
+before the tool leaves the surface: an arm in force control in free air would accelerate.
+"""
 
 import numpy as np
 
 from elastocal.arrays import FloatArray
 from elastocal.cell.devices import Motion
-from elastocal.planning import Joints
 from elastocal.procedure.record.journal import Action, ReadingStatus
 from elastocal.procedure.run._attempt import Attempt
+from elastocal.procedure.run._motion import (
+    approach_by,
+    drive,
+    largest_force,
+    release_force,
+    require_tool_weight,
+    retract_to,
+)
 from elastocal.procedure.run._stability import (
     LEAST_SAMPLES,
-    SlideWatch,
-    SlipWatch,
-    Stretch,
-    complaint,
-    shaking,
+    RecentSamples,
+    SlideDetector,
+    SlipReference,
     steadiness,
+    why_shaking,
+    why_unsteady,
 )
-from elastocal.procedure.run._supervisor import TIME_SLACK, Supervisor
-from elastocal.procedure.run._watchdog import Guard, Seen
+from elastocal.procedure.run._supervisor import TIME_SLACK
+from elastocal.procedure.run._watchdog import Snapshot
 from elastocal.procedure.run.faults import Fault, FaultError
-from elastocal.procedure.run.settings import Settings
-from elastocal.procedure.run.steps import Outcome
+from elastocal.procedure.run.steps import StepResult
 
-ARRIVED = 5e-3
-"""A joint that is closer to its target than this has arrived, in rad or m."""
-STRAIGHT_ARRIVED = 1e-3
-"""The same of a straight motion, in m."""
-BIAS = 0.1
-"""Bias of a sensor that is let pass, as a part of the force limit."""
-
-
-def drive(supervisor: Supervisor, way: tuple[Joints, ...], guard: Guard) -> None:
-    """Pass joint positions one after the other, each leg straight in joint space.
-
-    Raises
-    ------
-    FaultError
-        See `Supervisor.wait`.
-    """
-    settings = supervisor.settings
-    for leg, target in enumerate(way):
-        seen = supervisor.cycle(Guard())
-        if seen.arm.in_contact:
-            raise FaultError(Fault.IN_CONTACT, f"{seen.arm.source} says that it is")
-        # Once: a tare at each leg would hide a force that grows from leg to leg.
-        if leg == 0 and len(seen.wrenches):
-            force = seen.wrenches.force.mean(axis=0)
-            refuse_other_weight(force, settings)
-            supervisor.tare(force)
-        goal = np.array(target)
-        expected = float(settings.axes.duration(seen.arm.q, goal))
-        with supervisor.actuation(Action.MOVE, target):
-            supervisor.devices.arm.move_joints(goal, settings.override)
-            supervisor.wait(
-                guard,
-                partial(_stands_at, goal),
-                2.0 * expected + settings.procedure.timeout,
-                "a move",
-            )
+_AGREES = 0.5
+"""Smallest part of a force of the arm that its sensor must feel."""
+_REACH_MARGIN = 1e-3
+"""How much earlier than at the travel limit the surface counts as missed, in m."""
+_WINDOW_TRIES = 3
+"""Windows of one load case that may be spoiled before it is given up."""
 
 
-def move(a: Attempt) -> Outcome:
+def move(a: Attempt) -> StepResult:
     """Go to the approach pose."""
-    drive(a.supervisor, a.way, a.guard(beam=False))
-    return Outcome.GOOD
+    drive(a.supervisor, a.legs, a.guard(beam=False))
+    return StepResult.GOOD
 
 
-def aim(a: Attempt) -> Outcome:
+def aim(a: Attempt) -> StepResult:
     """Wait for the beam; take the sensor's reading and the marker's place at the approach pose."""
     s, procedure = a.supervisor, a.settings.procedure
     s.aim(a.station)
-    s.wait(
-        a.guard(),
-        lambda seen: s.watch.sees and len(seen.points) > 0 and seen.points.station == a.station,
-        procedure.beam_timeout + 1.0,
-        f"{a.station}: looking for the marker",
-    )
-    forces, points = Stretch(), Stretch()
+    # A station that measured the pose before may still deliver: its points are not ours.
+    _wait_for_beam(a, a.station)
+    forces, points = RecentSamples(), RecentSamples()
     for seen in s.stay(a.guard(), procedure.dwell):
         forces.add(seen.wrenches.time, seen.wrenches.force)
         points.add(seen.points.time, seen.points.position)
-    _refuse_empty(a, forces, points)
-    refuse_other_weight(forces.values.mean(axis=0), a.settings)
+    _require_samples(a, forces, points)
+    # Before the tare: it would hide a tool that is not the cell's, or a sensor in another frame.
+    require_tool_weight(forces.values.mean(axis=0), a.settings)
     s.tare(forces.values.mean(axis=0))
     a.at_approach = points.values.mean(axis=0)
-    return Outcome.GOOD
+    return StepResult.GOOD
 
 
-def near(a: Attempt) -> Outcome:
+def near(a: Attempt) -> StepResult:
     """Go straight to near contact; nothing may be touched on the way."""
     procedure = a.settings.procedure
     seen = a.supervisor.cycle(a.guard())
     distance = a.line.height(seen.arm.T_base_tcp) - a.settings.near_contact
     most = procedure.contact_force + a.noise
-    seen = go_straight(a, distance, procedure.approach_speed, most)
-    if seen.arm.in_contact or felt(seen) > most:
+    seen = approach_by(a, distance, procedure.approach_speed, most)
+    if seen.arm.in_contact or largest_force(seen) > most:
         height = a.line.height(seen.arm.T_base_tcp)
         raise FaultError(Fault.CONTACT_EARLY, f"{height * 1e3:.1f} mm before the expected contact")
-    return Outcome.GOOD
+    return StepResult.GOOD
 
 
-def unloaded(a: Attempt) -> Outcome:
+def unloaded(a: Attempt) -> StepResult:
     """Average tracker and sensor until both are quiet (p_i0^c, p_i0^m)."""
     s, procedure = a.supervisor, a.settings.procedure
     begin, noisy = s.now, ""
-    for _ in s.stay(a.guard(), procedure.dwell):
-        pass
+    _stand_still(a)
     while s.now - begin <= procedure.timeout + TIME_SLACK:
-        start, breaks, forces, points = s.now, s.watch.breaks, Stretch(), Stretch()
+        start, breaks, forces, points = s.now, s.watchdog.breaks, RecentSamples(), RecentSamples()
         for seen in s.stay(a.guard(), procedure.unloaded_average):
             forces.add(seen.wrenches.time, seen.wrenches.force)
             points.add(seen.points.time, seen.points.position)
-            if s.watch.breaks > breaks:
+            if s.watchdog.breaks > breaks:
                 break
-        if s.watch.breaks > breaks or not s.watch.sees:
+        if s.watchdog.breaks > breaks or not s.watchdog.sees:
             noisy = f"{a.station} loses the marker again and again"
             _wait_for_beam(a)
             continue
-        _refuse_empty(a, forces, points)
-        noisy = _noise(a, forces, points.values)
+        _require_samples(a, forces, points)
+        noisy = why_shaking(points.values, procedure.marker_sigma)
+        noisy = noisy or why_unsteady(steadiness(forces.time, forces.values), procedure) or ""
         if not noisy:
+            # The last tare before contact: from here on the force is that of the press alone.
             s.tare(forces.values.mean(axis=0))
-            a.slip_watch = SlipWatch.of(a.at_approach, points.values.mean(axis=0))
+            a.slip_reference = SlipReference.of(a.at_approach, points.values.mean(axis=0))
             a.close_window(None, start)
-            return Outcome.GOOD
+            return StepResult.GOOD
     raise FaultError(Fault.UNLOADED_NOISY, noisy)
 
 
-def released(a: Attempt) -> Outcome:
-    """Average once more, after the loads: how far the sensor is from its tare then.
-
-    Nothing depends on it but what the summary says of the drift, so it cannot fail.
-    """
-    s, procedure = a.supervisor, a.settings.procedure
-    for _ in s.stay(a.guard(beam=False), procedure.dwell):
-        pass
-    start = s.now
-    for _ in s.stay(a.guard(beam=False), procedure.unloaded_average):
-        pass
-    a.close_window(None, start)
-    return Outcome.GOOD
-
-
-def refuse_other_weight(force: FloatArray, settings: Settings) -> None:
-    """Refuse a force in free air, shape (3,), in N, that is not about the tool's weight.
-
-    Half the weight is left for a mass that is only roughly known, and `BIAS` of the force limit
-    for a sensor that has not been set to zero. Without a mass in the cell nothing is refused.
-
-    Raises
-    ------
-    FaultError
-        With both.
-    """
-    weight = settings.tool_weight
-    if not weight > 0.0:
-        return
-    size, tolerance = float(np.linalg.norm(force)), 0.5 * weight + BIAS * settings.force_limit
-    if not abs(size - weight) <= tolerance:
-        text = f"{size:.0f} N in free air, it weighs {weight:.0f} N, tolerance {tolerance:.0f} N"
-        raise FaultError(Fault.WEIGHT, text)
-
-
-def felt(seen: Seen) -> float:
-    """Return the largest force of a cycle, tared, in N; 0 when nothing has come."""
-    return float(np.linalg.norm(seen.force_tcp, axis=1).max(initial=0.0))
-
-
-def go_straight(a: Attempt, distance: float, speed: float, most: float = np.inf) -> Seen:
-    """Make a guarded linear move along the inward normal; return what is seen at its end.
-
-    It also ends, with the arm still moving, when a force above ``most`` N is felt.
-    """
-    s, procedure = a.supervisor, a.settings.procedure
-    start = s.cycle(a.guard()).arm.T_base_tcp[:3, 3]
-    with s.actuation(Action.APPROACH, (distance,)):
-        s.devices.arm.approach(-a.line.normal, distance, speed, procedure.contact_force)
-        return s.wait(
-            a.guard(),
-            lambda seen: _is_done(seen, start, distance) or felt(seen) > most,
-            2.0 * distance / speed + procedure.timeout,
-            "an approach",
-        )
-
-
-def _is_done(seen: Seen, start: FloatArray, distance: float) -> bool:
-    if seen.arm.motion is not Motion.IDLE:
-        return False
-    if seen.arm.in_contact:
-        return True
-    return float(np.linalg.norm(seen.arm.T_base_tcp[:3, 3] - start)) > distance - STRAIGHT_ARRIVED
-
-
-def _stands_at(goal: FloatArray, seen: Seen) -> bool:
-    return seen.arm.motion is Motion.IDLE and float(np.abs(seen.arm.q - goal).max()) <= ARRIVED
-
-
-def _wait_for_beam(a: Attempt) -> None:
-    a.supervisor.wait(
-        a.guard(),
-        lambda seen: a.supervisor.watch.sees and len(seen.points) > 0,
-        a.settings.procedure.beam_timeout + 1.0,
-        f"{a.station}: looking for the marker",
-    )
-
-
-def _noise(a: Attempt, forces: Stretch, positions: FloatArray) -> str:
-    """Return why a window is too noisy for a reference; empty when it is not."""
-    procedure = a.settings.procedure
-    why = shaking(positions, procedure.marker_sigma)
-    return why or complaint(steadiness(forces.time, forces.values), procedure) or ""
-
-
-def _refuse_empty(a: Attempt, forces: Stretch, points: Stretch) -> None:
-    """Refuse a window with hardly any samples in it; no watchdog saw a gap, so they are slow."""
-    for stretch, fault, name in (
-        (forces, Fault.SENSOR_STALE, "the sensor"),
-        (points, Fault.TRACKER_STALE, a.station),
-    ):
-        if len(stretch) < LEAST_SAMPLES:
-            raise FaultError(fault, f"{name} gave {len(stretch)} samples in a window")
-
-
-AGREES = 0.5
-"""Smallest part of a force of the arm that its sensor must feel."""
-REACH_MARGIN = 1e-3
-"""How much earlier than at the travel limit the surface counts as missed, in m."""
-WINDOW_TRIES = 3
-"""Windows of one load case that may be spoiled before it is given up."""
-
-
-def engage(a: Attempt) -> Outcome:
+def engage(a: Attempt) -> StepResult:
     """Go on until the contact force is felt."""
     procedure = a.settings.procedure
     seen = a.supervisor.cycle(a.guard())
     # Less than the limit: a place that is noisy must not turn a miss into something worse.
-    reach = max(procedure.travel_limit - REACH_MARGIN, 0.5 * procedure.travel_limit)
+    reach = max(procedure.travel_limit - _REACH_MARGIN, 0.5 * procedure.travel_limit)
     distance = a.line.height(seen.arm.T_base_tcp) + reach
-    seen = go_straight(a, distance, procedure.contact_speed)
+    seen = approach_by(a, distance, procedure.contact_speed)
     if not seen.arm.in_contact:
         text = f"none within {reach * 1e3:g} mm beyond the expected one"
         raise FaultError(Fault.CONTACT_MISSED, text)
-    _refuse_contact_unfelt(a, seen)
-    return Outcome.GOOD
+    # Before any load: an arm and a sensor that do not feel the same force must not press.
+    _require_contact_felt(a, seen)
+    return StepResult.GOOD
 
 
-def load(a: Attempt) -> Outcome:
+def load(a: Attempt) -> StepResult:
     """Ramp to the present load case."""
     s, (name, force) = a.supervisor, a.load
     ramp = a.settings.procedure.ramp
     present = s.cycle(a.guard()).force_tcp
     change = force - present[-1] if len(present) else force
+    # Set before the command, not after: should the command fail half way, the force is released.
     a.in_force_control = True
-    assert a.slip_watch is not None
-    a.slide_watch = slide = SlideWatch(a.slip_watch)
-    a.jump_watch = SlideWatch(a.slip_watch, along=True)
+    assert a.slip_reference is not None
+    a.slide = SlideDetector(a.slip_reference)
+    a.jump = SlideDetector(a.slip_reference, along=True)
     with s.actuation(Action.HOLD, name):
         s.devices.arm.hold(force, ramp)
         for seen in s.stay(a.guard(), float(np.linalg.norm(change)) / ramp):
-            slide.see(seen.points.position)
-    return Outcome.GOOD
+            a.slide.see(seen.points.position)
+    return StepResult.GOOD
 
 
-def settle(a: Attempt) -> Outcome:
+def settle(a: Attempt) -> StepResult:
     """Wait until the force is steady and the marker is seen."""
     s, (name, force), procedure = a.supervisor, a.load, a.settings.procedure
-    stretch, begin, why = Stretch(procedure.dwell), s.now, ""
+    samples, begin, why = RecentSamples(procedure.dwell), s.now, ""
     for seen in s.stay(a.guard(), procedure.timeout):
-        _refuse_other_motion(seen)
-        _see(a, seen)
-        stretch.add(seen.wrenches.time, seen.force_tcp)
-        if seen.time - begin < procedure.dwell - TIME_SLACK or len(stretch) < LEAST_SAMPLES:
+        _watch_hold(a, seen)
+        samples.add(seen.wrenches.time, seen.force_tcp)
+        if seen.time - begin < procedure.dwell - TIME_SLACK or len(samples) < LEAST_SAMPLES:
             continue
-        found = steadiness(stretch.time, stretch.values)
-        why = complaint(found, procedure, force) or ""
-        if not why and s.watch.sees:
-            return Outcome.GOOD
-        if seen.time - begin > 2.0 * procedure.dwell and not complaint(found, procedure):
-            _refuse_unfollowed(found.mean, force)
+        found = steadiness(samples.time, samples.values)
+        why = why_unsteady(found, procedure, force) or ""
+        if not why and s.watchdog.sees:
+            return StepResult.GOOD
+        # Steady, and yet not there: it is not a matter of waiting, arm and sensor disagree.
+        if seen.time - begin > 2.0 * procedure.dwell and not why_unsteady(found, procedure):
+            _require_force_followed(found.mean, force)
     note = f"not stable within {procedure.timeout:g} s: {why or 'the beam is broken'}"
     a.close_window(name, s.now, ReadingStatus.UNSTABLE, note)
-    return Outcome.LOST
+    return StepResult.LOAD_CASE_LOST
 
 
-def average(a: Attempt) -> Outcome:
+def average(a: Attempt) -> StepResult:
     """Take one reading, or find that it cannot be taken."""
     s, (name, force), procedure = a.supervisor, a.load, a.settings.procedure
-    start, breaks, forces, points = s.now, s.watch.breaks, Stretch(), Stretch()
-    if a.jump_watch is not None:
-        a.jump_watch.forget()
+    start, breaks, forces, points = s.now, s.watchdog.breaks, RecentSamples(), RecentSamples()
+    if a.jump is not None:
+        a.jump.forget()
     for seen in s.stay(a.guard(), procedure.average):
-        _refuse_other_motion(seen)
-        _see(a, seen)
-        if a.jump_watch is not None:
-            a.jump_watch.see(seen.points.position)
+        _watch_hold(a, seen)
+        if a.jump is not None:
+            a.jump.see(seen.points.position)
         forces.add(seen.wrenches.time, seen.force_tcp)
         points.add(seen.points.time, seen.points.position)
-        if s.watch.breaks > breaks:
-            note = f"{a.station} lost the marker in {WINDOW_TRIES} windows"
-            return _again(a, ReadingStatus.ABORTED, note)
+        if s.watchdog.breaks > breaks:
+            note = f"{a.station} lost the marker in {_WINDOW_TRIES} windows"
+            return _repeat(a, ReadingStatus.ABORTED, note)
     if len(forces) < LEAST_SAMPLES or len(points) < LEAST_SAMPLES:
         note = f"{len(forces)} samples of the force and {len(points)} of the marker"
-        return _again(a, ReadingStatus.ABORTED, note)
-    why = complaint(steadiness(forces.time, forces.values), procedure, force)
-    why = why or shaking(points.values, procedure.marker_sigma)
+        return _repeat(a, ReadingStatus.ABORTED, note)
+    why = why_unsteady(steadiness(forces.time, forces.values), procedure, force)
+    why = why or why_shaking(points.values, procedure.marker_sigma)
     if why:
-        note = f"not stable in {WINDOW_TRIES} windows: {why}"
-        return _again(a, ReadingStatus.UNSTABLE, note)
-    slipped = _slip(a, points.values, force)
+        note = f"not stable in {_WINDOW_TRIES} windows: {why}"
+        return _repeat(a, ReadingStatus.UNSTABLE, note)
+    slipped = _why_slipped(a, points.values, force)
     status = ReadingStatus.SLIPPED if slipped else ReadingStatus.OK
     a.close_window(name, start, status, slipped)
-    return Outcome.GOOD
+    return StepResult.GOOD
 
 
-def _again(a: Attempt, status: ReadingStatus, note: str) -> Outcome:
-    """Return AGAIN for a spoiled window; after the last one the load case has a status instead."""
+def release(a: Attempt) -> StepResult:
+    """Ramp the force to zero; the arm then is in position control."""
+    # From here on the beam may break: no reading depends on it, and the way off must not.
+    release_force(a.supervisor, a.guard(beam=False))
+    a.in_force_control = False
+    return StepResult.GOOD
+
+
+def lift(a: Attempt) -> StepResult:
+    """Go straight back until near contact."""
+    retract_to(a.supervisor, a.line, a.guard(beam=False), a.settings.near_contact)
+    return StepResult.GOOD
+
+
+def released(a: Attempt) -> StepResult:
+    """Average once more, after the loads: how far the sensor is from its tare then.
+
+    Nothing depends on it but what the summary says of the drift, so it cannot fail.
+    """
+    s, procedure = a.supervisor, a.settings.procedure
+    _stand_still(a, beam=False)
+    start = s.now
+    for _ in s.stay(a.guard(beam=False), procedure.unloaded_average):
+        pass
+    a.close_window(None, start)
+    return StepResult.GOOD
+
+
+def retract(a: Attempt) -> StepResult:
+    """Go straight back to the approach pose."""
+    retract_to(a.supervisor, a.line, a.guard(beam=False), a.settings.approach_distance)
+    return StepResult.GOOD
+
+
+def _wait_for_beam(a: Attempt, station: str | None = None) -> None:
+    """Wait until the marker is seen; with a station, until it is this one that sees it."""
+
+    def found(seen: Snapshot) -> bool:
+        ours = station is None or seen.points.station == station
+        return a.supervisor.watchdog.sees and len(seen.points) > 0 and ours
+
+    limit = a.settings.procedure.beam_timeout + 1.0
+    a.supervisor.wait(a.guard(), found, limit, f"{a.station}: looking for the marker")
+
+
+def _stand_still(a: Attempt, *, beam: bool = True) -> None:
+    """Let what still swings after a motion die down."""
+    for _ in a.supervisor.stay(a.guard(beam=beam), a.settings.procedure.dwell):
+        pass
+
+
+def _watch_hold(a: Attempt, seen: Snapshot) -> None:
+    """Refuse an arm that has left force control; look for slides."""
+    if seen.arm.motion is not Motion.HOLDING:
+        text = f"{seen.arm.source} is {seen.arm.motion.value} and holds no force"
+        raise FaultError(Fault.CONTACT_LOST, text)
+    if a.slide is not None:
+        a.slide.see(seen.points.position)
+
+
+def _repeat(a: Attempt, status: ReadingStatus, note: str) -> StepResult:
+    """Repeat a spoiled window; after the last try the load case has a status instead."""
     a.window_tries += 1
-    if a.window_tries < WINDOW_TRIES:
-        return Outcome.AGAIN
+    if a.window_tries < _WINDOW_TRIES:
+        return StepResult.REPEAT
     a.close_window(a.load[0], a.supervisor.now, status, note)
-    return Outcome.LOST
+    return StepResult.LOAD_CASE_LOST
 
 
-def _slip(a: Attempt, positions: FloatArray, force: FloatArray) -> str:
+def _why_slipped(a: Attempt, positions: FloatArray, force: FloatArray) -> str:
     """Return how the marker slipped during a window or on the way to it; empty: it did not."""
-    watch, slide, jump, procedure = a.slip_watch, a.slide_watch, a.jump_watch, a.settings.procedure
-    assert watch is not None
+    reference, slide, jump, procedure = a.slip_reference, a.slide, a.jump, a.settings.procedure
+    assert reference is not None
     assert slide is not None
     assert jump is not None
-    a.slip = watch.so_far(positions)
+    a.slip = reference.so_far(positions)
     moved, limit = abs(a.slip - a.slip_origin), procedure.slip_limit
     expected = procedure.contact_compliance * float(np.linalg.norm(force))
     for length, most, what in (
         (slide.largest, limit, "slid {} at once"),
-        (watch.during(positions), limit, "slid {} during the window"),
+        (reference.during(positions), limit, "slid {} during the window"),
         (jump.largest, limit, "jumped {} along the normal"),
         (moved, limit + expected, "is {} aside under this load"),
     ):
         if not length <= most:
             a.slip_origin = a.slip
-            said = what.format(f"{length * 1e3:.2f} mm")
-            return f"marker {said}, limit {most * 1e3:.2f} mm"
+            return f"marker {what.format(f'{length * 1e3:.2f} mm')}, limit {most * 1e3:.2f} mm"
     return ""
 
 
-def _refuse_contact_unfelt(a: Attempt, seen: Seen) -> None:
+def _require_samples(a: Attempt, forces: RecentSamples, points: RecentSamples) -> None:
+    """Refuse a window with hardly any samples in it; no watchdog saw a gap, so they are slow."""
+    for samples, fault, name in (
+        (forces, Fault.SENSOR_STALE, "the sensor"),
+        (points, Fault.TRACKER_STALE, a.station),
+    ):
+        if len(samples) < LEAST_SAMPLES:
+            raise FaultError(fault, f"{name} gave {len(samples)} samples in a window")
+
+
+def _require_contact_felt(a: Attempt, seen: Snapshot) -> None:
     """Refuse a contact that the arm has felt and the sensor has not, within ``stale`` seconds."""
-    s, procedure, largest = a.supervisor, a.settings.procedure, felt(seen)
-    wanted = AGREES * procedure.contact_force
+    s, procedure, largest = a.supervisor, a.settings.procedure, largest_force(seen)
+    wanted = _AGREES * procedure.contact_force
     if largest >= wanted:
         return
     for later in s.stay(a.guard(), procedure.stale):
-        largest = max(largest, felt(later))
+        largest = max(largest, largest_force(later))
         if largest >= wanted:
             return
     text = (
@@ -363,21 +310,10 @@ def _refuse_contact_unfelt(a: Attempt, seen: Seen) -> None:
     raise FaultError(Fault.DISAGREE, text)
 
 
-def _refuse_unfollowed(mean: FloatArray, force: FloatArray) -> None:
+def _require_force_followed(mean: FloatArray, force: FloatArray) -> None:
     """Refuse a force that is steady and has hardly come nearer to what was asked."""
     asked = float(np.linalg.norm(force))
     along = float(mean @ force) / asked
-    if not along >= AGREES * asked:
+    if not along >= _AGREES * asked:
         text = f"{asked:.0f} N are asked for, the sensor feels {along:.0f} N in that direction"
         raise FaultError(Fault.DISAGREE, text)
-
-
-def _see(a: Attempt, seen: Seen) -> None:
-    if a.slide_watch is not None:
-        a.slide_watch.see(seen.points.position)
-
-
-def _refuse_other_motion(seen: Seen) -> None:
-    if seen.arm.motion is not Motion.HOLDING:
-        text = f"{seen.arm.source} is {seen.arm.motion.value} and holds no force"
-        raise FaultError(Fault.CONTACT_LOST, text)

@@ -1,4 +1,10 @@
-"""Whether a force is steady: close to what is wanted, without drift, without spread."""
+"""Judge a load case while it is held: whether force and marker are steady, and whether it slips.
+
+A force is steady when it is close to what is wanted, without drift, without spread. A marker slips
+when it moves sideways more than the force explains. The tracker's orientation is not known during
+a run, but the approach shows it the normal: on the straight way to near contact the marker moves
+along it. Lateral is what is at right angles to that.
+"""
 
 from collections import deque
 from dataclasses import dataclass
@@ -8,16 +14,22 @@ import numpy as np
 from elastocal.arrays import FloatArray
 from elastocal.cell.description import ProcedureSettings
 
-SPREAD = 4.0
+_SPREAD = 4.0
 """Standard deviations that make up the width which holds 95 % of the samples."""
 LEAST_SAMPLES = 3
 """A line and a spread about it need as many."""
 _MICROSECOND = 1e-6
+_LEAST_APPROACH = 5e-3
+"""Shortest approach from which a direction is taken, in m."""
+_SUDDEN = 10
+"""Cycles within which a slide is sudden: no force that is built up explains it."""
+_ENDS = 5
+"""The first and the last fifth of a window are compared."""
 
 
 @dataclass(frozen=True, eq=False)
 class Steadiness:
-    """What a stretch of force samples looks like. Straight line ``mean + drift (t - mean t)``."""
+    """Straight line ``mean + drift (t - mean t)`` through force samples, and their spread."""
 
     mean: FloatArray
     """Shape (3,), in N."""
@@ -46,10 +58,10 @@ def steadiness(time: FloatArray, force: FloatArray) -> Steadiness:
     slope = (t @ about) / (t @ t)
     about -= t[:, None] * slope
     variance = (about * about).sum(axis=0).max() / (len(t) - 2)
-    return Steadiness(mean, float(np.sqrt(slope @ slope)), SPREAD * float(np.sqrt(variance)))
+    return Steadiness(mean, float(np.sqrt(slope @ slope)), _SPREAD * float(np.sqrt(variance)))
 
 
-def complaint(
+def why_unsteady(
     found: Steadiness, limits: ProcedureSettings, target: FloatArray | None = None
 ) -> str | None:
     """Return why a force is not steady enough, or None when it is.
@@ -74,7 +86,7 @@ def complaint(
     return None
 
 
-def shaking(positions: FloatArray, limit: float) -> str:
+def why_shaking(positions: FloatArray, limit: float) -> str:
     """Return why a marker is not quiet enough; empty when it is.
 
     Parameters
@@ -90,7 +102,7 @@ def shaking(positions: FloatArray, limit: float) -> str:
     return ""
 
 
-class Stretch:
+class RecentSamples:
     """The newest samples of a stream, as far back as a duration.
 
     Parameters
@@ -126,17 +138,9 @@ class Stretch:
         return np.concatenate([values for _, values in self._blocks])
 
 
-LEAST_WAY = 5e-3
-"""Shortest approach from which a direction is taken, in m."""
-SUDDEN = 10
-"""Cycles within which a slide is sudden: no force that is built up explains it."""
-_ENDS = 5
-"""The first and the last fifth of a window are compared."""
-
-
 @dataclass(frozen=True, eq=False)
-class SlipWatch:
-    """What the marker did before contact."""
+class SlipReference:
+    """Where the marker was, and how it moved, before contact."""
 
     unloaded: FloatArray
     """Marker at the unloaded reference, shape (3,), in m, tracker frame."""
@@ -145,8 +149,8 @@ class SlipWatch:
     movement then counts."""
 
     @classmethod
-    def of(cls, at_approach: FloatArray, unloaded: FloatArray) -> "SlipWatch":
-        """Return the watch of a pose.
+    def of(cls, at_approach: FloatArray, unloaded: FloatArray) -> "SlipReference":
+        """Return the reference of a pose.
 
         Parameters
         ----------
@@ -155,7 +159,7 @@ class SlipWatch:
         """
         way = at_approach - unloaded
         length = float(np.linalg.norm(way))
-        return cls(unloaded, way / length if length >= LEAST_WAY else None)
+        return cls(unloaded, way / length if length >= _LEAST_APPROACH else None)
 
     def lateral(self, movement: FloatArray) -> float:
         """Return the length of a movement, shape (3,), without its part along the normal, in m."""
@@ -177,20 +181,20 @@ class SlipWatch:
         return self.lateral(positions.mean(axis=0) - self.unloaded)
 
 
-class SlideWatch:
+class SlideDetector:
     """Looks for sudden slides while a load case is built up and held.
 
     Parameters
     ----------
-    slip : SlipWatch
-        What the marker did before contact.
+    slip : SlipReference
+        Where the marker was before contact.
     along : bool, default False
         Look for jumps along the normal in place of slides aside.
     """
 
-    def __init__(self, slip: SlipWatch, along: bool = False) -> None:
+    def __init__(self, slip: SlipReference, along: bool = False) -> None:
         self._length = slip.along if along else slip.lateral
-        self._recent: deque[FloatArray] = deque(maxlen=SUDDEN)
+        self._recent: deque[FloatArray] = deque(maxlen=_SUDDEN)
         self.largest = 0.0
         """Longest sudden slide so far, in m."""
 

@@ -1,10 +1,14 @@
-"""One supervision cycle after the other: read every device, record, watch."""
+"""The supervision cycle: read every device, record what it says, let the watchdog judge it.
+
+The order within a cycle matters. Time passes first, so that what is read is news. Every device is
+read and recorded before anything is judged: the streams then hold what led to a fault. Only then
+may somebody interrupt, and the watchdog refuse, so that a wish to stop never hides a reading.
+"""
 
 import contextlib
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 
@@ -12,44 +16,29 @@ from elastocal.arrays import FloatArray
 from elastocal.cell.devices import ArmState, Devices, PointBlock, WrenchBlock
 from elastocal.errors import DeviceError
 from elastocal.procedure.record.journal import Action, Logbook
+from elastocal.procedure.record.streams import StreamRecorder
 from elastocal.procedure.run._watchdog import (
     Guard,
-    Seen,
-    Watch,
+    Snapshot,
+    Watchdog,
     check_arm,
     check_points,
     check_wrenches,
 )
 from elastocal.procedure.run.faults import Fault, FaultError
-from elastocal.procedure.run.settings import Settings
+from elastocal.procedure.run.settings import RunSettings
 
 TIME_SLACK = 1e-6
 """Times that differ by less are equal, in s: sums of cycles are not exact."""
-BROKEN = (DeviceError, FaultError, OSError)
-"""What a device that is out of order may raise."""
-
-
-class Recorder(Protocol):
-    """Keeps the raw streams of one attempt; see `elastocal.procedure.record.streams.PoseRecorder`."""
-
-    def arm(self, state: ArmState) -> None:
-        """Keep a state of the arm."""
-
-    def wrenches(self, block: WrenchBlock) -> None:
-        """Keep a block of the force sensor."""
-
-    def points(self, block: PointBlock) -> None:
-        """Keep a block of the tracker."""
-
-    def mark(self, time: float, text: str) -> None:
-        """Keep a remark."""
+DEVICE_ERRORS = (DeviceError, FaultError, OSError)
+"""A device that is out of order raises one of these."""
 
 
 @dataclass(frozen=True)
 class Observers:
     """Who may look on, and interrupt."""
 
-    tell: Callable[[Seen], None]
+    report: Callable[[Snapshot], None]
     """Called each cycle."""
     interrupted: Callable[[], bool]
     """Whether somebody wants the run to stop."""
@@ -62,7 +51,7 @@ class Supervisor:
     ----------
     devices : Devices
         The devices.
-    settings : Settings
+    settings : RunSettings
         The run's figures.
     logbook : Logbook
         Where actuations are written.
@@ -71,21 +60,21 @@ class Supervisor:
     """
 
     def __init__(
-        self, devices: Devices, settings: Settings, logbook: Logbook, observers: Observers
+        self, devices: Devices, settings: RunSettings, logbook: Logbook, observers: Observers
     ) -> None:
         self.devices, self.settings, self.logbook = devices, settings, logbook
         self._observers = observers
         procedure = settings.procedure
-        self.watch = Watch(procedure.stale, procedure.beam_timeout)
-        self.recorder: Recorder | None = None
+        self.watchdog = Watchdog(procedure.stale, procedure.beam_timeout)
+        self.recorder: StreamRecorder | None = None
         self.station: str | None = None
         self._tare = np.zeros(3)
         self._R_sensor_tcp = settings.R_tcp_sensor.T
         self._still = 0
         self._joints = len(devices.arm.joint_names)
-        self._last_end: float | None = None
+        self._last_look: float | None = None
         self.arm: ArmState | None = None
-        """The last that the arm has said; None before the first."""
+        """The last state of the arm; None before the first."""
 
     @property
     def now(self) -> float:
@@ -96,12 +85,12 @@ class Supervisor:
         """Drop what has come before the run, and start to watch."""
         self.devices.sensor.read()
         self.devices.metrology.read()
-        self.watch.restart(self.now)
+        self.watchdog.restart(self.now)
         self.pause()
 
     def pause(self) -> None:
         """Say that until the next cycle nobody needs to watch: the arm stands off the surface."""
-        self._last_end = None
+        self._last_look = None
 
     def tare(self, force_sensor: FloatArray) -> None:
         """Take a force in the sensor's frame, shape (3,), as that of the free tool, in N."""
@@ -109,11 +98,11 @@ class Supervisor:
 
     def aim(self, station: str) -> None:
         """Let a tracker station look for the marker."""
-        self.station = self.watch.station = station
+        self.station = self.watchdog.station = station
         self.devices.metrology.look(station)
-        self.watch.expect_points(self.now)
+        self.watchdog.expect_points(self.now)
 
-    def cycle(self, guard: Guard) -> Seen:
+    def cycle(self, guard: Guard) -> Snapshot:
         """Let one cycle pass and return what the devices say.
 
         Raises
@@ -124,10 +113,10 @@ class Supervisor:
             If a device does not answer.
         """
         seen = self._look()
-        self._observers.tell(seen)
+        self._observers.report(seen)
         if self._observers.interrupted():
             raise FaultError(Fault.INTERRUPTED)
-        if self.watch.check(seen, guard) and self.station is not None:
+        if self.watchdog.check(seen, guard) and self.station is not None:
             self.devices.metrology.look(self.station)
         return seen
 
@@ -138,20 +127,20 @@ class Supervisor:
         out of order, so what they do changes nothing.
         """
         self.pause()
-        with contextlib.suppress(*BROKEN):
+        with contextlib.suppress(*DEVICE_ERRORS):
             self._pass_time()
         for look in (self._look_at_sensor, self._look_at_points):
-            with contextlib.suppress(*BROKEN):
+            with contextlib.suppress(*DEVICE_ERRORS):
                 look()
         return self.ask_arm()
 
     def ask_arm(self) -> ArmState | None:
         """Return what the arm says now; None when it does not answer."""
-        with contextlib.suppress(*BROKEN):
+        with contextlib.suppress(*DEVICE_ERRORS):
             return self._look_at_arm()
         return None
 
-    def _look(self) -> Seen:
+    def _look(self) -> Snapshot:
         """Let one cycle pass and return what the devices say."""
         self._pass_time()
         arm, wrenches, points = (
@@ -161,8 +150,8 @@ class Supervisor:
         )
         force_tcp = (wrenches.force - self._tare) @ self._R_sensor_tcp
         # What happens from here to the next cycle, nobody watches.
-        self._last_end = now = self.devices.clock.now()
-        return Seen(now, arm, wrenches, points, force_tcp)
+        self._last_look = now = self.devices.clock.now()
+        return Snapshot(now, arm, wrenches, points, force_tcp)
 
     # What has no form is not recorded either: it could not be written.
     def _look_at_arm(self) -> ArmState:
@@ -187,7 +176,9 @@ class Supervisor:
             self.recorder.points(block)
         return block
 
-    def wait(self, guard: Guard, done: Callable[[Seen], bool], limit: float, what: str) -> Seen:
+    def wait(
+        self, guard: Guard, done: Callable[[Snapshot], bool], limit: float, what: str
+    ) -> Snapshot:
         """Let cycles pass until something is done; return what was seen then.
 
         Raises
@@ -204,7 +195,7 @@ class Supervisor:
                 break
         raise FaultError(Fault.TIME_LIMIT, f"{what} is not done after {limit:.1f} s")
 
-    def stay(self, guard: Guard, duration: float) -> Iterator[Seen]:
+    def stay(self, guard: Guard, duration: float) -> Iterator[Snapshot]:
         """Yield what is seen each cycle until a duration is over."""
         start = self.now
         while self.now - start < duration - TIME_SLACK:
@@ -221,8 +212,8 @@ class Supervisor:
     def _pass_time(self) -> None:
         clock, procedure = self.devices.clock, self.settings.procedure
         before, longest = clock.now(), max(procedure.stale, procedure.cycle * 5)
-        if self._last_end is not None and not before - self._last_end <= longest:
-            text = f"{before - self._last_end:.2f} s passed between two cycles"
+        if self._last_look is not None and not before - self._last_look <= longest:
+            text = f"{before - self._last_look:.2f} s passed between two cycles"
             raise FaultError(Fault.CLOCK, text)
         clock.sleep(procedure.cycle)
         passed = clock.now() - before

@@ -1,4 +1,9 @@
-"""Watchdog: looks at what the devices say each cycle and refuses to go on when it is wrong."""
+"""The watchdog: look each cycle at what the devices say, and refuse to go on when it is wrong.
+
+The order of the checks is that of trust. The arm comes first: when it has stopped, the rest follows
+from that. Then the sensor, whether it lives and is within its range, before its force is compared
+with a limit. Then the tool's place, and last the beam, whose loss spoils a reading but no tooling.
+"""
 
 import math
 from dataclasses import dataclass
@@ -15,14 +20,14 @@ from elastocal.cell.devices import (
     WrenchBlock,
 )
 from elastocal.procedure.run.faults import Fault, FaultError
-from elastocal.procedure.run.routes import Line
+from elastocal.procedure.run.routes import ApproachLine
 
-LOOK_AGAIN = 1.0
+_LOOK_AGAIN = 1.0
 """Time after which a tracker that has not found the marker is told again to look, in s."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Seen:
+class Snapshot:
     """What the devices said in one cycle."""
 
     time: float
@@ -39,7 +44,7 @@ class Guard:
 
     force: float = np.inf
     """Largest force, in N."""
-    line: Line | None = None
+    line: ApproachLine | None = None
     """Line that the tool must keep to."""
     beam: bool = False
     """Whether the marker must be seen."""
@@ -47,7 +52,7 @@ class Guard:
     """Whether the tool may press: a sensor that is overloaded then ends the run."""
 
 
-class Watch:
+class Watchdog:
     """Remembers when each device last had news.
 
     Parameters
@@ -83,7 +88,7 @@ class Watch:
         """Whether the beam held in the last cycle in which it had to."""
         return self._lost_at is None
 
-    def check(self, seen: Seen, guard: Guard) -> bool:
+    def check(self, seen: Snapshot, guard: Guard) -> bool:
         """Refuse what is wrong; return whether the tracker should be told to look again.
 
         Raises
@@ -100,8 +105,8 @@ class Watch:
 
     def _check_arm(self, state: ArmState, now: float) -> None:
         if state.fault is not None or state.motion in (Motion.STOPPED, Motion.DISARMED):
-            said = state.fault or f"it is {state.motion.value}"
-            raise FaultError(Fault.ARM_STOPPED, f"{state.source} says: {said}")
+            reason = state.fault or f"it is {state.motion.value}"
+            raise FaultError(Fault.ARM_STOPPED, f"{state.source} says: {reason}")
         self._check_age(Fault.ARM_STALE, state.source, state.time, now)
 
     def _check_sensor(self, block: WrenchBlock, now: float, pressing: bool) -> None:
@@ -150,7 +155,7 @@ class Watch:
         if not now - self._lost_at <= self._beam_timeout:
             text = f"{block.station} sees no marker for {now - self._lost_at:.1f} s"
             raise FaultError(Fault.BEAM_LOST, text)
-        if now - self._looked_at >= LOOK_AGAIN:
+        if now - self._looked_at >= _LOOK_AGAIN:
             self._looked_at = now
             return True
         return False

@@ -1,11 +1,11 @@
-"""What can go wrong during a run, how each is said, and how much of the run it ends."""
+"""Faults of a run: the message of each, and whether it ends the attempt or the run."""
 
 from enum import Enum
 
 from elastocal.errors import DeviceError, FileAccessError, ProcedureError
 
 
-class Ends(Enum):
+class FaultScope(Enum):
     """How much a fault ends. What ends less than an attempt is a `ReadingStatus`, not a fault."""
 
     ATTEMPT = "attempt"
@@ -17,40 +17,40 @@ class Ends(Enum):
 class Fault(Enum):
     """Every fault, with what it ends and its message."""
 
-    CONTACT_EARLY = (Ends.ATTEMPT, "touched the surface before near contact: {}")
-    CONTACT_MISSED = (Ends.ATTEMPT, "contact missed: {}")
-    CONTACT_LOST = (Ends.ATTEMPT, "contact lost: {}")
-    UNLOADED_NOISY = (Ends.ATTEMPT, "unloaded reference too noisy: {}")
-    BEAM_LOST = (Ends.ATTEMPT, "beam lost: {}")
-    SENSOR_SATURATED = (Ends.ATTEMPT, "force sensor saturated: {}")
-    UNSTABLE = (Ends.ATTEMPT, "no load case settles: {}")
-    SENSOR_OVERLOAD = (Ends.RUN, "force sensor saturated in contact: {}")
-    FORCE_LIMIT = (Ends.RUN, "force limit exceeded: {}")
-    TRAVEL_LIMIT = (Ends.RUN, "travel limit exceeded: {}")
-    TIME_LIMIT = (Ends.RUN, "time limit exceeded: {}")
-    SENSOR_FAULT = (Ends.RUN, "force sensor fault: {}")
-    DISAGREE = (Ends.RUN, "arm and force sensor disagree: {}")
-    WEIGHT = (Ends.RUN, "force sensor does not feel the tool: {}")
-    SENSOR_STALE = (Ends.RUN, "force sensor silent: {}")
-    SENSOR_FROZEN = (Ends.RUN, "force sensor frozen: {}")
-    TRACKER_FAULT = (Ends.RUN, "tracker fault: {}")
-    TRACKER_STALE = (Ends.RUN, "tracker silent: {}")
-    ARM_STOPPED = (Ends.RUN, "arm stopped: {}")
-    ARM_FAULT = (Ends.RUN, "arm fault: {}")
-    IN_CONTACT = (Ends.RUN, "no move is begun in contact: {}")
-    ARM_STALE = (Ends.RUN, "arm silent: {}")
-    CLOCK = (Ends.RUN, "clock out of order: {}")
-    DEVICE = (Ends.RUN, "device refused: {}")
-    DISK = (Ends.RUN, "record lost: {}")
-    INTERRUPTED = (Ends.RUN, "interrupted{}")
+    CONTACT_EARLY = (FaultScope.ATTEMPT, "touched the surface before near contact: {}")
+    CONTACT_MISSED = (FaultScope.ATTEMPT, "contact missed: {}")
+    CONTACT_LOST = (FaultScope.ATTEMPT, "contact lost: {}")
+    UNLOADED_NOISY = (FaultScope.ATTEMPT, "unloaded reference too noisy: {}")
+    BEAM_LOST = (FaultScope.ATTEMPT, "beam lost: {}")
+    SENSOR_SATURATED = (FaultScope.ATTEMPT, "force sensor saturated: {}")
+    UNSTABLE = (FaultScope.ATTEMPT, "no load case settles: {}")
+    SENSOR_OVERLOAD = (FaultScope.RUN, "force sensor saturated in contact: {}")
+    FORCE_LIMIT = (FaultScope.RUN, "force limit exceeded: {}")
+    TRAVEL_LIMIT = (FaultScope.RUN, "travel limit exceeded: {}")
+    TIME_LIMIT = (FaultScope.RUN, "time limit exceeded: {}")
+    SENSOR_FAULT = (FaultScope.RUN, "force sensor fault: {}")
+    DISAGREE = (FaultScope.RUN, "arm and force sensor disagree: {}")
+    WEIGHT = (FaultScope.RUN, "force sensor does not feel the tool: {}")
+    SENSOR_STALE = (FaultScope.RUN, "force sensor silent: {}")
+    SENSOR_FROZEN = (FaultScope.RUN, "force sensor frozen: {}")
+    TRACKER_FAULT = (FaultScope.RUN, "tracker fault: {}")
+    TRACKER_STALE = (FaultScope.RUN, "tracker silent: {}")
+    ARM_STOPPED = (FaultScope.RUN, "arm stopped: {}")
+    ARM_FAULT = (FaultScope.RUN, "arm fault: {}")
+    IN_CONTACT = (FaultScope.RUN, "no move is begun in contact: {}")
+    ARM_STALE = (FaultScope.RUN, "arm silent: {}")
+    CLOCK = (FaultScope.RUN, "clock out of order: {}")
+    DEVICE = (FaultScope.RUN, "device refused: {}")
+    DISK = (FaultScope.RUN, "record lost: {}")
+    INTERRUPTED = (FaultScope.RUN, "interrupted{}")
 
     @property
-    def ends(self) -> Ends:
+    def scope(self) -> FaultScope:
         """How much of the run it ends."""
         return self.value[0]
 
     def message(self, detail: str) -> str:
-        """Return what is said of it.
+        """Return the message, with what was found.
 
         >>> Fault.BEAM_LOST.message("station_1 sees no marker for 5 s")
         'beam lost: station_1 sees no marker for 5 s'
@@ -66,8 +66,8 @@ class FaultError(ProcedureError):
         self.fault = fault
 
 
-CAUGHT = (ProcedureError, DeviceError, OSError)
-"""What a step of the procedure can fail with. Anything else is a mistake in the program."""
+EXPECTED_ERRORS = (ProcedureError, DeviceError, OSError)
+"""A step of the procedure fails with one of these. Anything else is a mistake in the program."""
 
 
 def as_fault(error: ProcedureError | DeviceError | OSError) -> FaultError:

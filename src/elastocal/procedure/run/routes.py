@@ -1,6 +1,7 @@
-"""Ways between HOME and the approach poses: those of the plan, forwards and backwards.
+"""Where the arm goes: the line to each surface, the legs between HOME and the approach poses.
 
-Stops are numbered: -1 is HOME, 0 the first pose, and the number of poses HOME again.
+Legs are those of the plan, forwards and backwards, because only those were checked for collisions.
+Stops are numbered by the poses' ids: before the first pose and after the last one is HOME.
 """
 
 import math
@@ -13,13 +14,25 @@ from elastocal.arrays import FloatArray
 from elastocal.errors import ProcedureError
 from elastocal.planning import Joints, PlanFile, PoseRecord
 from elastocal.procedure.run.faults import Fault, FaultError
-from elastocal.procedure.run.settings import Settings
+from elastocal.procedure.run.settings import RunSettings
 from elastocal.procedure.run.steps import Step
+
+HOME_AT_START = -1
+"""Stop before the first pose; the stop after the last one, HOME too, is the number of poses."""
+_AT_HOME = 0.01
+"""A joint that is closer to HOME than this is there, in rad or m."""
+_ON_LEG = 0.02
+"""A joint that is closer to a leg than this is on it, in rad or m."""
+_TILTED = 0.2
+"""A tool whose z axis is turned from the inward normal by more does not stand before that
+surface, in rad."""
+_SAME_POSTURE = 0.5
+"""Joints of one posture differ by less between approach pose and contact, in rad or m."""
 
 
 @dataclass(frozen=True, eq=False)
-class Line:
-    """Line through a contact point."""
+class ApproachLine:
+    """The straight way between approach pose and surface, along the normal."""
 
     contact: FloatArray
     """Expected contact point in base, shape (3,), in m."""
@@ -29,7 +42,7 @@ class Line:
     """How far beyond the contact or aside is too far, in m."""
 
     @classmethod
-    def of(cls, pose: PoseRecord, travel_limit: float) -> "Line":
+    def of_pose(cls, pose: PoseRecord, travel_limit: float) -> "ApproachLine":
         """Return the line of a planned pose."""
         return cls(np.array(pose.tcp_position), np.array(pose.normal), travel_limit)
 
@@ -50,6 +63,7 @@ class Line:
         FaultError
             With how far it is.
         """
+        # By hand, as `height` and `aside`: this runs each cycle, and three numbers are few.
         x, y, z = (T_base_tcp[:3, 3] - self.contact).tolist()
         nx, ny, nz = self.normal.tolist()
         height = x * nx + y * ny + z * nz
@@ -60,22 +74,10 @@ class Line:
                 raise FaultError(Fault.TRAVEL_LIMIT, text)
 
 
-HOME = -1
-AT_HOME = 0.01
-"""A joint that is closer to HOME than this is there, in rad or m."""
-ON_THE_WAY = 0.02
-"""A joint that is closer to a leg than this is on it, in rad or m."""
-TILTED = 0.2
-"""A tool whose z axis is turned from the inward normal by more does not stand before that
-surface, in rad."""
-SAME_POSTURE = 0.5
-"""Joints of one posture differ by less between approach pose and contact, in rad or m."""
-
-
-def way(plan: PlanFile, start: int, end: int) -> tuple[Joints, ...]:
+def route(plan: PlanFile, start: int, end: int) -> tuple[Joints, ...]:
     """Return the joint positions to pass from one stop to another, that of ``start`` excluded.
 
-    The way goes through the approach poses in between, so that every leg is one that the planner
+    The route goes through the approach poses in between, so that every leg is one that the planner
     has checked.
 
     Parameters
@@ -103,22 +105,22 @@ def stop_joints(plan: PlanFile, stop: int) -> Joints:
 
 
 @dataclass(frozen=True, eq=False)
-class WayHome:
+class HomeRoute:
     """How to get to HOME from where the arm stands."""
 
-    retreat_from: PoseRecord | None
+    retract_from: PoseRecord | None
     """Pose along whose normal the tool must go first."""
-    way: tuple[Joints, ...]
+    legs: tuple[Joints, ...]
     """Joint positions to pass then; none when the arm is at HOME."""
 
 
-def way_home(
+def home_route(
     plan: PlanFile,
     q: FloatArray,
     T_base_tcp: FloatArray,
     travel_limit: float,
     likely: int | None = None,
-) -> WayHome:
+) -> HomeRoute:
     """Return the way to HOME, over legs that the arm may have come along.
 
     Parameters
@@ -138,47 +140,51 @@ def way_home(
     Raises
     ------
     ProcedureError
-        If it stands neither at HOME, nor at a pose, nor on a way between them.
+        If it stands neither at HOME, nor at a pose, nor on a leg between them.
     """
-    if float(np.abs(q - plan.robot.home).max()) <= AT_HOME:
-        return WayHome(None, ())
+    if float(np.abs(q - plan.robot.home).max()) <= _AT_HOME:
+        return HomeRoute(None, ())
     before = [p for p in plan.poses if _stands_before(plan, p, q, T_base_tcp, travel_limit)]
     if before:
-        pose = min(
-            before,
-            key=lambda pose: (pose.id != likely, Line.of(pose, travel_limit).aside(T_base_tcp)),
-        )
-        return WayHome(pose, (pose.approach_joints, *way(plan, pose.id, HOME)))
-    distance, back = min(_legs(plan, q), key=lambda leg: leg[0])
-    if not distance <= ON_THE_WAY:
+
+        def rank(pose: PoseRecord) -> tuple[bool, float]:
+            aside = ApproachLine.of_pose(pose, travel_limit).aside(T_base_tcp)
+            return pose.id != likely, aside
+
+        pose = min(before, key=rank)
+        return HomeRoute(pose, (pose.approach_joints, *route(plan, pose.id, HOME_AT_START)))
+    distance, back = min(_legs_with_way_back(plan, q), key=lambda leg: leg[0])
+    if not distance <= _ON_LEG:
         raise ProcedureError(
             f"the arm stands at {np.round(q, 3).tolist()} (rad, m), which is neither HOME nor on a"
             " way of the plan: move it to HOME by hand"
         )
-    return WayHome(None, back)
+    return HomeRoute(None, back)
 
 
 def _stands_before(
     plan: PlanFile, pose: PoseRecord, q: FloatArray, T_base_tcp: FloatArray, travel_limit: float
 ) -> bool:
     """Whether the arm is on the line between approach pose and surface."""
-    line, posture = Line.of(pose, travel_limit), np.abs(q - pose.approach_joints)
+    line, posture = ApproachLine.of_pose(pose, travel_limit), np.abs(q - pose.approach_joints)
     height = line.height(T_base_tcp)
     return (
-        float(posture.max()) <= SAME_POSTURE
+        float(posture.max()) <= _SAME_POSTURE
         and line.aside(T_base_tcp) <= travel_limit
-        and -float(T_base_tcp[:3, 2] @ line.normal) >= math.cos(TILTED)
+        and -float(T_base_tcp[:3, 2] @ line.normal) >= math.cos(_TILTED)
         and -travel_limit <= height <= plan.contact.approach_distance + 1e-3
     )
 
 
-def _legs(plan: PlanFile, q: FloatArray) -> Iterator[tuple[float, tuple[Joints, ...]]]:
+def _legs_with_way_back(
+    plan: PlanFile, q: FloatArray
+) -> Iterator[tuple[float, tuple[Joints, ...]]]:
     """Yield how far each leg is, and the way to HOME from it against its direction."""
     for stop in range(len(plan.poses) + 1):
         start = stop_joints(plan, stop - 1)
         postures = [start, *plan.moves[stop].via, stop_joints(plan, stop)]
         for leg in range(len(postures) - 1):
-            back = tuple(postures[leg::-1]) + way(plan, stop - 1, HOME)
+            back = tuple(postures[leg::-1]) + route(plan, stop - 1, HOME_AT_START)
             yield _distance(np.array(postures[leg]), np.array(postures[leg + 1]), q), back
 
 
@@ -192,7 +198,7 @@ def _distance(start: FloatArray, end: FloatArray, q: FloatArray) -> float:
 
 @dataclass(frozen=True)
 class PlannedStep:
-    """One step."""
+    """One step of a run before it is made."""
 
     pose: int | None
     """None: on the way to HOME."""
@@ -203,14 +209,14 @@ class PlannedStep:
     """Estimated; what waits for something is taken at its shortest."""
 
 
-def itinerary(plan: PlanFile, settings: Settings) -> tuple[PlannedStep, ...]:
+def itinerary(plan: PlanFile, settings: RunSettings) -> tuple[PlannedStep, ...]:
     """Return all steps of an undisturbed run, in order.
 
     Parameters
     ----------
     plan : PlanFile
         The plan.
-    settings : Settings
+    settings : RunSettings
         Figures of the run.
     """
     steps: list[PlannedStep] = []
@@ -221,7 +227,7 @@ def itinerary(plan: PlanFile, settings: Settings) -> tuple[PlannedStep, ...]:
     return tuple(steps)
 
 
-def remaining(plan: PlanFile, settings: Settings) -> FloatArray:
+def remaining_times(plan: PlanFile, settings: RunSettings) -> FloatArray:
     """Return the time from before each pose to the end, shape (pose + 1,), in s.
 
     The last is that of the way HOME.
@@ -233,21 +239,18 @@ def remaining(plan: PlanFile, settings: Settings) -> FloatArray:
     return left
 
 
-def _travel(plan: PlanFile, settings: Settings, start: int, end: int) -> PlannedStep:
-    legs = way(plan, start, end)
+def _travel(plan: PlanFile, settings: RunSettings, start: int, end: int) -> PlannedStep:
+    legs = route(plan, start, end)
     seconds = settings.axes.along(np.array([stop_joints(plan, start), *legs]))
     home = end == len(plan.poses)
     target = "HOME" if home else "approach pose"
-    stops = f" by way of {_count(legs[:-1])}" if len(legs) > 1 else ""
-    begin = "from HOME " if start == HOME else ""
+    via = len(legs) - 1
+    stops = f" by way of {via} via pose{'s' if via > 1 else ''}" if via else ""
+    begin = "from HOME " if start == HOME_AT_START else ""
     return PlannedStep(None if home else end, Step.MOVE, f"{begin}to {target}{stops}", seconds)
 
 
-def _count(via: tuple[Joints, ...]) -> str:
-    return f"{len(via)} via pose{'s' if len(via) > 1 else ''}"
-
-
-def _at_pose(settings: Settings, station: str) -> Iterator[tuple[Step, str, float]]:
+def _at_pose(settings: RunSettings, station: str) -> Iterator[tuple[Step, str, float]]:
     p, near = settings.procedure, settings.near_contact
     way_in = (settings.approach_distance - near) / p.approach_speed
     yield Step.AIM, f"{station} finds the marker", p.dwell

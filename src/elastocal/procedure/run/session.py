@@ -1,29 +1,85 @@
-"""What a journal says of a run that is to go on: whose it is, how far it came, where it ended."""
+"""One session of a run: what it is to do, how far earlier sessions came, and how it ended.
+
+A run takes one session when nothing goes wrong. After a fault, an interruption or a crash, another
+one goes on from what the journal says.
+"""
 
 from collections import Counter
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from enum import Enum
-from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
+from elastocal import __version__
 from elastocal.cell import Cell, fingerprint
 from elastocal.errors import ProcedureError
 from elastocal.files import sha256
 from elastocal.planning import PlanFile
 from elastocal.procedure.record.folder import RunFolder
 from elastocal.procedure.record.journal import Action, Entry, Event, RunRecord, commits
-from elastocal.procedure.run._supervisor import Recorder
-from elastocal.procedure.run.routes import WayHome
-from elastocal.procedure.run.settings import Settings
-from elastocal.procedure.run.steps import Progress, Stand
+from elastocal.procedure.record.streams import StreamRecorder
+from elastocal.procedure.run.routes import HomeRoute
+from elastocal.procedure.run.settings import RunSettings
+from elastocal.procedure.run.steps import ArmLocation, Progress
 from elastocal.records import StrictModel
 
-SAME_SECTIONS = ("procedure", "devices", "simulation")
+_SAME_SECTIONS = ("procedure", "devices", "simulation")
 """Sections of the cell file that must not change within a run: its readings would not belong
 together. Those that the plan depends on are in the fingerprint."""
 
 _TOUCHES = frozenset({Action.APPROACH, Action.HOLD, Action.RELEASE, Action.RETRACT})
+
+
+@dataclass(frozen=True, eq=False)
+class Session:
+    """A session that may begin."""
+
+    plan: PlanFile
+    settings: RunSettings
+    folder: RunFolder
+    committed: frozenset[int] = frozenset()
+    """Poses that are finished already."""
+    attempts: Mapping[int, int] = field(default_factory=dict)
+    """Attempts that each pose has seen already."""
+    home: HomeRoute = field(default_factory=lambda: HomeRoute(None, ()))
+    """The way to HOME, which comes first."""
+
+
+@dataclass(frozen=True)
+class SessionHooks:
+    """What a session needs from outside, beside devices."""
+
+    recorder: Callable[[], StreamRecorder]
+    """Makes the recorder of one attempt."""
+    report: Callable[[Progress], None] = lambda _: None
+    """Called several times a second."""
+    interrupted: Callable[[], bool] = lambda: False
+    """Whether somebody wants the run to stop."""
+
+
+class RunEnd(Enum):
+    """How a session ended."""
+
+    DONE = "done"
+    """Every pose was tried; the arm is at HOME."""
+    STOPPED = "stopped"
+    """By a fault."""
+    INTERRUPTED = "interrupted"
+    """By a person."""
+
+
+@dataclass(frozen=True)
+class SessionResult:
+    """How a session ended, and where it left the arm."""
+
+    end: RunEnd
+    location: ArmLocation
+    message: str
+    """Why; empty when all went well."""
+    given_up: tuple[int, ...]
+    """Poses of this session that could not be had."""
+    failed_attempts: int
+    """Attempts of this session that failed."""
 
 
 @dataclass(frozen=True)
@@ -106,8 +162,6 @@ def run_record(
             f" fingerprint {plan.cell.fingerprint[:12]}, {cell.path} has {found[:12]};"
             " plan again, or run the cell that it was made for"
         )
-    from elastocal import __version__
-
     return RunRecord(
         elastocal=__version__,
         plan=sha256(plan_text),
@@ -147,7 +201,7 @@ def check_same_settings(used: Cell, wanted: Cell) -> None:
     ProcedureError
         With the first key that differs.
     """
-    for section in SAME_SECTIONS:
+    for section in _SAME_SECTIONS:
         old, new = (_dump(getattr(cell.file, section, None)) for cell in (used, wanted))
         for key in {**old, **new}:
             if old.get(key) != new.get(key):
@@ -176,67 +230,3 @@ def _dump(section: object) -> dict[str, Any]:
 
 def _short(value: object) -> str:
     return value[:12] if isinstance(value, str) else str(value)
-
-
-class SavingRecorder(Recorder, Protocol):
-    """A recorder that can write what it has kept."""
-
-    def save(self, path: Path) -> str | None:
-        """Write everything, atomically, and wait until it is on the disk.
-
-        Returns
-        -------
-        str or None
-            SHA-256 of the file, for the journal; None from a recorder that keeps none.
-        """
-
-
-class End(Enum):
-    """How a run ended."""
-
-    DONE = "done"
-    """Every pose was tried; the arm is at HOME."""
-    STOPPED = "stopped"
-    """By a fault."""
-    INTERRUPTED = "interrupted"
-    """By a person."""
-
-
-@dataclass(frozen=True)
-class Result:
-    """How a run, or a stretch of it, ended."""
-
-    end: End
-    stand: Stand
-    """Where the arm stands."""
-    message: str
-    """Why; empty when all went well."""
-    given_up: tuple[int, ...]
-    """Poses of this stretch that could not be had."""
-    failed_attempts: int
-    """Attempts of this stretch that failed."""
-
-
-@dataclass(frozen=True, eq=False)
-class Job:
-    """What is to be done."""
-
-    plan: PlanFile
-    settings: Settings
-    folder: RunFolder
-    committed: frozenset[int] = frozenset()
-    """Poses that are finished already."""
-    attempts: Mapping[int, int] = field(default_factory=dict)
-    """Attempts that each pose has seen already."""
-    home: WayHome = field(default_factory=lambda: WayHome(None, ()))
-    """The way to HOME, which comes first."""
-
-
-@dataclass(frozen=True)
-class Seams:
-    """What a run needs from outside, beside devices."""
-
-    recorder: Callable[[], SavingRecorder]
-    """Makes the recorder of one attempt."""
-    tell: Callable[[Progress], None] = lambda _: None
-    interrupted: Callable[[], bool] = lambda: False

@@ -1,4 +1,8 @@
-"""What the runner needs to know of a cell and its plan."""
+"""Settings of a run, taken from cell and plan, which must be compatible before anything moves.
+
+The fingerprint says which cell a plan was made for. It says nothing of the plan's own numbers, and
+those are what the arm is sent to and presses with.
+"""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -13,12 +17,20 @@ from elastocal.planning import PlanFile
 from elastocal.planning.motion import AxisMotion
 from elastocal.robot import GRAVITY
 
-LIMIT_PER_LOAD = 1.3
+_LIMIT_PER_LOAD = 1.3
 """Default force limit, as a multiple of the largest load case."""
+_LEAST_POSES = 3
+"""Unloaded marker readings that the rotation of a station needs."""
+_SAME_PLACE = 1e-5
+"""Largest distance between a frame and where its joints lead, in m."""
+_SAME_TURN = 1e-5
+"""Largest difference between two directions or rotations that are to be the same."""
+_SAME_NUMBER = 1e-9
+"""Largest difference between a number of the cell and the same in its plan, SI."""
 
 
 @dataclass(frozen=True, eq=False)
-class Settings:
+class RunSettings:
     """Figures of one run."""
 
     procedure: ProcedureSettings
@@ -45,7 +57,7 @@ class Settings:
         return max(float(np.linalg.norm(force)) for _, force in self.loads)
 
 
-def settings_of(cell: Cell, plan: PlanFile) -> Settings:
+def run_settings(cell: Cell, plan: PlanFile) -> RunSettings:
     """Return the settings of a run.
 
     Parameters
@@ -73,7 +85,7 @@ def settings_of(cell: Cell, plan: PlanFile) -> Settings:
     loads = tuple((name, np.array(force)) for name, force in plan.contact.load_cases.items())
     _check_contact_force(cell, loads)
     motion = cell.file.motion
-    return Settings(
+    return RunSettings(
         procedure=cell.file.procedure,
         override=motion.override,
         axes=AxisMotion(cell.axis_speeds, motion.acceleration_time),
@@ -109,7 +121,7 @@ def _force_limit(
         norm / float(np.max(np.abs(R_sensor_tcp @ force) / sensor.largest_force))
         for norm, (_, force) in zip(norms, loads, strict=True)
     )
-    limit = min(LIMIT_PER_LOAD * largest, within) if asked is None else asked
+    limit = min(_LIMIT_PER_LOAD * largest, within) if asked is None else asked
     room = largest + cell.file.procedure.force_tolerance
     if not room < limit <= within:
         raise ProcedureError(
@@ -119,17 +131,7 @@ def _force_limit(
     return limit
 
 
-LEAST_POSES = 3
-"""Unloaded marker readings that the rotation of a station needs."""
-SAME_PLACE = 1e-5
-"""Largest distance between a frame and where its joints lead, in m."""
-SAME_TURN = 1e-5
-"""Largest difference between two directions or rotations that are to be the same."""
-SAME_NUMBER = 1e-9
-"""Largest difference between a number of the cell and the same in its plan, SI."""
-
-
-def check_fits(plan: PlanFile, cell: Cell) -> None:
+def check_compatible(plan: PlanFile, cell: Cell) -> None:
     """Refuse a plan that is not the cell's, or whose numbers contradict one another.
 
     Parameters
@@ -150,7 +152,7 @@ def check_fits(plan: PlanFile, cell: Cell) -> None:
             raise ProcedureError(f"the plan does not fit {cell.path}: {text}; plan again")
 
 
-def registration_findings(plan: PlanFile) -> tuple[str, ...]:
+def registration_warnings(plan: PlanFile) -> tuple[str, ...]:
     """Return a warning for each station that sees too few poses to be registered.
 
     Parameters
@@ -167,15 +169,15 @@ def registration_findings(plan: PlanFile) -> tuple[str, ...]:
     for pose in plan.poses:
         if pose.seen_by is not None:
             seen.setdefault(pose.seen_by, []).append(pose.id)
-    few = {station: poses for station, poses in seen.items() if len(poses) < LEAST_POSES}
+    few = {station: poses for station, poses in seen.items() if len(poses) < _LEAST_POSES}
     if seen and len(few) == len(seen):
         most = max(len(poses) for poses in seen.values())
         raise ProcedureError(
-            f"no tracker station sees {LEAST_POSES} poses of the plan, {most} at most: none could"
+            f"no tracker station sees {_LEAST_POSES} poses of the plan, {most} at most: none could"
             " be registered, and no reading used; plan more poses"
         )
     return tuple(
-        f"station {station} sees {len(poses)} of the {LEAST_POSES} poses that it needs to be"
+        f"station {station} sees {len(poses)} of the {_LEAST_POSES} poses that it needs to be"
         f" registered: the readings at pose {', '.join(map(str, poses))} will be missing"
         for station, poses in few.items()
     )
@@ -240,7 +242,7 @@ def _about_poses(plan: PlanFile, cell: Cell) -> Iterator[str]:
                 f" (known: {', '.join(stations) or 'none'})"
             )
         away = np.array(pose.normal)
-        if not np.abs(pose.T_base_tcp[:3, 2] + away).max() <= SAME_TURN:
+        if not np.abs(pose.T_base_tcp[:3, 2] + away).max() <= _SAME_TURN:
             yield f"poses.{pose.id}: z of the tcp frame is not against the normal"
         for key, joints, distance in (
             ("joints", pose.joints, 0.0),
@@ -249,7 +251,7 @@ def _about_poses(plan: PlanFile, cell: Cell) -> Iterator[str]:
             reached = cell.robot.forward(joints)
             gap = np.linalg.norm(reached[:3, 3] - pose.T_base_tcp[:3, 3] - distance * away)
             turn = np.abs(reached[:3, :3] - pose.T_base_tcp[:3, :3]).max()
-            if not (gap <= SAME_PLACE and turn <= SAME_TURN):
+            if not (gap <= _SAME_PLACE and turn <= _SAME_TURN):
                 yield (
                     f"poses.{pose.id}.{key} lead {1e3 * gap:.3g} mm and {turn:.3g} rad away from"
                     " where its frame and normal say"
@@ -258,7 +260,7 @@ def _about_poses(plan: PlanFile, cell: Cell) -> Iterator[str]:
 
 def _same(found: object, wanted: object) -> bool:
     a, b = np.atleast_1d(np.asarray(found, float)), np.atleast_1d(np.asarray(wanted, float))
-    return a.shape == b.shape and bool(np.all(np.abs(a - b) <= SAME_NUMBER))
+    return a.shape == b.shape and bool(np.all(np.abs(a - b) <= _SAME_NUMBER))
 
 
 def _listed(values: object) -> str:

@@ -1,4 +1,4 @@
-"""The state machine of one attempt at a pose, as data (paper Procedure 1, steps 4-26)."""
+"""States of one attempt at a pose (paper Procedure 1, steps 4-26), and where the arm is left."""
 
 from dataclasses import dataclass
 from enum import Enum
@@ -37,57 +37,30 @@ class Step(Enum):
     """End of a good attempt."""
 
 
-class Outcome(Enum):
+class StepResult(Enum):
     """How a state was left."""
 
     GOOD = "good"
-    AGAIN = "again"
+    REPEAT = "repeat"
     """The window was spoiled (beam broken for a moment): settle again."""
-    LOST = "lost"
+    LOAD_CASE_LOST = "load case lost"
     """The load case cannot be had; its status says why."""
 
 
-_NEXT = {
-    Step.MOVE: Step.AIM,
-    Step.AIM: Step.NEAR,
-    Step.NEAR: Step.UNLOADED,
-    Step.UNLOADED: Step.ENGAGE,
-    Step.ENGAGE: Step.LOAD,
-    Step.LOAD: Step.SETTLE,
-    Step.SETTLE: Step.AVERAGE,
-    Step.RELEASE: Step.LIFT,
-    Step.LIFT: Step.RELEASED,
-    Step.RELEASED: Step.RETRACT,
-    Step.RETRACT: Step.COMMIT,
-    Step.COMMIT: Step.DONE,
-}
-OFF_APPROACH = frozenset(
-    {
-        Step.NEAR,
-        Step.UNLOADED,
-        Step.ENGAGE,
-        Step.LOAD,
-        Step.SETTLE,
-        Step.AVERAGE,
-        Step.RELEASE,
-        Step.LIFT,
-        Step.RELEASED,
-        Step.RETRACT,
-    }
-)
+ON_APPROACH_LINE = frozenset(Step) - {Step.MOVE, Step.AIM, Step.COMMIT, Step.DONE}
 """States in which the tool is on the line between approach pose and surface."""
-TOUCHING = OFF_APPROACH - {Step.NEAR, Step.UNLOADED, Step.RELEASED}
+MAY_TOUCH = ON_APPROACH_LINE - {Step.NEAR, Step.UNLOADED, Step.RELEASED}
 """States in which the tool may touch the surface."""
 
 
-def following(step: Step, outcome: Outcome, loads_left: int) -> Step:
+def next_step(step: Step, result: StepResult, loads_left: int) -> Step:
     """Return the state after a state.
 
     Parameters
     ----------
     step : Step
         The state that ended; not DONE.
-    outcome : Outcome
+    result : StepResult
         How.
     loads_left : int
         Number of load cases that have not been tried yet.
@@ -97,35 +70,37 @@ def following(step: Step, outcome: Outcome, loads_left: int) -> Step:
     Step
         The next one. ENGAGE is followed by RETRACT on every way to another ENGAGE.
     """
-    if step is Step.AVERAGE and outcome is Outcome.AGAIN:
+    if step is Step.AVERAGE and result is StepResult.REPEAT:
         return Step.SETTLE
-    if step is Step.AVERAGE or outcome is Outcome.LOST:
+    # Every load case ends here, had or lost: the arm never goes from one to the surface again.
+    if step is Step.AVERAGE or result is StepResult.LOAD_CASE_LOST:
         return Step.LOAD if loads_left else Step.RELEASE
-    return _NEXT[step]
+    order = list(Step)
+    return order[order.index(step) + 1]
 
 
-class Stand(Enum):
-    """Where the arm stands when a run or an attempt is over."""
+class ArmLocation(Enum):
+    """Where the arm is when a session or an attempt is over."""
 
     HOME = "at HOME"
-    WAY = "on its way between poses, off every surface"
-    NEAR = "off the surface, before contact"
-    APPROACH = "retracted to the approach pose"
-    SURFACE = "AT THE SURFACE: it could not retract and may still press"
+    BETWEEN_POSES = "on its way between poses, off every surface"
+    NEAR_CONTACT = "off the surface, before contact"
+    APPROACH_POSE = "retracted to the approach pose"
+    AT_SURFACE = "AT THE SURFACE: it could not retract and may still press"
 
 
 @dataclass(frozen=True)
-class Left:
-    """How an arm was left after a fault."""
+class BackOffResult:
+    """Where the arm was left after a fault."""
 
-    stand: Stand
-    why: str = ""
+    location: ArmLocation
+    reason: str = ""
     """Why it could not be brought off the surface; empty when it could or need not."""
 
 
 @dataclass(frozen=True, slots=True)
 class Progress:
-    """Where a run is; told several times a second."""
+    """Where a run is; reported several times a second."""
 
     time: float
     """In s of the devices' clock."""

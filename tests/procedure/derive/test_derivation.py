@@ -7,8 +7,8 @@ import pytest
 from elastocal.cell import fingerprint, load_cell
 from elastocal.dataset import read
 from elastocal.errors import DatasetError, ElastocalError, ProcedureError, SchemaError
-from elastocal.procedure import RunFolder, derive, read_journal, write_derived
-from elastocal.procedure.derive.derivation import Derived
+from elastocal.procedure import RunFolder, derive_run, read_journal, write_derived
+from elastocal.procedure.derive.derivation import DerivedRun
 from elastocal.procedure.record.journal import ReadingStatus, Window
 from support.recorded_runs import Run, Truth, record_run
 
@@ -19,11 +19,11 @@ def run(tmp_path_factory) -> Run:
 
 
 @pytest.fixture(scope="module")
-def derived(run) -> Derived:
-    return derive(run.path)
+def derived(run) -> DerivedRun:
+    return derive_run(run.path)
 
 
-def values(derived: Derived, name: str) -> np.ndarray:
+def values(derived: DerivedRun, name: str) -> np.ndarray:
     return derived.dataset.data[name].values
 
 
@@ -84,7 +84,7 @@ def test_deriving_again_gives_the_same_files(run, derived):
     write_derived(run.path, derived)
     folder = RunFolder(run.path)
     first = read(folder.dataset)
-    again = derive(run.path)
+    again = derive_run(run.path)
     write_derived(run.path, again)
     assert first.data.identical(read(folder.dataset).data)
     assert json.loads(folder.summary.read_text())["schema"] == "elastocal.run-summary/1"
@@ -96,7 +96,7 @@ def test_a_reading_that_slipped_keeps_its_numbers_and_its_status(tmp_path):
             return window.model_copy(update={"status": ReadingStatus.SLIPPED, "note": "slid"})
         return window
 
-    derived = derive(record_run(tmp_path / "run", change=slip).path)
+    derived = derive_run(record_run(tmp_path / "run", change=slip).path)
     cell = derived.dataset.data.sel(pose=2, load_case="east")
     assert cell["status"] == 1
     assert np.all(np.isfinite(cell["force"]))
@@ -112,7 +112,7 @@ def test_a_window_without_samples_is_missing_and_says_how_many_there_are(tmp_pat
             return window.model_copy(update={"end": window.start + 0.02})
         return window
 
-    derived = derive(record_run(tmp_path / "run", change=shorten).path)
+    derived = derive_run(record_run(tmp_path / "run", change=shorten).path)
     cell = derived.dataset.data.sel(pose=1, load_case="west")
     assert cell["status"] == 4
     assert np.all(np.isnan(cell["force"]))
@@ -127,7 +127,7 @@ def test_a_pose_with_a_bad_reference_is_missing_as_a_whole(tmp_path):
             return window.model_copy(update={"status": ReadingStatus.MISSING, "note": "no beam"})
         return window
 
-    derived = derive(record_run(tmp_path / "run", change=spoil).path)
+    derived = derive_run(record_run(tmp_path / "run", change=spoil).path)
     assert derived.dataset.data["status"].sel(pose=4).values.tolist() == [4] * 5
     notes = {entry["note"] for entry in derived.summary["readings"]["not_ok"]}
     assert notes == {"the unloaded reference is missing: no beam"}
@@ -139,7 +139,7 @@ def test_a_load_case_that_was_never_had_is_left_out_with_a_warning(tmp_path):
             return window.model_copy(update={"status": ReadingStatus.UNSTABLE, "note": "shakes"})
         return window
 
-    derived = derive(record_run(tmp_path / "run", change=without_north).path)
+    derived = derive_run(record_run(tmp_path / "run", change=without_north).path)
     assert derived.dataset.load_cases == ("normal", "south", "east", "west")
     assert derived.summary["warnings"][0] == (
         "load case 'north' has no usable reading at any pose: the dataset leaves it out"
@@ -148,7 +148,7 @@ def test_a_load_case_that_was_never_had_is_left_out_with_a_warning(tmp_path):
 
 def test_a_tool_that_is_heavier_than_the_cell_says_is_told(tmp_path):
     truth = Truth(mass=75.0, force_noise=0.1, drift=np.zeros(3))
-    derived = derive(record_run(tmp_path / "run", truth).path)
+    derived = derive_run(record_run(tmp_path / "run", truth).path)
     assert any(
         warning.startswith("the tool weighs 75.") and "60.0 kg by the cell file" in warning
         for warning in derived.summary["warnings"]
@@ -158,7 +158,7 @@ def test_a_tool_that_is_heavier_than_the_cell_says_is_told(tmp_path):
 def test_the_wrong_mass_hardly_touches_the_forces(tmp_path):
     """The tare of the same pose takes the weight away; only its turn under load is left."""
     run = record_run(tmp_path / "run", Truth(mass=75.0))
-    np.testing.assert_allclose(values(derive(run.path), "force"), run.force, atol=0.6)
+    np.testing.assert_allclose(values(derive_run(run.path), "force"), run.force, atol=0.6)
 
 
 def test_a_drift_after_release_is_told(tmp_path):
@@ -168,7 +168,7 @@ def test_a_drift_after_release_is_told(tmp_path):
             window.model_copy(update={"load_case": None}) if window.load_case == "west" else window
         )
 
-    derived = derive(record_run(tmp_path / "run", change=two_references).path)
+    derived = derive_run(record_run(tmp_path / "run", change=two_references).path)
     drift = derived.summary["drift"]
     assert drift["released_windows"] == 6
     assert drift["seconds"] == pytest.approx(15.0)
@@ -179,7 +179,7 @@ def test_two_poses_do_not_register_a_station(tmp_path):
     run = record_run(tmp_path / "run", poses=2)
     message = r"no usable reading among 10: station station_1 is not registered: it saw 2 of the 3"
     with pytest.raises(DatasetError, match=message):
-        derive(run.path)
+        derive_run(run.path)
 
 
 def no_commit(run: Path) -> None:
@@ -215,19 +215,19 @@ def test_a_run_that_cannot_be_derived_is_refused_in_one_line(tmp_path, spoil, er
     run = record_run(tmp_path / "run")
     spoil(run.path)
     with pytest.raises(error) as caught:
-        derive(run.path)
+        derive_run(run.path)
     assert message in str(caught.value)
     assert "\n" not in str(caught.value)
 
 
 def test_a_folder_that_is_no_run_is_refused(tmp_path):
     with pytest.raises(ElastocalError, match=r"journal\.jsonl"):
-        derive(tmp_path)
+        derive_run(tmp_path)
 
 
 def test_a_tool_that_gets_heavier_is_told_with_its_pose(tmp_path):
     run = record_run(tmp_path / "run", Truth(heavier_from=3, heavier_by=20.0))
-    found = derive(run.path).summary
+    found = derive_run(run.path).summary
     assert found["warnings"][0].startswith("the tool weight changed near pose 3, by about +")
     assert found["tool"]["changed"]["from_pose"] == 3
     assert not any("kg by the cell file" in line for line in found["warnings"])
@@ -256,5 +256,5 @@ def test_what_was_changed_in_the_folder_since_is_refused_by_name(tmp_path, chang
     run = record_run(tmp_path / "run")
     changed = change(run)
     with pytest.raises(SchemaError) as caught:
-        derive(run.path)
+        derive_run(run.path)
     assert str(caught.value).startswith(f"{changed} is not what the run wrote: its SHA-256 is ")

@@ -13,7 +13,7 @@ from elastocal.cell.devices import (
     SensorStatus,
     WrenchBlock,
 )
-from elastocal.procedure.run._watchdog import Guard, Seen, Watch
+from elastocal.procedure.run._watchdog import Guard, Snapshot, Watchdog
 from elastocal.procedure.run.faults import Fault, FaultError
 
 STALE, BEAM = 0.3, 2.0
@@ -24,7 +24,7 @@ def seen(now, *, arm=None, sensor=None, force=0.0, points=None, beam=BeamState.L
     arm, sensor = now if arm is None else arm, now if sensor is None else sensor
     value = now if row is None else row
     points = now if points is None else points
-    return Seen(
+    return Snapshot(
         now,
         ArmState(arm, np.zeros(3), np.eye(4), Motion.IDLE, False, None, "arm"),
         WrenchBlock(
@@ -38,7 +38,7 @@ def seen(now, *, arm=None, sensor=None, force=0.0, points=None, beam=BeamState.L
 
 @pytest.fixture
 def watch():
-    watch = Watch(STALE, BEAM)
+    watch = Watchdog(STALE, BEAM)
     watch.restart(0.0)
     return watch
 

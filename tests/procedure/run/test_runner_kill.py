@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from elastocal.cell.devices import Motion
-from elastocal.procedure import End, Event, read_journal
+from elastocal.procedure import Event, RunEnd, read_journal
 from elastocal.procedure.record.journal import read_commits
 from support.fake_devices import FakeCell
 from support.fake_runs import FakeRun
@@ -54,7 +54,7 @@ class Killer:
 @cache
 def undisturbed(folder):
     run = FakeRun(folder / "undisturbed")
-    assert run.start().end is End.DONE
+    assert run.start().end is RunEnd.DONE
     return run.readings(), len(read_journal(run.journal))
 
 
@@ -89,7 +89,7 @@ def committed(run):
 def test_a_killed_run_goes_on_to_the_same_readings(tmp_path, whole, boundary, torn):
     run = kill(tmp_path / "run", Killer(boundary, torn))
     before = committed(run)
-    assert run.resume().end is End.DONE
+    assert run.resume().end is RunEnd.DONE
     assert committed(run)[: len(before)] == before
     assert sorted(committed(run)) == [0, 1]
     readings = run.readings()
@@ -113,7 +113,7 @@ def test_an_arm_that_stands_where_it_was_finds_the_way_back(tmp_path, boundary, 
         # A controller that drops the force control and the release when its client is gone.
         world.motion = Motion.DISARMED
     world.commands.clear()
-    assert run.resume(cell=cell).end is End.DONE
+    assert run.resume(cell=cell).end is RunEnd.DONE
     assert sorted(committed(run)) == [0, 1]
     assert committed(run)[: len(before)] == before
     touched = world.in_contact or world.q[2] <= 0.0
@@ -127,7 +127,7 @@ def test_killed_twice_it_still_goes_on(tmp_path, whole):
     killer = Killer(9)
     with pytest.raises(KillRunError):
         run.resume(killer.guard, sync=killer)
-    assert run.resume().end is End.DONE
+    assert run.resume().end is RunEnd.DONE
     for key, values in whole[0].items():
         np.testing.assert_allclose(run.readings()[key], values, rtol=0, atol=1e-9)
 
@@ -141,6 +141,6 @@ def test_a_pose_that_is_done_again_gets_another_number_of_attempt(tmp_path):
 def test_a_run_that_is_complete_only_says_so_again(tmp_path):
     run = FakeRun(tmp_path / "run")
     run.start()
-    assert run.resume().end is End.DONE
+    assert run.resume().end is RunEnd.DONE
     assert run.cell.world.commands == ["enable", "disable"]
     assert read_journal(run.journal)[-1].event is Event.FINISH

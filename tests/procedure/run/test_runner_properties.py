@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings, strategies as st
 
 from elastocal.cell.devices import Motion
-from elastocal.procedure import End, Event, read_journal
+from elastocal.procedure import Event, RunEnd, read_journal
 from elastocal.procedure.record.journal import Action, read_commits
 from support import fake_faults as fault
 from support.fake_faults import when
@@ -87,7 +87,7 @@ def test_whatever_goes_wrong_the_cell_is_safe_and_the_run_can_go_on(script, late
         result = run.resume(prepared(later))
         check_safe(run, result)
         assert read_commits(run.journal)[: len(before)] == before
-        assert run.resume().end is End.DONE
+        assert run.resume().end is RunEnd.DONE
         done = [log.pose for log in read_commits(run.journal)]
         assert sorted(done) == [0, 1]
         check_order(run)
@@ -95,7 +95,7 @@ def test_whatever_goes_wrong_the_cell_is_safe_and_the_run_can_go_on(script, late
 
 def check_safe(run, result):
     world = run.cell.world
-    assert result.end in (End.DONE, End.STOPPED)
+    assert result.end in (RunEnd.DONE, RunEnd.STOPPED)
     assert run.cell.arm.deaf or world.motion is Motion.DISARMED
     assert world.largest_force <= run.settings.force_limit + CYCLE_RAMP
     assert world.contacts_kept == 0
@@ -141,7 +141,7 @@ def memory_growth(folder, poses, memory, **changes):
             taken[progress.pose] = memory()
 
     run.tell = tell
-    assert run.start().end is End.DONE
+    assert run.start().end is RunEnd.DONE
     return taken[poses - 1] - taken[poses // 10], run.cell.world.clock.now()
 
 

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from elastocal.procedure.derive.tool import ToolEstimate, Unloaded, estimate_tool
+from elastocal.procedure.derive.tool import ToolEstimate, UnloadedWrenches, estimate_tool
 
 GRAVITY = np.array([0.0, 0.0, -9.80665])
 MASS, CENTRE = 62.5, np.array([0.01, -0.02, 0.15])
@@ -10,7 +10,7 @@ BIAS, MOMENT_BIAS = np.array([20.0, -40.0, 10.0]), np.array([1.0, 2.0, -1.0])
 DRIFT, MOMENT_DRIFT = np.array([1e-3, 0.0, -3e-3]), np.array([0.0, 1e-4, 0.0])
 
 
-def unloaded(R: np.ndarray, seed: int = 0, noise: float = 0.5) -> Unloaded:
+def unloaded(R: np.ndarray, seed: int = 0, noise: float = 0.5) -> UnloadedWrenches:
     """Return readings a minute apart at given sensor rotations."""
     rng, count = np.random.default_rng(seed), len(R)
     time = 60.0 * np.arange(count)
@@ -19,7 +19,7 @@ def unloaded(R: np.ndarray, seed: int = 0, noise: float = 0.5) -> Unloaded:
     force = weight + BIAS + late * DRIFT + noise * rng.normal(size=(count, 3))
     moment = np.cross(CENTRE, weight) + MOMENT_BIAS + late * MOMENT_DRIFT
     moment = moment + 0.1 * noise * rng.normal(size=(count, 3))
-    return Unloaded(time, force, moment, R, GRAVITY)
+    return UnloadedWrenches(time, force, moment, R, GRAVITY)
 
 
 def tilts(count: int, angle: float = 0.4, seed: int = 9) -> np.ndarray:
@@ -94,7 +94,7 @@ def test_too_few_references_tell_nothing(count):
 def test_a_clock_that_began_anew_leaves_the_drift_open():
     made = unloaded(tilts(12))
     found = estimate_tool(
-        Unloaded(np.zeros(12), made.force, made.moment, made.R_base_sensor, GRAVITY), 60.0
+        UnloadedWrenches(np.zeros(12), made.force, made.moment, made.R_base_sensor, GRAVITY), 60.0
     )
     assert {"force drift x", "moment drift z"} <= set(found.undetermined)
     assert found.mass.value == pytest.approx(MASS, abs=0.5)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from elastocal.cell.description import ProcedureSettings
-from elastocal.procedure.run._stability import Stretch, complaint, shaking, steadiness
+from elastocal.procedure.run._stability import RecentSamples, steadiness, why_shaking, why_unsteady
 
 LIMITS = ProcedureSettings()
 TIME = np.arange(50) / 100.0
@@ -49,12 +49,14 @@ def test_the_time_of_day_changes_no_bit():
     ],
 )
 def test_what_is_not_steady_is_said(force, target, said):
-    found = complaint(steadiness(TIME, force), LIMITS, None if target is None else np.array(target))
+    found = why_unsteady(
+        steadiness(TIME, force), LIMITS, None if target is None else np.array(target)
+    )
     assert found is None if said is None else found.startswith(said)
 
 
 def test_a_stretch_keeps_what_is_young_enough():
-    stretch = Stretch(0.1)
+    stretch = RecentSamples(0.1)
     for block in range(10):
         time = block * 0.04 + np.arange(4) / 100.0
         stretch.add(time, np.full((4, 3), block))
@@ -66,5 +68,5 @@ def test_a_stretch_keeps_what_is_young_enough():
 def test_a_marker_is_shaking_by_its_worst_axis():
     positions = np.zeros((4, 3))
     positions[:, 1] = [0.0, 2e-4, 0.0, 2e-4]
-    assert shaking(positions, 50e-6) == "marker has a sigma of 115 um, limit 50 um"
-    assert shaking(positions, 116e-6) == ""
+    assert why_shaking(positions, 50e-6) == "marker has a sigma of 115 um, limit 50 um"
+    assert why_shaking(positions, 116e-6) == ""

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from elastocal.procedure.derive.tool import Unloaded, estimate_tool
+from elastocal.procedure.derive.tool import UnloadedWrenches, estimate_tool
 
 GRAVITY = np.array([0.0, 0.0, -9.80665])
 
@@ -16,7 +16,9 @@ def change(at: int, step: float, count: int = 12, seed: int = 0, drift: float = 
     time = 60.0 * np.arange(count)
     force = mass[:, None] * (GRAVITY @ R) + drift * time[:, None]
     force += 0.5 * rng.normal(size=force.shape)
-    return estimate_tool(Unloaded(time, force, np.zeros_like(force), R, GRAVITY), 60.0).change
+    return estimate_tool(
+        UnloadedWrenches(time, force, np.zeros_like(force), R, GRAVITY), 60.0
+    ).change
 
 
 @pytest.mark.parametrize("at", [1, 6, 11])

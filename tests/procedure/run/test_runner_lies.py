@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from elastocal.errors import DeviceError
-from elastocal.procedure import End, Event, PoseRecorder, read_journal
+from elastocal.procedure import Event, PoseRecorder, RunEnd, read_journal
 from elastocal.procedure.record.journal import read_commits
-from elastocal.procedure.run.steps import Stand
+from elastocal.procedure.run.steps import ArmLocation
 from support import fake_faults as fault, fake_lies as lie
 from support.fake_devices import R_BASE_TRACKER, Motion, fake_cell
 from support.fake_faults import when
@@ -36,7 +36,7 @@ def test_a_sensor_or_tracker_that_raises_does_not_keep_the_arm_at_the_surface(
     run, device, error, moment
 ):
     result = run.start(when(moment, lie.raising(device, "read", error)))
-    assert (result.end, result.stand) == (End.STOPPED, Stand.APPROACH)
+    assert (result.end, result.location) == (RunEnd.STOPPED, ArmLocation.APPROACH_POSE)
     assert f"device refused: {error}" in result.message
     assert not presses(run)
     assert run.cell.world.commands[-3:] == ["retract", "stop", "disable"]
@@ -50,7 +50,7 @@ def texts(run, event):
 @pytest.mark.parametrize("error", [LINE, NO_ANSWER], ids=["reset", "refused"])
 def test_an_arm_that_answers_no_more_is_told_all_the_same(run, error):
     result = run.start(when(fault.pressing(), lie.raising("arm", "state", error)))
-    assert (result.end, result.stand) == (End.STOPPED, Stand.SURFACE)
+    assert (result.end, result.location) == (RunEnd.STOPPED, ArmLocation.AT_SURFACE)
     assert result.message.endswith("; no retract: arm silent: it does not answer")
     assert run.cell.world.commands[-4:] == ["release", "retract", "stop", "disable"]
     assert not presses(run)
@@ -60,7 +60,7 @@ def test_an_arm_whose_line_is_wholly_dead_is_said_to_press(run):
     names = ("state", "stop", "release", "retract", "disable")
     dead = lie.both(*(lie.raising("arm", name, LINE) for name in names))
     result = run.start(when(fault.pressing(), dead))
-    assert (result.end, result.stand) == (End.STOPPED, Stand.SURFACE)
+    assert (result.end, result.location) == (RunEnd.STOPPED, ArmLocation.AT_SURFACE)
     assert "device refused: [Errno 104]" in result.message
     assert texts(run, Event.FINISH)[-1].startswith("stopped, AT THE SURFACE")
 
@@ -73,7 +73,7 @@ class FullDisk(MemoryRecorder):
 def test_streams_that_cannot_be_written_do_not_hide_where_the_arm_stands(run):
     run.recorder = lambda: FullDisk({})
     result = run.start(when(fault.pressing(), fault.stop_arm))
-    assert (result.end, result.stand) == (End.STOPPED, Stand.SURFACE)
+    assert (result.end, result.location) == (RunEnd.STOPPED, ArmLocation.AT_SURFACE)
     assert "arm stopped: arm says: safety gate opened" in result.message
     assert presses(run)
 
@@ -88,7 +88,7 @@ def test_a_second_fault_on_the_way_off_is_named(run):
         ),
     )
     result = run.start(when(fault.pressing(), stops))
-    assert result.stand is Stand.SURFACE
+    assert result.location is ArmLocation.AT_SURFACE
     assert "force sensor silent" in result.message
     assert "no retract: arm stopped: arm says: safety gate opened" in result.message
 
@@ -111,7 +111,7 @@ NONSENSE = [
 )
 def test_what_is_no_number_is_a_fault_with_a_message(run, device, names, moment, message):
     result = run.start(when(moment, lie.scaled(device, np.nan, *names)))
-    assert result.end is End.STOPPED
+    assert result.end is RunEnd.STOPPED
     assert message in result.message
     assert not presses(run)
     assert texts(run, Event.FAULT) == [result.message]
@@ -128,7 +128,7 @@ def test_what_is_no_number_is_a_fault_with_a_message(run, device, names, moment,
 )
 def test_what_has_another_form_is_a_fault_with_a_message(run, device, change, message):
     result = run.start(when(fault.pressing(), lie.saying(device, "read", change)))
-    assert (result.end, result.stand) == (End.STOPPED, Stand.APPROACH)
+    assert (result.end, result.location) == (RunEnd.STOPPED, ArmLocation.APPROACH_POSE)
     assert message in result.message
 
 
@@ -140,14 +140,14 @@ def test_an_arm_of_another_form_is_a_fault_with_a_message(run):
 
 def test_a_contact_that_the_sensor_does_not_feel_ends_the_run(run):
     result = run.start(when(fault.approaching, lie.numb_sensor))
-    assert (result.end, result.stand) == (End.STOPPED, Stand.APPROACH)
+    assert (result.end, result.location) == (RunEnd.STOPPED, ArmLocation.APPROACH_POSE)
     assert "engage: arm and force sensor disagree: arm feels 20 N of contact" in result.message
     assert "hold" not in run.cell.world.commands
 
 
 def test_a_load_that_the_sensor_does_not_feel_ends_the_run(run):
     result = run.start(when(fault.pressing(), lie.numb_sensor))
-    assert (result.end, result.stand) == (End.STOPPED, Stand.APPROACH)
+    assert (result.end, result.location) == (RunEnd.STOPPED, ArmLocation.APPROACH_POSE)
     assert "300 N are asked for, the sensor feels 0 N in that direction" in result.message
 
 
@@ -165,14 +165,14 @@ def test_a_pose_where_no_load_settles_is_given_up(run):
         when(lambda world: world.visits == 2, calm)(cell)
 
     result = run.start(prepare)
-    assert (result.end, result.given_up, result.failed_attempts) == (End.DONE, (0,), 1)
+    assert (result.end, result.given_up, result.failed_attempts) == (RunEnd.DONE, (0,), 1)
     assert "no load case settles: not stable within 4 s" in texts(run, Event.GIVEN_UP)[0]
 
 
 def test_an_arm_that_feels_nothing_is_stopped_soon_after_contact(run):
     run.changes = {"contact_speed": 0.005}
     result = run.start(when(fault.near, lie.numb_arm))
-    assert (result.end, result.stand) == (End.STOPPED, Stand.APPROACH)
+    assert (result.end, result.location) == (RunEnd.STOPPED, ArmLocation.APPROACH_POSE)
     assert "engage: force limit exceeded: " in result.message
     assert "limit 236 N" in result.message
     assert run.cell.world.largest_force < 236.0 + 200.0
@@ -195,7 +195,7 @@ def test_an_arm_that_feels_nothing_is_stopped_before_near_contact(run):
 def test_a_sensor_that_does_not_feel_the_tool_ends_the_run(run):
     light = lie.saying("sensor", "read", lambda b: replace(b, force=b.force * 0.1))
     result = run.start(light)
-    assert (result.end, result.stand) == (End.STOPPED, Stand.WAY)
+    assert (result.end, result.location) == (RunEnd.STOPPED, ArmLocation.BETWEEN_POSES)
     assert "force sensor does not feel the tool: 59 N in free air, it weighs 600 N" in (
         result.message
     )
@@ -212,14 +212,14 @@ def test_a_force_that_grows_from_leg_to_leg_is_not_tared_away(run):
         world.faults.append(pull)
 
     result = run.start(drag)
-    assert (result.end, result.stand) == (End.STOPPED, Stand.WAY)
+    assert (result.end, result.location) == (RunEnd.STOPPED, ArmLocation.BETWEEN_POSES)
     assert "force limit exceeded: 1800 N, limit 1650 N" in result.message
 
 
 def test_no_move_is_begun_in_contact(run):
     stuck = lie.saying("arm", "state", lambda state: replace(state, in_contact=True))
     result = run.start(stuck)
-    assert (result.end, result.stand) == (End.STOPPED, Stand.SURFACE)
+    assert (result.end, result.location) == (RunEnd.STOPPED, ArmLocation.AT_SURFACE)
     assert result.message.startswith("no move is begun in contact: arm says that it is")
     assert "move" not in run.cell.world.commands
 
@@ -237,7 +237,7 @@ def test_a_miss_does_not_depend_on_noise_of_the_arms_place(run):
         when(fault.approaching, fault.lower_floor)(cell)
 
     result = run.start(prepare)
-    assert (result.end, result.failed_attempts) == (End.DONE, 1)
+    assert (result.end, result.failed_attempts) == (RunEnd.DONE, 1)
     assert "contact missed: none within 14 mm" in texts(run, Event.FAULT)[0]
 
 
@@ -261,7 +261,7 @@ def windows(run, pose=0):
 def test_a_marker_that_jumps_along_the_normal_has_slipped(run):
     jump = R_BASE_TRACKER.T @ [0.0, 0.0, 5e-3]
     off = lie.saying("tracker", "read", lambda b: replace(b, position=b.position + jump))
-    assert in_the_first_window(run, off).end is End.DONE
+    assert in_the_first_window(run, off).end is RunEnd.DONE
     found = windows(run)["normal"]
     assert found.status.value == "slipped"
     assert "marker jumped 5.0" in found.note
@@ -280,7 +280,7 @@ def test_a_marker_that_shakes_under_load_gives_no_reading(run):
 
 
 def test_every_pose_ends_with_an_unloaded_window(run):
-    assert run.start().end is End.DONE
+    assert run.start().end is RunEnd.DONE
     for log in read_commits(run.journal):
         assert [w.load_case for w in log.windows] == [None, "normal", "north", None]
         assert log.windows[-1].end - log.windows[-1].start == pytest.approx(0.2)
@@ -291,7 +291,7 @@ def test_a_view_that_is_gone_does_not_end_a_run(run):
         raise BrokenPipeError(32, "Broken pipe")
 
     run.tell = tell
-    assert run.start().end is End.DONE
+    assert run.start().end is RunEnd.DONE
 
 
 def test_time_that_passes_between_two_cycles_is_seen(run):
@@ -301,7 +301,7 @@ def test_time_that_passes_between_two_cycles_is_seen(run):
 
     run.tell = tell
     result = run.start()
-    assert (result.end, result.stand) == (End.STOPPED, Stand.APPROACH)
+    assert (result.end, result.location) == (RunEnd.STOPPED, ArmLocation.APPROACH_POSE)
     assert "clock out of order: 0.50 s passed between two cycles" in result.message
 
 
@@ -309,7 +309,7 @@ def test_an_interruption_is_no_failed_attempt(run):
     pressed = []
     run.interrupted = lambda: bool(pressed)
     result = run.start(when(fault.pressing(2), pressed.append))
-    assert (result.end, result.failed_attempts) == (End.INTERRUPTED, 0)
+    assert (result.end, result.failed_attempts) == (RunEnd.INTERRUPTED, 0)
 
 
 def test_an_arm_that_was_left_in_contact_away_from_every_pose_is_not_moved(run):
@@ -317,7 +317,7 @@ def test_an_arm_that_was_left_in_contact_away_from_every_pose_is_not_moved(run):
     cell = fake_cell(HOME, 100.0)
     cell.world.q, cell.world.in_contact = np.array([0.05, 0.0, 0.275]), True
     result = run.resume(cell=cell)
-    assert (result.end, result.stand) == (End.STOPPED, Stand.SURFACE)
+    assert (result.end, result.location) == (RunEnd.STOPPED, ArmLocation.AT_SURFACE)
     assert "before no pose: free it by hand" in result.message
     assert cell.world.contacts_kept == 0
     assert not {"move", "retract"} & set(cell.world.commands)

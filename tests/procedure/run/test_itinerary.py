@@ -2,8 +2,8 @@
 
 import pytest
 
-from elastocal.procedure import End, itinerary
-from elastocal.procedure.run.routes import remaining
+from elastocal.procedure import RunEnd, itinerary
+from elastocal.procedure.run.routes import remaining_times
 from elastocal.procedure.run.steps import Step
 from support.fake_runs import FakeRun, plan, settings
 
@@ -22,7 +22,7 @@ def test_it_lists_every_state_of_every_pose_and_the_way_home():
 
 
 def test_what_remains_falls_with_every_pose():
-    left = remaining(PLAN, SETTINGS)
+    left = remaining_times(PLAN, SETTINGS)
     assert left.shape == (4,)
     assert left[0] == pytest.approx(sum(step.seconds for step in itinerary(PLAN, SETTINGS)))
     assert (left[:-1] > left[1:]).all()
@@ -30,6 +30,6 @@ def test_what_remains_falls_with_every_pose():
 
 def test_the_run_takes_about_as_long(tmp_path):
     run = FakeRun(tmp_path / "run", plan=PLAN)
-    assert run.start().end is End.DONE
+    assert run.start().end is RunEnd.DONE
     # Cycles are waited out whole and the fake arm has no acceleration.
-    assert run.cell.world.clock.now() == pytest.approx(remaining(PLAN, SETTINGS)[0], rel=0.35)
+    assert run.cell.world.clock.now() == pytest.approx(remaining_times(PLAN, SETTINGS)[0], rel=0.35)

@@ -6,7 +6,7 @@ import pytest
 from elastocal.cell import load_cell
 from elastocal.errors import ProcedureError
 from elastocal.planning import read_plan
-from elastocal.procedure import check_fits, registration_findings
+from elastocal.procedure import check_compatible, registration_warnings
 from support.run_cells import planned_cell
 
 
@@ -78,14 +78,14 @@ CHANGES = [
 
 def test_a_plan_fits_the_cell_that_it_was_made_for(made):
     cell, plan = made
-    check_fits(plan, cell)
+    check_compatible(plan, cell)
 
 
 @pytest.mark.parametrize(("change", "message"), CHANGES)
 def test_a_plan_with_other_numbers_is_refused_by_name(made, change, message):
     cell, plan = made
     with pytest.raises(ProcedureError) as caught:
-        check_fits(change(plan), cell)
+        check_compatible(change(plan), cell)
     assert message in str(caught.value)
     assert "\n" not in str(caught.value)
 
@@ -93,7 +93,7 @@ def test_a_plan_with_other_numbers_is_refused_by_name(made, change, message):
 def test_a_number_that_is_none_is_refused(made):
     cell, plan = made
     with pytest.raises(ProcedureError, match=r"contact\.near_contact"):
-        check_fits(with_part(plan, "contact", near_contact=np.nan), cell)
+        check_compatible(with_part(plan, "contact", near_contact=np.nan), cell)
 
 
 def seen_by(plan, *stations):
@@ -103,12 +103,12 @@ def seen_by(plan, *stations):
 
 def test_a_station_with_too_few_poses_is_told(made):
     plan = made[1]
-    assert registration_findings(seen_by(plan, "a", "a", "a", "a")) == ()
-    (line,) = registration_findings(seen_by(plan, "a", "b", "a", "a"))
+    assert registration_warnings(seen_by(plan, "a", "a", "a", "a")) == ()
+    (line,) = registration_warnings(seen_by(plan, "a", "b", "a", "a"))
     assert line.startswith("station b sees 1 of the 3 poses that it needs to be registered")
     assert "at pose 1 will be missing" in line
 
 
 def test_a_plan_of_which_no_station_could_be_registered_is_refused(made):
     with pytest.raises(ProcedureError, match="no tracker station sees 3 poses of the plan, 2"):
-        registration_findings(seen_by(made[1], "a", "b", "a", "b"))
+        registration_warnings(seen_by(made[1], "a", "b", "a", "b"))

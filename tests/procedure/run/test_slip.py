@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from elastocal.procedure.run._stability import SlideWatch, SlipWatch
+from elastocal.procedure.run._stability import SlideDetector, SlipReference
 
 R = Rotation.from_euler("xyz", [0.4, -1.1, 2.0]).as_matrix()
 """From base to tracker."""
@@ -14,7 +14,7 @@ def marker(height, aside=0.0):
     return R @ np.array([1.0 + aside, 2.0, height])
 
 
-WATCH = SlipWatch.of(marker(0.1), marker(0.003))
+WATCH = SlipReference.of(marker(0.1), marker(0.003))
 
 
 def test_movement_along_the_approach_is_no_slip():
@@ -32,13 +32,13 @@ def test_within_a_window_its_ends_are_compared():
 
 
 def test_after_too_short_an_approach_every_movement_counts():
-    watch = SlipWatch.of(marker(0.004), marker(0.003))
+    watch = SlipReference.of(marker(0.004), marker(0.003))
     assert watch.normal is None
     assert watch.lateral(np.array([0.0, 3e-4, 4e-4])) == pytest.approx(5e-4)
 
 
 def slide(asides):
-    watch = SlideWatch(WATCH)
+    watch = SlideDetector(WATCH)
     for aside in asides:
         watch.see(np.empty((0, 3)) if aside is None else marker(0.0, aside)[None])
     return watch.largest
@@ -55,7 +55,7 @@ def test_nothing_is_concluded_from_a_gap():
 
 
 def test_a_jump_along_the_normal_is_seen_apart_and_kept_over_a_gap():
-    jumps = SlideWatch(WATCH, along=True)
+    jumps = SlideDetector(WATCH, along=True)
     for height, aside in [(0.0, 0.0), (0.0, 5e-4), (1e-3, 5e-4)]:
         jumps.see(marker(height, aside)[None])
     assert jumps.largest == pytest.approx(1e-3)
