@@ -7,10 +7,11 @@ from numpy.typing import ArrayLike
 
 from elastocal.errors import IdentificationError, RobotError, SpringError
 from elastocal.identification.calibrated import CalibratedModel
-from elastocal.identification.model_file import read_model, read_record
+from elastocal.identification.model_file import CalibrateResult, read_model
 from elastocal.identification.recertification.caveats import load_caveat
 from elastocal.identification.recertification.recertify import recertify
 from elastocal.identification.recertification.result import Recertification
+from elastocal.records import read_json
 
 
 def recertify_files(
@@ -63,6 +64,5 @@ def _model(path: Path) -> CalibratedModel:
 
 def _measured_deflection(path: Path) -> float | None:
     """Return the mean measured deflection that a model file states, in m; None: none."""
-    stated = read_record(path).calibration.get("deflection")
-    mean = stated.get("mean") if isinstance(stated, dict) else None
-    return float(mean) if isinstance(mean, int | float) else None
+    figures = read_json(path, CalibrateResult).calibration
+    return None if figures is None else figures.deflection.mean
