@@ -25,11 +25,11 @@ from elastocal.robot import (
     Robot,
     catalogue,
     find_meshes,
+    inverse_transform,
     on_rail,
     parse_urdf,
     with_tool,
 )
-from elastocal.robot.inverse import inverse_transform
 from elastocal.schema import read_yaml
 
 TCP = "tcp"
