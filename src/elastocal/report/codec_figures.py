@@ -6,7 +6,7 @@ from pathlib import Path
 
 from matplotlib.figure import Figure
 
-from elastocal.codec import CodecData, Insight, Verdicts
+from elastocal.codec import CodecAnalysis, CodecData, Verdicts
 from elastocal.report.codec_chart import codec_chart, headline
 from elastocal.report.codec_page import write_codec_page
 from elastocal.report.compliance_chart import compliance_chart
@@ -22,7 +22,7 @@ def write_codec_figures(
     folder: Path,
     data: CodecData,
     verdicts: Verdicts,
-    insight: Insight | None = None,
+    insight: CodecAnalysis | None = None,
     axes: Sequence[str] = (),
 ) -> list[Path]:
     """Write the figures of a codec, each atomically; return their paths.
@@ -37,7 +37,7 @@ def write_codec_figures(
         An existing folder.
     data, verdicts : CodecData, Verdicts
         The arrays and what they say.
-    insight : Insight, optional
+    insight : CodecAnalysis, optional
         From `codec.insight.look_into`. Without it no compliances are drawn, since no picture
         could say which of them are findings; without its indices, none of them.
     axes : sequence of str
@@ -54,7 +54,7 @@ def write_codec_figures(
     figures: dict[str, Callable[[], Figure]] = {"codec": partial(codec_chart, data, verdicts)}
     for axis in axes:
         figures[f"codec-{axis}"] = partial(codec_chart, data, verdicts, axis)
-    found = insight or Insight(())
+    found = insight or CodecAnalysis(())
     if found.seen:
         figures["compliances"] = partial(compliance_chart, data, found.seen)
     if found.indices:

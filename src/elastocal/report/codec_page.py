@@ -12,7 +12,7 @@ from string import Template
 import numpy as np
 from plotly.offline import get_plotlyjs
 
-from elastocal.codec import INDICES, CodecData, Correlation, Observed, Verdicts
+from elastocal.codec import INDICES, CodecData, Correlation, SpringObservability, Verdicts
 from elastocal.files import write_text
 from elastocal.report.codec_chart import PANELS, error_boxes, how_to_read
 from elastocal.report.codec_views import compliance_views, error_views
@@ -29,7 +29,7 @@ def write_codec_page(
     path: Path,
     data: CodecData,
     verdicts: Verdicts,
-    seen: Sequence[Observed] = (),
+    seen: Sequence[SpringObservability] = (),
     correlations: Sequence[Correlation] = (),
 ) -> Path:
     """Write the interactive page of a codec, atomically; return its path.
@@ -40,7 +40,7 @@ def write_codec_page(
         An HTML file.
     data, verdicts : CodecData, Verdicts
         The arrays and what they say.
-    seen : sequence of Observed, optional
+    seen : sequence of SpringObservability, optional
         What each variant tells apart; without it the page shows no compliances, since it could
         not say which of them are findings.
     correlations : sequence of Correlation, optional
@@ -60,7 +60,7 @@ def write_codec_page(
 def _page(
     data: CodecData,
     verdicts: Verdicts,
-    seen: Sequence[Observed],
+    seen: Sequence[SpringObservability],
     correlations: Sequence[Correlation],
 ) -> str:
     names = [each.name for each in data.variants]

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from elastocal.codec import AXES, CodecData, Observed, Verdicts
+from elastocal.codec import AXES, CodecData, SpringObservability, Verdicts
 from elastocal.report.box_panel import reads_better_in_decades, round_values
 from elastocal.report.boxes import Boxes
 from elastocal.report.codec_chart import PANELS, error_boxes
@@ -35,7 +35,7 @@ def error_views(data: CodecData, verdicts: Verdicts) -> list[View]:
     return [_error_view(data, verdicts, axis) for axis in order]
 
 
-def compliance_views(data: CodecData, seen: Sequence[Observed]) -> list[View]:
+def compliance_views(data: CodecData, seen: Sequence[SpringObservability]) -> list[View]:
     """Return a figure for each spring.
 
     Raises
