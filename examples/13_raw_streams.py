@@ -25,8 +25,7 @@ from elastocal.procedure import (
     read_streams,
     run_settings,
 )
-from elastocal.procedure.record.journal import read_commits
-from elastocal.procedure.record.streams import PoseRecorder
+from elastocal.procedure.record import PoseRecorder, read_commits
 from elastocal.sim.workcell import simulated_devices
 
 folder = Path(sys.argv[1]) if len(sys.argv) > 1 else Path(tempfile.mkdtemp(prefix="elastocal-"))

@@ -14,7 +14,7 @@ import numpy as np
 from elastocal.dataset import Dataset, read, write
 from elastocal.elastic import ElasticModel, layout
 from elastocal.identification import calibrate, summary
-from elastocal.procedure.derive.tool import ToolLoad
+from elastocal.procedure.derive import ToolLoad
 from elastocal.procedure.registration import UnloadedReadings, register
 from elastocal.robot import GRAVITY, Robot, T_from_xyzabc, catalogue, with_tool
 from elastocal.sim.layouts import bearing_truth

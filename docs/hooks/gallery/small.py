@@ -24,10 +24,8 @@ from elastocal.procedure import (
     read_streams,
     run_settings,
 )
-from elastocal.procedure.record.journal import read_commits
-from elastocal.procedure.record.streams import PoseRecorder, Streams
-from elastocal.report import style
-from elastocal.report.printed import new_figure, write_figure
+from elastocal.procedure.record import PoseRecorder, Streams, read_commits
+from elastocal.report.plots import new_figure, style, write_figure
 from elastocal.sim.workcell import simulated_devices
 from gallery.campaign import example_cell
 

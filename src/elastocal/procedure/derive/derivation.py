@@ -33,7 +33,7 @@ from elastocal.procedure.record.journal import (
 )
 from elastocal.procedure.record.streams import Streams, read_streams
 from elastocal.procedure.registration import Registration, register
-from elastocal.robot.inverse import inverse_transform
+from elastocal.robot import inverse_transform
 
 
 @dataclass(frozen=True, eq=False)
