@@ -5,7 +5,7 @@ from functools import partial
 from pathlib import Path
 
 from elastocal.cli.process_bench import MACHINING_SETTINGS
-from elastocal.compensation.process import Trace
+from elastocal.compensation.process import CourseDeviation
 from elastocal.report.document.figures import process_maps
 from elastocal.report.printed import write_figure
 from gallery.campaign import SEED, accuracy, campaign, example_cell, process, reduction
@@ -22,7 +22,7 @@ def make(folder: Path) -> dict[str, str]:
     draw_displacements(folder / "displacements-machining.svg", done)
     outcome = process(done, "machining", MACHINING_SETTINGS, RINGS)
     pairs = zip(outcome.before, outcome.after, strict=True)
-    traces = [Trace.of(SEED, *pair) for pair in pairs]
+    traces = [CourseDeviation.of(SEED, *pair) for pair in pairs]
     write_figure(folder / "maps-machining.png", partial(process_maps, traces))
     shutil.rmtree(folder / "cell")
     return {

@@ -25,7 +25,7 @@ from elastocal.compensation.process import (
     ProcessRecord,
     Source,
     Table,
-    Trace,
+    CourseDeviation,
     lines_of,
     pooled,
 )
@@ -103,7 +103,7 @@ def answer(question: Question, report: Report) -> Answer:
     settings = _settings(question)
     benches = [_bench(question, settings, run) for run in question.runs]
     lines: list[Comparison] = []
-    traces: list[Trace] = []
+    traces: list[CourseDeviation] = []
     budget: tuple[Comparison, ...] = ()
     programme: tuple[Course, ...] = ()
     for bench in benches:
@@ -112,7 +112,7 @@ def answer(question: Question, report: Report) -> Answer:
         outcome = run_process(bench, courses, report)
         lines.append(outcome.line(f"seed {bench.seed}"))
         pairs = zip(outcome.before, outcome.after, strict=True)
-        traces += [Trace.of(bench.seed, before, after) for before, after in pairs]
+        traces += [CourseDeviation.of(bench.seed, before, after) for before, after in pairs]
         if question.budget and not budget:
             budget = tuple(
                 run_effect(bench, courses, effect, report).line(effect.name) for effect in BUDGET

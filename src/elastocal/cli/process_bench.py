@@ -22,9 +22,9 @@ from elastocal.compensation.process import (
     Corrector,
     Course,
     ModelCorrector,
-    Passage,
+    CourseRun,
     PerfectCorrector,
-    Placement,
+    FibrePlacement,
     Roughing,
     air_shifts,
     compare,
@@ -84,8 +84,8 @@ class Bench:
 class Outcome:
     """Every course without and with correction."""
 
-    before: tuple[Passage, ...]
-    after: tuple[Passage, ...]
+    before: tuple[CourseRun, ...]
+    after: tuple[CourseRun, ...]
 
     def line(self, name: str) -> Comparison:
         """Return the line of the table."""
@@ -135,7 +135,7 @@ def process_courses(kind: str, cell: Cell, seed: int, count: int | None) -> tupl
     """
     rng, surface = np.random.default_rng([seed, 6]), cell_surface(cell)
     if kind == "afp":
-        placement = Placement() if count is None else Placement(courses=count)
+        placement = FibrePlacement() if count is None else FibrePlacement(courses=count)
         return with_postures(cell, placement_courses(surface, placement, rng))
     if kind == "machining":
         roughing = Roughing() if count is None else Roughing(rings=count)
@@ -204,7 +204,7 @@ def _passages(
     """Run every course twice; ``late`` is that of a perfect corrector, None: the model corrects."""
     jobs = min(bench.jobs or os.cpu_count() or 1, len(courses))
     zeroed_at = courses[0].q[0]
-    pairs: dict[int, tuple[Passage, Passage]] = {}
+    pairs: dict[int, tuple[CourseRun, CourseRun]] = {}
     # The longest first, or the last one would be run while the other processes wait.
     order = sorted(range(len(courses)), key=lambda number: -len(courses[number].q))
     report(stage, 0, len(courses))
@@ -220,7 +220,7 @@ def _passages(
 
 def _twice(
     bench: Bench, course: Course, zeroed_at: FloatArray, late: int | None
-) -> tuple[Passage, Passage]:
+) -> tuple[CourseRun, CourseRun]:
     """Return a course without and with correction; courses know nothing of one another."""
     truth, robot = ProcessCell(bench.cell, bench.seed), bench.cell.robot
     corrects = _corrector(bench, truth, zeroed_at) if late is None else PerfectCorrector(late)

@@ -45,11 +45,11 @@ def simulate_process(  # noqa: PLR0913 (a command has as many options as it has)
     from elastocal.cli.process_table import show
     from elastocal.cli.progress import progress_bars
     from elastocal.compensation.process import (
-        PROGRAMME,
+        PROGRAMMED_PATH,
         TABLE,
         process_figures,
         write_process,
-        write_programme,
+        write_programmed_path,
     )
     from elastocal.dataset import joint_dimensions
     from elastocal.files import filling
@@ -59,7 +59,7 @@ def simulate_process(  # noqa: PLR0913 (a command has as many options as it has)
     with filling(out, TABLE, force) as folder, progress_bars(console()) as report:
         found = answer(Question(made, process, runs, settings, courses, budget, jobs), report)
         units = joint_dimensions(made.robot.joint_names, made.robot.revolute)
-        write_programme(folder / PROGRAMME, found.programme, units)
+        write_programmed_path(folder / PROGRAMMED_PATH, found.programme, units)
         write_process(folder, found.record)
     table = found.record.table
     if as_json:

@@ -39,7 +39,7 @@ from elastocal.cell.description import (
     PositiveLength,
     PositiveMoment,
 )
-from elastocal.compensation.filters import FilterChain, low_pass, notch
+from elastocal.compensation.conditioning.filters import FilterChain, low_pass, notch
 from elastocal.errors import CompensationError
 from elastocal.robot import T_from_xyzabc
 from elastocal.schema import StrictModel, read_yaml

@@ -7,7 +7,7 @@ from elastocal.compensation.process import (
     ProcessRecord,
     Source,
     Table,
-    Trace,
+    CourseDeviation,
     compare,
     lines_of,
     pooled,
@@ -18,11 +18,11 @@ from elastocal.compensation.process import (
 from elastocal.errors import CompensationError, FileAccessError, SchemaError
 
 
-def trace(seed: int, course: str, cycles: int) -> Trace:
+def trace(seed: int, course: str, cycles: int) -> CourseDeviation:
     rng = np.random.default_rng([seed, cycles])
     time = 0.0025 * np.arange(1.0, cycles + 1.0)
     before, after = 1e-3 * rng.standard_normal((2, cycles))
-    return Trace(seed, course, time, rng.standard_normal((cycles, 3)), before, 0.1 * after)
+    return CourseDeviation(seed, course, time, rng.standard_normal((cycles, 3)), before, 0.1 * after)
 
 
 @pytest.fixture

@@ -1,7 +1,11 @@
 from .mistakes import refuse_mistakes as refuse_mistakes
-from .posture_table import read_postures as read_postures
-from .postures import StaticPostures as StaticPostures, static_postures as static_postures
-from .tool_file import (
+from .postures import (
+    StaticPostures as StaticPostures,
+    read_postures as read_postures,
+    static_postures as static_postures,
+)
+from .tool import (
+    SensorLoad as SensorLoad,
     SensorMount as SensorMount,
     ToolRecord as ToolRecord,
     read_tool as read_tool,
@@ -9,6 +13,4 @@ from .tool_file import (
     tool_record as tool_record,
     write_tool as write_tool,
 )
-from .tool_fit import fit_tool as fit_tool
-from .tool_load import SensorLoad as SensorLoad
-from .tool_model import NAMES as NAMES
+from .tool_fit import NAMES as NAMES, fit_tool as fit_tool

@@ -4,23 +4,25 @@ from .correctors import (
     PerfectCorrector as PerfectCorrector,
 )
 from .course import Course as Course
-from .deviations import DEVIATIONS as DEVIATIONS
 from .folder import (
+    DEVIATIONS as DEVIATIONS,
+    PROGRAMMED_PATH as PROGRAMMED_PATH,
     TABLE as TABLE,
     process_figures as process_figures,
     read_process as read_process,
     read_table as read_table,
     write_process as write_process,
+    write_programmed_path as write_programmed_path,
 )
 from .loop import (
     Controller as Controller,
-    Passage as Passage,
+    CourseRun as CourseRun,
+    CourseDeviation as CourseDeviation,
     air_shifts as air_shifts,
     run_course as run_course,
 )
 from .placement import Placement as Placement, placement_courses as placement_courses
 from .posture import with_postures as with_postures
-from .programme import PROGRAMME as PROGRAMME, write_programme as write_programme
 from .record import (
     Line as Line,
     ProcessRecord as ProcessRecord,
@@ -31,4 +33,3 @@ from .record import (
 )
 from .roughing import SPINDLE as SPINDLE, Roughing as Roughing, roughing_rings as roughing_rings
 from .table import Comparison as Comparison, compare as compare, pooled as pooled
-from .trace import Trace as Trace

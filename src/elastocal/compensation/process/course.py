@@ -3,6 +3,7 @@
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+from numpy.random import Generator
 
 from elastocal.arrays import FloatArray
 
@@ -44,7 +45,7 @@ class Course:
         return replace(self, T_base_tcp=cut[0], force=cut[1], direction=cut[2], q=cut[3])
 
 
-def along(points: FloatArray, speed: float, step: float) -> FloatArray:
+def evenly_spaced(points: FloatArray, speed: float, step: float) -> FloatArray:
     """Return points of a polyline passed at an even speed, shape (row, column).
 
     Parameters
@@ -61,14 +62,14 @@ def along(points: FloatArray, speed: float, step: float) -> FloatArray:
     return np.stack([np.interp(wanted, way, column) for column in points.T], axis=1)
 
 
-def travel(points: FloatArray) -> FloatArray:
+def unit_tangents(points: FloatArray) -> FloatArray:
     """Return unit vectors along a path, shape (row, 3)."""
     slope = np.gradient(points, axis=0)
     result: FloatArray = slope / np.linalg.norm(slope, axis=1, keepdims=True)
     return result
 
 
-def frames(position: FloatArray, x: FloatArray, z: FloatArray) -> FloatArray:
+def tool_frames(position: FloatArray, x: FloatArray, z: FloatArray) -> FloatArray:
     """Return T_base_tcp, z as given and x as near to ``x`` as that allows, shape (row, 4, 4)."""
     y = np.cross(z, x)
     y /= np.linalg.norm(y, axis=1, keepdims=True)
@@ -76,3 +77,32 @@ def frames(position: FloatArray, x: FloatArray, z: FloatArray) -> FloatArray:
     T[:, :3, 0], T[:, :3, 1], T[:, :3, 2] = np.cross(y, z), y, z
     T[:, :3, 3], T[:, 3, 3] = position, 1.0
     return T
+
+
+PERIODS = (1.0, 2.3, 5.1)
+"""Of three sines, in s; no two of them keep step."""
+
+
+def swing(time: FloatArray, rng: Generator) -> FloatArray:
+    """Return a slow swing between -1 and 1, shape (row,): three sines of random phase."""
+    phase = rng.uniform(0.0, 2.0 * np.pi, len(PERIODS))
+    sines = [
+        np.sin(2.0 * np.pi * time / period + p) for period, p in zip(PERIODS, phase, strict=True)
+    ]
+    mean: FloatArray = np.mean(sines, axis=0)
+    return mean
+
+
+def engaged(time: FloatArray, rise: float) -> FloatArray:
+    """Return how much of the force acts, from 0 over 1 to 0, shape (row,).
+
+    Parameters
+    ----------
+    time : ndarray, shape (row,)
+        In s.
+    rise : float
+        Time from none to all of it, and back at the end, in s; a half cosine.
+    """
+    inward = np.minimum(time - time[0], time[-1] - time) / rise
+    share: FloatArray = 0.5 - 0.5 * np.cos(np.pi * np.clip(inward, 0.0, 1.0))
+    return share

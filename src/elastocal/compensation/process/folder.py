@@ -11,16 +11,94 @@
 
 import csv
 import io
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from itertools import groupby
 from pathlib import Path
 from typing import Any
 
-from elastocal.compensation.process.deviations import DEVIATIONS, read_traces, write_traces
+import numpy as np
+
+from elastocal.arrays import FloatArray
+from elastocal.compensation.process.course import Course
+from elastocal.compensation.process.loop import CourseDeviation
 from elastocal.compensation.process.record import SCHEMA, Line, ProcessRecord, Table, Values
 from elastocal.compensation.process.table import Figures, compare
 from elastocal.errors import CompensationError
-from elastocal.files import write_json, write_text
+from elastocal.files import read_text, write_json, write_text
 from elastocal.schema import read_json
+
+DEVIATIONS = "deviations.csv"
+HEADER = ("seed", "course", "time[s]", "x[mm]", "y[mm]", "z[mm]", "before[mm]", "after[mm]")
+"""Place: the programmed tool centre point in base."""
+
+
+def _write_deviations(path: Path, traces: Sequence[CourseDeviation]) -> None:
+    """Write courses cycle by cycle, atomically.
+
+    Raises
+    ------
+    FileAccessError
+        If the file cannot be written.
+    """
+    text = io.StringIO()
+    table = csv.writer(text, lineterminator="\n")
+    table.writerow(HEADER)
+    for trace in traces:
+        lengths = np.column_stack([trace.position, trace.before, trace.after])
+        for time, row in zip(trace.time.tolist(), (1e3 * lengths).tolist(), strict=True):
+            numbers = [f"{value:.6f}" for value in row]
+            table.writerow([trace.seed, trace.course, f"{time:.6f}", *numbers])
+    write_text(path, text.getvalue())
+
+
+def _read_deviations(path: Path) -> tuple[CourseDeviation, ...]:
+    """Return the courses of a ``deviations.csv``.
+
+    Raises
+    ------
+    CompensationError
+        If header, row or number is not as written, by line.
+    FileAccessError
+        If the file cannot be read.
+    """
+    header, *rows = csv.reader(io.StringIO(read_text(path)))
+    if tuple(header) != HEADER:
+        raise CompensationError(
+            f"{path}: header {','.join(header)!r} is not that of deviations, {','.join(HEADER)!r}"
+        )
+    if not rows:
+        raise CompensationError(f"{path} has no rows")
+    short = [n for n, row in enumerate(rows, start=2) if len(row) != len(HEADER)]
+    if short:
+        raise CompensationError(
+            f"{path}: line {short[0]} has {len(rows[short[0] - 2])} fields, not {len(HEADER)}"
+        )
+    numbers = np.array([_numbers(path, n, row) for n, row in enumerate(rows, start=2)])
+    courses = groupby(range(len(rows)), key=lambda n: (numbers[n, 0], rows[n][1]))
+    return tuple(
+        _trace(int(seed), name, numbers[list(lines), 1:]) for (seed, name), lines in courses
+    )
+
+
+def _numbers(path: Path, line: int, row: Sequence[str]) -> list[float]:
+    found = []
+    for name, value in zip(HEADER, row, strict=True):
+        if name == "course":
+            continue
+        try:
+            number = int(value) if name == "seed" else float(value)
+        except ValueError:
+            number = np.nan
+        if not np.isfinite(number):
+            raise CompensationError(f"{path}: line {line}: {name} {value!r} is not a number")
+        found.append(number)
+    return found
+
+
+def _trace(seed: int, course: str, numbers: FloatArray) -> CourseDeviation:
+    time, lengths = numbers[:, 0], 1e-3 * numbers[:, 1:]
+    return CourseDeviation(seed, course, time, lengths[:, :3], lengths[:, 3], lengths[:, 4])
+
 
 TABLE = "table.json"
 """Name of the file by which the folder is known."""
@@ -52,7 +130,7 @@ def write_process(folder: Path, record: ProcessRecord) -> None:
     write_text(folder / "table.csv", _lines(record.table.lines))
     if record.table.budget:
         write_text(folder / "budget.csv", _lines(record.table.budget))
-    write_traces(folder / DEVIATIONS, record.traces)
+    _write_deviations(folder / DEVIATIONS, record.traces)
     write_json(folder / TABLE, process_figures(record.table))
 
 
@@ -82,7 +160,7 @@ def read_process(folder: Path) -> ProcessRecord:
         If a file cannot be read.
     """
     folder = Path(folder)
-    record = ProcessRecord(read_table(folder / TABLE), read_traces(folder / DEVIATIONS))
+    record = ProcessRecord(read_table(folder / TABLE), _read_deviations(folder / DEVIATIONS))
     _require_own(folder, record)
     return record
 
@@ -124,3 +202,42 @@ def _lines(lines: Sequence[Line]) -> str:
 
 def _three(values: Values) -> tuple[float, float, float]:
     return values.mean, values.max, values.standard_deviation
+
+
+PROGRAMMED_PATH = "path.csv"
+"""Name of the file in a process's folder."""
+_UNITS = {"angle": "rad", "length": "m"}
+
+
+def write_programmed_path(path: Path, courses: Sequence[Course], joint_units: Mapping[str, str]) -> None:
+    """Write programmed joints and expected forces, a row a cycle, atomically.
+
+    The columns are those that ``elastocal compensate`` and ``elastocal predict`` read; forces are
+    on the robot, in base.
+
+    Parameters
+    ----------
+    path : Path
+        A CSV file.
+    courses : sequence of Course
+        With joints.
+    joint_units : mapping of str to str
+        The robot's joints, from base to tip, with their dimension: ``angle`` or ``length``.
+
+    Raises
+    ------
+    FileAccessError
+        If the file cannot be written.
+    """
+    text = io.StringIO()
+    table = csv.writer(text, lineterminator="\n")
+    names = [f"{name}[{_UNITS[dimension]}]" for name, dimension in joint_units.items()]
+    table.writerow(["course", "time[s]", *names, *(f"force_{axis}[N]" for axis in "xyz")])
+    for course in courses:
+        time = course.step * np.arange(len(course.q))
+        for t, q, force in zip(
+            time.tolist(), course.q.tolist(), course.force.tolist(), strict=True
+        ):
+            row = [f"{value:.9f}" for value in q] + [f"{value:.3f}" for value in force]
+            table.writerow([course.name, f"{t:.3f}", *row])
+    write_text(path, text.getvalue())

@@ -12,8 +12,7 @@ import trimesh
 from numpy.random import Generator
 
 from elastocal.arrays import FloatArray
-from elastocal.compensation.process.course import Course, along, frames, travel
-from elastocal.compensation.process.variation import engaged, swing
+from elastocal.compensation.process.course import Course, evenly_spaced, engaged, tool_frames, swing, unit_tangents
 from elastocal.errors import CompensationError
 from elastocal.planning.surface import Surface
 
@@ -22,7 +21,7 @@ _RAYS = 400
 
 
 @dataclass(frozen=True)
-class Placement:
+class FibrePlacement:
     """How courses are laid."""
 
     courses: int = 5
@@ -53,7 +52,7 @@ def placement_courses(surface: Surface, settings: Placement, rng: Generator) -> 
     ----------
     surface : Surface
         In base.
-    settings : Placement
+    settings : FibrePlacement
         How they are laid.
     rng : Generator
         Seeded source of randomness, for the forces.
@@ -77,17 +76,17 @@ def _course(
     name: str,
     surface: Surface,
     where: tuple[float, float, float, float],
-    settings: Placement,
+    settings: FibrePlacement,
     rng: Generator,
 ) -> Course:
     hits = _within(_hits(surface, where), settings.border)
     if len(hits) < 10:
         raise CompensationError(f"{surface.name} is too small for {name} within its border")
-    rows = along(hits, settings.speed, settings.step)
+    rows = evenly_spaced(hits, settings.speed, settings.step)
     kept, normal = rows[:, :3], rows[:, 3:]
     normal = normal / np.linalg.norm(normal, axis=1, keepdims=True)
-    forward = travel(kept)
-    T = frames(kept, forward, -normal)
+    forward = unit_tangents(kept)
+    T = tool_frames(kept, forward, -normal)
     time = np.arange(float(len(kept))) * settings.step
     share = engaged(time, settings.rise)
     press = settings.compaction * (1.0 + settings.compaction_swing * swing(time, rng))

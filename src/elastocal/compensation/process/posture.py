@@ -6,8 +6,11 @@ import numpy as np
 
 from elastocal.arrays import FloatArray
 from elastocal.cell import Cell
-from elastocal.compensation.offline import follow, jumps
-from elastocal.compensation.path import PathError
+from elastocal.compensation.offline import (
+    PathError,
+    joints_along_path,
+    posture_jumps,
+)
 from elastocal.compensation.process.course import Course
 from elastocal.errors import CompensationError
 from elastocal.robot.inverse import InverseKinematics, inverse_for
@@ -30,7 +33,7 @@ class _Try:
         except PathError:
             return -np.inf
         robot = self.cell.robot
-        if len(jumps(robot, q[1:], q[0])):
+        if len(posture_jumps(robot, q[1:], q[0])):
             return -np.inf
         arm = slice(robot.external_axes, None)
         limits = robot.limits.margin(q) - self.cell.joint_margin
@@ -44,7 +47,9 @@ class _Try:
         turn = np.array([[c, -s, 0, 0], [s, c, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1.0]])
         T = course.T_base_tcp[rows] @ turn
         external = np.repeat(stand[None], len(T), axis=0)
-        return follow(self.solver, T, external, self.cell.home, lambda row: f"row {row + 1}")
+        return joints_along_path(
+            self.solver, T, external, self.cell.home, lambda row: f"row {row + 1}"
+        )
 
 
 def with_postures(cell: Cell, courses: tuple[Course, ...]) -> tuple[Course, ...]:

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from elastocal.compensation.process.loop import CourseDeviation
 from elastocal.compensation.process.table import Comparison, Figures
-from elastocal.compensation.process.trace import Trace
 from elastocal.schema import StrictModel
 
 SCHEMA = "elastocal.process/1"
@@ -84,7 +84,7 @@ class ProcessRecord:
     """A simulated process, as its folder keeps it."""
 
     table: Table
-    traces: tuple[Trace, ...]
+    traces: tuple[CourseDeviation, ...]
     """Every course of every seed."""
 
 

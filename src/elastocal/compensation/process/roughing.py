@@ -11,8 +11,15 @@ import numpy as np
 from numpy.random import Generator
 
 from elastocal.arrays import FloatArray
-from elastocal.compensation.process.course import Course, Ripple, along, frames, travel
-from elastocal.compensation.process.variation import engaged, swing
+from elastocal.compensation.process.course import (
+    Course,
+    Ripple,
+    along,
+    engaged,
+    frames,
+    swing,
+    travel,
+)
 from elastocal.planning.surface import Surface
 
 SPINDLE = 12_000.0 / 60.0
@@ -88,10 +95,10 @@ def _ring(
     flat = np.stack([np.cos(angle), np.sin(angle), np.zeros(len(angle))], axis=1)
     depth = np.sqrt(sphere**2 - radius**2) - sphere
     own = apex + radius * flat + (0.0, 0.0, depth)
-    path = along(own @ R.T + T_base_surface[:3, 3], settings.speed, settings.step)
+    path = evenly_spaced(own @ R.T + T_base_surface[:3, 3], settings.speed, settings.step)
     centre = R @ (apex - (0.0, 0.0, sphere)) + T_base_surface[:3, 3]
     normal = (path - centre) / sphere
-    forward = travel(path)
+    forward = unit_tangents(path)
     across = np.cross(normal, forward)
     time = np.arange(float(len(path))) * settings.step
     cut = rng.uniform(*settings.engagement) * (1.0 + settings.swing * swing(time, rng))
@@ -100,5 +107,5 @@ def _ring(
         settings.normal * normal - settings.tangential * forward + settings.across * across
     )
     still = np.ones((len(path), 1))
-    T = frames(path, still * R[:, 0], -still * R[:, 2])
+    T = tool_frames(path, still * R[:, 0], -still * R[:, 2])
     return Course(name, settings.step, T, force, normal, settings.ripple)

@@ -6,7 +6,7 @@ from functools import partial
 
 import numpy as np
 
-from elastocal.compensation.process import Line, ProcessRecord, Trace, Values
+from elastocal.compensation.process import Line, ProcessRecord, CourseDeviation, Values
 from elastocal.report.document.figures import course_figure, process_maps
 from elastocal.report.document.markup import flattened, folded, paragraph, table
 from elastocal.report.document.parts import Parts
@@ -107,7 +107,7 @@ def _lines(title: str, lines: tuple[Line, ...]) -> str:
     return table(f"{title}, before to after in mm (reduction)", _HEADS, rows)
 
 
-def _pictures(traces: list[Trace], tolerance: float | None) -> str:
+def _pictures(traces: list[CourseDeviation], tolerance: float | None) -> str:
     worst = max(traces, key=lambda trace: float(np.abs(trace.before).max()))
     before, after = (
         np.concatenate([getattr(t, key) for t in traces]) for key in ("before", "after")
