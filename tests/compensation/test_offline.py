@@ -270,7 +270,7 @@ class TestPathFile:
     def test_pieces_of_any_size_give_the_same_file(self, tmp_path, monkeypatch):
         columns = euler_columns(COURSE) | self.IN_TCP
         self.run(tmp_path, columns, name="whole.csv")
-        monkeypatch.setattr("elastocal.compensation.offline.path_file.PIECE", 7)
+        monkeypatch.setattr("elastocal.compensation.offline.path_file._ROWS_AT_A_TIME", 7)
         tally = self.run(tmp_path, columns, name="pieces.csv")
         whole, parts = (tmp_path / f"out_{name}.csv" for name in ("whole", "pieces"))
         np.testing.assert_allclose(

@@ -47,12 +47,12 @@ def simulate_process(  # noqa: PLR0913 (a command has as many options as it has)
     from elastocal.compensation.process import (
         PROGRAMMED_PATH,
         TABLE,
-        process_figures,
         write_process,
         write_programmed_path,
     )
     from elastocal.dataset import joint_dimensions
     from elastocal.files import filling
+    from elastocal.records import to_data
 
     runs = runs_of(model, tool or [], seed or [0])
     made = load_cell(cell)
@@ -63,7 +63,7 @@ def simulate_process(  # noqa: PLR0913 (a command has as many options as it has)
         write_process(folder, found.record)
     table = found.record.table
     if as_json:
-        print_json(process_figures(table) | {"folder": str(out)})
+        print_json(to_data(table) | {"folder": str(out)})
     else:
         show(console(), table)
         console().print(f"written to {out}")

@@ -1,3 +1,15 @@
+from .filters import (
+    Duration as Duration,
+    FilterChain as FilterChain,
+    FilterSettings as FilterSettings,
+    Frequency as Frequency,
+    LowPass as LowPass,
+    Notch as Notch,
+    Section as Section,
+    Speed as Speed,
+    low_pass as low_pass,
+    notch as notch,
+)
 from .mistakes import refuse_mistakes as refuse_mistakes
 from .postures import (
     StaticPostures as StaticPostures,
@@ -7,10 +19,10 @@ from .postures import (
 from .tool import (
     SensorLoad as SensorLoad,
     SensorMount as SensorMount,
-    ToolRecord as ToolRecord,
+    ToolResult as ToolResult,
     read_tool as read_tool,
     sensor_load as sensor_load,
-    tool_record as tool_record,
+    tool_result as tool_result,
     write_tool as write_tool,
 )
 from .tool_fit import NAMES as NAMES, fit_tool as fit_tool

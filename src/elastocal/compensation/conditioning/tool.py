@@ -1,4 +1,4 @@
-"""Tool file ``*.json``: what hangs on the sensor and how the sensor sits, with intervals."""
+"""The tool on a force sensor: what a raw wrench is corrected by, and its file ``*.json``."""
 
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -8,10 +8,9 @@ import numpy as np
 from elastocal.arrays import FloatArray
 from elastocal.compensation.conditioning.tool_fit import NAMES, ToolFit
 from elastocal.errors import CompensationError, nearest
-from elastocal.files import write_json
+from elastocal.records import read_json, record, write_json
 from elastocal.robot import GRAVITY, Robot, parse_urdf
 from elastocal.robot.inverse import inverse_transform
-from elastocal.schema import StrictModel, read_json
 
 _RIGID = 1e-6
 """How far R R^T may be from identity."""
@@ -95,26 +94,25 @@ class SensorLoad:
         return f, m + np.cross(p, f)
 
 
-SCHEMA = "elastocal.tool/1"
-
-Triple = tuple[float, float, float]
+_Triple = tuple[float, float, float]
 
 
-class ToolRecord(StrictModel):
-    """A tool file without its schema key; SI units."""
+@record("elastocal.tool/1")
+class ToolResult:
+    """Tool and sensor from static postures: the contents of a tool file; SI units."""
 
     flange: str
     """Link of the robot that the sensor is bolted to."""
     mass: float
-    centre: Triple
+    centre: _Triple
     """In the sensor's frame."""
-    force_bias: Triple
-    moment_bias: Triple
-    R_flange_sensor: tuple[Triple, Triple, Triple]
+    force_bias: _Triple
+    moment_bias: _Triple
+    R_flange_sensor: tuple[_Triple, _Triple, _Triple]
     """By rows."""
-    sensor_origin: Triple
+    sensor_origin: _Triple
     """In the flange frame; not identified, static postures do not see it."""
-    gravity: Triple
+    gravity: _Triple
     """In base."""
     half_width: dict[str, float | None]
     """Half the 95 % interval of each unknown; null where not determined."""
@@ -127,7 +125,7 @@ class ToolRecord(StrictModel):
 
 @dataclass(frozen=True, eq=False)
 class SensorMount:
-    """Where a sensor sits, beside what its postures say."""
+    """Where a sensor sits; static postures do not see it."""
 
     flange: str
     """Link that it is bolted to."""
@@ -137,8 +135,8 @@ class SensorMount:
     """In base, shape (3,), in m/s²."""
 
 
-def tool_record(fit: ToolFit, mount: SensorMount, source: str) -> ToolRecord:
-    """Return a fit as a record.
+def tool_result(fit: ToolFit, mount: SensorMount, source: str) -> ToolResult:
+    """Return a fit, and where the sensor sits, as the file keeps them.
 
     Parameters
     ----------
@@ -150,12 +148,12 @@ def tool_record(fit: ToolFit, mount: SensorMount, source: str) -> ToolRecord:
         Where the postures come from.
     """
 
-    def triple(numbers: FloatArray) -> Triple:
+    def triple(numbers: FloatArray) -> _Triple:
         x, y, z = (float(number) for number in numbers)
         return x, y, z
 
     x, y, z = (triple(row) for row in fit.R_flange_sensor)
-    return ToolRecord(
+    return ToolResult(
         flange=mount.flange,
         # Without a tool it comes out a rounding error below nothing; more is refused as a mistake.
         mass=max(fit.mass, 0.0),
@@ -174,13 +172,12 @@ def tool_record(fit: ToolFit, mount: SensorMount, source: str) -> ToolRecord:
     )
 
 
-def write_tool(path: Path, record: ToolRecord) -> None:
+def write_tool(path: Path, result: ToolResult) -> None:
     """Write a tool file atomically."""
-    data = record.stated(SCHEMA)
-    write_json(path, data)
+    write_json(path, result)
 
 
-def read_tool(path: Path) -> ToolRecord:
+def read_tool(path: Path) -> ToolResult:
     """Return the validated contents of a tool file.
 
     Raises
@@ -190,10 +187,10 @@ def read_tool(path: Path) -> ToolRecord:
     FileAccessError
         If it cannot be read.
     """
-    return read_json(path, ToolRecord, SCHEMA)
+    return read_json(path, ToolResult)
 
 
-def sensor_load(record: ToolRecord, robot: Robot) -> SensorLoad:
+def sensor_load(tool: ToolResult, robot: Robot) -> SensorLoad:
     """Return the tool of a file at a robot's tool centre point.
 
     Raises
@@ -202,30 +199,30 @@ def sensor_load(record: ToolRecord, robot: Robot) -> SensorLoad:
         If an unknown that a wrench is corrected by is not determined, or the robot has no such
         link.
     """
-    open_ones = [name for name in NAMES if name in record.undetermined]
+    open_ones = [name for name in NAMES if name in tool.undetermined]
     if open_ones:
         raise CompensationError(
             f"the tool file leaves {', '.join(open_ones)} undetermined: take more postures that"
             " turn the sensor about two axes, and run `elastocal tool` again"
         )
     links = [str(link.get("name")) for link in parse_urdf(robot.urdf).findall("link")]
-    if record.flange not in links:
+    if tool.flange not in links:
         raise CompensationError(
-            f"the tool file's sensor sits on link {record.flange!r}, which {robot.name} does not"
-            f" have{nearest(record.flange, links)} (links: {', '.join(links)})"
+            f"the tool file's sensor sits on link {tool.flange!r}, which {robot.name} does not"
+            f" have{nearest(tool.flange, links)} (links: {', '.join(links)})"
         )
     home = np.zeros(len(robot.joint_names))
     T_flange_sensor = np.eye(4)
-    T_flange_sensor[:3, :3] = record.R_flange_sensor
-    T_flange_sensor[:3, 3] = record.sensor_origin
-    T_base_sensor = _flange(robot, record.flange).forward(home) @ T_flange_sensor
+    T_flange_sensor[:3, :3] = tool.R_flange_sensor
+    T_flange_sensor[:3, 3] = tool.sensor_origin
+    T_base_sensor = _flange(robot, tool.flange).forward(home) @ T_flange_sensor
     return SensorLoad(
-        mass=record.mass,
-        centre=np.array(record.centre),
-        force_bias=np.array(record.force_bias),
-        moment_bias=np.array(record.moment_bias),
+        mass=tool.mass,
+        centre=np.array(tool.centre),
+        force_bias=np.array(tool.force_bias),
+        moment_bias=np.array(tool.moment_bias),
         T_tcp_sensor=inverse_transform(robot.forward(home)) @ T_base_sensor,
-        gravity=np.array(record.gravity),
+        gravity=np.array(tool.gravity),
     )
 
 

@@ -91,7 +91,7 @@ class Controller:
 
 @dataclass(frozen=True, eq=False)
 class CourseRun:
-    """What a course has come to."""
+    """A course that was run: where the tool was at every cycle."""
 
     course: Course
     time: FloatArray
@@ -181,7 +181,7 @@ def run_course(
                 drives.command(corrector.correct(*raw.of(n, q), deflection))
             shifts.append(deflection + drives.done)
         before = now
-    return _passage(course, controller, cycles, np.array(shifts))
+    return _course_run(course, controller, cycles, np.array(shifts))
 
 
 @dataclass(frozen=True, eq=False)
@@ -236,7 +236,9 @@ def _readings(
     return _Raw(time, cell.read(time, true), controller.readings)
 
 
-def _passage(course: Course, controller: Controller, cycles: int, shift: FloatArray) -> CourseRun:
+def _course_run(
+    course: Course, controller: Controller, cycles: int, shift: FloatArray
+) -> CourseRun:
     at = np.arange(1, len(shift) + 1) / cycles
     rows = np.arange(len(course.q))
 
@@ -265,6 +267,6 @@ class CourseDeviation:
 
     @classmethod
     def of(cls, seed: int, before: CourseRun, after: CourseRun) -> "CourseDeviation":
-        """Return the trace of a course that was run twice."""
+        """Return the deviations of a course that was run twice."""
         name = before.course.name
         return cls(seed, name, before.time, before.position, before.deviation, after.deviation)

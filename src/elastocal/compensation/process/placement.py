@@ -12,7 +12,16 @@ import trimesh
 from numpy.random import Generator
 
 from elastocal.arrays import FloatArray
-from elastocal.compensation.process.course import Course, evenly_spaced, engaged, tool_frames, swing, unit_tangents
+from elastocal.compensation.process.course import (
+    Course,
+    Process,
+    arc_length,
+    engaged,
+    evenly_spaced,
+    swing,
+    tool_frames,
+    unit_tangents,
+)
 from elastocal.errors import CompensationError
 from elastocal.planning.surface import Surface
 
@@ -21,10 +30,9 @@ _RAYS = 400
 
 
 @dataclass(frozen=True)
-class FibrePlacement:
-    """How courses are laid."""
+class FibrePlacement(Process):
+    """Courses across a surface, along y of its frame; deviations count aside."""
 
-    courses: int = 5
     border: float = 0.08
     """Distance of the courses from the border of the mesh, in m."""
     speed: float = 0.1
@@ -44,32 +52,16 @@ class FibrePlacement:
     rise: float = 0.5
     """Time in which the roller comes down, in s."""
 
-
-def placement_courses(surface: Surface, settings: Placement, rng: Generator) -> tuple[Course, ...]:
-    """Return courses across the surface, along y of its frame; deviations count aside.
-
-    Parameters
-    ----------
-    surface : Surface
-        In base.
-    settings : FibrePlacement
-        How they are laid.
-    rng : Generator
-        Seeded source of randomness, for the forces.
-
-    Raises
-    ------
-    CompensationError
-        If the surface is too small for a course.
-    """
-    T = surface.T_base_surface
-    own = (surface.mesh.vertices - T[:3, 3]) @ T[:3, :3]
-    low, high = own.min(axis=0), own.max(axis=0)
-    inside = np.linspace(low[0] + settings.border, high[0] - settings.border, settings.courses)
-    return tuple(
-        _course(f"course {n + 1}", surface, (x, low[1], high[1], high[2]), settings, rng)
-        for n, x in enumerate(inside)
-    )
+    def courses(self, surface: Surface, rng: Generator) -> tuple[Course, ...]:
+        """Return courses across the surface; see `Process.courses`."""
+        T = surface.T_base_surface
+        own = (surface.mesh.vertices - T[:3, 3]) @ T[:3, :3]
+        low, high = own.min(axis=0), own.max(axis=0)
+        inside = np.linspace(low[0] + self.border, high[0] - self.border, self.count)
+        return tuple(
+            _course(f"course {n + 1}", surface, (x, low[1], high[1], high[2]), self, rng)
+            for n, x in enumerate(inside)
+        )
 
 
 def _course(
@@ -121,7 +113,6 @@ def _within(rows: FloatArray, border: float) -> FloatArray:
     """Return the rows that are so far from both ends, in m; none when there are none."""
     if len(rows) < 2:
         return rows[:0]
-    steps = np.linalg.norm(np.diff(rows[:, :3], axis=0), axis=1)
-    way = np.concatenate([[0.0], np.cumsum(steps)])
-    kept: FloatArray = rows[(way > border) & (way < way[-1] - border)]
+    length = arc_length(rows[:, :3])
+    kept: FloatArray = rows[(length > border) & (length < length[-1] - border)]
     return kept

@@ -5,7 +5,7 @@ from typing import Annotated, Self
 
 from pydantic import Field, FiniteFloat, model_validator
 
-from elastocal.schema import StrictModel
+from elastocal.records import StrictModel
 
 LINKS = ("base_link", "link_1", "link_2", "link_3", "link_4", "link_5", "link_6")
 """Links of a catalogue robot that have a mass, from the base on."""

@@ -8,9 +8,9 @@ from typing import Any
 import yaml
 
 from elastocal.errors import RobotError, SchemaError, nearest
+from elastocal.records import check_schema, validate
 from elastocal.robot.catalogue.likeness import inertias_like
 from elastocal.robot.catalogue.record import CatalogueEntry, Dimensions
-from elastocal.schema import check_schema, validate
 
 FILE = "kuka.yaml"
 SCHEMA = "elastocal.catalogue/1"

@@ -4,7 +4,7 @@ from typing import Literal
 import pytest
 
 from elastocal.errors import FileAccessError, SchemaError
-from elastocal.schema import StrictModel, check_schema, read_json, read_yaml, validate
+from elastocal.records import StrictModel, check_schema, read_json, read_yaml, validate
 
 
 class Station(StrictModel):
