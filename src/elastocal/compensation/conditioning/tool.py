@@ -9,8 +9,7 @@ from elastocal.arrays import FloatArray
 from elastocal.compensation.conditioning.tool_fit import NAMES, ToolFit
 from elastocal.errors import CompensationError, nearest
 from elastocal.records import read_json, record, write_json
-from elastocal.robot import GRAVITY, Robot, parse_urdf
-from elastocal.robot.inverse import inverse_transform
+from elastocal.robot import GRAVITY, Robot, inverse_transform, parse_urdf
 
 _RIGID = 1e-6
 """How far R R^T may be from identity."""

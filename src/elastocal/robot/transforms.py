@@ -1,6 +1,7 @@
-"""KUKA's way to write a pose: x, y, z and the Z-Y'-X'' Euler angles A, B, C.
+"""Rigid transforms: their inverse, and KUKA's way to write them.
 
-``R = Rz(A) Ry(B) Rx(C)``, which is also what URDF calls roll, pitch, yaw = C, B, A.
+A KUKA pose is x, y, z and the Z-Y'-X'' Euler angles A, B, C with ``R = Rz(A) Ry(B) Rx(C)``, which
+is also what URDF calls roll, pitch, yaw = C, B, A.
 """
 
 import numpy as np
@@ -10,6 +11,15 @@ from elastocal.arrays import FloatArray
 
 _GIMBAL = 1e-12
 """cos(B) below which A and C turn about the same axis."""
+
+
+def inverse_transform(T: FloatArray) -> FloatArray:
+    """Return the inverse of rigid transforms, shape (..., 4, 4)."""
+    inverse = np.zeros_like(T)
+    inverse[..., :3, :3] = np.swapaxes(T[..., :3, :3], -1, -2)
+    inverse[..., :3, 3] = -np.einsum("...ji,...j->...i", T[..., :3, :3], T[..., :3, 3])
+    inverse[..., 3, 3] = 1.0
+    return inverse
 
 
 def T_from_xyzabc(
