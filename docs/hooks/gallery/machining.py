@@ -5,8 +5,10 @@ from functools import partial
 from pathlib import Path
 
 from elastocal.compensation.process import CourseDeviation, Roughing
-from elastocal.report.document.figures import process_maps
-from elastocal.report.printed import write_figure
+from elastocal.report.plots import (
+    process_maps,
+    write_figure,
+)
 from gallery.campaign import SEED, accuracy, campaign, example_cell, process, reduction
 from gallery.placement import draw_displacements
 

@@ -12,12 +12,15 @@ from elastocal.compensation.process import (
     DeviationStatistics,
     SimulatedProcess,
 )
-from elastocal.report.document.figures import course_figure, process_maps
 from elastocal.report.document.markup import flattened, folded, paragraph, table
 from elastocal.report.document.parts import Parts
 from elastocal.report.document.pictures import picture
 from elastocal.report.document.section import Content, Finding, Section
-from elastocal.report.document.words import counted, mm
+from elastocal.report.plots import (
+    course_figure,
+    process_maps,
+)
+from elastocal.wording import counted, mm
 
 
 @dataclass(frozen=True)
