@@ -8,7 +8,7 @@ import plotly.graph_objects as go
 
 from elastocal.arrays import FloatArray, IndexArray
 from elastocal.cell import Cell
-from elastocal.planning import PlanFile
+from elastocal.planning import PlanResult
 from elastocal.planning.surface import Surface
 from elastocal.report import style
 from elastocal.report.camera import light
@@ -63,7 +63,7 @@ class MovingParts:
         return go.Frame(name=str(number), data=data, traces=list(range(len(data))))
 
 
-def moving_parts(cell: Cell, surface: Surface, plan: PlanFile) -> MovingParts:
+def moving_parts(cell: Cell, surface: Surface, plan: PlanResult) -> MovingParts:
     """Return the robot at HOME and in contact at every pose of a plan."""
     q = np.array([plan.robot.home, *(pose.joints for pose in plan.poses)])
     whole = robot_solids(cell, surface)

@@ -7,7 +7,7 @@ import numpy as np
 import plotly.graph_objects as go
 
 from elastocal.cell import Cell
-from elastocal.planning import PlanFile, PoolData
+from elastocal.planning import PlanResult, PoolData
 from elastocal.planning.surface import Surface
 from elastocal.report import style
 from elastocal.report.camera import Bounds, bounds_of, cameras_of
@@ -27,7 +27,7 @@ class View:
     """Plotly cameras by name; the first is the initial one."""
 
 
-def plan_view(cell: Cell, surface: Surface, plan: PlanFile, pool: PoolData) -> View:
+def plan_view(cell: Cell, surface: Surface, plan: PlanResult, pool: PoolData) -> View:
     """Return the interactive view of a plan.
 
     Parameters

@@ -1,29 +1,30 @@
 """The comments at the head of the program: what a person has to check before it may run."""
 
 import textwrap
+import unicodedata
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Sequence
 
 import numpy as np
 
 from elastocal.arrays import FloatArray
-from elastocal.planning.export.krl.names import comment_text
-from elastocal.planning.export.krl.speeds import speeds_of
-from elastocal.planning.plan_file import PlanFile
+from elastocal.planning.export._krl_motion import speeds_of
+from elastocal.planning.plan_result import PlanResult
 from elastocal.robot import Robot, T_from_xyzabc, parse_urdf, xyzabc_from_T
 from elastocal.robot.inverse import arm_base
 
 TOOL = BASE = 1
 """Numbers of TOOL_DATA and BASE_DATA that the program uses."""
 _WIDTH = 96
+_LONGEST_TEXT = 80
 
 
-def head_notes(plan: PlanFile, robot: Robot) -> list[str]:
+def head_notes(plan: PlanResult, robot: Robot) -> list[str]:
     """Return the notes of a program, as comment lines.
 
     Parameters
     ----------
-    plan : PlanFile
+    plan : PlanResult
         The plan.
     robot : Robot
         Its robot.
@@ -47,7 +48,21 @@ def comment(text: str) -> list[str]:
     return [f"; {line}" for line in textwrap.wrap(text, _WIDTH)]
 
 
-def _origin(plan: PlanFile) -> list[str]:
+def comment_text(text: str) -> str:
+    r"""Return a text that may stand in a comment: ASCII, one line, without fold parameters.
+
+    >>> comment_text("Höhe 5 %\nneu")
+    'Hohe 5 ? neu'
+    """
+    plain = unicodedata.normalize("NFKD", text)
+    plain = "".join(sign for sign in plain if not unicodedata.combining(sign))
+    line = " ".join(plain.encode("ascii", "replace").decode("ascii").split())
+    # In the title of a fold a percent sign begins its hidden parameters.
+    line = "".join(sign if sign.isprintable() and sign != "%" else "?" for sign in line)
+    return line[:_LONGEST_TEXT]
+
+
+def _origin(plan: PlanResult) -> list[str]:
     return [
         f"Calibration poses, elastocal {comment_text(plan.elastocal)}.",
         f"Cell: {comment_text(plan.cell.name)}, fingerprint {comment_text(plan.cell.fingerprint)}.",
@@ -74,7 +89,7 @@ def _axis_notes(robot: Robot) -> list[str]:
     ]
 
 
-def _tool_notes(plan: PlanFile, robot: Robot) -> list[str]:
+def _tool_notes(plan: PlanResult, robot: Robot) -> list[str]:
     parent, T = _tool_in_parent(plan, robot)
     return [
         f"TOOL_DATA[{TOOL}] must hold {_frame(T)}: the tcp in link '{comment_text(parent)}'. In"
@@ -84,7 +99,7 @@ def _tool_notes(plan: PlanFile, robot: Robot) -> list[str]:
     ]
 
 
-def _base_notes(plan: PlanFile, robot: Robot) -> list[str]:
+def _base_notes(plan: PlanResult, robot: Robot) -> list[str]:
     base = comment_text(plan.robot.base)
     if not robot.external_axes:
         return [
@@ -103,7 +118,7 @@ def _base_notes(plan: PlanFile, robot: Robot) -> list[str]:
     ]
 
 
-def _contact_notes(plan: PlanFile) -> list[str]:
+def _contact_notes(plan: PlanResult) -> list[str]:
     contact = plan.contact
     return [
         "Each pose: PTP to the approach pose by axis values, which choose the posture; LIN to"
@@ -120,7 +135,7 @@ def _contact_notes(plan: PlanFile) -> list[str]:
     ]
 
 
-def _time_notes(plan: PlanFile) -> list[str]:
+def _time_notes(plan: PlanResult) -> list[str]:
     speeds, contact = speeds_of(plan), plan.contact
     return [
         f"Speeds: PTP at {speeds.ptp_percent} percent, LIN at {1e3 * speeds.lin:.4g} mm/s and, for"
@@ -132,7 +147,7 @@ def _time_notes(plan: PlanFile) -> list[str]:
     ]
 
 
-def _tool_in_parent(plan: PlanFile, robot: Robot) -> tuple[str, FloatArray]:
+def _tool_in_parent(plan: PlanResult, robot: Robot) -> tuple[str, FloatArray]:
     """Return the link that the tcp is fixed to, and the tcp in it."""
     root = parse_urdf(plan.robot.urdf)
     for joint in root.findall("joint"):

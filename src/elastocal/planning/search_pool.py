@@ -7,10 +7,11 @@ from numpy.random import Generator
 
 from elastocal.arrays import FloatArray, IndexArray
 from elastocal.cell import Cell
+from elastocal.elastic import ElasticModel, layout
 from elastocal.errors import PlanningError
-from elastocal.planning.gathering import Gathered
-from elastocal.planning.observation import elastic_model, pose_rows, process_rows
-from elastocal.planning.plan_file import SpreadRecord
+from elastocal.planning.plan_result import SpreadRecord
+from elastocal.planning.pool_sampling import SampledPool
+from elastocal.planning.postures import Postures
 from elastocal.planning.search import (
     Candidates,
     Cover,
@@ -29,31 +30,36 @@ from elastocal.planning.surface import (
     geodesic_distance,
 )
 
+_SPRINGS = "bearing"
+"""Spring layout that poses are judged by: the paper's 18 on a six-axis arm."""
+_CHUNK = 5000
+
 
 @dataclass(frozen=True, eq=False)
-class Searched:
-    """The pool as a search sees it, with what its choices are judged by."""
+class SearchPool:
+    """The pool as a search sees it: observation rows, metric, and the edge of the surface."""
 
     candidates: Candidates
     information: Information
     boundary_distance: FloatArray
-    """Of each candidate, shape (candidate,), in m; infinite on a surface without edge."""
+    """Distance of each candidate from the edge, shape (candidate,), in m; infinite on a surface
+    without edge."""
 
     @staticmethod
-    def of(cell: Cell, surface: Surface, gathered: Gathered) -> "Searched":
+    def of(cell: Cell, surface: Surface, gathered: SampledPool) -> "SearchPool":
         """Return the pool of a cell with its observation rows and its metric."""
         postures = gathered.pool.postures
         points = gathered.points.take(postures.point)
-        model = elastic_model(cell)
+        model = _elastic_model(cell)
         geodesic = cell.file.search.metric == "geodesic"
         candidates = Candidates(
             postures.contact,
-            pose_rows(cell, model, postures),
+            _pose_rows(cell, model, postures),
             geodesic_distance(surface, points) if geodesic else None,
-            process_rows(cell, model),
+            _process_rows(cell, model),
         )
         edge = distance_to_boundary(surface, points)
-        return Searched(candidates, build_information(candidates), edge)
+        return SearchPool(candidates, build_information(candidates), edge)
 
     def spread(self, chosen: IndexArray) -> SpreadRecord:
         """Return how chosen candidates lie in the pool, shape (n,)."""
@@ -107,3 +113,48 @@ class Searched:
             )
         found = wanted.search(self.candidates.take(left), count, rng)
         return replace(found, order=left[found.order])
+
+
+def _elastic_model(cell: Cell) -> ElasticModel:
+    """Return the elastic model whose springs are to be identified."""
+    return ElasticModel(cell.robot, layout(cell.robot, _SPRINGS))
+
+
+def _pose_rows(cell: Cell, model: ElasticModel, postures: Postures) -> FloatArray:
+    """Return the observation rows of all load cases at each posture (paper Eq. 15, 17).
+
+    Parameters
+    ----------
+    cell : Cell
+        For its load cases.
+    model : ElasticModel
+        Of the cell's robot.
+    postures : Postures
+        In contact.
+
+    Returns
+    -------
+    ndarray, shape (pose, row, spring)
+        In m per unit of compliance; a row is an axis of a load case.
+    """
+    force_tcp = cell.file.load_cases.force_tcp
+    rows = np.empty((len(postures), 3 * len(force_tcp), len(model.springs)))
+    for start in range(0, len(postures), _CHUNK):
+        part = slice(start, start + _CHUNK)
+        R_base_tcp = postures.T_base_tcp[part, :3, :3]
+        force = np.einsum("pij,lj->pli", R_base_tcp, force_tcp)
+        blocks = model.observation_blocks(postures.q[part, None], force)
+        rows[part] = blocks.reshape(len(R_base_tcp), -1, len(model.springs))
+    return rows
+
+
+def _process_rows(cell: Cell, model: ElasticModel) -> FloatArray | None:
+    """Return the rows at the production's poses and forces, shape (row, spring).
+
+    In m per unit of compliance; None when the cell names no process.
+    """
+    process = cell.process
+    if process is None:
+        return None
+    blocks = model.observation_blocks(process.joint_position, process.force, process.moment)
+    return blocks.reshape(-1, len(model.springs))

@@ -1,23 +1,108 @@
-"""Farthest candidates of large pools: only cells that a new centre can improve are visited.
+"""Distance of every candidate from the nearest chosen one, kept up to date pick by pick.
 
-The bounding cube is halved along x, y, z in turn, as in a k-d tree with middle splits; the
-candidates in the order of its leaves (Morton's Z-order) are cut into cells of equal size, so
-that every step is a whole-array operation. A cell whose box is no nearer to the new centre than
-its own worst-covered candidate is to the old ones cannot change.
+Each field does the same two things. `PlainField` and `CellField` give the same picks bit for bit,
+because both compute ``dx dx + dy dy + dz dz`` in this order.
 """
+
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
 from elastocal.arrays import FloatArray, IndexArray
-from elastocal.planning.search.fields import CHOSEN, Farthest
+from elastocal.errors import PlanningError
+from elastocal.planning.search.protocol import Candidates, Metric
 
+CHOSEN = -1.0
+"""Stands for the distance of a chosen candidate, so that one at the same place comes first."""
 _CELL = 256
 """Candidates in a cell: smaller cells visit fewer candidates but cost more boxes a pick. Of 64,
 128, 256 and 512 the fastest for 10^6 -> 500 (docs/decisions/0010-pose-search.md)."""
 
 
+class Farthest(NamedTuple):
+    """The worst-covered candidate."""
+
+    pose: int
+    """Its number; the lowest where several are equally far."""
+    distance: float
+    """From the nearest chosen candidate, in m; 0 when all are chosen."""
+
+
+class DistanceField(Protocol):
+    """Distances of all candidates from the chosen ones."""
+
+    def add(self, index: int) -> None:
+        """Choose a candidate."""
+
+    def farthest(self) -> Farthest:
+        """Return the candidate that is farthest from the chosen ones, at least one of which is."""
+
+
+class PlainField:
+    """Euclidean distances, every candidate visited at every pick."""
+
+    def __init__(self, contact: FloatArray) -> None:
+        self._axes = [np.ascontiguousarray(axis) for axis in contact.T]
+        self._squared = np.full(len(contact), np.inf)
+        self._work = np.empty((2, len(contact)))
+
+    def add(self, index: int) -> None:
+        """Choose a candidate."""
+        total, term = self._work
+        for number, axis in enumerate(self._axes):
+            into = term if number else total
+            np.subtract(axis, axis[index], out=into)
+            np.multiply(into, into, out=into)
+            if number:
+                np.add(total, term, out=total)
+        np.minimum(self._squared, total, out=self._squared)
+        self._squared[index] = CHOSEN
+
+    def farthest(self) -> Farthest:
+        """Return the candidate that is farthest from the chosen ones."""
+        index = int(self._squared.argmax())
+        return Farthest(index, float(np.sqrt(max(self._squared[index], 0.0))))
+
+
+class MetricField:
+    """Distances by a metric of the pool's own."""
+
+    def __init__(self, metric: Metric, candidates: Candidates) -> None:
+        self._metric = metric
+        self._distance = np.full(len(candidates), np.inf)
+
+    def add(self, index: int) -> None:
+        """Choose a candidate.
+
+        Raises
+        ------
+        PlanningError
+            If the metric does not give one distance, 0 or more, for each candidate.
+        """
+        distance = np.asarray(self._metric.from_point(index), dtype=float)
+        expected = self._distance.shape
+        if distance.shape != expected or not np.all(distance >= 0.0):
+            raise PlanningError(
+                f"the metric's distances from candidate {index}: must be {expected[0]} numbers"
+                f" not below 0, got shape {distance.shape}, least {distance.min(initial=np.inf)}"
+            )
+        np.minimum(self._distance, distance, out=self._distance)
+        self._distance[index] = CHOSEN
+
+    def farthest(self) -> Farthest:
+        """Return the candidate that is farthest from the chosen ones."""
+        index = int(self._distance.argmax())
+        return Farthest(index, max(float(self._distance[index]), 0.0))
+
+
 class CellField:
     """Euclidean distances in cells; picks equal those of `PlainField` bit for bit.
+
+    The bounding cube is halved along x, y, z in turn, as in a k-d tree with middle splits; the
+    candidates in the order of its leaves (Morton's Z-order) are cut into cells of equal size, so
+    that every step is a whole-array operation. Only cells that a new centre can improve are
+    visited: one whose box is no nearer to the centre than its own worst-covered candidate is to
+    the old ones cannot change.
 
     Subtraction, squaring and addition round monotonically, so the distance to a box, computed
     in the same order of operations, is never above the computed distance of a candidate in it.

@@ -2,7 +2,7 @@
 
 import pytest
 
-from elastocal.planning.export.krl.notes import head_notes
+from elastocal.planning.export._krl_notes import head_notes
 from support import plans, urdfs
 
 

@@ -1,14 +1,44 @@
-"""Choices of 1, 2, … n poses from one pool, as a technique makes them."""
+"""Search techniques by name, and choices of 1, 2, … n poses as a technique makes them."""
 
 from collections.abc import Callable
+from functools import partial
 
 from numpy.random import Generator
 
 from elastocal.arrays import IndexArray
-from elastocal.planning.search.candidates import Candidates
+from elastocal.errors import PlanningError, nearest
+from elastocal.planning.search.cover import Cover
+from elastocal.planning.search.criteria import CRITERIA
 from elastocal.planning.search.exchange import ExchangeSearch
 from elastocal.planning.search.information import build_information
-from elastocal.planning.search.protocol import SearchTechnique, check_count
+from elastocal.planning.search.protocol import Candidates, SearchTechnique, check_count
+from elastocal.planning.search.random_choice import RandomChoice
+
+TECHNIQUES: dict[str, Callable[[], SearchTechnique]] = {
+    "cover": Cover,
+    "ioops": partial(ExchangeSearch, "d", label="ioops"),
+    "i_optimal": partial(ExchangeSearch, "i", label="i_optimal"),
+    "random": RandomChoice,
+    **{f"exchange-{name}": partial(ExchangeSearch, name) for name in CRITERIA if name != "i"},
+}
+"""Techniques by name, with their default options; the first is the default. ``ioops`` and
+``exchange-d`` are the same search, under the paper's name and the criterion's."""
+
+
+def technique(name: str) -> SearchTechnique:
+    """Return a search technique by name, with its default options.
+
+    Raises
+    ------
+    PlanningError
+        If there is none of that name.
+    """
+    if name not in TECHNIQUES:
+        raise PlanningError(
+            f"unknown search technique {name!r}{nearest(name, TECHNIQUES)}"
+            f" (allowed: {', '.join(TECHNIQUES)})"
+        )
+    return TECHNIQUES[name]()
 
 
 def growing_choices(

@@ -8,17 +8,15 @@ from scipy.spatial.transform import Rotation
 from elastocal import __version__
 from elastocal.arrays import FloatArray
 from elastocal.cell import Cell, fingerprint
-from elastocal.planning.choice import Searched
-from elastocal.planning.gathering import Gathered
 from elastocal.planning.motion import Route, contact_time
-from elastocal.planning.plan_file import (
+from elastocal.planning.plan_result import (
     POOL,
     CellRecord,
     CheckRecord,
     ComparisonRecord,
     ContactRecord,
     MoveRecord,
-    PlanFile,
+    PlanResult,
     PoolRecord,
     PoseRecord,
     RobotRecord,
@@ -28,7 +26,9 @@ from elastocal.planning.plan_file import (
 )
 from elastocal.planning.pool import REACH_ADVICE, Pool
 from elastocal.planning.pool_file import NOT_CHOSEN, PoolData
+from elastocal.planning.pool_sampling import SampledPool
 from elastocal.planning.search import CoverSelection, Selection
+from elastocal.planning.search_pool import SearchPool
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,8 +36,8 @@ class Decisions:
     """All that a plan was made of."""
 
     cell: Cell
-    gathered: Gathered
-    searched: Searched
+    gathered: SampledPool
+    searched: SearchPool
     selection: Selection
     """Numbers in the pool, in search order."""
     spread: SpreadRecord
@@ -50,11 +50,11 @@ class Decisions:
     findings: tuple[str, ...]
 
 
-def plan_record(made: Decisions) -> PlanFile:
+def plan_record(made: Decisions) -> PlanResult:
     """Return the plan's record."""
     cell, pool = made.cell, made.gathered.pool
     compared = made.comparison
-    return PlanFile(
+    return PlanResult(
         elastocal=__version__,
         cell=CellRecord(name=cell.name, file=str(cell.path), fingerprint=fingerprint(cell)),
         robot=_robot(cell),

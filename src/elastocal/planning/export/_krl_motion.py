@@ -5,6 +5,7 @@ depends on the robot (hardware facts, section 2.2). The axis positions of the ap
 the posture.
 """
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 
@@ -12,7 +13,7 @@ import numpy as np
 
 from elastocal.arrays import FloatArray
 from elastocal.errors import PlanningError
-from elastocal.planning.plan_file import Joints, PlanFile, PoseRecord
+from elastocal.planning.plan_result import Joints, PlanResult, PoseRecord
 from elastocal.robot import Robot, xyzabc_from_T
 
 ARM_AXES = 6
@@ -74,12 +75,12 @@ class Targets:
         yield from self.way_home
 
 
-def build_targets(plan: PlanFile, robot: Robot) -> Targets:
+def build_targets(plan: PlanResult, robot: Robot) -> Targets:
     """Return the positions of a plan's program.
 
     Parameters
     ----------
-    plan : PlanFile
+    plan : PlanResult
         The plan.
     robot : Robot
         Its robot; see `robot_of`.
@@ -119,7 +120,7 @@ def takes_krl(robot: Robot) -> bool:
     return len(arm) == ARM_AXES and all(arm) and robot.external_axes <= EXTERNAL_AXES
 
 
-def robot_of(plan: PlanFile) -> Robot:
+def robot_of(plan: PlanResult) -> Robot:
     """Return the robot of a plan, if a KUKA controller could drive it.
 
     Raises
@@ -180,7 +181,7 @@ def _external(joints: Joints, robot: Robot) -> list[tuple[str, float]]:
     return [(f"E{number}", value) for number, value in enumerate(values, start=1)]
 
 
-def _check_agrees(plan: PlanFile, robot: Robot, pose: PoseRecord) -> None:
+def _check_agrees(plan: PlanResult, robot: Robot, pose: PoseRecord) -> None:
     """Refuse a pose whose axis positions and frame would send the robot to different places."""
     for what, joints, away in (
         ("joints", pose.joints, 0.0),
@@ -211,3 +212,59 @@ def _number(key: str, value: float) -> str:
     """Return a decimal number: 1e-4 mm for lengths, 1e-5 deg for angles, never -0."""
     decimals = 4 if key in ("X", "Y", "Z") else 5
     return f"{round(value, decimals) + 0.0:.{decimals}f}"
+
+
+PTP_PERCENT = 10
+"""Fastest PTP moves, in percent of the axes' largest speeds."""
+LIN_SPEED = 0.05
+"""Fastest motion between approach pose and near contact, in m/s."""
+TOUCH_SPEED = 0.005
+"""Fastest motion between near contact and the surface, in m/s."""
+
+
+@dataclass(frozen=True)
+class Speeds:
+    """Speeds of a program: those of the cell, but never above the limits of this module."""
+
+    ptp_percent: int
+    """Of PTP moves, in percent of the axes' largest speeds."""
+    lin: float
+    """Between approach pose and near contact, in m/s."""
+    touch: float
+    """Between near contact and the surface, in m/s."""
+
+    def contact_time(self, plan: PlanResult, pose: PoseRecord) -> float:
+        """Return the seconds from the approach pose through all load cases and back to it.
+
+        The plan's own figure is for one speed from approach pose to contact; the retreat to near
+        contact is at the touch speed too.
+        """
+        contact = plan.contact
+        far = contact.approach_distance - contact.near_contact
+        planned = 2.0 * contact.approach_distance / contact.contact_speed
+        driven = 2.0 * (far / self.lin + contact.near_contact / self.touch)
+        return pose.contact_time - planned + driven
+
+    def total_time(self, plan: PlanResult) -> float:
+        """Return the seconds from HOME to HOME, all load cases included.
+
+        Moves of axes take longer in the ratio of the speeds; their ramps are counted so too,
+        which is on the safe side.
+        """
+        slower = 100.0 * plan.contact.axis_override / self.ptp_percent
+        return slower * plan.travel_time + sum(self.contact_time(plan, p) for p in plan.poses)
+
+
+def speeds_of(plan: PlanResult) -> Speeds:
+    """Return the speeds of a plan's program.
+
+    Parameters
+    ----------
+    plan : PlanResult
+        The plan, with the speeds of its cell.
+    """
+    contact = plan.contact
+    # A whole percent, and KRL knows none below 1.
+    percent = max(1, math.floor(100.0 * contact.axis_override + 1e-9))
+    lin, touch = (min(contact.contact_speed, limit) for limit in (LIN_SPEED, TOUCH_SPEED))
+    return Speeds(min(PTP_PERCENT, percent), lin, touch)

@@ -5,7 +5,7 @@ import pytest
 
 from elastocal.errors import FileAccessError, PlanningError, SchemaError
 from elastocal.planning.export import write_krl
-from elastocal.planning.export.krl.speeds import TOUCH_SPEED
+from elastocal.planning.export._krl_motion import TOUCH_SPEED
 from support import krl, plans
 
 DEG = MM = 1e-3

@@ -5,10 +5,12 @@ import math
 import coal
 import numpy as np
 import trimesh
+from numpy.random import Generator
 
 from elastocal.arrays import FloatArray
 from elastocal.cell import Cell
 from elastocal.cell.description import TOOLING, Box, Cylinder, Shape, Sphere
+from elastocal.errors import PlanningError
 from elastocal.planning.checks import (
     Check,
     Checks,
@@ -25,16 +27,25 @@ from elastocal.planning.checks import (
     TravelLimitsCheck,
     WristCheck,
 )
-from elastocal.planning.moving_solids import MovingSolids
+from elastocal.planning.checks.sight import MovingSolids
 from elastocal.planning.scene import Body, CollisionScene, mesh_shape
 from elastocal.planning.surface import (
+    Finding,
+    ReachableFrom,
     Surface,
     SurfacePoints,
+    arm_reach,
     distance_to_boundary,
+    first_joint_positions,
     fit_disk,
+    flipped,
+    load_surface,
+    mesh_findings,
+    placement_findings,
     read_mesh,
 )
 from elastocal.robot import has_wrist
+from elastocal.robot.inverse import inverse_for
 
 
 def point_checks(
@@ -199,3 +210,53 @@ def _joined(meshes: list[trimesh.Trimesh]) -> trimesh.Trimesh:
     joined = trimesh.util.concatenate(meshes)
     assert isinstance(joined, trimesh.Trimesh)
     return joined
+
+
+def cell_surface(cell: Cell) -> Surface:
+    """Return the surface that the cell file names, in base, its normals as it says.
+
+    Raises
+    ------
+    SurfaceError, FileAccessError
+        If the mesh cannot be read.
+    """
+    entry = cell.file.surface
+    surface = load_surface(
+        cell.surface_path, entry.metres, cell.T_base_surface, entry.region, entry.crease_angle
+    )
+    return flipped(surface) if entry.flip_normals else surface
+
+
+def surface_findings(cell: Cell, surface: Surface, rng: Generator) -> tuple[Finding, ...]:
+    """Return what a user should know of the mesh and of where it stands.
+
+    Parameters
+    ----------
+    cell : Cell
+        The cell.
+    surface : Surface
+        Its surface.
+    rng : Generator
+        Seeded source of randomness, for the points that are tried.
+
+    Raises
+    ------
+    PlanningError
+        If planning on this surface cannot lead anywhere.
+    SurfaceError
+        If the region holds no part of the surface.
+    """
+    external = cell.external_positions
+    # The middle and the ends of a grid will do to see from which side the robot can work.
+    few = external[np.unique(np.linspace(0, len(external) - 1, 3).astype(int))]
+    found = mesh_findings(surface) + placement_findings(
+        surface,
+        first_joint_positions(cell.robot, external),
+        arm_reach(cell.robot),
+        ReachableFrom(inverse_for(cell.robot), few),
+        rng,
+    )
+    for finding in found:
+        if finding.fatal:
+            raise PlanningError(finding.message)
+    return found

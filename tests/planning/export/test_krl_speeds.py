@@ -3,7 +3,7 @@
 import pytest
 
 from elastocal.planning.export import write_krl
-from elastocal.planning.export.krl.speeds import LIN_SPEED, PTP_PERCENT, TOUCH_SPEED, speeds_of
+from elastocal.planning.export._krl_motion import LIN_SPEED, PTP_PERCENT, TOUCH_SPEED, speeds_of
 from support import krl, plans
 
 

@@ -3,8 +3,8 @@
 import pytest
 
 from elastocal.errors import PlanningError
-from elastocal.planning.export.krl import check_name
-from elastocal.planning.export.krl.names import comment_text
+from elastocal.planning.export import check_name
+from elastocal.planning.export._krl_notes import comment_text
 
 
 @pytest.mark.parametrize("name", ["calib", "_x", "Plan_2", 20 * "Z"])

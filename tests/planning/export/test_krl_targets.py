@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from elastocal.errors import PlanningError
-from elastocal.planning.export.krl.targets import build_targets, robot_of
+from elastocal.planning.export._krl_motion import build_targets, robot_of
 from elastocal.robot import Robot
 from support import plans, urdfs
 

@@ -5,16 +5,39 @@ stops (``HALT``) before it touches the surface and on it, so that a person or a 
 decides. Nothing here was tried on a real robot, and the program says so.
 """
 
+import re
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 
+from elastocal.errors import PlanningError
 from elastocal.files import replacing
-from elastocal.planning.export.krl.names import SUFFIXES, check_name, comment_text
-from elastocal.planning.export.krl.notes import BASE, TOOL, comment, head_notes
-from elastocal.planning.export.krl.speeds import Speeds, speeds_of
-from elastocal.planning.export.krl.targets import PoseTargets, Target, build_targets, robot_of
-from elastocal.planning.plan_file import PlanFile, check_plan
+from elastocal.planning.export._krl_motion import (
+    PoseTargets,
+    Speeds,
+    Target,
+    build_targets,
+    robot_of,
+    speeds_of,
+)
+from elastocal.planning.export._krl_notes import BASE, TOOL, comment, comment_text, head_notes
+from elastocal.planning.plan_result import PlanResult, check_plan
 
+_LONGEST_FILE_NAME = 24
+"""With the suffix (hardware facts, section 2.2)."""
+_SUFFIXES = (".src", ".dat")
+
+_NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
+_KRL_WORDS = (
+    "AND ANIN ANOUT AXIS B_AND B_EXOR B_NOT B_OR BAS BASE_DATA BOOL BRAKE CASE CHAR CIRC CIRC_REL"
+    " CONFIRM CONST CONTINUE DATA DECL DEF DEFAULT DEFDAT DEFFCT DELAY DIGIN DO E6AXIS E6POS ELSE"
+    " END ENDDAT ENDFCT ENDFOR ENDIF ENDLOOP ENDSWITCH ENDWHILE ENUM EXIT EXOR EXT EXTFCT FALSE"
+    " FOR FRAME GLOBAL GOTO HALT IF IMPORT INT INTERRUPT IR_STOPM IS LIN LIN_REL LOOP MAXIMUM"
+    " MINIMUM NOT OFF ON OR POS PRIO PTP PTP_REL PUBLIC PULSE REAL REPEAT RESUME RETURN SCIRC SEC"
+    " SIGNAL SLIN SPLINE SPTP STRUC SWITCH THEN TO TOOL_DATA TRIGGER TRUE UNTIL WAIT WHEN WHILE"
+)
+_WINDOWS_NAMES = "AUX CON NUL PRN"
+_RESERVED = frozenset(f"{_KRL_WORDS} {_WINDOWS_NAMES}".split())
+"""Words that cannot name a program; the controller's disk is a Windows one."""
 _HEADER = (
     "&ACCESS RVP",
     "&REL 1",
@@ -34,14 +57,14 @@ _INI = (
 _STOP = ("WAIT SEC 0", "HALT")
 
 
-def write_krl(folder: Path, plan: PlanFile, name: str = "calib") -> tuple[Path, Path]:
+def write_krl(folder: Path, plan: PlanResult, name: str = "calib") -> tuple[Path, Path]:
     """Write ``<name>.src`` and ``<name>.dat`` into a folder, both or none; return their paths.
 
     Parameters
     ----------
     folder : Path
         Where to write.
-    plan : PlanFile
+    plan : PlanResult
         The plan.
     name : str
         Of the program: at most 20 letters, digits and underscores, not beginning with a digit.
@@ -63,16 +86,41 @@ def write_krl(folder: Path, plan: PlanFile, name: str = "calib") -> tuple[Path, 
     positions = tuple(targets)
     check_name(name, frozenset(target.name for target in positions))
     program = _program(name, plan, head_notes(plan, robot), targets.poses, targets.way_home)
-    src, dat = (Path(folder) / f"{name}{suffix}" for suffix in SUFFIXES)
+    src, dat = (Path(folder) / f"{name}{suffix}" for suffix in _SUFFIXES)
     with replacing(src) as new_src, replacing(dat) as new_dat:
         new_src.write_bytes(_text(program))
         new_dat.write_bytes(_text(_data(name, positions)))
     return src, dat
 
 
+def check_name(name: str, taken: frozenset[str] = frozenset()) -> None:
+    """Refuse a name that a controller would.
+
+    Parameters
+    ----------
+    name : str
+        Of the program, and of its two files without suffix.
+    taken : frozenset of str
+        Names that the program uses itself, in capitals.
+
+    Raises
+    ------
+    PlanningError
+        If it is no KRL name, too long, or has a meaning already.
+    """
+    longest = _LONGEST_FILE_NAME - len(_SUFFIXES[0])
+    if not _NAME.fullmatch(name) or len(name) > longest:
+        raise PlanningError(
+            f"{name!r} cannot name a KRL program: allowed are 1 to {longest} of the characters"
+            " A-Z a-z 0-9 _, not beginning with a digit"
+        )
+    if name.upper() in _RESERVED | taken:
+        raise PlanningError(f"{name!r} cannot name a KRL program: the word has a meaning in it")
+
+
 def _program(
     name: str,
-    plan: PlanFile,
+    plan: PlanResult,
     notes: list[str],
     poses: tuple[PoseTargets, ...],
     way_home: tuple[Target, ...],

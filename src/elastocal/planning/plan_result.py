@@ -178,7 +178,7 @@ class PoolRecord(StrictModel):
     """The check that refused most points."""
 
 
-class PlanFile(StrictModel):
+class PlanResult(StrictModel):
     """A plan without its schema key."""
 
     elastocal: str
@@ -207,25 +207,25 @@ class PlanFile(StrictModel):
         return self.travel_time + sum(pose.contact_time for pose in self.poses)
 
 
-class _WrittenPlan(PlanFile):
+class _WrittenPlan(PlanResult):
     """A plan as it stands in its file."""
 
     sha256: str
     """See `content_hash`."""
 
 
-def content_hash(plan: PlanFile) -> str:
+def content_hash(plan: PlanResult) -> str:
     """Return a SHA-256 over everything that a plan says, by which a change by hand is found.
 
     It is taken over the numbers as they are read: line breaks and the way a number is written do
     not count, the order of load cases does.
     """
-    keys = set(PlanFile.model_fields)
+    keys = set(PlanResult.model_fields)
     data = {"schema": SCHEMA, **plan.model_dump(mode="json", include=keys)}
     return sha256(json.dumps(data, separators=(",", ":"), allow_nan=False))
 
 
-def write_plan(folder: Path, plan: PlanFile) -> Path:
+def write_plan(folder: Path, plan: PlanResult) -> Path:
     """Write ``plan.json`` into a folder, atomically; return its path.
 
     Raises
@@ -242,7 +242,7 @@ def write_plan(folder: Path, plan: PlanFile) -> Path:
     return path
 
 
-def read_plan(folder: Path) -> PlanFile:
+def read_plan(folder: Path) -> PlanResult:
     """Return the plan of a folder (or of the ``plan.json`` itself).
 
     Raises
@@ -256,19 +256,19 @@ def read_plan(folder: Path) -> PlanFile:
     path = Path(folder)
     path = path / PLAN if path.is_dir() else path
     written = read_json(path, _WrittenPlan, SCHEMA)
-    plan = PlanFile(**{key: getattr(written, key) for key in PlanFile.model_fields})
+    plan = PlanResult(**{key: getattr(written, key) for key in PlanResult.model_fields})
     check_plan(plan, str(path))
     if written.sha256 != content_hash(plan):
         raise SchemaError(f"{path} was changed by hand: make it anew with `elastocal plan`")
     return plan
 
 
-def check_plan(plan: PlanFile, what: str = "plan") -> None:
+def check_plan(plan: PlanResult, what: str = "plan") -> None:
     """Refuse a plan whose parts contradict each other.
 
     Parameters
     ----------
-    plan : PlanFile
+    plan : PlanResult
         The plan.
     what : str
         How the message names it.
@@ -282,7 +282,7 @@ def check_plan(plan: PlanFile, what: str = "plan") -> None:
         raise SchemaError(f"{what}: {problem}")
 
 
-def _pose_problems(plan: PlanFile) -> Iterator[str]:
+def _pose_problems(plan: PlanResult) -> Iterator[str]:
     if not plan.poses:
         yield "poses: there is none"
     names = {check.name for check in plan.pool.checks}
@@ -298,7 +298,7 @@ def _pose_problems(plan: PlanFile) -> Iterator[str]:
         yield "poses: a candidate stands twice"
 
 
-def _move_problems(plan: PlanFile) -> Iterator[str]:
+def _move_problems(plan: PlanResult) -> Iterator[str]:
     stops = (None, *(pose.id for pose in plan.poses), None)
     ends = [(move.start, move.end) for move in plan.moves]
     if len(ends) != len(stops) - 1:
@@ -308,7 +308,7 @@ def _move_problems(plan: PlanFile) -> Iterator[str]:
             yield f"moves.{number}: (start, end) must be {wanted} (None: HOME), got {found}"
 
 
-def _number_problems(plan: PlanFile) -> Iterator[str]:
+def _number_problems(plan: PlanResult) -> Iterator[str]:
     """Yield lists that do not have as many numbers as there are joints or poses."""
     count = len(plan.robot.joints)
     for key, joints in _joint_lists(plan):
@@ -321,7 +321,7 @@ def _number_problems(plan: PlanFile) -> Iterator[str]:
             yield f"comparison.candidates: must be among {plan.pool.valid}, got {number}"
 
 
-def _joint_lists(plan: PlanFile) -> Iterator[tuple[str, Joints]]:
+def _joint_lists(plan: PlanResult) -> Iterator[tuple[str, Joints]]:
     yield "robot.home", plan.robot.home
     for number, pose in enumerate(plan.poses):
         yield f"poses.{number}.joints", pose.joints
