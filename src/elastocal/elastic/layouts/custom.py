@@ -17,8 +17,8 @@ from pydantic import BeforeValidator, Field
 
 from elastocal.elastic.springs import AXES, Spring, as_axis, axial
 from elastocal.errors import SpringError
+from elastocal.records import StrictModel, read_yaml
 from elastocal.robot import ChainJoint, Robot
-from elastocal.schema import StrictModel, read_yaml
 from elastocal.units import parse_quantity
 
 SCHEMA = "elastocal.springs/1"
