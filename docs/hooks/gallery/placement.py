@@ -7,13 +7,17 @@ from pathlib import Path
 import numpy as np
 
 from elastocal.cli.process_bench import AFP_SETTINGS
-from elastocal.codec import CodecData, Verdicts, cross_validate, judge, look_into, make_variants
+from elastocal.codec import CodecData, Verdicts, analyse, cross_validate, judge, make_variants
 from elastocal.compensation.process import Trace
 from elastocal.report import write_plan_figure, write_plan_page
-from elastocal.report.codec_chart import codec_chart
-from elastocal.report.document.figures import course_figure, displacement_figure, process_maps
-from elastocal.report.index_chart import index_chart
-from elastocal.report.printed import write_figure
+from elastocal.report.plots import (
+    codec_chart,
+    course_figure,
+    displacement_figure,
+    index_chart,
+    process_maps,
+    write_figure,
+)
 from gallery.campaign import SEED, Campaign, accuracy, campaign, example_cell, process, reduction
 
 COURSES = 2
@@ -76,7 +80,7 @@ def _codec(folder: Path, done: Campaign, name: str, key: str, values: tuple[str,
     verdicts = judge(data)
     write_figure(folder / f"{name}.svg", partial(codec_chart, data, verdicts))
     if key == "springs":
-        found = look_into(robot, done.readings, data, marker_offset=done.marker, with_indices=True)
+        found = analyse(robot, done.readings, data, marker_offset=done.marker, with_indices=True)
         draw = partial(index_chart, data, found.indices, found.correlations)
         write_figure(folder / "indices.svg", draw)
     return _last_errors(data) if key == "load_cases" else _sentence(verdicts)

@@ -90,10 +90,10 @@ def codec(  # noqa: PLR0913 - one parameter an option
     from elastocal.codec import (
         VERDICTS,
         CodecOptions,
+        analyse,
         cross_validate,
         figures,
         judge,
-        look_into,
         make_variants,
         verdict_record,
     )
@@ -119,7 +119,7 @@ def codec(  # noqa: PLR0913 - one parameter an option
             report=report,
         )
         verdicts = judge(found, near)
-        insight = look_into(arm, readings, found, marker_offset=offset, with_indices=indices)
+        insight = analyse(arm, readings, found, marker_offset=offset, with_indices=indices)
         record = verdict_record(found, verdicts, insight.correlations)
         axes = ("x", "y", "z") if per_axis else ()
         names = write_codec_folder(folder, found, verdicts, record, insight, axes)

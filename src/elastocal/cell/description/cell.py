@@ -26,11 +26,11 @@ from elastocal.robot import (
     Robot,
     catalogue,
     find_meshes,
+    inverse_transform,
     on_rail,
     parse_urdf,
     with_tool,
 )
-from elastocal.robot.inverse import inverse_transform
 
 TCP = "tcp"
 """Name of the link at the tool centre point."""
