@@ -320,7 +320,7 @@ class Dataset:
     def _taken(self, rows: Sequence[int], columns: Sequence[int]) -> "Dataset":
         """Return the poses and load cases at some positions."""
         index = np.ix_(np.array(rows, dtype=np.intp), np.array(columns, dtype=np.intp))
-        arrays = {
+        arrays: dict[str, Any] = {
             name: values[index[0][:, 0]] if name == "tcp_position" else values[index]
             for name, values in self.arrays.items()
         }

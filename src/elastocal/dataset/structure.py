@@ -355,7 +355,7 @@ def _joint_units(data: LabelledArrays, joints: int) -> tuple[list[str], FloatArr
                 f"variable 'joint_position': unit {unit!r} is not one of {', '.join(JOINT_UNITS)}"
                 f"{nearest(unit, JOINT_UNITS)}"
             )
-    if len(units) != joints or stated != _joined_units(units):
+    if len(units) != joints or (units and stated != _joined_units(units)):
         raise DatasetError(
             f"variable 'joint_position' has units {stated!r} but its coordinate 'joint_unit' is"
             f" {units}: it must give each of the {joints} joints one of the units"

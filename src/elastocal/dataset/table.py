@@ -372,7 +372,7 @@ def _statuses(table: TableText, text: Mapping[str, int], empty: BoolArray) -> St
 
 def _per_pose(table: TableText, grid: _Grid, values: FloatArray) -> FloatArray:
     """Return TCP positions, shape (pose, 3), from rows of which those of a pose must agree."""
-    positions = np.full((len(grid.poses), len(AXES)), math.nan)
+    positions, lines = np.full((len(grid.poses), len(AXES)), math.nan), table.rows.lines
     row, axis = np.nonzero(~np.isnan(values))
     positions[grid.pose[row], axis] = values[row, axis]
     for index in np.flatnonzero(positions[grid.pose[row], axis] != values[row, axis]):
@@ -380,15 +380,14 @@ def _per_pose(table: TableText, grid: _Grid, values: FloatArray) -> FloatArray:
         other = row[(grid.pose[row] == pose) & (axis == component)][-1]
         raise DatasetError(
             f"tcp_position_{AXES[component]} of pose {grid.poses[pose]} is"
-            f" {values[row[index], component]} m in row {table.rows.lines[row[index]]} but"
-            f" {values[other, component]} m in row {table.rows.lines[other]}: a pose has one unloaded"
-            " position"
+            f" {values[row[index], component]} m in row {lines[row[index]]} but"
+            f" {values[other, component]} m in row {lines[other]}: a pose has one unloaded position"
         )
     return positions
 
 
-def _label_columns(data: Dataset) -> dict[str, list[object]]:
-    columns: dict[str, list[object]] = {
+def _label_columns(data: Dataset) -> dict[str, list[Any]]:
+    columns: dict[str, list[Any]] = {
         "pose": [pose for pose in data.poses for _ in data.load_cases],
         "load_case": list(data.load_cases) * len(data.poses),
     }

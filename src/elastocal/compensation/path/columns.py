@@ -4,9 +4,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from elastocal.compensation.path.errors import PathError
-from elastocal.dataset import Column, joint_dimensions
+from elastocal.dataset import joint_dimensions
 from elastocal.errors import UnitError, nearest
 from elastocal.robot import Robot
+from elastocal.tables import Column
 from elastocal.units import factor, split_column
 
 AXES = ("x", "y", "z")

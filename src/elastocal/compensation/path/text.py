@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import TextIO
 
 from elastocal.compensation.path.errors import PathError
-from elastocal.dataset import DELIMITERS
 from elastocal.errors import FileAccessError
+from elastocal.tables import DELIMITERS
 
 _BLOCK = 1 << 20
 

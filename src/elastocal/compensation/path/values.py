@@ -11,8 +11,8 @@ from elastocal.compensation.path.angles import beyond_a_turn
 from elastocal.compensation.path.columns import EULER, PathColumns, Wrench
 from elastocal.compensation.path.errors import PathError
 from elastocal.compensation.path.text import Piece
-from elastocal.dataset import Column
 from elastocal.robot import T_from_xyzabc
+from elastocal.tables import Column
 
 _UNIT_NORM = 1e-3
 """How far the norm of a quaternion may be from 1."""
