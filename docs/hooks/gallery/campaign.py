@@ -76,12 +76,12 @@ def process(done: Campaign, kind: str, settings: CompensatorSettings, count: int
 
 def accuracy(done: Campaign) -> str:
     """Return in words what a calibration reaches."""
-    told = summary(done.calibration)
+    figures = summary(done.calibration)
     return (
-        f"{told['readings']} readings at {told['poses']} poses; measured deflection"
-        f" {1e3 * told['deflection']['mean']:.2f} mm mean; residual of the fit"
-        f" {1e3 * told['residual']['mean']:.3f} mm mean; error at left-out poses"
-        f" {1e3 * told['held_out']['mean']:.3f} mm mean"
+        f"{figures.readings} readings at {figures.poses} poses; measured deflection"
+        f" {1e3 * figures.deflection.mean:.2f} mm mean; residual of the fit"
+        f" {1e3 * figures.residual.mean:.3f} mm mean; error at left-out poses"
+        f" {1e3 * figures.held_out.mean:.3f} mm mean"
     )
 
 
