@@ -11,9 +11,9 @@ import numpy as np
 
 from elastocal.cell import Cell, load_cell
 from elastocal.cell.examples import write_example
-from elastocal.cli.process_bench import Bench, Outcome, process_courses, run_process
+from elastocal.cli.process_bench import Bench, Outcome, run_process
 from elastocal.compensation import CompensatorSettings
-from elastocal.compensation.process import Comparison
+from elastocal.compensation.process import DeviationComparison, process_courses
 from elastocal.dataset import Readings
 from elastocal.elastic import ElasticModel, layout
 from elastocal.identification import Calibration, calibrate, summary
@@ -85,11 +85,11 @@ def accuracy(done: Campaign) -> str:
     )
 
 
-def reduction(line: Comparison) -> str:
+def reduction(line: DeviationComparison) -> str:
     """Return in words what the correction does to a process."""
     before, after = line.before, line.after
     return (
         f"mean {1e3 * before.mean:.3f} mm without and {1e3 * after.mean:.3f} mm with correction"
-        f" ({1 - after.mean / before.mean:.1%} less), largest {1e3 * before.largest:.3f} and"
-        f" {1e3 * after.largest:.3f} mm"
+        f" ({1 - after.mean / before.mean:.1%} less), largest {1e3 * before.max:.3f} and"
+        f" {1e3 * after.max:.3f} mm"
     )
