@@ -104,9 +104,9 @@ def test_a_partial_run_holds_back_and_names_the_poses(parts):
 
 
 def test_a_pose_without_a_usable_reading_counts_as_missing(parts):
-    data = parts.dataset.data.copy(deep=True)
+    data = parts.dataset.to_xarray().copy(deep=True)
     data["status"].values[0] = 1
-    (told, *_) = findings(readings, replace(parts, dataset=type(parts.dataset)(data)))
+    (told, *_) = findings(readings, replace(parts, dataset=type(parts.dataset).from_xarray(data)))
     assert told.startswith("the run is partial: 1 of")
 
 
@@ -149,7 +149,7 @@ def test_axial_springs_alone_are_advised_to_be_compared_with_more(parts):
     few = tuple(s for s in parts.calibrated.model.model.springs if s.name.endswith(".axial"))
     model = parts.calibrated.model
     keep = [spring in few for spring in model.model.springs]
-    seen = replace(model.observability, springs=len(few), observable=(True,) * len(few),
+    seen = replace(model.observability, observable=(True,) * len(few),
                    unobservable=(), rank=len(few))  # fmt: skip
     smaller = replace(
         model, model=replace(model.model, springs=few), compliance=model.compliance[keep],
