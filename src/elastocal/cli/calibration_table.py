@@ -11,9 +11,12 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
+from elastocal.elastic import unit_of
 from elastocal.identification import Term, describe
 
 Figures = dict[str, Any]
+_USUAL_UNIT = unit_of("rad/(N*m)")
+"""Of most springs: the headings name it, other springs their own."""
 _MOST_SUSPICIOUS = 10
 _MOST_TERMS = 6
 """A combination of more springs than this tells a reader nothing."""
@@ -87,9 +90,9 @@ def _spring_table(figures: Figures) -> Table:
     }
     table = Table(box=None, pad_edge=False)
     table.add_column("spring", no_wrap=True)
-    table.add_column("compliance\nµrad/(N·m)", justify="right", no_wrap=True)
+    table.add_column(f"compliance\n{_USUAL_UNIT.shown}", justify="right", no_wrap=True)
     table.add_column("95 %\ninterval", justify="right", no_wrap=True)
-    table.add_column("stiffness\nMN·m/rad", justify="right", no_wrap=True)
+    table.add_column(f"stiffness\n{_USUAL_UNIT.stiffness}", justify="right", no_wrap=True)
     table.add_column("known?", no_wrap=True)
     for spring in figures["springs"]:
         table.add_row(*_spring_row(spring, group_of.get(spring["name"])))
@@ -97,8 +100,10 @@ def _spring_table(figures: Figures) -> Table:
 
 
 def _spring_row(spring: Figures, group: int | None) -> tuple[str, ...]:
-    value, low, high = (1e6 * spring[name] for name in ("compliance", "low", "high"))
-    unit, stiff = ("", "") if spring["kind"] == "revolute" else (" µm/N", " MN/m")
+    shown = unit_of(spring["unit"])
+    value, low, high = (shown.factor * spring[name] for name in ("compliance", "low", "high"))
+    usual = shown == _USUAL_UNIT
+    unit, stiff = ("", "") if usual else (f" {shown.shown}", f" {shown.stiffness}")
     if not spring["observable"]:
         note = f"[yellow]not by itself[/yellow], group {group}"
         return escape(spring["name"]), f"[dim]({value:.4f}{unit})[/dim]", "", "", note

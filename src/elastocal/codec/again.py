@@ -42,7 +42,7 @@ def trainees_of(
         each.springs: ElasticModel(robot, layout(robot, each.springs)) for each in data.variants
     }
     for each, labels in zip(data.variants, data.springs, strict=True):
-        found = tuple(spring.name for spring in models[each.springs].springs)
+        found = models[each.springs].parameter_names
         if found != labels.names:
             raise CodecError(
                 f"variant {each.name!r} was made with {len(labels.names)} springs;"

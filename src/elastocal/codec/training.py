@@ -64,10 +64,10 @@ class Trainee:
         Shape (pose, row, spring).
         """
         found = [self.problem.O[which & (self.problem.block == pose)] for pose in poses]
-        rows = np.zeros((len(poses), max(map(len, found)), 3, self.problem.springs))
+        rows = np.zeros((len(poses), max(map(len, found)), 3, self.problem.columns))
         for filled, blocks in zip(rows, found, strict=True):
             filled[: len(blocks)] = blocks
-        return rows.reshape(len(poses), -1, self.problem.springs)
+        return rows.reshape(len(poses), -1, self.problem.columns)
 
 
 @dataclass(frozen=True, eq=False)

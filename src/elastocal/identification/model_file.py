@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from pydantic import JsonValue
 
-from elastocal.elastic import ElasticModel, Spring
+from elastocal.elastic import ElasticModel, Hinge
 from elastocal.errors import SchemaError
 from elastocal.files import sha256, write_json
 from elastocal.identification.calibrated import CalibratedModel
@@ -132,7 +132,7 @@ def read_model(path: Path) -> CalibratedModel:
     record = read_record(path)
     if sha256(record.robot.urdf) != record.robot.urdf_sha256:
         raise SchemaError(f"{path}: robot.urdf was changed: its hash is not robot.urdf_sha256")
-    springs = tuple(Spring(**spring.model_dump()) for spring in record.springs)
+    springs = tuple(Hinge(**spring.model_dump()) for spring in record.springs)
     n = len(springs)
     if len(record.draws) < MINIMUM_DRAWS:
         raise SchemaError(f"{path}: {len(record.draws)} draws, at least {MINIMUM_DRAWS} are needed")

@@ -1,5 +1,6 @@
 """What a user may choose about a fit."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal, get_args
 
@@ -7,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from elastocal.arrays import FloatArray
+from elastocal.elastic import Parameter
 from elastocal.errors import IdentificationError
 from elastocal.identification.losses import LOSSES, check_loss
 
@@ -35,8 +37,9 @@ class FitOptions:
     """Options of the identification; the defaults are the paper's (Eq. 19, `lsqlin`)."""
 
     lower: ArrayLike = 0.0
-    """Lower bound of the compliances, a number or shape (spring,). Zero by default: on few
-    poses an unbounded fit of 18 springs is worse than one of 6."""
+    """Lower bound, a number or shape (parameter,). The number zero, the default, means what each
+    parameter's kind of spring says: zero for compliances, since on few poses an unbounded fit of
+    18 springs is worse than one of 6."""
     upper: ArrayLike = np.inf
     """Upper bound, likewise."""
     weights: Weights = "none"
@@ -68,28 +71,31 @@ MINIMUM_DRAWS = 40
 """Fewest draws that leave one beyond each end of a 95 % interval."""
 
 
-def bounds(options: FitOptions, springs: int) -> tuple[FloatArray, FloatArray]:
-    """Return the lower and upper bounds, each of shape (spring,).
+def bounds(
+    options: FitOptions, parameters: Sequence[Parameter]
+) -> tuple[FloatArray, FloatArray]:
+    """Return the lower and upper bounds, each of shape (parameter,).
 
     Raises
     ------
     IdentificationError
         If a bound has another shape, is NaN, or a lower bound exceeds the upper one.
     """
+    n = len(parameters)
+    lower, upper = (np.asarray(each, dtype=float) for each in (options.lower, options.upper))
+    if lower.ndim == 0 and lower == 0.0:
+        lower = np.array([parameter.lower for parameter in parameters])
     try:
-        lower = np.broadcast_to(np.asarray(options.lower, dtype=float), (springs,))
-        upper = np.broadcast_to(np.asarray(options.upper, dtype=float), (springs,))
+        lower, upper = np.broadcast_to(lower, (n,)), np.broadcast_to(upper, (n,))
     except ValueError as error:
         raise IdentificationError(
-            f"bounds must be a number or one number for each of the {springs} springs"
+            f"bounds must be a number or one number for each of the {n} springs"
         ) from error
     bad = np.flatnonzero(~((lower <= upper) & (lower < np.inf) & (upper > -np.inf)))
     if len(bad):
         raise IdentificationError(
-            f"bounds exclude everything: spring {bad[0] + 1} of {springs} would have to lie between"
+            f"bounds exclude everything: spring {bad[0] + 1} of {n} would have to lie between"
             f" {lower[bad[0]]:g} and {upper[bad[0]]:g}"
         )
     return lower, upper
 
-
-__all__ = ["LOSSES", "FitOptions", "Prior", "bounds"]

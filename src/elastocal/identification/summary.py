@@ -55,17 +55,18 @@ def springs(calibration: Calibration) -> list[dict[str, Any]]:
     """Return a row a spring: compliance with its 95 % interval, and whether it is observable."""
     calibrated = calibration.calibrated
     low, high = calibrated.interval()
+    named = ((spring, each) for spring in calibrated.model.springs for each in spring.parameters)
     return [
         {
-            "name": spring.name,
+            "name": parameter.name,
             "kind": spring.kind,
-            "unit": spring.unit,
+            "unit": parameter.unit.si,
             "compliance": float(calibrated.compliance[i]),
             "low": float(low[i]),
             "high": float(high[i]),
             "observable": calibrated.observability.observable[i],
         }
-        for i, spring in enumerate(calibrated.model.springs)
+        for i, (spring, parameter) in enumerate(named)
     ]
 
 

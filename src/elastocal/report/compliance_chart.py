@@ -9,6 +9,7 @@ from matplotlib.figure import Figure
 
 from elastocal.arrays import BoolArray
 from elastocal.codec import CodecData, Observed
+from elastocal.elastic import Unit, unit_of
 from elastocal.identification import describe
 from elastocal.report import style
 from elastocal.report.box_panel import draw_boxes, finish_axes, label_sizes
@@ -19,8 +20,6 @@ from elastocal.report.looks import Look, looks_of
 from elastocal.report.printed import new_figure, plain
 from elastocal.report.wrapping import wrapped
 
-UNITS = {"rad/(N*m)": (1e6, "µrad/(N·m)"), "m/N": (1e6, "µm/N")}
-"""What people read compliances in, by SI unit: factor and name."""
 COLUMNS = 3
 _LEFT, _RIGHT, _GAP = 0.62, 0.15, 0.52
 _PANEL, _OVER = 1.3, 0.38
@@ -107,11 +106,11 @@ def spring_boxes(data: CodecData, seen: Sequence[Observed]) -> list[SpringBoxes]
     }
     joints = list(dict.fromkeys(_joint(name) for name in units))
     names = sorted(units, key=lambda name: joints.index(_joint(name)))
-    return [_spring_boxes(data, seen, name, *UNITS[units[name]]) for name in names]
+    return [_spring_boxes(data, seen, name, unit_of(units[name])) for name in names]
 
 
 def _spring_boxes(
-    data: CodecData, seen: Sequence[Observed], spring: str, scale: float, unit: str
+    data: CodecData, seen: Sequence[Observed], spring: str, unit: Unit
 ) -> SpringBoxes:
     boxes: dict[str, Boxes] = {}
     hollow: dict[str, BoolArray] = {}
@@ -122,11 +121,11 @@ def _spring_boxes(
         if spring not in labels.names:
             continue
         place, name = labels.names.index(spring), variant.name
-        values = scale * data.compliance[k][:, :, place]
+        values = unit.factor * data.compliance[k][:, :, place]
         boxes[name] = make_boxes(values, f"compliance {spring} of variant {name!r}")
         hollow[name] = told.share[boxes[name].n - 1, place] < 0.5
         never += [name] if told.never[place] else []
-    return SpringBoxes(spring, unit, boxes, hollow, tuple(never))
+    return SpringBoxes(spring, unit.shown, boxes, hollow, tuple(never))
 
 
 def columns_of(springs: Sequence[SpringBoxes]) -> int:

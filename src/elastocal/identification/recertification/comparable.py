@@ -11,7 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from elastocal.arrays import FloatArray
-from elastocal.elastic import Spring
+from elastocal.elastic import Parameter, Spring
 from elastocal.errors import IdentificationError
 from elastocal.identification.calibrated import CalibratedModel
 from elastocal.identification.observability import Term, describe
@@ -47,7 +47,7 @@ def comparable_sums(old: CalibratedModel, new: CalibratedModel) -> tuple[tuple[T
     IdentificationError
         If an unobservable combination names a spring that its model does not have.
     """
-    springs = common_springs(old, new)
+    springs = [each for spring in common_springs(old, new) for each in spring.parameters]
     unseen = np.vstack([_unobservable(each, springs) for each in (old, new)])
     mixed = np.flatnonzero(np.any(unseen != 0.0, axis=0))
     sums: dict[int, list[tuple[Term, ...]]]
@@ -83,10 +83,10 @@ def weights(sums: Sequence[Sequence[Term]], names: Sequence[str]) -> FloatArray:
     return table
 
 
-def _unobservable(calibrated: CalibratedModel, springs: Sequence[Spring]) -> FloatArray:
+def _unobservable(calibrated: CalibratedModel, springs: Sequence[Parameter]) -> FloatArray:
     """Return the part of a model's unobservable combinations that lies in some springs."""
     names = [spring.name for spring in springs]
-    own = calibrated.model.spring_names
+    own = calibrated.model.parameter_names
     for term in (term for group in calibrated.observability.unobservable for term in group):
         if term.spring not in own:
             raise IdentificationError(

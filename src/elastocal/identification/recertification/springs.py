@@ -38,13 +38,13 @@ def compare_springs(
     sums = comparable_sums(old, new)
     if not sums:
         return ()
-    rows = [weights(sums, each.model.spring_names) for each in (old, new)]
+    rows = [weights(sums, each.model.parameter_names) for each in (old, new)]
     values = [W @ each.compliance for W, each in zip(rows, (old, new), strict=True)]
     ends = [interval(each.draws @ W.T) for W, each in zip(rows, (old, new), strict=True)]
     noise = spread.noise(*rows)
     alone = np.percentile(np.abs(noise), 100.0 * CONFIDENCE, axis=0)
     together = np.maximum(alone, critical(noise) * rms(noise))
-    units = {spring.name: spring.unit for spring in new.model.springs}
+    units = {each.name: each.unit.si for each in new.model.parameters}
     return tuple(
         SpringChange(
             written(terms),
