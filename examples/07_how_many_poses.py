@@ -11,8 +11,10 @@ from pathlib import Path
 import numpy as np
 
 from elastocal.codec import cross_validate, judge, make_variants
-from elastocal.report.codec_chart import codec_chart
-from elastocal.report.printed import write_figure
+from elastocal.report.plots import (
+    codec_chart,
+    write_figure,
+)
 from elastocal.robot import Robot, T_from_xyzabc, catalogue, with_tool
 from elastocal.sim.layouts import (
     LINK_BENDING,

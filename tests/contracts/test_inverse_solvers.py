@@ -6,7 +6,7 @@ import pytest
 from elastocal.errors import RobotError
 from elastocal.robot import Robot
 from elastocal.robot.inverse import InverseKinematics, NumericalInverse, OpwInverse
-from elastocal.robot.inverse.limits import nearest_zero
+from elastocal.robot.inverse.arm import nearest_zero
 from support.urdfs import (
     CEILING,
     HALF_TURN,

@@ -9,7 +9,7 @@ import pytest
 
 from elastocal.report.document import Options, Parts, gather, pictures as drawing
 from elastocal.report.document.sections import SECTIONS
-from elastocal.report.html import embedded
+from elastocal.report.pages.templating import embedded
 from support import reported
 
 KEPT = {"made", "name", "limits", "files", "absent", "doubts"}
@@ -63,7 +63,7 @@ def whole(tmp_path_factory):
 @pytest.fixture
 def undrawn(monkeypatch):
     """Leave the drawing out where only the rest of a section is looked at."""
-    monkeypatch.setattr(drawing, "_bytes", lambda *_: b"")
+    monkeypatch.setattr(drawing, "figure_bytes", lambda *_: b"")
 
 
 def only(parts, names):

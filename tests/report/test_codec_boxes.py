@@ -5,10 +5,12 @@ import pytest
 from matplotlib.cbook import boxplot_stats
 
 from elastocal.errors import CodecError
-from elastocal.report import style
-from elastocal.report.box_panel import label_step, round_values
-from elastocal.report.boxes import make_boxes
-from elastocal.report.looks import COLOURS, looks_of
+from elastocal.report.plots import (
+    COLOURS,
+    style,
+    variant_styles,
+)
+from elastocal.report.plots._box_plots import label_step, make_boxes, round_values
 
 
 def test_boxes_are_those_of_matplotlib():
@@ -37,7 +39,7 @@ def test_nothing_to_draw_is_refused_by_name():
 
 def test_boxes_of_a_group_lie_side_by_side_within_it():
     for count in (1, 2, 5, 11):
-        looks = looks_of([f"v{k}" for k in range(count)])
+        looks = variant_styles([f"v{k}" for k in range(count)])
         left = [look.place - 0.5 * look.width for look in looks]
         right = [look.place + 0.5 * look.width for look in looks]
         assert all(a < b for a, b in zip(right, left[1:], strict=False))
@@ -46,7 +48,7 @@ def test_boxes_of_a_group_lie_side_by_side_within_it():
 
 
 def test_a_dozen_variants_differ_without_markers():
-    looks = looks_of([f"v{k}" for k in range(2 * len(COLOURS))])
+    looks = variant_styles([f"v{k}" for k in range(2 * len(COLOURS))])
     assert len({(look.colour, look.fill == style.PAPER) for look in looks}) == len(looks)
 
 

@@ -10,11 +10,17 @@ from matplotlib.text import Text
 
 from elastocal.codec import AXES
 from elastocal.errors import CodecError
-from elastocal.report import style
-from elastocal.report.codec_chart import codec_chart, error_boxes, saturation_words
-from elastocal.report.compliance_chart import compliance_chart, spring_boxes
-from elastocal.report.index_chart import index_chart
-from elastocal.report.looks import looks_of, tint
+from elastocal.report.plots import (
+    codec_chart,
+    compliance_chart,
+    error_boxes,
+    index_chart,
+    saturation_words,
+    spring_boxes,
+    style,
+    tint,
+    variant_styles,
+)
 from support.codecs import judged, renamed, without_errors
 
 
@@ -84,7 +90,7 @@ def test_every_box_is_inside_its_panel(known):
 
 def test_a_variant_has_its_colour_and_a_box_for_every_size(known):
     axes = codec_chart(known.data, known.verdicts).axes[0]
-    for each, look in zip(boxes_in(axes), looks_of(["a", "b"]), strict=True):
+    for each, look in zip(boxes_in(axes), variant_styles(["a", "b"]), strict=True):
         assert len(each.get_paths()) == known.data.n_train[-1]
         assert to_hex(each.get_edgecolor()[0]) == look.colour
     assert [to_hex(each.get_edgecolor()[0]) for each in boxes_in(axes)] == [
@@ -182,7 +188,7 @@ def test_boxes_beyond_the_scale_have_an_arrow(known):
         for spot in each.get_offsets()
         if spot[1] == pytest.approx(top)
     ]
-    assert 1.0 + looks_of(["actuated", "bearing"])[1].place in arrows
+    assert 1.0 + variant_styles(["actuated", "bearing"])[1].place in arrows
     assert all(0.5 < x < 1.5 for x in arrows)
 
 

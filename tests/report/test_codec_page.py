@@ -12,8 +12,10 @@ import pytest
 
 from elastocal.errors import CodecError, FileAccessError
 from elastocal.report import write_codec_figures
-from elastocal.report.codec_page import write_codec_page
-from elastocal.report.printed import write_figure
+from elastocal.report.pages.codec_page import write_codec_page
+from elastocal.report.plots import (
+    write_figure,
+)
 from support.codecs import judged, renamed, without_errors
 from support.pages import Page
 

@@ -1,6 +1,8 @@
 import numpy as np
 
-from elastocal.report.labels import spread
+from elastocal.report.plots import (
+    spread_labels,
+)
 
 
 def _gaps(place):
@@ -10,19 +12,19 @@ def _gaps(place):
 
 def test_labels_with_room_stay():
     anchor = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 2.0]])
-    np.testing.assert_array_equal(spread(anchor, 0.9), anchor)
+    np.testing.assert_array_equal(spread_labels(anchor, 0.9), anchor)
 
 
 def test_a_crowd_is_moved_apart_and_stays_near():
     anchor = np.random.default_rng(0).normal(0.0, 0.3, (12, 2))
-    place = spread(anchor, 1.0)
+    place = spread_labels(anchor, 1.0)
     assert _gaps(place).min() > 0.95
     assert np.linalg.norm(place - anchor, axis=1).max() < 3.0
 
 
 def test_labels_on_one_spot_part():
-    assert _gaps(spread(np.zeros((5, 2)), 1.0)).min() > 0.95
+    assert _gaps(spread_labels(np.zeros((5, 2)), 1.0)).min() > 0.95
 
 
 def test_one_label_stays():
-    np.testing.assert_array_equal(spread(np.ones((1, 2)), 1.0), np.ones((1, 2)))
+    np.testing.assert_array_equal(spread_labels(np.ones((1, 2)), 1.0), np.ones((1, 2)))

@@ -7,7 +7,9 @@ import trimesh
 from elastocal.errors import FileAccessError, SchemaError
 from elastocal.planning.surface import TriangleMesh, build_surface
 from elastocal.report import write_plan_figure
-from elastocal.report.plan_figure import plan_figure
+from elastocal.report.plots import (
+    plan_figure,
+)
 
 
 def _texts(axes):

@@ -5,8 +5,13 @@ import numpy as np
 import pytest
 
 from elastocal.identification.recertification import recertify
-from elastocal.report import style, write_recertification_figure
-from elastocal.report.recertification_figure import recertification_figure
+from elastocal.report import (
+    write_recertification_figure,
+)
+from elastocal.report.plots import (
+    recertification_figure,
+    style,
+)
 from support.cells import linear_truth, unseen
 from support.recertified import calibrated, made_up, soft_truth
 

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from elastocal.planning.scene import mesh_shape
-from elastocal.report.solids import Solid, fixture_solids, joined, robot_solids, solid_of
+from elastocal.report.plots._solids import Solid, fixture_solids, joined, robot_solids, solid_of
 
 TETRAHEDRON = (
     np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]),

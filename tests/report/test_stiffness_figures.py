@@ -4,8 +4,13 @@ import numpy as np
 import pytest
 
 from elastocal.compensation.stiffness import Grid, Stations, Survey
-from elastocal.report import Curve, style
-from elastocal.report.stiffness_figures import stiffness_figure
+from elastocal.report import (
+    Curve,
+)
+from elastocal.report.plots import (
+    stiffness_figure,
+    style,
+)
 
 NAMES = ("as programmed", "one posture for the path", "stiffest at each station")
 

@@ -2,7 +2,9 @@ import numpy as np
 
 from elastocal.codec.study import Condition, ConditionRecord, Sample, study_record
 from elastocal.report import write_study_figures
-from elastocal.report.study_figure import study_figure
+from elastocal.report.plots import (
+    study_figure,
+)
 from support.studies import settings, simulate
 
 RESULTS = [simulate(Sample(3, number)) for number in range(6)]

@@ -5,7 +5,9 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from elastocal.report.view import plan_view
+from elastocal.report.plots import (
+    plan_view,
+)
 
 
 @pytest.fixture(scope="module")

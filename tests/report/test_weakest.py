@@ -2,7 +2,9 @@ import dataclasses
 
 import numpy as np
 
-from elastocal.report.weakest import weakest
+from elastocal.report.plots import (
+    weakest_margins,
+)
 
 
 def _with(pool, margin):
@@ -13,7 +15,7 @@ def test_weakest_check_is_the_smallest_part_of_its_median(pool):
     margin = np.ones((2, len(pool)))
     margin[0] *= 0.2
     margin[0, 3], margin[1, 4] = 0.05, 0.1
-    found = weakest(_with(pool, margin))
+    found = weakest_margins(_with(pool, margin))
     assert (found.check[3], found.check[4]) == (0, 1)
     np.testing.assert_allclose(found.share[[3, 4]], [0.25, 0.1])
     assert found.label[3] == f"{pool.check_names[0]} 50 mm"
@@ -23,7 +25,7 @@ def test_weakest_check_is_the_smallest_part_of_its_median(pool):
 def test_infinite_margins_are_never_the_weakest(pool):
     margin = np.ones((2, len(pool)))
     margin[0] = np.inf
-    found = weakest(_with(pool, margin))
+    found = weakest_margins(_with(pool, margin))
     assert np.all(found.check == 1)
     assert np.all(np.isfinite(found.share))
 
@@ -32,6 +34,6 @@ def test_a_pool_without_checks_has_no_weakest_one(pool):
     bare = dataclasses.replace(
         pool, margin=np.zeros((0, len(pool))), check_names=(), check_units=()
     )
-    found = weakest(bare)
+    found = weakest_margins(bare)
     assert set(found.label) == {"none"}
     np.testing.assert_array_equal(found.share, 1.0)

@@ -12,7 +12,10 @@ import yaml
 
 from elastocal.errors import RobotError, SchemaError
 from elastocal.robot import catalogue
-from elastocal.robot.catalogue import CatalogueEntry, table
+from elastocal.robot.catalogue import (
+    CatalogueEntry,
+    catalogue as table,
+)
 from elastocal.robot.catalogue.record import LINKS
 
 NAMES = catalogue.names()

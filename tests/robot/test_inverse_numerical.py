@@ -8,14 +8,14 @@ import pytest
 from elastocal.errors import RobotError
 from elastocal.robot import Robot
 from elastocal.robot.inverse import NumericalInverse, OpwInverse, pose_error
-from elastocal.robot.inverse.branch_solver import BranchSolver, distinct
+from elastocal.robot.inverse.solver import InverseKinematics, distinct
 from support.urdfs import KR_LIKE, offset_wrist_urdf, opw_arm_urdf, planar_arm_urdf
 
 ARM = Robot.from_urdf(opw_arm_urdf(**KR_LIKE), "tcp")
 
 
 @dataclass(frozen=True, eq=False)
-class _OneGuess(BranchSolver):
+class _OneGuess(InverseKinematics):
     """A solver whose only candidate is the same for every pose."""
 
     guess: np.ndarray

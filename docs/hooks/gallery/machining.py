@@ -6,8 +6,10 @@ from pathlib import Path
 
 from elastocal.cli.process_bench import MACHINING_SETTINGS
 from elastocal.compensation.process import Trace
-from elastocal.report.document.figures import process_maps
-from elastocal.report.printed import write_figure
+from elastocal.report.plots import (
+    process_maps,
+    write_figure,
+)
 from gallery.campaign import SEED, accuracy, campaign, example_cell, process, reduction
 from gallery.placement import draw_displacements
 

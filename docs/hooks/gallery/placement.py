@@ -10,10 +10,14 @@ from elastocal.cli.process_bench import AFP_SETTINGS
 from elastocal.codec import CodecData, Verdicts, cross_validate, judge, look_into, make_variants
 from elastocal.compensation.process import Trace
 from elastocal.report import write_plan_figure, write_plan_page
-from elastocal.report.codec_chart import codec_chart
-from elastocal.report.document.figures import course_figure, displacement_figure, process_maps
-from elastocal.report.index_chart import index_chart
-from elastocal.report.printed import write_figure
+from elastocal.report.plots import (
+    codec_chart,
+    course_figure,
+    displacement_figure,
+    index_chart,
+    process_maps,
+    write_figure,
+)
 from gallery.campaign import SEED, Campaign, accuracy, campaign, example_cell, process, reduction
 
 COURSES = 2

@@ -27,8 +27,11 @@ from elastocal.procedure import (
 from elastocal.procedure.journal import read_commits
 from elastocal.procedure.pose_recorder import PoseRecorder
 from elastocal.procedure.streams import Streams
-from elastocal.report import style
-from elastocal.report.printed import new_figure, write_figure
+from elastocal.report.plots import (
+    new_figure,
+    style,
+    write_figure,
+)
 from elastocal.sim.workcell import simulated_devices
 from gallery.campaign import example_cell
 

@@ -80,7 +80,10 @@ def _spring_table(found: Recertification, sums: dict[str, str]) -> Table:
     """Return a row a spring; linear springs, rare, name their own unit."""
     table = Table(box=None, pad_edge=False)
     table.add_column("spring", no_wrap=True)
-    headings = (*(f"{name}\n{_USUAL_UNIT}" for name in ("old", "new", "change")), "95 %, all\nat once")
+    headings = (
+        *(f"{name}\n{_USUAL_UNIT}" for name in ("old", "new", "change")),
+        "95 %, all\nat once",
+    )
     for heading in headings:
         table.add_column(heading, justify="right", no_wrap=True)
     table.add_column("", no_wrap=True)

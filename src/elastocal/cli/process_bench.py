@@ -36,7 +36,9 @@ from elastocal.compensation.process import (
 from elastocal.errors import CompensationError
 from elastocal.identification import CalibratedModel
 from elastocal.planning import cell_surface
-from elastocal.robot.inverse import inverse_transform
+from elastocal.robot import (
+    inverse_transform,
+)
 from elastocal.sim.workcell import ProcessCell
 
 Report = Callable[[str, int, int], None]

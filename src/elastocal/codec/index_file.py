@@ -11,7 +11,7 @@ from elastocal.codec.data import CodecData
 from elastocal.codec.index_correlation import Correlation
 from elastocal.codec.indices import COVERING_RADIUS, INDICES, IndexValues
 from elastocal.files import write_text
-from elastocal.schema import StrictModel
+from elastocal.records import StrictModel
 
 TABLE = "indices.csv"
 """Name of the table in a codec's folder."""

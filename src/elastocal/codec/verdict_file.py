@@ -13,7 +13,7 @@ from elastocal.codec.overlap import Overlap
 from elastocal.codec.variants import KEYS
 from elastocal.codec.verdicts import Verdicts
 from elastocal.files import write_json
-from elastocal.schema import StrictModel, read_json
+from elastocal.records import StrictModel, read_json
 
 VERDICTS_SCHEMA = "elastocal.codec_verdicts/1"
 VERDICTS = "codec.json"

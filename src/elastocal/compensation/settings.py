@@ -41,8 +41,8 @@ from elastocal.cell.description import (
 )
 from elastocal.compensation.filters import FilterChain, low_pass, notch
 from elastocal.errors import CompensationError
+from elastocal.records import StrictModel, read_yaml
 from elastocal.robot import T_from_xyzabc
-from elastocal.schema import StrictModel, read_yaml
 from elastocal.units import parse_quantity
 
 SCHEMA = "elastocal.compensator/1"

@@ -7,7 +7,7 @@ import xarray as xr
 
 from elastocal.errors import DatasetError, FileAccessError, SchemaError
 from elastocal.files import replacing
-from elastocal.schema import check_schema
+from elastocal.records import check_schema
 
 _ENGINE: Literal["h5netcdf"] = "h5netcdf"
 _SIGNATURE = b"\x89HDF\r\n\x1a\n"

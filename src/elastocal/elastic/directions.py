@@ -53,5 +53,3 @@ def as_axis(vector: ArrayLike) -> tuple[float, float, float]:
         raise SpringError(f"axis {vector!r} must be three finite numbers that are not all zero")
     unit: FloatArray = array / length
     return float(unit[0]), float(unit[1]), float(unit[2])
-
-

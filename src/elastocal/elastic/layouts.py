@@ -20,13 +20,14 @@ from pydantic import BeforeValidator, Field
 from elastocal.elastic.directions import AXES, as_axis, orthogonal_axes
 from elastocal.elastic.springs import KINDS, Hinge, Spring, SpringAxis, axial
 from elastocal.errors import SpringError, nearest
+from elastocal.records import StrictModel, read_yaml
 from elastocal.robot import ChainJoint, Robot
-from elastocal.schema import StrictModel, read_yaml
 from elastocal.units import parse_quantity
 
 _SCHEMA = "elastocal.springs/1"
 _MOTIONS = ("revolute", "prismatic")
 """What a hinge may do; other kinds of springs are asked for by their word."""
+
 
 def actuated(robot: Robot) -> tuple[Spring, ...]:
     """Return one axial spring per joint (6 on a 6R arm; the model of paper section 4.2.4)."""

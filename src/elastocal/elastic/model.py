@@ -32,7 +32,6 @@ from elastocal.robot import (
     evaluate_jacobian,
 )
 
-
 _Columns = IndexArray | slice
 """Columns of an array; those that lie side by side as a slice, which copies nothing."""
 

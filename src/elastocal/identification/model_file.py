@@ -12,8 +12,8 @@ from elastocal.files import sha256, write_json
 from elastocal.identification.calibrated import CalibratedModel
 from elastocal.identification.observability import Observability, Term
 from elastocal.identification.options import MINIMUM_DRAWS
+from elastocal.records import StrictModel, read_json
 from elastocal.robot import Robot
-from elastocal.schema import StrictModel, read_json
 
 SCHEMA = "elastocal.model/1"
 

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from elastocal.arrays import FloatArray
 from elastocal.elastic import Parameter
 from elastocal.errors import IdentificationError
-from elastocal.identification.losses import LOSSES, check_loss
+from elastocal.identification.losses import check_loss
 
 Weights = Literal["none", "sigma"]
 WEIGHTS: tuple[Weights, ...] = get_args(Weights)
@@ -71,9 +71,7 @@ MINIMUM_DRAWS = 40
 """Fewest draws that leave one beyond each end of a 95 % interval."""
 
 
-def bounds(
-    options: FitOptions, parameters: Sequence[Parameter]
-) -> tuple[FloatArray, FloatArray]:
+def bounds(options: FitOptions, parameters: Sequence[Parameter]) -> tuple[FloatArray, FloatArray]:
     """Return the lower and upper bounds, each of shape (parameter,).
 
     Raises
@@ -98,4 +96,3 @@ def bounds(
             f" {lower[bad[0]]:g} and {upper[bad[0]]:g}"
         )
     return lower, upper
-

@@ -15,7 +15,7 @@ from scipy.spatial.transform import Rotation
 from elastocal.arrays import FloatArray
 from elastocal.errors import SchemaError
 from elastocal.files import sha256, write_json
-from elastocal.schema import StrictModel, read_json
+from elastocal.records import StrictModel, read_json
 
 SCHEMA = "elastocal.plan/1"
 PLAN = "plan.json"

@@ -27,7 +27,9 @@ from elastocal.procedure.summary import Derivation, summarise
 from elastocal.procedure.tool_estimate import estimate_tool
 from elastocal.procedure.tool_weight import ToolLoad
 from elastocal.procedure.unloaded import marker_readings, tool_readings
-from elastocal.robot.inverse import inverse_transform
+from elastocal.robot import (
+    inverse_transform,
+)
 
 
 @dataclass(frozen=True, eq=False)

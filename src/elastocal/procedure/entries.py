@@ -6,7 +6,7 @@ from typing import Any
 from pydantic import SerializerFunctionWrapHandler, model_serializer
 
 from elastocal.procedure.pose_log import PoseLog
-from elastocal.schema import StrictModel
+from elastocal.records import StrictModel
 
 SCHEMA = "elastocal.journal/1"
 

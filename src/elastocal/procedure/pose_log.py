@@ -2,7 +2,7 @@
 
 from enum import Enum
 
-from elastocal.schema import StrictModel
+from elastocal.records import StrictModel
 
 
 class ReadingStatus(Enum):

@@ -11,7 +11,7 @@ from elastocal.files import sha256
 from elastocal.planning import PlanFile
 from elastocal.procedure.entries import Action, Entry, Event, RunRecord
 from elastocal.procedure.journal import commits
-from elastocal.schema import StrictModel
+from elastocal.records import StrictModel
 
 SAME_SECTIONS = ("procedure", "devices", "simulation")
 """Sections of the cell file that must not change within a run: its readings would not belong

@@ -17,7 +17,7 @@ from elastocal.errors import SchemaError
 from elastocal.procedure.mcap import Messages, read_mcap
 from elastocal.procedure.pose_recorder import NANOSECONDS, RECORD, SCHEMA, Mark, PoseRecorder
 from elastocal.procedure.stream_messages import ARM, MARKER, MARKS, WRENCH
-from elastocal.schema import check_schema
+from elastocal.records import check_schema
 
 __all__ = [
     "ArmStream",

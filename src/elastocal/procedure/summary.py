@@ -27,7 +27,7 @@ from elastocal.procedure.run_warnings import run_warnings
 from elastocal.procedure.tool_estimate import Interval, ToolEstimate
 from elastocal.procedure.tool_weight import ToolLoad
 from elastocal.procedure.unloaded import weighed_poses
-from elastocal.schema import check_schema
+from elastocal.records import check_schema
 
 SCHEMA = "elastocal.run-summary/1"
 

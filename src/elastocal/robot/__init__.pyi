@@ -11,7 +11,6 @@ from .mesh_files import (
     is_relative as is_relative,
 )
 from .mounting import Rail as Rail, on_rail as on_rail, with_tool as with_tool
-from .pose import T_from_xyzabc as T_from_xyzabc, xyzabc_from_T as xyzabc_from_T
 from .robot import (
     GRAVITY as GRAVITY,
     Jacobian as Jacobian,
@@ -22,7 +21,22 @@ from .robot import (
 from .singularity import (
     characteristic_length as characteristic_length,
     has_wrist as has_wrist,
+    manipulability as manipulability,
+    scaled_singular_values as scaled_singular_values,
     smallest_singular_value as smallest_singular_value,
     wrist_angle as wrist_angle,
 )
-from .urdf import leaf_links as leaf_links, parse_urdf as parse_urdf
+from .transforms import (
+    T_from_xyzabc as T_from_xyzabc,
+    inverse_transform as inverse_transform,
+    xyzabc_from_T as xyzabc_from_T,
+)
+from .urdf import (
+    Assumption as Assumption,
+    assumptions as assumptions,
+    leaf_links as leaf_links,
+    parse_urdf as parse_urdf,
+    read_chain as read_chain,
+    robot_name as robot_name,
+    root_link as root_link,
+)

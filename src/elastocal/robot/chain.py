@@ -50,6 +50,9 @@ class SerialChain:
     T_last_tip: FloatArray
     """Tip frame in the last joint's moving frame, shape (4, 4)."""
 
+    def __repr__(self) -> str:
+        return f"{len(self.joints)} joints from {self.base!r} to {self.tip!r}"
+
 
 @dataclass(frozen=True)
 class InsertedJoint:
@@ -77,6 +80,10 @@ class ChainModel:
     """Column of each joint of the chain, shape (joint,)."""
     inserted_columns: IndexArray
     """Column of each inserted joint, in the order given, shape (inserted,)."""
+
+    def __repr__(self) -> str:
+        joints, inserted = len(self.joint_columns), len(self.inserted_columns)
+        return f"ChainModel({joints} joints, {inserted} inserted)"
 
 
 def build_model(chain: SerialChain, inserted: Sequence[InsertedJoint] = ()) -> ChainModel:

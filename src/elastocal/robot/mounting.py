@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from elastocal.arrays import FloatArray
 from elastocal.errors import RobotError, nearest
-from elastocal.robot.pose import xyzabc_from_T
+from elastocal.robot.transforms import xyzabc_from_T
 from elastocal.robot.urdf import parse_urdf, robot_name, root_link
 
 _RIGID = 1e-6

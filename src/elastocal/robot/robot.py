@@ -10,11 +10,13 @@ from numpy.typing import ArrayLike
 from elastocal.arrays import FloatArray, IndexArray
 from elastocal.errors import RobotError
 from elastocal.files import read_text, sha256
-from elastocal.robot.chain import ChainModel, SerialChain, build_model
+from elastocal.robot.chain import ChainJoint, ChainModel, SerialChain, build_model
 from elastocal.robot.urdf import Assumption, assumptions, parse_urdf, read_chain, robot_name
 
 GRAVITY = (0.0, 0.0, -9.80665)
 """Standard gravity in the base frame of a robot that stands upright, in m/s² (ISO 80000-3)."""
+_JOINTS_SHOWN = 12
+"""Most joints that the `repr` of a robot lists."""
 
 
 @dataclass(frozen=True)
@@ -29,6 +31,9 @@ class Jacobian:
     """Rows of the linear velocity, shape (..., 3, joint), in m/rad or m/m."""
     rotation: FloatArray
     """Rows of the angular velocity, shape (..., 3, joint), in rad/rad or rad/m."""
+
+    def __repr__(self) -> str:
+        return f"Jacobian(translation and rotation of shape {self.translation.shape})"
 
 
 @dataclass(frozen=True)
@@ -78,6 +83,16 @@ class Robot:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "_rigid", build_model(self.chain))
+
+    def __repr__(self) -> str:
+        lines = [f"Robot {self.name!r}: {self.chain!r}"]
+        lines += [f"  {_joint_row(joint)}" for joint in self.chain.joints[:_JOINTS_SHOWN]]
+        if len(self.chain.joints) > _JOINTS_SHOWN:
+            lines.append(f"  and {len(self.chain.joints) - _JOINTS_SHOWN} more joints")
+        if self.assumptions:
+            fields = ", ".join(assumption.field for assumption in self.assumptions)
+            lines.append(f"  without a source: {fields}")
+        return "\n".join(lines)
 
     @classmethod
     def from_urdf(
@@ -236,6 +251,15 @@ class Robot:
         if not np.all(np.isfinite(array)):
             raise RobotError(f"joint positions of {self.name} hold a value that is not finite")
         return array
+
+
+def _joint_row(joint: ChainJoint) -> str:
+    """Return name, range, speed and torque of a joint as a row to read."""
+    one, unit, torque = (180.0 / np.pi, "deg", "N·m") if joint.revolute else (1e3, "mm", "N")
+    figures = ((joint.velocity * one, f"{unit}/s"), (joint.effort, torque))
+    known = [f"{value:.4g} {name}" for value, name in figures if not np.isnan(value)]
+    ends = f"{one * joint.lower:.5g} to {one * joint.upper:.5g} {unit}"
+    return ", ".join([f"{joint.name}: {ends}", *known])
 
 
 def evaluate_jacobian(chain: ChainModel, q: FloatArray, columns: IndexArray) -> Jacobian:

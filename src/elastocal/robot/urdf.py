@@ -4,6 +4,7 @@ The checks come before Pinocchio because its parser reports problems on the C++ 
 a user of elastocal gets one line that names the link, the joint and the allowed ones.
 """
 
+import math
 import xml.etree.ElementTree as ElementTree
 from dataclasses import dataclass
 
@@ -12,7 +13,19 @@ import pinocchio as pin
 
 from elastocal.errors import RobotError, nearest
 from elastocal.robot.chain import ChainJoint, SerialChain
-from elastocal.robot.urdf_elements import check_elements
+
+_NUMBERS = {
+    "origin": {"xyz": 3, "rpy": 3},
+    "axis": {"xyz": 3},
+    "limit": {"lower": 1, "upper": 1, "effort": 1, "velocity": 1},
+    "mass": {"value": 1},
+    "inertia": dict.fromkeys(("ixx", "ixy", "ixz", "iyy", "iyz", "izz"), 1),
+    "box": {"size": 3},
+    "sphere": {"radius": 1},
+    "cylinder": {"radius": 1, "length": 1},
+    "mesh": {"scale": 3},
+}
+"""How many numbers each attribute of each element holds (ROS wiki, urdf/XML)."""
 
 
 @dataclass(frozen=True)
@@ -108,13 +121,54 @@ def read_chain(text: str, tip: str, base: str | None = None) -> SerialChain:
                 f"URDF of {robot_name(root)} has no {role} link {link!r}{nearest(link, links)}"
                 f" (links: {', '.join(links)})"
             )
-    check_elements(root)
+    _check_elements(root)
     joints = _joints_between(root, base, tip)
     try:
         model = pin.buildModelFromXML(text)
     except ValueError as error:
         raise RobotError(f"URDF of {robot_name(root)} is refused by Pinocchio: {error}") from error
     return _chain_of(model, joints, base, tip)
+
+
+def _check_elements(root: ElementTree.Element) -> None:
+    """Refuse numbers that are none and names that stand twice.
+
+    Raises
+    ------
+    RobotError
+        With the link or joint, the element and its value.
+    """
+    for kind in ("link", "joint"):
+        names = [element.get("name", "") for element in root.findall(kind)]
+        twice = sorted({name for name in names if names.count(name) > 1})
+        if twice:
+            raise RobotError(f"URDF has two {kind}s named {twice[0]!r}")
+        for owner in root.findall(kind):
+            for element in owner.iter():
+                _check_numbers(f"{kind} {owner.get('name')!r}", element)
+    links = {link.get("name", "") for link in root.findall("link")}
+    for joint in root.findall("joint"):
+        for role in ("parent", "child"):
+            found = joint.find(role)
+            name = "" if found is None else found.get("link", "")
+            if name and name not in links:
+                raise RobotError(f"URDF joint {joint.get('name')!r}: no link {name!r} ({role})")
+
+
+def _check_numbers(owner: str, element: ElementTree.Element) -> None:
+    for name, count in _NUMBERS.get(element.tag, {}).items():
+        text = element.get(name)
+        if text is None:
+            continue
+        try:
+            values = [float(part) for part in text.split()]
+        except ValueError:
+            values = []
+        if len(values) != count or not all(math.isfinite(value) for value in values):
+            what = "a finite number" if count == 1 else f"{count} finite numbers"
+            raise RobotError(f"URDF {owner}: <{element.tag} {name}={text!r}> must be {what}")
+        if element.tag == "axis" and not any(values):
+            raise RobotError(f"URDF {owner}: <axis xyz={text!r}> must not be zero")
 
 
 def _link_names(root: ElementTree.Element) -> list[str]:

@@ -1,7 +1,7 @@
 """What a calibration is judged by: the tolerances of the process."""
 
 from elastocal.cell.description.quantities import PositiveLength
-from elastocal.schema import StrictModel
+from elastocal.records import StrictModel
 
 
 class Acceptance(StrictModel):

@@ -19,18 +19,18 @@ from elastocal.cell.description.shapes import MeshFile, Shape
 from elastocal.dataset import LoadRows, joint_dimensions, read_load_rows
 from elastocal.errors import ElastocalError, FileAccessError, RobotError, SchemaError, nearest
 from elastocal.files import read_text
+from elastocal.records import read_yaml
 from elastocal.robot import (
     GRAVITY,
     Rail,
     Robot,
     catalogue,
     find_meshes,
+    inverse_transform,
     on_rail,
     parse_urdf,
     with_tool,
 )
-from elastocal.robot.inverse import inverse_transform
-from elastocal.schema import read_yaml
 
 TCP = "tcp"
 """Name of the link at the tool centre point."""

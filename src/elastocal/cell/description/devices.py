@@ -1,6 +1,6 @@
 """Which devices carry a run out."""
 
-from elastocal.schema import StrictModel
+from elastocal.records import StrictModel
 
 SIMULATED = "simulated"
 """Name of the device of each kind that needs no hardware."""

@@ -6,7 +6,7 @@ from typing import Any
 from pydantic import field_validator
 
 from elastocal.cell.description.quantities import Distance, PositiveAngle, PositiveLength
-from elastocal.schema import StrictModel
+from elastocal.records import StrictModel
 
 
 class Engagement(StrictModel):

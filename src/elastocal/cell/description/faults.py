@@ -6,7 +6,7 @@ from pydantic import BeforeValidator, Field, model_validator
 
 from elastocal.cell.description.motion import PositiveTime
 from elastocal.cell.description.quantities import Force, Mass, Point, PositiveLength
-from elastocal.schema import StrictModel
+from elastocal.records import StrictModel
 from elastocal.units import parse_quantity
 
 Kind = Literal[

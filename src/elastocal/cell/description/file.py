@@ -21,7 +21,7 @@ from elastocal.cell.description.shapes import Shape
 from elastocal.cell.description.simulation import Simulation
 from elastocal.cell.description.surface import SurfaceEntry
 from elastocal.cell.description.tool import ForceSensor, Tool
-from elastocal.schema import StrictModel
+from elastocal.records import StrictModel
 
 SCHEMA = "elastocal.cell/1"
 TOOLING = "tooling"

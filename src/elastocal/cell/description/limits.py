@@ -6,7 +6,7 @@ from pydantic import Field, FiniteFloat, field_validator
 
 from elastocal.cell.description.quantities import Distance, PositiveMass, SpanAngle
 from elastocal.errors import UnitError
-from elastocal.schema import StrictModel
+from elastocal.records import StrictModel
 from elastocal.units import parse_quantity
 
 

@@ -7,7 +7,7 @@ from pydantic import Field, FiniteFloat, field_validator
 
 from elastocal.arrays import FloatArray
 from elastocal.cell.description.quantities import Force, PositiveForce
-from elastocal.schema import StrictModel
+from elastocal.records import StrictModel
 
 DIRECTIONS = {
     "normal": (0.0, 0.0, -1.0),

@@ -3,7 +3,7 @@
 from elastocal.arrays import FloatArray
 from elastocal.cell.description.pose import unit_vector, vector
 from elastocal.cell.description.quantities import Direction, Point, PositiveAngle, Range
-from elastocal.schema import StrictModel
+from elastocal.records import StrictModel
 
 
 class Tracker(StrictModel):

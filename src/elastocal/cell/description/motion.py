@@ -9,8 +9,8 @@ from pydantic import AfterValidator, BeforeValidator, Field, FiniteFloat, field_
 
 from elastocal.arrays import FloatArray
 from elastocal.errors import RobotError, UnitError, nearest
+from elastocal.records import StrictModel
 from elastocal.robot import Robot
-from elastocal.schema import StrictModel
 from elastocal.units import parse_quantity
 
 _SLOWEST = 1e-12

@@ -4,8 +4,8 @@ import numpy as np
 
 from elastocal.arrays import FloatArray
 from elastocal.cell.description.quantities import Angle, Point
+from elastocal.records import StrictModel
 from elastocal.robot import T_from_xyzabc
-from elastocal.schema import StrictModel
 
 
 class Pose(StrictModel):

@@ -13,7 +13,7 @@ from pydantic_core import InitErrorDetails, PydanticCustomError
 
 from elastocal.cell.description.motion import PositiveSpeed, PositiveTime
 from elastocal.cell.description.quantities import PositiveForce, PositiveLength
-from elastocal.schema import StrictModel
+from elastocal.records import StrictModel
 from elastocal.units import parse_quantity
 
 

@@ -6,7 +6,7 @@ from pydantic import Field, model_validator
 
 from elastocal.cell.description.pose import IDENTITY, Pose
 from elastocal.cell.description.quantities import Direction, Travel, check_exactly_one
-from elastocal.schema import StrictModel
+from elastocal.records import StrictModel
 
 
 class RailEntry(StrictModel):

@@ -5,7 +5,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Field, field_validator
 
 from elastocal.cell.description.quantities import PositiveLength
-from elastocal.schema import StrictModel
+from elastocal.records import StrictModel
 
 DEFAULT_POSES = 31
 """Number of poses of the paper's first case study."""

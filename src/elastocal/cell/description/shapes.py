@@ -7,7 +7,7 @@ from pydantic import model_validator
 from elastocal.arrays import FloatArray
 from elastocal.cell.description.pose import IDENTITY, Pose, vector
 from elastocal.cell.description.quantities import PositiveLength, check_exactly_one
-from elastocal.schema import StrictModel
+from elastocal.records import StrictModel
 from elastocal.units import factor
 
 

@@ -27,7 +27,7 @@ from elastocal.cell.description.simulation_truth import (
     TranslationalStiffness,
     TruthScale,
 )
-from elastocal.schema import StrictModel
+from elastocal.records import StrictModel
 from elastocal.units import parse_quantity
 
 Share = Annotated[FiniteFloat, Field(ge=0.0, lt=1.0)]

@@ -6,7 +6,7 @@ from typing import Annotated, Any
 from pydantic import BeforeValidator, Field, FiniteFloat, field_validator
 
 from elastocal.cell.description.quantities import PositiveLength, SpanAngle
-from elastocal.schema import StrictModel
+from elastocal.records import StrictModel
 from elastocal.units import parse_quantity
 
 RotationalStiffness = Annotated[

@@ -16,7 +16,7 @@ from elastocal.cell.description.quantities import (
     check_exactly_one,
 )
 from elastocal.cell.description.shapes import MeshFile
-from elastocal.schema import StrictModel
+from elastocal.records import StrictModel
 
 
 class RegionBox(StrictModel):

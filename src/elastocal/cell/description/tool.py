@@ -4,7 +4,7 @@ from elastocal.arrays import FloatArray
 from elastocal.cell.description.pose import IDENTITY, Pose, vector
 from elastocal.cell.description.quantities import Mass, Point, PositiveForce, PositiveMoment
 from elastocal.cell.description.shapes import Shape
-from elastocal.schema import StrictModel
+from elastocal.records import StrictModel
 
 
 class Tool(StrictModel):

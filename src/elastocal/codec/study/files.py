@@ -11,7 +11,7 @@ from elastocal.codec.study.settings import StudySettings, written
 from elastocal.codec.study.summary import ConditionSummary, advice, summarise
 from elastocal.errors import CodecError
 from elastocal.files import write_json, write_text
-from elastocal.schema import StrictModel, read_json
+from elastocal.records import StrictModel, read_json
 
 STUDY_SCHEMA = "elastocal.study/1"
 RECORD, TABLE, COMPLIANCES = "study.json", "study.csv", "compliance.csv"

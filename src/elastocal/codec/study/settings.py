@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 from elastocal.codec.study.factors import FACTORS, Condition, Value
 from elastocal.errors import CodecError
-from elastocal.schema import StrictModel
+from elastocal.records import StrictModel
 
 SETTINGS_SCHEMA = "elastocal.study_settings/1"
 _LONGEST = 60

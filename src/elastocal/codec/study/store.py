@@ -17,7 +17,7 @@ from elastocal.codec.study.samples import Accuracy, Outcome, SampleResult
 from elastocal.codec.study.settings import SETTINGS_SCHEMA, StudySettings, check_same
 from elastocal.errors import FileAccessError, SchemaError
 from elastocal.files import sha256, write_text
-from elastocal.schema import StrictModel, read_json
+from elastocal.records import StrictModel, read_json
 
 SETTINGS = "settings.json"
 """Name of the file by which a study's folder is known."""

@@ -10,7 +10,7 @@ from elastocal.arrays import FloatArray
 from elastocal.codec.study.samples import SampleResult
 from elastocal.codec.study.settings import ConditionRecord, StudySettings
 from elastocal.identification import CONFIDENCE
-from elastocal.schema import StrictModel
+from elastocal.records import StrictModel
 
 RELIABLE = 0.9
 """Share of the arms that a condition has to bring to the target before it is recommended."""

@@ -11,9 +11,15 @@ from elastocal.compensation.conditioning.tool_load import SensorLoad
 from elastocal.compensation.conditioning.tool_model import NAMES
 from elastocal.errors import CompensationError, nearest
 from elastocal.files import write_json
-from elastocal.robot import Robot, parse_urdf
-from elastocal.robot.inverse import inverse_transform
-from elastocal.schema import StrictModel, read_json
+from elastocal.records import (
+    StrictModel,
+    read_json,
+)
+from elastocal.robot import (
+    Robot,
+    inverse_transform,
+    parse_urdf,
+)
 
 SCHEMA = "elastocal.tool/1"
 

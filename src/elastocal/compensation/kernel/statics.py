@@ -211,9 +211,7 @@ def _numbered(lengths: Sequence[int]) -> list[range]:
     return [range(end - length, end) for end, length in zip(ends, lengths, strict=True)]
 
 
-def _displaced(
-    program: Program, start: Vector, place: _Place, moved: dict[int, Value]
-) -> Vector:
+def _displaced(program: Program, start: Vector, place: _Place, moved: dict[int, Value]) -> Vector:
     """Return ``start`` with what the axes of a place displace the tool centre point by."""
     turns = {number: axis.revolute for number, (axis, _) in place.axes.items()}
     turned = [(moved[n], a) for n, a in place.directions.items() if turns[n]]

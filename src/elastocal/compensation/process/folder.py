@@ -20,7 +20,7 @@ from elastocal.compensation.process.record import SCHEMA, Line, ProcessRecord, T
 from elastocal.compensation.process.table import Figures, compare
 from elastocal.errors import CompensationError
 from elastocal.files import write_json, write_text
-from elastocal.schema import read_json
+from elastocal.records import read_json
 
 TABLE = "table.json"
 """Name of the file by which the folder is known."""

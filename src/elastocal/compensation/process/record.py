@@ -9,7 +9,7 @@ from typing import Any
 
 from elastocal.compensation.process.table import Comparison, Figures
 from elastocal.compensation.process.trace import Trace
-from elastocal.schema import StrictModel
+from elastocal.records import StrictModel
 
 SCHEMA = "elastocal.process/1"
 

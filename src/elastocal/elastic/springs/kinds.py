@@ -1,7 +1,7 @@
 """Every kind of spring by the name that files have for it, and what files hold of a spring."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, fields
+from dataclasses import asdict
 from typing import Any
 
 from elastocal.elastic.springs.hinge import Hinge

@@ -11,7 +11,7 @@ from elastocal.identification.recertification.result import (
     Recertification,
     SpringChange,
 )
-from elastocal.schema import StrictModel, read_json
+from elastocal.records import StrictModel, read_json
 
 SCHEMA = "elastocal.comparison/1"
 

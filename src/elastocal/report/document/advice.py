@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from elastocal.report.document.again import Unseen
 from elastocal.report.document.leading import leading
 from elastocal.report.document.parts import Parts
-from elastocal.report.document.words import counted, mm, um
+from elastocal.wording import counted, mm, um
 
 _LOUD = 0.3
 """Part of the mean error from which on the noise of a reading is worth less of it."""

@@ -4,7 +4,7 @@ from elastocal.report.document.again import Unseen
 from elastocal.report.document.markup import coded, facts, heading, html, listed, paragraph
 from elastocal.report.document.parts import Parts
 from elastocal.report.document.verdict import Light, Verdict
-from elastocal.report.document.words import mm
+from elastocal.wording import mm
 
 _SHAPES = {
     Light.GREEN: '<circle cx="24" cy="24" r="21"/><path class="sign" d="M14 25l7 7 14-15"/>',

@@ -17,7 +17,7 @@ from elastocal.report.document.parts import Parts
 from elastocal.report.document.section import Content
 from elastocal.report.document.sections import SECTIONS
 from elastocal.report.document.verdict import Verdict, judge
-from elastocal.report.html import POLICY, embedded, template
+from elastocal.report.pages.templating import POLICY, embedded, template
 
 
 @dataclass(frozen=True)

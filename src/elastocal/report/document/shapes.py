@@ -8,7 +8,7 @@ from typing import Any
 from pydantic import ConfigDict, FiniteFloat
 
 from elastocal.errors import SchemaError
-from elastocal.schema import StrictModel, validate
+from elastocal.records import StrictModel, validate
 
 Number = FiniteFloat | None
 Numbers = tuple[Number, ...]

@@ -12,7 +12,7 @@ from enum import Enum
 from elastocal.report.document.again import Unseen
 from elastocal.report.document.parts import Parts
 from elastocal.report.document.section import Finding
-from elastocal.report.document.words import counted, mm
+from elastocal.wording import counted, mm
 
 
 class Light(Enum):

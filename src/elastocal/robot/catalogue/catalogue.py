@@ -4,15 +4,29 @@ The table `kuka.yaml` beside this file is the only copy of the numbers; the URDF
 on demand. What has no source says so in `Robot.assumptions`.
 """
 
-from elastocal.robot.catalogue.record import CatalogueEntry
-from elastocal.robot.catalogue.table import entries, find
+import functools
+import importlib.resources
+import re
+from typing import Any
+
+import yaml
+
+from elastocal.errors import RobotError, SchemaError, nearest
+from elastocal.records import (
+    check_schema,
+    validate,
+)
+from elastocal.robot.catalogue.record import CatalogueEntry, Dimensions, inertias_like
 from elastocal.robot.catalogue.writer import urdf_of
 from elastocal.robot.robot import Robot
+
+_FILE = "kuka.yaml"
+SCHEMA = "elastocal.catalogue/1"
 
 
 def names() -> tuple[str, ...]:
     """Return the names of all robots, in the order of the table."""
-    return tuple(entries())
+    return tuple(_entries())
 
 
 def entry(name: str) -> CatalogueEntry:
@@ -28,12 +42,12 @@ def entry(name: str) -> CatalogueEntry:
     RobotError
         If no robot has that name.
     """
-    return find(name)
+    return _find(name)
 
 
 def urdf(name: str) -> str:
     """Return the URDF of a robot; see `elastocal.robot.catalogue.writer`."""
-    return urdf_of(find(name))
+    return urdf_of(_find(name))
 
 
 def load(name: str, tip: str = "flange") -> Robot:
@@ -55,3 +69,79 @@ def load(name: str, tip: str = "flange") -> Robot:
         If no robot has that name, or it has no such link.
     """
     return Robot.from_urdf(urdf(name), tip)
+
+
+def read_table(text: str, what: str) -> dict[str, CatalogueEntry]:
+    """Return the robots of a table text by name.
+
+    Parameters
+    ----------
+    text : str
+        YAML: `schema`, free `sources` to refer to, and the list `robots`.
+    what : str
+        Name of the table, for messages.
+
+    Raises
+    ------
+    SchemaError
+        If the table has another schema, a robot does not fit `CatalogueEntry`, two have the
+        same name, or an inertia is ``like`` a robot that has no inertia of its own.
+    """
+    data = yaml.safe_load(text)
+    check_schema(data.get("schema"), SCHEMA, what)
+    by_name = {str(robot["name"]): robot for robot in data["robots"]}
+    if len(by_name) != len(data["robots"]):
+        raise SchemaError(f"{what}: two robots have the same name")
+    return {name: _entry(name, by_name, what) for name in by_name}
+
+
+@functools.cache
+def _entries() -> dict[str, CatalogueEntry]:
+    """Return the robots of the package by name, in the order of the table."""
+    text = importlib.resources.files(__package__).joinpath(_FILE).read_text(encoding="utf-8")
+    return read_table(text, _FILE)
+
+
+def _find(name: str) -> CatalogueEntry:
+    """Return the robot of a name; case, spaces, hyphens and underscores do not matter.
+
+    Raises
+    ------
+    RobotError
+        If there is none, with the nearest name and the list of all.
+    """
+    table = _entries()
+    by_key = {_key(known): known for known in table}
+    known = by_key.get(_key(name))
+    if known is None:
+        raise RobotError(
+            f"no robot {name!r} in the catalogue{_suggestion(name, by_key)}"
+            f" (robots: {', '.join(table)})"
+        )
+    return table[known]
+
+
+def _entry(name: str, by_name: dict[str, Any], what: str) -> CatalogueEntry:
+    """Return one robot; masses that are ``like`` a sister's are estimated from hers."""
+    robot = by_name[name]
+    sister_name = robot.get("inertia", {}).get("like")
+    if sister_name is not None:
+        if "links" not in by_name.get(sister_name, {}).get("inertia", {}):
+            raise SchemaError(
+                f"{what}: inertia of {name} is like {sister_name!r}, which has none of its own"
+            )
+        arm = validate(robot["dimensions"], Dimensions, f"{what}: {name}")
+        robot = robot | {"inertia": inertias_like(_entry(sister_name, by_name, what), arm)}
+    return validate(robot, CatalogueEntry, f"{what}: {name}")
+
+
+def _key(name: str) -> str:
+    return re.sub(r"[\s_-]+", "", name).casefold()
+
+
+def _suggestion(name: str, by_key: dict[str, str]) -> str:
+    """Return the nearest name as a person writes it; `nearest` compares spelling only."""
+    hint = nearest(_key(name), by_key)
+    for key, known in by_key.items():
+        hint = hint.replace(repr(key), repr(known))
+    return hint

@@ -1,18 +1,21 @@
-"""What the catalogue knows of a robot: numbers in groups, each with its source or its excuse."""
+"""A robot of the catalogue: numbers in groups, each with its source or its excuse.
+
+The masses of a robot may be estimated from those of a sister with sourced ones.
+"""
 
 import math
 from typing import Annotated, Self
 
 from pydantic import Field, FiniteFloat, model_validator
 
-from elastocal.schema import StrictModel
+from elastocal.records import StrictModel
 
 LINKS = ("base_link", "link_1", "link_2", "link_3", "link_4", "link_5", "link_6")
 """Links of a catalogue robot that have a mass, from the base on."""
 
-Six = tuple[FiniteFloat, FiniteFloat, FiniteFloat, FiniteFloat, FiniteFloat, FiniteFloat]
-Vector = tuple[FiniteFloat, FiniteFloat, FiniteFloat]
-Length = Annotated[float, Field(ge=0.0, allow_inf_nan=False)]
+_Six = tuple[FiniteFloat, FiniteFloat, FiniteFloat, FiniteFloat, FiniteFloat, FiniteFloat]
+_Vector = tuple[FiniteFloat, FiniteFloat, FiniteFloat]
+_Length = Annotated[float, Field(ge=0.0, allow_inf_nan=False)]
 
 
 class Group(StrictModel):
@@ -38,33 +41,33 @@ class Dimensions(Group):
     wrist", Austrian Robotics Workshop 2014.
     """
 
-    a1: Length
+    a1: _Length
     """From the A1 axis forward to the A2 axis."""
     a2: FiniteFloat
     """From the A3 axis *down* to the A4 axis, the forearm stretched forward."""
-    c1: Length
+    c1: _Length
     """From the floor up to the A2 axis."""
-    c2: Length
+    c2: _Length
     """From the A2 axis to the A3 axis."""
-    c3: Length
+    c3: _Length
     """From the A3 axis along the forearm to the wrist centre."""
-    c4: Length
+    c4: _Length
     """From the wrist centre to the flange."""
-    published_reach: Length | None = None
+    published_reach: _Length | None = None
     """Largest distance of the wrist centre from the A1 axis according to the maker."""
 
 
 class PositionLimits(Group):
     """Range of A1 to A6 in deg, in the sense of the controller's pendant."""
 
-    lower: Six
-    upper: Six
+    lower: _Six
+    upper: _Six
 
 
 class Maxima(Group):
     """Largest velocities in deg/s or torques in N·m of A1 to A6; None when not known."""
 
-    maximum: Six | None = None
+    maximum: _Six | None = None
 
     @model_validator(mode="after")
     def _unknown_is_said(self) -> Self:
@@ -76,11 +79,11 @@ class Maxima(Group):
 class LinkInertia(StrictModel):
     """Mass properties of a link in the frame of its joint; axes as the base's at zero."""
 
-    mass: Length
+    mass: _Length
     """In kg; 0 when the source lumps the link into another one."""
-    centre: Vector
+    centre: _Vector
     """Centre of mass in m."""
-    tensor: Six
+    tensor: _Six
     """xx, yy, zz, xy, xz, yz about the centre of mass, in kg·m²."""
 
 
@@ -138,3 +141,38 @@ class CatalogueEntry(StrictModel):
         nearest_to_horizontal = math.radians(min(max(0.0, lower), upper))
         arm = self.dimensions
         return arm.a1 + arm.c2 * math.cos(nearest_to_horizontal) + math.hypot(arm.c3, arm.a2)
+
+
+def inertias_like(sister: CatalogueEntry, arm: Dimensions) -> Inertias:
+    """Return a sister's mass properties with the centres of mass moved along the links.
+
+    Masses and tensors stay: castings and motors of a family differ less than their lengths. The
+    estimate is always marked as an assumption.
+
+    Parameters
+    ----------
+    sister : CatalogueEntry
+        Robot of about the same size whose masses have a source.
+    arm : Dimensions
+        Of the robot that the estimate is for.
+    """
+    had = sister.dimensions
+    along = {
+        "link_1": (arm.a1 / had.a1, arm.c1 / had.c1),
+        "link_2": (arm.c2 / had.c2, 1.0),
+        "link_3": (arm.c3 / had.c3, arm.a2 / had.a2),
+    }
+    links = {
+        name: _moved(link, *along.get(name, (1.0, 1.0)))
+        for name, link in sister.inertia.links.items()
+    }
+    reason = (
+        f"estimated from {sister.name}: its masses and inertias, centres of mass moved in"
+        " proportion to the lengths of the links"
+    )
+    return Inertias(assumption=reason, links=links)
+
+
+def _moved(link: LinkInertia, x: float, z: float) -> LinkInertia:
+    centre = (link.centre[0] * x, link.centre[1], link.centre[2] * z)
+    return link.model_copy(update={"centre": centre})

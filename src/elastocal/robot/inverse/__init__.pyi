@@ -1,13 +1,26 @@
-from .branch_solver import pose_error as pose_error
-from .choice import inverse_for as inverse_for
-from .frames import arm_base as arm_base, inverse_transform as inverse_transform
-from .limits import TURN as TURN, turns as turns
-from .numerical import NumericalInverse as NumericalInverse
-from .opw import OpwInverse as OpwInverse
-from .opw_geometry import (
+from .arm import (
+    TURN as TURN,
+    AxisLines as AxisLines,
+    arm_axes as arm_axes,
+    arm_base as arm_base,
+    arm_joints as arm_joints,
+    arm_tip_at_zero as arm_tip_at_zero,
+    nearest_zero as nearest_zero,
+    turns as turns,
+)
+from .numerical import NumericalInverse as NumericalInverse, inverse_for as inverse_for
+from .opw import (
     NotOrthoParallelError as NotOrthoParallelError,
     OpwGeometry as OpwGeometry,
+    OpwInverse as OpwInverse,
     OpwParameters as OpwParameters,
     derive_opw as derive_opw,
+    opw_branches as opw_branches,
 )
-from .protocol import InverseKinematics as InverseKinematics, InverseSolutions as InverseSolutions
+from .solver import (
+    InverseKinematics as InverseKinematics,
+    InverseSolutions as InverseSolutions,
+    distinct as distinct,
+    pose_error as pose_error,
+    reaches as reaches,
+)

@@ -6,11 +6,18 @@ import numpy as np
 
 from elastocal.arrays import FloatArray
 from elastocal.errors import RobotError
-from elastocal.robot.inverse.branch_solver import BranchSolver, distinct, pose_error, reaches
-from elastocal.robot.inverse.limits import nearest_zero
+from elastocal.robot.inverse.arm import nearest_zero
+from elastocal.robot.inverse.opw import NotOrthoParallelError, OpwInverse
+from elastocal.robot.inverse.solver import (
+    InverseKinematics,
+    distinct,
+    pose_error,
+    reaches,
+)
+from elastocal.robot.robot import Robot
 from elastocal.robot.singularity import characteristic_length
 
-MOST_SOLUTIONS = 16
+_MOST_SOLUTIONS = 16
 """A general arm of six revolute joints reaches a pose in at most 16 ways (Primrose, 1986)."""
 _SAME = 1e-4
 """Two ends of a descent nearer than this (rad, m) are one solution, found twice."""
@@ -18,8 +25,29 @@ _CONVERGED = 1e-11
 _LARGEST_STEP = 1.0
 
 
-@dataclass(frozen=True, eq=False)
-class NumericalInverse(BranchSolver):
+def inverse_for(robot: Robot, seed: int = 0) -> InverseKinematics:
+    """Return the solver for a robot: closed form if its arm has one, else numerical.
+
+    Parameters
+    ----------
+    robot : Robot
+        Its last six joints are the arm, those before it external axes.
+    seed : int
+        Seed of the numerical solver, should it be needed.
+
+    Returns
+    -------
+    OpwInverse or NumericalInverse
+        The latter's ``reason`` says what the closed form failed on.
+    """
+    try:
+        return OpwInverse(robot)
+    except NotOrthoParallelError as error:
+        return NumericalInverse(robot, seed=seed, reason=str(error))
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class NumericalInverse(InverseKinematics):
     """Levenberg-Marquardt descents of the pose error from seeded random starts.
 
     For any arm of up to six joints, revolute or prismatic. **It may miss solutions**, also the
@@ -54,13 +82,13 @@ class NumericalInverse(BranchSolver):
     @property
     def branches(self) -> int:
         """Number of slots a pose has: sixteen."""
-        return MOST_SOLUTIONS
+        return _MOST_SOLUTIONS
 
     def candidates(self, T_base_tcp: FloatArray, external: FloatArray) -> FloatArray:
-        """Return what the descents found; see `BranchSolver.candidates`."""
+        """Return what the descents found; see `InverseKinematics.candidates`."""
         length = characteristic_length(self.robot)
         arm_starts = self._arm_starts(length)
-        shape = (len(T_base_tcp), MOST_SOLUTIONS, arm_starts.shape[1])
+        shape = (len(T_base_tcp), _MOST_SOLUTIONS, arm_starts.shape[1])
         found = np.full(shape, np.nan)
         for slots, T, fixed in zip(found, T_base_tcp, external, strict=True):
             q = np.hstack([np.tile(fixed, (len(arm_starts), 1)), arm_starts])
@@ -70,7 +98,7 @@ class NumericalInverse(BranchSolver):
             arm = nearest_zero(self.robot, arm)
             arm = arm[np.isfinite(arm).all(axis=-1)]
             arm = arm[np.lexsort(np.round(arm, 6).T[::-1])]
-            arm = distinct(self.robot, arm, _SAME)[:MOST_SOLUTIONS]
+            arm = distinct(self.robot, arm, _SAME)[:_MOST_SOLUTIONS]
             slots[: len(arm)] = arm
         return found
 

@@ -8,7 +8,9 @@ import numpy as np
 from elastocal.arrays import FloatArray
 from elastocal.cell import Cell
 from elastocal.cell.devices import Motion
-from elastocal.robot.inverse import inverse_transform
+from elastocal.robot import (
+    inverse_transform,
+)
 from elastocal.sim.workcell.clock import SimClock
 from elastocal.sim.workcell.contact import Contact, ContactLaw
 from elastocal.sim.workcell.keys import generator, posture_key

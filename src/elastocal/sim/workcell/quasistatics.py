@@ -14,7 +14,9 @@ from scipy.spatial.transform import Rotation
 from elastocal.arrays import FloatArray
 from elastocal.cell import Cell
 from elastocal.errors import DeviceError
-from elastocal.robot.inverse import inverse_transform
+from elastocal.robot import (
+    inverse_transform,
+)
 from elastocal.sim.reach import reach
 from elastocal.sim.workcell.robot import Rest, TrueRobot
 from elastocal.sim.workcell.segment import Knots

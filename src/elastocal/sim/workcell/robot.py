@@ -10,7 +10,9 @@ import numpy as np
 
 from elastocal.arrays import FloatArray, IndexArray
 from elastocal.cell import Cell
-from elastocal.robot.inverse import inverse_transform
+from elastocal.robot import (
+    inverse_transform,
+)
 from elastocal.sim.newton import minimise
 from elastocal.sim.statics import DeadLoads, EnergyState, LoadedMechanism
 from elastocal.sim.workcell.robot_layout import RobotLayout, lay_out_robot

@@ -20,7 +20,9 @@ from elastocal.arrays import FloatArray, IndexArray
 from elastocal.cell import Cell
 from elastocal.cell.description import Gears
 from elastocal.errors import DeviceError
-from elastocal.robot.inverse import inverse_transform
+from elastocal.robot import (
+    inverse_transform,
+)
 from elastocal.sim.layouts import AXIAL_STIFFNESS, LINK_BENDING, across, link_vector, triple
 from elastocal.sim.linkage import Linkage
 from elastocal.sim.skeleton import Skeleton, TruthSpring, lay_out

@@ -11,8 +11,13 @@ from elastocal.compensation.offline.krl.moves import Move
 from elastocal.compensation.offline.krl.points import Point
 from elastocal.compensation.offline.limits import Where, check_limits
 from elastocal.compensation.path import PathError
-from elastocal.robot import T_from_xyzabc
-from elastocal.robot.inverse import InverseKinematics, inverse_transform
+from elastocal.robot import (
+    T_from_xyzabc,
+    inverse_transform,
+)
+from elastocal.robot.inverse import (
+    InverseKinematics,
+)
 
 _FRAME = ("X", "Y", "Z", "A", "B", "C")
 _ARM = tuple(f"A{number}" for number in range(1, 7))

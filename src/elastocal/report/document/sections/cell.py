@@ -8,7 +8,7 @@ from elastocal.cell import Cell
 from elastocal.report.document.markup import paragraph, table
 from elastocal.report.document.parts import Parts
 from elastocal.report.document.section import Content, Section
-from elastocal.report.document.words import mm, point
+from elastocal.wording import mm, point
 
 Row = tuple[str, str]
 

@@ -5,13 +5,17 @@ from functools import partial
 
 from elastocal.codec import CodecData, Saturation
 from elastocal.errors import CodecError
-from elastocal.report.codec_chart import codec_chart, headline, how_to_read
 from elastocal.report.document.leading import leading
 from elastocal.report.document.markup import facts, heading, listed, paragraph, table
 from elastocal.report.document.parts import Codec, Parts
 from elastocal.report.document.pictures import picture
 from elastocal.report.document.section import Content, Finding, Section
-from elastocal.report.document.words import counted, mm
+from elastocal.report.plots import (
+    codec_chart,
+    headline,
+    how_to_read,
+)
+from elastocal.wording import counted, mm
 
 _FIGURES = {
     "search": ("Search", "Fig. 7"),

@@ -5,12 +5,15 @@ from functools import partial
 from typing import Any
 
 from elastocal.identification import Term, describe
-from elastocal.report.document.figures import SpringBar, spring_figure
 from elastocal.report.document.markup import facts, heading, listed, paragraph, table
 from elastocal.report.document.parts import Calibrated, Parts
 from elastocal.report.document.pictures import picture
 from elastocal.report.document.section import Content, Finding, Section
-from elastocal.report.document.words import mm
+from elastocal.report.plots import (
+    SpringBar,
+    spring_figure,
+)
+from elastocal.wording import mm
 
 Figures = dict[str, Any]
 _MOST_TERMS = 6

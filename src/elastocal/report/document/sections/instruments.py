@@ -6,12 +6,14 @@ from typing import Any
 
 import numpy as np
 
-from elastocal.report.document.figures import station_figure
 from elastocal.report.document.markup import heading, listed, paragraph, table
 from elastocal.report.document.parts import Parts
 from elastocal.report.document.pictures import picture
 from elastocal.report.document.section import Content, Finding, Section
-from elastocal.report.document.words import counted, mm, point, spans, um
+from elastocal.report.plots import (
+    station_figure,
+)
+from elastocal.wording import counted, mm, point, spans, um
 
 Figures = dict[str, Any]
 

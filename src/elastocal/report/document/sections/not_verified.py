@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from elastocal.report.document.markup import coded, heading, listed, paragraph
 from elastocal.report.document.parts import Parts
 from elastocal.report.document.section import Content, Finding, Section
-from elastocal.report.document.words import mm
+from elastocal.wording import mm
 
 ALWAYS = (
     "Geometric calibration and the sag under the arm's own weight: only deflection under a force"

@@ -9,11 +9,13 @@ from elastocal.report.document.markup import Markup, facts, folded, paragraph, t
 from elastocal.report.document.parts import Parts
 from elastocal.report.document.pictures import picture
 from elastocal.report.document.section import Content, Section
-from elastocal.report.document.words import counted, mm
-from elastocal.report.html import template
-from elastocal.report.plan_figure import plan_figure
-from elastocal.report.plan_page import key_figures, view_data
-from elastocal.report.view import plan_view
+from elastocal.report.pages.plan_page import key_figures, view_data
+from elastocal.report.pages.templating import template
+from elastocal.report.plots import (
+    plan_figure,
+    plan_view,
+)
+from elastocal.wording import counted, mm
 
 
 def body(parts: Parts) -> Content:

@@ -7,12 +7,15 @@ from functools import partial
 import numpy as np
 
 from elastocal.compensation.process import Line, ProcessRecord, Trace, Values
-from elastocal.report.document.figures import course_figure, process_maps
 from elastocal.report.document.markup import flattened, folded, paragraph, table
 from elastocal.report.document.parts import Parts
 from elastocal.report.document.pictures import picture
 from elastocal.report.document.section import Content, Finding, Section
-from elastocal.report.document.words import counted, mm
+from elastocal.report.plots import (
+    course_figure,
+    process_maps,
+)
+from elastocal.wording import counted, mm
 
 
 @dataclass(frozen=True)

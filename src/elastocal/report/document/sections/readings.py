@@ -10,12 +10,15 @@ from elastocal.arrays import FloatArray
 from elastocal.dataset import Dataset
 from elastocal.identification import Calibration
 from elastocal.report.document.again import Again
-from elastocal.report.document.figures import displacement_figure, pose_grid
 from elastocal.report.document.markup import facts, folded, heading, listed, paragraph, table
 from elastocal.report.document.parts import Parts
 from elastocal.report.document.pictures import picture
 from elastocal.report.document.section import Content, Finding, Section
-from elastocal.report.document.words import counted, mm, spans
+from elastocal.report.plots import (
+    displacement_figure,
+    pose_grid,
+)
+from elastocal.wording import counted, mm, spans
 
 Figures = dict[str, Any]
 

@@ -14,8 +14,10 @@ from elastocal.report.document.markup import facts, listed, paragraph, table
 from elastocal.report.document.parts import Parts
 from elastocal.report.document.pictures import picture
 from elastocal.report.document.section import Content, Finding, Section
-from elastocal.report.document.words import counted, mm
-from elastocal.report.recertification_figure import recertification_figure
+from elastocal.report.plots import (
+    recertification_figure,
+)
+from elastocal.wording import counted, mm
 
 
 def body(parts: Parts) -> Content:

@@ -1,0 +1,270 @@
+"""Processes and threads: how many there may be, and what runs in them.
+
+This is the one place that counts cores, starts processes (through joblib) and limits the threads
+of linear algebra. NumPy and SciPy each bring an OpenBLAS of their own, with a thread a core. On the
+systems of a calibration, 18 by 18, a second thread computes nothing sooner, but every call waits
+for it to wake up: six times as long when another program keeps the cores busy. Processes therefore
+run one thread each, and so do the workflows with `one_blas_thread`.
+"""
+
+import importlib
+import signal
+import warnings
+from collections.abc import Callable, Generator, Iterable, Iterator
+from contextlib import contextmanager
+from typing import Any, TypeVar
+
+from elastocal.errors import ElastocalError
+
+Task = TypeVar("Task")
+Result = TypeVar("Result")
+
+
+def core_count() -> int:
+    """Return the number of cores that this process may use.
+
+    Counts its CPU affinity and the quota of its control group (containers, batch systems).
+    """
+    from joblib import cpu_count  # takes longer to import than a calibration to compute
+
+    return int(cpu_count())
+
+
+def process_count(
+    jobs: int | None = None, tasks: int | None = None, *, worthwhile: bool = True
+) -> int:
+    """Return the number of processes for some work.
+
+    Parameters
+    ----------
+    jobs : int, optional
+        Number that the user asks for; all cores by default.
+    tasks : int, optional
+        Number of tasks: more processes than these have nothing to do.
+    worthwhile : bool
+        Whether the work outweighs the seconds that processes need to start. If not, and the user
+        asks for nothing else, it is done by this process.
+
+    Raises
+    ------
+    ValueError
+        If ``jobs`` is below 1.
+    """
+    if jobs is None:
+        jobs = core_count() if worthwhile else 1
+    elif not jobs >= 1:
+        raise ValueError(f"{jobs} jobs: must be at least 1")
+    return jobs if tasks is None else max(1, min(jobs, tasks))
+
+
+def map_in_processes(
+    function: Callable[[Task], Result], tasks: Iterable[Task], processes: int
+) -> Iterator[Result]:
+    """Yield the result of each task, in their order, as soon as it is known.
+
+    Parameters
+    ----------
+    function : callable
+        Can be pickled, as can tasks and results.
+    tasks : iterable
+        What it is called with. With one process it is called here, one task at a time.
+    processes : int
+        Number of processes, from `process_count`.
+    """
+    if processes == 1:
+        yield from map(function, tasks)
+        return
+    from joblib import Parallel, delayed
+
+    with _one_thread_each(processes):
+        parallel = Parallel(return_as="generator")
+    yield from _to_the_end(parallel(delayed(function)(task) for task in tasks))
+
+
+class ProcessPool:
+    """Processes that get ready while the caller goes on, and are kept for the next pool.
+
+    Parameters
+    ----------
+    processes : int
+        Number of processes. There are at least two, but with one no two tasks run side by side.
+    prepare : callable
+        What each does first, such as imports; can be pickled.
+    """
+
+    def __init__(self, processes: int, prepare: Callable[[], object]) -> None:
+        self._processes = processes
+        with _interrupts_blocked():
+            self._ready = self._run(_call, [prepare] * processes, at_once=processes, ordered=False)
+
+    def map(
+        self, function: Callable[[Task], Result], tasks: Iterable[Task], *, ordered: bool = True
+    ) -> Iterator[Result]:
+        """Yield the result of each task.
+
+        Parameters
+        ----------
+        function : callable
+            Can be pickled, as can tasks and results.
+        tasks : iterable
+            What it is called with; taken from as processes become free.
+        ordered : bool
+            Whether results come in the order of the tasks, or as they are known.
+
+        Raises
+        ------
+        concurrent.futures.process.BrokenProcessPool
+            If a process dies.
+        """
+        # Joblib runs one set of tasks at a time without a loss; these take a second or two.
+        self.wait()
+        at_once = 1 if self._processes == 1 else 3 * self._processes
+        yield from _to_the_end(self._run(function, tasks, at_once, ordered))
+
+    def wait(self) -> None:
+        """Wait until all processes are ready.
+
+        Raises
+        ------
+        concurrent.futures.process.BrokenProcessPool
+            If a process dies.
+        """
+        for _ in self._ready:
+            pass
+
+    def abandon(self) -> None:
+        """Give up what the processes still have to do to get ready."""
+        self._ready.close()
+
+    def _run(
+        self,
+        function: Callable[[Task], Result],
+        tasks: Iterable[Task],
+        at_once: int,
+        ordered: bool,
+    ) -> Any:
+        from joblib import Parallel, delayed
+
+        # With one job joblib would start no process.
+        with _one_thread_each(max(self._processes, 2)):
+            parallel = Parallel(
+                batch_size=1,
+                pre_dispatch=at_once,
+                return_as="generator" if ordered else "generator_unordered",
+            )
+        return parallel(delayed(function)(task) for task in tasks)
+
+
+@contextmanager
+def process_pool(processes: int, prepare: Callable[[], object]) -> Iterator[ProcessPool]:
+    """Yield processes that get ready while the block runs.
+
+    An error of ours waits for them, since processes that are ended while they start complain;
+    Ctrl-C does not.
+
+    Parameters
+    ----------
+    processes, prepare
+        See `ProcessPool`.
+    """
+    with _without_complaints():
+        pool = ProcessPool(processes, prepare)
+        try:
+            yield pool
+        except (KeyboardInterrupt, SystemExit):
+            pool.abandon()
+            raise
+        except ElastocalError:
+            pool.wait()
+            raise
+        pool.wait()
+
+
+def map_on_cluster(
+    function: Callable[[Task], Result], tasks: Iterable[Task], client: object, patience: float
+) -> Iterator[Result]:
+    """Yield the results of tasks as they are known, done by the workers of a Dask scheduler.
+
+    Parameters
+    ----------
+    function : callable
+        Can be pickled, as can tasks and results.
+    tasks : iterable
+        What it is called with.
+    client : distributed.Client
+        Connection to the scheduler.
+    patience : float
+        How long to wait for a worker, in s.
+    """
+    from joblib import Parallel, delayed, parallel_config
+
+    with parallel_config("dask", client=client, wait_for_workers_timeout=patience):
+        parallel = Parallel(batch_size=1, pre_dispatch="3*n_jobs", return_as="generator_unordered")
+    yield from _to_the_end(parallel(delayed(function)(task) for task in tasks))
+
+
+@contextmanager
+def one_blas_thread() -> Iterator[None]:
+    """Run linear algebra in the thread that calls it while the block lasts: for small systems.
+
+    Afterwards NumPy and SciPy use as many threads as before. Also a decorator of functions.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> with one_blas_thread():
+    ...     x = np.linalg.solve(np.eye(18), np.ones(18))
+    """
+    from threadpoolctl import threadpool_limits
+
+    # Only libraries that are loaded can be limited.
+    importlib.import_module("scipy.linalg")
+    with threadpool_limits(1, user_api="blas"):
+        yield
+
+
+def _call(task: Callable[[], object]) -> object:
+    return task()
+
+
+def _one_thread_each(processes: int) -> Any:
+    """Return joblib's settings for processes that leave each other's cores alone."""
+    from joblib import parallel_config
+
+    return parallel_config("loky", n_jobs=processes, inner_max_num_threads=1)
+
+
+def _to_the_end(results: Generator[Result]) -> Iterator[Result]:
+    """Yield results; whoever does not want the rest of them is told nothing about it."""
+    try:
+        for result in results:  # noqa: UP028 - `yield from` would close them with complaints
+            yield result
+    except GeneratorExit:
+        with _without_complaints():
+            results.close()
+        raise
+
+
+@contextmanager
+def _without_complaints() -> Iterator[None]:
+    """Keep joblib quiet about tasks that Ctrl-C leaves unfinished, which is what a user wants."""
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", message=r"\s*\d+ tasks", category=UserWarning)
+        yield
+
+
+@contextmanager
+def _interrupts_blocked() -> Iterator[None]:
+    """Keep Ctrl-C from the processes that are started meanwhile: this one ends them.
+
+    A terminal sends it to all of them, and each would print where it was. Blocked signals stay
+    blocked in what is started; this process gets its own afterwards.
+    """
+    if not hasattr(signal, "pthread_sigmask"):
+        yield
+        return
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)

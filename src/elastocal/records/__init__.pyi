@@ -1,0 +1,10 @@
+from ._codec import (
+    from_data as from_data,
+    read_json as read_json,
+    record as record,
+    schema_of as schema_of,
+    to_data as to_data,
+    write_json as write_json,
+)
+from ._strict import StrictModel as StrictModel, read_yaml as read_yaml
+from ._validation import check_schema as check_schema, validate as validate

@@ -1,0 +1,111 @@
+"""Files that people write: strict models, one-line errors.
+
+Unknown keys are refused with the nearest known one; a problem is reported by its path in the
+file, for example ``springs.2.axis``.
+"""
+
+from collections.abc import Iterable
+from functools import cache
+from pathlib import Path
+from typing import Annotated, Any, TypeVar, get_args, get_origin
+
+import yaml
+from pydantic import (
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    ValidationInfo,
+    field_validator,
+)
+
+from elastocal.errors import SchemaError
+from elastocal.files import read_text
+from elastocal.records._validation import check_schema, validate
+
+
+class StrictModel(BaseModel):
+    """Base of every model that is read from a file: frozen, no unknown keys, no yes for a 1."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+    @field_validator("*", mode="before")
+    @classmethod
+    def _no_truth_for_a_number(cls, value: Any, info: ValidationInfo) -> Any:
+        # YAML reads yes, no, on, off as truth values, and Python counts those as 1 and 0.
+        if _holds_truth(value) and _takes_bare_numbers(cls, info.field_name or ""):
+            raise ValueError("must be a number")
+        return value
+
+    def stated(self, schema: str) -> dict[str, Any]:
+        """Return JSON-ready data that state their schema first, as every file of ours does."""
+        return {"schema": schema, **self.model_dump(mode="json")}
+
+
+Model = TypeVar("Model", bound=StrictModel)
+
+
+class _UniqueKeyLoader(yaml.SafeLoader):
+    """The safe loader, but a key that stands twice is an error instead of the last one winning."""
+
+
+def _unique_mapping(loader: yaml.SafeLoader, node: yaml.MappingNode) -> dict[Any, Any]:
+    keys = [key.value for key, _ in node.value]
+    twice = sorted({str(key) for key in keys if keys.count(key) > 1})
+    if twice:
+        raise yaml.YAMLError(f"key {twice[0]!r} stands twice, {node.start_mark}")
+    return loader.construct_mapping(node, deep=True)
+
+
+_UniqueKeyLoader.add_constructor(yaml.resolver.BaseResolver.DEFAULT_MAPPING_TAG, _unique_mapping)
+
+
+def read_yaml(path: Path, model: type[Model], schema: str) -> Model:
+    """Return the contents of a YAML file as a validated model.
+
+    Raises
+    ------
+    SchemaError
+        If the file is not YAML, has another schema, or does not fit the model.
+    FileAccessError
+        If the file cannot be read.
+    """
+    try:
+        # The loader is PyYAML's safe one with duplicate keys refused.
+        data = yaml.load(read_text(path), _UniqueKeyLoader)
+    except (yaml.YAMLError, ValueError, RecursionError) as error:
+        raise SchemaError(f"{path} is not valid YAML: {' '.join(str(error).split())}") from error
+    if not isinstance(data, dict):
+        raise SchemaError(f"{path} must hold keys and values, among them the schema {schema!r}")
+    check_schema(data.pop("schema", None), schema, str(path))
+    return validate(data, model, str(path))
+
+
+def _holds_truth(value: Any) -> bool:
+    """Return whether a value is a truth value or a list or mapping with one in it."""
+    if isinstance(value, dict):
+        value = list(value.values())
+    if isinstance(value, list | tuple):
+        return any(_holds_truth(inner) for inner in value)
+    return isinstance(value, bool)
+
+
+@cache
+def _takes_bare_numbers(model: type[BaseModel], field: str) -> bool:
+    """Return whether a field takes numbers without unit, itself or in a list, and no truth value.
+
+    What is in a section of its own is judged there.
+    """
+    info = model.model_fields[field]
+    kinds = set(_bare_kinds(info.annotation, info.metadata))
+    return bool(kinds & {int, float}) and bool not in kinds
+
+
+def _bare_kinds(annotation: Any, metadata: Iterable[Any] = ()) -> set[Any]:
+    """Return the types that an annotation is made of, without those that are read from text."""
+    if any(isinstance(item, BeforeValidator) for item in metadata):
+        return set()
+    if get_origin(annotation) is Annotated:
+        inner, *rest = get_args(annotation)
+        return _bare_kinds(inner, rest)
+    arguments = get_args(annotation)
+    return {annotation}.union(*(_bare_kinds(argument) for argument in arguments))

@@ -1,0 +1,121 @@
+"""Refusals in one line: the path of the first problem in a file, its value, what is allowed."""
+
+import dataclasses
+import json
+import types
+import typing
+from functools import cache
+from typing import Any, TypeVar
+
+from pydantic import BaseModel, TypeAdapter, ValidationError
+
+from elastocal.errors import SchemaError, nearest
+
+T = TypeVar("T")
+Model = TypeVar("Model", bound=BaseModel)
+
+_LONGEST_SHOWN = 60
+"""Longer values are left out of messages."""
+
+
+def check_schema(found: object, known: str, what: str) -> None:
+    """Refuse a missing or unknown schema by name.
+
+    Raises
+    ------
+    SchemaError
+        If ``found`` is not ``known``.
+    """
+    if found != known:
+        raise SchemaError(f"{what} has schema {found!r}; this version reads {known!r}")
+
+
+def validate(data: Any, model: type[Model], what: str) -> Model:
+    """Return ``data`` as a model, or refuse it in one line.
+
+    Raises
+    ------
+    SchemaError
+        With the path of the first problem, its value and what is allowed.
+    """
+    try:
+        return model.model_validate(data)
+    except ValidationError as error:
+        raise SchemaError(f"{what}: {_first_problem(error, model)}") from error
+
+
+def validate_record(data: Any, cls: type[T], what: str) -> T:
+    """Return ``data`` as a record or a model, or refuse it in one line; see `validate`.
+
+    Records are read strictly: no text for a number, no yes for a 1.
+    """
+    if issubclass(cls, BaseModel):
+        return validate(data, cls, what)
+    try:
+        # Strict checks know JSON's lists for tuples only where they read JSON itself.
+        adapter = _adapter(typing.cast("Any", cls))
+        checked: T = adapter.validate_json(json.dumps(data), strict=True)
+    except ValidationError as error:
+        raise SchemaError(f"{what}: {_first_problem(error, cls)}") from error
+    return checked
+
+
+@cache
+def _adapter(cls: Any) -> TypeAdapter[Any]:
+    return TypeAdapter(cls)
+
+
+def _first_problem(error: ValidationError, cls: type) -> str:
+    """Return the first problem in the words of the file."""
+    first = error.errors(include_url=False)[0]
+    path = ".".join(str(part) for part in first["loc"])
+    if first["type"] in ("extra_forbidden", "unexpected_keyword_argument"):
+        key, known = str(first["loc"][-1]), _known_keys(cls, first["loc"][:-1])
+        allowed = f" (known: {', '.join(known)})" if known else ""
+        return f"unknown key {path!r}{nearest(key, known)}{allowed}"
+    if first["type"] in ("missing", "missing_argument"):
+        return f"key {path!r} is missing"
+    reason = first["msg"].removeprefix("Value error, ")
+    message = f"{path}: {reason}" if path else reason
+    # A whole section is no value that a person would recognise.
+    given = _shown(first["input"])
+    return message if given in reason or len(given) > _LONGEST_SHOWN else f"{message}, got {given}"
+
+
+def _shown(value: Any) -> str:
+    try:
+        return repr(value)
+    except ValueError:  # an integer of more digits than Python writes
+        return "a number of thousands of digits"
+
+
+def _known_keys(cls: type, path: tuple[int | str, ...]) -> list[str]:
+    """Return the keys of the record or model that a location points into."""
+    current: type = cls
+    for part in path:
+        fields = _fields(current)
+        if isinstance(part, str) and part in fields:
+            inner = _section_in(fields[part])
+            if inner is None:
+                return []
+            current = inner
+    return list(_fields(current))
+
+
+def _fields(cls: Any) -> dict[str, Any]:
+    if issubclass(cls, BaseModel):
+        return {name: info.annotation for name, info in cls.model_fields.items()}
+    hints = typing.get_type_hints(cls)
+    return {each.name: hints[each.name] for each in dataclasses.fields(cls)}
+
+
+def _section_in(annotation: Any) -> type | None:
+    """Return the record or model that an annotation holds, itself or in a list."""
+    if isinstance(annotation, type) and not isinstance(annotation, types.GenericAlias):
+        section = issubclass(annotation, BaseModel) or dataclasses.is_dataclass(annotation)
+        return annotation if section else None
+    for argument in typing.get_args(annotation):
+        found = _section_in(argument)
+        if found is not None:
+            return found
+    return None

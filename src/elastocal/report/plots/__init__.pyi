@@ -1,0 +1,84 @@
+from . import style as style
+from ._plan_layers import weakest_margins as weakest_margins
+from .calibration_figures import (
+    SpringBar as SpringBar,
+    displacement_figure as displacement_figure,
+    pose_grid as pose_grid,
+    spring_figure as spring_figure,
+    station_figure as station_figure,
+)
+from .codec_chart import (
+    ERROR_PANELS as ERROR_PANELS,
+    codec_chart as codec_chart,
+    error_boxes as error_boxes,
+    headline as headline,
+    how_to_read as how_to_read,
+    saturation_words as saturation_words,
+)
+from .compliance_chart import (
+    SpringBoxes as SpringBoxes,
+    compliance_chart as compliance_chart,
+    never_told_apart as never_told_apart,
+    scale_top as scale_top,
+    spring_boxes as spring_boxes,
+)
+from .index_chart import (
+    INDEX_NAMES as INDEX_NAMES,
+    KIND_TITLES as KIND_TITLES,
+    check_indices as check_indices,
+    index_chart as index_chart,
+)
+from .interactive_codec import compliance_views as compliance_views, error_views as error_views
+from .plan_figure import (
+    plan_figure as plan_figure,
+    spread_labels as spread_labels,
+    write_plan_figure as write_plan_figure,
+)
+from .plan_scene import PlanView as PlanView, plan_view as plan_view
+from .printing import (
+    SUFFIXES as SUFFIXES,
+    figure_bytes as figure_bytes,
+    literal as literal,
+    new_figure as new_figure,
+    wrapped as wrapped,
+    write_figure as write_figure,
+    write_kinds as write_kinds,
+)
+from .process_figures import course_figure as course_figure, process_maps as process_maps
+from .recertification_figure import (
+    recertification_figure as recertification_figure,
+    write_recertification_figure as write_recertification_figure,
+)
+from .stiffness_figure import (
+    Curve as Curve,
+    stiffness_figure as stiffness_figure,
+    write_stiffness_figure as write_stiffness_figure,
+)
+from .study_figure import study_figure as study_figure, write_study_figures as write_study_figures
+from .style import (
+    ARM as ARM,
+    BLUE as BLUE,
+    CHOSEN as CHOSEN,
+    COLOURS as COLOURS,
+    FAINT as FAINT,
+    FIXTURE as FIXTURE,
+    GREEN as GREEN,
+    INK as INK,
+    MUTED as MUTED,
+    ORANGE as ORANGE,
+    PAPER as PAPER,
+    PURPLE as PURPLE,
+    REFUSED as REFUSED,
+    SEQUENTIAL as SEQUENTIAL,
+    SIGHT as SIGHT,
+    SKY as SKY,
+    TOOL as TOOL,
+    TOOLING as TOOLING,
+    TOUR as TOUR,
+    VERMILLION as VERMILLION,
+    YELLOW as YELLOW,
+    VariantStyle as VariantStyle,
+    print_settings as print_settings,
+    tint as tint,
+    variant_styles as variant_styles,
+)

@@ -1,0 +1,276 @@
+"""Box plots of codecs: their numbers, the same for print and screen, and their printed panels."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.collections import LineCollection, PolyCollection
+from matplotlib.figure import Figure
+from matplotlib.patches import Patch
+from matplotlib.ticker import FixedLocator, FuncFormatter, MultipleLocator, NullFormatter
+
+from elastocal.arrays import BoolArray, FloatArray, IndexArray
+from elastocal.errors import CodecError
+from elastocal.report.plots import style
+from elastocal.report.plots.printing import literal
+from elastocal.report.plots.style import VariantStyle, tint
+
+REACH = 1.5
+"""How far a whisker may reach, in heights of the box."""
+BAND = "#f4f4f1"
+"""Behind every second number of training poses: shows which boxes belong together."""
+_LABEL = 0.26
+"""Room that the label of a number of training poses takes, in inches."""
+_PALE = 0.55
+"""Part of the colour in the outline of a hollow box."""
+_DECADES = 12.0
+"""Largest over smallest value from which on a logarithmic scale reads better."""
+ROW = 0.22
+"""Height of a row, in inches."""
+_CHARACTER, _SWATCH = 0.075, 0.55
+"""Width of a letter, and of what stands before a name, in inches."""
+
+
+@dataclass(frozen=True, eq=False)
+class Boxes:
+    """One box for each number of training poses, over the verification sets.
+
+    J. W. Tukey, *Exploratory Data Analysis*, 1977: quartiles, whiskers to the farthest value
+    within `REACH` heights of the box, single points beyond.
+    """
+
+    n: IndexArray
+    """Numbers of training poses that have a box, rising, shape (box,)."""
+    q1: FloatArray
+    """Shape (box,), as the following, in the unit of the values."""
+    median: FloatArray
+    q3: FloatArray
+    low: FloatArray
+    """Ends of the lower whiskers."""
+    high: FloatArray
+    """Ends of the upper whiskers."""
+    count: IndexArray
+    """Verification sets behind each box."""
+    outlier_box: IndexArray
+    """Number of the box, from 0, of each value beyond the whiskers, shape (outlier,)."""
+    outlier: FloatArray
+    """Those values."""
+
+    def extent(self) -> tuple[float, float]:
+        """Return the smallest and largest value that is drawn."""
+        values = np.concatenate([self.low, self.high, self.outlier])
+        return float(values.min()), float(values.max())
+
+
+def make_boxes(values: FloatArray, what: str) -> Boxes:
+    """Return the boxes of values; NaN is a value that is missing.
+
+    Parameters
+    ----------
+    values : ndarray, shape (cv, n_train)
+        A figure of each verification set for 1, 2, … training poses.
+    what : str
+        What it is, for the message of a refusal.
+
+    Raises
+    ------
+    CodecError
+        If there is not one finite value: an empty chart says nothing.
+    """
+    finite = np.isfinite(values)
+    drawn = np.flatnonzero(finite.any(axis=0))
+    if not len(drawn):
+        raise CodecError(
+            f"{what} has no finite value in {values.shape[0]} verification sets and"
+            f" {values.shape[1]} numbers of training poses: there is nothing to draw"
+        )
+    values, finite = values[:, drawn], finite[:, drawn]
+    known = np.where(finite, values, np.nan)
+    q1, median, q3 = np.nanpercentile(known, (25.0, 50.0, 75.0), axis=0)
+    reach = REACH * (q3 - q1)
+    near: BoolArray = finite & (values >= q1 - reach) & (values <= q3 + reach)
+    box, verification_set = np.nonzero((finite & ~near).T)
+    return Boxes(
+        n=drawn + 1,
+        q1=q1,
+        median=median,
+        q3=q3,
+        # A quartile lies between two values: the farthest one within reach may be inside the box.
+        low=np.minimum(q1, np.where(near, values, np.inf).min(axis=0)),
+        high=np.maximum(q3, np.where(near, values, -np.inf).max(axis=0)),
+        count=finite.sum(axis=0),
+        outlier_box=box,
+        outlier=values[verification_set, box],
+    )
+
+
+def draw_boxes(
+    axes: Axes, boxes: Boxes, variant: VariantStyle, hollow: BoolArray | None = None
+) -> None:
+    """Draw the boxes of a variant; limits are left to `finish_axes`.
+
+    Parameters
+    ----------
+    axes : Axes
+        Panel whose x axis counts training poses.
+    boxes : Boxes
+        In the unit of the panel.
+    variant : VariantStyle
+        Of the variant.
+    hollow : ndarray, shape (box,), optional
+        Which boxes are drawn as pale outlines.
+    """
+    x, half = variant.at(boxes.n), 0.5 * variant.width
+    empty = np.zeros(len(x), dtype=bool) if hollow is None else hollow
+    left, right = x - half, x + half
+    corners = np.stack(
+        [_points(left, boxes.q1), _points(right, boxes.q1), _points(right, boxes.q3),
+         _points(left, boxes.q3)], axis=1,
+    )  # fmt: skip
+    faces = [style.PAPER if each else variant.fill for each in empty]
+    edges = [tint(variant.colour, _PALE) if each else variant.colour for each in empty]
+    ends = ((boxes.q1, boxes.low), (boxes.q3, boxes.high))
+    for near, far in ends:
+        whiskers = np.stack([_points(x, near), _points(x, far)], axis=1)
+        axes.add_collection(LineCollection(list(whiskers), colors=edges, lw=0.8, zorder=2))
+    axes.add_collection(
+        PolyCollection(list(corners), facecolors=faces, edgecolors=edges, lw=0.8, zorder=3)
+    )
+    line = np.stack([_points(left, boxes.median), _points(right, boxes.median)], axis=1)
+    # A box without height shows nothing but its median, which then has to tell the variant.
+    full = np.where(boxes.q3 > boxes.q1, style.INK, variant.colour)
+    inks = np.where(empty, style.REFUSED, full).tolist()
+    axes.add_collection(LineCollection(list(line), colors=inks, lw=1.3, zorder=4))
+    axes.scatter(
+        x[boxes.outlier_box], boxes.outlier, s=4.0, linewidths=0, zorder=3, clip_on=True,
+        c=[edges[box] for box in boxes.outlier_box] or variant.colour,
+    )  # fmt: skip
+
+
+def finish_axes(axes: Axes, last: int, low: float, high: float, log: bool) -> None:
+    """Set limits and labels of a panel.
+
+    Parameters
+    ----------
+    axes : Axes
+        Panel with its boxes.
+    last : int
+        Largest number of training poses.
+    low, high : float
+        Smallest and largest value that is to be seen.
+    log : bool
+        Whether the scale of the values is logarithmic.
+    """
+    for n in range(2, last + 1, 2):
+        axes.axvspan(n - 0.5, n + 0.5, color=BAND, lw=0, zorder=0)
+    axes.set_xlim(0.5, last + 0.5)
+    if log:
+        axes.set_yscale("log")
+        axes.set_ylim(low / 1.12, high * 1.12)
+        axes.yaxis.set_major_locator(FixedLocator(round_values(low / 1.12, high * 1.12)))
+        axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+        axes.yaxis.set_minor_formatter(NullFormatter())
+    else:
+        margin = 0.05 * (high - min(low, 0.0)) or 1.0
+        # A box at zero, where bounded fits put many springs, would hide under the axis.
+        axes.set_ylim(min(0.0, low - margin * (low <= 0.0)), high + margin)
+    axes.grid(axis="y", color="#dcdcd8", lw=0.5, zorder=0.5)
+    axes.set_axisbelow(True)
+    axes.spines[["top", "right"]].set_visible(False)
+    axes.tick_params(axis="x", length=0)
+    axes.tick_params(axis="y", which="both", length=2)
+
+
+def label_sizes(axes: Axes, last: int, width: float, shown: bool = True) -> None:
+    """Label numbers of training poses, every one where there is room.
+
+    Parameters
+    ----------
+    axes : Axes
+        Panel.
+    last : int
+        Largest number of training poses.
+    width : float
+        Of the panel, in inches.
+    shown : bool
+        Whether labels are written; panels above others go without.
+    """
+    axes.xaxis.set_major_locator(MultipleLocator(label_step(last, width)))
+    axes.tick_params(axis="x", labelbottom=shown)
+
+
+def label_step(last: int, width: float) -> int:
+    """Return after how many sizes the next label follows.
+
+    >>> label_step(22, 9.0), label_step(22, 2.9), label_step(70, 9.0)
+    (1, 2, 5)
+    """
+    steps = (1, 2, 5, 10, 20, 50, 100, 200, 500)
+    return next((step for step in steps if step * width / last >= _LABEL), last)
+
+
+def reads_better_in_decades(low: float, high: float) -> bool:
+    """Return whether values from low to high belong on a logarithmic scale."""
+    return low > 0.0 and high > _DECADES * low
+
+
+def legend_handles(styles: Sequence[VariantStyle]) -> list[Patch]:
+    """Return what a legend shows of variants."""
+    return [
+        Patch(facecolor=variant.fill, edgecolor=variant.colour, label=literal(variant.name))
+        for variant in styles
+    ]
+
+
+def round_values(low: float, high: float) -> list[float]:
+    """Return 1, 2 and 5 times powers of ten between two values, decades only where many.
+
+    >>> round_values(0.04, 0.6)
+    [0.05, 0.1, 0.2, 0.5]
+    """
+    exponents = np.arange(np.floor(np.log10(low)), np.ceil(np.log10(high)) + 1)
+    factors = (1.0, 2.0, 5.0) if high < 2e3 * low else (1.0,)
+    values = (
+        float(f"{factor * 10.0**exponent:.3g}") for exponent in exponents for factor in factors
+    )
+    return [value for value in values if low <= value <= high]
+
+
+def _points(x: FloatArray, y: FloatArray) -> FloatArray:
+    return np.column_stack([x, y])
+
+
+def legend_height(styles: Sequence[VariantStyle], across: float) -> float:
+    """Return the height of a legend of some width, both in inches."""
+    return ROW * -(-len(styles) // _columns(styles, across))
+
+
+def draw_legend(
+    figure: Figure, styles: Sequence[VariantStyle], left: float, top: float, across: float
+) -> None:
+    """Draw the legend.
+
+    Parameters
+    ----------
+    figure : Figure
+        Where to.
+    styles : sequence of VariantStyle
+        Of the variants.
+    left, top : float
+        Its corner, from the left and the upper edge of the figure, in inches.
+    across : float
+        Its width, in inches.
+    """
+    width, height = figure.get_size_inches()
+    figure.legend(
+        handles=legend_handles(styles), loc="upper left", ncols=_columns(styles, across),
+        frameon=False,
+        bbox_to_anchor=(left / width, 1.0 - top / height), borderpad=0.0, borderaxespad=0.0,
+        handlelength=1.4, columnspacing=1.6, fontsize=9.0,
+    )  # fmt: skip
+
+
+def _columns(styles: Sequence[VariantStyle], across: float) -> int:
+    longest = max(len(variant.name) for variant in styles)
+    return max(1, min(len(styles), int(across / (_CHARACTER * longest + _SWATCH))))

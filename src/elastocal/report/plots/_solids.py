@@ -1,0 +1,276 @@
+"""Triangle meshes of what stands in a cell, as few as the screen needs, shaded for Plotly.
+
+They are the shapes that collisions are checked with: fine meshes of a maker's drawings are not
+needed to see how the robot stands. Shades are computed here, so that the light is the same on
+every machine and in every posture.
+
+Meshes are made coarser by clusters of vertices: J. Rossignac, P. Borrel, "Multi-resolution 3D
+approximations for rendering complex scenes", in Modeling in Computer Graphics, Springer, 1993.
+Vertices in one cell of a grid become their mean; faces and edges that lose a corner go.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import coal
+import numpy as np
+import plotly.graph_objects as go
+import trimesh
+
+from elastocal.arrays import BoolArray, FloatArray, IndexArray
+from elastocal.cell import Cell
+from elastocal.cell.description import TOOLING
+from elastocal.planning import CollisionScene, collision_scene
+from elastocal.planning.surface import Surface
+
+_SECTIONS = 24
+"""Sides of a drawn cylinder."""
+MOST_OF_TOOLING = 60_000
+"""Faces of the tooling that an interactive page draws; its file would grow by 40 bytes a face."""
+MOST_OF_FIXTURE = 20_000
+"""Faces of one fixture."""
+MOST_OF_LINK = 3_000
+"""Faces of one part of the robot, whose vertices the page holds for every posture."""
+_COARSER = 1.25
+"""By how much the cells grow until there are few enough faces."""
+_DARK = 0.5
+"""Brightness of a face that is turned away from the light."""
+_UNLIT = {"ambient": 1.0, "diffuse": 0.0, "specular": 0.0, "fresnel": 0.0}
+
+
+@dataclass(frozen=True, eq=False)
+class Solid:
+    """Triangles; vertices in m."""
+
+    vertices: FloatArray
+    """Shape (vertex, 3)."""
+    faces: IndexArray
+    """Shape (face, 3)."""
+
+    def placed(self, T: FloatArray) -> "Solid":
+        """Return the solid moved by a transform, shape (4, 4)."""
+        return Solid(self.vertices @ T[:3, :3].T + T[:3, 3], self.faces)
+
+    def brightness(self, light: FloatArray) -> FloatArray:
+        """Return how much light falls on each face, from 0 (turned away) to 1, shape (face,).
+
+        Parameters
+        ----------
+        light : ndarray, shape (3,)
+            Unit vector towards the light.
+        """
+        a, b, c = np.moveaxis(self.vertices[self.faces], 1, 0)
+        normal = np.cross(b - a, c - a)
+        length = np.linalg.norm(normal, axis=1)
+        cosine = normal @ light / np.where(length > 0.0, length, 1.0)
+        return np.asarray(0.5 + 0.5 * cosine)
+
+
+@dataclass(frozen=True, eq=False)
+class RobotSolids:
+    """Links and tool of a robot; `at` places them."""
+
+    scene: CollisionScene
+    parts: tuple[Solid, ...]
+    """Links, then tool, each in its own frame, as `CollisionScene.moving` orders them."""
+
+    @property
+    def on_tool(self) -> BoolArray:
+        """Whether each face of the joined mesh is the tool's, shape (face,)."""
+        links = len(self.parts) - len(self.scene.tool)
+        sizes = [len(part.faces) for part in self.parts]
+        return np.repeat(np.arange(len(self.parts)) >= links, sizes)
+
+    def at(self, q: FloatArray) -> list[Solid]:
+        """Return links and tool as one mesh in base, one a configuration.
+
+        Parameters
+        ----------
+        q : ndarray, shape (pose, joint)
+            Joint positions in rad or m, in the order of the robot's joints.
+        """
+        places = np.stack([body.T_frame_body for body in self.scene.moving(q)], axis=1)
+        return [
+            joined([part.placed(T) for part, T in zip(self.parts, row, strict=True)])
+            for row in places
+        ]
+
+
+@dataclass(frozen=True, eq=False)
+class CoarseSolid:
+    """A mesh as it is drawn."""
+
+    solid: Solid
+    cluster: IndexArray
+    """Vertex of the drawn solid that each vertex of the whole one went into, shape (vertex,)."""
+    whole: int
+    """Faces of the whole mesh."""
+
+    def edges(self, ends: IndexArray) -> IndexArray:
+        """Return which edges of the whole mesh are left, each once, shape (edge, 2).
+
+        Parameters
+        ----------
+        ends : ndarray of int, shape (edge, 2)
+            Vertex numbers of the whole mesh.
+        """
+        drawn = np.sort(self.cluster[ends], axis=1)
+        return np.unique(drawn[drawn[:, 0] < drawn[:, 1]], axis=0)
+
+    def note(self, what: str) -> str:
+        """Return what to tell of it; nothing when it is drawn whole."""
+        drawn = len(self.solid.faces)
+        if drawn == self.whole:
+            return ""
+        return f"{what} is drawn with {drawn} faces in place of {self.whole}."
+
+
+def robot_solids(cell: Cell, surface: Surface) -> RobotSolids:
+    """Return the solids of a cell's robot and tool."""
+    scene = collision_scene(cell, surface)
+    nowhere = np.zeros((0, len(cell.robot.joint_names)))
+    return RobotSolids(scene, tuple(solid_of(body.shape) for body in scene.moving(nowhere)))
+
+
+def fixture_solids(cell: Cell, surface: Surface) -> dict[str, Solid]:
+    """Return the fixtures of a cell in base, by name; not the tooling."""
+    return {
+        body.name: solid_of(body.shape).placed(body.T_frame_body)
+        for body in collision_scene(cell, surface).obstacles
+        if body.name != TOOLING
+    }
+
+
+def joined(solids: Sequence[Solid]) -> Solid:
+    """Return several solids as one."""
+    if not solids:
+        return Solid(np.zeros((0, 3)), np.zeros((0, 3), dtype=np.intp))
+    starts = np.cumsum([0, *(len(solid.vertices) for solid in solids)])
+    faces = [solid.faces + start for solid, start in zip(solids, starts, strict=False)]
+    return Solid(np.concatenate([solid.vertices for solid in solids]), np.concatenate(faces))
+
+
+def solid_of(shape: coal.CollisionGeometry) -> Solid:
+    """Return the triangles of a collision shape; its bounding box when it is of a rare kind."""
+    if isinstance(shape, coal.BVHModelBase):
+        # A coal triangle is no sequence: it has no end.
+        triangles = map(shape.tri_indices, range(shape.num_tris))
+        faces = [(triangle[0], triangle[1], triangle[2]) for triangle in triangles]
+        return Solid(np.array(shape.vertices()), np.array(faces, dtype=np.intp).reshape(-1, 3))
+    mesh = _primitive(shape)
+    return Solid(np.array(mesh.vertices), np.array(mesh.faces, dtype=np.intp))
+
+
+def _primitive(shape: coal.CollisionGeometry) -> Any:
+    """Return the trimesh of a shape that is not a mesh."""
+    if isinstance(shape, coal.Cylinder):
+        return trimesh.creation.cylinder(shape.radius, 2.0 * shape.halfLength, sections=_SECTIONS)
+    if isinstance(shape, coal.Sphere):
+        return trimesh.creation.icosphere(2, shape.radius)
+    if isinstance(shape, coal.Capsule):
+        return trimesh.creation.capsule(2.0 * shape.halfLength, shape.radius)
+    if isinstance(shape, coal.Box):
+        return trimesh.creation.box(2.0 * shape.halfSide)
+    shape.computeLocalAABB()
+    box = trimesh.creation.box(np.ptp([shape.aabb_local.min_, shape.aabb_local.max_], axis=0))
+    return box.apply_translation(shape.aabb_center)
+
+
+def coarsened(solid: Solid, most: int) -> CoarseSolid:
+    """Return a solid with no more than a number of faces.
+
+    Parameters
+    ----------
+    solid : Solid
+        Its vertices are welded.
+    most : int
+        Faces, at least 56. A solid that has no more stays as it is.
+    """
+    count = len(solid.faces)
+    if count <= most:
+        return CoarseSolid(solid, np.arange(len(solid.vertices)), count)
+    a, b = solid.vertices[solid.faces[:, 0]], solid.vertices[solid.faces[:, 1]]
+    size = float(np.ptp(solid.vertices, axis=0).max())
+    middling = float(np.median(np.linalg.norm(b - a, axis=1)))
+    cell = max(middling, 1e-6 * size) * np.sqrt(count / most)
+    # Two cells along each side make eight vertices, and those no more than 56 triangles.
+    coarsest = 0.51 * size
+    while True:
+        cell = min(cell, coarsest)
+        cluster, vertices = _clusters(solid.vertices, cell)
+        faces = _left(cluster[solid.faces])
+        if len(faces) <= most or cell == coarsest:
+            return CoarseSolid(Solid(vertices, faces), cluster, count)
+        cell *= _COARSER
+
+
+def _clusters(vertices: FloatArray, cell: float) -> tuple[IndexArray, FloatArray]:
+    """Return the cluster of each vertex, and the mean of each cluster."""
+    place = np.floor((vertices - vertices.min(axis=0)) / cell).astype(np.int64)
+    _, cluster, count = np.unique(place, axis=0, return_inverse=True, return_counts=True)
+    cluster = cluster.reshape(-1)
+    sums = [np.bincount(cluster, vertices[:, axis]) for axis in range(3)]
+    return cluster, np.stack(sums, axis=1) / count[:, None]
+
+
+def _left(faces: IndexArray) -> IndexArray:
+    """Return the faces with three different corners, each once."""
+    a, b, c = faces.T
+    faces = faces[(a != b) & (b != c) & (c != a)]
+    _, first = np.unique(np.sort(faces, axis=1), axis=0, return_index=True)
+    return faces[np.sort(first)]
+
+
+def solid_trace(
+    solid: Solid, light: FloatArray, name: str, colours: Sequence[str], part: Any = 0
+) -> Any:
+    """Return a Plotly mesh of a solid.
+
+    Parameters
+    ----------
+    solid : Solid
+        In base.
+    light : ndarray, shape (3,)
+        Unit vector towards the light.
+    name : str
+        Of the trace.
+    colours : sequence of str
+        Of the parts, as ``#rrggbb``.
+    part : int or ndarray of int, shape (face,)
+        Which part each face belongs to.
+    """
+    x, y, z = single_precision(solid.vertices)
+    i, j, k = np.asarray(solid.faces, dtype=np.int32).T
+    return go.Mesh3d(
+        x=x, y=y, z=z, i=i, j=j, k=k, name=name, hoverinfo="skip", showscale=False,
+        intensity=tones(solid, light, part, len(colours)), intensitymode="cell", cmin=0.0, cmax=1.0,
+        colorscale=_scale(colours), lighting=_UNLIT,
+    )  # fmt: skip
+
+
+def tones(solid: Solid, light: FloatArray, part: Any, parts: int) -> Any:
+    """Return where each face lies on the colour scale of `solid_trace`, shape (face,).
+
+    Each part has its own stretch of the scale, from dark to light.
+    """
+    within = 0.01 + 0.98 * solid.brightness(light)
+    return ((part + within) / parts).astype(np.float32)
+
+
+def single_precision(points: FloatArray) -> Any:
+    """Return x, y, z in single precision, shape (3, point): good to a micrometre within 10 m."""
+    return np.asarray(points, dtype=np.float32).T
+
+
+def _scale(colours: Sequence[str]) -> list[tuple[float, str]]:
+    stops = []
+    for number, colour in enumerate(colours):
+        stops.append((number / len(colours), _darker(colour)))
+        stops.append(((number + 1) / len(colours), colour))
+    return stops
+
+
+def _darker(colour: str) -> str:
+    parts = (int(colour[start : start + 2], 16) for start in (1, 3, 5))
+    return "#" + "".join(f"{round(_DARK * part):02x}" for part in parts)

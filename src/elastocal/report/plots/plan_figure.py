@@ -1,0 +1,318 @@
+"""One printable figure of a plan, after the paper's Fig. 3: two search techniques side by side.
+
+Colour tells how far each candidate is from its nearest chosen pose; the numbers under a panel
+tell the same in short. Clustering at the edges shows as dark areas, a large covering radius, a
+small distance from the edge and a small distance between neighbours.
+"""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.collections import LineCollection, PolyCollection
+from matplotlib.figure import Figure
+from scipy.spatial import cKDTree
+
+from elastocal.arrays import FloatArray
+from elastocal.planning import PlanFile, PoolData, SpreadRecord, check_pool_of
+from elastocal.planning.surface import Surface
+from elastocal.report.plots import style
+from elastocal.report.plots._flat_map import FlatMap, flat_map
+from elastocal.report.plots.printing import new_figure, write_figure
+from elastocal.wording import readable
+
+_HEAD, _FOOT, _SIDE = 0.7, 1.95, 0.25
+"""Room above, below and beside the panels, in inches."""
+_FLATTEST, _TALLEST = 0.25, 1.3
+"""Height of a panel as part of its width; a longer surface has room beside it."""
+_ROUNDS = 200
+_PULL = 0.02
+"""Part of its way back to its anchor that a label is drawn in each round."""
+_GOLDEN = np.pi * (3.0 - np.sqrt(5.0))
+"""Turn between the first steps of labels that share an anchor, in rad."""
+_WIDTH = 5.1
+"""Of a panel, in inches."""
+_DISC, _CROWD = 13.0, 200.0
+"""Diameter of a numbered disc in points; with many it shrinks to the second over their root."""
+_MANY = 20_000
+"""With more candidates than this their dots are stored as an image."""
+_FINE = 5_000
+"""With more faces or border lines than this the surface is stored as an image."""
+_NAME: dict[str, Any] = {"color": style.MUTED}
+_VALUE: dict[str, Any] = {"ha": "right", "weight": "bold"}
+
+
+@dataclass(frozen=True, eq=False)
+class _Choice:
+    """One panel: what a technique chose."""
+
+    title: str
+    colour: str
+    marker: str
+    order: list[int]
+    """Candidates in search order."""
+    spread: SpreadRecord
+    metric: str
+    """Of the covering radius: ``euclidean`` or ``geodesic``."""
+
+    def distance(self, pool: PoolData) -> FloatArray:
+        """Return how far each candidate is from the nearest chosen one, straight, in m."""
+        return np.asarray(cKDTree(pool.contact[self.order]).query(pool.contact)[0])
+
+
+def write_plan_figure(path: Path, surface: Surface, plan: PlanFile, pool: PoolData) -> Path:
+    """Write the figure of a plan, atomically; return its path.
+
+    Parameters
+    ----------
+    path : Path
+        Its suffix decides the kind: SVG, PNG or PDF.
+    surface : Surface
+        That the plan was made for.
+    plan, pool : PlanFile, PoolData
+        Of one run. Without a comparison in the plan there is one panel.
+
+    Raises
+    ------
+    SchemaError
+        If plan and pool are not of one run.
+    FileAccessError
+        If the suffix is another or the file cannot be written.
+    """
+    check_pool_of(plan, pool)
+    return write_figure(path, lambda: plan_figure(surface, plan, pool))
+
+
+def plan_figure(surface: Surface, plan: PlanFile, pool: PoolData) -> Figure:
+    """Return the figure; see `write_plan_figure`."""
+    flat = flat_map(surface, pool.contact, pool.normal)
+    choices = _choices(plan)
+    low, high = _extent(surface, flat)
+    height = _WIDTH * float((high - low)[1] / (high - low)[0])
+    size = (len(choices) * (_WIDTH + _SIDE) + _SIDE, _HEAD + height + _FOOT)
+    figure = new_figure(*size)
+    farthest = max(float(choice.distance(pool).max()) for choice in choices)
+    dots = None
+    for number, choice in enumerate(choices):
+        left = _SIDE + number * (_WIDTH + _SIDE)
+        box = (left / size[0], _FOOT / size[1], _WIDTH / size[0], height / size[1])
+        axes = figure.add_axes(box, xlim=(low[0], high[0]), ylim=(low[1], high[1]))
+        dots = _draw_panel(axes, surface, flat, pool, choice, farthest)
+    _draw_frame(figure, plan, flat, dots)
+    return figure
+
+
+def _choices(plan: PlanFile) -> list[_Choice]:
+    """Return what the plan's technique chose, and the one that it is compared with."""
+    candidate = {pose.id: pose.candidate for pose in plan.poses}
+    search, other = plan.search, plan.comparison
+    found = [(search.name, "this plan", [candidate[i] for i in search.order], search.spread)]
+    if other is not None:
+        found.append((other.name, "for comparison", list(other.candidates), other.spread))
+    return [
+        _Choice(f"{name.upper()} ({role})", colour, marker, order, numbers, search.metric)
+        for (name, role, order, numbers), colour, marker in zip(
+            found, style.CHOSEN, "os", strict=False
+        )
+    ]
+
+
+def _extent(surface: Surface, flat: FlatMap) -> tuple[FloatArray, FloatArray]:
+    """Return the corners of the map with some room about it, each of shape (2,), in m."""
+    points = np.concatenate(
+        [
+            sheet.flat(surface.mesh.vertices[surface.mesh.faces[sheet.faces]]).reshape(-1, 2)
+            for sheet in flat.sheets
+        ]
+    )
+    low, high = points.min(axis=0), points.max(axis=0)
+    size = 1.08 * (high - low)
+    size = np.maximum(size, (size[1] / _TALLEST, _FLATTEST * size[0]))
+    middle = 0.5 * (low + high)
+    return middle - 0.5 * size, middle + 0.5 * size
+
+
+def _draw_frame(figure: Figure, plan: PlanFile, flat: FlatMap, dots: Any) -> None:
+    """Draw what belongs to all panels: title, colour bar, how to read it."""
+    width, height = figure.get_size_inches()
+    sizes = f"{len(plan.poses)} of {plan.pool.valid} candidate poses"
+    figure.text(
+        0.5, 1.0 - 0.12 / height, f"{plan.cell.name}: {sizes}".replace("$", r"\$"),
+        ha="center", va="top", fontsize=12,
+    )  # fmt: skip
+    bar = figure.add_axes((0.5 - 1.7 / width, 0.72 / height, 3.4 / width, 0.11 / height))
+    figure.colorbar(dots, cax=bar, orientation="horizontal")
+    bar.set_title(
+        "Straight distance of each candidate from its nearest chosen pose in mm", fontsize=8, pad=3
+    )
+    bar.tick_params(labelsize=8, length=2)
+    figure.text(
+        0.5, 0.1 / height,
+        f"Surface {flat.kind}.\n"
+        "Poses are numbered in the order in which they were chosen.",
+        ha="center", va="bottom", fontsize=8, color=style.MUTED,
+    )  # fmt: skip
+
+
+def _draw_panel(
+    axes: Axes, surface: Surface, flat: FlatMap, pool: PoolData, choice: _Choice, farthest: float
+) -> Any:
+    """Draw a panel; return the dots, for a colour bar.
+
+    Parameters
+    ----------
+    axes : Axes
+        As wide as `_WIDTH`, its limits set.
+    surface, flat, pool : Surface, FlatMap, PoolData
+        What was chosen from.
+    choice : _Choice
+        What was chosen.
+    farthest : float
+        Distance at the dark end of the colours, in m.
+    """
+    axes.set_axis_off()
+    axes.set_title(choice.title, fontsize=11, fontweight="bold", color=choice.colour, pad=2)
+    _draw_surface(axes, surface, flat)
+    dots = _draw_candidates(axes, flat, pool, choice, farthest)
+    _draw_chosen(axes, flat, pool, choice)
+    _draw_scale(axes)
+    _draw_numbers(axes, choice)
+    return dots
+
+
+def _draw_surface(axes: Axes, surface: Surface, flat: FlatMap) -> None:
+    face, corner = np.divmod(surface.border_half_edges, 3)
+    for sheet in flat.sheets:
+        triangles = surface.mesh.vertices[surface.mesh.faces[sheet.faces]]
+        lit = surface.face_normals[sheet.faces] @ sheet.towards_viewer
+        grey = 0.86 + 0.1 * lit.clip(0.0, 1.0)
+        colours = np.repeat(grey[:, None], 3, axis=1)
+        axes.add_collection(
+            PolyCollection(
+                list(sheet.flat(triangles)),
+                facecolors=colours,
+                edgecolors=colours,
+                lw=0.3,
+                rasterized=len(triangles) > _FINE,
+            )
+        )
+        shown = np.isin(face, sheet.faces)
+        ends = [surface.mesh.faces[face[shown], (corner[shown] + step) % 3] for step in (0, 1)]
+        border = sheet.flat(surface.mesh.vertices[np.stack(ends, axis=1)])
+        axes.add_collection(
+            LineCollection(list(border), colors=style.MUTED, lw=0.8, rasterized=len(border) > _FINE)
+        )
+
+
+def _draw_candidates(
+    axes: Axes, flat: FlatMap, pool: PoolData, choice: _Choice, farthest: float
+) -> Any:
+    distance = choice.distance(pool)
+    # The farthest come last, so that no gap hides under near ones.
+    order = np.argsort(distance)
+    x, y = flat.positions(pool.contact)[order].T
+    return axes.scatter(
+        x, y, s=_dot_size(len(pool.contact)), c=1e3 * distance[order], cmap=f"{style.SEQUENTIAL}_r",
+        vmin=0.0, vmax=1e3 * farthest, linewidths=0, rasterized=len(order) > _MANY,
+    )  # fmt: skip
+
+
+def _dot_size(count: int) -> float:
+    return float(np.clip(12_000.0 / count, 0.5, 12.0))
+
+
+def _draw_chosen(axes: Axes, flat: FlatMap, pool: PoolData, choice: _Choice) -> None:
+    """Draw numbered discs; where they crowd, they move aside and point to their place."""
+    anchor = flat.positions(pool.contact)[choice.order]
+    left, right = axes.get_xlim()
+    points = min(_DISC, _CROWD / np.sqrt(len(anchor)))
+    disc = points * (right - left) / (72.0 * _WIDTH)
+    place = spread_labels(anchor, 1.08 * disc)
+    moved = np.linalg.norm(place - anchor, axis=1) > 0.1 * disc
+    pairs = np.stack([anchor, place], axis=1)[moved]
+    axes.add_collection(LineCollection(list(pairs), colors=choice.colour, lw=0.8, zorder=3))
+    axes.scatter(anchor[moved, 0], anchor[moved, 1], s=9, c=choice.colour, linewidths=0, zorder=3)
+    axes.scatter(
+        place[:, 0], place[:, 1], s=points**2, c=style.PAPER, edgecolors=choice.colour,
+        linewidths=1.3, marker=choice.marker, zorder=4,
+    )  # fmt: skip
+    for number, (x, y) in enumerate(place, start=1):
+        axes.text(
+            x, y, str(number), ha="center", va="center_baseline", fontsize=0.5 * points, zorder=5,
+        )  # fmt: skip
+
+
+def spread_labels(anchor: FloatArray, distance: float) -> FloatArray:
+    """Return places near their anchors that keep a distance from one another, shape (label, 2).
+
+    Labels that are far enough apart stay where they are. Crowded ones push each other away and
+    are pulled back, round by round; the same anchors give the same places.
+
+    Parameters
+    ----------
+    anchor : ndarray, shape (label, 2)
+        Where the labels belong.
+    distance : float
+        To keep between two labels, in the unit of the anchors.
+    """
+    count = len(anchor)
+    angle = _GOLDEN * np.arange(count)
+    nudge = 1e-3 * distance * np.column_stack([np.cos(angle), np.sin(angle)])
+    gap = np.linalg.norm(anchor[:, None] - anchor[None], axis=2) + distance * np.eye(count)
+    crowded = (gap < distance).any(axis=1, keepdims=True)
+    place = np.where(crowded, anchor + nudge, anchor)
+    for number in range(_ROUNDS):
+        pull = _PULL if number < 0.8 * _ROUNDS else 0.0
+        step = _pushes(place, distance) + pull * (anchor - place)
+        if not np.any(step):
+            break
+        place = place + step
+    return place
+
+
+def _pushes(place: FloatArray, distance: float) -> FloatArray:
+    """Return how far each label is pushed by those that are too near, shape (label, 2)."""
+    offset = place[:, None] - place[None]
+    gap = np.linalg.norm(offset, axis=2)
+    np.fill_diagonal(gap, np.inf)
+    lacking = np.clip(distance - gap, 0.0, None)
+    weight = np.where(lacking > 0.0, 0.5 * lacking / np.maximum(gap, 1e-12), 0.0)
+    pushes: FloatArray = np.einsum("ab,abi->ai", weight, offset)
+    return pushes
+
+
+def _draw_scale(axes: Axes) -> None:
+    """Draw a bar of a round length in the lower left corner."""
+    (left, right), (low, _) = axes.get_xlim(), axes.get_ylim()
+    width = right - left
+    round_lengths = np.outer(10.0 ** np.arange(-3, 4), (1.0, 2.0, 5.0)).ravel()
+    length = float(round_lengths[round_lengths <= max(0.25 * width, 1e-3)].max())
+    start, up = left + 0.03 * width, low + 0.012 * width
+    axes.plot([start, start + length], [up, up], color=style.INK, lw=1.6, solid_capstyle="butt")
+    axes.text(
+        start + 0.5 * length, up + 0.008 * width, readable(length, "m"), ha="center", va="bottom",
+        fontsize=7.5,
+    )  # fmt: skip
+
+
+def _draw_numbers(axes: Axes, choice: _Choice) -> None:
+    """Write the figures that show clustering under the panel."""
+    numbers = choice.spread
+    lines = [
+        (f"Covering radius ({choice.metric})", readable(numbers.covering_radius, "m")),
+        ("Mean distance from the edge", _length(numbers.boundary_distance)),
+        ("Mean distance to the nearest other pose", _length(numbers.nearest_neighbour)),
+        ("Observability index O1 (no unit)", f"{numbers.o1:.3g}"),
+    ]
+    for row, (name, value) in enumerate(lines):
+        for x, text, kind in ((0.08, name, _NAME), (0.92, value, _VALUE)):
+            axes.annotate(
+                text, (x, 0.0), (0, -8 - 14 * row), "axes fraction", "offset points",
+                va="top", **kind,
+            )  # fmt: skip
+
+
+def _length(value: float | None) -> str:
+    return "none" if value is None else readable(value, "m")

@@ -1,0 +1,114 @@
+"""Quantities and counts as people read them: millimetres, degrees, minutes, plurals."""
+
+import math
+from collections.abc import Sequence
+
+_READABLE = {
+    "m": (1e3, " mm"),
+    "rad": (180.0 / math.pi, "°"),
+    "N*m": (1.0, " N·m"),
+    "1": (1.0, ""),
+    "": (1.0, ""),
+}
+
+
+def readable(value: float, unit: str) -> str:
+    """Return an SI value in the unit that people read, with three digits.
+
+    >>> readable(0.0123, "m"), readable(0.5, "rad"), readable(1234.0, "N"), readable(0.25, "1")
+    ('12.3 mm', '28.6°', '1234 N', '0.25')
+    >>> readable(math.inf, "m")
+    'no limit'
+    """
+    if math.isinf(value):
+        return "no limit"
+    scale, name = _READABLE.get(unit, (1.0, f" {unit}"))
+    return f"{_three_digits(value * scale)}{name}"
+
+
+def millimetres(point: tuple[float, float, float]) -> str:
+    """Return a point in mm.
+
+    >>> millimetres((1.2345, -0.5, 0.0))
+    '1234.5, -500.0, 0.0'
+    """
+    return ", ".join(f"{1e3 * value + 0.0:.1f}" for value in point)
+
+
+def duration(seconds: float) -> str:
+    """Return a time span.
+
+    >>> duration(42.4), duration(1300.0), duration(7322.0)
+    ('42 s', '21 min 40 s', '2 h 02 min')
+    """
+    whole = round(seconds)
+    if whole < 60:
+        return f"{whole} s"
+    if whole < 3600:
+        return f"{whole // 60} min {whole % 60:02d} s"
+    return f"{whole // 3600} h {whole % 3600 // 60:02d} min"
+
+
+def _three_digits(value: float) -> str:
+    """Return at least three significant digits, without an exponent for everyday sizes."""
+    if value == 0.0:
+        return "0"
+    digits = 2 - math.floor(math.log10(abs(value)))
+    if digits > 6:
+        return f"{value:.2e}"
+    text = f"{value:.{max(0, digits)}f}"
+    return text.rstrip("0").rstrip(".") if "." in text else text
+
+
+def mm(metres: float, digits: int = 3) -> str:
+    """Return a length in mm.
+
+    >>> mm(0.0001234)
+    '0.123 mm'
+    """
+    return f"{1e3 * metres:.{digits}f} mm" if math.isfinite(metres) else "not known"
+
+
+def um(metres: float) -> str:
+    """Return a length in µm.
+
+    >>> um(17.2e-6)
+    '17.2 µm'
+    """
+    return f"{1e6 * metres:.1f} µm"
+
+
+def counted(number: int, name: str) -> str:
+    """Return a number with its noun.
+
+    >>> counted(1, "pose"), counted(3, "pose")
+    ('1 pose', '3 poses')
+    """
+    return f"{number} {name}{'' if number == 1 else 's'}"
+
+
+def point(values: Sequence[float | None], scale: float = 1e3, digits: int = 1) -> str:
+    """Return coordinates, in mm unless scaled otherwise.
+
+    >>> point([0.1, 0.0, -0.0905])
+    '100.0, 0.0, -90.5'
+    """
+    return ", ".join(
+        "?" if v is None else f"{round(scale * v, digits) + 0.0:.{digits}f}" for v in values
+    )
+
+
+def spans(numbers: Sequence[int]) -> str:
+    """Return whole numbers with runs shortened.
+
+    >>> spans([0, 1, 2, 5])
+    '0 to 2, 5'
+    """
+    runs: list[list[int]] = []
+    for number in sorted(numbers):
+        if runs and number == runs[-1][-1] + 1:
+            runs[-1].append(number)
+        else:
+            runs.append([number])
+    said = (f"{run[0]} to {run[-1]}" if len(run) > 2 else ", ".join(map(str, run)) for run in runs)
+    return ", ".join(said)
