@@ -1,6 +1,5 @@
 """What a user may choose about a fit."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal, get_args
 
@@ -8,7 +7,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from elastocal.arrays import FloatArray
-from elastocal.elastic import Parameter
 from elastocal.errors import IdentificationError
 from elastocal.identification.losses import check_loss
 
@@ -71,28 +69,39 @@ MINIMUM_DRAWS = 40
 """Fewest draws that leave one beyond each end of a 95 % interval."""
 
 
-def bounds(options: FitOptions, parameters: Sequence[Parameter]) -> tuple[FloatArray, FloatArray]:
+def bounds(
+    options: FitOptions, parameters: int, natural: ArrayLike = 0.0
+) -> tuple[FloatArray, FloatArray]:
     """Return the lower and upper bounds, each of shape (parameter,).
+
+    Parameters
+    ----------
+    options : FitOptions
+        What the user chose.
+    parameters : int
+        Number of parameters.
+    natural : array_like, shape (parameter,), optional
+        Smallest values that make sense to each: what a lower bound of zero means.
 
     Raises
     ------
     IdentificationError
         If a bound has another shape, is NaN, or a lower bound exceeds the upper one.
     """
-    n = len(parameters)
-    lower, upper = (np.asarray(each, dtype=float) for each in (options.lower, options.upper))
-    if lower.ndim == 0 and lower == 0.0:
-        lower = np.array([parameter.lower for parameter in parameters])
+    zero = np.ndim(options.lower) == 0 and options.lower == 0.0
+    wanted = (natural if zero else options.lower, options.upper)
     try:
-        lower, upper = np.broadcast_to(lower, (n,)), np.broadcast_to(upper, (n,))
+        lower, upper = (
+            np.broadcast_to(np.asarray(each, dtype=float), (parameters,)) for each in wanted
+        )
     except ValueError as error:
         raise IdentificationError(
-            f"bounds must be a number or one number for each of the {n} springs"
+            f"bounds must be a number or one number for each of the {parameters} springs"
         ) from error
     bad = np.flatnonzero(~((lower <= upper) & (lower < np.inf) & (upper > -np.inf)))
     if len(bad):
         raise IdentificationError(
-            f"bounds exclude everything: spring {bad[0] + 1} of {n} would have to lie between"
+            f"bounds exclude everything: spring {bad[0] + 1} of {parameters} would have to lie between"
             f" {lower[bad[0]]:g} and {upper[bad[0]]:g}"
         )
     return lower, upper

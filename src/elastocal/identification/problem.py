@@ -159,7 +159,8 @@ def build(
     options = options or FitOptions()
     q, force = readings.joint_position, readings.force
     blocks = model.observation_blocks(q, force, readings.moment, marker_offset)
-    lower, upper = bounds(options, model.parameters)
+    natural = [parameter.lower for parameter in model.parameters]
+    lower, upper = bounds(options, len(natural), natural)
     return Problem(
         O=blocks,
         d=np.array(readings.deflection),
