@@ -17,6 +17,7 @@ from .model import (
 )
 from .springs import (
     KINDS as KINDS,
+    AnySpring as AnySpring,
     Hinge as Hinge,
     OneAxisSpring as OneAxisSpring,
     Parameter as Parameter,

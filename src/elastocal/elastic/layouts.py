@@ -25,6 +25,7 @@ from elastocal.robot import ChainJoint, Robot
 from elastocal.units import parse_quantity
 
 _SCHEMA = "elastocal.springs/1"
+_HINGE = "hinge"
 _MOTIONS = ("revolute", "prismatic")
 """What a hinge may do; other kinds of springs are asked for by their word."""
 
@@ -97,7 +98,7 @@ def _words(known: Callable[[], Iterable[str]]) -> BeforeValidator:
 
 Length = Annotated[float, BeforeValidator(lambda text: parse_quantity(text, "length"))]
 LayoutName = Annotated[str, _words(lambda: tuple(LAYOUTS))]
-Kind = Annotated[str, _words(lambda: (*_MOTIONS, *(word for word in KINDS if word != Hinge.word)))]
+Kind = Annotated[str, _words(lambda: (*_MOTIONS, *(word for word in KINDS if word != _HINGE)))]
 
 
 class SpringEntry(StrictModel):
@@ -149,7 +150,7 @@ def _spring(entry: SpringEntry, joints: dict[str, ChainJoint]) -> Spring:
     parts += ["distal"] if distal else []
     parts += [entry.axis if isinstance(entry.axis, str) else _direction(axis)]
     name = entry.name or f"{joint.name}.{'-'.join(parts)}"
-    kind = KINDS.get(entry.kind or Hinge.word, Hinge)
+    kind = KINDS.get(entry.kind or _HINGE, Hinge)
     return kind.at(SpringAxis(name, joint.name, axis, revolute, distal, entry.offset))
 
 

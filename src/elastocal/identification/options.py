@@ -101,7 +101,7 @@ def bounds(
     bad = np.flatnonzero(~((lower <= upper) & (lower < np.inf) & (upper > -np.inf)))
     if len(bad):
         raise IdentificationError(
-            f"bounds exclude everything: spring {bad[0] + 1} of {parameters} would have to lie between"
-            f" {lower[bad[0]]:g} and {upper[bad[0]]:g}"
+            f"bounds exclude everything: spring {bad[0] + 1} of {parameters} would have to lie"
+            f" between {lower[bad[0]]:g} and {upper[bad[0]]:g}"
         )
     return lower, upper

@@ -11,9 +11,8 @@ from .expression import (
 from .hinge import Hinge as Hinge, axial as axial
 from .kinds import (
     KINDS as KINDS,
+    AnySpring as AnySpring,
     check_springs as check_springs,
-    kind_of as kind_of,
-    spring_data as spring_data,
     unit_of as unit_of,
 )
 from .spring import (

@@ -1,7 +1,5 @@
 """Hinge: a linear spring about an axis, or along one."""
 
-from dataclasses import dataclass
-
 from elastocal.arrays import FloatArray
 from elastocal.elastic.directions import as_axis
 from elastocal.elastic.springs.expression import Quantity
@@ -13,6 +11,7 @@ from elastocal.elastic.springs.spring import (
     Tangents,
     Unit,
 )
+from elastocal.records import record
 from elastocal.robot import ChainJoint
 
 _TORSIONAL = Unit("rad/(N*m)", "µrad/(N·m)", 1e6, "MN·m/rad")
@@ -22,11 +21,10 @@ _SCALE = 1e-6
 to a newton."""
 
 
-@dataclass(frozen=True, repr=False)
+@record()
 class Hinge(OneAxisSpring):
     """A virtual joint that yields in proportion to its load: ``theta = c t`` (paper Eq. 10)."""
 
-    word = "hinge"
     units = (_TORSIONAL, _LINEAR)
 
     @property

@@ -1,40 +1,40 @@
-"""Every kind of spring by the name that files have for it, and what files hold of a spring."""
+"""Every kind of spring by the word that files have for it."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict
-from typing import Any
+from functools import reduce
+from operator import or_
+from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
+
+from pydantic import Discriminator, Tag
 
 from elastocal.elastic.springs.hinge import Hinge
 from elastocal.elastic.springs.spring import Spring, Unit
-from elastocal.errors import SpringError, nearest
+from elastocal.errors import SpringError
 
-KINDS: dict[str, type[Spring]] = {kind.word: kind for kind in (Hinge,)}
-"""Kinds of springs by the word that files have for them."""
-_USUAL = Hinge.word
+_USUAL = "hinge"
 """The kind of a spring whose kind a file does not name."""
 
-
-def spring_data(spring: Spring) -> dict[str, Any]:
-    """Return what a model file holds of a spring; hinges are what is meant without a kind."""
-    kind = {} if spring.word == _USUAL else {"kind": spring.word}
-    return {**asdict(spring), **kind}
+KINDS: dict[str, type[Spring]] = {_USUAL: Hinge}
+"""Kinds of springs by the word that files have for them."""
 
 
-def kind_of(data: Mapping[str, Any]) -> type[Spring]:
-    """Return the class of a spring in a model file.
+def _tag(spring: Any) -> str:
+    """Return the tag of the class that a spring in a file is read as."""
+    return f"<{spring.get('kind', _USUAL) if isinstance(spring, Mapping) else _USUAL}>"
 
-    Raises
-    ------
-    SpringError
-        If the kind is unknown.
-    """
-    word = data.get("kind", _USUAL)
-    if word not in KINDS:
-        raise SpringError(
-            f"unknown kind of spring {word!r}{nearest(str(word), KINDS)}"
-            f" (allowed: {', '.join(KINDS)})"
-        )
-    return KINDS[word]
+
+if TYPE_CHECKING:
+    AnySpring: TypeAlias = Spring
+else:
+    AnySpring = Annotated[
+        reduce(or_, (Annotated[kind, Tag(f"<{word}>")] for word, kind in KINDS.items())),
+        Discriminator(
+            _tag,
+            custom_error_type="kind",
+            custom_error_message=f"unknown kind of spring (allowed: {', '.join(KINDS)})",
+        ),
+    ]
+    """A spring of any kind, as a field of a file's record."""
 
 
 def unit_of(si: str) -> Unit:

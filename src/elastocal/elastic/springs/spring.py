@@ -10,6 +10,7 @@ import numpy as np
 from elastocal.arrays import FloatArray
 from elastocal.elastic.springs.expression import Quantity
 from elastocal.errors import SpringError, nearest
+from elastocal.records import record
 from elastocal.robot import ChainJoint
 
 _UNIT_LENGTH = 1e-9
@@ -102,7 +103,7 @@ Tangents = tuple[tuple[tuple[FloatArray | float, ...], ...], ...]
 """By axis, by torque, by parameter."""
 
 
-@dataclass(frozen=True)
+@record()
 class Spring(ABC):
     """A place where a robot is soft.
 
@@ -120,8 +121,6 @@ class Spring(ABC):
     joint: str
     """Name of the joint in whose frame the spring sits."""
 
-    word: ClassVar[str]
-    """Name of the kind in files."""
     units: ClassVar[tuple[Unit, ...]]
     """Every unit that parameters of this kind may have."""
     places: ClassVar[frozenset[str]] = frozenset({"name", "joint", "axis", "distal", "offset"})
@@ -133,9 +132,9 @@ class Spring(ABC):
         """Return the spring that a spring file asks for at a place."""
 
     @property
+    @abstractmethod
     def kind(self) -> str:
-        """What ``calibrate --json`` calls the spring."""
-        return self.word
+        """What files call the spring; a field of every kind but the hinge, which is understood."""
 
     @property
     @abstractmethod
@@ -194,7 +193,7 @@ class Spring(ABC):
         return (type(self), *settings)
 
 
-@dataclass(frozen=True)
+@record()
 class OneAxisSpring(Spring):
     """A spring about one axis, or along it; its subclasses differ in parameters and law."""
 

@@ -16,9 +16,10 @@ from elastocal.compensation.conditioning import ToolRecord, read_tool
 from elastocal.compensation.process import TABLE, ProcessRecord, read_process
 from elastocal.dataset import Dataset
 from elastocal.errors import ElastocalError
-from elastocal.identification import read_model, read_record
+from elastocal.identification import CalibrateResult
 from elastocal.identification.recertification import recertify_files
 from elastocal.procedure import file_sha256
+from elastocal.records import read_json, to_data
 from elastocal.report.document.again import Again, calibrate_again
 from elastocal.report.document.fitting import (
     check_codec,
@@ -43,7 +44,6 @@ from elastocal.report.document.places import (
 )
 from elastocal.report.document.run_parts import with_run
 from elastocal.report.document.searching import Search
-from elastocal.report.document.shapes import checked_figures
 
 
 @dataclass(frozen=True)
@@ -111,9 +111,10 @@ def _with_model(parts: Parts, search: Search, options: Options) -> Parts:
 
 
 def _calibrated(path: Path, dataset: Dataset | None) -> Calibrated:
-    record, model = read_record(path), read_model(path)
+    record = read_json(path, CalibrateResult)
+    model = record.calibrated
     check_model(model, dataset, path)
-    figures = checked_figures(dict(record.calibration), f"{path}: calibration")
+    figures = {} if record.calibration is None else to_data(record.calibration)
     return Calibrated(model, figures, record.robot.urdf_sha256, file_sha256(path))
 
 

@@ -14,7 +14,14 @@ import numpy as np
 from matplotlib.figure import Figure
 from plotly.offline import get_plotlyjs
 
-from elastocal.codec import INDICES, CodecData, Correlation, Insight, Observed, Verdicts
+from elastocal.codec import (
+    INDICES,
+    CodecAnalysis,
+    CodecData,
+    Correlation,
+    SpringObservability,
+    Verdicts,
+)
 from elastocal.files import write_text
 from elastocal.report.pages.templating import POLICY, embedded, template
 from elastocal.report.plots import (
@@ -42,7 +49,7 @@ def write_codec_page(
     path: Path,
     data: CodecData,
     verdicts: Verdicts,
-    seen: Sequence[Observed] = (),
+    seen: Sequence[SpringObservability] = (),
     correlations: Sequence[Correlation] = (),
 ) -> Path:
     """Write the interactive page of a codec, atomically; return its path.
@@ -53,7 +60,7 @@ def write_codec_page(
         An HTML file.
     data, verdicts : CodecData, Verdicts
         The arrays and what they say.
-    seen : sequence of Observed, optional
+    seen : sequence of SpringObservability, optional
         What each variant tells apart; without it the page shows no compliances, since it could
         not say which of them are findings.
     correlations : sequence of Correlation, optional
@@ -73,7 +80,7 @@ def write_codec_page(
 def _page(
     data: CodecData,
     verdicts: Verdicts,
-    seen: Sequence[Observed],
+    seen: Sequence[SpringObservability],
     correlations: Sequence[Correlation],
 ) -> str:
     names = [each.name for each in data.variants]
@@ -200,7 +207,7 @@ def write_codec_figures(
     folder: Path,
     data: CodecData,
     verdicts: Verdicts,
-    insight: Insight | None = None,
+    insight: CodecAnalysis | None = None,
     axes: Sequence[str] = (),
 ) -> list[Path]:
     """Write the figures of a codec, each atomically; return their paths.
@@ -215,8 +222,8 @@ def write_codec_figures(
         An existing folder.
     data, verdicts : CodecData, Verdicts
         The arrays and what they say.
-    insight : Insight, optional
-        From `codec.insight.look_into`. Without it no compliances are drawn, since no picture
+    insight : CodecAnalysis, optional
+        From `codec.analyse`. Without it no compliances are drawn, since no picture
         could say which of them are findings; without its indices, none of them.
     axes : sequence of str
         Axes of which a printed figure is wanted beside that of the norm.
@@ -232,7 +239,7 @@ def write_codec_figures(
     figures: dict[str, Callable[[], Figure]] = {"codec": partial(codec_chart, data, verdicts)}
     for axis in axes:
         figures[f"codec-{axis}"] = partial(codec_chart, data, verdicts, axis)
-    found = insight or Insight(())
+    found = insight or CodecAnalysis(())
     if found.seen:
         figures["compliances"] = partial(compliance_chart, data, found.seen)
     if found.indices:

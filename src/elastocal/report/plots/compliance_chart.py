@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from elastocal.arrays import BoolArray
-from elastocal.codec import CodecData, Observed
+from elastocal.codec import CodecData, SpringObservability
 from elastocal.elastic import Unit, unit_of
 from elastocal.identification import describe
 from elastocal.report.plots import style
@@ -56,14 +56,14 @@ class SpringBoxes:
     """Variants that never tell it apart."""
 
 
-def compliance_chart(data: CodecData, seen: Sequence[Observed]) -> Figure:
+def compliance_chart(data: CodecData, seen: Sequence[SpringObservability]) -> Figure:
     """Return one page with a panel for each spring.
 
     Parameters
     ----------
     data : CodecData
         The arrays.
-    seen : sequence of Observed
+    seen : sequence of SpringObservability
         What each variant tells apart, in the order of the variants.
 
     Raises
@@ -99,7 +99,7 @@ def compliance_chart(data: CodecData, seen: Sequence[Observed]) -> Figure:
     return figure
 
 
-def spring_boxes(data: CodecData, seen: Sequence[Observed]) -> list[SpringBoxes]:
+def spring_boxes(data: CodecData, seen: Sequence[SpringObservability]) -> list[SpringBoxes]:
     """Return the boxes of every spring, joint by joint.
 
     Raises
@@ -118,7 +118,7 @@ def spring_boxes(data: CodecData, seen: Sequence[Observed]) -> list[SpringBoxes]
 
 
 def _spring_boxes(
-    data: CodecData, seen: Sequence[Observed], spring: str, unit: Unit
+    data: CodecData, seen: Sequence[SpringObservability], spring: str, unit: Unit
 ) -> SpringBoxes:
     boxes: dict[str, Boxes] = {}
     hollow: dict[str, BoolArray] = {}
@@ -198,7 +198,7 @@ def _mark_cut(axes: Axes, boxes: Boxes, variant: VariantStyle) -> None:
     )  # fmt: skip
 
 
-def _notes(seen: Sequence[Observed], width: int) -> list[str]:
+def _notes(seen: Sequence[SpringObservability], width: int) -> list[str]:
     """Return the combinations that are not told apart, once for variants that share them."""
     variants: dict[str, list[str]] = {}
     for each in seen:

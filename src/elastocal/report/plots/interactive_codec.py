@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from elastocal.arrays import BoolArray
-from elastocal.codec import AXES, CodecData, Observed, Verdicts
+from elastocal.codec import AXES, CodecData, SpringObservability, Verdicts
 from elastocal.report.plots import style
 from elastocal.report.plots._box_plots import BAND, Boxes, reads_better_in_decades, round_values
 from elastocal.report.plots.codec_chart import ERROR_PANELS, error_boxes
@@ -94,7 +94,7 @@ def _scale(found: Sequence[Boxes]) -> dict[str, Any]:
     return {"type": "linear", "range": [0.0, 1.05 * high or 1.0]}
 
 
-def compliance_views(data: CodecData, seen: Sequence[Observed]) -> list[_View]:
+def compliance_views(data: CodecData, seen: Sequence[SpringObservability]) -> list[_View]:
     """Return a figure for each spring.
 
     Raises
