@@ -113,4 +113,4 @@ def process_folder(path: Path) -> Described:
     """Describe the folder of a simulated process; its deviations are validated, too."""
     record = read_process(path)
     kind, facts = process_table(path / TABLE)
-    return kind, {**facts, "courses": len(record.traces)}
+    return kind, {**facts, "courses": len(record.courses)}
