@@ -24,7 +24,7 @@ from elastocal.procedure import (
     read_journal,
     refuse_foreign_files,
 )
-from elastocal.procedure.record.journal import read_commits
+from elastocal.procedure.record import read_commits
 from support.cli import elastocal
 from support.run_cells import PlannedCell, planned_cell
 

@@ -4,8 +4,14 @@ import numpy as np
 import pytest
 
 from elastocal.procedure.derive.readings import average
-from elastocal.procedure.record.journal import ReadingStatus, Window
-from elastocal.procedure.record.streams import ArmStream, PointStream, Streams, WrenchStream
+from elastocal.procedure.record import (
+    ArmStream,
+    PointStream,
+    ReadingStatus,
+    Streams,
+    Window,
+    WrenchStream,
+)
 from support.stations import station
 
 COUNT = 200

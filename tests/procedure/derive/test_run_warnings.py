@@ -6,7 +6,7 @@ import pytest
 from elastocal.procedure.derive.displacement import LoadRow
 from elastocal.procedure.derive.summary import run_warnings
 from elastocal.procedure.derive.tool import Interval, ToolChange, ToolEstimate, ToolLoad
-from elastocal.procedure.record.journal import ReadingStatus
+from elastocal.procedure.record import ReadingStatus
 from elastocal.procedure.registration import Blunder, Registration, StationFit, StationMove
 
 TOOL = ToolLoad(60.0, np.array([0.0, 0.0, 0.15]), np.array([0.0, 0.0, -9.8]), np.eye(4))

@@ -7,7 +7,7 @@ import pytest
 
 from elastocal.errors import FileAccessError, SchemaError
 from elastocal.procedure import Event, Journal, PoseLog, read_journal
-from elastocal.procedure.record.journal import Action, read_commits
+from elastocal.procedure.record import Action, read_commits
 from support.fake_runs import RECORD
 
 LOG = PoseLog(pose=3, attempt=2, streams="pose_0003_2.mcap", windows=())

@@ -5,7 +5,7 @@ import pytest
 
 from elastocal.errors import FileAccessError
 from elastocal.procedure import Event, RunEnd, read_journal
-from elastocal.procedure.record.journal import ReadingStatus, read_commits
+from elastocal.procedure.record import ReadingStatus, read_commits
 from elastocal.procedure.run.steps import ArmLocation
 from support import fake_faults as fault
 from support.fake_faults import when

@@ -8,7 +8,7 @@ import pytest
 
 from elastocal.cell.devices import Motion
 from elastocal.procedure import Event, RunEnd, read_journal
-from elastocal.procedure.record.journal import read_commits
+from elastocal.procedure.record import read_commits
 from support.fake_devices import FakeCell
 from support.fake_runs import FakeRun
 

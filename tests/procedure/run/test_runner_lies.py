@@ -5,7 +5,7 @@ import pytest
 
 from elastocal.errors import DeviceError
 from elastocal.procedure import Event, PoseRecorder, RunEnd, read_journal
-from elastocal.procedure.record.journal import read_commits
+from elastocal.procedure.record import read_commits
 from elastocal.procedure.run.steps import ArmLocation
 from support import fake_faults as fault, fake_lies as lie
 from support.fake_devices import R_BASE_TRACKER, Motion, fake_cell

@@ -11,7 +11,7 @@ from hypothesis import given, settings, strategies as st
 
 from elastocal.cell.devices import Motion
 from elastocal.procedure import Event, RunEnd, read_journal
-from elastocal.procedure.record.journal import Action, read_commits
+from elastocal.procedure.record import Action, read_commits
 from support import fake_faults as fault
 from support.fake_faults import when
 from support.fake_runs import FakeRun, MemoryRecorder, plan

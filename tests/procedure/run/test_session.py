@@ -4,7 +4,7 @@ import pytest
 
 from elastocal.errors import ProcedureError
 from elastocal.procedure import Entry, Event, PoseLog, check_same_run, last_known
-from elastocal.procedure.record.journal import Action
+from elastocal.procedure.record import Action
 from support.fake_runs import RECORD, FakeRun
 
 

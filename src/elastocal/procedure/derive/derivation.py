@@ -12,7 +12,7 @@ from elastocal.cell import Cell
 from elastocal.dataset import Dataset, write
 from elastocal.errors import DatasetError, FileAccessError, ProcedureError, SchemaError
 from elastocal.files import write_json
-from elastocal.planning import PlanFile
+from elastocal.planning import PlanResult
 from elastocal.procedure.derive.displacement import LoadRow, load_rows, make_dataset
 from elastocal.procedure.derive.readings import (
     PoseReadings,
@@ -22,16 +22,19 @@ from elastocal.procedure.derive.readings import (
 )
 from elastocal.procedure.derive.summary import RunFindings, summarise
 from elastocal.procedure.derive.tool import ToolLoad, estimate_tool
-from elastocal.procedure.record.folder import RunFolder, check_stream, read_copies
-from elastocal.procedure.record.journal import (
+from elastocal.procedure.record import (
     Entry,
     PoseLog,
     ReadingStatus,
+    RunFolder,
     RunRecord,
+    Streams,
+    check_stream,
     commits,
+    read_copies,
     read_journal,
+    read_streams,
 )
-from elastocal.procedure.record.streams import Streams, read_streams
 from elastocal.procedure.registration import Registration, register
 from elastocal.robot import inverse_transform
 
@@ -99,7 +102,7 @@ def write_derived(run: Path, derived: DerivedRun) -> None:
 def derive_poses(
     poses: Sequence[PoseReadings],
     cell: Cell,
-    plan: PlanFile,
+    plan: PlanResult,
     entries: Sequence[Entry],
     provenance: str,
 ) -> DerivedRun:
@@ -111,7 +114,7 @@ def derive_poses(
         In the order of time.
     cell : Cell
         The cell.
-    plan : PlanFile
+    plan : PlanResult
         The plan; its load cases are the dataset's.
     entries : sequence of Entry
         Of the journal, for times, retries and faults.

@@ -27,7 +27,7 @@ from elastocal.procedure.derive.tool import (
     turned_sigma,
     wrench_on_robot,
 )
-from elastocal.procedure.record.journal import ReadingStatus
+from elastocal.procedure.record import ReadingStatus
 from elastocal.procedure.registration import Registration
 from elastocal.robot import Robot
 

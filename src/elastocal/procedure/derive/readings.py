@@ -15,8 +15,7 @@ import numpy as np
 
 from elastocal.arrays import BoolArray, FloatArray
 from elastocal.procedure.derive.tool import ToolLoad, UnloadedWrenches
-from elastocal.procedure.record.journal import PoseLog, ReadingStatus, Window
-from elastocal.procedure.record.streams import SAME_TIME, Streams
+from elastocal.procedure.record import SAME_TIME, PoseLog, ReadingStatus, Streams, Window
 from elastocal.procedure.registration import UnloadedReadings
 from elastocal.robot import Robot
 

@@ -21,7 +21,7 @@ from elastocal.files import read_text
 from elastocal.procedure.derive.displacement import LoadRow
 from elastocal.procedure.derive.readings import PoseReadings, weighed_poses
 from elastocal.procedure.derive.tool import Interval, ToolEstimate, ToolLoad
-from elastocal.procedure.record.journal import Entry, Event, ReadingStatus
+from elastocal.procedure.record import Entry, Event, ReadingStatus
 from elastocal.procedure.registration import Registration, StationFit, UnloadedReadings
 from elastocal.records import check_schema
 
@@ -243,7 +243,7 @@ def _readings(rows: Sequence[LoadRow]) -> dict[str, Any]:
 
 
 def _registration(registration: Registration, dataset: Dataset) -> dict[str, Any]:
-    typical = np.linalg.norm(dataset.data["marker_displacement"].values, axis=-1)
+    typical = np.linalg.norm(dataset.marker_displacement, axis=-1)
     displacement = float(np.nanmedian(typical))
     return {
         "stations": [_station(fit, displacement) for fit in registration.stations],

@@ -12,7 +12,7 @@ from pathlib import Path
 from elastocal.cell import Cell, fingerprint, load_cell, named_files
 from elastocal.errors import FileAccessError, SchemaError
 from elastocal.files import read_text, replacing, sha256
-from elastocal.planning import PLAN, POOL, PlanFile, read_plan
+from elastocal.planning import PLAN, POOL, PlanResult, read_plan
 from elastocal.procedure.record.journal import RunRecord
 
 JOURNAL = "journal.jsonl"
@@ -160,7 +160,7 @@ def make_folder(folder: Path) -> None:
         raise FileAccessError(f"cannot make {folder}: {error.strerror or error}") from error
 
 
-def read_copies(folder: RunFolder, record: RunRecord) -> tuple[Cell, PlanFile]:
+def read_copies(folder: RunFolder, record: RunRecord) -> tuple[Cell, PlanResult]:
     """Return the cell and the plan that a run was made with, as they stand in its folder.
 
     Parameters

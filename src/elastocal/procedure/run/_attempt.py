@@ -6,7 +6,7 @@ import numpy as np
 
 from elastocal.arrays import FloatArray
 from elastocal.planning import Joints, PoseRecord
-from elastocal.procedure.record.journal import PoseLog, ReadingStatus, Window
+from elastocal.procedure.record import PoseLog, ReadingStatus, Window
 from elastocal.procedure.run._stability import SlideDetector, SlipReference
 from elastocal.procedure.run._supervisor import Supervisor
 from elastocal.procedure.run._watchdog import Guard

@@ -11,7 +11,7 @@ import numpy as np
 from elastocal.arrays import FloatArray
 from elastocal.cell.devices import ArmState, Motion
 from elastocal.planning import Joints
-from elastocal.procedure.record.journal import Action
+from elastocal.procedure.record import Action
 from elastocal.procedure.run._attempt import Attempt
 from elastocal.procedure.run._supervisor import Supervisor
 from elastocal.procedure.run._watchdog import Guard, Snapshot

@@ -12,7 +12,7 @@ import numpy as np
 
 from elastocal.arrays import FloatArray
 from elastocal.cell.devices import Motion
-from elastocal.procedure.record.journal import Action, ReadingStatus
+from elastocal.procedure.record import Action, ReadingStatus
 from elastocal.procedure.run._attempt import Attempt
 from elastocal.procedure.run._motion import (
     approach_by,

@@ -11,7 +11,7 @@ import contextlib
 from collections.abc import Callable
 
 from elastocal.cell.devices import ArmState, Motion
-from elastocal.procedure.record.journal import Action
+from elastocal.procedure.record import Action
 from elastocal.procedure.run import _press
 from elastocal.procedure.run._attempt import Attempt
 from elastocal.procedure.run._motion import has_gone, is_idle, release_limit, retract_limit

@@ -15,8 +15,7 @@ import numpy as np
 from elastocal.arrays import FloatArray
 from elastocal.cell.devices import ArmState, Devices, PointBlock, WrenchBlock
 from elastocal.errors import DeviceError
-from elastocal.procedure.record.journal import Action, Logbook
-from elastocal.procedure.record.streams import StreamRecorder
+from elastocal.procedure.record import Action, Logbook, StreamRecorder
 from elastocal.procedure.run._watchdog import (
     Guard,
     Snapshot,

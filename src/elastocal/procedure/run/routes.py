@@ -12,7 +12,7 @@ import numpy as np
 
 from elastocal.arrays import FloatArray
 from elastocal.errors import ProcedureError
-from elastocal.planning import Joints, PlanFile, PoseRecord
+from elastocal.planning import Joints, PlanResult, PoseRecord
 from elastocal.procedure.run.faults import Fault, FaultError
 from elastocal.procedure.run.settings import RunSettings
 from elastocal.procedure.run.steps import Step
@@ -74,7 +74,7 @@ class ApproachLine:
                 raise FaultError(Fault.TRAVEL_LIMIT, text)
 
 
-def route(plan: PlanFile, start: int, end: int) -> tuple[Joints, ...]:
+def route(plan: PlanResult, start: int, end: int) -> tuple[Joints, ...]:
     """Return the joint positions to pass from one stop to another, that of ``start`` excluded.
 
     The route goes through the approach poses in between, so that every leg is one that the planner
@@ -82,7 +82,7 @@ def route(plan: PlanFile, start: int, end: int) -> tuple[Joints, ...]:
 
     Parameters
     ----------
-    plan : PlanFile
+    plan : PlanResult
         The plan.
     start, end : int
         Numbers of stops.
@@ -97,7 +97,7 @@ def route(plan: PlanFile, start: int, end: int) -> tuple[Joints, ...]:
     return tuple(legs)
 
 
-def stop_joints(plan: PlanFile, stop: int) -> Joints:
+def stop_joints(plan: PlanResult, stop: int) -> Joints:
     """Return the joint positions of a stop."""
     if 0 <= stop < len(plan.poses):
         return plan.poses[stop].approach_joints
@@ -115,7 +115,7 @@ class HomeRoute:
 
 
 def home_route(
-    plan: PlanFile,
+    plan: PlanResult,
     q: FloatArray,
     T_base_tcp: FloatArray,
     travel_limit: float,
@@ -125,7 +125,7 @@ def home_route(
 
     Parameters
     ----------
-    plan : PlanFile
+    plan : PlanResult
         The plan.
     q : ndarray, shape (joint,)
         Where the arm stands, in rad or m.
@@ -163,7 +163,7 @@ def home_route(
 
 
 def _stands_before(
-    plan: PlanFile, pose: PoseRecord, q: FloatArray, T_base_tcp: FloatArray, travel_limit: float
+    plan: PlanResult, pose: PoseRecord, q: FloatArray, T_base_tcp: FloatArray, travel_limit: float
 ) -> bool:
     """Whether the arm is on the line between approach pose and surface."""
     line, posture = ApproachLine.of_pose(pose, travel_limit), np.abs(q - pose.approach_joints)
@@ -177,7 +177,7 @@ def _stands_before(
 
 
 def _legs_with_way_back(
-    plan: PlanFile, q: FloatArray
+    plan: PlanResult, q: FloatArray
 ) -> Iterator[tuple[float, tuple[Joints, ...]]]:
     """Yield how far each leg is, and the way to HOME from it against its direction."""
     for stop in range(len(plan.poses) + 1):
@@ -209,12 +209,12 @@ class PlannedStep:
     """Estimated; what waits for something is taken at its shortest."""
 
 
-def itinerary(plan: PlanFile, settings: RunSettings) -> tuple[PlannedStep, ...]:
+def itinerary(plan: PlanResult, settings: RunSettings) -> tuple[PlannedStep, ...]:
     """Return all steps of an undisturbed run, in order.
 
     Parameters
     ----------
-    plan : PlanFile
+    plan : PlanResult
         The plan.
     settings : RunSettings
         Figures of the run.
@@ -227,7 +227,7 @@ def itinerary(plan: PlanFile, settings: RunSettings) -> tuple[PlannedStep, ...]:
     return tuple(steps)
 
 
-def remaining_times(plan: PlanFile, settings: RunSettings) -> FloatArray:
+def remaining_times(plan: PlanResult, settings: RunSettings) -> FloatArray:
     """Return the time from before each pose to the end, shape (pose + 1,), in s.
 
     The last is that of the way HOME.
@@ -239,7 +239,7 @@ def remaining_times(plan: PlanFile, settings: RunSettings) -> FloatArray:
     return left
 
 
-def _travel(plan: PlanFile, settings: RunSettings, start: int, end: int) -> PlannedStep:
+def _travel(plan: PlanResult, settings: RunSettings, start: int, end: int) -> PlannedStep:
     legs = route(plan, start, end)
     seconds = settings.axes.along(np.array([stop_joints(plan, start), *legs]))
     home = end == len(plan.poses)

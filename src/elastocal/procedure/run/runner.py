@@ -8,8 +8,14 @@ import numpy as np
 from elastocal.cell.devices import Devices, Motion
 from elastocal.errors import ProcedureError
 from elastocal.planning import Joints, PoseRecord
-from elastocal.procedure.record.journal import Action, Event, Journal, Logbook, ReadingStatus
-from elastocal.procedure.record.streams import StreamRecorder
+from elastocal.procedure.record import (
+    Action,
+    Event,
+    Journal,
+    Logbook,
+    ReadingStatus,
+    StreamRecorder,
+)
 from elastocal.procedure.run._attempt import Attempt
 from elastocal.procedure.run._motion import drive, leave_force_control, retract_to
 from elastocal.procedure.run._sequence import AttemptFailedError, disarm, halt, run_attempt

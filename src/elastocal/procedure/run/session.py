@@ -14,10 +14,16 @@ from elastocal import __version__
 from elastocal.cell import Cell, fingerprint
 from elastocal.errors import ProcedureError
 from elastocal.files import sha256
-from elastocal.planning import PlanFile
-from elastocal.procedure.record.folder import RunFolder
-from elastocal.procedure.record.journal import Action, Entry, Event, RunRecord, commits
-from elastocal.procedure.record.streams import StreamRecorder
+from elastocal.planning import PlanResult
+from elastocal.procedure.record import (
+    Action,
+    Entry,
+    Event,
+    RunFolder,
+    RunRecord,
+    StreamRecorder,
+    commits,
+)
 from elastocal.procedure.run.routes import HomeRoute
 from elastocal.procedure.run.settings import RunSettings
 from elastocal.procedure.run.steps import ArmLocation, Progress
@@ -34,7 +40,7 @@ _TOUCHES = frozenset({Action.APPROACH, Action.HOLD, Action.RELEASE, Action.RETRA
 class Session:
     """A session that may begin."""
 
-    plan: PlanFile
+    plan: PlanResult
     settings: RunSettings
     folder: RunFolder
     committed: frozenset[int] = frozenset()
@@ -146,7 +152,7 @@ def last_known(entries: tuple[Entry, ...]) -> LastKnown:
 
 
 def run_record(
-    cell: Cell, plan: PlanFile, plan_text: str, cell_file: str, seed: int, started: str
+    cell: Cell, plan: PlanResult, plan_text: str, cell_file: str, seed: int, started: str
 ) -> RunRecord:
     """Return the record by which a run is known again.
 

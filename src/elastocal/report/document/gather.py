@@ -12,8 +12,8 @@ from pathlib import Path
 from elastocal.arrays import FloatArray
 from elastocal.cell import Cell
 from elastocal.codec import ARRAYS, judge, read_codec
-from elastocal.compensation.conditioning import ToolRecord, read_tool
-from elastocal.compensation.process import TABLE, ProcessRecord, read_process
+from elastocal.compensation.conditioning import ToolResult, read_tool
+from elastocal.compensation.process import TABLE, SimulatedProcess, read_process
 from elastocal.dataset import Dataset
 from elastocal.errors import ElastocalError
 from elastocal.identification import CalibrateResult
@@ -119,10 +119,10 @@ def _calibrated(path: Path, dataset: Dataset | None) -> Calibrated:
 
 
 def _with_rest(parts: Parts, search: Search, options: Options) -> Parts:
-    def tool(path: Path) -> ToolRecord:
+    def tool(path: Path) -> ToolResult:
         return check_tool(read_tool(path), parts, path)
 
-    def process(path: Path) -> ProcessRecord:
+    def process(path: Path) -> SimulatedProcess:
         folder = path.parent if path.name == TABLE else path
         return check_process(read_process(folder), parts, folder / TABLE)
 
