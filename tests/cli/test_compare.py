@@ -127,9 +127,9 @@ def test_rows_that_cannot_be_used_are_refused(folder, tmp_path):
 
 
 def test_a_dataset_of_another_robot_is_refused(folder, tmp_path):
-    data = dataset.read(folder / "measured.nc").data.copy()
+    data = dataset.read(folder / "measured.nc").to_xarray().copy()
     data.attrs["robot_urdf"] = data.attrs["robot_urdf"].replace("1.15", "1.25")
-    dataset.write(dataset.Dataset(data), tmp_path / "other.nc")
+    dataset.write(dataset.Dataset.from_xarray(data), tmp_path / "other.nc")
     assert "are of different robots" in run(folder, "--rows", tmp_path / "other.nc").reason
 
 

@@ -17,7 +17,7 @@ from elastocal.compensation.process import DeviationComparison, process_courses
 from elastocal.dataset import Readings
 from elastocal.elastic import ElasticModel, layout
 from elastocal.identification import Calibration, calibrate, summary
-from elastocal.planning import Planned, make_plan
+from elastocal.planning import PlanAndPool, make_plan
 from elastocal.sim.workcell import ErrorDraws, Places, QuickCell, QuickErrors, Scales
 
 SEED = 0
@@ -28,7 +28,7 @@ class Campaign:
     """Everything up to the calibrated model."""
 
     cell: Cell
-    planned: Planned
+    planned: PlanAndPool
     readings: Readings
     calibration: Calibration
 
@@ -76,12 +76,12 @@ def process(done: Campaign, kind: str, settings: CompensatorSettings, count: int
 
 def accuracy(done: Campaign) -> str:
     """Return in words what a calibration reaches."""
-    told = summary(done.calibration)
+    figures = summary(done.calibration)
     return (
-        f"{told['readings']} readings at {told['poses']} poses; measured deflection"
-        f" {1e3 * told['deflection']['mean']:.2f} mm mean; residual of the fit"
-        f" {1e3 * told['residual']['mean']:.3f} mm mean; error at left-out poses"
-        f" {1e3 * told['held_out']['mean']:.3f} mm mean"
+        f"{figures.readings} readings at {figures.poses} poses; measured deflection"
+        f" {1e3 * figures.deflection.mean:.2f} mm mean; residual of the fit"
+        f" {1e3 * figures.residual.mean:.3f} mm mean; error at left-out poses"
+        f" {1e3 * figures.held_out.mean:.3f} mm mean"
     )
 
 
