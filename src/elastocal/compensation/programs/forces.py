@@ -18,12 +18,12 @@ from elastocal.compensation.offline import (
 )
 
 _POINT = "point"
-_PIECE = 10_000
+_BLOCK = 10_000
 
 
 @dataclass(frozen=True, eq=False)
 class PointForces:
-    """Loads by point."""
+    """Forces and moments by point."""
 
     rows: dict[str, int]
     """Row of each point, by its name in capitals."""
@@ -61,13 +61,13 @@ def _read(path: Path) -> PointForces:
     rows: dict[str, int] = {}
     forces: list[FloatArray] = []
     moments: list[FloatArray] = []
-    for piece in row_blocks(path, layout, _PIECE):
-        for line, cells in zip(piece.lines, piece.cells, strict=True):
+    for block in row_blocks(path, layout, _BLOCK):
+        for line, cells in zip(block.lines, block.cells, strict=True):
             name = cells[place].strip().upper()
             if not name or name in rows:
                 raise PathError(f"row {line}: point {name!r} stands twice or has no name")
             rows[name] = len(rows)
-        values = read_values(piece, columns)
+        values = read_values(block, columns)
         forces += [] if values.force is None else [values.force]
         moments += [] if values.moment is None else [values.moment]
     return PointForces(

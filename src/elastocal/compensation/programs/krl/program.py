@@ -1,14 +1,27 @@
-"""What a ``.src`` file moves to, and in which frame. What is not understood is refused by line."""
+"""A KRL program: the motions of its ``.src`` file, the points of its ``.dat`` file.
+
+What is not understood is refused by line. A correction changes numbers in the ``.dat`` file; the
+``.src`` file and all other bytes stay as they were.
+"""
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
+from typing import ClassVar
 
-from elastocal.compensation.offline import (
-    PathError,
+from elastocal.compensation.offline import PathError, in_file
+from elastocal.compensation.programs.krl._points import (
+    KrlPoint,
+    code_of,
+    read_axes,
+    read_lines,
+    read_points,
+    replaced,
 )
-from elastocal.compensation.offline.krl.points import Point, read_axes
-from elastocal.compensation.offline.krl.text import code_of
+from elastocal.compensation.programs.program import CorrectedPoint, Move, Words
+from elastocal.errors import FileAccessError
+from elastocal.files import replacing
 
 _MOVE = re.compile(
     r"(S?PTP|S?LIN|S?CIRC|SPL|ASYPTP|(?:S?PTP|S?LIN|S?CIRC|SPL)_REL)\b(?!\s*[=(\[.])\s*(.*)",
@@ -29,46 +42,89 @@ _NUMBERED = {"BASE": "BASE_DATA", "TOOL": "TOOL_DATA"}
 
 
 @dataclass(frozen=True)
-class Move:
-    """One motion to a point."""
+class KrlProgram:
+    """A program of a KUKA controller: a `ControllerProgram`."""
 
-    line: int
-    """Of the ``.src`` file, from 1."""
-    straight: bool
-    """LIN or SLIN, else PTP or SPTP."""
-    order: str
-    name: str | None
-    """The point, in capitals; None: values or an expression (PTP only)."""
-    axes: Point | None = None
-    """Axis values that stand in the motion itself (PTP only)."""
-
-
-@dataclass(frozen=True)
-class Program:
-    """The motions of a program, in the order of its text."""
-
+    files: tuple[Path, Path]
+    """``.src`` and ``.dat``."""
+    lines: Sequence[str]
+    data: Sequence[str]
+    """Lines of both files; each character is one byte."""
+    points: Mapping[str, KrlPoint]
     moves: tuple[Move, ...]
     base: str
-    """What LIN targets are in, as the program says it; empty when it does not."""
+    """Base of the LIN targets, as the program says it; empty when it does not."""
     tool: str
     name: str
-    """What its first DEF calls it; empty without one."""
+    """Name by its first DEF; empty without one."""
+    words: ClassVar[Words] = Words("the .dat file", "an E6AXIS", "E1")
+
+    def write(self, out: Path, corrected: Mapping[str, CorrectedPoint]) -> tuple[Path, ...]:
+        """Write the ``.src`` file as it was and the ``.dat`` file beside it; see the protocol."""
+        data = list(self.data)
+        for name, new in corrected.items():
+            point = self.points[name]
+            data[point.line] = replaced(data[point.line], point, point.corrected(new))
+        files = (Path(out), Path(out).with_suffix(".dat"))
+        with replacing(files[0]) as new_src, replacing(files[1]) as new_dat:
+            new_src.write_bytes("".join(self.lines).encode("latin-1"))
+            new_dat.write_bytes("".join(data).encode("latin-1"))
+        return files
+
+    def notes(self, assumed: Sequence[str], out: Path, frame_given: bool) -> tuple[str, ...]:
+        """Return how frame, tool, files and name were taken; see the protocol."""
+        frame = self.base or "$BASE, which the program does not set,"
+        tool = self.tool or "$TOOL, which the program does not set,"
+        place = "the frame given by --base" if frame_given else "the base of the model"
+        notes = [
+            f"{frame} is taken for {place}, {tool} for its tcp",
+            f"{out.name} is the program as it was, {out.with_suffix('.dat').name} has the corrected"
+            " points",
+        ]
+        if assumed:
+            notes.append(
+                f"{len(assumed)} motions (first: {assumed[0]}) come from a PTP that"
+                " does not tell its posture (no E6AXIS of the .dat file): the last one known is"
+                " taken"
+            )
+        if self.name and self.name.lower() != out.stem.lower():
+            notes.append(f"the program inside is {self.name}: a controller wants {self.name}.src")
+        return tuple(notes)
 
 
-def read_program(lines: Sequence[str], data: Sequence[str]) -> Program:
-    """Return the motions of a program.
-
-    Parameters
-    ----------
-    lines, data : sequence of str
-        Of the ``.src`` and of the ``.dat`` file.
+def read_krl(src: Path) -> KrlProgram:
+    """Return the program of a ``.src`` file and the ``.dat`` file beside it.
 
     Raises
     ------
     PathError
         If a straight motion does not go to a named point, a motion is of another kind, a point
-        that it goes to is changed by the program, or straight motions are in several frames.
+        that it goes to is changed by the program, straight motions are in several frames, or a
+        point is declared twice.
+    FileAccessError
+        If a file cannot be read.
     """
+    dat = _dat_of(src)
+    lines, data = read_lines(src), read_lines(dat)
+    with in_file(dat):
+        points = read_points(data)
+    with in_file(src):
+        moves, base, tool = _read_moves(lines, data)
+    names = [match[1] for line in lines if (match := _DEF.match(code_of(line)))]
+    name = names[0] if names else ""
+    return KrlProgram((Path(src), dat), lines, data, points, moves, base, tool, name)
+
+
+def _dat_of(src: Path) -> Path:
+    """Return the ``.dat`` file beside a ``.src`` file; Windows does not tell capitals."""
+    for suffix in (".dat", ".DAT", ".Dat"):
+        if (path := Path(src).with_suffix(suffix)).is_file():
+            return path
+    raise FileAccessError(f"cannot read {Path(src).with_suffix('.dat')}: it must be beside {src}")
+
+
+def _read_moves(lines: Sequence[str], data: Sequence[str]) -> tuple[tuple[Move, ...], str, str]:
+    """Return the motions, and the base and tool of the straight ones."""
     frames = _frame_data(data)
     active = {"BASE": "", "TOOL": ""}
     moves: list[Move] = []
@@ -90,9 +146,8 @@ def read_program(lines: Sequence[str], data: Sequence[str]) -> Program:
                 f"line {assigned[move.name]}: the program changes {move.name}, to which line"
                 f" {move.line} moves: its value in the .dat file is not the one that is reached"
             )
-    names = [match[1] for line in lines if (match := _DEF.match(code_of(line)))]
     base, tool = (used.get(what, ("", 0))[0] for what in ("BASE", "TOOL"))
-    return Program(tuple(moves), base, tool, names[0] if names else "")
+    return tuple(moves), base, tool
 
 
 def _move(code: str, number: int) -> Move | None:

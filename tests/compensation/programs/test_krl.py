@@ -8,10 +8,10 @@ import pytest
 from elastocal.compensation.offline import (
     CorrectionSettings,
     PathError,
-    compensate_krl,
     correct_rows,
     joints_along_path,
 )
+from elastocal.compensation.programs import compensate_program
 from elastocal.errors import FileAccessError
 from elastocal.robot import Robot, T_from_xyzabc, xyzabc_from_T
 from elastocal.robot.inverse import inverse_for
@@ -86,7 +86,7 @@ def program(tmp_path):
         (tmp_path / "forces.csv").write_text(forces)
         (tmp_path / "out").mkdir(exist_ok=True)
         out = tmp_path / "out" / "course.src"
-        return compensate_krl(
+        return compensate_program(
             calibrated(), tmp_path / "course.src", tmp_path / "forces.csv", out, settings, base
         )
 
@@ -119,8 +119,9 @@ def test_points_are_corrected_in_the_programs_frame_to_a_tenth_of_a_micrometre(p
         gap = np.linalg.norm(found[:3, 3] - expected.T_base_tcp[row, :3, 3])
         assert gap < 1e-7
         np.testing.assert_allclose(found[:3, :3], COURSE[row, :3, :3], atol=1e-7)
-    assert result.tally.rows == 4
-    assert (result.base, result.tool, result.name) == ("BASE_DATA[1]", "TOOL_DATA[1]", "course")
+    assert result.summary.rows == 4
+    read = result.program
+    assert (read.base, read.tool, read.name) == ("BASE_DATA[1]", "TOOL_DATA[1]", "course")
 
 
 def test_everything_but_the_corrected_numbers_is_the_same_to_the_byte(program, tmp_path):
@@ -157,14 +158,14 @@ def test_inline_forms_of_the_pendant_are_understood(program):
     src = changed("LIN XP1 C_DIS", "FDAT_ACT=FP1\r\nLIN XP1 C_DIS", src)
     data = dat()
     data.insert(-1, 'DECL FDAT FP1={TOOL_NO 1,BASE_NO 2,IPO_FRAME #BASE,POINT2[] " "}')
-    assert program(src, data).base == "BASE_DATA[2]"
+    assert program(src, data).program.base == "BASE_DATA[2]"
 
 
 def test_a_frame_without_posture_needs_one(program):
     src = [line for line in SRC if line != "PTP XHOME"]
     with pytest.raises(PathError, match=r"line 12, LIN XP1: nothing says in which posture"):
         program(src)
-    assert program(src, settings=CorrectionSettings(start=posture())).tally.rows == 4
+    assert program(src, settings=CorrectionSettings(start=posture())).summary.rows == 4
 
 
 def test_axis_values_in_the_motion_itself_tell_the_posture(program):
@@ -264,7 +265,7 @@ def test_one_point_in_two_postures_is_refused(program):
 def test_a_program_without_its_dat_file_is_refused(tmp_path):
     (tmp_path / "a.src").write_text("DEF a( )\nEND\n")
     with pytest.raises(FileAccessError, match="must be beside"):
-        compensate_krl(calibrated(), tmp_path / "a.src", tmp_path / "f.csv", tmp_path / "b.src")
+        compensate_program(calibrated(), tmp_path / "a.src", tmp_path / "f.csv", tmp_path / "b.src")
 
 
 def test_the_rail_stands_where_e1_has_it_else_where_it_stood(tmp_path):
@@ -286,7 +287,7 @@ def test_the_rail_stands_where_e1_has_it_else_where_it_stood(tmp_path):
     )
     model = made_up(arm)
     out = tmp_path / "b.src"
-    compensate_krl(model, tmp_path / "a.src", tmp_path / "f.csv", out)
+    compensate_program(model, tmp_path / "a.src", tmp_path / "f.csv", out)
     load = (np.tile([0.0, 300.0, 900.0], (2, 1)), None)
     expected = correct_rows(inverse_for(arm), model, q, arm.forward(q), load, str)
     for row, name in enumerate(("XP1", "XP2")):
