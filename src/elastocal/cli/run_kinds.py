@@ -11,11 +11,13 @@ from elastocal.planning import read_plan, read_pool
 from elastocal.procedure import (
     STREAMS_SCHEMA as STREAMS,
     RunFolder,
+    RunSummary,
     commits,
     read_journal,
     read_streams,
     read_summary,
 )
+from elastocal.records import schema_of
 
 Described = tuple[str, dict[str, Any]]
 """The kind of a file and what it holds."""
@@ -101,9 +103,9 @@ def summary_file(path: Path) -> Described:
     """Describe a summary of a run."""
     summary = read_summary(path)
     return "summary of a run", {
-        "schema": summary["schema"],
-        "readings": summary["readings"]["counts"],
-        "warnings": len(summary["warnings"]),
+        "schema": schema_of(RunSummary),
+        "readings": summary.readings.counts,
+        "warnings": len(summary.warnings),
     }
 
 

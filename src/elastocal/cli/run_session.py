@@ -1,11 +1,9 @@
 """One stretch of a run, from the command line's side: folder, confirmation, devices, result."""
 
 import sys
-from collections.abc import Mapping
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any
 
 import typer
 from rich.console import Console
@@ -29,6 +27,7 @@ from elastocal.procedure import (
     Runner,
     RunRecord,
     RunSettings,
+    RunSummary,
     Session,
     SessionHooks,
     SessionResult,
@@ -79,8 +78,8 @@ class Finished:
     """How a stretch of a run ended, and what its streams say when it was the last one."""
 
     result: SessionResult
-    summary: Mapping[str, Any] | None = None
-    """See `elastocal.procedure.derive.summary`; None where nothing was derived."""
+    summary: RunSummary | None = None
+    """None where nothing was derived."""
     problem: ElastocalError | None = None
     """Why nothing was derived of a run that is done."""
 

@@ -1,14 +1,14 @@
 """What `elastocal run` shows: the steps beforehand, the figures afterwards."""
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 from rich.console import Console
 from rich.table import Table
 
 from elastocal.cli.run_session import Finished, Prepared
-from elastocal.procedure import Event, PoseLog, commits, itinerary, read_journal
+from elastocal.procedure import Event, PoseLog, RunSummary, commits, itinerary, read_journal
 
 
 def dry_figures(job: Prepared) -> dict[str, Any]:
@@ -66,15 +66,15 @@ def figures(job: Prepared, finished: Finished) -> dict[str, Any]:
         "failed_attempts": sum(entry.event is Event.FAULT for entry in entries),
         "seconds": entries[-1].time - entries[0].time,
         "dataset": str(job.folder.dataset) if summary is not None else None,
-        "warnings": list(job.warnings if summary is None else summary["warnings"]),
+        "warnings": list(job.warnings if summary is None else summary.warnings),
         "problem": str(finished.problem) if finished.problem is not None else None,
     }
 
 
-def _readings(summary: Mapping[str, Any] | None, logs: Sequence[PoseLog]) -> dict[str, int]:
+def _readings(summary: RunSummary | None, logs: Sequence[PoseLog]) -> dict[str, int]:
     """Return the number of readings by status, as derived; else as the journal has them."""
     if summary is not None:
-        return {status: n for status, n in summary["readings"]["counts"].items() if n}
+        return {status: n for status, n in summary.readings.counts.items() if n}
     windows = [window for log in logs for window in log.windows if window.load_case is not None]
     return dict(Counter(window.status.value for window in windows))
 

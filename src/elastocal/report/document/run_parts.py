@@ -18,6 +18,7 @@ from elastocal.planning import (
     read_pool,
 )
 from elastocal.procedure import Entry, RunFolder, check_plan, read_journal, read_summary
+from elastocal.records import to_data
 from elastocal.report.belongs import check_robot
 from elastocal.report.document.parts import Absence, Parts
 from elastocal.report.document.places import run_files
@@ -51,7 +52,7 @@ def with_run(parts: Parts, search: Search) -> Parts:
         search,
         "summary of the run",
         run.summary,
-        lambda path: checked_summary(read_summary(path), str(path)),
+        lambda path: checked_summary(to_data(read_summary(path)), str(path)),
     )
     parts = replace(parts, dataset=_derived(search, "dataset", run.dataset, datasets.read))
     for file in run_files(run):
