@@ -2,10 +2,13 @@ import numpy as np
 import pytest
 
 from elastocal.errors import DatasetError, UnreachableError
-from elastocal.sim.layouts import bearing_truth, with_link_bending, with_stiffening_gears
-from elastocal.sim.measurement import SHOP_FLOOR, Blunder, Contact, Noise, measure
-from elastocal.sim.scene import LOAD_CASES
-from elastocal.sim.truth import GRAVITY
+from elastocal.sim.arm.elastic_arm import (
+    GRAVITY,
+    bearing_truth,
+    with_link_bending,
+    with_stiffening_gears,
+)
+from elastocal.sim.arm.measurement import LOAD_CASES, SHOP_FLOOR, Blunder, Contact, Noise, measure
 
 
 @pytest.fixture(scope="module")

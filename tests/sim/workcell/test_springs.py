@@ -2,9 +2,8 @@ import numpy as np
 import pytest
 
 from elastocal.cell.description import Gears
-from elastocal.sim.workcell.balancer import BalancerSpring
 from elastocal.sim.workcell.robot_layout import gear_laws
-from elastocal.sim.workcell.springs import RobotSprings
+from elastocal.sim.workcell.springs import BalancerSpring, RobotSprings
 
 K = np.array([2e6, 1e6, 5e5])
 ENTRY = Gears()

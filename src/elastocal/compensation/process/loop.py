@@ -39,7 +39,7 @@ class LoadedRobot(Protocol):
 
 
 class TrueCell(Protocol):
-    """What a cell does; `elastocal.sim.workcell.process.ProcessCell` is one."""
+    """What a cell does; `elastocal.sim.workcell.cell.ProcessCell` is one."""
 
     def lift(self, course: str, q: FloatArray) -> None:
         """Begin a course in the air."""

@@ -10,8 +10,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from elastocal.arrays import FloatArray
-from elastocal.sim.newton import minimise
-from elastocal.sim.statics import DeadLoads, LoadedMechanism
+from elastocal.sim.arm.statics import DeadLoads, LoadedMechanism, minimise
 from elastocal.sim.workcell.robot import BALANCE, TrueRobot
 from elastocal.sim.workcell.springs import RobotSprings
 

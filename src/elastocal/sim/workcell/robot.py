@@ -1,7 +1,7 @@
 """The simulated robot at rest: a nonlinear equilibrium with a memory.
 
 The potential energy of the deformed robot under its own weight, the tool's and the contact force
-is least (`elastocal.sim.statics`, with the laws of `elastocal.sim.workcell.springs`).
+is least (`elastocal.sim.arm.statics`, with the laws of `elastocal.sim.workcell.springs`).
 """
 
 from dataclasses import dataclass, field
@@ -13,8 +13,7 @@ from elastocal.cell import Cell
 from elastocal.robot import (
     inverse_transform,
 )
-from elastocal.sim.newton import minimise
-from elastocal.sim.statics import DeadLoads, EnergyState, LoadedMechanism
+from elastocal.sim.arm.statics import DeadLoads, EnergyState, LoadedMechanism, minimise
 from elastocal.sim.workcell.robot_layout import RobotLayout, lay_out_robot
 from elastocal.sim.workcell.springs import RobotSprings
 

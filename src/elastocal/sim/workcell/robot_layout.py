@@ -6,7 +6,7 @@ each of the two long links, and the end-effector (three turns and three shifts a
 Six or eighteen springs at the joints can express none but the gears and tilts, and those only
 where they are linear.
 
-Figures that the file leaves out are those of `elastocal.sim.layouts` for an arm of 1.1 t, in
+Figures that the file leaves out are those of `elastocal.sim.arm.elastic_arm` for an arm of 1.1 t, in
 proportion to the mass that the arm moves: an assumption that brings a small robot to the right
 order of magnitude.
 """
@@ -23,12 +23,10 @@ from elastocal.errors import DeviceError
 from elastocal.robot import (
     inverse_transform,
 )
-from elastocal.sim.layouts import AXIAL_STIFFNESS, LINK_BENDING, across, link_vector, triple
-from elastocal.sim.linkage import Linkage
-from elastocal.sim.skeleton import Skeleton, TruthSpring, lay_out
-from elastocal.sim.torque_laws import Linear
-from elastocal.sim.workcell.balancer import BalancerSpring
-from elastocal.sim.workcell.springs import GearLaws, RobotSprings
+from elastocal.sim.arm.elastic_arm import AXIAL_STIFFNESS, LINK_BENDING, across, link_vector, triple
+from elastocal.sim.arm.linkage import Linkage
+from elastocal.sim.arm.springs import Linear, Skeleton, TruthSpring, lay_out
+from elastocal.sim.workcell.springs import BalancerSpring, GearLaws, RobotSprings
 
 ARM_JOINTS = 6
 MOVED_MASS = 850.0

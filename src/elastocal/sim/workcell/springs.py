@@ -5,7 +5,7 @@ The torque of a gear over its twist is
     tau(x) = k x - sum_m L_m a_m atan(x / a_m) + sum_i kappa_i clip(x - s_i, -d_i, d_i)
 
 *Growth and backlash* (the sum over m): near rest the stiffness is smaller by ``L_m``, and half of
-that is back at the twist ``a_m``; see `elastocal.sim.torque_laws.TwoSlopeGear`. A small ``a_m``
+that is back at the twist ``a_m``; see `elastocal.sim.arm.springs.TwoSlopeGear`. A small ``a_m``
 with nearly all of ``k`` is a smoothed play: beyond it the twist is larger by ``b / 2`` with
 ``b = pi a_m L_m / k``, so that a torque and its opposite are ``b`` further apart.
 
@@ -24,7 +24,42 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from elastocal.arrays import FloatArray, IndexArray
-from elastocal.sim.workcell.balancer import BalancerSpring
+
+
+@dataclass(frozen=True)
+class BalancerSpring:
+    """A spring beside one joint."""
+
+    rate: float
+    """k in N/m."""
+    free_length: float
+    """L_0 in m."""
+    anchor: float
+    """a in m."""
+    lever: float
+    """b in m, other than ``anchor``."""
+    upright: float
+    """Joint angle at which the arm is upright, in rad."""
+
+    def evaluate(self, angle: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return energy in J, torque dE/dalpha in N·m and stiffness d²E/dalpha² in N·m/rad.
+
+        Parameters
+        ----------
+        angle : ndarray
+            Angle of the joint, twist of its gear included, in rad.
+        """
+        alpha = angle - self.upright
+        product = self.anchor * self.lever
+        length = np.sqrt(self.anchor**2 + self.lever**2 - 2.0 * product * np.cos(alpha))
+        stretch = length - self.free_length
+        slope = product * np.sin(alpha) / length
+        bend = product * np.cos(alpha) / length - slope**2 / length
+        return (
+            0.5 * self.rate * stretch**2,
+            self.rate * stretch * slope,
+            self.rate * (slope**2 + stretch * bend),
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,7 +86,7 @@ class GearLaws:
 
 @dataclass(frozen=True, eq=False)
 class RobotSprings:
-    """Springs of the robot with the memory of its gears; a `elastocal.sim.statics.SpringBank`."""
+    """Springs of the robot with the memory of its gears; a `elastocal.sim.arm.statics.SpringBank`."""
 
     stiffness: FloatArray
     """k: at high torque, shape (spring,), in N·m/rad or N/m."""
