@@ -19,7 +19,6 @@ from elastocal.sim.arm.linkage import Linkage
 from elastocal.sim.arm.springs import CubicGear, Linear, Skeleton, TorqueLaw, TruthSpring, lay_out
 from elastocal.sim.arm.statics import DeadLoads, LoadedMechanism, minimise
 
-
 GRAVITY = (0.0, 0.0, -9.80665)
 """Standard gravity (CGPM 1901) in the base of an upright robot, in m/s²."""
 

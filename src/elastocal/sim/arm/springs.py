@@ -1,7 +1,8 @@
-"""Torque laws: how hard a spring of the simulated arm resists being turned.
+"""The springs of the simulated arm: how hard each resists being turned, and where it sits.
 
-A law is three verbs, each vectorised over angles: the energy stored, the torque (its derivative)
-and the stiffness (the derivative of that). For a prismatic spring read m, N, N/m.
+A torque law is three verbs, each vectorised over angles: the energy stored, the torque (its
+derivative) and the stiffness (the derivative of that). For a prismatic spring read m, N, N/m.
+Motors and springs together are one row of screws from base to tip, the spring chain.
 """
 
 from collections.abc import Sequence
@@ -9,9 +10,8 @@ from dataclasses import dataclass, fields
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
-from elastocal.arrays import FloatArray
+from elastocal.arrays import FloatArray, IndexArray
 from elastocal.errors import SpringError, nearest
 from elastocal.sim.arm.linkage import (
     Linkage,
@@ -111,21 +111,50 @@ class TwoSlopeGear:
 
     def energy(self, angle: FloatArray) -> FloatArray:
         """Return the integral of `torque`."""
-        ratio = angle / self.knee
-        gap = self.knee**2 * (ratio * np.arctan(ratio) - 0.5 * np.log1p(ratio**2))
-        energy: FloatArray = 0.5 * self.stiff * angle**2 - (self.stiff - self.soft) * gap
+        lost, _, _ = self._lost(angle)
+        energy: FloatArray = 0.5 * self.stiff * angle**2 - lost
         return energy
 
     def torque(self, angle: FloatArray) -> FloatArray:
         """Return ``stiff angle - (stiff - soft) knee atan(angle / knee)``."""
-        lost = self.knee * np.arctan(angle / self.knee)
-        torque: FloatArray = self.stiff * angle - (self.stiff - self.soft) * lost
+        _, lost, _ = self._lost(angle)
+        torque: FloatArray = self.stiff * angle - lost
         return torque
 
     def stiffness(self, angle: FloatArray) -> FloatArray:
-        """Return ``soft + (stiff - soft) angle² / (angle² + knee²)``."""
-        square = angle**2
-        return self.soft + (self.stiff - self.soft) * square / (square + self.knee**2)
+        """Return ``stiff - (stiff - soft) / (1 + (angle / knee)²)``."""
+        _, _, lost = self._lost(angle)
+        stiffness: FloatArray = self.stiff - lost
+        return stiffness
+
+    def _lost(self, angle: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        return gear_softening(angle, self.stiff - self.soft, self.knee)
+
+
+def gear_softening(
+    twist: FloatArray, loss: FloatArray | float, scale: FloatArray | float
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return the energy, torque and stiffness that a gear lacks near rest.
+
+    With the stiffness ``L`` that is missing at rest and the twist ``a`` at which half of it is
+    back: ``L a² (r atan(r) - log(1 + r²) / 2)``, ``L a atan(r)`` and ``L / (1 + r²)`` at
+    ``r = twist / a``, each the derivative of the one before.
+
+    Parameters
+    ----------
+    twist : ndarray
+        In rad.
+    loss : ndarray or float
+        L in N·m/rad, of a shape that broadcasts with ``twist``.
+    scale : ndarray or float
+        a in rad, likewise.
+    """
+    ratio = twist / scale
+    bend, square = np.arctan(ratio), ratio**2
+    energy: FloatArray = loss * scale**2 * (ratio * bend - 0.5 * np.log1p(square))
+    torque: FloatArray = loss * scale * bend
+    stiffness: FloatArray = loss / (1.0 + square)
+    return energy, torque, stiffness
 
 
 def _require_positive(law: Linear | CubicGear | TwoSlopeGear) -> None:
@@ -163,9 +192,9 @@ class Skeleton:
     """All of them, in base with the arm at zero."""
     springs: tuple[TruthSpring, ...]
     """The springs in that order."""
-    spring_elements: NDArray[np.intp]
+    spring_elements: IndexArray
     """Which screws are springs, ascending, shape (spring,)."""
-    motor_elements: NDArray[np.intp]
+    motor_elements: IndexArray
     """Which screws are motors, ascending, shape (joint,)."""
     ends: tuple[int, ...]
     """Number of screws up to and with those of each joint."""

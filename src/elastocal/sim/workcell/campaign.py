@@ -19,8 +19,7 @@ from elastocal.errors import DeviceError
 from elastocal.sim.arm.inverse import solve_inverse
 from elastocal.sim.workcell.contact import Contact, ContactLaw
 from elastocal.sim.workcell.quasistatics import Quasistatics
-from elastocal.sim.workcell.quick_rest import Rests, rest_side_by_side
-from elastocal.sim.workcell.robot import TrueRobot
+from elastocal.sim.workcell.robot import RobotEquilibrium, TrueRobot
 
 CLOSED = 1e-6
 """How far a tool may end from where the contact holds it, in m: nanometres of deflection."""
@@ -65,7 +64,9 @@ class _States(NamedTuple):
     q: FloatArray
     twist: FloatArray
     """What the controller is off by; see `quasistatics.Knots.twist`, shape (place, 9)."""
-    rests: Rests
+    rest: RobotEquilibrium
+    sag: FloatArray
+    """What the undeformed robot is off by, shape (place, 9)."""
     force: FloatArray
     """On the robot in base, shape (place, 3), in N."""
 
@@ -164,10 +165,10 @@ class CampaignSimulator:
         q, reached = start.q, start
         for _ in range(_ROUNDS):
             force = _turn(self._sensor(reached), reading) - weight
-            theta, slider = reached.rests.theta, start.rests.slider
-            rests = rest_side_by_side(statics.robot, q, force, slider, theta)
-            twist = rests.twist - statics.compensation * touch.rests.twist
-            reached = _States(q, twist, rests, force)
+            rest = statics.robot.rest(q, force, start.rest.springs, reached.rest.theta)
+            sag = statics.twist(q, rest)
+            twist = sag - statics.compensation * touch.sag
+            reached = _States(q, twist, rest, sag, force)
             goal = [c.tool_position(f) for c, f in zip(contacts, force, strict=True)]
             missed = np.array(goal) - self._tool(reached)
             if np.linalg.norm(missed, axis=1).max() < CLOSED:
@@ -188,15 +189,16 @@ class CampaignSimulator:
             if np.linalg.norm(missed, axis=1).max() < CLOSED:
                 break
             forward = self.statics.robot.forward(reached.q)
-            reached = self._free(self._along(reached.q, forward, missed), reached.rests.theta)
+            reached = self._free(self._along(reached.q, forward, missed), reached.rest.theta)
         each = zip(anchor, T[:, :3, :3], places.normal, reached.q, strict=True)
         return reached, [Contact(self.law, *parts) for parts in each]
 
     def _free(self, q: FloatArray, start: FloatArray | None) -> _States:
         """Return the robot free of contact, its gears relaxed; see `Quasistatics.free`."""
         nothing = np.zeros((len(q), 3))
-        rests = rest_side_by_side(self.statics.robot, q, nothing, None, start)
-        return _States(q, (1.0 - self.statics.compensation) * rests.twist, rests, nothing)
+        rest = self.statics.robot.rest(q, nothing, self.statics.robot.springs, start)
+        sag = self.statics.twist(q, rest)
+        return _States(q, (1.0 - self.statics.compensation) * sag, rest, sag, nothing)
 
     def _along(self, q: FloatArray, T: FloatArray, way: FloatArray) -> FloatArray:
         """Return joints that move the undeformed tool from T by a way, orientation kept."""

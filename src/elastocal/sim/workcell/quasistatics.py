@@ -18,7 +18,7 @@ from elastocal.robot import (
     inverse_transform,
 )
 from elastocal.sim.arm.inverse import solve_inverse
-from elastocal.sim.workcell.robot import Rest, TrueRobot
+from elastocal.sim.workcell.robot import RobotEquilibrium, TrueRobot
 from elastocal.sim.workcell.springs import RobotSprings
 from elastocal.sim.workcell.timeline import Knots
 
@@ -105,15 +105,20 @@ class Quasistatics:
         """
         return replace(self, weight=self.weight + mass * self.robot.gravity)
 
-    def twist(self, q: FloatArray, rest: Rest) -> FloatArray:
-        """Return the deviation of a resting robot from the undeformed one, shape (9,)."""
+    def twist(self, q: FloatArray, rest: RobotEquilibrium) -> FloatArray:
+        """Return the deviation of a resting robot from the undeformed one, shape (..., 9)."""
         T = self.robot.forward(q)
-        R_sensor = T[:3, :3] @ self.robot.T_tcp_sensor[:3, :3]
+        R_sensor = T[..., :3, :3] @ self.robot.T_tcp_sensor[:3, :3]
         turns = np.stack(
-            [rest.T_base_tcp[:3, :3] @ T[:3, :3].T, rest.T_base_sensor[:3, :3] @ R_sensor.T]
+            [
+                rest.T_base_tcp[..., :3, :3] @ T[..., :3, :3].swapaxes(-1, -2),
+                rest.T_base_sensor[..., :3, :3] @ R_sensor.swapaxes(-1, -2),
+            ],
+            axis=-3,
         )
-        shift = rest.T_base_tcp[:3, 3] - T[:3, 3]
-        return np.concatenate([shift, Rotation.from_matrix(turns).as_rotvec().ravel()])
+        shift = rest.T_base_tcp[..., :3, 3] - T[..., :3, 3]
+        vectors = Rotation.from_matrix(turns.reshape(-1, 3, 3)).as_rotvec()
+        return np.concatenate([shift, vectors.reshape(*q.shape[:-1], 6)], axis=-1)
 
     def free(self, q: FloatArray, stop_error: FloatArray, start: FloatArray | None) -> RobotState:
         """Return the robot free of contact, its gears relaxed.
