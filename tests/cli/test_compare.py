@@ -9,10 +9,12 @@ import pytest
 
 from elastocal import dataset
 from elastocal.identification import write_model
-from elastocal.identification.recertification import read_comparison
+from elastocal.identification.recertification import CompareResult
+from elastocal.records import read_json
 from support.cells import Cell, linear_truth, unseen
 from support.cli import elastocal
 from support.recertified import calibrated, soft_truth
+from support.summaries import made_up_summary
 
 
 @pytest.fixture(scope="module")
@@ -28,7 +30,7 @@ def folder(tmp_path_factory) -> Path:
         ),
         "six": calibrated(linear_truth(), 1, "actuated"),
     }.items():
-        write_model(folder / f"{name}.json", model, {"deflection": {"mean": 1e-3, "max": 2e-3}})
+        write_model(folder / f"{name}.json", model, made_up_summary(1e-3))
     loads = unseen(linear_truth())
     header = [f"joint_{n}[rad]" for n in range(1, 7)] + [f"force_{axis}[N]" for axis in "xyz"]
     rows = np.hstack([loads.joint_position, loads.force])
@@ -83,7 +85,7 @@ def test_file_and_figure_are_written_and_checked(folder, tmp_path):
     out, figure = tmp_path / "c.json", tmp_path / "c.svg"
     result = run(folder, "--rows", folder / "rows.csv", "--out", out, "--figure", figure)
     assert result.code == 0
-    assert read_comparison(out).moved == ("joint_3.axial",)
+    assert read_json(out, CompareResult).moved == ("joint_3.axial",)
     assert "joint_3.axial" in figure.read_text()
     checked = json.loads(elastocal("check", out, "--json").out)
     assert checked["kind"] == "comparison of two calibrations"

@@ -21,8 +21,8 @@ FILES = {"table.json", "table.csv", "deviations.csv", "path.csv"}
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory) -> Path:
     folder = tmp_path_factory.mktemp("process")
-    write_model(folder / "model.json", made_up(example_cell("afp").robot), {})
-    write_model(folder / "other.json", made_up(example_cell("machining").robot), {})
+    write_model(folder / "model.json", made_up(example_cell("afp").robot))
+    write_model(folder / "other.json", made_up(example_cell("machining").robot))
     return folder
 
 
@@ -68,7 +68,7 @@ def test_check_knows_the_table_and_the_folder(folder):
 def test_the_place_of_every_deviation_lies_on_the_course(folder):
     result = run(folder, "placed", "--seed", 4)
     assert result.code == 0, result.err
-    (trace,) = read_process(folder / "placed").traces
+    (trace,) = read_process(folder / "placed").courses
     surface = cell_surface(example_cell("afp"))
     some = trace.position[::50]
     down = np.repeat(-surface.T_base_surface[None, :3, 2], len(some), axis=0)

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from scipy import signal
 
-from elastocal.compensation.filters import FilterChain, low_pass, notch
+from elastocal.compensation.conditioning.filters import FilterChain, low_pass, notch
 from elastocal.errors import CompensationError
 
 SAMPLE = 0.004

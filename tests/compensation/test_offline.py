@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 
 from elastocal.compensation.offline import (
-    Settings,
+    CorrectionSettings,
+    PathError,
     compensate_path,
-    correct,
-    follow,
-    jumps,
+    correct_rows,
+    joints_along_path,
     nearest_zero_posture,
+    posture_jumps,
 )
-from elastocal.compensation.path import PathError
 from elastocal.elastic import ElasticModel
 from elastocal.identification import CalibratedModel
 from elastocal.robot import Robot
@@ -36,7 +36,7 @@ from support.urdfs import KR_LIKE, opw_arm_urdf
 
 SOLVER = inverse_for(robot())
 COURSE = dome_course(30)
-SETTINGS = Settings(start=np.array(START))
+SETTINGS = CorrectionSettings(start=np.array(START))
 STRETCHED = -float(np.arctan2(0.041, 1.2))
 """Joint 3 where the wrist centre is farthest from the shoulder, in rad."""
 
@@ -45,20 +45,20 @@ def named(row: int) -> str:
     return f"row {row}"
 
 
-def programmed() -> tuple[np.ndarray, np.ndarray]:
+def programmed_rows() -> tuple[np.ndarray, np.ndarray]:
     """Return joints along the course, and forces in base."""
-    q = follow(SOLVER, COURSE, np.zeros((len(COURSE), 0)), np.array(START), named)
+    q = joints_along_path(SOLVER, COURSE, np.zeros((len(COURSE), 0)), np.array(START), named)
     return q, COURSE[:, :3, :3] @ FORCE_TCP
 
 
 def corrected(**changes):
-    q, force = programmed()
-    return correct(SOLVER, calibrated(), q, COURSE, (force, None), named, **changes)
+    q, force = programmed_rows()
+    return correct_rows(SOLVER, calibrated(), q, COURSE, (force, None), named, **changes)
 
 
 class TestCorrect:
     def test_the_loaded_tcp_is_the_programmed_one_by_the_model_to_a_tenth_of_a_micrometre(self):
-        found, (_, force) = corrected(may_turn=True), programmed()
+        found, (_, force) = corrected(may_turn=True), programmed_rows()
         model = calibrated().model
         deflection = model.deflection(calibrated().compliance, found.q, force)
         loaded = robot().forward(found.q)[:, :3, 3] + deflection
@@ -74,7 +74,7 @@ class TestCorrect:
         )
 
     def test_it_leaves_at_most_a_tenth_of_the_deviation_of_an_arm_with_bending_links(self):
-        (q, force), found = programmed(), corrected(may_turn=True)
+        (q, force), found = programmed_rows(), corrected(may_turn=True)
         before = rich_truth().equilibrium(q, force).tcp_position - COURSE[:, :3, 3]
         after = rich_truth().equilibrium(found.q, force).tcp_position - COURSE[:, :3, 3]
         before, after = (np.linalg.norm(each, axis=1) for each in (before, after))
@@ -84,16 +84,16 @@ class TestCorrect:
         assert after.max() <= 0.1 * before.max()
 
     def test_a_moment_is_corrected_too(self):
-        q, force = programmed()
+        q, force = programmed_rows()
         moment = np.tile([0.0, 150.0, 0.0], (len(q), 1))
-        found = correct(SOLVER, calibrated(), q, COURSE, (force, moment), named, may_turn=True)
+        found = correct_rows(SOLVER, calibrated(), q, COURSE, (force, moment), named, may_turn=True)
         without = corrected(may_turn=True)
         assert np.linalg.norm(found.deflection - without.deflection, axis=1).min() > 1e-5
         assert found.residual.max() < 1e-7
 
     def test_no_force_leaves_the_path_as_it_is(self):
-        q, force = programmed()
-        found = correct(SOLVER, calibrated(), q, COURSE, (0.0 * force, None), named)
+        q, force = programmed_rows()
+        found = correct_rows(SOLVER, calibrated(), q, COURSE, (0.0 * force, None), named)
         np.testing.assert_array_equal(found.q, q)
         assert found.first_order.max() == 0.0
 
@@ -101,41 +101,41 @@ class TestCorrect:
         q = np.array([[0.0, -1.75, 1.9, 0.2, 1e-12, 0.1], [0.1, -1.75, 1.9, 0.2, 0.8, 0.1]])
         T = robot().forward(q)
         force = np.tile([0.0, 700.0, 700.0], (2, 1))
-        found = correct(SOLVER, calibrated(), q, T, (force, None), named, may_turn=True)
+        found = correct_rows(SOLVER, calibrated(), q, T, (force, None), named, may_turn=True)
         assert found.residual.max() < 1e-7
         np.testing.assert_allclose(robot().forward(found.q)[:, :3, :3], T[:, :3, :3], atol=1e-8)
 
     def test_a_joint_corrected_over_its_limit_is_refused_by_row(self):
-        q, force = programmed()
+        q, force = programmed_rows()
         row = slice(7, 8)
         move = corrected(may_turn=True).q[7, 1] - q[7, 1]
         ends = sorted((q[7, 1] - 0.9 * np.sign(move), q[7, 1] + 0.5 * move))
         arm = limited("joint_2", *ends)
         assert abs(move) > 1e-5
         with pytest.raises(PathError, match="row 0: joint_2 would be corrected to"):
-            correct(
+            correct_rows(
                 inverse_for(arm.model.robot), arm, q[row], COURSE[row], (force[row], None), named
             )
 
     def test_only_a_path_of_poses_may_go_over_a_limit_by_a_whole_turn(self):
-        q, force = programmed()
+        q, force = programmed_rows()
         move = corrected(may_turn=True).q[7, 5] - q[7, 5]
         start = np.copysign(np.pi, move) * (1.0 - 1e-9)
         q = q[7:8].copy()
         q[0, 5] = start
         T = robot().forward(q)
         load = (force[7:8], None)
-        turned = correct(SOLVER, calibrated(), q, T, load, named, may_turn=True).q[0, 5]
+        turned = correct_rows(SOLVER, calibrated(), q, T, load, named, may_turn=True).q[0, 5]
         assert abs(turned - start) > 6.0
         with pytest.raises(PathError, match="row 0: joint_6 would be corrected to"):
-            correct(SOLVER, calibrated(), q, T, load, named, may_turn=False)
+            correct_rows(SOLVER, calibrated(), q, T, load, named, may_turn=False)
 
     def test_a_joint_programmed_outside_its_limits_is_refused_by_row(self):
-        q, force = programmed()
+        q, force = programmed_rows()
         q = q.copy()
         q[3, 1] = 4.0
         with pytest.raises(PathError, match=r"row 3: joint_2 is programmed to 229\.2 deg"):
-            correct(SOLVER, calibrated(), q, COURSE, (force, None), named)
+            correct_rows(SOLVER, calibrated(), q, COURSE, (force, None), named)
 
     def test_a_position_that_the_correction_puts_out_of_reach_is_refused_by_row(self):
         # The forearm in line with the upper arm; pushed back, it would have to reach farther.
@@ -143,20 +143,20 @@ class TestCorrect:
         T = robot().forward(q)
         inward = -1500.0 * (T[:, :3, 3] - [0.0, 0.0, 0.675])
         with pytest.raises(PathError, match="row 0: no posture reaches the corrected position"):
-            correct(SOLVER, calibrated(), q, T, (inward, None), named)
+            correct_rows(SOLVER, calibrated(), q, T, (inward, None), named)
 
 
 class TestFollow:
     def test_joints_go_on_without_a_jump_from_the_start(self):
-        q, _ = programmed()
+        q, _ = programmed_rows()
         assert np.abs(np.diff(q, axis=0))[:, :5].max() < 0.1
         np.testing.assert_allclose(robot().forward(q), COURSE, atol=1e-9)
 
     def test_another_start_is_another_branch(self):
         start = np.array([np.pi, 1.0, -1.5, 0.0, -1.0, 0.0])
-        q = follow(SOLVER, COURSE, np.zeros((len(COURSE), 0)), start, named)
+        q = joints_along_path(SOLVER, COURSE, np.zeros((len(COURSE), 0)), start, named)
         np.testing.assert_allclose(robot().forward(q), COURSE, atol=1e-9)
-        assert np.abs(q - programmed()[0]).max() > 1.0
+        assert np.abs(q - programmed_rows()[0]).max() > 1.0
 
     def test_whole_turns_go_on_as_far_as_the_limits_let_them(self):
         arm = limited("joint_6", -6.0, 6.0).model.robot
@@ -165,18 +165,18 @@ class TestFollow:
         q_true = np.tile(q0, (60, 1))
         q_true[:, 5] += spins
         T = robot().forward(q_true)
-        q = follow(inverse_for(arm), T, np.zeros((60, 0)), q0, named)
+        q = joints_along_path(inverse_for(arm), T, np.zeros((60, 0)), q0, named)
         np.testing.assert_allclose(arm.forward(q), T, atol=1e-9)
         assert arm.limits.margin(q).min() >= 0.0
         inside = q_true[:, 5] <= 6.0
         np.testing.assert_allclose(q[inside], q_true[inside], atol=1e-8)
-        assert jumps(arm, q, q0).tolist() == [int(np.argmin(inside))]
+        assert posture_jumps(arm, q, q0).tolist() == [int(np.argmin(inside))]
 
     def test_a_pose_out_of_reach_is_refused_by_row(self):
         far = COURSE.copy()
         far[4, :3, 3] *= 3.0
         with pytest.raises(PathError, match=r"row 4: no posture of arm reaches \(\d+"):
-            follow(SOLVER, far, np.zeros((len(far), 0)), np.array(START), named)
+            joints_along_path(SOLVER, far, np.zeros((len(far), 0)), np.array(START), named)
 
     def test_zero_is_where_limits_let_it_be(self):
         np.testing.assert_array_equal(nearest_zero_posture(robot()), np.zeros(6))
@@ -194,7 +194,7 @@ class TestPathFile:
         return compensate_path(calibrated(), path, tmp_path / f"out_{name}", settings)
 
     def test_every_form_of_a_path_gives_the_same_correction(self, tmp_path):
-        q, _ = programmed()
+        q, _ = programmed_rows()
         expected = corrected(may_turn=True)
         forms = {
             "euler.csv": (euler_columns(COURSE), self.POSITION, 1e-3),
@@ -270,7 +270,7 @@ class TestPathFile:
     def test_pieces_of_any_size_give_the_same_file(self, tmp_path, monkeypatch):
         columns = euler_columns(COURSE) | self.IN_TCP
         self.run(tmp_path, columns, name="whole.csv")
-        monkeypatch.setattr("elastocal.compensation.offline.path_file.PIECE", 7)
+        monkeypatch.setattr("elastocal.compensation.offline.path_file._ROWS_AT_A_TIME", 7)
         tally = self.run(tmp_path, columns, name="pieces.csv")
         whole, parts = (tmp_path / f"out_{name}.csv" for name in ("whole", "pieces"))
         np.testing.assert_allclose(
@@ -308,12 +308,12 @@ class TestPathFile:
             compensate_path(model, without, tmp_path / "o.csv")
         outs = []
         for path in (without, given):
-            compensate_path(model, path, tmp_path / "o.csv", Settings(start=q[0]))
+            compensate_path(model, path, tmp_path / "o.csv", CorrectionSettings(start=q[0]))
             outs.append(read_csv(tmp_path / "o.csv", *self.POSITION))
         np.testing.assert_array_equal(*outs)
         beyond = write_csv(tmp_path / "beyond.csv", columns | {"rail[mm]": [500.0, 2500.0]})
         with pytest.raises(PathError, match="row 3: rail is programmed to 2500 mm, outside"):
-            compensate_path(model, beyond, tmp_path / "o.csv", Settings(start=q[0]))
+            compensate_path(model, beyond, tmp_path / "o.csv", CorrectionSettings(start=q[0]))
 
 
 def limited(joint: str, low: float, high: float) -> CalibratedModel:

@@ -5,8 +5,13 @@ import re
 import numpy as np
 import pytest
 
-from elastocal.compensation.offline import Settings, compensate_krl, correct, follow
-from elastocal.compensation.path import PathError
+from elastocal.compensation.offline import (
+    CorrectionSettings,
+    PathError,
+    compensate_krl,
+    correct_rows,
+    joints_along_path,
+)
 from elastocal.errors import FileAccessError
 from elastocal.robot import Robot, T_from_xyzabc, xyzabc_from_T
 from elastocal.robot.inverse import inverse_for
@@ -24,7 +29,7 @@ EXTERNAL = ",".join(f"E{number} 0.0" for number in range(1, 7))
 
 def posture() -> np.ndarray:
     solver = inverse_for(robot())
-    return follow(solver, COURSE[:1], np.zeros((1, 0)), np.array(START), str)[0]
+    return joints_along_path(solver, COURSE[:1], np.zeros((1, 0)), np.array(START), str)[0]
 
 
 def position(name: str, T: np.ndarray, base: np.ndarray) -> str:
@@ -104,9 +109,9 @@ def changed(old: str, new: str, lines: list[str]) -> list[str]:
 def test_points_are_corrected_in_the_programs_frame_to_a_tenth_of_a_micrometre(program):
     result = program()
     solver = inverse_for(robot())
-    q = follow(solver, COURSE, np.zeros((4, 0)), posture(), str)
+    q = joints_along_path(solver, COURSE, np.zeros((4, 0)), posture(), str)
     load = (COURSE[:, :3, :3] @ FORCE_TCP, None)
-    expected = correct(solver, calibrated(), q, COURSE, load, str, may_turn=True)
+    expected = correct_rows(solver, calibrated(), q, COURSE, load, str, may_turn=True)
     shift = np.linalg.norm(expected.T_base_tcp[:, :3, 3] - COURSE[:, :3, 3], axis=1)
     assert shift.min() > 1e-3
     for row in range(4):
@@ -159,7 +164,7 @@ def test_a_frame_without_posture_needs_one(program):
     src = [line for line in SRC if line != "PTP XHOME"]
     with pytest.raises(PathError, match=r"line 12, LIN XP1: nothing says in which posture"):
         program(src)
-    assert program(src, settings=Settings(start=posture())).tally.rows == 4
+    assert program(src, settings=CorrectionSettings(start=posture())).tally.rows == 4
 
 
 def test_axis_values_in_the_motion_itself_tell_the_posture(program):
@@ -283,7 +288,7 @@ def test_the_rail_stands_where_e1_has_it_else_where_it_stood(tmp_path):
     out = tmp_path / "b.src"
     compensate_krl(model, tmp_path / "a.src", tmp_path / "f.csv", out)
     load = (np.tile([0.0, 300.0, 900.0], (2, 1)), None)
-    expected = correct(inverse_for(arm), model, q, arm.forward(q), load, str)
+    expected = correct_rows(inverse_for(arm), model, q, arm.forward(q), load, str)
     for row, name in enumerate(("XP1", "XP2")):
         (line,) = [line for line in (tmp_path / "b.dat").read_text().splitlines() if name in line]
         found = [float(re.search(rf"\b{key} (\S+?),", line)[1]) / 1e3 for key in "XYZ"]

@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from elastocal.compensation.path import (
+from elastocal.compensation.offline import (
     PathError,
     find_columns,
     in_file,
-    pieces,
     read_layout,
     read_values,
+    row_blocks,
     turned_to_base,
 )
 from elastocal.errors import CompensationError, FileAccessError
@@ -27,7 +27,7 @@ ON_RAIL = Robot.from_urdf(opw_arm_urdf(**KR_LIKE, rail=(-2.0, 2.0)), "tcp")
 def values_of(path):
     layout = read_layout(path)
     columns = find_columns(layout.header, robot())
-    (piece,) = pieces(path, layout, 1000)
+    (piece,) = row_blocks(path, layout, 1000)
     return read_values(piece, columns), columns
 
 
@@ -88,7 +88,7 @@ class TestText:
         assert layout.preamble == ("# made by hand\r\n", "\r\n")
         assert layout.header == ("x[mm]", "a; b")
         assert (layout.delimiter, layout.line_end) == (";", "\r\n")
-        found = list(pieces(path, layout, 1))
+        found = list(row_blocks(path, layout, 1))
         assert [piece.cells for piece in found] == [[["1", "2"]], [["3", "4"]]]
         assert [piece.lines for piece in found] == [[4], [6]]
 
@@ -105,7 +105,7 @@ class TestText:
         path = tmp_path / "path.csv"
         path.write_text(text)
         with pytest.raises(PathError) as refusal, in_file(path):
-            list(pieces(path, read_layout(path), 10))
+            list(row_blocks(path, read_layout(path), 10))
         assert why in str(refusal.value)
         assert str(path) in str(refusal.value)
 
@@ -115,7 +115,7 @@ class TestText:
         if data is not None:
             path.write_bytes(data)
         with pytest.raises(FileAccessError, match="cannot read"):
-            list(pieces(path, read_layout(path), 10))
+            list(row_blocks(path, read_layout(path), 10))
 
 
 class TestValues:

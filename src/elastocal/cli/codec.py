@@ -86,7 +86,6 @@ def codec(  # noqa: PLR0913 - one parameter an option
     from elastocal.cli.output import console, print_json
     from elastocal.cli.parsing import parse_point
     from elastocal.cli.progress import progress_bars
-    from elastocal.cli.robot_source import find_robot
     from elastocal.codec import (
         VERDICTS,
         CodecOptions,
@@ -100,6 +99,7 @@ def codec(  # noqa: PLR0913 - one parameter an option
     from elastocal.dataset import without
     from elastocal.files import filling
     from elastocal.records import to_data
+    from elastocal.workflows import find_robot
 
     variants = make_variants(read_comparisons(compare or []))
     options = CodecOptions(splits, parse_ratio(ratio), seed, not keep_blunders, trust_conventions)

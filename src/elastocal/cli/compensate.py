@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 if TYPE_CHECKING:
-    from elastocal.compensation.offline import KrlResult, Tally
+    from elastocal.compensation.offline import CorrectionSummary, KrlResult
     from elastocal.robot import Robot
 
 START_HELP = (
@@ -38,13 +38,14 @@ def compensate(
 ) -> None:
     """Correct a programmed path so that the loaded tool is where it was programmed."""
     from elastocal.cli.coverage import NOT_COVERED, covered
-    from elastocal.cli.output import console, print_json, refuse_overwriting
+    from elastocal.cli.output import console, print_json
     from elastocal.cli.posture_option import parse_frame, parse_posture
     from elastocal.cli.progress import progress_bars
-    from elastocal.compensation.offline import Settings, compensate_krl, compensate_path
+    from elastocal.compensation.offline import CorrectionSettings, compensate_krl, compensate_path
     from elastocal.errors import FileAccessError, UnitError
     from elastocal.identification import read_model
     from elastocal.units import parse_quantity
+    from elastocal.workflows import refuse_overwriting
 
     krl = path.suffix.lower() == ".src"
     inputs = [model, path, *([forces] if forces else [])]
@@ -57,7 +58,7 @@ def compensate(
     limit = parse_quantity(largest, "length")
     if not limit > 0.0:
         raise UnitError(f"--limit {largest!r} must be above 0")
-    settings = Settings(parse_posture(calibrated.model.robot, start), limit)
+    settings = CorrectionSettings(parse_posture(calibrated.model.robot, start), limit)
     notes = [] if covered(calibrated) else [NOT_COVERED]
     if krl:
         if forces is None:
@@ -81,7 +82,7 @@ def compensate(
             console().print(line)
 
 
-def _lines(tally: "Tally", out: Path) -> list[str]:
+def _lines(tally: "CorrectionSummary", out: Path) -> list[str]:
     """Return what was done, for people."""
     names = (
         ("deviation as programmed", tally.deviation),
@@ -98,7 +99,7 @@ def _lines(tally: "Tally", out: Path) -> list[str]:
     return lines
 
 
-def _path_notes(tally: "Tally", robot: "Robot", start: str | None) -> list[str]:
+def _path_notes(tally: "CorrectionSummary", robot: "Robot", start: str | None) -> list[str]:
     from elastocal.cli.posture_option import written_posture
 
     notes = []

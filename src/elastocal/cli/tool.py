@@ -31,16 +31,18 @@ def tool(
     ] = False,
 ) -> None:
     """Find mass, centre of mass, sensor bias and sensor rotation from static postures."""
-    from elastocal.cli.output import console, print_json, refuse_overwriting
+    from elastocal.cli.output import console, print_json
     from elastocal.cli.tool_inputs import posture_robot, three_numbers, transform
     from elastocal.cli.tool_source import from_run, from_table
     from elastocal.cli.tool_table import show_tool
     from elastocal.compensation.conditioning import (
         fit_tool,
         refuse_mistakes,
-        tool_record,
+        tool_result,
         write_tool,
     )
+    from elastocal.records import to_data
+    from elastocal.workflows import refuse_overwriting
 
     refuse_overwriting(out, data)
     if data.is_dir():
@@ -50,9 +52,9 @@ def tool(
         source = from_table(data, arm, flange, transform(sensor), three_numbers(down))
     fit = fit_tool(source.postures, source.R_nominal, keep_rotation)
     refuse_mistakes(source.postures, fit, source.R_nominal, source.expected_centre, source.points)
-    record = tool_record(fit, source.mount, str(data))
+    record = tool_result(fit, source.mount, str(data))
     write_tool(out, record)
     if as_json:
-        print_json(record.model_dump(mode="json"))
+        print_json(to_data(record))
     else:
         show_tool(console(), record, out)

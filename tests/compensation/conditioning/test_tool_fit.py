@@ -3,8 +3,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from elastocal.compensation.conditioning import NAMES, fit_tool, static_postures
-from elastocal.compensation.conditioning.tool_fit import residual
-from elastocal.compensation.conditioning.tool_model import derivatives, wrenches
+from elastocal.compensation.conditioning.tool_fit import derivatives, residual, wrenches
 from elastocal.errors import CompensationError
 from support.static_postures import PlantedTool, turned
 

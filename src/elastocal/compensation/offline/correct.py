@@ -14,8 +14,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from elastocal.arrays import BoolArray, FloatArray, IndexArray
-from elastocal.compensation.offline.limits import Where, check_limits, turned_inside
-from elastocal.compensation.path import PathError
+from elastocal.compensation.offline import (
+    PathError,
+)
+from elastocal.compensation.offline.path_joints import RowName, check_limits, turned_inside
 from elastocal.identification import CalibratedModel
 from elastocal.robot import Robot
 from elastocal.robot.inverse import TURN, InverseKinematics, pose_error
@@ -32,7 +34,7 @@ _SMALL_TURN = 1.0
 
 
 @dataclass(frozen=True, eq=False)
-class Correction:
+class PathCorrection:
     """Corrected rows."""
 
     q: FloatArray
@@ -56,17 +58,17 @@ class Correction:
     a surface cannot: shape (row,)."""
 
 
-def correct(
+def correct_rows(
     solver: InverseKinematics,
     calibrated: CalibratedModel,
     q: FloatArray,
     T_base_tcp: FloatArray,
     wrench: tuple[FloatArray, FloatArray | None],
-    where: Where,
+    where: RowName,
     *,
     may_turn: bool = False,
     largest: float = LARGEST,
-) -> Correction:
+) -> PathCorrection:
     """Return the corrected rows of a path.
 
     Parameters
@@ -124,7 +126,7 @@ def correct(
     commanded[:, :3, 3] = reached[:, :3, 3]
     residual = reached[:, :3, 3] + deflection - T_base_tcp[:, :3, 3]
     predicted = calibrated.predict(q, *wrench)
-    return Correction(
+    return PathCorrection(
         q,
         commanded,
         deflection,
@@ -156,7 +158,7 @@ def _pulled(T_base_tcp: FloatArray, force: FloatArray) -> BoolArray:
     return np.asarray(along > 0.5 * np.linalg.norm(force, axis=1))
 
 
-def _check_size(deflection: FloatArray, largest: float, where: Where) -> None:
+def _check_size(deflection: FloatArray, largest: float, where: RowName) -> None:
     """Refuse deflections that cannot be meant."""
     with np.errstate(over="ignore"):
         length = np.linalg.norm(deflection, axis=1)
@@ -200,7 +202,7 @@ def _by_solver(
     q_start: FloatArray,
     T: FloatArray,
     row: int,
-    where: Where,
+    where: RowName,
 ) -> FloatArray:
     """Return one row by exact inverse kinematics: beside a singularity Newton steps go astray."""
     robot, q, wanted = solver.robot, q_start, T.copy()

@@ -1,4 +1,4 @@
-"""``PATH.csv`` to ``OUT.csv``: rows corrected piece by piece, everything else as it stood."""
+"""``PATH.csv`` to ``OUT.csv``: rows corrected block by block, everything else as it stood."""
 
 import csv
 from collections.abc import Callable
@@ -9,35 +9,40 @@ from typing import Any, TextIO
 import numpy as np
 
 from elastocal.arrays import FloatArray
-from elastocal.compensation.offline.correct import LARGEST, Correction, correct
-from elastocal.compensation.offline.follow import follow, jumps, nearest_zero_posture
-from elastocal.compensation.offline.limits import Where, check_limits
-from elastocal.compensation.offline.tally import Tally
-from elastocal.compensation.path import (
+from elastocal.compensation.offline import (
     PathColumns,
     PathError,
     PathValues,
-    Piece,
+    RowBlock,
     TextLayout,
     count_lines,
     find_columns,
     in_file,
-    pieces,
     read_layout,
     read_values,
+    row_blocks,
     turned_to_base,
 )
+from elastocal.compensation.offline.correct import LARGEST, PathCorrection, correct_rows
+from elastocal.compensation.offline.path_joints import (
+    RowName,
+    check_limits,
+    joints_along_path,
+    nearest_zero_posture,
+    posture_jumps,
+)
+from elastocal.compensation.offline.summary import CorrectionSummary
 from elastocal.files import replacing
 from elastocal.identification import CalibratedModel
 from elastocal.robot.inverse import InverseKinematics, inverse_for
 
-PIECE = 2000
+_ROWS_AT_A_TIME = 2000
 """Rows corrected at a time; bounds memory."""
 _ADDED = tuple(f"deflection_{axis}{end}[m]" for end in ("", "_low", "_high") for axis in "xyz")
 
 
 @dataclass(frozen=True, eq=False)
-class Settings:
+class CorrectionSettings:
     """How a path is corrected."""
 
     start: FloatArray | None = None
@@ -50,9 +55,9 @@ def compensate_path(
     calibrated: CalibratedModel,
     path: Path,
     out: Path,
-    settings: Settings | None = None,
+    settings: CorrectionSettings | None = None,
     report: Callable[[str, int, int], None] = lambda *_: None,
-) -> Tally:
+) -> CorrectionSummary:
     """Correct a path file; write the same columns corrected, and the predicted deflection.
 
     Parameters
@@ -61,7 +66,7 @@ def compensate_path(
         The model.
     path, out : Path
         The file as programmed, and the one to write, atomically.
-    settings : Settings, optional
+    settings : CorrectionSettings, optional
         How.
     report : callable
         Told a stage, how many rows are done and how many there are.
@@ -73,7 +78,7 @@ def compensate_path(
     FileAccessError
         If a file cannot be read or written.
     """
-    settings = Settings() if settings is None else settings
+    settings = CorrectionSettings() if settings is None else settings
     with in_file(path):
         layout = read_layout(path)
         columns = find_columns(layout.header, calibrated.model.robot)
@@ -89,41 +94,41 @@ class _Job:
     calibrated: CalibratedModel
     solver: InverseKinematics
     columns: PathColumns
-    settings: Settings
+    settings: CorrectionSettings
 
 
 def _run(
     job: _Job, path: Path, layout: TextLayout, file: TextIO, done: Callable[[int], None]
-) -> Tally:
+) -> CorrectionSummary:
     kept = [i for i, name in enumerate(layout.header) if name.strip() not in _ADDED]
     file.writelines(layout.preamble)
     writer = csv.writer(file, delimiter=layout.delimiter, lineterminator=layout.line_end)
     writer.writerow([*(layout.header[i] for i in kept), *_ADDED])
-    tally, previous = Tally(), job.settings.start
-    for piece in pieces(path, layout, PIECE):
-        values = read_values(piece, job.columns)
-        labels = [f"row {line}" for line in piece.lines]
-        q, T = programmed(job.solver, values, previous, labels.__getitem__)
+    summary, previous = CorrectionSummary(), job.settings.start
+    for block in row_blocks(path, layout, _ROWS_AT_A_TIME):
+        values = read_values(block, job.columns)
+        labels = [f"row {line}" for line in block.lines]
+        q, T = programmed_rows(job.solver, values, previous, labels.__getitem__)
         found = _corrected(job, values, q, T, labels.__getitem__)
         shift = found.T_base_tcp[:, :3, 3] - T[:, :3, 3]
         turned: list[int] = []
         if job.columns.by_pose:
             # How the first row is reached is not the path's.
-            before = previous if tally.rows and previous is not None else q[0]
-            turned = jumps(job.solver.robot, q, before).tolist()
-            tally = tally if tally.rows else replace(tally, start=tuple(q[0].tolist()))
-        tally = tally.plus(found, shift, labels, turned)
+            before = previous if summary.rows and previous is not None else q[0]
+            turned = posture_jumps(job.solver.robot, q, before).tolist()
+            summary = summary if summary.rows else replace(summary, start=tuple(q[0].tolist()))
+        summary = summary.plus(found, shift, labels, turned)
         previous = q[-1]
-        _write(writer, job, piece, kept, found)
-        done(tally.rows)
-    return tally
+        _write(writer, job, block, kept, found)
+        done(summary.rows)
+    return summary
 
 
-def programmed(
+def programmed_rows(
     solver: InverseKinematics,
     values: PathValues,
     previous: FloatArray | None,
-    where: Where,
+    where: RowName,
 ) -> tuple[FloatArray, FloatArray]:
     """Return joints and poses as programmed, shapes (row, joint) and (row, 4, 4).
 
@@ -158,18 +163,18 @@ def programmed(
         external = np.broadcast_to(held, (len(values.T_base_tcp), len(names)))
     check_limits(robot, external, where, "is programmed")
     before = nearest_zero_posture(robot) if previous is None else previous
-    return follow(solver, values.T_base_tcp, external, before, where), values.T_base_tcp
+    return joints_along_path(solver, values.T_base_tcp, external, before, where), values.T_base_tcp
 
 
 def _corrected(
-    job: _Job, values: PathValues, q: FloatArray, T: FloatArray, where: Where
-) -> Correction:
+    job: _Job, values: PathValues, q: FloatArray, T: FloatArray, where: RowName
+) -> PathCorrection:
     force = turned_to_base(values.force, job.columns.force, T)
     moment = turned_to_base(values.moment, job.columns.moment, T)
     if force is None:
         raise PathError("path has no forces")
     wrench, largest = (force, moment), job.settings.largest
-    return correct(
+    return correct_rows(
         job.solver,
         job.calibrated,
         q,
@@ -181,7 +186,7 @@ def _corrected(
     )
 
 
-def _write(writer: Any, job: _Job, piece: Piece, kept: list[int], found: Correction) -> None:
+def _write(writer: Any, job: _Job, block: RowBlock, kept: list[int], found: PathCorrection) -> None:
     """Write rows; only the cells that were corrected are new text."""
     columns, robot = job.columns, job.solver.robot
     new: list[tuple[int, list[str]]] = []
@@ -195,7 +200,7 @@ def _write(writer: Any, job: _Job, piece: Piece, kept: list[int], found: Correct
         new.append((column.index, list(map(repr, (numbers / column.scale).tolist()))))
     deflection = np.hstack([found.deflection, found.low, found.high])
     ends = [list(map(repr, row)) for row in deflection.tolist()]
-    for row, (cells, end) in enumerate(zip(piece.cells, ends, strict=True)):
+    for row, (cells, end) in enumerate(zip(block.cells, ends, strict=True)):
         for index, text in new:
             cells[index] = text[row]
         writer.writerow([*(cells[i] for i in kept), *end])

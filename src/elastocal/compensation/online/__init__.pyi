@@ -5,5 +5,10 @@ from .design import (
     Design as Design,
     design as design,
 )
-from .rkorr import rkorr as rkorr
-from .state import Correction as Correction, Reading as Reading, State as State, Status as Status
+from .state import (
+    Correction as Correction,
+    Reading as Reading,
+    State as State,
+    Status as Status,
+    rkorr as rkorr,
+)

@@ -7,7 +7,7 @@ from scipy import stats
 
 from elastocal.arrays import FloatArray
 from elastocal.compensation.conditioning import SensorLoad
-from elastocal.compensation.filters import FilterChain
+from elastocal.compensation.conditioning.filters import FilterChain
 from elastocal.compensation.kernel import Routine, deflection, observation_block, orientation
 from elastocal.compensation.settings import CompensatorSettings
 from elastocal.errors import CompensationError

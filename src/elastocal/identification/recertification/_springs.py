@@ -56,7 +56,7 @@ def compare_springs(
     units = {spring.name: spring.unit for spring in new.model.springs}
     changes = []
     for i, terms in enumerate(sums):
-        old, new = (
+        before, after = (
             Estimate(float(c[i]), float(low[i]), float(high[i]))
             for c, (low, high) in zip(values, ends, strict=True)
         )
@@ -68,8 +68,8 @@ def compare_springs(
                 name=sum_text(terms),
                 terms=terms,
                 unit=units[terms[0].spring],
-                old=old,
-                new=new,
+                old=before,
+                new=after,
                 difference=difference,
                 together=simultaneous,
                 moved=0.0 not in simultaneous,

@@ -10,12 +10,13 @@ from elastocal.arrays import FloatArray
 from elastocal.elastic import check_vectors
 from elastocal.errors import IdentificationError, RobotError, SpringError
 from elastocal.identification.calibrated import CalibratedModel
-from elastocal.identification.model_file import read_model, read_record
+from elastocal.identification.model_file import CalibrateResult, read_model
 from elastocal.identification.recertification._judgement import judge, load_note, notes_on
 from elastocal.identification.recertification._rows import compare_rows
 from elastocal.identification.recertification._spread import Spread
 from elastocal.identification.recertification._springs import common_springs, compare_springs
 from elastocal.identification.recertification.result import CompareResult, Recertification
+from elastocal.records import read_json
 from elastocal.robot import Robot
 
 _PROBES, _SEED = 8, 0
@@ -231,6 +232,5 @@ def _read_named(path: Path) -> CalibratedModel:
 
 def _measured_deflection(path: Path) -> float | None:
     """Return the mean measured deflection that a model file states, in m; None: none."""
-    stated = read_record(path).calibration.get("deflection")
-    mean = stated.get("mean") if isinstance(stated, dict) else None
-    return float(mean) if isinstance(mean, int | float) else None
+    figures = read_json(path, CalibrateResult).calibration
+    return None if figures is None else figures.deflection.mean

@@ -7,8 +7,8 @@ import numpy as np
 
 from elastocal.cell import fingerprint
 from elastocal.codec import CodecData
-from elastocal.compensation.conditioning import ToolRecord
-from elastocal.compensation.process import ProcessRecord
+from elastocal.compensation.conditioning import ToolResult
+from elastocal.compensation.process import SimulatedProcess
 from elastocal.dataset import Dataset
 from elastocal.errors import CodecError, CompensationError, IdentificationError
 from elastocal.identification import CalibratedModel
@@ -36,7 +36,7 @@ def check_model(model: CalibratedModel, dataset: Dataset | None, path: Path) -> 
         )
 
 
-def check_tool(record: ToolRecord, parts: Parts, path: Path) -> ToolRecord:
+def check_tool(record: ToolResult, parts: Parts, path: Path) -> ToolResult:
     """Return a tool file, or refuse one whose flange the robot does not have.
 
     Raises
@@ -76,7 +76,7 @@ def check_codec(data: CodecData, parts: Parts, path: Path) -> CodecData:
     return data
 
 
-def check_process(record: ProcessRecord, parts: Parts, path: Path) -> ProcessRecord:
+def check_process(record: SimulatedProcess, parts: Parts, path: Path) -> SimulatedProcess:
     """Return a process, or refuse one of another cell.
 
     Raises

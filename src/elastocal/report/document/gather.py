@@ -12,13 +12,14 @@ from pathlib import Path
 from elastocal.arrays import FloatArray
 from elastocal.cell import Cell
 from elastocal.codec import ARRAYS, judge, read_codec
-from elastocal.compensation.conditioning import ToolRecord, read_tool
-from elastocal.compensation.process import TABLE, ProcessRecord, read_process
+from elastocal.compensation.conditioning import ToolResult, read_tool
+from elastocal.compensation.process import TABLE, SimulatedProcess, read_process
 from elastocal.dataset import Dataset
 from elastocal.errors import ElastocalError
-from elastocal.identification import read_model, read_record
+from elastocal.identification import CalibrateResult
 from elastocal.identification.recertification import recertify_files
 from elastocal.procedure import file_sha256
+from elastocal.records import read_json, to_data
 from elastocal.report.document.again import Again, calibrate_again
 from elastocal.report.document.fitting import (
     check_codec,
@@ -43,7 +44,6 @@ from elastocal.report.document.places import (
 )
 from elastocal.report.document.run_parts import with_run
 from elastocal.report.document.searching import Search
-from elastocal.report.document.shapes import checked_figures
 
 
 @dataclass(frozen=True)
@@ -111,17 +111,18 @@ def _with_model(parts: Parts, search: Search, options: Options) -> Parts:
 
 
 def _calibrated(path: Path, dataset: Dataset | None) -> Calibrated:
-    record, model = read_record(path), read_model(path)
+    record = read_json(path, CalibrateResult)
+    model = record.calibrated
     check_model(model, dataset, path)
-    figures = checked_figures(dict(record.calibration), f"{path}: calibration")
+    figures = {} if record.calibration is None else to_data(record.calibration)
     return Calibrated(model, figures, record.robot.urdf_sha256, file_sha256(path))
 
 
 def _with_rest(parts: Parts, search: Search, options: Options) -> Parts:
-    def tool(path: Path) -> ToolRecord:
+    def tool(path: Path) -> ToolResult:
         return check_tool(read_tool(path), parts, path)
 
-    def process(path: Path) -> ProcessRecord:
+    def process(path: Path) -> SimulatedProcess:
         folder = path.parent if path.name == TABLE else path
         return check_process(read_process(folder), parts, folder / TABLE)
 
@@ -173,7 +174,7 @@ def _with_old(parts: Parts, search: Search, options: Options) -> Parts:
     q, force = _rows_that_matter(parts)
     found = recertify_files(old, new, q, force, limit=parts.limits.drift)
     search.use(old)
-    return replace(parts, recertification=found)
+    return replace(parts, recertification=found.result)
 
 
 def _rows_that_matter(parts: Parts) -> tuple[FloatArray | None, FloatArray | None]:

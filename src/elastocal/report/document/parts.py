@@ -5,11 +5,11 @@ from typing import Any
 
 from elastocal.cell import Cell
 from elastocal.codec import CodecData, Verdicts
-from elastocal.compensation.conditioning import ToolRecord
-from elastocal.compensation.process import ProcessRecord
+from elastocal.compensation.conditioning import ToolResult
+from elastocal.compensation.process import SimulatedProcess
 from elastocal.dataset import Dataset
 from elastocal.identification import CalibratedModel
-from elastocal.identification.recertification import Recertification
+from elastocal.identification.recertification import CompareResult
 from elastocal.planning import PlanFile, PoolData
 from elastocal.planning.surface import Surface
 from elastocal.procedure import Entry
@@ -92,13 +92,13 @@ class Parts:
     calibrated: Calibrated | None = None
     again: Again | None = None
     """The calibration made once more from the dataset."""
-    tool: ToolRecord | None = None
+    tool: ToolResult | None = None
     tool_sha256: str | None = None
     """Of the tool file."""
     codecs: tuple[Codec, ...] = ()
     """One a comparison."""
-    process: ProcessRecord | None = None
-    recertification: Recertification | None = None
+    process: SimulatedProcess | None = None
+    recertification: CompareResult | None = None
     """This calibration against an earlier one."""
     limits: Limits = field(default_factory=Limits)
     files: tuple[UsedFile, ...] = ()

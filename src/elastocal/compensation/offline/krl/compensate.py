@@ -6,15 +6,19 @@ from pathlib import Path
 import numpy as np
 
 from elastocal.arrays import FloatArray
-from elastocal.compensation.offline.correct import Correction, correct
+from elastocal.compensation.offline import (
+    PathError,
+    in_file,
+    turned_to_base,
+)
+from elastocal.compensation.offline.correct import PathCorrection, correct_rows
 from elastocal.compensation.offline.krl.forces import PointForces, read_forces
 from elastocal.compensation.offline.krl.moves import Program, read_program
 from elastocal.compensation.offline.krl.points import Point, read_points, replaced
 from elastocal.compensation.offline.krl.text import read_lines
 from elastocal.compensation.offline.krl.walk import Walk
-from elastocal.compensation.offline.path_file import Settings
-from elastocal.compensation.offline.tally import Tally
-from elastocal.compensation.path import PathError, in_file, turned_to_base
+from elastocal.compensation.offline.path_file import CorrectionSettings
+from elastocal.compensation.offline.summary import CorrectionSummary
 from elastocal.errors import FileAccessError, nearest
 from elastocal.files import replacing
 from elastocal.identification import CalibratedModel
@@ -25,7 +29,7 @@ from elastocal.robot.inverse import inverse_for
 class KrlResult:
     """What was corrected."""
 
-    tally: Tally
+    tally: CorrectionSummary
     base: str
     """What the program calls the frame of its points; empty when it does not say."""
     tool: str
@@ -42,7 +46,7 @@ def compensate_krl(
     src: Path,
     forces: Path,
     out: Path,
-    settings: Settings | None = None,
+    settings: CorrectionSettings | None = None,
     T_base_points: FloatArray | None = None,
 ) -> KrlResult:
     """Correct every LIN and SLIN target of a program, and the PTP targets that have a force.
@@ -57,7 +61,7 @@ def compensate_krl(
         CSV with the column ``point`` and forces as in a path.
     out : Path
         The ``.src`` file to write; the ``.dat`` file comes beside it.
-    settings : Settings, optional
+    settings : CorrectionSettings, optional
         How.
     T_base_points : ndarray, shape (4, 4), optional
         The program's $BASE in the model's base; the same by default.
@@ -70,7 +74,7 @@ def compensate_krl(
     FileAccessError
         If a file cannot be read or written.
     """
-    settings = Settings() if settings is None else settings
+    settings = CorrectionSettings() if settings is None else settings
     dat, out_dat = _dat_of(src), Path(out).with_suffix(".dat")
     lines, data, table = read_lines(src), read_lines(dat), read_forces(forces)
     with in_file(dat):
@@ -141,7 +145,7 @@ def _corrected(
     table: PointForces,
     postures: dict[str, FloatArray],
     largest: float,
-) -> tuple[Correction, Tally]:
+) -> tuple[PathCorrection, CorrectionSummary]:
     q = np.array(list(postures.values()))
     labels = [f"point {walk.points[name].name}" for name in postures]
     T = np.array([walk.pose(walk.points[name], q[i]) for i, name in enumerate(postures)])
@@ -152,8 +156,8 @@ def _corrected(
     # An E6AXIS means its joints as they stand; the turn of a frame is the controller's.
     frames = not any(walk.points[name].by_axes for name in postures)
     wrench = (force, moment)
-    found = correct(
+    found = correct_rows(
         walk.solver, calibrated, q, T, wrench, labels.__getitem__, may_turn=frames, largest=largest
     )
     shift = found.T_base_tcp[:, :3, 3] - T[:, :3, 3]
-    return found, Tally().plus(found, shift, labels, [])
+    return found, CorrectionSummary().plus(found, shift, labels, [])

@@ -6,15 +6,15 @@ from pathlib import Path
 import numpy as np
 
 from elastocal.arrays import FloatArray
-from elastocal.compensation.path import (
+from elastocal.compensation.offline import (
     PathColumns,
     PathError,
-    Wrench,
-    find_wrenches,
+    WrenchColumns,
+    find_wrench_columns,
     in_file,
-    pieces,
     read_layout,
     read_values,
+    row_blocks,
 )
 
 _POINT = "point"
@@ -31,8 +31,8 @@ class PointForces:
     """As the table has it, shape (row, 3), in N."""
     moment: FloatArray | None
     """The same in N·m."""
-    force_columns: Wrench
-    moment_columns: Wrench | None
+    force_columns: WrenchColumns
+    moment_columns: WrenchColumns | None
 
 
 def read_forces(path: Path) -> PointForces:
@@ -51,7 +51,7 @@ def read_forces(path: Path) -> PointForces:
 
 def _read(path: Path) -> PointForces:
     layout = read_layout(path)
-    force, moment = find_wrenches(layout.header)
+    force, moment = find_wrench_columns(layout.header)
     header = [name.strip() for name in layout.header]
     if header.count(_POINT) != 1:
         raise PathError(
@@ -61,7 +61,7 @@ def _read(path: Path) -> PointForces:
     rows: dict[str, int] = {}
     forces: list[FloatArray] = []
     moments: list[FloatArray] = []
-    for piece in pieces(path, layout, _PIECE):
+    for piece in row_blocks(path, layout, _PIECE):
         for line, cells in zip(piece.lines, piece.cells, strict=True):
             name = cells[place].strip().upper()
             if not name or name in rows:

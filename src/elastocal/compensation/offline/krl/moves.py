@@ -4,9 +4,11 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
+from elastocal.compensation.offline import (
+    PathError,
+)
 from elastocal.compensation.offline.krl.points import Point, read_axes
 from elastocal.compensation.offline.krl.text import code_of
-from elastocal.compensation.path import PathError
 
 _MOVE = re.compile(
     r"(S?PTP|S?LIN|S?CIRC|SPL|ASYPTP|(?:S?PTP|S?LIN|S?CIRC|SPL)_REL)\b(?!\s*[=(\[.])\s*(.*)",

@@ -5,8 +5,10 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+from elastocal.compensation.offline import (
+    PathError,
+)
 from elastocal.compensation.offline.krl.text import code_of
-from elastocal.compensation.path import PathError
 
 AXIS_KINDS = ("E6AXIS", "AXIS")
 _DECLARED = re.compile(

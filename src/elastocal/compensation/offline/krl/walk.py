@@ -6,18 +6,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from elastocal.arrays import FloatArray
-from elastocal.compensation.offline.follow import follow
+from elastocal.compensation.offline import (
+    PathError,
+)
 from elastocal.compensation.offline.krl.moves import Move
 from elastocal.compensation.offline.krl.points import Point
-from elastocal.compensation.offline.limits import Where, check_limits
-from elastocal.compensation.path import PathError
-from elastocal.robot import (
-    T_from_xyzabc,
-    inverse_transform,
-)
-from elastocal.robot.inverse import (
-    InverseKinematics,
-)
+from elastocal.compensation.offline.path_joints import RowName, check_limits, joints_along_path
+from elastocal.robot import T_from_xyzabc, inverse_transform
+from elastocal.robot.inverse import InverseKinematics
 
 _FRAME = ("X", "Y", "Z", "A", "B", "C")
 _ARM = tuple(f"A{number}" for number in range(1, 7))
@@ -109,7 +105,7 @@ class Walk:
                 " file comes before it, give --start"
             )
         T = self.pose(point, previous)
-        q = follow(self.solver, T[None], external[None], previous, _naming(move))
+        q = joints_along_path(self.solver, T[None], external[None], previous, _naming(move))
         return np.asarray(q[0], dtype=float)
 
     def _external(self, move: Move, point: Point, previous: FloatArray | None) -> FloatArray:
@@ -135,7 +131,7 @@ class Walk:
             )
 
 
-def _naming(move: Move) -> Where:
+def _naming(move: Move) -> RowName:
     return lambda _: _label(move)
 
 

@@ -6,7 +6,12 @@ from functools import partial
 
 import numpy as np
 
-from elastocal.compensation.process import Line, ProcessRecord, Trace, Values
+from elastocal.compensation.process import (
+    CourseDeviation,
+    DeviationComparison,
+    DeviationStatistics,
+    SimulatedProcess,
+)
 from elastocal.report.document.markup import flattened, folded, paragraph, table
 from elastocal.report.document.parts import Parts
 from elastocal.report.document.pictures import picture
@@ -58,8 +63,8 @@ def body(parts: Parts) -> Content:
         "Simulated: the simulated robot followed the path under process forces, once as programmed"
         " and once with the online compensator of a calibrated model.", "banner",
     ) + _table_1(record)  # fmt: skip
-    seed = record.traces[0].seed
-    own = [trace for trace in record.traces if trace.seed == seed]
+    seed = record.courses[0].seed
+    own = [trace for trace in record.courses if trace.seed == seed]
     html += _pictures(own, parts.limits.tolerance)
     if table_.budget:
         html += folded("Error budget", _lines("Error budget of the first seed", table_.budget))
@@ -70,7 +75,7 @@ def body(parts: Parts) -> Content:
     return Content(html, findings=tuple(_findings(record, parts.limits.tolerance)))
 
 
-def _table_1(record: ProcessRecord) -> str:
+def _table_1(record: SimulatedProcess) -> str:
     what = _WHAT.get(record.table.process, "Absolute deviation")
     rows: list[tuple[str, ...]] = []
     for line in record.table.lines:
@@ -94,7 +99,7 @@ def _table_1(record: ProcessRecord) -> str:
     return table("In the form of the paper's Table 1", _HEADS, rows) + (note if paper else "")
 
 
-def _lines(title: str, lines: tuple[Line, ...]) -> str:
+def _lines(title: str, lines: tuple[DeviationComparison, ...]) -> str:
     rows = [
         (
             line.name,
@@ -110,7 +115,7 @@ def _lines(title: str, lines: tuple[Line, ...]) -> str:
     return table(f"{title}, before to after in mm (reduction)", _HEADS, rows)
 
 
-def _pictures(traces: list[Trace], tolerance: float | None) -> str:
+def _pictures(traces: list[CourseDeviation], tolerance: float | None) -> str:
     worst = max(traces, key=lambda trace: float(np.abs(trace.before).max()))
     before, after = (
         np.concatenate([getattr(t, key) for t in traces]) for key in ("before", "after")
@@ -131,7 +136,7 @@ def _pictures(traces: list[Trace], tolerance: float | None) -> str:
     )  # fmt: skip
 
 
-def _findings(record: ProcessRecord, tolerance: float | None) -> Iterator[Finding]:
+def _findings(record: SimulatedProcess, tolerance: float | None) -> Iterator[Finding]:
     line = record.table.lines[-1]
     told = (
         f"on the simulated process path the mean deviation fell by {line.reduction.mean:.1%}, from"
@@ -143,11 +148,11 @@ def _findings(record: ProcessRecord, tolerance: float | None) -> Iterator[Findin
         yield Finding(told, holds_back=False)
 
 
-def _three(values: Values) -> tuple[float, float, float]:
+def _three(values: DeviationStatistics) -> tuple[float, float, float]:
     return values.mean, values.max, values.standard_deviation
 
 
-def _mm(values: Values) -> tuple[str, ...]:
+def _mm(values: DeviationStatistics) -> tuple[str, ...]:
     return tuple(f"{1e3 * value:.3f}" for value in _three(values))
 
 

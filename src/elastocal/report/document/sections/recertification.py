@@ -4,9 +4,9 @@ from collections.abc import Iterator
 from functools import partial
 
 from elastocal.identification.recertification import (
+    CompareResult,
     DeflectionChange,
     Estimate,
-    Recertification,
     Verdict,
 )
 from elastocal.report.document.markup import facts, listed, paragraph, table
@@ -43,7 +43,7 @@ def body(parts: Parts) -> Content:
     return Content(html + listed(_notes(found)), findings=tuple(_findings(found)))
 
 
-def _sentence(found: Recertification) -> str:
+def _sentence(found: CompareResult) -> str:
     words = {
         Verdict.PASS: "Passed:",
         Verdict.FAIL: "Failed:",
@@ -53,8 +53,8 @@ def _sentence(found: Recertification) -> str:
     return f"{words[found.verdict]} {found.reason}. {_moved(found)}"
 
 
-def _moved(found: Recertification) -> str:
-    names = ", ".join(each.name for each in found.moved)
+def _moved(found: CompareResult) -> str:
+    names = ", ".join(found.moved)
     if not names:
         return "No compared spring moved beyond its interval."
     return f"Moved beyond their intervals: {names}."
@@ -63,7 +63,7 @@ def _moved(found: Recertification) -> str:
 def _deflections(change: DeflectionChange, limit: float | None) -> str:
     return facts(
         [
-            ("Poses and forces compared", len(change.q)),
+            ("Poses and forces compared", change.rows),
             ("Change, mean", _span(change.mean)),
             ("Change, largest", _span(change.largest)),
             ("Limit", "none given" if limit is None else mm(limit)),
@@ -71,7 +71,7 @@ def _deflections(change: DeflectionChange, limit: float | None) -> str:
     )
 
 
-def _springs(found: Recertification) -> str:
+def _springs(found: CompareResult) -> str:
     rows = [
         (
             each.name,
@@ -88,13 +88,13 @@ def _springs(found: Recertification) -> str:
     return table("Springs and sums that both calibrations determine", heads, rows, texts=2)
 
 
-def _notes(found: Recertification) -> Iterator[str]:
+def _notes(found: CompareResult) -> Iterator[str]:
     # The origin of the readings is a path; where a folder lies is no part of a report.
     for note in found.notes:
         yield note.replace(f" ({found.old_provenance})", "")
 
 
-def _findings(found: Recertification) -> Iterator[Finding]:
+def _findings(found: CompareResult) -> Iterator[Finding]:
     if found.verdict is Verdict.PASS:
         yield Finding(f"against the earlier calibration: {found.reason}", holds_back=False)
     elif found.verdict is not None:

@@ -1,13 +1,34 @@
 """Which column of a path holds what (spec section 4, ``PATH.csv``)."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
+from pathlib import Path
 
-from elastocal.compensation.path.errors import PathError
 from elastocal.dataset import Column, joint_dimensions
-from elastocal.errors import UnitError, nearest
+from elastocal.errors import CompensationError, UnitError, nearest
 from elastocal.robot import Robot
 from elastocal.units import factor, split_column
+
+
+class PathError(CompensationError):
+    """A programmed path that cannot be corrected; the message names its line or point."""
+
+
+@contextmanager
+def in_file(path: Path) -> Iterator[None]:
+    """Name the file in a refusal that comes up inside.
+
+    Raises
+    ------
+    PathError
+        The same with the file's name before it.
+    """
+    try:
+        yield
+    except PathError as error:
+        raise PathError(f"{path}: {error}") from error
+
 
 AXES = ("x", "y", "z")
 EULER = ("a", "b", "c")
@@ -19,7 +40,7 @@ _EXAMPLES = {"angle": "deg", "length": "mm", "force": "N", "moment": "N*m"}
 
 
 @dataclass(frozen=True)
-class Wrench:
+class WrenchColumns:
     """Three columns of a force or a moment on the robot at the tcp."""
 
     columns: tuple[Column, Column, Column]
@@ -37,9 +58,9 @@ class PathColumns:
     """x, y, z of the tcp in base; none in a path of joints."""
     orientation: tuple[Column, ...]
     """a, b, c or qx, qy, qz, qw; none in a path of joints."""
-    force: Wrench | None
+    force: WrenchColumns | None
     """None only where forces are not asked for."""
-    moment: Wrench | None
+    moment: WrenchColumns | None
 
     @property
     def by_pose(self) -> bool:
@@ -94,7 +115,7 @@ def find_columns(header: Sequence[str], robot: Robot, forces: bool = True) -> Pa
     )
 
 
-def find_wrenches(header: Sequence[str]) -> tuple[Wrench, Wrench | None]:
+def find_wrench_columns(header: Sequence[str]) -> tuple[WrenchColumns, WrenchColumns | None]:
     """Return the columns of the force, and of the moment if there are any.
 
     Raises
@@ -160,14 +181,14 @@ def _orientation(found: _Found) -> tuple[Column, ...]:
     return tuple(_column(found, name, "angle") for name in EULER)
 
 
-def _wrenches(found: _Found, forces: bool) -> tuple[Wrench | None, Wrench | None]:
+def _wrenches(found: _Found, forces: bool) -> tuple[WrenchColumns | None, WrenchColumns | None]:
     force = _wrench(found, "force", FORCES, forces)
     return force, _wrench(found, "moment", MOMENTS, False)
 
 
 def _wrench(
     found: _Found, dimension: str, prefixes: tuple[str, str], required: bool
-) -> Wrench | None:
+) -> WrenchColumns | None:
     given = [prefix for prefix in prefixes if any(f"{prefix}{axis}" in found for axis in AXES)]
     in_base, in_tcp = (f"{prefix}x" for prefix in prefixes)
     if len(given) > 1:
@@ -183,7 +204,7 @@ def _wrench(
             )
         return None
     x, y, z = (_column(found, f"{given[0]}{axis}", dimension) for axis in AXES)
-    return Wrench((x, y, z), given[0] == prefixes[1])
+    return WrenchColumns((x, y, z), given[0] == prefixes[1])
 
 
 def _neither(found: _Found, robot: Robot) -> str:

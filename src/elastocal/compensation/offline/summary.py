@@ -1,15 +1,15 @@
-"""Figures of a corrected path, added up piece by piece."""
+"""What a correction did to a path, added up piece by piece."""
 
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from elastocal.arrays import FloatArray
-from elastocal.compensation.offline.correct import Correction
+from elastocal.compensation.offline.correct import PathCorrection
 
 
 @dataclass(frozen=True)
-class Figure:
+class LengthSummary:
     """Mean and largest of a length over the rows."""
 
     total: float = 0.0
@@ -19,28 +19,28 @@ class Figure:
     label: str = ""
     """Of the row with the largest."""
 
-    def plus(self, lengths: FloatArray, labels: list[str]) -> "Figure":
+    def plus(self, lengths: FloatArray, labels: list[str]) -> "LengthSummary":
         """Return the figure with further rows."""
         worst = int(lengths.argmax())
         here = float(lengths[worst])
         label, largest = self.label, self.largest
         if here > largest or not label:
             label, largest = labels[worst], here
-        return Figure(self.total + float(lengths.sum()), largest, label)
+        return LengthSummary(self.total + float(lengths.sum()), largest, label)
 
 
 @dataclass(frozen=True)
-class Tally:
+class CorrectionSummary:
     """What a correction did, predicted by the model."""
 
     rows: int = 0
-    deviation: Figure = field(default_factory=Figure)
+    deviation: LengthSummary = field(default_factory=LengthSummary)
     """Deviation of the path as programmed."""
-    first_order: Figure = field(default_factory=Figure)
+    first_order: LengthSummary = field(default_factory=LengthSummary)
     """Deviation that one first-order step would leave."""
-    residual: Figure = field(default_factory=Figure)
+    residual: LengthSummary = field(default_factory=LengthSummary)
     """Deviation that the correction leaves."""
-    correction: Figure = field(default_factory=Figure)
+    correction: LengthSummary = field(default_factory=LengthSummary)
     """Distance between programmed and corrected position."""
     jumps: int = 0
     """Rows at which the posture changes from the row before."""
@@ -51,13 +51,13 @@ class Tally:
     """Joints that were found for the first row of a path of poses, in rad or m."""
 
     def plus(
-        self, correction: Correction, shift: FloatArray, labels: list[str], jumps: list[int]
-    ) -> "Tally":
-        """Return the tally with further rows.
+        self, correction: PathCorrection, shift: FloatArray, labels: list[str], jumps: list[int]
+    ) -> "CorrectionSummary":
+        """Return the summary with further rows.
 
         Parameters
         ----------
-        correction : Correction
+        correction : PathCorrection
             Of these rows.
         shift : ndarray, shape (row, 3)
             Corrected minus programmed position, in m.
@@ -84,7 +84,7 @@ class Tally:
         lengths = ("deviation", "first_order", "residual", "correction")
         figures: dict[str, object] = {"rows": self.rows}
         for name in lengths:
-            figure: Figure = getattr(self, name)
+            figure: LengthSummary = getattr(self, name)
             figures[name] = {
                 "mean": figure.total / max(self.rows, 1),
                 "max": figure.largest,

@@ -5,25 +5,52 @@ of the last readings, then second-order sections in the transposed direct form I
 
     y = b0 x + z1,    z1' = b1 x - a1 y + z2,    z2' = b2 x - a2 y.
 
-Every section is scaled to pass a constant unchanged.
+Every section is scaled to pass a constant unchanged. A further linear filter is a settings class
+with a method ``sections`` here, and its key in `FilterSettings`: compensator and C export run
+whatever sections there are.
 """
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Annotated, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
+from pydantic import AfterValidator, BeforeValidator
 from scipy import signal
 
 from elastocal.arrays import FloatArray
 from elastocal.errors import CompensationError
+from elastocal.records import StrictModel
+from elastocal.units import parse_quantity
 
 Section = tuple[float, float, float, float, float]
 """b0, b1, b2, a1, a2; a0 is 1."""
-MEDIANS = (1, 3, 5)
+_MEDIANS = (1, 3, 5)
 """Lengths of the median; 1 is none."""
-MOST_ORDER = 8
+_LARGEST_ORDER = 8
 """Highest order of the low-pass: with more, sections lose digits and the delay is too long."""
+_LONGEST_DELAY = 0.5
+"""Of all filters together, in s."""
+
+
+def _positive(value: float) -> float:
+    if not 0.0 < value < math.inf:
+        raise ValueError("must be above 0")
+    return value
+
+
+def _quantity(dimension: str) -> BeforeValidator:
+    return BeforeValidator(lambda text: parse_quantity(text, dimension))
+
+
+Frequency = Annotated[float, _quantity("frequency"), AfterValidator(_positive)]
+"""In Hz, above 0."""
+Duration = Annotated[float, _quantity("time"), AfterValidator(_positive)]
+"""In s, above 0."""
+Speed = Annotated[float, _quantity("speed"), AfterValidator(_positive)]
+"""In m/s, above 0."""
 
 
 @dataclass(frozen=True)
@@ -37,7 +64,7 @@ class FilterChain:
     sections: tuple[Section, ...] = ()
 
     def __post_init__(self) -> None:
-        if self.median not in MEDIANS:
+        if self.median not in _MEDIANS:
             raise CompensationError(f"median of {self.median} readings: allowed are 1, 3 and 5")
 
     def delay(self, frequency: ArrayLike = 0.0) -> FloatArray:
@@ -72,6 +99,64 @@ class FilterChain:
         return passed
 
 
+class LowPass(StrictModel):
+    """Settings of a Butterworth low-pass."""
+
+    cutoff: Frequency
+    order: int = 2
+
+    def sections(self, sample: float) -> tuple[Section, ...]:
+        """Return its sections for a sampling time in s; see `low_pass`."""
+        return low_pass(self.cutoff, self.order, sample)
+
+
+class Notch(StrictModel):
+    """Settings of a notch for one line."""
+
+    frequency: Frequency
+    width: Frequency
+
+    def sections(self, sample: float) -> tuple[Section, ...]:
+        """Return its section for a sampling time in s; see `notch`."""
+        return notch(self.frequency, self.width, sample)
+
+
+class FilterSettings(StrictModel):
+    """Settings of the filters that smooth the wrench."""
+
+    sample: Duration | None = None
+    """Time between two readings, in s; the cycle by default."""
+    median: Literal[1, 3, 5] = 3
+    notches: tuple[Notch, ...] = ()
+    low_pass: LowPass | None = LowPass.model_construct(cutoff=15.0)
+
+    def chain(self, cycle: float) -> FilterChain:
+        """Return the filters; made anew at every call.
+
+        Parameters
+        ----------
+        cycle : float
+            Time between two corrections, in s: that of the readings where ``sample`` is not given.
+
+        Raises
+        ------
+        CompensationError
+            If a frequency is not below half the rate of readings, or they delay a wrench too long.
+        """
+        sample = self.sample or cycle
+        sections = tuple(section for each in self.notches for section in each.sections(sample))
+        if self.low_pass is not None:
+            sections += self.low_pass.sections(sample)
+        chain = FilterChain(sample, self.median, sections)
+        delay = float(chain.delay())
+        if not delay <= _LONGEST_DELAY:
+            raise CompensationError(
+                f"the filters delay a slow wrench by {delay:.4g} s: at most {_LONGEST_DELAY:g} s,"
+                " after that it no longer is what acts"
+            )
+        return chain
+
+
 def low_pass(cutoff: float, order: int, sample: float) -> tuple[Section, ...]:
     """Return a Butterworth low-pass as second-order sections.
 
@@ -90,8 +175,8 @@ def low_pass(cutoff: float, order: int, sample: float) -> tuple[Section, ...]:
         If the cut-off is not between 0 and half the sampling rate, or the order is not allowed.
     """
     _check_frequency("low-pass cut-off", cutoff, sample)
-    if order not in range(1, MOST_ORDER + 1):
-        raise CompensationError(f"low-pass order {order}: allowed are 1 to {MOST_ORDER}")
+    if order not in range(1, _LARGEST_ORDER + 1):
+        raise CompensationError(f"low-pass order {order}: allowed are 1 to {_LARGEST_ORDER}")
     return _sections(signal.butter(order, cutoff, fs=1.0 / sample, output="sos"))
 
 

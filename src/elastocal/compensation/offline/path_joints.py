@@ -1,14 +1,74 @@
-"""From poses to joints, on the branch that goes on from the row before."""
+"""Joints of a path: from poses to joints on the branch that goes on, and within the limits."""
+
+from collections.abc import Callable
 
 import numpy as np
 
 from elastocal.arrays import FloatArray, IndexArray
-from elastocal.compensation.offline.limits import Where
-from elastocal.compensation.path import PathError
+from elastocal.compensation.offline import (
+    PathError,
+)
 from elastocal.robot import Robot
 from elastocal.robot.inverse import TURN, InverseKinematics
 
-JUMP = 0.5 * np.pi
+RowName = Callable[[int], str]
+"""Names a row for a person, e.g. ``row 12``."""
+
+_ON_LIMIT = 1e-9
+"""Outside by less than this, in rad or m, is on the limit."""
+
+
+def check_limits(robot: Robot, q: FloatArray, where: RowName, what: str) -> None:
+    """Refuse joints outside their limits, the first by name.
+
+    Parameters
+    ----------
+    robot : Robot
+        Whose limits hold.
+    q : ndarray, shape (row, joint)
+        Positions of the robot's first joints (all, or the external axes), in rad or m.
+    where : callable
+        Names a row.
+    what : str
+        What is the matter with the joint.
+
+    Raises
+    ------
+    PathError
+        If there is one.
+    """
+    count = q.shape[1]
+    low, high = robot.limits.lower[:count], robot.limits.upper[:count]
+    inside = (q >= low - _ON_LIMIT) & (q <= high + _ON_LIMIT)
+    if inside.all():
+        return
+    row, joint = np.argwhere(~inside)[0]
+    turns = robot.revolute[joint]
+    scale, unit = (180.0 / np.pi, "deg") if turns else (1e3, "mm")
+    lower, upper = scale * low[joint], scale * high[joint]
+    raise PathError(
+        f"{where(int(row))}: {robot.joint_names[joint]} {what} to {scale * q[row, joint]:.4g}"
+        f" {unit}, outside its limits {lower:.4g} to {upper:.4g} {unit}"
+    )
+
+
+def turned_inside(robot: Robot, q: FloatArray) -> FloatArray:
+    """Return joints that are outside their limits a whole turn elsewhere, if that is inside.
+
+    Parameters
+    ----------
+    robot : Robot
+        Whose limits hold.
+    q : ndarray, shape (row, joint)
+        In rad or m.
+    """
+    limits, revolute = robot.limits, np.array(robot.revolute)
+    turned = q - TURN * np.sign(q)
+    swap = revolute & (limits.margin(q) < -_ON_LIMIT) & (limits.margin(turned) >= -_ON_LIMIT)
+    return np.where(swap, turned, q)
+
+
+_JUMP = 0.5 * np.pi
 """A joint that turns farther than this from one row to the next has changed its posture, in rad."""
 _OUTSIDE = 1e-9
 
@@ -19,12 +79,12 @@ def nearest_zero_posture(robot: Robot) -> FloatArray:
     return zero
 
 
-def follow(
+def joints_along_path(
     solver: InverseKinematics,
     T_base_tcp: FloatArray,
     external: FloatArray,
     previous: FloatArray,
-    where: Where,
+    where: RowName,
 ) -> FloatArray:
     """Return joints that reach the poses, each on the branch nearest to the row before.
 
@@ -65,19 +125,19 @@ def follow(
             f" {z:.1f}) mm in this orientation within the joint limits"
         )
     robot = solver.robot
-    slots = _slots(robot, found.q, previous)
+    slots = _branches(robot, found.q, previous)
     return _unwound(robot, found.q[np.arange(len(slots)), slots], previous)
 
 
-def jumps(robot: Robot, q: FloatArray, previous: FloatArray) -> IndexArray:
-    """Return the rows at which a joint of the arm turns farther than `JUMP` from the row before."""
+def posture_jumps(robot: Robot, q: FloatArray, previous: FloatArray) -> IndexArray:
+    """Return the rows at which a joint of the arm turns by more than 90 deg from the row before."""
     arm = slice(robot.external_axes, None)
     steps = np.abs(np.diff(np.vstack([previous, q]), axis=0))[:, arm]
     turning = np.array(robot.revolute)[arm]
-    return np.flatnonzero((steps[:, turning] > JUMP).any(axis=1))
+    return np.flatnonzero((steps[:, turning] > _JUMP).any(axis=1))
 
 
-def _slots(robot: Robot, branches: FloatArray, previous: FloatArray) -> IndexArray:
+def _branches(robot: Robot, branches: FloatArray, previous: FloatArray) -> IndexArray:
     """Return the branch slot of each row."""
     slots = np.empty(len(branches), dtype=np.intp)
     slots[0] = _cost(robot, branches[0] - previous).argmin()
