@@ -50,7 +50,7 @@ def test_every_spring_is_drawn_with_both_intervals(found):
         for estimate in (change.old, change.new):
             assert any(np.allclose(x, [1e6 * estimate.low, 1e6 * estimate.high]) for x in ends)
     assert len(tested.lines) >= 2 * 14
-    np.testing.assert_allclose(rows.lines[0].get_ydata(), 1e3 * found.deflection.size)
+    np.testing.assert_allclose(rows.lines[0].get_ydata(), 1e3 * np.array(found.deflection.size))
 
 
 def test_what_moved_is_said_in_words_and_set_in_bold(found):
