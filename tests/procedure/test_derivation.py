@@ -24,7 +24,7 @@ def derived(run) -> Derived:
 
 
 def values(derived: Derived, name: str) -> np.ndarray:
-    return derived.dataset.data[name].values
+    return derived.dataset.to_xarray()[name].values
 
 
 def test_forces_come_out_in_base_without_tool_weight_and_bias(run, derived):
@@ -86,7 +86,7 @@ def test_deriving_again_gives_the_same_files(run, derived):
     first = read(folder.dataset)
     again = derive(run.path)
     write_derived(run.path, again)
-    assert first.data.identical(read(folder.dataset).data)
+    assert first.to_xarray().identical(read(folder.dataset).to_xarray())
     assert json.loads(folder.summary.read_text())["schema"] == "elastocal.run-summary/1"
 
 
@@ -97,7 +97,7 @@ def test_a_reading_that_slipped_keeps_its_numbers_and_its_status(tmp_path):
         return window
 
     derived = derive(record_run(tmp_path / "run", change=slip).path)
-    cell = derived.dataset.data.sel(pose=2, load_case="east")
+    cell = derived.dataset.to_xarray().sel(pose=2, load_case="east")
     assert cell["status"] == 1
     assert np.all(np.isfinite(cell["force"]))
     assert derived.summary["readings"]["not_ok"] == [
@@ -113,7 +113,7 @@ def test_a_window_without_samples_is_missing_and_says_how_many_there_are(tmp_pat
         return window
 
     derived = derive(record_run(tmp_path / "run", change=shorten).path)
-    cell = derived.dataset.data.sel(pose=1, load_case="west")
+    cell = derived.dataset.to_xarray().sel(pose=1, load_case="west")
     assert cell["status"] == 4
     assert np.all(np.isnan(cell["force"]))
     assert derived.summary["readings"]["not_ok"][0]["note"] == (
@@ -128,7 +128,7 @@ def test_a_pose_with_a_bad_reference_is_missing_as_a_whole(tmp_path):
         return window
 
     derived = derive(record_run(tmp_path / "run", change=spoil).path)
-    assert derived.dataset.data["status"].sel(pose=4).values.tolist() == [4] * 5
+    assert derived.dataset.to_xarray()["status"].sel(pose=4).values.tolist() == [4] * 5
     notes = {entry["note"] for entry in derived.summary["readings"]["not_ok"]}
     assert notes == {"the unloaded reference is missing: no beam"}
 

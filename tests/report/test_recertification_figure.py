@@ -27,7 +27,7 @@ def compared():
 
 @pytest.fixture(scope="module")
 def found(compared):
-    return compared.result
+    return compared.summary
 
 
 def drawn(found):
@@ -67,7 +67,7 @@ def test_what_moved_is_said_in_words_and_set_in_bold(found):
 def test_without_rows_there_are_springs_alone(found):
     figure = drawn(replace(found, deflection=None, verdict=None, limit=None))
     assert len(figure.axes) == 2
-    assert "No compared" in words(drawn(recertify(made_up(0), made_up(1)).result))
+    assert "No compared" in words(drawn(recertify(made_up(0), made_up(1)).summary))
 
 
 def test_nothing_to_compare_still_makes_a_page(found):
@@ -81,7 +81,7 @@ def test_many_rows_are_drawn_in_groups_that_keep_the_extremes(compared):
         calibrated(linear_truth(), 0), calibrated(soft_truth(), 50_000),
         np.tile(change.q, (20, 1)), np.tile(change.force, (20, 1)),
     )  # fmt: skip
-    line = drawn(many.result).axes[2].lines[0]
+    line = drawn(many.summary).axes[2].lines[0]
     assert len(line.get_ydata()) <= 1500
     assert line.get_ydata().max() == pytest.approx(1e3 * change.largest.value)
 

@@ -90,7 +90,7 @@ def codec(  # noqa: PLR0913 - one parameter an option
         VERDICTS,
         CodecOptions,
         analyse,
-        codec_result,
+        codec_summary,
         cross_validate,
         judge,
         make_variants,
@@ -121,7 +121,7 @@ def codec(  # noqa: PLR0913 - one parameter an option
         )
         verdicts = judge(found, near)
         insight = analyse(arm, readings, found, marker_offset=offset, with_indices=indices)
-        result = codec_result(found, verdicts, insight.correlations)
+        result = codec_summary(found, verdicts, insight.correlations)
         axes = ("x", "y", "z") if per_axis else ()
         names = write_codec_folder(folder, found, verdicts, result, insight, axes)
     if as_json:

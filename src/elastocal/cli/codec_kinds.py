@@ -12,7 +12,7 @@ from elastocal.codec import (
     CodecData,
     read_codec,
     read_codec_folder,
-    read_codec_result,
+    read_codec_summary,
 )
 from elastocal.errors import SchemaError
 from elastocal.files import read_text
@@ -50,7 +50,7 @@ def arrays(path: Path) -> Described:
 
 def verdicts(path: Path) -> Described:
     """Describe the verdicts of a codec."""
-    result = read_codec_result(path)
+    result = read_codec_summary(path)
     return "verdict file of a codec", {
         "schema": VERDICTS_SCHEMA,
         "robot": result.robot,

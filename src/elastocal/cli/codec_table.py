@@ -8,12 +8,12 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from elastocal.codec import CodecResult
+from elastocal.codec import CodecSummary
 
 _MOST_ROWS = 12
 
 
-def show_codec(console: Console, result: CodecResult, out: Path, names: Sequence[str]) -> None:
+def show_codec(console: Console, result: CodecSummary, out: Path, names: Sequence[str]) -> None:
     """Print the verdicts of a codec."""
     console.print(f"[bold]{escape(result.robot)}[/bold]: {result.settings.sentence}")
     console.print(_table(result))
@@ -24,7 +24,7 @@ def show_codec(console: Console, result: CodecResult, out: Path, names: Sequence
     console.print(f"\n{', '.join(names)} written to [bold]{escape(str(out))}[/bold]")
 
 
-def _table(result: CodecResult) -> Table:
+def _table(result: CodecSummary) -> Table:
     """Return the median errors at held-out poses, for some numbers of training poses."""
     table = Table(box=None, pad_edge=False, title="error norm at held-out poses, µm: mean / max")
     table.add_column("training poses", justify="right")

@@ -52,14 +52,14 @@ def compare(
     if figure is not None:
         from elastocal.report import write_recertification_figure
 
-        write_recertification_figure(figure, found.result)
+        write_recertification_figure(figure, found.summary)
     if out is not None:
-        write_json(out, found.result)
+        write_json(out, found.summary)
     if as_json:
-        print_json(to_data(found.result))
+        print_json(to_data(found.summary))
         return
     hint = (
-        measured_rows(found.result.new_provenance) if limit is not None and rows is None else None
+        measured_rows(found.summary.new_provenance) if limit is not None and rows is None else None
     )
     show_comparison(console(), found, hint)
     for path in (each for each in outputs.values() if each is not None):

@@ -34,19 +34,6 @@ from .paired_differences import (
     PairVerdict as PairVerdict,
     paired_difference as paired_difference,
 )
-from .result import (
-    VERDICTS as VERDICTS,
-    VERDICTS_SCHEMA as VERDICTS_SCHEMA,
-    CodecResult as CodecResult,
-    CodecSetup as CodecSetup,
-    Curve as Curve,
-    Verdicts as Verdicts,
-    codec_result as codec_result,
-    judge as judge,
-    read_codec_folder as read_codec_folder,
-    read_codec_result as read_codec_result,
-    write_codec_result as write_codec_result,
-)
 from .saturation import (
     Saturation as Saturation,
     SaturationInterval as SaturationInterval,
@@ -71,4 +58,17 @@ from .variants import (
     read_comparison as read_comparison,
     read_comparisons as read_comparisons,
     training_cases as training_cases,
+)
+from .verdicts import (
+    VERDICTS as VERDICTS,
+    VERDICTS_SCHEMA as VERDICTS_SCHEMA,
+    CodecSetup as CodecSetup,
+    CodecSummary as CodecSummary,
+    Curve as Curve,
+    Verdicts as Verdicts,
+    codec_summary as codec_summary,
+    judge as judge,
+    read_codec_folder as read_codec_folder,
+    read_codec_summary as read_codec_summary,
+    write_codec_summary as write_codec_summary,
 )

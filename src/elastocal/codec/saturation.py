@@ -1,6 +1,6 @@
 """The saturation verdict: from how many training poses on the error no longer falls."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.random import Generator
@@ -90,6 +90,11 @@ class Saturation(SaturationInterval):
     """Smallest number of training poses whose error is within the tolerance of the last."""
     last: int
     """Size of the largest training set."""
+    settled: bool = field(init=False)
+
+    def __post_init__(self) -> None:
+        settled = self.high is not None and self.high < self.last and not self.rises
+        object.__setattr__(self, "settled", settled)
 
     def sentence(self, tolerance: Tolerance, largest: FloatArray, where: str) -> str:
         """Return the verdict in words.
@@ -179,20 +184,18 @@ def find_saturation(
         low = min(int(n), int(np.percentile(_for_good(reached), tail, method="lower")))
         high = max(int(n), int(np.percentile(_first(reached), 100.0 - tail, method="higher")))
     least = int(np.argmin(curve))
-    rises = bool(curve[-1] - curve[least] > tolerance.of(curve[-1]))
     return Saturation(
         variant=variant,
         n_train=int(n),
         low=low,
         high=high,
-        settled=high is not None and high < len(curve) and not rises,
         error=float(curve[n - 1]),
         last_error=float(curve[-1]),
         last=len(curve),
         stays=int(_for_good(tolerance.reached(curve))),
         least=least + 1,
         least_error=float(curve[least]),
-        rises=rises,
+        rises=bool(curve[-1] - curve[least] > tolerance.of(curve[-1])),
     )
 
 

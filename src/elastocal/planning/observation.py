@@ -36,13 +36,13 @@ def pose_rows(cell: Cell, model: ElasticModel, postures: Postures) -> FloatArray
         In m per unit of compliance; a row is an axis of a load case.
     """
     force_tcp = cell.file.load_cases.force_tcp
-    rows = np.empty((len(postures), 3 * len(force_tcp), len(model.springs)))
+    rows = np.empty((len(postures), 3 * len(force_tcp), len(model.parameters)))
     for start in range(0, len(postures), _CHUNK):
         part = slice(start, start + _CHUNK)
         R_base_tcp = postures.T_base_tcp[part, :3, :3]
         force = np.einsum("pij,lj->pli", R_base_tcp, force_tcp)
         blocks = model.observation_blocks(postures.q[part, None], force)
-        rows[part] = blocks.reshape(len(R_base_tcp), -1, len(model.springs))
+        rows[part] = blocks.reshape(len(R_base_tcp), -1, len(model.parameters))
     return rows
 
 
@@ -55,4 +55,4 @@ def process_rows(cell: Cell, model: ElasticModel) -> FloatArray | None:
     if process is None:
         return None
     blocks = model.observation_blocks(process.joint_position, process.force, process.moment)
-    return blocks.reshape(-1, len(model.springs))
+    return blocks.reshape(-1, len(model.parameters))

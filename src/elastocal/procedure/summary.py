@@ -118,7 +118,7 @@ def _readings(rows: Sequence[LoadRow]) -> dict[str, Any]:
 
 
 def _registration(registration: Registration, dataset: Dataset) -> dict[str, Any]:
-    typical = np.linalg.norm(dataset.data["marker_displacement"].values, axis=-1)
+    typical = np.linalg.norm(dataset.marker_displacement, axis=-1)
     displacement = float(np.nanmedian(typical))
     return {
         "stations": [_station(fit, displacement) for fit in registration.stations],

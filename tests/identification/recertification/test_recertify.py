@@ -12,7 +12,7 @@ from support.recertified import calibrated, made_up, soft_truth, softened
 
 
 def compare(*models_and_rows, **options):
-    return recertify(*models_and_rows, **options).result
+    return recertify(*models_and_rows, **options).summary
 
 
 @pytest.fixture(scope="module")
@@ -71,7 +71,7 @@ def test_the_limit_decides_by_the_interval_of_the_largest_change(loads):
 def test_turned_round_the_change_has_the_other_sign(loads):
     old, new = calibrated(linear_truth(), 0), calibrated(soft_truth(), 50_000)
     there, back = recertify(old, new, *loads), recertify(new, old, *loads)
-    for a, b in zip(there.result.springs, back.result.springs, strict=True):
+    for a, b in zip(there.summary.springs, back.summary.springs, strict=True):
         assert a.difference.value == pytest.approx(-b.difference.value)
         assert a.moved == b.moved
     np.testing.assert_allclose(there.rows.change, -back.rows.change)

@@ -5,9 +5,10 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
-from elastocal.dataset import Column, joint_dimensions
+from elastocal.dataset import joint_dimensions
 from elastocal.errors import CompensationError, UnitError, nearest
 from elastocal.robot import Robot
+from elastocal.tables import Column
 from elastocal.units import factor, split_column
 
 

@@ -13,9 +13,9 @@ from scipy.spatial.transform import Rotation
 
 from elastocal.arrays import FloatArray
 from elastocal.compensation.offline.path_columns import EULER, PathColumns, PathError, WrenchColumns
-from elastocal.dataset import DELIMITERS, Column
 from elastocal.errors import FileAccessError
 from elastocal.robot import T_from_xyzabc
+from elastocal.tables import DELIMITERS, Column
 
 _BLOCK = 1 << 20
 

@@ -6,10 +6,10 @@ from .comparison import (
 from .result import (
     SCHEMA as SCHEMA,
     CompareResult as CompareResult,
+    CompareSummary as CompareSummary,
     DeflectionChange as DeflectionChange,
     Estimate as Estimate,
     LargestChange as LargestChange,
-    Recertification as Recertification,
     RowComparison as RowComparison,
     SpringChange as SpringChange,
     Verdict as Verdict,

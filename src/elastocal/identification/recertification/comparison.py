@@ -15,7 +15,7 @@ from elastocal.identification.recertification._judgement import judge, load_note
 from elastocal.identification.recertification._rows import compare_rows
 from elastocal.identification.recertification._spread import Spread
 from elastocal.identification.recertification._springs import common_springs, compare_springs
-from elastocal.identification.recertification.result import CompareResult, Recertification
+from elastocal.identification.recertification.result import CompareResult, CompareSummary
 from elastocal.records import read_json
 from elastocal.robot import Robot
 
@@ -33,7 +33,7 @@ def recertify_files(
     moment: ArrayLike | None = None,
     *,
     limit: float | None = None,
-) -> Recertification:
+) -> CompareResult:
     """Compare two model files; as `recertify`, with a note where the loads were others.
 
     Parameters
@@ -64,7 +64,7 @@ def recertify_files(
     note = load_note(*(_measured_deflection(path) for path in (old, new)))
     if note is None:
         return found
-    return replace(found, result=replace(found.result, notes=(*found.result.notes, note)))
+    return replace(found, summary=replace(found.summary, notes=(*found.summary.notes, note)))
 
 
 def recertify(
@@ -76,7 +76,7 @@ def recertify(
     *,
     limit: float | None = None,
     names: tuple[str, str] = ("the old model", "the new model"),
-) -> Recertification:
+) -> CompareResult:
     """Compare two calibrations of one cell.
 
     Parameters
@@ -124,7 +124,7 @@ def recertify(
         tuple(name for name in each.model.spring_names if name not in common) for each in (old, new)
     )
     outside = 0 if loads is None else _count_outside_limits(new.model.robot, loads[0])
-    result = CompareResult(
+    result = CompareSummary(
         robot=new.model.robot.name,
         tcp=new.model.robot.tip,
         old_provenance=old.provenance,
@@ -140,7 +140,7 @@ def recertify(
         reason=reason,
         notes=notes_on(old, new, not only_old and not only_new, outside),
     )
-    return Recertification(result, rows)
+    return CompareResult(result, rows)
 
 
 def check_same_robot(old: Robot, new: Robot, names: tuple[str, str]) -> None:

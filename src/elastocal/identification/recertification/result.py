@@ -8,6 +8,7 @@ import numpy as np
 from elastocal.arrays import FloatArray
 from elastocal.identification.observability import Term
 from elastocal.records import record
+from elastocal.results import Result
 
 SCHEMA = "elastocal.comparison/1"
 
@@ -72,7 +73,7 @@ class SpringChange:
         return abs(d.value) / width if width > 0.0 else float("inf")
 
 
-Triple = tuple[float, float, float]
+_Triple = tuple[float, float, float]
 
 
 @record()
@@ -83,15 +84,15 @@ class LargestChange:
     """Its number, from 0."""
     joints: tuple[float, ...]
     """In rad or m."""
-    force: Triple
+    force: _Triple
     """On the robot at the tcp in base, in N."""
-    moment: Triple | None
+    moment: _Triple | None
     """On the robot about the tcp in base, in N·m; None: none."""
-    tcp_position: Triple
+    tcp_position: _Triple
     """In base, in m."""
-    old: Triple
+    old: _Triple
     """Deflection by the old model in base, in m."""
-    new: Triple
+    new: _Triple
     """Deflection by the new model in base, in m."""
 
 
@@ -114,7 +115,7 @@ class DeflectionChange:
 
 
 @record(SCHEMA)
-class CompareResult:
+class CompareSummary:
     """Two calibrations of one cell, compared."""
 
     robot: str
@@ -229,16 +230,27 @@ class RowComparison:
         )
 
 
-@dataclass(frozen=True, eq=False)
-class Recertification:
-    """A comparison with the rows that it rests on."""
+@dataclass(frozen=True, eq=False, repr=False)
+class CompareResult(Result):
+    """Two calibrations of one cell, compared, with the rows that it rests on."""
 
-    result: CompareResult
+    summary: CompareSummary
+    """The figures and the verdict, as files hold them."""
     rows: RowComparison | None
     """None without rows."""
 
+    def facts(self) -> tuple[tuple[str, str], ...]:
+        """Return what a person wants to know first."""
+        found = self.summary
+        return (
+            ("robot", found.robot),
+            ("moved", ", ".join(found.moved) or "none"),
+            ("verdict", "none" if found.verdict is None else found.verdict.value),
+            ("reason", found.reason),
+        )
 
-def _triple(vector: FloatArray) -> Triple:
+
+def _triple(vector: FloatArray) -> _Triple:
     x, y, z = vector.tolist()
     return x, y, z
 

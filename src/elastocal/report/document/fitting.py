@@ -71,7 +71,7 @@ def check_codec(data: CodecData, parts: Parts, path: Path) -> CodecData:
     foreign = [label for group in data.pose_labels for label in group if label not in known]
     if foreign:
         raise CodecError(f"{path} has pose {foreign[0]}, which the dataset does not have")
-    if "tcp_position" in parts.dataset.data and not _same_places(data, parts.dataset):
+    if not _same_places(data, parts.dataset):
         raise CodecError(f"{path} has its poses at other places than the dataset")
     return data
 
@@ -114,7 +114,9 @@ def _doubts(parts: Parts) -> Iterator[str]:
 
 
 def _same_places(data: CodecData, dataset: Dataset) -> bool:
-    place = dict(zip(dataset.poses, dataset.data["tcp_position"].values, strict=True))
+    if dataset.tcp_position is None:
+        return True
+    place = dict(zip(dataset.poses, dataset.tcp_position, strict=True))
     found = np.array([place[group[0]] for group in data.pose_labels])
     gap = np.linalg.norm(found - data.contact, axis=1)
     return bool(np.all(~(gap > _SAME_PLACE)))

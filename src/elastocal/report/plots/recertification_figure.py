@@ -11,7 +11,7 @@ from matplotlib.ticker import FuncFormatter, MaxNLocator
 
 from elastocal.arrays import FloatArray
 from elastocal.identification.recertification import (
-    CompareResult,
+    CompareSummary,
     DeflectionChange,
     Estimate,
     SpringChange,
@@ -32,14 +32,14 @@ _EDGE = 3.0
 """Changes beyond this many times what chance allows are drawn at the edge, with the number."""
 
 
-def write_recertification_figure(path: Path, found: CompareResult) -> Path:
+def write_recertification_figure(path: Path, found: CompareSummary) -> Path:
     """Write the figure, atomically; return its path.
 
     Parameters
     ----------
     path : Path
         Its suffix decides the kind: SVG, PNG or PDF.
-    found : CompareResult
+    found : CompareSummary
         The comparison.
 
     Raises
@@ -52,7 +52,7 @@ def write_recertification_figure(path: Path, found: CompareResult) -> Path:
     return write_figure(path, lambda: recertification_figure(found), _title(found), description)
 
 
-def recertification_figure(found: CompareResult) -> Figure:
+def recertification_figure(found: CompareSummary) -> Figure:
     """Return the figure; see `write_recertification_figure`.
 
     Above, every compared spring or sum with both intervals, and its change over what chance
@@ -170,7 +170,7 @@ def _over_chance(together: Estimate) -> float:
     return float(np.sign(together.value) * np.inf) if together.value != 0.0 else 0.0
 
 
-def _draw_frame(figure: Figure, found: CompareResult, height: float) -> None:
+def _draw_frame(figure: Figure, found: CompareSummary, height: float) -> None:
     figure.text(
         0.15 / _WIDTH, 1.0 - 0.1 / height, literal(_title(found)), va="top", fontsize=11.5,
         weight="bold",
@@ -200,11 +200,11 @@ def _draw_frame(figure: Figure, found: CompareResult, height: float) -> None:
     )  # fmt: skip
 
 
-def _title(found: CompareResult) -> str:
+def _title(found: CompareSummary) -> str:
     return f"{found.robot}: two calibrations compared"
 
 
-def _found(found: CompareResult) -> str:
+def _found(found: CompareSummary) -> str:
     """Return the finding in a sentence or two."""
     names = ", ".join(found.moved)
     verb = "moved" if found.same_springs else "differ"

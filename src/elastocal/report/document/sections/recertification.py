@@ -3,8 +3,9 @@
 from collections.abc import Iterator
 from functools import partial
 
+from elastocal.elastic import unit_of
 from elastocal.identification.recertification import (
-    CompareResult,
+    CompareSummary,
     DeflectionChange,
     Estimate,
     Verdict,
@@ -43,7 +44,7 @@ def body(parts: Parts) -> Content:
     return Content(html + listed(_notes(found)), findings=tuple(_findings(found)))
 
 
-def _sentence(found: CompareResult) -> str:
+def _sentence(found: CompareSummary) -> str:
     words = {
         Verdict.PASS: "Passed:",
         Verdict.FAIL: "Failed:",
@@ -53,7 +54,7 @@ def _sentence(found: CompareResult) -> str:
     return f"{words[found.verdict]} {found.reason}. {_moved(found)}"
 
 
-def _moved(found: CompareResult) -> str:
+def _moved(found: CompareSummary) -> str:
     names = ", ".join(found.moved)
     if not names:
         return "No compared spring moved beyond its interval."
@@ -71,30 +72,30 @@ def _deflections(change: DeflectionChange, limit: float | None) -> str:
     )
 
 
-def _springs(found: CompareResult) -> str:
+def _springs(found: CompareSummary) -> str:
     rows = [
         (
             each.name,
             "moved" if each.moved else "",
-            f"{1e6 * each.old.value:.4f}",
-            f"{1e6 * each.new.value:.4f}",
-            f"{1e6 * each.difference.value:+.4f}",
-            f"{1e6 * each.together.low:+.3f} to {1e6 * each.together.high:+.3f}",
-            "µm/N" if each.unit.startswith("m/") else "µrad/(N·m)",
+            f"{unit.factor * each.old.value:.4f}",
+            f"{unit.factor * each.new.value:.4f}",
+            f"{unit.factor * each.difference.value:+.4f}",
+            f"{unit.factor * each.together.low:+.3f} to {unit.factor * each.together.high:+.3f}",
+            unit.shown,
         )
-        for each in found.springs
+        for each, unit in ((each, unit_of(each.unit)) for each in found.springs)
     ]
     heads = ("Spring or sum", "", "Old", "New", "Change", "95 %, all at once", "Unit")
     return table("Springs and sums that both calibrations determine", heads, rows, texts=2)
 
 
-def _notes(found: CompareResult) -> Iterator[str]:
+def _notes(found: CompareSummary) -> Iterator[str]:
     # The origin of the readings is a path; where a folder lies is no part of a report.
     for note in found.notes:
         yield note.replace(f" ({found.old_provenance})", "")
 
 
-def _findings(found: CompareResult) -> Iterator[Finding]:
+def _findings(found: CompareSummary) -> Iterator[Finding]:
     if found.verdict is Verdict.PASS:
         yield Finding(f"against the earlier calibration: {found.reason}", holds_back=False)
     elif found.verdict is not None:

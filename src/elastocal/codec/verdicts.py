@@ -81,7 +81,7 @@ class CodecSetup:
 
 
 @record(VERDICTS_SCHEMA)
-class CodecResult:
+class CodecSummary:
     """The figures of a codec: contents of ``codec.json``, for people's scripts."""
 
     robot: str
@@ -135,12 +135,12 @@ def judge(data: CodecData, tolerance: Tolerance | None = None) -> Verdicts:
     return Verdicts(found, pairs, tolerance, sentences)
 
 
-def codec_result(
+def codec_summary(
     data: CodecData, verdicts: Verdicts, correlations: Sequence[Correlation] = ()
-) -> CodecResult:
+) -> CodecSummary:
     """Return the figures of a codec, its verdicts, and correlations of indices if there are."""
     interval = [each.name for each in fields(SaturationInterval)]
-    return CodecResult(
+    return CodecSummary(
         robot=data.robot,
         provenance=data.provenance,
         settings=_setup(data, verdicts.tolerance),
@@ -159,7 +159,7 @@ def codec_result(
     )
 
 
-def write_codec_result(folder: Path, result: CodecResult) -> Path:
+def write_codec_summary(folder: Path, result: CodecSummary) -> Path:
     """Write ``codec.json`` into a folder, atomically; return its path.
 
     Raises
@@ -172,7 +172,7 @@ def write_codec_result(folder: Path, result: CodecResult) -> Path:
     return path
 
 
-def read_codec_result(path: Path) -> CodecResult:
+def read_codec_summary(path: Path) -> CodecSummary:
     """Return the validated contents of a ``codec.json``.
 
     Raises
@@ -182,10 +182,10 @@ def read_codec_result(path: Path) -> CodecResult:
     FileAccessError
         If it cannot be read.
     """
-    return read_json(path, CodecResult)
+    return read_json(path, CodecSummary)
 
 
-def read_codec_folder(folder: Path) -> tuple[CodecData, CodecResult]:
+def read_codec_folder(folder: Path) -> tuple[CodecData, CodecSummary]:
     """Return arrays and result of a codec's folder.
 
     Raises
@@ -195,7 +195,7 @@ def read_codec_folder(folder: Path) -> tuple[CodecData, CodecResult]:
     FileAccessError
         If one cannot be read.
     """
-    data, result = read_codec(folder), read_codec_result(Path(folder) / VERDICTS)
+    data, result = read_codec(folder), read_codec_summary(Path(folder) / VERDICTS)
     names = [each.name for each in data.variants]
     if names != list(result.variants) or len(data.contact) != result.settings.poses:
         raise SchemaError(f"{folder}: {ARRAYS} and {VERDICTS} are of different codecs")
