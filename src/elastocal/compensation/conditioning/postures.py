@@ -15,7 +15,7 @@ from elastocal.errors import CompensationError
 from elastocal.files import read_text
 from elastocal.robot import GRAVITY, Robot, T_from_xyzabc
 
-LEAST = 3
+LEAST_POSTURES = 3
 """Postures; with fewer nothing is left to tell whether the numbers fit."""
 
 
@@ -90,10 +90,10 @@ def static_postures(
         *(np.array(x, dtype=float) for x in (R_base_flange, force, moment, gravity))
     )
     n = len(made.force)
-    if n < LEAST:
+    if n < LEAST_POSTURES:
         raise CompensationError(
-            f"{n} postures: the tool's weight needs at least {LEAST}, and better 8 or more that"
-            " turn the sensor about two axes"
+            f"{n} postures: the tool's weight needs at least {LEAST_POSTURES}, and better 8 or more"
+            " that turn the sensor about two axes"
         )
     shapes = (made.R_base_flange.shape, made.force.shape, made.moment.shape, made.gravity.shape)
     if shapes != ((n, 3, 3), (n, 3), (n, 3), (3,)):
@@ -107,7 +107,7 @@ def static_postures(
 _ANGLES = ("a", "b", "c")
 _QUATERNION = ("qx", "qy", "qz", "qw")
 _UNIT = 1e-2
-"""How far the length of a quaternion may be from 1."""
+"""Largest distance of the length of a quaternion from 1."""
 
 
 def read_postures(

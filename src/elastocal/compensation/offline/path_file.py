@@ -23,7 +23,7 @@ from elastocal.compensation.offline import (
     row_blocks,
     turned_to_base,
 )
-from elastocal.compensation.offline.correct import LARGEST, PathCorrection, correct_rows
+from elastocal.compensation.offline.correct import LARGEST_DEFLECTION, PathCorrection, correct_rows
 from elastocal.compensation.offline.path_joints import (
     RowName,
     check_limits,
@@ -43,11 +43,11 @@ _ADDED = tuple(f"deflection_{axis}{end}[m]" for end in ("", "_low", "_high") for
 
 @dataclass(frozen=True, eq=False)
 class CorrectionSettings:
-    """How a path is corrected."""
+    """Settings of the correction of a path."""
 
     start: FloatArray | None = None
     """Posture before the first row of a path of poses, shape (joint,), in rad or m."""
-    largest: float = LARGEST
+    largest: float = LARGEST_DEFLECTION
     """Largest deflection that is taken for one, in m."""
 
 

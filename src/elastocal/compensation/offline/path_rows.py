@@ -12,7 +12,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from elastocal.arrays import FloatArray
-from elastocal.compensation.offline.path_columns import EULER, PathColumns, PathError, WrenchColumns
+from elastocal.compensation.offline.path_columns import PathColumns, PathError, WrenchColumns
 from elastocal.errors import FileAccessError
 from elastocal.robot import T_from_xyzabc
 from elastocal.tables import DELIMITERS, Column
@@ -22,7 +22,7 @@ _BLOCK = 1 << 20
 
 @dataclass(frozen=True)
 class TextLayout:
-    """How a file is written, so that it is written back the same way."""
+    """The layout of a file's text, so that it is written back the same way."""
 
     preamble: tuple[str, ...]
     """Comment and blank lines above the header, with their line ends."""
@@ -120,7 +120,7 @@ def _above(file: TextIO) -> tuple[list[str], str]:
 
 @contextmanager
 def _opened(path: Path) -> Iterator[TextIO]:
-    """Yield a text file; its troubles are told as ours."""
+    """Yield a text file; its troubles are raised as ours."""
     try:
         with Path(path).open(encoding="utf-8-sig", newline="") as file:
             yield file
@@ -152,7 +152,7 @@ def beyond_a_turn(angles: FloatArray) -> tuple[int, int] | None:
 
 
 _UNIT_NORM = 1e-3
-"""How far the norm of a quaternion may be from 1."""
+"""Largest distance of the norm of a quaternion from 1."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -185,7 +185,7 @@ def read_values(block: RowBlock, columns: PathColumns) -> PathValues:
     pose = None
     if columns.by_pose:
         position, orientation = numbers(columns.position), numbers(columns.orientation)
-        if len(columns.orientation) == len(EULER):
+        if len(columns.orientation) == 3:
             _check_angles(block, columns.orientation, orientation)
         pose = _poses(block, position, orientation)
     wrenches = [

@@ -26,7 +26,7 @@ class PathStations:
     """Rows of a path, evenly taken."""
 
     lines: tuple[int, ...]
-    """Of the file, from 1."""
+    """Lines of the file, from 1."""
     T_base_tcp: FloatArray
     """Shape (station, 4, 4), in m."""
     q: FloatArray
