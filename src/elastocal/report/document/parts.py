@@ -88,7 +88,7 @@ class Parts:
     journal: tuple[Entry, ...] | None = None
     dataset: Dataset | None = None
     summary: dict[str, Any] | None = None
-    """Of the run; see `elastocal.procedure.summary`."""
+    """Of the run; see `elastocal.procedure.derive.summary`."""
     calibrated: Calibrated | None = None
     again: Again | None = None
     """The calibration made once more from the dataset."""
