@@ -12,8 +12,8 @@ from elastocal.compensation.offline import (
 )
 from elastocal.dataset import LoadRows, joint_dimensions, read_load_rows
 from elastocal.errors import CompensationError
-from elastocal.files import read_text
 from elastocal.robot import GRAVITY, Robot, T_from_xyzabc
+from elastocal.tables import opened_table
 
 LEAST_POSTURES = 3
 """Postures; with fewer nothing is left to tell whether the numbers fit."""
@@ -131,7 +131,8 @@ def read_postures(
     DatasetError, FileAccessError
         If the file cannot be read.
     """
-    header = [name.split("[")[0].strip() for name in _header(path)]
+    with opened_table(path) as table:
+        header = [name.split("[")[0].strip() for name in table.layout.header]
     if set(_QUATERNION) <= set(header):
         rows = read_load_rows(path, {})
         R = _from_quaternions(path, rows, header)
@@ -164,13 +165,6 @@ def read_postures(
         return static_postures(R, rows.force, rows.moment, gravity)
     except CompensationError as error:
         raise CompensationError(f"{path}: {error}") from error
-
-
-def _header(path: Path) -> list[str]:
-    """Return the cells of the first line that is no comment."""
-    lines = (line for line in read_text(path).splitlines() if line.strip())
-    first = next((line for line in lines if not line.startswith("#")), "")
-    return first.replace(";", ",").replace("\t", ",").split(",")
 
 
 def _from_quaternions(path: Path, rows: LoadRows, header: list[str]) -> FloatArray:

@@ -26,8 +26,6 @@ from .path_joints import (
 )
 from .path_rows import (
     PathValues as PathValues,
-    RowBlock as RowBlock,
-    TextLayout as TextLayout,
     beyond_a_turn as beyond_a_turn,
     count_lines as count_lines,
     read_layout as read_layout,
