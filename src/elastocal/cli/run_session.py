@@ -17,7 +17,7 @@ from elastocal.cli.interruption import interruption
 from elastocal.cli.run_view import watching
 from elastocal.errors import ElastocalError, ProcedureError
 from elastocal.files import read_text
-from elastocal.planning import PLAN, PlanFile, read_plan
+from elastocal.planning import PLAN, PlanResult, read_plan
 from elastocal.procedure import (
     End,
     Entry,
@@ -64,7 +64,7 @@ class Prepared:
     """A run that may begin: everything has been read and fits together."""
 
     cell: Cell
-    plan: PlanFile
+    plan: PlanResult
     plan_folder: Path
     settings: Settings
     source: DeviceSource

@@ -29,6 +29,7 @@ from elastocal.identification.uncertainty import (
     widen_draws,
     widening_factor,
 )
+from elastocal.parallel import one_blas_thread
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,6 +68,7 @@ class Calibration:
         return np.asarray(np.linalg.norm(self.readings.deflection[self.used], axis=1))
 
 
+@one_blas_thread()
 def calibrate(
     model: ElasticModel,
     readings: Readings,
