@@ -5,7 +5,7 @@ import pytest
 
 from elastocal.cell import load_cell
 from elastocal.cell.examples import EXAMPLES, write_example
-from elastocal.cell.examples.meshes import block, dome_section
+from elastocal.cell.examples.example import block, dome_section
 from elastocal.planning.surface import (
     ReachableFrom,
     arm_reach,

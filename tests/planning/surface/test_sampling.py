@@ -5,7 +5,7 @@ import pytest
 from scipy.spatial import cKDTree
 
 from elastocal.cell.description.surface import RegionEntry
-from elastocal.cell.examples.meshes import block
+from elastocal.cell.examples.example import block
 from elastocal.planning.surface import (
     SurfaceError,
     build_surface,
