@@ -9,7 +9,7 @@ from elastocal.compensation.conditioning import ToolResult
 from elastocal.compensation.process import SimulatedProcess
 from elastocal.dataset import Dataset
 from elastocal.identification import CalibratedModel
-from elastocal.identification.recertification import Recertification
+from elastocal.identification.recertification import CompareSummary
 from elastocal.planning import PlanResult, PoolData
 from elastocal.planning.surface import Surface
 from elastocal.procedure import Entry
@@ -98,7 +98,7 @@ class Parts:
     codecs: tuple[Codec, ...] = ()
     """One a comparison."""
     process: SimulatedProcess | None = None
-    recertification: Recertification | None = None
+    recertification: CompareSummary | None = None
     """This calibration against an earlier one."""
     limits: Limits = field(default_factory=Limits)
     files: tuple[UsedFile, ...] = ()
