@@ -13,7 +13,7 @@ import pytest
 import xarray as xr
 
 from elastocal.cell import fingerprint, load_cell
-from elastocal.cli.device_sources import KINDS, SOURCES, DeviceSource
+from elastocal.workflows import KINDS, SOURCES, DeviceSource
 from elastocal.errors import DatasetError, FileAccessError
 from elastocal.planning import read_plan, write_plan
 from elastocal.procedure import Journal, RunFolder, cell_place, fill, read_journal, refuse_foreign

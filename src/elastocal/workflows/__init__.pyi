@@ -10,3 +10,17 @@ from .predict import (
     PredictSettings as PredictSettings,
     predict as predict,
 )
+from ._device_sources import DeviceSource as DeviceSource, KINDS as KINDS, SOURCES as SOURCES
+from .derive import DeriveResult as DeriveResult, DeriveSettings as DeriveSettings, derive as derive
+from .run import (
+    DryRunResult as DryRunResult,
+    Operator as Operator,
+    POSES_MEASURED as POSES_MEASURED,
+    RunFigures as RunFigures,
+    RunResult as RunResult,
+    RunSettings as RunSettings,
+    Supervision as Supervision,
+    Unattended as Unattended,
+    dry_run as dry_run,
+    run as run,
+)
