@@ -54,7 +54,7 @@ def planted(known, goodness) -> dict[tuple[str, str], float]:
 
 
 def rows_of(trainee, poses):
-    return trainee.rows(np.asarray(poses), trainee.trains).reshape(-1, trainee.problem.springs)
+    return trainee.rows(np.asarray(poses), trainee.trains).reshape(-1, trainee.problem.columns)
 
 
 @pytest.mark.parametrize(("cv", "n"), [(0, 1), (3, 4), (9, 7)])

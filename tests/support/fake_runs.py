@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 
 from elastocal.cell.description import ProcedureSettings
-from elastocal.planning import PlanFile, PoseRecord, SpreadRecord
+from elastocal.planning import PlanResult, PoseRecord, SpreadRecord
 from elastocal.planning.motion import AxisMotion
-from elastocal.planning.plan_file import (
+from elastocal.planning.plan_result import (
     CellRecord,
     ContactRecord,
     MoveRecord,
@@ -58,12 +58,12 @@ RECORD = RunRecord(
 )
 
 
-def plan(poses: int = 2, loads: int = 2) -> PlanFile:
+def plan(poses: int = 2, loads: int = 2) -> PlanResult:
     """Return poses in a row on a flat floor; every other move has a via pose."""
     records = tuple(_pose(number) for number in range(poses))
     stops = [None, *range(poses), None]
     spread = SpreadRecord(covering_radius=0.1, boundary_distance=None, nearest_neighbour=None, o1=1)
-    return PlanFile(
+    return PlanResult(
         elastocal="0",
         cell=CellRecord(name="fake", file="cell.yaml", fingerprint="0" * 64),
         robot=RobotRecord(
@@ -120,7 +120,7 @@ def _pose(number: int) -> PoseRecord:
     )
 
 
-def settings(of: PlanFile, **changes: Any) -> Settings:
+def settings(of: PlanResult, **changes: Any) -> Settings:
     """Return quick settings; changes are keys of the section ``procedure``."""
     loads = tuple((name, np.array(force)) for name, force in of.contact.load_cases.items())
     return Settings(
@@ -170,7 +170,7 @@ class FakeRun:
     """A run folder with what is needed to start, kill and resume it."""
 
     path: Path
-    plan: PlanFile = field(default_factory=plan)
+    plan: PlanResult = field(default_factory=plan)
     changes: dict[str, Any] = field(default_factory=dict)
     kept: dict[str, dict[str, np.ndarray]] = field(default_factory=dict)
     cell: FakeCell | None = None

@@ -17,7 +17,7 @@ from elastocal.compensation.process import DeviationComparison, process_courses
 from elastocal.dataset import Readings
 from elastocal.elastic import ElasticModel, layout
 from elastocal.identification import Calibration, calibrate, summary
-from elastocal.planning import Planned, make_plan
+from elastocal.planning import PlanAndPool, make_plan
 from elastocal.sim.workcell import ErrorDraws, Places, QuickCell, QuickErrors, Scales
 
 SEED = 0
@@ -28,7 +28,7 @@ class Campaign:
     """Everything up to the calibrated model."""
 
     cell: Cell
-    planned: Planned
+    planned: PlanAndPool
     readings: Readings
     calibration: Calibration
 

@@ -7,6 +7,7 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
+from elastocal.elastic import unit_of
 from elastocal.identification.recertification import (
     DeflectionChange,
     Estimate,
@@ -15,6 +16,8 @@ from elastocal.identification.recertification import (
     Verdict,
 )
 
+_USUAL_UNIT = unit_of("rad/(N*m)").shown
+"""Of most springs: the heading names it, other springs their own."""
 _COLOURS = {Verdict.PASS: "green", Verdict.FAIL: "red", Verdict.UNDECIDED: "yellow"}
 
 
@@ -77,26 +80,30 @@ def _spring_table(found: Recertification, sums: dict[str, str]) -> Table:
     """Return a row a spring; linear springs, rare, name their own unit."""
     table = Table(box=None, pad_edge=False)
     table.add_column("spring", no_wrap=True)
-    headings = ("old\nµrad/(N·m)", "new\nµrad/(N·m)", "change\nµrad/(N·m)", "95 %, all\nat once")
+    headings = (
+        *(f"{name}\n{_USUAL_UNIT}" for name in ("old", "new", "change")),
+        "95 %, all\nat once",
+    )
     for heading in headings:
         table.add_column(heading, justify="right", no_wrap=True)
     table.add_column("", no_wrap=True)
     word = "moved" if found.same_springs else "differs"
     for change in found.springs:
-        unit = "" if change.unit.startswith("rad") else " µm/N"
+        unit = unit_of(change.unit)
+        shown = "" if unit.shown == _USUAL_UNIT else f" {unit.shown}"
         table.add_row(
             escape(sums.get(change.name, change.name)),
-            f"{1e6 * change.old.value:.4f}{unit}",
-            f"{1e6 * change.new.value:.4f}{unit}",
-            f"{1e6 * change.difference.value:+.4f}",
-            _between(change.together),
+            f"{unit.factor * change.old.value:.4f}{shown}",
+            f"{unit.factor * change.new.value:.4f}{shown}",
+            f"{unit.factor * change.difference.value:+.4f}",
+            _between(change.together, unit.factor),
             f"[red]{word}[/red]" if change.moved else "",
         )
     return table
 
 
-def _between(estimate: Estimate) -> str:
-    return f"{1e6 * estimate.low:+.3f} … {1e6 * estimate.high:+.3f}"
+def _between(estimate: Estimate, factor: float) -> str:
+    return f"{factor * estimate.low:+.3f} … {factor * estimate.high:+.3f}"
 
 
 def _show_deflection(console: Console, change: DeflectionChange) -> None:

@@ -6,7 +6,7 @@ from typing import Any
 from elastocal.compensation import read_settings
 from elastocal.compensation.conditioning import read_tool
 from elastocal.compensation.process import TABLE, read_process, read_table
-from elastocal.elastic.layouts import read_springs
+from elastocal.elastic import read_springs
 from elastocal.errors import RobotError
 from elastocal.files import read_text
 from elastocal.identification import read_model

@@ -191,12 +191,12 @@ def _compare(
 ) -> Comparison | None:
     """Fit the 6-spring model to the same readings when ours contains it."""
     actuated = [spring.name for spring in LAYOUTS["actuated"](model.robot)]
-    names = list(model.spring_names)
+    names = list(model.parameter_names)
     if names == actuated or not set(actuated) <= set(names):
         return None
     columns = np.array([names.index(name) for name in actuated], dtype=np.intp)
     try:
-        other = leave_poses_out(problem.with_springs(columns))
+        other = leave_poses_out(problem.with_columns(columns))
     except IdentificationError:
         return None
     return compare(ours, other, "actuated", problem, rng)

@@ -50,6 +50,6 @@ def widen(problem: Problem, compliance: FloatArray, draws: FloatArray, by: float
 
 def _variance(problem: Problem, deviations: FloatArray) -> float:
     """Return the sum over deviations of the mean squared change of predicted deflection."""
-    rows = problem.O.reshape(-1, problem.springs)
+    rows = problem.O.reshape(-1, problem.columns)
     gram = rows.T @ rows / len(problem)
     return float(np.einsum("dn,nm,dm->", deviations, gram, deviations))

@@ -6,12 +6,12 @@ from pathlib import Path
 from elastocal.cell import Cell, fingerprint, load_cell
 from elastocal.errors import FileAccessError, SchemaError
 from elastocal.files import read_text, sha256
-from elastocal.planning import PLAN, PlanFile, read_plan
+from elastocal.planning import PLAN, PlanResult, read_plan
 from elastocal.procedure.entries import RunRecord
 from elastocal.procedure.run_folder import RunFolder
 
 
-def read_copies(folder: RunFolder, record: RunRecord) -> tuple[Cell, PlanFile]:
+def read_copies(folder: RunFolder, record: RunRecord) -> tuple[Cell, PlanResult]:
     """Return the cell and the plan that a run was made with, as they stand in its folder.
 
     Parameters

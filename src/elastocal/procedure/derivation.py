@@ -12,7 +12,7 @@ from elastocal.cell import Cell
 from elastocal.dataset import Dataset, write
 from elastocal.errors import DatasetError, FileAccessError, ProcedureError, SchemaError
 from elastocal.files import write_json
-from elastocal.planning import PlanFile
+from elastocal.planning import PlanResult
 from elastocal.procedure.averaged_dataset import make_dataset
 from elastocal.procedure.copies import check_stream, read_copies
 from elastocal.procedure.displacement import LoadRow, load_rows
@@ -95,7 +95,7 @@ def write_derived(run: Path, derived: Derived) -> None:
 def derive_poses(
     poses: Sequence[PoseReadings],
     cell: Cell,
-    plan: PlanFile,
+    plan: PlanResult,
     entries: Sequence[Entry],
     provenance: str,
 ) -> Derived:
@@ -107,7 +107,7 @@ def derive_poses(
         In the order of time.
     cell : Cell
         The cell.
-    plan : PlanFile
+    plan : PlanResult
         The plan; its load cases are the dataset's.
     entries : sequence of Entry
         Of the journal, for times, retries and faults.

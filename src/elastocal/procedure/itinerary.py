@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from elastocal.arrays import FloatArray
-from elastocal.planning import Joints, PlanFile
+from elastocal.planning import Joints, PlanResult
 from elastocal.procedure.settings import Settings
 from elastocal.procedure.steps import Step
 from elastocal.procedure.ways import HOME, stop_joints, way
@@ -25,12 +25,12 @@ class PlannedStep:
     """Estimated; what waits for something is taken at its shortest."""
 
 
-def itinerary(plan: PlanFile, settings: Settings) -> tuple[PlannedStep, ...]:
+def itinerary(plan: PlanResult, settings: Settings) -> tuple[PlannedStep, ...]:
     """Return all steps of an undisturbed run, in order.
 
     Parameters
     ----------
-    plan : PlanFile
+    plan : PlanResult
         The plan.
     settings : Settings
         Figures of the run.
@@ -43,7 +43,7 @@ def itinerary(plan: PlanFile, settings: Settings) -> tuple[PlannedStep, ...]:
     return tuple(steps)
 
 
-def remaining(plan: PlanFile, settings: Settings) -> FloatArray:
+def remaining(plan: PlanResult, settings: Settings) -> FloatArray:
     """Return the time from before each pose to the end, shape (pose + 1,), in s.
 
     The last is that of the way HOME.
@@ -55,7 +55,7 @@ def remaining(plan: PlanFile, settings: Settings) -> FloatArray:
     return left
 
 
-def _travel(plan: PlanFile, settings: Settings, start: int, end: int) -> PlannedStep:
+def _travel(plan: PlanResult, settings: Settings, start: int, end: int) -> PlannedStep:
     legs = way(plan, start, end)
     seconds = settings.axes.along(np.array([stop_joints(plan, start), *legs]))
     home = end == len(plan.poses)

@@ -6,7 +6,7 @@ from enum import Enum
 from pathlib import Path
 from typing import Protocol
 
-from elastocal.planning import PlanFile
+from elastocal.planning import PlanResult
 from elastocal.procedure.progress import Progress
 from elastocal.procedure.run_folder import RunFolder
 from elastocal.procedure.settings import Settings
@@ -58,7 +58,7 @@ class Result:
 class Job:
     """What is to be done."""
 
-    plan: PlanFile
+    plan: PlanResult
     settings: Settings
     folder: RunFolder
     committed: frozenset[int] = frozenset()

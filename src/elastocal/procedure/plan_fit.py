@@ -10,7 +10,7 @@ import numpy as np
 
 from elastocal.cell import Cell
 from elastocal.errors import ProcedureError
-from elastocal.planning import PlanFile
+from elastocal.planning import PlanResult
 
 LEAST_POSES = 3
 """Unloaded marker readings that the rotation of a station needs."""
@@ -22,12 +22,12 @@ SAME_NUMBER = 1e-9
 """Largest difference between a number of the cell and the same in its plan, SI."""
 
 
-def check_fits(plan: PlanFile, cell: Cell) -> None:
+def check_fits(plan: PlanResult, cell: Cell) -> None:
     """Refuse a plan that is not the cell's, or whose numbers contradict one another.
 
     Parameters
     ----------
-    plan : PlanFile
+    plan : PlanResult
         The plan.
     cell : Cell
         The cell; the plan carries its fingerprint.
@@ -43,12 +43,12 @@ def check_fits(plan: PlanFile, cell: Cell) -> None:
             raise ProcedureError(f"the plan does not fit {cell.path}: {text}; plan again")
 
 
-def registration_findings(plan: PlanFile) -> tuple[str, ...]:
+def registration_findings(plan: PlanResult) -> tuple[str, ...]:
     """Return a warning for each station that sees too few poses to be registered.
 
     Parameters
     ----------
-    plan : PlanFile
+    plan : PlanResult
         The plan.
 
     Raises
@@ -74,7 +74,7 @@ def registration_findings(plan: PlanFile) -> tuple[str, ...]:
     )
 
 
-def _about_robot(plan: PlanFile, cell: Cell) -> Iterator[str]:
+def _about_robot(plan: PlanResult, cell: Cell) -> Iterator[str]:
     if plan.robot.joints != cell.robot.joint_names:
         yield (
             f"robot.joints are {', '.join(plan.robot.joints)}, those of the cell"
@@ -84,7 +84,7 @@ def _about_robot(plan: PlanFile, cell: Cell) -> Iterator[str]:
         yield f"robot.home is {_listed(plan.robot.home)}, HOME of the cell {_listed(cell.home)}"
 
 
-def _about_contact(plan: PlanFile, cell: Cell) -> Iterator[str]:
+def _about_contact(plan: PlanResult, cell: Cell) -> Iterator[str]:
     engagement, loads = cell.file.engagement, cell.file.load_cases
     for key in ("approach_distance", "near_contact"):
         found, wanted = getattr(plan.contact, key), getattr(engagement, key)
@@ -101,7 +101,7 @@ def _about_contact(plan: PlanFile, cell: Cell) -> Iterator[str]:
             yield f"load case {name!r} is {_listed(found)} N, that of the cell {_listed(wanted)} N"
 
 
-def _about_limits(plan: PlanFile, cell: Cell) -> Iterator[str]:
+def _about_limits(plan: PlanResult, cell: Cell) -> Iterator[str]:
     """Yield joint positions outside the robot's limits."""
     for what, joints in _all_joints(plan):
         margin = cell.robot.limits.margin(np.array(joints))
@@ -113,7 +113,7 @@ def _about_limits(plan: PlanFile, cell: Cell) -> Iterator[str]:
             )
 
 
-def _all_joints(plan: PlanFile) -> Iterator[tuple[str, tuple[float, ...]]]:
+def _all_joints(plan: PlanResult) -> Iterator[tuple[str, tuple[float, ...]]]:
     yield "robot.home", plan.robot.home
     for pose in plan.poses:
         yield f"poses.{pose.id}.joints", pose.joints
@@ -123,7 +123,7 @@ def _all_joints(plan: PlanFile) -> Iterator[tuple[str, tuple[float, ...]]]:
             yield f"moves.{number}.via.{stop}", joints
 
 
-def _about_poses(plan: PlanFile, cell: Cell) -> Iterator[str]:
+def _about_poses(plan: PlanResult, cell: Cell) -> Iterator[str]:
     """Yield poses that name no tracker of the cell, or whose joints do not lead to their frames."""
     stations = [tracker.name for tracker in cell.file.trackers]
     for pose in plan.poses:

@@ -8,7 +8,7 @@ from typing import Any
 from elastocal.cell import Cell, fingerprint
 from elastocal.errors import ProcedureError
 from elastocal.files import sha256
-from elastocal.planning import PlanFile
+from elastocal.planning import PlanResult
 from elastocal.procedure.entries import Action, Entry, Event, RunRecord
 from elastocal.procedure.journal import commits
 from elastocal.records import StrictModel
@@ -84,7 +84,7 @@ def last_known(entries: tuple[Entry, ...]) -> LastKnown:
 
 
 def run_record(
-    cell: Cell, plan: PlanFile, plan_text: str, cell_file: str, seed: int, started: str
+    cell: Cell, plan: PlanResult, plan_text: str, cell_file: str, seed: int, started: str
 ) -> RunRecord:
     """Return the record by which a run is known again.
 

@@ -8,7 +8,7 @@ from elastocal.arrays import FloatArray
 from elastocal.cell import Cell
 from elastocal.cell.description import ProcedureSettings
 from elastocal.errors import ProcedureError
-from elastocal.planning import PlanFile
+from elastocal.planning import PlanResult
 from elastocal.planning.motion import AxisMotion
 from elastocal.robot import GRAVITY
 
@@ -44,14 +44,14 @@ class Settings:
         return max(float(np.linalg.norm(force)) for _, force in self.loads)
 
 
-def settings_of(cell: Cell, plan: PlanFile) -> Settings:
+def settings_of(cell: Cell, plan: PlanResult) -> Settings:
     """Return the settings of a run.
 
     Parameters
     ----------
     cell : Cell
         The cell.
-    plan : PlanFile
+    plan : PlanResult
         Its plan.
 
     Raises

@@ -11,7 +11,7 @@ import numpy as np
 
 from elastocal.arrays import FloatArray
 from elastocal.errors import ProcedureError
-from elastocal.planning import Joints, PlanFile, PoseRecord
+from elastocal.planning import Joints, PlanResult, PoseRecord
 from elastocal.procedure.line import Line
 
 HOME = -1
@@ -26,7 +26,7 @@ SAME_POSTURE = 0.5
 """Joints of one posture differ by less between approach pose and contact, in rad or m."""
 
 
-def way(plan: PlanFile, start: int, end: int) -> tuple[Joints, ...]:
+def way(plan: PlanResult, start: int, end: int) -> tuple[Joints, ...]:
     """Return the joint positions to pass from one stop to another, that of ``start`` excluded.
 
     The way goes through the approach poses in between, so that every leg is one that the planner
@@ -34,7 +34,7 @@ def way(plan: PlanFile, start: int, end: int) -> tuple[Joints, ...]:
 
     Parameters
     ----------
-    plan : PlanFile
+    plan : PlanResult
         The plan.
     start, end : int
         Numbers of stops.
@@ -49,7 +49,7 @@ def way(plan: PlanFile, start: int, end: int) -> tuple[Joints, ...]:
     return tuple(legs)
 
 
-def stop_joints(plan: PlanFile, stop: int) -> Joints:
+def stop_joints(plan: PlanResult, stop: int) -> Joints:
     """Return the joint positions of a stop."""
     if 0 <= stop < len(plan.poses):
         return plan.poses[stop].approach_joints
@@ -67,7 +67,7 @@ class WayHome:
 
 
 def way_home(
-    plan: PlanFile,
+    plan: PlanResult,
     q: FloatArray,
     T_base_tcp: FloatArray,
     travel_limit: float,
@@ -77,7 +77,7 @@ def way_home(
 
     Parameters
     ----------
-    plan : PlanFile
+    plan : PlanResult
         The plan.
     q : ndarray, shape (joint,)
         Where the arm stands, in rad or m.
@@ -113,7 +113,7 @@ def way_home(
 
 
 def _stands_before(
-    plan: PlanFile, pose: PoseRecord, q: FloatArray, T_base_tcp: FloatArray, travel_limit: float
+    plan: PlanResult, pose: PoseRecord, q: FloatArray, T_base_tcp: FloatArray, travel_limit: float
 ) -> bool:
     """Whether the arm is on the line between approach pose and surface."""
     line, posture = Line.of(pose, travel_limit), np.abs(q - pose.approach_joints)
@@ -126,7 +126,7 @@ def _stands_before(
     )
 
 
-def _legs(plan: PlanFile, q: FloatArray) -> Iterator[tuple[float, tuple[Joints, ...]]]:
+def _legs(plan: PlanResult, q: FloatArray) -> Iterator[tuple[float, tuple[Joints, ...]]]:
     """Yield how far each leg is, and the way to HOME from it against its direction."""
     for stop in range(len(plan.poses) + 1):
         start = stop_joints(plan, stop - 1)

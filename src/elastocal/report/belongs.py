@@ -2,10 +2,10 @@
 
 from elastocal.cell import Cell
 from elastocal.errors import PlanningError
-from elastocal.planning import PlanFile
+from elastocal.planning import PlanResult
 
 
-def check_robot(plan: PlanFile, cell: Cell) -> None:
+def check_robot(plan: PlanResult, cell: Cell) -> None:
     """Refuse a cell whose robot has other joints than the plan's.
 
     Raises

@@ -24,3 +24,4 @@ from .run import (
     dry_run as dry_run,
     run as run,
 )
+from .plan import PlanFigures as PlanFigures, PlanResult as PlanResult, PlanSettings as PlanSettings, plan as plan, plan_figures as plan_figures

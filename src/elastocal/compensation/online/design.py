@@ -150,7 +150,7 @@ def draws_factor(draws: FloatArray) -> FloatArray:
 
 
 def _check_compliances(calibrated: CalibratedModel) -> None:
-    names = calibrated.model.spring_names
+    names = calibrated.model.parameter_names
     for what, values in (("compliance", calibrated.compliance[None]), ("a draw", calibrated.draws)):
         bad = np.argwhere(~(np.abs(values) <= LARGEST_COMPLIANCE))
         if len(bad):

@@ -73,10 +73,7 @@ def stiffness_along(calibrated: CalibratedModel, q: ArrayLike, direction: ArrayL
 def _squared_torques(calibrated: CalibratedModel, q: ArrayLike, direction: ArrayLike) -> FloatArray:
     """Return the squares ``(J_i^T u)^2``, shape (row, spring): times ``c`` they are ``u^T C u``."""
     q = calibrated.model.robot.check_positions(q)
-    u = np.broadcast_to(np.asarray(direction, dtype=float), (len(q), 3))
-    J = calibrated.model.spring_jacobian(q).translation
-    torques: FloatArray = (u[:, None, :] @ J)[:, 0, :]
-    return torques**2
+    return calibrated.model.directional_rows(q, np.broadcast_to(direction, (len(q), 3)))
 
 
 def principal_stiffness(calibrated: CalibratedModel, q: ArrayLike) -> PrincipalStiffness:

@@ -10,7 +10,7 @@ from elastocal.compensation.process import SimulatedProcess
 from elastocal.dataset import Dataset
 from elastocal.identification import CalibratedModel
 from elastocal.identification.recertification import Recertification
-from elastocal.planning import PlanFile, PoolData
+from elastocal.planning import PlanResult, PoolData
 from elastocal.planning.surface import Surface
 from elastocal.procedure import Entry
 from elastocal.report.document.again import Again
@@ -83,7 +83,7 @@ class Parts:
     cell_text: str | None = None
     """The cell file as it stands."""
     surface: Surface | None = None
-    plan: PlanFile | None = None
+    plan: PlanResult | None = None
     pool: PoolData | None = None
     journal: tuple[Entry, ...] | None = None
     dataset: Dataset | None = None

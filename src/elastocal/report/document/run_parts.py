@@ -10,7 +10,7 @@ from elastocal.files import read_text
 from elastocal.planning import (
     PLAN,
     POOL,
-    PlanFile,
+    PlanResult,
     PoolData,
     cell_surface,
     check_pool_of,
@@ -70,7 +70,7 @@ def _with_plan(
 ) -> Parts:
     cell, record = parts.cell, journal[0].run if journal else None
 
-    def plan_of_cell() -> PlanFile:
+    def plan_of_cell() -> PlanResult:
         plan = read_plan(run.plan)
         if record is not None:
             check_plan(run, record)

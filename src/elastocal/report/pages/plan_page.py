@@ -14,7 +14,7 @@ from plotly.offline import get_plotlyjs
 
 from elastocal.cell import Cell
 from elastocal.files import write_text
-from elastocal.planning import PlanFile, PoolData, PoseRecord, check_pool_of
+from elastocal.planning import PlanResult, PoolData, PoseRecord, check_pool_of
 from elastocal.planning.surface import Surface
 from elastocal.report.belongs import check_robot
 from elastocal.report.pages.templating import POLICY, embedded, template
@@ -27,7 +27,7 @@ from elastocal.wording import duration, millimetres, readable
 
 
 def write_plan_page(
-    path: Path, cell: Cell, surface: Surface, plan: PlanFile, pool: PoolData
+    path: Path, cell: Cell, surface: Surface, plan: PlanResult, pool: PoolData
 ) -> Path:
     """Write the interactive page of a plan, atomically; return its path.
 
@@ -37,7 +37,7 @@ def write_plan_page(
         An HTML file.
     cell, surface : Cell, Surface
         That the plan was made for.
-    plan, pool : PlanFile, PoolData
+    plan, pool : PlanResult, PoolData
         Of one run.
 
     Raises
@@ -55,7 +55,7 @@ def write_plan_page(
     return Path(path)
 
 
-def _page(view: PlanView, plan: PlanFile, pool: PoolData) -> str:
+def _page(view: PlanView, plan: PlanResult, pool: PoolData) -> str:
     worst = weakest_margins(pool).label
     made = f"{len(plan.poses)} poses chosen by {plan.search.name} for {plan.robot.name}"
     return Template(template("plan.html")).substitute(
@@ -79,7 +79,7 @@ def _page(view: PlanView, plan: PlanFile, pool: PoolData) -> str:
     )
 
 
-def key_figures(plan: PlanFile) -> list[tuple[str, str]]:
+def key_figures(plan: PlanResult) -> list[tuple[str, str]]:
     """Return the figures at the head of the page, as name and value with its unit."""
     search, pool = plan.search, plan.pool
     asked = f" (asked: {readable(search.d_max, 'm')})" if search.d_max is not None else ""
@@ -97,14 +97,14 @@ def _figure(name: str, value: str) -> str:
     return f"<div><dt>{escape(name)}</dt><dd>{escape(value)}</dd></div>"
 
 
-def _findings(plan: PlanFile) -> str:
+def _findings(plan: PlanResult) -> str:
     if not plan.findings:
         return ""
     items = "".join(f"<li>{escape(finding)}</li>" for finding in plan.findings)
     return f'<section class="findings"><h2>Findings</h2><ul>{items}</ul></section>'
 
 
-def _row(plan: PlanFile, pose: PoseRecord, worst: str) -> str:
+def _row(plan: PlanResult, pose: PoseRecord, worst: str) -> str:
     rank = plan.search.order.index(pose.id) + 1
     way = sum(move.duration for move in plan.moves if move.end == pose.id)
     cells = [
@@ -119,14 +119,14 @@ def _row(plan: PlanFile, pose: PoseRecord, worst: str) -> str:
     return f"<tr>{first}{''.join(f'<td>{escape(cell)}</td>' for cell in cells)}</tr>"
 
 
-def view_data(view: PlanView, plan: PlanFile, pool: PoolData) -> dict[str, Any]:
+def view_data(view: PlanView, plan: PlanResult, pool: PoolData) -> dict[str, Any]:
     """Return what the script of a page reads to show a view.
 
     Parameters
     ----------
     view : PlanView
         From `plan_view`.
-    plan, pool : PlanFile, PoolData
+    plan, pool : PlanResult, PoolData
         That it shows.
     """
     worst = weakest_margins(pool).label

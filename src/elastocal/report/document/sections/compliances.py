@@ -16,8 +16,6 @@ from elastocal.report.plots import (
 from elastocal.wording import mm
 
 Figures = dict[str, Any]
-UNITS = {"revolute": "µrad/(N·m)", "prismatic": "µm/N"}
-_STIFF = {"revolute": "MN·m/rad", "prismatic": "MN/m"}
 _MOST_TERMS = 6
 
 
@@ -29,12 +27,12 @@ def body(parts: Parts) -> Content:
     springs = list(_springs(parts.calibrated, groups))
     observable = sum(each["group"] is None for each in springs)
     html = _head(parts.calibrated, observable) + _comparison(parts.calibrated.figures)
+    units = dict.fromkeys(each["unit"] for each in springs)
     panels = [
-        (unit, [_bar(each) for each in springs if each["kind"] == kind])
-        for kind, unit in UNITS.items()
+        (unit.shown, [_bar(each) for each in springs if each["unit"] == unit]) for unit in units
     ]
     html += picture(
-        partial(spring_figure, [panel for panel in panels if panel[1]]),
+        partial(spring_figure, panels),
         f"Compliances of {len(springs)} springs with 95 % intervals; {len(springs) - observable} of"
         " them have no value of their own",
         "Filled: known by itself, with its 95 % interval. Hollow: not known by itself; the number"
@@ -53,15 +51,16 @@ def _groups(found: Calibrated) -> dict[str, int]:
 
 def _springs(found: Calibrated, groups: dict[str, int]) -> Iterator[Figures]:
     low, high = found.model.interval()
-    for k, spring in enumerate(found.model.model.springs):
+    for k, parameter in enumerate(found.model.model.parameters):
         by_itself = found.model.observability.observable[k]
+        unit = parameter.unit
         yield {
-            "name": spring.name,
-            "kind": spring.kind,
-            "value": 1e6 * float(found.model.compliance[k]),
-            "low": 1e6 * float(low[k]),
-            "high": 1e6 * float(high[k]),
-            "group": None if by_itself else groups.get(spring.name, 0),
+            "name": parameter.name,
+            "unit": unit,
+            "value": unit.factor * float(found.model.compliance[k]),
+            "low": unit.factor * float(low[k]),
+            "high": unit.factor * float(high[k]),
+            "group": None if by_itself else groups.get(parameter.name, 0),
         }
 
 
@@ -70,10 +69,10 @@ def _bar(each: Figures) -> SpringBar:
 
 
 def _row(each: Figures) -> tuple[str, ...]:
-    name, unit, value = each["name"], UNITS[each["kind"]], each["value"]
+    name, unit, value = each["name"], each["unit"].shown, each["value"]
     if each["group"] is not None:
         return name, f"not by itself, group {each['group']}", f"({value:.4f})", "none", unit, "none"
-    stiff = f"{1.0 / value:.3f} {_STIFF[each['kind']]}" if value > 0.0 else "rigid"
+    stiff = f"{1.0 / value:.3f} {each['unit'].stiffness}" if value > 0.0 else "rigid"
     known = "at its bound"
     if value > 0.0:
         known = f"±{(each['high'] - each['low']) / 2 / value:.0%}"

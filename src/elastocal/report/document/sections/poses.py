@@ -4,7 +4,7 @@ from functools import partial
 from html import escape
 from typing import Any
 
-from elastocal.planning import PlanFile
+from elastocal.planning import PlanResult
 from elastocal.report.document.markup import Markup, facts, folded, paragraph, table
 from elastocal.report.document.parts import Parts
 from elastocal.report.document.pictures import picture
@@ -43,7 +43,7 @@ def body(parts: Parts) -> Content:
     return Content(html + _notes(plan) + _poses(plan, shown=True), data)
 
 
-def _poses(plan: PlanFile, shown: bool = False) -> str:
+def _poses(plan: PlanResult, shown: bool = False) -> str:
     """Return the table of the poses, with buttons where there is a view that shows them."""
     rows = [
         (
@@ -64,7 +64,7 @@ def _button(pose: int) -> Markup:
     return Markup(f'<button type="button" aria-label="Show pose {pose}">{pose}</button>')
 
 
-def _choice(plan: PlanFile) -> str:
+def _choice(plan: PlanResult) -> str:
     search, other = plan.search, plan.comparison
     rows = [(search.name, search.spread)] + ([(other.name, other.spread)] if other else [])
     return table(
@@ -83,7 +83,7 @@ def _choice(plan: PlanFile) -> str:
     )
 
 
-def _alt(plan: PlanFile) -> str:
+def _alt(plan: PlanResult) -> str:
     names = [plan.search.name] + ([plan.comparison.name] if plan.comparison else [])
     return (
         f"Flat map of the surface with {len(plan.poses)} poses chosen by {' and by '.join(names)};"
@@ -91,7 +91,7 @@ def _alt(plan: PlanFile) -> str:
     )
 
 
-def _notes(plan: PlanFile) -> str:
+def _notes(plan: PlanResult) -> str:
     if not plan.findings:
         return ""
     folder = plan.cell.file.rpartition("/")[0]

@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 from functools import partial
 
+from elastocal.elastic import unit_of
 from elastocal.identification.recertification import (
     DeflectionChange,
     Estimate,
@@ -76,13 +77,13 @@ def _springs(found: Recertification) -> str:
         (
             each.name,
             "moved" if each.moved else "",
-            f"{1e6 * each.old.value:.4f}",
-            f"{1e6 * each.new.value:.4f}",
-            f"{1e6 * each.difference.value:+.4f}",
-            f"{1e6 * each.together.low:+.3f} to {1e6 * each.together.high:+.3f}",
-            "µm/N" if each.unit.startswith("m/") else "µrad/(N·m)",
+            f"{unit.factor * each.old.value:.4f}",
+            f"{unit.factor * each.new.value:.4f}",
+            f"{unit.factor * each.difference.value:+.4f}",
+            f"{unit.factor * each.together.low:+.3f} to {unit.factor * each.together.high:+.3f}",
+            unit.shown,
         )
-        for each in found.springs
+        for each, unit in ((each, unit_of(each.unit)) for each in found.springs)
     ]
     heads = ("Spring or sum", "", "Old", "New", "Change", "95 %, all at once", "Unit")
     return table("Springs and sums that both calibrations determine", heads, rows, texts=2)
