@@ -13,11 +13,11 @@ import pytest
 import xarray as xr
 
 from elastocal.cell import fingerprint, load_cell
-from elastocal.workflows import KINDS, SOURCES, DeviceSource
 from elastocal.errors import DatasetError, FileAccessError
 from elastocal.planning import read_plan, write_plan
 from elastocal.procedure import Journal, RunFolder, cell_place, fill, read_journal, refuse_foreign
 from elastocal.procedure.journal import read_commits
+from elastocal.workflows import KINDS, SOURCES, DeviceSource
 from support.cli import elastocal
 from support.run_cells import PlannedCell, planned_cell
 

@@ -1,3 +1,4 @@
+from ._device_sources import KINDS as KINDS, SOURCES as SOURCES, DeviceSource as DeviceSource
 from ._outputs import refuse_overwriting as refuse_overwriting
 from ._robot_source import find_robot as find_robot
 from .calibrate import (
@@ -5,17 +6,23 @@ from .calibrate import (
     CalibrateSettings as CalibrateSettings,
     calibrate as calibrate,
 )
+from .derive import DeriveResult as DeriveResult, DeriveSettings as DeriveSettings, derive as derive
+from .plan import (
+    PlanFigures as PlanFigures,
+    PlanResult as PlanResult,
+    PlanSettings as PlanSettings,
+    plan as plan,
+    plan_figures as plan_figures,
+)
 from .predict import (
     PredictResult as PredictResult,
     PredictSettings as PredictSettings,
     predict as predict,
 )
-from ._device_sources import DeviceSource as DeviceSource, KINDS as KINDS, SOURCES as SOURCES
-from .derive import DeriveResult as DeriveResult, DeriveSettings as DeriveSettings, derive as derive
 from .run import (
+    POSES_MEASURED as POSES_MEASURED,
     DryRunResult as DryRunResult,
     Operator as Operator,
-    POSES_MEASURED as POSES_MEASURED,
     RunFigures as RunFigures,
     RunResult as RunResult,
     RunSettings as RunSettings,
@@ -24,4 +31,3 @@ from .run import (
     dry_run as dry_run,
     run as run,
 )
-from .plan import PlanFigures as PlanFigures, PlanResult as PlanResult, PlanSettings as PlanSettings, plan as plan, plan_figures as plan_figures

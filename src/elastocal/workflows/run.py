@@ -394,9 +394,7 @@ def _check_folder(job: _Job, entries: tuple[Entry, ...], resume: bool) -> None:
     check_same_settings(used, job.cell)
 
 
-def _confirm(
-    job: _Job, known: LastKnown | None, devices: Devices, settings: RunSettings
-) -> None:
+def _confirm(job: _Job, known: LastKnown | None, devices: Devices, settings: RunSettings) -> None:
     """Have the operator agree before anything moves that was not expected to."""
     settings.operator.warn([f"warning: {warning}" for warning in job.warnings])
     if known is not None:
