@@ -14,8 +14,8 @@ import numpy as np
 from elastocal.dataset import Dataset, read, write
 from elastocal.elastic import ElasticModel, layout
 from elastocal.identification import calibrate, summary
+from elastocal.procedure.derive import ToolLoad
 from elastocal.procedure.registration import UnloadedReadings, register
-from elastocal.procedure.tool_weight import ToolLoad
 from elastocal.robot import GRAVITY, Robot, T_from_xyzabc, catalogue, with_tool
 from elastocal.sim.layouts import bearing_truth
 from elastocal.sim.linkage import Linkage

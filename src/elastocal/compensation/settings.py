@@ -36,7 +36,7 @@ from elastocal.cell.description import (
     PositiveLength,
     PositiveMoment,
 )
-from elastocal.compensation.conditioning.filters import (
+from elastocal.compensation.conditioning import (
     Duration,
     FilterChain,
     FilterSettings,
@@ -111,7 +111,7 @@ class CompensatorSettings(StrictModel):
     deadband: Distance = 0.0
     """Deflections below it are not corrected, above twice it fully, in m."""
     hold: Annotated[Duration, Field(le=_LONGEST_HOLD)] = 0.04
-    """How long the correction is held when readings fail before it fades, in s; a reading that
+    """Time that the correction is held when readings fail before it fades, in s; a reading that
     comes later than this after the one before it is not used either."""
     filter: FilterSettings = FilterSettings()
     sensor: SensorRange = SensorRange()

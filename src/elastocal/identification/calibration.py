@@ -24,6 +24,7 @@ from elastocal.identification.problem import Problem, build
 from elastocal.identification.solve import Solution, factor, solve
 from elastocal.identification.suspicious import Screening, screen
 from elastocal.identification.widening import widen, widening
+from elastocal.parallel import one_blas_thread
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,6 +63,7 @@ class Calibration:
         return np.asarray(np.linalg.norm(self.readings.deflection[self.used], axis=1))
 
 
+@one_blas_thread()
 def calibrate(
     model: ElasticModel,
     readings: Readings,

@@ -17,13 +17,12 @@ from elastocal.cell import Cell, load_cell
 from elastocal.cell.devices import Devices
 from elastocal.errors import ElastocalError, ProcedureError
 from elastocal.files import read_text
-from elastocal.planning import PLAN, PlanFile, read_plan
+from elastocal.planning import PLAN, PlanResult, read_plan
 from elastocal.procedure import (
     Entry,
     Event,
     Journal,
     LastKnown,
-    PlannedStep,
     PoseLog,
     PoseRecorder,
     Progress as RunProgress,
@@ -54,6 +53,7 @@ from elastocal.procedure import (
     run_settings,
     write_derived,
 )
+from elastocal.procedure.run import PlannedStep
 from elastocal.progress import Progress
 from elastocal.records import record
 from elastocal.results import Result
@@ -200,7 +200,7 @@ class _Job:
     """A run that may begin: everything has been read and fits together."""
 
     cell: Cell
-    plan: PlanFile
+    plan: PlanResult
     plan_folder: Path
     settings: SessionSettings
     source: DeviceSource

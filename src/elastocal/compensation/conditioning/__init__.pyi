@@ -12,6 +12,7 @@ from .filters import (
 )
 from .mistakes import refuse_mistakes as refuse_mistakes
 from .postures import (
+    LEAST_POSTURES as LEAST_POSTURES,
     StaticPostures as StaticPostures,
     read_postures as read_postures,
     static_postures as static_postures,
@@ -25,4 +26,11 @@ from .tool import (
     tool_result as tool_result,
     write_tool as write_tool,
 )
-from .tool_fit import NAMES as NAMES, fit_tool as fit_tool
+from .tool_fit import (
+    TOOL_UNKNOWNS as TOOL_UNKNOWNS,
+    ToolFit as ToolFit,
+    fit_tool as fit_tool,
+    tool_derivatives as tool_derivatives,
+    tool_residual as tool_residual,
+    tool_wrenches as tool_wrenches,
+)

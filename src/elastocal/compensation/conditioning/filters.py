@@ -32,7 +32,7 @@ _MEDIANS = (1, 3, 5)
 _LARGEST_ORDER = 8
 """Highest order of the low-pass: with more, sections lose digits and the delay is too long."""
 _LONGEST_DELAY = 0.5
-"""Of all filters together, in s."""
+"""Longest delay of all filters together, in s."""
 
 
 def _positive(value: float) -> float:

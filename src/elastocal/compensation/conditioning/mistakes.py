@@ -9,11 +9,11 @@ from collections.abc import Iterable, Mapping
 import numpy as np
 
 from elastocal.arrays import FloatArray
-from elastocal.compensation.conditioning.postures import LEAST, StaticPostures
-from elastocal.compensation.conditioning.tool_fit import ToolFit, fit_tool, residual
+from elastocal.compensation.conditioning.postures import LEAST_POSTURES, StaticPostures
+from elastocal.compensation.conditioning.tool_fit import ToolFit, fit_tool, tool_residual
 from elastocal.errors import CompensationError
 
-HEAVIEST = 5000.0
+_HEAVIEST = 5000.0
 """In kg; robots carry up to 2300 kg."""
 _POOR = 0.1
 """Part of what turns with the posture that may be left: noise, cross-talk leave a few percent."""
@@ -27,7 +27,7 @@ _TRIED = 10
 """Postures that are left out in turn, those with most left first."""
 
 
-def refuse_misfit(postures: StaticPostures, fit: ToolFit, R_nominal: FloatArray | None) -> None:
+def _refuse_misfit(postures: StaticPostures, fit: ToolFit, R_nominal: FloatArray | None) -> None:
     """Refuse postures that do not fit one tool, saying why where that can be found.
 
     Parameters
@@ -44,9 +44,9 @@ def refuse_misfit(postures: StaticPostures, fit: ToolFit, R_nominal: FloatArray 
     CompensationError
         Naming the posture, the angle or the unit.
     """
-    if fit.mass > HEAVIEST:
+    if fit.mass > _HEAVIEST:
         raise CompensationError(
-            f"mass comes out as {fit.mass:.4g} kg, more than a robot carries ({HEAVIEST:g} kg):"
+            f"mass comes out as {fit.mass:.4g} kg, more than a robot carries ({_HEAVIEST:g} kg):"
             " forces in another unit than stated"
         )
     left, turning = _left(postures, fit), _turning(postures)
@@ -70,7 +70,7 @@ def refuse_misfit(postures: StaticPostures, fit: ToolFit, R_nominal: FloatArray 
 def _refuse_one_posture(
     postures: StaticPostures, fit: ToolFit, R_nominal: FloatArray | None, left: FloatArray
 ) -> None:
-    if len(postures) <= LEAST + 1:
+    if len(postures) <= LEAST_POSTURES + 1:
         return
     for row in _suspects(postures, fit):
         others = postures.without(row)
@@ -89,7 +89,7 @@ def _refuse_one_posture(
 def _suspects(postures: StaticPostures, fit: ToolFit) -> Iterable[int]:
     force, moment = (
         np.linalg.norm(part, axis=1) / max(float(np.abs(part).max()), np.finfo(float).tiny)
-        for part in residual(postures, fit)
+        for part in tool_residual(postures, fit)
     )
     worst: list[int] = np.argsort(-np.maximum(force, moment), kind="stable").tolist()
     return worst[:_TRIED]
@@ -110,7 +110,7 @@ def _refuse_rotation(postures: StaticPostures, fit: ToolFit, left: FloatArray) -
 
 def _left(postures: StaticPostures, fit: ToolFit) -> FloatArray:
     """Return what is left of a component of force and moment, root mean square."""
-    return np.array([_rms(part) for part in residual(postures, fit)])
+    return np.array([_rms(part) for part in tool_residual(postures, fit)])
 
 
 def _allowed(postures: StaticPostures) -> FloatArray:
@@ -134,9 +134,9 @@ _TURNED = np.radians(15.0)
 _FARTHEST = 3.0
 """Largest distance of a centre of mass from its sensor that is believed, in m."""
 _CLEAR = 10.0
-"""How many times its scatter the moment must change for that."""
+"""Change of the moment, as a multiple of its scatter, from which on that is believed."""
 _CLOSE = 0.3
-"""How near the centre of mass must come to where another point would put it, as a share."""
+"""Largest distance of the centre of mass from where another point puts it, as a share."""
 
 
 def refuse_mistakes(
@@ -171,7 +171,7 @@ def refuse_mistakes(
     _refuse_other_forces(postures, fit, R_nominal)
     _refuse_other_moments(postures, fit)
     _refuse_far_centre(postures, fit)
-    refuse_misfit(postures, fit, R_nominal)
+    _refuse_misfit(postures, fit, R_nominal)
     if expected_centre is not None:
         _refuse_other_point(fit, expected_centre, points or {})
 
@@ -185,7 +185,7 @@ def _refuse_base(postures: StaticPostures, fit: ToolFit) -> None:
     A = A.reshape(-1, 4)
     solution, *_ = np.linalg.lstsq(A, postures.force.ravel(), rcond=None)
     left = _rms(postures.force.ravel() - A @ solution)
-    stated = _rms(residual(postures, fit)[0])
+    stated = _rms(tool_residual(postures, fit)[0])
     weight = abs(fit.mass) * float(np.linalg.norm(g))
     constant = float(np.linalg.norm(fit.force_bias))
     upright = float(fit.force_bias @ g) > 0.9 * constant * float(np.linalg.norm(g))
@@ -202,7 +202,7 @@ def _refuse_base(postures: StaticPostures, fit: ToolFit) -> None:
 def _refuse_other_forces(
     postures: StaticPostures, fit: ToolFit, R_nominal: FloatArray | None
 ) -> None:
-    stated = _rms(residual(postures, fit)[0])
+    stated = _rms(tool_residual(postures, fit)[0])
     others = {
         "the sign of the wrenches is turned, or one of the sensor's axes (a left-handed frame)": (
             postures.read_as(-postures.force, -postures.moment)
@@ -212,7 +212,7 @@ def _refuse_other_forces(
         ),
     }
     fits = {mistake: fit_tool(other, R_nominal) for mistake, other in others.items()}
-    left = {mistake: _rms(residual(others[mistake], fits[mistake])[0]) for mistake in others}
+    left = {mistake: _rms(tool_residual(others[mistake], fits[mistake])[0]) for mistake in others}
     best = min(left, key=left.__getitem__)
     if stated > _NOTICEABLE * _rms(postures.force) and left[best] < _BETTER * stated:
         raise CompensationError(
@@ -237,12 +237,12 @@ def _refuse_other_forces(
 
 
 def _refuse_other_moments(postures: StaticPostures, fit: ToolFit) -> None:
-    stated = _rms(residual(postures, fit)[1])
+    stated = _rms(tool_residual(postures, fit)[1])
     if not stated > 10.0 * _NOTICEABLE * max(_rms(postures.moment), 1e-9):
         return
     R = postures.R_base_flange @ fit.R_flange_sensor
     other = postures.read_as(moment=np.einsum("nji,nj->ni", R, postures.moment))
-    left = _rms(residual(other, fit_tool(other, fit.R_flange_sensor, rotation_known=True))[1])
+    left = _rms(tool_residual(other, fit_tool(other, fit.R_flange_sensor, rotation_known=True))[1])
     if left < _BETTER * stated:
         raise CompensationError(
             f"moments seem to be in base while the forces are not: read so, {left:.3g} N*m are left"

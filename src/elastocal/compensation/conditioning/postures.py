@@ -12,10 +12,10 @@ from elastocal.compensation.offline import (
 )
 from elastocal.dataset import LoadRows, joint_dimensions, read_load_rows
 from elastocal.errors import CompensationError
-from elastocal.files import read_text
 from elastocal.robot import GRAVITY, Robot, T_from_xyzabc
+from elastocal.tables import opened_table
 
-LEAST = 3
+LEAST_POSTURES = 3
 """Postures; with fewer nothing is left to tell whether the numbers fit."""
 
 
@@ -90,10 +90,10 @@ def static_postures(
         *(np.array(x, dtype=float) for x in (R_base_flange, force, moment, gravity))
     )
     n = len(made.force)
-    if n < LEAST:
+    if n < LEAST_POSTURES:
         raise CompensationError(
-            f"{n} postures: the tool's weight needs at least {LEAST}, and better 8 or more that"
-            " turn the sensor about two axes"
+            f"{n} postures: the tool's weight needs at least {LEAST_POSTURES}, and better 8 or more"
+            " that turn the sensor about two axes"
         )
     shapes = (made.R_base_flange.shape, made.force.shape, made.moment.shape, made.gravity.shape)
     if shapes != ((n, 3, 3), (n, 3), (n, 3), (3,)):
@@ -107,7 +107,7 @@ def static_postures(
 _ANGLES = ("a", "b", "c")
 _QUATERNION = ("qx", "qy", "qz", "qw")
 _UNIT = 1e-2
-"""How far the length of a quaternion may be from 1."""
+"""Largest distance of the length of a quaternion from 1."""
 
 
 def read_postures(
@@ -131,7 +131,8 @@ def read_postures(
     DatasetError, FileAccessError
         If the file cannot be read.
     """
-    header = [name.split("[")[0].strip() for name in _header(path)]
+    with opened_table(path) as table:
+        header = [name.split("[")[0].strip() for name in table.layout.header]
     if set(_QUATERNION) <= set(header):
         rows = read_load_rows(path, {})
         R = _from_quaternions(path, rows, header)
@@ -164,13 +165,6 @@ def read_postures(
         return static_postures(R, rows.force, rows.moment, gravity)
     except CompensationError as error:
         raise CompensationError(f"{path}: {error}") from error
-
-
-def _header(path: Path) -> list[str]:
-    """Return the cells of the first line that is no comment."""
-    lines = (line for line in read_text(path).splitlines() if line.strip())
-    first = next((line for line in lines if not line.startswith("#")), "")
-    return first.replace(";", ",").replace("\t", ",").split(",")
 
 
 def _from_quaternions(path: Path, rows: LoadRows, header: list[str]) -> FloatArray:

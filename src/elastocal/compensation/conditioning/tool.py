@@ -6,13 +6,13 @@ from pathlib import Path
 import numpy as np
 
 from elastocal.arrays import FloatArray
-from elastocal.compensation.conditioning.tool_fit import NAMES, ToolFit
+from elastocal.compensation.conditioning.tool_fit import TOOL_UNKNOWNS, ToolFit
 from elastocal.errors import CompensationError, nearest
 from elastocal.records import read_json, record, write_json
 from elastocal.robot import GRAVITY, Robot, inverse_transform, parse_urdf
 
 _RIGID = 1e-6
-"""How far R R^T may be from identity."""
+"""Largest distance of a component of R R^T from the identity's."""
 
 
 def _zero() -> FloatArray:
@@ -124,7 +124,7 @@ class ToolResult:
 
 @dataclass(frozen=True, eq=False)
 class SensorMount:
-    """Where a sensor sits; static postures do not see it."""
+    """Place of a sensor on the arm; static postures do not see it."""
 
     flange: str
     """Link that it is bolted to."""
@@ -198,7 +198,7 @@ def sensor_load(tool: ToolResult, robot: Robot) -> SensorLoad:
         If an unknown that a wrench is corrected by is not determined, or the robot has no such
         link.
     """
-    open_ones = [name for name in NAMES if name in tool.undetermined]
+    open_ones = [name for name in TOOL_UNKNOWNS if name in tool.undetermined]
     if open_ones:
         raise CompensationError(
             f"the tool file leaves {', '.join(open_ones)} undetermined: take more postures that"

@@ -1,5 +1,8 @@
-from .correct import PathCorrection as PathCorrection, correct_rows as correct_rows
-from .krl import KrlResult as KrlResult, compensate_krl as compensate_krl
+from .correct import (
+    LARGEST_DEFLECTION as LARGEST_DEFLECTION,
+    PathCorrection as PathCorrection,
+    correct_rows as correct_rows,
+)
 from .path_columns import (
     PathColumns as PathColumns,
     PathError as PathError,
@@ -19,11 +22,10 @@ from .path_joints import (
     joints_along_path as joints_along_path,
     nearest_zero_posture as nearest_zero_posture,
     posture_jumps as posture_jumps,
+    turned_inside as turned_inside,
 )
 from .path_rows import (
     PathValues as PathValues,
-    RowBlock as RowBlock,
-    TextLayout as TextLayout,
     beyond_a_turn as beyond_a_turn,
     count_lines as count_lines,
     read_layout as read_layout,
@@ -31,4 +33,4 @@ from .path_rows import (
     row_blocks as row_blocks,
     turned_to_base as turned_to_base,
 )
-from .summary import CorrectionSummary as CorrectionSummary
+from .summary import CorrectionSummary as CorrectionSummary, LengthSummary as LengthSummary

@@ -6,7 +6,7 @@ With programmed tcp position ``p``, orientation ``R`` and force ``f``, find ``q`
 
 by Newton steps of the rigid arm: ``J_arm dq = [p - p(q) - C(q) f; log(R R(q)^T)]``. What is left
 out of the derivative, ``d(C f)/dq``, is a deflection per metre, some 1e-3, so that each step gains
-three digits. The first step alone is what is usually done; its residual is told.
+three digits. The first step alone is what is usually done; its residual is reported.
 """
 
 from dataclasses import dataclass
@@ -22,13 +22,13 @@ from elastocal.identification import CalibratedModel
 from elastocal.robot import Robot
 from elastocal.robot.inverse import TURN, InverseKinematics, pose_error
 
-LARGEST = 0.02
+LARGEST_DEFLECTION = 0.02
 """Largest deflection that is taken for one, in m."""
-TOLERANCE = 1e-9
-"""What is left of position (m) and orientation (rad); the contract is 1e-7 m."""
+_TOLERANCE = 1e-9
+"""Largest error left in position (m) and orientation (rad); the contract is 1e-7 m."""
 _STEPS = 12
 _DAMPING = 1e-6
-"""Of the Newton step, so that a straight wrist does not stop the rows beside it."""
+"""Damping of the Newton step, so that a straight wrist does not stop the rows beside it."""
 _SMALL_TURN = 1.0
 """Largest step of a joint (rad or m) that still is one of a correction."""
 
@@ -67,7 +67,7 @@ def correct_rows(
     where: RowName,
     *,
     may_turn: bool = False,
-    largest: float = LARGEST,
+    largest: float = LARGEST_DEFLECTION,
 ) -> PathCorrection:
     """Return the corrected rows of a path.
 
@@ -180,7 +180,7 @@ def _error(T: FloatArray, deflection: FloatArray, T_wanted: FloatArray) -> Float
 def _small(error: FloatArray) -> BoolArray:
     position = np.linalg.norm(error[:, :3], axis=1)
     turn = np.linalg.norm(error[:, 3:], axis=1)
-    return np.asarray((position <= TOLERANCE) & (turn <= TOLERANCE))
+    return np.asarray((position <= _TOLERANCE) & (turn <= _TOLERANCE))
 
 
 def _newton_step(robot: Robot, q: FloatArray, error: FloatArray) -> FloatArray:
@@ -216,7 +216,7 @@ def _by_solver(
         deflection = load.deflection(q[None], np.array([row]))[0]
         before, wanted = wanted, T.copy()
         wanted[:3, 3] -= deflection
-        if np.linalg.norm(wanted[:3, 3] - before[:3, 3]) <= TOLERANCE:
+        if np.linalg.norm(wanted[:3, 3] - before[:3, 3]) <= _TOLERANCE:
             return np.asarray(q, dtype=float)
     x, y, z = 1e3 * wanted[:3, 3]
     raise PathError(

@@ -31,11 +31,11 @@ def in_file(path: Path) -> Iterator[None]:
         raise PathError(f"{path}: {error}") from error
 
 
-AXES = ("x", "y", "z")
-EULER = ("a", "b", "c")
-QUATERNION = ("qx", "qy", "qz", "qw")
-FORCES = ("force_", "force_tcp_")
-MOMENTS = ("moment_", "moment_tcp_")
+_AXES = ("x", "y", "z")
+_EULER = ("a", "b", "c")
+_QUATERNION = ("qx", "qy", "qz", "qw")
+_FORCES = ("force_", "force_tcp_")
+_MOMENTS = ("moment_", "moment_tcp_")
 """In base axes, and in those of the programmed tcp."""
 _EXAMPLES = {"angle": "deg", "length": "mm", "force": "N", "moment": "N*m"}
 
@@ -93,10 +93,10 @@ def find_columns(header: Sequence[str], robot: Robot, forces: bool = True) -> Pa
     arm = [name for name in robot.joint_names[robot.external_axes :] if name in found]
     pose = [
         name
-        for name in (*AXES, *EULER, *QUATERNION)
+        for name in (*_AXES, *_EULER, *_QUATERNION)
         if name in found and name not in robot.joint_names
     ]
-    if arm and {*AXES} <= set(pose):
+    if arm and {*_AXES} <= set(pose):
         raise PathError(
             f"path has both joints ({', '.join(arm)}) and a tcp pose ({', '.join(pose)}): keep one"
         )
@@ -107,7 +107,7 @@ def find_columns(header: Sequence[str], robot: Robot, forces: bool = True) -> Pa
     if names and not arm and names != external:
         missing = next(name for name in external if name not in names)
         raise PathError(f"column '{missing}[…]' is missing: a path gives all external axes or none")
-    position = () if arm else tuple(_column(found, name, "length") for name in AXES)
+    position = () if arm else tuple(_column(found, name, "length") for name in _AXES)
     return PathColumns(
         joints,
         position,
@@ -171,26 +171,26 @@ def _column(found: _Found, name: str, dimension: str | None) -> Column:
 
 
 def _orientation(found: _Found) -> tuple[Column, ...]:
-    given = [names for names in (EULER, QUATERNION) if any(name in found for name in names)]
+    given = [names for names in (_EULER, _QUATERNION) if any(name in found for name in names)]
     if len(given) > 1:
         raise PathError(
-            f"path has both angles ({', '.join(EULER)}) and a quaternion ({', '.join(QUATERNION)}):"
-            " keep one"
+            f"path has both angles ({', '.join(_EULER)}) and a quaternion"
+            f" ({', '.join(_QUATERNION)}): keep one"
         )
-    if given == [QUATERNION]:
-        return tuple(_column(found, name, None) for name in QUATERNION)
-    return tuple(_column(found, name, "angle") for name in EULER)
+    if given == [_QUATERNION]:
+        return tuple(_column(found, name, None) for name in _QUATERNION)
+    return tuple(_column(found, name, "angle") for name in _EULER)
 
 
 def _wrenches(found: _Found, forces: bool) -> tuple[WrenchColumns | None, WrenchColumns | None]:
-    force = _wrench(found, "force", FORCES, forces)
-    return force, _wrench(found, "moment", MOMENTS, False)
+    force = _wrench(found, "force", _FORCES, forces)
+    return force, _wrench(found, "moment", _MOMENTS, False)
 
 
 def _wrench(
     found: _Found, dimension: str, prefixes: tuple[str, str], required: bool
 ) -> WrenchColumns | None:
-    given = [prefix for prefix in prefixes if any(f"{prefix}{axis}" in found for axis in AXES)]
+    given = [prefix for prefix in prefixes if any(f"{prefix}{axis}" in found for axis in _AXES)]
     in_base, in_tcp = (f"{prefix}x" for prefix in prefixes)
     if len(given) > 1:
         raise PathError(
@@ -204,7 +204,7 @@ def _wrench(
                 f" {in_tcp}[N] … (in the programmed tcp frame) are missing"
             )
         return None
-    x, y, z = (_column(found, f"{given[0]}{axis}", dimension) for axis in AXES)
+    x, y, z = (_column(found, f"{given[0]}{axis}", dimension) for axis in _AXES)
     return WrenchColumns((x, y, z), given[0] == prefixes[1])
 
 

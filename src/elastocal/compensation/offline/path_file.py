@@ -1,10 +1,8 @@
 """``PATH.csv`` to ``OUT.csv``: rows corrected block by block, everything else as it stood."""
 
-import csv
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, TextIO
 
 import numpy as np
 
@@ -13,8 +11,6 @@ from elastocal.compensation.offline import (
     PathColumns,
     PathError,
     PathValues,
-    RowBlock,
-    TextLayout,
     count_lines,
     find_columns,
     in_file,
@@ -23,7 +19,7 @@ from elastocal.compensation.offline import (
     row_blocks,
     turned_to_base,
 )
-from elastocal.compensation.offline.correct import LARGEST, PathCorrection, correct_rows
+from elastocal.compensation.offline.correct import LARGEST_DEFLECTION, PathCorrection, correct_rows
 from elastocal.compensation.offline.path_joints import (
     RowName,
     check_limits,
@@ -32,9 +28,10 @@ from elastocal.compensation.offline.path_joints import (
     posture_jumps,
 )
 from elastocal.compensation.offline.summary import CorrectionSummary
-from elastocal.files import replacing
 from elastocal.identification import CalibratedModel
+from elastocal.progress import Progress, silent
 from elastocal.robot.inverse import InverseKinematics, inverse_for
+from elastocal.tables import TableRows, new_table
 
 _ROWS_AT_A_TIME = 2000
 """Rows corrected at a time; bounds memory."""
@@ -43,11 +40,11 @@ _ADDED = tuple(f"deflection_{axis}{end}[m]" for end in ("", "_low", "_high") for
 
 @dataclass(frozen=True, eq=False)
 class CorrectionSettings:
-    """How a path is corrected."""
+    """Settings of the correction of a path."""
 
     start: FloatArray | None = None
     """Posture before the first row of a path of poses, shape (joint,), in rad or m."""
-    largest: float = LARGEST
+    largest: float = LARGEST_DEFLECTION
     """Largest deflection that is taken for one, in m."""
 
 
@@ -56,7 +53,7 @@ def compensate_path(
     path: Path,
     out: Path,
     settings: CorrectionSettings | None = None,
-    report: Callable[[str, int, int], None] = lambda *_: None,
+    progress: Progress = silent,
 ) -> CorrectionSummary:
     """Correct a path file; write the same columns corrected, and the predicted deflection.
 
@@ -67,9 +64,9 @@ def compensate_path(
     path, out : Path
         The file as programmed, and the one to write, atomically.
     settings : CorrectionSettings, optional
-        How.
-    report : callable
-        Told a stage, how many rows are done and how many there are.
+        Posture at the start, and the largest deflection.
+    progress : Progress
+        Hears how many rows are done.
 
     Raises
     ------
@@ -85,8 +82,15 @@ def compensate_path(
         solver = inverse_for(calibrated.model.robot)
         job = _Job(calibrated, solver, columns, settings)
         total = count_lines(path) - len(layout.preamble) - 1
-        with replacing(out) as temporary, temporary.open("w", encoding="utf-8", newline="") as file:
-            return _run(job, path, layout, file, lambda done: report("rows", done, total))
+        kept = [i for i, name in enumerate(layout.header) if name.strip() not in _ADDED]
+        header = (*(layout.header[i] for i in kept), *_ADDED)
+        with new_table(out, replace(layout, header=header)) as write:
+            return _correct_blocks(
+                job,
+                row_blocks(path, layout, _ROWS_AT_A_TIME),
+                lambda block, found: write(_new_cells(job, block, kept, found)),
+                lambda done: progress("rows", done, total),
+            )
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,15 +101,14 @@ class _Job:
     settings: CorrectionSettings
 
 
-def _run(
-    job: _Job, path: Path, layout: TextLayout, file: TextIO, done: Callable[[int], None]
+def _correct_blocks(
+    job: _Job,
+    blocks: Iterable[TableRows],
+    write: Callable[[TableRows, PathCorrection], None],
+    done: Callable[[int], None],
 ) -> CorrectionSummary:
-    kept = [i for i, name in enumerate(layout.header) if name.strip() not in _ADDED]
-    file.writelines(layout.preamble)
-    writer = csv.writer(file, delimiter=layout.delimiter, lineterminator=layout.line_end)
-    writer.writerow([*(layout.header[i] for i in kept), *_ADDED])
     summary, previous = CorrectionSummary(), job.settings.start
-    for block in row_blocks(path, layout, _ROWS_AT_A_TIME):
+    for block in blocks:
         values = read_values(block, job.columns)
         labels = [f"row {line}" for line in block.lines]
         q, T = programmed_rows(job.solver, values, previous, labels.__getitem__)
@@ -119,7 +122,7 @@ def _run(
             summary = summary if summary.rows else replace(summary, start=tuple(q[0].tolist()))
         summary = summary.plus(found, shift, labels, turned)
         previous = q[-1]
-        _write(writer, job, block, kept, found)
+        write(block, found)
         done(summary.rows)
     return summary
 
@@ -186,8 +189,10 @@ def _corrected(
     )
 
 
-def _write(writer: Any, job: _Job, block: RowBlock, kept: list[int], found: PathCorrection) -> None:
-    """Write rows; only the cells that were corrected are new text."""
+def _new_cells(
+    job: _Job, block: TableRows, kept: list[int], found: PathCorrection
+) -> Iterator[list[str]]:
+    """Yield the cells of corrected rows; only those that were corrected are new text."""
     columns, robot = job.columns, job.solver.robot
     new: list[tuple[int, list[str]]] = []
     if columns.by_pose:
@@ -203,4 +208,4 @@ def _write(writer: Any, job: _Job, block: RowBlock, kept: list[int], found: Path
     for row, (cells, end) in enumerate(zip(block.cells, ends, strict=True)):
         for index, text in new:
             cells[index] = text[row]
-        writer.writerow([*(cells[i] for i in kept), *end])
+        yield [*(cells[i] for i in kept), *end]

@@ -1,48 +1,24 @@
 """The rows of a path file, read in blocks so that any length fits into memory, as SI numbers."""
 
-import csv
-import itertools
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TextIO
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from elastocal.arrays import FloatArray
-from elastocal.compensation.offline.path_columns import EULER, PathColumns, PathError, WrenchColumns
+from elastocal.compensation.offline.path_columns import PathColumns, PathError, WrenchColumns
 from elastocal.errors import FileAccessError
 from elastocal.robot import T_from_xyzabc
-from elastocal.tables import DELIMITERS, Column
+from elastocal.tables import Column, TableError, TableLayout, TableRows, opened_table
 
 _BLOCK = 1 << 20
 
 
-@dataclass(frozen=True)
-class TextLayout:
-    """How a file is written, so that it is written back the same way."""
-
-    preamble: tuple[str, ...]
-    """Comment and blank lines above the header, with their line ends."""
-    header: tuple[str, ...]
-    delimiter: str
-    line_end: str
-
-
-@dataclass(frozen=True)
-class RowBlock:
-    """Some consecutive rows."""
-
-    cells: list[list[str]]
-    """As they stand in the file."""
-    lines: list[int]
-    """Line of the file that each row ends on, from 1."""
-
-
-def read_layout(path: Path) -> TextLayout:
-    """Return how a path file is written.
+def read_layout(path: Path) -> TableLayout:
+    """Return how a path file is written, so that it is written back the same way.
 
     Raises
     ------
@@ -51,15 +27,13 @@ def read_layout(path: Path) -> TextLayout:
     FileAccessError
         If it cannot be read.
     """
-    with _opened(path) as file:
-        preamble, line = _above(file)
-    delimiter = max(DELIMITERS, key=line.count)
-    bare = line.rstrip("\r\n")
-    header = tuple(next(csv.reader([bare], delimiter=delimiter)))
-    return TextLayout(tuple(preamble), header, delimiter, line[len(bare) :] or "\n")
+    with _as_path_errors(), opened_table(path) as table:
+        if not table.layout.header:
+            raise PathError("file has no header line")
+        return table.layout
 
 
-def row_blocks(path: Path, layout: TextLayout, size: int) -> Iterator[RowBlock]:
+def row_blocks(path: Path, layout: TableLayout, size: int) -> Iterator[TableRows]:
     """Yield the rows of a path file, up to ``size`` at a time; blank lines are left out.
 
     Raises
@@ -69,26 +43,16 @@ def row_blocks(path: Path, layout: TextLayout, size: int) -> Iterator[RowBlock]:
     FileAccessError
         If the file cannot be read.
     """
-    width, above, empty = len(layout.header), len(layout.preamble) + 1, True
-    with _opened(path) as file:
-        _above(file)
-        reader = csv.reader(file, delimiter=layout.delimiter, strict=True)
-        numbered = ((above + reader.line_num, row) for row in reader if any(map(str.strip, row)))
-        while True:
-            try:
-                some = list(itertools.islice(numbered, size))
-            except csv.Error as error:
-                raise PathError(f"row {above + reader.line_num}: {error}") from error
-            if not some:
-                break
+    width, empty = len(layout.header), True
+    with _as_path_errors(), opened_table(path) as table:
+        for block in table.pieces(size):
             empty = False
-            for number, row in some:
-                if len(row) != width:
-                    raise PathError(
-                        f"row {number} has {len(row)} cells, the header has {width}"
-                        " (a decimal comma needs another delimiter, and the comma made a point)"
-                    )
-            yield RowBlock([row for _, row in some], [number for number, _ in some])
+            if uneven := block.uneven(width):
+                raise PathError(
+                    f"row {uneven[0]} has {uneven[1]} cells, the header has {width}"
+                    " (a decimal comma needs another delimiter, and the comma made a point)"
+                )
+            yield block
     if empty:
         raise PathError("path has a header but no row")
 
@@ -108,28 +72,13 @@ def count_lines(path: Path) -> int:
         raise FileAccessError(f"cannot read {path}: {error.strerror or error}") from error
 
 
-def _above(file: TextIO) -> tuple[list[str], str]:
-    """Return the lines above the header, and the header's."""
-    preamble: list[str] = []
-    for line in file:
-        if line.strip() and not line.startswith("#"):
-            return preamble, line
-        preamble.append(line)
-    raise PathError("file has no header line")
-
-
 @contextmanager
-def _opened(path: Path) -> Iterator[TextIO]:
-    """Yield a text file; its troubles are told as ours."""
+def _as_path_errors() -> Iterator[None]:
+    """Raise what is wrong with a table as what is wrong with a path."""
     try:
-        with Path(path).open(encoding="utf-8-sig", newline="") as file:
-            yield file
-    except UnicodeDecodeError as error:
-        raise FileAccessError(f"cannot read {path}: not a UTF-8 text file") from error
-    except OSError as error:
-        if isinstance(error, FileAccessError):
-            raise
-        raise FileAccessError(f"cannot read {path}: {error.strerror or error}") from error
+        yield
+    except TableError as error:
+        raise PathError(str(error)) from error
 
 
 _MOST = 2.0 * np.pi * (1.0 + 1e-6)
@@ -152,7 +101,7 @@ def beyond_a_turn(angles: FloatArray) -> tuple[int, int] | None:
 
 
 _UNIT_NORM = 1e-3
-"""How far the norm of a quaternion may be from 1."""
+"""Largest distance of the norm of a quaternion from 1."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -169,7 +118,7 @@ class PathValues:
     """The same in N·m."""
 
 
-def read_values(block: RowBlock, columns: PathColumns) -> PathValues:
+def read_values(block: TableRows, columns: PathColumns) -> PathValues:
     """Return the numbers of some rows.
 
     Raises
@@ -180,12 +129,18 @@ def read_values(block: RowBlock, columns: PathColumns) -> PathValues:
     """
 
     def numbers(some: Sequence[Column]) -> FloatArray:
-        return np.column_stack([np.empty((len(block.cells), 0)), *(_read(block, c) for c in some)])
+        with _as_path_errors():
+            return np.column_stack(
+                [
+                    np.empty((len(block.cells), 0)),
+                    *(block.numbers(column, _finite) for column in some),
+                ]
+            )
 
     pose = None
     if columns.by_pose:
         position, orientation = numbers(columns.position), numbers(columns.orientation)
-        if len(columns.orientation) == len(EULER):
+        if len(columns.orientation) == 3:
             _check_angles(block, columns.orientation, orientation)
         pose = _poses(block, position, orientation)
     wrenches = [
@@ -214,44 +169,27 @@ def turned_to_base(
     return turned
 
 
-def _read(block: RowBlock, column: Column) -> FloatArray:
-    index = column.index
+def _finite(cell: str) -> float:
     try:
-        values = np.array([float(row[index]) for row in block.cells])
+        value = float(cell)
     except ValueError:
-        values = np.array([_or_nan(row[index]) for row in block.cells])
-    finite = np.isfinite(values)
-    if not finite.all():
-        bad = int(np.argmin(finite))
-        cell = block.cells[bad][index]
-        raise PathError(
-            f"row {block.lines[bad]}, column {_named(column)!r}: {cell!r} is not a finite number"
-        )
-    return values * column.scale
+        value = np.nan
+    if not np.isfinite(value):
+        raise ValueError("is not a finite number")
+    return value
 
 
-def _or_nan(cell: str) -> float:
-    try:
-        return float(cell)
-    except ValueError:
-        return np.nan
-
-
-def _named(column: Column) -> str:
-    return column.header if column.unit else column.name
-
-
-def _check_angles(block: RowBlock, columns: Sequence[Column], angles: FloatArray) -> None:
+def _check_angles(block: TableRows, columns: Sequence[Column], angles: FloatArray) -> None:
     found = beyond_a_turn(angles)
     if found is not None:
         row, k = found
         raise PathError(
-            f"row {block.lines[row]}, column {_named(columns[k])!r}: an orientation of"
+            f"row {block.lines[row]}, column {columns[k].header!r}: an orientation of"
             f" {np.degrees(angles[row, k]):.4g} deg is more than a turn: is it in degrees?"
         )
 
 
-def _poses(block: RowBlock, position: FloatArray, orientation: FloatArray) -> FloatArray:
+def _poses(block: TableRows, position: FloatArray, orientation: FloatArray) -> FloatArray:
     if orientation.shape[1] == 3:
         return T_from_xyzabc(*position.T, *orientation.T)
     norm = np.linalg.norm(orientation, axis=1)

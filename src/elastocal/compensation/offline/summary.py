@@ -1,4 +1,4 @@
-"""What a correction did to a path, added up piece by piece."""
+"""Figures of a corrected path, added up block by block."""
 
 from dataclasses import dataclass, field, replace
 
@@ -17,7 +17,7 @@ class LengthSummary:
     largest: float = 0.0
     """In m."""
     label: str = ""
-    """Of the row with the largest."""
+    """Name of the row with the largest."""
 
     def plus(self, lengths: FloatArray, labels: list[str]) -> "LengthSummary":
         """Return the figure with further rows."""
@@ -31,7 +31,7 @@ class LengthSummary:
 
 @dataclass(frozen=True)
 class CorrectionSummary:
-    """What a correction did, predicted by the model."""
+    """Figures of a correction, predicted by the model."""
 
     rows: int = 0
     deviation: LengthSummary = field(default_factory=LengthSummary)

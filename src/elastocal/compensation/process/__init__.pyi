@@ -3,7 +3,17 @@ from .correctors import (
     ModelCorrector as ModelCorrector,
     PerfectCorrector as PerfectCorrector,
 )
-from .course import Course as Course, Process as Process, Ripple as Ripple
+from .course import (
+    Course as Course,
+    Process as Process,
+    Ripple as Ripple,
+    arc_length as arc_length,
+    engaged as engaged,
+    evenly_spaced as evenly_spaced,
+    swing as swing,
+    tool_frames as tool_frames,
+    unit_tangents as unit_tangents,
+)
 from .effects import BUDGET as BUDGET, Effect as Effect
 from .folder import (
     DEVIATIONS as DEVIATIONS,

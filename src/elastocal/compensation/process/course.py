@@ -17,7 +17,7 @@ from elastocal.compensation.settings import CompensatorSettings
 from elastocal.planning.surface import Surface
 
 _PERIODS = (1.0, 2.3, 5.1)
-"""Of three sines, in s; no two of them keep step."""
+"""Periods of three sines, in s; no two of them keep step."""
 
 
 @dataclass(frozen=True)

@@ -9,9 +9,7 @@
 ==================  ==============================================================
 """
 
-import csv
-import io
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from itertools import groupby
 from pathlib import Path
 
@@ -28,8 +26,8 @@ from elastocal.compensation.process.result import (
     compare_deviations,
 )
 from elastocal.errors import CompensationError
-from elastocal.files import read_text, write_text
 from elastocal.records import read_json, write_json
+from elastocal.tables import TableError, TableRows, opened_table, write_table
 
 TABLE = "table.json"
 """Name of the file by which the folder is known."""
@@ -96,7 +94,7 @@ def write_programmed_path(
             row = [f"{value:.9f}" for value in q] + [f"{value:.3f}" for value in force]
             rows.append([course.name, f"{t:.3f}", *row])
     header = ["course", "time[s]", *names, *(f"force_{axis}[N]" for axis in "xyz")]
-    _write_csv(path, header, rows)
+    write_table(path, header, rows)
 
 
 def read_table(path: Path) -> SimulateProcessResult:
@@ -163,7 +161,7 @@ def _write_lines(path: Path, lines: Sequence[DeviationComparison]) -> None:
         shares = [f"{100 * share:.3f}" for share in line.reduction.values]
         rows.append([line.name, *sizes, *shares, line.points])
     columns = ["line", *header, *(f"reduction_{kind}[%]" for kind in kinds), "points"]
-    _write_csv(path, columns, rows)
+    write_table(path, columns, rows)
 
 
 def _write_deviations(path: Path, courses: Sequence[CourseDeviation]) -> None:
@@ -173,49 +171,49 @@ def _write_deviations(path: Path, courses: Sequence[CourseDeviation]) -> None:
         for time, row in zip(course.time.tolist(), (1e3 * lengths).tolist(), strict=True):
             numbers = [f"{value:.6f}" for value in row]
             rows.append([course.seed, course.course, f"{time:.6f}", *numbers])
-    _write_csv(path, _HEADER, rows)
-
-
-def _write_csv(path: Path, header: Sequence[str], rows: Iterable[Sequence[object]]) -> None:
-    text = io.StringIO()
-    csv.writer(text, lineterminator="\n").writerows([header, *rows])
-    write_text(path, text.getvalue())
+    write_table(path, _HEADER, rows)
 
 
 def _read_deviations(path: Path) -> tuple[CourseDeviation, ...]:
     """Return the courses of a ``deviations.csv``; refuse what is not as written, by line."""
-    header, *rows = csv.reader(io.StringIO(read_text(path)))
-    if tuple(header) != _HEADER:
+    try:
+        with opened_table(path) as table:
+            header, rows = table.layout.header, table.rows()
+    except TableError as error:
+        raise CompensationError(f"{path}: {error}") from error
+    if header != _HEADER:
         raise CompensationError(
             f"{path}: header {','.join(header)!r} is not that of deviations, {','.join(_HEADER)!r}"
         )
     if not rows:
         raise CompensationError(f"{path} has no rows")
-    short = [n for n, row in enumerate(rows, start=2) if len(row) != len(_HEADER)]
-    if short:
+    if uneven := rows.uneven(len(_HEADER)):
         raise CompensationError(
-            f"{path}: line {short[0]} has {len(rows[short[0] - 2])} fields, not {len(_HEADER)}"
+            f"{path}: line {uneven[0]} has {uneven[1]} fields, not {len(_HEADER)}"
         )
-    numbers = np.array([_numbers(path, n, row) for n, row in enumerate(rows, start=2)])
-    courses = groupby(range(len(rows)), key=lambda n: (numbers[n, 0], rows[n][1]))
+    numbers = _numbers(path, rows)
+    courses = groupby(range(len(rows)), key=lambda n: (numbers[n, 0], rows.cells[n][1]))
     return tuple(
         _course_deviation(int(seed), name, numbers[list(lines), 1:])
         for (seed, name), lines in courses
     )
 
 
-def _numbers(path: Path, line: int, row: Sequence[str]) -> list[float]:
-    found = []
-    for name, value in zip(_HEADER, row, strict=True):
-        if name == "course":
-            continue
-        try:
-            number = int(value) if name == "seed" else float(value)
-        except ValueError:
-            number = np.nan
-        if not np.isfinite(number):
-            raise CompensationError(f"{path}: line {line}: {name} {value!r} is not a number")
-        found.append(number)
+def _numbers(path: Path, rows: TableRows) -> FloatArray:
+    """Return all columns but the course, shape (row, 7)."""
+    names = [name for name in _HEADER if name != "course"]
+    places = [_HEADER.index(name) for name in names]
+    found = np.empty((len(rows), len(names)))
+    for row, (line, cells) in enumerate(zip(rows.lines, rows.cells, strict=True)):
+        for column, (name, place) in enumerate(zip(names, places, strict=True)):
+            value = cells[place]
+            try:
+                number = int(value) if name == "seed" else float(value)
+            except ValueError:
+                number = np.nan
+            if not np.isfinite(number):
+                raise CompensationError(f"{path}: line {line}: {name} {value!r} is not a number")
+            found[row, column] = number
     return found
 
 

@@ -24,7 +24,7 @@ class LoadedRobot(Protocol):
 
     @property
     def shift(self) -> FloatArray:
-        """Of the tool from where the undeformed robot has it, in base, shape (3,), in m."""
+        """Shift of the tool from where the undeformed robot has it, in base, shape (3,), in m."""
         ...
 
     @property
@@ -39,7 +39,7 @@ class LoadedRobot(Protocol):
 
 
 class TrueCell(Protocol):
-    """What a cell does; `elastocal.sim.workcell.process.ProcessCell` is one."""
+    """The truth of a cell; `elastocal.sim.workcell.process.ProcessCell` is one."""
 
     def lift(self, course: str, q: FloatArray) -> None:
         """Begin a course in the air."""
@@ -60,7 +60,7 @@ class TrueCell(Protocol):
 
 @dataclass(frozen=True)
 class Controller:
-    """How a robot controller follows corrections. Assumed; no data sheet says it."""
+    """A robot controller that follows corrections; assumed, no data sheet says it."""
 
     cycle: float = 0.004
     """In s."""
@@ -95,9 +95,9 @@ class CourseRun:
 
     course: Course
     time: FloatArray
-    """Of the cycles, shape (cycle,), in s."""
+    """Time of the cycles, shape (cycle,), in s."""
     shift: FloatArray
-    """Of the tool from the same path in the air, in base, shape (cycle, 3), in m."""
+    """Shift of the tool from the same path in the air, in base, shape (cycle, 3), in m."""
     position: FloatArray
     """Programmed tool centre point in base, shape (cycle, 3), in m."""
     deviation: FloatArray

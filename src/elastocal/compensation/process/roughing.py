@@ -25,7 +25,7 @@ from elastocal.compensation.process.course import (
 from elastocal.compensation.settings import CompensatorSettings
 from elastocal.planning.surface import Surface
 
-SPINDLE = 12_000.0 / 60.0
+_SPINDLE = 12_000.0 / 60.0
 """In Hz."""
 
 
@@ -37,7 +37,7 @@ class Roughing(Process):
     """
 
     radius: float = 0.14
-    """Of the lowest ring, in m."""
+    """Radius of the lowest ring, in m."""
     disk: float = 0.05
     """Radius of the disk on top that is not machined (Fig. 13), in m."""
     height: float = 0.06
@@ -58,7 +58,7 @@ class Roughing(Process):
     """Share by which the depth of the cut, and with it the force, changes along a ring."""
     roll_in: float = 0.02
     """Length over which the cutter rolls in and out, in m."""
-    ripple: tuple[Ripple, ...] = (Ripple(2.0 * SPINDLE, 0.4), Ripple(SPINDLE, 0.15))
+    ripple: tuple[Ripple, ...] = (Ripple(2.0 * _SPINDLE, 0.4), Ripple(_SPINDLE, 0.15))
 
     # The lines at 200 and 400 Hz cannot be notched at a cycle of 4 ms: readings come every 1 ms.
     compensator: ClassVar[CompensatorSettings] = CompensatorSettings.model_validate(
@@ -66,8 +66,8 @@ class Roughing(Process):
             "filter": {
                 "sample": "1 ms",
                 "notches": [
-                    {"frequency": f"{SPINDLE:g} Hz", "width": "20 Hz"},
-                    {"frequency": f"{2.0 * SPINDLE:g} Hz", "width": "20 Hz"},
+                    {"frequency": f"{_SPINDLE:g} Hz", "width": "20 Hz"},
+                    {"frequency": f"{2.0 * _SPINDLE:g} Hz", "width": "20 Hz"},
                 ],
                 "low_pass": {"cutoff": "25 Hz"},
             }

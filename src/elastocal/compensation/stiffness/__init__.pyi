@@ -10,6 +10,7 @@ from .directional import (
     PrincipalStiffness as PrincipalStiffness,
     directional_stiffness as directional_stiffness,
     principal_stiffness as principal_stiffness,
+    stiffness_along as stiffness_along,
 )
 from .stations import PathStations as PathStations, read_stations as read_stations
 from .survey import (

@@ -1,7 +1,5 @@
 """The best postures of a survey, and the tables of all postures and of the chosen ones."""
 
-import csv
-import io
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,10 +10,10 @@ from elastocal.arrays import FloatArray
 from elastocal.compensation.stiffness.directional import directional_stiffness, principal_stiffness
 from elastocal.compensation.stiffness.stations import PathStations
 from elastocal.compensation.stiffness.survey import PostureSurvey
-from elastocal.files import write_text
 from elastocal.identification import CalibratedModel
 from elastocal.robot import Robot
 from elastocal.robot.inverse import InverseKinematics, OpwInverse
+from elastocal.tables import write_table
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,7 +106,8 @@ def write_survey(path: Path, robot: Robot, stations: PathStations, survey: Postu
         arm = _shown(robot, q)[robot.external_axes :]
         line = str(stations.lines[station])
         rows.append([line, _number(float(np.degrees(spins[spin]))), *held, _number(k), *arm])
-    return _write(path, header, rows)
+    write_table(path, header, rows)
+    return path
 
 
 def write_choice(
@@ -152,14 +151,7 @@ def write_choice(
                     *map(_number, shape.axes[place].T.ravel()),
                 ]
             )
-    return _write(path, header, rows)
-
-
-def _write(path: Path, header: list[str], rows: list[list[str]]) -> Path:
-    text = io.StringIO(newline="")
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerows([header, *rows])
-    write_text(path, text.getvalue())
+    write_table(path, header, rows)
     return path
 
 

@@ -1,4 +1,4 @@
-"""How stiff a posture is: in one direction, and in all.
+"""Stiffness of a posture: in one direction, and in all.
 
 With the Cartesian compliance ``C = J diag(c) J^T`` of the tool centre point (paper Eq. 10), a force
 of 1 N along the unit vector ``u`` moves the tool by ``u^T C u`` along ``u``. The directional

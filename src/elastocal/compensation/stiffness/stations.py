@@ -8,7 +8,6 @@ import numpy as np
 from elastocal.arrays import FloatArray
 from elastocal.compensation.offline import (
     PathError,
-    RowBlock,
     find_columns,
     in_file,
     programmed_rows,
@@ -17,6 +16,7 @@ from elastocal.compensation.offline import (
     row_blocks,
 )
 from elastocal.robot.inverse import InverseKinematics
+from elastocal.tables import TableRows
 
 _BLOCK = 20_000
 
@@ -26,7 +26,7 @@ class PathStations:
     """Rows of a path, evenly taken."""
 
     lines: tuple[int, ...]
-    """Of the file, from 1."""
+    """Lines of the file, from 1."""
     T_base_tcp: FloatArray
     """Shape (station, 4, 4), in m."""
     q: FloatArray
@@ -84,7 +84,7 @@ def read_stations(
     return PathStations(tuple(block.lines), T, q)
 
 
-def _rows(path: Path, wanted: np.ndarray) -> RowBlock:
+def _rows(path: Path, wanted: np.ndarray) -> TableRows:
     """Return some rows of a file by their numbers, in ascending order."""
     cells: list[list[str]] = []
     lines: list[int] = []
@@ -94,4 +94,4 @@ def _rows(path: Path, wanted: np.ndarray) -> RowBlock:
             cells.append(block.cells[row - first])
             lines.append(block.lines[row - first])
         first += len(block.lines)
-    return RowBlock(cells, lines)
+    return TableRows(cells, lines)

@@ -26,7 +26,7 @@ from elastocal.robot.inverse import InverseKinematics
 _SAMPLES = 5
 """Joint positions at which two robots are compared."""
 _SAME = 1e-6
-"""Where they may differ by rounding, in m or as a number of a rotation."""
+"""Difference of their poses by rounding, in m or as a number of a rotation."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,7 +107,7 @@ _MOST = 3_000_000
 
 @dataclass(frozen=True, eq=False)
 class PostureGrid:
-    """What may be chosen at every station."""
+    """The choices at every station."""
 
     spins: FloatArray
     """Turns about the tool's axis from the programmed orientation, shape (spin,), in rad."""
@@ -198,7 +198,7 @@ def survey_postures(
     return PostureSurvey(grid, q, stiffness, refused)
 
 
-def spun(T_base_tcp: FloatArray, spins: FloatArray) -> FloatArray:
+def _spun(T_base_tcp: FloatArray, spins: FloatArray) -> FloatArray:
     """Return a pose turned about its z axis, shape (spin, 4, 4)."""
     turn = np.tile(np.eye(4), (len(spins), 1, 1))
     turn[:, 0, 0] = turn[:, 1, 1] = np.cos(spins)
@@ -211,7 +211,7 @@ def spun(T_base_tcp: FloatArray, spins: FloatArray) -> FloatArray:
 def _postures(solver: InverseKinematics, T: FloatArray, grid: PostureGrid) -> FloatArray:
     """Return the branches of a station, shape (spin, external, branch, joint)."""
     spins, externals = len(grid.spins), len(grid.external)
-    poses = np.repeat(spun(T, grid.spins), externals, axis=0)
+    poses = np.repeat(_spun(T, grid.spins), externals, axis=0)
     external = np.tile(grid.external, (spins, 1))
     found = solver.solve_many(poses, external).q
     return found.reshape(spins, externals, *found.shape[1:])
