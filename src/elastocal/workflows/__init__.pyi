@@ -1,4 +1,5 @@
 from ._device_sources import KINDS as KINDS, SOURCES as SOURCES, DeviceSource as DeviceSource
+from ._operator import Operator as Operator, Supervision as Supervision, Unattended as Unattended
 from ._outputs import refuse_overwriting as refuse_overwriting
 from ._robot_source import find_robot as find_robot
 from .calibrate import (
@@ -22,12 +23,9 @@ from .predict import (
 from .run import (
     POSES_MEASURED as POSES_MEASURED,
     DryRunResult as DryRunResult,
-    Operator as Operator,
     RunFigures as RunFigures,
     RunResult as RunResult,
     RunSettings as RunSettings,
-    Supervision as Supervision,
-    Unattended as Unattended,
     dry_run as dry_run,
     run as run,
 )

@@ -5,13 +5,12 @@ that a person must look at first moves before the operator has agreed.
 """
 
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import AbstractContextManager, contextmanager
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from os import PathLike
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 from elastocal.cell import Cell, load_cell
 from elastocal.cell.devices import Devices
@@ -58,55 +57,11 @@ from elastocal.progress import Progress
 from elastocal.records import record
 from elastocal.results import Result
 from elastocal.workflows._device_sources import DeviceSource, device_source
+from elastocal.workflows._operator import Operator, Unattended
 from elastocal.workflows._workflow import workflow
 
 POSES_MEASURED = "poses measured"
 """The stage that a run reports to its progress."""
-
-
-@dataclass(frozen=True)
-class Supervision:
-    """The operator's part while the arm moves."""
-
-    show: Callable[[RunProgress], None]
-    """Takes note of every step; never raises, never waits."""
-    interrupted: Callable[[], bool]
-    """Whether somebody wants the run to stop: it releases, retracts and stops."""
-
-
-class Operator(Protocol):
-    """The person at the cell."""
-
-    def warn(self, lines: Sequence[str]) -> None:
-        """Read what should be known before anything moves."""
-
-    def confirm(self) -> None:
-        """Agree that the cell is clear, or raise `ProcedureError`."""
-
-    def supervise(self, poses: int) -> AbstractContextManager[Supervision]:
-        """Watch while the arm moves to this number of poses."""
-
-
-class Unattended:
-    """Nobody: agrees to nothing, interrupts nothing, hears progress by the callable alone."""
-
-    def warn(self, lines: Sequence[str]) -> None:
-        """Read nothing."""
-
-    def confirm(self) -> None:
-        """Refuse.
-
-        Raises
-        ------
-        ProcedureError
-            Always.
-        """
-        raise ProcedureError("a person must confirm that the cell is clear: give --yes")
-
-    @contextmanager
-    def supervise(self, poses: int) -> Iterator[Supervision]:  # noqa: ARG002 - the protocol's form
-        """Watch nothing."""
-        yield Supervision(lambda _step: None, lambda: False)
 
 
 @dataclass(frozen=True)
