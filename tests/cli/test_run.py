@@ -1,5 +1,6 @@
 """``elastocal run`` on the simulated cell: refusals, the dry run, a whole run, kill and resume."""
 
+import importlib
 import json
 import shutil
 import signal
@@ -219,7 +220,8 @@ def test_a_run_whose_readings_cannot_be_derived_still_says_how_it_ended(
     def fails(_):
         raise DatasetError("no usable reading among 8")
 
-    monkeypatch.setattr("elastocal.cli.run_session.derive_run", fails)
+    module = importlib.import_module("elastocal.workflows.run")  # its face has the function
+    monkeypatch.setattr(module, "derive_run", fails)
     result = run(planned, tmp_path / "run", "--json")
     assert result.code == 1
     figures = json.loads(result.out)
