@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 from elastocal.arrays import FloatArray
 from elastocal.dataset import Readings
 from elastocal.elastic import ElasticModel
-from elastocal.identification.least_squares import RANK_TOLERANCE
+from elastocal.identification._least_squares import RANK_TOLERANCE
 from elastocal.identification.problem import Problem
 from elastocal.identification.solve import solve
 
