@@ -1,5 +1,5 @@
+from ._layout import SCHEMA as SCHEMA, STATUSES as STATUSES
 from .dataset import Dataset as Dataset
-from .layout import SCHEMA as SCHEMA, STATUSES as STATUSES
 from .load_rows import (
     LoadRows as LoadRows,
     joint_dimensions as joint_dimensions,

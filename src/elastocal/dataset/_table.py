@@ -16,8 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from elastocal.dataset.dataset import Dataset
-from elastocal.dataset.layout import (
+from elastocal.dataset._layout import (
     ATTRIBUTES,
     AXES,
     CF_ATTRIBUTES,
@@ -30,8 +29,9 @@ from elastocal.dataset.layout import (
     FloatArray,
     StatusArray,
 )
-from elastocal.dataset.structure import assemble
-from elastocal.dataset.table_header import parse_header
+from elastocal.dataset._structure import assemble
+from elastocal.dataset._table_header import parse_header
+from elastocal.dataset.dataset import Dataset
 from elastocal.errors import DatasetError, nearest
 from elastocal.files import read_text
 from elastocal.records import LabelledArrays

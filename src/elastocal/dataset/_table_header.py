@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from elastocal.dataset.layout import (
+from elastocal.dataset._layout import (
     COLUMN_NAMES,
     JOINT_UNITS,
     SI_JOINT_UNITS,
