@@ -7,13 +7,20 @@ from itertools import combinations
 
 import pytest
 
-from elastocal.report.document import Options, Parts, gather, pictures as drawing
+from elastocal.report.document import (
+    pictures as drawing,
+)
 from elastocal.report.document.sections import SECTIONS
 from elastocal.report.pages.templating import embedded
+from elastocal.verdict import (
+    Evidence,
+    EvidenceOptions,
+    gather_evidence,
+)
 from support import reported
 
-KEPT = {"made", "name", "limits", "files", "absent", "doubts"}
-EMPTY = {field.name: field.default for field in fields(Parts) if field.name not in KEPT}
+KEPT = {"made", "name", "limits", "files", "missing", "doubts"}
+EMPTY = {field.name: field.default for field in fields(Evidence) if field.name not in KEPT}
 NAMES = list(EMPTY)
 VOID = {"br", "img", "input", "path", "circle", "meta", "hr"}
 
@@ -55,7 +62,7 @@ def whole(tmp_path_factory):
     data = folder / "run" / "dataset.nc"
     made = elastocal("calibrate", data, "--out", old, "--exclude", 0, "--draws", 40)
     assert made.code == 0, made.err
-    parts = gather(Options(folder, old=old), reported.MADE)
+    parts = gather_evidence(EvidenceOptions(folder, old=old), reported.MADE)
     assert all(getattr(parts, name) != empty for name, empty in EMPTY.items())
     return parts
 

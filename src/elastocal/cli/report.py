@@ -6,7 +6,12 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 if TYPE_CHECKING:
-    from elastocal.report.document import Parts, Written
+    from elastocal.report.document import (
+        Written,
+    )
+    from elastocal.verdict import (
+        Evidence,
+    )
 
 
 def report(  # noqa: PLR0913 - one parameter an option
@@ -63,7 +68,15 @@ def report(  # noqa: PLR0913 - one parameter an option
 
     from elastocal.cli.output import console, print_json
     from elastocal.cli.parsing import parse_limit
-    from elastocal.report.document import Options, find_browser, gather, write_pdf, write_report
+    from elastocal.report.document import (
+        find_browser,
+        write_pdf,
+        write_report,
+    )
+    from elastocal.verdict import (
+        EvidenceOptions,
+        gather_evidence,
+    )
 
     paper = out.with_suffix(".pdf") if pdf else None
     check_places(out, paper, force)
@@ -71,12 +84,14 @@ def report(  # noqa: PLR0913 - one parameter an option
     accepted = None if tolerance is None else parse_limit(tolerance, "--tolerance")
     drift = None if limit is None else parse_limit(limit)
     made = datetime.now(UTC).isoformat(timespec="seconds")
-    parts = gather(Options(run, model, tool, codec, process, old, accepted, drift), made)
-    written = write_report(out, parts)
+    evidence = gather_evidence(
+        EvidenceOptions(run, model, tool, codec, process, old, accepted, drift), made
+    )
+    written = write_report(out, evidence)
     if paper is not None:
         write_pdf(out, paper, browser)
     if as_json:
-        print_json(_figures(parts, written, paper))
+        print_json(_figures(evidence, written, paper))
         return
     shown = console()
     verdict = written.verdict
@@ -107,8 +122,8 @@ def check_places(out: Path, paper: Path | None, force: bool) -> None:
             raise FileAccessError(f"{path} is there already: name another file, or give --force")
 
 
-def _figures(parts: "Parts", written: "Written", paper: Path | None) -> dict[str, Any]:
-    verdict, again = written.verdict, parts.again
+def _figures(evidence: "Evidence", written: "Written", paper: Path | None) -> dict[str, Any]:
+    verdict, again = written.verdict, evidence.reproduction
     unseen = again.unseen if again is not None and again.same else None
     return {
         "report": str(written.path),
@@ -117,12 +132,12 @@ def _figures(parts: "Parts", written: "Written", paper: Path | None) -> dict[str
         "verdict": verdict.sentence,
         "reasons": list(verdict.reasons),
         "advice": list(verdict.advice),
-        "tolerance": parts.limits.tolerance,
+        "tolerance": evidence.limits.tolerance,
         "unseen": None if unseen is None else {
             "mean": _estimate(unseen.mean), "p95": _estimate(unseen.p95), "max": unseen.max,
             "poses": unseen.poses, "readings": len(unseen.error),
         },
-        "missing": [each.name for each in parts.absent],
+        "missing": [each.name for each in evidence.missing],
     }  # fmt: skip
 
 

@@ -1,6 +1,10 @@
 import pytest
 
-from elastocal.report.document import Options, Parts, gather
+from elastocal.verdict import (
+    Evidence,
+    EvidenceOptions,
+    gather_evidence,
+)
 from support import reported
 
 
@@ -11,8 +15,8 @@ def finished(tmp_path_factory):
 
 
 @pytest.fixture(scope="session")
-def parts(finished) -> Parts:
-    return gather(Options(finished), reported.MADE)
+def parts(finished) -> Evidence:
+    return gather_evidence(EvidenceOptions(finished), reported.MADE)
 
 
 @pytest.fixture

@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 from elastocal.identification import describe
-from elastocal.report.document import Absence
 from elastocal.report.document.markup import Markup, plain
 from elastocal.report.document.sections import (
     cell,
@@ -19,6 +18,9 @@ from elastocal.report.document.sections import (
     process,
     provenance,
     readings,
+)
+from elastocal.verdict import (
+    MissingPart,
 )
 
 
@@ -66,11 +68,11 @@ def test_poses_stand_with_their_places_and_the_other_technique(parts):
 
 def test_readings_are_counted_and_the_worst_is_named(parts):
     text = words(readings, parts)
-    unseen = parts.again.unseen
+    unseen = parts.reproduction.unseen
     worst = int(unseen.error.argmax())
     assert f"pose {unseen.pose[worst]} {unseen.load_case[worst]} {1e3 * unseen.max:.3f} mm" in text
     assert "No reading looks wrong" in text or "looks wrong" in text
-    deflection = np.linalg.norm(parts.again.calibration.readings.deflection, axis=1)
+    deflection = np.linalg.norm(parts.reproduction.calibration.readings.deflection, axis=1)
     assert f"{1e3 * deflection.max():.3f} mm" in text
 
 
@@ -241,18 +243,18 @@ def test_what_was_not_verified_is_never_empty(parts):
 @pytest.mark.parametrize(
     ("absence", "holds_back"),
     [
-        (Absence("dataset", "gone"), True),
-        (Absence("calibrated model", "gone"), True),
-        (Absence("tool file", "gone"), False),
-        (Absence("process", "gone"), False),
-        (Absence("codec", "torn", damaged=True), False),
+        (MissingPart("dataset", "gone"), True),
+        (MissingPart("calibrated model", "gone"), True),
+        (MissingPart("tool file", "gone"), False),
+        (MissingPart("process", "gone"), False),
+        (MissingPart("codec", "torn", damaged=True), False),
     ],
 )
 def test_only_what_is_essential_holds_back_when_it_is_missing(parts, absence, holds_back):
-    found = replace(parts, absent=(absence,))
+    found = replace(parts, missing=(absence,))
     assert len(findings(not_verified, found, holds_back)) == 1
     assert findings(not_verified, found, not holds_back) == []
 
 
 def test_doubts_hold_back(parts):
-    assert findings(not_verified, replace(parts, absent=(), doubts=("odd",))) == ["odd"]
+    assert findings(not_verified, replace(parts, missing=(), doubts=("odd",))) == ["odd"]

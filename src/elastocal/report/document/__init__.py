@@ -2,10 +2,10 @@
 
 ================  ==================================================================
 `places`          where the files of a run lie
-`gather`          from files to `parts`, with what is missing and why
+`gather`          from files to `evidence`, with what is missing and why
 `again`           the calibration once more from its readings, and its errors
 `verdict`         light, reasons, and what would improve the result
-`sections`        one file a section: from parts to HTML
+`sections`        one file a section: from evidence to HTML
 `page`, `pdf`     the whole document
 ================  ==================================================================
 """

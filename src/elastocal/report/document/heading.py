@@ -1,9 +1,9 @@
 """The head of the report: light, key figures, reasons, advice."""
 
-from elastocal.report.document.again import Unseen
+from elastocal.identification.reproduction import UnseenErrors
 from elastocal.report.document.markup import coded, facts, heading, html, listed, paragraph
-from elastocal.report.document.parts import Parts
-from elastocal.report.document.verdict import Light, Verdict
+from elastocal.verdict.evidence import Evidence
+from elastocal.verdict.judgement import Light, Verdict
 from elastocal.wording import mm
 
 _SHAPES = {
@@ -17,12 +17,12 @@ _SHAPES = {
 """Of the light: a disc with a tick, a triangle with a mark, an octagon with a cross."""
 
 
-def verdict_html(parts: Parts, verdict: Verdict) -> str:
+def verdict_html(evidence: Evidence, verdict: Verdict) -> str:
     """Return the verdict as HTML."""
-    again = parts.again
+    again = evidence.reproduction
     unseen = again.unseen if again is not None and again.same else None
     text = _light(verdict)
-    if parts.simulated:
+    if evidence.simulated:
         text += paragraph("A simulated cell: no real robot was measured.", "banner")
     text += paragraph(verdict.sentence, "sentence")
     if unseen is not None:
@@ -48,7 +48,7 @@ def _light(verdict: Verdict) -> str:
     )
 
 
-def _figures(unseen: Unseen) -> str:
+def _figures(unseen: UnseenErrors) -> str:
     def span(low: float, high: float) -> str:
         return f"({mm(low)} to {mm(high)})"
 

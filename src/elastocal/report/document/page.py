@@ -10,14 +10,13 @@ from plotly.offline import get_plotlyjs
 
 from elastocal import __version__
 from elastocal.files import write_text
-from elastocal.report.document.advice import advised
 from elastocal.report.document.heading import verdict_html
 from elastocal.report.document.markup import stamp
-from elastocal.report.document.parts import Parts
 from elastocal.report.document.section import Content
 from elastocal.report.document.sections import SECTIONS
-from elastocal.report.document.verdict import Verdict, judge
 from elastocal.report.pages.templating import POLICY, embedded, template
+from elastocal.verdict.evidence import Evidence
+from elastocal.verdict.judgement import Verdict, advised, judge
 
 
 @dataclass(frozen=True)
@@ -28,14 +27,14 @@ class Written:
     verdict: Verdict
 
 
-def write_report(path: Path, parts: Parts) -> Written:
+def write_report(path: Path, evidence: Evidence) -> Written:
     """Write the report, atomically.
 
     Parameters
     ----------
     path : Path
         An HTML file.
-    parts : Parts
+    evidence : Evidence
         Whatever is there.
 
     Raises
@@ -43,21 +42,21 @@ def write_report(path: Path, parts: Parts) -> Written:
     FileAccessError
         If it cannot be written.
     """
-    contents = {section.identifier: section.body(parts) for section in SECTIONS}
+    contents = {section.identifier: section.body(evidence) for section in SECTIONS}
     findings = [finding for content in contents.values() for finding in content.findings]
-    verdict = judge(parts, findings, tuple(advised(parts)))
-    write_text(path, _page(parts, verdict, contents))
+    verdict = judge(evidence, findings, tuple(advised(evidence)))
+    write_text(path, _page(evidence, verdict, contents))
     return Written(Path(path), verdict)
 
 
-def _page(parts: Parts, verdict: Verdict, contents: dict[str, Content]) -> str:
+def _page(evidence: Evidence, verdict: Verdict, contents: dict[str, Content]) -> str:
     data: dict[str, Any] = {key: each.data for key, each in contents.items() if each.data}
     return Template(template("report.html")).substitute(
         policy=escape(POLICY),
-        title=escape(f"Calibration report: {parts.name}"),
-        subtitle=escape(_subtitle(parts)),
+        title=escape(f"Calibration report: {evidence.name}"),
+        subtitle=escape(_subtitle(evidence)),
         css=template("report.css"),
-        verdict=verdict_html(parts, verdict),
+        verdict=verdict_html(evidence, verdict),
         contents="".join(
             f'<li><a href="#{section.identifier}">{escape(section.title)}</a></li>'
             for section in SECTIONS
@@ -67,7 +66,7 @@ def _page(parts: Parts, verdict: Verdict, contents: dict[str, Content]) -> str:
             f"{number}. {escape(section.title)}</h2>{contents[section.identifier].html}</section>"
             for number, section in enumerate(SECTIONS, start=1)
         ),
-        footer=f"Made by elastocal {escape(__version__)}, {stamp(parts.made)}.",
+        footer=f"Made by elastocal {escape(__version__)}, {stamp(evidence.made)}.",
         data=embedded(data),
         # Four and a half megabytes that only the view in three dimensions needs.
         plotly=get_plotlyjs() if "poses" in data else "",
@@ -75,6 +74,6 @@ def _page(parts: Parts, verdict: Verdict, contents: dict[str, Content]) -> str:
     )
 
 
-def _subtitle(parts: Parts) -> str:
-    robot = parts.robot or "robot not known"
-    return f"Elastic calibration of {robot}{', simulated cell' if parts.simulated else ''}"
+def _subtitle(evidence: Evidence) -> str:
+    robot = evidence.robot or "robot not known"
+    return f"Elastic calibration of {robot}{', simulated cell' if evidence.simulated else ''}"

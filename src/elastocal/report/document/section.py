@@ -4,7 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
-from elastocal.report.document.parts import Parts
+from elastocal.verdict.evidence import Evidence
 
 
 @dataclass(frozen=True)
@@ -30,9 +30,9 @@ class Content:
 
 @dataclass(frozen=True)
 class Section:
-    """One section: a title, and how it is made from the parts, whichever are there."""
+    """One section: a title, and how it is made from the evidence, whichever are there."""
 
     identifier: str
     """Of the heading; also the key of its data."""
     title: str
-    body: Callable[[Parts], Content]
+    body: Callable[[Evidence], Content]

@@ -16,13 +16,13 @@ from elastocal.cell import Cell
 from elastocal.files import write_text
 from elastocal.planning import PlanFile, PoolData, PoseRecord, check_pool_of
 from elastocal.planning.surface import Surface
-from elastocal.report.belongs import check_robot
 from elastocal.report.pages.templating import POLICY, embedded, template
 from elastocal.report.plots import (
     PlanView,
     plan_view,
     weakest_margins,
 )
+from elastocal.verdict.consistency import check_plan_robot
 from elastocal.wording import duration, millimetres, readable
 
 
@@ -50,7 +50,7 @@ def write_plan_page(
         If the page cannot be written.
     """
     check_pool_of(plan, pool)
-    check_robot(plan, cell)
+    check_plan_robot(plan, cell)
     write_text(path, _page(plan_view(cell, surface, plan, pool), plan, pool))
     return Path(path)
 

@@ -6,24 +6,24 @@ import numpy as np
 
 from elastocal.cell import Cell
 from elastocal.report.document.markup import paragraph, table
-from elastocal.report.document.parts import Parts
 from elastocal.report.document.section import Content, Section
+from elastocal.verdict.evidence import Evidence
 from elastocal.wording import mm, point
 
 Row = tuple[str, str]
 
 
-def body(parts: Parts) -> Content:
+def body(evidence: Evidence) -> Content:
     """Return the section."""
-    if parts.cell is None:
-        robot = f" The robot of the model is {parts.robot}." if parts.robot else ""
+    if evidence.cell is None:
+        robot = f" The robot of the model is {evidence.robot}." if evidence.robot else ""
         return Content(paragraph(f"The cell is not known: no cell file could be read.{robot}"))
-    cell = parts.cell
+    cell = evidence.cell
     top = paragraph(
         "The devices are simulated: no real robot, sensor or tracker took part.", "banner"
     )
     return Content(
-        (top if parts.simulated else "")
+        (top if evidence.simulated else "")
         + table("Robot, tool and instruments", ("What", "Value"), _facts(cell), texts=2)
         + table(
             "Load cases: force on the robot in the tcp frame, in N",

@@ -5,9 +5,7 @@ from functools import partial
 
 from elastocal.codec import CodecData, Saturation
 from elastocal.errors import CodecError
-from elastocal.report.document.leading import leading
 from elastocal.report.document.markup import facts, heading, listed, paragraph, table
-from elastocal.report.document.parts import Codec, Parts
 from elastocal.report.document.pictures import picture
 from elastocal.report.document.section import Content, Finding, Section
 from elastocal.report.plots import (
@@ -15,6 +13,8 @@ from elastocal.report.plots import (
     headline,
     how_to_read,
 )
+from elastocal.verdict.evidence import CodecEvidence, Evidence
+from elastocal.verdict.judgement import leading
 from elastocal.wording import counted, mm
 
 _FIGURES = {
@@ -25,9 +25,9 @@ _FIGURES = {
 """What a codec may compare: in words, and the figure of the paper that does; in its order."""
 
 
-def body(parts: Parts) -> Content:
+def body(evidence: Evidence) -> Content:
     """Return the section."""
-    if not parts.codecs:
+    if not evidence.codecs:
         return Content(
             paragraph("There is no codec, so it is not known whether there were enough poses."),
             findings=(
@@ -38,7 +38,7 @@ def body(parts: Parts) -> Content:
                 ),
             ),
         )
-    data = parts.codecs[0].data
+    data = evidence.codecs[0].data
     sets, size = data.verification.shape
     html = facts(
         [
@@ -48,12 +48,12 @@ def body(parts: Parts) -> Content:
             ("Training poses", f"1 to {data.n_train[-1]}"),
         ]
     )
-    html += "".join(_codec(codec) for codec in sorted(parts.codecs, key=_order))
-    best = leading(parts)
+    html += "".join(_codec(codec) for codec in sorted(evidence.codecs, key=_order))
+    best = leading(evidence)
     return Content(html, findings=() if best is None else tuple(_findings(best)))
 
 
-def _codec(codec: Codec) -> str:
+def _codec(codec: CodecEvidence) -> str:
     data, verdicts = codec.data, codec.verdicts
     html = heading(_title(data)) + listed(_micro(each) for each in verdicts.sentences)
     try:
@@ -89,7 +89,7 @@ def _compared(data: CodecData) -> str | None:
     return None
 
 
-def _order(codec: Codec) -> int:
+def _order(codec: CodecEvidence) -> int:
     key = _compared(codec.data)
     return list(_FIGURES).index(key) if key else len(_FIGURES)
 
@@ -99,7 +99,7 @@ def _micro(sentence: str) -> str:
     return sentence.replace(" um", " µm")
 
 
-def _table(codec: Codec) -> str:
+def _table(codec: CodecEvidence) -> str:
     rows = [
         (
             each.variant,

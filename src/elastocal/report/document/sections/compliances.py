@@ -6,13 +6,13 @@ from typing import Any
 
 from elastocal.identification import Term, describe
 from elastocal.report.document.markup import facts, heading, listed, paragraph, table
-from elastocal.report.document.parts import Calibrated, Parts
 from elastocal.report.document.pictures import picture
 from elastocal.report.document.section import Content, Finding, Section
 from elastocal.report.plots import (
     SpringBar,
     spring_figure,
 )
+from elastocal.verdict.evidence import Evidence, ModelEvidence
 from elastocal.wording import mm
 
 Figures = dict[str, Any]
@@ -21,14 +21,14 @@ _STIFF = {"revolute": "MN·m/rad", "prismatic": "MN/m"}
 _MOST_TERMS = 6
 
 
-def body(parts: Parts) -> Content:
+def body(evidence: Evidence) -> Content:
     """Return the section."""
-    if parts.calibrated is None:
+    if evidence.calibrated is None:
         return Content(paragraph("There is no calibrated model, so no compliance is known."))
-    groups = _groups(parts.calibrated)
-    springs = list(_springs(parts.calibrated, groups))
+    groups = _groups(evidence.calibrated)
+    springs = list(_springs(evidence.calibrated, groups))
     observable = sum(each["group"] is None for each in springs)
-    html = _head(parts.calibrated, observable) + _comparison(parts.calibrated.figures)
+    html = _head(evidence.calibrated, observable) + _comparison(evidence.calibrated.figures)
     panels = [
         (unit, [_bar(each) for each in springs if each["kind"] == kind])
         for kind, unit in UNITS.items()
@@ -42,16 +42,18 @@ def body(parts: Parts) -> Content:
     )
     heads = ("Spring", "Known?", "Compliance", "95 % interval", "Unit", "Stiffness")
     html += table("Compliances", heads, [_row(each) for each in springs], texts=2)
-    return Content(html + _told(parts.calibrated), findings=tuple(_findings(parts.calibrated)))
+    return Content(
+        html + _told(evidence.calibrated), findings=tuple(_findings(evidence.calibrated))
+    )
 
 
-def _groups(found: Calibrated) -> dict[str, int]:
+def _groups(found: ModelEvidence) -> dict[str, int]:
     """Return the number of the first group that each spring is mixed up in, by its name."""
     numbered = list(enumerate(found.model.observability.unobservable, start=1))
     return {term.spring: number for number, group in reversed(numbered) for term in group}
 
 
-def _springs(found: Calibrated, groups: dict[str, int]) -> Iterator[Figures]:
+def _springs(found: ModelEvidence, groups: dict[str, int]) -> Iterator[Figures]:
     low, high = found.model.interval()
     for k, spring in enumerate(found.model.model.springs):
         by_itself = found.model.observability.observable[k]
@@ -81,7 +83,7 @@ def _row(each: Figures) -> tuple[str, ...]:
     return name, known, f"{value:.4f}", span, unit, stiff
 
 
-def _head(found: Calibrated, observable: int) -> str:
+def _head(found: ModelEvidence, observable: int) -> str:
     figures, seen = found.figures, found.model.observability
     fit = figures.get("residual", {})
     return facts(
@@ -114,7 +116,7 @@ def _comparison(figures: Figures) -> str:
     )
 
 
-def _told(found: Calibrated) -> str:
+def _told(found: ModelEvidence) -> str:
     seen = found.model.observability
     if not seen.unobservable:
         return paragraph("Every spring is observable by itself.")
@@ -137,7 +139,7 @@ def _described(group: tuple[Term, ...]) -> str:
     return describe(group) if len(group) <= _MOST_TERMS else f"{len(group)} springs mixed"
 
 
-def _findings(found: Calibrated) -> Iterator[Finding]:
+def _findings(found: ModelEvidence) -> Iterator[Finding]:
     other = found.figures.get("comparison")
     if other and other["difference"]["high"] < 0.0:
         yield Finding(

@@ -7,26 +7,26 @@ from typing import Any
 import numpy as np
 
 from elastocal.report.document.markup import heading, listed, paragraph, table
-from elastocal.report.document.parts import Parts
 from elastocal.report.document.pictures import picture
 from elastocal.report.document.section import Content, Finding, Section
 from elastocal.report.plots import (
     station_figure,
 )
+from elastocal.verdict.evidence import Evidence
 from elastocal.wording import counted, mm, point, spans, um
 
 Figures = dict[str, Any]
 
 
-def body(parts: Parts) -> Content:
+def body(evidence: Evidence) -> Content:
     """Return the section."""
-    summary = parts.summary
+    summary = evidence.summary
     if summary is None:
         text = paragraph("The summary of the run is not known: stations and sensor are not judged.")
-        return Content(text + _tool_file(parts))
+        return Content(text + _tool_file(evidence))
     html = _stations(summary["registration"]) + _noise(summary) + _tool(summary["tool"])
     warnings = listed(summary["warnings"]) or paragraph("The run gave no warning.")
-    html += _tool_file(parts) + heading("Warnings of the run") + warnings
+    html += _tool_file(evidence) + heading("Warnings of the run") + warnings
     return Content(html, findings=tuple(_findings(summary)))
 
 
@@ -125,8 +125,8 @@ def _compared(name: str, found: Figures, scale: float) -> tuple[str, str, str, s
     )  # type: ignore[return-value]
 
 
-def _tool_file(parts: Parts) -> str:
-    tool = parts.tool
+def _tool_file(evidence: Evidence) -> str:
+    tool = evidence.tool
     if tool is None:
         return paragraph("There is no tool file: sensor rotation and bias were not identified.")
     R = np.array(tool.R_flange_sensor)

@@ -3,8 +3,8 @@
 from collections.abc import Iterator
 
 from elastocal.report.document.markup import coded, heading, listed, paragraph
-from elastocal.report.document.parts import Parts
 from elastocal.report.document.section import Content, Finding, Section
+from elastocal.verdict.evidence import Evidence
 from elastocal.wording import mm
 
 ALWAYS = (
@@ -20,45 +20,45 @@ ALWAYS = (
 )
 ESSENTIAL = ("run", "journal", "cell", "plan", "summary of the run", "dataset", "calibrated model",
              "calibration made again")  # fmt: skip
-"""Parts without which no light is green; the codec has a finding of its own."""
+"""Evidence without which no light is green; the codec has a finding of its own."""
 TOLD_ELSEWHERE = ("codec", "earlier calibration")
 """A codec has a finding of its own; a first calibration has no earlier one."""
 
 
-def body(parts: Parts) -> Content:
+def body(evidence: Evidence) -> Content:
     """Return the section."""
-    html = paragraph("Whatever the light says, this was not verified:") + listed(_always(parts))
+    html = paragraph("Whatever the light says, this was not verified:") + listed(_always(evidence))
     absent = [
         f"{each.name[0].upper()}{each.name[1:]}{' (cannot be used)' if each.damaged else ''}:"
         f" {each.reason}"
-        for each in parts.absent
+        for each in evidence.missing
     ]
     html += heading("Missing in this report")
     html += listed(map(coded, absent)) or paragraph("No part of the report is missing.")
-    if parts.doubts:
-        html += heading("What does not fit together") + listed(parts.doubts)
-    return Content(html, findings=tuple(_findings(parts)))
+    if evidence.doubts:
+        html += heading("What does not fit together") + listed(evidence.doubts)
+    return Content(html, findings=tuple(_findings(evidence)))
 
 
-def _always(parts: Parts) -> Iterator[str]:
-    if parts.simulated:
+def _always(evidence: Evidence) -> Iterator[str]:
+    if evidence.simulated:
         yield "A real robot: all devices of this run are simulated."
     yield from ALWAYS
-    if parts.calibrated is not None and parts.calibrated.model.observability.unobservable:
+    if evidence.calibrated is not None and evidence.calibrated.model.observability.unobservable:
         yield (
             "Single springs that no reading tells apart (see Compliances): their numbers are not"
             " findings."
         )
-    if parts.plan is not None:
+    if evidence.plan is not None:
         yield (
             "Places on the surface farther than"
-            f" {mm(parts.plan.search.covering_radius, 1)} from every pose; that is how far the"
+            f" {mm(evidence.plan.search.covering_radius, 1)} from every pose; that is how far the"
             " worst covered candidate is from one."
         )
 
 
-def _findings(parts: Parts) -> Iterator[Finding]:
-    for each in parts.absent:
+def _findings(evidence: Evidence) -> Iterator[Finding]:
+    for each in evidence.missing:
         if each.name in TOLD_ELSEWHERE and not each.damaged:
             continue
         word = "cannot be used" if each.damaged else "is missing"
@@ -68,7 +68,7 @@ def _findings(parts: Parts) -> Iterator[Finding]:
                 "Run `elastocal tool`: without it the compensation relies on the cell file's tool."
             )
         yield Finding(f"the {each.name} {word}: {each.reason}", each.name in ESSENTIAL, advice)
-    for doubt in parts.doubts:
+    for doubt in evidence.doubts:
         yield Finding(doubt)
 
 

@@ -6,7 +6,6 @@ from typing import Any
 
 from elastocal.planning import PlanFile
 from elastocal.report.document.markup import Markup, facts, folded, paragraph, table
-from elastocal.report.document.parts import Parts
 from elastocal.report.document.pictures import picture
 from elastocal.report.document.section import Content, Section
 from elastocal.report.pages.plan_page import key_figures, view_data
@@ -15,26 +14,27 @@ from elastocal.report.plots import (
     plan_figure,
     plan_view,
 )
+from elastocal.verdict.evidence import Evidence
 from elastocal.wording import counted, mm
 
 
-def body(parts: Parts) -> Content:
+def body(evidence: Evidence) -> Content:
     """Return the section."""
-    plan, pool = parts.plan, parts.pool
+    plan, pool = evidence.plan, evidence.pool
     if plan is None:
         return Content(
             paragraph("The plan is not known, so nothing is said of how the poses were chosen.")
         )
     html = facts(key_figures(plan)) + _choice(plan)
-    if pool is None or parts.surface is None or parts.cell is None:
+    if pool is None or evidence.surface is None or evidence.cell is None:
         told = paragraph("Without cell, mesh and pool there is no picture.")
         return Content(html + told + _notes(plan) + _poses(plan))
-    view = plan_view(parts.cell, parts.surface, plan, pool)
+    view = plan_view(evidence.cell, evidence.surface, plan, pool)
     data: dict[str, Any] = view_data(view, plan, pool)
     labels = {"last": str(len(plan.poses)), "first": str(min(1, len(plan.poses)))}
     html += _filled(template("report_view.html"), labels)
     html += picture(
-        partial(plan_figure, parts.surface, plan, pool),
+        partial(plan_figure, evidence.surface, plan, pool),
         _alt(plan),
         "After the paper's Fig. 3: the surface unrolled; colour is the distance of each candidate"
         " from its nearest chosen pose.",

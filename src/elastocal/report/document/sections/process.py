@@ -8,19 +8,19 @@ import numpy as np
 
 from elastocal.compensation.process import Line, ProcessRecord, Trace, Values
 from elastocal.report.document.markup import flattened, folded, paragraph, table
-from elastocal.report.document.parts import Parts
 from elastocal.report.document.pictures import picture
 from elastocal.report.document.section import Content, Finding, Section
 from elastocal.report.plots import (
     course_figure,
     process_maps,
 )
+from elastocal.verdict.evidence import Evidence
 from elastocal.wording import counted, mm
 
 
 @dataclass(frozen=True)
 class Published:
-    """A case of the paper's Table 1, in mm and parts of 1."""
+    """A case of the paper's Table 1, in mm and evidence of 1."""
 
     title: str
     before: tuple[float, float, float]
@@ -46,9 +46,9 @@ _WHAT = {
 _HEADS = ("", "Mean", "Max", "St. dev.")
 
 
-def body(parts: Parts) -> Content:
+def body(evidence: Evidence) -> Content:
     """Return the section."""
-    record = parts.process
+    record = evidence.process
     if record is None:
         return Content(
             paragraph("No process path was run, so the effect of the correction was not verified.")
@@ -60,14 +60,14 @@ def body(parts: Parts) -> Content:
     ) + _table_1(record)  # fmt: skip
     seed = record.traces[0].seed
     own = [trace for trace in record.traces if trace.seed == seed]
-    html += _pictures(own, parts.limits.tolerance)
+    html += _pictures(own, evidence.limits.tolerance)
     if table_.budget:
         html += folded("Error budget", _lines("Error budget of the first seed", table_.budget))
     settings = flattened(table_.settings)
     html += folded(
         "Settings of the compensator", table("Settings, SI units", ("Key", "Value"), settings, 2)
     )
-    return Content(html, findings=tuple(_findings(record, parts.limits.tolerance)))
+    return Content(html, findings=tuple(_findings(record, evidence.limits.tolerance)))
 
 
 def _table_1(record: ProcessRecord) -> str:

@@ -9,31 +9,31 @@ import numpy as np
 from elastocal.arrays import FloatArray
 from elastocal.dataset import Dataset
 from elastocal.identification import Calibration
-from elastocal.report.document.again import Again
+from elastocal.identification.reproduction import Reproduction
 from elastocal.report.document.markup import facts, folded, heading, listed, paragraph, table
-from elastocal.report.document.parts import Parts
 from elastocal.report.document.pictures import picture
 from elastocal.report.document.section import Content, Finding, Section
 from elastocal.report.plots import (
     displacement_figure,
     pose_grid,
 )
+from elastocal.verdict.evidence import Evidence
 from elastocal.wording import counted, mm, spans
 
 Figures = dict[str, Any]
 
 
-def body(parts: Parts) -> Content:
+def body(evidence: Evidence) -> Content:
     """Return the section."""
-    findings = (*_of_run(parts), *_of_readings(parts))
-    if parts.dataset is None:
+    findings = (*_of_run(evidence), *_of_readings(evidence))
+    if evidence.dataset is None:
         text = paragraph("The dataset is not known, so no reading is shown.")
-        return Content(text + _suspicious(parts), findings=findings)
-    html = _counts(parts.dataset, parts.summary)
-    if parts.again is not None:
-        html += _residuals(parts.again.calibration)
-    html += _grids(parts.dataset, parts.again)
-    return Content(html + _suspicious(parts) + _worst(parts), findings=findings)
+        return Content(text + _suspicious(evidence), findings=findings)
+    html = _counts(evidence.dataset, evidence.summary)
+    if evidence.reproduction is not None:
+        html += _residuals(evidence.reproduction.calibration)
+    html += _grids(evidence.dataset, evidence.reproduction)
+    return Content(html + _suspicious(evidence) + _worst(evidence), findings=findings)
 
 
 def _counts(dataset: Dataset, summary: Figures | None) -> str:
@@ -78,7 +78,7 @@ def _residuals(again: Calibration) -> str:
     )
 
 
-def _grids(dataset: Dataset, again: Again | None) -> str:
+def _grids(dataset: Dataset, again: Reproduction | None) -> str:
     panels = [("Measured deflection, norm in mm", _grid(dataset, _deflection(dataset)))]
     if again is not None:
         unseen = again.unseen
@@ -129,14 +129,14 @@ def _grid(dataset: Dataset, values: dict[tuple[int, str], float]) -> FloatArray:
     )
 
 
-def _figures(parts: Parts) -> Figures:
-    return parts.calibrated.figures if parts.calibrated is not None else {}
+def _figures(evidence: Evidence) -> Figures:
+    return evidence.calibrated.figures if evidence.calibrated is not None else {}
 
 
-def _suspicious(parts: Parts) -> str:
-    if parts.calibrated is None:
+def _suspicious(evidence: Evidence) -> str:
+    if evidence.calibrated is None:
         return ""
-    found = _figures(parts).get("suspicious", [])
+    found = _figures(evidence).get("suspicious", [])
     if not found:
         return heading("Suspicious readings") + paragraph("No reading looks wrong.")
     rows = [
@@ -153,11 +153,11 @@ def _suspicious(parts: Parts) -> str:
     return table("Readings that look wrong", heads, rows)
 
 
-def _worst(parts: Parts) -> str:
+def _worst(evidence: Evidence) -> str:
     """Return where the model errs most."""
-    if parts.again is None:
+    if evidence.reproduction is None:
         return ""
-    unseen = parts.again.unseen
+    unseen = evidence.reproduction.unseen
     order = np.argsort(-unseen.error, kind="stable")[:5]
     rows = [
         (f"pose {unseen.pose[k]} {unseen.load_case[k]}", mm(float(unseen.error[k]))) for k in order
@@ -166,22 +166,22 @@ def _worst(parts: Parts) -> str:
     return table("Largest errors, each at a left-out pose", heads, rows)
 
 
-def _of_run(parts: Parts) -> Iterator[Finding]:
-    if parts.plan is not None and parts.dataset is not None:
-        usable = parts.dataset.readings(parts.dataset.joint_names).pose
-        missing = sorted({pose.id for pose in parts.plan.poses} - set(map(int, usable)))
+def _of_run(evidence: Evidence) -> Iterator[Finding]:
+    if evidence.plan is not None and evidence.dataset is not None:
+        usable = evidence.dataset.readings(evidence.dataset.joint_names).pose
+        missing = sorted({pose.id for pose in evidence.plan.poses} - set(map(int, usable)))
         if missing:
             yield Finding(
                 f"the run is partial: {len(missing)} of"
-                f" {counted(len(parts.plan.poses), 'planned pose')}"
+                f" {counted(len(evidence.plan.poses), 'planned pose')}"
                 f" {'has' if len(missing) == 1 else 'have'} no usable reading"
                 f" (pose {spans(missing)})",
                 advice="Finish the run: `elastocal run --resume` measures the missing poses.",
             )
 
 
-def _of_readings(parts: Parts) -> Iterator[Finding]:
-    figures = _figures(parts)
+def _of_readings(evidence: Evidence) -> Iterator[Finding]:
+    figures = _figures(evidence)
     for each in figures.get("suspicious", []):
         name = f"pose {each['pose']} {each['load_case']}"
         if each["set_aside"]:

@@ -10,18 +10,18 @@ from elastocal.identification.recertification import (
     Verdict,
 )
 from elastocal.report.document.markup import facts, listed, paragraph, table
-from elastocal.report.document.parts import Parts
 from elastocal.report.document.pictures import picture
 from elastocal.report.document.section import Content, Finding, Section
 from elastocal.report.plots import (
     recertification_figure,
 )
+from elastocal.verdict.evidence import Evidence
 from elastocal.wording import counted, mm
 
 
-def body(parts: Parts) -> Content:
+def body(evidence: Evidence) -> Content:
     """Return the section."""
-    found = parts.recertification
+    found = evidence.recertification
     if found is None:
         return Content(
             paragraph(

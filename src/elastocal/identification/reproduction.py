@@ -39,7 +39,7 @@ class Estimate:
 
 
 @dataclass(frozen=True, eq=False)
-class Unseen:
+class UnseenErrors:
     """Errors of predicted deflections at poses that were left out of the fit."""
 
     error: FloatArray
@@ -68,16 +68,18 @@ class Unseen:
 
 
 @dataclass(frozen=True, eq=False)
-class Again:
+class Reproduction:
     """A calibration made once more."""
 
     calibration: Calibration
-    unseen: Unseen
+    unseen: UnseenErrors
     same: bool
     """Whether deflections and held-out errors are those of the model file."""
 
 
-def calibrate_again(found: CalibratedModel, figures: dict[str, Any], dataset: Dataset) -> Again:
+def reproduce_calibration(
+    found: CalibratedModel, figures: dict[str, Any], dataset: Dataset
+) -> Reproduction:
     """Return the calibration of a dataset with the settings of a model file.
 
     Parameters
@@ -104,10 +106,10 @@ def calibrate_again(found: CalibratedModel, figures: dict[str, Any], dataset: Da
         marker_offset=settings.get("marker") or dataset.marker,
     )
     same = _same_deflections(calibration, found) and _same_errors(calibration, figures)
-    return Again(calibration, unseen_of(calibration, np.random.default_rng(0)), same)
+    return Reproduction(calibration, unseen_errors(calibration, np.random.default_rng(0)), same)
 
 
-def unseen_of(calibration: Calibration, rng: Generator) -> Unseen:
+def unseen_errors(calibration: Calibration, rng: Generator) -> UnseenErrors:
     """Return the errors at left-out poses with intervals over resampled poses.
 
     The readings at one pose share what the model gets wrong there, so that whole poses are drawn
@@ -126,7 +128,7 @@ def unseen_of(calibration: Calibration, rng: Generator) -> Unseen:
     blocks = [held.error[held.fold == fold] for fold in np.unique(held.fold)]
     chosen = rng.integers(len(blocks), size=(DRAWS, len(blocks)))
     drawn = [np.concatenate([blocks[k] for k in row]) for row in chosen]
-    return Unseen(
+    return UnseenErrors(
         error=held.error,
         pose=pose,
         load_case=tuple(map(str, cases.tolist())),

@@ -1,27 +1,27 @@
-"""What a report is made from: every part may be missing."""
+"""Evidence: everything that a verdict on a calibration is based on; every part may be missing."""
 
 from dataclasses import dataclass, field
-from typing import Any
 
 from elastocal.cell import Cell
-from elastocal.codec import CodecData, Verdicts
+from elastocal.codec import ALL_LOADS, CodecData, Saturation, Variant, Verdicts
 from elastocal.compensation.conditioning import ToolRecord
 from elastocal.compensation.process import ProcessRecord
 from elastocal.dataset import Dataset
 from elastocal.identification import CalibratedModel
 from elastocal.identification.recertification import Recertification
+from elastocal.identification.reproduction import Reproduction, UnseenErrors
 from elastocal.planning import PlanFile, PoolData
 from elastocal.planning.surface import Surface
-from elastocal.procedure import Entry
-from elastocal.report.document.again import Again
+from elastocal.procedure import Entry, RunRecord
+from elastocal.verdict._figures import CalibrationFigures, RunFigures
 
 
 @dataclass(frozen=True)
-class Absence:
+class MissingPart:
     """A part that the report does without."""
 
     name: str
-    """What it is, in words: ``codec``, ``tool file``."""
+    """As people call it: ``codec``, ``tool file``."""
     reason: str
     """Why it is not there."""
     damaged: bool = False
@@ -36,12 +36,12 @@ class UsedFile:
     """Its path relative to the run."""
     sha256: str
     of: str
-    """What the hash was taken of; see `content`."""
+    """The part of the file that was hashed; see `content_hash`."""
 
 
 @dataclass(frozen=True)
-class Limits:
-    """What the figures are held against."""
+class AcceptanceLimits:
+    """Limits that the figures are held against."""
 
     tolerance: float | None = None
     """Of the error at unseen poses, in m."""
@@ -52,33 +52,32 @@ class Limits:
 
 
 @dataclass(frozen=True, eq=False)
-class Calibrated:
+class ModelEvidence:
     """A model file."""
 
     model: CalibratedModel
-    figures: dict[str, Any]
-    """See `elastocal.identification.summary`."""
+    figures: CalibrationFigures
     urdf_sha256: str
     sha256: str
-    """Of the file."""
+    """Hash of the file."""
 
 
 @dataclass(frozen=True, eq=False)
-class Codec:
-    """The arrays of a codec and what they say."""
+class CodecEvidence:
+    """The arrays of a codec and its verdicts."""
 
     data: CodecData
     verdicts: Verdicts
 
 
 @dataclass(frozen=True, eq=False)
-class Parts:
+class Evidence:
     """Everything that was found, and what was not."""
 
     made: str
     """Date and time of the report, ISO 8601, UTC."""
     name: str = ""
-    """Of the cell, or of the robot where there is no cell."""
+    """Name of the cell, or of the robot where there is no cell."""
     cell: Cell | None = None
     cell_text: str | None = None
     """The cell file as it stands."""
@@ -87,24 +86,24 @@ class Parts:
     pool: PoolData | None = None
     journal: tuple[Entry, ...] | None = None
     dataset: Dataset | None = None
-    summary: dict[str, Any] | None = None
-    """Of the run; see `elastocal.procedure.summary`."""
-    calibrated: Calibrated | None = None
-    again: Again | None = None
+    summary: RunFigures | None = None
+    """The summary of the run."""
+    calibrated: ModelEvidence | None = None
+    reproduction: Reproduction | None = None
     """The calibration made once more from the dataset."""
     tool: ToolRecord | None = None
     tool_sha256: str | None = None
-    """Of the tool file."""
-    codecs: tuple[Codec, ...] = ()
+    """Hash of the tool file."""
+    codecs: tuple[CodecEvidence, ...] = ()
     """One a comparison."""
     process: ProcessRecord | None = None
     recertification: Recertification | None = None
     """This calibration against an earlier one."""
-    limits: Limits = field(default_factory=Limits)
+    limits: AcceptanceLimits = field(default_factory=AcceptanceLimits)
     files: tuple[UsedFile, ...] = ()
-    absent: tuple[Absence, ...] = ()
+    missing: tuple[MissingPart, ...] = ()
     doubts: tuple[str, ...] = ()
-    """What does not fit together although each part by itself is sound."""
+    """Contradictions between parts that are sound by themselves."""
 
     @property
     def robot(self) -> str:
@@ -123,3 +122,37 @@ class Parts:
             self.cell.file.devices.sensor,
             self.cell.file.devices.metrology,
         )
+
+    @property
+    def run_record(self) -> RunRecord | None:
+        """How the run began, by its journal."""
+        return self.journal[0].run if self.journal else None
+
+    @property
+    def unseen(self) -> UnseenErrors | None:
+        """Errors at unseen poses; none where the reproduction is not the model file's."""
+        return self.reproduction.unseen if self.reproduction and self.reproduction.same else None
+
+    @property
+    def saturation(self) -> Saturation | None:
+        """Saturation of the variant like the calibration; else of the most accurate one."""
+        found = [
+            (variant, saturation)
+            for codec in self.codecs
+            for variant, saturation in zip(
+                codec.data.variants, codec.verdicts.saturation, strict=True
+            )
+        ]
+        alike = [pair for pair in found if self._is_like(pair[0])]
+        return min(
+            (saturation for _, saturation in alike or found),
+            key=lambda each: each.last_error,
+            default=None,
+        )
+
+    def _is_like(self, variant: Variant) -> bool:
+        """Return whether a variant has the springs, loads and search of the calibration."""
+        settings = self.calibrated.figures.settings if self.calibrated else None
+        springs = settings.springs if settings else "bearing"
+        search = self.plan.search.name if self.plan is not None else variant.search
+        return (variant.springs, variant.load_cases, variant.search) == (springs, ALL_LOADS, search)
