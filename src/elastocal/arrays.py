@@ -24,19 +24,43 @@ class _ArrayField:
     def _read(self, value: Any) -> NDArray[Any]:
         try:
             array = np.array(value)
-        except ValueError as error:
-            raise ValueError("rows must have one length") from error
+        except ValueError:
+            array = np.array(None)
         if array.size and array.dtype.kind not in _ACCEPTED[self.kind]:
-            raise ValueError(f"must be {_WORDS[self.kind]}")
+            raise self._refusal(value)
         array = array.astype(self.kind)
         if self.kind == "f8" and not np.all(np.isfinite(array)):
-            raise ValueError("must be finite numbers")
+            raise self._refusal(value)
         array.flags.writeable = False
         return array
 
+    def _refusal(self, value: Any) -> Exception:
+        """Return an error that names the first wrong item by where it stands."""
+        from pydantic_core import PydanticCustomError
+
+        at, given = _first_wrong(value, _ITEMS[self.kind], [])
+        reason = "rows must have one length" if at is None else f"must be {_WORDS[self.kind]}"
+        where = {"at": at or [], "given": given}
+        return PydanticCustomError("array", reason, where)
+
+
+def _first_wrong(
+    value: Any, kinds: tuple[type, ...], at: list[int]
+) -> tuple[list[int] | None, Any]:
+    """Return the place of the first item that is none of these types; none: only lengths differ."""
+    if not isinstance(value, list):
+        fits = type(value) in kinds and (type(value) is not float or np.isfinite(value))
+        return (None if fits else at), value
+    for index, item in enumerate(value):
+        found, given = _first_wrong(item, kinds, [*at, index])
+        if found is not None:
+            return found, given
+    return None, value
+
 
 _ACCEPTED = {"f8": "fiu", "i8": "iu", "?": "b"}
-_WORDS = {"f8": "numbers", "i8": "whole numbers", "?": "true or false"}
+_ITEMS = {"f8": (float, int), "i8": (int,), "?": (bool,)}
+_WORDS = {"f8": "a finite number", "i8": "a whole number", "?": "true or false"}
 
 FloatArray = Annotated[NDArray[np.float64], _ArrayField("f8")]
 IndexArray = Annotated[NDArray[np.intp], _ArrayField("i8")]

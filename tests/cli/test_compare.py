@@ -13,6 +13,7 @@ from elastocal.identification.recertification import read_comparison
 from support.cells import Cell, linear_truth, unseen
 from support.cli import elastocal
 from support.recertified import calibrated, soft_truth
+from support.summaries import made_up_summary
 
 
 @pytest.fixture(scope="module")
@@ -28,7 +29,7 @@ def folder(tmp_path_factory) -> Path:
         ),
         "six": calibrated(linear_truth(), 1, "actuated"),
     }.items():
-        write_model(folder / f"{name}.json", model, {"deflection": {"mean": 1e-3, "max": 2e-3}})
+        write_model(folder / f"{name}.json", model, made_up_summary(1e-3))
     loads = unseen(linear_truth())
     header = [f"joint_{n}[rad]" for n in range(1, 7)] + [f"force_{axis}[N]" for axis in "xyz"]
     rows = np.hstack([loads.joint_position, loads.force])

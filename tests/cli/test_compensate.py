@@ -32,7 +32,7 @@ POSITION = ("x[mm]", "y[mm]", "z[mm]")
 def folder(tmp_path_factory) -> Path:
     """A folder with a model and a path."""
     folder = tmp_path_factory.mktemp("compensate")
-    write_model(folder / "model.json", calibrated(), {})
+    write_model(folder / "model.json", calibrated())
     write_csv(folder / "path.csv", euler_columns(COURSE) | FORCE)
     return folder
 

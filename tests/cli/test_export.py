@@ -20,7 +20,7 @@ def model(tmp_path_factory):
     T[2, 3] = 0.4
     urdf = with_tool(catalogue.urdf("KR 120 R2700-2"), "flange", "tcp", T)
     path = tmp_path_factory.mktemp("model") / "model.json"
-    write_model(path, calibrated(Robot.from_urdf(urdf, "tcp")), {})
+    write_model(path, calibrated(Robot.from_urdf(urdf, "tcp")))
     return path
 
 

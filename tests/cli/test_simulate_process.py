@@ -21,8 +21,8 @@ FILES = {"table.json", "table.csv", "deviations.csv", "path.csv"}
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory) -> Path:
     folder = tmp_path_factory.mktemp("process")
-    write_model(folder / "model.json", made_up(example_cell("afp").robot), {})
-    write_model(folder / "other.json", made_up(example_cell("machining").robot), {})
+    write_model(folder / "model.json", made_up(example_cell("afp").robot))
+    write_model(folder / "other.json", made_up(example_cell("machining").robot))
     return folder
 
 

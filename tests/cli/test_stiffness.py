@@ -25,7 +25,7 @@ FILES = {"postures.csv", "choice.csv", "stiffness.svg", "stiffness.png", "stiffn
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory) -> Path:
     folder = tmp_path_factory.mktemp("stiffness")
-    write_model(folder / "model.json", calibrated(), {})
+    write_model(folder / "model.json", calibrated())
     write_csv(folder / "path.csv", euler_columns(dome_course(9)))
     return folder
 
@@ -92,7 +92,7 @@ def test_a_survey_in_which_nothing_is_allowed_is_told_and_drawn(folder):
         for number, height in enumerate((1.4, 1.7, 2.0))
     ]
     cell = example_cell("afp", fixtures=beams)
-    write_model(folder / "tight.json", made_up(cell.robot), {})
+    write_model(folder / "tight.json", made_up(cell.robot))
     q = np.array([place.q for place in places("afp", 2)])
     pose = euler_columns(cell.robot.forward(q))
     write_csv(folder / "tight.csv", pose | {f"{cell.robot.joint_names[0]}[m]": q[:, 0]})
@@ -122,7 +122,7 @@ def test_what_cannot_be_done_is_one_line(folder, arguments, why):
 
 def test_a_cell_brings_its_rail_its_margins_and_its_tooling(folder):
     cell = example_cell("afp")
-    write_model(folder / "afp.json", made_up(cell.robot), {})
+    write_model(folder / "afp.json", made_up(cell.robot))
     q = np.array([place.q for place in places("afp", 2)])
     rail = {f"{cell.robot.joint_names[0]}[m]": q[:, 0]}
     write_csv(folder / "afp.csv", euler_columns(cell.robot.forward(q)) | rail)

@@ -11,17 +11,17 @@ from elastocal.codec import (
     INDICES,
     IndexValues,
     Variant,
+    analyse,
     cross_validate,
-    look_into,
     write_index_table,
 )
-from elastocal.codec.again import trainees_of
+from elastocal.codec._training import prepared_variants
 from elastocal.codec.index_correlation import (
     KINDS,
-    at_equal_size,
-    at_equal_size_and_split,
+    _at_equal_size,
+    _at_equal_size_and_split,
+    _growth,
     correlate,
-    growth,
 )
 from elastocal.codec.index_file import index_records
 from elastocal.codec.indices import index_values
@@ -108,12 +108,12 @@ def test_training_load_cases_decide_the_indices():
     readings = Cell(rich_truth(), poses=POSES, seed=4).readings()
     variants = [Variant("one", load_cases="normal"), Variant("five")]
     data = cross_validate(robot(), readings, variants)
-    one, five = (index_values(data, each) for each in trainees_of(robot(), readings, data))
+    one, five = (index_values(data, each) for each in prepared_variants(robot(), readings, data))
     assert not np.allclose(one.values["i"], five.values["i"], rtol=0.1)
 
 
 def test_indices_are_worked_out_only_when_asked_for(known):
-    found = look_into(robot(), known.readings, known.data)
+    found = analyse(robot(), known.readings, known.data)
     assert len(found.seen) == 2
     assert (found.indices, found.correlations) == ((), ())
 
@@ -126,8 +126,8 @@ def test_growth_and_equal_size_are_means_of_spearmans(known):
     accuracy = -known.data.errors("bearing")
     rows = [spearmanr(a, b).statistic for a, b in zip(goodness, accuracy, strict=True)]
     columns = [spearmanr(a, b).statistic for a, b in zip(goodness.T, accuracy.T, strict=True)]
-    assert growth(goodness, accuracy) == pytest.approx(np.mean(rows))
-    assert at_equal_size(goodness, accuracy) == pytest.approx(np.mean(columns))
+    assert _growth(goodness, accuracy) == pytest.approx(np.mean(rows))
+    assert _at_equal_size(goodness, accuracy) == pytest.approx(np.mean(columns))
 
 
 def test_an_index_that_is_the_accuracy_correlates_fully(known):
@@ -150,8 +150,8 @@ def test_a_hard_verification_set_is_not_taken_for_the_index():
     rng = np.random.default_rng(0)
     hard = 100.0 * rng.random((31, 1))
     accuracy, index = -hard + rng.random((31, 22)), -hard + rng.random((31, 22))
-    assert at_equal_size(index, accuracy) > 0.95
-    assert abs(at_equal_size_and_split(index, accuracy)) < 0.2
+    assert _at_equal_size(index, accuracy) > 0.95
+    assert abs(_at_equal_size_and_split(index, accuracy)) < 0.2
 
 
 def test_indices_that_differ_by_round_off_are_ties(known):
@@ -192,7 +192,7 @@ def test_every_index_error_and_kind_has_a_correlation(known):
 def test_readings_of_another_campaign_are_refused(known):
     other = Cell(rich_truth(), poses=POSES, seed=5).readings()
     with pytest.raises(CodecError, match="not those of the codec: they have 10 poses"):
-        trainees_of(robot(), other, known.data)
+        prepared_variants(robot(), other, known.data)
 
 
 def test_a_layout_that_changed_is_refused(known):
@@ -204,7 +204,7 @@ def test_a_layout_that_changed_is_refused(known):
         ),
     )
     with pytest.raises(CodecError, match="variant 'actuated' was made with 6 springs"):
-        trainees_of(robot(), known.readings, swapped)
+        prepared_variants(robot(), known.readings, swapped)
 
 
 def test_springs_told_apart_are_those_of_the_calibration(known):

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.stats import t
 
-from elastocal.codec.overlap import Overlap, corrected_mean, median_draws
+from elastocal.codec._overlap import Overlap, corrected_mean, median_draws
 
 
 def rng() -> np.random.Generator:

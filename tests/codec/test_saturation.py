@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from elastocal.codec import Tolerance, saturation
-from elastocal.codec.overlap import Overlap
+from elastocal.codec import Tolerance, find_saturation
+from elastocal.codec._overlap import Overlap
 from elastocal.errors import CodecError
 
 CURVE = np.array([900.0, 400.0, 200.0, 110.0, 104.0, 101.0, 100.0, 100.0]) * 1e-6
@@ -12,7 +12,7 @@ CURVE = np.array([900.0, 400.0, 200.0, 110.0, 104.0, 101.0, 100.0, 100.0]) * 1e-
 
 def verdict(errors, overlap=None, tolerance=None):
     overlap = overlap or Overlap(len(errors), 0.3)
-    return saturation("x", errors, tolerance or Tolerance(), overlap, np.random.default_rng(0))
+    return find_saturation("x", errors, tolerance or Tolerance(), overlap, np.random.default_rng(0))
 
 
 def spread(curve, sigma, sets=31):

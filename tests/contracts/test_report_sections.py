@@ -11,7 +11,9 @@ from elastocal.report.document import (
     pictures as drawing,
 )
 from elastocal.report.document.sections import SECTIONS
-from elastocal.report.pages.templating import embedded
+from elastocal.report.pages import (
+    embedded,
+)
 from elastocal.verdict import (
     Evidence,
     EvidenceOptions,

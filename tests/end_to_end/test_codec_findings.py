@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.stats import t
 
-from elastocal.codec import Pair, Verdicts, cross_validate, judge, make_variants
+from elastocal.codec import PairedDifference, Verdicts, cross_validate, judge, make_variants
 from support.cells import Cell, linear_truth, rich_truth, robot
 from support.cli import elastocal
 from support.shared import FANUC, needs_shared
@@ -42,7 +42,7 @@ def verdicts(truth: str, key: str, *values: str) -> tuple[Verdicts, ...]:
     return tuple(judge(cross_validate(robot(), each, variants)) for each in campaigns)
 
 
-def pairs(truth: str, key: str, *values: str) -> list[Pair]:
+def pairs(truth: str, key: str, *values: str) -> list[PairedDifference]:
     return [each.pairs[0] for each in verdicts(truth, key, *values)]
 
 

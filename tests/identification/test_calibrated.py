@@ -11,7 +11,7 @@ from support.virtual_chain import configurations
 RNG = np.random.default_rng(0)
 C = np.array([0.0, 1e-6, 2e-6, 3e-6, 4e-6, 5e-6])
 DRAWS = C * RNG.uniform(0.8, 1.2, (60, 6))
-SEEN = Observability(6, 6, 3.0, (True,) * 6, ())
+SEEN = Observability(6, 3.0, (True,) * 6, ())
 
 
 @pytest.fixture(scope="module")

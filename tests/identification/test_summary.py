@@ -4,7 +4,8 @@ from functools import cache
 import numpy as np
 import pytest
 
-from elastocal.identification import Calibration, FitOptions, calibrate, summary
+from elastocal.identification import Calibration, DeflectionSummary, FitOptions, calibrate, summary
+from elastocal.records import to_data
 from elastocal.sim.measurement import Blunder
 from support.cells import Cell, linear_truth
 from support.problems import elastic
@@ -20,19 +21,19 @@ def calibration(springs="bearing", keep=False) -> Calibration:
 
 
 def test_it_is_json_without_nan():
-    text = json.dumps(summary(calibration()), allow_nan=False)
+    text = json.dumps(to_data(summary(calibration())), allow_nan=False)
     assert json.loads(text)["schema"] == "elastocal.calibration/1"
 
 
 def test_the_residuals_are_those_of_the_readings_in_the_fit():
     figures, made = summary(calibration()), calibration()
     norms = np.linalg.norm(made.residual, axis=1)[made.used]
-    assert figures["readings"] == len(norms) == 154
-    assert figures["residual"]["mean"] == pytest.approx(norms.mean())
-    assert figures["residual"]["max"] == pytest.approx(norms.max())
-    assert figures["residual"]["p95"] == pytest.approx(np.percentile(norms, 95))
+    assert figures.readings == len(norms) == 154
+    assert figures.residual.mean == pytest.approx(norms.mean())
+    assert figures.residual.max == pytest.approx(norms.max())
+    assert figures.residual.p95 == pytest.approx(np.percentile(norms, 95))
     rms = np.sqrt(np.mean(made.residual[made.used] ** 2, axis=0))
-    assert figures["residual"]["rms_axis"] == pytest.approx(rms.tolist())
+    assert figures.residual.rms_axis == pytest.approx(rms.tolist())
 
 
 def test_the_residual_is_prediction_minus_measurement():
@@ -44,57 +45,57 @@ def test_the_residual_is_prediction_minus_measurement():
 def test_deflections_are_those_measured():
     figures, made = summary(calibration()), calibration()
     norms = np.linalg.norm(made.readings.deflection, axis=1)[made.used]
-    assert figures["deflection"] == {"mean": norms.mean(), "max": norms.max()}
+    assert figures.deflection == DeflectionSummary(norms.mean(), norms.max())
 
 
 def test_every_spring_has_its_interval_and_says_whether_it_is_observable():
     figures = summary(calibration())
-    assert [row["name"] for row in figures["springs"]] == list(elastic().spring_names)
-    assert all(row["low"] <= row["high"] for row in figures["springs"])
-    assert {row["unit"] for row in figures["springs"]} == {"rad/(N*m)"}
-    hidden = {term["spring"] for group in figures["unobservable"] for term in group}
-    assert {row["name"] for row in figures["springs"] if not row["observable"]} == hidden
-    assert (figures["rank"], figures["springs_total"], len(figures["unobservable"])) == (14, 18, 4)
+    assert [row.name for row in figures.springs] == list(elastic().spring_names)
+    assert all(row.low <= row.high for row in figures.springs)
+    assert {row.unit for row in figures.springs} == {"rad/(N*m)"}
+    hidden = {term.spring for group in figures.unobservable for term in group}
+    assert {row.name for row in figures.springs if not row.observable} == hidden
+    assert (figures.rank, figures.springs_total, len(figures.unobservable)) == (14, 18, 4)
 
 
 def test_suspicious_readings_come_worst_first_and_say_whether_they_were_set_aside():
-    listed = summary(calibration())["suspicious"]
-    where = [(row["pose"], row["load_case"], row["set_aside"]) for row in listed]
+    listed = summary(calibration()).suspicious
+    where = [(row.pose, row.load_case, row.set_aside) for row in listed]
     assert where[:2] == [(3, "west", True), (9, "north", False)]
-    scores = [row["score"] for row in listed]
+    scores = [row.score for row in listed]
     assert scores == sorted(scores, reverse=True)
 
 
 def test_blunders_that_are_kept_are_named_but_not_set_aside():
     figures = summary(calibration(keep=True))
-    assert figures["readings"] == 155
-    assert not figures["suspicious"][0]["set_aside"]
-    assert figures["residual"]["mean"] > 5.0 * summary(calibration())["residual"]["mean"]
+    assert figures.readings == 155
+    assert not figures.suspicious[0].set_aside
+    assert figures.residual.mean > 5.0 * summary(calibration()).residual.mean
 
 
 def test_accuracy_is_stated_with_its_split_and_only_of_poses_left_out():
     figures = summary(calibration())
-    held_out = figures["held_out"]
-    assert (held_out["split"], held_out["folds"], held_out["readings"]) == (
+    held_out = figures.held_out
+    assert (held_out.split, held_out.folds, held_out.readings) == (
         "leave-poses-out",
         31,
         154,
     )
-    assert held_out["mean"] > figures["residual"]["mean"]
+    assert held_out.mean > figures.residual.mean
 
 
 def test_the_six_spring_model_is_compared_on_the_same_poses():
-    comparison = summary(calibration())["comparison"]
+    comparison = summary(calibration()).comparison
     alone = summary(calibration("actuated"))
-    assert comparison["springs"] == "actuated"
-    assert comparison["held_out"]["mean"] == pytest.approx(alone["held_out"]["mean"], rel=1e-6)
-    assert comparison["difference"]["low"] > 0.0
-    assert alone["comparison"] is None
+    assert comparison.springs == "actuated"
+    assert comparison.held_out.mean == pytest.approx(alone.held_out.mean, rel=1e-6)
+    assert comparison.difference.low > 0.0
+    assert alone.comparison is None
 
 
 def test_the_same_seed_gives_the_same_figures():
     made = calibrate(elastic(), calibration().readings, np.random.default_rng(0))
     assert summary(made) == summary(calibration())
     other = calibrate(elastic(), calibration().readings, np.random.default_rng(1))
-    assert summary(other)["springs"] != summary(made)["springs"]
-    assert summary(other)["residual"] == summary(made)["residual"]
+    assert summary(other).springs != summary(made).springs
+    assert summary(other).residual == summary(made).residual

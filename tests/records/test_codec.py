@@ -72,9 +72,10 @@ def test_a_file_gives_the_same_class_back(tmp_path):
         ({"parts": [{"name": "p", "weight": float("nan")}]}, "parts.0.weight"),
         ({"parts": [{"name": "p", "weight": 1, "light": "blue"}]}, "'green' or 'red', got 'blue'"),
         ({"draws": [[1.0], [2.0, 3.0]]}, "draws: rows must have one length"),
-        ({"draws": [["x"]]}, "draws: must be numbers"),
-        ({"draws": [None]}, "draws: must be numbers"),
-        ({"seen": [1, 0]}, "seen: must be true or false"),
+        ({"draws": [["x"]]}, "draws.0.0: must be a finite number, got 'x'"),
+        ({"draws": [None]}, "draws.0: must be a finite number, got None"),
+        ({"draws": [[1.0, float("inf")]]}, "draws.0.1: must be a finite number, got inf"),
+        ({"seen": [1, 0]}, "seen.0: must be true or false, got 1"),
     ],
 )
 def test_what_does_not_fit_is_refused_in_one_line(change, words):

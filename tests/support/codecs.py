@@ -6,16 +6,15 @@ from functools import cache
 import numpy as np
 
 from elastocal.codec import (
+    CodecAnalysis,
     CodecData,
-    Insight,
     Verdicts,
+    analyse,
     cross_validate,
     judge,
-    look_into,
     make_variants,
 )
-from elastocal.codec.again import trainees_of
-from elastocal.codec.training import Trainee
+from elastocal.codec._training import PreparedVariant, prepared_variants
 from elastocal.dataset import Readings
 from support.cells import Cell, rich_truth, robot
 
@@ -29,8 +28,8 @@ class Judged:
     readings: Readings
     data: CodecData
     verdicts: Verdicts
-    trainees: tuple[Trainee, ...]
-    insight: Insight
+    trainees: tuple[PreparedVariant, ...]
+    insight: CodecAnalysis
 
 
 @cache
@@ -38,8 +37,8 @@ def judged() -> Judged:
     """Return a codec that compares 6 with 18 springs."""
     readings = Cell(rich_truth(), poses=POSES, seed=4).readings()
     data = cross_validate(robot(), readings, make_variants({"springs": ("actuated", "bearing")}))
-    trainees = trainees_of(robot(), readings, data)
-    insight = look_into(robot(), readings, data, with_indices=True)
+    trainees = prepared_variants(robot(), readings, data)
+    insight = analyse(robot(), readings, data, with_indices=True)
     return Judged(readings, data, judge(data), trainees, insight)
 
 

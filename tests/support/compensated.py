@@ -20,7 +20,7 @@ def calibrated(robot: Robot, springs: tuple[Spring, ...] | None = None, seed: in
     n, rng = len(model.springs), np.random.default_rng(seed)
     compliance = rng.uniform(5e-8, 8e-7, n)
     draws = compliance * (1.0 + 0.1 * rng.normal(size=(50, n)))
-    seen = Observability(n, n, 1.0, (True,) * n, ())
+    seen = Observability(n, 1.0, (True,) * n, ())
     return CalibratedModel(model, compliance, draws, seen, "made up")
 
 

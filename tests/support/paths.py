@@ -29,7 +29,7 @@ def made_up(robot: Robot) -> CalibratedModel:
     model = ElasticModel(robot, layout(robot, "bearing"))
     n = len(model.springs)
     c = np.full(n, 1e-6)
-    return CalibratedModel(model, c, np.tile(c, (40, 1)), Observability(n, n, 1.0, (True,) * n, ()))
+    return CalibratedModel(model, c, np.tile(c, (40, 1)), Observability(n, 1.0, (True,) * n, ()))
 
 
 def dome_course(count: int = 40, width: float = 0.4) -> np.ndarray:

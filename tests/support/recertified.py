@@ -65,7 +65,7 @@ def made_up(
     scatter = estimate + sigma * rng.standard_normal((draws, len(truth)))
     mixed = {term.spring for group in unobservable for term in group}
     seen = Observability(
-        len(truth) - len(unobservable), len(truth), 10.0,
+        len(truth) - len(unobservable), 10.0,
         tuple(name not in mixed for name in model.spring_names), unobservable,
     )  # fmt: skip
     return CalibratedModel(model, estimate, scatter, seen, f"made up {seed}")

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from elastocal.cli.process_bench import AFP_SETTINGS
-from elastocal.codec import CodecData, Verdicts, cross_validate, judge, look_into, make_variants
+from elastocal.codec import CodecData, Verdicts, analyse, cross_validate, judge, make_variants
 from elastocal.compensation.process import Trace
 from elastocal.report import write_plan_figure, write_plan_page
 from elastocal.report.plots import (
@@ -80,7 +80,7 @@ def _codec(folder: Path, done: Campaign, name: str, key: str, values: tuple[str,
     verdicts = judge(data)
     write_figure(folder / f"{name}.svg", partial(codec_chart, data, verdicts))
     if key == "springs":
-        found = look_into(robot, done.readings, data, marker_offset=done.marker, with_indices=True)
+        found = analyse(robot, done.readings, data, marker_offset=done.marker, with_indices=True)
         draw = partial(index_chart, data, found.indices, found.correlations)
         write_figure(folder / "indices.svg", draw)
     return _last_errors(data) if key == "load_cases" else _sentence(verdicts)

@@ -1,12 +1,11 @@
 """``elastocal calibrate``: from a measured dataset to a calibrated model."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, cast
+from typing import Annotated
 
 import typer
 
-if TYPE_CHECKING:
-    from elastocal.identification import Weights
+from elastocal import workflows
 
 
 def calibrate(  # noqa: PLR0913 - one parameter an option
@@ -54,55 +53,28 @@ def calibrate(  # noqa: PLR0913 - one parameter an option
     ] = False,
 ) -> None:
     """Identify the compliances of a robot from a measured dataset."""
-    import numpy as np
-
-    from elastocal import dataset as datasets
     from elastocal.cli.calibration_table import show_calibration
-    from elastocal.cli.output import console, print_json, refuse_overwriting
-    from elastocal.cli.parsing import parse_bounds, parse_point
-    from elastocal.cli.robot_source import find_robot
-    from elastocal.dataset import without
-    from elastocal.elastic import ElasticModel, layout
-    from elastocal.identification import FitOptions, calibrate as identify, summary, write_model
+    from elastocal.cli.output import console, print_json
+    from elastocal.cli.parsing import parse_point
 
-    lower, upper = parse_bounds(bounds)
-    options = FitOptions(
-        lower=lower,
-        upper=upper,
-        weights=cast("Weights", weights),
+    result = workflows.calibrate(
+        data,
+        out=out,
+        robot=robot,
+        tcp=tcp,
+        tool=tool,
+        springs=springs,
         loss=loss,
-        set_blunders_aside=not keep_blunders,
+        weights=weights,
+        bounds=bounds,
+        marker=None if marker is None else parse_point(marker),
+        exclude=tuple(exclude or ()),
+        keep_blunders=keep_blunders,
         trust_conventions=trust_conventions,
         draws=draws,
+        seed=seed,
     )
-    refuse_overwriting(out, data)
-    measured = datasets.read(data)
-    arm = find_robot(robot, tcp, tool, measured)
-    readings = without(measured.readings(arm.joint_names), exclude or [])
-    calibration = identify(
-        ElasticModel(arm, layout(arm, springs)),
-        readings,
-        np.random.default_rng(seed),
-        options,
-        marker_offset=measured.marker if marker is None else parse_point(marker),
-        provenance=f"{data}; {measured.provenance}" if measured.provenance else str(data),
-    )
-    figures = summary(calibration)
-    # With these a report makes the calibration again and sees whether it comes out the same.
-    figures["settings"] = {
-        "springs": springs,
-        "loss": loss,
-        "weights": weights,
-        "bounds": bounds,
-        "marker": None if marker is None else list(parse_point(marker)),
-        "exclude": exclude or [],
-        "keep_blunders": keep_blunders,
-        "trust_conventions": trust_conventions,
-        "draws": draws,
-        "seed": seed,
-    }
-    write_model(out, calibration.calibrated, figures)
     if as_json:
-        print_json(figures)
+        print_json(result.calibration)
     else:
-        show_calibration(console(), figures, out)
+        show_calibration(console(), result, out)

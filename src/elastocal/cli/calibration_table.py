@@ -5,66 +5,77 @@ which readings look wrong.
 """
 
 from pathlib import Path
-from typing import Any
 
 from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from elastocal.identification import Term, describe
+from elastocal.identification import (
+    CalibrateResult,
+    CalibrationSummary,
+    ComparisonSummary,
+    SpringSummary,
+    SuspiciousReading,
+    describe,
+)
 
-Figures = dict[str, Any]
 _MOST_SUSPICIOUS = 10
 _MOST_TERMS = 6
 """A combination of more springs than this tells a reader nothing."""
 
 
-def show_calibration(console: Console, figures: Figures, out: Path) -> None:
+def show_calibration(console: Console, result: CalibrateResult, out: Path) -> None:
     """Print the figures of a calibration for a person."""
-    _show_fit(console, figures)
-    _show_comparison(console, figures["comparison"])
-    console.print()
-    console.print(_spring_table(figures))
-    _show_groups(console, figures)
-    _show_suspicious(console, figures["suspicious"])
-    for warning in figures["warnings"]:
-        console.print(f"[yellow]warning:[/yellow] {escape(warning)}")
+    figures = result.calibration
+    if figures is not None:
+        _show_figures(console, figures)
     console.print(f"\nmodel written to [bold]{escape(str(out))}[/bold]")
 
 
-def _show_fit(console: Console, figures: Figures) -> None:
-    mean, peak = figures["deflection"]["mean"], figures["deflection"]["max"]
-    fit, held_out = figures["residual"], figures["held_out"]
+def _show_figures(console: Console, figures: CalibrationSummary) -> None:
+    _show_fit(console, figures)
+    _show_comparison(console, figures.comparison)
+    console.print()
+    console.print(_spring_table(figures))
+    _show_groups(console, figures)
+    _show_suspicious(console, figures.suspicious)
+    for warning in figures.warnings:
+        console.print(f"[yellow]warning:[/yellow] {escape(warning)}")
+
+
+def _show_fit(console: Console, figures: CalibrationSummary) -> None:
+    mean, peak = figures.deflection.mean, figures.deflection.max
+    fit, held_out = figures.residual, figures.held_out
     console.print(
-        f"[bold]{escape(figures['robot'])}[/bold]: {figures['springs_total']} springs,"
-        f" {figures['readings']} readings at {figures['poses']} poses,"
+        f"[bold]{escape(figures.robot)}[/bold]: {figures.springs_total} springs,"
+        f" {figures.readings} readings at {figures.poses} poses,"
         f" measured deflection {_mm(mean)} mean, {_mm(peak)} max"
     )
     table = Table(box=None, pad_edge=False)
     for heading in ("error norm", "mean", "of deflection", "95 %", "max"):
         table.add_column(heading, justify="left" if heading == "error norm" else "right")
     table.add_row(
-        f"at left-out poses ({held_out['folds']} refits)",
-        f"[bold]{_mm(held_out['mean'])}[/bold]",
-        f"{held_out['mean'] / mean:.2%}",
+        f"at left-out poses ({held_out.folds} refits)",
+        f"[bold]{_mm(held_out.mean)}[/bold]",
+        f"{held_out.mean / mean:.2%}",
         "",
-        _mm(held_out["max"]),
+        _mm(held_out.max),
     )
     table.add_row(
         "at the poses fitted",
-        _mm(fit["mean"]),
-        f"{fit['mean'] / mean:.2%}",
-        _mm(fit["p95"]),
-        _mm(fit["max"]),
+        _mm(fit.mean),
+        f"{fit.mean / mean:.2%}",
+        _mm(fit.p95),
+        _mm(fit.max),
     )
     console.print(table)
 
 
-def _show_comparison(console: Console, comparison: Figures | None) -> None:
+def _show_comparison(console: Console, comparison: ComparisonSummary | None) -> None:
     if comparison is None:
         return
-    other, difference = comparison["held_out"]["mean"], comparison["difference"]
-    low, high = difference["low"], difference["high"]
+    other, difference = comparison.held_out.mean, comparison.difference
+    low, high = difference.low, difference.high
     if low > 0.0:
         verdict = "[green]more springs are better[/green]"
     elif high < 0.0:
@@ -73,16 +84,16 @@ def _show_comparison(console: Console, comparison: Figures | None) -> None:
         verdict = "[yellow]no clear difference[/yellow]: the poses do not decide"
     console.print(
         f"axial springs alone: {_mm(other)} at left-out poses,"
-        f" {1e3 * difference['mean']:+.3f} mm ({1e3 * low:+.3f} to {1e3 * high:+.3f}, 95 %);"
+        f" {1e3 * difference.mean:+.3f} mm ({1e3 * low:+.3f} to {1e3 * high:+.3f}, 95 %);"
         f" {verdict}"
     )
 
 
-def _spring_table(figures: Figures) -> Table:
+def _spring_table(figures: CalibrationSummary) -> Table:
     """Return a row a spring; linear springs, rare, name their own units."""
     group_of = {
-        term["spring"]: number
-        for number, group in reversed(list(enumerate(figures["unobservable"], start=1)))
+        term.spring: number
+        for number, group in reversed(list(enumerate(figures.unobservable, start=1)))
         for term in group
     }
     table = Table(box=None, pad_edge=False)
@@ -91,19 +102,19 @@ def _spring_table(figures: Figures) -> Table:
     table.add_column("95 %\ninterval", justify="right", no_wrap=True)
     table.add_column("stiffness\nMN·m/rad", justify="right", no_wrap=True)
     table.add_column("known?", no_wrap=True)
-    for spring in figures["springs"]:
-        table.add_row(*_spring_row(spring, group_of.get(spring["name"])))
+    for spring in figures.springs:
+        table.add_row(*_spring_row(spring, group_of.get(spring.name)))
     return table
 
 
-def _spring_row(spring: Figures, group: int | None) -> tuple[str, ...]:
-    value, low, high = (1e6 * spring[name] for name in ("compliance", "low", "high"))
-    unit, stiff = ("", "") if spring["kind"] == "revolute" else (" µm/N", " MN/m")
-    if not spring["observable"]:
+def _spring_row(spring: SpringSummary, group: int | None) -> tuple[str, ...]:
+    value, low, high = (1e6 * each for each in (spring.compliance, spring.low, spring.high))
+    unit, stiff = ("", "") if spring.kind == "revolute" else (" µm/N", " MN/m")
+    if not spring.observable:
         note = f"[yellow]not by itself[/yellow], group {group}"
-        return escape(spring["name"]), f"[dim]({value:.4f}{unit})[/dim]", "", "", note
+        return escape(spring.name), f"[dim]({value:.4f}{unit})[/dim]", "", "", note
     return (
-        escape(spring["name"]),
+        escape(spring.name),
         f"{value:.4f}{unit}",
         f"{low:.3f} … {high:.3f}",
         f"{1.0 / value:.3f}{stiff}" if value > 0.0 else "rigid",
@@ -119,11 +130,11 @@ def _known(value: float, low: float, high: float) -> str:
     return f"[{colour}]±{relative:.0%}[/{colour}]"
 
 
-def _show_groups(console: Console, figures: Figures) -> None:
-    if not figures["unobservable"]:
-        console.print(f"every spring is observable; condition number {figures['condition']:.0f}")
+def _show_groups(console: Console, figures: CalibrationSummary) -> None:
+    if not figures.unobservable:
+        console.print(f"every spring is observable; condition number {figures.condition:.0f}")
         return
-    missing = figures["rank_attainable"] - figures["rank"]
+    missing = figures.rank_attainable - figures.rank
     meaning = (
         "these combinations change no deflection under a force, so their springs have no value of"
         " their own; predictions do not need one"
@@ -132,32 +143,31 @@ def _show_groups(console: Console, figures: Figures) -> None:
         " of these combinations are harmless"
     )
     console.print(
-        f"\nrank {figures['rank']} of {figures['springs_total']} (condition number"
-        f" {figures['condition']:.0f}): {meaning}"
+        f"\nrank {figures.rank} of {figures.springs_total} (condition number"
+        f" {figures.condition:.0f}): {meaning}"
     )
-    for number, group in enumerate(figures["unobservable"], start=1):
-        terms = [Term(term["spring"], term["weight"]) for term in group]
-        shown = describe(terms) if len(terms) <= _MOST_TERMS else f"{len(terms)} springs mixed"
+    for number, group in enumerate(figures.unobservable, start=1):
+        shown = describe(group) if len(group) <= _MOST_TERMS else f"{len(group)} springs mixed"
         console.print(f"   group {number}: {escape(shown)}")
 
 
-def _show_suspicious(console: Console, suspicious: list[Figures]) -> None:
+def _show_suspicious(console: Console, suspicious: tuple[SuspiciousReading, ...]) -> None:
     if not suspicious:
         console.print("no reading looks wrong")
         return
     many = "reading looks" if len(suspicious) == 1 else "readings look"
     console.print(f"\n[yellow]{len(suspicious)} {many} wrong[/yellow] (robust score):")
     for reading in suspicious[:_MOST_SUSPICIOUS]:
-        note = " [red]set aside as a blunder[/red]" if reading["set_aside"] else ""
-        off = _mm(reading["residual"])
+        note = " [red]set aside as a blunder[/red]" if reading.set_aside else ""
+        off = _mm(reading.residual)
         console.print(
-            f"   pose {reading['pose']} {escape(reading['load_case'])}: {off} off,"
-            f" score {reading['score']:.1f}{note}"
+            f"   pose {reading.pose} {escape(reading.load_case)}: {off} off,"
+            f" score {reading.score:.1f}{note}"
         )
     if len(suspicious) > _MOST_SUSPICIOUS:
         console.print(f"   … and {len(suspicious) - _MOST_SUSPICIOUS} more (--json lists all)")
     first = suspicious[0]
-    console.print(f"   to leave one out: --exclude {first['pose']}:{escape(first['load_case'])}")
+    console.print(f"   to leave one out: --exclude {first.pose}:{escape(first.load_case)}")
 
 
 def _mm(metres: float) -> str:

@@ -86,19 +86,19 @@ def codec(  # noqa: PLR0913 - one parameter an option
     from elastocal.cli.output import console, print_json
     from elastocal.cli.parsing import parse_point
     from elastocal.cli.progress import progress_bars
-    from elastocal.cli.robot_source import find_robot
     from elastocal.codec import (
         VERDICTS,
         CodecOptions,
+        analyse,
         cross_validate,
         figures,
         judge,
-        look_into,
         make_variants,
         verdict_record,
     )
     from elastocal.dataset import without
     from elastocal.files import filling
+    from elastocal.workflows import find_robot
 
     variants = make_variants(comparisons(compare or []))
     options = CodecOptions(splits, parse_ratio(ratio), seed, not keep_blunders, trust_conventions)
@@ -119,7 +119,7 @@ def codec(  # noqa: PLR0913 - one parameter an option
             report=report,
         )
         verdicts = judge(found, near)
-        insight = look_into(arm, readings, found, marker_offset=offset, with_indices=indices)
+        insight = analyse(arm, readings, found, marker_offset=offset, with_indices=indices)
         record = verdict_record(found, verdicts, insight.correlations)
         axes = ("x", "y", "z") if per_axis else ()
         names = write_codec_folder(folder, found, verdicts, record, insight, axes)

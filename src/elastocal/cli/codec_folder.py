@@ -4,8 +4,8 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from elastocal.codec import (
+    CodecAnalysis,
     CodecData,
-    Insight,
     VerdictRecord,
     Verdicts,
     write_codec,
@@ -20,7 +20,7 @@ def write_codec_folder(
     data: CodecData,
     verdicts: Verdicts,
     record: VerdictRecord,
-    insight: Insight,
+    insight: CodecAnalysis,
     axes: Sequence[str] = (),
 ) -> list[str]:
     """Write everything that a codec leaves behind; return the names of the files.
@@ -33,7 +33,7 @@ def write_codec_folder(
         The arrays.
     verdicts, record : Verdicts, VerdictRecord
         What they say, and its file.
-    insight : Insight
+    insight : CodecAnalysis
         What the readings tell beyond; its indices are written if there are any.
     axes : sequence of str
         Axes of which a printed figure is wanted beside that of the norm.

@@ -34,7 +34,7 @@ def compare(
     """
     from elastocal.cli.compare_rows import measured_rows, read_rows
     from elastocal.cli.compare_table import show_comparison
-    from elastocal.cli.output import console, print_json, refuse_overwriting
+    from elastocal.cli.output import console, print_json
     from elastocal.cli.parsing import parse_limit
     from elastocal.identification.recertification import (
         comparison_record,
@@ -42,6 +42,7 @@ def compare(
         recertify_files,
         write_comparison,
     )
+    from elastocal.workflows import refuse_overwriting
 
     accepted = None if limit is None else parse_limit(limit)
     inputs = [old, new] if rows is None else [old, new, rows]

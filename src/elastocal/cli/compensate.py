@@ -38,13 +38,14 @@ def compensate(
 ) -> None:
     """Correct a programmed path so that the loaded tool is where it was programmed."""
     from elastocal.cli.coverage import NOT_COVERED, covered
-    from elastocal.cli.output import console, print_json, refuse_overwriting
+    from elastocal.cli.output import console, print_json
     from elastocal.cli.posture_option import parse_frame, parse_posture
     from elastocal.cli.progress import progress_bars
     from elastocal.compensation.offline import Settings, compensate_krl, compensate_path
     from elastocal.errors import FileAccessError, UnitError
     from elastocal.identification import read_model
     from elastocal.units import parse_quantity
+    from elastocal.workflows import refuse_overwriting
 
     krl = path.suffix.lower() == ".src"
     inputs = [model, path, *([forces] if forces else [])]

@@ -5,12 +5,10 @@ import json
 import sys
 from collections.abc import Iterator
 from contextvars import ContextVar
-from pathlib import Path
-from typing import Any
 
 from rich.console import Console
 
-from elastocal.errors import FileAccessError
+from elastocal.records import to_data
 
 _CONSOLE: ContextVar[Console | None] = ContextVar("console", default=None)
 
@@ -30,21 +28,8 @@ def printing_to(listener: Console) -> Iterator[None]:
         _CONSOLE.reset(token)
 
 
-def refuse_overwriting(out: Path, *inputs: Path) -> None:
-    """Refuse an output path that is also an input: measurements are not to be replaced.
-
-    Raises
-    ------
-    FileAccessError
-        If the paths are the same file.
-    """
-    for path in inputs:
-        if out.resolve() == path.resolve():
-            raise FileAccessError(f"--out {out} is an input of this command: name another file")
-
-
-def print_json(data: Any) -> None:
-    """Print one JSON object on standard output, and nothing else there."""
-    sys.stdout.write(json.dumps(data, allow_nan=False) + "\n")
+def print_json(data: object) -> None:
+    """Print a record as one JSON object on standard output, and nothing else there."""
+    sys.stdout.write(json.dumps(to_data(data), allow_nan=False) + "\n")
     # A disk that is full is to be known now, not when Python ends.
     sys.stdout.flush()

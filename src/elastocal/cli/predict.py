@@ -5,6 +5,8 @@ from typing import Annotated
 
 import typer
 
+from elastocal import workflows
+
 
 def predict(
     model: Annotated[Path, typer.Argument(help="Model file from calibrate.")],
@@ -15,50 +17,20 @@ def predict(
     ] = False,
 ) -> None:
     """Predict the deflection of each row, with 95 % intervals of the fit and of a measurement."""
-    import numpy as np
+    from elastocal.cli.output import console, print_json
 
-    from elastocal.cli.output import console, print_json, refuse_overwriting
-    from elastocal.dataset import joint_dimensions, read_load_rows, write_load_rows
-    from elastocal.identification import read_model
-
-    refuse_overwriting(out, model, rows)
-    calibrated = read_model(model)
-    robot = calibrated.model.robot
-    loads = read_load_rows(rows, joint_dimensions(robot.joint_names, robot.revolute))
-    prediction = calibrated.predict(loads.joint_position, loads.force, loads.moment)
-    known = bool(np.isfinite(calibrated.misfit))
-    parts = [
-        ("", prediction.deflection),
-        ("_low", prediction.low),
-        ("_high", prediction.high),
-    ]
-    if known:
-        parts += [
-            ("_measured_low", prediction.measured_low),
-            ("_measured_high", prediction.measured_high),
-        ]
-    added = {
-        f"deflection_{axis}{suffix}[m]": values[:, index]
-        for suffix, values in parts
-        for index, axis in enumerate("xyz")
-    }
-    write_load_rows(out, loads, added)
-    norms = np.linalg.norm(prediction.deflection, axis=1)
-    figures = {
-        "rows": len(norms),
-        "deflection": {"mean": norms.mean(), "max": norms.max()},
-        "misfit": calibrated.misfit if known else None,
-    }
+    figures = workflows.predict(model, rows=rows, out=out).summary
     if as_json:
         print_json(figures)
     else:
+        size = figures.deflection
         console().print(
-            f"{len(norms)} rows: predicted deflection {1e3 * norms.mean():.3f} mm mean,"
-            f" {1e3 * norms.max():.3f} mm max; written to {out}",
+            f"{figures.rows} rows: predicted deflection {1e3 * size.mean:.3f} mm mean,"
+            f" {1e3 * size.max:.3f} mm max; written to {out}",
             markup=False,
             soft_wrap=True,
         )
-        if not known:
+        if figures.misfit is None:
             console().print(
                 "Note: the model does not know its errors at left-out poses, so that there are no"
                 " intervals of what would be measured; calibrate again to have them",

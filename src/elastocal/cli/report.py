@@ -7,7 +7,7 @@ import typer
 
 if TYPE_CHECKING:
     from elastocal.report.document import (
-        Written,
+        WrittenReport,
     )
     from elastocal.verdict import (
         Evidence,
@@ -122,7 +122,7 @@ def check_places(out: Path, paper: Path | None, force: bool) -> None:
             raise FileAccessError(f"{path} is there already: name another file, or give --force")
 
 
-def _figures(evidence: "Evidence", written: "Written", paper: Path | None) -> dict[str, Any]:
+def _figures(evidence: "Evidence", written: "WrittenReport", paper: Path | None) -> dict[str, Any]:
     verdict, again = written.verdict, evidence.reproduction
     unseen = again.unseen if again is not None and again.same else None
     return {

@@ -31,7 +31,7 @@ def tool(
     ] = False,
 ) -> None:
     """Find mass, centre of mass, sensor bias and sensor rotation from static postures."""
-    from elastocal.cli.output import console, print_json, refuse_overwriting
+    from elastocal.cli.output import console, print_json
     from elastocal.cli.tool_inputs import posture_robot, three_numbers, transform
     from elastocal.cli.tool_source import from_run, from_table
     from elastocal.cli.tool_table import show_tool
@@ -41,6 +41,7 @@ def tool(
         tool_record,
         write_tool,
     )
+    from elastocal.workflows import refuse_overwriting
 
     refuse_overwriting(out, data)
     if data.is_dir():

@@ -5,11 +5,11 @@ from pathlib import Path
 import numpy as np
 
 from elastocal.arrays import FloatArray
-from elastocal.cli.robot_source import find_robot
 from elastocal.errors import CompensationError
 from elastocal.identification import read_model
 from elastocal.robot import Robot, T_from_xyzabc
 from elastocal.units import parse_quantity
+from elastocal.workflows import find_robot
 
 
 def posture_robot(robot: str | None, flange: str) -> Robot | None:

@@ -1,21 +1,39 @@
+from .analysis import (
+    CodecAnalysis as CodecAnalysis,
+    SpringObservability as SpringObservability,
+    analyse as analyse,
+)
 from .cross_validation import cross_validate as cross_validate
-from .data import CodecData as CodecData, SpringLabels as SpringLabels
-from .data_file import (
+from .data import (
+    AXES as AXES,
+    NO_POSE as NO_POSE,
+    CodecData as CodecData,
+    SpringLabels as SpringLabels,
+)
+from .index_correlation import Correlation as Correlation
+from .index_file import write_index_table as write_index_table
+from .indices import INDICES as INDICES, IndexValues as IndexValues
+from .netcdf import (
     ARRAYS as ARRAYS,
     ARRAYS_SCHEMA as ARRAYS_SCHEMA,
     read_codec as read_codec,
     write_codec as write_codec,
 )
-from .index_correlation import Correlation as Correlation
-from .index_file import write_index_table as write_index_table
-from .indices import INDICES as INDICES, IndexValues as IndexValues
-from .insight import Insight as Insight, look_into as look_into
-from .observed import Observed as Observed
-from .options import CodecOptions as CodecOptions
-from .pairs import Pair as Pair, paired as paired
-from .saturation import Saturation as Saturation, Tolerance as Tolerance, saturation as saturation
-from .splits import Split as Split, make_splits as make_splits, split_sizes as split_sizes
-from .training import AXES as AXES
+from .paired_differences import (
+    PairedDifference as PairedDifference,
+    paired_difference as paired_difference,
+)
+from .saturation import (
+    Saturation as Saturation,
+    Tolerance as Tolerance,
+    find_saturation as find_saturation,
+)
+from .splits import (
+    CodecOptions as CodecOptions,
+    Split as Split,
+    make_splits as make_splits,
+    split_sizes as split_sizes,
+)
 from .variants import (
     ALL_LOADS as ALL_LOADS,
     KEYS as KEYS,

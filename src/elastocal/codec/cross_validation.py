@@ -9,11 +9,9 @@ from joblib import Parallel, delayed
 from numpy.typing import ArrayLike
 
 from elastocal.arrays import IndexArray
-from elastocal.codec.campaign import make_campaign
-from elastocal.codec.data import NONE, CodecData, SpringLabels
-from elastocal.codec.options import CodecOptions
-from elastocal.codec.splits import Split, make_splits, split_sizes
-from elastocal.codec.training import Outcome, Trainee, train
+from elastocal.codec._training import LearningCurve, PreparedVariant, train
+from elastocal.codec.data import NO_POSE, CodecData, SpringLabels
+from elastocal.codec.splits import CodecOptions, Split, make_campaign, make_splits, split_sizes
 from elastocal.codec.variants import Variant, check_different
 from elastocal.dataset import Readings
 from elastocal.elastic import ElasticModel, layout
@@ -82,10 +80,10 @@ def cross_validate(
     check_different(variants, campaign.load_cases)
     training, verification = split_sizes(len(campaign), options.ratio)
     splits = make_splits(campaign.contact, options.splits, verification)
-    trainees = [
-        Trainee.of(each, models[each.springs], campaign, marker_offset) for each in variants
+    prepared = [
+        PreparedVariant.of(each, models[each.springs], campaign, marker_offset) for each in variants
     ]
-    most = min(_most(trainee, splits) for trainee in trainees)
+    most = min(_largest_training_set(each, splits) for each in prepared)
     findings = list(campaign.findings)
     if most < training:
         findings.append(
@@ -93,9 +91,9 @@ def cross_validate(
             " load cases that a variant trains with"
         )
     processes = _processes(jobs, variants, most * len(splits))
-    outcomes = _run(trainees, splits, most, options.seed, processes, report or _silent)
-    for trainee, found in zip(trainees, outcomes, strict=True):
-        _refuse_nothing_fitted(trainee, found)
+    curves = _run_splits(prepared, splits, most, options.seed, processes, report or _silent)
+    for each, found in zip(prepared, curves, strict=True):
+        _require_a_fit(each, found)
     return CodecData(
         variants=tuple(variants),
         springs=tuple(SpringLabels.of(layouts[each.springs]) for each in variants),
@@ -103,10 +101,10 @@ def cross_validate(
         contact=campaign.contact,
         seed_pose=np.array([split.seed_pose for split in splits]),
         verification=np.array([split.verification for split in splits]),
-        chosen=np.array([[_padded(each.chosen) for each in found] for found in outcomes]),
-        compliance=tuple(np.array([each.compliance for each in found]) for found in outcomes),
-        error_mean=np.array([[each.error_mean for each in found] for found in outcomes]),
-        error_max=np.array([[each.error_max for each in found] for found in outcomes]),
+        chosen=np.array([[_padded(each.chosen) for each in found] for found in curves]),
+        compliance=tuple(np.array([each.compliance for each in found]) for found in curves),
+        error_mean=np.array([[each.error_mean for each in found] for found in curves]),
+        error_max=np.array([[each.error_max for each in found] for found in curves]),
         load_cases=campaign.load_cases,
         options=options,
         robot=robot.name,
@@ -116,13 +114,14 @@ def cross_validate(
     )
 
 
-def _most(trainee: Trainee, splits: Sequence[Split]) -> int:
+def _largest_training_set(prepared: PreparedVariant, splits: Sequence[Split]) -> int:
     """Return the largest training set that every split can give a variant."""
-    most = min(len(trainee.can_train(split)) for split in splits)
+    most = min(len(prepared.can_train(split)) for split in splits)
     if most < 1:
+        variant = prepared.variant
         raise CodecError(
-            f"variant {trainee.variant.name!r} fits nothing: a split leaves it no training pose"
-            f" with a reading of load cases {trainee.variant.load_cases!r}"
+            f"variant {variant.name!r} fits nothing: a split leaves it no training pose"
+            f" with a reading of load cases {variant.load_cases!r}"
         )
     return most
 
@@ -133,51 +132,53 @@ def _processes(jobs: int | None, variants: Sequence[Variant], fits: int) -> int:
     return jobs or ((os.cpu_count() or 1) if slow * fits > _WORTH_PROCESSES else 1)
 
 
-def _run(
-    trainees: Sequence[Trainee],
+def _run_splits(
+    prepared: Sequence[PreparedVariant],
     splits: Sequence[Split],
     most: int,
     seed: int,
     processes: int,
     report: Report,
-) -> list[list[Outcome]]:
-    """Return the outcomes by variant and split."""
+) -> list[list[LearningCurve]]:
+    """Return the learning curves by variant and split."""
     parallel = Parallel(n_jobs=min(processes, len(splits)), return_as="generator")
     found = []
     report(STAGE, 0, len(splits))
-    for outcome in parallel(delayed(_run_split)(trainees, split, most, seed) for split in splits):
-        found.append(outcome)
+    for curves in parallel(delayed(_run_split)(prepared, split, most, seed) for split in splits):
+        found.append(curves)
         report(STAGE, len(found), len(splits))
     return [list(column) for column in zip(*found, strict=True)]
 
 
-def _run_split(trainees: Sequence[Trainee], split: Split, most: int, seed: int) -> list[Outcome]:
-    return [_run_one(trainee, split, most, seed) for trainee in trainees]
+def _run_split(
+    prepared: Sequence[PreparedVariant], split: Split, most: int, seed: int
+) -> list[LearningCurve]:
+    """Return the learning curve of each variant on one split."""
+    curves = []
+    for each in prepared:
+        try:
+            curves.append(train(each, split, most, seed))
+        except IdentificationError as error:
+            raise IdentificationError(
+                f"variant {each.variant.name!r}, split grown from pose {split.seed_pose}: {error}"
+            ) from error
+    return curves
 
 
-def _run_one(trainee: Trainee, split: Split, most: int, seed: int) -> Outcome:
-    try:
-        return train(trainee, split, most, seed)
-    except IdentificationError as error:
-        raise IdentificationError(
-            f"variant {trainee.variant.name!r}, split grown from pose {split.seed_pose}: {error}"
-        ) from error
-
-
-def _refuse_nothing_fitted(trainee: Trainee, outcomes: Sequence[Outcome]) -> None:
+def _require_a_fit(prepared: PreparedVariant, curves: Sequence[LearningCurve]) -> None:
     """Refuse a variant whose largest training sets leave every spring at a bound."""
-    last = np.array([outcome.compliance[-1] for outcome in outcomes])
-    problem = trainee.problem
+    last = np.array([curve.compliance[-1] for curve in curves])
+    problem = prepared.problem
     if np.all((last == problem.lower) | (last == problem.upper)):
         raise CodecError(
-            f"variant {trainee.variant.name!r} fits nothing: in all {len(outcomes)} splits every"
+            f"variant {prepared.variant.name!r} fits nothing: in all {len(curves)} splits every"
             " spring ends at a bound"
         )
 
 
 def _padded(chosen: Sequence[IndexArray]) -> IndexArray:
-    """Return choices of 1, 2, … poses as rows of one array, filled up with `NONE`."""
-    filled = np.full((len(chosen), len(chosen)), NONE, dtype=np.intp)
+    """Return choices of 1, 2, … poses as rows of one array, filled up with `NO_POSE`."""
+    filled = np.full((len(chosen), len(chosen)), NO_POSE, dtype=np.intp)
     for row, poses in zip(filled, chosen, strict=True):
         row[: len(poses)] = poses
     return filled

@@ -6,13 +6,14 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from elastocal.arrays import FloatArray, IndexArray
-from elastocal.codec.options import CodecOptions
-from elastocal.codec.training import AXES
+from elastocal.codec.splits import CodecOptions
 from elastocal.codec.variants import Variant
 from elastocal.elastic import Spring
 from elastocal.errors import CodecError, nearest
 
-NONE = -1
+AXES = ("x", "y", "z", "norm")
+"""Components of an error in base, and the length of the vector."""
+NO_POSE = -1
 """Fills `CodecData.chosen` behind the last chosen pose."""
 
 
@@ -57,7 +58,7 @@ class CodecData:
     verification: IndexArray
     """Poses of each verification set in the order of choice, shape (cv, N_v)."""
     chosen: IndexArray
-    """Training poses in the order of choice, `NONE` behind the last, shape
+    """Training poses in the order of choice, `NO_POSE` behind the last, shape
     (variant, cv, n_train, n_train)."""
     compliance: tuple[FloatArray, ...]
     """Of each variant, shape (cv, n_train, spring), in the units of ``springs``."""
@@ -153,5 +154,5 @@ class CodecData:
             raise CodecError("variants must be at least one, each with a name of its own")
         for name in ("seed_pose", "verification", "chosen"):
             outside = getattr(self, name)
-            if np.any((outside < NONE) | (outside >= poses)):
+            if np.any((outside < NO_POSE) | (outside >= poses)):
                 raise CodecError(f"{name} names a pose that is not one of the {poses}")

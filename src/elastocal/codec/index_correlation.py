@@ -20,14 +20,13 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import rankdata
 
 from elastocal.arrays import FloatArray, IndexArray
+from elastocal.codec._overlap import Overlap, corrected_mean
 from elastocal.codec.data import CodecData
 from elastocal.codec.indices import INDICES, IndexValues
-from elastocal.codec.overlap import Overlap, corrected_mean
 
-ERRORS = ("mean", "max")
+_ERRORS = ("mean", "max")
 _DIGITS = 7
 """Digits of an index that count: the prior of 1e-6 leaves no more where poses are few."""
 _ALMOST = 1.0 - 1e-6
@@ -52,7 +51,7 @@ class Correlation:
     high: float
 
 
-def growth(goodness: FloatArray, accuracy: FloatArray) -> float:
+def _growth(goodness: FloatArray, accuracy: FloatArray) -> float:
     """Return the mean over splits of the rank correlation over sizes.
 
     Parameters
@@ -63,21 +62,21 @@ def growth(goodness: FloatArray, accuracy: FloatArray) -> float:
     return _mean(_spearman(goodness, accuracy))
 
 
-def at_equal_size(goodness: FloatArray, accuracy: FloatArray) -> float:
-    """Return the mean over sizes of the rank correlation over splits; see `growth`."""
+def _at_equal_size(goodness: FloatArray, accuracy: FloatArray) -> float:
+    """Return the mean over sizes of the rank correlation over splits; see `_growth`."""
     return _mean(_spearman(goodness.T, accuracy.T))
 
 
-def at_equal_size_and_split(goodness: FloatArray, accuracy: FloatArray) -> float:
-    """Return the correlation of ranks within sizes, without each split's mean; see `growth`."""
-    left = [_centred(_centred(rankdata(each, axis=0).T).T) for each in (goodness, accuracy)]
+def _at_equal_size_and_split(goodness: FloatArray, accuracy: FloatArray) -> float:
+    """Return the correlation of ranks within sizes, without each split's mean; see `_growth`."""
+    left = [_centred(_centred(_ranks(each.T)).T) for each in (goodness, accuracy)]
     return float(_pearson(left[0].reshape(1, -1), left[1].reshape(1, -1))[0])
 
 
 KINDS: dict[str, Callable[[FloatArray, FloatArray], float]] = {
-    "growth": growth,
-    "size": at_equal_size,
-    "size_and_split": at_equal_size_and_split,
+    "growth": _growth,
+    "size": _at_equal_size,
+    "size_and_split": _at_equal_size_and_split,
 }
 
 
@@ -96,7 +95,7 @@ def correlate(data: CodecData, indices: IndexValues) -> tuple[Correlation, ...]:
     """
     overlap = Overlap.of(data.verification, len(data.contact))
     found = []
-    for error in ERRORS:
+    for error in _ERRORS:
         accuracy = -data.errors(indices.variant, error)
         for name in INDICES:
             goodness = _rounded(indices.goodness(name))
@@ -136,7 +135,27 @@ def _fisher(correlation: FloatArray) -> FloatArray:
 
 def _spearman(a: FloatArray, b: FloatArray) -> FloatArray:
     """Return the rank correlation of each row, NaN where a row does not vary, shape (row,)."""
-    return _pearson(rankdata(a, axis=1), rankdata(b, axis=1))
+    return _pearson(_ranks(a), _ranks(b))
+
+
+def _ranks(rows: FloatArray) -> FloatArray:
+    """Return the rank of each value in its row, from 1; equal values share their mean rank.
+
+    As `scipy.stats.rankdata`, whose package takes longer to import than a codec to rank. A row
+    with NaN has no ranks.
+    """
+    order = np.argsort(rows, axis=1)
+    ordered = np.take_along_axis(rows, order, axis=1)
+    place = np.broadcast_to(np.arange(1.0, rows.shape[1] + 1.0), rows.shape)
+    begins = np.ones(rows.shape, dtype=bool)
+    begins[:, 1:] = ordered[:, 1:] > ordered[:, :-1]
+    ends = np.roll(begins, -1, axis=1)
+    first = np.maximum.accumulate(np.where(begins, place, 0.0), axis=1)
+    last = np.minimum.accumulate(np.where(ends, place, np.inf)[:, ::-1], axis=1)[:, ::-1]
+    ranks = np.empty(rows.shape)
+    np.put_along_axis(ranks, order, 0.5 * (first + last), axis=1)
+    ranks[np.isnan(rows).any(axis=1)] = np.nan
+    return ranks
 
 
 def _pearson(a: FloatArray, b: FloatArray) -> FloatArray:

@@ -13,7 +13,7 @@ from elastocal.codec.indices import COVERING_RADIUS, INDICES, IndexValues
 from elastocal.files import write_text
 from elastocal.records import StrictModel
 
-TABLE = "indices.csv"
+_TABLE = "indices.csv"
 """Name of the table in a codec's folder."""
 
 
@@ -76,7 +76,7 @@ def write_index_table(folder: Path, data: CodecData, indices: Sequence[IndexValu
         for cv, n in np.ndindex(columns[0].shape):
             numbers = [repr(float(column[cv, n])) for column in columns]
             table.writerow([each.variant, data.seed_pose[cv], data.n_train[n], *numbers])
-    path = Path(folder) / TABLE
+    path = Path(folder) / _TABLE
     write_text(path, text.getvalue())
     return path
 

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from elastocal.arrays import BoolArray, FloatArray
+from elastocal.codec._training import PreparedVariant
 from elastocal.codec.data import CodecData
-from elastocal.codec.training import Trainee
 from elastocal.planning.search import Candidates, build_information, covering_radius
 from elastocal.planning.search.criteria import CRITERIA, IOptimal
 
@@ -32,7 +32,7 @@ class IndexValues:
         return sign * self.values[name]
 
 
-def index_values(data: CodecData, trainee: Trainee) -> IndexValues:
+def index_values(data: CodecData, prepared: PreparedVariant) -> IndexValues:
     """Return the indices of all training sets of a variant.
 
     All sets are measured by one rule: over the directions that all poses together observe under
@@ -44,18 +44,18 @@ def index_values(data: CodecData, trainee: Trainee) -> IndexValues:
     ----------
     data : CodecData
         The codec.
-    trainee : Trainee
-        Of the variant; from `trainees_of`.
+    prepared : PreparedVariant
+        The variant; from `prepared_variants`.
 
     Raises
     ------
     PlanningError
         If the forces load no spring.
     """
-    number = data.index(trainee.variant.name)
-    poses, everything = np.arange(len(data.contact)), np.ones_like(trainee.trains)
-    rows = trainee.rows(poses, everything)
-    pool = Candidates(data.contact, trainee.rows(poses, trainee.trains))
+    number = data.index(prepared.variant.name)
+    poses, everything = np.arange(len(data.contact)), np.ones_like(prepared.trains)
+    rows = prepared.rows(poses, everything)
+    pool = Candidates(data.contact, prepared.rows(poses, prepared.trains))
     information = build_information(pool)
     member = _members(data, number)
     flat = information.gram.reshape(len(poses), -1)
@@ -72,7 +72,7 @@ def index_values(data: CodecData, trainee: Trainee) -> IndexValues:
     values[COVERING_RADIUS] = np.array(
         [[covering_radius(pool, np.flatnonzero(one)) for one in sets] for sets in member]
     )
-    return IndexValues(trainee.variant.name, {name: values[name] for name in INDICES})
+    return IndexValues(prepared.variant.name, {name: values[name] for name in INDICES})
 
 
 def _process(rows: FloatArray, scale: FloatArray, basis: FloatArray) -> FloatArray:

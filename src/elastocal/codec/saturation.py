@@ -1,4 +1,4 @@
-"""From how many training poses on the error no longer falls."""
+"""The saturation verdict: from how many training poses on the error no longer falls."""
 
 from dataclasses import dataclass
 
@@ -6,7 +6,7 @@ import numpy as np
 from numpy.random import Generator
 
 from elastocal.arrays import BoolArray, FloatArray, IndexArray
-from elastocal.codec.overlap import Overlap, median_draws
+from elastocal.codec._overlap import Overlap, median_draws, micrometres
 from elastocal.errors import CodecError
 from elastocal.identification import CONFIDENCE
 
@@ -89,8 +89,66 @@ class Saturation:
         """
         return self.high is not None and self.high < self.last and not self.rises
 
+    def sentence(self, tolerance: Tolerance, largest: FloatArray, where: str) -> str:
+        """Return the verdict in words.
 
-def saturation(
+        Parameters
+        ----------
+        tolerance : Tolerance
+            By which it was found.
+        largest : ndarray, shape (cv, n_train)
+            Largest error norm of each verification set, in m.
+        where : str
+            What the figures were measured on.
+        """
+        if self.last == 1:
+            return (
+                f"{self.variant}: training sets of one pose only ({micrometres(self.error)}):"
+                f" nothing can be said of saturation ({where})"
+            )
+        worst = largest[:, self.n_train - 1]
+        extent = (
+            f"largest error with {self.n_train}: {micrometres(float(np.median(worst)))} in the"
+            f" median set, {micrometres(float(worst.max()))} in the worst; {where}"
+        )
+        if self.n_train == self.last:
+            early = ""
+            if self.low is not None and self.low < self.last:
+                early = f"; that it has saturated from {self.low} on cannot be ruled out"
+            return (
+                f"{self.variant}: the error still falls at {self.last} training poses: mean"
+                f" {micrometres(self.last_error)}; more poses may help{early}; {extent}"
+            )
+        return f"{self._saturated(tolerance)}; {extent}{self._doubts()}"
+
+    def _saturated(self, tolerance: Tolerance) -> str:
+        between = "these sets tell no interval"
+        if self.low is not None and self.high is not None:
+            between = f"95 % interval {self.low} to {self.high}"
+        from_on = f"saturated from {self.n_train} training poses on ({between})"
+        if self.stays > self.n_train:
+            from_on = (
+                f"as good as the last from {self.n_train} training poses ({between}), steadily only"
+                f" from {self.stays} on"
+            )
+        return (
+            f"{self.variant}: {from_on}: mean error (median set) {micrometres(self.error)} there,"
+            f" {micrometres(self.last_error)} with {self.last} (tolerance"
+            f" {100.0 * tolerance.relative:.3g} % of that, or {micrometres(tolerance.floor)})"
+        )
+
+    def _doubts(self) -> str:
+        if self.rises:
+            return (
+                f"; the error rises again: {micrometres(self.least_error)} with {self.least}: look"
+                " for a bad reading, or springs too many for these loads"
+            )
+        if self.settled or self.high is None:
+            return ""
+        return f"; that it still falls at {self.last} cannot be ruled out"
+
+
+def find_saturation(
     variant: str, errors: FloatArray, tolerance: Tolerance, overlap: Overlap, rng: Generator
 ) -> Saturation:
     """Return from how many training poses on the median error is that of the last.

@@ -12,7 +12,7 @@ from elastocal.planning.search import technique
 
 ALL_LOADS = "all"
 """Name of the set of all load cases of a dataset."""
-DEFAULT = "default"
+_DEFAULT = "default"
 """Name of the variant of a codec that compares nothing."""
 _JOINS_CASES = "+"
 
@@ -37,7 +37,7 @@ class Variant:
         robot and dataset when they are known.
     """
 
-    name: str = DEFAULT
+    name: str = _DEFAULT
     search: str = "cover"
     """Technique that chooses the training poses; one of `planning.search.TECHNIQUES`."""
     springs: str = "bearing"
@@ -107,7 +107,7 @@ def make_variants(comparisons: Mapping[str, Sequence[str]]) -> tuple[Variant, ..
         If a value is unknown.
     """
     return tuple(
-        Variant(", ".join(values) or DEFAULT, **dict(zip(comparisons, values, strict=True)))
+        Variant(", ".join(values) or _DEFAULT, **dict(zip(comparisons, values, strict=True)))
         for values in product(*comparisons.values())
     )
 

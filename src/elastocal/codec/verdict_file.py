@@ -6,10 +6,10 @@ from typing import Any
 
 import numpy as np
 
+from elastocal.codec._overlap import Overlap
 from elastocal.codec.data import CodecData
 from elastocal.codec.index_correlation import Correlation
 from elastocal.codec.index_file import IndexRecord, index_records
-from elastocal.codec.overlap import Overlap
 from elastocal.codec.variants import KEYS
 from elastocal.codec.verdicts import Verdicts
 from elastocal.files import write_json

@@ -1,24 +1,25 @@
 """Model file ``*.json``: a calibrated model with its draws, observability and provenance."""
 
+from functools import cached_property
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-from pydantic import JsonValue
 
+from elastocal.arrays import FloatArray
 from elastocal.elastic import ElasticModel, Spring
 from elastocal.errors import SchemaError
-from elastocal.files import sha256, write_json
+from elastocal.files import sha256
 from elastocal.identification.calibrated import CalibratedModel
-from elastocal.identification.observability import Observability, Term
+from elastocal.identification.observability import Observability
 from elastocal.identification.options import MINIMUM_DRAWS
-from elastocal.records import StrictModel, read_json
+from elastocal.identification.summary import CalibrationSummary
+from elastocal.records import read_json, record, write_json
+from elastocal.results import Result
 from elastocal.robot import Robot
 
-SCHEMA = "elastocal.model/1"
 
-
-class RobotRecord(StrictModel):
+@record()
+class RobotRecord:
     """The robot, whole, so that a model file needs no other file."""
 
     name: str
@@ -28,95 +29,115 @@ class RobotRecord(StrictModel):
     tcp: str
 
 
-class SpringRecord(StrictModel):
-    """One spring."""
-
-    name: str
-    joint: str
-    axis: tuple[float, float, float]
-    revolute: bool
-    distal: bool
-    offset: tuple[float, float, float]
-
-
-class TermRecord(StrictModel):
-    """One spring of an unobservable combination."""
-
-    spring: str
-    weight: float
-
-
-class ObservabilityRecord(StrictModel):
-    """What the data determined."""
-
-    rank: int
-    condition: float
-    observable: tuple[bool, ...]
-    unobservable: tuple[tuple[TermRecord, ...], ...]
-
-
-class ModelRecord(StrictModel):
-    """A model file without its schema key."""
+@record("elastocal.model/1", eq=False)
+class CalibrateResult(Result):
+    """A calibrated model as its file holds it: what ``calibrate`` returns and writes."""
 
     robot: RobotRecord
-    springs: tuple[SpringRecord, ...]
-    compliance: tuple[float, ...]
-    draws: tuple[tuple[float, ...], ...]
-    observability: ObservabilityRecord
+    springs: tuple[Spring, ...]
+    compliance: FloatArray
+    """Shape (spring,), in rad/(N·m) or m/N."""
+    draws: FloatArray
+    """Bootstrap draws, shape (draw, spring)."""
+    observability: Observability
     provenance: str
+    """Where the data came from."""
     misfit: float | None = None
     """See `CalibratedModel.misfit`; none where it is not known, as in files of elastocal 0.1.0."""
-    calibration: dict[str, JsonValue]
-    """The figures of the calibration that made the model; see `summary`."""
+    calibration: CalibrationSummary | None = None
+    """The figures of the calibration; none for a model that was made otherwise."""
+
+    def __post_init__(self) -> None:
+        """Refuse parts that contradict one another.
+
+        Raises
+        ------
+        SchemaError
+            If the URDF was changed, or numbers and springs differ in count.
+        """
+        if sha256(self.robot.urdf) != self.robot.urdf_sha256:
+            raise SchemaError("robot.urdf was changed: its hash is not robot.urdf_sha256")
+        n = len(self.springs)
+        if len(self.draws) < MINIMUM_DRAWS:
+            raise SchemaError(f"{len(self.draws)} draws, at least {MINIMUM_DRAWS} are needed")
+        for name, rows in (("compliance", self.compliance[None]), ("draws", self.draws)):
+            if rows.ndim != 2 or rows.shape[1] != n:
+                raise SchemaError(f"{name} must have one number for each of {n} springs")
+        if self.misfit is not None and not 0.0 <= self.misfit < np.inf:
+            raise SchemaError(f"misfit {self.misfit:g} must be 0 or more")
+        seen = self.observability
+        if seen.springs != n or not 0 <= seen.rank <= n:
+            raise SchemaError(f"observability (rank {seen.rank}) does not fit {n} springs")
+
+    @classmethod
+    def of(
+        cls, calibrated: CalibratedModel, calibration: CalibrationSummary | None = None
+    ) -> "CalibrateResult":
+        """Return the record of a calibrated model."""
+        robot = calibrated.model.robot
+        return cls(
+            robot=RobotRecord(robot.name, robot.urdf, robot.urdf_hash, robot.base, robot.tip),
+            springs=calibrated.model.springs,
+            compliance=calibrated.compliance,
+            draws=calibrated.draws,
+            observability=calibrated.observability,
+            provenance=calibrated.provenance,
+            misfit=calibrated.misfit if np.isfinite(calibrated.misfit) else None,
+            calibration=calibration,
+        )
+
+    @cached_property
+    def calibrated(self) -> CalibratedModel:
+        """The model, ready to predict.
+
+        Raises
+        ------
+        RobotError, SpringError
+            If springs or frames do not fit the robot.
+        """
+        robot = Robot.from_urdf(self.robot.urdf, self.robot.tcp, self.robot.base)
+        return CalibratedModel(
+            ElasticModel(robot, self.springs),
+            self.compliance,
+            self.draws,
+            self.observability,
+            self.provenance,
+            float("nan") if self.misfit is None else self.misfit,
+        )
+
+    def facts(self) -> tuple[tuple[str, str], ...]:
+        """Return what a person wants to know first."""
+        seen, figures = self.observability, self.calibration
+        facts = [
+            ("robot", f"{self.robot.name}, tool centre point {self.robot.tcp}"),
+            ("springs", f"{seen.springs}, rank {seen.rank}, {sum(seen.observable)} known alone"),
+        ]
+        if figures is not None:
+            held, mean = figures.held_out, figures.deflection.mean
+            facts += [
+                ("readings", f"{figures.readings} at {figures.poses} poses"),
+                ("deflection", f"{1e3 * mean:.3f} mm mean, measured"),
+                (
+                    "error at left-out poses",
+                    f"{1e3 * held.mean:.3f} mm mean ({held.mean / mean:.1%}),"
+                    f" {1e3 * held.max:.3f} mm max, {held.folds} refits",
+                ),
+            ]
+            facts += [("warning", text) for text in figures.warnings]
+        return (*facts, ("provenance", self.provenance))
 
 
-def write_model(path: Path, calibrated: CalibratedModel, calibration: dict[str, Any]) -> None:
-    """Write a model file atomically.
-
-    Parameters
-    ----------
-    path : Path
-        The file.
-    calibrated : CalibratedModel
-        The model.
-    calibration : dict
-        Its `summary`.
+def write_model(
+    path: Path, calibrated: CalibratedModel, calibration: CalibrationSummary | None = None
+) -> None:
+    """Write a model file atomically; see `CalibrateResult`.
 
     Raises
     ------
     FileAccessError
         If the file cannot be written.
     """
-    robot, seen = calibrated.model.robot, calibrated.observability
-    record = ModelRecord(
-        robot=RobotRecord(
-            name=robot.name,
-            urdf=robot.urdf,
-            urdf_sha256=robot.urdf_hash,
-            base=robot.base,
-            tcp=robot.tip,
-        ),
-        springs=tuple(
-            SpringRecord(**{name: getattr(spring, name) for name in SpringRecord.model_fields})
-            for spring in calibrated.model.springs
-        ),
-        compliance=tuple(calibrated.compliance.tolist()),
-        draws=tuple(tuple(draw) for draw in calibrated.draws.tolist()),
-        observability=ObservabilityRecord(
-            rank=seen.rank,
-            condition=seen.condition,
-            observable=seen.observable,
-            unobservable=tuple(
-                tuple(TermRecord(spring=term.spring, weight=term.weight) for term in group)
-                for group in seen.unobservable
-            ),
-        ),
-        provenance=calibrated.provenance,
-        misfit=calibrated.misfit if np.isfinite(calibrated.misfit) else None,
-        calibration=calibration,
-    )
-    data = record.stated(SCHEMA)
-    write_json(path, data)
+    write_json(path, CalibrateResult.of(calibrated, calibration))
 
 
 def read_model(path: Path) -> CalibratedModel:
@@ -126,52 +147,9 @@ def read_model(path: Path) -> CalibratedModel:
     ------
     SchemaError
         If the file is not a model of a known version, or contradicts itself.
+    RobotError, SpringError
+        If springs or frames do not fit the robot.
     FileAccessError
         If it cannot be read.
     """
-    record = read_record(path)
-    if sha256(record.robot.urdf) != record.robot.urdf_sha256:
-        raise SchemaError(f"{path}: robot.urdf was changed: its hash is not robot.urdf_sha256")
-    springs = tuple(Spring(**spring.model_dump()) for spring in record.springs)
-    n = len(springs)
-    if len(record.draws) < MINIMUM_DRAWS:
-        raise SchemaError(f"{path}: {len(record.draws)} draws, at least {MINIMUM_DRAWS} are needed")
-    for name, rows in (("compliance", (record.compliance,)), ("draws", record.draws)):
-        if any(len(row) != n for row in rows) or not rows:
-            raise SchemaError(f"{path}: {name} must have one number for each of {n} springs")
-    if record.misfit is not None and not 0.0 <= record.misfit < np.inf:
-        raise SchemaError(f"{path}: misfit {record.misfit:g} must be 0 or more")
-    seen = record.observability
-    if len(seen.observable) != n or not 0 <= seen.rank <= n:
-        raise SchemaError(f"{path}: observability (rank {seen.rank}) does not fit {n} springs")
-    robot = Robot.from_urdf(record.robot.urdf, record.robot.tcp, record.robot.base)
-    return CalibratedModel(
-        ElasticModel(robot, springs),
-        np.array(record.compliance),
-        np.array(record.draws),
-        Observability(
-            seen.rank,
-            n,
-            seen.condition,
-            seen.observable,
-            tuple(
-                tuple(Term(term.spring, term.weight) for term in group)
-                for group in seen.unobservable
-            ),
-        ),
-        record.provenance,
-        float("nan") if record.misfit is None else record.misfit,
-    )
-
-
-def read_record(path: Path) -> ModelRecord:
-    """Return the validated contents of a model file.
-
-    Raises
-    ------
-    SchemaError
-        If it is not JSON, or not a model of a known version.
-    FileAccessError
-        If it cannot be read.
-    """
-    return read_json(path, ModelRecord, SCHEMA)
+    return read_json(path, CalibrateResult).calibrated

@@ -7,7 +7,6 @@ which springs are not (spec section 2, trap 1).
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -18,12 +17,13 @@ from elastocal.identification.least_squares import rank
 from elastocal.identification.problem import unit_columns
 from elastocal.identification.solve import Factored
 from elastocal.identification.sparse_basis import sparse_basis
+from elastocal.records import record
 
 _PROBES, _PROBE_SEED = 60, 0
 """Number and seed of the configurations that show what could be observed at all."""
 
 
-@dataclass(frozen=True)
+@record()
 class Term:
     """One spring of an unobservable combination."""
 
@@ -31,12 +31,11 @@ class Term:
     weight: float
 
 
-@dataclass(frozen=True)
+@record()
 class Observability:
     """Rank, conditioning, and the springs that cannot be told apart."""
 
     rank: int
-    springs: int
     condition: float
     """Condition number of the column-scaled system over the observable directions."""
     observable: tuple[bool, ...]
@@ -45,6 +44,11 @@ class Observability:
     """Combinations of compliances that the data do not see, in a sparse basis: adding any
     multiple of one of them changes no deflection that was measured. Whether it changes others
     is told by `attainable_rank`."""
+
+    @property
+    def springs(self) -> int:
+        """Number of springs."""
+        return len(self.observable)
 
 
 def observability(system: Factored, springs: Sequence[Spring]) -> Observability:
@@ -63,7 +67,7 @@ def observability(system: Factored, springs: Sequence[Spring]) -> Observability:
     condition = system.s[0] / system.s[determined - 1] if determined else np.inf
     mixed = {term.spring for group in groups for term in group}
     observable = tuple(spring.name not in mixed for spring in springs)
-    return Observability(determined, len(springs), float(condition), observable, groups)
+    return Observability(determined, float(condition), observable, groups)
 
 
 def attainable_rank(model: ElasticModel, marker_offset: ArrayLike | None = None) -> int:

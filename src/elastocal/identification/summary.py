@@ -1,112 +1,216 @@
-"""What a calibration says of itself: the figures of ``calibrate --json``.
+"""The figures of a calibration: what ``calibrate --json`` prints and the model file keeps.
 
-The same dictionary is printed, stored in the model file and turned into tables, so that no two
-places can disagree. All numbers are SI.
+Printed, stored and turned into tables, they are one record, so that no two places can disagree.
+All numbers are SI.
 """
-
-from typing import Any
 
 import numpy as np
 
+from elastocal.arrays import BoolArray
 from elastocal.dataset import Readings
 from elastocal.identification.calibration import Calibration
+from elastocal.identification.fit_settings import FitSettings
 from elastocal.identification.held_out import HeldOut
+from elastocal.identification.observability import Term
 from elastocal.identification.suspicious import Screening
+from elastocal.records import record
 
-SCHEMA = "elastocal.calibration/1"
+
+@record()
+class SpringSummary:
+    """One spring: its compliance, how well it is known, and whether it is known by itself."""
+
+    name: str
+    kind: str
+    unit: str
+    """SI unit of the compliance."""
+    compliance: float
+    low: float
+    """Lower end of the 95 % interval."""
+    high: float
+    """Upper end of the 95 % interval."""
+    observable: bool
+    """Whether the data determine it by itself."""
 
 
-def summary(calibration: Calibration) -> dict[str, Any]:
-    """Return the figures of a calibration as JSON-ready data (spec section 4)."""
+@record()
+class ResidualSummary:
+    """Residual norms of the readings that entered the fit, in m."""
+
+    mean: float
+    max: float
+    p95: float
+    rms_axis: tuple[float, ...]
+    """Root mean square along each axis of base."""
+
+
+@record()
+class DeflectionSummary:
+    """Measured deflection norms of the readings that entered the fit, in m."""
+
+    mean: float
+    max: float
+
+
+@record()
+class HeldOutSummary:
+    """Errors at left-out poses, in m."""
+
+    mean: float
+    max: float
+    readings: int
+    folds: int
+    """Number of refits."""
+    misfit: float | None = None
+    """See `HeldOut.misfit`; none where there are too few errors for it."""
+    split: str = "leave-poses-out"
+
+
+@record()
+class DifferenceSummary:
+    """Mean error of another layout minus ours, with its 95 % interval, in m."""
+
+    mean: float
+    low: float
+    high: float
+
+
+@record()
+class ComparisonSummary:
+    """Another spring layout on the same left-out poses."""
+
+    springs: str
+    """Name of the other layout."""
+    held_out: HeldOutSummary
+    difference: DifferenceSummary
+
+
+@record()
+class SuspiciousReading:
+    """A reading that looks wrong to a robust fit."""
+
+    pose: int
+    load_case: str
+    score: float
+    """Leverage-corrected residual in robust standard deviations."""
+    residual: float
+    """Residual norm of the robust fit, in m."""
+    leverage: float
+    set_aside: bool
+    """Whether it was left out of the fit as a blunder."""
+
+
+@record("elastocal.calibration/1")
+class CalibrationSummary:
+    """The figures of a calibration (spec section 4)."""
+
+    robot: str
+    springs: tuple[SpringSummary, ...]
+    rank: int
+    rank_attainable: int
+    """Rank that any number of poses and forces would reach."""
+    springs_total: int
+    condition: float
+    unobservable: tuple[tuple[Term, ...], ...]
+    residual: ResidualSummary
+    deflection: DeflectionSummary
+    readings: int
+    poses: int
+    suspicious: tuple[SuspiciousReading, ...]
+    """The worst first."""
+    held_out: HeldOutSummary
+    comparison: ComparisonSummary | None
+    draws: int
+    interval_widening: float
+    warnings: tuple[str, ...]
+    settings: FitSettings | None = None
+    """With these a report makes the calibration again."""
+
+
+def summary(calibration: Calibration, settings: FitSettings | None = None) -> CalibrationSummary:
+    """Return the figures of a calibration that was made with these settings."""
     calibrated = calibration.calibrated
     seen = calibrated.observability
     residual, deflection = calibration.residual_norm, calibration.deflection_norm
-    return {
-        "schema": SCHEMA,
-        "robot": calibrated.model.robot.name,
-        "springs": springs(calibration),
-        "rank": seen.rank,
-        "rank_attainable": calibration.attainable_rank,
-        "springs_total": seen.springs,
-        "condition": seen.condition,
-        "unobservable": [
-            [{"spring": term.spring, "weight": term.weight} for term in group]
-            for group in seen.unobservable
-        ],
-        "residual": {
-            "mean": float(residual.mean()),
-            "max": float(residual.max()),
-            "p95": float(np.percentile(residual, 95)),
-            "rms_axis": _rms(calibration.residual[calibration.used]),
-        },
-        "deflection": {"mean": float(deflection.mean()), "max": float(deflection.max())},
-        "readings": len(residual),
-        "poses": calibration.poses,
-        "suspicious": suspicious(calibration.readings, calibration.screening, calibration.used),
-        "held_out": _held_out(calibration.held_out),
-        "comparison": _comparison(calibration),
-        "draws": len(calibrated.draws),
-        "interval_widening": calibration.widening,
-        "warnings": list(calibration.warnings),
-    }
+    rms = np.sqrt(np.mean(np.square(calibration.residual[calibration.used]), axis=0))
+    return CalibrationSummary(
+        robot=calibrated.model.robot.name,
+        springs=_springs(calibration),
+        rank=seen.rank,
+        rank_attainable=calibration.attainable_rank,
+        springs_total=seen.springs,
+        condition=seen.condition,
+        unobservable=seen.unobservable,
+        residual=ResidualSummary(
+            mean=float(residual.mean()),
+            max=float(residual.max()),
+            p95=float(np.percentile(residual, 95)),
+            rms_axis=tuple(map(float, rms)),
+        ),
+        deflection=DeflectionSummary(float(deflection.mean()), float(deflection.max())),
+        readings=len(residual),
+        poses=calibration.poses,
+        suspicious=_suspicious(calibration.readings, calibration.screening, calibration.used),
+        held_out=_held_out(calibration.held_out),
+        comparison=_comparison(calibration),
+        draws=len(calibrated.draws),
+        interval_widening=calibration.widening,
+        warnings=calibration.warnings,
+        settings=settings,
+    )
 
 
-def springs(calibration: Calibration) -> list[dict[str, Any]]:
-    """Return a row a spring: compliance with its 95 % interval, and whether it is observable."""
+def _springs(calibration: Calibration) -> tuple[SpringSummary, ...]:
     calibrated = calibration.calibrated
     low, high = calibrated.interval()
-    return [
-        {
-            "name": spring.name,
-            "kind": spring.kind,
-            "unit": spring.unit,
-            "compliance": float(calibrated.compliance[i]),
-            "low": float(low[i]),
-            "high": float(high[i]),
-            "observable": calibrated.observability.observable[i],
-        }
+    return tuple(
+        SpringSummary(
+            name=spring.name,
+            kind=spring.kind,
+            unit=spring.unit,
+            compliance=float(calibrated.compliance[i]),
+            low=float(low[i]),
+            high=float(high[i]),
+            observable=calibrated.observability.observable[i],
+        )
         for i, spring in enumerate(calibrated.model.springs)
-    ]
+    )
 
 
-def suspicious(readings: Readings, screening: Screening, used: Any) -> list[dict[str, Any]]:
-    """Return the readings that look wrong, the worst first."""
+def _suspicious(
+    readings: Readings, screening: Screening, used: BoolArray
+) -> tuple[SuspiciousReading, ...]:
     order = np.argsort(-screening.score, kind="stable")
-    return [
-        {
-            "pose": int(readings.pose[i]),
-            "load_case": str(readings.load_case[i]),
-            "score": float(screening.score[i]),
-            "residual": float(screening.residual[i]),
-            "leverage": float(screening.leverage[i]),
-            "set_aside": not bool(used[i]),
-        }
+    return tuple(
+        SuspiciousReading(
+            pose=int(readings.pose[i]),
+            load_case=str(readings.load_case[i]),
+            score=float(screening.score[i]),
+            residual=float(screening.residual[i]),
+            leverage=float(screening.leverage[i]),
+            set_aside=not bool(used[i]),
+        )
         for i in order
         if screening.suspicious[i]
-    ]
+    )
 
 
-def _held_out(held_out: HeldOut) -> dict[str, Any]:
-    return {
-        "mean": held_out.mean,
-        "max": held_out.max,
-        "readings": len(held_out.error),
-        "folds": held_out.folds,
-        "misfit": held_out.misfit if np.isfinite(held_out.misfit) else None,
-        "split": "leave-poses-out",
-    }
+def _held_out(held_out: HeldOut) -> HeldOutSummary:
+    return HeldOutSummary(
+        mean=held_out.mean,
+        max=held_out.max,
+        readings=len(held_out.error),
+        folds=held_out.folds,
+        misfit=held_out.misfit if np.isfinite(held_out.misfit) else None,
+    )
 
 
-def _comparison(calibration: Calibration) -> dict[str, Any] | None:
+def _comparison(calibration: Calibration) -> ComparisonSummary | None:
     other = calibration.comparison
     if other is None:
         return None
-    return {
-        "springs": other.layout,
-        "held_out": _held_out(other.held_out),
-        "difference": {"mean": other.difference, "low": other.low, "high": other.high},
-    }
-
-
-def _rms(residual: Any) -> list[float]:
-    return [float(value) for value in np.sqrt(np.mean(np.square(residual), axis=0))]
+    return ComparisonSummary(
+        springs=other.layout,
+        held_out=_held_out(other.held_out),
+        difference=DifferenceSummary(other.difference, other.low, other.high),
+    )

@@ -20,7 +20,9 @@ _CONFIG = {"extra": "forbid", "allow_inf_nan": False}
 
 
 @dataclass_transform(frozen_default=True, field_specifiers=(dataclasses.field,))
-def record(schema: str = "", *, eq: bool = True) -> Callable[[type[T]], type[T]]:
+def record(
+    schema: str = "", *, eq: bool = True, kw_only: bool = False
+) -> Callable[[type[T]], type[T]]:
     """Make a class a frozen dataclass that the codec reads and writes.
 
     Parameters
@@ -30,10 +32,14 @@ def record(schema: str = "", *, eq: bool = True) -> Callable[[type[T]], type[T]]
         part of another record.
     eq : bool
         Whether two of them compare by value; False where fields are arrays.
+    kw_only : bool
+        Whether fields are given by name only.
     """
 
     def mark(cls: type[T]) -> type[T]:
-        made = dataclasses.dataclass(frozen=True, eq=eq)(cls)
+        # A base that shows itself (`elastocal.results`) does so better than a list of fields.
+        own = cls.__repr__ is not object.__repr__
+        made = dataclasses.dataclass(frozen=True, eq=eq, repr=not own, kw_only=kw_only)(cls)
         made.__pydantic_config__ = _CONFIG  # type: ignore[attr-defined]
         made.__schema__ = schema  # type: ignore[attr-defined]
         return made

@@ -68,7 +68,9 @@ def _adapter(cls: Any) -> TypeAdapter[Any]:
 def _first_problem(error: ValidationError, cls: type) -> str:
     """Return the first problem in the words of the file."""
     first = error.errors(include_url=False)[0]
-    path = ".".join(str(part) for part in first["loc"])
+    # An item of an array is known by its place in it; see `elastocal.arrays`.
+    item = first.get("ctx", {})
+    path = ".".join(str(part) for part in (*first["loc"], *item.get("at", ())))
     if first["type"] in ("extra_forbidden", "unexpected_keyword_argument"):
         key, known = str(first["loc"][-1]), _known_keys(cls, first["loc"][:-1])
         allowed = f" (known: {', '.join(known)})" if known else ""
@@ -78,7 +80,7 @@ def _first_problem(error: ValidationError, cls: type) -> str:
     reason = first["msg"].removeprefix("Value error, ")
     message = f"{path}: {reason}" if path else reason
     # A whole section is no value that a person would recognise.
-    given = _shown(first["input"])
+    given = _shown(item.get("given", first["input"]))
     return message if given in reason or len(given) > _LONGEST_SHOWN else f"{message}, got {given}"
 
 

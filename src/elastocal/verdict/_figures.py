@@ -1,10 +1,10 @@
-"""Figures of files whose form is free: the keys that a verdict needs, each of the right kind.
+"""Figures in the summary of a run that a verdict needs, each of the right kind.
 
 Keys that are not used here may be there; those that are must be of the right kind, so that no
 section of a report stumbles.
 """
 
-from pydantic import ConfigDict, FiniteFloat, field_validator
+from pydantic import ConfigDict, FiniteFloat
 
 from elastocal.records import StrictModel
 
@@ -16,84 +16,6 @@ class _Figures(StrictModel):
     """A part of a file of which other keys are left alone."""
 
     model_config = ConfigDict(frozen=True, extra="ignore", allow_inf_nan=False)
-
-
-class SuspiciousReading(_Figures):
-    """A reading that looks wrong to the calibration."""
-
-    pose: int
-    load_case: str
-    score: float
-    residual: float
-    leverage: float
-    set_aside: bool
-
-
-class HeldOutFigures(_Figures):
-    """Errors at poses left out of the fit, in m."""
-
-    mean: float
-    max: float
-    readings: int
-    folds: int
-
-
-class DifferenceFigures(_Figures):
-    """Difference of mean errors with its 95 % interval, in m."""
-
-    mean: float
-    low: float
-    high: float
-
-
-class ComparisonFigures(_Figures):
-    """Another spring layout on the same left-out poses."""
-
-    springs: str
-    held_out: HeldOutFigures
-    difference: DifferenceFigures
-
-
-class ResidualFigures(_Figures):
-    """Residual norms of the fit, in m."""
-
-    mean: float
-
-
-class FitSettings(_Figures):
-    """Settings of the calibration; see `elastocal calibrate`."""
-
-    model_config = ConfigDict(frozen=True, extra="allow", allow_inf_nan=False)
-
-    springs: str = "bearing"
-    loss: str = "linear"
-    weights: str = "none"
-    bounds: str = "0,inf"
-    marker: tuple[float, float, float] | None = None
-    exclude: tuple[str, ...] = ()
-    keep_blunders: bool = False
-    trust_conventions: bool = False
-
-    @field_validator("bounds")
-    @classmethod
-    def _two_numbers(cls, text: str) -> str:
-        try:
-            _, _ = (float(part) for part in text.split(","))
-        except ValueError as error:
-            raise ValueError(f"must be two numbers, got {text!r}") from error
-        return text
-
-
-class CalibrationFigures(_Figures):
-    """A calibration; all may be missing, as a program may write a model without them."""
-
-    suspicious: tuple[SuspiciousReading, ...] = ()
-    warnings: tuple[str, ...] = ()
-    held_out: HeldOutFigures | None = None
-    comparison: ComparisonFigures | None = None
-    residual: ResidualFigures | None = None
-    rank_attainable: int | None = None
-    settings: FitSettings | None = None
 
 
 class UnusableReading(_Figures):

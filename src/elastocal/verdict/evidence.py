@@ -7,13 +7,17 @@ from elastocal.codec import ALL_LOADS, CodecData, Saturation, Variant, Verdicts
 from elastocal.compensation.conditioning import ToolRecord
 from elastocal.compensation.process import ProcessRecord
 from elastocal.dataset import Dataset
-from elastocal.identification import CalibratedModel
+from elastocal.identification import (
+    CalibratedModel,
+    CalibrationSummary,
+    Reproduction,
+    UnseenErrors,
+)
 from elastocal.identification.recertification import Recertification
-from elastocal.identification.reproduction import Reproduction, UnseenErrors
 from elastocal.planning import PlanFile, PoolData
 from elastocal.planning.surface import Surface
 from elastocal.procedure import Entry, RunRecord
-from elastocal.verdict._figures import CalibrationFigures, RunFigures
+from elastocal.verdict._figures import RunFigures
 
 
 @dataclass(frozen=True)
@@ -56,7 +60,8 @@ class ModelEvidence:
     """A model file."""
 
     model: CalibratedModel
-    figures: CalibrationFigures
+    figures: CalibrationSummary | None
+    """None for a model that was made otherwise."""
     urdf_sha256: str
     sha256: str
     """Hash of the file."""
@@ -129,6 +134,11 @@ class Evidence:
         return self.journal[0].run if self.journal else None
 
     @property
+    def figures(self) -> CalibrationSummary | None:
+        """The figures of the calibration by its model file."""
+        return self.calibrated.figures if self.calibrated is not None else None
+
+    @property
     def unseen(self) -> UnseenErrors | None:
         """Errors at unseen poses; none where the reproduction is not the model file's."""
         return self.reproduction.unseen if self.reproduction and self.reproduction.same else None
@@ -152,7 +162,7 @@ class Evidence:
 
     def _is_like(self, variant: Variant) -> bool:
         """Return whether a variant has the springs, loads and search of the calibration."""
-        settings = self.calibrated.figures.settings if self.calibrated else None
+        settings = self.figures.settings if self.figures else None
         springs = settings.springs if settings else "bearing"
         search = self.plan.search.name if self.plan is not None else variant.search
         return (variant.springs, variant.load_cases, variant.search) == (springs, ALL_LOADS, search)

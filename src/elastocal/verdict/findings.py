@@ -3,8 +3,8 @@
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
+from elastocal.identification import SuspiciousReading
 from elastocal.identification.recertification import Verdict as Recertified
-from elastocal.verdict._figures import SuspiciousReading
 from elastocal.verdict.evidence import Evidence
 from elastocal.wording import counted, mm, spans
 
@@ -13,6 +13,9 @@ _ESSENTIAL = ("run", "journal", "cell", "plan", "summary of the run", "dataset",
 """Parts without which no light is green; the codec has a finding of its own."""
 _TOLD_ELSEWHERE = ("codec", "earlier calibration")
 """A codec has a finding of its own; a first calibration has no earlier one."""
+_MOVED_ADVICE = (
+    "Fix the tracker's stand before the next run: a station that moves splits its poses."
+)
 
 
 @dataclass(frozen=True)
@@ -34,9 +37,9 @@ def find_everything(evidence: Evidence) -> tuple[Finding, ...]:
 def reading_findings(evidence: Evidence) -> Iterator[Finding]:
     """Yield findings on single readings: missing, suspicious, left out."""
     yield from _missing_poses(evidence)
-    if evidence.calibrated is None:
+    figures = evidence.figures
+    if figures is None:
         return
-    figures = evidence.calibrated.figures
     yield from map(_suspicious, figures.suspicious)
     excluded = figures.settings.exclude if figures.settings else ()
     if excluded:
@@ -97,7 +100,7 @@ def compliance_findings(evidence: Evidence) -> Iterator[Finding]:
     """Yield findings on the choice of springs."""
     if evidence.calibrated is None:
         return
-    other = evidence.calibrated.figures.comparison
+    other = evidence.figures.comparison if evidence.figures else None
     if other is not None and other.difference.high < 0.0:
         yield Finding(
             "axial springs alone predict left-out poses better than this layout",

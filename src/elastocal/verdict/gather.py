@@ -19,9 +19,11 @@ from elastocal.compensation.process import TABLE, ProcessRecord, read_process
 from elastocal.dataset import Dataset
 from elastocal.errors import ElastocalError
 from elastocal.files import read_text
-from elastocal.identification import read_model, read_record
+from elastocal.identification import (
+    CalibrateResult,
+    reproduce_calibration,
+)
 from elastocal.identification.recertification import recertify_files
-from elastocal.identification.reproduction import Reproduction, reproduce_calibration
 from elastocal.planning import (
     PLAN,
     POOL,
@@ -40,8 +42,8 @@ from elastocal.procedure import (
     read_journal,
     read_summary,
 )
-from elastocal.records import validate
-from elastocal.verdict._figures import CalibrationFigures, RunFigures
+from elastocal.records import read_json, validate
+from elastocal.verdict._figures import RunFigures
 from elastocal.verdict._folders import (
     CODEC,
     MODEL,
@@ -194,22 +196,19 @@ def _with_model(evidence: Evidence, reader: PartReader, options: EvidenceOptions
     if calibrated is None or evidence.dataset is None:
         return evidence
     try:
-        again: Reproduction | None = reproduce_calibration(
-            calibrated.model, calibrated.figures, evidence.dataset
-        )
+        reproduction = reproduce_calibration(calibrated.model, calibrated.figures, evidence.dataset)
     except ElastocalError as error:
-        reader.missing.append(
-            MissingPart("calibration made again", " ".join(str(error).split()), True)
-        )
-        again = None
-    return replace(evidence, reproduction=again)
+        reason = " ".join(str(error).split())
+        reader.missing.append(MissingPart("calibration made again", reason, damaged=True))
+        return evidence
+    return replace(evidence, reproduction=reproduction)
 
 
 def _calibrated(path: Path, dataset: Dataset | None) -> ModelEvidence:
-    record, model = read_record(path), read_model(path)
-    check_model(model, dataset, path)
-    figures = validate(dict(record.calibration), CalibrationFigures, f"{path}: calibration")
-    return ModelEvidence(model, figures, record.robot.urdf_sha256, file_sha256(path))
+    result = read_json(path, CalibrateResult)
+    check_model(result.calibrated, dataset, path)
+    hashes = result.robot.urdf_sha256, file_sha256(path)
+    return ModelEvidence(result.calibrated, result.calibration, *hashes)
 
 
 def _with_rest(evidence: Evidence, reader: PartReader, options: EvidenceOptions) -> Evidence:

@@ -9,7 +9,9 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from enum import Enum
 
-from elastocal.identification.reproduction import UnseenErrors
+from elastocal.identification import (
+    UnseenErrors,
+)
 from elastocal.verdict.evidence import Evidence
 from elastocal.verdict.findings import Finding, find_everything
 from elastocal.wording import counted, mm, um
@@ -136,7 +138,7 @@ def _sentence(evidence: Evidence, unseen: UnseenErrors | None, light: Light | No
 
 
 def _stated(evidence: Evidence) -> str:
-    held_out = evidence.calibrated.figures.held_out if evidence.calibrated else None
+    held_out = evidence.figures.held_out if evidence.figures else None
     if held_out is None:
         return "The model file tells no error at unseen poses."
     return (

@@ -3,11 +3,11 @@ import pytest
 
 from elastocal.errors import IdentificationError
 from elastocal.identification import Term
-from elastocal.identification.recertification.comparable import (
+from elastocal.identification.recertification._springs import (
     common_springs,
     comparable_sums,
+    sum_text,
     weights,
-    written,
 )
 from support.cells import linear_truth
 from support.recertified import calibrated, made_up
@@ -25,7 +25,7 @@ def test_springs_that_both_models_determine_are_compared_one_by_one():
 def test_springs_that_one_model_cannot_tell_apart_are_compared_by_their_sum(which):
     old, new = (made_up(n, unobservable=groups) for n, groups in enumerate(which))
     sums = comparable_sums(old, new)
-    assert [written(terms) for terms in sums] == [
+    assert [sum_text(terms) for terms in sums] == [
         "joint_1.axial", "joint_2.axial", "joint_3.axial", "joint_4.axial + joint_6.axial",
         "joint_5.axial",
     ]  # fmt: skip
@@ -33,7 +33,7 @@ def test_springs_that_one_model_cannot_tell_apart_are_compared_by_their_sum(whic
 
 def test_a_spring_that_is_not_seen_at_all_is_in_no_comparison():
     old = made_up(0, unobservable=((Term("joint_6.axial", 1.0),),))
-    assert [written(each) for each in comparable_sums(old, made_up(1))] == list(NAMES[:5])
+    assert [sum_text(each) for each in comparable_sums(old, made_up(1))] == list(NAMES[:5])
 
 
 def test_every_sum_vanishes_on_what_neither_model_sees_and_there_are_as_many_as_the_rank():

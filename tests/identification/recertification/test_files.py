@@ -7,13 +7,13 @@ from elastocal.errors import IdentificationError, RobotError, SchemaError, Sprin
 from elastocal.identification import write_model
 from elastocal.identification.recertification import recertify, recertify_files
 from support.recertified import made_up
+from support.summaries import made_up_summary
 
 
 @pytest.fixture
 def paths(tmp_path) -> tuple[Path, Path]:
     for n, name in enumerate(("old", "new")):
-        figures = {"deflection": {"mean": 1e-3, "max": 2e-3}}
-        write_model(tmp_path / f"{name}.json", made_up(n), figures)
+        write_model(tmp_path / f"{name}.json", made_up(n), made_up_summary(1e-3))
     return tmp_path / "old.json", tmp_path / "new.json"
 
 
@@ -56,8 +56,21 @@ def test_a_damaged_file_is_named(paths, edit, error):
         recertify_files(*paths)
 
 
-@pytest.mark.parametrize("stated", [{"mean": 3e-3}, {}, 5, {"mean": "3"}, None])
-def test_other_loads_are_noted_where_the_files_state_them(paths, stated):
-    change(paths[1], lambda data: data["calibration"].update(deflection=stated))
+@pytest.mark.parametrize("mean", [3e-3, 1.2e-3, None])
+def test_other_loads_are_noted_where_the_files_state_them(paths, mean):
+    def edit(data):
+        if mean is None:
+            data["calibration"] = None
+        else:
+            data["calibration"]["deflection"]["mean"] = mean
+
+    change(paths[1], edit)
     noted = any("was deflected by" in note for note in recertify_files(*paths).notes)
-    assert noted == (stated == {"mean": 3e-3})
+    assert noted == (mean == 3e-3)
+
+
+@pytest.mark.parametrize("stated", [{}, 5, {"mean": "3", "max": 1.0}, None])
+def test_figures_that_are_none_are_refused_by_name(paths, stated):
+    change(paths[1], lambda data: data["calibration"].update(deflection=stated))
+    with pytest.raises(SchemaError, match=r"new\.json: .*calibration\.deflection"):
+        recertify_files(*paths)

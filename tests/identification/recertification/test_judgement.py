@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from elastocal.identification.recertification import Estimate, Verdict
-from elastocal.identification.recertification.judgement import judge
-from elastocal.identification.recertification.rows import compare_rows
-from elastocal.identification.recertification.spread import Spread
+from elastocal.identification.recertification._judgement import judge
+from elastocal.identification.recertification._rows import compare_rows
+from elastocal.identification.recertification._spread import Spread
 from support.problems import campaign
 from support.recertified import made_up
 

@@ -109,7 +109,7 @@ def test_models_without_a_common_spring_are_compared_by_their_predictions(loads)
 
 def _only(seed: int, kept: slice) -> CalibratedModel:
     whole = made_up(seed)
-    seen = Observability(3, 3, 10.0, (True,) * 3, ())
+    seen = Observability(3, 10.0, (True,) * 3, ())
     model = ElasticModel(whole.model.robot, whole.model.springs[kept])
     return CalibratedModel(model, whole.compliance[kept], whole.draws[:, kept], seen)
 

@@ -6,7 +6,11 @@ import json
 import pytest
 
 from elastocal import dataset
-from elastocal.verdict.hashes import BYTES, CONTENT, content_hash
+from elastocal.verdict import (
+    BYTES,
+    CONTENT,
+    content_hash,
+)
 
 
 def written(path, data):

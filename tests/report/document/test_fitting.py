@@ -41,7 +41,7 @@ def test_a_model_of_another_robot_is_no_part_of_the_run(copied, tmp_path):
     found = calibrate(
         ElasticModel(robot(), layout(robot(), "bearing")), readings, np.random.default_rng(0)
     )
-    write_model(folder / "model.json", found.calibrated, {})
+    write_model(folder / "model.json", found.calibrated)
     assert (
         "is a model of"
         in absent(gather_evidence(EvidenceOptions(folder), MADE))["calibrated model"]

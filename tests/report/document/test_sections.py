@@ -151,7 +151,7 @@ def test_axial_springs_alone_are_advised_to_be_compared_with_more(parts):
     few = tuple(s for s in parts.calibrated.model.model.springs if s.name.endswith(".axial"))
     model = parts.calibrated.model
     keep = [spring in few for spring in model.model.springs]
-    seen = replace(model.observability, springs=len(few), observable=(True,) * len(few),
+    seen = replace(model.observability, observable=(True,) * len(few),
                    unobservable=(), rank=len(few))  # fmt: skip
     smaller = replace(
         model, model=replace(model.model, springs=few), compliance=model.compliance[keep],

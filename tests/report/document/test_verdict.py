@@ -4,12 +4,23 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-
-from elastocal.identification.reproduction import Estimate, UnseenErrors
 from elastocal.report.document.heading import verdict_html
 from elastocal.report.document.section import Finding
-from elastocal.verdict.evidence import AcceptanceLimits
-from elastocal.verdict.judgement import Light, advised, judge
+
+from elastocal.identification import (
+    UnseenErrors,
+)
+from elastocal.identification.reproduction import (
+    Estimate,
+)
+from elastocal.verdict import (
+    AcceptanceLimits,
+    Light,
+    judge,
+)
+from elastocal.verdict.judgement import (
+    advised,
+)
 
 
 def errors(worst, low, high, count=20):

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 from pydantic import FiniteFloat
-from scipy.stats import binom, norm
+from scipy.special import bdtr, ndtri
 
 from elastocal.arrays import FloatArray
 from elastocal.codec.study.samples import SampleResult
@@ -110,7 +110,8 @@ def distribution(values: FloatArray) -> Distribution:
     """
     ordered = np.sort(values)
     n, tail = len(ordered), 0.5 * (1.0 - CONFIDENCE)
-    below = max(int(binom.ppf(tail, n, 0.5)), 1)
+    # The smallest number of values below the median that is not rarer than the tail.
+    below = max(int(np.searchsorted(bdtr(np.arange(n + 1), n, 0.5), tail)), 1)
     q = np.quantile(ordered, [0.05, 0.25, 0.5, 0.75, 0.95]).tolist()
     return Distribution(
         median=q[2], median_low=float(ordered[below - 1]), median_high=float(ordered[n - below]),
@@ -124,7 +125,7 @@ def share(successes: int, n: int) -> Share:
     >>> share(10, 10).low > 0.7
     True
     """
-    z = float(norm.ppf(0.5 + 0.5 * CONFIDENCE))
+    z = float(ndtri(0.5 + 0.5 * CONFIDENCE))
     p, spread = successes / n, z * z / n
     middle = (p + 0.5 * spread) / (1.0 + spread)
     half = np.sqrt(p * (1.0 - p) * spread + 0.25 * spread**2) / (1.0 + spread)

@@ -1,5 +1,8 @@
-from .files import recertify_files as recertify_files
-from .recertify import recertify as recertify
+from .comparison import (
+    check_same_robot as check_same_robot,
+    recertify as recertify,
+    recertify_files as recertify_files,
+)
 from .record import (
     ComparisonRecord as ComparisonRecord,
     comparison_record as comparison_record,
@@ -14,4 +17,3 @@ from .result import (
     SpringChange as SpringChange,
     Verdict as Verdict,
 )
-from .same_robot import check_same_robot as check_same_robot

@@ -5,6 +5,7 @@ DevTools protocol goes over two pipes (file descriptors 3 and 4 of the child): n
 any port, and nothing is asked of the network.
 """
 
+import base64
 import fcntl
 import json
 import os
@@ -19,6 +20,7 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 from elastocal.errors import FileAccessError
+from elastocal.files import replacing
 
 BROWSERS = ("chromium", "chromium-browser", "google-chrome", "chrome")
 """Names that are looked for on the search path, in order."""
@@ -54,6 +56,30 @@ def find_browser() -> str:
         if found is not None:
             return found
     raise FileAccessError(f"--pdf needs a Chromium: none of {', '.join(BROWSERS)} is on the path")
+
+
+def write_pdf(page: Path, path: Path, browser: str) -> Path:
+    """Print a page to a PDF file, atomically; return its path.
+
+    Parameters
+    ----------
+    page : Path
+        HTML file that sets ``data-ready`` of its root to ``yes`` when it is drawn.
+    path : Path
+        PDF file.
+    browser : str
+        From `find_browser`.
+
+    Raises
+    ------
+    FileAccessError
+        If the browser fails or the file cannot be written.
+    """
+    with replacing(path) as temporary, open_tab(browser) as tab:
+        tab.open(page)
+        printed = tab.call("Page.printToPDF", preferCSSPageSize=True, printBackground=True)
+        temporary.write_bytes(base64.b64decode(printed["data"]))
+    return path
 
 
 class Tab:

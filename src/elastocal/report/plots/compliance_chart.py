@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from elastocal.arrays import BoolArray
-from elastocal.codec import CodecData, Observed
+from elastocal.codec import CodecData, SpringObservability
 from elastocal.identification import describe
 from elastocal.report.plots import style
 from elastocal.report.plots._box_plots import (
@@ -57,14 +57,14 @@ class SpringBoxes:
     """Variants that never tell it apart."""
 
 
-def compliance_chart(data: CodecData, seen: Sequence[Observed]) -> Figure:
+def compliance_chart(data: CodecData, seen: Sequence[SpringObservability]) -> Figure:
     """Return one page with a panel for each spring.
 
     Parameters
     ----------
     data : CodecData
         The arrays.
-    seen : sequence of Observed
+    seen : sequence of SpringObservability
         What each variant tells apart, in the order of the variants.
 
     Raises
@@ -100,7 +100,7 @@ def compliance_chart(data: CodecData, seen: Sequence[Observed]) -> Figure:
     return figure
 
 
-def spring_boxes(data: CodecData, seen: Sequence[Observed]) -> list[SpringBoxes]:
+def spring_boxes(data: CodecData, seen: Sequence[SpringObservability]) -> list[SpringBoxes]:
     """Return the boxes of every spring, joint by joint.
 
     Raises
@@ -119,7 +119,7 @@ def spring_boxes(data: CodecData, seen: Sequence[Observed]) -> list[SpringBoxes]
 
 
 def _spring_boxes(
-    data: CodecData, seen: Sequence[Observed], spring: str, scale: float, unit: str
+    data: CodecData, seen: Sequence[SpringObservability], spring: str, scale: float, unit: str
 ) -> SpringBoxes:
     boxes: dict[str, Boxes] = {}
     hollow: dict[str, BoolArray] = {}
@@ -199,7 +199,7 @@ def _mark_cut(axes: Axes, boxes: Boxes, variant: VariantStyle) -> None:
     )  # fmt: skip
 
 
-def _notes(seen: Sequence[Observed], width: int) -> list[str]:
+def _notes(seen: Sequence[SpringObservability], width: int) -> list[str]:
     """Return the combinations that are not told apart, once for variants that share them."""
     variants: dict[str, list[str]] = {}
     for each in seen:

@@ -1,4 +1,4 @@
-"""The sections of the report, in their order. The verdict comes before them; see `verdict`."""
+"""Sections of the report, one file each; `elastocal.report.document.page` has their order."""
 
 import lazy_loader
 

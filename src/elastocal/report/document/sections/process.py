@@ -7,20 +7,25 @@ from functools import partial
 import numpy as np
 
 from elastocal.compensation.process import Line, ProcessRecord, Trace, Values
-from elastocal.report.document.markup import flattened, folded, paragraph, table
-from elastocal.report.document.pictures import picture
-from elastocal.report.document.section import Content, Finding, Section
-from elastocal.report.plots import (
-    course_figure,
-    process_maps,
+from elastocal.report.document.blocks import (
+    Block,
+    Content,
+    Details,
+    Paragraph,
+    Row,
+    Section,
+    Table,
+    flattened,
+    picture,
 )
-from elastocal.verdict.evidence import Evidence
+from elastocal.report.plots import course_figure, process_maps
+from elastocal.verdict import Evidence
 from elastocal.wording import counted, mm
 
 
 @dataclass(frozen=True)
 class Published:
-    """A case of the paper's Table 1, in mm and evidence of 1."""
+    """A case of the paper's Table 1, in mm and parts of 1."""
 
     title: str
     before: tuple[float, float, float]
@@ -39,7 +44,7 @@ PAPER = {
     ),
 }  # fmt: skip
 """Table 1 of Monsarrat et al., RCIM 2024: mean, maximum and standard deviation."""
-_WHAT = {
+_DEVIATIONS = {
     "afp": "Absolute value of lateral deviation",
     "machining": "Absolute value of the error normal to the part",
 }
@@ -48,33 +53,32 @@ _HEADS = ("", "Mean", "Max", "St. dev.")
 
 def body(evidence: Evidence) -> Content:
     """Return the section."""
-    record = evidence.process
-    if record is None:
-        return Content(
-            paragraph("No process path was run, so the effect of the correction was not verified.")
-        )
-    table_ = record.table
-    html = paragraph(
+    if evidence.process is None:
+        text = "No process path was run, so the effect of the correction was not verified."
+        return Content((Paragraph(text),))
+    return Content(tuple(_blocks(evidence.process, evidence.limits.tolerance)))
+
+
+def _blocks(record: ProcessRecord, tolerance: float | None) -> Iterator[Block]:
+    yield Paragraph(
         "Simulated: the simulated robot followed the path under process forces, once as programmed"
         " and once with the online compensator of a calibrated model.", "banner",
-    ) + _table_1(record)  # fmt: skip
+    )  # fmt: skip
+    yield from _table_1(record)
     seed = record.traces[0].seed
-    own = [trace for trace in record.traces if trace.seed == seed]
-    html += _pictures(own, evidence.limits.tolerance)
-    if table_.budget:
-        html += folded("Error budget", _lines("Error budget of the first seed", table_.budget))
-    settings = flattened(table_.settings)
-    html += folded(
-        "Settings of the compensator", table("Settings, SI units", ("Key", "Value"), settings, 2)
-    )
-    return Content(html, findings=tuple(_findings(record, evidence.limits.tolerance)))
+    yield from _pictures([trace for trace in record.traces if trace.seed == seed], tolerance)
+    if record.table.budget:
+        yield Details("Error budget", (_budget(record.table.budget),))
+    settings = Table("Settings, SI units", ("Key", "Value"),
+                     tuple(flattened(record.table.settings)), 2)  # fmt: skip
+    yield Details("Settings of the compensator", (settings,))
 
 
-def _table_1(record: ProcessRecord) -> str:
-    what = _WHAT.get(record.table.process, "Absolute deviation")
-    rows: list[tuple[str, ...]] = []
+def _table_1(record: ProcessRecord) -> Iterator[Block]:
+    deviation = _DEVIATIONS.get(record.table.process, "Absolute deviation")
+    rows: list[Row] = []
     for line in record.table.lines:
-        head = f"{what}, {line.name} ({line.points} points)"
+        head = f"{deviation}, {line.name} ({line.points} points)"
         rows += [
             (f"{head}, without correction in mm", *_mm(line.before)),
             ("With correction in mm", *_mm(line.after)),
@@ -87,15 +91,16 @@ def _table_1(record: ProcessRecord) -> str:
             ("Paper, with correction in mm", *(f"{value:.3f}" for value in paper.after)),
             ("Paper, reduction", *(f"{share:.2%}" for share in paper.reduction)),
         ]
-    note = paragraph(
-        "The paper's figures are of its real cell; those above them of the simulated one. They are"
-        " set side by side for their size, not as a repetition.", "sub",
-    )  # fmt: skip
-    return table("In the form of the paper's Table 1", _HEADS, rows) + (note if paper else "")
+    yield Table("In the form of the paper's Table 1", _HEADS, tuple(rows))
+    if paper is not None:
+        yield Paragraph(
+            "The paper's figures are of its real cell; those above them of the simulated one. They"
+            " are set side by side for their size, not as a repetition.", "sub",
+        )  # fmt: skip
 
 
-def _lines(title: str, lines: tuple[Line, ...]) -> str:
-    rows = [
+def _budget(lines: tuple[Line, ...]) -> Block:
+    rows = tuple(
         (
             line.name,
             *(
@@ -106,41 +111,31 @@ def _lines(title: str, lines: tuple[Line, ...]) -> str:
             ),
         )
         for line in lines
-    ]
-    return table(f"{title}, before to after in mm (reduction)", _HEADS, rows)
+    )
+    caption = "Error budget of the first seed, before to after in mm (reduction)"
+    return Table(caption, _HEADS, rows)
 
 
-def _pictures(traces: list[Trace], tolerance: float | None) -> str:
+def _pictures(traces: list[Trace], tolerance: float | None) -> Iterator[Block]:
     worst = max(traces, key=lambda trace: float(np.abs(trace.before).max()))
     before, after = (
         np.concatenate([getattr(t, key) for t in traces]) for key in ("before", "after")
     )
-    told = (
+    text = (
         f"mean {mm(float(np.abs(before).mean()))} without and {mm(float(np.abs(after).mean()))}"
         f" with correction, over {counted(len(traces), 'course')}"
     )
-    return picture(
+    yield picture(
         partial(process_maps, traces),
-        f"Two maps of the path, coloured by absolute deviation: {told}",
+        f"Two maps of the path, coloured by absolute deviation: {text}",
         f"After the paper's Fig. 11e, 11f and 13b, 13c, in the plane that fits the path best:"
-        f" {told}.", ".png",
-    ) + picture(
+        f" {text}.", ".png",
+    )  # fmt: skip
+    yield picture(
         partial(course_figure, worst, tolerance),
         f"Deviation over time of course {worst.course}, without and with correction",
         f"After the paper's Fig. 11g: the course with the largest deviation, {worst.course}.",
-    )  # fmt: skip
-
-
-def _findings(record: ProcessRecord, tolerance: float | None) -> Iterator[Finding]:
-    line = record.table.lines[-1]
-    told = (
-        f"on the simulated process path the mean deviation fell by {line.reduction.mean:.1%}, from"
-        f" {mm(line.before.mean)} to {mm(line.after.mean)}; largest left {mm(line.after.max)}"
     )
-    if tolerance is not None and not line.after.max <= tolerance:
-        yield Finding(f"{told}, beyond the tolerance of {mm(tolerance)}")
-    else:
-        yield Finding(told, holds_back=False)
 
 
 def _three(values: Values) -> tuple[float, float, float]:

@@ -12,9 +12,8 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from elastocal.codec.data import CodecData, SpringLabels
-from elastocal.codec.options import CodecOptions
-from elastocal.codec.training import AXES
+from elastocal.codec.data import AXES, CodecData, SpringLabels
+from elastocal.codec.splits import CodecOptions
 from elastocal.codec.variants import KEYS, Variant
 from elastocal.dataset import read_stated, write_netcdf
 from elastocal.errors import CodecError, SchemaError

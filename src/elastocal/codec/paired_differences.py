@@ -1,11 +1,11 @@
-"""Two variants on the same splits."""
+"""Paired verdicts: how the errors of two variants differ on the same splits."""
 
 from dataclasses import dataclass
 
 import numpy as np
 
 from elastocal.arrays import BoolArray, FloatArray
-from elastocal.codec.overlap import Overlap, corrected_mean
+from elastocal.codec._overlap import Overlap, corrected_mean, micrometres
 
 _ROUND_OFF = 1e-9
 """Part of an error below which a difference is round-off: techniques that choose the same poses
@@ -13,7 +13,7 @@ in another order."""
 
 
 @dataclass(frozen=True, eq=False)
-class Pair:
+class PairedDifference:
     """How the errors of two variants differ, for 1, 2, … training poses."""
 
     a: str
@@ -53,11 +53,46 @@ class Pair:
         since = _since(sign == sign[-1])
         return None if since == 1 or sign[-1] == 0.0 else since
 
+    def sentence(self, where: str) -> str:
+        """Return the verdict at `at` training poses in words.
 
-def paired(
+        Parameters
+        ----------
+        where : str
+            What the figures were measured on.
+        """
+        at = self.at
+        ends = (self.difference, self.low, self.high)
+        difference, low, high = (float(each[at - 1]) for each in ends)
+        smaller, larger = (self.a, self.b) if difference < 0.0 else (self.b, self.a)
+        size = f"{at} training pose{'s' if at > 1 else ''}"
+        there = f"where both have saturated, with {size}" if at < len(self.low) else f"with {size}"
+        if np.isnan(low):
+            return (
+                f"{smaller} against {larger}: smaller by {micrometres(abs(difference))} {there};"
+                f" the verification sets tell no interval ({where})"
+            )
+        if self.better is None:
+            return (
+                f"{self.a} against {self.b}: no difference can be told {there} (first minus second,"
+                f" mean over the sets: {micrometres(difference)}, 95 % interval {micrometres(low)}"
+                f" to {micrometres(high)}; {where})"
+            )
+        nearest, farthest = sorted((abs(low), abs(high)))
+        text = (
+            f"{smaller} is better than {larger} by {micrometres(abs(difference))} (95 % interval"
+            f" {micrometres(nearest)} to {micrometres(farthest)}) {there}, clearly so from"
+            f" {self.proved_from} on"
+        )
+        if self.crossing is not None:
+            text += f"; with fewer than {self.crossing} it is not always so"
+        return f"{text} ({where})"
+
+
+def paired_difference(
     a: str, b: str, errors_a: FloatArray, errors_b: FloatArray, overlap: Overlap, at: int
-) -> Pair:
-    """Return the paired difference of two variants.
+) -> PairedDifference:
+    """Return the paired_difference difference of two variants.
 
     Parameters
     ----------
@@ -73,7 +108,7 @@ def paired(
     difference = errors_a - errors_b
     round_off = np.abs(difference) <= _ROUND_OFF * np.maximum(errors_a, errors_b)
     found = corrected_mean(np.where(round_off, 0.0, difference), overlap)
-    return Pair(a, b, at, found.mean, found.low, found.high)
+    return PairedDifference(a, b, at, found.mean, found.low, found.high)
 
 
 def _since(holds: BoolArray) -> int:

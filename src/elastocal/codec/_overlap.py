@@ -14,12 +14,12 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.random import Generator
-from scipy.stats import norm, t
+from scipy.special import ndtri, stdtrit
 
 from elastocal.arrays import FloatArray, IndexArray
 from elastocal.identification import CONFIDENCE
 
-DRAWS = 1000
+_DRAWS = 1000
 """Bootstrap draws."""
 _TAIL = 0.5 * (1.0 + CONFIDENCE)
 _SMALLEST = np.finfo(float).tiny
@@ -74,7 +74,7 @@ class Overlap:
     @property
     def student(self) -> float:
         """Quantile of Student's distribution for the 95 % interval."""
-        return float(t.ppf(_TAIL, self.sets - 1))
+        return float(stdtrit(self.sets - 1, _TAIL))
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,13 +124,18 @@ def median_draws(values: FloatArray, overlap: Overlap, rng: Generator) -> FloatA
     sets, estimate = len(values), _log_median(values)
     if not overlap.known:
         return np.empty((0, len(estimate)))
-    chosen = rng.integers(sets, size=(DRAWS, sets))
+    chosen = rng.integers(sets, size=(_DRAWS, sets))
     drawn = np.array([_log_median(values[draw]) for draw in chosen])
     # Draws spread as the population of the sets does, (1 - 1 / J) / J of the sample variance.
     by = np.sqrt(overlap.variance * sets * sets / (sets - 1.0))
-    by *= overlap.student / float(norm.ppf(_TAIL))
+    by *= overlap.student / float(ndtri(_TAIL))
     return np.asarray(np.exp(estimate + by * (drawn - estimate)))
 
 
 def _log_median(values: FloatArray) -> FloatArray:
     return np.asarray(np.log(np.maximum(np.median(values, axis=0), _SMALLEST)))
+
+
+def micrometres(length: float) -> str:
+    """Return a length in m as sentences state it, in µm."""
+    return f"{1e6 * length:.1f} µm"

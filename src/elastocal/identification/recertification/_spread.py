@@ -67,3 +67,8 @@ class Spread:
         """Return the second moments of the deviations, each of shape (spring, spring)."""
         old, new = (each.T @ each / len(each) for each in (self.old, self.new))
         return old, new
+
+
+def over(numbers: FloatArray, scale: FloatArray) -> FloatArray:
+    """Return numbers over their scale; 0 where the scale is 0."""
+    return np.divide(numbers, scale, out=np.zeros_like(numbers), where=scale > 0.0)

@@ -7,19 +7,22 @@ from numpy.random import Generator
 from numpy.typing import ArrayLike
 
 from elastocal.arrays import BoolArray, FloatArray, IndexArray
-from elastocal.codec.campaign import Campaign
-from elastocal.codec.splits import Split
+from elastocal.codec.data import CodecData
+from elastocal.codec.splits import Campaign, Split, make_campaign
 from elastocal.codec.variants import Variant, training_cases
-from elastocal.elastic import ElasticModel
+from elastocal.dataset import Readings
+from elastocal.elastic import ElasticModel, layout
+from elastocal.errors import CodecError
 from elastocal.identification import PoseTriangles, Problem, build, solve
 from elastocal.planning.search import Candidates, growing_choices, technique
+from elastocal.robot import Robot
 
-AXES = ("x", "y", "z", "norm")
-"""What errors are of: the components in base, and the length of the vector."""
+_SAME = 1e-9
+"""Largest distance of a pose from where the codec has it, in m."""
 
 
 @dataclass(frozen=True, eq=False)
-class Trainee:
+class PreparedVariant:
     """What a variant needs of the campaign, prepared once for all splits."""
 
     variant: Variant
@@ -39,7 +42,7 @@ class Trainee:
         model: ElasticModel,
         campaign: Campaign,
         marker_offset: ArrayLike | None,
-    ) -> "Trainee":
+    ) -> "PreparedVariant":
         """Return a variant prepared for a campaign.
 
         Raises
@@ -71,7 +74,7 @@ class Trainee:
 
 
 @dataclass(frozen=True, eq=False)
-class Outcome:
+class LearningCurve:
     """What a variant reached on a split, for 1, 2, … training poses."""
 
     chosen: tuple[IndexArray, ...]
@@ -84,12 +87,12 @@ class Outcome:
     """Largest absolute residual, likewise."""
 
 
-def train(trainee: Trainee, split: Split, most: int, seed: int) -> Outcome:
-    """Return what a variant reaches with 1 to ``most`` training poses of a split.
+def train(prepared: PreparedVariant, split: Split, most: int, seed: int) -> LearningCurve:
+    """Return the errors that a variant reaches with 1 to ``most`` training poses of a split.
 
     Parameters
     ----------
-    trainee : Trainee
+    prepared : PreparedVariant
         The variant.
     split : Split
         The split.
@@ -99,40 +102,86 @@ def train(trainee: Trainee, split: Split, most: int, seed: int) -> Outcome:
         Searches draw from ``default_rng((seed, seed pose, number of poses))``, so that all
         variants with one technique draw alike.
     """
-    chosen = _choices(trainee, split, most, seed)
-    if trainee.variant.options.loss == "linear":
-        compliance = trainee.triangles.fit(chosen)
+    chosen = _choices(prepared, split, most, seed)
+    if prepared.variant.options.loss == "linear":
+        compliance = prepared.triangles.fit(chosen)
     else:
-        compliance = np.array([_robust_fit(trainee, poses) for poses in chosen])
-    verified = np.isin(trainee.problem.block, split.verification)
-    O, d = trainee.problem.O[verified], trainee.problem.d[verified]  # noqa: E741 - paper
+        compliance = np.array([_robust_fit(prepared, poses) for poses in chosen])
+    verified = np.isin(prepared.problem.block, split.verification)
+    O, d = prepared.problem.O[verified], prepared.problem.d[verified]  # noqa: E741 - paper
     # Verification always takes all load cases, whatever was trained with.
     residual = np.abs(compliance @ O.reshape(-1, O.shape[2]).T - d.ravel())
     residual = residual.reshape(len(chosen), -1, 3)
     norm = np.sqrt(np.square(residual).sum(axis=2, keepdims=True))
     errors = np.concatenate([residual, norm], axis=2)
-    return Outcome(tuple(chosen), compliance, errors.mean(axis=1), errors.max(axis=1))
+    return LearningCurve(tuple(chosen), compliance, errors.mean(axis=1), errors.max(axis=1))
 
 
-def _choices(trainee: Trainee, split: Split, most: int, seed: int) -> list[IndexArray]:
+def _choices(prepared: PreparedVariant, split: Split, most: int, seed: int) -> list[IndexArray]:
     """Return the training poses for 1, 2, … of them (line 10)."""
-    poses = trainee.can_train(split)
-    wanted = technique(trainee.variant.search)
+    poses = prepared.can_train(split)
+    wanted = technique(prepared.variant.search)
 
     def rng_of(count: int) -> Generator:
         return np.random.default_rng((seed, split.seed_pose, count))
 
-    candidates = Candidates(trainee.contact[poses])
+    candidates = Candidates(prepared.contact[poses])
     if not wanted.nested:
         # To a technique that looks at a production, the training poses under all loads stand
         # for it: nothing of the verification poses is known to any technique.
-        everything = trainee.rows(poses, np.ones_like(trainee.trains))
+        everything = prepared.rows(poses, np.ones_like(prepared.trains))
         process = everything.reshape(-1, everything.shape[2])
-        observation = trainee.rows(poses, trainee.trains)
+        observation = prepared.rows(poses, prepared.trains)
         candidates = Candidates(candidates.contact, observation, process=process)
     return [poses[order] for order in growing_choices(wanted, candidates, most, rng_of)]
 
 
-def _robust_fit(trainee: Trainee, poses: IndexArray) -> FloatArray:
-    used = trainee.trains & np.isin(trainee.problem.block, poses)
-    return solve(trainee.problem.take(used), trainee.variant.options.loss).compliance
+def _robust_fit(prepared: PreparedVariant, poses: IndexArray) -> FloatArray:
+    used = prepared.trains & np.isin(prepared.problem.block, poses)
+    return solve(prepared.problem.take(used), prepared.variant.options.loss).compliance
+
+
+def prepared_variants(
+    robot: Robot, readings: Readings, data: CodecData, marker_offset: ArrayLike | None = None
+) -> tuple[PreparedVariant, ...]:
+    """Return the variants of a finished codec, prepared again from its readings.
+
+    Parameters
+    ----------
+    robot : Robot
+        The robot.
+    readings : Readings
+        Those that the codec was made from.
+    data : CodecData
+        The codec.
+    marker_offset : array_like, shape (3,), optional
+        Metrology marker in the tcp frame, in m.
+
+    Raises
+    ------
+    CodecError
+        If the readings have other poses than the codec, or a layout has other springs.
+    DatasetError
+        If the data lack a load case, or joints are not this robot's.
+    """
+    models = {
+        each.springs: ElasticModel(robot, layout(robot, each.springs)) for each in data.variants
+    }
+    for each, labels in zip(data.variants, data.springs, strict=True):
+        found = tuple(spring.name for spring in models[each.springs].springs)
+        if found != labels.names:
+            raise CodecError(
+                f"variant {each.name!r} was made with {len(labels.names)} springs;"
+                f" {each.springs!r} now has {len(found)}, or others"
+            )
+    campaign = make_campaign(list(models.values()), readings, data.options, marker_offset)
+    contact = campaign.contact
+    if contact.shape != data.contact.shape or not np.all(np.abs(contact - data.contact) <= _SAME):
+        raise CodecError(
+            f"the readings are not those of the codec: they have {len(contact)} poses, the codec"
+            f" {len(data.contact)}, or poses lie elsewhere"
+        )
+    return tuple(
+        PreparedVariant.of(each, models[each.springs], campaign, marker_offset)
+        for each in data.variants
+    )

@@ -15,8 +15,8 @@ import numpy as np
 from elastocal.arrays import FloatArray
 from elastocal.identification.bootstrap import CONFIDENCE
 from elastocal.identification.calibrated import CalibratedModel
+from elastocal.identification.recertification._spread import Spread, over
 from elastocal.identification.recertification.result import DeflectionChange, Estimate
-from elastocal.identification.recertification.spread import Spread
 
 _CHUNK = 100
 """Rows at a time, so that the pairs of a long path fit into memory."""
@@ -101,8 +101,3 @@ def _widest(blocks: list[FloatArray], spread: Spread) -> tuple[FloatArray, Float
     old = np.einsum("ri,rij,rj->r", axis, parts[0], axis)
     share = over(old, widest)
     return np.sqrt(widest), np.clip(share, 0.0, 1.0)
-
-
-def over(numbers: FloatArray, scale: FloatArray) -> FloatArray:
-    """Return numbers over their scale; 0 where the scale is 0."""
-    return np.divide(numbers, scale, out=np.zeros_like(numbers), where=scale > 0.0)

@@ -1,0 +1,111 @@
+"""The training sets of a finished codec: which springs they tell apart, and their indices.
+
+A compliance that is not told apart has a value, the smallest one that explains the data, but the
+value is no finding (spec section 2, trap 1). Charts of compliances say so.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from elastocal.arrays import BoolArray, FloatArray
+from elastocal.codec._training import PreparedVariant, prepared_variants
+from elastocal.codec.data import NO_POSE, CodecData
+from elastocal.codec.index_correlation import Correlation, correlate
+from elastocal.codec.indices import IndexValues, index_values
+from elastocal.dataset import Readings
+from elastocal.elastic import layout
+from elastocal.identification import Term, factor, observability, rank, unit_columns
+from elastocal.robot import Robot
+
+_SHARE = 1e-6
+"""Least part in a direction that the data do not see by which a spring counts as mixed up."""
+
+
+@dataclass(frozen=True, eq=False)
+class SpringObservability:
+    """What the training sets of one variant tell apart."""
+
+    variant: str
+    determined: BoolArray
+    """Whether a training set tells a spring apart from all others, shape
+    (cv, n_train, spring)."""
+    groups: tuple[tuple[Term, ...], ...]
+    """Combinations that even all poses do not see; see `Observability.unobservable`."""
+
+    @property
+    def share(self) -> FloatArray:
+        """Return the part of the splits that tell a spring apart, shape (n_train, spring)."""
+        return np.asarray(self.determined.mean(axis=0))
+
+    @property
+    def never(self) -> BoolArray:
+        """Return which springs no training set tells apart, shape (spring,)."""
+        return np.asarray(~self.determined.any(axis=(0, 1)))
+
+
+@dataclass(frozen=True, eq=False)
+class CodecAnalysis:
+    """The training sets of every variant, in order of the variants."""
+
+    seen: tuple[SpringObservability, ...]
+    """Which springs its training sets tell apart."""
+    indices: tuple[IndexValues, ...] = ()
+    """Indices of its training sets; empty where they were not asked for."""
+    correlations: tuple[Correlation, ...] = ()
+    """How those correlate with accuracy."""
+
+
+def analyse(
+    robot: Robot,
+    readings: Readings,
+    data: CodecData,
+    *,
+    marker_offset: ArrayLike | None = None,
+    with_indices: bool = False,
+) -> CodecAnalysis:
+    """Return what the readings tell of a codec beyond its errors.
+
+    Parameters
+    ----------
+    robot, readings, marker_offset : Robot, Readings, array_like
+        Those that the codec was made with.
+    data : CodecData
+        The codec.
+    with_indices : bool
+        Whether indices are wanted; they take about a second a variant.
+
+    Raises
+    ------
+    CodecError
+        If readings or layouts are not those of the codec.
+    """
+    variants = prepared_variants(robot, readings, data, marker_offset)
+    seen = tuple(_spring_observability(robot, data, each) for each in variants)
+    if not with_indices:
+        return CodecAnalysis(seen)
+    indices = tuple(index_values(data, each) for each in variants)
+    correlations = tuple(one for each in indices for one in correlate(data, each))
+    return CodecAnalysis(seen, indices, correlations)
+
+
+def _spring_observability(
+    robot: Robot, data: CodecData, prepared: PreparedVariant
+) -> SpringObservability:
+    variant, rows = prepared.variant, prepared.triangles.rows[:, :, :-1]
+    chosen = data.chosen[data.index(variant.name)]
+    determined = np.array(
+        [[_determined(rows[poses[poses != NO_POSE]]) for poses in row] for row in chosen]
+    )
+    system = factor(prepared.problem.take(prepared.trains))
+    found = observability(system, layout(robot, variant.springs))
+    return SpringObservability(variant.name, determined, found.unobservable)
+
+
+def _determined(triangles: FloatArray) -> BoolArray:
+    """Return which springs the rows of some poses determine, shape (spring,)."""
+    rows = unit_columns(triangles).rows
+    triangle = np.linalg.qr(rows.reshape(-1, rows.shape[2]), mode="r")
+    _, s, Vt = np.linalg.svd(triangle, full_matrices=True)
+    return np.asarray(np.linalg.norm(Vt[rank(s) :], axis=0) <= _SHARE)

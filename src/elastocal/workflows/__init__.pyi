@@ -1,0 +1,12 @@
+from ._outputs import refuse_overwriting as refuse_overwriting
+from ._robot_source import find_robot as find_robot
+from .calibrate import (
+    CalibrateResult as CalibrateResult,
+    CalibrateSettings as CalibrateSettings,
+    calibrate as calibrate,
+)
+from .predict import (
+    PredictResult as PredictResult,
+    PredictSettings as PredictSettings,
+    predict as predict,
+)

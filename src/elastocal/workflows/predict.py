@@ -1,0 +1,101 @@
+"""``predict``: the deflection of each row of joints and force."""
+
+from dataclasses import dataclass
+from os import PathLike
+from pathlib import Path
+
+import numpy as np
+
+from elastocal.arrays import FloatArray
+from elastocal.dataset import joint_dimensions, read_load_rows, write_load_rows
+from elastocal.identification import DeflectionSummary, Prediction, read_model
+from elastocal.progress import Progress
+from elastocal.records import record
+from elastocal.results import Result
+from elastocal.workflows._outputs import refuse_overwriting
+from elastocal.workflows._workflow import workflow
+
+
+@dataclass(frozen=True)
+class PredictSettings:
+    """Which model predicts which rows."""
+
+    model: str | PathLike[str]
+    """Model file of `calibrate`."""
+    rows: str | PathLike[str]
+    """CSV with joint columns, ``force_x[N] …`` and optionally ``moment_x[N*m] …``."""
+    out: Path | None = None
+    """CSV to write: the rows with their deflections and intervals."""
+
+
+@record()
+class PredictSummary:
+    """The figures of ``predict --json``."""
+
+    rows: int
+    deflection: DeflectionSummary
+    """Predicted deflection norms in m."""
+    misfit: float | None
+    """See `CalibratedModel.misfit`; none where the model does not know it."""
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class PredictResult(Result):
+    """Predicted deflections of rows."""
+
+    prediction: Prediction
+    summary: PredictSummary
+
+    def facts(self) -> tuple[tuple[str, str], ...]:
+        """Return what a person wants to know first."""
+        figures = self.summary
+        return (
+            ("rows", str(figures.rows)),
+            ("deflection", f"{1e3 * figures.deflection.mean:.3f} mm mean"),
+            ("largest", f"{1e3 * figures.deflection.max:.3f} mm"),
+        )
+
+
+@workflow(PredictSettings)
+def predict(settings: PredictSettings, progress: Progress) -> PredictResult:  # noqa: ARG001 - done in an instant
+    """Predict the deflection of each row, with 95 % intervals of the fit and of a measurement.
+
+    Parameters
+    ----------
+    settings : PredictSettings
+        Or its ``model``, and the other fields by name.
+    progress : Progress, optional
+        Hears how far the work is.
+
+    Raises
+    ------
+    SchemaError, DatasetError
+        If the model or the rows are not valid.
+    FileAccessError
+        If a file cannot be read or written, or ``out`` is an input.
+    """
+    model, rows = Path(settings.model), Path(settings.rows)
+    refuse_overwriting(settings.out, model, rows)
+    calibrated = read_model(model)
+    robot = calibrated.model.robot
+    loads = read_load_rows(rows, joint_dimensions(robot.joint_names, robot.revolute))
+    prediction = calibrated.predict(loads.joint_position, loads.force, loads.moment)
+    misfit = float(calibrated.misfit) if np.isfinite(calibrated.misfit) else None
+    if settings.out is not None:
+        write_load_rows(settings.out, loads, _columns(prediction, misfit is not None))
+    norms = np.linalg.norm(prediction.deflection, axis=1)
+    size = DeflectionSummary(float(norms.mean()), float(norms.max()))
+    return PredictResult(prediction, PredictSummary(len(norms), size, misfit))
+
+
+def _columns(prediction: Prediction, with_measured: bool) -> dict[str, FloatArray]:
+    """Return the columns to add, by their headings."""
+    parts = {"": prediction.deflection, "_low": prediction.low, "_high": prediction.high}
+    if with_measured:
+        parts["_measured_low"] = prediction.measured_low
+        parts["_measured_high"] = prediction.measured_high
+    return {
+        f"deflection_{axis}{suffix}[m]": values[:, index]
+        for suffix, values in parts.items()
+        for index, axis in enumerate("xyz")
+    }
