@@ -11,9 +11,9 @@ from elastocal import dataset
 from elastocal.codec import read_codec, write_codec
 from elastocal.errors import FileAccessError
 from elastocal.report.document import (
+    SECTIONS,
     write_report,
 )
-from elastocal.report.document.sections import SECTIONS
 from elastocal.verdict import (
     Evidence,
     EvidenceOptions,

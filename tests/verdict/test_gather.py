@@ -48,10 +48,10 @@ def test_the_run_itself_may_be_named_in_place_of_the_folder_around_it(parts, fin
 
 def test_the_calibration_made_again_is_that_of_the_model_file(parts):
     assert parts.reproduction.same
-    held_out = parts.calibrated.figures["held_out"]
+    held_out = parts.calibrated.figures.held_out
     unseen = parts.reproduction.unseen
-    assert unseen.mean.value == pytest.approx(held_out["mean"], rel=1e-9)
-    assert unseen.max == pytest.approx(held_out["max"], rel=1e-9)
+    assert unseen.mean.value == pytest.approx(held_out.mean, rel=1e-9)
+    assert unseen.max == pytest.approx(held_out.max, rel=1e-9)
     assert unseen.mean.low < unseen.mean.value < unseen.mean.high
     assert unseen.p95.low <= unseen.p95.value <= unseen.p95.high <= unseen.max
     assert unseen.poses == unseen.folds == POSES

@@ -4,23 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from elastocal.report.document.heading import verdict_html
-from elastocal.report.document.section import Finding
 
-from elastocal.identification import (
-    UnseenErrors,
-)
-from elastocal.identification.reproduction import (
-    Estimate,
-)
-from elastocal.verdict import (
-    AcceptanceLimits,
-    Light,
-    judge,
-)
-from elastocal.verdict.judgement import (
-    advised,
-)
+from elastocal.identification import UnseenErrors
+from elastocal.identification.recertification import Estimate
+from elastocal.report.document import verdict_html
+from elastocal.verdict import AcceptanceLimits, Finding, Light, advise, judge
 
 
 def errors(worst, low, high, count=20):
@@ -130,10 +118,10 @@ def test_a_simulated_cell_is_told_in_the_verdict(parts):
 
 def test_advice_weighs_the_tracker_against_the_errors(parts):
     def told(scatter):
-        registration = {**parts.summary["registration"], "scatter": scatter}
-        noise = {**parts.summary["noise"], "marker_sigma_median": None}
-        summary = {**parts.summary, "registration": registration, "noise": noise}
-        return " ".join(advised(replace(parts, summary=summary)))
+        registration = parts.summary.registration.model_copy(update={"scatter": scatter})
+        noise = parts.summary.noise.model_copy(update={"marker_sigma_median": None})
+        summary = parts.summary.model_copy(update={"registration": registration, "noise": noise})
+        return " ".join(advise(replace(parts, summary=summary)))
 
     mean = parts.reproduction.unseen.mean.value
     assert "Average longer" in told(0.5 * mean)
@@ -143,7 +131,7 @@ def test_advice_weighs_the_tracker_against_the_errors(parts):
 
 def test_advice_names_the_pose_of_the_largest_error_when_it_stands_out(parts):
     again = replace(parts.reproduction, unseen=errors(worst=0.5, low=0.1, high=0.2))
-    found = " ".join(advised(replace(parts, reproduction=again)))
+    found = " ".join(advise(replace(parts, reproduction=again)))
     assert "Look at pose 19 normal first" in found
     assert "0.500 mm" in found
 
