@@ -58,7 +58,7 @@ def learning_curve_seconds(robot: Robot, readings: Readings, data: CodecData) ->
         return seconds(
             lambda: learning_curve(
                 model,
-                problem.O.reshape(-1, problem.springs),
+                problem.O.reshape(-1, problem.columns),
                 problem.d.ravel(),
                 train_sizes=sizes,
                 cv=splits,

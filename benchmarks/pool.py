@@ -14,20 +14,20 @@ import numpy as np
 
 from elastocal.cell import load_cell
 from elastocal.cell.examples import write_example
-from elastocal.planning import cell_surface, gather
-from elastocal.planning.gathering import Gathered
+from elastocal.planning import cell_surface, sample_pool
+from elastocal.planning.pool_sampling import SampledPool
 
 SIZES = (1000, 3000, 10_000)
 LARGE = (*SIZES, 30_000, 100_000)
 
 
-def made(folder: Path, like: str, size: int, jobs: int) -> tuple[float, Gathered]:
+def made(folder: Path, like: str, size: int, jobs: int) -> tuple[float, SampledPool]:
     """Return the seconds that a pool takes, surface and checks included, and the pool."""
     path, *_ = write_example(folder, like, force=True)
     path.write_text(path.read_text().replace("pool: 3000", f"pool: {size}"))
     cell = load_cell(path)
     start = time.perf_counter()
-    found = gather(cell, cell_surface(cell), np.random.default_rng(0), jobs)
+    found = sample_pool(cell, cell_surface(cell), np.random.default_rng(0), jobs)
     return time.perf_counter() - start, found
 
 

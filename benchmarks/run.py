@@ -31,7 +31,7 @@ def median_ms(work: Callable[[], object], repetitions: int) -> float:
 
 def full_system(problem: Problem) -> None:
     """Solve the bounded problem the direct way."""
-    lsq_linear(problem.O.reshape(-1, problem.springs), problem.d.ravel(), (0.0, np.inf))
+    lsq_linear(problem.O.reshape(-1, problem.columns), problem.d.ravel(), (0.0, np.inf))
 
 
 def command_ms(*command: str) -> float:

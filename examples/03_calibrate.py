@@ -46,21 +46,21 @@ data = read(folder / "dataset.nc")
 robot = Robot.from_urdf(data.robot_urdf, data.tcp_frame)
 model = ElasticModel(robot, layout(robot, "bearing"))
 calibration = calibrate(model, data.readings(robot.joint_names), np.random.default_rng(0))
-told = summary(calibration)
-write_model(folder / "model.json", calibration.calibrated, told)
+figures = summary(calibration)
+write_model(folder / "model.json", calibration.calibrated, figures)
 mm = 1e3
-print(f"{told['readings']} readings at {told['poses']} poses")
-print(f"deflection measured: {mm * told['deflection']['mean']:.3f} mm mean")
-print(f"error at left-out poses: {mm * told['held_out']['mean']:.3f} mm mean")
-difference = told["comparison"]["difference"]
+print(f"{figures.readings} readings at {figures.poses} poses")
+print(f"deflection measured: {mm * figures.deflection.mean:.3f} mm mean")
+print(f"error at left-out poses: {mm * figures.held_out.mean:.3f} mm mean")
+difference = figures.comparison.difference
 print(
-    f"6 springs miss by {mm * difference['mean']:.3f} mm more"
-    f" (95 %: {mm * difference['low']:.3f} to {mm * difference['high']:.3f} mm)"
+    f"6 springs miss by {mm * difference.mean:.3f} mm more"
+    f" (95 %: {mm * difference.low:.3f} to {mm * difference.high:.3f} mm)"
 )
-for spring in told["springs"][:6]:
-    known = "" if spring["observable"] else "  (only in sum with others)"
-    print(f"{spring['name']:14s} {1e6 * spring['compliance']:6.3f} µrad/(N·m){known}")
-for reading in told["suspicious"]:
-    aside = "set aside" if reading["set_aside"] else "kept"
-    print(f"looks wrong: pose {reading['pose']} {reading['load_case']}, {aside}")
+for spring in figures.springs[:6]:
+    known = "" if spring.observable else "  (only in sum with others)"
+    print(f"{spring.name:14s} {1e6 * spring.compliance:6.3f} µrad/(N·m){known}")
+for reading in figures.suspicious:
+    aside = "set aside" if reading.set_aside else "kept"
+    print(f"looks wrong: pose {reading.pose} {reading.load_case}, {aside}")
 print("written: dataset.nc, model.json")

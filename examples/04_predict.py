@@ -45,18 +45,18 @@ for name, arm in arms.items():
     rng = np.random.default_rng(2)
     calibration = calibrate(model, readings_of(arm, 31, SHOP_FLOOR, rng), rng)
     unseen = readings_of(arm, 40, Noise(), rng)
-    told = calibration.calibrated.predict(unseen.joint_position, unseen.force)
+    predicted = calibration.calibrated.predict(unseen.joint_position, unseen.force)
 
-    error = np.linalg.norm(told.deflection - unseen.deflection, axis=1)
+    error = np.linalg.norm(predicted.deflection - unseen.deflection, axis=1)
     truth = unseen.deflection
-    fit = (told.low <= truth) & (truth <= told.high)
-    measured = (told.measured_low <= truth) & (truth <= told.measured_high)
+    fit = (predicted.low <= truth) & (truth <= predicted.high)
+    measured = (predicted.measured_low <= truth) & (truth <= predicted.measured_high)
     print(f"true arm: {name}")
-    print(f"  error at left-out poses  {1e6 * summary(calibration)['held_out']['mean']:5.0f} µm")
+    print(f"  error at left-out poses  {1e6 * summary(calibration).held_out.mean:5.0f} µm")
     print(f"  error at unseen poses    {1e6 * error.mean():5.0f} µm, against the truth")
     for what, low, high, inside in (
-        ("fit", told.low, told.high, fit),
-        ("measurement", told.measured_low, told.measured_high, measured),
+        ("fit", predicted.low, predicted.high, fit),
+        ("measurement", predicted.measured_low, predicted.measured_high, measured),
     ):
         print(
             f"  interval of the {what:11s} ±{1e6 * (high - low).mean() / 2:3.0f} µm on average,"

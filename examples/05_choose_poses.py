@@ -14,7 +14,7 @@ import numpy as np
 from elastocal.cell import load_cell
 from elastocal.cell.examples import write_example
 from elastocal.elastic import ElasticModel, layout
-from elastocal.planning import gather
+from elastocal.planning import sample_pool
 from elastocal.planning.search import (
     Candidates,
     Cover,
@@ -35,7 +35,7 @@ cell_file.write_text(text, encoding="utf-8")
 cell = load_cell(cell_file)
 entry = cell.file.surface
 surface = load_surface(cell.surface_path, entry.metres, cell.T_base_surface, entry.region)
-gathered = gather(cell, surface, np.random.default_rng(1), jobs=1)
+gathered = sample_pool(cell, surface, np.random.default_rng(1), jobs=1)
 postures = gathered.pool.postures
 print(f"{len(postures)} valid poses of {gathered.pool.sampled} points on the surface")
 for check, count in gathered.pool.refused.items():

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from elastocal.compensation.offline import compensate_path, follow
+from elastocal.compensation.offline import compensate_path, joints_along_path
 from elastocal.elastic import ElasticModel, layout
 from elastocal.identification import calibrate
 from elastocal.robot import Robot, T_from_xyzabc, catalogue, with_tool
@@ -47,7 +47,7 @@ course = T_from_xyzabc(1.6, -0.4 + 0.8 * way, 0.8, 0.0, np.pi, 0.0)
 force_tcp = np.column_stack([280.0 * np.sin(6.0 * way), 0.0 * way, np.full(len(way), -1100.0)])
 start = np.array([0.0, -1.75, 1.9, 0.0, 1.0, 0.0])
 no_rail = np.zeros((len(way), 0))
-q = follow(inverse_for(robot), course, no_rail, start, lambda row: f"point {row}")
+q = joints_along_path(inverse_for(robot), course, no_rail, start, lambda row: f"point {row}")
 force = np.einsum("pij,pj->pi", robot.forward(q)[:, :3, :3], force_tcp)
 
 joints = [f"{name}[rad]" for name in robot.joint_names]

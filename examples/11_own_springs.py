@@ -9,7 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from elastocal.elastic import ElasticModel, Spring, layout
+from elastocal.elastic import ElasticModel, Hinge, layout
 from elastocal.identification import build, calibrate, leave_poses_out
 from elastocal.robot import Robot, T_from_xyzabc, catalogue, with_tool
 from elastocal.sim.layouts import bearing_truth
@@ -42,7 +42,7 @@ readings = data.readings(robot.joint_names)
 # The paper's 18 springs, and the same with three linear ones behind the last joint.
 eighteen = layout(robot, "bearing")
 tool = tuple(
-    Spring(f"tool.{name}", "joint_a6", axis, revolute=False, distal=True)
+    Hinge(f"tool.{name}", "joint_a6", axis, revolute=False, distal=True)
     for name, axis in AXES.items()
 )
 errors = {}

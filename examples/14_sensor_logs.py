@@ -14,8 +14,8 @@ import numpy as np
 from elastocal.dataset import Dataset, read, write
 from elastocal.elastic import ElasticModel, layout
 from elastocal.identification import calibrate, summary
+from elastocal.procedure.derive import ToolLoad
 from elastocal.procedure.registration import UnloadedReadings, register
-from elastocal.procedure.tool_weight import ToolLoad
 from elastocal.robot import GRAVITY, Robot, T_from_xyzabc, catalogue, with_tool
 from elastocal.sim.layouts import bearing_truth
 from elastocal.sim.linkage import Linkage
@@ -80,10 +80,10 @@ write(dataset, folder / "readings.csv")
 # 3. The file is what `elastocal calibrate readings.csv --robot URDF --tcp tcp` takes.
 readings = read(folder / "readings.csv").readings(robot.joint_names)
 calibration = calibrate(ElasticModel(robot, layout(robot, "bearing")), readings, rng)
-told = summary(calibration)
+figures = summary(calibration)
 print(
-    f"{told['readings']} readings written to readings.csv; first force {np.round(force[0, 0], 1)} N"
+    f"{figures.readings} readings written to readings.csv; first force {np.round(force[0, 0], 1)} N"
 )
-print(f"error at left-out poses: {1e3 * told['held_out']['mean']:.3f} mm mean")
-for warning in told["warnings"]:
+print(f"error at left-out poses: {1e3 * figures.held_out.mean:.3f} mm mean")
+for warning in figures.warnings:
     print("warning:", warning)

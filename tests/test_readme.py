@@ -16,10 +16,10 @@ from pydantic.fields import FieldInfo
 
 from elastocal.cell import CellFile
 from elastocal.cell.description import ProcedureSettings
-from elastocal.cell.description.faults import Kind
+from elastocal.cell.description.simulation import FaultKind
 from elastocal.cell.fingerprint import RUN_SECTIONS
 from elastocal.cli.demo_story import chapters
-from elastocal.procedure.faults import Fault
+from elastocal.procedure.run.faults import Fault
 from support.cli import Result, elastocal
 from support.demos import demo_result, finished_demo
 
@@ -242,7 +242,7 @@ def test_every_default_of_the_procedure_is_the_one_that_the_reference_tells():
 
 
 def test_every_kind_of_fault_is_on_both_pages_that_list_them():
-    kinds = set(get_args(Kind))
+    kinds = set(get_args(FaultKind))
     page = (ROOT / "docs/explanation/simulated-cell.md").read_text(encoding="utf-8")
     assert kinds <= shown_words(cell_file_section("Section faults"))
     assert kinds == set(re.findall(r"^\| `(\w+)` \|", page, flags=re.MULTILINE))

@@ -19,6 +19,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
+from typing import TypeGuard
 
 SHORT = 60
 """A file with fewer lines than this needs a reason."""
@@ -193,19 +194,28 @@ def functions(module: Module) -> Iterator[tuple[str, int]]:
             yield f"{module.name}.{node.name}", sum(line in module.code for line in lines)
 
 
-def public_names(module: Module) -> Iterator[str]:
-    """Yield the public names that a module defines at its top level."""
-    if any(part.startswith("_") for part in module.name.split(".")):
-        return
+def defined_names(module: Module) -> set[str]:
+    """Return the names that a module defines at its top level."""
+    names: set[str] = set()
     for node in module.tree.body:
-        names: list[str] = []
         if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef):
-            names = [node.name]
+            names.add(node.name)
         elif isinstance(node, ast.Assign):
-            names = [each.id for each in node.targets if isinstance(each, ast.Name)]
+            names.update(n.id for each in node.targets for n in ast.walk(each) if _is_name(n))
         elif isinstance(node, ast.AnnAssign) and isinstance(node.target, ast.Name):
-            names = [node.target.id]
-        yield from (name for name in names if not name.startswith("_"))
+            names.add(node.target.id)
+    return names
+
+
+def _is_name(node: ast.AST) -> TypeGuard[ast.Name]:
+    return isinstance(node, ast.Name)
+
+
+def public_names(module: Module) -> set[str]:
+    """Return the public names that a module defines at its top level."""
+    if any(part.startswith("_") for part in module.name.split(".")):
+        return set()
+    return {name for name in defined_names(module) if not name.startswith("_")}
 
 
 def _is_dict_of_any(node: ast.AST) -> bool:

@@ -232,9 +232,9 @@ def test_load_rows_know_moments(tmp_path):
 
 
 def test_calibrate_takes_the_marker_of_the_dataset_unless_told_otherwise(folder, tmp_path):
-    data = dataset.read(folder / "data.nc").data.copy(deep=True)
+    data = dataset.read(folder / "data.nc").to_xarray().copy(deep=True)
     data.attrs["marker"] = "0.0 m, 0.03 m, -0.02 m"
-    dataset.write(dataset.Dataset(data), tmp_path / "marked.nc")
+    dataset.write(dataset.Dataset.from_xarray(data), tmp_path / "marked.nc")
 
     def residual(*options: str) -> dict[str, float]:
         out = tmp_path / "m.json"

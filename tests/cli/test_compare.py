@@ -9,7 +9,8 @@ import pytest
 
 from elastocal import dataset
 from elastocal.identification import write_model
-from elastocal.identification.recertification import read_comparison
+from elastocal.identification.recertification import CompareSummary
+from elastocal.records import read_json
 from support.cells import Cell, linear_truth, unseen
 from support.cli import elastocal
 from support.recertified import calibrated, soft_truth
@@ -84,7 +85,7 @@ def test_file_and_figure_are_written_and_checked(folder, tmp_path):
     out, figure = tmp_path / "c.json", tmp_path / "c.svg"
     result = run(folder, "--rows", folder / "rows.csv", "--out", out, "--figure", figure)
     assert result.code == 0
-    assert read_comparison(out).moved == ("joint_3.axial",)
+    assert read_json(out, CompareSummary).moved == ("joint_3.axial",)
     assert "joint_3.axial" in figure.read_text()
     checked = json.loads(elastocal("check", out, "--json").out)
     assert checked["kind"] == "comparison of two calibrations"
@@ -127,9 +128,9 @@ def test_rows_that_cannot_be_used_are_refused(folder, tmp_path):
 
 
 def test_a_dataset_of_another_robot_is_refused(folder, tmp_path):
-    data = dataset.read(folder / "measured.nc").data.copy()
+    data = dataset.read(folder / "measured.nc").to_xarray().copy()
     data.attrs["robot_urdf"] = data.attrs["robot_urdf"].replace("1.15", "1.25")
-    dataset.write(dataset.Dataset(data), tmp_path / "other.nc")
+    dataset.write(dataset.Dataset.from_xarray(data), tmp_path / "other.nc")
     assert "are of different robots" in run(folder, "--rows", tmp_path / "other.nc").reason
 
 

@@ -16,8 +16,15 @@ from elastocal.cell import fingerprint, load_cell
 from elastocal.cli.device_sources import KINDS, SOURCES, DeviceSource
 from elastocal.errors import DatasetError, FileAccessError
 from elastocal.planning import read_plan, write_plan
-from elastocal.procedure import Journal, RunFolder, cell_place, fill, read_journal, refuse_foreign
-from elastocal.procedure.journal import read_commits
+from elastocal.procedure import (
+    Journal,
+    RunFolder,
+    cell_path_in_run,
+    fill_folder,
+    read_journal,
+    refuse_foreign_files,
+)
+from elastocal.procedure.record import read_commits
 from support.cli import elastocal
 from support.run_cells import PlannedCell, planned_cell
 
@@ -212,7 +219,7 @@ def test_a_run_whose_readings_cannot_be_derived_still_says_how_it_ended(
     def fails(_):
         raise DatasetError("no usable reading among 8")
 
-    monkeypatch.setattr("elastocal.cli.run_session.derive", fails)
+    monkeypatch.setattr("elastocal.cli.run_session.derive_run", fails)
     result = run(planned, tmp_path / "run", "--json")
     assert result.code == 1
     figures = json.loads(result.out)
@@ -345,16 +352,16 @@ def test_files_above_the_cell_file_keep_their_places(planned, tmp_path):
     cell.write_text(text.replace("dome.stl", "../meshes/dome.stl"), encoding="utf-8")
     (tmp_path / "meshes" / "dome.stl").write_bytes(planned.cell.with_name("dome.stl").read_bytes())
     loaded, folder = load_cell(cell), RunFolder(tmp_path / "run")
-    fill(folder, loaded, planned.plan)
-    assert cell_place(loaded) == str(Path("cells") / "cell.yaml")
-    assert load_cell(folder.cell / cell_place(loaded)).file == loaded.file
+    fill_folder(folder, loaded, planned.plan)
+    assert cell_path_in_run(loaded) == str(Path("cells") / "cell.yaml")
+    assert load_cell(folder.cell / cell_path_in_run(loaded)).file == loaded.file
 
 
 def test_what_a_run_leaves_before_its_first_entry_is_no_hindrance(tmp_path):
     folder = RunFolder(tmp_path)
     folder.streams.mkdir()
     folder.journal.touch()
-    refuse_foreign(folder)
+    refuse_foreign_files(folder)
     (tmp_path / "other").touch()
     with pytest.raises(FileAccessError, match="holds 'other'"):
-        refuse_foreign(folder)
+        refuse_foreign_files(folder)

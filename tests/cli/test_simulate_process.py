@@ -68,7 +68,7 @@ def test_check_knows_the_table_and_the_folder(folder):
 def test_the_place_of_every_deviation_lies_on_the_course(folder):
     result = run(folder, "placed", "--seed", 4)
     assert result.code == 0, result.err
-    (trace,) = read_process(folder / "placed").traces
+    (trace,) = read_process(folder / "placed").courses
     surface = cell_surface(example_cell("afp"))
     some = trace.position[::50]
     down = np.repeat(-surface.T_base_surface[None, :3, 2], len(some), axis=0)

@@ -3,19 +3,21 @@
 import numpy as np
 import pytest
 
-from elastocal.compensation.offline import follow
-from elastocal.compensation.path import PathError
+from elastocal.compensation.offline import (
+    PathError,
+    joints_along_path,
+)
 from elastocal.compensation.stiffness import (
-    Grid,
-    Permit,
-    cell_permit,
-    choose,
-    directional,
-    ellipsoid,
+    PostureConstraint,
+    PostureGrid,
+    cell_constraints,
+    choose_postures,
+    directional_stiffness,
+    joint_limit_constraint,
+    principal_stiffness,
     read_stations,
-    same_robot,
-    survey,
-    within_limits,
+    require_same_robot,
+    survey_postures,
 )
 from elastocal.errors import RobotError
 from elastocal.identification import CalibratedModel
@@ -43,7 +45,7 @@ Q = np.array([[0.1, -1.2, 1.9, 0.4, 0.9, 0.3], [0.5, -0.9, 1.5, -0.4, -0.9, 1.3]
 
 @pytest.fixture(scope="module")
 def surveyed():
-    return survey(calibrated(), SOLVER, COURSE, NORMAL, Grid(SPINS, NOWHERE))
+    return survey_postures(calibrated(), SOLVER, COURSE, NORMAL, PostureGrid(SPINS, NOWHERE))
 
 
 class TestDirectional:
@@ -51,15 +53,15 @@ class TestDirectional:
         u = np.array([0.6, 0.0, 0.8])
         model = calibrated()
         deflection = model.model.deflection(model.compliance, Q, 700.0 * u)
-        found = directional(model, Q, u)
+        found = directional_stiffness(model, Q, u)
         np.testing.assert_allclose(found.stiffness, 700.0 / (deflection @ u), rtol=1e-12)
         assert np.all((found.low < found.stiffness) & (found.stiffness < found.high))
 
     def test_the_arm_itself_is_as_stiff_to_a_few_percent(self):
-        q = follow(SOLVER, COURSE, np.zeros((len(COURSE), 0)), np.array(START), str)
+        q = joints_along_path(SOLVER, COURSE, np.zeros((len(COURSE), 0)), np.array(START), str)
         moved = rich_truth().equilibrium(q, -1100.0 * NORMAL).deflection
         truth = 1100.0 / -np.sum(moved * NORMAL, axis=1)
-        found = directional(calibrated(), q, NORMAL).stiffness
+        found = directional_stiffness(calibrated(), q, NORMAL).stiffness
         np.testing.assert_allclose(found, truth, rtol=0.03)
 
     def test_springs_that_cannot_be_told_apart_do_not_matter(self):
@@ -74,21 +76,23 @@ class TestDirectional:
         other = CalibratedModel(own.model, moved, own.draws, own.observability)
         u = np.array([0.0, 0.6, 0.8])
         np.testing.assert_allclose(
-            directional(other, Q, u).stiffness, directional(own, Q, u).stiffness, rtol=1e-6
+            directional_stiffness(other, Q, u).stiffness,
+            directional_stiffness(own, Q, u).stiffness,
+            rtol=1e-6,
         )
 
     def test_a_principal_axis_is_as_stiff_as_its_principal_stiffness(self):
-        found = ellipsoid(calibrated(), Q)
+        found = principal_stiffness(calibrated(), Q)
         assert np.all(np.diff(found.stiffness, axis=1) > 0.0)
         for number in range(3):
-            k = directional(calibrated(), Q, found.axes[:, :, number]).stiffness
+            k = directional_stiffness(calibrated(), Q, found.axes[:, :, number]).stiffness
             np.testing.assert_allclose(k, found.stiffness[:, number], rtol=1e-9)
 
     def test_no_direction_is_softer_than_the_first_or_stiffer_than_the_third(self):
-        found = ellipsoid(calibrated(), Q)
+        found = principal_stiffness(calibrated(), Q)
         rng = np.random.default_rng(0)
         for u in rng.normal(size=(20, 3)):
-            k = directional(calibrated(), Q, u / np.linalg.norm(u)).stiffness
+            k = directional_stiffness(calibrated(), Q, u / np.linalg.norm(u)).stiffness
             assert np.all(k >= found.stiffness[:, 0] * (1 - 1e-9))
             assert np.all(k <= found.stiffness[:, 2] * (1 + 1e-9))
 
@@ -107,30 +111,36 @@ class TestSurvey:
 
     def test_its_stiffness_is_that_of_the_posture(self, surveyed):
         q = surveyed.q[2, 5, 0]
-        k = directional(calibrated(), q, NORMAL[2]).stiffness
+        k = directional_stiffness(calibrated(), q, NORMAL[2]).stiffness
         np.testing.assert_allclose(surveyed.stiffness[2, 5, 0], k, rtol=1e-12)
         assert surveyed.best_by_spin[2, 5] == k.max()
 
     def test_a_permit_takes_postures_out_and_is_counted(self, surveyed):
-        permit = Permit("elbow up", lambda q: q[:, 2] > 0.0)
-        found = survey(calibrated(), SOLVER, COURSE, NORMAL, Grid(SPINS, NOWHERE), (permit,))
+        constraint = PostureConstraint("elbow up", lambda q: q[:, 2] > 0.0)
+        found = survey_postures(
+            calibrated(), SOLVER, COURSE, NORMAL, PostureGrid(SPINS, NOWHERE), (constraint,)
+        )
         out = np.isnan(found.stiffness) & ~np.isnan(surveyed.stiffness)
         assert found.refused["elbow up"] == out.sum() > 0
         assert np.all(surveyed.q[out][:, 2] <= 0.0)
-        margin = within_limits(robot(), np.full(6, 0.2))
+        margin = joint_limit_constraint(robot(), np.full(6, 0.2))
         near = np.array([[0.0, 0.0, 0.0, 0.0, 0.0, 3.0], [0.0, 0.0, 0.0, 0.0, 0.0, 2.9]])
         assert margin.allows(near).tolist() == [False, True]
 
     def test_a_survey_too_large_is_refused(self):
         with pytest.raises(PathError, match="postures: at most"):
-            survey(calibrated(), SOLVER, COURSE, NORMAL, Grid(np.zeros(10**6), NOWHERE))
+            survey_postures(
+                calibrated(), SOLVER, COURSE, NORMAL, PostureGrid(np.zeros(10**6), NOWHERE)
+            )
 
     def test_a_rail_is_part_of_the_choice(self):
         arm = Robot.from_urdf(opw_arm_urdf(**KR_LIKE, rail=(-2.0, 2.0)), "tcp")
         T = arm.forward(np.array([[0.2, 0.1, 0.6, 0.9, 0.2, 0.8, 0.0]]))
         stands = np.linspace(-2.0, 2.0, 5)[:, None]
-        found = survey(made_up(arm), inverse_for(arm), T, T[:, :3, 2], Grid(SPINS, stands))
-        reached = ~np.isnan(found.best_by_stand[0])
+        found = survey_postures(
+            made_up(arm), inverse_for(arm), T, T[:, :3, 2], PostureGrid(SPINS, stands)
+        )
+        reached = ~np.isnan(found.best_by_external[0])
         assert reached.any()
         for stand in np.flatnonzero(reached):
             rails = found.q[0, :, stand, :, 0]
@@ -139,31 +149,35 @@ class TestSurvey:
 
 class TestChoice:
     def test_one_posture_is_the_stiffest_where_it_is_softest(self, surveyed):
-        found = choose(surveyed, SOLVER).one
-        k = directional(calibrated(), found.q, NORMAL).stiffness
+        found = choose_postures(surveyed, SOLVER).one
+        k = directional_stiffness(calibrated(), found.q, NORMAL).stiffness
         softest = np.where(np.isnan(surveyed.stiffness), -np.inf, surveyed.stiffness).min(axis=0)
         assert k.min() == pytest.approx(softest.max(), rel=1e-12)
         assert len(set(found.spin)) == 1
 
     def test_at_each_station_none_is_stiffer(self, surveyed):
-        found = choose(surveyed, SOLVER)
-        k = directional(calibrated(), found.each.q, NORMAL).stiffness
+        found = choose_postures(surveyed, SOLVER)
+        k = directional_stiffness(calibrated(), found.each.q, NORMAL).stiffness
         np.testing.assert_allclose(k, np.nanmax(surveyed.best_by_spin, axis=1), rtol=1e-12)
-        assert np.all(k >= directional(calibrated(), found.one.q, NORMAL).stiffness * (1 - 1e-12))
+        assert np.all(
+            k >= directional_stiffness(calibrated(), found.one.q, NORMAL).stiffness * (1 - 1e-12)
+        )
 
     def test_where_no_posture_holds_along_the_path_there_is_none(self):
         far = COURSE.copy()
         far[2, :3, 3] *= 3.0
-        found = survey(calibrated(), SOLVER, far, NORMAL, Grid(SPINS, NOWHERE))
-        choice = choose(found, SOLVER)
+        found = survey_postures(calibrated(), SOLVER, far, NORMAL, PostureGrid(SPINS, NOWHERE))
+        choice = choose_postures(found, SOLVER)
         assert choice.one is None
         assert np.isnan(choice.each.q[2]).all()
         assert np.isfinite(choice.each.q[[0, 1, 3]]).all()
 
     def test_branches_of_the_numerical_solver_are_not_taken_to_go_on(self):
         solver = NumericalInverse(robot(), seed=0, reason="for a test")
-        found = survey(calibrated(), solver, COURSE[:2], NORMAL[:2], Grid(SPINS[:1], NOWHERE))
-        choice = choose(found, solver)
+        found = survey_postures(
+            calibrated(), solver, COURSE[:2], NORMAL[:2], PostureGrid(SPINS[:1], NOWHERE)
+        )
+        choice = choose_postures(found, solver)
         np.testing.assert_array_equal(choice.one.q, choice.each.q)
 
 
@@ -173,8 +187,8 @@ class TestStations:
         found = read_stations(path, SOLVER, 5, np.array(START))
         assert found.lines == (2, 27, 52, 77, 102)
         np.testing.assert_allclose(robot().forward(found.q), found.T_base_tcp, atol=1e-9)
-        assert found.way[0] == 0.0
-        assert 0.8 < found.way[-1] < 0.85
+        assert found.arc_length[0] == 0.0
+        assert 0.8 < found.arc_length[-1] < 0.85
         assert len(read_stations(path, SOLVER, 1000, np.array(START))) == 101
 
     def test_no_station_is_refused(self, tmp_path):
@@ -186,23 +200,25 @@ class TestStations:
 class TestCell:
     def test_postures_that_touch_a_fixture_are_refused(self):
         cell = example_cell("afp", fixtures=[BEAM])
-        permits = {permit.name: permit for permit in cell_permit(cell)}
-        assert set(permits) == {"joint margin", "singularity", "collision"}
+        constraints = {constraint.name: constraint for constraint in cell_constraints(cell)}
+        assert set(constraints) == {"joint margin", "singularity", "collision"}
         q = np.array([place.q for place in places("afp", 2)])
         solver = inverse_for(cell.robot)
         T = cell.robot.forward(q)
-        grid = Grid(np.radians([0.0, 120.0, 240.0]), cell.external_positions[::6])
-        found = survey(made_up(cell.robot), solver, T, T[:, :3, 2], grid, tuple(permits.values()))
+        grid = PostureGrid(np.radians([0.0, 120.0, 240.0]), cell.external_positions[::6])
+        found = survey_postures(
+            made_up(cell.robot), solver, T, T[:, :3, 2], grid, tuple(constraints.values())
+        )
         assert found.refused["collision"] > 0
         assert np.isfinite(found.best_by_spin).any()
         inside = found.q[~np.isnan(found.stiffness)]
-        assert permits["collision"].allows(inside).all()
+        assert constraints["collision"].allows(inside).all()
 
     def test_a_cell_of_another_robot_is_refused(self):
         cell = example_cell("afp")
-        same_robot(cell.robot, cell.robot)
+        require_same_robot(cell.robot, cell.robot)
         with pytest.raises(RobotError, match="they must be the same"):
-            same_robot(robot(), cell.robot)
+            require_same_robot(robot(), cell.robot)
         other = Robot.from_urdf(opw_arm_urdf(**KR_LIKE), "tcp")
         with pytest.raises(RobotError, match="mm apart"):
-            same_robot(robot(), other)
+            require_same_robot(robot(), other)

@@ -5,10 +5,15 @@ from functools import cache, partial
 import numpy as np
 import pytest
 
-from elastocal.elastic import LAYOUTS, ElasticModel, Spring
-from elastocal.elastic.layouts import bearing, custom
-from elastocal.elastic.layouts.custom import SpringEntry
-from elastocal.elastic.springs import axial
+from elastocal.elastic import (
+    LAYOUTS,
+    ElasticModel,
+    Spring,
+    SpringEntry,
+    axial,
+    bearing,
+    custom,
+)
 from elastocal.robot import Robot
 from elastocal.sim.linkage import Linkage
 from support.virtual_chain import ARMS, configurations, numerical_column

@@ -30,7 +30,7 @@ class TestEveryLoss:
     def test_noisy_data_give_them_within_the_noise(self, name):
         problem, truth = planted(sigma=1e-5)
         found = solve(problem, name).compliance
-        rows = problem.O.reshape(-1, problem.springs)
+        rows = problem.O.reshape(-1, problem.columns)
         sigma = 1e-5 * np.sqrt(np.diag(np.linalg.inv(rows.T @ rows)))
         assert np.all(np.abs(found - truth) < 4.0 * sigma)
         assert np.any(np.abs(found - truth) > 0.1 * sigma)

@@ -9,7 +9,7 @@ from support.datasets import JOINTS, dataset, full_keywords
 
 def test_one_dataset_merges_to_itself():
     data = Dataset.from_arrays(**full_keywords())
-    assert merge([data]).data.identical(data.data)
+    assert merge([data]).to_xarray().identical(data.to_xarray())
 
 
 @settings(max_examples=20, deadline=None)
@@ -18,7 +18,9 @@ def test_parts_merge_to_the_whole_in_the_order_given(part_of):
     whole = dataset(count=5)
     parts = [[pose for pose in range(5) if part_of[pose] == part] for part in range(3)]
     merged = merge([whole.select(part) for part in parts if part])
-    assert merged.data.identical(whole.select([pose for part in parts for pose in part]).data)
+    assert merged.to_xarray().identical(
+        whole.select([pose for part in parts for pose in part]).to_xarray()
+    )
 
 
 def test_a_load_case_that_a_part_lacks_is_missing_there():
@@ -30,15 +32,15 @@ def test_a_load_case_that_a_part_lacks_is_missing_there():
         ]
     )
     assert merged.load_cases == ("normal", "north", "east")
-    assert merged.data["status"].values.tolist() == [[0, 0, 4]] * 3 + [[0, 4, 0]] * 3
-    assert np.isnan(merged.data["force"].sel(pose=3, load_case="north").values).all()
+    assert merged.to_xarray()["status"].values.tolist() == [[0, 0, 4]] * 3 + [[0, 4, 0]] * 3
+    assert np.isnan(merged.to_xarray()["force"].sel(pose=3, load_case="north").values).all()
     assert len(merged.readings(JOINTS)) == 12
 
 
 def test_joints_are_matched_by_name():
     data = dataset()
-    turned = Dataset(data.data.isel(joint=[1, 0]).assign_coords(pose=[7, 8, 9]))
-    merged = merge([data, turned]).data["joint_position"].values
+    turned = Dataset.from_xarray(data.to_xarray().isel(joint=[1, 0]).assign_coords(pose=[7, 8, 9]))
+    merged = merge([data, turned]).to_xarray()["joint_position"].values
     np.testing.assert_array_equal(merged[:3], merged[3:])
 
 

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from elastocal.dataset import Dataset
-from elastocal.dataset.table_read import read_table
+from elastocal.dataset.table import read_table
 from elastocal.errors import DatasetError, FileAccessError, SchemaError
 from support.datasets import write_lines
 
@@ -24,7 +24,7 @@ def empty(pose, case, status=""):
 
 
 def read_rows(tmp_path, *rows, header=HEADER):
-    return Dataset(read_table(write_lines(tmp_path / "data.csv", header, *rows)))
+    return Dataset.from_labelled(read_table(write_lines(tmp_path / "data.csv", header, *rows)))
 
 
 def refusal(tmp_path, *rows, header=HEADER):
@@ -51,9 +51,9 @@ def test_labels_keep_the_order_of_the_file(tmp_path):
 
 def test_an_absent_row_and_an_empty_one_are_missing_readings(tmp_path):
     data = read_rows(tmp_path, row(1, "a"), row(1, "b"), row(2, "a"), row(3, "a"), empty(3, "b"))
-    assert data.data["status"].values.tolist() == [[0, 0], [0, 4], [0, 4]]
-    assert np.isnan(data.data["force"].values[1, 1]).all()
-    assert data.data["tcp_position"].values[:, 0].tolist() == [1.5, 1.5, 1.5]
+    assert data.to_xarray()["status"].values.tolist() == [[0, 0], [0, 4], [0, 4]]
+    assert np.isnan(data.to_xarray()["force"].values[1, 1]).all()
+    assert data.to_xarray()["tcp_position"].values[:, 0].tolist() == [1.5, 1.5, 1.5]
 
 
 def test_status_words_are_read_and_an_empty_one_means_ok(tmp_path):
@@ -65,13 +65,13 @@ def test_status_words_are_read_and_an_empty_one_means_ok(tmp_path):
         row(2, "b"),
         empty(3, "a", "aborted"),
     )
-    assert data.data["status"].values.tolist() == [[0, 1], [2, 0], [3, 4]]
+    assert data.to_xarray()["status"].values.tolist() == [[0, 1], [2, 0], [3, 4]]
 
 
 def test_a_byte_order_mark_and_windows_line_ends_are_accepted(tmp_path):
     path = tmp_path / "data.csv"
     path.write_bytes(f"\ufeff{HEADER}\r\n{row(1)}\r\n".encode())
-    assert Dataset(read_table(path)).poses == (1,)
+    assert Dataset.from_labelled(read_table(path)).poses == (1,)
 
 
 def test_a_spreadsheet_with_semicolons_is_accepted(tmp_path):
@@ -86,13 +86,16 @@ def test_a_file_without_attributes_says_nothing_about_the_robot(tmp_path):
 
 def test_attributes_are_read_from_comment_lines(tmp_path):
     lines = ('# tcp_frame: "tool"', "# a remark", HEADER, row(1))
-    assert Dataset(read_table(write_lines(tmp_path / "a.csv", *lines))).tcp_frame == "tool"
+    assert (
+        Dataset.from_labelled(read_table(write_lines(tmp_path / "a.csv", *lines))).tcp_frame
+        == "tool"
+    )
 
 
 def test_an_unknown_schema_is_refused_by_name(tmp_path):
     path = write_lines(tmp_path / "a.csv", '# schema: "elastocal.dataset/9"', HEADER, row(1))
     with pytest.raises(SchemaError, match=r"^dataset has schema 'elastocal.dataset/9'; this"):
-        Dataset(read_table(path))
+        Dataset.from_labelled(read_table(path))
 
 
 def test_a_pose_measured_twice_is_refused_with_both_rows(tmp_path):
@@ -151,7 +154,7 @@ def test_a_decimal_comma_is_refused_by_row(tmp_path):
 
 def test_a_blank_cell_is_an_empty_one(tmp_path):
     data = read_rows(tmp_path, row(1), row(2, "normal", "slipped", marker="  "))
-    assert np.isnan(data.data["marker_displacement"].values[1, 0, 0])
+    assert np.isnan(data.to_xarray()["marker_displacement"].values[1, 0, 0])
 
 
 def test_an_empty_file_and_one_that_is_not_text_cannot_be_read(tmp_path):

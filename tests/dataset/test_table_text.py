@@ -1,6 +1,6 @@
 import pytest
 
-from elastocal.dataset.table_text import attribute_lines, cut
+from elastocal.dataset.table import attribute_lines, cut
 from elastocal.errors import DatasetError
 
 
@@ -12,18 +12,18 @@ def test_attributes_survive_their_comment_lines():
 def test_remarks_of_a_person_are_passed_over():
     table = cut('# measured on monday\n# note: by hand\n# humidity: "low"\n\na,b\n1,2\n')
     assert table.attributes == {}
-    assert table.header == ["a", "b"]
+    assert table.header == ("a", "b")
 
 
 @pytest.mark.parametrize("delimiter", [",", ";", "\t"])
 def test_the_delimiter_of_the_header_is_used(delimiter):
-    assert cut(f"a{delimiter}b\n1{delimiter}2\n").rows == [["1", "2"]]
+    assert cut(f"a{delimiter}b\n1{delimiter}2\n").rows.cells == [["1", "2"]]
 
 
 def test_rows_are_counted_as_lines_of_the_file_and_blank_ones_passed_over():
     table = cut("# remark\n\na,b\n1,2\n\n,\n3,4\n")
-    assert table.lines == [4, 7]
-    assert table.rows == [["1", "2"], ["3", "4"]]
+    assert table.rows.lines == [4, 7]
+    assert table.rows.cells == [["1", "2"], ["3", "4"]]
 
 
 @pytest.mark.parametrize(

@@ -21,7 +21,7 @@ def test_a_number_that_is_not_finite_is_refused_where_the_status_is_ok(name, ind
     data = labelled()
     data[name].values[index] = value
     with pytest.raises(DatasetError) as caught:
-        Dataset(data)
+        Dataset.from_xarray(data)
     assert str(caught.value) == (
         f"{where} is {value} although the status is ok: give a finite number, or the status"
         " 'missing'"
@@ -32,7 +32,12 @@ def test_a_number_that_is_not_finite_may_stand_where_the_status_says_so():
     data = labelled()
     data["status"][0, 0] = 1
     data["force"].values[0, 0] = np.inf
-    assert Dataset(data).readings(("joint_1", "joint_2")).pose.tolist() == [4, 2, 11, 11]
+    assert Dataset.from_xarray(data).readings(("joint_1", "joint_2")).pose.tolist() == [
+        4,
+        2,
+        11,
+        11,
+    ]
 
 
 @pytest.mark.parametrize("value", [0.0, -1e-5, np.nan])
@@ -40,7 +45,7 @@ def test_a_sigma_must_be_positive(value):
     data = labelled()
     data["marker_sigma"].values[0, 1, 2] = value
     with pytest.raises(DatasetError, match=r"^marker_sigma z of pose 4, load case 'north' is"):
-        Dataset(data)
+        Dataset.from_xarray(data)
 
 
 def test_a_load_case_without_a_usable_reading_is_refused_by_name():
@@ -63,4 +68,4 @@ def test_a_dataset_without_any_usable_reading_is_refused():
 
 def test_a_dataset_without_poses_is_refused():
     with pytest.raises(DatasetError, match="none of its 0 readings has the status ok"):
-        Dataset(labelled().isel(pose=[]))
+        Dataset.from_xarray(labelled().isel(pose=[]))

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from elastocal.elastic import ElasticModel, Spring, layout, spring_torques
+from elastocal.elastic import ElasticModel, Hinge, layout, spring_torques
 from elastocal.errors import RobotError, SpringError
 from elastocal.robot import Jacobian, Robot
 from elastocal.sim.linkage import Linkage
@@ -110,7 +110,7 @@ def test_broadcast_load_cases_and_a_marker_go_together(model):
 def test_a_distal_spring_turns_with_its_joint_and_a_proximal_one_does_not(model):
     robot = model.robot
     at = [
-        ElasticModel(robot, (Spring("s", "joint_1", (1.0, 0.0, 0.0), distal=distal),))
+        ElasticModel(robot, (Hinge("s", "joint_1", (1.0, 0.0, 0.0), distal=distal),))
         for distal in (False, True)
     ]
     q = np.array([0.7, 0.1, 0.2, 0.3, 0.4, 0.5])
@@ -122,8 +122,8 @@ def test_a_distal_spring_turns_with_its_joint_and_a_proximal_one_does_not(model)
 def test_a_prismatic_spring_moves_the_tcp_along_its_axis_wherever_it_sits(model):
     axis = (0.0, 0.6, 0.8)
     springs = [
-        Spring("here", "joint_1", axis, revolute=False),
-        Spring("there", "joint_1", axis, revolute=False, offset=(1.0, 2.0, 3.0)),
+        Hinge("here", "joint_1", axis, revolute=False),
+        Hinge("there", "joint_1", axis, revolute=False, offset=(1.0, 2.0, 3.0)),
     ]
     found = ElasticModel(model.robot, springs).spring_jacobian(Q)
     np.testing.assert_allclose(found.translation, np.tile(np.transpose([axis] * 2), (6, 1, 1)))

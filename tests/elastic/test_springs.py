@@ -4,8 +4,15 @@ import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 
-from elastocal.elastic import ElasticModel, Spring, layout
-from elastocal.elastic.springs import as_axis, axial, check_springs, is_axial, orthogonal_axes
+from elastocal.elastic import (
+    ElasticModel,
+    Hinge,
+    as_axis,
+    axial,
+    check_springs,
+    layout,
+    orthogonal_axes,
+)
 from elastocal.errors import SpringError
 from support.cells import robot
 
@@ -49,10 +56,10 @@ def test_what_is_no_axis_is_refused(axis):
 
 
 def test_units_follow_the_kind():
-    spring = Spring("a", "joint_1", (0.0, 0.0, 1.0))
-    assert (spring.kind, spring.unit) == ("revolute", "rad/(N*m)")
+    spring = Hinge("a", "joint_1", (0.0, 0.0, 1.0))
+    assert (spring.kind, spring.parameters[0].unit.si) == ("revolute", "rad/(N*m)")
     linear = dataclasses.replace(spring, revolute=False)
-    assert (linear.kind, linear.unit) == ("prismatic", "m/N")
+    assert (linear.kind, linear.parameters[0].unit.si) == ("prismatic", "m/N")
 
 
 @pytest.mark.parametrize(
@@ -66,21 +73,21 @@ def test_units_follow_the_kind():
 )
 def test_only_a_spring_along_the_joints_own_motion_is_axial(changes):
     joint = robot().chain.joints[0]
-    assert is_axial(axial(joint), joint)
-    assert not is_axial(dataclasses.replace(axial(joint), **changes), joint)
+    assert axial(joint).axes[0].is_axis_of(joint)
+    assert not dataclasses.replace(axial(joint), **changes).axes[0].is_axis_of(joint)
 
 
 @pytest.mark.parametrize(
     ("springs", "message"),
     [
         ((), "at least one spring"),
-        ((Spring("a", "joint_1", (1.0, 0.0, 0.0)),) * 2, "'a' is listed twice"),
-        ((Spring("a", "joint1", (1.0, 0.0, 0.0)),), "did you mean 'joint_1'"),
-        ((Spring("a", "joint_1", (2.0, 0.0, 0.0)),), r"'a'.*\(2.0, 0.0, 0.0\)"),
-        ((Spring("a", "joint_1", (0.0, 0.0, 0.0)),), "'a'"),
-        ((Spring("a", "joint_1", (np.nan, 0.0, 0.0)),), "'a'"),
+        ((Hinge("a", "joint_1", (1.0, 0.0, 0.0)),) * 2, "'a' is listed twice"),
+        ((Hinge("a", "joint1", (1.0, 0.0, 0.0)),), "did you mean 'joint_1'"),
+        ((Hinge("a", "joint_1", (2.0, 0.0, 0.0)),), r"'a'.*\(2.0, 0.0, 0.0\)"),
+        ((Hinge("a", "joint_1", (0.0, 0.0, 0.0)),), "'a'"),
+        ((Hinge("a", "joint_1", (np.nan, 0.0, 0.0)),), "'a'"),
         (
-            (Spring("a", "joint_1", (1.0, 0.0, 0.0), offset=(0.0, np.inf, 0.0)),),
+            (Hinge("a", "joint_1", (1.0, 0.0, 0.0), offset=(0.0, np.inf, 0.0)),),
             "offset of spring 'a'",
         ),
     ],

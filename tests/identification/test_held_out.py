@@ -85,7 +85,7 @@ def test_mean_and_max_are_those_of_the_errors():
 def test_a_model_that_lacks_a_spring_compares_worse_with_an_interval_above_zero():
     problem, _ = noisy(blocks=12)
     ours = leave_poses_out(problem)
-    other = leave_poses_out(problem.with_springs(np.arange(4)))
+    other = leave_poses_out(problem.with_columns(np.arange(4)))
     found = compare(ours, other, "four", problem, np.random.default_rng(0))
     assert found.difference == pytest.approx(other.mean - ours.mean)
     assert 0.0 < found.low < found.difference < found.high
@@ -101,7 +101,7 @@ def test_a_model_compared_with_itself_differs_by_nothing():
 def test_the_interval_of_a_comparison_is_reproducible_by_seed():
     problem, _ = noisy(blocks=6)
     ours = leave_poses_out(problem)
-    other = leave_poses_out(problem.with_springs(np.arange(4)))
+    other = leave_poses_out(problem.with_columns(np.arange(4)))
     lows = [
         compare(ours, other, "four", problem, np.random.default_rng(seed)).low for seed in (1, 1, 2)
     ]

@@ -5,7 +5,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from elastocal.elastic import ElasticModel, Spring
+from elastocal.elastic import ElasticModel, Hinge
 from elastocal.errors import FileAccessError, RobotError, SchemaError, SpringError
 from elastocal.identification import (
     CalibratedModel,
@@ -62,8 +62,8 @@ def test_a_model_comes_back_to_the_last_digit(path):
 
 def test_every_kind_of_spring_comes_back(tmp_path):
     springs = [
-        Spring("tilt", "joint_2", (0.6, 0.0, 0.8), distal=True),
-        Spring("slide", "joint_3", (0.0, 1.0, 0.0), revolute=False, offset=(0.1, -0.2, 0.3)),
+        Hinge("tilt", "joint_2", (0.6, 0.0, 0.8), distal=True),
+        Hinge("slide", "joint_3", (0.0, 1.0, 0.0), revolute=False, offset=(0.1, -0.2, 0.3)),
     ]
     model = ElasticModel(elastic().robot, springs)
     seen = Observability(2, 1.5, (True, True), ())

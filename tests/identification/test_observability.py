@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from elastocal.dataset import Readings
-from elastocal.elastic import ElasticModel, layout
-from elastocal.elastic.layouts import bearing
+from elastocal.elastic import ElasticModel, bearing, layout
 from elastocal.identification import (
     FitOptions,
     Prior,

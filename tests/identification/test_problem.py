@@ -18,7 +18,7 @@ def test_observation_times_compliance_is_the_deflection():
     problem = build(elastic(), readings)
     np.testing.assert_allclose(problem.residuals(compliance), 0.0, atol=1e-15)
     np.testing.assert_array_equal(problem.d, readings.deflection)
-    assert (len(problem), problem.springs) == (155, 18)
+    assert (len(problem), problem.columns) == (155, 18)
 
 
 def test_a_moment_and_a_marker_enter_the_rows():
@@ -107,7 +107,7 @@ def test_some_springs_keep_their_bounds_and_prior():
     options = FitOptions(lower=np.arange(6) * 1e-9, upper=1e-5, prior=strong)
     problem, _ = planted(sigma=1e-5, options=options)
     columns = np.array([1, 4])
-    some = problem.with_springs(columns)
+    some = problem.with_columns(columns)
     np.testing.assert_array_equal(some.lower, [1e-9, 4e-9])
     expected = replace(
         strong, mean=np.asarray(strong.mean)[columns], sigma=np.asarray(strong.sigma)[columns]

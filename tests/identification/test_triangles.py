@@ -26,7 +26,7 @@ def test_a_full_rank_refit_is_that_of_plain_nnls():
     problem, _ = made_up(np.random.default_rng(2))
     found = PoseTriangles.of(problem, np.arange(8)).fit([np.arange(8)])[0]
     scale = np.linalg.norm(problem.O, axis=(0, 1))
-    rows = (problem.O / scale).reshape(-1, problem.springs) * problem.weight.ravel()[:, None]
+    rows = (problem.O / scale).reshape(-1, problem.columns) * problem.weight.ravel()[:, None]
     wanted = nnls(rows, (problem.d * problem.weight).ravel())[0] / scale
     np.testing.assert_allclose(found * scale, wanted * scale, atol=1e-10)
 

@@ -9,8 +9,8 @@ from elastocal.cell import load_cell
 from elastocal.cell.description import TOOLING
 from elastocal.cell.examples import write_example
 from elastocal.planning import cell_surface, collision_scene
+from elastocal.planning.pool_sampling import PoolBuilder
 from elastocal.planning.surface import sample_uniform
-from elastocal.planning.workshop import Workshop
 
 POINTS = 150
 
@@ -20,7 +20,7 @@ def planned(like, folder):
     write_example(folder, like)
     cell = load_cell(folder / "cell.yaml")
     surface = cell_surface(cell)
-    workshop = Workshop.of(cell, surface)
+    workshop = PoolBuilder.of(cell, surface)
     points = sample_uniform(surface, POINTS, np.random.default_rng(0))
     stands = workshop.rank(points.take(np.arange(32)))
     return cell, surface, points, workshop.pool(stands, points)

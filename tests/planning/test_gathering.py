@@ -6,7 +6,11 @@ import pytest
 from elastocal.cell import load_cell
 from elastocal.cell.examples import write_example
 from elastocal.errors import PlanningError
-from elastocal.planning import cell_surface, gather, gathering
+from elastocal.planning import (
+    cell_surface,
+    pool_sampling as gathering,
+    sample_pool,
+)
 from elastocal.planning.surface import SurfaceError
 
 
@@ -21,7 +25,7 @@ def example(folder, like="afp", **changes):
 
 
 def gathered(cell, jobs=1, seed=0, progress=lambda *_: None):
-    return gather(cell, cell_surface(cell), np.random.default_rng(seed), jobs, progress)
+    return sample_pool(cell, cell_surface(cell), np.random.default_rng(seed), jobs, progress)
 
 
 FEW = ("pool: 3000", "pool: 120")

@@ -9,7 +9,7 @@ import trimesh
 from elastocal.cell import load_cell
 from elastocal.cell.examples import write_example
 from elastocal.planning import CollisionScene, sight_check
-from elastocal.planning.moving_solids import HOUSED, SEAT, MovingSolids
+from elastocal.planning.checks.sight import HOUSED, SEAT, MovingSolids
 from elastocal.planning.scene import Body, mesh_shape
 from elastocal.planning.sight_lines import Beams
 from elastocal.planning.surface import load_surface

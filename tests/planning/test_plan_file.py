@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from elastocal.errors import FileAccessError, SchemaError
-from elastocal.planning import PLAN, PlanFile, read_plan, write_plan
-from elastocal.planning.plan_file import SCHEMA, check_plan
+from elastocal.planning import PLAN, PlanResult, read_plan, write_plan
+from elastocal.planning.plan_result import SCHEMA, check_plan
 from support import plans
 
 
@@ -33,7 +33,7 @@ def refusal(folder, error=SchemaError):
     return message
 
 
-def altered(**changes) -> PlanFile:
+def altered(**changes) -> PlanResult:
     return plans.plan().model_copy(update=changes)
 
 

@@ -5,13 +5,13 @@ import pytest
 
 from elastocal.errors import PlanningError
 from elastocal.planning.checks import Checks, EdgeCheck, FrictionCheck, JointLimitsCheck, WristCheck
-from elastocal.planning.pool import UNREACHABLE, Approach, Stand, joined, make_pool
+from elastocal.planning.pool import UNREACHABLE, Approach, BasePlacement, join_pools, make_pool
 from elastocal.planning.surface import contact_frames
 from elastocal.robot.inverse import inverse_for
 from elastocal.sim.scene import SphericalCap
 from support.postures import FORCE_TCP, arm, pool
 
-STANDS = (Stand(),)
+STANDS = (BasePlacement(),)
 QUICK = [JointLimitsCheck(arm(), 0.05), WristCheck(arm(), 0.1)]
 
 
@@ -119,7 +119,7 @@ def test_branches_are_asked_in_the_order_of_the_stand():
     points, normals = SphericalCap().spread(30, 0.0)
     usual = made(points, normals)
     other = (usual.branch[0] + 4) % 8
-    found = made(points, normals, stands=(Stand((), (int(other),)),))
+    found = made(points, normals, stands=(BasePlacement((), (int(other),)),))
     assert set(found.branch.tolist()) <= {int(other)}
 
 
@@ -127,7 +127,7 @@ def test_parts_of_the_points_make_the_same_pool_as_all_of_them():
     points, normals = SphericalCap().spread(40, 0.0)
     order = made(points, normals).branch
     assert len(set(order.tolist())) == 1
-    parts = joined([made(points[:13], normals[:13]), made(points[13:], normals[13:])])
+    parts = join_pools([made(points[:13], normals[:13]), made(points[13:], normals[13:])])
     whole = made(points, normals)
     np.testing.assert_array_equal(parts.postures.point, whole.postures.point)
     np.testing.assert_array_equal(parts.refused_by, whole.refused_by)

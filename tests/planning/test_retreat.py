@@ -5,7 +5,7 @@ import pytest
 
 from elastocal.planning.checks import Checks
 from elastocal.planning.pool import Approach, make_pool
-from elastocal.planning.retreat import STRAIGHT, on_the_way
+from elastocal.planning.postures import _STRAIGHT, retreat_joints
 from elastocal.robot.inverse import inverse_for
 from elastocal.sim.scene import SphericalCap
 from support.postures import arm
@@ -20,11 +20,11 @@ def postures(distance):
 @pytest.mark.parametrize("part", [0.1, 0.5, 0.8])
 def test_the_tool_is_on_the_straight_line_and_keeps_its_orientation(distance, part):
     poses = postures(distance)
-    T = arm().forward(on_the_way(arm(), poses, part))
+    T = arm().forward(retreat_joints(arm(), poses, part))
     wanted = poses.contact + part * distance * poses.normal
-    assert np.linalg.norm(T[:, :3, 3] - wanted, axis=1).max() < STRAIGHT
+    assert np.linalg.norm(T[:, :3, 3] - wanted, axis=1).max() < _STRAIGHT
     turned = np.linalg.norm(T[:, :3, :3] - poses.T_base_tcp[:, :3, :3], axis=(1, 2))
-    assert turned.max() < 2.0 * STRAIGHT
+    assert turned.max() < 2.0 * _STRAIGHT
 
 
 def test_a_straight_line_in_joint_space_would_miss_it_by_a_millimetre():
@@ -36,6 +36,6 @@ def test_a_straight_line_in_joint_space_would_miss_it_by_a_millimetre():
 
 def test_both_ends_are_those_given():
     poses = postures(0.1)
-    np.testing.assert_array_equal(on_the_way(arm(), poses, 0.0), poses.q)
-    np.testing.assert_array_equal(on_the_way(arm(), poses, 1.0), poses.q_approach)
-    assert on_the_way(arm(), poses.take([]), 0.5).shape == (0, 6)
+    np.testing.assert_array_equal(retreat_joints(arm(), poses, 0.0), poses.q)
+    np.testing.assert_array_equal(retreat_joints(arm(), poses, 1.0), poses.q_approach)
+    assert retreat_joints(arm(), poses.take([]), 0.5).shape == (0, 6)

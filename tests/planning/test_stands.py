@@ -5,7 +5,7 @@ import pytest
 
 from elastocal.planning.checks import Checks, JointLimitsCheck
 from elastocal.planning.pool import Approach
-from elastocal.planning.stands import rank_stands
+from elastocal.planning.pool_sampling import rank_base_placements
 from elastocal.robot import Rail, Robot, catalogue, on_rail, with_tool
 from elastocal.robot.inverse import inverse_for
 from elastocal.sim.scene import SphericalCap
@@ -24,7 +24,7 @@ def ranked(robot, apexes, external, slow=(), margin=0.05):
     caps = [SphericalCap(apex=apex).spread(24, 0.0) for apex in apexes]
     points, normals = (np.concatenate(parts) for parts in zip(*caps, strict=True))
     checks = Checks((), (JointLimitsCheck(robot, margin),), tuple(slow))
-    return rank_stands(
+    return rank_base_placements(
         inverse_for(robot), points, normals, APPROACH, checks, np.array(external)[:, None]
     )
 

@@ -104,10 +104,10 @@ def choose(  # noqa: PLR0913 - what a technique may look at
         return [training[k] for k in order[:j]]
     labels = sorted(set(readings.pose.tolist()))
     stacked = [
-        problem.O[may_train & (readings.pose == labels[pose])].reshape(-1, problem.springs)
+        problem.O[may_train & (readings.pose == labels[pose])].reshape(-1, problem.columns)
         for pose in training
     ]
-    rows = np.zeros((len(training), max(map(len, stacked)), problem.springs))
+    rows = np.zeros((len(training), max(map(len, stacked)), problem.columns))
     for filled, block in zip(rows, stacked, strict=True):
         filled[: len(block)] = block
     pool = Candidates(points[training], rows)

@@ -67,7 +67,7 @@ def dataset(**changes: Any) -> Dataset:
 
 def labelled(**changes: Any) -> xr.Dataset:
     """Return a labelled dataset that may be changed, made of `full_keywords`."""
-    return Dataset.from_arrays(**full_keywords(**changes)).data.copy(deep=True)
+    return Dataset.from_arrays(**full_keywords(**changes)).to_xarray().copy(deep=True)
 
 
 def write_lines(path: Path, *lines: str) -> Path:

@@ -6,8 +6,8 @@ from functools import cache
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from elastocal.planning import PlanFile, PoolData, PoseRecord, SpreadRecord
-from elastocal.planning.plan_file import (
+from elastocal.planning import PlanResult, PoolData, PoseRecord, SpreadRecord
+from elastocal.planning.plan_result import (
     CellRecord,
     CheckRecord,
     ComparisonRecord,
@@ -148,13 +148,13 @@ def pool(rail: bool = True) -> PoolData:
 
 
 @cache
-def plan(rail: bool = True) -> PlanFile:
+def plan(rail: bool = True) -> PlanResult:
     """Return a plan of six poses; one of its moves has a via point."""
     found, data = _found(rail), pool(rail)
     visited, chosen = _in_visiting_order(found), _chosen(found)
     arm = robot(rail)
     spread = _spread(data, chosen)
-    return PlanFile(
+    return PlanResult(
         elastocal="0.1.0",
         cell=CellRecord(name="dome", file="cell.yaml", fingerprint="0" * 64),
         robot=RobotRecord(

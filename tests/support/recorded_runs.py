@@ -19,7 +19,7 @@ from elastocal.cell.devices import (
 )
 from elastocal.cell.examples import write_example
 from elastocal.files import sha256
-from elastocal.planning import PlanFile, write_plan
+from elastocal.planning import PlanResult, write_plan
 from elastocal.procedure import (
     Event,
     Journal,
@@ -29,7 +29,7 @@ from elastocal.procedure import (
     RunRecord,
     file_sha256,
 )
-from elastocal.procedure.pose_log import ReadingStatus, Window
+from elastocal.procedure.record import ReadingStatus, Window
 from support import plans
 
 RECORD = RunRecord(
@@ -81,7 +81,7 @@ class Run:
     """A run folder, and what its dataset must say."""
 
     path: Path
-    plan: PlanFile
+    plan: PlanResult
     truth: Truth
     force: np.ndarray
     """Shape (pose, load case, 3), in base, in N."""
@@ -131,7 +131,7 @@ def record_run(
 def _record_pose(
     places: RunFolder,
     cell: Cell,
-    plan: PlanFile,
+    plan: PlanResult,
     pose: int,
     truth: Truth,
     change: Change,
@@ -167,7 +167,7 @@ def _record_pose(
     return PoseLog(pose=pose, attempt=1, streams=name, windows=tuple(windows)), wanted
 
 
-def _loads(plan: PlanFile) -> Iterator[tuple[str | None, tuple[float, float, float]]]:
+def _loads(plan: PlanResult) -> Iterator[tuple[str | None, tuple[float, float, float]]]:
     yield None, (0.0, 0.0, 0.0)
     yield from plan.contact.load_cases.items()
 

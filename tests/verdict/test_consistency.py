@@ -113,19 +113,19 @@ def test_parts_of_one_run_raise_no_doubt(finished):
 def test_a_dataset_of_another_run_is_doubted(copied):
     folder = copied("run")
     path = folder / "run" / "dataset.nc"
-    data = dataset.read(path).data.copy()
+    data = dataset.read(path).to_xarray().copy()
     data.attrs["provenance"] = data.attrs["provenance"].replace("seed 0", "seed 2")
-    dataset.write(dataset.Dataset(data), path)
+    dataset.write(dataset.Dataset.from_xarray(data), path)
     assert "the dataset does not say that it is of the run" in doubts(folder)
 
 
 def test_readings_that_were_struck_out_after_the_run_are_doubted(copied):
     folder = copied("run")
     path = folder / "run" / "dataset.nc"
-    data = dataset.read(path).data.copy(deep=True)
+    data = dataset.read(path).to_xarray().copy(deep=True)
     data["status"].values[0] = 1
     usable = int((data["status"].values == 0).sum())
-    dataset.write(dataset.Dataset(data), path)
+    dataset.write(dataset.Dataset.from_xarray(data), path)
     assert f"the dataset has {usable} usable readings, the summary" in doubts(folder)
 
 

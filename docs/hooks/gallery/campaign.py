@@ -11,13 +11,13 @@ import numpy as np
 
 from elastocal.cell import Cell, load_cell
 from elastocal.cell.examples import write_example
-from elastocal.cli.process_bench import Bench, Outcome, process_courses, run_process
+from elastocal.cli.process_bench import Bench, Outcome, run_process
 from elastocal.compensation import CompensatorSettings
-from elastocal.compensation.process import Comparison
+from elastocal.compensation.process import DeviationComparison, process_courses
 from elastocal.dataset import Readings
 from elastocal.elastic import ElasticModel, layout
 from elastocal.identification import Calibration, calibrate, summary
-from elastocal.planning import Planned, make_plan
+from elastocal.planning import PlanAndPool, make_plan
 from elastocal.sim.workcell import ErrorDraws, Places, QuickCell, QuickErrors, Scales
 
 SEED = 0
@@ -28,7 +28,7 @@ class Campaign:
     """Everything up to the calibrated model."""
 
     cell: Cell
-    planned: Planned
+    planned: PlanAndPool
     readings: Readings
     calibration: Calibration
 
@@ -76,20 +76,20 @@ def process(done: Campaign, kind: str, settings: CompensatorSettings, count: int
 
 def accuracy(done: Campaign) -> str:
     """Return in words what a calibration reaches."""
-    told = summary(done.calibration)
+    figures = summary(done.calibration)
     return (
-        f"{told['readings']} readings at {told['poses']} poses; measured deflection"
-        f" {1e3 * told['deflection']['mean']:.2f} mm mean; residual of the fit"
-        f" {1e3 * told['residual']['mean']:.3f} mm mean; error at left-out poses"
-        f" {1e3 * told['held_out']['mean']:.3f} mm mean"
+        f"{figures.readings} readings at {figures.poses} poses; measured deflection"
+        f" {1e3 * figures.deflection.mean:.2f} mm mean; residual of the fit"
+        f" {1e3 * figures.residual.mean:.3f} mm mean; error at left-out poses"
+        f" {1e3 * figures.held_out.mean:.3f} mm mean"
     )
 
 
-def reduction(line: Comparison) -> str:
+def reduction(line: DeviationComparison) -> str:
     """Return in words what the correction does to a process."""
     before, after = line.before, line.after
     return (
         f"mean {1e3 * before.mean:.3f} mm without and {1e3 * after.mean:.3f} mm with correction"
-        f" ({1 - after.mean / before.mean:.1%} less), largest {1e3 * before.largest:.3f} and"
-        f" {1e3 * after.largest:.3f} mm"
+        f" ({1 - after.mean / before.mean:.1%} less), largest {1e3 * before.max:.3f} and"
+        f" {1e3 * after.max:.3f} mm"
     )

@@ -4,8 +4,7 @@ import shutil
 from functools import partial
 from pathlib import Path
 
-from elastocal.cli.process_bench import MACHINING_SETTINGS
-from elastocal.compensation.process import Trace
+from elastocal.compensation.process import CourseDeviation, Roughing
 from elastocal.report.plots import (
     process_maps,
     write_figure,
@@ -22,9 +21,9 @@ def make(folder: Path) -> dict[str, str]:
     """Make the figures; return what is told of each."""
     done = campaign(example_cell(folder / "cell", "machining", SMALLER), None)
     draw_displacements(folder / "displacements-machining.svg", done)
-    outcome = process(done, "machining", MACHINING_SETTINGS, RINGS)
+    outcome = process(done, "machining", Roughing.compensator, RINGS)
     pairs = zip(outcome.before, outcome.after, strict=True)
-    traces = [Trace.of(SEED, *pair) for pair in pairs]
+    traces = [CourseDeviation.of(SEED, *pair) for pair in pairs]
     write_figure(folder / "maps-machining.png", partial(process_maps, traces))
     shutil.rmtree(folder / "cell")
     return {

@@ -6,9 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
-from elastocal.cli.process_bench import AFP_SETTINGS
 from elastocal.codec import CodecData, Verdicts, analyse, cross_validate, judge, make_variants
-from elastocal.compensation.process import Trace
+from elastocal.compensation.process import CourseDeviation, FibrePlacement
 from elastocal.report import write_plan_figure, write_plan_page
 from elastocal.report.plots import (
     codec_chart,
@@ -37,8 +36,10 @@ def make(folder: Path) -> dict[str, str]:
     draw_displacements(folder / "displacements-placement.svg", done)
     for name, (key, values) in CODECS.items():
         told[name] = _codec(folder, done, name, key, values)
-    outcome = process(done, "afp", AFP_SETTINGS, COURSES)
-    traces = [Trace.of(SEED, *pair) for pair in zip(outcome.before, outcome.after, strict=True)]
+    outcome = process(done, "afp", FibrePlacement.compensator, COURSES)
+    traces = [
+        CourseDeviation.of(SEED, *pair) for pair in zip(outcome.before, outcome.after, strict=True)
+    ]
     write_figure(folder / "maps-placement.png", partial(process_maps, traces))
     longest = max(traces, key=lambda trace: float(np.abs(trace.before).max()))
     write_figure(folder / "course-placement.svg", partial(course_figure, longest, TOLERANCE))

@@ -10,6 +10,7 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
+from elastocal.elastic import unit_of
 from elastocal.identification import (
     CalibrateResult,
     CalibrationSummary,
@@ -19,6 +20,8 @@ from elastocal.identification import (
     describe,
 )
 
+_USUAL_UNIT = unit_of("rad/(N*m)")
+"""Of most springs: the headings name it, other springs their own."""
 _MOST_SUSPICIOUS = 10
 _MOST_TERMS = 6
 """A combination of more springs than this tells a reader nothing."""
@@ -98,9 +101,9 @@ def _spring_table(figures: CalibrationSummary) -> Table:
     }
     table = Table(box=None, pad_edge=False)
     table.add_column("spring", no_wrap=True)
-    table.add_column("compliance\nµrad/(N·m)", justify="right", no_wrap=True)
+    table.add_column(f"compliance\n{_USUAL_UNIT.shown}", justify="right", no_wrap=True)
     table.add_column("95 %\ninterval", justify="right", no_wrap=True)
-    table.add_column("stiffness\nMN·m/rad", justify="right", no_wrap=True)
+    table.add_column(f"stiffness\n{_USUAL_UNIT.stiffness}", justify="right", no_wrap=True)
     table.add_column("known?", no_wrap=True)
     for spring in figures.springs:
         table.add_row(*_spring_row(spring, group_of.get(spring.name)))
@@ -108,8 +111,11 @@ def _spring_table(figures: CalibrationSummary) -> Table:
 
 
 def _spring_row(spring: SpringSummary, group: int | None) -> tuple[str, ...]:
-    value, low, high = (1e6 * each for each in (spring.compliance, spring.low, spring.high))
-    unit, stiff = ("", "") if spring.kind == "revolute" else (" µm/N", " MN/m")
+    shown = unit_of(spring.unit)
+    values = (spring.compliance, spring.low, spring.high)
+    value, low, high = (shown.factor * each for each in values)
+    usual = shown == _USUAL_UNIT
+    unit, stiff = ("", "") if usual else (f" {shown.shown}", f" {shown.stiffness}")
     if not spring.observable:
         note = f"[yellow]not by itself[/yellow], group {group}"
         return escape(spring.name), f"[dim]({value:.4f}{unit})[/dim]", "", "", note

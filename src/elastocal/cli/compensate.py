@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 if TYPE_CHECKING:
-    from elastocal.compensation.offline import KrlResult, Tally
+    from elastocal.compensation.offline import CorrectionSummary
     from elastocal.robot import Robot
 
 START_HELP = (
@@ -41,7 +41,8 @@ def compensate(
     from elastocal.cli.output import console, print_json
     from elastocal.cli.posture_option import parse_frame, parse_posture
     from elastocal.cli.progress import progress_bars
-    from elastocal.compensation.offline import Settings, compensate_krl, compensate_path
+    from elastocal.compensation.offline import CorrectionSettings, compensate_path
+    from elastocal.compensation.programs import compensate_program
     from elastocal.errors import FileAccessError, UnitError
     from elastocal.identification import read_model
     from elastocal.units import parse_quantity
@@ -58,13 +59,13 @@ def compensate(
     limit = parse_quantity(largest, "length")
     if not limit > 0.0:
         raise UnitError(f"--limit {largest!r} must be above 0")
-    settings = Settings(parse_posture(calibrated.model.robot, start), limit)
+    settings = CorrectionSettings(parse_posture(calibrated.model.robot, start), limit)
     notes = [] if covered(calibrated) else [NOT_COVERED]
     if krl:
         if forces is None:
             raise FileAccessError(f"{path} has no forces: name a table of them with --forces")
-        program = compensate_krl(calibrated, path, forces, out, settings, parse_frame(base))
-        tally, notes = program.tally, notes + _program_notes(program, base)
+        program = compensate_program(calibrated, path, forces, out, settings, parse_frame(base))
+        tally, notes = program.summary, [*notes, *program.notes]
     else:
         with progress_bars(console()) as report:
             tally = compensate_path(calibrated, path, out, settings, report)
@@ -82,7 +83,7 @@ def compensate(
             console().print(line)
 
 
-def _lines(tally: "Tally", out: Path) -> list[str]:
+def _lines(tally: "CorrectionSummary", out: Path) -> list[str]:
     """Return what was done, for people."""
     names = (
         ("deviation as programmed", tally.deviation),
@@ -99,7 +100,7 @@ def _lines(tally: "Tally", out: Path) -> list[str]:
     return lines
 
 
-def _path_notes(tally: "Tally", robot: "Robot", start: str | None) -> list[str]:
+def _path_notes(tally: "CorrectionSummary", robot: "Robot", start: str | None) -> list[str]:
     from elastocal.cli.posture_option import written_posture
 
     notes = []
@@ -114,23 +115,4 @@ def _path_notes(tally: "Tally", robot: "Robot", start: str | None) -> list[str]:
             f"the first row is taken to be reached in the posture nearest to zero: {shown}; another"
             " posture deflects otherwise, give --start if it is another"
         )
-    return notes
-
-
-def _program_notes(program: "KrlResult", base: str | None) -> list[str]:
-    frame = program.base or "$BASE, which the program does not set,"
-    tool = program.tool or "$TOOL, which the program does not set,"
-    src, dat = program.files
-    notes = [
-        f"{frame} is taken for {'the frame given by --base' if base else 'the base of the model'},"
-        f" {tool} for its tcp",
-        f"{src.name} is the program as it was, {dat.name} has the corrected points",
-    ]
-    if program.assumed:
-        notes.append(
-            f"{len(program.assumed)} motions (first: {program.assumed[0]}) come from a PTP that"
-            " does not tell its posture (no E6AXIS of the .dat file): the last one known is taken"
-        )
-    if program.name and program.name.lower() != src.stem.lower():
-        notes.append(f"the program inside is {program.name}: a controller wants {program.name}.src")
     return notes

@@ -7,11 +7,11 @@ from typing import Any
 
 from elastocal.cli import codec_kinds, model_kinds, run_kinds, study_kinds
 from elastocal.compensation.process import TABLE
-from elastocal.dataset import read_netcdf
 from elastocal.errors import DatasetError, SchemaError
 from elastocal.files import read_text
 from elastocal.planning import PLAN
 from elastocal.procedure import JOURNAL
+from elastocal.records import read_arrays
 
 Facts = dict[str, Any]
 Described = tuple[str, Facts]
@@ -71,9 +71,9 @@ def _folder(path: Path) -> Described:
 def _netcdf(path: Path) -> Described:
     """Describe a NetCDF file by the schema that it states."""
     try:
-        stated = read_netcdf(path).attrs.get("schema")
-    except DatasetError as error:
-        raise DatasetError(f"{path}: {error}") from error
+        stated = read_arrays(path).attributes.get("schema")
+    except SchemaError as error:
+        raise DatasetError(str(error)) from error
     kinds: dict[str, Describe] = {
         "elastocal.codec": codec_kinds.arrays,
         "elastocal.pool": run_kinds.pool_file,

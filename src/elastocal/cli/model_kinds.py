@@ -6,11 +6,12 @@ from typing import Any
 from elastocal.compensation import read_settings
 from elastocal.compensation.conditioning import read_tool
 from elastocal.compensation.process import TABLE, read_process, read_table
-from elastocal.elastic.layouts import read_springs
+from elastocal.elastic import read_springs
 from elastocal.errors import RobotError
 from elastocal.files import read_text
 from elastocal.identification import read_model
-from elastocal.identification.recertification import read_comparison
+from elastocal.identification.recertification import CompareSummary
+from elastocal.records import read_json
 from elastocal.robot import Robot, leaf_links, parse_urdf
 
 Described = tuple[str, dict[str, Any]]
@@ -97,7 +98,7 @@ def process_table(path: Path) -> Described:
 
 def comparison_file(path: Path) -> Described:
     """Describe a comparison of two calibrations."""
-    record = read_comparison(path)
+    record = read_json(path, CompareSummary)
     return "comparison of two calibrations", {
         "schema": "elastocal.comparison/1",
         "robot": record.robot,
@@ -113,4 +114,4 @@ def process_folder(path: Path) -> Described:
     """Describe the folder of a simulated process; its deviations are validated, too."""
     record = read_process(path)
     kind, facts = process_table(path / TABLE)
-    return kind, {**facts, "courses": len(record.traces)}
+    return kind, {**facts, "courses": len(record.courses)}

@@ -3,12 +3,12 @@
 from pathlib import Path
 
 from elastocal.cell import Cell
-from elastocal.planning import Planned, write_plan, write_pool
+from elastocal.planning import PlanAndPool, write_plan, write_pool
 from elastocal.planning.export import takes_krl, write_krl, write_table
 from elastocal.report import write_plan_figure, write_plan_page
 
 
-def write_plan_folder(folder: Path, cell: Cell, planned: Planned, program: str) -> list[str]:
+def write_plan_folder(folder: Path, cell: Cell, planned: PlanAndPool, program: str) -> list[str]:
     """Write every file of a plan; return their names.
 
     Parameters
@@ -17,7 +17,7 @@ def write_plan_folder(folder: Path, cell: Cell, planned: Planned, program: str) 
         An empty folder.
     cell : Cell
         That the plan was made for.
-    planned : Planned
+    planned : PlanAndPool
         Plan, pool and surface.
     program : str
         Name of the KRL program; none is written for an arm whose axes KRL cannot name.

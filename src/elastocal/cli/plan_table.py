@@ -7,10 +7,10 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table
 
-from elastocal.planning import PlanFile, SpreadRecord
+from elastocal.planning import PlanResult, SpreadRecord
 
 
-def key_figures(plan: PlanFile) -> dict[str, Any]:
+def key_figures(plan: PlanResult) -> dict[str, Any]:
     """Return the figures of ``plan --json``, in SI units."""
     search = plan.search
     return {
@@ -32,7 +32,7 @@ def key_figures(plan: PlanFile) -> dict[str, Any]:
     }
 
 
-def show_plan(console: Console, plan: PlanFile, folder: Path, names: list[str]) -> None:
+def show_plan(console: Console, plan: PlanResult, folder: Path, names: list[str]) -> None:
     """Print the plan for a person."""
     search, pool = plan.search, plan.pool
     console.print(
@@ -52,7 +52,7 @@ def show_plan(console: Console, plan: PlanFile, folder: Path, names: list[str]) 
     console.print(f"written to {folder}: {', '.join(names)}", markup=False, soft_wrap=True)
 
 
-def _spread_table(plan: PlanFile) -> Table:
+def _spread_table(plan: PlanResult) -> Table:
     table = Table(title="How the poses lie in the pool", title_justify="left")
     table.add_column("technique")
     for title in ("covering radius", "to the edge, mean", "to the next pose, mean", "O1"):
@@ -70,7 +70,7 @@ def _lengths(spread: SpreadRecord) -> list[str]:
     return ["none" if value is None else f"{1e3 * value:.1f} mm" for value in values]
 
 
-def _check_table(plan: PlanFile) -> Table:
+def _check_table(plan: PlanResult) -> Table:
     """Return what each check refused, and how near the chosen poses come to it."""
     table = Table(title="Checks", title_justify="left")
     table.add_column("check")
@@ -99,7 +99,7 @@ def _with_unit(margin: float, unit: str | None) -> str:
     return f"{margin:.3f}" if unit in (None, "1") else f"{margin:.1f} {unit}"
 
 
-def _stations(plan: PlanFile) -> dict[str, int]:
+def _stations(plan: PlanResult) -> dict[str, int]:
     names = [pose.seen_by for pose in plan.poses if pose.seen_by is not None]
     return {name: names.count(name) for name in sorted(set(names))}
 

@@ -7,12 +7,8 @@ from pathlib import Path
 
 from elastocal.cell import Cell
 from elastocal.cli.process_bench import (
-    AFP_SETTINGS,
-    BUDGET,
-    MACHINING_SETTINGS,
     Bench,
     Report,
-    process_courses,
     require_same_robot,
     run_effect,
     run_process,
@@ -20,14 +16,16 @@ from elastocal.cli.process_bench import (
 from elastocal.compensation import CompensatorSettings, read_settings
 from elastocal.compensation.conditioning import read_tool, sensor_load
 from elastocal.compensation.process import (
-    Comparison,
+    BUDGET,
+    PROCESSES,
     Course,
-    ProcessRecord,
-    Source,
-    Table,
-    Trace,
-    lines_of,
+    CourseDeviation,
+    DeviationComparison,
+    ProcessRun,
+    SimulatedProcess,
+    SimulateProcessResult,
     pooled,
+    process_courses,
 )
 from elastocal.errors import CompensationError
 from elastocal.files import read_text, sha256
@@ -63,7 +61,7 @@ class Question:
 class Answer:
     """What was found."""
 
-    record: ProcessRecord
+    record: SimulatedProcess
     programme: tuple[Course, ...]
     """What was programmed, with the forces of the first seed."""
 
@@ -102,9 +100,9 @@ def answer(question: Question, report: Report) -> Answer:
     """
     settings = _settings(question)
     benches = [_bench(question, settings, run) for run in question.runs]
-    lines: list[Comparison] = []
-    traces: list[Trace] = []
-    budget: tuple[Comparison, ...] = ()
+    lines: list[DeviationComparison] = []
+    deviations: list[CourseDeviation] = []
+    budget: tuple[DeviationComparison, ...] = ()
     programme: tuple[Course, ...] = ()
     for bench in benches:
         courses = process_courses(question.process, question.cell, bench.seed, question.courses)
@@ -112,31 +110,31 @@ def answer(question: Question, report: Report) -> Answer:
         outcome = run_process(bench, courses, report)
         lines.append(outcome.line(f"seed {bench.seed}"))
         pairs = zip(outcome.before, outcome.after, strict=True)
-        traces += [Trace.of(bench.seed, before, after) for before, after in pairs]
+        deviations += [CourseDeviation.of(bench.seed, before, after) for before, after in pairs]
         if question.budget and not budget:
             budget = tuple(
                 run_effect(bench, courses, effect, report).line(effect.name) for effect in BUDGET
             )
     if len(lines) > 1:
         lines.append(pooled("all seeds", lines))
-    record = ProcessRecord(_table(question, settings, lines, budget), tuple(traces))
+    record = SimulatedProcess(_table(question, settings, lines, budget), tuple(deviations))
     return Answer(record, programme)
 
 
 def _table(
     question: Question,
     settings: CompensatorSettings,
-    lines: Sequence[Comparison],
-    budget: Sequence[Comparison],
-) -> Table:
-    return Table(
+    lines: Sequence[DeviationComparison],
+    budget: Sequence[DeviationComparison],
+) -> SimulateProcessResult:
+    return SimulateProcessResult(
         cell=question.cell.name,
         process=question.process,
         runs=tuple(_source(run) for run in question.runs),
         settings=settings.model_dump(mode="json"),
         versions={name: version(name) for name in _PACKAGES},
-        lines=lines_of(lines),
-        budget=lines_of(budget),
+        lines=tuple(lines),
+        budget=tuple(budget),
     )
 
 
@@ -152,9 +150,9 @@ def _bench(question: Question, settings: CompensatorSettings, run: Run) -> Bench
     return Bench(question.cell, calibrated, load, settings, run.seed, jobs=question.jobs)
 
 
-def _source(run: Run) -> Source:
+def _source(run: Run) -> ProcessRun:
     tool = run.tool
-    return Source(
+    return ProcessRun(
         seed=run.seed,
         model=str(run.model),
         model_sha256=sha256(read_text(run.model)),
@@ -172,4 +170,6 @@ def _settings(question: Question) -> CompensatorSettings:
                 " corrected in base"
             )
         return settings
-    return MACHINING_SETTINGS if question.process == "machining" else AFP_SETTINGS
+    # A process that is not known is refused when its courses are made.
+    known = PROCESSES.get(question.process)
+    return CompensatorSettings() if known is None else known.compensator

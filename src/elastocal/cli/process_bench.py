@@ -16,49 +16,26 @@ from elastocal.compensation import CompensatorSettings
 from elastocal.compensation.conditioning import SensorLoad
 from elastocal.compensation.online import Compensator
 from elastocal.compensation.process import (
-    SPINDLE,
-    Comparison,
     Controller,
     Corrector,
     Course,
+    CourseRun,
+    DeviationComparison,
+    Effect,
     ModelCorrector,
-    Passage,
     PerfectCorrector,
-    Placement,
-    Roughing,
     air_shifts,
-    compare,
-    placement_courses,
-    roughing_rings,
+    compare_deviations,
     run_course,
-    with_postures,
 )
 from elastocal.errors import CompensationError
 from elastocal.identification import CalibratedModel
-from elastocal.planning import cell_surface
-from elastocal.robot import (
-    inverse_transform,
-)
+from elastocal.robot import inverse_transform
 from elastocal.sim.workcell import ProcessCell
 
 Report = Callable[[str, int, int], None]
 _ZEROING = 250
 """Readings in the air that a sensor is zeroed by when no tool file says its bias."""
-
-AFP_SETTINGS = CompensatorSettings()
-MACHINING_SETTINGS = CompensatorSettings.model_validate(
-    {
-        "filter": {
-            "sample": "1 ms",
-            "notches": [
-                {"frequency": f"{SPINDLE:g} Hz", "width": "20 Hz"},
-                {"frequency": f"{2.0 * SPINDLE:g} Hz", "width": "20 Hz"},
-            ],
-            "low_pass": {"cutoff": "25 Hz"},
-        }
-    }
-)
-"""The lines at 200 and 400 Hz cannot be notched at a cycle of 4 ms: readings come every 1 ms."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,63 +63,14 @@ class Bench:
 class Outcome:
     """Every course without and with correction."""
 
-    before: tuple[Passage, ...]
-    after: tuple[Passage, ...]
+    before: tuple[CourseRun, ...]
+    after: tuple[CourseRun, ...]
 
-    def line(self, name: str) -> Comparison:
+    def line(self, name: str) -> DeviationComparison:
         """Return the line of the table."""
-        return compare(name, *([p.deviation for p in side] for side in (self.before, self.after)))
-
-
-@dataclass(frozen=True)
-class Effect:
-    """A line of the error budget: something is switched off."""
-
-    name: str
-    quiet: bool = False
-    prompt: bool = False
-    supple: bool = False
-    exact: bool = False
-    """The deflection is known, though as late as the filters and the controller make it."""
-
-
-BUDGET = (
-    Effect("everything on"),
-    Effect("without noise, drift, cross-talk, stop error", quiet=True),
-    Effect("without delay of filters and controller", prompt=True),
-    Effect("without backlash and hysteresis", supple=True),
-    Effect("with a perfect model, delays on", exact=True),
-    Effect("none of noise, delay, backlash: the model alone", quiet=True, prompt=True, supple=True),
-)
-
-
-def process_courses(kind: str, cell: Cell, seed: int, count: int | None) -> tuple[Course, ...]:
-    """Return the courses of a process on the cell's surface, with joints.
-
-    Parameters
-    ----------
-    kind : str
-        ``afp`` or ``machining``.
-    cell : Cell
-        The cell.
-    seed : int
-        Of the forces.
-    count : int, optional
-        Number of courses or rings; by default the process's.
-
-    Raises
-    ------
-    CompensationError
-        If the kind is neither, or the robot cannot follow.
-    """
-    rng, surface = np.random.default_rng([seed, 6]), cell_surface(cell)
-    if kind == "afp":
-        placement = Placement() if count is None else Placement(courses=count)
-        return with_postures(cell, placement_courses(surface, placement, rng))
-    if kind == "machining":
-        roughing = Roughing() if count is None else Roughing(rings=count)
-        return with_postures(cell, roughing_rings(surface, roughing, rng))
-    raise CompensationError(f"process {kind!r} is not one of afp, machining")
+        return compare_deviations(
+            name, *([p.deviation for p in side] for side in (self.before, self.after))
+        )
 
 
 def run_process(bench: Bench, courses: tuple[Course, ...], report: Report) -> Outcome:
@@ -161,7 +89,7 @@ def run_effect(
 ) -> Outcome:
     """Run courses with something switched off."""
     late = round(float(bench.settings.chain.delay()) / bench.settings.cycle)
-    changed = replace(bench, cell=_changed(bench.cell, effect))
+    changed = replace(bench, cell=effect.changed(bench.cell))
     if effect.prompt:
         none = {"median": 1, "notches": (), "low_pass": None}
         bare = bench.settings.filter.model_copy(update=none)
@@ -206,7 +134,7 @@ def _passages(
     """Run every course twice; ``late`` is that of a perfect corrector, None: the model corrects."""
     jobs = min(bench.jobs or os.cpu_count() or 1, len(courses))
     zeroed_at = courses[0].q[0]
-    pairs: dict[int, tuple[Passage, Passage]] = {}
+    pairs: dict[int, tuple[CourseRun, CourseRun]] = {}
     # The longest first, or the last one would be run while the other processes wait.
     order = sorted(range(len(courses)), key=lambda number: -len(courses[number].q))
     report(stage, 0, len(courses))
@@ -222,7 +150,7 @@ def _passages(
 
 def _twice(
     bench: Bench, course: Course, zeroed_at: FloatArray, late: int | None
-) -> tuple[Passage, Passage]:
+) -> tuple[CourseRun, CourseRun]:
     """Return a course without and with correction; courses know nothing of one another."""
     truth, robot = ProcessCell(bench.cell, bench.seed), bench.cell.robot
     corrects = _corrector(bench, truth, zeroed_at) if late is None else PerfectCorrector(late)
@@ -250,18 +178,3 @@ def _zeroed(cell: Cell, truth: ProcessCell, q: FloatArray) -> SensorLoad:
     known = np.concatenate([weight, np.cross(centre, weight)])
     bias = raw - known
     return SensorLoad(mass, centre, bias[:3], bias[3:], T, gravity)
-
-
-def _changed(cell: Cell, effect: Effect) -> Cell:
-    """Return the cell with parts of its truth switched off."""
-    simulation = cell.file.simulation
-    update: dict[str, object] = {}
-    if effect.quiet:
-        silent = {"force_noise": 0.0, "moment_noise": 0.0, "drift": 0.0, "cross_talk": 0.0}
-        update["sensor"] = simulation.sensor.model_copy(update=silent)
-        update["controller"] = simulation.controller.model_copy(update={"repeatability": 0.0})
-    if effect.supple:
-        easy = {"backlash": 0.0, "hysteresis": 0.0}
-        update["gears"] = simulation.gears.model_copy(update=easy)
-    changed = simulation.model_copy(update=update)
-    return replace(cell, file=cell.file.model_copy(update={"simulation": changed}))

@@ -5,10 +5,10 @@ from collections.abc import Sequence
 from rich.console import Console
 from rich.table import Table as Printed
 
-from elastocal.compensation.process import Line, Table, Values
+from elastocal.compensation.process import DeviationComparison, SimulateProcessResult
 
 
-def show(console: Console, table: Table) -> None:
+def show(console: Console, table: SimulateProcessResult) -> None:
     """Print the table in mm, and the budget below it."""
     points = f"{table.lines[-1].points} points"
     title = f"{table.cell}, {table.process}: absolute deviation in mm at {points}"
@@ -17,17 +17,13 @@ def show(console: Console, table: Table) -> None:
         console.print(_printed(f"error budget of seed {table.runs[0].seed}", table.budget))
 
 
-def _printed(title: str, lines: Sequence[Line]) -> Printed:
+def _printed(title: str, lines: Sequence[DeviationComparison]) -> Printed:
     """Return a table with two lines of text a line: before and after, reduction below."""
     printed = Printed("before > after, reduction", title=title, show_lines=True)
     for name in ("mean", "max", "st. dev."):
         printed.add_column(name, justify="right", no_wrap=True)
     for line in lines:
-        triples = zip(*map(_three, (line.before, line.after, line.reduction)), strict=True)
+        triples = zip(line.before.values, line.after.values, line.reduction.values, strict=True)
         cells = [f"{1e3 * b:.3f} > {1e3 * a:.3f}\n{100 * r:.1f} %" for b, a, r in triples]
         printed.add_row(line.name, *cells)
     return printed
-
-
-def _three(values: Values) -> tuple[float, float, float]:
-    return values.mean, values.max, values.standard_deviation

@@ -45,25 +45,25 @@ def simulate_process(  # noqa: PLR0913 (a command has as many options as it has)
     from elastocal.cli.process_table import show
     from elastocal.cli.progress import progress_bars
     from elastocal.compensation.process import (
-        PROGRAMME,
+        PROGRAMMED_PATH,
         TABLE,
-        process_figures,
         write_process,
-        write_programme,
+        write_programmed_path,
     )
     from elastocal.dataset import joint_dimensions
     from elastocal.files import filling
+    from elastocal.records import to_data
 
     runs = runs_of(model, tool or [], seed or [0])
     made = load_cell(cell)
     with filling(out, TABLE, force) as folder, progress_bars(console()) as report:
         found = answer(Question(made, process, runs, settings, courses, budget, jobs), report)
         units = joint_dimensions(made.robot.joint_names, made.robot.revolute)
-        write_programme(folder / PROGRAMME, found.programme, units)
+        write_programmed_path(folder / PROGRAMMED_PATH, found.programme, units)
         write_process(folder, found.record)
     table = found.record.table
     if as_json:
-        print_json(process_figures(table) | {"folder": str(out)})
+        print_json(to_data(table) | {"folder": str(out)})
     else:
         show(console(), table)
         console().print(f"written to {out}")

@@ -10,19 +10,21 @@ import numpy as np
 from elastocal.arrays import FloatArray
 from elastocal.cell import load_cell
 from elastocal.cli.coverage import covered
-from elastocal.compensation.path import PathError
+from elastocal.compensation.offline import (
+    PathError,
+)
 from elastocal.compensation.stiffness import (
-    Choice,
-    Grid,
-    Hold,
-    Permit,
-    Stations,
-    Survey,
-    cell_permit,
-    choose,
+    PathPostures,
+    PathStations,
+    PostureChoice,
+    PostureConstraint,
+    PostureGrid,
+    PostureSurvey,
+    cell_constraints,
+    choose_postures,
     read_stations,
-    same_robot,
-    survey,
+    require_same_robot,
+    survey_postures,
 )
 from elastocal.identification import CalibratedModel
 from elastocal.robot import Robot
@@ -47,11 +49,11 @@ class Answer:
     """What was found."""
 
     question: Question
-    stations: Stations
+    stations: PathStations
     direction: FloatArray
     """Shape (station, 3), in base."""
-    survey: Survey
-    choice: Choice
+    survey: PostureSurvey
+    choice: PostureChoice
     covered: bool
 
     @property
@@ -61,9 +63,9 @@ class Answer:
         return "the tool's axis (normal)" if text == "normal" else f"({text}) in base"
 
     @property
-    def holds(self) -> list[Hold]:
+    def postures(self) -> list[PathPostures]:
         """Postures as programmed, and those chosen."""
-        programmed = Hold("as programmed", self.stations.q, np.zeros(len(self.stations)))
+        programmed = PathPostures("as programmed", self.stations.q, np.zeros(len(self.stations)))
         one = [] if self.choice.one is None else [self.choice.one]
         return [programmed, *one, self.choice.each]
 
@@ -82,26 +84,26 @@ def answer(
     """
     robot = calibrated.model.robot
     solver = inverse_for(robot)
-    permits: tuple[Permit, ...] = ()
+    constraints: tuple[PostureConstraint, ...] = ()
     external = grid_of_external(robot, question.stands)
     if question.cell is not None:
         cell = load_cell(question.cell)
-        same_robot(robot, cell.robot)
-        permits, external = cell_permit(cell), cell.external_positions
+        require_same_robot(robot, cell.robot)
+        constraints, external = cell_constraints(cell), cell.external_positions
     stations = read_stations(question.path, solver, question.stations, question.start)
     towards = parse_direction(question.direction, stations)
     turns = np.linspace(0.0, 2.0 * np.pi, question.spins, endpoint=False)
     count = len(stations)
-    found = survey(
+    found = survey_postures(
         calibrated,
         solver,
         stations.T_base_tcp,
         towards,
-        Grid(turns, external),
-        permits,
+        PostureGrid(turns, external),
+        constraints,
         lambda done: report("stations", done, count),
     )
-    choice = choose(found, solver)
+    choice = choose_postures(found, solver)
     return Answer(question, stations, towards, found, choice, covered(calibrated))
 
 
@@ -125,7 +127,7 @@ def grid_of_external(robot: Robot, count: int) -> FloatArray:
     return np.array(grid, dtype=float).reshape(len(grid), robot.external_axes)
 
 
-def parse_direction(text: str, stations: Stations) -> FloatArray:
+def parse_direction(text: str, stations: PathStations) -> FloatArray:
     """Return unit vectors in base, shape (station, 3).
 
     Raises

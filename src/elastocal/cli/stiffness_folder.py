@@ -7,8 +7,13 @@ import numpy as np
 
 from elastocal.arrays import FloatArray
 from elastocal.cli.stiffness_answer import Answer
-from elastocal.compensation.offline import jumps
-from elastocal.compensation.stiffness import Hold, directional, write_choice, write_survey
+from elastocal.compensation.offline import posture_jumps
+from elastocal.compensation.stiffness import (
+    PathPostures,
+    directional_stiffness,
+    write_choice,
+    write_survey,
+)
 from elastocal.files import write_json
 from elastocal.identification import CalibratedModel
 from elastocal.report import Curve, write_stiffness_figure
@@ -26,11 +31,11 @@ def write_folder(folder: Path, calibrated: CalibratedModel, found: Answer) -> di
         If a file cannot be written.
     """
     robot = calibrated.model.robot
-    curves = [_curve(calibrated, found, hold) for hold in found.holds]
+    curves = [_curve(calibrated, found, postures) for postures in found.postures]
     paths = [
         write_survey(folder / "postures.csv", robot, found.stations, found.survey),
         write_choice(
-            folder / "choice.csv", calibrated, found.stations, found.direction, found.holds
+            folder / "choice.csv", calibrated, found.stations, found.direction, found.postures
         ),
     ]
     for name in ("stiffness.svg", "stiffness.png"):
@@ -45,20 +50,20 @@ def write_folder(folder: Path, calibrated: CalibratedModel, found: Answer) -> di
     return figures
 
 
-def _curve(calibrated: CalibratedModel, found: Answer, hold: Hold) -> Curve:
-    there = np.flatnonzero(np.isfinite(hold.q).all(axis=1))
-    k = directional(calibrated, hold.q[there], found.direction[there])
-    stiffness, low, high = (np.full(len(hold.q), np.nan) for _ in range(3))
+def _curve(calibrated: CalibratedModel, found: Answer, postures: PathPostures) -> Curve:
+    there = np.flatnonzero(np.isfinite(postures.q).all(axis=1))
+    k = directional_stiffness(calibrated, postures.q[there], found.direction[there])
+    stiffness, low, high = (np.full(len(postures.q), np.nan) for _ in range(3))
     stiffness[there], low[there], high[there] = k.stiffness, k.low, k.high
     railed = calibrated.model.robot.external_axes > 0
-    rail = hold.q[:, 0] if railed else np.full(len(hold.q), np.nan)
-    return Curve(hold.name, stiffness, low, high, hold.spin, rail)
+    rail = postures.q[:, 0] if railed else np.full(len(postures.q), np.nan)
+    return Curve(postures.name, stiffness, low, high, postures.spin, rail)
 
 
-def _jumps(robot: Robot, hold: Hold) -> int:
+def _jumps(robot: Robot, postures: PathPostures) -> int:
     """Return at how many stations a joint turns by more than 90 deg from the one before."""
-    q = hold.q[np.isfinite(hold.q).all(axis=1)]
-    return len(jumps(robot, q, q[0])) if len(q) else 0
+    q = postures.q[np.isfinite(postures.q).all(axis=1)]
+    return len(posture_jumps(robot, q, q[0])) if len(q) else 0
 
 
 def _figures(robot: Robot, found: Answer, curves: list[Curve]) -> dict[str, Any]:
@@ -76,8 +81,8 @@ def _figures(robot: Robot, found: Answer, curves: list[Curve]) -> dict[str, Any]
             "refused": found.survey.refused,
         },
         "choices": [
-            _choice(curve, _jumps(robot, hold))
-            for curve, hold in zip(curves, found.holds, strict=True)
+            _choice(curve, _jumps(robot, postures))
+            for curve, postures in zip(curves, found.postures, strict=True)
         ],
     }
 

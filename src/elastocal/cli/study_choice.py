@@ -11,7 +11,7 @@ from elastocal.cell import Cell
 from elastocal.codec import training_cases
 from elastocal.codec.study import Condition
 from elastocal.errors import CodecError
-from elastocal.planning import Searched, cell_surface, gather, sight_check
+from elastocal.planning import SearchPool, cell_surface, sample_pool, sight_check
 from elastocal.planning.search import Candidates, RandomChoice, technique
 from elastocal.sim.workcell import Places
 
@@ -86,7 +86,7 @@ def study_poses(cell: Cell, verification: int, jobs: int | None) -> StudyPoses:
     """
     for_points, for_verification = np.random.default_rng(cell.file.search.seed).spawn(2)
     surface = cell_surface(cell)
-    gathered = gather(cell, surface, for_points, jobs)
+    gathered = sample_pool(cell, surface, for_points, jobs)
     postures = gathered.pool.postures
     if not 1 <= verification < len(postures):
         raise CodecError(
@@ -100,7 +100,7 @@ def study_poses(cell: Cell, verification: int, jobs: int | None) -> StudyPoses:
     places = {each.name: each.position_base for each in cell.file.trackers}
     station = np.array([places[str(name)] for name in check.seen_by(postures)])
     pool = StudyPool(postures.q, postures.normal, station, left, aside)
-    return StudyPoses(pool, Searched.of(cell, surface, gathered).candidates.take(left))
+    return StudyPoses(pool, SearchPool.of(cell, surface, gathered).candidates.take(left))
 
 
 def choose(cell: Cell, poses: StudyPoses, conditions: Sequence[Condition]) -> tuple[Chosen, ...]:

@@ -189,7 +189,7 @@ def _settings(
         load_cases=cell.file.load_cases.cases,
         conditions=tuple(ConditionRecord.of(each) for each in conditions),
         springs={
-            name: tuple(SpringRecord(name=s.name, unit=s.unit) for s in model.springs)
+            name: tuple(SpringRecord(name=p.name, unit=p.unit.si) for p in model.parameters)
             for name, model in models.items()
         },
         versions={name: version(name) for name in _PACKAGES},

@@ -38,9 +38,10 @@ def tool(
     from elastocal.compensation.conditioning import (
         fit_tool,
         refuse_mistakes,
-        tool_record,
+        tool_result,
         write_tool,
     )
+    from elastocal.records import to_data
     from elastocal.workflows import refuse_overwriting
 
     refuse_overwriting(out, data)
@@ -51,9 +52,9 @@ def tool(
         source = from_table(data, arm, flange, transform(sensor), three_numbers(down))
     fit = fit_tool(source.postures, source.R_nominal, keep_rotation)
     refuse_mistakes(source.postures, fit, source.R_nominal, source.expected_centre, source.points)
-    record = tool_record(fit, source.mount, str(data))
+    record = tool_result(fit, source.mount, str(data))
     write_tool(out, record)
     if as_json:
-        print_json(record.model_dump(mode="json"))
+        print_json(to_data(record))
     else:
         show_tool(console(), record, out)

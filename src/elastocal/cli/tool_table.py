@@ -7,13 +7,13 @@ from rich.console import Console
 from rich.table import Table
 from scipy.spatial.transform import Rotation
 
-from elastocal.compensation.conditioning import NAMES, ToolRecord
+from elastocal.compensation.conditioning import TOOL_UNKNOWNS, ToolResult
 
 _SHOWN = {"mass": ("kg", 1.0), "sensor": ("deg", 180.0 / np.pi), "force": ("N", 1.0)}
 _SHOWN |= {"centre": ("mm", 1e3), "moment": ("N*m", 1.0)}
 
 
-def show_tool(console: Console, record: ToolRecord, out: Path) -> None:
+def show_tool(console: Console, record: ToolResult, out: Path) -> None:
     """Print the unknowns with their intervals."""
     rotation = Rotation.from_matrix(record.R_flange_sensor).as_rotvec()
     values = [
@@ -24,7 +24,7 @@ def show_tool(console: Console, record: ToolRecord, out: Path) -> None:
         *record.moment_bias,
     ]
     table = Table("", "value", "± (95 %)", "", title=f"{record.postures} static postures")
-    for name, value in zip(NAMES, values, strict=True):
+    for name, value in zip(TOOL_UNKNOWNS, values, strict=True):
         unit, scale = _SHOWN[name.split()[0]]
         width = record.half_width[name]
         if width is None:

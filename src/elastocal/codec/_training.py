@@ -67,10 +67,10 @@ class PreparedVariant:
         Shape (pose, row, spring).
         """
         found = [self.problem.O[which & (self.problem.block == pose)] for pose in poses]
-        rows = np.zeros((len(poses), max(map(len, found)), 3, self.problem.springs))
+        rows = np.zeros((len(poses), max(map(len, found)), 3, self.problem.columns))
         for filled, blocks in zip(rows, found, strict=True):
             filled[: len(blocks)] = blocks
-        return rows.reshape(len(poses), -1, self.problem.springs)
+        return rows.reshape(len(poses), -1, self.problem.columns)
 
 
 @dataclass(frozen=True, eq=False)
@@ -168,7 +168,7 @@ def prepared_variants(
         each.springs: ElasticModel(robot, layout(robot, each.springs)) for each in data.variants
     }
     for each, labels in zip(data.variants, data.springs, strict=True):
-        found = tuple(spring.name for spring in models[each.springs].springs)
+        found = models[each.springs].parameter_names
         if found != labels.names:
             raise CodecError(
                 f"variant {each.name!r} was made with {len(labels.names)} springs;"

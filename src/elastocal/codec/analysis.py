@@ -94,18 +94,18 @@ def _spring_observability(
     robot: Robot, data: CodecData, prepared: PreparedVariant
 ) -> SpringObservability:
     variant, rows = prepared.variant, prepared.triangles.rows[:, :, :-1]
-    chosen = data.chosen[data.index(variant.name)]
+    chosen, size = data.chosen[data.index(variant.name)], prepared.problem.size
     determined = np.array(
-        [[_determined(rows[poses[poses != NO_POSE]]) for poses in row] for row in chosen]
+        [[_determined(rows[poses[poses != NO_POSE]], size) for poses in row] for row in chosen]
     )
     system = factor(prepared.problem.take(prepared.trains))
     found = observability(system, layout(robot, variant.springs))
     return SpringObservability(variant.name, determined, found.unobservable)
 
 
-def _determined(triangles: FloatArray) -> BoolArray:
+def _determined(triangles: FloatArray, size: FloatArray | float) -> BoolArray:
     """Return which springs the rows of some poses determine, shape (spring,)."""
-    rows = unit_columns(triangles).rows
+    rows = unit_columns(triangles, size).rows
     triangle = np.linalg.qr(rows.reshape(-1, rows.shape[2]), mode="r")
     _, s, Vt = np.linalg.svd(triangle, full_matrices=True)
     return np.asarray(np.linalg.norm(Vt[rank(s) :], axis=0) <= _SHARE)

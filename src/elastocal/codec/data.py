@@ -29,7 +29,8 @@ class SpringLabels:
     def of(cls, springs: Sequence[Spring]) -> "SpringLabels":
         """Return the labels of springs."""
         return cls(
-            tuple(spring.name for spring in springs), tuple(spring.unit for spring in springs)
+            tuple(each.name for spring in springs for each in spring.parameters),
+            tuple(each.unit.si for spring in springs for each in spring.parameters),
         )
 
 

@@ -10,13 +10,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import xarray as xr
 
 from elastocal.codec.data import AXES, CodecData, SpringLabels
 from elastocal.codec.splits import CodecOptions
 from elastocal.codec.variants import KEYS, Variant
-from elastocal.dataset import read_stated, write_netcdf
 from elastocal.errors import CodecError, SchemaError
+from elastocal.records import LabelledArray, LabelledArrays, read_arrays, write_arrays
 
 ARRAYS_SCHEMA = "elastocal.codec/1"
 ARRAYS = "codec.nc"
@@ -50,7 +49,7 @@ def write_codec(folder: Path, data: CodecData) -> Path:
         If it cannot be written.
     """
     path = Path(folder) / ARRAYS
-    write_netcdf(_dataset_of(data), path)
+    write_arrays(path, _arrays_of(data))
     return path
 
 
@@ -66,7 +65,7 @@ def read_codec(folder: Path) -> CodecData:
     """
     path = Path(folder)
     path = path / ARRAYS if path.is_dir() else path
-    found = read_stated(path, ARRAYS_SCHEMA)
+    found = read_arrays(path, ARRAYS_SCHEMA)
     try:
         return _data_of(found)
     except (CodecError, KeyError, TypeError, ValueError) as error:
@@ -74,31 +73,31 @@ def read_codec(folder: Path) -> CodecData:
         raise SchemaError(f"{path}: {' '.join(str(error).split())}") from error
 
 
-def _dataset_of(data: CodecData) -> xr.Dataset:
-    variables: dict[str, Any] = {}
+def _arrays_of(data: CodecData) -> LabelledArrays:
+    variables: dict[str, LabelledArray] = {}
     for name, (dims, kind, unit, meaning) in _FIELDS.items():
         values = getattr(data, name)
         values = values.astype(np.int32) if kind is int else values
         notes = {"long_name": meaning} | ({"units": unit} if unit else {})
-        variables[name] = _variable(dims, values, notes)
+        variables[name] = LabelledArray(dims, values, notes, packed=True)
     for k, (compliance, springs) in enumerate(zip(data.compliance, data.springs, strict=True)):
         dims = ("cv", "n_train", f"spring_{k}")
         notes = {"long_name": f"compliances of variant {data.variants[k].name}"}
-        variables[f"compliance_{k}"] = _variable(dims, compliance, notes)
+        variables[f"compliance_{k}"] = LabelledArray(dims, compliance, notes, packed=True)
         variables[f"spring_unit_{k}"] = _texts(f"spring_{k}", springs.units)
     for key in KEYS:
         variables[f"variant_{key}"] = _texts("variant", [getattr(v, key) for v in data.variants])
     labels = [", ".join(map(str, group)) for group in data.pose_labels]
     variables["pose_label"] = _texts("pose", labels)
-    coordinates = {
+    variables |= {
         "variant": _texts("variant", [each.name for each in data.variants]),
-        "n_train": data.n_train.astype(np.int32),
+        "n_train": LabelledArray(("n_train",), data.n_train.astype(np.int32)),
         "axis": _texts("axis", AXES),
         "xyz": _texts("xyz", AXES[:3]),
     }
     for k, springs in enumerate(data.springs):
-        coordinates[f"spring_{k}"] = _texts(f"spring_{k}", springs.names)
-    return xr.Dataset(variables, coordinates, _attributes(data))
+        variables[f"spring_{k}"] = _texts(f"spring_{k}", springs.names)
+    return LabelledArrays(variables, _attributes(data))
 
 
 def _attributes(data: CodecData) -> dict[str, Any]:
@@ -115,20 +114,14 @@ def _attributes(data: CodecData) -> dict[str, Any]:
     }
 
 
-def _variable(dims: tuple[str, ...], values: Any, notes: dict[str, Any]) -> xr.Variable:
-    # Without a fill value NaN stays what it is, and integers stay integers.
-    encoding: dict[str, Any] = {"_FillValue": None, "zlib": True, "shuffle": True, "complevel": 4}
-    return xr.Variable(dims, values, notes, encoding)
+def _texts(dim: str, texts: Any) -> LabelledArray:
+    return LabelledArray((dim,), np.array(texts, dtype=np.str_))
 
 
-def _texts(dim: str, texts: Any) -> xr.Variable:
-    return xr.Variable(dim, np.array(texts, dtype=np.str_))
-
-
-def _data_of(found: xr.Dataset) -> CodecData:
+def _data_of(found: LabelledArrays) -> CodecData:
     """Return what a file holds; variables that are not ours are left alone."""
     for name, (dims, _, _, _) in _FIELDS.items():
-        if name not in found.variables:
+        if name not in found:
             raise CodecError(f"variable {name!r} is missing")
         if found[name].dims != dims:
             raise CodecError(f"{name} has dimensions {found[name].dims}, not {dims}")
@@ -148,15 +141,15 @@ def _data_of(found: xr.Dataset) -> CodecData:
         ),
         pose_labels=tuple(labels),
         compliance=tuple(found[f"compliance_{k}"].values for k in numbers),
-        load_cases=tuple(json.loads(found.attrs["load_cases"])),
-        options=CodecOptions(**json.loads(found.attrs["options"])),
-        robot=str(found.attrs["robot_name"]),
-        provenance=str(found.attrs["provenance"]),
-        findings=tuple(json.loads(found.attrs["findings"])),
-        versions=json.loads(found.attrs["versions"]),
+        load_cases=tuple(json.loads(found.attributes["load_cases"])),
+        options=CodecOptions(**json.loads(found.attributes["options"])),
+        robot=str(found.attributes["robot_name"]),
+        provenance=str(found.attributes["provenance"]),
+        findings=tuple(json.loads(found.attributes["findings"])),
+        versions=json.loads(found.attributes["versions"]),
         **{name: found[name].values for name in _FIELDS},
     )
 
 
-def _listed(texts: xr.DataArray) -> tuple[str, ...]:
+def _listed(texts: LabelledArray) -> tuple[str, ...]:
     return tuple(map(str, texts.values.tolist()))

@@ -7,13 +7,6 @@ from .load_rows import (
     write_load_rows as write_load_rows,
 )
 from .merging import merge as merge
-from .netcdf import (
-    read_netcdf as read_netcdf,
-    read_stated as read_stated,
-    write_netcdf as write_netcdf,
-)
-from .readings import Readings as Readings
-from .selection import without as without
+from .netcdf import read_stated as read_stated, write_netcdf as write_netcdf
+from .readings import Readings as Readings, without as without
 from .store import read as read, write as write
-from .table_header import Column as Column
-from .table_text import DELIMITERS as DELIMITERS

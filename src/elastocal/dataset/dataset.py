@@ -1,29 +1,42 @@
 """The dataset: the labelled arrays of the paper's Procedure 1."""
 
-from collections.abc import Hashable, Sequence
-from dataclasses import dataclass
-from typing import Any
+from collections.abc import Hashable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import xarray as xr
 from numpy.typing import ArrayLike
 
-from elastocal.dataset.assembly import as_array, assemble
-from elastocal.dataset.attributes import read_point, write_point
-from elastocal.dataset.layout import SCHEMA, SI_JOINT_UNITS, FloatArray, freeze
-from elastocal.dataset.plausibility import check_plausible
+from elastocal.dataset.layout import (
+    OK,
+    SCHEMA,
+    VARIABLE_NAMES,
+    BoolArray,
+    FloatArray,
+    Point,
+    StatusArray,
+    canonical_attributes,
+    freeze,
+    read_point,
+    write_point,
+)
 from elastocal.dataset.readings import Readings
-from elastocal.dataset.structure import canonical
-from elastocal.dataset.validation import check_numbers, usable
+from elastocal.dataset.structure import assemble, canonical, check_labels, check_shapes, labelled
+from elastocal.dataset.validation import check_numbers, check_plausible
 from elastocal.errors import DatasetError, nearest
+from elastocal.records import LabelledArray, LabelledArrays
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Dataset:
     """Measured displacements, forces and joint positions, by pose and load case.
 
-    Whatever is given is copied, brought into canonical form (SI units, float64, dimensions in
-    order, ``status`` present) and checked; the arrays are read-only.
+    All in SI units, in the order of their labels; arrays are copied in and read-only. Plain arrays
+    become a dataset with `from_arrays`, labelled ones in any unit and order with `from_labelled`
+    and `from_xarray`.
 
     Raises
     ------
@@ -33,15 +46,54 @@ class Dataset:
         If the schema is not known.
     """
 
-    data: xr.Dataset
-    """Variables, coordinates, units and attributes as spec section 3 lists them."""
+    poses: tuple[int, ...]
+    """Labels of the poses, in order."""
+    load_cases: tuple[str, ...]
+    """Names of the load cases, in order."""
+    joint_names: tuple[str, ...]
+    """Names of the joints, in the order of the file."""
+    joint_units: tuple[str, ...]
+    """Unit of each joint position: ``"rad"`` for a revolute joint, ``"m"`` for a prismatic."""
+    joint_position: FloatArray
+    """Joint positions after settling (paper: Theta^c), shape (pose, load_case, joint)."""
+    force: FloatArray
+    """Force on the robot at the TCP in base (F^m), shape (pose, load_case, 3), in N."""
+    controller_displacement: FloatArray
+    """Displacement by the controller (P^c), in base, shape (pose, load_case, 3), in m."""
+    marker_displacement: FloatArray
+    """Displacement by the tracker (P^m), in base, shape (pose, load_case, 3), in m."""
+    status: StatusArray
+    """Index into ``STATUSES`` of each reading, shape (pose, load_case)."""
+    moment: FloatArray | None = None
+    """Moment on the robot at the TCP in base, shape (pose, load_case, 3), in N·m."""
+    force_sigma: FloatArray | None = None
+    """Standard deviation of the force, shape (pose, load_case, 3), in N."""
+    marker_sigma: FloatArray | None = None
+    """Standard deviation of the marker displacement, shape (pose, load_case, 3), in m."""
+    tcp_position: FloatArray | None = None
+    """Unloaded TCP position in base, shape (pose, 3), in m."""
+    attributes: Mapping[str, str] = field(default_factory=lambda: {"schema": SCHEMA})
+    """What the file says about itself: schema, robot, marker, provenance, and CF's remarks."""
 
     def __post_init__(self) -> None:
-        data = canonical(self.data)
-        check_numbers(data)
-        for variable in data.variables.values():
-            freeze(variable.values)
-        object.__setattr__(self, "data", data)
+        for name in ("poses", "load_cases", "joint_names", "joint_units"):
+            object.__setattr__(self, name, tuple(getattr(self, name)))
+        for name in VARIABLE_NAMES:
+            if getattr(self, name) is not None:
+                values = np.array(getattr(self, name), np.int8 if name == "status" else np.float64)
+                freeze(values)
+                object.__setattr__(self, name, values)
+        object.__setattr__(self, "attributes", canonical_attributes(self.attributes))
+        check_labels(self)
+        check_shapes(self)
+        check_numbers(self)
+
+    def __repr__(self) -> str:
+        """Return the size of the dataset and where it comes from, in one line."""
+        return (
+            f"Dataset({self.robot_name or 'robot without name'}: {int(self.usable.sum())} usable"
+            f" readings at {len(self.poses)} poses, load cases {', '.join(self.load_cases)})"
+        )
 
     @classmethod
     def from_arrays(  # noqa: PLR0913 (one keyword for each variable of the file)
@@ -63,7 +115,7 @@ class Dataset:
         robot_name: str = "",
         robot_urdf: str | None = None,
         tcp_frame: str | None = None,
-        marker: tuple[float, float, float] | None = None,
+        marker: Point | None = None,
         provenance: str = "",
     ) -> "Dataset":
         """Return the dataset of plain arrays in SI units, if it is plausible.
@@ -101,82 +153,111 @@ class Dataset:
         DatasetError
             If shapes, labels or values break the contract, or look like a unit mistake.
         """
-        if poses is None:
-            poses = range(len(np.atleast_1d(as_array("force", force))))
-        data = assemble(
-            {"pose": poses, "load_case": load_cases, "joint": joint_names},
-            {
-                "joint_position": joint_position,
-                "force": force,
-                "moment": moment,
-                "controller_displacement": controller_displacement,
-                "marker_displacement": marker_displacement,
-                "status": status,
-                "force_sigma": force_sigma,
-                "marker_sigma": marker_sigma,
-                "tcp_position": tcp_position,
-            },
-            joint_units or ("rad",) * len(joint_names),
-            {
-                "schema": SCHEMA,
-                "robot_name": robot_name,
-                "robot_urdf": robot_urdf,
-                "tcp_frame": tcp_frame,
-                "marker": None if marker is None else write_point(marker),
-                "provenance": provenance,
-            },
-        )
-        dataset = cls(data)
-        check_plausible(dataset.data)
+        arrays = {
+            "joint_position": joint_position,
+            "force": force,
+            "moment": moment,
+            "controller_displacement": controller_displacement,
+            "marker_displacement": marker_displacement,
+            "status": status,
+            "force_sigma": force_sigma,
+            "marker_sigma": marker_sigma,
+            "tcp_position": tcp_position,
+        }
+        attributes = {
+            "schema": SCHEMA,
+            "robot_name": robot_name,
+            "robot_urdf": robot_urdf,
+            "tcp_frame": tcp_frame,
+            "marker": None if marker is None else write_point(marker),
+            "provenance": provenance,
+        }
+        labels = {"pose": poses, "load_case": load_cases, "joint": joint_names}
+        units = joint_units or ("rad",) * len(joint_names)
+        dataset = cls.from_labelled(assemble(labels, arrays, units, attributes))
+        check_plausible(dataset)
         return dataset
 
-    @property
-    def poses(self) -> tuple[int, ...]:
-        """Labels of the poses, in order."""
-        return tuple(self.data["pose"].values.tolist())
+    @classmethod
+    def from_labelled(cls, arrays: LabelledArrays) -> "Dataset":
+        """Return the dataset of labelled arrays, such as a NetCDF file holds them.
+
+        Dimensions and axes may stand in any order. A stated unit that is not SI is converted,
+        since nothing is guessed; a missing one is refused.
+
+        Raises
+        ------
+        DatasetError
+            If a variable, coordinate, attribute or unit is missing, unknown or of the wrong form.
+        SchemaError
+            If the schema is not known.
+        """
+        return cls(**canonical(arrays))
+
+    @classmethod
+    def from_xarray(cls, data: "xr.Dataset") -> "Dataset":
+        """Return the dataset of an `xarray.Dataset`; see `from_labelled`."""
+        coordinates = [str(name) for name in data.coords if data[name].dims != (name,)]
+        variables = {
+            str(name): LabelledArray(tuple(map(str, each.dims)), each.values, each.attrs)
+            for name, each in data.variables.items()
+        }
+        attributes = {str(name): value for name, value in data.attrs.items()}
+        return cls.from_labelled(LabelledArrays(variables, attributes, tuple(coordinates)))
+
+    def to_labelled(self) -> LabelledArrays:
+        """Return the arrays with their labels, units and meanings, as the NetCDF file has them."""
+        return labelled(self)
+
+    def to_xarray(self) -> "xr.Dataset":
+        """Return the dataset as an `xarray.Dataset`, which shares the read-only arrays."""
+        import xarray as xr
+
+        arrays = self.to_labelled()
+        variables: dict[str, Any] = {
+            name: (each.dims, each.values, dict(each.attributes))
+            for name, each in arrays.variables.items()
+        }
+        coordinates = {name: variables.pop(name) for name in arrays.coordinates}
+        return xr.Dataset(variables, coordinates, arrays.attributes)
 
     @property
-    def load_cases(self) -> tuple[str, ...]:
-        """Names of the load cases, in order."""
-        return tuple(self.data["load_case"].values.tolist())
+    def arrays(self) -> dict[str, FloatArray]:
+        """The variables that are present, by name; all but the status."""
+        found = {name: getattr(self, name) for name in VARIABLE_NAMES if name != "status"}
+        return {name: values for name, values in found.items() if values is not None}
 
     @property
-    def joint_names(self) -> tuple[str, ...]:
-        """Names of the joints, in the order of the file."""
-        return tuple(self.data["joint"].values.tolist())
-
-    @property
-    def joint_units(self) -> tuple[str, ...]:
-        """Unit of each joint position: ``"rad"`` for a revolute joint, ``"m"`` for a prismatic."""
-        if "joint_unit" in self.data.coords:
-            return tuple(self.data["joint_unit"].values.tolist())
-        return (SI_JOINT_UNITS["angle"],) * len(self.joint_names)
+    def usable(self) -> BoolArray:
+        """Whether each reading has the status ok, shape (pose, load_case)."""
+        mask: BoolArray = self.status == OK
+        return mask
 
     @property
     def robot_name(self) -> str:
         """Name of the robot; empty when not known."""
-        return str(self.data.attrs["robot_name"])
+        return self.attributes["robot_name"]
 
     @property
     def robot_urdf(self) -> str | None:
         """URDF text of the robot; None when the file does not carry one."""
-        return self.data.attrs.get("robot_urdf")
+        return self.attributes.get("robot_urdf")
 
     @property
     def tcp_frame(self) -> str | None:
         """Link of the URDF at the tool centre point; None when the file does not name one."""
-        return self.data.attrs.get("tcp_frame")
+        return self.attributes.get("tcp_frame")
 
     @property
-    def marker(self) -> tuple[float, float, float] | None:
+    def marker(self) -> Point | None:
         """Metrology marker in the tcp frame, in m; None: at the tcp, or the file does not say."""
-        text = self.data.attrs.get("marker")
-        return None if text is None else read_point("marker", str(text))
+        text = self.attributes.get("marker")
+        return None if text is None else read_point("marker", text)
 
     @property
     def provenance(self) -> str:
         """Where the data come from; empty when not known."""
-        return str(self.data.attrs["provenance"])
+        return self.attributes["provenance"]
 
     def select(
         self, poses: Sequence[int] | None = None, load_cases: Sequence[str] | None = None
@@ -198,14 +279,15 @@ class Dataset:
         DatasetError
             If a label is unknown or stands twice, or nothing usable is left.
         """
-        data = self.data
+        rows = list(range(len(self.poses)))
         if poses is not None:
-            data = data.isel(pose=_positions("pose", poses, self.poses))
+            rows = _positions("pose", poses, self.poses)
+        columns = list(range(len(self.load_cases)))
         if load_cases is not None:
-            data = data.isel(load_case=_positions("load case", load_cases, self.load_cases))
-        elif usable(data).any():
-            data = data.isel(load_case=np.flatnonzero(usable(data).any(axis=0)))
-        return Dataset(data)
+            columns = _positions("load case", load_cases, self.load_cases)
+        elif self.usable[rows].any():
+            columns = np.flatnonzero(self.usable[rows].any(axis=0)).tolist()
+        return self._taken(rows, columns)
 
     def readings(self, joint_names: Sequence[str]) -> Readings:
         """Return the usable readings as flat arrays, the joints in the robot's order.
@@ -227,23 +309,28 @@ class Dataset:
                 " they must have the same names"
             )
         order = [self.joint_names.index(name) for name in wanted]
-        ok = usable(self.data)
-        pose, case = np.nonzero(ok)
-        return Readings(
-            pose=self.data["pose"].values[pose],
-            load_case=self.data["load_case"].values[case],
-            joint_position=self.data["joint_position"].values[ok][:, order],
-            force=self.data["force"].values[ok],
-            controller_displacement=self.data["controller_displacement"].values[ok],
-            marker_displacement=self.data["marker_displacement"].values[ok],
-            moment=self._optional("moment", ok),
-            force_sigma=self._optional("force_sigma", ok),
-            marker_sigma=self._optional("marker_sigma", ok),
-            tcp_position=self._optional("tcp_position", pose),
-        )
+        pose, case = np.nonzero(self.usable)
+        flat = {
+            name: values[pose] if name == "tcp_position" else values[pose, case]
+            for name, values in self.arrays.items()
+        }
+        flat["joint_position"] = flat["joint_position"][:, order]
+        return Readings(np.array(self.poses)[pose], np.array(self.load_cases)[case], **flat)
 
-    def _optional(self, name: str, index: np.ndarray) -> FloatArray | None:
-        return self.data[name].values[index] if name in self.data else None
+    def _taken(self, rows: Sequence[int], columns: Sequence[int]) -> "Dataset":
+        """Return the poses and load cases at some positions."""
+        index = np.ix_(np.array(rows, dtype=np.intp), np.array(columns, dtype=np.intp))
+        arrays: dict[str, Any] = {
+            name: values[index[0][:, 0]] if name == "tcp_position" else values[index]
+            for name, values in self.arrays.items()
+        }
+        return replace(
+            self,
+            poses=tuple(self.poses[row] for row in rows),
+            load_cases=tuple(self.load_cases[column] for column in columns),
+            status=self.status[index],
+            **arrays,
+        )
 
 
 def _positions(kind: str, labels: Sequence[Any], known: Sequence[Hashable]) -> list[int]:

@@ -3,9 +3,6 @@
 Every other column is carried through untouched, in its place.
 """
 
-import csv
-import io
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,9 +10,10 @@ from pathlib import Path
 import numpy as np
 
 from elastocal.dataset.layout import AXES, FloatArray
-from elastocal.dataset.table_text import cut
+from elastocal.dataset.table import cut
 from elastocal.errors import DatasetError, UnitError, nearest
-from elastocal.files import read_text, write_text
+from elastocal.files import read_text
+from elastocal.tables import Column, TableError, write_table
 from elastocal.units import factor, split_column
 
 _EXAMPLES = {"angle": "rad", "length": "m", "force": "N", "moment": "N*m"}
@@ -61,17 +59,17 @@ def read_load_rows(path: Path, joint_units: Mapping[str, str]) -> LoadRows:
         has_moment = any(name in columns for name, _ in moment)
         wanted = [*joints, *force, *(moment if has_moment else [])]
         values = np.column_stack(
-            [_values(table.rows, table.lines, columns, *column) for column in wanted]
+            [table.rows.numbers(_column(columns, *column)) for column in wanted]
         )
-    except (DatasetError, UnitError) as error:
+    except (DatasetError, TableError, UnitError) as error:
         raise DatasetError(f"{path}: {error}") from error
     n = len(joints)
     return LoadRows(
         values[:, :n],
         values[:, n : n + 3],
         values[:, n + 3 :] if has_moment else None,
-        tuple(table.header),
-        tuple(tuple(row) for row in table.rows),
+        table.header,
+        tuple(tuple(row) for row in table.rows.cells),
     )
 
 
@@ -93,12 +91,15 @@ def write_load_rows(path: Path, rows: LoadRows, added: Mapping[str, FloatArray])
         If the file cannot be written.
     """
     kept = [index for index, name in enumerate(rows.header) if name not in added]
-    text = io.StringIO(newline="")
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow([*(rows.header[index] for index in kept), *added])
-    for cells, numbers in zip(rows.cells, np.column_stack([*added.values()]), strict=True):
-        writer.writerow([*(cells[index] for index in kept), *(repr(float(x)) for x in numbers)])
-    write_text(path, text.getvalue())
+    numbers = np.column_stack([*added.values()]).tolist()
+    write_table(
+        path,
+        [*(rows.header[index] for index in kept), *added],
+        (
+            [*(cells[index] for index in kept), *new]
+            for cells, new in zip(rows.cells, numbers, strict=True)
+        ),
+    )
 
 
 def joint_dimensions(names: Sequence[str], revolute: Sequence[bool]) -> dict[str, str]:
@@ -118,13 +119,7 @@ def _columns(header: Sequence[str]) -> dict[str, tuple[int, str | None]]:
     return columns
 
 
-def _values(
-    rows: Sequence[Sequence[str]],
-    lines: Sequence[int],
-    columns: Mapping[str, tuple[int, str | None]],
-    name: str,
-    dimension: str,
-) -> FloatArray:
+def _column(columns: Mapping[str, tuple[int, str | None]], name: str, dimension: str) -> Column:
     if name not in columns:
         raise DatasetError(
             f"column '{name}[…]' is missing{nearest(name, columns)} (columns: {', '.join(columns)})"
@@ -133,23 +128,4 @@ def _values(
     if unit is None:
         example = _EXAMPLES[dimension]
         raise DatasetError(f"column {name!r} has no unit: it is written {name}[{example}]")
-    scale = factor(unit, dimension)
-    return (
-        np.array(
-            [
-                _number(row[index], line, f"{name}[{unit}]")
-                for row, line in zip(rows, lines, strict=True)
-            ]
-        )
-        * scale
-    )
-
-
-def _number(cell: str, line: int, column: str) -> float:
-    try:
-        value = float(cell)
-    except ValueError as error:
-        raise DatasetError(f"row {line}, column {column!r}: {cell!r} is not a number") from error
-    if not math.isfinite(value):
-        raise DatasetError(f"row {line}, column {column!r}: {cell!r} is not a finite number")
-    return value
+    return Column(index, name, unit, factor(unit, dimension))

@@ -2,12 +2,13 @@
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
-import xarray as xr
 
 from elastocal.dataset.dataset import Dataset
-from elastocal.dataset.layout import MISSING
+from elastocal.dataset.layout import MISSING, FloatArray
 from elastocal.errors import DatasetError
 
 _SAME_ATTRIBUTES = ("robot_name", "robot_urdf", "tcp_frame")
@@ -43,35 +44,45 @@ def merge(datasets: Sequence[Dataset], *, relabel: bool = False) -> Dataset:
         _check_compatible(datasets[0], dataset, index)
     if not relabel:
         _check_poses_differ(datasets)
-    cases = list(dict.fromkeys(case for dataset in datasets for case in dataset.load_cases))
-    joints = datasets[0].joint_names
-    parts = [
-        dataset.data.isel(joint=[dataset.joint_names.index(name) for name in joints]).reindex(
-            load_case=cases, fill_value={"status": np.int8(MISSING)}
-        )
-        for dataset in datasets
-    ]
-    # compat decides about joint_unit, which is the same in all parts by now.
-    data = xr.concat(
-        parts,
-        "pose",
-        data_vars="minimal",
-        coords="minimal",
-        compat="override",
-        join="exact",
-        combine_attrs="override",
-    )
+    cases = tuple(dict.fromkeys(case for dataset in datasets for case in dataset.load_cases))
+    poses = tuple(pose for dataset in datasets for pose in dataset.poses)
     sources = [dataset.provenance for dataset in datasets if dataset.provenance]
-    data.attrs["provenance"] = "; ".join(dict.fromkeys(sources))
-    if relabel:
-        data = data.assign_coords(pose=np.arange(data.sizes["pose"]))
-    return Dataset(data)
+    provenance = "; ".join(dict.fromkeys(sources))
+    arrays: dict[str, Any] = {name: _joined(datasets, name, cases) for name in datasets[0].arrays}
+    return replace(
+        datasets[0],
+        poses=tuple(range(len(poses))) if relabel else poses,
+        load_cases=cases,
+        status=np.concatenate([_spread(each, each.status, cases, MISSING) for each in datasets]),
+        attributes={**datasets[0].attributes, "provenance": provenance},
+        **arrays,
+    )
+
+
+def _joined(datasets: Sequence[Dataset], name: str, cases: Sequence[str]) -> FloatArray:
+    """Return the values of a variable at the poses of all datasets, joints in the first's order."""
+    parts = []
+    for dataset in datasets:
+        values = dataset.arrays[name]
+        if name == "joint_position":
+            order = [dataset.joint_names.index(joint) for joint in datasets[0].joint_names]
+            values = values[..., order]
+        parts.append(values if name == "tcp_position" else _spread(dataset, values, cases, np.nan))
+    return np.concatenate(parts)
+
+
+def _spread(dataset: Dataset, values: np.ndarray, cases: Sequence[str], fill: float) -> np.ndarray:
+    """Return values of shape (pose, load_case, …) for other load cases; ``fill`` without one."""
+    shape = (len(values), len(cases), *values.shape[2:])
+    spread = np.full(shape, fill, dtype=values.dtype)
+    spread[:, [cases.index(case) for case in dataset.load_cases]] = values
+    return spread
 
 
 def _check_compatible(first: Dataset, other: Dataset, index: int) -> None:
     """Refuse to merge dataset ``index`` with dataset 0 when they are not of one kind."""
     for name in _SAME_ATTRIBUTES:
-        here, there = first.data.attrs.get(name), other.data.attrs.get(name)
+        here, there = first.attributes.get(name), other.attributes.get(name)
         if here != there:
             raise DatasetError(
                 f"datasets 0 and {index} are not of the same robot: attribute {name!r} is"
@@ -83,8 +94,8 @@ def _check_compatible(first: Dataset, other: Dataset, index: int) -> None:
         raise DatasetError(
             f"datasets 0 and {index} have different joints: {joints[0]} and {joints[1]}"
         )
-    for variable in sorted(set(first.data.data_vars) ^ set(other.data.data_vars), key=str):
-        lacking = index if variable in first.data else 0
+    for variable in sorted(set(first.arrays) ^ set(other.arrays)):
+        lacking = index if variable in first.arrays else 0
         raise DatasetError(
             f"dataset {lacking} has no variable {variable!r}, dataset {index - lacking} has:"
             " what was not measured cannot be filled in"
@@ -98,8 +109,8 @@ def _check_marker(first: Dataset, other: Dataset, index: int) -> None:
     if here is None or there is None or not math.dist(here, there) <= SAME_MARKER:
         raise DatasetError(
             f"datasets 0 and {index} have different markers: attribute 'marker' is"
-            f" {_short(first.data.attrs.get('marker'))} in one and"
-            f" {_short(other.data.attrs.get('marker'))} in the other"
+            f" {_short(first.attributes.get('marker'))} in one and"
+            f" {_short(other.attributes.get('marker'))} in the other"
         )
 
 

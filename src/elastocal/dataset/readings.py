@@ -1,6 +1,6 @@
 """Readings: the usable part of a dataset as flat arrays, one row a reading."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, fields
 from typing import Any
 
@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from elastocal.dataset.layout import FloatArray, IntArray, StringArray, freeze
-from elastocal.errors import DatasetError
+from elastocal.errors import DatasetError, nearest
 
 _LARGEST = 1e9
 """No SI number of a robot's reading comes near; what does is a damaged file."""
@@ -105,3 +105,38 @@ class Readings:
             raise DatasetError(f"{name} of the readings has shape {array.shape}, not {shape}")
         freeze(array)
         object.__setattr__(self, name, array)
+
+
+def without(readings: Readings, excluded: Sequence[str]) -> Readings:
+    """Return the readings without those named ``POSE`` or ``POSE:LOAD_CASE``.
+
+    Raises
+    ------
+    DatasetError
+        If a name matches no reading, or none is left.
+    """
+    keep = np.ones(len(readings), dtype=bool)
+    for name in excluded:
+        keep &= ~_named(readings, name)
+    if not np.any(keep):
+        raise DatasetError(f"--exclude {' '.join(excluded)} leaves no reading")
+    return readings.take(keep)
+
+
+def _named(readings: Readings, name: str) -> np.ndarray:
+    pose, _, load_case = name.partition(":")
+    try:
+        mask = readings.pose == int(pose)
+    except ValueError as error:
+        raise DatasetError(f"--exclude {name!r} must be POSE or POSE:LOAD_CASE") from error
+    if not np.any(mask):
+        raise DatasetError(f"--exclude {name!r}: there is no usable reading at pose {pose}")
+    if load_case:
+        cases = sorted(set(readings.load_case[mask].tolist()))
+        mask &= readings.load_case == load_case
+        if not np.any(mask):
+            raise DatasetError(
+                f"--exclude {name!r}: pose {pose} has no load case {load_case!r}"
+                f"{nearest(load_case, cases)} (it has {', '.join(cases)})"
+            )
+    return np.asarray(mask)

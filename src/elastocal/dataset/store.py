@@ -1,24 +1,16 @@
-"""Dataset files: which kind a path is, by its suffix."""
+"""Dataset files: NetCDF or CSV, as the suffix of the path says."""
 
 from collections.abc import Callable
 from pathlib import Path
 
-import xarray as xr
-
 from elastocal.dataset.dataset import Dataset
-from elastocal.dataset.netcdf import read_netcdf, write_netcdf
-from elastocal.dataset.plausibility import check_plausible
-from elastocal.dataset.table_read import read_table
-from elastocal.dataset.table_write import write_table
+from elastocal.dataset.table import read_table, write_table
+from elastocal.dataset.validation import check_plausible
 from elastocal.errors import DatasetError, SchemaError
+from elastocal.records import LabelledArrays, read_arrays, write_arrays
 
-_Read = Callable[[Path], xr.Dataset]
-_Write = Callable[[xr.Dataset, Path], None]
-
-_FORMATS: dict[str, tuple[_Read, _Write]] = {
-    ".nc": (read_netcdf, write_netcdf),
-    ".csv": (read_table, write_table),
-}
+_Read = Callable[[Path], LabelledArrays]
+_Write = Callable[[Dataset, Path], None]
 
 
 def read(path: Path | str) -> Dataset:
@@ -40,9 +32,10 @@ def read(path: Path | str) -> Dataset:
     """
     path = Path(path)
     reader, _ = _format_of(path)
+    arrays = reader(path)
     try:
-        dataset = Dataset(reader(path))
-        check_plausible(dataset.data)
+        dataset = Dataset.from_labelled(arrays)
+        check_plausible(dataset)
     except (DatasetError, SchemaError) as error:
         raise type(error)(f"{path}: {error}") from error
     return dataset
@@ -67,7 +60,7 @@ def write(dataset: Dataset, path: Path | str) -> None:
     """
     path = Path(path)
     _, writer = _format_of(path)
-    writer(dataset.data, path)
+    writer(dataset, path)
 
 
 def _format_of(path: Path) -> tuple[_Read, _Write]:
@@ -78,3 +71,27 @@ def _format_of(path: Path) -> tuple[_Read, _Write]:
             f" {', '.join(_FORMATS)}"
         )
     return found
+
+
+def _read_csv(path: Path) -> LabelledArrays:
+    try:
+        return read_table(path)
+    except DatasetError as error:
+        raise DatasetError(f"{path}: {error}") from error
+
+
+def _read_netcdf(path: Path) -> LabelledArrays:
+    try:
+        return read_arrays(path)
+    except SchemaError as error:
+        raise DatasetError(str(error)) from error
+
+
+def _write_netcdf(dataset: Dataset, path: Path) -> None:
+    write_arrays(path, dataset.to_labelled())
+
+
+_FORMATS: dict[str, tuple[_Read, _Write]] = {
+    ".nc": (_read_netcdf, _write_netcdf),
+    ".csv": (_read_csv, write_table),
+}

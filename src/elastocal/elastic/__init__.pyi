@@ -1,8 +1,31 @@
-from .layouts import LAYOUTS as LAYOUTS, layout as layout
+from .directions import AXES as AXES, as_axis as as_axis, orthogonal_axes as orthogonal_axes
+from .layouts import (
+    LAYOUTS as LAYOUTS,
+    SpringEntry as SpringEntry,
+    SpringFile as SpringFile,
+    actuated as actuated,
+    bearing as bearing,
+    custom as custom,
+    layout as layout,
+    read_springs as read_springs,
+)
 from .model import (
     CartesianCompliance as CartesianCompliance,
     ElasticModel as ElasticModel,
     check_vectors as check_vectors,
     spring_torques as spring_torques,
 )
-from .springs import Spring as Spring
+from .springs import (
+    KINDS as KINDS,
+    AnySpring as AnySpring,
+    Hinge as Hinge,
+    OneAxisSpring as OneAxisSpring,
+    Parameter as Parameter,
+    Spring as Spring,
+    SpringAxis as SpringAxis,
+    SpringLoad as SpringLoad,
+    Unit as Unit,
+    axial as axial,
+    check_springs as check_springs,
+    unit_of as unit_of,
+)

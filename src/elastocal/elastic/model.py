@@ -5,19 +5,23 @@ force ``f`` and a moment ``m`` on the robot make the spring torques
 
     tau = J^T f + W^T m,                                   (Eq. 9)
 
-and, with compliances ``c``, the deflection
+and, with compliances ``c`` of linear springs, the deflection
 
     deflection = J diag(c) tau = O c,    O = J diag(tau).  (Eq. 10, 11, 14)
+
+Every kind of spring is linear in its parameters, so that ``O c = deflection`` holds for all; what
+a column of ``O`` is, the spring knows (`elastocal.elastic.springs`).
 """
 
-from collections.abc import Sequence
+from collections.abc import Hashable, Iterator, Sequence
 from dataclasses import dataclass, field
+from itertools import product
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from elastocal.arrays import FloatArray, IndexArray
-from elastocal.elastic.springs import Spring, check_springs, is_axial
+from elastocal.elastic.springs import Parameter, Spring, SpringLoad, check_springs
 from elastocal.errors import SpringError
 from elastocal.robot import (
     ChainModel,
@@ -27,6 +31,9 @@ from elastocal.robot import (
     build_model,
     evaluate_jacobian,
 )
+
+_Columns = IndexArray | slice
+"""Columns of an array; those that lie side by side as a slice, which copies nothing."""
 
 
 @dataclass(frozen=True)
@@ -55,25 +62,52 @@ class CartesianCompliance:
 
 
 @dataclass(frozen=True, eq=False)
+class _Alike:
+    """Springs that share a law and so are evaluated together."""
+
+    law: Spring
+    """One of them."""
+    axes: tuple[_Columns, ...]
+    """For each axis of the law, the column of the Jacobian of each spring."""
+    parameters: tuple[_Columns, ...]
+    """For each parameter of the law, its place in the compliance vector for each spring."""
+
+    def load(self, torques: FloatArray) -> SpringLoad[FloatArray]:
+        """Return the loads of these springs, of torques of shape (..., axis)."""
+        return SpringLoad(tuple(torques[..., axis] for axis in self.axes))
+
+
+@dataclass(frozen=True, eq=False)
 class ElasticModel:
     """A robot with springs; compliances are arguments, so that one model serves many fits."""
 
     robot: Robot
     springs: tuple[Spring, ...]
+    parameters: tuple[Parameter, ...] = field(init=False, repr=False)
+    """Of all springs, in the order of every compliance vector."""
     _chain: ChainModel = field(init=False, repr=False)
     _columns: IndexArray = field(init=False, repr=False)
+    _groups: tuple[_Alike, ...] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "springs", tuple(self.springs))
         check_springs(self.springs, self.robot.joint_names)
         chain, columns = _insert_springs(self.robot, self.springs)
+        parameters = tuple(p for spring in self.springs for p in spring.parameters)
+        object.__setattr__(self, "parameters", parameters)
         object.__setattr__(self, "_chain", chain)
         object.__setattr__(self, "_columns", columns)
+        object.__setattr__(self, "_groups", tuple(_alike(self.springs)))
 
     @property
     def spring_names(self) -> tuple[str, ...]:
-        """Names of the springs, in the order of every compliance vector."""
+        """Names of the springs."""
         return tuple(spring.name for spring in self.springs)
+
+    @property
+    def parameter_names(self) -> tuple[str, ...]:
+        """Names of the parameters, in the order of every compliance vector."""
+        return tuple(parameter.name for parameter in self.parameters)
 
     def spring_jacobian(self, q: ArrayLike) -> Jacobian:
         """Return the Jacobian of the tool centre point for the springs (paper Eq. 1-3).
@@ -86,7 +120,7 @@ class ElasticModel:
         Returns
         -------
         Jacobian
-            Columns are the springs, shape (..., 3, spring).
+            Columns are the axes of the springs (one of a hinge), shape (..., 3, axis).
         """
         return evaluate_jacobian(self._chain, self.robot.check_positions(q), self._columns)
 
@@ -116,8 +150,8 @@ class ElasticModel:
 
         Returns
         -------
-        ndarray, shape (..., 3, spring)
-            In m per unit of compliance.
+        ndarray, shape (..., 3, parameter)
+            In m per unit of each parameter.
 
         Raises
         ------
@@ -133,7 +167,13 @@ class ElasticModel:
             rotation = self.robot.forward(q)[..., :3, :3]
             lever = rotation @ check_vectors("marker_offset", marker_offset)
             observed = observed + np.cross(jacobian.rotation, lever[..., None], axis=-2)
-        blocks: FloatArray = observed * torques[..., None, :]
+        loaded = np.broadcast_shapes(observed.shape[:-2], torques.shape[:-1])
+        blocks = np.empty((*loaded, 3, len(self.parameters)))
+        for group in self._groups:
+            J = [observed[..., axis] for axis in group.axes]
+            columns = group.law.columns(J, group.load(torques))
+            for place, column in zip(group.parameters, columns, strict=True):
+                blocks[..., place] = column
         return blocks
 
     def deflection(
@@ -147,8 +187,8 @@ class ElasticModel:
 
         Parameters
         ----------
-        compliance : array_like, shape (spring,)
-            In rad/(N·m) or m/N.
+        compliance : array_like, shape (parameter,)
+            In the units of the parameters: rad/(N·m) or m/N of hinges.
         q, force, moment : array_like
             As for `observation_blocks`.
 
@@ -160,24 +200,72 @@ class ElasticModel:
         c = self.check_compliance(compliance)
         return self.observation_blocks(q, force, moment) @ c
 
-    def cartesian_compliance(self, compliance: ArrayLike, q: ArrayLike) -> CartesianCompliance:
-        """Return the Cartesian compliance ``J diag(c) J^T`` at a pose (paper Eq. 10).
+    def cartesian_compliance(
+        self,
+        compliance: ArrayLike,
+        q: ArrayLike,
+        force: ArrayLike = (0.0, 0.0, 0.0),
+        moment: ArrayLike | None = None,
+    ) -> CartesianCompliance:
+        """Return the Cartesian compliance at a pose and load: ``J diag(c) J^T`` (paper Eq. 10).
+
+        In general ``sum_ab J_a (d theta_a / d tau_b) J_b^T`` over the axes of each spring; that
+        of hinges does not depend on the load.
 
         Parameters
         ----------
-        compliance : array_like, shape (spring,)
-            In rad/(N·m) or m/N.
+        compliance : array_like, shape (parameter,)
+            In the units of the parameters.
         q : array_like, shape (..., joint)
             Joint positions in rad or m.
+        force, moment : array_like, shape (..., 3), optional
+            Load at the tool centre point, in base, in N and N·m. Default: none.
         """
         c = self.check_compliance(compliance)
         jacobian = self.spring_jacobian(q)
         J, W = jacobian.translation, jacobian.rotation
-        return CartesianCompliance(
-            (J * c) @ np.swapaxes(J, -1, -2),
-            (W * c) @ np.swapaxes(W, -1, -2),
-            (J * c) @ np.swapaxes(W, -1, -2),
-        )
+        torques = spring_torques(jacobian, check_vectors("force", force), moment)
+        shape = (*torques.shape[:-1], 3, 3)
+        translation, rotation, coupling = np.zeros(shape), np.zeros(shape), np.zeros(shape)
+        for group in self._groups:
+            tangents = group.law.tangents(group.load(torques))
+            for (a, axis), (b, other) in product(enumerate(group.axes), repeat=2):
+                terms = zip(group.parameters, tangents[a][b], strict=True)
+                # Each of shape (spring,) or (..., spring).
+                weight = np.asarray(sum(c[place] * slope for place, slope in terms))
+                weighted = J[..., axis] * weight[..., None, :], W[..., axis] * weight[..., None, :]
+                J_b, W_b = (np.swapaxes(part[..., other], -1, -2) for part in (J, W))
+                translation += weighted[0] @ J_b
+                rotation += weighted[1] @ W_b
+                coupling += weighted[0] @ W_b
+        return CartesianCompliance(translation, rotation, coupling)
+
+    def directional_rows(self, q: ArrayLike, direction: ArrayLike) -> FloatArray:
+        """Return the rows that times ``c`` are the compliance ``u^T C u`` along a direction.
+
+        Of hinges the squares ``(J_i^T u)^2``; of others the tangent without load.
+
+        Parameters
+        ----------
+        q : array_like, shape (..., joint)
+            Joint positions in rad or m.
+        direction : array_like, shape (..., 3)
+            Unit vectors ``u`` in base.
+
+        Returns
+        -------
+        ndarray, shape (..., parameter)
+        """
+        along = spring_torques(self.spring_jacobian(q), check_vectors("direction", direction))
+        rows = np.empty((*along.shape[:-1], len(self.parameters)))
+        for group in self._groups:
+            tangents = group.law.tangents(group.load(np.zeros_like(along)))
+            for p, place in enumerate(group.parameters):
+                rows[..., place] = sum(
+                    along[..., axis] * tangents[a][b][p] * along[..., other]
+                    for (a, axis), (b, other) in product(enumerate(group.axes), repeat=2)
+                )
+        return rows
 
     def check_compliance(self, compliance: ArrayLike) -> FloatArray:
         """Return compliances as a float array, or refuse them by shape or value.
@@ -185,13 +273,14 @@ class ElasticModel:
         Raises
         ------
         SpringError
-            If there is not one finite number a spring.
+            If there is not one finite number a parameter.
         """
         c = np.asarray(compliance, dtype=float)
-        if c.shape != (len(self.springs),) or not np.all(np.isfinite(c)):
+        n = len(self.parameters)
+        if c.shape != (n,) or not np.all(np.isfinite(c)):
+            each = "spring" if n == len(self.springs) else "parameter"
             raise SpringError(
-                f"compliances must be {len(self.springs)} finite numbers, one a spring,"
-                f" got shape {c.shape}"
+                f"compliances must be {n} finite numbers, one a {each}, got shape {c.shape}"
             )
         return c
 
@@ -231,25 +320,47 @@ def spring_torques(
 
 
 def _insert_springs(robot: Robot, springs: Sequence[Spring]) -> tuple[ChainModel, IndexArray]:
-    """Build the chain; axial springs share the column of the joint itself."""
+    """Build the chain and find the column of each axis; axial ones share that of the joint."""
     joints = {joint.name: index for index, joint in enumerate(robot.chain.joints)}
-    own = [is_axial(spring, robot.chain.joints[joints[spring.joint]]) for spring in springs]
+    axes = [axis for spring in springs for axis in spring.axes]
+    own = [axis.is_axis_of(robot.chain.joints[joints[axis.joint]]) for axis in axes]
     inserted = [
         InsertedJoint(
-            spring.name,
-            joints[spring.joint],
-            np.array(spring.axis),
-            spring.revolute,
-            spring.distal,
-            np.array(spring.offset),
+            axis.name,
+            joints[axis.joint],
+            np.array(axis.axis),
+            axis.revolute,
+            axis.distal,
+            np.array(axis.offset),
         )
-        for spring, shares in zip(springs, own, strict=True)
+        for axis, shares in zip(axes, own, strict=True)
         if not shares
     ]
     chain = build_model(robot.chain, inserted)
     virtual = iter(chain.inserted_columns)
     columns = [
-        chain.joint_columns[joints[spring.joint]] if shares else next(virtual)
-        for spring, shares in zip(springs, own, strict=True)
+        chain.joint_columns[joints[axis.joint]] if shares else next(virtual)
+        for axis, shares in zip(axes, own, strict=True)
     ]
     return chain, np.array(columns, dtype=np.intp)
+
+
+def _alike(springs: Sequence[Spring]) -> Iterator[_Alike]:
+    """Group springs by their law."""
+    members: dict[Hashable, list[int]] = {}
+    for index, spring in enumerate(springs):
+        members.setdefault(spring.law, []).append(index)
+    first_axis = np.cumsum([0, *(len(spring.axes) for spring in springs)])
+    first_parameter = np.cumsum([0, *(len(spring.parameters) for spring in springs)])
+    for indices in members.values():
+        law = springs[indices[0]]
+        yield _Alike(
+            law,
+            tuple(_side_by_side(first_axis[indices] + k) for k in range(len(law.axes))),
+            tuple(_side_by_side(first_parameter[indices] + k) for k in range(len(law.parameters))),
+        )
+
+
+def _side_by_side(columns: IndexArray) -> _Columns:
+    start, stop = int(columns[0]), int(columns[-1]) + 1
+    return slice(start, stop) if np.array_equal(columns, np.arange(start, stop)) else columns

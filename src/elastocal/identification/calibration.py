@@ -24,6 +24,7 @@ from elastocal.identification.problem import Problem, build
 from elastocal.identification.solve import Solution, factor, solve
 from elastocal.identification.suspicious import Screening, screen
 from elastocal.identification.widening import widen, widening
+from elastocal.parallel import one_blas_thread
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,6 +63,7 @@ class Calibration:
         return np.asarray(np.linalg.norm(self.readings.deflection[self.used], axis=1))
 
 
+@one_blas_thread()
 def calibrate(
     model: ElasticModel,
     readings: Readings,
@@ -191,12 +193,12 @@ def _compare(
 ) -> Comparison | None:
     """Fit the 6-spring model to the same readings when ours contains it."""
     actuated = [spring.name for spring in LAYOUTS["actuated"](model.robot)]
-    names = list(model.spring_names)
+    names = list(model.parameter_names)
     if names == actuated or not set(actuated) <= set(names):
         return None
     columns = np.array([names.index(name) for name in actuated], dtype=np.intp)
     try:
-        other = leave_poses_out(problem.with_springs(columns))
+        other = leave_poses_out(problem.with_columns(columns))
     except IdentificationError:
         return None
     return compare(ours, other, "actuated", problem, rng)

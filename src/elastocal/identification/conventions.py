@@ -71,7 +71,7 @@ def check_conventions(
         other = replace(problem, O=blocks, d=undone.deflection).reweighted(robust.reading_weight)
         found.append((_unexplained(other), mistake.message))
     best, message = min(found, key=itemgetter(0))
-    few = problem.d.size < 4 * problem.springs
+    few = problem.d.size < 4 * problem.columns
     enough = stated > (NOTHING if few else EXACT)
     if enough and best <= min(DECISIVE * stated, EXPLAINED):
         raise ConventionError(

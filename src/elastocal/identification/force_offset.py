@@ -89,7 +89,7 @@ def force_offset(
     marker_offset : array_like, shape (3,), optional
         Marker in the tcp frame, in m, as the problem was built with.
     """
-    unknowns = problem.springs + 3
+    unknowns = problem.columns + 3
     if len(np.unique(problem.block)) < _FEWEST_POSES or problem.d.size < _SPARE * unknowns:
         return None
     T_base_tcp = model.robot.forward(readings.joint_position)
@@ -151,7 +151,7 @@ def _yield(
 def _step(problem: Problem, columns: FloatArray) -> _Step:
     """Fit an offset's columns to what no compliances can explain."""
     w = problem.weight[..., None]
-    O = problem.scaled().rows.reshape(-1, problem.springs)  # noqa: E741
+    O = problem.scaled().rows.reshape(-1, problem.columns)  # noqa: E741
     A = (columns * w).reshape(-1, 3)
     d = (problem.d * problem.weight).ravel()
     Q, s, _ = np.linalg.svd(O, full_matrices=False)

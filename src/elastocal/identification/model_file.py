@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from elastocal.arrays import FloatArray
-from elastocal.elastic import ElasticModel, Spring
+from elastocal.elastic import AnySpring, ElasticModel
 from elastocal.errors import SchemaError
 from elastocal.files import sha256
 from elastocal.identification.calibrated import CalibratedModel
@@ -34,11 +34,11 @@ class CalibrateResult(Result):
     """A calibrated model as its file holds it: what ``calibrate`` returns and writes."""
 
     robot: RobotRecord
-    springs: tuple[Spring, ...]
+    springs: tuple[AnySpring, ...]
     compliance: FloatArray
-    """Shape (spring,), in rad/(N·m) or m/N."""
+    """Shape (parameter,), in rad/(N·m) or m/N of hinges."""
     draws: FloatArray
-    """Bootstrap draws, shape (draw, spring)."""
+    """Bootstrap draws, shape (draw, parameter)."""
     observability: Observability
     provenance: str
     """Where the data came from."""
@@ -57,7 +57,7 @@ class CalibrateResult(Result):
         """
         if sha256(self.robot.urdf) != self.robot.urdf_sha256:
             raise SchemaError("robot.urdf was changed: its hash is not robot.urdf_sha256")
-        n = len(self.springs)
+        n = sum(len(spring.parameters) for spring in self.springs)
         if len(self.draws) < MINIMUM_DRAWS:
             raise SchemaError(f"{len(self.draws)} draws, at least {MINIMUM_DRAWS} are needed")
         for name, rows in (("compliance", self.compliance[None]), ("draws", self.draws)):

@@ -12,9 +12,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from elastocal.arrays import FloatArray
-from elastocal.elastic import ElasticModel, Spring
+from elastocal.elastic import ElasticModel, Parameter, Spring
 from elastocal.identification.least_squares import rank
-from elastocal.identification.problem import unit_columns
+from elastocal.identification.problem import relative_sizes, unit_columns
 from elastocal.identification.solve import Factored
 from elastocal.identification.sparse_basis import sparse_basis
 from elastocal.records import record
@@ -25,7 +25,7 @@ _PROBES, _PROBE_SEED = 60, 0
 
 @record()
 class Term:
-    """One spring of an unobservable combination."""
+    """One spring (or parameter of one) in an unobservable combination."""
 
     spring: str
     weight: float
@@ -61,12 +61,13 @@ def observability(system: Factored, springs: Sequence[Spring]) -> Observability:
     springs : sequence of Spring
         In column order.
     """
+    parameters = [parameter for spring in springs for parameter in spring.parameters]
     determined = rank(system.s)
     null_space = system.Vt[determined:].T
-    groups = _readable(null_space / system.scale[:, None], springs)
+    groups = _readable(null_space / system.scale[:, None], parameters)
     condition = system.s[0] / system.s[determined - 1] if determined else np.inf
     mixed = {term.spring for group in groups for term in group}
-    observable = tuple(spring.name not in mixed for spring in springs)
+    observable = tuple(parameter.name not in mixed for parameter in parameters)
     return Observability(determined, float(condition), observable, groups)
 
 
@@ -88,18 +89,23 @@ def attainable_rank(model: ElasticModel, marker_offset: ArrayLike | None = None)
     rng = np.random.default_rng(_PROBE_SEED)
     q = rng.uniform(lower, upper, (_PROBES, len(lower)))
     blocks = model.observation_blocks(q[:, None], np.eye(3), marker_offset=marker_offset)
-    rows = unit_columns(blocks.reshape(-1, 3, len(model.springs))).rows
-    s = np.linalg.svd(rows.reshape(-1, len(model.springs)), compute_uv=False)
+    n = len(model.parameters)
+    rows = unit_columns(blocks.reshape(-1, 3, n), relative_sizes(model.parameters)).rows
+    s = np.linalg.svd(rows.reshape(-1, n), compute_uv=False)
     return rank(np.asarray(s, dtype=float))
 
 
-def _readable(null_space: FloatArray, springs: Sequence[Spring]) -> tuple[tuple[Term, ...], ...]:
+def _readable(
+    null_space: FloatArray, parameters: Sequence[Parameter]
+) -> tuple[tuple[Term, ...], ...]:
     """Return the null space of the compliances, by name."""
-    joints = list(dict.fromkeys(spring.joint for spring in springs))
-    orthonormal = np.linalg.qr(null_space)[0]
-    basis = sparse_basis(orthonormal, [joints.index(spring.joint) for spring in springs])
+    joints = list(dict.fromkeys(parameter.joint for parameter in parameters))
+    # Which weights count as zero is judged in multiples of sensible sizes, which have no unit.
+    size = relative_sizes(parameters)
+    orthonormal = np.linalg.qr(null_space / size[:, None])[0]
+    basis = sparse_basis(orthonormal, [joints.index(each.joint) for each in parameters]) * size
     return tuple(
-        tuple(Term(springs[i].name, float(vector[i])) for i in map(int, np.flatnonzero(vector)))
+        tuple(Term(parameters[i].name, float(vector[i])) for i in map(int, np.flatnonzero(vector)))
         for vector in basis
     )
 

@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike
 
 from elastocal.arrays import FloatArray
 from elastocal.errors import IdentificationError
-from elastocal.identification.losses import LOSSES, check_loss
+from elastocal.identification.losses import check_loss
 
 Weights = Literal["none", "sigma"]
 WEIGHTS: tuple[Weights, ...] = get_args(Weights)
@@ -35,8 +35,9 @@ class FitOptions:
     """Options of the identification; the defaults are the paper's (Eq. 19, `lsqlin`)."""
 
     lower: ArrayLike = 0.0
-    """Lower bound of the compliances, a number or shape (spring,). Zero by default: on few
-    poses an unbounded fit of 18 springs is worse than one of 6."""
+    """Lower bound, a number or shape (parameter,). The number zero, the default, means what each
+    parameter's kind of spring says: zero for compliances, since on few poses an unbounded fit of
+    18 springs is worse than one of 6."""
     upper: ArrayLike = np.inf
     """Upper bound, likewise."""
     weights: Weights = "none"
@@ -68,28 +69,39 @@ MINIMUM_DRAWS = 40
 """Fewest draws that leave one beyond each end of a 95 % interval."""
 
 
-def bounds(options: FitOptions, springs: int) -> tuple[FloatArray, FloatArray]:
-    """Return the lower and upper bounds, each of shape (spring,).
+def bounds(
+    options: FitOptions, parameters: int, natural: ArrayLike = 0.0
+) -> tuple[FloatArray, FloatArray]:
+    """Return the lower and upper bounds, each of shape (parameter,).
+
+    Parameters
+    ----------
+    options : FitOptions
+        What the user chose.
+    parameters : int
+        Number of parameters.
+    natural : array_like, shape (parameter,), optional
+        Smallest values that make sense to each: what a lower bound of zero means.
 
     Raises
     ------
     IdentificationError
         If a bound has another shape, is NaN, or a lower bound exceeds the upper one.
     """
+    zero = np.ndim(options.lower) == 0 and options.lower == 0.0
+    wanted = (natural if zero else options.lower, options.upper)
     try:
-        lower = np.broadcast_to(np.asarray(options.lower, dtype=float), (springs,))
-        upper = np.broadcast_to(np.asarray(options.upper, dtype=float), (springs,))
+        lower, upper = (
+            np.broadcast_to(np.asarray(each, dtype=float), (parameters,)) for each in wanted
+        )
     except ValueError as error:
         raise IdentificationError(
-            f"bounds must be a number or one number for each of the {springs} springs"
+            f"bounds must be a number or one number for each of the {parameters} springs"
         ) from error
     bad = np.flatnonzero(~((lower <= upper) & (lower < np.inf) & (upper > -np.inf)))
     if len(bad):
         raise IdentificationError(
-            f"bounds exclude everything: spring {bad[0] + 1} of {springs} would have to lie between"
-            f" {lower[bad[0]]:g} and {upper[bad[0]]:g}"
+            f"bounds exclude everything: spring {bad[0] + 1} of {parameters} would have to lie"
+            f" between {lower[bad[0]]:g} and {upper[bad[0]]:g}"
         )
     return lower, upper
-
-
-__all__ = ["LOSSES", "FitOptions", "Prior", "bounds"]

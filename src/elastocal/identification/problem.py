@@ -1,5 +1,6 @@
 """Build: the observation system ``O c = d`` of a dataset (paper Eq. 14-18)."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -7,7 +8,7 @@ from numpy.typing import ArrayLike
 
 from elastocal.arrays import FloatArray, IndexArray
 from elastocal.dataset import Readings
-from elastocal.elastic import ElasticModel
+from elastocal.elastic import ElasticModel, Parameter
 from elastocal.errors import IdentificationError
 from elastocal.identification.least_squares import RANK_TOLERANCE
 from elastocal.identification.options import FitOptions, Prior, bounds
@@ -19,9 +20,9 @@ class ScaledRows:
     """Weighted observation blocks whose columns are comparable."""
 
     rows: FloatArray
-    """Columns of unit norm, zero for an unloaded spring, shape (reading, 3, spring)."""
+    """Columns of unit norm, zero for an unloaded spring, shape (reading, 3, parameter)."""
     scale: FloatArray
-    """What each column was divided by, shape (spring,); the largest for an unloaded spring."""
+    """What each column was divided by, shape (parameter,); the largest for an unloaded spring."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,7 +33,7 @@ class Problem:
     """
 
     O: FloatArray  # noqa: E741 - the paper's name
-    """Observation blocks, shape (reading, 3, spring)."""
+    """Observation blocks, shape (reading, 3, parameter)."""
     d: FloatArray
     """Deflections, shape (reading, 3), in m."""
     weight: FloatArray
@@ -40,24 +41,27 @@ class Problem:
     block: IndexArray
     """Pose block of each reading, shape (reading,)."""
     lower: FloatArray
-    """Shape (spring,)."""
+    """Shape (parameter,)."""
     upper: FloatArray
-    """Shape (spring,)."""
+    """Shape (parameter,)."""
     prior_rows: FloatArray
-    """Rows of the prior, shape (row, spring + 1), right-hand side last; no rows without one."""
+    """Rows of the prior, shape (row, parameter + 1), right-hand side last; no rows without one."""
+    size: FloatArray | float = 1.0
+    """Sensible size of each parameter over that of the first, shape (parameter,): what makes a
+    column in m per rad/(N·m) comparable with one in m per m/N."""
 
     def __len__(self) -> int:
         """Return the number of readings."""
         return len(self.d)
 
     @property
-    def springs(self) -> int:
-        """Number of springs."""
+    def columns(self) -> int:
+        """Number of columns: of the parameters of all springs."""
         return int(self.O.shape[2])
 
     @property
     def scale(self) -> FloatArray:
-        """Norm of each weighted column; see `scaled`. Shape (spring,)."""
+        """Norm of each weighted column; see `scaled`. Shape (parameter,)."""
         return self.scaled().scale
 
     def scaled(self) -> "ScaledRows":
@@ -66,7 +70,7 @@ class Problem:
         The column of a spring that no force turns, e.g. of the last joint when the tcp is on its
         axis, is round-off that would pass for information; it becomes zero.
         """
-        return unit_columns(self.O * self.weight[..., None])
+        return unit_columns(self.O * self.weight[..., None], self.size)
 
     def residuals(self, compliance: FloatArray) -> FloatArray:
         """Return ``O c - d``, unweighted, shape (reading, 3), in m."""
@@ -91,24 +95,41 @@ class Problem:
             block=self.block[index],
         )
 
-    def with_springs(self, springs: IndexArray) -> "Problem":
-        """Return the problem of some of the springs, by column."""
+    def with_columns(self, columns: IndexArray) -> "Problem":
+        """Return the problem of some of the parameters."""
         return replace(
             self,
-            O=self.O[:, :, springs],
-            lower=self.lower[springs],
-            upper=self.upper[springs],
-            prior_rows=self.prior_rows[:, [*springs, -1]],
+            O=self.O[:, :, columns],
+            lower=self.lower[columns],
+            upper=self.upper[columns],
+            prior_rows=self.prior_rows[:, [*columns, -1]],
+            size=np.broadcast_to(self.size, self.lower.shape)[columns],
         )
 
 
-def unit_columns(rows: FloatArray) -> ScaledRows:
-    """Return observation rows, shape (reading, 3, spring), with columns of unit norm or zero."""
+def unit_columns(rows: FloatArray, size: FloatArray | float = 1.0) -> ScaledRows:
+    """Return observation rows with columns of unit norm, or zero for an unloaded spring.
+
+    Parameters
+    ----------
+    rows : ndarray, shape (reading, 3, parameter)
+        In m per unit of each parameter.
+    size : ndarray, shape (parameter,), optional
+        Sensible relative size of each parameter; see `relative_sizes`.
+    """
     norms = np.sqrt(np.einsum("rin,rin->n", rows, rows))
-    largest = norms.max() or 1.0
-    loaded = norms > RANK_TOLERANCE * largest
+    # The deflections that sensible values make have one unit, the norms may have several.
+    visible = norms * size
+    largest = visible.max() or 1.0
+    loaded = visible > RANK_TOLERANCE * largest
     gain = np.where(loaded, 1.0 / np.where(loaded, norms, 1.0), 0.0)
-    return ScaledRows(rows * gain, np.where(loaded, norms, largest))
+    return ScaledRows(rows * gain, np.where(loaded, norms, largest / size))
+
+
+def relative_sizes(parameters: Sequence[Parameter]) -> FloatArray:
+    """Return the sensible size of each parameter over that of the first, shape (parameter,)."""
+    sizes = np.array([parameter.scale for parameter in parameters])
+    return np.asarray(sizes / sizes[0])
 
 
 def build(
@@ -138,7 +159,8 @@ def build(
     options = options or FitOptions()
     q, force = readings.joint_position, readings.force
     blocks = model.observation_blocks(q, force, readings.moment, marker_offset)
-    lower, upper = bounds(options, len(model.springs))
+    natural = [parameter.lower for parameter in model.parameters]
+    lower, upper = bounds(options, len(natural), natural)
     return Problem(
         O=blocks,
         d=np.array(readings.deflection),
@@ -146,7 +168,8 @@ def build(
         block=pose_blocks(readings),
         lower=lower,
         upper=upper,
-        prior_rows=_prior_rows(options.prior, len(model.springs)),
+        prior_rows=_prior_rows(options.prior, len(model.parameters)),
+        size=relative_sizes(model.parameters),
     )
 
 

@@ -46,7 +46,7 @@ class Solution:
 
 def factor(problem: Problem) -> Factored:
     """Reduce the weighted rows to a triangle and decompose it."""
-    n, scaled = problem.springs, problem.scaled()
+    n, scaled = problem.columns, problem.scaled()
     deflection = (problem.d * problem.weight).ravel()
     system = np.column_stack([scaled.rows.reshape(-1, n), deflection])
     system = np.vstack([system, problem.prior_rows / np.append(scaled.scale, 1.0)])

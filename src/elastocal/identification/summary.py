@@ -163,17 +163,18 @@ def summary(calibration: Calibration, settings: FitSettings | None = None) -> Ca
 def _springs(calibration: Calibration) -> tuple[SpringSummary, ...]:
     calibrated = calibration.calibrated
     low, high = calibrated.interval()
+    named = ((spring, each) for spring in calibrated.model.springs for each in spring.parameters)
     return tuple(
         SpringSummary(
-            name=spring.name,
+            name=parameter.name,
             kind=spring.kind,
-            unit=spring.unit,
+            unit=parameter.unit.si,
             compliance=float(calibrated.compliance[i]),
             low=float(low[i]),
             high=float(high[i]),
             observable=calibrated.observability.observable[i],
         )
-        for i, spring in enumerate(calibrated.model.springs)
+        for i, (spring, parameter) in enumerate(named)
     )
 
 

@@ -9,7 +9,7 @@ Detection*, 1987, chapter 6).
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import f
+from scipy.special import fdtri
 
 from elastocal.arrays import BoolArray, FloatArray
 from elastocal.identification.least_squares import rank
@@ -69,7 +69,7 @@ def screen(problem: Problem) -> Screening:
         blunder = np.zeros_like(blunder)
     # The scale is a median itself, about half as good as a variance of all that is left over.
     freedom = 0.5 * max(problem.d.size - rank(robust.factored.s), 2)
-    threshold = float(np.sqrt(3.0 * f.ppf(1.0 - FALSE_ALARM / len(problem), 3, freedom)))
+    threshold = float(np.sqrt(3.0 * fdtri(3, freedom, 1.0 - FALSE_ALARM / len(problem))))
     return Screening(score, residual, h, threshold, blunder)
 
 

@@ -10,7 +10,7 @@ Student's to the normal quantile. See docs/decisions/0003-bootstrap-widening.md.
 """
 
 import numpy as np
-from scipy.stats import norm, t
+from scipy.special import ndtri, stdtrit
 
 from elastocal.arrays import FloatArray
 from elastocal.identification.bootstrap import CONFIDENCE
@@ -39,7 +39,7 @@ def widening(
     if not bootstrap > 0.0:
         return 1.0
     tail = 0.5 * (1.0 + CONFIDENCE)
-    student = t.ppf(tail, folds - 1) / norm.ppf(tail)
+    student = stdtrit(folds - 1, tail) / ndtri(tail)
     return max(1.0, float(student * np.sqrt(jackknife / bootstrap)))
 
 
@@ -50,6 +50,6 @@ def widen(problem: Problem, compliance: FloatArray, draws: FloatArray, by: float
 
 def _variance(problem: Problem, deviations: FloatArray) -> float:
     """Return the sum over deviations of the mean squared change of predicted deflection."""
-    rows = problem.O.reshape(-1, problem.springs)
+    rows = problem.O.reshape(-1, problem.columns)
     gram = rows.T @ rows / len(problem)
     return float(np.einsum("dn,nm,dm->", deviations, gram, deviations))

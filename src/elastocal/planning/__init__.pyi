@@ -1,20 +1,46 @@
-from .cell_checks import collision_scene as collision_scene, sight_check as sight_check
-from .choice import Searched as Searched
-from .gathering import gather as gather
+from .cell_setup import (
+    cell_surface as cell_surface,
+    collision_scene as collision_scene,
+    point_checks as point_checks,
+    robot_checks as robot_checks,
+    sight_check as sight_check,
+    surface_findings as surface_findings,
+    torque_check as torque_check,
+)
 from .plan import (
-    Planned as Planned,
+    PlanAndPool as PlanAndPool,
     make_plan as make_plan,
     refuse_before_the_long_work as refuse_before_the_long_work,
 )
-from .plan_file import (
+from .plan_result import (
     PLAN as PLAN,
     POOL as POOL,
+    CellRecord as CellRecord,
+    CheckRecord as CheckRecord,
+    ComparisonRecord as ComparisonRecord,
+    ContactRecord as ContactRecord,
     Joints as Joints,
-    PlanFile as PlanFile,
+    MoveRecord as MoveRecord,
+    PlanResult as PlanResult,
+    PoolRecord as PoolRecord,
     PoseRecord as PoseRecord,
+    RobotRecord as RobotRecord,
+    SearchRecord as SearchRecord,
     SpreadRecord as SpreadRecord,
+    check_plan as check_plan,
     read_plan as read_plan,
     write_plan as write_plan,
+)
+from .pool import (
+    UNREACHABLE as UNREACHABLE,
+    Approach as Approach,
+    BasePlacement as BasePlacement,
+    Options as Options,
+    Pool as Pool,
+    Progress as Progress,
+    join_pools as join_pools,
+    make_pool as make_pool,
+    options_at as options_at,
 )
 from .pool_file import (
     PoolData as PoolData,
@@ -22,5 +48,13 @@ from .pool_file import (
     read_pool as read_pool,
     write_pool as write_pool,
 )
-from .scene import CollisionScene as CollisionScene
-from .tooling import cell_surface as cell_surface, surface_findings as surface_findings
+from .pool_sampling import (
+    CANDIDATES as CANDIDATES,
+    PoolBuilder as PoolBuilder,
+    SampledPool as SampledPool,
+    rank_base_placements as rank_base_placements,
+    sample_pool as sample_pool,
+)
+from .postures import Postures as Postures, retreat_joints as retreat_joints
+from .scene import Body as Body, CollisionScene as CollisionScene, mesh_shape as mesh_shape
+from .search_pool import SearchPool as SearchPool

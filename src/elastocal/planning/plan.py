@@ -8,11 +8,15 @@ from numpy.random import Generator
 from elastocal.arrays import IndexArray
 from elastocal.cell import Cell
 from elastocal.errors import PlanningError
-from elastocal.planning.cell_checks import collision_scene, sight_check, torque_check
-from elastocal.planning.choice import Searched
-from elastocal.planning.gathering import STAGE as CANDIDATES, Gathered, gather
+from elastocal.planning._plan_record import Decisions, plan_record, pool_data
+from elastocal.planning.cell_setup import (
+    cell_surface,
+    collision_scene,
+    sight_check,
+    surface_findings,
+    torque_check,
+)
 from elastocal.planning.motion import (
-    STAGE as VISITING,
     Mover,
     Route,
     clear_retreats,
@@ -20,26 +24,29 @@ from elastocal.planning.motion import (
     plan_route,
     refuse_blocked_home,
 )
-from elastocal.planning.plan_file import PlanFile, SpreadRecord
+from elastocal.planning.plan_result import PlanResult, SpreadRecord
 from elastocal.planning.pool import Progress
 from elastocal.planning.pool_file import PoolData
+from elastocal.planning.pool_sampling import (
+    SampledPool,
+    sample_pool,
+)
 from elastocal.planning.postures import Postures
-from elastocal.planning.records import Decisions, plan_record, pool_data
 from elastocal.planning.search import Cover, Selection, technique
+from elastocal.planning.search_pool import SearchPool
 from elastocal.planning.surface import Finding, Surface
-from elastocal.planning.tooling import cell_surface, surface_findings
 
-STAGES = ("surface", CANDIDATES, "search", VISITING)
-"""What progress is told of, in this order."""
+_SURFACE, _SEARCH = "surface", "search"
+"""Stages under which progress is reported, beside `CANDIDATES` and `VISITING`."""
 _REPLACEMENTS = 10
 """Times that poses which no way leads to are replaced by others."""
 
 
 @dataclass(frozen=True, eq=False)
-class Planned:
+class PlanAndPool:
     """A plan, the pool beside it, and the surface that it lies on."""
 
-    plan: PlanFile
+    plan: PlanResult
     pool: PoolData
     surface: Surface
 
@@ -49,7 +56,7 @@ def make_plan(
     compare: str | None = None,
     jobs: int | None = None,
     progress: Progress = lambda *_: None,
-) -> Planned:
+) -> PlanAndPool:
     """Return the calibration poses of a cell, checked and in visiting order.
 
     Everything random is drawn from ``search.seed`` of the cell file: the same cell gives the same
@@ -64,7 +71,8 @@ def make_plan(
     jobs : int, optional
         Number of processes; all cores by default.
     progress : callable, optional
-        Told the stage (one of `STAGES`), what is done of it and how much there is.
+        Told the stage (``surface``, ``candidates``, ``search``, ``visiting order``), what is done
+        of it and how much there is.
 
     Raises
     ------
@@ -76,19 +84,19 @@ def make_plan(
     other = None if compare is None else technique(compare)
     refuse_before_the_long_work(cell, compare)
     for_findings, for_points, for_search = np.random.default_rng(cell.file.search.seed).spawn(3)
-    progress(STAGES[0], 0, 1)
+    progress(_SURFACE, 0, 1)
     surface = cell_surface(cell)
     findings = surface_findings(cell, surface, for_findings)
     mover = mover_for(cell, collision_scene(cell, surface))
     refuse_blocked_home(cell.home, mover)
-    progress(STAGES[0], 1, 1)
-    gathered = gather(cell, surface, for_points, jobs, progress)
+    progress(_SURFACE, 1, 1)
+    gathered = sample_pool(cell, surface, for_points, jobs, progress)
     _refuse_too_few(cell, gathered, findings)
-    progress(STAGES[2], 0, 1)
-    searched = Searched.of(cell, surface, gathered)
+    progress(_SEARCH, 0, 1)
+    searched = SearchPool.of(cell, surface, gathered)
     selection, route = _choose(cell, searched, gathered, mover, for_search, progress)
     spread = searched.spread(selection.order)
-    progress(STAGES[2], 1, 1)
+    progress(_SEARCH, 1, 1)
     everyone = np.arange(len(searched.candidates))
     comparison = (
         None if other is None else searched.take(other, everyone, len(selection), for_search)
@@ -108,7 +116,7 @@ def make_plan(
             *_notes(cell, gathered, selection, spread),
         ),
     )
-    return Planned(plan_record(decisions), pool_data(decisions), surface)
+    return PlanAndPool(plan_record(decisions), pool_data(decisions), surface)
 
 
 def refuse_before_the_long_work(cell: Cell, compare: str | None = None) -> None:
@@ -135,7 +143,7 @@ def refuse_before_the_long_work(cell: Cell, compare: str | None = None) -> None:
             )
 
 
-def _refuse_too_few(cell: Cell, gathered: Gathered, findings: tuple[Finding, ...]) -> None:
+def _refuse_too_few(cell: Cell, gathered: SampledPool, findings: tuple[Finding, ...]) -> None:
     """Refuse a pool that cannot give the poses wanted, saying what to move."""
     pool, wanted = gathered.pool, cell.file.search.poses or 1
     found = len(pool.postures)
@@ -153,8 +161,8 @@ def _refuse_too_few(cell: Cell, gathered: Gathered, findings: tuple[Finding, ...
 
 def _choose(
     cell: Cell,
-    searched: Searched,
-    gathered: Gathered,
+    searched: SearchPool,
+    gathered: SampledPool,
     mover: Mover,
     rng: Generator,
     progress: Progress,
@@ -185,7 +193,7 @@ def _stations(cell: Cell, surface: Surface, chosen: Postures) -> tuple[str | Non
 
 
 def _notes(
-    cell: Cell, gathered: Gathered, selection: Selection, spread: SpreadRecord
+    cell: Cell, gathered: SampledPool, selection: Selection, spread: SpreadRecord
 ) -> tuple[str, ...]:
     """Return what a user should know of how the poses were found, a line each."""
     search, pool = cell.file.search, gathered.pool

@@ -31,7 +31,7 @@ REACH_ADVICE = (
 )
 """What a user can move when most points are out of reach."""
 
-ROUNDS = 6
+_ROUNDS = 6
 """Postures of a point and branch that the slow checks are asked about, at most."""
 
 Progress = Callable[[str, int, int], None]
@@ -49,8 +49,8 @@ class Approach:
 
 
 @dataclass(frozen=True)
-class Stand:
-    """Where the external axes stand, and which branches are asked there, the best first."""
+class BasePlacement:
+    """Where the external axes carry the arm, and which branches are asked there, the best first."""
 
     external: tuple[float, ...] = ()
     """Positions of the external axes, in rad or m."""
@@ -128,7 +128,7 @@ def make_pool(
     normals: FloatArray,
     approach: Approach,
     checks: Checks,
-    stands: Sequence[Stand] = (Stand(),),
+    placements: Sequence[BasePlacement] = (BasePlacement(),),
 ) -> Pool:
     """Return a posture for every point that has one which passes every check.
 
@@ -142,8 +142,8 @@ def make_pool(
         How the tool comes to the surface.
     checks : Checks
         What a posture has to pass; those of points refer to these points.
-    stands : sequence of Stand
-        Where the external axes may stand, in the order in which they are tried.
+    placements : sequence of BasePlacement
+        Where the external axes may carry the arm, in the order in which they are tried.
 
     Raises
     ------
@@ -152,21 +152,22 @@ def make_pool(
     """
     if not len(points):
         raise PlanningError("the surface has no candidate points: is its region empty?")
-    found = _Found(checks, len(points))
+    found = _PoolSearch(checks, len(points))
     found.refuse_points()
-    for stand in stands:
+    for placement in placements:
         waiting = found.waiting
         if not len(waiting):
             break
-        options = options_at(solver, points[waiting], normals[waiting], approach, stand.external)
+        where = points[waiting], normals[waiting]
+        options = options_at(solver, *where, approach, placement.external)
         options = Options(options.postures.at(waiting[options.point]), options.branch)
-        order = range(solver.branches) if stand.branches is None else stand.branches
+        order = range(solver.branches) if placement.branches is None else placement.branches
         for branch in order:
             _ask_branch(options.of(branch, found.is_waiting), branch, checks, found)
     return found.pool(len(solver.robot.joint_names))
 
 
-def joined(pools: Sequence[Pool]) -> Pool:
+def join_pools(pools: Sequence[Pool]) -> Pool:
     """Return one pool of several that were made of consecutive parts of the points."""
     starts = np.cumsum([0, *(pool.sampled for pool in pools)])
     postures = [
@@ -199,8 +200,8 @@ class Options:
         return self.postures.take((self.branch == branch) & is_waiting[self.point])
 
 
-class _Found:
-    """What the search has found so far; lives inside `make_pool` only."""
+class _PoolSearch:
+    """The postures found so far, and the points that wait for one; lives in `make_pool` only."""
 
     def __init__(self, checks: Checks, points: int) -> None:
         self.checks = checks
@@ -283,7 +284,7 @@ def options_at(
     return Options(Postures.joined(parts), np.concatenate(branches))
 
 
-def _ask_branch(postures: Postures, branch: int, checks: Checks, found: _Found) -> None:
+def _ask_branch(postures: Postures, branch: int, checks: Checks, found: _PoolSearch) -> None:
     """Give every waiting point the best of its postures in a branch that passes all checks."""
     fast = verdicts(checks.quick, postures)
     before = 1 + len(checks.point)
@@ -310,4 +311,4 @@ def _rounds(point: IndexArray, ordered: IndexArray) -> list[IndexArray]:
     place = np.arange(len(ordered))
     for a, b in pairwise([*starts, len(ordered)]):
         place[a:b] -= a
-    return [ordered[place == turn] for turn in range(min(ROUNDS, int(place.max(initial=-1)) + 1))]
+    return [ordered[place == turn] for turn in range(min(_ROUNDS, int(place.max(initial=-1)) + 1))]

@@ -14,7 +14,7 @@ import xarray as xr
 from elastocal.arrays import FloatArray, IndexArray
 from elastocal.dataset import read_stated, write_netcdf
 from elastocal.errors import PlanningError, SchemaError
-from elastocal.planning.plan_file import POOL, PlanFile
+from elastocal.planning.plan_result import POOL, PlanResult
 
 SCHEMA = "elastocal.pool/1"
 NOT_CHOSEN = -1
@@ -133,12 +133,12 @@ def read_pool(folder: Path) -> PoolData:
         raise SchemaError(f"{path}: {error}") from error
 
 
-def check_pool_of(plan: PlanFile, data: PoolData, what: str = POOL) -> None:
+def check_pool_of(plan: PlanResult, data: PoolData, what: str = POOL) -> None:
     """Refuse a pool that a plan was not chosen from.
 
     Parameters
     ----------
-    plan : PlanFile
+    plan : PlanResult
         The plan.
     data : PoolData
         The pool that lies beside it.

@@ -11,7 +11,7 @@ from elastocal.arrays import BoolArray, FloatArray, IndexArray
 from elastocal.errors import RobotError
 from elastocal.robot import Robot, collision_model
 
-NEIGHBOURS = 1
+_NEIGHBOURS = 1
 """Links this many joints apart touch by construction and are not checked against each other."""
 
 
@@ -198,6 +198,6 @@ def _pairs(
         (a, b)
         for i, a in enumerate(moving)
         for b in moving[i + 1 :]
-        if abs(joint[a] - joint[b]) > NEIGHBOURS
+        if abs(joint[a] - joint[b]) > _NEIGHBOURS
     ]
     return [*outside, *inside]

@@ -6,5 +6,11 @@ from ._codec import (
     to_data as to_data,
     write_json as write_json,
 )
+from ._netcdf import (
+    LabelledArray as LabelledArray,
+    LabelledArrays as LabelledArrays,
+    read_arrays as read_arrays,
+    write_arrays as write_arrays,
+)
 from ._strict import StrictModel as StrictModel, read_yaml as read_yaml
 from ._validation import check_schema as check_schema, validate as validate

@@ -70,7 +70,9 @@ def _first_problem(error: ValidationError, cls: type) -> str:
     first = error.errors(include_url=False)[0]
     # An item of an array is known by its place in it; see `elastocal.arrays`.
     item = first.get("ctx", {})
-    path = ".".join(str(part) for part in (*first["loc"], *item.get("at", ())))
+    # A part in angle brackets is the tag of a class among several; the file has no such key.
+    parts = [str(part) for part in (*first["loc"], *item.get("at", ()))]
+    path = ".".join(part for part in parts if not part.startswith("<"))
     if first["type"] in ("extra_forbidden", "unexpected_keyword_argument"):
         key, known = str(first["loc"][-1]), _known_keys(cls, first["loc"][:-1])
         allowed = f" (known: {', '.join(known)})" if known else ""

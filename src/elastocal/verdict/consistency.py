@@ -12,12 +12,12 @@ import numpy as np
 
 from elastocal.cell import Cell, fingerprint
 from elastocal.codec import CodecData
-from elastocal.compensation.conditioning import ToolRecord
-from elastocal.compensation.process import ProcessRecord
+from elastocal.compensation.conditioning import ToolResult
+from elastocal.compensation.process import SimulatedProcess
 from elastocal.dataset import Dataset
 from elastocal.errors import CodecError, CompensationError, IdentificationError, PlanningError
 from elastocal.identification import CalibratedModel
-from elastocal.planning import PlanFile
+from elastocal.planning import PlanResult
 from elastocal.procedure import commits
 from elastocal.robot import parse_urdf
 from elastocal.verdict.evidence import Evidence
@@ -42,7 +42,7 @@ def check_model(model: CalibratedModel, dataset: Dataset | None, path: Path) -> 
         )
 
 
-def check_plan_robot(plan: PlanFile, cell: Cell) -> None:
+def check_plan_robot(plan: PlanResult, cell: Cell) -> None:
     """Refuse a cell whose robot has other joints than the plan's.
 
     Raises
@@ -57,7 +57,7 @@ def check_plan_robot(plan: PlanFile, cell: Cell) -> None:
         )
 
 
-def check_tool(record: ToolRecord, evidence: Evidence, path: Path) -> ToolRecord:
+def check_tool(record: ToolResult, evidence: Evidence, path: Path) -> ToolResult:
     """Return a tool file, or refuse one whose flange the robot does not have.
 
     Raises
@@ -92,19 +92,21 @@ def check_codec(data: CodecData, evidence: Evidence, path: Path) -> CodecData:
     foreign = [label for group in data.pose_labels for label in group if label not in known]
     if foreign:
         raise CodecError(f"{path} has pose {foreign[0]}, which the dataset does not have")
-    if "tcp_position" in evidence.dataset.data and not _same_places(data, evidence.dataset):
+    if not _same_places(data, evidence.dataset):
         raise CodecError(f"{path} has its poses at other places than the dataset")
     return data
 
 
 def _same_places(data: CodecData, dataset: Dataset) -> bool:
-    place = dict(zip(dataset.poses, dataset.data["tcp_position"].values, strict=True))
+    if dataset.tcp_position is None:
+        return True
+    place = dict(zip(dataset.poses, dataset.tcp_position, strict=True))
     found = np.array([place[group[0]] for group in data.pose_labels])
     gap = np.linalg.norm(found - data.contact, axis=1)
     return bool(np.all(~(gap > _SAME_PLACE)))
 
 
-def check_process(record: ProcessRecord, evidence: Evidence, path: Path) -> ProcessRecord:
+def check_process(record: SimulatedProcess, evidence: Evidence, path: Path) -> SimulatedProcess:
     """Return a process, or refuse one of another cell.
 
     Raises

@@ -4,8 +4,8 @@ from dataclasses import dataclass, field
 
 from elastocal.cell import Cell
 from elastocal.codec import ALL_LOADS, CodecData, Saturation, Variant, Verdicts
-from elastocal.compensation.conditioning import ToolRecord
-from elastocal.compensation.process import ProcessRecord
+from elastocal.compensation.conditioning import ToolResult
+from elastocal.compensation.process import SimulatedProcess
 from elastocal.dataset import Dataset
 from elastocal.identification import (
     CalibratedModel,
@@ -13,8 +13,8 @@ from elastocal.identification import (
     Reproduction,
     UnseenErrors,
 )
-from elastocal.identification.recertification import Recertification
-from elastocal.planning import PlanFile, PoolData
+from elastocal.identification.recertification import CompareSummary
+from elastocal.planning import PlanResult, PoolData
 from elastocal.planning.surface import Surface
 from elastocal.procedure import Entry, RunRecord
 from elastocal.verdict._figures import RunFigures
@@ -87,7 +87,7 @@ class Evidence:
     cell_text: str | None = None
     """The cell file as it stands."""
     surface: Surface | None = None
-    plan: PlanFile | None = None
+    plan: PlanResult | None = None
     pool: PoolData | None = None
     journal: tuple[Entry, ...] | None = None
     dataset: Dataset | None = None
@@ -96,13 +96,13 @@ class Evidence:
     calibrated: ModelEvidence | None = None
     reproduction: Reproduction | None = None
     """The calibration made once more from the dataset."""
-    tool: ToolRecord | None = None
+    tool: ToolResult | None = None
     tool_sha256: str | None = None
     """Hash of the tool file."""
     codecs: tuple[CodecEvidence, ...] = ()
     """One a comparison."""
-    process: ProcessRecord | None = None
-    recertification: Recertification | None = None
+    process: SimulatedProcess | None = None
+    recertification: CompareSummary | None = None
     """This calibration against an earlier one."""
     limits: AcceptanceLimits = field(default_factory=AcceptanceLimits)
     files: tuple[UsedFile, ...] = ()

@@ -14,8 +14,8 @@ from elastocal import dataset as datasets
 from elastocal.arrays import FloatArray
 from elastocal.cell import Cell, load_cell
 from elastocal.codec import ARRAYS, judge, read_codec
-from elastocal.compensation.conditioning import ToolRecord, read_tool
-from elastocal.compensation.process import TABLE, ProcessRecord, read_process
+from elastocal.compensation.conditioning import ToolResult, read_tool
+from elastocal.compensation.process import TABLE, SimulatedProcess, read_process
 from elastocal.dataset import Dataset
 from elastocal.errors import ElastocalError
 from elastocal.files import read_text
@@ -27,7 +27,7 @@ from elastocal.identification.recertification import recertify_files
 from elastocal.planning import (
     PLAN,
     POOL,
-    PlanFile,
+    PlanResult,
     PoolData,
     cell_surface,
     check_pool_of,
@@ -155,7 +155,7 @@ def _with_plan(
 ) -> Evidence:
     cell, record = evidence.cell, journal[0].run if journal else None
 
-    def plan_of_cell() -> PlanFile:
+    def plan_of_cell() -> PlanResult:
         plan = read_plan(run.plan)
         if record is not None:
             check_plan(run, record)
@@ -212,10 +212,10 @@ def _calibrated(path: Path, dataset: Dataset | None) -> ModelEvidence:
 
 
 def _with_rest(evidence: Evidence, reader: PartReader, options: EvidenceOptions) -> Evidence:
-    def tool(path: Path) -> ToolRecord:
+    def tool(path: Path) -> ToolResult:
         return check_tool(read_tool(path), evidence, path)
 
-    def process(path: Path) -> ProcessRecord:
+    def process(path: Path) -> SimulatedProcess:
         folder = path.parent if path.name == TABLE else path
         return check_process(read_process(folder), evidence, folder / TABLE)
 
@@ -269,7 +269,7 @@ def _with_old(evidence: Evidence, reader: PartReader, options: EvidenceOptions) 
     q, force = _rows_that_matter(evidence)
     found = recertify_files(old, new, q, force, limit=evidence.limits.drift)
     reader.use(old)
-    return replace(evidence, recertification=found)
+    return replace(evidence, recertification=found.summary)
 
 
 def _rows_that_matter(evidence: Evidence) -> tuple[FloatArray | None, FloatArray | None]:

@@ -13,10 +13,10 @@ from typing import Any
 
 import numpy as np
 
-from elastocal.dataset import read_netcdf
 from elastocal.errors import ElastocalError
 from elastocal.files import read_text
 from elastocal.procedure import file_sha256
+from elastocal.records import read_arrays
 
 BYTES, CONTENT = "bytes", "content without times and folders"
 _LEFT_OUT = (
@@ -68,13 +68,13 @@ def _left_out(key: str, value: Any) -> bool:
 
 
 def _arrays(path: Path) -> str:
-    data = read_netcdf(path)
+    data = read_arrays(path)
     digest = hashlib.sha256()
-    for name in sorted(map(str, data.variables)):
+    for name in sorted(data.variables):
         values = np.ascontiguousarray(data[name].values)
         shape = f"{name} {data[name].dims} {values.shape}"
         told = json.dumps(values.tolist()) if values.dtype.kind in "OU" else ""
         digest.update(shape.encode() + (told.encode() if told else values.tobytes()))
-    attributes = {str(k): str(v) for k, v in data.attrs.items() if k not in _LEFT_OUT}
+    attributes = {k: str(v) for k, v in data.attributes.items() if k not in _LEFT_OUT}
     digest.update(json.dumps(attributes, sort_keys=True).encode())
     return digest.hexdigest()

@@ -8,7 +8,7 @@ from elastocal.compensation.conditioning import (
     fit_tool,
     read_tool,
     sensor_load,
-    tool_record,
+    tool_result,
     write_tool,
 )
 from elastocal.errors import CompensationError, SchemaError
@@ -33,7 +33,7 @@ def fit():
 
 
 def test_a_record_survives_its_file(tmp_path, fit):
-    record = tool_record(fit, MOUNT, "static.csv")
+    record = tool_result(fit, MOUNT, "static.csv")
     write_tool(tmp_path / "tool.json", record)
     assert read_tool(tmp_path / "tool.json") == record
 
@@ -41,12 +41,12 @@ def test_a_record_survives_its_file(tmp_path, fit):
 def test_undetermined_intervals_are_null(tmp_path):
     rng = np.random.default_rng(0)
     fit = fit_tool(TOOL.raw(np.repeat(turned(1, rng), 3, axis=0), rng))
-    write_tool(tmp_path / "tool.json", tool_record(fit, MOUNT, ""))
+    write_tool(tmp_path / "tool.json", tool_result(fit, MOUNT, ""))
     assert read_tool(tmp_path / "tool.json").half_width["mass"] is None
 
 
 def test_the_load_sits_where_the_chain_puts_it(fit, robot):
-    load = sensor_load(tool_record(fit, MOUNT, ""), robot)
+    load = sensor_load(tool_result(fit, MOUNT, ""), robot)
     T_flange_sensor = np.eye(4)
     T_flange_sensor[:3, :3], T_flange_sensor[:3, 3] = fit.R_flange_sensor, MOUNT.origin
     np.testing.assert_allclose(T_FLANGE_TCP @ load.T_tcp_sensor, T_flange_sensor, atol=1e-12)
@@ -56,19 +56,19 @@ def test_the_load_sits_where_the_chain_puts_it(fit, robot):
 def test_what_is_not_determined_is_refused_by_name(fit, robot):
     open_one = replace(fit, undetermined=("mass", "force bias z"))
     with pytest.raises(CompensationError, match="leaves mass, force bias z undetermined"):
-        sensor_load(tool_record(open_one, MOUNT, ""), robot)
+        sensor_load(tool_result(open_one, MOUNT, ""), robot)
 
 
 def test_a_link_that_the_robot_has_not_is_refused(fit, robot):
     mount = replace(MOUNT, flange="flang")
     with pytest.raises(CompensationError, match=r"link 'flang', .* did you mean 'flange'"):
-        sensor_load(tool_record(fit, mount, ""), robot)
+        sensor_load(tool_result(fit, mount, ""), robot)
 
 
 def test_a_link_before_the_wrist_is_refused(fit, robot):
     mount = replace(MOUNT, flange="link_3")
     with pytest.raises(CompensationError, match="'link_3' of the tool file lies before joint jo"):
-        sensor_load(tool_record(fit, mount, ""), robot)
+        sensor_load(tool_result(fit, mount, ""), robot)
 
 
 def test_another_kind_of_file_is_refused(tmp_path):

@@ -2,9 +2,14 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from elastocal.compensation.conditioning import NAMES, fit_tool, static_postures
-from elastocal.compensation.conditioning.tool_fit import residual
-from elastocal.compensation.conditioning.tool_model import derivatives, wrenches
+from elastocal.compensation.conditioning import (
+    TOOL_UNKNOWNS,
+    fit_tool,
+    static_postures,
+    tool_derivatives,
+    tool_residual,
+    tool_wrenches,
+)
 from elastocal.errors import CompensationError
 from support.static_postures import PlantedTool, turned
 
@@ -12,7 +17,7 @@ TOOL = PlantedTool()
 
 
 def errors(fit, tool=TOOL):
-    """Return the errors of a fit in the order of `NAMES`."""
+    """Return the errors of a fit in the order of `TOOL_UNKNOWNS`."""
     rotation = Rotation.from_matrix(fit.R_flange_sensor.T @ tool.R_flange_sensor).as_rotvec()
     return np.array(
         [
@@ -38,7 +43,7 @@ def test_intervals_cover_planted_values_about_as_often_as_they_say(count):
     covered = []
     for _ in range(80):
         fit = fit_tool(TOOL.raw(turned(count, rng), rng))
-        widths = np.array([fit.half_width[name] for name in NAMES])
+        widths = np.array([fit.half_width[name] for name in TOOL_UNKNOWNS])
         covered.append(np.abs(errors(fit)) <= widths)
     assert 0.92 <= np.mean(covered) <= 0.98
     assert np.mean(covered, axis=0).min() >= 0.87
@@ -54,7 +59,7 @@ def test_scatter_is_that_of_the_noise():
 def test_equal_postures_determine_nothing():
     rng = np.random.default_rng(3)
     fit = fit_tool(TOOL.raw(np.repeat(turned(1, rng), 6, axis=0), rng))
-    assert fit.undetermined == NAMES
+    assert fit.undetermined == TOOL_UNKNOWNS
     assert all(np.isnan(width) for width in fit.half_width.values())
 
 
@@ -95,7 +100,7 @@ def test_a_gravity_that_points_elsewhere_is_no_matter():
 def test_residuals_are_what_the_fit_leaves():
     rng = np.random.default_rng(8)
     postures = TOOL.raw(turned(8, rng), rng)
-    force, moment = residual(postures, fit_tool(postures))
+    force, moment = tool_residual(postures, fit_tool(postures))
     assert np.sqrt((force**2).mean()) < 0.7
     assert np.sqrt((moment**2).mean()) < 0.07
 
@@ -104,7 +109,7 @@ def test_derivatives_are_those_of_the_wrenches():
     rng = np.random.default_rng(9)
     postures, values = TOOL.raw(turned(3, rng), rng), rng.normal(size=13)
     values[1:4] = 0.0
-    J = derivatives(postures, values, TOOL.R_flange_sensor)
+    J = tool_derivatives(postures, values, TOOL.R_flange_sensor)
     for k in range(13):
         ends = []
         for sign in (1.0, -1.0):
@@ -113,7 +118,7 @@ def test_derivatives_are_those_of_the_wrenches():
                 R = R @ Rotation.from_rotvec(sign * 1e-6 * np.eye(3)[k - 1]).as_matrix()
             else:
                 moved[k] += sign * 1e-6
-            ends.append(wrenches(postures, moved, R))
+            ends.append(tool_wrenches(postures, moved, R))
         np.testing.assert_allclose(J[:, :, k], (ends[0] - ends[1]) / 2e-6, atol=1e-6)
 
 

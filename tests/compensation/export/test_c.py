@@ -8,9 +8,7 @@ import numpy as np
 import pytest
 
 from elastocal.compensation.online import Compensator, Reading, design
-from elastocal.elastic.layouts import custom
-from elastocal.elastic.layouts.custom import SpringEntry
-from elastocal.elastic.springs import axial
+from elastocal.elastic import SpringEntry, axial, custom
 from elastocal.robot import Robot
 from support import compensated, exported
 from support.exported import SANITIZED, build, needs_gcc, written

@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 
 from elastocal.compensation.process import (
-    ProcessRecord,
-    Source,
-    Table,
-    Trace,
-    compare,
-    lines_of,
+    CourseDeviation,
+    DeviationComparison,
+    ProcessRun,
+    SimulatedProcess,
+    SimulateProcessResult,
+    compare_deviations,
     pooled,
     read_process,
     read_table,
@@ -18,37 +18,43 @@ from elastocal.compensation.process import (
 from elastocal.errors import CompensationError, FileAccessError, SchemaError
 
 
-def trace(seed: int, course: str, cycles: int) -> Trace:
+def trace(seed: int, course: str, cycles: int) -> CourseDeviation:
     rng = np.random.default_rng([seed, cycles])
     time = 0.0025 * np.arange(1.0, cycles + 1.0)
     before, after = 1e-3 * rng.standard_normal((2, cycles))
-    return Trace(seed, course, time, rng.standard_normal((cycles, 3)), before, 0.1 * after)
+    return CourseDeviation(
+        seed, course, time, rng.standard_normal((cycles, 3)), before, 0.1 * after
+    )
 
 
 @pytest.fixture
-def record() -> ProcessRecord:
+def record() -> SimulatedProcess:
     traces = [trace(seed, f"course, {n}", 20 + n) for seed in (3, 5) for n in (1, 2)]
     each = []
     for seed in (3, 5):
         own = [t for t in traces if t.seed == seed]
-        each.append(compare(f"seed {seed}", [t.before for t in own], [t.after for t in own]))
+        each.append(
+            compare_deviations(f"seed {seed}", [t.before for t in own], [t.after for t in own])
+        )
     runs = tuple(
-        Source(seed=seed, model="m.json", model_sha256="0", tool=None, tool_sha256=None)
+        ProcessRun(seed=seed, model="m.json", model_sha256="0", tool=None, tool_sha256=None)
         for seed in (3, 5)
     )
-    table = Table(
+    table = SimulateProcessResult(
         cell="hall 3", process="afp", runs=runs, settings={"cycle": 0.0025}, versions={},
-        lines=lines_of([*each, pooled("all seeds", each)]), budget=lines_of(each[:1]),
+        lines=(*each, pooled("all seeds", each)), budget=tuple(each[:1]),
     )  # fmt: skip
-    return ProcessRecord(table, tuple(traces))
+    return SimulatedProcess(table, tuple(traces))
 
 
 def test_what_is_written_is_read(record, tmp_path):
     write_process(tmp_path, record)
     again = read_process(tmp_path)
     assert again.table == record.table
-    assert [(t.seed, t.course) for t in again.traces] == [(t.seed, t.course) for t in record.traces]
-    for found, wanted in zip(again.traces, record.traces, strict=True):
+    assert [(t.seed, t.course) for t in again.courses] == [
+        (t.seed, t.course) for t in record.courses
+    ]
+    for found, wanted in zip(again.courses, record.courses, strict=True):
         np.testing.assert_allclose(found.time, wanted.time, atol=1e-9)
         np.testing.assert_allclose(found.position, wanted.position, atol=1e-9)
         np.testing.assert_allclose(found.before, wanted.before, atol=1e-9)
@@ -57,8 +63,9 @@ def test_what_is_written_is_read(record, tmp_path):
 
 def test_a_line_is_a_comparison_again(record):
     line = record.table.lines[0]
-    assert line.comparison.reduction[0] == pytest.approx(line.reduction.mean)
-    assert line.comparison.after.points == line.points
+    made = DeviationComparison.of(line.name, line.points, line.before, line.after)
+    assert made.reduction.mean == pytest.approx(line.reduction.mean)
+    assert made.points == line.points
 
 
 def test_deviations_of_another_table_are_refused(record, tmp_path):

@@ -4,13 +4,11 @@ import numpy as np
 import pytest
 
 from elastocal.compensation.process import (
-    Placement,
+    FibrePlacement,
     Roughing,
-    placement_courses,
-    roughing_rings,
     with_postures,
 )
-from elastocal.compensation.process.variation import engaged, swing
+from elastocal.compensation.process.course import engaged, swing
 from elastocal.errors import CompensationError
 from elastocal.planning import cell_surface
 from support.simulated import example_cell
@@ -19,13 +17,13 @@ from support.simulated import example_cell
 @pytest.fixture(scope="module")
 def courses():
     surface = cell_surface(example_cell("afp"))
-    return surface, placement_courses(surface, Placement(), np.random.default_rng(1))
+    return surface, FibrePlacement().courses(surface, np.random.default_rng(1))
 
 
 @pytest.fixture(scope="module")
 def rings():
     surface = cell_surface(example_cell("machining"))
-    return surface, roughing_rings(surface, Roughing(), np.random.default_rng(1))
+    return surface, Roughing().courses(surface, np.random.default_rng(1))
 
 
 def test_courses_lie_on_the_mesh_with_the_tool_into_it(courses):
@@ -59,7 +57,7 @@ def test_lateral_is_square_to_travel_and_to_the_tool(courses):
 
 def test_a_surface_without_room_for_a_course_is_refused(courses):
     with pytest.raises(CompensationError, match="too small for course 1"):
-        placement_courses(courses[0], Placement(border=0.7), np.random.default_rng(1))
+        FibrePlacement(border=0.7).courses(courses[0], np.random.default_rng(1))
 
 
 def test_rings_lie_on_the_dome_below_the_top_of_the_block(rings):

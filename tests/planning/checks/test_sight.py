@@ -7,7 +7,7 @@ import trimesh
 
 from elastocal.planning import CollisionScene
 from elastocal.planning.checks import SightCheck, Station
-from elastocal.planning.moving_solids import MovingSolids
+from elastocal.planning.checks.sight import MovingSolids
 from elastocal.planning.scene import Body
 from support.postures import arm, postures
 

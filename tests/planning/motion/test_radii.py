@@ -9,7 +9,7 @@ import pytest
 
 from elastocal.errors import PlanningError
 from elastocal.planning import CollisionScene
-from elastocal.planning.motion.radii import joint_radii
+from elastocal.planning.motion.sweep import joint_radii
 from elastocal.planning.scene import Body
 from elastocal.robot import Rail, Robot, catalogue, on_rail, with_tool
 from support.moving import BALL, scene

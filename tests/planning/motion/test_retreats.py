@@ -7,9 +7,9 @@ from elastocal.cell import load_cell
 from elastocal.cell.examples import write_example
 from elastocal.planning import cell_surface, collision_scene
 from elastocal.planning.motion import clear_retreats, mover_for
-from elastocal.planning.retreat import on_the_way
+from elastocal.planning.pool_sampling import PoolBuilder
+from elastocal.planning.postures import retreat_joints
 from elastocal.planning.surface import sample_uniform
-from elastocal.planning.workshop import Workshop
 
 
 def planned(folder, *changes):
@@ -26,7 +26,7 @@ def planned(folder, *changes):
 @pytest.fixture(scope="module")
 def postures(tmp_path_factory):
     cell, surface = planned(tmp_path_factory.mktemp("afp"))
-    workshop = Workshop.of(cell, surface)
+    workshop = PoolBuilder.of(cell, surface)
     points = sample_uniform(surface, 40, np.random.default_rng(0))
     return workshop.pool(workshop.rank(points), points).postures.take(np.arange(8))
 
@@ -51,7 +51,7 @@ def test_a_fixture_in_the_way_is_found(tmp_path, postures):
     scene = collision_scene(cell, surface)
     blocked = not clear(cell, surface, pose)[0]
     assert blocked == any(
-        scene.distances(on_the_way(cell.robot, pose, part))[:, away(scene)].min() < 5e-3
+        scene.distances(retreat_joints(cell.robot, pose, part))[:, away(scene)].min() < 5e-3
         for part in np.linspace(0.0, 1.0, 21)
     )
 

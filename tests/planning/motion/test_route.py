@@ -11,10 +11,10 @@ from elastocal.cell.examples import write_example
 from elastocal.errors import PlanningError, RobotError
 from elastocal.planning import cell_surface, collision_scene
 from elastocal.planning.motion import contact_time, mover_for, plan_route
-from elastocal.planning.motion.ways import Ways
+from elastocal.planning.motion.route import _Roadmap
+from elastocal.planning.pool_sampling import PoolBuilder
 from elastocal.planning.postures import Postures
 from elastocal.planning.surface import sample_uniform
-from elastocal.planning.workshop import Workshop
 from support.moving import BALL, CLEARANCE, HOME, box, chain, dense, mover, pressed
 from support.postures import arm
 
@@ -57,7 +57,7 @@ def test_a_wall_between_poses_is_passed_by_way_of_via_poses():
 def test_no_order_of_the_poses_is_quicker_around_a_wall():
     points = [(2.06, -0.19, 0.7), (1.56, 0.29, 0.7), (1.96, 0.23, 0.7), (1.51, 0.25, 0.7)]
     postures, walled = pressed(points), mover(box("wall", (0.05, 1.4, 1.0), (1.75, 0.0, 0.5)))
-    ways = Ways(walled, np.vstack([HOME, postures.q_approach]), postures.normal)
+    ways = _Roadmap(walled, np.vstack([HOME, postures.q_approach]), postures.normal)
 
     def duration(order):
         return sum(ways.find(*leg).duration for leg in itertools.pairwise((0, *order, 0)))
@@ -71,7 +71,7 @@ def test_no_order_of_the_poses_is_quicker_around_a_wall():
 
 def test_the_way_taken_is_the_quickest_free_one_of_those_tried():
     postures, walled = pressed(POINTS[:2]), mover(WALL)
-    ways = Ways(walled, np.vstack([HOME, postures.q_approach]), postures.normal)
+    ways = _Roadmap(walled, np.vstack([HOME, postures.q_approach]), postures.normal)
     found = ways.find(1, 2)
     first, last = ways.q[1:]
     lifts = [v for q in (first, last) for v in walled.lifted(q, postures.normal[0])]
@@ -154,7 +154,7 @@ def test_a_home_of_another_robot_is_refused():
 def example(like, folder, count) -> tuple:
     cell = load_cell(write_example(folder, like)[0])
     surface = cell_surface(cell)
-    workshop = Workshop.of(cell, surface)
+    workshop = PoolBuilder.of(cell, surface)
     points = sample_uniform(surface, 60, np.random.default_rng(0))
     pool = workshop.pool(workshop.rank(points.take(np.arange(16))), points)
     return cell, surface, pool.postures.take(np.arange(min(count, len(pool.postures))))

@@ -7,8 +7,13 @@ import pytest
 
 from elastocal.errors import PlanningError
 from elastocal.planning.motion import shortest_tour
-from elastocal.planning.motion.tour import ALL_EDGES, MOST_NODES
-from elastocal.planning.motion.tour_start import nearest_neighbour, tour_length, two_opt
+from elastocal.planning.motion.tour import (
+    _ALL_EDGES,
+    _MOST_NODES,
+    _nearest_neighbour,
+    _tour_length,
+    _two_opt,
+)
 
 
 def costs(nodes: int, seed: int, dimensions: int = 2) -> np.ndarray:
@@ -29,7 +34,7 @@ def test_no_order_is_shorter(nodes, seed):
     tour = shortest_tour(cost)
     assert tour.shortest
     assert tour.length == pytest.approx(by_brute_force(cost), rel=1e-12)
-    assert tour.length == pytest.approx(tour_length(cost, tour.order))
+    assert tour.length == pytest.approx(_tour_length(cost, tour.order))
 
 
 def test_clusters_are_joined_into_one_tour():
@@ -40,25 +45,25 @@ def test_clusters_are_joined_into_one_tour():
     assert tour.length == pytest.approx(30.0, abs=10.0)  # three ways between three clusters
 
 
-@pytest.mark.parametrize("nodes", [4, 20, ALL_EDGES + 1, MOST_NODES + 1])
+@pytest.mark.parametrize("nodes", [4, 20, _ALL_EDGES + 1, _MOST_NODES + 1])
 def test_the_tour_is_never_longer_than_the_simple_ones(nodes):
     cost = costs(nodes, 1)
-    simple = nearest_neighbour(cost)
-    better = two_opt(cost, simple)
+    simple = _nearest_neighbour(cost)
+    better = _two_opt(cost, simple)
     tour = shortest_tour(cost)
     assert sorted(tour.order) == sorted(better) == list(range(nodes))
-    assert tour.length <= tour_length(cost, better) * (1 + 1e-12)
-    assert tour_length(cost, better) <= tour_length(cost, simple)
-    assert tour.shortest == (nodes <= ALL_EDGES)
+    assert tour.length <= _tour_length(cost, better) * (1 + 1e-12)
+    assert _tour_length(cost, better) <= _tour_length(cost, simple)
+    assert tour.shortest == (nodes <= _ALL_EDGES)
 
 
 def test_two_opt_leaves_no_reversal_that_shortens():
     cost = costs(30, 2)
-    order = two_opt(cost, nearest_neighbour(cost))
-    length = tour_length(cost, order)
+    order = _two_opt(cost, _nearest_neighbour(cost))
+    length = _tour_length(cost, order)
     for a, b in itertools.combinations(range(1, 31), 2):
         turned = np.concatenate([order[:a], order[a:b][::-1], order[b:]])
-        assert tour_length(cost, turned) >= length - 1e-9
+        assert _tour_length(cost, turned) >= length - 1e-9
 
 
 def test_the_tour_starts_at_node_0_in_the_direction_of_the_lower_neighbour():

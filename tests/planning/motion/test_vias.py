@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from elastocal.planning.motion.vias import DETOURS, LIFTS, WIDTH, detours, lifted
+from elastocal.planning.motion.mover import _DETOURS, _LIFTS, _WIDTH, detours, lifted
 from elastocal.robot.inverse import inverse_for
 from support.moving import HOME, pressed
 from support.postures import arm
@@ -14,9 +14,9 @@ def test_a_lift_moves_off_along_the_normal_and_keeps_the_tool_as_it_was():
     q = POSTURE.q_approach[0]
     normal = np.array([0.6, 0.0, 0.8])
     here, lifts = arm().forward(q), arm().forward(lifted(inverse_for(arm()), q, normal))
-    offset = np.multiply.outer(LIFTS, normal)
+    offset = np.multiply.outer(_LIFTS, normal)
     np.testing.assert_allclose(lifts[:, :3, 3] - here[:3, 3], offset, atol=1e-8)
-    np.testing.assert_allclose(lifts[:, :3, :3], [here[:3, :3]] * len(LIFTS), atol=1e-8)
+    np.testing.assert_allclose(lifts[:, :3, :3], [here[:3, :3]] * len(_LIFTS), atol=1e-8)
 
 
 def test_a_lift_stays_in_its_configuration_and_its_turn():
@@ -34,9 +34,9 @@ def test_lifts_out_of_reach_are_left_out():
 def test_detours_lie_about_the_way_within_the_limits_and_are_the_same_back():
     end = POSTURE.q_approach[0]
     there = detours(arm(), HOME, end)
-    assert there.shape == (DETOURS, 6)
-    assert len(np.unique(there, axis=0)) == DETOURS
+    assert there.shape == (_DETOURS, 6)
+    assert len(np.unique(there, axis=0)) == _DETOURS
     assert np.all(arm().limits.margin(there) >= 0.0)
-    assert np.all(there >= np.minimum(HOME, end) - WIDTH)
-    assert np.all(there <= np.maximum(HOME, end) + WIDTH)
+    assert np.all(there >= np.minimum(HOME, end) - _WIDTH)
+    assert np.all(there <= np.maximum(HOME, end) + _WIDTH)
     assert np.array_equal(there, detours(arm(), end, HOME))

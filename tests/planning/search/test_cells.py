@@ -5,8 +5,7 @@ import pytest
 from hypothesis import given, settings, strategies as st
 from hypothesis.extra.numpy import arrays
 
-from elastocal.planning.search.cells import CellField, z_order
-from elastocal.planning.search.fields import PlainField
+from elastocal.planning.search._fields import CellField, PlainField, z_order
 from support.pools import scattered
 
 

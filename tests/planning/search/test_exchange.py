@@ -17,7 +17,7 @@ from elastocal.planning.search import (
     o1,
     technique,
 )
-from elastocal.planning.search.detmax import exchange, greedy_order
+from elastocal.planning.search.exchange import _exchange_poses, _greedy_order
 from support.pools import dome
 
 
@@ -171,7 +171,7 @@ def test_each_pose_of_the_order_raises_the_criterion_most():
 def test_equal_poses_go_to_the_lowest_number():
     pool = dome(20).take(np.repeat(np.arange(20), 2))
     information = build_information(pool)
-    order, _ = greedy_order(information, _criterion("d", information), np.arange(40))
+    order, _ = _greedy_order(information, _criterion("d", information), np.arange(40))
     first = {}
     for place, pose in enumerate(order.tolist()):
         first.setdefault(pose // 2, (place, pose))
@@ -211,7 +211,7 @@ class Undefined(Fickle):
 @pytest.mark.parametrize("seed", range(10))
 def test_a_criterion_without_rhyme_or_reason_still_ends(seed):
     information = build_information(dome(12))
-    run = exchange(information, Fickle(np.random.default_rng(seed)), np.arange(6), 50)
+    run = _exchange_poses(information, Fickle(np.random.default_rng(seed)), np.arange(6), 50)
     assert run.ended in ("cycle", "cap", "converged")
     assert len(run.added) <= 50
     assert len(run.chosen) == 6
@@ -231,7 +231,7 @@ def test_a_choice_that_comes_back_ends_the_run():
                 return np.eye(3)[self.turn % 3]
             return np.array([1.0, 0.0])  # what to drop: the old one
 
-    run = exchange(build_information(dome(3)), Circle(None), [0], 50)
+    run = _exchange_poses(build_information(dome(3)), Circle(None), [0], 50)
     assert run.ended == "cycle"
     assert run.added.tolist() == [1, 2, 0]
     assert run.dropped.tolist()[:2] == [0, 1]
@@ -240,7 +240,7 @@ def test_a_choice_that_comes_back_ends_the_run():
 def test_a_criterion_that_gives_nan_is_refused():
     information = build_information(dome(12))
     with pytest.raises(PlanningError, match="criterion 'undefined' gives NaN"):
-        exchange(information, Undefined(None), np.arange(4), 10)
+        _exchange_poses(information, Undefined(None), np.arange(4), 10)
 
 
 @pytest.mark.parametrize(("option", "value"), [("starts", 0), ("cap", 0), ("starts", -3)])

@@ -5,13 +5,13 @@ import pytest
 
 from elastocal.cell import load_cell
 from elastocal.cell.examples import EXAMPLES, write_example
-from elastocal.cell.examples.meshes import block, dome_section
+from elastocal.cell.examples.example import block, dome_section
 from elastocal.planning.surface import (
     ReachableFrom,
     arm_reach,
-    arm_stands,
     build_surface,
     contact_poses,
+    first_joint_positions,
     flipped,
     inverted_finding,
     load_surface,
@@ -37,7 +37,7 @@ def placed(cell, unit=None):
 
 def kinds(cell, surface):
     reachable = ReachableFrom(inverse_for(cell.robot), cell.external_positions)
-    stands = arm_stands(cell.robot, cell.external_positions)
+    stands = first_joint_positions(cell.robot, cell.external_positions)
     rng = np.random.default_rng(RNG)
     found = placement_findings(surface, stands, arm_reach(cell.robot), reachable, rng)
     assert all("\n" not in finding.message for finding in found)
@@ -74,7 +74,7 @@ def test_the_reach_is_a_bound_that_a_stretched_arm_nearly_attains(cell):
     limits = cell.robot.limits
     q = rng.uniform(limits.lower, limits.upper, (500, len(limits.lower)))
     q[:, : cell.robot.external_axes] = 0.0
-    stand = arm_stands(cell.robot, np.zeros((1, cell.robot.external_axes)))[0]
+    stand = first_joint_positions(cell.robot, np.zeros((1, cell.robot.external_axes)))[0]
     distance = np.linalg.norm(cell.robot.forward(q)[:, :3, 3] - stand, axis=1)
     assert 0.6 * reach < distance.max() <= reach
 

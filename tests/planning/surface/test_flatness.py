@@ -3,14 +3,14 @@
 import numpy as np
 import pytest
 
-from elastocal.cell.examples.meshes import block
+from elastocal.cell.examples.example import block
 from elastocal.planning.surface import (
     SurfaceError,
     distance_to_boundary,
     fit_disk,
     sample_uniform,
 )
-from elastocal.planning.surface.flatness import tangents
+from elastocal.planning.surface.contact import _tangents
 from support.tooling import cap, grid, plane, soup
 
 RADIUS = 0.03
@@ -58,7 +58,7 @@ def test_tangents_are_orthonormal_even_for_a_normal_along_minus_z():
     rng = np.random.default_rng(2)
     normal = np.concatenate([rng.normal(size=(50, 3)), [[0, 0, -1.0], [0, 0, 1.0]]])
     normal /= np.linalg.norm(normal, axis=1, keepdims=True)
-    frame = np.stack([*tangents(normal), normal], axis=2)
+    frame = np.stack([*_tangents(normal), normal], axis=2)
     np.testing.assert_allclose(
         frame.swapaxes(1, 2) @ frame, np.tile(np.eye(3), (52, 1, 1)), atol=1e-12
     )

@@ -5,7 +5,7 @@ import pytest
 from scipy.spatial import cKDTree
 
 from elastocal.cell.description.surface import RegionEntry
-from elastocal.cell.examples.meshes import block
+from elastocal.cell.examples.example import block
 from elastocal.planning.surface import (
     SurfaceError,
     build_surface,
@@ -14,7 +14,7 @@ from elastocal.planning.surface import (
     sample_uniform,
     weld,
 )
-from elastocal.planning.surface.blue_noise import _pair_weights, eliminate
+from elastocal.planning.surface.sampling import _eliminate, _pair_weights
 from support.tooling import cap, plane, soup
 
 
@@ -61,7 +61,7 @@ def test_elimination_in_rounds_removes_what_the_heap_removes():
     for _ in range(150):  # Yuksel's loop, one by one
         weight = np.where(alive, pairs[:, alive].sum(axis=1), -np.inf)
         alive[np.argmax(weight)] = False
-    np.testing.assert_array_equal(eliminate(position, normal, 50, 1.0), np.flatnonzero(alive))
+    np.testing.assert_array_equal(_eliminate(position, normal, 50, 1.0), np.flatnonzero(alive))
 
 
 def test_the_two_sides_of_a_thin_plate_are_sampled_independently():

@@ -113,9 +113,11 @@ def test_a_partial_run_holds_back_and_names_the_poses(parts):
 
 
 def test_a_pose_without_a_usable_reading_counts_as_missing(parts):
-    data = parts.dataset.data.copy(deep=True)
+    data = parts.dataset.to_xarray().copy(deep=True)
     data["status"].values[0] = 1
-    (told, *_) = findings(reading_findings, replace(parts, dataset=type(parts.dataset)(data)))
+    (told, *_) = findings(
+        reading_findings, replace(parts, dataset=type(parts.dataset).from_xarray(data))
+    )
     assert told.startswith("the run is partial: 1 of")
 
 

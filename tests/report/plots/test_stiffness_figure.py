@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from elastocal.compensation.stiffness import Grid, Stations, Survey
+from elastocal.compensation.stiffness import PathStations, PostureGrid, PostureSurvey
 from elastocal.report import (
     Curve,
 )
@@ -21,10 +21,10 @@ def drawn(stations: int):
     T[:, 0, 3] = 0.1 * np.arange(stations)
     q, k = np.zeros((stations, 4, 1, 1, 6)), np.full((stations, 4, 1, 1), 1e6)
     spins = np.linspace(0.0, 2.0 * np.pi, 4, endpoint=False)
-    survey = Survey(Grid(spins, np.zeros((1, 0))), q, k, {})
+    survey = PostureSurvey(PostureGrid(spins, np.zeros((1, 0))), q, k, {})
     held, none = np.full(stations, 1e6), np.full(stations, np.nan)
     curves = [Curve(name, held, held, held, np.zeros(stations), none) for name in NAMES]
-    where = Stations(tuple(range(2, 2 + stations)), T, q[:, 0, 0, 0])
+    where = PathStations(tuple(range(2, 2 + stations)), T, q[:, 0, 0, 0])
     return stiffness_figure("arm", where, survey, curves)
 
 

@@ -1,25 +1,39 @@
-"""A cell ready to compute with: the cell file with its robot made and its files found."""
+"""The cell file, validated, and the cell ready to compute with: robot made, files found."""
 
 import math
+from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
+from pydantic import Field, field_validator
 
 from elastocal.arrays import FloatArray
-from elastocal.cell.description.external import external_positions
-from elastocal.cell.description.file import SCHEMA, CellFile
-from elastocal.cell.description.limits import Limits
-from elastocal.cell.description.motion import axis_speeds, home_position
-from elastocal.cell.description.pose import vector
-from elastocal.cell.description.robot import RailEntry
-from elastocal.cell.description.shapes import MeshFile, Shape
+from elastocal.cell.description._quantities import IDENTITY, Pose, vector
+from elastocal.cell.description.loads import Engagement, Limits, LoadCases
+from elastocal.cell.description.motion import (
+    MotionEntry,
+    axis_speeds,
+    external_positions,
+    home_position,
+)
+from elastocal.cell.description.procedure import Acceptance, DeviceNames, ProcedureSettings, Search
+from elastocal.cell.description.robot import (
+    Marker,
+    RailEntry,
+    RobotEntry,
+    SensorEntry,
+    Tool,
+    Tracker,
+)
+from elastocal.cell.description.simulation import Fault, Simulation
+from elastocal.cell.description.surface import MeshFile, Shape, SurfaceEntry
 from elastocal.dataset import LoadRows, joint_dimensions, read_load_rows
 from elastocal.errors import ElastocalError, FileAccessError, RobotError, SchemaError, nearest
 from elastocal.files import read_text
-from elastocal.records import read_yaml
+from elastocal.records import StrictModel, read_yaml
 from elastocal.robot import (
     GRAVITY,
     Rail,
@@ -32,10 +46,105 @@ from elastocal.robot import (
     with_tool,
 )
 
-TCP = "tcp"
+SCHEMA = "elastocal.cell/1"
+TOOLING = "tooling"
+"""Name of the surface among the solids of the cell; no fixture may have it."""
+
+
+class ProcessFile(StrictModel):
+    """Poses and forces of the production process."""
+
+    file: str
+    """CSV with joint and force columns (the ROWS.csv of `elastocal predict`), relative to the
+    cell file."""
+
+
+class CellFile(StrictModel):
+    """All keys of a cell file but ``schema``."""
+
+    name: str = ""
+    robot: RobotEntry
+    tcp: Pose = IDENTITY
+    """Tool centre point in the flange frame, z out of the tool."""
+    tool: Tool
+    sensor: SensorEntry | None = None
+    marker: Marker | None = None
+    trackers: tuple[Tracker, ...] = ()
+    surface: SurfaceEntry
+    fixtures: tuple[Shape, ...] = ()
+    """Solids in base."""
+    load_cases: LoadCases
+    engagement: Engagement
+    limits: Limits = Field(default_factory=Limits)
+    motion: MotionEntry
+    """Required: where HOME is safe is not guessed."""
+    search: Search = Field(default_factory=Search)
+    process: ProcessFile | None = None
+    acceptance: Acceptance = Field(default_factory=Acceptance)
+    """What the result is judged by; neither plan nor run depends on it."""
+    procedure: ProcedureSettings = Field(default_factory=ProcedureSettings)
+    devices: DeviceNames = Field(default_factory=DeviceNames)
+    simulation: Simulation = Field(default_factory=Simulation)
+    """Of the simulated devices; the calibration never reads it."""
+    faults: tuple[Fault, ...] = ()
+    """What the simulated devices get wrong, and when."""
+
+    def __repr__(self) -> str:
+        return "\n  ".join([f"CellFile {self.name!r}", *self.summary()])
+
+    __str__ = __repr__
+
+    def summary(self) -> list[str]:
+        """Return what stands in the cell, one line a subject."""
+        robot, loads, sensor = self.robot, self.load_cases, self.sensor
+        rail = " on a rail" if robot.rail else ""
+        lines = [
+            f"robot: {robot.model or robot.urdf}{rail}",
+            f"tool: {self.tool.mass:g} kg, sensor: {'none' if sensor is None else sensor.name}",
+            f"trackers: {', '.join(tracker.name for tracker in self.trackers) or 'none'}",
+            f"surface: {self.surface.file}, {len(self.fixtures)} fixtures",
+            f"load cases: {', '.join(loads.cases)};"
+            f" fx {loads.fx:g} N, fy {loads.fy:g} N, fz {loads.fz:g} N",
+            f"search: {self.search.technique}, {self.search.most or 'any number of'} poses",
+        ]
+        return lines + ([f"faults: {len(self.faults)}"] if self.faults else [])
+
+    @field_validator("trackers")
+    @classmethod
+    def _named_once(cls, trackers: tuple[Tracker, ...]) -> tuple[Tracker, ...]:
+        for name, times in Counter(tracker.name for tracker in trackers).items():
+            if times > 1:
+                raise ValueError(f"{times} stations are named {name!r}")
+        return trackers
+
+    @field_validator("trackers")
+    @classmethod
+    def _something_to_look_at(cls, trackers: tuple[Tracker, ...], info: Any) -> Any:
+        if trackers and info.data.get("marker") is None:
+            raise ValueError("trackers need a marker to look at (key 'marker')")
+        return trackers
+
+    @field_validator("fixtures")
+    @classmethod
+    def _none_is_the_tooling(cls, fixtures: tuple[Shape, ...]) -> tuple[Shape, ...]:
+        # Under this name the plan knows the surface, which the tool may touch.
+        if any(fixture.name == TOOLING for fixture in fixtures):
+            raise ValueError(f"the name {TOOLING!r} is the surface's: name the fixture otherwise")
+        return fixtures
+
+    @field_validator("limits")
+    @classmethod
+    def _carries_the_tool(cls, limits: Limits, info: Any) -> Limits:
+        mass, payload = getattr(info.data.get("tool"), "mass", 0.0), limits.payload
+        if payload is not None and not mass <= payload:
+            raise ValueError(f"payload {payload:g} kg is below the tool's mass, {mass:g} kg")
+        return limits
+
+
+_TCP = "tcp"
 """Name of the link at the tool centre point."""
 
-Result = TypeVar("Result")
+_Result = TypeVar("_Result")
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,6 +170,9 @@ class Cell:
     """Speeds that are used between poses, override included, shape (joint,), in rad/s or m/s."""
     process: LoadRows | None = None
     """Poses and forces of the production process."""
+
+    def __repr__(self) -> str:
+        return "\n  ".join([f"Cell {self.name!r} of {self.path}", *self.file.summary()])
 
     @property
     def name(self) -> str:
@@ -155,7 +267,7 @@ def load_cell(path: Path) -> Cell:
     return Cell(path, file, robot, positions, torques, home, speeds, process)
 
 
-def _at(path: Path, key: str, make: Callable[[], Result]) -> Result:
+def _at(path: Path, key: str, make: Callable[[], _Result]) -> _Result:
     """Return what ``make`` makes; its refusal names the place in the cell file."""
     try:
         return make()
@@ -175,7 +287,7 @@ def _robot(path: Path, file: CellFile) -> Robot:
         urdf = read_text(place)
         meshes = find_meshes(urdf, place.parent)
     links = {link.get("name") for link in parse_urdf(urdf).findall("link")}
-    tip = f"cell_{TCP}" if TCP in links else TCP
+    tip = f"cell_{_TCP}" if _TCP in links else _TCP
     urdf = with_tool(urdf, entry.flange, tip, file.tcp.T)
     if entry.rail is not None:
         urdf = on_rail(urdf, _rail(entry.rail))

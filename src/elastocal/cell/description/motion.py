@@ -1,13 +1,16 @@
-"""How the robot moves between poses: HOME, axis speeds, and how long a pose takes."""
+"""How the robot moves between poses: HOME, axis speeds, where the external axes may stand."""
 
+import itertools
 import math
 from collections.abc import Iterable
 from typing import Annotated, Any
 
 import numpy as np
-from pydantic import AfterValidator, BeforeValidator, Field, FiniteFloat, field_validator
+from pydantic import Field, FiniteFloat, field_validator
 
 from elastocal.arrays import FloatArray
+from elastocal.cell.description._quantities import PositiveSpeed, PositiveTime
+from elastocal.cell.description.robot import RobotEntry
 from elastocal.errors import RobotError, UnitError, nearest
 from elastocal.records import StrictModel
 from elastocal.robot import Robot
@@ -15,31 +18,21 @@ from elastocal.units import parse_quantity
 
 _SLOWEST = 1e-12
 """A joint that is slower, in rad/s or m/s, has no speed."""
+_STEP_LENGTH = 0.25
+"""Largest distance between positions of a linear axis that are searched, in m."""
+_STEP_ANGLE = math.radians(15.0)
+"""Largest angle between positions of a turning axis that are searched, in rad."""
+_INSIDE_LENGTH = 1e-3
+"""How far inside the margins of a linear axis the outermost searched positions lie, in m."""
+_INSIDE_ANGLE = math.radians(0.1)
+"""The same for a turning axis, in rad."""
+_ROUNDING = 1e-9
+"""How near to the end of its range a position counts as on it, in m or rad."""
+_MOST = 500
+"""Largest number of combinations of positions that are tried."""
 
 
-def _finite(value: float) -> float:
-    if not math.isfinite(value):
-        raise ValueError("must be finite")
-    return value
-
-
-PositiveTime = Annotated[
-    float,
-    BeforeValidator(lambda text: parse_quantity(text, "time")),
-    Field(gt=0.0),
-    AfterValidator(_finite),
-]
-"""In s, above 0."""
-PositiveSpeed = Annotated[
-    float,
-    BeforeValidator(lambda text: parse_quantity(text, "speed")),
-    Field(gt=0.0),
-    AfterValidator(_finite),
-]
-"""In m/s, above 0."""
-
-
-class Motion(StrictModel):
+class MotionEntry(StrictModel):
     """HOME, and the figures that the cycle time is estimated from."""
 
     home: dict[str, str]
@@ -67,14 +60,14 @@ class Motion(StrictModel):
         return text
 
 
-def home_position(robot: Robot, entry: Motion) -> FloatArray:
+def home_position(robot: Robot, entry: MotionEntry) -> FloatArray:
     """Return the joint positions of HOME.
 
     Parameters
     ----------
     robot : Robot
         The robot, with its rail.
-    entry : Motion
+    entry : MotionEntry
         What the cell file says.
 
     Returns
@@ -108,14 +101,14 @@ def home_position(robot: Robot, entry: Motion) -> FloatArray:
     return home
 
 
-def axis_speeds(robot: Robot, entry: Motion) -> FloatArray:
+def axis_speeds(robot: Robot, entry: MotionEntry) -> FloatArray:
     """Return the speeds that are used: the largest ones times the override.
 
     Parameters
     ----------
     robot : Robot
         The robot, with its rail.
-    entry : Motion
+    entry : MotionEntry
         What the cell file says; it precedes the robot's description.
 
     Returns
@@ -146,6 +139,54 @@ def axis_speeds(robot: Robot, entry: Motion) -> FloatArray:
     return used
 
 
+def external_positions(robot: Robot, entry: RobotEntry, margin: FloatArray) -> FloatArray:
+    """Return every combination of positions of the external axes.
+
+    All of them are where poses may be: farther from the limits than the margin.
+
+    Parameters
+    ----------
+    robot : Robot
+        The robot, with its rail.
+    entry : RobotEntry
+        What the cell file says.
+    margin : ndarray, shape (joint,)
+        Distance that each joint keeps to its limits, in rad or m; it leaves some of the range.
+
+    Returns
+    -------
+    ndarray, shape (combination, external axis)
+        In m or rad; one row without columns when the robot has no external axis.
+
+    Raises
+    ------
+    RobotError
+        If a name is no external axis, a position is not within the margins, an axis without
+        limits is to be searched, or there are more than 500 combinations.
+    UnitError
+        If a position has no unit or a wrong one.
+    """
+    names = robot.joint_names[: robot.external_axes]
+    for name in entry.external:
+        if name not in names:
+            raise RobotError(
+                f"external: {robot.name} has no external axis {name!r}{nearest(name, names)}"
+                f" (it has {', '.join(names) or 'none'})"
+            )
+    wanted = [entry.external.get(name, "search") for name in names]
+    counts = [_count(robot, index, choice, margin) for index, choice in enumerate(wanted)]
+    if math.prod(counts) > _MOST:
+        each = " x ".join(f"{count} of {name}" for name, count in zip(names, counts, strict=True))
+        raise RobotError(
+            f"external: {each} are {math.prod(counts)} combinations of positions, at most {_MOST}"
+            " are tried: list the positions to try instead of search, or is the travel in the"
+            " wrong unit?"
+        )
+    axes = [_positions(robot, index, choice, margin) for index, choice in enumerate(wanted)]
+    combinations = list(itertools.product(*axes))
+    return np.array(combinations, dtype=float).reshape(len(combinations), len(names))
+
+
 def _refuse_unknown(robot: Robot, key: str, names: Iterable[str]) -> None:
     for name in names:
         if name not in robot.joint_names:
@@ -161,3 +202,46 @@ def _parse(key: str, text: str, revolute: bool, speed: bool = False) -> float:
         return parse_quantity(text, names[0] if revolute else names[1])
     except UnitError as error:
         raise UnitError(f"{key}: {error}") from error
+
+
+def _range(robot: Robot, index: int, margin: FloatArray) -> tuple[float, float]:
+    """Return the ends of what the margin leaves of an axis; poses are between, not on them."""
+    limits, keep = robot.limits, float(margin[index])
+    return float(limits.lower[index]) + keep, float(limits.upper[index]) - keep
+
+
+def _count(robot: Robot, index: int, wanted: str | tuple[str, ...], margin: FloatArray) -> int:
+    """Return how many positions of an axis are tried."""
+    if wanted != "search":
+        return len(wanted)
+    low, high = _range(robot, index, margin)
+    if not math.isfinite(high - low):
+        name = robot.joint_names[index]
+        raise RobotError(f"external.{name}: an axis without limits cannot be searched")
+    return math.ceil((high - low) / (_STEP_ANGLE if robot.revolute[index] else _STEP_LENGTH)) + 1
+
+
+def _positions(
+    robot: Robot, index: int, wanted: str | tuple[str, ...], margin: FloatArray
+) -> FloatArray:
+    name, revolute = robot.joint_names[index], robot.revolute[index]
+    low, high = _range(robot, index, margin)
+    if wanted == "search":
+        inside = min(_INSIDE_ANGLE if revolute else _INSIDE_LENGTH, 0.25 * (high - low))
+        count = _count(robot, index, wanted, margin)
+        return np.linspace(low + inside, high - inside, count)
+    values = np.array([parse_quantity(text, "angle" if revolute else "length") for text in wanted])
+    if not len(values):
+        raise RobotError(f"external.{name}: give at least one position, or 'search'")
+    within = (values > low + _ROUNDING) & (values < high - _ROUNDING)
+    if not within.all():
+        key, unit, scale = (
+            ("joint_margin", "deg", 180.0 / math.pi) if revolute else ("rail_margin", "mm", 1e3)
+        )
+        raise RobotError(
+            f"external.{name}: {wanted[int(np.argmin(within))]} must be above {scale * low:.6g}"
+            f" {unit} and below {scale * high:.6g} {unit}, which are its limits less"
+            f" limits.{key} of {scale * margin[index]:.6g} {unit}; the very ends are no places"
+            " for poses"
+        )
+    return values

@@ -1,42 +1,70 @@
-"""How Procedure 1 is carried out: speeds, limits, and when a reading is good.
+"""How poses are searched for, Procedure 1 carried out on which devices, and its result judged.
 
 The bounds are there so that a slip of the pen in the cell file is refused and not carried out. They
 are wide: what is within them may still be wrong for a machine.
 """
 
-import math
 from collections.abc import Iterator
-from typing import Annotated
+from typing import Annotated, Any, Literal
 
-from pydantic import AfterValidator, BeforeValidator, Field, ValidationError, model_validator
+from pydantic import (
+    Field,
+    ValidationError,
+    field_validator,
+    model_validator,
+)
 from pydantic_core import InitErrorDetails, PydanticCustomError
 
-from elastocal.cell.description.motion import PositiveSpeed, PositiveTime
-from elastocal.cell.description.quantities import PositiveForce, PositiveLength
+from elastocal.cell.description._quantities import (
+    PositiveForce,
+    PositiveForceRate,
+    PositiveLength,
+    PositiveSpeed,
+    PositiveTime,
+    TranslationalCompliance,
+)
 from elastocal.records import StrictModel
-from elastocal.units import parse_quantity
+
+DEFAULT_POSES = 31
+"""Number of poses of the paper's first case study."""
+_MOST_CANDIDATES = 10_000_000
+"""Largest pool; with more, no memory would hold the candidates."""
+SIMULATED = "simulated"
+"""Name of the device of each kind that needs no hardware."""
 
 
-def _finite(value: float) -> float:
-    if not math.isfinite(value):
-        raise ValueError("must be finite")
-    return value
+class Search(StrictModel):
+    """Pool and technique; ends at ``poses`` or at ``d_max``, whichever comes first."""
 
+    technique: str = "cover"
+    """Name of a search technique (`elastocal.planning.search`)."""
+    metric: Literal["euclidean", "geodesic"] = "euclidean"
+    """How COVER measures the distance between contact points."""
+    poses: Annotated[int, Field(ge=1, le=_MOST_CANDIDATES)] | None = None
+    """Largest number of poses N."""
+    d_max: PositiveLength | None = None
+    """Cover distance at which COVER may stop, in m."""
+    pool: Annotated[int, Field(ge=1, le=_MOST_CANDIDATES)] = 3000
+    """Number of candidates."""
+    sampling: Literal["blue_noise", "uniform"] = "blue_noise"
+    """How candidate points are spread: keeping their distance, or each by itself."""
+    seed: Annotated[int, Field(ge=0, lt=2**63)] = 0
+    """Of everything random."""
 
-PositiveForceRate = Annotated[
-    float,
-    BeforeValidator(lambda text: parse_quantity(text, "force rate")),
-    Field(gt=0.0),
-    AfterValidator(_finite),
-]
-"""In N/s, above 0."""
-TranslationalCompliance = Annotated[
-    float,
-    BeforeValidator(lambda text: parse_quantity(text, "translational compliance")),
-    Field(ge=0.0),
-    AfterValidator(_finite),
-]
-"""In m/N, 0 or above."""
+    @field_validator("pool")
+    @classmethod
+    def _holds_the_poses(cls, pool: int, info: Any) -> int:
+        poses = info.data.get("poses")
+        if poses is not None and not poses <= pool:
+            raise ValueError(f"must be at least the {poses} poses that are to be chosen")
+        return pool
+
+    @property
+    def most(self) -> int | None:
+        """Largest number of poses; None when only ``d_max`` ends the search."""
+        if self.poses is None and self.d_max is None:
+            return DEFAULT_POSES
+        return self.poses
 
 
 class ProcedureSettings(StrictModel):
@@ -113,3 +141,22 @@ class ProcedureSettings(StrictModel):
             yield "timeout", f"must be at least dwell and average together ({least:g} s)"
         if not self.beam_timeout >= self.stale:
             yield "beam_timeout", f"must be at least stale ({self.stale:g} s)"
+
+
+class DeviceNames(StrictModel):
+    """Name of each device; which names there are is known to `elastocal run`."""
+
+    arm: str = SIMULATED
+    sensor: str = SIMULATED
+    """Force/torque sensor."""
+    metrology: str = SIMULATED
+    """Laser trackers."""
+
+
+class Acceptance(StrictModel):
+    """Limits that the report and the comparison of two calibrations hold their figures against."""
+
+    tolerance: PositiveLength | None = None
+    """Largest error of a predicted deflection at a pose that the fit has not seen, in m."""
+    drift: PositiveLength | None = None
+    """Largest change of a predicted deflection between two calibrations of the cell, in m."""

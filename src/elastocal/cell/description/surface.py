@@ -1,4 +1,4 @@
-"""The tooling surface: which mesh, where it stands, which part of it is used."""
+"""The solids of the cell: tooling surface, the region of it that is used, tool parts, fixtures."""
 
 import math
 from typing import Annotated, Any, Self
@@ -7,16 +7,87 @@ import numpy as np
 from pydantic import AfterValidator, Field, field_validator, model_validator
 
 from elastocal.arrays import BoolArray, FloatArray
-from elastocal.cell.description.pose import IDENTITY, Pose
-from elastocal.cell.description.quantities import (
+from elastocal.cell.description._quantities import (
+    IDENTITY,
     Length,
     Point,
+    Pose,
     PositiveAngle,
+    PositiveLength,
     Travel,
     check_exactly_one,
+    vector,
 )
-from elastocal.cell.description.shapes import MeshFile
 from elastocal.records import StrictModel
+from elastocal.units import factor
+
+
+class Box(StrictModel):
+    """A box about its centre."""
+
+    size: tuple[PositiveLength, PositiveLength, PositiveLength]
+    """Edge lengths along x, y, z in m."""
+
+    @property
+    def extent(self) -> FloatArray:
+        """The edge lengths, shape (3,), in m."""
+        return vector(self.size)
+
+
+class Cylinder(StrictModel):
+    """A cylinder about its centre, along z."""
+
+    radius: PositiveLength
+    length: PositiveLength
+
+
+class Sphere(StrictModel):
+    """A sphere about its centre."""
+
+    radius: PositiveLength
+
+
+class MeshFile(StrictModel):
+    """Triangles of a file."""
+
+    file: str
+    """STL, OBJ or PLY; relative to the cell file."""
+    unit: str
+    """Unit of the file's numbers: ``mm`` or ``m``; mesh files do not say."""
+
+    @model_validator(mode="after")
+    def _known_unit(self) -> Self:
+        factor(self.unit, "length")
+        return self
+
+    @property
+    def metres(self) -> float:
+        """Length of one unit of the file, in m."""
+        return factor(self.unit, "length")
+
+
+class Shape(StrictModel):
+    """One solid with its place: a box, a cylinder, a sphere or a mesh."""
+
+    name: str = ""
+    pose: Pose = IDENTITY
+    """Of the shape in its frame: the flange for parts of the tool, the base for fixtures."""
+    box: Box | None = None
+    cylinder: Cylinder | None = None
+    sphere: Sphere | None = None
+    mesh: MeshFile | None = None
+
+    @model_validator(mode="after")
+    def _one_kind(self) -> Self:
+        check_exactly_one(box=self.box, cylinder=self.cylinder, sphere=self.sphere, mesh=self.mesh)
+        return self
+
+    @property
+    def solid(self) -> Box | Cylinder | Sphere | MeshFile:
+        """The one that is given."""
+        found = self.box or self.cylinder or self.sphere or self.mesh
+        assert found is not None
+        return found
 
 
 class RegionBox(StrictModel):
@@ -34,10 +105,10 @@ class RegionBox(StrictModel):
         return value
 
 
-Corner = tuple[Length, Length]
+_Corner = tuple[Length, Length]
 
 
-def _encloses(corners: tuple[Corner, ...]) -> tuple[Corner, ...]:
+def _encloses(corners: tuple[_Corner, ...]) -> tuple[_Corner, ...]:
     x, y = np.array(corners).T
     area = 0.5 * float(x @ np.roll(y, -1) - y @ np.roll(x, -1))
     if not abs(area) > 0.0:
@@ -48,7 +119,7 @@ def _encloses(corners: tuple[Corner, ...]) -> tuple[Corner, ...]:
 class RegionPolygon(StrictModel):
     """All points over or under a polygon in the x-y plane."""
 
-    corners: Annotated[tuple[Corner, ...], Field(min_length=3), AfterValidator(_encloses)]
+    corners: Annotated[tuple[_Corner, ...], Field(min_length=3), AfterValidator(_encloses)]
     """In order, either way round; the last is joined to the first."""
     height: Travel | None = None
     """Lowest and highest z; all by default."""

@@ -1,14 +1,36 @@
+from .filters import (
+    Duration as Duration,
+    FilterChain as FilterChain,
+    FilterSettings as FilterSettings,
+    Frequency as Frequency,
+    LowPass as LowPass,
+    Notch as Notch,
+    Section as Section,
+    Speed as Speed,
+    low_pass as low_pass,
+    notch as notch,
+)
 from .mistakes import refuse_mistakes as refuse_mistakes
-from .posture_table import read_postures as read_postures
-from .postures import StaticPostures as StaticPostures, static_postures as static_postures
-from .tool_file import (
+from .postures import (
+    LEAST_POSTURES as LEAST_POSTURES,
+    StaticPostures as StaticPostures,
+    read_postures as read_postures,
+    static_postures as static_postures,
+)
+from .tool import (
+    SensorLoad as SensorLoad,
     SensorMount as SensorMount,
-    ToolRecord as ToolRecord,
+    ToolResult as ToolResult,
     read_tool as read_tool,
     sensor_load as sensor_load,
-    tool_record as tool_record,
+    tool_result as tool_result,
     write_tool as write_tool,
 )
-from .tool_fit import fit_tool as fit_tool
-from .tool_load import SensorLoad as SensorLoad
-from .tool_model import NAMES as NAMES
+from .tool_fit import (
+    TOOL_UNKNOWNS as TOOL_UNKNOWNS,
+    ToolFit as ToolFit,
+    fit_tool as fit_tool,
+    tool_derivatives as tool_derivatives,
+    tool_residual as tool_residual,
+    tool_wrenches as tool_wrenches,
+)

@@ -8,7 +8,7 @@ With gravity ``u_i`` in the flange's axes, the rotation ``R`` of the sensor in t
 Thirteen unknowns: mass, a small rotation, ``b``, ``h``, ``b_m``. Gauss-Newton from the best
 rotation between forces and gravity (Kabsch 1976), with singular directions left where they
 started; force and moment are weighed by their own scatter. The intervals are those of the last
-linear step, by Student's t. This extends `elastocal.procedure.tool_estimate`, which knows the
+linear step, by Student's t. This extends `elastocal.procedure.derive.tool`, which knows the
 rotation and looks for drift instead.
 """
 
@@ -20,15 +20,54 @@ from scipy.spatial.transform import Rotation
 
 from elastocal.arrays import BoolArray, FloatArray
 from elastocal.compensation.conditioning.postures import StaticPostures
-from elastocal.compensation.conditioning.tool_model import (
-    NAMES,
-    ROTATION,
-    derivatives,
-    wrenches,
-)
 
-LEVEL = 0.95
-"""Of the intervals."""
+TOOL_UNKNOWNS = (
+    "mass",
+    *(f"sensor rotation about {axis}" for axis in "xyz"),
+    *(f"force bias {axis}" for axis in "xyz"),
+    *(f"centre of mass {axis}" for axis in "xyz"),
+    *(f"moment bias {axis}" for axis in "xyz"),
+)
+"""The unknowns, in the order of every vector of them; in place of the centre of mass itself the
+vectors hold mass times centre."""
+_ROTATION = slice(1, 4)
+
+
+def tool_wrenches(postures: StaticPostures, values: FloatArray, R: FloatArray) -> FloatArray:
+    """Return forces and moments, shape (posture, 6)."""
+    u = postures.gravity_flange @ R
+    force = values[0] * u + values[4:7]
+    return np.hstack([force, np.cross(values[7:10], u) + values[10:13]])
+
+
+def tool_derivatives(postures: StaticPostures, values: FloatArray, R: FloatArray) -> FloatArray:
+    """Return the derivatives of `tool_wrenches`, shape (posture, 6, 13).
+
+    They are by mass, rotation (in sensor axes), b, h and b_m.
+    """
+    u = postures.gravity_flange @ R
+    J = np.zeros((len(u), 6, len(TOOL_UNKNOWNS)))
+    skew_u = _skew(u)
+    J[:, :3, 0] = u
+    J[:, :3, _ROTATION] = values[0] * skew_u
+    J[:, :3, 4:7] = np.eye(3)
+    J[:, 3:, _ROTATION] = _skew(values[7:10]) @ skew_u
+    J[:, 3:, 7:10] = -skew_u
+    J[:, 3:, 10:13] = np.eye(3)
+    return J
+
+
+def _skew(v: FloatArray) -> FloatArray:
+    """Return ``[v]x`` with ``[v]x a = v x a``."""
+    S = np.zeros((*v.shape[:-1], 3, 3))
+    S[..., 0, 1], S[..., 0, 2] = -v[..., 2], v[..., 1]
+    S[..., 1, 0], S[..., 1, 2] = v[..., 2], -v[..., 0]
+    S[..., 2, 0], S[..., 2, 1] = -v[..., 1], v[..., 0]
+    return S
+
+
+_LEVEL = 0.95
+"""Confidence level of the intervals."""
 _DEPENDENT = 1e-6
 """Ratio of singular values, columns scaled, below which unknowns depend on one another."""
 _LOADING = 1e-3
@@ -37,19 +76,19 @@ _STEPS = 30
 _DONE = 1e-13
 _NO_MASS = 1e-9
 """In kg; what divides by the mass divides by no less."""
-WIDE_MASS = 0.2
+_WIDE_MASS = 0.2
 """Half interval of the mass, as a share of it, beyond which it counts as not determined."""
-WIDE_ROTATION = np.radians(5.0)
+_WIDE_ROTATION = np.radians(5.0)
 """Half interval of a rotation beyond which it is not determined, in rad."""
-WIDE_CENTRE = 0.05
+_WIDE_CENTRE = 0.05
 """Half interval of a coordinate of the centre of mass beyond which it is not, in m."""
-WIDE_BIAS = 0.2
+_WIDE_BIAS = 0.2
 """Half interval of a bias, as a share of the weight (of weight times 0.1 m), beyond which."""
 
 
 @dataclass(frozen=True, eq=False)
 class ToolFit:
-    """What static postures say of tool and sensor."""
+    """Tool and sensor, as static postures show them."""
 
     mass: float
     """In kg."""
@@ -62,10 +101,11 @@ class ToolFit:
     R_flange_sensor: FloatArray
     """Shape (3, 3)."""
     half_width: dict[str, float]
-    """Half the 95 % interval of each of `NAMES`: kg, rad, N, m, N·m; NaN where not determined,
-    0 for a rotation that was taken as known."""
+    """Half the 95 % interval of each of `TOOL_UNKNOWNS`: kg, rad, N, m, N·m; NaN where not
+    determined, 0 for a rotation that was taken as known."""
     undetermined: tuple[str, ...]
-    """Which of `NAMES` the postures do not determine; their values are where the fit began."""
+    """Those of `TOOL_UNKNOWNS` that the postures do not determine; their values are where the fit
+    began."""
     count: int
     """Postures."""
     force_scatter: float
@@ -95,8 +135,8 @@ def fit_tool(
     """
     nominal = np.eye(3) if R_nominal is None else R_nominal
     R = nominal if rotation_known else _rotation_between(postures, nominal)
-    free = np.ones(len(NAMES), dtype=bool)
-    free[ROTATION] = not rotation_known
+    free = np.ones(len(TOOL_UNKNOWNS), dtype=bool)
+    free[_ROTATION] = not rotation_known
     weights = np.ones(2)
     for _ in range(2):
         values, R = _descend(postures, R, free, weights)
@@ -107,7 +147,7 @@ def fit_tool(
     return _result(postures, values, R, free, weights, scatter)
 
 
-def residual(postures: StaticPostures, fit: ToolFit) -> tuple[FloatArray, FloatArray]:
+def tool_residual(postures: StaticPostures, fit: ToolFit) -> tuple[FloatArray, FloatArray]:
     """Return what a fit leaves of forces and moments, shapes (posture, 3)."""
     weight = fit.mass * (postures.gravity_flange @ fit.R_flange_sensor)
     return (
@@ -132,17 +172,17 @@ def _descend(
     postures: StaticPostures, R: FloatArray, free: BoolArray, weights: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     """Return values (rotation 0, about the R returned) of the least squares."""
-    values = np.zeros(len(NAMES))
+    values = np.zeros(len(TOOL_UNKNOWNS))
     measured = np.hstack([postures.force, postures.moment])
     w = np.repeat(weights, 3)
     for _ in range(_STEPS):
-        left = (measured - wrenches(postures, values, R)) * w
-        J = (derivatives(postures, values, R) * w[:, None]).reshape(left.size, -1)[:, free]
-        step = np.zeros(len(NAMES))
+        left = (measured - tool_wrenches(postures, values, R)) * w
+        J = (tool_derivatives(postures, values, R) * w[:, None]).reshape(left.size, -1)[:, free]
+        step = np.zeros(len(TOOL_UNKNOWNS))
         step[free] = _least_squares(J, left.ravel())
         values = values + step
-        R = R @ Rotation.from_rotvec(step[ROTATION]).as_matrix()
-        values[ROTATION] = 0.0
+        R = R @ Rotation.from_rotvec(step[_ROTATION]).as_matrix()
+        values[_ROTATION] = 0.0
         if np.abs(step).max() <= _DONE * max(1.0, float(np.abs(values).max())):
             break
     return values, R
@@ -167,7 +207,7 @@ def _scatter(
     postures: StaticPostures, values: FloatArray, R: FloatArray, free: BoolArray
 ) -> FloatArray:
     """Return the standard deviations of what is left of force and moment components."""
-    left = np.hstack([postures.force, postures.moment]) - wrenches(postures, values, R)
+    left = np.hstack([postures.force, postures.moment]) - tool_wrenches(postures, values, R)
     rows = 3 * len(postures)
     over = rows - np.array([4 + 3 * bool(free[1]), 6])
     squares = (left.reshape(-1, 2, 3) ** 2).sum(axis=(0, 2))
@@ -183,20 +223,20 @@ def _result(
     scatter: FloatArray,
 ) -> ToolFit:
     w = np.repeat(weights, 3)
-    J = (derivatives(postures, values, R) * w[:, None]).reshape(6 * len(postures), -1)[:, free]
+    J = (tool_derivatives(postures, values, R) * w[:, None]).reshape(6 * len(postures), -1)[:, free]
     _, s, vt, scale, kept = _decomposed(J)
     mass = float(values[0])
     centre = values[7:10] / (mass if abs(mass) > 0.0 else np.inf)
     # Rows: how each unknown moves with the independent directions, each by its deviation.
-    moves = np.zeros((len(NAMES), int(kept.sum())))
+    moves = np.zeros((len(TOOL_UNKNOWNS), int(kept.sum())))
     moves[free] = (vt[kept] / s[kept, None]).T / scale[:, None]
     moves[7:10] = (moves[7:10] - centre[:, None] * moves[0]) / max(abs(mass), _NO_MASS)
     sigma = np.linalg.norm(moves, axis=1)
     # Columns that are weighed have scatter 1; those that are not have what is left of them.
     unit = 1.0 if np.all(scatter > 0.0) else float(np.nan_to_num(scatter).max())
     degrees = 6 * len(postures) - int(free.sum())
-    half = stats.t.ppf(0.5 + LEVEL / 2, max(degrees, 1)) * sigma * unit
-    loose = np.zeros(len(NAMES), dtype=bool)
+    half = stats.t.ppf(0.5 + _LEVEL / 2, max(degrees, 1)) * sigma * unit
+    loose = np.zeros(len(TOOL_UNKNOWNS), dtype=bool)
     loose[free] = np.linalg.norm(vt[~kept], axis=0) > _LOADING
     if degrees < 1:
         half[:] = np.nan
@@ -208,8 +248,8 @@ def _result(
         force_bias=values[4:7],
         moment_bias=values[10:13],
         R_flange_sensor=R,
-        half_width=dict(zip(NAMES, half.tolist(), strict=True)),
-        undetermined=tuple(name for name, open_ in zip(NAMES, loose, strict=True) if open_),
+        half_width=dict(zip(TOOL_UNKNOWNS, half.tolist(), strict=True)),
+        undetermined=tuple(name for name, open_ in zip(TOOL_UNKNOWNS, loose, strict=True) if open_),
         count=len(postures),
         force_scatter=float(scatter[0]),
         moment_scatter=float(scatter[1]),
@@ -222,10 +262,10 @@ def _widest(mass: float, postures: StaticPostures) -> FloatArray:
     weight = abs(mass) * float(np.linalg.norm(postures.gravity))
     return np.array(
         [
-            WIDE_MASS * abs(mass),
-            *[WIDE_ROTATION] * 3,
-            *[WIDE_BIAS * weight] * 3,
-            *[WIDE_CENTRE] * 3,
-            *[WIDE_BIAS * weight * 0.1] * 3,
+            _WIDE_MASS * abs(mass),
+            *[_WIDE_ROTATION] * 3,
+            *[_WIDE_BIAS * weight] * 3,
+            *[_WIDE_CENTRE] * 3,
+            *[_WIDE_BIAS * weight * 0.1] * 3,
         ]
     )

@@ -91,7 +91,7 @@ def _header(numbers: Design) -> list[Constant]:
     filters = numbers.filters
     values = {
         "JOINTS": numbers.joints,
-        "SPRINGS": len(numbers.calibrated.model.springs),
+        "SPRINGS": len(numbers.calibrated.model.parameters),
         "SECTIONS": len(filters.sections),
         "MEDIAN": filters.median,
         "CYCLE": numbers.settings.cycle,
@@ -126,10 +126,9 @@ def _trigonometry() -> list[Constant]:
 
 def _model(numbers: Design) -> list[Constant]:
     """Return the numbers of the chain and the springs, by the names that the routines use."""
-    springs = numbers.calibrated.model.springs
     comments = {
-        f"compliance{i + 1}": f"{spring.name}, {spring.unit.replace('*', ' ')}"
-        for i, spring in enumerate(springs)
+        f"compliance{i + 1}": f"{parameter.name}, {parameter.unit.si.replace('*', ' ')}"
+        for i, parameter in enumerate(numbers.calibrated.model.parameters)
     }
     named = {
         **numbers.orientation.constants,

@@ -5,13 +5,14 @@ from collections.abc import Mapping, Sequence
 from elastocal.compensation.export.comments import remark
 from elastocal.compensation.kernel import (
     Assignment,
+    Call,
     Naming,
     Remark,
     Routine,
     Statement,
     Turn,
-    Value,
     sum_text,
+    used_names,
     value_text,
 )
 from elastocal.compensation.online import Design
@@ -21,7 +22,7 @@ _VECTORS = {"f": "force", "m": "moment"}
 
 def c_routines(numbers: Design) -> str:
     """Return the functions for orientation, deflection and observation block."""
-    springs = len(numbers.calibrated.model.springs)
+    springs = len(numbers.calibrated.model.parameters)
     load = "const double q[], const double force[3], const double moment[3]"
     inputs = ("q", "force", "moment")
     rotation = [f"rotation[{i}]" for i in range(9)]
@@ -60,7 +61,7 @@ def _function(
         f"    {output} = {value_text(value, naming)};"
         for output, value in zip(outputs, routine.outputs, strict=True)
     ]
-    used = _used(routine.statements, routine.outputs)
+    used = used_names(routine.statements, routine.outputs)
     idle = [
         f"    (void){name};"
         for name in inputs
@@ -85,14 +86,5 @@ def _lines(statement: Statement, naming: Naming) -> list[str]:
             ]
         case Assignment():
             return [f"    const double {statement.name} = {sum_text(statement, naming)};"]
-
-
-def _used(statements: Sequence[Statement], outputs: Sequence[Value]) -> set[str]:
-    used = {value.name for value in outputs}
-    for statement in statements:
-        match statement:
-            case Assignment():
-                used |= statement.uses()
-            case Turn():
-                used.add(statement.angle)
-    return used
+        case Call(name, function, argument):
+            return [f"    const double {name} = {function}({value_text(argument, naming)});"]

@@ -78,7 +78,7 @@ def _values(numbers: Design) -> dict[str, str]:
         "ABOUT": "\n".join(f" * {remark(line)}" for line in about),
         "JOINT_NAMES": "\n".join(f" *   {remark(name)}" for name in names),
         "JOINTS": str(numbers.joints),
-        "SPRINGS": str(len(calibrated.model.springs)),
+        "SPRINGS": str(len(calibrated.model.parameters)),
         "SECTIONS": str(len(numbers.filters.sections)),
         "MEDIAN": str(median),
         "MEDIAN_CODE": _template(f"median_{median}.c").rstrip("\n"),

@@ -1,10 +1,15 @@
 from .compiled import compiled as compiled
 from .program import (
     Assignment as Assignment,
+    Call as Call,
+    Naming as Naming,
     Remark as Remark,
     Statement as Statement,
     Turn as Turn,
     Value as Value,
+    sum_text as sum_text,
+    used_names as used_names,
+    value_text as value_text,
 )
 from .statics import (
     Routine as Routine,
@@ -12,4 +17,3 @@ from .statics import (
     observation_block as observation_block,
     orientation as orientation,
 )
-from .text import Naming as Naming, sum_text as sum_text, value_text as value_text

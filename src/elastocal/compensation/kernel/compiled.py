@@ -3,9 +3,8 @@
 import math
 from collections.abc import Callable, Sequence
 
-from elastocal.compensation.kernel.program import Assignment, Turn
+from elastocal.compensation.kernel.program import Assignment, Call, Turn, sum_text, value_text
 from elastocal.compensation.kernel.statics import Routine
-from elastocal.compensation.kernel.text import sum_text, value_text
 
 Function = Callable[..., tuple[float, ...]]
 
@@ -32,7 +31,9 @@ def compiled(routine: Routine, joints: int, loaded: bool = True) -> Function:
         floats: rad or m, N, N·m.
     """
     source = python_text(routine, joints, loaded)
-    namespace: dict[str, Function] = {"sin": math.sin, "cos": math.cos}  # type: ignore[dict-item]
+    functions = {"sin", "cos"}
+    functions |= {each.function for each in routine.statements if isinstance(each, Call)}
+    namespace: dict[str, Function] = {name: getattr(math, name) for name in functions}
     exec(compile(source, "<elastic model>", "exec"), namespace)
     return namespace["routine"]
 
@@ -55,6 +56,8 @@ def python_text(routine: Routine, joints: int, loaded: bool) -> str:
                 lines += [f"    {sine} = sin({angle})", f"    {cosine} = cos({angle})"]
             case Assignment():
                 lines.append(f"    {statement.name} = {sum_text(statement, naming)}")
+            case Call(name, function, argument):
+                lines.append(f"    {name} = {function}({value_text(argument, naming)})")
     lines.append(f"    return ({' '.join(value_text(v, naming) + ',' for v in routine.outputs)})")
     return "\n".join(lines) + "\n"
 

@@ -6,7 +6,7 @@ in the same order; products with 0 and 1, of which the transforms of a robot are
 out when the list is made.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 
 _SNAP = 4e-16
@@ -32,6 +32,8 @@ Vector = tuple[Value, Value, Value]
 Matrix = tuple[Vector, Vector, Vector]
 """Rows."""
 Product = tuple[Value, ...]
+Naming = Callable[[str], str]
+"""From the name of a value to how it is written, in C or in Python."""
 
 
 @dataclass(frozen=True)
@@ -63,7 +65,17 @@ class Remark:
     text: str
 
 
-Statement = Assignment | Turn | Remark
+@dataclass(frozen=True)
+class Call:
+    """``name = function(argument)``."""
+
+    name: str
+    function: str
+    """As C's ``math.h`` and Python's `math` both call it."""
+    argument: Value
+
+
+Statement = Assignment | Turn | Call | Remark
 
 
 @dataclass
@@ -103,6 +115,11 @@ class Program:
         sine, cosine = f"s{index}", f"c{index}"
         self.statements.append(Turn(sine, cosine, angle))
         return Value(1, sine), Value(1, cosine)
+
+    def call(self, name: str, function: str, argument: Value) -> Value:
+        """Return a function of a value."""
+        self.statements.append(Call(name, function, argument))
+        return Value(1, name)
 
     def total(self, name: str, products: Iterable[Product]) -> Value:
         """Return a sum of products, left to right; a plain one needs no statement.
@@ -170,6 +187,20 @@ class Program:
         return self.total(name, list(zip(a, b, strict=True)))
 
 
+def used_names(statements: Iterable[Statement], outputs: Iterable[Value]) -> set[str]:
+    """Return the names that statements and outputs read."""
+    used = {value.name for value in outputs}
+    for statement in statements:
+        match statement:
+            case Assignment():
+                used |= statement.uses()
+            case Turn():
+                used.add(statement.angle)
+            case Call():
+                used.add(statement.argument.name)
+    return used
+
+
 def needed(statements: Sequence[Statement], outputs: Iterable[Value]) -> tuple[Statement, ...]:
     """Return the statements that the outputs depend on, in their order, remarks kept."""
     wanted = {value.name for value in outputs}
@@ -183,7 +214,31 @@ def needed(statements: Sequence[Statement], outputs: Iterable[Value]) -> tuple[S
             case Assignment() if statement.name in wanted:
                 wanted |= statement.uses()
                 kept.append(statement)
+            case Call() if statement.name in wanted:
+                wanted.add(statement.argument.name)
+                kept.append(statement)
     return tuple(_without_idle_remarks(kept[::-1]))
+
+
+def sum_text(assignment: Assignment, naming: Naming = str) -> str:
+    """Return the right side of an assignment, every product in parentheses, left to right."""
+    parts: list[str] = []
+    for sign, factors in assignment.terms:
+        product = " * ".join(map(naming, factors)) or "1.0"
+        alone = len(assignment.terms) == 1
+        term = product if len(factors) < 2 or (alone and sign > 0) else f"({product})"
+        if not parts:
+            parts.append(term if sign > 0 else f"-{term}")
+        else:
+            parts.append(f"{'+' if sign > 0 else '-'} {term}")
+    return " ".join(parts)
+
+
+def value_text(value: Value, naming: Naming = str) -> str:
+    """Return a value by itself."""
+    if not value.name:
+        return repr(float(value.sign))
+    return naming(value.name) if value.sign > 0 else f"-{naming(value.name)}"
 
 
 def _without_idle_remarks(statements: Sequence[Statement]) -> Iterable[Statement]:

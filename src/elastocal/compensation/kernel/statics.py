@@ -1,7 +1,8 @@
 """Springs as statements: deflection and observation block at given joints and load."""
 
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, field
+from itertools import count
 
 from elastocal.compensation.kernel.chain import (
     FORCE,
@@ -13,14 +14,15 @@ from elastocal.compensation.kernel.chain import (
     write_chain,
 )
 from elastocal.compensation.kernel.program import (
-    Assignment,
     Program,
     Statement,
     Value,
     Vector,
     needed,
+    used_names,
 )
-from elastocal.elastic import ElasticModel, Spring
+from elastocal.elastic import ElasticModel, SpringAxis, SpringLoad
+from elastocal.elastic.springs import Expression, Function, Input, Number, Product, Sum
 
 Point = tuple[int, bool, tuple[float, float, float]]
 """Joint, whether behind its motion, offset: where the axis of a spring passes."""
@@ -52,107 +54,210 @@ def deflection(model: ElasticModel, compliance: Sequence[float]) -> Routine:
     tool centre point and the moment ``n = m + l x f`` that the load has there,
 
         deflection = sum over points of (theta x l + u),
-        theta = sum of c_i (a_i . n) a_i  over the revolute springs of the point,
-        u     = sum of c_i (a_i . f) a_i  over its prismatic springs,
+        theta = sum of w_i a_i  over the revolute axes of the point,
+        u     = sum of w_i a_i  over its prismatic axes,
 
-    which is ``sum c_i tau_i J_i`` (paper Eq. 10, 14) with ``J_i = a_i x l`` or ``a_i`` and
-    ``tau_i = J_i . f + W_i . m``.
+    where the spring makes ``w_i`` of the torques ``a_i . n`` about, or forces ``a_i . f`` along,
+    its axes: ``c_i`` times them for a hinge. That is ``sum c_i tau_i J_i`` (paper Eq. 10, 14)
+    with ``J_i = a_i x l`` or ``a_i`` and ``tau_i = J_i . f + W_i . m``.
     """
     program = Program()
-    chain = write_chain(program, model.robot.chain)
+    laws = _Laws(program, model)
     total = NOTHING
-    names = _labels(model)
-    for point, indices in _points(model):
-        label = names[point]
-        program.remark(f"springs {', '.join(model.springs[i].name for i in indices)}")
-        lever, moment = _lever(program, chain, point, label)
-        turned: list[Weighted] = []
-        shifted: list[Weighted] = []
-        for i in indices:
-            spring = model.springs[i]
-            axis = _axis(program, chain, spring, point[0], i)
-            torque = program.dot(f"tau{i + 1}", axis, moment if spring.revolute else FORCE)
-            c = program.quantity(f"compliance{i + 1}", float(compliance[i]))
-            yielding = program.total(f"w{i + 1}", [(c, torque)])
-            (turned if spring.revolute else shifted).append((yielding, axis))
-        theta = _sum(program, f"theta{label}", turned)
-        for_shift = _sum(program, f"shift{label}", shifted)
-        start = program.add(f"base{label}", total, for_shift)
-        total = program.cross(f"sum{label}", theta, lever, start)
+    # A spring between two places of the chain moves neither before both its torques are known.
+    waiting: list[_Place] = []
+    moved: dict[int, Value] = {}
+    for place in _places(program, model):
+        for axis in place.loaded():
+            for number, angles in laws.angles(axis):
+                terms = [
+                    (program.quantity(f"compliance{p + 1}", float(compliance[p])), angle)
+                    for p, angle in angles
+                ]
+                moved[number] = program.total(f"w{number + 1}", terms)
+        waiting.append(place)
+        for ready in [each for each in waiting if moved.keys() >= set(each.numbers)]:
+            waiting.remove(ready)
+            total = _displaced(program, total, ready, moved)
     return _routine(program, total)
 
 
 def observation_block(model: ElasticModel) -> Routine:
     """Return the program of the block ``O`` with ``O c = deflection`` (paper Eq. 11, 14).
 
-    The outputs are the x components of all springs, then the y, then the z components.
+    The outputs are the x components of all parameters, then the y, then the z components.
     """
     program = Program()
-    chain = write_chain(program, model.robot.chain)
+    laws = _Laws(program, model)
+    jacobian: dict[int, Vector] = {}
+    terms: dict[int, list[Weighted]] = {p: [] for p in range(len(model.parameters))}
     columns: dict[int, Vector] = {}
-    names = _labels(model)
-    for point, indices in _points(model):
-        label = names[point]
-        program.remark(f"springs {', '.join(model.springs[i].name for i in indices)}")
-        lever, moment = _lever(program, chain, point, label)
-        for i in indices:
-            spring = model.springs[i]
-            axis = _axis(program, chain, spring, point[0], i)
-            torque = program.dot(f"tau{i + 1}", axis, moment if spring.revolute else FORCE)
-            J = program.cross(f"j{i + 1}", axis, lever) if spring.revolute else axis
-            x, y, z = (
-                program.total(f"b{i + 1}_{a}", [(torque, component)])
-                for a, component in zip("xyz", J, strict=True)
+    for place in _places(program, model):
+        for axis in place.loaded():
+            jacobian[axis.number] = (
+                program.cross(f"j{axis.number + 1}", axis.direction, place.lever)
+                if axis.revolute
+                else axis.direction
             )
-            columns[i] = (x, y, z)
-    springs = range(len(model.springs))
-    return _routine(program, [columns[i][row] for row in range(3) for i in springs])
+            complete = list(laws.angles(axis))
+            for number, angles in complete:
+                for p, angle in angles:
+                    terms[p].append((angle, jacobian[number]))
+            for p in dict.fromkeys(p for _, angles in complete for p, _ in angles):
+                columns[p] = _sum(program, f"b{p + 1}", terms[p])
+    parameters = range(len(model.parameters))
+    return _routine(program, [columns[p][row] for row in range(3) for p in parameters])
 
 
-def _points(model: ElasticModel) -> list[tuple[Point, list[int]]]:
-    """Return where springs sit, from base to tip, with the springs of each place.
+@dataclass(frozen=True)
+class _LoadedAxis:
+    """An axis of a spring at given joints, with its load."""
+
+    number: int
+    """Counts the axes of all springs."""
+    revolute: bool
+    direction: Vector
+    torque: Value
+    """About the axis, or force along it."""
+
+
+@dataclass(frozen=True)
+class _Place:
+    """A point of the chain where axes of springs pass."""
+
+    program: Program
+    label: str
+    """Tells the names of its statements from those of other points: 2, 2_2, 2_3."""
+    lever: Vector
+    """From it to the tool centre point."""
+    moment: Vector
+    """Of the load, about the point."""
+    axes: dict[int, tuple[SpringAxis, Frame]]
+    """By number, with the frame that each is fixed in."""
+    directions: dict[int, Vector] = field(default_factory=dict)
+
+    @property
+    def numbers(self) -> tuple[int, ...]:
+        """Of its axes."""
+        return tuple(self.axes)
+
+    def loaded(self) -> Iterator[_LoadedAxis]:
+        """Write and yield one axis after the other."""
+        program = self.program
+        for number, (axis, frame) in self.axes.items():
+            fixed = constant_vector(program, f"spring{number + 1}", axis.axis)
+            a = program.transformed(f"a{number + 1}", frame.rotation, fixed, NOTHING)
+            self.directions[number] = a
+            torque = program.dot(f"tau{number + 1}", a, self.moment if axis.revolute else FORCE)
+            yield _LoadedAxis(number, axis.revolute, a, torque)
+
+
+class _Laws:
+    """What the springs make of the torques about their axes, as statements."""
+
+    def __init__(self, program: Program, model: ElasticModel) -> None:
+        self._program = program
+        self._torques: dict[int, Value] = {}
+        self._spring_of = [s for s, each in enumerate(model.springs) for _ in each.axes]
+        self._springs = model.springs
+        self._axes = _numbered([len(spring.axes) for spring in model.springs])
+        self._parameters = _numbered([len(spring.parameters) for spring in model.springs])
+
+    def angles(self, axis: _LoadedAxis) -> Iterator[tuple[int, list[tuple[int, Value]]]]:
+        """Yield, once all torques of a spring are known, the angles of each of its axes.
+
+        Each axis by its number, with the angle that one unit of each parameter makes, by the
+        number of the parameter.
+        """
+        self._torques[axis.number] = axis.torque
+        s = self._spring_of[axis.number]
+        axes, parameters = self._axes[s], self._parameters[s]
+        if not self._torques.keys() >= set(axes):
+            return
+        inputs = {f"t{k}": self._torques[number] for k, number in enumerate(axes)}
+        names = (f"x{s + 1}_{k}" for k in count(1))
+        load = SpringLoad[Expression](tuple(Input(name) for name in inputs))
+        for number, row in zip(axes, self._springs[s].angles(load), strict=True):
+            values = [_written(self._program, x, inputs, names) for x in row]
+            yield number, list(zip(parameters, values, strict=True))
+
+
+def _written(
+    program: Program, x: Expression, inputs: dict[str, Value], names: Iterator[str]
+) -> Value:
+    """Write the statements of a formula and return its value."""
+
+    def value(part: Expression) -> Value:
+        return _written(program, part, inputs, names)
+
+    match x:
+        case Input(name):
+            return inputs[name]
+        case Number(number):
+            plain = number in (0.0, 1.0, -1.0)
+            return Value(int(number)) if plain else program.quantity(next(names), number)
+        case Product(factors):
+            return program.total(next(names), [tuple(map(value, factors))])
+        case Sum(terms):
+            return program.total(next(names), [(value(term),) for term in terms])
+        case Function(name, argument):
+            return program.call(next(names), name, value(argument))
+    raise TypeError(f"no formula: {x!r}")
+
+
+def _numbered(lengths: Sequence[int]) -> list[range]:
+    """Return the numbers of each one's parts, counted through."""
+    ends = [sum(lengths[: k + 1]) for k in range(len(lengths))]
+    return [range(end - length, end) for end, length in zip(ends, lengths, strict=True)]
+
+
+def _displaced(program: Program, start: Vector, place: _Place, moved: dict[int, Value]) -> Vector:
+    """Return ``start`` with what the axes of a place displace the tool centre point by."""
+    turns = {number: axis.revolute for number, (axis, _) in place.axes.items()}
+    turned = [(moved[n], a) for n, a in place.directions.items() if turns[n]]
+    shifted = [(moved[n], a) for n, a in place.directions.items() if not turns[n]]
+    theta = _sum(program, f"theta{place.label}", turned)
+    shift = _sum(program, f"shift{place.label}", shifted)
+    base = program.add(f"base{place.label}", start, shift)
+    return program.cross(f"sum{place.label}", theta, place.lever, base)
+
+
+def _places(program: Program, model: ElasticModel) -> Iterator[_Place]:
+    """Write the chain and yield where springs sit, from base to tip."""
+    chain = write_chain(program, model.robot.chain)
+    axes = [axis for spring in model.springs for axis in spring.axes]
+    before: dict[int, int] = {}
+    for (joint, behind, offset), numbers in _points(model, axes):
+        before[joint] = before.get(joint, 0) + 1
+        label = f"{joint + 1}" + (f"_{before[joint]}" if before[joint] > 1 else "")
+        program.remark(f"springs {', '.join(axes[i].name for i in numbers)}")
+        frame = _frame(chain, joint, behind)
+        shift = constant_vector(program, f"offset{label}", offset)
+        at = program.transformed(f"at{label}", frame.rotation, shift, frame.origin)
+        x, y, z = (-value for value in at)
+        lever = program.add(f"lever{label}", chain.tcp.origin, (x, y, z))
+        moment = program.cross(f"moment{label}", lever, FORCE, MOMENT)
+        here = {i: (axes[i], _frame(chain, joint, axes[i].distal)) for i in numbers}
+        yield _Place(program, label, lever, moment, here)
+
+
+def _points(model: ElasticModel, axes: Sequence[SpringAxis]) -> list[tuple[Point, list[int]]]:
+    """Return where axes pass, from base to tip, with the axes of each place.
 
     A revolute spring about its joint's own axis is the same before and behind the motion.
     """
     names = model.robot.joint_names
     groups: dict[Point, list[int]] = {}
-    for i, spring in enumerate(model.springs):
-        joint = names.index(spring.joint)
-        own = tuple(model.robot.chain.joints[joint].axis.tolist()) == spring.axis
-        behind = spring.distal and not (own and spring.revolute and not any(spring.offset))
-        groups.setdefault((joint, behind, spring.offset), []).append(i)
+    for i, axis in enumerate(axes):
+        joint = names.index(axis.joint)
+        own = tuple(model.robot.chain.joints[joint].axis.tolist()) == axis.axis
+        behind = axis.distal and not (own and axis.revolute and not any(axis.offset))
+        groups.setdefault((joint, behind, axis.offset), []).append(i)
     return sorted(groups.items(), key=lambda item: (item[0][:2], item[1]))
 
 
 def _frame(chain: Chain, joint: int, behind: bool) -> Frame:
     return chain.joints[joint].distal if behind else chain.joints[joint].proximal
-
-
-def _labels(model: ElasticModel) -> dict[Point, str]:
-    """Return what tells the names of a point's statements from those of others: 2, 2_2, 2_3."""
-    points = [point for point, _ in _points(model)]
-    labels: dict[Point, str] = {}
-    for point in points:
-        before = sum(1 for other in labels if other[0] == point[0])
-        labels[point] = f"{point[0] + 1}" + (f"_{before + 1}" if before else "")
-    return labels
-
-
-def _lever(program: Program, chain: Chain, point: Point, label: str) -> tuple[Vector, Vector]:
-    """Return the lever to the tool centre point and the moment of the load at the point."""
-    joint, behind, offset = point
-    frame = _frame(chain, joint, behind)
-    shift = constant_vector(program, f"offset{label}", offset)
-    at = program.transformed(f"at{label}", frame.rotation, shift, frame.origin)
-    x, y, z = (-value for value in at)
-    lever = program.add(f"lever{label}", chain.tcp.origin, (x, y, z))
-    return lever, program.cross(f"moment{label}", lever, FORCE, MOMENT)
-
-
-def _axis(program: Program, chain: Chain, spring: Spring, joint: int, index: int) -> Vector:
-    frame = _frame(chain, joint, spring.distal)
-    axis = constant_vector(program, f"spring{index + 1}", spring.axis)
-    return program.transformed(f"a{index + 1}", frame.rotation, axis, NOTHING)
 
 
 def _sum(program: Program, name: str, parts: Sequence[Weighted]) -> Vector:
@@ -167,7 +272,6 @@ def _sum(program: Program, name: str, parts: Sequence[Weighted]) -> Vector:
 def _routine(program: Program, outputs: Iterable[Value]) -> Routine:
     outputs = tuple(outputs)
     statements = needed(program.statements, outputs)
-    used = {name for s in statements if isinstance(s, Assignment) for name in s.uses()}
-    used |= {value.name for value in outputs}
+    used = used_names(statements, outputs)
     constants = {name: x for name, x in program.constants.items() if name in used}
     return Routine(statements, outputs, constants)

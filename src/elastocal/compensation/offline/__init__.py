@@ -1,6 +1,7 @@
 """Offline correction of a programmed path: the commanded pose whose loaded tcp is the programmed.
 
-See `correct` for the equation, `compensate_path` for CSV files, `compensate_krl` for KUKA programs.
+See `correct` for the equation, `path_file` for CSV files; programs of robot controllers are
+corrected by `elastocal.compensation.programs`.
 """
 
 import lazy_loader

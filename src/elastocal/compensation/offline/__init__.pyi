@@ -1,9 +1,36 @@
-from .correct import Correction as Correction, correct as correct
-from .follow import follow as follow, jumps as jumps, nearest_zero_posture as nearest_zero_posture
-from .krl import KrlResult as KrlResult, compensate_krl as compensate_krl
-from .path_file import (
-    Settings as Settings,
-    compensate_path as compensate_path,
-    programmed as programmed,
+from .correct import (
+    LARGEST_DEFLECTION as LARGEST_DEFLECTION,
+    PathCorrection as PathCorrection,
+    correct_rows as correct_rows,
 )
-from .tally import Tally as Tally
+from .path_columns import (
+    PathColumns as PathColumns,
+    PathError as PathError,
+    WrenchColumns as WrenchColumns,
+    find_columns as find_columns,
+    find_wrench_columns as find_wrench_columns,
+    in_file as in_file,
+)
+from .path_file import (
+    CorrectionSettings as CorrectionSettings,
+    compensate_path as compensate_path,
+    programmed_rows as programmed_rows,
+)
+from .path_joints import (
+    RowName as RowName,
+    check_limits as check_limits,
+    joints_along_path as joints_along_path,
+    nearest_zero_posture as nearest_zero_posture,
+    posture_jumps as posture_jumps,
+    turned_inside as turned_inside,
+)
+from .path_rows import (
+    PathValues as PathValues,
+    beyond_a_turn as beyond_a_turn,
+    count_lines as count_lines,
+    read_layout as read_layout,
+    read_values as read_values,
+    row_blocks as row_blocks,
+    turned_to_base as turned_to_base,
+)
+from .summary import CorrectionSummary as CorrectionSummary, LengthSummary as LengthSummary

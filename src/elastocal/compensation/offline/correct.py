@@ -6,7 +6,7 @@ With programmed tcp position ``p``, orientation ``R`` and force ``f``, find ``q`
 
 by Newton steps of the rigid arm: ``J_arm dq = [p - p(q) - C(q) f; log(R R(q)^T)]``. What is left
 out of the derivative, ``d(C f)/dq``, is a deflection per metre, some 1e-3, so that each step gains
-three digits. The first step alone is what is usually done; its residual is told.
+three digits. The first step alone is what is usually done; its residual is reported.
 """
 
 from dataclasses import dataclass
@@ -14,25 +14,27 @@ from dataclasses import dataclass
 import numpy as np
 
 from elastocal.arrays import BoolArray, FloatArray, IndexArray
-from elastocal.compensation.offline.limits import Where, check_limits, turned_inside
-from elastocal.compensation.path import PathError
+from elastocal.compensation.offline import (
+    PathError,
+)
+from elastocal.compensation.offline.path_joints import RowName, check_limits, turned_inside
 from elastocal.identification import CalibratedModel
 from elastocal.robot import Robot
 from elastocal.robot.inverse import TURN, InverseKinematics, pose_error
 
-LARGEST = 0.02
+LARGEST_DEFLECTION = 0.02
 """Largest deflection that is taken for one, in m."""
-TOLERANCE = 1e-9
-"""What is left of position (m) and orientation (rad); the contract is 1e-7 m."""
+_TOLERANCE = 1e-9
+"""Largest error left in position (m) and orientation (rad); the contract is 1e-7 m."""
 _STEPS = 12
 _DAMPING = 1e-6
-"""Of the Newton step, so that a straight wrist does not stop the rows beside it."""
+"""Damping of the Newton step, so that a straight wrist does not stop the rows beside it."""
 _SMALL_TURN = 1.0
 """Largest step of a joint (rad or m) that still is one of a correction."""
 
 
 @dataclass(frozen=True, eq=False)
-class Correction:
+class PathCorrection:
     """Corrected rows."""
 
     q: FloatArray
@@ -56,17 +58,17 @@ class Correction:
     a surface cannot: shape (row,)."""
 
 
-def correct(
+def correct_rows(
     solver: InverseKinematics,
     calibrated: CalibratedModel,
     q: FloatArray,
     T_base_tcp: FloatArray,
     wrench: tuple[FloatArray, FloatArray | None],
-    where: Where,
+    where: RowName,
     *,
     may_turn: bool = False,
-    largest: float = LARGEST,
-) -> Correction:
+    largest: float = LARGEST_DEFLECTION,
+) -> PathCorrection:
     """Return the corrected rows of a path.
 
     Parameters
@@ -124,7 +126,7 @@ def correct(
     commanded[:, :3, 3] = reached[:, :3, 3]
     residual = reached[:, :3, 3] + deflection - T_base_tcp[:, :3, 3]
     predicted = calibrated.predict(q, *wrench)
-    return Correction(
+    return PathCorrection(
         q,
         commanded,
         deflection,
@@ -156,7 +158,7 @@ def _pulled(T_base_tcp: FloatArray, force: FloatArray) -> BoolArray:
     return np.asarray(along > 0.5 * np.linalg.norm(force, axis=1))
 
 
-def _check_size(deflection: FloatArray, largest: float, where: Where) -> None:
+def _check_size(deflection: FloatArray, largest: float, where: RowName) -> None:
     """Refuse deflections that cannot be meant."""
     with np.errstate(over="ignore"):
         length = np.linalg.norm(deflection, axis=1)
@@ -178,7 +180,7 @@ def _error(T: FloatArray, deflection: FloatArray, T_wanted: FloatArray) -> Float
 def _small(error: FloatArray) -> BoolArray:
     position = np.linalg.norm(error[:, :3], axis=1)
     turn = np.linalg.norm(error[:, 3:], axis=1)
-    return np.asarray((position <= TOLERANCE) & (turn <= TOLERANCE))
+    return np.asarray((position <= _TOLERANCE) & (turn <= _TOLERANCE))
 
 
 def _newton_step(robot: Robot, q: FloatArray, error: FloatArray) -> FloatArray:
@@ -200,7 +202,7 @@ def _by_solver(
     q_start: FloatArray,
     T: FloatArray,
     row: int,
-    where: Where,
+    where: RowName,
 ) -> FloatArray:
     """Return one row by exact inverse kinematics: beside a singularity Newton steps go astray."""
     robot, q, wanted = solver.robot, q_start, T.copy()
@@ -214,7 +216,7 @@ def _by_solver(
         deflection = load.deflection(q[None], np.array([row]))[0]
         before, wanted = wanted, T.copy()
         wanted[:3, 3] -= deflection
-        if np.linalg.norm(wanted[:3, 3] - before[:3, 3]) <= TOLERANCE:
+        if np.linalg.norm(wanted[:3, 3] - before[:3, 3]) <= _TOLERANCE:
             return np.asarray(q, dtype=float)
     x, y, z = 1e3 * wanted[:3, 3]
     raise PathError(

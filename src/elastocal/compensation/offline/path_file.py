@@ -1,48 +1,50 @@
-"""``PATH.csv`` to ``OUT.csv``: rows corrected piece by piece, everything else as it stood."""
+"""``PATH.csv`` to ``OUT.csv``: rows corrected block by block, everything else as it stood."""
 
-import csv
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, TextIO
 
 import numpy as np
 
 from elastocal.arrays import FloatArray
-from elastocal.compensation.offline.correct import LARGEST, Correction, correct
-from elastocal.compensation.offline.follow import follow, jumps, nearest_zero_posture
-from elastocal.compensation.offline.limits import Where, check_limits
-from elastocal.compensation.offline.tally import Tally
-from elastocal.compensation.path import (
+from elastocal.compensation.offline import (
     PathColumns,
     PathError,
     PathValues,
-    Piece,
-    TextLayout,
     count_lines,
     find_columns,
     in_file,
-    pieces,
     read_layout,
     read_values,
+    row_blocks,
     turned_to_base,
 )
-from elastocal.files import replacing
+from elastocal.compensation.offline.correct import LARGEST_DEFLECTION, PathCorrection, correct_rows
+from elastocal.compensation.offline.path_joints import (
+    RowName,
+    check_limits,
+    joints_along_path,
+    nearest_zero_posture,
+    posture_jumps,
+)
+from elastocal.compensation.offline.summary import CorrectionSummary
 from elastocal.identification import CalibratedModel
+from elastocal.progress import Progress, silent
 from elastocal.robot.inverse import InverseKinematics, inverse_for
+from elastocal.tables import TableRows, new_table
 
-PIECE = 2000
+_ROWS_AT_A_TIME = 2000
 """Rows corrected at a time; bounds memory."""
 _ADDED = tuple(f"deflection_{axis}{end}[m]" for end in ("", "_low", "_high") for axis in "xyz")
 
 
 @dataclass(frozen=True, eq=False)
-class Settings:
-    """How a path is corrected."""
+class CorrectionSettings:
+    """Settings of the correction of a path."""
 
     start: FloatArray | None = None
     """Posture before the first row of a path of poses, shape (joint,), in rad or m."""
-    largest: float = LARGEST
+    largest: float = LARGEST_DEFLECTION
     """Largest deflection that is taken for one, in m."""
 
 
@@ -50,9 +52,9 @@ def compensate_path(
     calibrated: CalibratedModel,
     path: Path,
     out: Path,
-    settings: Settings | None = None,
-    report: Callable[[str, int, int], None] = lambda *_: None,
-) -> Tally:
+    settings: CorrectionSettings | None = None,
+    progress: Progress = silent,
+) -> CorrectionSummary:
     """Correct a path file; write the same columns corrected, and the predicted deflection.
 
     Parameters
@@ -61,10 +63,10 @@ def compensate_path(
         The model.
     path, out : Path
         The file as programmed, and the one to write, atomically.
-    settings : Settings, optional
-        How.
-    report : callable
-        Told a stage, how many rows are done and how many there are.
+    settings : CorrectionSettings, optional
+        Posture at the start, and the largest deflection.
+    progress : Progress
+        Hears how many rows are done.
 
     Raises
     ------
@@ -73,15 +75,22 @@ def compensate_path(
     FileAccessError
         If a file cannot be read or written.
     """
-    settings = Settings() if settings is None else settings
+    settings = CorrectionSettings() if settings is None else settings
     with in_file(path):
         layout = read_layout(path)
         columns = find_columns(layout.header, calibrated.model.robot)
         solver = inverse_for(calibrated.model.robot)
         job = _Job(calibrated, solver, columns, settings)
         total = count_lines(path) - len(layout.preamble) - 1
-        with replacing(out) as temporary, temporary.open("w", encoding="utf-8", newline="") as file:
-            return _run(job, path, layout, file, lambda done: report("rows", done, total))
+        kept = [i for i, name in enumerate(layout.header) if name.strip() not in _ADDED]
+        header = (*(layout.header[i] for i in kept), *_ADDED)
+        with new_table(out, replace(layout, header=header)) as write:
+            return _correct_blocks(
+                job,
+                row_blocks(path, layout, _ROWS_AT_A_TIME),
+                lambda block, found: write(_new_cells(job, block, kept, found)),
+                lambda done: progress("rows", done, total),
+            )
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,41 +98,40 @@ class _Job:
     calibrated: CalibratedModel
     solver: InverseKinematics
     columns: PathColumns
-    settings: Settings
+    settings: CorrectionSettings
 
 
-def _run(
-    job: _Job, path: Path, layout: TextLayout, file: TextIO, done: Callable[[int], None]
-) -> Tally:
-    kept = [i for i, name in enumerate(layout.header) if name.strip() not in _ADDED]
-    file.writelines(layout.preamble)
-    writer = csv.writer(file, delimiter=layout.delimiter, lineterminator=layout.line_end)
-    writer.writerow([*(layout.header[i] for i in kept), *_ADDED])
-    tally, previous = Tally(), job.settings.start
-    for piece in pieces(path, layout, PIECE):
-        values = read_values(piece, job.columns)
-        labels = [f"row {line}" for line in piece.lines]
-        q, T = programmed(job.solver, values, previous, labels.__getitem__)
+def _correct_blocks(
+    job: _Job,
+    blocks: Iterable[TableRows],
+    write: Callable[[TableRows, PathCorrection], None],
+    done: Callable[[int], None],
+) -> CorrectionSummary:
+    summary, previous = CorrectionSummary(), job.settings.start
+    for block in blocks:
+        values = read_values(block, job.columns)
+        labels = [f"row {line}" for line in block.lines]
+        q, T = programmed_rows(job.solver, values, previous, labels.__getitem__)
         found = _corrected(job, values, q, T, labels.__getitem__)
         shift = found.T_base_tcp[:, :3, 3] - T[:, :3, 3]
         turned: list[int] = []
         if job.columns.by_pose:
             # How the first row is reached is not the path's.
-            before = previous if tally.rows and previous is not None else q[0]
-            turned = jumps(job.solver.robot, q, before).tolist()
-            tally = tally if tally.rows else replace(tally, start=tuple(q[0].tolist()))
-        tally = tally.plus(found, shift, labels, turned)
+            before = previous if summary.rows and previous is not None else q[0]
+            turned = posture_jumps(job.solver.robot, q, before).tolist()
+            summary = summary if summary.rows else replace(summary, start=tuple(q[0].tolist()))
+        summary = summary.plus(found, shift, labels, turned)
         previous = q[-1]
-        _write(writer, job, piece, kept, found)
-        done(tally.rows)
-    return tally
+        write(block, found)
+        done(summary.rows)
+    return summary
 
 
-def programmed(
+def programmed_rows(
     solver: InverseKinematics,
     values: PathValues,
     previous: FloatArray | None,
-    where: Where,
+    where: RowName,
 ) -> tuple[FloatArray, FloatArray]:
     """Return joints and poses as programmed, shapes (row, joint) and (row, 4, 4).
 
@@ -158,18 +166,18 @@ def programmed(
         external = np.broadcast_to(held, (len(values.T_base_tcp), len(names)))
     check_limits(robot, external, where, "is programmed")
     before = nearest_zero_posture(robot) if previous is None else previous
-    return follow(solver, values.T_base_tcp, external, before, where), values.T_base_tcp
+    return joints_along_path(solver, values.T_base_tcp, external, before, where), values.T_base_tcp
 
 
 def _corrected(
-    job: _Job, values: PathValues, q: FloatArray, T: FloatArray, where: Where
-) -> Correction:
+    job: _Job, values: PathValues, q: FloatArray, T: FloatArray, where: RowName
+) -> PathCorrection:
     force = turned_to_base(values.force, job.columns.force, T)
     moment = turned_to_base(values.moment, job.columns.moment, T)
     if force is None:
         raise PathError("path has no forces")
     wrench, largest = (force, moment), job.settings.largest
-    return correct(
+    return correct_rows(
         job.solver,
         job.calibrated,
         q,
@@ -181,8 +189,10 @@ def _corrected(
     )
 
 
-def _write(writer: Any, job: _Job, piece: Piece, kept: list[int], found: Correction) -> None:
-    """Write rows; only the cells that were corrected are new text."""
+def _new_cells(
+    job: _Job, block: TableRows, kept: list[int], found: PathCorrection
+) -> Iterator[list[str]]:
+    """Yield the cells of corrected rows; only those that were corrected are new text."""
     columns, robot = job.columns, job.solver.robot
     new: list[tuple[int, list[str]]] = []
     if columns.by_pose:
@@ -195,7 +205,7 @@ def _write(writer: Any, job: _Job, piece: Piece, kept: list[int], found: Correct
         new.append((column.index, list(map(repr, (numbers / column.scale).tolist()))))
     deflection = np.hstack([found.deflection, found.low, found.high])
     ends = [list(map(repr, row)) for row in deflection.tolist()]
-    for row, (cells, end) in enumerate(zip(piece.cells, ends, strict=True)):
+    for row, (cells, end) in enumerate(zip(block.cells, ends, strict=True)):
         for index, text in new:
             cells[index] = text[row]
-        writer.writerow([*(cells[i] for i in kept), *end])
+        yield [*(cells[i] for i in kept), *end]

@@ -1,9 +1,17 @@
 from .compensator import Compensator as Compensator
+from .conditioner import Conditioner as Conditioner
 from .design import (
     JOINT_RANGE as JOINT_RANGE,
     LONG_AGO as LONG_AGO,
     Design as Design,
     design as design,
+    draws_factor as draws_factor,
 )
-from .rkorr import rkorr as rkorr
-from .state import Correction as Correction, Reading as Reading, State as State, Status as Status
+from .state import (
+    Correction as Correction,
+    Reading as Reading,
+    State as State,
+    Status as Status,
+    Triple as Triple,
+    rkorr as rkorr,
+)

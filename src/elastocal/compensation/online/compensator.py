@@ -85,6 +85,8 @@ class Compensator:
         q : sequence of float
             Joint positions, in rad or m.
         """
+        # Both ways out come before the model: it is not to be asked at joints that are none, nor
+        # with a wrench that no reading of this cycle stands for.
         if not _are_joints(q):
             return self._without_reading(state, state.problem | Status.INVALID.value)
         if not state.fresh:
@@ -94,16 +96,20 @@ class Compensator:
         target, status = self._target(deflection, rotation)
         if half_width > self._uncertain:
             status |= Status.UNCERTAIN.value
+        # The rate limit is last, from the correction before: whatever the model, the deadband or
+        # the end of a gap asks for, the arm moves no farther than a step.
         correction, late = _towards(state.correction, target, self._step)
         status |= late | state.problem
-        told = Correction(correction, deflection, half_width, status)
+        answer = Correction(correction, deflection, half_width, status)
         return State(
             state.time, False, state.problem, 0, *state[4:7], correction, deflection, half_width
-        ), told
+        ), answer
 
     def _predicted(
         self, q: Sequence[float], rotation: tuple[float, ...], wrench: tuple[float, ...]
     ) -> tuple[Triple, float]:
+        """Return the deflection in base, and half its 95 % interval where that is widest."""
+        # The wrench is filtered in tcp axes, which turn with it, and turned to base only here.
         rxx, rxy, rxz, ryx, ryy, ryz, rzx, rzy, rzz = rotation
         ax, ay, az, nx, ny, nz = wrench
         force = (
@@ -125,10 +131,12 @@ class Compensator:
         """Return minus the deflection in the correction's frame, within deadband and limit."""
         dx, dy, dz = deflection
         length = math.sqrt(dx * dx + dy * dy + dz * dz)
+        # From none at the deadband to all at twice it: no jump at its edge.
         share = (length - self._deadband) * self._slope
         status = 0
         if share < 1.0:
             status |= Status.DEADBAND.value
+        # The gain before the limit: the limit holds for what is commanded.
         share = min(max(share, 0.0), 1.0) * self._gain
         if length * share > self._largest:
             share = self._largest / length
@@ -145,8 +153,10 @@ class Compensator:
 
         Otherwise the first readings after a gap would be corrected by the wrench before it.
         """
+        # Counted no farther than needed: a counter that grows for days would overflow in C.
         missed = min(state.missed + 1, self._hold + 1)
         faded = missed > self._hold
+        # Towards zero along a straight line and never past it, slower than the rate limit.
         share = _faded_share(state.correction, self._fade) if faded else 1.0
         x, y, z = state.correction
         correction = (share * x, share * y, share * z)
@@ -158,9 +168,9 @@ class Compensator:
                 _scaled(state.wrench, share),
             )
         status = (Status.FADED if faded else Status.HELD).value | problem
-        told = Correction(correction, state.deflection, state.half_width, status)
+        answer = Correction(correction, state.deflection, state.half_width, status)
         after = State(state.time, False, state.problem, missed, *remembered, correction, *state[8:])
-        return after, told
+        return after, answer
 
 
 def _are_joints(q: Sequence[float]) -> bool:

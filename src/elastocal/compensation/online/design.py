@@ -1,4 +1,4 @@
-"""Every number of a compensator, worked out once: what the Python and the C step both read."""
+"""The numbers of a compensator, worked out once: the Python and the C step both read them."""
 
 from dataclasses import dataclass
 
@@ -6,8 +6,7 @@ import numpy as np
 from scipy import stats
 
 from elastocal.arrays import FloatArray
-from elastocal.compensation.conditioning import SensorLoad
-from elastocal.compensation.filters import FilterChain
+from elastocal.compensation.conditioning import FilterChain, SensorLoad
 from elastocal.compensation.kernel import Routine, deflection, observation_block, orientation
 from elastocal.compensation.settings import CompensatorSettings
 from elastocal.errors import CompensationError
@@ -17,7 +16,7 @@ LONG_AGO = -1.0e300
 """Time of a reading that never was, in s."""
 JOINT_RANGE = 1000.0
 """Positions beyond it are no joint's, in rad or m."""
-LARGEST_COMPLIANCE = 1.0
+_LARGEST_COMPLIANCE = 1.0
 """In rad/(N·m) or m/N: a spring that yields a metre under a newton is a broken file."""
 _NEGLIGIBLE = 1e-9
 """Share of the largest standard deviation below which a direction of the draws is left out."""
@@ -38,7 +37,7 @@ class Design:
     spread: FloatArray
     """``L`` with ``L L^T`` the covariance of the draws times 1.96², shape (spring, direction)."""
     weight: FloatArray
-    """Of the tool, in base, shape (3,), in N."""
+    """Weight of the tool in base, shape (3,), in N."""
     sensor_rotation: FloatArray
     """R_tcp_sensor, shape (3, 3)."""
     sensor_origin: FloatArray
@@ -67,12 +66,12 @@ class Design:
 
     @property
     def largest_step(self) -> float:
-        """Of the correction in one cycle, in m."""
+        """Largest change of the correction in one cycle, in m."""
         return self.settings.limits.rate * self.settings.cycle
 
     @property
     def fade_step(self) -> float:
-        """Of the correction in one cycle while it fades, in m."""
+        """Change of the correction in one cycle while it fades, in m."""
         return self.settings.limits.fade * self.settings.cycle
 
     @property
@@ -150,12 +149,12 @@ def draws_factor(draws: FloatArray) -> FloatArray:
 
 
 def _check_compliances(calibrated: CalibratedModel) -> None:
-    names = calibrated.model.spring_names
+    names = calibrated.model.parameter_names
     for what, values in (("compliance", calibrated.compliance[None]), ("a draw", calibrated.draws)):
-        bad = np.argwhere(~(np.abs(values) <= LARGEST_COMPLIANCE))
+        bad = np.argwhere(~(np.abs(values) <= _LARGEST_COMPLIANCE))
         if len(bad):
             row, column = bad[0]
             raise CompensationError(
                 f"{what} of spring {names[column]} is {values[row, column]:g}: it must be finite"
-                f" and at most {LARGEST_COMPLIANCE:g} in size"
+                f" and at most {_LARGEST_COMPLIANCE:g} in size"
             )

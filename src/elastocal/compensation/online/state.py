@@ -1,4 +1,4 @@
-"""What goes into a step of the compensator, what it remembers, and what comes out.
+"""State of the compensator: what goes into a step, what it remembers, and what comes out.
 
 Plain tuples of floats: a step takes microseconds, and an array of three costs one.
 """
@@ -11,7 +11,7 @@ Triple = tuple[float, float, float]
 
 
 class Status(IntFlag):
-    """What a correction is to be read with; the C header has the same numbers."""
+    """Flags that a correction is to be read with; the C header has the same numbers."""
 
     OK = 0
     HELD = 1
@@ -37,10 +37,10 @@ class Status(IntFlag):
 
 
 class Reading(NamedTuple):
-    """What arm and sensor say."""
+    """A reading of arm and sensor."""
 
     time: float
-    """Of the reading by the sensor's clock, in s; it must advance."""
+    """Time of the reading by the sensor's clock, in s; it must advance."""
     q: Sequence[float]
     """Joint positions, measured, in rad or m."""
     force: Sequence[float]
@@ -52,10 +52,10 @@ class Reading(NamedTuple):
 
 
 class State(NamedTuple):
-    """What a compensator remembers from one step to the next."""
+    """The memory of a compensator from one step to the next."""
 
     time: float
-    """Of the last reading, in s."""
+    """Time of the last reading, in s."""
     fresh: bool
     """Whether a usable reading came since the last correction."""
     problem: int
@@ -77,13 +77,27 @@ class State(NamedTuple):
 
 
 class Correction(NamedTuple):
-    """What the controller is told."""
+    """The correction of a cycle, for the controller."""
 
     correction: Triple
-    """What the commanded position is to be changed by, in the settings' frame, in m."""
+    """Change of the commanded position, in the settings' frame, in m."""
     deflection: Triple
     """Predicted deflection, in base, in m; the last one while the correction is held."""
     half_width: float
     """Half the 95 % interval of its most uncertain component, in m."""
     status: int
     """`Status` flags."""
+
+
+def rkorr(correction: Triple) -> tuple[float, float, float, float, float, float]:
+    """Return a correction as RKorr: X, Y, Z in mm, A, B, C in degrees.
+
+    For an absolute correction (``RSI_ON(#ABSOLUTE)``, ``HOLDON="1"``); the object POSCORR must
+    name the frame that the compensator corrects in: ``base`` is its ``RobRoot`` where the model
+    begins at the robot's root, ``tcp`` its ``Tool``. The orientation is not corrected.
+
+    >>> rkorr((1e-3, 0.0, -2.5e-4))
+    (1.0, 0.0, -0.25, 0.0, 0.0, 0.0)
+    """
+    x, y, z = correction
+    return 1e3 * x, 1e3 * y, 1e3 * z, 0.0, 0.0, 0.0

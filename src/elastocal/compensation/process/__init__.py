@@ -1,18 +1,15 @@
 """A process path in closed loop, without and with correction: the paper's Table 1.
 
 =============  ====================================================================
-`course`       a stretch of path under force, by time
+`course`       a stretch of path under force, by time; what a process is
 `placement`    fibre placement courses on a dome (paper 4.2)
 `roughing`     rings of a dome roughed from a block (paper 4.3)
-`posture`      one spin and one rail position that the robot can follow
-`variation`    forces that change slowly, and how they begin and end
-`correctors`   what corrects: the online compensator, or a perfect one with delay
+`postures`     the processes by name; one spin and rail position for their courses
+`correctors`   the online compensator, or a perfect one with delay
 `loop`         cycle by cycle: readings, correction, delay, deviation
-`table`        mean, max and standard deviation; reduction
-`trace`        a course at every cycle: place, deviation before and after
-`record`       what it has come to, as a folder keeps it
-`deviations`   the traces in a CSV
-`folder`       written and read: `read_process`, `write_process`
+`effects`      the error budget: effects that are switched off in turn
+`result`       mean, max and standard deviation; reduction: Table 1
+`folder`       the result's folder, written and read
 =============  ====================================================================
 
 Nothing here knows what the cell truly does: it comes in as a `loop.TrueCell`.

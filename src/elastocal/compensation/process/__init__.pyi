@@ -3,32 +3,49 @@ from .correctors import (
     ModelCorrector as ModelCorrector,
     PerfectCorrector as PerfectCorrector,
 )
-from .course import Course as Course
-from .deviations import DEVIATIONS as DEVIATIONS
+from .course import (
+    Course as Course,
+    Process as Process,
+    Ripple as Ripple,
+    arc_length as arc_length,
+    engaged as engaged,
+    evenly_spaced as evenly_spaced,
+    swing as swing,
+    tool_frames as tool_frames,
+    unit_tangents as unit_tangents,
+)
+from .effects import BUDGET as BUDGET, Effect as Effect
 from .folder import (
+    DEVIATIONS as DEVIATIONS,
+    PROGRAMMED_PATH as PROGRAMMED_PATH,
     TABLE as TABLE,
-    process_figures as process_figures,
     read_process as read_process,
     read_table as read_table,
     write_process as write_process,
+    write_programmed_path as write_programmed_path,
 )
 from .loop import (
     Controller as Controller,
-    Passage as Passage,
+    CourseDeviation as CourseDeviation,
+    CourseRun as CourseRun,
+    LoadedRobot as LoadedRobot,
+    TrueCell as TrueCell,
     air_shifts as air_shifts,
     run_course as run_course,
 )
-from .placement import Placement as Placement, placement_courses as placement_courses
-from .posture import with_postures as with_postures
-from .programme import PROGRAMME as PROGRAMME, write_programme as write_programme
-from .record import (
-    Line as Line,
-    ProcessRecord as ProcessRecord,
-    Source as Source,
-    Table as Table,
-    Values as Values,
-    lines_of as lines_of,
+from .placement import FibrePlacement as FibrePlacement
+from .postures import (
+    PROCESSES as PROCESSES,
+    process_courses as process_courses,
+    with_postures as with_postures,
 )
-from .roughing import SPINDLE as SPINDLE, Roughing as Roughing, roughing_rings as roughing_rings
-from .table import Comparison as Comparison, compare as compare, pooled as pooled
-from .trace import Trace as Trace
+from .result import (
+    DeviationComparison as DeviationComparison,
+    DeviationStatistics as DeviationStatistics,
+    ProcessRun as ProcessRun,
+    SimulatedProcess as SimulatedProcess,
+    SimulateProcessResult as SimulateProcessResult,
+    compare_deviations as compare_deviations,
+    pooled as pooled,
+)
+from .roughing import Roughing as Roughing

@@ -1,4 +1,4 @@
-"""What corrects a path: the online compensator, or one that knows the deflection but is late."""
+"""Correctors of a path: the online compensator, or one that knows the deflection but is late."""
 
 from collections import deque
 from typing import Protocol
@@ -11,7 +11,7 @@ from elastocal.errors import CompensationError
 
 
 class Corrector(Protocol):
-    """Says every cycle what the commanded position is to be changed by."""
+    """Corrects the commanded position every cycle."""
 
     def start(self) -> None:
         """Forget what was."""
@@ -68,8 +68,8 @@ class ModelCorrector:
         state, joints = self._state, q.tolist()
         for t, values in zip(time.tolist(), raw.tolist(), strict=True):
             state = self._compensator.condition(state, Reading(t, joints, values[:3], values[3:]))
-        self._state, told = self._compensator.correct(state, joints)
-        return np.array(told.correction)
+        self._state, answer = self._compensator.correct(state, joints)
+        return np.array(answer.correction)
 
 
 class PerfectCorrector:

@@ -1,10 +1,23 @@
-"""A stretch of process path under force, at even steps of time."""
+"""Courses of a process: stretches of path under force, at even steps of time.
 
+A process (`placement`, `roughing`) makes courses on a surface, with forces from a seeded generator
+that change slowly. A further process is a file with a subclass of `Process`, and a line in
+`postures`.
+"""
+
+from abc import ABC, abstractmethod
 from dataclasses import dataclass, field, replace
+from typing import ClassVar
 
 import numpy as np
+from numpy.random import Generator
 
 from elastocal.arrays import FloatArray
+from elastocal.compensation.settings import CompensatorSettings
+from elastocal.planning.surface import Surface
+
+_PERIODS = (1.0, 2.3, 5.1)
+"""Periods of three sines, in s; no two of them keep step."""
 
 
 @dataclass(frozen=True)
@@ -19,7 +32,7 @@ class Ripple:
 
 @dataclass(frozen=True, eq=False)
 class Course:
-    """From the first contact to the last."""
+    """A stretch of path from the first contact to the last."""
 
     name: str
     step: float
@@ -44,7 +57,34 @@ class Course:
         return replace(self, T_base_tcp=cut[0], force=cut[1], direction=cut[2], q=cut[3])
 
 
-def along(points: FloatArray, speed: float, step: float) -> FloatArray:
+@dataclass(frozen=True)
+class Process(ABC):
+    """A process on a surface: how its courses run, and what forces act on them."""
+
+    count: int = 5
+    """Number of courses."""
+    compensator: ClassVar[CompensatorSettings] = CompensatorSettings()
+    """Settings of the compensator that suit its forces."""
+
+    @abstractmethod
+    def courses(self, surface: Surface, rng: Generator) -> tuple[Course, ...]:
+        """Return courses without joints.
+
+        Parameters
+        ----------
+        surface : Surface
+            In base.
+        rng : Generator
+            Seeded source of randomness, for the forces.
+
+        Raises
+        ------
+        CompensationError
+            If the surface is too small.
+        """
+
+
+def evenly_spaced(points: FloatArray, speed: float, step: float) -> FloatArray:
     """Return points of a polyline passed at an even speed, shape (row, column).
 
     Parameters
@@ -56,19 +96,25 @@ def along(points: FloatArray, speed: float, step: float) -> FloatArray:
     step : float
         Time between rows, in s.
     """
-    way = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points[:, :3], axis=0), axis=1))])
-    wanted = np.arange(0.0, way[-1], speed * step)
-    return np.stack([np.interp(wanted, way, column) for column in points.T], axis=1)
+    length = arc_length(points[:, :3])
+    wanted = np.arange(0.0, length[-1], speed * step)
+    return np.stack([np.interp(wanted, length, column) for column in points.T], axis=1)
 
 
-def travel(points: FloatArray) -> FloatArray:
+def arc_length(points: FloatArray) -> FloatArray:
+    """Return the length of a polyline up to each of its points, shape (point,), in m."""
+    steps = np.linalg.norm(np.diff(points, axis=0), axis=1)
+    return np.concatenate([[0.0], np.cumsum(steps)])
+
+
+def unit_tangents(points: FloatArray) -> FloatArray:
     """Return unit vectors along a path, shape (row, 3)."""
     slope = np.gradient(points, axis=0)
     result: FloatArray = slope / np.linalg.norm(slope, axis=1, keepdims=True)
     return result
 
 
-def frames(position: FloatArray, x: FloatArray, z: FloatArray) -> FloatArray:
+def tool_frames(position: FloatArray, x: FloatArray, z: FloatArray) -> FloatArray:
     """Return T_base_tcp, z as given and x as near to ``x`` as that allows, shape (row, 4, 4)."""
     y = np.cross(z, x)
     y /= np.linalg.norm(y, axis=1, keepdims=True)
@@ -76,3 +122,28 @@ def frames(position: FloatArray, x: FloatArray, z: FloatArray) -> FloatArray:
     T[:, :3, 0], T[:, :3, 1], T[:, :3, 2] = np.cross(y, z), y, z
     T[:, :3, 3], T[:, 3, 3] = position, 1.0
     return T
+
+
+def swing(time: FloatArray, rng: Generator) -> FloatArray:
+    """Return a slow swing between -1 and 1, shape (row,): three sines of random phase."""
+    phase = rng.uniform(0.0, 2.0 * np.pi, len(_PERIODS))
+    sines = [
+        np.sin(2.0 * np.pi * time / period + p) for period, p in zip(_PERIODS, phase, strict=True)
+    ]
+    mean: FloatArray = np.mean(sines, axis=0)
+    return mean
+
+
+def engaged(time: FloatArray, rise: float) -> FloatArray:
+    """Return how much of the force acts, from 0 over 1 to 0, shape (row,).
+
+    Parameters
+    ----------
+    time : ndarray, shape (row,)
+        In s.
+    rise : float
+        Time from none to all of it, and back at the end, in s; a half cosine.
+    """
+    inward = np.minimum(time - time[0], time[-1] - time) / rise
+    share: FloatArray = 0.5 - 0.5 * np.cos(np.pi * np.clip(inward, 0.0, 1.0))
+    return share

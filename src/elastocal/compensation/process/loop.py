@@ -19,12 +19,12 @@ from elastocal.errors import CompensationError
 from elastocal.robot import Robot
 
 
-class Pressed(Protocol):
+class LoadedRobot(Protocol):
     """The robot under a process force."""
 
     @property
     def shift(self) -> FloatArray:
-        """Of the tool from where the undeformed robot has it, in base, shape (3,), in m."""
+        """Shift of the tool from where the undeformed robot has it, in base, shape (3,), in m."""
         ...
 
     @property
@@ -39,7 +39,7 @@ class Pressed(Protocol):
 
 
 class TrueCell(Protocol):
-    """What a cell does; `elastocal.sim.workcell.process.ProcessCell` is one."""
+    """The truth of a cell; `elastocal.sim.workcell.process.ProcessCell` is one."""
 
     def lift(self, course: str, q: FloatArray) -> None:
         """Begin a course in the air."""
@@ -49,7 +49,7 @@ class TrueCell(Protocol):
         """Return the shift of the tool in the air, shape (3,), in m."""
         ...
 
-    def press(self, q: FloatArray, force_base: FloatArray) -> Pressed:
+    def press(self, q: FloatArray, force_base: FloatArray) -> LoadedRobot:
         """Go on to joints and a force on the robot."""
         ...
 
@@ -60,7 +60,7 @@ class TrueCell(Protocol):
 
 @dataclass(frozen=True)
 class Controller:
-    """How a robot controller follows corrections. Assumed; no data sheet says it."""
+    """A robot controller that follows corrections; assumed, no data sheet says it."""
 
     cycle: float = 0.004
     """In s."""
@@ -90,14 +90,14 @@ class Controller:
 
 
 @dataclass(frozen=True, eq=False)
-class Passage:
-    """What a course has come to."""
+class CourseRun:
+    """A course that was run: where the tool was at every cycle."""
 
     course: Course
     time: FloatArray
-    """Of the cycles, shape (cycle,), in s."""
+    """Time of the cycles, shape (cycle,), in s."""
     shift: FloatArray
-    """Of the tool from the same path in the air, in base, shape (cycle, 3), in m."""
+    """Shift of the tool from the same path in the air, in base, shape (cycle, 3), in m."""
     position: FloatArray
     """Programmed tool centre point in base, shape (cycle, 3), in m."""
     deviation: FloatArray
@@ -112,13 +112,13 @@ class _Drives:
         self._gain = controller.gain
         self._line = deque(np.zeros(3) for _ in range(controller.dead_cycles))
 
-    def told(self, correction: FloatArray) -> None:
+    def command(self, correction: FloatArray) -> None:
         """Take the correction of a cycle."""
         self._line.append(correction)
         self.done = self.done + self._gain * (self._line.popleft() - self.done)
 
 
-class _Between:
+class _Interpolated:
     """A row and the next, with what lies between them."""
 
     def __init__(self, here: FloatArray, there: FloatArray) -> None:
@@ -141,7 +141,7 @@ def run_course(
     air: FloatArray,
     controller: Controller,
     corrector: Corrector | None,
-) -> Passage:
+) -> CourseRun:
     """Run a course and return what the tool does.
 
     Parameters
@@ -171,17 +171,17 @@ def run_course(
         offset = into_joints[row] @ drives.done
         now = cell.press(course.q[row] + offset, course.force[row])
         raw = _readings(cell, course, controller, (row, cycles), before, now)
-        shift = _Between(before.shift - air[row - 1], now.shift - air[row])
-        joints = _Between(course.q[row - 1], course.q[row])
+        shift = _Interpolated(before.shift - air[row - 1], now.shift - air[row])
+        joints = _Interpolated(course.q[row - 1], course.q[row])
         for n in range(cycles):
             part = (n + 1) / cycles
             deflection = shift.at(part)
             if corrector is not None:
                 q = joints.at(part) + into_joints[row] @ drives.done
-                drives.told(corrector.correct(*raw.of(n, q), deflection))
+                drives.command(corrector.correct(*raw.of(n, q), deflection))
             shifts.append(deflection + drives.done)
         before = now
-    return _passage(course, controller, cycles, np.array(shifts))
+    return _course_run(course, controller, cycles, np.array(shifts))
 
 
 @dataclass(frozen=True, eq=False)
@@ -221,8 +221,8 @@ def _readings(
     course: Course,
     controller: Controller,
     where: tuple[int, int],
-    before: Pressed,
-    now: Pressed,
+    before: LoadedRobot,
+    now: LoadedRobot,
 ) -> _Raw:
     """Return what the sensor says between two rows; the ripple swings in all its axes alike."""
     row, cycles = where
@@ -236,7 +236,9 @@ def _readings(
     return _Raw(time, cell.read(time, true), controller.readings)
 
 
-def _passage(course: Course, controller: Controller, cycles: int, shift: FloatArray) -> Passage:
+def _course_run(
+    course: Course, controller: Controller, cycles: int, shift: FloatArray
+) -> CourseRun:
     at = np.arange(1, len(shift) + 1) / cycles
     rows = np.arange(len(course.q))
 
@@ -245,4 +247,26 @@ def _passage(course: Course, controller: Controller, cycles: int, shift: FloatAr
 
     deviation = np.einsum("ck,ck->c", shift, between(course.direction))
     time = np.arange(1.0, len(shift) + 1.0) * controller.cycle
-    return Passage(course, time, shift, between(course.T_base_tcp[:, :3, 3]), deviation)
+    return CourseRun(course, time, shift, between(course.T_base_tcp[:, :3, 3]), deviation)
+
+
+@dataclass(frozen=True, eq=False)
+class CourseDeviation:
+    """One course of one seed, at every cycle, without and with correction."""
+
+    seed: int
+    course: str
+    time: FloatArray
+    """Since the course began, shape (cycle,), in s."""
+    position: FloatArray
+    """Programmed tool centre point in base, shape (cycle, 3), in m."""
+    before: FloatArray
+    """Signed deviation without correction, shape (cycle,), in m."""
+    after: FloatArray
+    """Signed deviation with correction, shape (cycle,), in m."""
+
+    @classmethod
+    def of(cls, seed: int, before: CourseRun, after: CourseRun) -> "CourseDeviation":
+        """Return the deviations of a course that was run twice."""
+        name = before.course.name
+        return cls(seed, name, before.time, before.position, before.deviation, after.deviation)

@@ -12,8 +12,16 @@ import trimesh
 from numpy.random import Generator
 
 from elastocal.arrays import FloatArray
-from elastocal.compensation.process.course import Course, along, frames, travel
-from elastocal.compensation.process.variation import engaged, swing
+from elastocal.compensation.process.course import (
+    Course,
+    Process,
+    arc_length,
+    engaged,
+    evenly_spaced,
+    swing,
+    tool_frames,
+    unit_tangents,
+)
 from elastocal.errors import CompensationError
 from elastocal.planning.surface import Surface
 
@@ -22,10 +30,9 @@ _RAYS = 400
 
 
 @dataclass(frozen=True)
-class Placement:
-    """How courses are laid."""
+class FibrePlacement(Process):
+    """Courses across a surface, along y of its frame; deviations count aside."""
 
-    courses: int = 5
     border: float = 0.08
     """Distance of the courses from the border of the mesh, in m."""
     speed: float = 0.1
@@ -45,49 +52,33 @@ class Placement:
     rise: float = 0.5
     """Time in which the roller comes down, in s."""
 
-
-def placement_courses(surface: Surface, settings: Placement, rng: Generator) -> tuple[Course, ...]:
-    """Return courses across the surface, along y of its frame; deviations count aside.
-
-    Parameters
-    ----------
-    surface : Surface
-        In base.
-    settings : Placement
-        How they are laid.
-    rng : Generator
-        Seeded source of randomness, for the forces.
-
-    Raises
-    ------
-    CompensationError
-        If the surface is too small for a course.
-    """
-    T = surface.T_base_surface
-    own = (surface.mesh.vertices - T[:3, 3]) @ T[:3, :3]
-    low, high = own.min(axis=0), own.max(axis=0)
-    inside = np.linspace(low[0] + settings.border, high[0] - settings.border, settings.courses)
-    return tuple(
-        _course(f"course {n + 1}", surface, (x, low[1], high[1], high[2]), settings, rng)
-        for n, x in enumerate(inside)
-    )
+    def courses(self, surface: Surface, rng: Generator) -> tuple[Course, ...]:
+        """Return courses across the surface; see `Process.courses`."""
+        T = surface.T_base_surface
+        own = (surface.mesh.vertices - T[:3, 3]) @ T[:3, :3]
+        low, high = own.min(axis=0), own.max(axis=0)
+        inside = np.linspace(low[0] + self.border, high[0] - self.border, self.count)
+        return tuple(
+            _course(f"course {n + 1}", surface, (x, low[1], high[1], high[2]), self, rng)
+            for n, x in enumerate(inside)
+        )
 
 
 def _course(
     name: str,
     surface: Surface,
     where: tuple[float, float, float, float],
-    settings: Placement,
+    settings: FibrePlacement,
     rng: Generator,
 ) -> Course:
     hits = _within(_hits(surface, where), settings.border)
     if len(hits) < 10:
         raise CompensationError(f"{surface.name} is too small for {name} within its border")
-    rows = along(hits, settings.speed, settings.step)
+    rows = evenly_spaced(hits, settings.speed, settings.step)
     kept, normal = rows[:, :3], rows[:, 3:]
     normal = normal / np.linalg.norm(normal, axis=1, keepdims=True)
-    forward = travel(kept)
-    T = frames(kept, forward, -normal)
+    forward = unit_tangents(kept)
+    T = tool_frames(kept, forward, -normal)
     time = np.arange(float(len(kept))) * settings.step
     share = engaged(time, settings.rise)
     press = settings.compaction * (1.0 + settings.compaction_swing * swing(time, rng))
@@ -122,7 +113,6 @@ def _within(rows: FloatArray, border: float) -> FloatArray:
     """Return the rows that are so far from both ends, in m; none when there are none."""
     if len(rows) < 2:
         return rows[:0]
-    steps = np.linalg.norm(np.diff(rows[:, :3], axis=0), axis=1)
-    way = np.concatenate([[0.0], np.cumsum(steps)])
-    kept: FloatArray = rows[(way > border) & (way < way[-1] - border)]
+    length = arc_length(rows[:, :3])
+    kept: FloatArray = rows[(length > border) & (length < length[-1] - border)]
     return kept

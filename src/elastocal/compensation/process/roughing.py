@@ -6,26 +6,38 @@ the forces within the load cases of its Fig. 12 (500 N aside, 1500 N along the t
 """
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 from numpy.random import Generator
 
 from elastocal.arrays import FloatArray
-from elastocal.compensation.process.course import Course, Ripple, along, frames, travel
-from elastocal.compensation.process.variation import engaged, swing
+from elastocal.compensation.process.course import (
+    Course,
+    Process,
+    Ripple,
+    engaged,
+    evenly_spaced,
+    swing,
+    tool_frames,
+    unit_tangents,
+)
+from elastocal.compensation.settings import CompensatorSettings
 from elastocal.planning.surface import Surface
 
-SPINDLE = 12_000.0 / 60.0
+_SPINDLE = 12_000.0 / 60.0
 """In Hz."""
 
 
 @dataclass(frozen=True)
-class Roughing:
-    """How the dome is roughed."""
+class Roughing(Process):
+    """Rings about the middle of a block's top; deviations count normal to the dome.
 
-    rings: int = 5
+    The tool's axis stays square to the top. Frames: the block's z points up, as in its file.
+    """
+
     radius: float = 0.14
-    """Of the lowest ring, in m."""
+    """Radius of the lowest ring, in m."""
     disk: float = 0.05
     """Radius of the disk on top that is not machined (Fig. 13), in m."""
     height: float = 0.06
@@ -45,33 +57,34 @@ class Roughing:
     swing: float = 0.25
     """Share by which the depth of the cut, and with it the force, changes along a ring."""
     roll_in: float = 0.02
-    """Way over which the cutter rolls in and out, in m."""
-    ripple: tuple[Ripple, ...] = (Ripple(2.0 * SPINDLE, 0.4), Ripple(SPINDLE, 0.15))
+    """Length over which the cutter rolls in and out, in m."""
+    ripple: tuple[Ripple, ...] = (Ripple(2.0 * _SPINDLE, 0.4), Ripple(_SPINDLE, 0.15))
 
-
-def roughing_rings(surface: Surface, settings: Roughing, rng: Generator) -> tuple[Course, ...]:
-    """Return rings about the middle of the block's top; deviations count normal to the dome.
-
-    The tool's axis stays square to the top. Frames: the block's z points up, as in its file.
-
-    Parameters
-    ----------
-    surface : Surface
-        The block, in base.
-    settings : Roughing
-        How it is roughed.
-    rng : Generator
-        Seeded source of randomness, for the forces.
-    """
-    T = surface.T_base_surface
-    own = (surface.mesh.vertices - T[:3, 3]) @ T[:3, :3]
-    middle, top = 0.5 * (own.min(axis=0) + own.max(axis=0)), own[:, 2].max()
-    apex = np.array([middle[0], middle[1], top])
-    radii = np.linspace(settings.disk, settings.radius, settings.rings + 1)[1:]
-    return tuple(
-        _ring(f"ring {n + 1}", T, apex, float(radius), settings, rng)
-        for n, radius in enumerate(radii)
+    # The lines at 200 and 400 Hz cannot be notched at a cycle of 4 ms: readings come every 1 ms.
+    compensator: ClassVar[CompensatorSettings] = CompensatorSettings.model_validate(
+        {
+            "filter": {
+                "sample": "1 ms",
+                "notches": [
+                    {"frequency": f"{_SPINDLE:g} Hz", "width": "20 Hz"},
+                    {"frequency": f"{2.0 * _SPINDLE:g} Hz", "width": "20 Hz"},
+                ],
+                "low_pass": {"cutoff": "25 Hz"},
+            }
+        }
     )
+
+    def courses(self, surface: Surface, rng: Generator) -> tuple[Course, ...]:
+        """Return rings about the middle of the block's top; see `Process.courses`."""
+        T = surface.T_base_surface
+        own = (surface.mesh.vertices - T[:3, 3]) @ T[:3, :3]
+        middle, top = 0.5 * (own.min(axis=0) + own.max(axis=0)), own[:, 2].max()
+        apex = np.array([middle[0], middle[1], top])
+        radii = np.linspace(self.disk, self.radius, self.count + 1)[1:]
+        return tuple(
+            _ring(f"ring {n + 1}", T, apex, float(radius), self, rng)
+            for n, radius in enumerate(radii)
+        )
 
 
 def _ring(
@@ -88,10 +101,10 @@ def _ring(
     flat = np.stack([np.cos(angle), np.sin(angle), np.zeros(len(angle))], axis=1)
     depth = np.sqrt(sphere**2 - radius**2) - sphere
     own = apex + radius * flat + (0.0, 0.0, depth)
-    path = along(own @ R.T + T_base_surface[:3, 3], settings.speed, settings.step)
+    path = evenly_spaced(own @ R.T + T_base_surface[:3, 3], settings.speed, settings.step)
     centre = R @ (apex - (0.0, 0.0, sphere)) + T_base_surface[:3, 3]
     normal = (path - centre) / sphere
-    forward = travel(path)
+    forward = unit_tangents(path)
     across = np.cross(normal, forward)
     time = np.arange(float(len(path))) * settings.step
     cut = rng.uniform(*settings.engagement) * (1.0 + settings.swing * swing(time, rng))
@@ -100,5 +113,5 @@ def _ring(
         settings.normal * normal - settings.tangential * forward + settings.across * across
     )
     still = np.ones((len(path), 1))
-    T = frames(path, still * R[:, 0], -still * R[:, 2])
+    T = tool_frames(path, still * R[:, 0], -still * R[:, 2])
     return Course(name, settings.step, T, force, normal, settings.ripple)

@@ -1,6 +1,6 @@
 """Posture choice by elastostatic stiffness (paper section 4.3.1).
 
-See `directional` for the measure, `survey` for all postures along a path, `choose` for the best.
+See `directional` for the measure, `survey` for all postures along a path, `choice` for the best.
 """
 
 import lazy_loader

@@ -1,16 +1,24 @@
-from .choose import Choice as Choice, Hold as Hold, choose as choose
+from .choice import (
+    PathPostures as PathPostures,
+    PostureChoice as PostureChoice,
+    choose_postures as choose_postures,
+    write_choice as write_choice,
+    write_survey as write_survey,
+)
 from .directional import (
-    Directional as Directional,
-    Ellipsoid as Ellipsoid,
-    directional as directional,
-    ellipsoid as ellipsoid,
+    DirectionalStiffness as DirectionalStiffness,
+    PrincipalStiffness as PrincipalStiffness,
+    directional_stiffness as directional_stiffness,
+    principal_stiffness as principal_stiffness,
+    stiffness_along as stiffness_along,
 )
-from .permits import (
-    Permit as Permit,
-    cell_permit as cell_permit,
-    same_robot as same_robot,
-    within_limits as within_limits,
+from .stations import PathStations as PathStations, read_stations as read_stations
+from .survey import (
+    PostureConstraint as PostureConstraint,
+    PostureGrid as PostureGrid,
+    PostureSurvey as PostureSurvey,
+    cell_constraints as cell_constraints,
+    joint_limit_constraint as joint_limit_constraint,
+    require_same_robot as require_same_robot,
+    survey_postures as survey_postures,
 )
-from .stations import Stations as Stations, read_stations as read_stations
-from .survey import Grid as Grid, Survey as Survey, survey as survey
-from .tables import write_choice as write_choice, write_survey as write_survey

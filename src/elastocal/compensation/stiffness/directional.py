@@ -1,4 +1,4 @@
-"""How stiff a posture is: in one direction, and in all.
+"""Stiffness of a posture: in one direction, and in all.
 
 With the Cartesian compliance ``C = J diag(c) J^T`` of the tool centre point (paper Eq. 10), a force
 of 1 N along the unit vector ``u`` moves the tool by ``u^T C u`` along ``u``. The directional
@@ -21,7 +21,7 @@ from elastocal.identification import CalibratedModel, interval
 
 
 @dataclass(frozen=True, eq=False)
-class Directional:
+class DirectionalStiffness:
     """Directional stiffness with its 95 % interval (bootstrap draws of the model)."""
 
     stiffness: FloatArray
@@ -31,7 +31,7 @@ class Directional:
 
 
 @dataclass(frozen=True, eq=False)
-class Ellipsoid:
+class PrincipalStiffness:
     """Principal stiffnesses of the tool centre point."""
 
     stiffness: FloatArray
@@ -40,7 +40,9 @@ class Ellipsoid:
     """Unit vectors in base as columns, in the same order, shape (row, 3, 3)."""
 
 
-def directional(calibrated: CalibratedModel, q: ArrayLike, direction: ArrayLike) -> Directional:
+def directional_stiffness(
+    calibrated: CalibratedModel, q: ArrayLike, direction: ArrayLike
+) -> DirectionalStiffness:
     """Return the stiffness along a direction.
 
     Parameters
@@ -52,34 +54,29 @@ def directional(calibrated: CalibratedModel, q: ArrayLike, direction: ArrayLike)
     direction : array_like, shape (3,) or (row, 3)
         Unit vectors in base.
     """
-    rows = directional_rows(calibrated, q, direction)
+    rows = _squared_torques(calibrated, q, direction)
     with np.errstate(divide="ignore"):
         low, high = interval((rows @ calibrated.draws.T).T)
         # What is most compliant is least stiff.
-        return Directional(1.0 / (rows @ calibrated.compliance), 1.0 / high, 1.0 / low)
+        return DirectionalStiffness(1.0 / (rows @ calibrated.compliance), 1.0 / high, 1.0 / low)
 
 
-def directional_stiffness(
-    calibrated: CalibratedModel, q: ArrayLike, direction: ArrayLike
-) -> FloatArray:
-    """Return the stiffness along a direction without its interval; see `directional`."""
+def stiffness_along(calibrated: CalibratedModel, q: ArrayLike, direction: ArrayLike) -> FloatArray:
+    """Return the stiffness along a direction without its interval; see `directional_stiffness`."""
     with np.errstate(divide="ignore"):
         stiffness: FloatArray = 1.0 / (
-            directional_rows(calibrated, q, direction) @ calibrated.compliance
+            _squared_torques(calibrated, q, direction) @ calibrated.compliance
         )
     return stiffness
 
 
-def directional_rows(calibrated: CalibratedModel, q: ArrayLike, direction: ArrayLike) -> FloatArray:
+def _squared_torques(calibrated: CalibratedModel, q: ArrayLike, direction: ArrayLike) -> FloatArray:
     """Return the squares ``(J_i^T u)^2``, shape (row, spring): times ``c`` they are ``u^T C u``."""
     q = calibrated.model.robot.check_positions(q)
-    u = np.broadcast_to(np.asarray(direction, dtype=float), (len(q), 3))
-    J = calibrated.model.spring_jacobian(q).translation
-    torques: FloatArray = (u[:, None, :] @ J)[:, 0, :]
-    return torques**2
+    return calibrated.model.directional_rows(q, np.broadcast_to(direction, (len(q), 3)))
 
 
-def ellipsoid(calibrated: CalibratedModel, q: ArrayLike) -> Ellipsoid:
+def principal_stiffness(calibrated: CalibratedModel, q: ArrayLike) -> PrincipalStiffness:
     """Return the principal stiffnesses and their axes.
 
     Parameters
@@ -94,4 +91,4 @@ def ellipsoid(calibrated: CalibratedModel, q: ArrayLike) -> Ellipsoid:
     # Of a compliance with bounds at zero, round-off may leave an eigenvalue just below.
     values = np.maximum(values[..., ::-1], 0.0)
     with np.errstate(divide="ignore"):
-        return Ellipsoid(1.0 / values, axes[..., ::-1])
+        return PrincipalStiffness(1.0 / values, axes[..., ::-1])

@@ -6,27 +6,27 @@ from pathlib import Path
 import numpy as np
 
 from elastocal.arrays import FloatArray
-from elastocal.compensation.offline import programmed
-from elastocal.compensation.path import (
+from elastocal.compensation.offline import (
     PathError,
-    Piece,
     find_columns,
     in_file,
-    pieces,
+    programmed_rows,
     read_layout,
     read_values,
+    row_blocks,
 )
 from elastocal.robot.inverse import InverseKinematics
+from elastocal.tables import TableRows
 
-_PIECE = 20_000
+_BLOCK = 20_000
 
 
 @dataclass(frozen=True, eq=False)
-class Stations:
+class PathStations:
     """Rows of a path, evenly taken."""
 
     lines: tuple[int, ...]
-    """Of the file, from 1."""
+    """Lines of the file, from 1."""
     T_base_tcp: FloatArray
     """Shape (station, 4, 4), in m."""
     q: FloatArray
@@ -36,7 +36,7 @@ class Stations:
         return len(self.lines)
 
     @property
-    def way(self) -> FloatArray:
+    def arc_length(self) -> FloatArray:
         """Length of the path up to each station, straight from one to the next, in m."""
         steps = np.linalg.norm(np.diff(self.T_base_tcp[:, :3, 3], axis=0), axis=1)
         return np.concatenate([[0.0], np.cumsum(steps)])
@@ -49,7 +49,7 @@ class Stations:
 
 def read_stations(
     path: Path, solver: InverseKinematics, most: int, start: FloatArray | None
-) -> Stations:
+) -> PathStations:
     """Return up to ``most`` rows of a path, evenly spread; forces are not needed.
 
     Parameters
@@ -75,23 +75,23 @@ def read_stations(
     with in_file(path):
         layout = read_layout(path)
         columns = find_columns(layout.header, solver.robot, forces=False)
-        count = sum(len(piece.lines) for piece in pieces(path, layout, _PIECE))
+        count = sum(len(block.lines) for block in row_blocks(path, layout, _BLOCK))
         wanted = np.unique(np.linspace(0, count - 1, min(most, count)).round().astype(int))
-        piece = _rows(path, wanted)
-        values = read_values(piece, columns)
-        labels = [f"row {line}" for line in piece.lines]
-        q, T = programmed(solver, values, start, labels.__getitem__)
-    return Stations(tuple(piece.lines), T, q)
+        block = _rows(path, wanted)
+        values = read_values(block, columns)
+        labels = [f"row {line}" for line in block.lines]
+        q, T = programmed_rows(solver, values, start, labels.__getitem__)
+    return PathStations(tuple(block.lines), T, q)
 
 
-def _rows(path: Path, wanted: np.ndarray) -> Piece:
+def _rows(path: Path, wanted: np.ndarray) -> TableRows:
     """Return some rows of a file by their numbers, in ascending order."""
     cells: list[list[str]] = []
     lines: list[int] = []
     first = 0
-    for piece in pieces(path, read_layout(path), _PIECE):
-        for row in wanted[(wanted >= first) & (wanted < first + len(piece.lines))]:
-            cells.append(piece.cells[row - first])
-            lines.append(piece.lines[row - first])
-        first += len(piece.lines)
-    return Piece(cells, lines)
+    for block in row_blocks(path, read_layout(path), _BLOCK):
+        for row in wanted[(wanted >= first) & (wanted < first + len(block.lines))]:
+            cells.append(block.cells[row - first])
+            lines.append(block.lines[row - first])
+        first += len(block.lines)
+    return TableRows(cells, lines)

@@ -1,44 +1,129 @@
 """Every posture in which the tool can be held along a path, and how stiff each is.
 
 What may be chosen: the spin about the tool's axis, the positions of the external axes, and the
-branch of the arm (elbow, shoulder, wrist).
+branch of the arm (elbow, shoulder, wrist). What a posture must pass: margins to the limits and to
+singularity, no collision.
 """
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
 from elastocal.arrays import BoolArray, FloatArray
-from elastocal.compensation.path import PathError
-from elastocal.compensation.stiffness.directional import directional_stiffness
-from elastocal.compensation.stiffness.permits import Permit
+from elastocal.cell import Cell
+from elastocal.compensation.offline import (
+    PathError,
+)
+from elastocal.compensation.stiffness.directional import stiffness_along
+from elastocal.errors import RobotError
 from elastocal.identification import CalibratedModel
+from elastocal.planning import cell_surface, collision_scene
+from elastocal.robot import Robot, characteristic_length, smallest_singular_value
 from elastocal.robot.inverse import InverseKinematics
 
-MOST = 3_000_000
+_SAMPLES = 5
+"""Joint positions at which two robots are compared."""
+_SAME = 1e-6
+"""Difference of their poses by rounding, in m or as a number of a rotation."""
+
+
+@dataclass(frozen=True, eq=False)
+class PostureConstraint:
+    """A condition that a posture must pass to be chosen."""
+
+    name: str
+    allows: Callable[[FloatArray], BoolArray]
+    """From joints, shape (row, joint), to whether each row passes, shape (row,)."""
+
+
+def joint_limit_constraint(robot: Robot, margin: FloatArray) -> PostureConstraint:
+    """Return the constraint of a margin to the joint limits.
+
+    Parameters
+    ----------
+    robot : Robot
+        Whose limits hold.
+    margin : ndarray, shape (joint,)
+        In rad or m.
+    """
+    return PostureConstraint(
+        "joint margin", lambda q: np.all(robot.limits.margin(q) >= margin, axis=1)
+    )
+
+
+def cell_constraints(cell: Cell) -> tuple[PostureConstraint, ...]:
+    """Return the constraints of a cell: joint margin, singularity, collision with its solids.
+
+    The tool is in contact: it is not checked against the surface that it works on.
+
+    Parameters
+    ----------
+    cell : Cell
+        The cell.
+    """
+    robot, limits = cell.robot, cell.file.limits
+    scene = collision_scene(cell, cell_surface(cell))
+    length = characteristic_length(robot)
+    return (
+        joint_limit_constraint(robot, cell.joint_margin),
+        PostureConstraint(
+            "singularity",
+            lambda q: np.asarray(
+                smallest_singular_value(robot, q, length) >= limits.singular_value
+            ),
+        ),
+        PostureConstraint("collision", lambda q: scene.keeps(q, limits.clearance, -math.inf)),
+    )
+
+
+def require_same_robot(model: Robot, cell: Robot) -> None:
+    """Refuse a cell whose robot, or whose tcp, is not that of the model.
+
+    Raises
+    ------
+    RobotError
+        If joints have other names, or the same joints lead elsewhere.
+    """
+    if model.joint_names != cell.joint_names:
+        raise RobotError(
+            f"the cell's robot has joints {', '.join(cell.joint_names)}, the model's"
+            f" {', '.join(model.joint_names)}: they must be the same"
+        )
+    low, high = (np.clip(end, -np.pi, np.pi) for end in (cell.limits.lower, cell.limits.upper))
+    q = np.linspace(low, high, _SAMPLES)
+    gap = float(np.abs(model.forward(q) - cell.forward(q)).max())
+    if not gap <= _SAME:
+        raise RobotError(
+            f"the same joints lead {1e3 * gap:.3g} mm apart in the cell and in the model: another"
+            " tool centre point, base or robot"
+        )
+
+
+_MOST = 3_000_000
 """Postures of one survey; bounds memory and time."""
 
 
 @dataclass(frozen=True, eq=False)
-class Grid:
-    """What may be chosen at every station."""
+class PostureGrid:
+    """The choices at every station."""
 
     spins: FloatArray
     """Turns about the tool's axis from the programmed orientation, shape (spin,), in rad."""
     external: FloatArray
-    """Positions of the external axes, shape (stand, external axis), in rad or m."""
+    """Positions of the external axes, shape (external, external axis), in rad or m."""
 
 
 @dataclass(frozen=True, eq=False)
-class Survey:
-    """Postures by station, spin, stand and branch."""
+class PostureSurvey:
+    """Postures by station, spin, external position and branch."""
 
-    grid: Grid
+    grid: PostureGrid
     q: FloatArray
-    """Shape (station, spin, stand, branch, joint), in rad or m; NaN where out of reach."""
+    """Shape (station, spin, external, branch, joint), in rad or m; NaN where out of reach."""
     stiffness: FloatArray
-    """Along the direction asked for, shape (station, spin, stand, branch), in N/m; NaN where the
+    """Along the direction asked for, shape (station, spin, external, branch), in N/m; NaN where the
     posture is not allowed."""
     refused: dict[str, int]
     """Number of postures by what refused them."""
@@ -49,21 +134,21 @@ class Survey:
         return _largest(self.stiffness.reshape(*self.stiffness.shape[:2], -1))
 
     @property
-    def best_by_stand(self) -> FloatArray:
-        """Stiffest posture of each stand, shape (station, stand), in N/m; NaN: none."""
+    def best_by_external(self) -> FloatArray:
+        """Stiffest posture of each external position, shape (station, external), in N/m."""
         moved = np.moveaxis(self.stiffness, 2, 1)
         return _largest(moved.reshape(*moved.shape[:2], -1))
 
 
-def survey(
+def survey_postures(
     calibrated: CalibratedModel,
     solver: InverseKinematics,
     T_base_tcp: FloatArray,
     direction: FloatArray,
-    grid: Grid,
-    permits: tuple[Permit, ...] = (),
+    grid: PostureGrid,
+    constraints: tuple[PostureConstraint, ...] = (),
     done: Callable[[int], None] = lambda _: None,
-) -> Survey:
+) -> PostureSurvey:
     """Return all postures along a path and their stiffness.
 
     Parameters
@@ -76,9 +161,9 @@ def survey(
         Tool poses, in m.
     direction : ndarray, shape (station, 3)
         Unit vectors in base.
-    grid : Grid
+    grid : PostureGrid
         What may be chosen.
-    permits : tuple of Permit
+    constraints : tuple of PostureConstraint
         What a posture must pass, quick ones first.
     done : callable
         Told how many stations are done.
@@ -89,31 +174,31 @@ def survey(
         If the survey is too large.
     """
     shape = (len(T_base_tcp), len(grid.spins), len(grid.external), solver.branches)
-    if not np.prod(shape) <= MOST:
+    if not np.prod(shape) <= _MOST:
         raise PathError(
             f"{shape[0]} stations x {shape[1]} spins x {shape[2]} rail positions x {shape[3]}"
-            f" branches are {np.prod(shape)} postures: at most {MOST}, take fewer"
+            f" branches are {np.prod(shape)} postures: at most {_MOST}, take fewer"
         )
     q = np.full((*shape, len(solver.robot.joint_names)), np.nan)
     stiffness = np.full(shape, np.nan)
-    refused = {"reach and joint limits": 0} | {permit.name: 0 for permit in permits}
+    refused = {"reach and joint limits": 0} | {constraint.name: 0 for constraint in constraints}
     for station, (T, u) in enumerate(zip(T_base_tcp, direction, strict=True)):
         q[station] = _postures(solver, T, grid)
         rows = q[station].reshape(-1, q.shape[-1])
         allowed = np.isfinite(rows).all(axis=1)
         refused["reach and joint limits"] += int(np.sum(~allowed))
-        for permit in permits:
-            passed = _passed(permit, rows, allowed)
-            refused[permit.name] += int(np.sum(allowed & ~passed))
+        for constraint in constraints:
+            passed = _passed(constraint, rows, allowed)
+            refused[constraint.name] += int(np.sum(allowed & ~passed))
             allowed = passed
         found = np.full(len(rows), np.nan)
-        found[allowed] = directional_stiffness(calibrated, rows[allowed], u)
+        found[allowed] = stiffness_along(calibrated, rows[allowed], u)
         stiffness[station] = found.reshape(shape[1:])
         done(station + 1)
-    return Survey(grid, q, stiffness, refused)
+    return PostureSurvey(grid, q, stiffness, refused)
 
 
-def spun(T_base_tcp: FloatArray, spins: FloatArray) -> FloatArray:
+def _spun(T_base_tcp: FloatArray, spins: FloatArray) -> FloatArray:
     """Return a pose turned about its z axis, shape (spin, 4, 4)."""
     turn = np.tile(np.eye(4), (len(spins), 1, 1))
     turn[:, 0, 0] = turn[:, 1, 1] = np.cos(spins)
@@ -123,18 +208,18 @@ def spun(T_base_tcp: FloatArray, spins: FloatArray) -> FloatArray:
     return turned
 
 
-def _postures(solver: InverseKinematics, T: FloatArray, grid: Grid) -> FloatArray:
-    """Return the branches of a station, shape (spin, stand, branch, joint)."""
-    spins, stands = len(grid.spins), len(grid.external)
-    poses = np.repeat(spun(T, grid.spins), stands, axis=0)
+def _postures(solver: InverseKinematics, T: FloatArray, grid: PostureGrid) -> FloatArray:
+    """Return the branches of a station, shape (spin, external, branch, joint)."""
+    spins, externals = len(grid.spins), len(grid.external)
+    poses = np.repeat(_spun(T, grid.spins), externals, axis=0)
     external = np.tile(grid.external, (spins, 1))
     found = solver.solve_many(poses, external).q
-    return found.reshape(spins, stands, *found.shape[1:])
+    return found.reshape(spins, externals, *found.shape[1:])
 
 
-def _passed(permit: Permit, q: FloatArray, allowed: BoolArray) -> BoolArray:
+def _passed(constraint: PostureConstraint, q: FloatArray, allowed: BoolArray) -> BoolArray:
     passed = allowed.copy()
-    passed[allowed] = permit.allows(q[allowed])
+    passed[allowed] = constraint.allows(q[allowed])
     return passed
 
 

@@ -18,7 +18,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from elastocal.arrays import FloatArray
-from elastocal.elastic import Spring
+from elastocal.elastic import Parameter, Spring
 from elastocal.errors import IdentificationError
 from elastocal.identification.bootstrap import CONFIDENCE, interval
 from elastocal.identification.calibrated import CalibratedModel
@@ -47,26 +47,35 @@ def compare_springs(
     sums = comparable_sums(old, new)
     if not sums:
         return ()
-    rows = [weights(sums, each.model.spring_names) for each in (old, new)]
+    rows = [weights(sums, each.model.parameter_names) for each in (old, new)]
     values = [W @ each.compliance for W, each in zip(rows, (old, new), strict=True)]
     ends = [interval(each.draws @ W.T) for W, each in zip(rows, (old, new), strict=True)]
     noise = spread.noise(*rows)
     alone = np.percentile(np.abs(noise), 100.0 * CONFIDENCE, axis=0)
     together = np.maximum(alone, critical(noise) * rms(noise))
-    units = {spring.name: spring.unit for spring in new.model.springs}
-    return tuple(
-        SpringChange(
-            sum_text(terms),
-            terms,
-            units[terms[0].spring],
-            *(
-                Estimate(float(c[i]), float(low[i]), float(high[i]))
-                for c, (low, high) in zip(values, ends, strict=True)
-            ),
-            *(_around(values[1][i] - values[0][i], half[i]) for half in (alone, together)),
+    units = {each.name: each.unit.si for each in new.model.parameters}
+    changes = []
+    for i, terms in enumerate(sums):
+        before, after = (
+            Estimate(float(c[i]), float(low[i]), float(high[i]))
+            for c, (low, high) in zip(values, ends, strict=True)
         )
-        for i, terms in enumerate(sums)
-    )
+        difference, simultaneous = (
+            _around(values[1][i] - values[0][i], half[i]) for half in (alone, together)
+        )
+        changes.append(
+            SpringChange(
+                name=sum_text(terms),
+                terms=terms,
+                unit=units[terms[0].spring],
+                old=before,
+                new=after,
+                difference=difference,
+                together=simultaneous,
+                moved=0.0 not in simultaneous,
+            )
+        )
+    return tuple(changes)
 
 
 def rms(noise: FloatArray) -> FloatArray:
@@ -109,7 +118,7 @@ def comparable_sums(old: CalibratedModel, new: CalibratedModel) -> tuple[tuple[T
     IdentificationError
         If an unobservable combination names a spring that its model does not have.
     """
-    springs = common_springs(old, new)
+    springs = [each for spring in common_springs(old, new) for each in spring.parameters]
     unseen = np.vstack([_unobservable(each, springs) for each in (old, new)])
     mixed = np.flatnonzero(np.any(unseen != 0.0, axis=0))
     sums: dict[int, list[tuple[Term, ...]]]
@@ -145,10 +154,10 @@ def weights(sums: Sequence[Sequence[Term]], names: Sequence[str]) -> FloatArray:
     return table
 
 
-def _unobservable(calibrated: CalibratedModel, springs: Sequence[Spring]) -> FloatArray:
+def _unobservable(calibrated: CalibratedModel, springs: Sequence[Parameter]) -> FloatArray:
     """Return the part of a model's unobservable combinations that lies in some springs."""
     names = [spring.name for spring in springs]
-    own = calibrated.model.spring_names
+    own = calibrated.model.parameter_names
     for term in (term for group in calibrated.observability.unobservable for term in group):
         if term.spring not in own:
             raise IdentificationError(

@@ -6,21 +6,20 @@ from dataclasses import dataclass
 import numpy as np
 
 from elastocal.arrays import FloatArray
-from elastocal.planning.postures import Postures
-from elastocal.planning.retreat import on_the_way
+from elastocal.planning.postures import Postures, retreat_joints
 from elastocal.planning.scene import CollisionScene
 
-SPARE = (1e-3, 1e-2, 3e-2, 1e-1)
+_SPARE = (1e-3, 1e-2, 3e-2, 1e-1)
 """Distances in m beyond the clearance asked for that are tried. Whether bodies keep a distance
 is decided by their bounding volumes, a hundred times faster than the distance is found."""
 
-STEP = 0.035
+_STEP = 0.035
 """Largest distance in m between the places on the retreat that are looked at."""
 
 
 @dataclass(frozen=True, eq=False)
 class CollisionCheck:
-    """Largest of the `SPARE` distances that is kept beyond the clearance asked for.
+    """Largest of the `_SPARE` distances that is kept beyond the clearance asked for.
 
     In contact, and at places on the straight way to the approach pose. In contact the tool is not
     checked against what it presses on; near contact it must not touch it; from the first step of
@@ -40,10 +39,10 @@ class CollisionCheck:
 
     def margin(self, postures: Postures) -> FloatArray:
         """Return the margin of each posture, shape (pose,), in m; minus ``keep`` when none."""
-        margin = np.full(len(postures), -max(self.keep, SPARE[0]))
+        margin = np.full(len(postures), -max(self.keep, _SPARE[0]))
         left = np.arange(len(postures))
         places = self._places(postures)
-        for spare in reversed(SPARE):
+        for spare in reversed(_SPARE):
             kept = left
             for q, pressed in places:
                 kept = kept[self.scene.keeps(q[kept], self.keep + spare, pressed)]
@@ -56,8 +55,8 @@ class CollisionCheck:
 
         The first step of the retreat comes first: it most often decides.
         """
-        steps = max(2, math.ceil(self.approach / STEP))
+        steps = max(2, math.ceil(self.approach / _STEP))
         robot = self.scene.robot
-        retreat = [on_the_way(robot, postures, step / steps) for step in range(1, steps + 1)]
-        near = on_the_way(robot, postures, self.near / self.approach)
+        retreat = [retreat_joints(robot, postures, step / steps) for step in range(1, steps + 1)]
+        near = retreat_joints(robot, postures, self.near / self.approach)
         return [*((q, None) for q in retreat), (near, 0.0), (postures.q, -math.inf)]

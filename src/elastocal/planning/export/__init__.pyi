@@ -1,2 +1,3 @@
-from .krl import check_name as check_name, takes_krl as takes_krl, write_krl as write_krl
+from ._krl_motion import takes_krl as takes_krl
+from .krl_program import check_name as check_name, write_krl as write_krl
 from .table import write_table as write_table

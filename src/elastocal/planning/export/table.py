@@ -8,11 +8,11 @@ import io
 from pathlib import Path
 
 from elastocal.files import write_text
-from elastocal.planning.plan_file import Joints, PlanFile, PoseRecord
+from elastocal.planning.plan_result import Joints, PlanResult, PoseRecord
 from elastocal.robot import Robot, xyzabc_from_T
 from elastocal.units import factor
 
-TABLE = "plan.csv"
+_TABLE = "plan.csv"
 """Name of the table in its folder."""
 
 _SHOWN = {"rad": ("deg", "angle", 6), "m": ("mm", "length", 4)}
@@ -21,7 +21,7 @@ _AXES = ("x", "y", "z")
 _ANGLES = ("a", "b", "c")
 
 
-def write_table(folder: Path, plan: PlanFile) -> Path:
+def write_table(folder: Path, plan: PlanResult) -> Path:
     """Write ``plan.csv`` into a folder, atomically; return its path.
 
     Columns: pose, candidate, rank in the search, joints in contact and at the approach pose, tcp
@@ -42,13 +42,13 @@ def write_table(folder: Path, plan: PlanFile) -> Path:
     writer = csv.DictWriter(buffer, list(dict.fromkeys(key for row in rows for key in row)))
     writer.writeheader()
     writer.writerows(rows)
-    path = Path(folder) / TABLE
+    path = Path(folder) / _TABLE
     write_text(path, buffer.getvalue().replace("\r\n", "\n"))
     return path
 
 
 def _row(
-    plan: PlanFile, pose: PoseRecord, rank: int, revolute: tuple[bool, ...]
+    plan: PlanResult, pose: PoseRecord, rank: int, revolute: tuple[bool, ...]
 ) -> dict[str, object]:
     units = {check.name: check.unit or "1" for check in plan.pool.checks}
     row: dict[str, object] = {

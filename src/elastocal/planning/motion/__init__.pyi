@@ -1,8 +1,12 @@
-from .durations import AxisMotion as AxisMotion
-from .mover import Mover as Mover, contact_time as contact_time, mover_for as mover_for
-from .retreats import clear_retreats as clear_retreats
+from .mover import (
+    AxisMotion as AxisMotion,
+    Mover as Mover,
+    clear_retreats as clear_retreats,
+    contact_time as contact_time,
+    mover_for as mover_for,
+)
 from .route import (
-    STAGE as STAGE,
+    VISITING as VISITING,
     Move as Move,
     Route as Route,
     plan_route as plan_route,

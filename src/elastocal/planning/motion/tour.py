@@ -18,22 +18,22 @@ from scipy.sparse.csgraph import connected_components
 
 from elastocal.arrays import BoolArray, FloatArray, IndexArray
 from elastocal.errors import PlanningError
-from elastocal.planning.motion.tour_start import nearest_neighbour, tour_length, two_opt
 
-ALL_EDGES = 60
+_ALL_EDGES = 60
 """Up to as many nodes every edge may be chosen; beyond, those to the nearest neighbours and those
 of the first tour."""
-NEIGHBOURS = 10
+_NEIGHBOURS = 10
 """Nearest neighbours of each node that edges lead to, with many nodes."""
-MOST_NODES = 200
+_MOST_NODES = 200
 """Beyond, the tour of nearest neighbour and 2-opt is taken."""
 _BRANCHES = 5000
 """Most branches of one integer program: with a limit on time the order would depend on it."""
 _ROUNDS = 200
 _USED = 1e-6
 """An edge of the linear relaxation that is chosen less than this is not chosen."""
-
-Cuts = list[frozenset[int]]
+_GAIN = 1e-12
+"""Least gain of an exchange, as a part of the largest cost: less is rounding."""
+_Cuts = list[frozenset[int]]
 """Parts of the nodes that no tour may close on itself in."""
 
 
@@ -50,7 +50,7 @@ class Tour:
     """Whether it is proved that no tour is shorter."""
 
 
-def shortest_tour(cost: FloatArray, cuts: Cuts | None = None) -> Tour:
+def shortest_tour(cost: FloatArray, cuts: _Cuts | None = None) -> Tour:
     """Return the shortest closed tour, or a good one when there are too many nodes.
 
     Parameters
@@ -69,13 +69,13 @@ def shortest_tour(cost: FloatArray, cuts: Cuts | None = None) -> Tour:
     cost = _checked(cost)
     if len(cost) <= 3:
         return _tour(cost, np.arange(len(cost), dtype=np.intp), True)
-    start = two_opt(cost, nearest_neighbour(cost))
-    if len(cost) > MOST_NODES:
+    start = _two_opt(cost, _nearest_neighbour(cost))
+    if len(cost) > _MOST_NODES:
         return _tour(cost, start, False)
     found = _solve(cost, _edges(cost, start), [] if cuts is None else cuts)
     if found is None:
         return _tour(cost, start, False)
-    return _tour(cost, found, len(cost) <= ALL_EDGES)
+    return _tour(cost, found, len(cost) <= _ALL_EDGES)
 
 
 def _checked(cost: FloatArray) -> FloatArray:
@@ -95,22 +95,86 @@ def _tour(cost: FloatArray, order: IndexArray, shortest: bool) -> Tour:
     if len(order) > 2 and order[1] > order[-1]:
         order = np.roll(order[::-1], 1)
     order.setflags(write=False)
-    return Tour(order, tour_length(cost, order), shortest)
+    return Tour(order, _tour_length(cost, order), shortest)
+
+
+def _nearest_neighbour(cost: FloatArray) -> IndexArray:
+    """Return the tour from node 0 that always goes to the nearest node left; ties: lowest index.
+
+    Parameters
+    ----------
+    cost : ndarray, shape (node, node)
+        Cost of each edge, symmetric.
+
+    Returns
+    -------
+    ndarray of int, shape (node,)
+    """
+    order, left = [0], np.ones(len(cost), dtype=bool)
+    left[0] = False
+    while left.any():
+        order.append(int(np.where(left, cost[order[-1]], np.inf).argmin()))
+        left[order[-1]] = False
+    return np.array(order, dtype=np.intp)
+
+
+def _two_opt(cost: FloatArray, order: IndexArray) -> IndexArray:
+    """Return a tour that no reversal of a part of it shortens.
+
+    With ``a b ... c d`` in the tour, reversing ``b ... c`` gains
+    ``cost[a, b] + cost[c, d] - cost[a, c] - cost[b, d]``; the largest gain is taken each time.
+
+    Parameters
+    ----------
+    cost : ndarray, shape (node, node)
+        Cost of each edge, symmetric.
+    order : ndarray of int, shape (node,)
+        The tour to improve.
+
+    Returns
+    -------
+    ndarray of int, shape (node,)
+        Starts at the same node.
+    """
+    order = order.copy()
+    least = _GAIN * float(cost.max(initial=0.0))
+    while True:
+        after = np.roll(order, -1)
+        step = cost[order, after]
+        gain = step[:, None] + step - cost[np.ix_(order, order)] - cost[np.ix_(after, after)]
+        gain = np.triu(gain, 2)
+        first, last = divmod(int(gain.argmax()), len(order))
+        if not gain[first, last] > least:
+            return order
+        order[first + 1 : last + 1] = order[first + 1 : last + 1][::-1]
+
+
+def _tour_length(cost: FloatArray, order: IndexArray) -> float:
+    """Return the length of a closed tour.
+
+    Parameters
+    ----------
+    cost : ndarray, shape (node, node)
+        Cost of each edge, symmetric.
+    order : ndarray of int, shape (node,)
+        Nodes in visiting order; the last leads back to the first.
+    """
+    return float(cost[order, np.roll(order, -1)].sum())
 
 
 def _edges(cost: FloatArray, start: IndexArray) -> IndexArray:
     """Return the edges that may be chosen, lower node first, shape (edge, 2)."""
     count = len(cost)
     allowed = np.ones((count, count), dtype=bool)
-    if count > ALL_EDGES:
+    if count > _ALL_EDGES:
         near = np.argsort(cost + np.diag(np.full(count, np.inf)), axis=1, kind="stable")
         allowed[:] = False
-        allowed[np.arange(count)[:, None], near[:, :NEIGHBOURS]] = True
+        allowed[np.arange(count)[:, None], near[:, :_NEIGHBOURS]] = True
         allowed[start, np.roll(start, -1)] = True
     return np.argwhere(np.triu(allowed | allowed.T, 1)).astype(np.intp)
 
 
-def _solve(cost: FloatArray, edges: IndexArray, cuts: Cuts) -> IndexArray | None:
+def _solve(cost: FloatArray, edges: IndexArray, cuts: _Cuts) -> IndexArray | None:
     """Return the order of the shortest tour along some edges; None when a limit was met.
 
     The linear relaxation finds most of the parts that need a constraint, at little cost.
@@ -129,7 +193,7 @@ def _solve(cost: FloatArray, edges: IndexArray, cuts: Cuts) -> IndexArray | None
     return _order(edges[chosen], len(cost))
 
 
-def _choice(cost: FloatArray, edges: IndexArray, cuts: Cuts, whole: bool) -> BoolArray | None:
+def _choice(cost: FloatArray, edges: IndexArray, cuts: _Cuts, whole: bool) -> BoolArray | None:
     """Return which edges the program uses, in whole numbers or as its linear relaxation."""
     inside, most = _inside(edges, cuts), np.array([len(part) - 1.0 for part in cuts])
     constraints = [LinearConstraint(_incidence(edges, len(cost)), 2.0, 2.0)]
@@ -153,13 +217,13 @@ def _incidence(edges: IndexArray, nodes: int) -> csr_array:
     return csr_array((np.ones(len(edge)), (edges.T.ravel(), edge)), shape=(nodes, len(edges)))
 
 
-def _inside(edges: IndexArray, cuts: Cuts) -> csr_array:
+def _inside(edges: IndexArray, cuts: _Cuts) -> csr_array:
     """Return which edges lie inside which part, shape (part, edge)."""
     rows = [np.isin(edges, list(part)).all(axis=1) for part in cuts]
     return csr_array(np.array(rows, dtype=float).reshape(len(cuts), len(edges)))
 
 
-def _parts(edges: IndexArray, nodes: int) -> Cuts:
+def _parts(edges: IndexArray, nodes: int) -> _Cuts:
     """Return the nodes of each connected part of a graph."""
     graph = csr_array((np.ones(len(edges)), (edges[:, 0], edges[:, 1])), shape=(nodes, nodes))
     count, label = connected_components(graph, directed=False)

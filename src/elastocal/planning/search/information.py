@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from elastocal.arrays import BoolArray, FloatArray
 from elastocal.errors import PlanningError
 from elastocal.identification import RANK_TOLERANCE, rank
-from elastocal.planning.search.candidates import Candidates
+from elastocal.planning.search.protocol import Candidates
 
 EPSILON = 1e-6
 """Prior information on every direction. A typical pose gives 1; a direction a thousandth as

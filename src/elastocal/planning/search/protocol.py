@@ -1,4 +1,4 @@
-"""What every search technique offers, and what it returns."""
+"""What every search technique is given (candidates), offers, and returns (a selection)."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -6,10 +6,117 @@ from types import MappingProxyType
 from typing import Protocol
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from elastocal.arrays import FloatArray, IndexArray
 from elastocal.errors import PlanningError
-from elastocal.planning.search.candidates import Candidates
+
+
+class Metric(Protocol):
+    """A distance between candidates other than the Euclidean one, e.g. along the surface."""
+
+    def from_point(self, index: int) -> FloatArray:
+        """Return the distance of every candidate from one of them, shape (pose,), in m.
+
+        Infinite where no way leads. `elastocal.planning.surface.GeodesicDistance` is one.
+        """
+
+
+@dataclass(frozen=True, eq=False)
+class Candidates:
+    """A pool of poses that pass every check; arrays are copied and read-only.
+
+    Raises
+    ------
+    PlanningError
+        If a shape does not fit, or a value is not finite.
+    """
+
+    contact: FloatArray
+    """Contact points, shape (pose, 3), in m, in any one frame."""
+    observation: FloatArray | None = None
+    """Rows of the observation matrix of all load cases at each pose (paper Eq. 15, 17), shape
+    (pose, row, spring), in m per unit of compliance; row is 3 x load cases."""
+    distance: Metric | None = None
+    """Metric for COVER; Euclidean between contact points when there is none."""
+    process: FloatArray | None = None
+    """Observation rows at the poses and forces of the production, shape (row, spring), in m per
+    unit of compliance: what I-optimality wants to predict well."""
+
+    def __post_init__(self) -> None:
+        contact = _frozen(self.contact, "contact points")
+        if contact.ndim != 2 or contact.shape[1] != 3:
+            raise PlanningError(f"contact points of shape {contact.shape}: must be (pose, 3)")
+        _check_each(contact, "contact point")
+        object.__setattr__(self, "contact", contact)
+        if self.observation is not None:
+            self._set_observation(_frozen(self.observation, "observation rows"))
+        if self.process is not None:
+            self._set_process(_frozen(self.process, "process rows"))
+
+    def __len__(self) -> int:
+        """Return the number of candidates."""
+        return len(self.contact)
+
+    def take(self, index: ArrayLike) -> "Candidates":
+        """Return the pool of some of the candidates, in the order of ``index``.
+
+        Parameters
+        ----------
+        index : array_like of int, shape (pose,)
+            Which candidates; the new pool numbers them from 0.
+        """
+        chosen = np.asarray(index, dtype=np.intp)
+        observation = None if self.observation is None else self.observation[chosen]
+        distance = None if self.distance is None else _Part(self.distance, chosen)
+        return Candidates(self.contact[chosen], observation, distance, self.process)
+
+    def _set_observation(self, rows: FloatArray) -> None:
+        if rows.ndim != 3 or len(rows) != len(self):
+            raise PlanningError(
+                f"observation rows of shape {rows.shape}: must be (pose, row, spring)"
+                f" for {len(self)} candidates"
+            )
+        _check_each(rows, "observation rows")
+        object.__setattr__(self, "observation", rows)
+
+    def _set_process(self, rows: FloatArray) -> None:
+        springs = "spring" if self.observation is None else str(self.observation.shape[2])
+        if rows.ndim != 2 or not len(rows) or springs not in ("spring", str(rows.shape[1])):
+            raise PlanningError(f"process rows of shape {rows.shape}: must be (row, {springs})")
+        _check_each(rows, "process row", "process row")
+        object.__setattr__(self, "process", rows)
+
+
+@dataclass(frozen=True, eq=False)
+class _Part:
+    """A metric restricted to some of its points."""
+
+    metric: Metric
+    index: IndexArray
+
+    def from_point(self, index: int) -> FloatArray:
+        return self.metric.from_point(int(self.index[index]))[self.index]
+
+
+def _frozen(values: ArrayLike, what: str) -> FloatArray:
+    try:
+        copy: NDArray[np.float64] = np.array(values, dtype=float)
+    except (TypeError, ValueError) as error:
+        raise PlanningError(f"{what} must be an array of numbers: {error}") from error
+    copy.setflags(write=False)
+    return copy
+
+
+def _check_each(values: FloatArray, what: str, item: str = "candidate") -> None:
+    """Refuse values that are not finite, by the number of the first item that has one."""
+    if np.isfinite(values).all():
+        return
+    bad = np.flatnonzero(~np.isfinite(values).all(axis=tuple(range(1, values.ndim))))
+    raise PlanningError(
+        f"{item} {bad[0]} has a value that is not finite in its {what}"
+        f" ({len(bad)} of {len(values)} have)"
+    )
 
 
 @dataclass(frozen=True, eq=False)

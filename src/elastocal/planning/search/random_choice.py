@@ -4,8 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from elastocal.planning.search.candidates import Candidates
-from elastocal.planning.search.protocol import Selection, check_count
+from elastocal.planning.search.protocol import Candidates, Selection, check_count
 
 
 @dataclass(frozen=True)

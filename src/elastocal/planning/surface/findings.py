@@ -10,18 +10,19 @@ from elastocal.arrays import BoolArray, FloatArray
 from elastocal.planning.surface.contact import contact_poses
 from elastocal.planning.surface.sampling import sample_uniform
 from elastocal.planning.surface.surface import Surface, SurfacePoints
+from elastocal.robot import Robot
+from elastocal.robot.inverse import InverseKinematics, arm_base
 
-FAR = 5.0
+_FAR = 5.0
 """A surface whose nearest point is more than this many reaches away is in the wrong unit."""
-HUGE = 50.0
+_HUGE = 50.0
 """So is one whose bounding box is larger than this many reaches: a ship is not."""
-TINY = 0.02
+_TINY = 0.02
 """So is one whose bounding box is smaller than this part of the reach."""
 _POINTS = 200
 _SPINS = 4
 _CLEARLY = 0.25
 """By how much of the points the other side has to be the better reachable one."""
-
 Reachable = Callable[[FloatArray], BoolArray]
 """Whether the robot reaches poses T_base_tcp, shape (pose, 4, 4), within its limits."""
 
@@ -74,7 +75,7 @@ def mesh_findings(surface: Surface) -> tuple[Finding, ...]:
 
 def placement_findings(
     surface: Surface,
-    stands: FloatArray,
+    first_joints: FloatArray,
     reach: float,
     reachable: Reachable,
     rng: Generator,
@@ -85,8 +86,8 @@ def placement_findings(
     ----------
     surface : Surface
         The surface.
-    stands : ndarray, shape (stand, 3)
-        Where the arm can stand, in base, in m: one row without a rail.
+    first_joints : ndarray, shape (place, 3)
+        Where the arm's first joint can be, in base, in m: one row without a rail.
     reach : float
         Of the arm with its tool, in m; an upper bound will do.
     reachable : callable
@@ -95,22 +96,22 @@ def placement_findings(
         Seeded source of randomness, for the points that are tried.
     """
     vertices = surface.mesh.vertices
-    gap = np.linalg.norm(vertices[:, None] - stands[None], axis=2).min()
-    if not gap <= FAR * reach:
+    gap = np.linalg.norm(vertices[:, None] - first_joints[None], axis=2).min()
+    if not gap <= _FAR * reach:
         text = (
             f"{surface.name}: its nearest point is {gap:.3g} m from the robot, whose reach is"
             f" {reach:.3g} m: is the mesh in mm and read as m (surface.unit), or its pose wrong?"
         )
         return (Finding("far", text, fatal=True),)
     size = float(np.linalg.norm(np.ptp(vertices, axis=0)))
-    if not size <= HUGE * reach:
+    if not size <= _HUGE * reach:
         text = (
             f"{surface.name} is {size:.3g} m across; the reach of the robot is {reach:.3g} m: is"
             " the mesh in mm and read as m (surface.unit)?"
         )
         return (Finding("huge", text, fatal=True),)
     found: tuple[Finding, ...] = ()
-    if size < TINY * reach:
+    if size < _TINY * reach:
         text = (
             f"{surface.name} is only {1e3 * size:.3g} mm across; the reach of the robot is"
             f" {reach:.3g} m: is the mesh in m and read as mm (surface.unit)?"
@@ -159,3 +160,57 @@ def _reached(points: SurfacePoints, sign: float, reachable: Reachable) -> float:
     turned = SurfacePoints(points.position, sign * points.normal, points.face, points.barycentric)
     poses = contact_poses(turned, np.linspace(0.0, 2.0 * np.pi, _SPINS, endpoint=False))
     return float(reachable(poses.reshape(-1, 4, 4)).reshape(len(points), -1).any(axis=1).mean())
+
+
+def arm_reach(robot: Robot) -> float:
+    """Return a bound in m that the tool centre point never goes beyond.
+
+    The sum of the lengths from the arm's second joint to the tool centre point, and of the first
+    joint's from its own origin: the arm stretched out as no limit would let it.
+
+    Parameters
+    ----------
+    robot : Robot
+        The robot with its tool.
+    """
+    joints = robot.chain.joints[robot.external_axes + 1 :]
+    lengths = [float(np.linalg.norm(joint.placement[:3, 3])) for joint in joints]
+    return sum(lengths) + float(np.linalg.norm(robot.chain.T_last_tip[:3, 3]))
+
+
+def first_joint_positions(robot: Robot, external: FloatArray) -> FloatArray:
+    """Return where the arm's first joint can be, in base, shape (combination, 3), in m.
+
+    Parameters
+    ----------
+    robot : Robot
+        The robot.
+    external : ndarray, shape (combination, external axis)
+        Positions of its external axes in rad or m.
+    """
+    first = robot.chain.joints[robot.external_axes].placement
+    return (arm_base(robot, external) @ first)[:, :3, 3]
+
+
+@dataclass(frozen=True, eq=False)
+class ReachableFrom:
+    """Whether a robot reaches poses from any of some positions of its external axes."""
+
+    inverse: InverseKinematics
+    external: FloatArray
+    """Shape (combination, external axis), in rad or m."""
+
+    def __call__(self, T_base_tcp: FloatArray) -> BoolArray:
+        """Return whether each pose is reached within the limits, shape (pose,).
+
+        Parameters
+        ----------
+        T_base_tcp : ndarray, shape (pose, 4, 4)
+            In m.
+        """
+        reached = np.zeros(len(T_base_tcp), dtype=bool)
+        for position in self.external:
+            left = np.flatnonzero(~reached)
+            if len(left):
+                reached[left] = self.inverse.solve_many(T_base_tcp[left], position).reachable
+        return reached

@@ -5,23 +5,42 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
+from typing import Protocol
 
 import numpy as np
 import trimesh
 from numpy.typing import ArrayLike
 
-from elastocal.arrays import FloatArray, IndexArray
+from elastocal.arrays import BoolArray, FloatArray, IndexArray
 from elastocal.planning.surface import topology
-from elastocal.planning.surface.errors import SurfaceError
-from elastocal.planning.surface.mesh import TriangleMesh, read_mesh
-from elastocal.planning.surface.normals import corner_normals, face_normals_and_areas
-from elastocal.planning.surface.region import Region
+from elastocal.planning.surface.mesh import SurfaceError, TriangleMesh, read_mesh
+from elastocal.planning.surface.topology import corner_normals, face_normals_and_areas
 
 CREASE_ANGLE = math.radians(30.0)
 """Normals of neighbouring faces further apart than this meet in a crease, by default.
 
 A tessellated dome has a few degrees between its faces, a machined edge 45° and more.
 """
+
+
+class Region(Protocol):
+    """A part of space; `elastocal.cell` has boxes and polygons.
+
+    Its border is no border of the surface: a contact disk may reach over it.
+    """
+
+    def contains(self, points_surface: FloatArray) -> BoolArray:
+        """Return whether points lie in the region.
+
+        Parameters
+        ----------
+        points_surface : ndarray, shape (point, 3)
+            In the frame of the surface's mesh, in m.
+
+        Returns
+        -------
+        ndarray of bool, shape (point,)
+        """
 
 
 @dataclass(frozen=True, eq=False)

@@ -4,7 +4,6 @@ from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
 
-import numpy as np
 from matplotlib.figure import Figure
 
 from elastocal.codec import (
@@ -199,8 +198,8 @@ def _index_rows(
 
 
 def _correlation(found: Correlation) -> str:
-    if not np.isfinite(found.value):
+    if found.correlation is None:
         return "index never varies"
-    if not np.isfinite(found.low):
-        return f"{found.value:+.2f} (no interval)"
-    return f"{found.value:+.2f} ({found.low:+.2f} to {found.high:+.2f})"
+    if found.low is None:
+        return f"{found.correlation:+.2f} (no interval)"
+    return f"{found.correlation:+.2f} ({found.low:+.2f} to {found.high:+.2f})"

@@ -6,7 +6,7 @@ from typing import Any
 
 from elastocal.cell import Cell
 from elastocal.files import write_text
-from elastocal.planning import PlanFile, PoolData, PoseRecord, check_pool_of
+from elastocal.planning import PlanResult, PoolData, PoseRecord, check_pool_of
 from elastocal.planning.surface import Surface
 from elastocal.report.pages.templating import render
 from elastocal.report.plots import (
@@ -21,7 +21,7 @@ from elastocal.wording import duration, millimetres, readable
 
 
 def write_plan_page(
-    path: Path, cell: Cell, surface: Surface, plan: PlanFile, pool: PoolData
+    path: Path, cell: Cell, surface: Surface, plan: PlanResult, pool: PoolData
 ) -> Path:
     """Write the interactive page of a plan, atomically; return its path.
 
@@ -31,7 +31,7 @@ def write_plan_page(
         An HTML file.
     cell, surface : Cell, Surface
         That the plan was made for.
-    plan, pool : PlanFile, PoolData
+    plan, pool : PlanResult, PoolData
         Of one run.
 
     Raises
@@ -49,7 +49,7 @@ def write_plan_page(
     return Path(path)
 
 
-def _page(view: PlanView, plan: PlanFile, pool: PoolData) -> str:
+def _page(view: PlanView, plan: PlanResult, pool: PoolData) -> str:
     worst = weakest_margins(pool).label
     return render(
         "plan.html",
@@ -65,7 +65,7 @@ def _page(view: PlanView, plan: PlanFile, pool: PoolData) -> str:
     )
 
 
-def key_figures(plan: PlanFile) -> tuple[tuple[str, str], ...]:
+def key_figures(plan: PlanResult) -> tuple[tuple[str, str], ...]:
     """Return the figures at the head of the page, as name and value with its unit."""
     search, pool = plan.search, plan.pool
     asked = f" (asked: {readable(search.d_max, 'm')})" if search.d_max is not None else ""
@@ -79,7 +79,7 @@ def key_figures(plan: PlanFile) -> tuple[tuple[str, str], ...]:
     )
 
 
-def _cells(plan: PlanFile, pose: PoseRecord, worst: str) -> list[str]:
+def _cells(plan: PlanResult, pose: PoseRecord, worst: str) -> list[str]:
     way = sum(move.duration for move in plan.moves if move.end == pose.id)
     return [
         str(plan.search.order.index(pose.id) + 1),
@@ -91,14 +91,14 @@ def _cells(plan: PlanFile, pose: PoseRecord, worst: str) -> list[str]:
     ]
 
 
-def view_data(view: PlanView, plan: PlanFile, pool: PoolData) -> dict[str, Any]:
+def view_data(view: PlanView, plan: PlanResult, pool: PoolData) -> dict[str, Any]:
     """Return the data from which the script of a page shows a view.
 
     Parameters
     ----------
     view : PlanView
         From `plan_view`.
-    plan, pool : PlanFile, PoolData
+    plan, pool : PlanResult, PoolData
         That it shows.
     """
     worst = weakest_margins(pool).label

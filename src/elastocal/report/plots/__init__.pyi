@@ -17,7 +17,6 @@ from .codec_chart import (
     saturation_words as saturation_words,
 )
 from .compliance_chart import (
-    COMPLIANCE_UNITS as COMPLIANCE_UNITS,
     SpringBoxes as SpringBoxes,
     compliance_chart as compliance_chart,
     never_told_apart as never_told_apart,

@@ -11,7 +11,7 @@ import plotly.graph_objects as go
 
 from elastocal.arrays import FloatArray, IndexArray
 from elastocal.cell import Cell
-from elastocal.planning import PlanFile, PoolData, PoseRecord
+from elastocal.planning import PlanResult, PoolData, PoseRecord
 from elastocal.planning.surface import Surface
 from elastocal.report.plots import style
 from elastocal.report.plots._solids import (
@@ -59,7 +59,7 @@ class Layer:
 
 
 def still_layers(
-    cell: Cell, surface: Surface, plan: PlanFile, pool: PoolData, towards_light: FloatArray
+    cell: Cell, surface: Surface, plan: PlanResult, pool: PoolData, towards_light: FloatArray
 ) -> list[Layer]:
     """Return the layers that stay as they are whatever posture is shown.
 
@@ -103,7 +103,7 @@ def _typical(margin: FloatArray) -> FloatArray:
     return np.where(median > 0.0, median, 1.0)
 
 
-def tool_path(cell: Cell, plan: PlanFile, steps: int = 12) -> FloatArray:
+def tool_path(cell: Cell, plan: PlanResult, steps: int = 12) -> FloatArray:
     """Return the tool centre point along all moves, shape (point, 3), in m.
 
     Moves are straight in joint space, so that the tool runs along curves.
@@ -112,7 +112,7 @@ def tool_path(cell: Cell, plan: PlanFile, steps: int = 12) -> FloatArray:
     ----------
     cell : Cell
         Whose robot moves.
-    plan : PlanFile
+    plan : PlanResult
         The plan.
     steps : int
         Points on each straight piece.
@@ -204,7 +204,7 @@ def _refused(pool: PoolData) -> list[Layer]:
     return layers
 
 
-def _poses(plan: PlanFile, lift: float) -> Any:
+def _poses(plan: PlanResult, lift: float) -> Any:
     contact = np.array([pose.tcp_position for pose in plan.poses])
     normal = np.array([pose.normal for pose in plan.poses])
     x, y, z = single_precision(contact + lift * normal)
@@ -220,7 +220,7 @@ def _poses(plan: PlanFile, lift: float) -> Any:
     )  # fmt: skip
 
 
-def _hover(plan: PlanFile, pose: PoseRecord, rank: int | None) -> str:
+def _hover(plan: PlanResult, pose: PoseRecord, rank: int | None) -> str:
     unit = {check.name: check.unit or "" for check in plan.pool.checks}
     seen = f"seen by {escape(pose.seen_by)}" if pose.seen_by else "not seen by a station"
     lines = [
@@ -234,11 +234,11 @@ def _hover(plan: PlanFile, pose: PoseRecord, rank: int | None) -> str:
     return "<br>".join(lines)
 
 
-def _travel(plan: PlanFile, pose: int) -> float:
+def _travel(plan: PlanResult, pose: int) -> float:
     return sum(move.duration for move in plan.moves if move.end == pose)
 
 
-def _approaches(plan: PlanFile) -> Any:
+def _approaches(plan: PlanResult) -> Any:
     """Return the last part of the way to each pose; near the surface it would cross the number."""
     ends = [(_off(plan, pose, 0.4), _off(plan, pose, 1.0)) for pose in plan.poses]
     x, y, z = single_precision(segments(ends))
@@ -248,13 +248,13 @@ def _approaches(plan: PlanFile) -> Any:
     )  # fmt: skip
 
 
-def _off(plan: PlanFile, pose: PoseRecord, part: float) -> FloatArray:
+def _off(plan: PlanResult, pose: PoseRecord, part: float) -> FloatArray:
     """Return the point off the surface by a part of the approach distance, shape (3,), in m."""
     distance = part * plan.contact.approach_distance
     return np.array(pose.tcp_position) + distance * np.array(pose.normal)
 
 
-def _tour(cell: Cell, plan: PlanFile) -> tuple[Any, Any]:
+def _tour(cell: Cell, plan: PlanResult) -> tuple[Any, Any]:
     path = tool_path(cell, plan)
     x, y, z = single_precision(path)
     way = go.Scatter3d(

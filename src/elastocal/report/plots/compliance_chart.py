@@ -9,6 +9,7 @@ from matplotlib.figure import Figure
 
 from elastocal.arrays import BoolArray
 from elastocal.codec import CodecData, SpringObservability
+from elastocal.elastic import Unit, unit_of
 from elastocal.identification import describe
 from elastocal.report.plots import style
 from elastocal.report.plots._box_plots import (
@@ -25,8 +26,6 @@ from elastocal.report.plots.printing import literal, new_figure, wrapped
 from elastocal.report.plots.style import VariantStyle, variant_styles
 from elastocal.wording import counted
 
-COMPLIANCE_UNITS = {"rad/(N*m)": (1e6, "µrad/(N·m)"), "m/N": (1e6, "µm/N")}
-"""What people read compliances in, by SI unit: factor and name."""
 _COLUMNS = 3
 _LEFT, _RIGHT, _GAP = 0.62, 0.15, 0.52
 _PANEL, _OVER = 1.3, 0.38
@@ -115,11 +114,11 @@ def spring_boxes(data: CodecData, seen: Sequence[SpringObservability]) -> list[S
     }
     joints = list(dict.fromkeys(_joint(name) for name in units))
     names = sorted(units, key=lambda name: joints.index(_joint(name)))
-    return [_spring_boxes(data, seen, name, *COMPLIANCE_UNITS[units[name]]) for name in names]
+    return [_spring_boxes(data, seen, name, unit_of(units[name])) for name in names]
 
 
 def _spring_boxes(
-    data: CodecData, seen: Sequence[SpringObservability], spring: str, scale: float, unit: str
+    data: CodecData, seen: Sequence[SpringObservability], spring: str, unit: Unit
 ) -> SpringBoxes:
     boxes: dict[str, Boxes] = {}
     hollow: dict[str, BoolArray] = {}
@@ -130,11 +129,11 @@ def _spring_boxes(
         if spring not in labels.names:
             continue
         place, name = labels.names.index(spring), variant.name
-        values = scale * data.compliance[k][:, :, place]
+        values = unit.factor * data.compliance[k][:, :, place]
         boxes[name] = make_boxes(values, f"compliance {spring} of variant {name!r}")
         hollow[name] = told_apart.share[boxes[name].n - 1, place] < 0.5
         never += [name] if told_apart.never[place] else []
-    return SpringBoxes(spring, unit, boxes, hollow, tuple(never))
+    return SpringBoxes(spring, unit.shown, boxes, hollow, tuple(never))
 
 
 def _columns(springs: Sequence[SpringBoxes]) -> int:

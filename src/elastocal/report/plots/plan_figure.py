@@ -16,7 +16,7 @@ from matplotlib.figure import Figure
 from scipy.spatial import cKDTree
 
 from elastocal.arrays import FloatArray
-from elastocal.planning import PlanFile, PoolData, SpreadRecord, check_pool_of
+from elastocal.planning import PlanResult, PoolData, SpreadRecord, check_pool_of
 from elastocal.planning.surface import Surface
 from elastocal.report.plots import style
 from elastocal.report.plots._flat_map import FlatMap, flat_map
@@ -62,7 +62,7 @@ class _Choice:
         return np.asarray(cKDTree(pool.contact[self.order]).query(pool.contact)[0])
 
 
-def write_plan_figure(path: Path, surface: Surface, plan: PlanFile, pool: PoolData) -> Path:
+def write_plan_figure(path: Path, surface: Surface, plan: PlanResult, pool: PoolData) -> Path:
     """Write the figure of a plan, atomically; return its path.
 
     Parameters
@@ -71,7 +71,7 @@ def write_plan_figure(path: Path, surface: Surface, plan: PlanFile, pool: PoolDa
         Its suffix decides the kind: SVG, PNG or PDF.
     surface : Surface
         That the plan was made for.
-    plan, pool : PlanFile, PoolData
+    plan, pool : PlanResult, PoolData
         Of one run. Without a comparison in the plan there is one panel.
 
     Raises
@@ -85,7 +85,7 @@ def write_plan_figure(path: Path, surface: Surface, plan: PlanFile, pool: PoolDa
     return write_figure(path, lambda: plan_figure(surface, plan, pool))
 
 
-def plan_figure(surface: Surface, plan: PlanFile, pool: PoolData) -> Figure:
+def plan_figure(surface: Surface, plan: PlanResult, pool: PoolData) -> Figure:
     """Return the figure; see `write_plan_figure`."""
     flat = flat_map(surface, pool.contact, pool.normal)
     choices = _choices(plan)
@@ -104,7 +104,7 @@ def plan_figure(surface: Surface, plan: PlanFile, pool: PoolData) -> Figure:
     return figure
 
 
-def _choices(plan: PlanFile) -> list[_Choice]:
+def _choices(plan: PlanResult) -> list[_Choice]:
     """Return what the plan's technique chose, and the one that it is compared with."""
     candidate = {pose.id: pose.candidate for pose in plan.poses}
     search, other = plan.search, plan.comparison
@@ -134,7 +134,7 @@ def _extent(surface: Surface, flat: FlatMap) -> tuple[FloatArray, FloatArray]:
     return middle - 0.5 * size, middle + 0.5 * size
 
 
-def _draw_frame(figure: Figure, plan: PlanFile, flat: FlatMap, dots: Any) -> None:
+def _draw_frame(figure: Figure, plan: PlanResult, flat: FlatMap, dots: Any) -> None:
     """Draw what belongs to all panels: title, colour bar, how to read it."""
     width, height = figure.get_size_inches()
     sizes = f"{len(plan.poses)} of {plan.pool.valid} candidate poses"

@@ -12,7 +12,7 @@ import plotly.graph_objects as go
 
 from elastocal.arrays import FloatArray, IndexArray
 from elastocal.cell import Cell
-from elastocal.planning import PlanFile, PoolData
+from elastocal.planning import PlanResult, PoolData
 from elastocal.planning.surface import Surface
 from elastocal.report.plots import style
 from elastocal.report.plots._plan_layers import Layer, segments, still_layers, tool_path
@@ -113,7 +113,7 @@ class PlanView:
     """Plotly cameras by name; the first is the initial one."""
 
 
-def plan_view(cell: Cell, surface: Surface, plan: PlanFile, pool: PoolData) -> PlanView:
+def plan_view(cell: Cell, surface: Surface, plan: PlanResult, pool: PoolData) -> PlanView:
     """Return the interactive view of a plan.
 
     Parameters
@@ -153,7 +153,7 @@ def _layout(bounds: _Bounds, camera: dict[str, Any]) -> dict[str, Any]:
     }
 
 
-def _moving_parts(cell: Cell, surface: Surface, plan: PlanFile) -> _MovingParts:
+def _moving_parts(cell: Cell, surface: Surface, plan: PlanResult) -> _MovingParts:
     """Return the robot at HOME and in contact at every pose of a plan."""
     q = np.array([plan.robot.home, *(pose.joints for pose in plan.poses)])
     whole = robot_solids(cell, surface)

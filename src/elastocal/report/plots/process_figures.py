@@ -8,7 +8,7 @@ from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 
 from elastocal.arrays import FloatArray
-from elastocal.compensation.process import Trace
+from elastocal.compensation.process import CourseDeviation
 from elastocal.report.plots import style
 from elastocal.report.plots.printing import literal, new_figure
 
@@ -16,12 +16,12 @@ _WIDTH = 9.0
 _MM = 1e3
 
 
-def process_maps(traces: Sequence[Trace]) -> Figure:
+def process_maps(traces: Sequence[CourseDeviation]) -> Figure:
     """Return the maps: absolute deviation on the path, before and after, in one scale.
 
     Parameters
     ----------
-    traces : sequence of Trace
+    traces : sequence of CourseDeviation
         Courses of one seed.
     """
     place = _best_plane(np.concatenate([trace.position for trace in traces]))
@@ -58,12 +58,12 @@ def process_maps(traces: Sequence[Trace]) -> Figure:
     return figure
 
 
-def course_figure(trace: Trace, tolerance: float | None) -> Figure:
+def course_figure(trace: CourseDeviation, tolerance: float | None) -> Figure:
     """Return the deviation along one course, with the tolerance where there is one.
 
     Parameters
     ----------
-    trace : Trace
+    trace : CourseDeviation
         The course.
     tolerance : float, optional
         In m.

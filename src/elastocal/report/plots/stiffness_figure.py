@@ -14,7 +14,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from elastocal.arrays import FloatArray
-from elastocal.compensation.stiffness import Stations, Survey
+from elastocal.compensation.stiffness import PathStations, PostureSurvey
 from elastocal.report.plots import style
 from elastocal.report.plots.printing import new_figure, write_figure
 
@@ -46,7 +46,7 @@ class Curve:
 
 
 def write_stiffness_figure(
-    path: Path, title: str, stations: Stations, survey: Survey, curves: Sequence[Curve]
+    path: Path, title: str, stations: PathStations, survey: PostureSurvey, curves: Sequence[Curve]
 ) -> Path:
     """Write the figure, atomically; return its path.
 
@@ -56,9 +56,9 @@ def write_stiffness_figure(
         Its suffix decides the kind: SVG, PNG or PDF.
     title : str
         Of the figure.
-    stations : Stations
+    stations : PathStations
         Where along the path.
-    survey : Survey
+    survey : PostureSurvey
         All postures there.
     curves : sequence of Curve
         Up to three choices.
@@ -72,7 +72,7 @@ def write_stiffness_figure(
 
 
 def stiffness_figure(
-    title: str, stations: Stations, survey: Survey, curves: Sequence[Curve]
+    title: str, stations: PathStations, survey: PostureSurvey, curves: Sequence[Curve]
 ) -> Figure:
     """Return the figure; see `write_stiffness_figure`."""
     rail = survey.grid.external.shape[1] == 1 and len(survey.grid.external) > 1
@@ -87,7 +87,7 @@ def stiffness_figure(
     maps = [("Spin of the tool in °", np.degrees(survey.grid.spins), survey.best_by_spin, degrees)]
     if rail:
         held = [curve.rail for curve in curves]
-        maps.append(("Rail in m", survey.grid.external[:, 0], survey.best_by_stand, held))
+        maps.append(("Rail in m", survey.grid.external[:, 0], survey.best_by_external, held))
     for place, box, (label, values, best, chosen) in zip(axes, boxes, maps, strict=False):
         drawn = _draw_map(place, along, values, best)
         place.set_ylabel(label)
@@ -174,9 +174,9 @@ def _styles(along: FloatArray) -> list[dict[str, Any]]:
     ]
 
 
-def _along(stations: Stations) -> FloatArray:
+def _along(stations: PathStations) -> FloatArray:
     """Return the way along the path in mm; a path that stays in one place is counted in rows."""
-    way = 1e3 * stations.way
+    way = 1e3 * stations.arc_length
     return way if way[-1] > 0.0 else np.arange(len(way), dtype=float)
 
 

@@ -59,7 +59,7 @@ class Schedule:
         Parameters
         ----------
         step : str
-            See `elastocal.cell.description.faults.Fault.step`.
+            See `elastocal.cell.description.simulation.Fault.step`.
         visit : int
             Number of the visit.
         load : int

@@ -5,9 +5,8 @@ from typing import ClassVar
 import numpy as np
 
 from elastocal.arrays import FloatArray
-from elastocal.planning.search.criteria.criterion import Criterion
+from elastocal.planning.search.criteria.criterion import Criterion, inverse_trace_loss
 from elastocal.planning.search.information import Information
-from elastocal.planning.search.rank_update import inverse_trace_loss
 
 
 class AOptimal(Criterion):

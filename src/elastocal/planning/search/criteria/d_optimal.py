@@ -6,9 +6,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from elastocal.arrays import FloatArray
-from elastocal.planning.search.criteria.criterion import Criterion
+from elastocal.planning.search.criteria.criterion import Criterion, log_determinant_gain
 from elastocal.planning.search.information import Information
-from elastocal.planning.search.rank_update import log_determinant_gain
 
 
 class DOptimal(Criterion):

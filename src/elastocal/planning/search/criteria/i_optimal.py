@@ -7,9 +7,8 @@ import numpy as np
 
 from elastocal.arrays import FloatArray
 from elastocal.errors import PlanningError
-from elastocal.planning.search.criteria.criterion import Criterion
+from elastocal.planning.search.criteria.criterion import Criterion, inverse_trace_loss
 from elastocal.planning.search.information import Information
-from elastocal.planning.search.rank_update import inverse_trace_loss
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,10 +10,7 @@ from elastocal.planning.search.criteria.criterion import Criterion
 from elastocal.planning.search.criteria.d_optimal import DOptimal
 from elastocal.planning.search.criteria.e_optimal import EOptimal
 from elastocal.planning.search.criteria.i_optimal import IOptimal
-from elastocal.planning.search.criteria.o2 import O2
-from elastocal.planning.search.criteria.o3 import O3
-from elastocal.planning.search.criteria.o4 import O4
-from elastocal.planning.search.criteria.o5 import O5
+from elastocal.planning.search.criteria.observability import O2, O3, O4, O5
 
 CRITERIA: dict[str, type[Criterion]] = {
     criterion.name: criterion

@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 from functools import partial
 
+from elastocal.elastic import Unit
 from elastocal.identification import CalibrationSummary, Term, describe
 from elastocal.report.document.blocks import (
     Block,
@@ -20,8 +21,6 @@ from elastocal.report.plots import SpringBar, spring_figure
 from elastocal.verdict import Evidence, ModelEvidence
 from elastocal.wording import mm
 
-_UNITS = {"revolute": "µrad/(N·m)", "prismatic": "µm/N"}
-_STIFF = {"µrad/(N·m)": "MN·m/rad", "µm/N": "MN/m"}
 _MOST_TERMS = 6
 
 
@@ -37,9 +36,10 @@ def _blocks(found: ModelEvidence) -> Iterator[Block]:
     observable = sum(each.group is None for _, each in springs)
     yield _head(found, observable)
     yield from _comparison(found.figures)
-    panels = [(unit, [bar for own, bar in springs if own == unit]) for unit in _UNITS.values()]
+    units = dict.fromkeys(unit for unit, _ in springs)
+    panels = [(unit.shown, [bar for own, bar in springs if own == unit]) for unit in units]
     yield picture(
-        partial(spring_figure, [panel for panel in panels if panel[1]]),
+        partial(spring_figure, panels),
         f"Compliances of {len(springs)} springs with 95 % intervals; {len(springs) - observable} of"
         " them have no value of their own",
         "Filled: known by itself, with its 95 % interval. Hollow: not known by itself; the number"
@@ -50,36 +50,37 @@ def _blocks(found: ModelEvidence) -> Iterator[Block]:
     yield from _not_told_apart(found)
 
 
-def _springs(found: ModelEvidence) -> Iterator[tuple[str, SpringBar]]:
+def _springs(found: ModelEvidence) -> Iterator[tuple[Unit, SpringBar]]:
     """Yield unit and compliance of each spring, and the first group that it is mixed up in."""
     numbered = list(enumerate(found.model.observability.unobservable, start=1))
     groups = {term.spring: number for number, group in reversed(numbered) for term in group}
     low, high = found.model.interval()
-    for k, spring in enumerate(found.model.model.springs):
+    for k, parameter in enumerate(found.model.model.parameters):
+        unit = parameter.unit
         by_itself = found.model.observability.observable[k]
         yield (
-            _UNITS[spring.kind],
+            unit,
             SpringBar(
-                spring.name,
-                1e6 * float(found.model.compliance[k]),
-                1e6 * float(low[k]),
-                1e6 * float(high[k]),
-                None if by_itself else groups.get(spring.name, 0),
+                parameter.name,
+                unit.factor * float(found.model.compliance[k]),
+                unit.factor * float(low[k]),
+                unit.factor * float(high[k]),
+                None if by_itself else groups.get(parameter.name, 0),
             ),
         )
 
 
-def _row(unit: str, spring: SpringBar) -> Row:
+def _row(unit: Unit, spring: SpringBar) -> Row:
     name, value = spring.name, spring.value
     if spring.group is not None:
         known = f"not by itself, group {spring.group}"
-        return name, known, f"({value:.4f})", "none", unit, "none"
-    stiff = f"{1.0 / value:.3f} {_STIFF[unit]}" if value > 0.0 else "rigid"
+        return name, known, f"({value:.4f})", "none", unit.shown, "none"
+    stiff = f"{1.0 / value:.3f} {unit.stiffness}" if value > 0.0 else "rigid"
     known = "at its bound"
     if value > 0.0:
         known = f"±{(spring.high - spring.low) / 2 / value:.0%}"
     span = f"{spring.low:.3f} to {spring.high:.3f}"
-    return name, known, f"{value:.4f}", span, unit, stiff
+    return name, known, f"{value:.4f}", span, unit.shown, stiff
 
 
 def _head(found: ModelEvidence, observable: int) -> Block:

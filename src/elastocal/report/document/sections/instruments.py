@@ -5,7 +5,7 @@ from functools import partial
 
 import numpy as np
 
-from elastocal.compensation.conditioning import ToolRecord
+from elastocal.compensation.conditioning import ToolResult
 from elastocal.report.document.blocks import (
     Block,
     Bullets,
@@ -131,7 +131,7 @@ def _scaled(scale: float, *values: float | None) -> tuple[str, ...]:
     return tuple(_or_unknown(value, lambda v: f"{scale * v:.2f}") for value in values)
 
 
-def _tool_file(tool: ToolRecord | None) -> Block:
+def _tool_file(tool: ToolResult | None) -> Block:
     if tool is None:
         return Paragraph("There is no tool file: sensor rotation and bias were not identified.")
     R = np.array(tool.R_flange_sensor)

@@ -2,7 +2,7 @@
 
 from functools import partial
 
-from elastocal.planning import PlanFile
+from elastocal.planning import PlanResult
 from elastocal.report.document.blocks import (
     Block,
     Bullets,
@@ -45,7 +45,7 @@ def body(evidence: Evidence) -> Content:
     return Content(blocks, view_data(view, plan, pool))
 
 
-def _poses(plan: PlanFile, buttons: bool) -> Block:
+def _poses(plan: PlanResult, buttons: bool) -> Block:
     """Return the table of the poses, with buttons where there is a scene that shows them."""
     rows = tuple(
         (
@@ -62,7 +62,7 @@ def _poses(plan: PlanFile, buttons: bool) -> Block:
     return Details(f"The {counted(len(plan.poses), 'pose')} in visiting order", (table,))
 
 
-def _spreads(plan: PlanFile) -> Block:
+def _spreads(plan: PlanResult) -> Block:
     search, other = plan.search, plan.comparison
     rows = [(search.name, search.spread)] + ([(other.name, other.spread)] if other else [])
     return Table(
@@ -81,7 +81,7 @@ def _spreads(plan: PlanFile) -> Block:
     )
 
 
-def _alt(plan: PlanFile) -> str:
+def _alt(plan: PlanResult) -> str:
     names = [plan.search.name] + ([plan.comparison.name] if plan.comparison else [])
     return (
         f"Flat map of the surface with {len(plan.poses)} poses chosen by {' and by '.join(names)};"
@@ -89,7 +89,7 @@ def _alt(plan: PlanFile) -> str:
     )
 
 
-def _notes(plan: PlanFile) -> tuple[Block, ...]:
+def _notes(plan: PlanResult) -> tuple[Block, ...]:
     if not plan.findings:
         return ()
     # Where the folder lies is no part of a report.

@@ -6,7 +6,12 @@ from functools import partial
 
 import numpy as np
 
-from elastocal.compensation.process import Line, ProcessRecord, Trace, Values
+from elastocal.compensation.process import (
+    CourseDeviation,
+    DeviationComparison,
+    DeviationStatistics,
+    SimulatedProcess,
+)
 from elastocal.report.document.blocks import (
     Block,
     Content,
@@ -59,14 +64,14 @@ def body(evidence: Evidence) -> Content:
     return Content(tuple(_blocks(evidence.process, evidence.limits.tolerance)))
 
 
-def _blocks(record: ProcessRecord, tolerance: float | None) -> Iterator[Block]:
+def _blocks(record: SimulatedProcess, tolerance: float | None) -> Iterator[Block]:
     yield Paragraph(
         "Simulated: the simulated robot followed the path under process forces, once as programmed"
         " and once with the online compensator of a calibrated model.", "banner",
     )  # fmt: skip
     yield from _table_1(record)
-    seed = record.traces[0].seed
-    yield from _pictures([trace for trace in record.traces if trace.seed == seed], tolerance)
+    seed = record.courses[0].seed
+    yield from _pictures([trace for trace in record.courses if trace.seed == seed], tolerance)
     if record.table.budget:
         yield Details("Error budget", (_budget(record.table.budget),))
     settings = Table("Settings, SI units", ("Key", "Value"),
@@ -74,7 +79,7 @@ def _blocks(record: ProcessRecord, tolerance: float | None) -> Iterator[Block]:
     yield Details("Settings of the compensator", (settings,))
 
 
-def _table_1(record: ProcessRecord) -> Iterator[Block]:
+def _table_1(record: SimulatedProcess) -> Iterator[Block]:
     deviation = _DEVIATIONS.get(record.table.process, "Absolute deviation")
     rows: list[Row] = []
     for line in record.table.lines:
@@ -99,7 +104,7 @@ def _table_1(record: ProcessRecord) -> Iterator[Block]:
         )  # fmt: skip
 
 
-def _budget(lines: tuple[Line, ...]) -> Block:
+def _budget(lines: tuple[DeviationComparison, ...]) -> Block:
     rows = tuple(
         (
             line.name,
@@ -116,7 +121,7 @@ def _budget(lines: tuple[Line, ...]) -> Block:
     return Table(caption, _HEADS, rows)
 
 
-def _pictures(traces: list[Trace], tolerance: float | None) -> Iterator[Block]:
+def _pictures(traces: list[CourseDeviation], tolerance: float | None) -> Iterator[Block]:
     worst = max(traces, key=lambda trace: float(np.abs(trace.before).max()))
     before, after = (
         np.concatenate([getattr(t, key) for t in traces]) for key in ("before", "after")
@@ -138,11 +143,11 @@ def _pictures(traces: list[Trace], tolerance: float | None) -> Iterator[Block]:
     )
 
 
-def _three(values: Values) -> tuple[float, float, float]:
+def _three(values: DeviationStatistics) -> tuple[float, float, float]:
     return values.mean, values.max, values.standard_deviation
 
 
-def _mm(values: Values) -> tuple[str, ...]:
+def _mm(values: DeviationStatistics) -> tuple[str, ...]:
     return tuple(f"{1e3 * value:.3f}" for value in _three(values))
 
 

@@ -3,10 +3,11 @@
 from collections.abc import Iterator
 from functools import partial
 
+from elastocal.elastic import unit_of
 from elastocal.identification.recertification import (
+    CompareSummary,
     DeflectionChange,
     Estimate,
-    Recertification,
     Verdict,
 )
 from elastocal.report.document.blocks import (
@@ -42,7 +43,7 @@ def body(evidence: Evidence) -> Content:
     return Content(tuple(_blocks(evidence.recertification)))
 
 
-def _blocks(found: Recertification) -> Iterator[Block]:
+def _blocks(found: CompareSummary) -> Iterator[Block]:
     yield Paragraph(f"{_WORDS[found.verdict]} {found.reason}. {_moved(found)}", "sentence")
     if found.deflection is not None:
         yield _deflections(found.deflection, found.limit)
@@ -59,8 +60,8 @@ def _blocks(found: Recertification) -> Iterator[Block]:
     yield Bullets(tuple(note.replace(origin, "") for note in found.notes))
 
 
-def _moved(found: Recertification) -> str:
-    names = ", ".join(each.name for each in found.moved)
+def _moved(found: CompareSummary) -> str:
+    names = ", ".join(found.moved)
     if not names:
         return "No compared spring moved beyond its interval."
     return f"Moved beyond their intervals: {names}."
@@ -69,7 +70,7 @@ def _moved(found: Recertification) -> str:
 def _deflections(change: DeflectionChange, limit: float | None) -> Block:
     return Facts(
         (
-            ("Poses and forces compared", len(change.q)),
+            ("Poses and forces compared", change.rows),
             ("Change, mean", _span(change.mean)),
             ("Change, largest", _span(change.largest)),
             ("Limit", "none given" if limit is None else mm(limit)),
@@ -77,18 +78,18 @@ def _deflections(change: DeflectionChange, limit: float | None) -> Block:
     )
 
 
-def _springs(found: Recertification) -> Block:
+def _springs(found: CompareSummary) -> Block:
     rows = tuple(
         (
             each.name,
             "moved" if each.moved else "",
-            f"{1e6 * each.old.value:.4f}",
-            f"{1e6 * each.new.value:.4f}",
-            f"{1e6 * each.difference.value:+.4f}",
-            f"{1e6 * each.together.low:+.3f} to {1e6 * each.together.high:+.3f}",
-            "µm/N" if each.unit.startswith("m/") else "µrad/(N·m)",
+            f"{unit.factor * each.old.value:.4f}",
+            f"{unit.factor * each.new.value:.4f}",
+            f"{unit.factor * each.difference.value:+.4f}",
+            f"{unit.factor * each.together.low:+.3f} to {unit.factor * each.together.high:+.3f}",
+            unit.shown,
         )
-        for each in found.springs
+        for each, unit in ((each, unit_of(each.unit)) for each in found.springs)
     )
     heads = ("Spring or sum", "", "Old", "New", "Change", "95 %, all at once", "Unit")
     return Table("Springs and sums that both calibrations determine", heads, rows, texts=2)

@@ -1,0 +1,241 @@
+"""The tool on a force sensor: what a raw wrench is corrected by, and its file ``*.json``."""
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from elastocal.arrays import FloatArray
+from elastocal.compensation.conditioning.tool_fit import TOOL_UNKNOWNS, ToolFit
+from elastocal.errors import CompensationError, nearest
+from elastocal.records import read_json, record, write_json
+from elastocal.robot import GRAVITY, Robot, inverse_transform, parse_urdf
+
+_RIGID = 1e-6
+"""Largest distance of a component of R R^T from the identity's."""
+
+
+def _zero() -> FloatArray:
+    return np.zeros(3)
+
+
+@dataclass(frozen=True, eq=False)
+class SensorLoad:
+    """Tool weight and bias of a force sensor, and its place at the tool centre point.
+
+    The sensor reads, in its own frame,
+
+        F = R^T (f + w) + b,        M = R^T m + c x R^T w + b_m,
+
+    with its rotation ``R`` in base, force ``f`` and moment ``m`` on the robot about its origin,
+    the tool's weight ``w`` and centre of mass ``c``, and the biases ``b``. The default is a
+    sensor at the tool centre point that tool weight and bias have been taken from already.
+    """
+
+    mass: float = 0.0
+    """In kg."""
+    centre: FloatArray = field(default_factory=_zero)
+    """Centre of mass in the sensor's frame, shape (3,), in m."""
+    force_bias: FloatArray = field(default_factory=_zero)
+    """In the sensor's frame, shape (3,), in N."""
+    moment_bias: FloatArray = field(default_factory=_zero)
+    """In the sensor's frame, shape (3,), in N·m."""
+    T_tcp_sensor: FloatArray = field(default_factory=lambda: np.eye(4))
+    """Sensor's measuring frame in the tcp frame, shape (4, 4), in m."""
+    gravity: FloatArray = field(default_factory=lambda: np.array(GRAVITY))
+    """Acceleration of gravity in base, shape (3,), in m/s²."""
+
+    def __post_init__(self) -> None:
+        for name, shape in (
+            ("centre", (3,)),
+            ("force_bias", (3,)),
+            ("moment_bias", (3,)),
+            ("T_tcp_sensor", (4, 4)),
+            ("gravity", (3,)),
+        ):
+            array = np.array(getattr(self, name), dtype=float)
+            if array.shape != shape or not np.all(np.isfinite(array)):
+                raise CompensationError(
+                    f"{name} of the tool must be finite numbers of shape {shape}, got {array}"
+                )
+            array.setflags(write=False)
+            object.__setattr__(self, name, array)
+        if not 0.0 <= self.mass < np.inf:
+            raise CompensationError(f"mass of the tool is {self.mass} kg: it must be 0 or above")
+        R = self.T_tcp_sensor[:3, :3]
+        if not np.abs(R @ R.T - np.eye(3)).max() <= _RIGID or not np.linalg.det(R) > 0.0:
+            raise CompensationError("T_tcp_sensor of the tool does not hold a rotation")
+
+    def wrench_tcp(
+        self, R_base_tcp: FloatArray, force: FloatArray, moment: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return the wrench on the robot about the tool centre point, in the tcp frame.
+
+        Bias and weight are taken away, then the moment is moved from the sensor's origin:
+        ``m_tcp = m_sensor + p x f`` with ``p`` the sensor's origin in the tcp frame.
+
+        Parameters
+        ----------
+        R_base_tcp : ndarray, shape (..., 3, 3)
+            Rotation of the tool centre point in base.
+        force, moment : ndarray, shape (..., 3)
+            Raw, in the sensor's frame, in N and N·m.
+
+        Returns
+        -------
+        tuple of ndarray, shape (..., 3)
+            Force in N and moment in N·m.
+        """
+        R, p = self.T_tcp_sensor[:3, :3], self.T_tcp_sensor[:3, 3]
+        weight = self.mass * (self.gravity @ R_base_tcp)
+        f = (force - self.force_bias) @ R.T - weight
+        m = (moment - self.moment_bias) @ R.T - np.cross(R @ self.centre, weight)
+        return f, m + np.cross(p, f)
+
+
+_Triple = tuple[float, float, float]
+
+
+@record("elastocal.tool/1")
+class ToolResult:
+    """Tool and sensor from static postures: the contents of a tool file; SI units."""
+
+    flange: str
+    """Link of the robot that the sensor is bolted to."""
+    mass: float
+    centre: _Triple
+    """In the sensor's frame."""
+    force_bias: _Triple
+    moment_bias: _Triple
+    R_flange_sensor: tuple[_Triple, _Triple, _Triple]
+    """By rows."""
+    sensor_origin: _Triple
+    """In the flange frame; not identified, static postures do not see it."""
+    gravity: _Triple
+    """In base."""
+    half_width: dict[str, float | None]
+    """Half the 95 % interval of each unknown; null where not determined."""
+    undetermined: tuple[str, ...]
+    postures: int
+    force_scatter: float | None
+    moment_scatter: float | None
+    source: str
+
+
+@dataclass(frozen=True, eq=False)
+class SensorMount:
+    """Place of a sensor on the arm; static postures do not see it."""
+
+    flange: str
+    """Link that it is bolted to."""
+    origin: FloatArray
+    """Its origin in that link's frame, shape (3,), in m."""
+    gravity: FloatArray
+    """In base, shape (3,), in m/s²."""
+
+
+def tool_result(fit: ToolFit, mount: SensorMount, source: str) -> ToolResult:
+    """Return a fit, and where the sensor sits, as the file keeps them.
+
+    Parameters
+    ----------
+    fit : ToolFit
+        Of static postures.
+    mount : SensorMount
+        Where the sensor sits.
+    source : str
+        Where the postures come from.
+    """
+
+    def triple(numbers: FloatArray) -> _Triple:
+        x, y, z = (float(number) for number in numbers)
+        return x, y, z
+
+    x, y, z = (triple(row) for row in fit.R_flange_sensor)
+    return ToolResult(
+        flange=mount.flange,
+        # Without a tool it comes out a rounding error below nothing; more is refused as a mistake.
+        mass=max(fit.mass, 0.0),
+        centre=triple(fit.centre),
+        force_bias=triple(fit.force_bias),
+        moment_bias=triple(fit.moment_bias),
+        R_flange_sensor=(x, y, z),
+        sensor_origin=triple(mount.origin),
+        gravity=triple(mount.gravity),
+        half_width={name: _or_none(width) for name, width in fit.half_width.items()},
+        undetermined=fit.undetermined,
+        postures=fit.count,
+        force_scatter=_or_none(fit.force_scatter),
+        moment_scatter=_or_none(fit.moment_scatter),
+        source=source,
+    )
+
+
+def write_tool(path: Path, result: ToolResult) -> None:
+    """Write a tool file atomically."""
+    write_json(path, result)
+
+
+def read_tool(path: Path) -> ToolResult:
+    """Return the validated contents of a tool file.
+
+    Raises
+    ------
+    SchemaError
+        If it is not JSON, or no tool file of a known version.
+    FileAccessError
+        If it cannot be read.
+    """
+    return read_json(path, ToolResult)
+
+
+def sensor_load(tool: ToolResult, robot: Robot) -> SensorLoad:
+    """Return the tool of a file at a robot's tool centre point.
+
+    Raises
+    ------
+    CompensationError
+        If an unknown that a wrench is corrected by is not determined, or the robot has no such
+        link.
+    """
+    open_ones = [name for name in TOOL_UNKNOWNS if name in tool.undetermined]
+    if open_ones:
+        raise CompensationError(
+            f"the tool file leaves {', '.join(open_ones)} undetermined: take more postures that"
+            " turn the sensor about two axes, and run `elastocal tool` again"
+        )
+    links = [str(link.get("name")) for link in parse_urdf(robot.urdf).findall("link")]
+    if tool.flange not in links:
+        raise CompensationError(
+            f"the tool file's sensor sits on link {tool.flange!r}, which {robot.name} does not"
+            f" have{nearest(tool.flange, links)} (links: {', '.join(links)})"
+        )
+    home = np.zeros(len(robot.joint_names))
+    T_flange_sensor = np.eye(4)
+    T_flange_sensor[:3, :3] = tool.R_flange_sensor
+    T_flange_sensor[:3, 3] = tool.sensor_origin
+    T_base_sensor = _flange(robot, tool.flange).forward(home) @ T_flange_sensor
+    return SensorLoad(
+        mass=tool.mass,
+        centre=np.array(tool.centre),
+        force_bias=np.array(tool.force_bias),
+        moment_bias=np.array(tool.moment_bias),
+        T_tcp_sensor=inverse_transform(robot.forward(home)) @ T_base_sensor,
+        gravity=np.array(tool.gravity),
+    )
+
+
+def _flange(robot: Robot, link: str) -> Robot:
+    """Return the robot to the sensor's link, which must move with the last joint."""
+    arm = Robot.from_urdf(robot.urdf, link, robot.base)
+    if arm.joint_names != robot.joint_names:
+        missing = [name for name in robot.joint_names if name not in arm.joint_names]
+        raise CompensationError(
+            f"link {link!r} of the tool file lies before joint {missing[0] if missing else '?'}: a"
+            " sensor there does not turn with the tool"
+        )
+    return arm
+
+
+def _or_none(number: float) -> float | None:
+    return None if np.isnan(number) else float(number)

@@ -1,1 +1,0 @@
-from .compensate import KrlResult as KrlResult, compensate_krl as compensate_krl

@@ -1,0 +1,97 @@
+"""Figures of a corrected path, added up block by block."""
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from elastocal.arrays import FloatArray
+from elastocal.compensation.offline.correct import PathCorrection
+
+
+@dataclass(frozen=True)
+class LengthSummary:
+    """Mean and largest of a length over the rows."""
+
+    total: float = 0.0
+    """Sum, in m."""
+    largest: float = 0.0
+    """In m."""
+    label: str = ""
+    """Name of the row with the largest."""
+
+    def plus(self, lengths: FloatArray, labels: list[str]) -> "LengthSummary":
+        """Return the figure with further rows."""
+        worst = int(lengths.argmax())
+        here = float(lengths[worst])
+        label, largest = self.label, self.largest
+        if here > largest or not label:
+            label, largest = labels[worst], here
+        return LengthSummary(self.total + float(lengths.sum()), largest, label)
+
+
+@dataclass(frozen=True)
+class CorrectionSummary:
+    """Figures of a correction, predicted by the model."""
+
+    rows: int = 0
+    deviation: LengthSummary = field(default_factory=LengthSummary)
+    """Deviation of the path as programmed."""
+    first_order: LengthSummary = field(default_factory=LengthSummary)
+    """Deviation that one first-order step would leave."""
+    residual: LengthSummary = field(default_factory=LengthSummary)
+    """Deviation that the correction leaves."""
+    correction: LengthSummary = field(default_factory=LengthSummary)
+    """Distance between programmed and corrected position."""
+    jumps: int = 0
+    """Rows at which the posture changes from the row before."""
+    first_jump: str = ""
+    pulled: int = 0
+    """Rows at which the force draws the tool out, which a surface cannot."""
+    start: tuple[float, ...] = ()
+    """Joints that were found for the first row of a path of poses, in rad or m."""
+
+    def plus(
+        self, correction: PathCorrection, shift: FloatArray, labels: list[str], jumps: list[int]
+    ) -> "CorrectionSummary":
+        """Return the summary with further rows.
+
+        Parameters
+        ----------
+        correction : PathCorrection
+            Of these rows.
+        shift : ndarray, shape (row, 3)
+            Corrected minus programmed position, in m.
+        labels : list of str
+            Names of the rows.
+        jumps : list of int
+            Rows among them at which the posture changes.
+        """
+        first = self.first_jump or (labels[jumps[0]] if jumps else "")
+        return replace(
+            self,
+            rows=self.rows + len(labels),
+            deviation=self.deviation.plus(np.linalg.norm(correction.uncorrected, axis=1), labels),
+            first_order=self.first_order.plus(correction.first_order, labels),
+            residual=self.residual.plus(correction.residual, labels),
+            correction=self.correction.plus(np.linalg.norm(shift, axis=1), labels),
+            jumps=self.jumps + len(jumps),
+            first_jump=first,
+            pulled=self.pulled + int(correction.pulled.sum()),
+        )
+
+    def figures(self) -> dict[str, object]:
+        """Return the figures by name, lengths in m."""
+        lengths = ("deviation", "first_order", "residual", "correction")
+        figures: dict[str, object] = {"rows": self.rows}
+        for name in lengths:
+            figure: LengthSummary = getattr(self, name)
+            figures[name] = {
+                "mean": figure.total / max(self.rows, 1),
+                "max": figure.largest,
+                "at": figure.label,
+            }
+        return figures | {
+            "posture_jumps": self.jumps,
+            "first_jump": self.first_jump,
+            "pulled": self.pulled,
+        }

@@ -1,0 +1,143 @@
+"""The processes by name, and joints for their courses.
+
+The tool is turned by one angle for all courses; the rail stands still along each of them.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from elastocal.arrays import FloatArray
+from elastocal.cell import Cell
+from elastocal.compensation.offline import (
+    PathError,
+    joints_along_path,
+    posture_jumps,
+)
+from elastocal.compensation.process.course import Course
+from elastocal.compensation.process.placement import FibrePlacement
+from elastocal.compensation.process.roughing import Roughing
+from elastocal.errors import CompensationError
+from elastocal.planning import cell_surface
+from elastocal.robot.inverse import InverseKinematics, inverse_for
+
+_SPINS = np.linspace(0.0, 2.0 * np.pi, 12, endpoint=False)
+_FEW = 25
+"""Rows of a course that a posture is tried at."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Trial:
+    """A robot that tries to follow a course."""
+
+    solver: InverseKinematics
+    cell: Cell
+
+    def margin(self, course: Course, spin: float, external: FloatArray) -> float:
+        """Return the least distance to a joint limit or a straight wrist, -inf if out of reach."""
+        rows = np.unique(np.linspace(0, len(course.force) - 1, _FEW).astype(int))
+        try:
+            q = self.joints(course, spin, external, rows)
+        except PathError:
+            return -np.inf
+        robot = self.cell.robot
+        if len(posture_jumps(robot, q[1:], q[0])):
+            return -np.inf
+        arm = slice(robot.external_axes, None)
+        limits = robot.limits.margin(q) - self.cell.joint_margin
+        wrist = np.abs(q[:, -2]) - self.cell.file.limits.wrist_angle
+        return float(min(limits[:, arm].min(), wrist.min()))
+
+    def joints(
+        self, course: Course, spin: float, external: FloatArray, rows: FloatArray | slice
+    ) -> FloatArray:
+        c, s = np.cos(spin), np.sin(spin)
+        turn = np.array([[c, -s, 0, 0], [s, c, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1.0]])
+        T = course.T_base_tcp[rows] @ turn
+        positions = np.repeat(external[None], len(T), axis=0)
+        return joints_along_path(
+            self.solver, T, positions, self.cell.home, lambda row: f"row {row + 1}"
+        )
+
+
+PROCESSES: Mapping[str, type[FibrePlacement] | type[Roughing]] = {
+    "afp": FibrePlacement,
+    "machining": Roughing,
+}
+"""The processes that can be simulated, by the name that a command gives them."""
+
+
+def process_courses(name: str, cell: Cell, seed: int, count: int | None) -> tuple[Course, ...]:
+    """Return the courses of a process on the cell's surface, with joints.
+
+    Parameters
+    ----------
+    name : str
+        One of `PROCESSES`.
+    cell : Cell
+        The cell.
+    seed : int
+        Of the forces.
+    count : int, optional
+        Number of courses or rings; by default the process's.
+
+    Raises
+    ------
+    CompensationError
+        If there is no such process, or the robot cannot follow.
+    """
+    if name not in PROCESSES:
+        raise CompensationError(f"process {name!r} is not one of {', '.join(PROCESSES)}")
+    process = PROCESSES[name]() if count is None else PROCESSES[name](count=count)
+    rng = np.random.default_rng([seed, 6])
+    return with_postures(cell, process.courses(cell_surface(cell), rng))
+
+
+def with_postures(cell: Cell, courses: tuple[Course, ...]) -> tuple[Course, ...]:
+    """Return courses with joints: the postures farthest from limits and a straight wrist.
+
+    The tool is turned about its axis by the same angle in all courses, as a head that is bolted
+    on; a rail stands still along a course. Collisions are not looked at.
+
+    Parameters
+    ----------
+    cell : Cell
+        The cell.
+    courses : tuple of Course
+        Without joints.
+
+    Raises
+    ------
+    CompensationError
+        If no turn lets the robot follow all of them.
+    """
+    trial = _Trial(inverse_for(cell.robot), cell)
+    found = [_best_positions(trial, courses, float(spin)) for spin in _SPINS]
+    margins = [min(margin for margin, _ in best) for best in found]
+    chosen = int(np.argmax(margins))
+    if not margins[chosen] > 0.0:
+        reached = [any(best[k][0] > 0.0 for best in found) for k in range(len(courses))]
+        worst = courses[reached.index(False)].name if False in reached else "all courses at once"
+        raise CompensationError(
+            f"{cell.robot.name} cannot follow {worst} within joint_margin and wrist_angle, however"
+            " the tool is turned about its axis"
+        )
+    return tuple(
+        course.with_joints(trial.joints(course, float(_SPINS[chosen]), external, slice(None)))
+        for course, (_, external) in zip(courses, found[chosen], strict=True)
+    )
+
+
+def _best_positions(
+    trial: _Trial, courses: tuple[Course, ...], spin: float
+) -> list[tuple[float, FloatArray]]:
+    """Return the best external position of each course with its margin."""
+    positions = trial.cell.external_positions
+    some = positions[np.unique(np.linspace(0, len(positions) - 1, 7).astype(int))]
+    result = []
+    for course in courses:
+        margins = [trial.margin(course, spin, external) for external in some]
+        best = int(np.argmax(margins))
+        result.append((margins[best], some[best]))
+    return result

@@ -1,0 +1,1 @@
+from .program import KrlProgram as KrlProgram, read_krl as read_krl

@@ -1,0 +1,227 @@
+"""A KRL program: the motions of its ``.src`` file, the points of its ``.dat`` file.
+
+What is not understood is refused by line. A correction changes numbers in the ``.dat`` file; the
+``.src`` file and all other bytes stay as they were.
+"""
+
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import ClassVar
+
+from elastocal.compensation.offline import PathError, in_file
+from elastocal.compensation.programs.krl._points import (
+    KrlPoint,
+    code_of,
+    read_axes,
+    read_lines,
+    read_points,
+    replaced,
+)
+from elastocal.compensation.programs.program import CorrectedPoint, Move, Words
+from elastocal.errors import FileAccessError
+from elastocal.files import replacing
+
+_MOVE = re.compile(
+    r"(S?PTP|S?LIN|S?CIRC|SPL|ASYPTP|(?:S?PTP|S?LIN|S?CIRC|SPL)_REL)\b(?!\s*[=(\[.])\s*(.*)",
+    re.IGNORECASE,
+)
+_TO_NAME = re.compile(
+    r"(\w+)(?:\s+(?:C_DIS|C_VEL|C_ORI|C_PTP|C_SPL)(?:\s+C_\w+)*)?(?:\s+WITH\s.*)?", re.IGNORECASE
+)
+_FRAME = re.compile(r"\$(BASE|TOOL)\s*=\s*(.+)", re.IGNORECASE)
+_BAS = re.compile(r"BAS\s*\(\s*#(BASE|TOOL)\s*,\s*(\d+)\s*\)", re.IGNORECASE)
+_PART = re.compile(r"\$(BASE|TOOL)\s*\.\s*\w+\s*=.*", re.IGNORECASE)
+_IN_TOOL = re.compile(r"\$IPO_MODE\s*=\s*#TCP", re.IGNORECASE)
+_FDAT = re.compile(r"FDAT_ACT\s*=\s*(\w+)", re.IGNORECASE)
+_FDAT_VALUE = re.compile(r"\s*(?:DECL\s+)?(?:GLOBAL\s+)?FDAT\s+(\w+)\s*=\s*\{(.*)\}", re.IGNORECASE)
+_DEF = re.compile(r"(?:GLOBAL\s+)?DEF\s+(\w+)", re.IGNORECASE)
+_ASSIGNED = re.compile(r"(\w+)\s*(?:\.\s*\w+\s*)?=(?!=)", re.IGNORECASE)
+_NUMBERED = {"BASE": "BASE_DATA", "TOOL": "TOOL_DATA"}
+
+
+@dataclass(frozen=True)
+class KrlProgram:
+    """A program of a KUKA controller: a `ControllerProgram`."""
+
+    files: tuple[Path, Path]
+    """``.src`` and ``.dat``."""
+    lines: Sequence[str]
+    data: Sequence[str]
+    """Lines of both files; each character is one byte."""
+    points: Mapping[str, KrlPoint]
+    moves: tuple[Move, ...]
+    base: str
+    """Base of the LIN targets, as the program says it; empty when it does not."""
+    tool: str
+    name: str
+    """Name by its first DEF; empty without one."""
+    words: ClassVar[Words] = Words("the .dat file", "an E6AXIS", "E1")
+
+    def write(self, out: Path, corrected: Mapping[str, CorrectedPoint]) -> tuple[Path, ...]:
+        """Write the ``.src`` file as it was and the ``.dat`` file beside it; see the protocol."""
+        data = list(self.data)
+        for name, new in corrected.items():
+            point = self.points[name]
+            data[point.line] = replaced(data[point.line], point, point.corrected(new))
+        files = (Path(out), Path(out).with_suffix(".dat"))
+        with replacing(files[0]) as new_src, replacing(files[1]) as new_dat:
+            new_src.write_bytes("".join(self.lines).encode("latin-1"))
+            new_dat.write_bytes("".join(data).encode("latin-1"))
+        return files
+
+    def notes(self, assumed: Sequence[str], out: Path, frame_given: bool) -> tuple[str, ...]:
+        """Return how frame, tool, files and name were taken; see the protocol."""
+        frame = self.base or "$BASE, which the program does not set,"
+        tool = self.tool or "$TOOL, which the program does not set,"
+        place = "the frame given by --base" if frame_given else "the base of the model"
+        notes = [
+            f"{frame} is taken for {place}, {tool} for its tcp",
+            f"{out.name} is the program as it was, {out.with_suffix('.dat').name} has the corrected"
+            " points",
+        ]
+        if assumed:
+            notes.append(
+                f"{len(assumed)} motions (first: {assumed[0]}) come from a PTP that"
+                " does not tell its posture (no E6AXIS of the .dat file): the last one known is"
+                " taken"
+            )
+        if self.name and self.name.lower() != out.stem.lower():
+            notes.append(f"the program inside is {self.name}: a controller wants {self.name}.src")
+        return tuple(notes)
+
+
+def read_krl(src: Path) -> KrlProgram:
+    """Return the program of a ``.src`` file and the ``.dat`` file beside it.
+
+    Raises
+    ------
+    PathError
+        If a straight motion does not go to a named point, a motion is of another kind, a point
+        that it goes to is changed by the program, straight motions are in several frames, or a
+        point is declared twice.
+    FileAccessError
+        If a file cannot be read.
+    """
+    dat = _dat_of(src)
+    lines, data = read_lines(src), read_lines(dat)
+    with in_file(dat):
+        points = read_points(data)
+    with in_file(src):
+        moves, base, tool = _read_moves(lines, data)
+    names = [match[1] for line in lines if (match := _DEF.match(code_of(line)))]
+    name = names[0] if names else ""
+    return KrlProgram((Path(src), dat), lines, data, points, moves, base, tool, name)
+
+
+def _dat_of(src: Path) -> Path:
+    """Return the ``.dat`` file beside a ``.src`` file; Windows does not tell capitals."""
+    for suffix in (".dat", ".DAT", ".Dat"):
+        if (path := Path(src).with_suffix(suffix)).is_file():
+            return path
+    raise FileAccessError(f"cannot read {Path(src).with_suffix('.dat')}: it must be beside {src}")
+
+
+def _read_moves(lines: Sequence[str], data: Sequence[str]) -> tuple[tuple[Move, ...], str, str]:
+    """Return the motions, and the base and tool of the straight ones."""
+    frames = _frame_data(data)
+    active = {"BASE": "", "TOOL": ""}
+    moves: list[Move] = []
+    used: dict[str, tuple[str, int]] = {}
+    assigned: dict[str, int] = {}
+    for number, line in enumerate(lines, start=1):
+        code = code_of(line)
+        if move := _move(code, number):
+            moves.append(move)
+            if move.straight:
+                _check_one_frame(active, used, number)
+        else:
+            active |= _frame_change(code, number, frames)
+            if match := _ASSIGNED.match(code):
+                assigned.setdefault(match[1].upper(), number)
+    for move in moves:
+        if move.name in assigned:
+            raise PathError(
+                f"line {assigned[move.name]}: the program changes {move.name}, to which line"
+                f" {move.line} moves: its value in the .dat file is not the one that is reached"
+            )
+    base, tool = (used.get(what, ("", 0))[0] for what in ("BASE", "TOOL"))
+    return tuple(moves), base, tool
+
+
+def _move(code: str, number: int) -> Move | None:
+    match = _MOVE.fullmatch(code)
+    if match is None:
+        return None
+    order, target = match[1].upper(), match[2].strip()
+    named = _TO_NAME.fullmatch(target)
+    if order in ("LIN", "SLIN"):
+        if named is None:
+            raise PathError(
+                f"line {number}: {order} {target!r:.60} does not go to a named point of the .dat"
+                " file: only such points are corrected"
+            )
+        return Move(number, True, order, named[1].upper())
+    if order in ("PTP", "SPTP"):
+        axes = None if named else read_axes(target, number - 1)
+        return Move(number, False, order, named[1].upper() if named else None, axes)
+    raise PathError(
+        f"line {number}: {order} cannot be corrected: allowed are LIN and SLIN to named points,"
+        " PTP and SPTP"
+    )
+
+
+def _check_one_frame(
+    active: Mapping[str, str], used: dict[str, tuple[str, int]], number: int
+) -> None:
+    for what, value in active.items():
+        before, line = used.setdefault(what, (value, number))
+        if before != value:
+            raise PathError(
+                f"line {number}: this motion is in ${what} = {value}, that of line {line} in"
+                f" {before or 'none set'}: straight motions must all be in one"
+            )
+
+
+def _frame_change(
+    code: str, number: int, frames: Mapping[str, Mapping[str, str]]
+) -> dict[str, str]:
+    """Return the frames that a line sets."""
+    if match := _BAS.fullmatch(code):
+        what = match[1].upper()
+        return {what: f"{_NUMBERED[what]}[{match[2]}]"}
+    if match := _FRAME.fullmatch(code):
+        return {match[1].upper(): "".join(match[2].upper().split())}
+    if match := _FDAT.fullmatch(code):
+        if match[1].upper() not in frames:
+            raise PathError(f"line {number}: {match[1]} is not declared in the .dat file")
+        return dict(frames[match[1].upper()])
+    if _PART.fullmatch(code) or _IN_TOOL.search(code):
+        raise PathError(f"line {number}: {code!r:.60} moves the frame: this is not understood")
+    return {}
+
+
+def _frame_data(data: Sequence[str]) -> dict[str, dict[str, str]]:
+    """Return tool and base of each FDAT that a pendant's inline form has left."""
+    return dict(_fdats(data))
+
+
+def _fdats(data: Sequence[str]) -> Iterator[tuple[str, dict[str, str]]]:
+    for number, line in enumerate(data, start=1):
+        match = _FDAT_VALUE.fullmatch(code_of(line))
+        if match is None:
+            continue
+        parts = dict(re.findall(r"(TOOL_NO|BASE_NO|IPO_FRAME)\s+(#?\w+)", match[2].upper()))
+        if parts.get("IPO_FRAME", "#BASE") != "#BASE" or not {"TOOL_NO", "BASE_NO"} <= set(parts):
+            raise PathError(
+                f"line {number}: {match[1]} of the .dat file must have TOOL_NO, BASE_NO and"
+                " IPO_FRAME #BASE"
+            )
+        yield (
+            match[1].upper(),
+            {
+                "BASE": f"BASE_DATA[{parts['BASE_NO']}]",
+                "TOOL": f"TOOL_DATA[{parts['TOOL_NO']}]",
+            },
+        )

@@ -1,0 +1,164 @@
+"""Spring layouts: which springs a robot is given, by name or as a YAML file lists them.
+
+A new named layout is a function ``(robot) -> springs`` here, an entry in `LAYOUTS`, a line in the
+changelog and an entry in ``tests/contracts/test_layouts.py``. A spring file::
+
+    schema: elastocal.springs/1
+    include: actuated            # optional: start from a named layout
+    springs:
+      - {joint: joint_a2, axis: x}                          # torsion, bearing housing
+      - {joint: joint_a3, axis: [0, 1, 1], frame: distal}   # any axis, behind the joint
+      - {joint: joint_a6, axis: z, kind: prismatic, offset: ["0 mm", "0 mm", "150 mm"]}
+"""
+
+from collections.abc import Callable, Iterable
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import BeforeValidator, Field
+
+from elastocal.elastic.directions import AXES, as_axis, orthogonal_axes
+from elastocal.elastic.springs import KINDS, Hinge, Spring, SpringAxis, axial
+from elastocal.errors import SpringError, nearest
+from elastocal.records import StrictModel, read_yaml
+from elastocal.robot import ChainJoint, Robot
+from elastocal.units import parse_quantity
+
+_SCHEMA = "elastocal.springs/1"
+_HINGE = "hinge"
+_MOTIONS = ("revolute", "prismatic")
+"""What a hinge may do; other kinds of springs are asked for by their word."""
+
+
+def actuated(robot: Robot) -> tuple[Spring, ...]:
+    """Return one axial spring per joint (6 on a 6R arm; the model of paper section 4.2.4)."""
+    return tuple(axial(joint) for joint in robot.chain.joints)
+
+
+def bearing(robot: Robot, distal: bool = False) -> tuple[Spring, ...]:
+    """Return the paper's lumped kinetostatic model (section 4.1; 18 springs on a 6R arm).
+
+    Order: all axial springs, then the virtual ones joint by joint, the paper's
+    ``[c_a; c_v]`` of Eq. 11.
+
+    Parameters
+    ----------
+    robot : Robot
+        The robot.
+    distal : bool
+        Put the virtual springs behind each joint's motion instead of in the bearing housing.
+    """
+    virtual = (
+        Hinge(f"{joint.name}.{name}", joint.name, axis, distal=distal)
+        for joint in robot.chain.joints
+        for name, axis in orthogonal_axes(joint.axis).items()
+    )
+    return (*actuated(robot), *virtual)
+
+
+LAYOUTS: dict[str, Callable[[Robot], tuple[Spring, ...]]] = {
+    "actuated": actuated,
+    "bearing": bearing,
+}
+"""Layouts by name."""
+
+
+def layout(robot: Robot, name: str) -> tuple[Spring, ...]:
+    """Return the springs of a layout by name, or of a YAML file by its path.
+
+    Raises
+    ------
+    SpringError
+        If the name is neither a layout nor a file.
+    """
+    if name in LAYOUTS:
+        return LAYOUTS[name](robot)
+    path = Path(name)
+    if path.suffix not in (".yaml", ".yml"):
+        raise SpringError(
+            f"unknown spring layout {name!r}{nearest(name, LAYOUTS)}"
+            f" (allowed: {', '.join(LAYOUTS)}, or a .yaml file)"
+        )
+    file = read_springs(path)
+    included = LAYOUTS[file.include](robot) if file.include else ()
+    return (*included, *custom(robot, file.springs))
+
+
+def _words(known: Callable[[], Iterable[str]]) -> BeforeValidator:
+    """Return the check that a text is one of the known words."""
+
+    def check(text: Any) -> Any:
+        *others, last = [repr(word) for word in known()]
+        if text not in known():
+            raise ValueError(f"Input should be {', '.join(others)} or {last}")
+        return text
+
+    return BeforeValidator(check)
+
+
+Length = Annotated[float, BeforeValidator(lambda text: parse_quantity(text, "length"))]
+LayoutName = Annotated[str, _words(lambda: tuple(LAYOUTS))]
+Kind = Annotated[str, _words(lambda: (*_MOTIONS, *(word for word in KINDS if word != _HINGE)))]
+
+
+class SpringEntry(StrictModel):
+    """One spring as a person writes it."""
+
+    joint: str
+    axis: Literal["axial", "x", "y", "z"] | tuple[float, float, float] = "axial"
+    kind: Kind | None = None
+    """Default: a torsional hinge; one of the joint's own motion for ``axial``."""
+    frame: Literal["proximal", "distal"] = "proximal"
+    offset: tuple[Length, Length, Length] = (0.0, 0.0, 0.0)
+    name: str | None = None
+
+
+class SpringFile(StrictModel):
+    """A spring file."""
+
+    include: LayoutName | None = None
+    springs: tuple[SpringEntry, ...] = Field(default=())
+
+
+def read_springs(path: Path) -> SpringFile:
+    """Return a validated spring file.
+
+    Raises
+    ------
+    SchemaError, FileAccessError
+        If the file cannot be read or does not fit.
+    """
+    return read_yaml(path, SpringFile, _SCHEMA)
+
+
+def custom(robot: Robot, entries: tuple[SpringEntry, ...]) -> tuple[Spring, ...]:
+    """Return the springs that a file lists for a robot, in its order."""
+    joints = {joint.name: joint for joint in robot.chain.joints}
+    return tuple(_spring(entry, joints) for entry in entries)
+
+
+def _spring(entry: SpringEntry, joints: dict[str, ChainJoint]) -> Spring:
+    if entry.joint not in joints:
+        raise SpringError(f"spring at joint {entry.joint!r}: the robot has {', '.join(joints)}")
+    joint = joints[entry.joint]
+    usual = joint.revolute if entry.axis == "axial" else True
+    revolute = entry.kind == "revolute" if entry.kind in _MOTIONS else usual
+    axis, distal = _axis(entry, joint), entry.frame == "distal"
+    # A name tells what distinguishes a spring, e.g. x, distal-x, linear-z.
+    parts = [] if entry.kind in (None, *_MOTIONS) else [str(entry.kind)]
+    parts += [] if revolute == usual else ["torsion" if revolute else "linear"]
+    parts += ["distal"] if distal else []
+    parts += [entry.axis if isinstance(entry.axis, str) else _direction(axis)]
+    name = entry.name or f"{joint.name}.{'-'.join(parts)}"
+    kind = KINDS.get(entry.kind or _HINGE, Hinge)
+    return kind.at(SpringAxis(name, joint.name, axis, revolute, distal, entry.offset))
+
+
+def _axis(entry: SpringEntry, joint: ChainJoint) -> tuple[float, float, float]:
+    if entry.axis == "axial":
+        return axial(joint).axis
+    return AXES[entry.axis] if isinstance(entry.axis, str) else as_axis(entry.axis)
+
+
+def _direction(axis: tuple[float, float, float]) -> str:
+    return "(" + " ".join(f"{component:.3g}" for component in axis) + ")"

@@ -1,0 +1,95 @@
+"""Formulas of named inputs, so that one law of a spring serves arrays, Python and C.
+
+A kind writes its law with ``+ - * /`` and the functions of this module. Given arrays it computes;
+given an `Input` it makes an `Expression`, from which `elastocal.compensation.kernel` takes the
+statements of the online step and of the exported C.
+"""
+
+from dataclasses import dataclass
+from typing import TypeVar, overload
+
+import numpy as np
+
+from elastocal.arrays import FloatArray
+
+
+@dataclass(frozen=True)
+class Expression:
+    """A formula; see the subclasses."""
+
+    def __add__(self, other: "Expression | float") -> "Expression":
+        return Sum((self, _as_expression(other)))
+
+    def __radd__(self, other: float) -> "Expression":
+        return Sum((Number(other), self))
+
+    def __sub__(self, other: "Expression | float") -> "Expression":
+        return Sum((self, -_as_expression(other)))
+
+    def __rsub__(self, other: float) -> "Expression":
+        return Sum((Number(other), -self))
+
+    def __mul__(self, other: "Expression | float") -> "Expression":
+        return Product((self, _as_expression(other)))
+
+    def __rmul__(self, other: float) -> "Expression":
+        return Product((Number(other), self))
+
+    def __truediv__(self, other: float) -> "Expression":
+        return Product((self, Number(1.0 / other)))
+
+    def __neg__(self) -> "Expression":
+        return Product((Number(-1.0), self))
+
+
+@dataclass(frozen=True)
+class Input(Expression):
+    """A named input."""
+
+    name: str
+
+
+@dataclass(frozen=True)
+class Number(Expression):
+    """A constant."""
+
+    value: float
+
+
+@dataclass(frozen=True)
+class Sum(Expression):
+    """A sum, left to right."""
+
+    terms: tuple[Expression, ...]
+
+
+@dataclass(frozen=True)
+class Product(Expression):
+    """A product, left to right."""
+
+    factors: tuple[Expression, ...]
+
+
+@dataclass(frozen=True)
+class Function(Expression):
+    """A function of one argument, by the name that it has in C and in Python's `math`."""
+
+    name: str
+    argument: Expression
+
+
+Quantity = TypeVar("Quantity", FloatArray, Expression)
+"""What a law works on: numbers, or the names of numbers to come."""
+
+
+@overload
+def atan(x: FloatArray) -> FloatArray: ...
+@overload
+def atan(x: Expression) -> Expression: ...
+def atan(x: FloatArray | Expression) -> FloatArray | Expression:
+    """Return the arc tangent, in rad."""
+    return Function("atan", x) if isinstance(x, Expression) else np.arctan(x)
+
+
+def _as_expression(x: Expression | float) -> Expression:
+    return x if isinstance(x, Expression) else Number(float(x))

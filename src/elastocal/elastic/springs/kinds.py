@@ -1,0 +1,63 @@
+"""Every kind of spring by the word that files have for it."""
+
+from collections.abc import Mapping, Sequence
+from functools import reduce
+from operator import or_
+from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
+
+from pydantic import Discriminator, Tag
+
+from elastocal.elastic.springs.hinge import Hinge
+from elastocal.elastic.springs.spring import Spring, Unit
+from elastocal.errors import SpringError
+
+_USUAL = "hinge"
+"""The kind of a spring whose kind a file does not name."""
+
+KINDS: dict[str, type[Spring]] = {_USUAL: Hinge}
+"""Kinds of springs by the word that files have for them."""
+
+
+def _tag(spring: Any) -> str:
+    """Return the tag of the class that a spring in a file is read as."""
+    return f"<{spring.get('kind', _USUAL) if isinstance(spring, Mapping) else _USUAL}>"
+
+
+if TYPE_CHECKING:
+    AnySpring: TypeAlias = Spring
+else:
+    AnySpring = Annotated[
+        reduce(or_, (Annotated[kind, Tag(f"<{word}>")] for word, kind in KINDS.items())),
+        Discriminator(
+            _tag,
+            custom_error_type="kind",
+            custom_error_message=f"unknown kind of spring (allowed: {', '.join(KINDS)})",
+        ),
+    ]
+    """A spring of any kind, as a field of a file's record."""
+
+
+def unit_of(si: str) -> Unit:
+    """Return the unit that files state so; one that no kind has is shown as it is."""
+    known = (unit for kind in KINDS.values() for unit in kind.units if unit.si == si)
+    return next(known, Unit(si, si))
+
+
+def check_springs(springs: Sequence[Spring], joint_names: Sequence[str]) -> None:
+    """Refuse a list of springs that does not fit a robot.
+
+    Raises
+    ------
+    SpringError
+        If the list is empty, a name occurs twice, a joint is not the robot's, or an axis is no
+        unit vector.
+    """
+    if not springs:
+        raise SpringError("a model needs at least one spring")
+    names = [spring.name for spring in springs]
+    twice = sorted({name for name in names if names.count(name) > 1})
+    if twice:
+        raise SpringError(f"spring {twice[0]!r} is listed twice")
+    for spring in springs:
+        for axis in spring.axes:
+            axis.check(joint_names)

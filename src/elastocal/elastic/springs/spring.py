@@ -1,0 +1,219 @@
+"""What a spring is: its place in the chain, its parameters, its law and the law's tangent."""
+
+from abc import ABC, abstractmethod
+from collections.abc import Hashable, Sequence
+from dataclasses import dataclass, fields
+from typing import ClassVar, Generic
+
+import numpy as np
+
+from elastocal.arrays import FloatArray
+from elastocal.elastic.springs.expression import Quantity
+from elastocal.errors import SpringError, nearest
+from elastocal.records import record
+from elastocal.robot import ChainJoint
+
+_UNIT_LENGTH = 1e-9
+"""Largest error of the length of a unit vector."""
+
+
+@dataclass(frozen=True)
+class Unit:
+    """The unit of a parameter: in files, and as people read it."""
+
+    si: str
+    """As files state it, e.g. ``rad/(N*m)``."""
+    shown: str
+    """As tables and figures show it, e.g. ``µrad/(N·m)``."""
+    factor: float = 1.0
+    """From SI to what is shown."""
+    stiffness: str = ""
+    """Unit of one over a shown value, e.g. ``MN·m/rad``; empty where that is no stiffness."""
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One coefficient of a spring; the deflection is linear in it."""
+
+    name: str
+    """Unique in a model: the spring's name where the spring has one parameter."""
+    joint: str
+    """Name of the joint that the spring sits at."""
+    unit: Unit
+    scale: float
+    """A sensible size, in SI: what makes parameters of different units comparable."""
+    lower: float = 0.0
+    """Smallest value that makes sense, in SI."""
+
+
+@dataclass(frozen=True)
+class SpringAxis:
+    """A virtual joint that a spring inserts into the chain."""
+
+    name: str
+    joint: str
+    """Name of the joint in whose frame it sits."""
+    axis: tuple[float, float, float]
+    """Unit vector in the joint frame."""
+    revolute: bool = True
+    """True: it turns about the axis. False: it slides along it."""
+    distal: bool = False
+    """False: in the joint's proximal frame, before its motion. True: behind its motion."""
+    offset: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    """Point of that frame that the axis passes through, in m."""
+
+    def is_axis_of(self, joint: ChainJoint) -> bool:
+        """Return whether this is the joint's own motion."""
+        return (
+            self.revolute == joint.revolute
+            and self.offset == (0.0, 0.0, 0.0)
+            and bool(np.array_equal(np.asarray(self.axis), joint.axis))
+        )
+
+    def check(self, joint_names: Sequence[str]) -> None:
+        """Refuse an axis that does not fit a robot.
+
+        Raises
+        ------
+        SpringError
+            If the joint is not the robot's, or a vector is none.
+        """
+        if self.joint not in joint_names:
+            raise SpringError(
+                f"spring {self.name!r} sits at joint {self.joint!r}, which the robot does not"
+                f" have{nearest(self.joint, joint_names)} (joints: {', '.join(joint_names)})"
+            )
+        if not abs(float(np.linalg.norm(self.axis)) - 1.0) < _UNIT_LENGTH:
+            raise SpringError(f"axis of spring {self.name!r} is {self.axis}, not a unit vector")
+        if not np.all(np.isfinite(self.offset)):
+            raise SpringError(f"offset of spring {self.name!r} is {self.offset}, not finite")
+
+
+@dataclass(frozen=True)
+class SpringLoad(Generic[Quantity]):
+    """The load on a spring; everything that a law may depend on stands here."""
+
+    torque: tuple[Quantity, ...]
+    """Torque about each axis of the spring, in N·m; force along it, in N, where it slides."""
+
+
+Angles = tuple[tuple[Quantity, ...], ...]
+"""By axis, by parameter."""
+Tangents = tuple[tuple[tuple[FloatArray | float, ...], ...], ...]
+"""By axis, by torque, by parameter."""
+
+
+@record()
+class Spring(ABC):
+    """A place where a robot is soft.
+
+    A spring inserts virtual joints, its `axes`, into the chain. Under a load they move by
+
+        theta_a = sum over parameters p of angle_ap(load) c_p,
+
+    which is linear in the parameters ``c`` but need not be in the load. With the Jacobian ``J_a``
+    of the observed point for each axis, the deflection is ``sum_a J_a theta_a``, so the columns of
+    the observation matrix (paper Eq. 11, 14) are ``sum_a J_a angle_ap``.
+    """
+
+    name: str
+    """Unique name, ``<joint>.<axis>``, e.g. ``joint_a2.axial`` or ``joint_a2.x``."""
+    joint: str
+    """Name of the joint in whose frame the spring sits."""
+
+    units: ClassVar[tuple[Unit, ...]]
+    """Every unit that parameters of this kind may have."""
+    places: ClassVar[frozenset[str]] = frozenset({"name", "joint", "axis", "distal", "offset"})
+    """Fields that say where a spring is; the law may not depend on them."""
+
+    @classmethod
+    @abstractmethod
+    def at(cls, axis: SpringAxis) -> "Spring":
+        """Return the spring that a spring file asks for at a place."""
+
+    @property
+    @abstractmethod
+    def kind(self) -> str:
+        """What files call the spring; a field of every kind but the hinge, which is understood."""
+
+    @property
+    @abstractmethod
+    def axes(self) -> tuple[SpringAxis, ...]:
+        """The virtual joints that the spring inserts."""
+
+    @property
+    @abstractmethod
+    def parameters(self) -> tuple[Parameter, ...]:
+        """The coefficients, in the order of every compliance vector."""
+
+    @abstractmethod
+    def angles(self, load: SpringLoad[Quantity]) -> Angles[Quantity]:
+        """Return the law: the angle of each axis for one unit of each parameter.
+
+        Written with ``+ - * /`` and the functions of `elastocal.elastic.springs.expression`, so
+        that it takes arrays (of any shape, element by element) as well as names.
+        """
+
+    @abstractmethod
+    def tangents(self, load: SpringLoad[FloatArray]) -> Tangents:
+        """Return the derivative of the law by the load torques.
+
+        Symmetric in axis and torque, since a spring stores energy.
+        """
+
+    def columns(
+        self, J: Sequence[FloatArray], load: SpringLoad[FloatArray]
+    ) -> tuple[FloatArray, ...]:
+        """Return the columns of the observation matrix, one for each parameter.
+
+        Parameters
+        ----------
+        J : sequence of ndarray, shape (..., 3, spring)
+            For each axis, its column of the Jacobian of the observed point. The last axis is for
+            springs that share this law: they are evaluated together.
+        load : SpringLoad
+            Each array of shape (..., spring).
+
+        Returns
+        -------
+        tuple of ndarray, shape (..., 3, spring)
+            In m per unit of the parameter.
+        """
+        angles = self.angles(load)
+        first, *others = zip(J, angles, strict=True)
+        columns = [first[0] * angle[..., None, :] for angle in first[1]]
+        for J_axis, row in others:
+            columns = [c + J_axis * x[..., None, :] for c, x in zip(columns, row, strict=True)]
+        return tuple(columns)
+
+    @property
+    def law(self) -> Hashable:
+        """What springs have in common that can be evaluated together: all but their place."""
+        settings = (getattr(self, f.name) for f in fields(self) if f.name not in self.places)
+        return (type(self), *settings)
+
+
+@record()
+class OneAxisSpring(Spring):
+    """A spring about one axis, or along it; its subclasses differ in parameters and law."""
+
+    axis: tuple[float, float, float]
+    """Unit vector in the joint frame."""
+    revolute: bool = True
+    """True for a torsional spring, False for a linear one."""
+    distal: bool = False
+    """False: in the joint's proximal frame, before its motion (the bearing housing; Angeles'
+    Hartenberg-Denavit convention, used by the paper). True: behind its motion."""
+    offset: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    """Point of that frame that the axis passes through, in m."""
+
+    @classmethod
+    def at(cls, axis: SpringAxis) -> "OneAxisSpring":
+        """Return the spring at an axis."""
+        return cls(axis.name, axis.joint, axis.axis, axis.revolute, axis.distal, axis.offset)
+
+    @property
+    def axes(self) -> tuple[SpringAxis, ...]:
+        """The axis of the spring."""
+        place = (self.axis, self.revolute, self.distal, self.offset)
+        return (SpringAxis(self.name, self.joint, *place),)

@@ -1,0 +1,331 @@
+"""Plan file ``plan.json``: the poses in visiting order, the way between them, and why these.
+
+A plan belongs to one cell: it carries the cell's fingerprint and its robot whole. All numbers are
+SI; joint positions are in rad (m for prismatic joints) in the order of ``robot.joints``.
+"""
+
+import json
+from collections.abc import Iterator
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from elastocal.arrays import FloatArray
+from elastocal.errors import SchemaError
+from elastocal.files import sha256, write_json
+from elastocal.records import StrictModel, read_json
+
+SCHEMA = "elastocal.plan/1"
+PLAN = "plan.json"
+"""Name of the plan in its folder."""
+POOL = "pool.nc"
+"""Name of the pool beside it."""
+
+Vector = tuple[float, float, float]
+Joints = tuple[float, ...]
+
+
+class CellRecord(StrictModel):
+    """Which cell a plan was made for."""
+
+    name: str
+    file: str
+    """Path of the cell file as it was given."""
+    fingerprint: str
+    """See `elastocal.cell.fingerprint`: changes with every number of the cell and every file it
+    names, not with comments."""
+
+
+class RobotRecord(StrictModel):
+    """The robot with rail and tool."""
+
+    name: str
+    urdf: str
+    base: str
+    tcp: str
+    joints: tuple[str, ...]
+    home: Joints
+
+
+class ContactRecord(StrictModel):
+    """How the tool comes to the surface and what it presses with."""
+
+    approach_distance: float
+    near_contact: float
+    axis_override: float
+    """Part of the axes' largest speeds that the times of moves are estimated for."""
+    contact_speed: float
+    """Speed of the straight motion between approach pose and contact that the times in contact
+    are estimated for, in m/s."""
+    load_cases: dict[str, Vector]
+    """Force on the robot in the tcp frame, in N, in the order in which they are applied."""
+
+
+class PoseRecord(StrictModel):
+    """One calibration pose."""
+
+    id: int
+    """Number in visiting order, from 0: the ``pose`` of the dataset."""
+    candidate: int
+    """Number in the pool."""
+    joints: Joints
+    """In contact."""
+    approach_joints: Joints
+    """Off the surface by the approach distance, along the normal."""
+    tcp_position: Vector
+    """Contact point in base, in m."""
+    tcp_quaternion: tuple[float, float, float, float]
+    """Orientation of the tcp frame in base, x, y, z, w; its z axis points into the surface."""
+    normal: Vector
+    """Outward unit normal of the surface in base."""
+    seen_by: str | None
+    """Tracker station that sees the marker best; None in a cell without trackers."""
+    contact_time: float
+    """Estimated seconds from the approach pose through all load cases and back to it."""
+    margins: dict[str, float]
+    """How far each check is from refusing, in the unit of the check; positive is fine. A check
+    that cannot refuse (the edge of a surface that has none) is left out."""
+
+    @property
+    def T_base_tcp(self) -> FloatArray:
+        """Contact frame in base, shape (4, 4), in m."""
+        T = np.eye(4)
+        T[:3, :3] = Rotation.from_quat(self.tcp_quaternion).as_matrix()
+        T[:3, 3] = self.tcp_position
+        return T
+
+
+class MoveRecord(StrictModel):
+    """One joint-space move between HOME and approach poses."""
+
+    start: int | None
+    """Pose it leaves; None: HOME."""
+    end: int | None
+    """Pose it leads to; None: HOME."""
+    via: tuple[Joints, ...]
+    """Joint positions in between; each leg is straight in joint space."""
+    duration: float
+    """Estimated, in s."""
+
+
+class SpreadRecord(StrictModel):
+    """How the chosen poses lie in their pool: the numbers behind the paper's Fig. 3."""
+
+    covering_radius: float
+    """Distance of the worst-covered candidate from its nearest chosen pose, in m."""
+    boundary_distance: float | None
+    """Mean distance of the chosen points from the edge of the surface, in m; None without edge."""
+    nearest_neighbour: float | None
+    """Mean distance of a chosen point from the nearest other one, in m; None for one pose."""
+    o1: float
+    """Observability index O1 over the springs' observable directions (paper Eq. 20)."""
+
+
+class SearchRecord(StrictModel):
+    """How the poses were chosen."""
+
+    name: str
+    metric: str
+    seed: int
+    wanted: int | None
+    """Largest number of poses asked for; None: as many as d_max needs."""
+    d_max: float | None
+    """Cover distance asked for, in m."""
+    covering_radius: float
+    """Reached, in m."""
+    lower_bound: float | None
+    """No choice of as many candidates has a smaller covering radius, in m (COVER only)."""
+    covered: bool | None
+    """Whether d_max was reached; None when none was asked for."""
+    order: tuple[int, ...]
+    """Ids of the poses in the order in which they were chosen: any beginning of it is a sensible
+    smaller plan."""
+    spread: SpreadRecord
+    process_unseen: float | None = None
+    """Part of the process rows (by norm, scaled) that no candidate can show, whatever is chosen;
+    None in a cell without process."""
+
+
+class ComparisonRecord(StrictModel):
+    """What another technique would have chosen from the same pool, as many poses."""
+
+    name: str
+    candidates: tuple[int, ...]
+    """Numbers in the pool, in search order."""
+    spread: SpreadRecord
+
+
+class CheckRecord(StrictModel):
+    """One check, and how many of the sampled points it left without a posture."""
+
+    name: str
+    unit: str | None
+    """Unit of its margin; None for the reach of the robot, which has none."""
+    refused: int
+    advice: str
+
+
+class PoolRecord(StrictModel):
+    """The candidates that the search chose from."""
+
+    file: str
+    sampled: int
+    valid: int
+    checks: tuple[CheckRecord, ...]
+    bottleneck: str | None
+    """The check that refused most points."""
+
+
+class PlanResult(StrictModel):
+    """A plan without its schema key."""
+
+    elastocal: str
+    """Version that made it."""
+    cell: CellRecord
+    robot: RobotRecord
+    contact: ContactRecord
+    poses: tuple[PoseRecord, ...]
+    """In visiting order."""
+    moves: tuple[MoveRecord, ...]
+    """From HOME through all poses and back, one more than there are poses."""
+    search: SearchRecord
+    comparison: ComparisonRecord | None
+    pool: PoolRecord
+    findings: tuple[str, ...]
+    """What a user should know, a line each."""
+
+    @property
+    def travel_time(self) -> float:
+        """Estimated seconds on the way between poses."""
+        return sum(move.duration for move in self.moves)
+
+    @property
+    def total_time(self) -> float:
+        """Estimated seconds from HOME to HOME, all load cases included."""
+        return self.travel_time + sum(pose.contact_time for pose in self.poses)
+
+
+class _WrittenPlan(PlanResult):
+    """A plan as it stands in its file."""
+
+    sha256: str
+    """See `content_hash`."""
+
+
+def content_hash(plan: PlanResult) -> str:
+    """Return a SHA-256 over everything that a plan says, by which a change by hand is found.
+
+    It is taken over the numbers as they are read: line breaks and the way a number is written do
+    not count, the order of load cases does.
+    """
+    keys = set(PlanResult.model_fields)
+    data = {"schema": SCHEMA, **plan.model_dump(mode="json", include=keys)}
+    return sha256(json.dumps(data, separators=(",", ":"), allow_nan=False))
+
+
+def write_plan(folder: Path, plan: PlanResult) -> Path:
+    """Write ``plan.json`` into a folder, atomically; return its path.
+
+    Raises
+    ------
+    SchemaError
+        If the plan contradicts itself; see `check_plan`.
+    FileAccessError
+        If it cannot be written.
+    """
+    path = Path(folder) / PLAN
+    check_plan(plan, str(path))
+    data = {"schema": SCHEMA, "sha256": content_hash(plan), **plan.model_dump(mode="json")}
+    write_json(path, data)
+    return path
+
+
+def read_plan(folder: Path) -> PlanResult:
+    """Return the plan of a folder (or of the ``plan.json`` itself).
+
+    Raises
+    ------
+    SchemaError
+        If it has another schema, does not fit it, contradicts itself, or was changed since it was
+        written: its parts were checked together.
+    FileAccessError
+        If it cannot be read.
+    """
+    path = Path(folder)
+    path = path / PLAN if path.is_dir() else path
+    written = read_json(path, _WrittenPlan, SCHEMA)
+    plan = PlanResult(**{key: getattr(written, key) for key in PlanResult.model_fields})
+    check_plan(plan, str(path))
+    if written.sha256 != content_hash(plan):
+        raise SchemaError(f"{path} was changed by hand: make it anew with `elastocal plan`")
+    return plan
+
+
+def check_plan(plan: PlanResult, what: str = "plan") -> None:
+    """Refuse a plan whose parts contradict each other.
+
+    Parameters
+    ----------
+    plan : PlanResult
+        The plan.
+    what : str
+        How the message names it.
+
+    Raises
+    ------
+    SchemaError
+        With the first contradiction, in one line.
+    """
+    for problem in (*_pose_problems(plan), *_move_problems(plan), *_number_problems(plan)):
+        raise SchemaError(f"{what}: {problem}")
+
+
+def _pose_problems(plan: PlanResult) -> Iterator[str]:
+    if not plan.poses:
+        yield "poses: there is none"
+    names = {check.name for check in plan.pool.checks}
+    for number, pose in enumerate(plan.poses):
+        if pose.id != number:
+            yield f"poses.{number}.id: must be {number}, its place in visiting order, got {pose.id}"
+        if not 0 <= pose.candidate < plan.pool.valid:
+            yield f"poses.{number}.candidate: {pose.candidate} is not one of {plan.pool.valid}"
+        for key in pose.margins:
+            if key not in names:
+                yield f"poses.{number}.margins: {key!r} is no check (known: {', '.join(names)})"
+    if len({pose.candidate for pose in plan.poses}) < len(plan.poses):
+        yield "poses: a candidate stands twice"
+
+
+def _move_problems(plan: PlanResult) -> Iterator[str]:
+    stops = (None, *(pose.id for pose in plan.poses), None)
+    ends = [(move.start, move.end) for move in plan.moves]
+    if len(ends) != len(stops) - 1:
+        yield f"moves: {len(plan.poses)} poses need {len(stops) - 1} moves, got {len(ends)}"
+    for number, (found, wanted) in enumerate(zip(ends, pairwise(stops), strict=False)):
+        if found != wanted:
+            yield f"moves.{number}: (start, end) must be {wanted} (None: HOME), got {found}"
+
+
+def _number_problems(plan: PlanResult) -> Iterator[str]:
+    """Yield lists that do not have as many numbers as there are joints or poses."""
+    count = len(plan.robot.joints)
+    for key, joints in _joint_lists(plan):
+        if len(joints) != count:
+            yield f"{key}: needs a position of each of {count} joints, got {len(joints)}"
+    if sorted(plan.search.order) != list(range(len(plan.poses))):
+        yield f"search.order: must hold each pose id once, got {list(plan.search.order)}"
+    for number in plan.comparison.candidates if plan.comparison else ():
+        if not 0 <= number < plan.pool.valid:
+            yield f"comparison.candidates: must be among {plan.pool.valid}, got {number}"
+
+
+def _joint_lists(plan: PlanResult) -> Iterator[tuple[str, Joints]]:
+    yield "robot.home", plan.robot.home
+    for number, pose in enumerate(plan.poses):
+        yield f"poses.{number}.joints", pose.joints
+        yield f"poses.{number}.approach_joints", pose.approach_joints
+    for number, move in enumerate(plan.moves):
+        for stop, joints in enumerate(move.via):
+            yield f"moves.{number}.via.{stop}", joints

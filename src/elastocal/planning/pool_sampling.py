@@ -1,0 +1,352 @@
+"""The pool of a cell: points are sampled until as many candidates are valid as were asked for.
+
+Points are tried in parts, on all cores. Which part a point is in does not depend on the number of
+cores, so neither do the candidates.
+"""
+
+import math
+import os
+import pickle
+import warnings
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from itertools import repeat
+
+import numpy as np
+from joblib import Parallel, delayed
+from numpy.random import Generator
+
+from elastocal.arrays import BoolArray, FloatArray, IndexArray
+from elastocal.cell import Cell
+from elastocal.errors import PlanningError
+from elastocal.planning.cell_setup import point_checks, robot_checks
+from elastocal.planning.checks import Checks, verdicts
+from elastocal.planning.pool import (
+    Approach,
+    BasePlacement,
+    Pool,
+    Progress,
+    join_pools,
+    make_pool,
+    options_at,
+)
+from elastocal.planning.surface import (
+    Surface,
+    SurfacePoints,
+    sample_blue_noise,
+    sample_uniform,
+)
+from elastocal.robot.inverse import InverseKinematics, inverse_for
+
+CANDIDATES = "candidates"
+"""Stage under which progress is reported."""
+_PART = 800
+"""Points that are tried at once: bounds memory, and is what progress counts in."""
+_PROBES = 32
+"""Points by which base placements are ranked."""
+_WORTH_HELP = 8000
+"""Candidates from which on other processes are started: it takes them seconds to get ready."""
+_HARDEST = 20
+"""Points that are tried for each candidate wanted, at most."""
+_ENOUGH = 1000
+"""Points without a single candidate after which no more are tried."""
+_SPARE = 1.03
+"""Points that are sampled for each that should turn out to be missing."""
+_WORTH = 0.02
+"""Share of the points that a further base placement must serve alone."""
+
+
+@dataclass(frozen=True, eq=False)
+class SampledPool:
+    """A pool with the points that it was made of."""
+
+    points: SurfacePoints
+    """Every point that was tried; ``pool.postures.point`` counts in them."""
+    pool: Pool
+    placements: tuple[BasePlacement, ...]
+    """Where the external axes carry the arm, the first choice first."""
+
+
+def sample_pool(
+    cell: Cell,
+    surface: Surface,
+    rng: Generator,
+    jobs: int | None = None,
+    progress: Progress = lambda *_: None,
+) -> SampledPool:
+    """Return as many valid candidates as the cell file asks for, or as there are.
+
+    Parameters
+    ----------
+    cell : Cell
+        The cell.
+    surface : Surface
+        What the robot presses on.
+    rng : Generator
+        Seeded source of randomness.
+    jobs : int, optional
+        Number of processes; all cores by default. Small pools are made by one. The result does
+        not depend on it.
+    progress : callable, optional
+        Told how many candidates are valid, and how many are wanted.
+
+    Raises
+    ------
+    PlanningError
+        If ``jobs`` is below 1.
+    SurfaceError
+        If the region holds no part of the surface.
+    """
+    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
+    jobs = (cores or 1) if jobs is None else jobs
+    if not jobs >= 1:
+        raise PlanningError(f"{jobs} jobs: must be at least 1")
+    wanted = cell.file.search.pool
+    tried: list[SurfacePoints] = []
+    pools: list[Pool] = []
+    progress(CANDIDATES, 0, wanted)
+    with _started(cell, surface, jobs if wanted >= _WORTH_HELP else 1) as workers:
+        builder = PoolBuilder.of(cell, surface)
+        placements = builder.rank(sample_uniform(surface, _PROBES, rng))
+        while (missing := wanted - _valid(pools)) > 0 and not _hopeless(pools, wanted):
+            tried.append(_sample(cell, surface, missing, pools, rng))
+            for pool in _made(builder, workers, placements, _parts(tried[-1])):
+                pools.append(pool)
+                progress(CANDIDATES, min(_valid(pools), wanted), wanted)
+    pool = join_pools(pools).first(wanted)
+    return SampledPool(SurfacePoints.joined(tried).take(np.arange(pool.sampled)), pool, placements)
+
+
+def _valid(pools: Sequence[Pool]) -> int:
+    return sum(len(pool.postures) for pool in pools)
+
+
+def _hopeless(pools: Sequence[Pool], wanted: int) -> bool:
+    """Return whether points have been tried, and more of them would not help."""
+    sampled = sum(pool.sampled for pool in pools)
+    return sampled >= _HARDEST * wanted or (_valid(pools) == 0 and sampled >= _ENOUGH)
+
+
+def _sample(
+    cell: Cell, surface: Surface, missing: int, pools: Sequence[Pool], rng: Generator
+) -> SurfacePoints:
+    """Return points of which about ``missing`` should become candidates, in no order."""
+    if pools:
+        share = max(_valid(pools) / sum(pool.sampled for pool in pools), 1.0 / _HARDEST)
+    else:
+        probe = sample_uniform(surface, 1000, rng)
+        edge = point_checks(cell, surface, probe)[0]
+        share = max(float(np.mean(edge.at_points > 0.0)), 1.0 / _HARDEST)
+    count = math.ceil(missing / share * _SPARE) + 4
+    if cell.file.search.sampling == "uniform":
+        return sample_uniform(surface, count, rng)
+    points = sample_blue_noise(surface, count, rng)
+    return points.take(rng.permutation(len(points)))
+
+
+def _parts(points: SurfacePoints) -> list[SurfacePoints]:
+    starts = range(0, len(points), _PART)
+    return [points.take(np.arange(at, min(at + _PART, len(points)))) for at in starts]
+
+
+@dataclass(frozen=True, eq=False)
+class PoolBuilder:
+    """Solver and checks of one cell; each process has its own."""
+
+    cell: Cell
+    surface: Surface
+    solver: InverseKinematics
+    checks: Checks
+    """Those of the robot; those of points are made with the points."""
+    approach: Approach
+
+    @staticmethod
+    def of(cell: Cell, surface: Surface) -> "PoolBuilder":
+        """Return the builder of a cell's pool."""
+        checks = robot_checks(cell, surface)
+        approach = Approach(cell.file.engagement.approach_distance)
+        return PoolBuilder(cell, surface, inverse_for(cell.robot), checks, approach)
+
+    def rank(self, probes: SurfacePoints) -> tuple[BasePlacement, ...]:
+        """Return where the external axes should carry the arm, judged by some tens of points."""
+        external = self.cell.external_positions
+        coarse = replace(self.approach, spins=self.approach.spins // 2)
+        return rank_base_placements(
+            self.solver, probes.position, probes.normal, coarse, self.checks, external
+        )
+
+    def pool(self, placements: tuple[BasePlacement, ...], points: SurfacePoints) -> Pool:
+        """Return the pool of some points."""
+        of_points = point_checks(self.cell, self.surface, points)
+        checks = Checks(of_points, self.checks.quick, self.checks.slow)
+        where = points.position, points.normal
+        return make_pool(self.solver, *where, self.approach, checks, placements)
+
+
+class _Workers:
+    """Processes that make pools; they unpack the cell once. See `_started`."""
+
+    def __init__(self, packed: bytes, parallel: Parallel, jobs: int) -> None:
+        self._packed = packed
+        self._parallel = parallel
+        # They import and unpack while the caller goes on: that takes a second of each.
+        self._preparing = parallel(delayed(_prepare)(packed) for _ in range(jobs))
+
+    def pools(
+        self, placements: tuple[BasePlacement, ...], parts: Sequence[SurfacePoints]
+    ) -> Iterator[Pool]:
+        """Yield the pool of each part of the points, in their order."""
+        for _ in self._preparing:
+            pass
+        yield from self._parallel(
+            delayed(_make_part)(packed, placements, part)
+            for packed, part in zip(repeat(self._packed), parts, strict=False)
+        )
+
+
+def _made(
+    builder: PoolBuilder,
+    workers: _Workers | None,
+    placements: tuple[BasePlacement, ...],
+    parts: Sequence[SurfacePoints],
+) -> Iterator[Pool]:
+    """Return the pools of the parts, in their order."""
+    if workers is None or len(parts) == 1:
+        return (builder.pool(placements, part) for part in parts)
+    return workers.pools(placements, parts)
+
+
+@contextmanager
+def _started(cell: Cell, surface: Surface, jobs: int) -> Iterator[_Workers | None]:
+    """Yield workers that prepare themselves already; None when there is but one job."""
+    if jobs == 1:
+        yield None
+        return
+    # Coal's shapes cannot be sent to a process: it makes its own from the cell.
+    with warnings.catch_warnings():
+        # Ctrl-C leaves tasks unfinished, which is what a user wants and need not be told.
+        warnings.filterwarnings("ignore", message=r"\s*\d+ tasks (have been|which were)")
+        with Parallel(n_jobs=jobs, return_as="generator") as parallel:
+            yield _Workers(pickle.dumps((cell, surface)), parallel, jobs)
+
+
+def _prepare(packed: bytes) -> None:
+    _builder(packed)
+
+
+def _make_part(packed: bytes, placements: tuple[BasePlacement, ...], points: SurfacePoints) -> Pool:
+    return _builder(packed).pool(placements, points)
+
+
+@lru_cache(maxsize=1)
+def _builder(packed: bytes) -> PoolBuilder:
+    return PoolBuilder.of(*pickle.loads(packed))
+
+
+@dataclass(frozen=True, eq=False)
+class _Survey:
+    """The use of one base placement for a few points."""
+
+    placement: BasePlacement
+    served: BoolArray
+    """Points with a posture, shape (point,); after the quick checks only, until asked."""
+    nearness: float
+    """Mean over the points of the most checks that a posture passes; tells placements that serve
+    no point apart, so that what refuses the points at the best of them is what a user hears."""
+    quality: float
+    """Mean over the points of the best posture's smallest margin, in units of its median."""
+    asked: bool = False
+    """Whether the slow checks have been asked."""
+
+    def rank(self, left: BoolArray) -> tuple[int, float, float]:
+        """Return what counts, most important first, for points that no better stand serves."""
+        return int(np.count_nonzero(self.served & left)), self.nearness, self.quality
+
+
+def rank_base_placements(
+    solver: InverseKinematics,
+    points: FloatArray,
+    normals: FloatArray,
+    approach: Approach,
+    checks: Checks,
+    external: FloatArray,
+) -> tuple[BasePlacement, ...]:
+    """Return as few positions of the external axes as serve the surface, the best first.
+
+    Greedy set cover over a few points: the placement that serves most points that no better one
+    serves, as long as that is 2 % of them; among equals the one with the larger margins. Each
+    comes with its branches of the inverse kinematics, ranked in the same way.
+
+    Parameters
+    ----------
+    solver : InverseKinematics
+        Of the robot with its tool.
+    points, normals : ndarray, shape (point, 3)
+        Some tens of contact points in base, in m, and outward unit normals.
+    approach : Approach
+        How the tool comes to the surface.
+    checks : Checks
+        What a posture has to pass; those of points are not asked.
+    external : ndarray, shape (combination, external axis)
+        Positions to choose from, in rad or m.
+
+    Returns
+    -------
+    tuple of BasePlacement
+        At least one, even when none serves any point.
+    """
+    of_robot = replace(checks, point=())
+    surveys = [
+        _survey(solver, points, normals, approach, of_robot, tuple(map(float, position)))
+        for position in external
+    ]
+    chosen: list[BasePlacement] = []
+    left = np.ones(len(points), dtype=bool)
+    while surveys:
+        best = max(surveys, key=lambda one: one.rank(left))
+        if chosen and np.count_nonzero(best.served & left) < max(1.0, _WORTH * len(points)):
+            break
+        surveys.remove(best)
+        if not best.asked:
+            pool = make_pool(solver, points, normals, approach, of_robot, (best.placement,))
+            surveys.append(replace(best, served=pool.refused_by < 0, asked=True))
+            continue
+        chosen.append(best.placement)
+        left &= ~best.served
+    return tuple(chosen)
+
+
+def _survey(
+    solver: InverseKinematics,
+    points: FloatArray,
+    normals: FloatArray,
+    approach: Approach,
+    checks: Checks,
+    external: tuple[float, ...],
+) -> _Survey:
+    options = options_at(solver, points, normals, approach, external)
+    found = verdicts(checks.quick, options.postures)
+    served = np.zeros((solver.branches, len(points)), dtype=bool)
+    served[options.branch[found.passed], options.point[found.passed]] = True
+    best, nearest = np.zeros(len(points)), np.full(len(points), -1.0)
+    np.maximum.at(nearest, options.point, (found.margin > 0.0).sum(axis=0))
+    np.maximum.at(best, options.point, np.where(found.passed, found.quality, 0.0))
+    placement = BasePlacement(external, tuple(_branch_order(served).tolist()))
+    serves = np.asarray(served.any(axis=0))
+    return _Survey(placement, serves, float(nearest.mean()), float(best.mean()))
+
+
+def _branch_order(served: BoolArray) -> IndexArray:
+    """Return the branches by greedy set cover of the points, shape (branch,)."""
+    order: list[int] = []
+    open_points = np.ones(served.shape[1], dtype=bool)
+    while len(order) < len(served):
+        gain = (served & open_points).sum(axis=1).astype(float)
+        gain[order] = -1.0
+        # Branches that add no point are ranked by how many they serve.
+        best = int(np.lexsort((np.arange(len(gain)), -served.sum(axis=1), -gain))[0])
+        order.append(best)
+        open_points &= ~served[best]
+    return np.array(order, dtype=np.intp)

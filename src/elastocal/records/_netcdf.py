@@ -1,0 +1,229 @@
+"""NetCDF4 files as labelled arrays, without xarray, whose import takes longer than a calibration.
+
+What is written here is what ``xarray.open_dataset`` and any other reader of NetCDF expects: the
+data model is theirs, the conventions are CF (https://cfconventions.org).
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from elastocal.errors import FileAccessError, SchemaError
+from elastocal.files import replacing
+from elastocal.records._validation import check_schema
+
+_SIGNATURE = b"\x89HDF\r\n\x1a\n"
+"""First bytes of an HDF5 file, which every NetCDF4 file is (HDF5 file format, section II.A)."""
+_PACKED = {"compression": "gzip", "compression_opts": 4, "shuffle": True}
+_STORAGE = ("_FillValue", "missing_value", "scale_factor", "add_offset", "_Encoding", "coordinates")
+"""Attributes that say how values are stored (CF section 2.5.1, 8.1), not what they mean."""
+
+
+@dataclass(frozen=True, eq=False)
+class LabelledArray:
+    """An array whose dimensions have names."""
+
+    dims: tuple[str, ...]
+    """Name of each dimension."""
+    values: np.ndarray
+    """Numbers or texts, a dimension for each name."""
+    attributes: Mapping[str, Any] = field(default_factory=dict)
+    """``units``, ``long_name`` and whatever else is said about the values."""
+    packed: bool = False
+    """Whether the file holds it compressed and without a fill value."""
+
+
+@dataclass(frozen=True, eq=False)
+class LabelledArrays:
+    """The contents of a NetCDF file: variables that share their dimensions, and attributes."""
+
+    variables: dict[str, LabelledArray]
+    """All variables by name; one that is named as its only dimension labels that dimension."""
+    attributes: dict[str, Any] = field(default_factory=dict)
+    """Attributes of the whole file."""
+    auxiliary: tuple[str, ...] = ()
+    """Variables that are coordinates although no dimension has their name (CF section 5)."""
+
+    @property
+    def coordinates(self) -> tuple[str, ...]:
+        """Names of the variables that label others."""
+        labels = [name for name, array in self.variables.items() if array.dims == (name,)]
+        return (*labels, *self.auxiliary)
+
+    @property
+    def sizes(self) -> dict[str, int]:
+        """Length of each dimension.
+
+        Raises
+        ------
+        ValueError
+            If an array has not as many dimensions as names, or another length than another array.
+        """
+        sizes: dict[str, int] = {}
+        for name, array in self.variables.items():
+            for dim, length in zip(array.dims, array.values.shape, strict=True):
+                if sizes.setdefault(dim, length) != length:
+                    raise ValueError(f"{name} has length {length} along {dim}, not {sizes[dim]}")
+        return sizes
+
+    def __contains__(self, name: str) -> bool:
+        """Return whether there is a variable of that name."""
+        return name in self.variables
+
+    def __getitem__(self, name: str) -> LabelledArray:
+        """Return a variable."""
+        return self.variables[name]
+
+
+def read_arrays(path: Path, schema: str = "") -> LabelledArrays:
+    """Return the contents of a NetCDF4 file.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    schema : str
+        What the file must state; nothing by default.
+
+    Raises
+    ------
+    SchemaError
+        If the file is not NetCDF4, is damaged, or states another schema.
+    FileAccessError
+        If the file is missing, unreadable or empty.
+    """
+    _check_signature(path)
+    import h5netcdf
+
+    try:
+        # HDF5 without dimension scales gets made-up ones; the validation then names what lacks.
+        with h5netcdf.File(path, "r", decode_vlen_strings=True, phony_dims="sort") as file:
+            found = _contents(file)
+    except (OSError, ValueError, KeyError, RuntimeError) as error:
+        # What the libraries raise for damaged files; their own text is the only diagnosis.
+        reason = " ".join(str(error).split())
+        raise SchemaError(f"{path}: not a readable NetCDF4 file: {reason}") from error
+    if schema:
+        check_schema(found.attributes.get("schema"), schema, str(path))
+    return found
+
+
+def write_arrays(path: Path, arrays: LabelledArrays) -> None:
+    """Write a NetCDF4 file, whole or not at all.
+
+    Numbers that are not packed have NaN as their fill value, as xarray gives them.
+
+    Raises
+    ------
+    FileAccessError
+        If the file cannot be written.
+    """
+    import h5netcdf
+
+    with replacing(path) as temporary, h5netcdf.File(temporary, "w") as file:
+        file.attrs.update(arrays.attributes)
+        file.dimensions = arrays.sizes
+        for name, array in arrays.variables.items():
+            _write(file, name, array)
+            labels = [each for each in arrays.auxiliary if _labels(arrays, each, name)]
+            if labels:
+                file.variables[name].attrs["coordinates"] = " ".join(labels)
+
+
+def _check_signature(path: Path) -> None:
+    try:
+        with Path(path).open("rb") as file:
+            start = file.read(len(_SIGNATURE))
+    except OSError as error:
+        raise FileAccessError(f"cannot read {path}: {error.strerror or error}") from error
+    if not start:
+        raise FileAccessError(f"cannot read {path}: the file is empty")
+    if start != _SIGNATURE:
+        raise SchemaError(f"{path}: not a NetCDF4 file: it does not begin with the HDF5 signature")
+
+
+def _contents(file: Any) -> LabelledArrays:
+    attributes = _attributes(file)
+    listed = str(attributes.pop("coordinates", "")).split()
+    variables = {}
+    for name, variable in file.variables.items():
+        stated = _attributes(variable)
+        listed += str(stated.get("coordinates", "")).split()
+        variables[name] = _decoded(variable, stated)
+    auxiliary = tuple(
+        name
+        for name in dict.fromkeys(listed)
+        if name in variables and variables[name].dims != (name,)
+    )
+    return LabelledArrays(variables, attributes, auxiliary)
+
+
+def _attributes(holder: Any) -> dict[str, Any]:
+    return {
+        name: value.decode("utf-8", "replace") if isinstance(value, bytes) else value
+        for name, value in holder.attrs.items()
+    }
+
+
+def _decoded(variable: Any, stated: dict[str, Any]) -> LabelledArray:
+    """Return the values that a variable means by what it stores (CF section 2.5.1, 8.1)."""
+    values, dims = np.asarray(variable[...]), tuple(variable.dimensions)
+    if values.dtype == "S1" and dims:
+        # Texts as rows of characters, from before NetCDF had texts.
+        values, dims = _joined_characters(values), dims[:-1]
+    if "_Encoding" in stated and values.dtype.kind == "S":
+        values = np.char.decode(values, str(stated["_Encoding"]))
+    if values.dtype.kind in "iuf":
+        values = _unpacked(values, stated)
+    notes = {name: value for name, value in stated.items() if name not in _STORAGE}
+    return LabelledArray(dims, values, notes)
+
+
+def _joined_characters(values: np.ndarray) -> np.ndarray:
+    length = values.shape[-1]
+    if not length:
+        return np.zeros(values.shape[:-1], dtype="S1")
+    return np.ascontiguousarray(values).view(f"S{length}")[..., 0]
+
+
+def _unpacked(values: np.ndarray, stated: dict[str, Any]) -> np.ndarray:
+    fills = [stated[name] for name in ("_FillValue", "missing_value") if name in stated]
+    absent = np.isin(values, np.concatenate([np.ravel(fill) for fill in fills])) if fills else None
+    if "scale_factor" in stated or "add_offset" in stated:
+        values = values * stated.get("scale_factor", 1.0) + stated.get("add_offset", 0.0)
+    if absent is not None and np.any(absent):
+        values = np.where(absent, np.nan, values)
+    return values
+
+
+def _write(file: Any, name: str, array: LabelledArray) -> None:
+    texts = array.values.dtype.kind in "UO"
+    fill = np.nan if array.values.dtype.kind == "f" and not array.packed else None
+    # HDF5 cannot cut nothing into chunks.
+    storage = _PACKED if array.packed and array.values.size else {}
+    variable = file.create_variable(
+        name,
+        array.dims,
+        _text_type() if texts else array.values.dtype,
+        fillvalue=fill,
+        **storage,
+    )
+    for key, value in array.attributes.items():
+        variable.attrs[key] = value
+    variable[...] = array.values.astype(object) if texts else array.values
+
+
+def _text_type() -> Any:
+    import h5py
+
+    return h5py.string_dtype()
+
+
+def _labels(arrays: LabelledArrays, label: str, name: str) -> bool:
+    """Return whether an auxiliary coordinate says something about a variable."""
+    if name in arrays.coordinates:
+        return False
+    return set(arrays[label].dims) <= set(arrays[name].dims)

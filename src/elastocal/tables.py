@@ -1,0 +1,275 @@
+"""CSV tables: the one place that reads and writes them.
+
+A table has a header line that names each column, with its unit where it has one (``force_x[N]``);
+comment and blank lines may stand above it. Rows are counted as lines of the file from 1, as editors
+and spreadsheets show them. Nothing here knows what a table is about: what a column must be called,
+how long a row must be, is for whoever reads it to refuse in the words of its file.
+"""
+
+import csv
+import math
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from itertools import chain, islice
+from pathlib import Path
+from typing import TextIO
+
+import numpy as np
+
+from elastocal.arrays import FloatArray
+from elastocal.errors import ElastocalError, FileAccessError
+from elastocal.files import replacing
+
+DELIMITERS = ",;\t"
+"""Delimiters that are recognised; the first is the one that is written."""
+
+
+class TableError(ElastocalError, ValueError):
+    """A table that cannot be read: quotes that do not match, a cell that is no number."""
+
+
+@dataclass(frozen=True)
+class Column:
+    """A column of numbers."""
+
+    index: int
+    """Where it stands in a row."""
+    name: str
+    unit: str
+    """The unit as the header states it; empty for a plain number."""
+    scale: float
+    """The SI value of one such unit."""
+
+    @property
+    def header(self) -> str:
+        """The column as the file names it."""
+        return f"{self.name}[{self.unit}]" if self.unit else self.name
+
+
+@dataclass(frozen=True)
+class TableLayout:
+    """How a table is written, so that it can be written back the same way."""
+
+    header: tuple[str, ...] = ()
+    """Name of each column; none where there is no header."""
+    preamble: tuple[str, ...] = ()
+    """Comment and blank lines above the header, with their line ends."""
+    delimiter: str = DELIMITERS[0]
+    line_end: str = "\n"
+
+
+@dataclass(frozen=True)
+class TableRows:
+    """Some consecutive rows of a table; those that are blank are left out."""
+
+    cells: list[list[str]]
+    """As they stand in the file."""
+    lines: list[int]
+    """Line of the file that each row ends on."""
+
+    def __len__(self) -> int:
+        """Return the number of rows."""
+        return len(self.cells)
+
+    def uneven(self, width: int) -> tuple[int, int] | None:
+        """Return line and number of cells of the first row that has not ``width``, if any."""
+        for line, row in zip(self.lines, self.cells, strict=True):
+            if len(row) != width:
+                return line, len(row)
+        return None
+
+    def numbers(self, column: Column, parse: Callable[[str], float] | None = None) -> FloatArray:
+        """Return the numbers of a column in SI units, shape (row,).
+
+        Parameters
+        ----------
+        column : Column
+            The column.
+        parse : callable, optional
+            Reads a cell that is not an ordinary number; its `ValueError` says what the cell is.
+            Finite numbers only by default.
+
+        Raises
+        ------
+        TableError
+            If a cell cannot be read; the message names row and column.
+        """
+        parse = finite_number if parse is None else parse
+        cells = [row[column.index] for row in self.cells]
+        try:
+            values = np.array([float(cell) for cell in cells])
+            ordinary = bool(np.isfinite(values).all()) and "_" not in "".join(cells)
+        except ValueError:
+            ordinary = False
+        if not ordinary:
+            # Rarely taken: some cell is blank or no number, and its row has to be found.
+            pairs = zip(self.lines, cells, strict=True)
+            values = np.array([_parsed(cell, line, column, parse) for line, cell in pairs])
+        # x * 1.0 is x, bit for bit: data in SI units pass unchanged.
+        scaled: FloatArray = values * column.scale
+        return scaled
+
+
+class TableReader:
+    """Reads a table from its lines, once.
+
+    Parameters
+    ----------
+    lines : iterable of str
+        Lines of a text with their line ends. The delimiter is the one that the header uses.
+
+    Raises
+    ------
+    TableError
+        If quotes in the header do not match.
+    """
+
+    layout: TableLayout
+
+    def __init__(self, lines: Iterable[str]) -> None:
+        remaining = iter(lines)
+        preamble: list[str] = []
+        first = ""
+        for line in remaining:
+            if line.strip() and not line.startswith("#"):
+                first = line
+                break
+            preamble.append(line)
+        self._above = len(preamble)
+        delimiter = max(DELIMITERS, key=first.count)
+        self._reader = csv.reader(chain([first], remaining), delimiter=delimiter, strict=True)
+        line_end = first[len(first.rstrip("\r\n")) :] or "\n"
+        header = tuple(next(self._cells(), (0, []))[1]) if first else ()
+        self.layout = TableLayout(header, tuple(preamble), delimiter, line_end)
+
+    def rows(self) -> TableRows:
+        """Return all rows that are left.
+
+        Raises
+        ------
+        TableError
+            If quotes do not match; the message names the row.
+        """
+        return self._taken(None)
+
+    def pieces(self, size: int) -> Iterator[TableRows]:
+        """Yield the rows up to ``size`` at a time, so that a table of any length fits into memory.
+
+        Raises
+        ------
+        TableError
+            If quotes do not match; the message names the row.
+        """
+        while piece := self._taken(size):
+            yield piece
+
+    def _taken(self, size: int | None) -> TableRows:
+        numbered = ((n, row) for n, row in self._cells() if any(map(str.strip, row)))
+        some = list(islice(numbered, size))
+        return TableRows([row for _, row in some], [number for number, _ in some])
+
+    def _cells(self) -> Iterator[tuple[int, list[str]]]:
+        try:
+            for row in self._reader:
+                yield self._above + self._reader.line_num, row
+        except csv.Error as error:
+            raise TableError(f"row {self._above + self._reader.line_num}: {error}") from error
+
+
+@contextmanager
+def opened_table(path: Path) -> Iterator[TableReader]:
+    """Yield the reader of a table file of any length.
+
+    Raises
+    ------
+    TableError
+        If quotes in the header do not match.
+    FileAccessError
+        If the file cannot be read, or is no text; also while rows are taken.
+    """
+    try:
+        with Path(path).open(encoding="utf-8-sig", newline="") as file:
+            yield TableReader(file)
+    except UnicodeDecodeError as error:
+        raise FileAccessError(f"cannot read {path}: not a UTF-8 text file") from error
+    except OSError as error:
+        if isinstance(error, FileAccessError):
+            raise
+        raise FileAccessError(f"cannot read {path}: {error.strerror or error}") from error
+
+
+def finite_number(cell: str) -> float:
+    """Return the finite number in a cell.
+
+    Raises
+    ------
+    ValueError
+        Saying what the cell is.
+    """
+    try:
+        value = float(cell)
+    except ValueError:
+        raise ValueError("is not a number") from None
+    if not math.isfinite(value):
+        raise ValueError("is not a finite number")
+    return value
+
+
+def write_table(
+    path: Path,
+    header: Sequence[str],
+    rows: Iterable[Sequence[object]],
+    preamble: Sequence[str] = (),
+) -> None:
+    """Write a table, whole or not at all; rows are taken one by one.
+
+    Floating-point numbers keep all their digits.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    header : sequence of str
+        Name of each column, with its unit.
+    rows : iterable of sequence
+        Cells: texts and numbers.
+    preamble : sequence of str
+        Lines above the header, with their line ends.
+
+    Raises
+    ------
+    FileAccessError
+        If the file cannot be written.
+    """
+    with new_table(path, TableLayout(tuple(header), tuple(preamble))) as write:
+        write(rows)
+
+
+@contextmanager
+def new_table(
+    path: Path, layout: TableLayout
+) -> Iterator[Callable[[Iterable[Sequence[object]]], None]]:
+    """Yield what appends rows to a table, which takes its place when the block ends without error.
+
+    Raises
+    ------
+    FileAccessError
+        If the file cannot be written.
+    """
+    with replacing(path) as temporary, temporary.open("w", encoding="utf-8", newline="") as file:
+        yield _append_to(file, layout)
+
+
+def _append_to(file: TextIO, layout: TableLayout) -> Callable[[Iterable[Sequence[object]]], None]:
+    file.writelines(layout.preamble)
+    writer = csv.writer(file, delimiter=layout.delimiter, lineterminator=layout.line_end)
+    writer.writerow(layout.header)
+    return writer.writerows
+
+
+def _parsed(cell: str, line: int, column: Column, parse: Callable[[str], float]) -> float:
+    try:
+        return parse(cell)
+    except ValueError as error:
+        raise TableError(f"row {line}, column {column.header!r}: {cell!r} {error}") from error

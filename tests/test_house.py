@@ -1,0 +1,55 @@
+"""What keeps the house in order; `make house` prints the same measures."""
+
+import importlib
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[1]
+sys.path.insert(0, str(ROOT / "tools"))
+
+import house  # noqa: E402 - it lives beside the sources, not among them
+
+
+@pytest.fixture(scope="module")
+def measured():
+    return house.measure(ROOT / "src")
+
+
+@pytest.fixture(scope="module")
+def faces(measured):
+    return house.find_faces(measured.modules)
+
+
+def test_a_face_holds_no_logic(measured):
+    for module in measured.modules.values():
+        if module.is_face:
+            assert house.defined_names(module) <= {"__getattr__", "__dir__", "__all__"}, module.name
+            assert module.path.with_suffix(".pyi").is_file() or len(module.code) == 0, module.name
+
+
+def test_what_a_face_exports_is_there(faces):
+    for package, names in faces.items():
+        face = importlib.import_module(package)
+        missing = [name for name in names if not hasattr(face, name)]
+        assert missing == [], package
+
+
+def test_no_module_hides_what_its_face_exports_under_the_same_name(measured, faces):
+    hidden = [
+        f"{package}.{name} (from {source})"
+        for package, names in faces.items()
+        for name, source in names.items()
+        if f"{package}.{name}" in measured.modules and source != f"{package}.{name}"
+    ]
+    assert hidden == []
+
+
+def test_no_function_is_longer_than_fifty_lines_of_code(measured):
+    every = [found for module in measured.modules.values() for found in house.functions(module)]
+    assert [name for name, length in every if length > house.LONG_FUNCTION] == []
+
+
+def test_no_file_is_longer_than_four_hundred_lines(measured):
+    assert [m.name for m in measured.modules.values() if m.lines > house.LONG] == []
