@@ -1,5 +1,6 @@
 """Compliances with intervals, and what the readings tell apart."""
 
+from collections import Counter
 from collections.abc import Iterator
 from functools import partial
 
@@ -36,7 +37,9 @@ def _blocks(found: ModelEvidence) -> Iterator[Block]:
     observable = sum(each.group is None for _, each in springs)
     yield _head(found, observable)
     yield from _comparison(found.figures)
-    units = dict.fromkeys(unit for unit, _ in springs)
+    counts = Counter(unit for unit, _ in springs)
+    # The unit of most springs comes first, so that a rail does not stand above the joints.
+    units = [unit for unit, _ in counts.most_common()]
     panels = [(unit.shown, [bar for own, bar in springs if own == unit]) for unit in units]
     yield picture(
         partial(spring_figure, panels),
