@@ -21,7 +21,7 @@ from elastocal.identification.recertification import Estimate
 from elastocal.identification.summary import CalibrationSummary
 
 _DRAWS = 1000
-"""Of whole poses, for the intervals of the errors."""
+"""Draws of whole poses, for the intervals of the errors."""
 _SAME = 1e-4
 """Relative difference below which two results are of one computation, be it on other machines."""
 

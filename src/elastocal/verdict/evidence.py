@@ -48,11 +48,11 @@ class AcceptanceLimits:
     """Limits that the figures are held against."""
 
     tolerance: float | None = None
-    """Of the error at unseen poses, in m."""
+    """Largest error at unseen poses, in m."""
     drift: float | None = None
-    """Of the change between two calibrations, in m."""
+    """Largest change between two calibrations, in m."""
     source: str = ""
-    """Where the tolerance comes from."""
+    """Origin of the tolerance, for the verdict."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -130,7 +130,7 @@ class Evidence:
 
     @property
     def run_record(self) -> RunRecord | None:
-        """How the run began, by its journal."""
+        """The begin of the run, by its journal."""
         return self.journal[0].run if self.journal else None
 
     @property

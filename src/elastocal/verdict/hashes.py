@@ -51,8 +51,8 @@ def _content(path: Path) -> str:
     documents = text.splitlines() if path.suffix == ".jsonl" else [text]
     digest = hashlib.sha256()
     for document in documents:
-        told = json.dumps(_kept(json.loads(document)), sort_keys=True, separators=(",", ":"))
-        digest.update(told.encode("utf-8") + b"\n")
+        kept = json.dumps(_kept(json.loads(document)), sort_keys=True, separators=(",", ":"))
+        digest.update(kept.encode("utf-8") + b"\n")
     return digest.hexdigest()
 
 
@@ -73,8 +73,8 @@ def _arrays(path: Path) -> str:
     for name in sorted(data.variables):
         values = np.ascontiguousarray(data[name].values)
         shape = f"{name} {data[name].dims} {values.shape}"
-        told = json.dumps(values.tolist()) if values.dtype.kind in "OU" else ""
-        digest.update(shape.encode() + (told.encode() if told else values.tobytes()))
+        listed = json.dumps(values.tolist()) if values.dtype.kind in "OU" else ""
+        digest.update(shape.encode() + (listed.encode() if listed else values.tobytes()))
     attributes = {k: str(v) for k, v in data.attributes.items() if k not in _LEFT_OUT}
     digest.update(json.dumps(attributes, sort_keys=True).encode())
     return digest.hexdigest()

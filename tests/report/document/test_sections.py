@@ -8,16 +8,8 @@ import pytest
 
 from elastocal.identification import CalibrationSummary, describe
 from elastocal.records import from_data, to_data
-from elastocal.report.document.sections import (
-    cell,
-    compliances,
-    instruments,
-    not_verified,
-    poses,
-    process,
-    provenance,
-    readings,
-)
+from elastocal.report.document import SECTIONS
+from elastocal.report.document.sections import PAPER
 from elastocal.verdict import (
     MissingPart,
     RunFigures,
@@ -29,10 +21,14 @@ from elastocal.verdict import (
     reading_findings,
 )
 
+cell, poses, readings, instruments, compliances, codecs, process, _, provenance, not_verified = (
+    SECTIONS
+)
+
 
 def words(section, parts):
     """Return the text of a section, without tags."""
-    html = section.SECTION.body(parts).html
+    html = section.body(parts).html
     return " ".join(re.sub(r"<[^>]*>", "", html.replace("<", " <")).split())
 
 
@@ -68,7 +64,7 @@ def test_poses_stand_with_their_places_and_the_other_technique(parts):
     assert "ioops (not used)" in text
     x = 1e3 * parts.plan.poses[0].tcp_position[0]
     assert f"{x:.1f}" in text
-    data = poses.SECTION.body(parts).data
+    data = poses.body(parts).data
     assert len(data["postures"]) == len(parts.plan.poses) + 1
     assert str(parts.plan.cell.file).rpartition("/")[0] not in text
 
@@ -223,7 +219,7 @@ def test_table_1_has_the_figures_of_the_process_beside_those_of_the_paper(parts)
 
 
 def test_reductions_of_the_paper_are_those_of_its_own_deviations():
-    for case in process.PAPER.values():
+    for case in PAPER.values():
         for before, after, share in zip(case.before, case.after, case.reduction, strict=True):
             assert share == pytest.approx(1.0 - after / before, abs=3e-3)
 

@@ -16,7 +16,7 @@ from elastocal.report.plots import figure_bytes
 from elastocal.verdict import Evidence
 
 _DPI = 130
-"""Of figures with thousands of points, which would be large as SVG."""
+"""Resolution of figures with thousands of points, which would be large as SVG."""
 _TYPES = {".svg": "image/svg+xml", ".png": "image/png"}
 
 
@@ -147,8 +147,10 @@ class Section:
     """One section: a title, and how it is made from the evidence, whatever is there."""
 
     identifier: str
-    """Of the heading; also the key of its data."""
+    """Identifier of the heading; also the key of its data."""
     title: str
+    place: int
+    """Sections stand in the order of these numbers."""
     body: Callable[[Evidence], Content]
 
 

@@ -89,7 +89,7 @@ class Tab:
         self._browser, self._read, self._write = browser, read, write
         self._buffer, self._count, self._session = b"", 0, ""
         self.events: list[Message] = []
-        """What the page and the browser said by themselves."""
+        """Messages that the page and the browser sent by themselves."""
         target = self.call("Target.createTarget", url="about:blank")["targetId"]
         attached = self.call("Target.attachToTarget", targetId=target, flatten=True)
         self._session = attached["sessionId"]

@@ -8,36 +8,17 @@ from typing import Any
 from elastocal import __version__
 from elastocal.files import write_text
 from elastocal.identification import UnseenErrors
+from elastocal.report.document import sections as exported
 from elastocal.report.document.blocks import Block, Facts, Paragraph, Section
-from elastocal.report.document.sections import (
-    cell,
-    codecs,
-    compliances,
-    instruments,
-    not_verified,
-    poses,
-    process,
-    provenance,
-    readings,
-    recertification,
-)
 from elastocal.report.pages import render
 from elastocal.verdict import Evidence, Verdict, judge_evidence
 from elastocal.wording import mm
 
-SECTIONS: tuple[Section, ...] = (
-    cell.SECTION,
-    poses.SECTION,
-    readings.SECTION,
-    instruments.SECTION,
-    compliances.SECTION,
-    codecs.SECTION,
-    process.SECTION,
-    recertification.SECTION,
-    provenance.SECTION,
-    not_verified.SECTION,
+_EXPORTED = (getattr(exported, name) for name in dir(exported))
+SECTIONS: tuple[Section, ...] = tuple(
+    sorted((each for each in _EXPORTED if isinstance(each, Section)), key=lambda each: each.place)
 )
-"""The sections in their order; a new one is one file and one entry here."""
+"""Every section that `elastocal.report.document.sections` exports, in order."""
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""Sections of the report, one file each; `elastocal.report.document.page` has their order."""
+"""Sections of the report: one file each, and its export here; each knows its place."""
 
 import lazy_loader
 

@@ -10,7 +10,7 @@ from elastocal.verdict import Evidence
 from elastocal.wording import mm, point
 
 
-def body(evidence: Evidence) -> Content:
+def _body(evidence: Evidence) -> Content:
     """Return the section."""
     if evidence.cell is None:
         robot = f" The robot of the model is {evidence.robot}." if evidence.robot else ""
@@ -82,4 +82,4 @@ def _limits(cell: Cell) -> Iterator[tuple[str, str]]:
     yield "Torques that may be used, in N·m", torques or "not known"
 
 
-SECTION = Section("cell", "The cell", body)
+CELL = Section("cell", "The cell", 10, _body)

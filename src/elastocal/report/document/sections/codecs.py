@@ -28,7 +28,7 @@ _FIGURES = {
 """Comparisons of the paper, in its order: title and figure of each."""
 
 
-def body(evidence: Evidence) -> Content:
+def _body(evidence: Evidence) -> Content:
     """Return the section."""
     if not evidence.codecs:
         text = "There is no codec, so it is not known whether there were enough poses."
@@ -111,4 +111,4 @@ def _saturation(codec: CodecEvidence) -> Block:
     return Table("Saturation: training poses from which on more do not help", heads, rows)
 
 
-SECTION = Section("codecs", "Number of poses: codecs", body)
+CODECS = Section("codecs", "Number of poses: codecs", 60, _body)

@@ -25,7 +25,7 @@ from elastocal.wording import mm
 _MOST_TERMS = 6
 
 
-def body(evidence: Evidence) -> Content:
+def _body(evidence: Evidence) -> Content:
     """Return the section."""
     if evidence.calibrated is None:
         return Content((Paragraph("There is no calibrated model, so no compliance is known."),))
@@ -141,4 +141,4 @@ def _described(group: tuple[Term, ...]) -> str:
     return describe(group) if len(group) <= _MOST_TERMS else f"{len(group)} springs mixed"
 
 
-SECTION = Section("compliances", "Compliances", body)
+COMPLIANCES = Section("compliances", "Compliances", 50, _body)

@@ -27,7 +27,7 @@ from elastocal.verdict import (
 from elastocal.wording import counted, mm, point, spans, um
 
 
-def body(evidence: Evidence) -> Content:
+def _body(evidence: Evidence) -> Content:
     """Return the section."""
     summary = evidence.summary
     if summary is None:
@@ -152,4 +152,4 @@ def _or_unknown(value: float | None, written: Callable[[float], str]) -> str:
     return "not known" if value is None else written(value)
 
 
-SECTION = Section("instruments", "Stations, sensor and tool", body)
+INSTRUMENTS = Section("instruments", "Stations, sensor and tool", 40, _body)

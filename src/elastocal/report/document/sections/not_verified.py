@@ -19,7 +19,7 @@ _ALWAYS = (
 )
 
 
-def body(evidence: Evidence) -> Content:
+def _body(evidence: Evidence) -> Content:
     """Return the section."""
     return Content(tuple(_blocks(evidence)))
 
@@ -58,4 +58,4 @@ def _always(evidence: Evidence) -> Iterator[str]:
         )
 
 
-SECTION = Section("not-verified", "What was not verified", body)
+NOT_VERIFIED = Section("not-verified", "What was not verified", 100, _body)

@@ -22,7 +22,7 @@ from elastocal.verdict import Evidence
 from elastocal.wording import counted, mm
 
 
-def body(evidence: Evidence) -> Content:
+def _body(evidence: Evidence) -> Content:
     """Return the section."""
     plan, pool = evidence.plan, evidence.pool
     if plan is None:
@@ -98,4 +98,4 @@ def _notes(plan: PlanResult) -> tuple[Block, ...]:
     return (Details("Notes of the planner", (Bullets(notes),)),)
 
 
-SECTION = Section("poses", "Surface, pool and poses", body)
+POSES = Section("poses", "Surface, pool and poses", 20, _body)

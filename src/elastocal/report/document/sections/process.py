@@ -29,7 +29,7 @@ from elastocal.wording import counted, mm
 
 
 @dataclass(frozen=True)
-class Published:
+class PublishedCase:
     """A case of the paper's Table 1, in mm and parts of 1."""
 
     title: str
@@ -39,11 +39,11 @@ class Published:
 
 
 PAPER = {
-    "afp": Published(
+    "afp": PublishedCase(
         "Robotized AFP processing of a 3D thermoplastic aerostructure",
         (0.570, 0.956, 0.100), (0.061, 0.285, 0.046), (0.8930, 0.7019, 0.5400),
     ),
-    "machining": Published(
+    "machining": PublishedCase(
         "Robotized roughing of an Al-7075 aerospace part",
         (0.597, 2.050, 0.725), (0.101, 0.520, 0.342), (0.8308, 0.7463, 0.5283),
     ),
@@ -56,7 +56,7 @@ _DEVIATIONS = {
 _HEADS = ("", "Mean", "Max", "St. dev.")
 
 
-def body(evidence: Evidence) -> Content:
+def _body(evidence: Evidence) -> Content:
     """Return the section."""
     if evidence.process is None:
         text = "No process path was run, so the effect of the correction was not verified."
@@ -151,4 +151,4 @@ def _mm(values: DeviationStatistics) -> tuple[str, ...]:
     return tuple(f"{1e3 * value:.3f}" for value in _three(values))
 
 
-SECTION = Section("process", "The process path, before and after", body)
+PROCESS = Section("process", "The process path, before and after", 70, _body)

@@ -1,4 +1,4 @@
-"""Where everything comes from: versions, hashes, seeds, every setting."""
+"""Provenance: versions, hashes, seeds, every setting."""
 
 import platform
 from collections.abc import Iterator
@@ -26,7 +26,7 @@ from elastocal.verdict import BYTES, Evidence
 _PACKAGES = ("numpy", "scipy", "pin", "xarray", "matplotlib", "plotly")
 
 
-def body(evidence: Evidence) -> Content:
+def _body(evidence: Evidence) -> Content:
     """Return the section."""
     return Content(tuple(_blocks(evidence)))
 
@@ -124,4 +124,4 @@ def _setting(key: str, value: str) -> str:
     return "that of the dataset" if key == "marker" and value == "none" else value
 
 
-SECTION = Section("provenance", "Provenance", body)
+PROVENANCE = Section("provenance", "Provenance", 90, _body)

@@ -29,11 +29,11 @@ from elastocal.report.plots import displacement_figure, pose_grid
 from elastocal.verdict import Evidence, RunFigures
 from elastocal.wording import counted, mm
 
-PoseValues = dict[tuple[int, str], float]
+_PoseValues = dict[tuple[int, str], float]
 """Values in m by pose and load case."""
 
 
-def body(evidence: Evidence) -> Content:
+def _body(evidence: Evidence) -> Content:
     """Return the section."""
     return Content(tuple(_blocks(evidence)))
 
@@ -118,7 +118,7 @@ def _number_table(dataset: Dataset, title: str, values: FloatArray) -> Table:
     return Table(title, ("Pose", *dataset.load_cases), rows)
 
 
-def _deflection(dataset: Dataset) -> PoseValues:
+def _deflection(dataset: Dataset) -> _PoseValues:
     readings = dataset.readings(dataset.joint_names)
     size = np.linalg.norm(readings.deflection, axis=1)
     return {
@@ -127,14 +127,14 @@ def _deflection(dataset: Dataset) -> PoseValues:
     }
 
 
-def _errors(unseen: UnseenErrors) -> PoseValues:
+def _errors(unseen: UnseenErrors) -> _PoseValues:
     return {
         (int(pose), case): float(value)
         for pose, case, value in zip(unseen.pose, unseen.load_case, unseen.error, strict=True)
     }
 
 
-def _grid(dataset: Dataset, values: PoseValues) -> FloatArray:
+def _grid(dataset: Dataset, values: _PoseValues) -> FloatArray:
     """Return values in mm, shape (pose, load_case), NaN where there is none."""
     return np.array(
         [
@@ -175,4 +175,4 @@ def _worst(unseen: UnseenErrors) -> Block:
     return Table("Largest errors, each at a left-out pose", ("Reading", "Error"), rows)
 
 
-SECTION = Section("readings", "What was measured", body)
+READINGS = Section("readings", "What was measured", 30, _body)

@@ -32,7 +32,7 @@ _WORDS = {
 }
 
 
-def body(evidence: Evidence) -> Content:
+def _body(evidence: Evidence) -> Content:
     """Return the section."""
     if evidence.recertification is None:
         text = (
@@ -99,4 +99,4 @@ def _span(found: Estimate) -> str:
     return f"{mm(found.value)} ({mm(found.low)} to {mm(found.high)})"
 
 
-SECTION = Section("recertification", "Change since the last calibration", body)
+RECERTIFICATION = Section("recertification", "Change since the last calibration", 80, _body)
