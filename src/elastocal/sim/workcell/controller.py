@@ -13,18 +13,76 @@ from elastocal.arrays import FloatArray
 from elastocal.cell.description import Fault
 from elastocal.cell.devices import ArmState, Motion
 from elastocal.errors import DeviceError
-from elastocal.sim.workcell.clock import MICROSECONDS, to_microseconds
-from elastocal.sim.workcell.commands import check_distance, check_vector, require
 from elastocal.sim.workcell.contact import Contact
 from elastocal.sim.workcell.force_control import ForceControl
-from elastocal.sim.workcell.guarded import guarded_way, retract_way
-from elastocal.sim.workcell.plant import Plant
-from elastocal.sim.workcell.schedule import FOREVER
-from elastocal.sim.workcell.segment import Segment
-from elastocal.sim.workcell.time_laws import Uniform, joint_move
-from elastocal.sim.workcell.ways import joint_way
+from elastocal.sim.workcell.paths import guarded_move, joint_path, retract_path
+from elastocal.sim.workcell.plant import FOREVER, Plant
+from elastocal.sim.workcell.timeline import (
+    MICROSECONDS,
+    Segment,
+    Uniform,
+    joint_move,
+    to_microseconds,
+)
 
-SOURCE = "simulated arm"
+_UNIT = 1e-6
+"""How far the length of a direction may be from 1."""
+
+
+def require(holds: bool, what: str, value: object, allowed: str) -> None:
+    """Refuse a value.
+
+    Raises
+    ------
+    DeviceError
+        Naming it and what is allowed.
+    """
+    if not holds:
+        raise DeviceError(f"simulated arm: {what} is {value}: must be {allowed}")
+
+
+def check_vector(what: str, values: FloatArray, size: int, *, unit: bool = False) -> FloatArray:
+    """Return numbers as an array of their own.
+
+    Parameters
+    ----------
+    what : str
+        How the message names them.
+    values : ndarray, shape (size,)
+        Finite.
+    size : int
+        How many there must be.
+    unit : bool
+        Whether they must be a unit vector; it is then made one exactly.
+
+    Raises
+    ------
+    DeviceError
+        If they are not as they must be.
+    """
+    array = np.array(values, dtype=float)
+    fits = array.shape == (size,) and bool(np.all(np.isfinite(array)))
+    require(fits, what, array.tolist(), f"{size} finite numbers")
+    if unit:
+        length = float(np.linalg.norm(array))
+        require(abs(length - 1.0) <= _UNIT, f"length of the {what}", length, "1")
+        array /= length
+    return array
+
+
+def check_distance(what: str, distance: float, speed: float) -> None:
+    """Refuse a way or a speed that is not above 0 and finite.
+
+    Raises
+    ------
+    DeviceError
+        Naming it.
+    """
+    require(0.0 < distance < math.inf, f"{what} distance", distance, "above 0 m and finite")
+    require(0.0 < speed < math.inf, f"{what} speed", speed, "above 0 m/s and finite")
+
+
+_SOURCE = "simulated arm"
 _STANDING = (Motion.IDLE,)
 _FORCED = (Motion.IDLE, Motion.HOLDING, Motion.RELEASING)
 
@@ -71,17 +129,17 @@ class SimulatedArm:
             motion=motion,
             in_contact=self._in_contact(done),
             fault=segment.fault_after if done else None,
-            source=SOURCE,
+            source=_SOURCE,
         )
 
     def enable(self) -> None:
         """Release the arm for motion; it then is idle. Refused while a fault stands."""
         plant = self._plant
         if plant.now < self._refused_until:
-            raise DeviceError(f"{SOURCE} cannot be enabled: {self._fault}")
+            raise DeviceError(f"{_SOURCE} cannot be enabled: {self._fault}")
         self._fault = None
         if self._motion() in (Motion.DISARMED, Motion.STOPPED):
-            plant.switch(plant.standing(plant.stand(), Motion.IDLE))
+            plant.switch(plant.standing(plant.robot_state(), Motion.IDLE))
 
     def disable(self) -> None:
         """Take the release back; the arm stands."""
@@ -102,7 +160,7 @@ class SimulatedArm:
             require(low <= value <= high, f"joint target {name}", value, f"{low:g} to {high:g}")
         require(0.0 < speed <= 1.0, "speed", speed, "a part of the axis speeds in (0, 1]")
         self._allow("move_joints", _STANDING, free=True)
-        start = plant.stand()
+        start = plant.robot_state()
         plant.begin_journey(target)
         self._visiting = False
         end = plant.statics.free(target, plant.stop_error(), None)
@@ -111,8 +169,8 @@ class SimulatedArm:
         # The cell's speeds hold its override already; a caller says its own part of them.
         fastest = plant.cell.axis_speeds / motion.override
         law = joint_move(target - start.q, speed * fastest, motion.acceleration_time)
-        way = joint_way(plant.statics, start, end)
-        plant.run(way, law, (Motion.MOVING, Motion.IDLE), start)
+        path = joint_path(plant.statics, start, end)
+        plant.run(path, law, (Motion.MOVING, Motion.IDLE), start)
 
     def approach(
         self, direction_base: FloatArray, distance: float, speed: float, contact_force: float
@@ -123,15 +181,15 @@ class SimulatedArm:
         check_distance("approach", distance, speed)
         require(contact_force > 0.0, "contact force", contact_force, "above 0 N")
         self._allow("approach", _STANDING, in_contact=False)
-        start = plant.stand()
+        start = plant.robot_state()
         self._begin_approach()
-        guarded = guarded_way(plant, start, direction, distance, (speed, contact_force))
+        guarded = guarded_move(plant, start, direction, distance, (speed, contact_force))
         plant.contact, self._touched = guarded.contact, guarded.felt
-        plant.note_sag(guarded.way.end)
+        plant.note_sag(guarded.path.end)
         after = Motion.STOPPED if guarded.fault else Motion.IDLE
         self._fault = guarded.fault
         law = Uniform(guarded.length / speed)
-        plant.run(guarded.way, law, (Motion.APPROACHING, after), start, fault=guarded.fault)
+        plant.run(guarded.path, law, (Motion.APPROACHING, after), start, fault=guarded.fault)
         if self._approaches == 1 and not guarded.felt:
             segment = plant.segment
             plant.later(segment.end, partial(self._reference, segment))
@@ -163,16 +221,16 @@ class SimulatedArm:
         self._allow("retract", _FORCED)
         if plant.contact is not None and not float(direction @ plant.contact.normal) > 0.0:
             raise DeviceError(
-                f"{SOURCE}: retract direction {direction.tolist()} leads into the surface, whose"
+                f"{_SOURCE}: retract direction {direction.tolist()} leads into the surface, whose"
                 f" normal is {np.round(plant.contact.normal, 4).tolist()}"
             )
-        start = plant.stand()
-        way, contact = retract_way(plant, start, direction, distance)
+        start = plant.robot_state()
+        path, contact = retract_path(plant, start, direction, distance)
         self._leaving, plant.contact = plant.contact, contact
         if contact is None:
-            plant.note_sag(way.end)
+            plant.note_sag(path.end)
             self._touched = self._visiting = False
-        plant.run(way, Uniform(distance / speed), (Motion.RETRACTING, Motion.IDLE), start)
+        plant.run(path, Uniform(distance / speed), (Motion.RETRACTING, Motion.IDLE), start)
         self._begin("retract")
 
     def _motion(self) -> Motion:
@@ -195,19 +253,19 @@ class SimulatedArm:
         if motion not in states:
             allowed = ", ".join(state.value for state in states)
             raise DeviceError(
-                f"{SOURCE} refuses {command}: it is {motion.value} (allowed when {allowed})"
+                f"{_SOURCE} refuses {command}: it is {motion.value} (allowed when {allowed})"
             )
         if in_contact is not None and in_contact is not self._touched:
             what = "only in contact" if in_contact else "not in contact: retract first"
-            raise DeviceError(f"{SOURCE} refuses {command}: allowed {what}")
+            raise DeviceError(f"{_SOURCE} refuses {command}: allowed {what}")
         if free and self._plant.contact is not None:
-            raise DeviceError(f"{SOURCE} refuses {command}: the tool is at the surface, retract")
+            raise DeviceError(f"{_SOURCE} refuses {command}: the tool is at the surface, retract")
 
     def _freeze(self, motion: Motion, fault: str | None) -> None:
         """Stand where the arm is."""
         plant = self._plant
         before = self._motion()
-        plant.switch(plant.standing(plant.stand(), motion, fault))
+        plant.switch(plant.standing(plant.robot_state(), motion, fault))
         pressing = bool(np.any(plant.segment.knots.force[-1]))
         if before is Motion.APPROACHING:
             self._touched = False

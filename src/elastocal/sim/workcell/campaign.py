@@ -16,18 +16,17 @@ from scipy.spatial.transform import Rotation
 from elastocal.arrays import FloatArray
 from elastocal.cell import Cell
 from elastocal.errors import DeviceError
-from elastocal.sim.reach import reach
+from elastocal.sim.arm.inverse import solve_inverse
 from elastocal.sim.workcell.contact import Contact, ContactLaw
 from elastocal.sim.workcell.quasistatics import Quasistatics
-from elastocal.sim.workcell.quick_rest import Rests, rest_side_by_side
-from elastocal.sim.workcell.robot import TrueRobot
+from elastocal.sim.workcell.robot import RobotEquilibrium, TrueRobot
 
 CLOSED = 1e-6
 """How far a tool may end from where the contact holds it, in m: nanometres of deflection."""
 _ROUNDS = 8
 
 
-class Places(NamedTuple):
+class ContactPoses(NamedTuple):
     """Where to press."""
 
     q: FloatArray
@@ -37,7 +36,7 @@ class Places(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Settled:
+class TrueReadings:
     """What is true where the arm stands still: near contact without load, and under each load."""
 
     q: FloatArray
@@ -59,19 +58,21 @@ class Settled:
     """Orientation of the sensor by the controller, shape (place, 3, 3)."""
 
 
-class _Stands(NamedTuple):
+class _States(NamedTuple):
     """The robot at all places."""
 
     q: FloatArray
     twist: FloatArray
     """What the controller is off by; see `quasistatics.Knots.twist`, shape (place, 9)."""
-    rests: Rests
+    rest: RobotEquilibrium
+    sag: FloatArray
+    """What the undeformed robot is off by, shape (place, 9)."""
     force: FloatArray
     """On the robot in base, shape (place, 3), in N."""
 
 
 @dataclass(frozen=True, eq=False)
-class QuickCell:
+class CampaignSimulator:
     """The truth of a cell; make one with `of`. It can be sent to another process."""
 
     statics: Quasistatics
@@ -82,7 +83,7 @@ class QuickCell:
     """How far the tooling stands from where the cell file puts it, shape (3,), in m."""
 
     @classmethod
-    def of(cls, cell: Cell) -> "QuickCell":
+    def of(cls, cell: Cell) -> "CampaignSimulator":
         """Return the truth of a cell.
 
         Raises
@@ -102,7 +103,7 @@ class QuickCell:
         """Number of springs of the robot, the balancer not counted."""
         return len(self.statics.robot.springs.stiffness)
 
-    def stiffened(self, factor: FloatArray, balancer: float = 1.0) -> "QuickCell":
+    def stiffened(self, factor: FloatArray, balancer: float = 1.0) -> "CampaignSimulator":
         """Return the cell with another arm of the same make.
 
         Parameters
@@ -124,12 +125,12 @@ class QuickCell:
         layout = replace(robot.layout, springs=scaled)
         return replace(self, statics=replace(self.statics, robot=replace(robot, layout=layout)))
 
-    def settle(self, places: Places, force_tcp: FloatArray) -> Settled:
+    def settle(self, places: ContactPoses, force_tcp: FloatArray) -> TrueReadings:
         """Return what is true at every place under every load case, in this order.
 
         Parameters
         ----------
-        places : Places
+        places : ContactPoses
             Where.
         force_tcp : ndarray, shape (load, 3)
             Wanted readings of the sensor, tcp frame, in N.
@@ -145,17 +146,17 @@ class QuickCell:
         near = self._free(self._along(places.q, T, self.near * places.normal), None)
         touch, contacts = self._touch(places, T, near)
         zero, weight = self._sensor(near), self.statics.weight
-        stand, stands = touch, []
+        state, states = touch, []
         for wanted in force_tcp:
             # The controller has zeroed the sensor near contact; the arm turns it under load.
             held = self.statics.robot.T_tcp_sensor[:3, :3].T @ self.law.held(wanted)
-            stand = self._press(stand, touch, contacts, held + weight @ zero)
-            stands.append(stand)
-        return self._settled(near, touch, stands)
+            state = self._press(state, touch, contacts, held + weight @ zero)
+            states.append(state)
+        return self._settled(near, touch, states)
 
     def _press(
-        self, start: _Stands, touch: _Stands, contacts: list[Contact], reading: FloatArray
-    ) -> _Stands:
+        self, start: _States, touch: _States, contacts: list[Contact], reading: FloatArray
+    ) -> _States:
         """Return the robot where the sensor reads a force, shape (place, 3), sensor frame.
 
         See `ways.pressed`.
@@ -164,10 +165,10 @@ class QuickCell:
         q, reached = start.q, start
         for _ in range(_ROUNDS):
             force = _turn(self._sensor(reached), reading) - weight
-            theta, slider = reached.rests.theta, start.rests.slider
-            rests = rest_side_by_side(statics.robot, q, force, slider, theta)
-            twist = rests.twist - statics.compensation * touch.rests.twist
-            reached = _Stands(q, twist, rests, force)
+            rest = statics.robot.rest(q, force, start.rest.springs, reached.rest.theta)
+            sag = statics.twist(q, rest)
+            twist = sag - statics.compensation * touch.sag
+            reached = _States(q, twist, rest, sag, force)
             goal = [c.tool_position(f) for c, f in zip(contacts, force, strict=True)]
             missed = np.array(goal) - self._tool(reached)
             if np.linalg.norm(missed, axis=1).max() < CLOSED:
@@ -175,7 +176,9 @@ class QuickCell:
             q = self._along(q, statics.robot.forward(q), missed)
         return reached
 
-    def _touch(self, places: Places, T: FloatArray, near: _Stands) -> tuple[_Stands, list[Contact]]:
+    def _touch(
+        self, places: ContactPoses, T: FloatArray, near: _States
+    ) -> tuple[_States, list[Contact]]:
         """Return the robot touching the tooling without force; see `ways.touching`."""
         beside = self._tool(near) - (T[:, :3, 3] + self.offset)
         height = np.sum(beside * places.normal, axis=1, keepdims=True)
@@ -186,58 +189,59 @@ class QuickCell:
             if np.linalg.norm(missed, axis=1).max() < CLOSED:
                 break
             forward = self.statics.robot.forward(reached.q)
-            reached = self._free(self._along(reached.q, forward, missed), reached.rests.theta)
+            reached = self._free(self._along(reached.q, forward, missed), reached.rest.theta)
         each = zip(anchor, T[:, :3, :3], places.normal, reached.q, strict=True)
         return reached, [Contact(self.law, *parts) for parts in each]
 
-    def _free(self, q: FloatArray, start: FloatArray | None) -> _Stands:
+    def _free(self, q: FloatArray, start: FloatArray | None) -> _States:
         """Return the robot free of contact, its gears relaxed; see `Quasistatics.free`."""
         nothing = np.zeros((len(q), 3))
-        rests = rest_side_by_side(self.statics.robot, q, nothing, None, start)
-        return _Stands(q, (1.0 - self.statics.compensation) * rests.twist, rests, nothing)
+        rest = self.statics.robot.rest(q, nothing, self.statics.robot.springs, start)
+        sag = self.statics.twist(q, rest)
+        return _States(q, (1.0 - self.statics.compensation) * sag, rest, sag, nothing)
 
     def _along(self, q: FloatArray, T: FloatArray, way: FloatArray) -> FloatArray:
         """Return joints that move the undeformed tool from T by a way, orientation kept."""
         layout, goal = self.statics.robot.layout, T.copy()
         goal[:, :3, 3] += way
-        found = reach(layout.linkage, goal, q, tolerance=1e-10, locked=layout.external)
+        found = solve_inverse(layout.linkage, goal, q, tolerance=1e-10, locked=layout.external)
         if not found.ok.all():
             place = int(np.flatnonzero(~found.ok)[0])
             raise DeviceError(
                 f"the arm cannot follow to {np.round(goal[place, :3, 3], 4).tolist()} m:"
-                " a singularity or the end of its reach"
+                " a singularity or the end of its solve_inverse"
             )
         return found.q
 
-    def _tool(self, stand: _Stands) -> FloatArray:
+    def _tool(self, state: _States) -> FloatArray:
         """Return where the tool centre points truly are, in base, shape (place, 3), in m."""
-        at: FloatArray = self.statics.robot.forward(stand.q)[:, :3, 3] + stand.twist[:, :3]
+        at: FloatArray = self.statics.robot.forward(state.q)[:, :3, 3] + state.twist[:, :3]
         return at
 
-    def _sensor(self, stand: _Stands) -> FloatArray:
+    def _sensor(self, state: _States) -> FloatArray:
         """Return the true orientations of the sensor, shape (place, 3, 3)."""
-        nominal = self.statics.robot.forward(stand.q)[:, :3, :3]
+        nominal = self.statics.robot.forward(state.q)[:, :3, :3]
         nominal = nominal @ self.statics.robot.T_tcp_sensor[:3, :3]
-        turned: FloatArray = Rotation.from_rotvec(stand.twist[:, 6:]).as_matrix() @ nominal
+        turned: FloatArray = Rotation.from_rotvec(state.twist[:, 6:]).as_matrix() @ nominal
         return turned
 
-    def _markers(self, stand: _Stands) -> tuple[FloatArray, FloatArray]:
+    def _markers(self, state: _States) -> tuple[FloatArray, FloatArray]:
         """Return the marker by the controller and where it truly is, each (place, 3), in m."""
-        T = self.statics.robot.forward(stand.q)
+        T = self.statics.robot.forward(state.q)
         lever = T[:, :3, :3] @ self.statics.marker_tcp
-        turned = Rotation.from_rotvec(stand.twist[:, 3:6]).apply(lever)
-        return T[:, :3, 3] + lever, T[:, :3, 3] + stand.twist[:, :3] + turned
+        turned = Rotation.from_rotvec(state.twist[:, 3:6]).apply(lever)
+        return T[:, :3, 3] + lever, T[:, :3, 3] + state.twist[:, :3] + turned
 
-    def _settled(self, near: _Stands, touch: _Stands, stands: list[_Stands]) -> Settled:
+    def _settled(self, near: _States, touch: _States, states: list[_States]) -> TrueReadings:
         weight, statics = self.statics.weight, self.statics
-        unloaded, markers = self._markers(near), [self._markers(stand) for stand in stands]
+        unloaded, markers = self._markers(near), [self._markers(state) for state in states]
         tare = weight @ self._sensor(near)
-        felt = [_turn_back(self._sensor(stand), stand.force + weight) - tare for stand in stands]
+        felt = [_turn_back(self._sensor(state), state.force + weight) - tare for state in states]
         R = statics.robot.forward(near.q)[:, :3, :3] @ statics.robot.T_tcp_sensor[:3, :3]
-        return Settled(
-            q=_stack([stand.q for stand in stands]),
-            force=_stack([stand.force for stand in stands]),
-            deflection=_stack([stand.twist[:, :3] - touch.twist[:, :3] for stand in stands]),
+        return TrueReadings(
+            q=_stack([state.q for state in states]),
+            force=_stack([state.force for state in states]),
+            deflection=_stack([state.twist[:, :3] - touch.twist[:, :3] for state in states]),
             controller_displacement=_stack([each[0] - unloaded[0] for each in markers]),
             marker_displacement=_stack([each[1] - unloaded[1] for each in markers]),
             marker=unloaded[1],

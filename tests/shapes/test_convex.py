@@ -4,16 +4,16 @@ import coal
 import numpy as np
 import pytest
 
-from elastocal.planning.sight_lines import Beams, Box, Capsule, Cylinder, Sphere
+from elastocal.shapes import Beams, Box, Capsule, Cylinder, Sphere
 from support.beams import distance_along, random_beams, signed_distance
 
 SEAT = 0.02
 STEP = 2e-3
 PAIRS = {
-    "box": (Box(np.array([0.1, 0.2, 0.3])), coal.Box(0.2, 0.4, 0.6)),
+    "box": (Box(0.2, 0.4, 0.6), coal.Box(0.2, 0.4, 0.6)),
     "sphere": (Sphere(0.25), coal.Sphere(0.25)),
-    "cylinder": (Cylinder(0.1, 0.3), coal.Cylinder(0.1, 0.6)),
-    "capsule": (Capsule(0.1, 0.2), coal.Capsule(0.1, 0.4)),
+    "cylinder": (Cylinder(0.1, 0.6), coal.Cylinder(0.1, 0.6)),
+    "capsule": (Capsule(0.1, 0.4), coal.Capsule(0.1, 0.4)),
 }
 
 
@@ -61,7 +61,7 @@ def test_a_capsule_has_round_ends():
     starts = np.array([[-1.0, 0.0, 0.29], [-1.0, 0.09, 0.29], [0.0, 0.0, 1.0]])
     direction = np.array([[1.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]])
     beams = Beams(starts, direction, np.array([2.0, 2.0, 0.71]))
-    np.testing.assert_array_equal(Capsule(0.1, 0.2).crosses(beams, 0.0), [True, False, True])
+    np.testing.assert_array_equal(Capsule(0.1, 0.4).crosses(beams, 0.0), [True, False, True])
 
 
 def test_beams_keep_their_length_in_other_frames():

@@ -1,6 +1,5 @@
 """What links and tool hide, on the example cells and for markers on and in the tool."""
 
-import coal
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -9,11 +8,10 @@ import trimesh
 from elastocal.cell import load_cell
 from elastocal.cell.examples import write_example
 from elastocal.planning import CollisionScene, sight_check
-from elastocal.planning.checks.sight import HOUSED, SEAT, MovingSolids
-from elastocal.planning.scene import Body, mesh_shape
-from elastocal.planning.sight_lines import Beams
+from elastocal.planning.checks import HOUSED, SEAT, MovingSolids
 from elastocal.planning.surface import load_surface
 from elastocal.robot import Robot
+from elastocal.shapes import Beams, Body, Box, Capsule, Cylinder, Mesh, Sphere
 from support.beams import distance_along
 from support.postures import arm, postures
 
@@ -57,7 +55,9 @@ def shapes_by_pinocchio(scene, q):
         pin.updateGeometryPlacements(model, data, geometry, placed, row)
         links[:, pose] = [placed.oMg[i].homogeneous for i in range(geometry.ngeoms)]
     found = [(link.geometry, T) for link, T in zip(geometry.geometryObjects, links, strict=True)]
-    return found + [(body.shape, robot.forward(q) @ body.T_frame_body) for body in scene.tool]
+    return found + [
+        (body.solid.geometry, robot.forward(q) @ body.T_frame_body) for body in scene.tool
+    ]
 
 
 def test_hides_what_exact_distances_along_the_beam_find_in_the_way(example):
@@ -81,7 +81,7 @@ def test_the_markers_of_the_examples_stand_free_of_the_tool(example):
 
 def test_bodies_are_placed_in_the_robots_base_wherever_that_is():
     q = postures().q[:3]
-    tool = (Body("tool", coal.Sphere(0.1), np.eye(4)),)
+    tool = (Body("tool", Sphere(0.1), np.eye(4)),)
     carried = Robot.from_urdf(arm().urdf, "tcp", "link_1")
     from_root = CollisionScene(arm(), tool, ()).moving(np.insert(q[:, 1:], 0, 0.0, axis=1))
     from_link = CollisionScene(carried, tool, ()).moving(q[:, 1:])
@@ -113,23 +113,23 @@ class TestTool:
         return solids, solids.hide(np.tile(one.q, (count, 1)), beams)
 
     def test_a_face_that_the_marker_sits_on_hides_what_is_behind_it(self):
-        solids, hidden = self.hidden(coal.Box(0.1, 0.1, 0.1), np.radians([0, 60, 89, 100, 180]))
+        solids, hidden = self.hidden(Box(0.1, 0.1, 0.1), np.radians([0, 60, 89, 100, 180]))
         np.testing.assert_array_equal(hidden, [False, False, False, True, True])
         assert solids.housings == ()
 
     def test_a_face_drawn_a_little_too_high_does_not_blind(self):
-        block, widest = coal.Box(0.1, 0.1, 0.1), np.arccos(HOUSED / SEAT)
+        block, widest = Box(0.1, 0.1, 0.1), np.arccos(HOUSED / SEAT)
         _, hidden = self.hidden(block, [0.0, widest - 0.01], depth=0.99 * HOUSED)
         assert not np.any(hidden)
 
     @pytest.mark.parametrize(
         "shape",
         [
-            coal.Box(0.1, 0.1, 0.1),
-            coal.Sphere(0.05),
-            coal.Cylinder(0.05, 0.1),
-            coal.Capsule(0.05, 0.1),
-            mesh_shape(CUBE.vertices, CUBE.faces),
+            Box(0.1, 0.1, 0.1),
+            Sphere(0.05),
+            Cylinder(0.05, 0.1),
+            Capsule(0.05, 0.1),
+            Mesh(CUBE),
         ],
         ids=lambda shape: type(shape).__name__,
     )
@@ -139,10 +139,10 @@ class TestTool:
         assert solids.housings == ("head",)
 
     def test_another_part_of_the_tool_does(self):
-        solids, hidden = self.hidden(coal.Box(0.1, 0.1, 0.1), np.radians([0, 180]), depth=-0.02)
+        solids, hidden = self.hidden(Box(0.1, 0.1, 0.1), np.radians([0, 180]), depth=-0.02)
         np.testing.assert_array_equal(hidden, [False, True])
         assert solids.housings == ()
 
     def test_a_small_part_right_before_the_marker_hides_it(self):
-        _, hidden = self.hidden(coal.Sphere(0.004), np.radians([0, 90, 180]), depth=0.06)
+        _, hidden = self.hidden(Sphere(0.004), np.radians([0, 90, 180]), depth=0.06)
         np.testing.assert_array_equal(hidden, [True, False, False])

@@ -6,11 +6,16 @@ import numpy as np
 import pytest
 
 from elastocal.cell.devices import Motion
-from elastocal.sim.workcell import ErrorDraws, Places, QuickCell, QuickErrors, Scales
-from elastocal.sim.workcell.force_sensor import force_gain
-from elastocal.sim.workcell.keys import generator
-from elastocal.sim.workcell.quick import Settled
-from elastocal.sim.workcell.tracker import _draw
+from elastocal.sim.workcell import (
+    CampaignErrors,
+    CampaignSimulator,
+    ContactPoses,
+    ErrorDraws,
+    ErrorScales,
+)
+from elastocal.sim.workcell.campaign import TrueReadings
+from elastocal.sim.workcell.instruments import _draw, force_gain
+from elastocal.sim.workcell.sampling import generator
 from support.simulated import QUIET, Session, example_cell, marker_by_controller, places
 
 NANOMETRE = 1e-9
@@ -18,13 +23,13 @@ NANOMETRE = 1e-9
 
 def where(like):
     found = places(like, 3)
-    return Places(np.array([p.q for p in found]), np.array([p.normal for p in found]))
+    return ContactPoses(np.array([p.q for p in found]), np.array([p.normal for p in found]))
 
 
 @cache
-def settled(like="afp") -> Settled:
+def settled(like="afp") -> TrueReadings:
     cell = example_cell(like, simulation=QUIET)
-    return QuickCell.of(cell).settle(where(like), cell.file.load_cases.force_tcp)
+    return CampaignSimulator.of(cell).settle(where(like), cell.file.load_cases.force_tcp)
 
 
 @pytest.mark.parametrize("like", ["afp", "machining"])
@@ -49,21 +54,21 @@ def test_quick_readings_are_those_of_the_devices(like):
 def test_gears_remember_the_load_cases_before():
     cell = example_cell("afp", simulation=QUIET)
     forces = cell.file.load_cases.force_tcp
-    alone = QuickCell.of(cell).settle(where("afp"), forces[2:3])
+    alone = CampaignSimulator.of(cell).settle(where("afp"), forces[2:3])
     gap = np.abs(alone.deflection[:, 0] - settled().deflection[:, 2]).max()
     assert 1e-7 < gap < 1e-4
 
 
 def test_a_place_does_not_depend_on_the_places_beside_it():
     cell, all_places = example_cell("afp", simulation=QUIET), where("afp")
-    one = Places(all_places.q[1:2], all_places.normal[1:2])
-    alone = QuickCell.of(cell).settle(one, cell.file.load_cases.force_tcp)
+    one = ContactPoses(all_places.q[1:2], all_places.normal[1:2])
+    alone = CampaignSimulator.of(cell).settle(one, cell.file.load_cases.force_tcp)
     np.testing.assert_allclose(alone.deflection[0], settled().deflection[1], atol=2 * NANOMETRE)
 
 
 def test_an_arm_twice_as_stiff_deflects_half():
     cell = example_cell("afp", simulation=QUIET | {"balancer": {"fitted": False}})
-    quick = QuickCell.of(cell)
+    quick = CampaignSimulator.of(cell)
     soft = quick.settle(where("afp"), cell.file.load_cases.force_tcp)
     stiff = quick.stiffened(np.full(quick.springs, 2.0)).settle(
         where("afp"), cell.file.load_cases.force_tcp
@@ -77,8 +82,8 @@ def test_without_errors_the_readings_are_the_truth():
     cell, quick = example_cell("afp"), settled()
     draws = ErrorDraws.of(3, 5, np.random.default_rng(0))
     still = example_cell("afp", simulation={"controller": {"repeatability": "0 um"}})
-    readings = QuickErrors.of(still).readings(
-        quick, draws, Scales(0.0, 0.0), np.zeros((3, 3)), cell.file.load_cases.cases
+    readings = CampaignErrors.of(still).readings(
+        quick, draws, ErrorScales(0.0, 0.0), np.zeros((3, 3)), cell.file.load_cases.cases
     )
     np.testing.assert_array_equal(
         readings.marker_displacement.reshape(3, 5, 3), quick.marker_displacement
@@ -90,12 +95,14 @@ def test_without_errors_the_readings_are_the_truth():
 def test_errors_have_the_size_that_the_cell_file_gives_their_averages():
     cell, quick = example_cell("afp"), settled()
     many, rng = 2000, np.random.default_rng(1)
-    errors = QuickErrors.of(cell)
+    errors = CampaignErrors.of(cell)
     one = {name: np.repeat(getattr(quick, name)[:1], many, axis=0) for name in vars(quick)}
-    quick = Settled(**one)
+    quick = TrueReadings(**one)
     station = np.repeat(quick.marker[:1] + np.array([3.0, 0.0, 0.0]), many, axis=0)
     draws = ErrorDraws.of(many, 5, rng)
-    found = errors.readings(quick, draws, Scales(2.0, 0.0), station, cell.file.load_cases.cases)
+    found = errors.readings(
+        quick, draws, ErrorScales(2.0, 0.0), station, cell.file.load_cases.cases
+    )
     error = found.marker_displacement.reshape(many, 5, 3) - quick.marker_displacement
     sample = 2.0 * (15e-6 + 3 * 6e-6) / 1.96
     averaged = sample * averaged_noise(cell)
@@ -115,7 +122,7 @@ def averaged_noise(cell):
 def test_cross_talk_is_that_of_the_simulated_sensor():
     cell, seed = example_cell("afp"), 3
     talk = generator(seed, "sensor", "cross-talk").standard_normal((6, 6))
-    gain = np.eye(3) + np.einsum("ijkl,kl->ij", QuickErrors.of(cell).gain, talk)
+    gain = np.eye(3) + np.einsum("ijkl,kl->ij", CampaignErrors.of(cell).gain, talk)
     np.testing.assert_allclose(gain, force_gain(cell, seed), atol=1e-12)
 
 

@@ -15,12 +15,11 @@ import numpy as np
 from elastocal.arrays import FloatArray, IndexArray
 from elastocal.cell import Cell
 from elastocal.dataset import Readings
-from elastocal.sim.workcell.force_sensor import sensor_range
-from elastocal.sim.workcell.quick import Settled
-from elastocal.sim.workcell.tracker import AIR_TIME, COVERAGE
+from elastocal.sim.workcell.campaign import TrueReadings
+from elastocal.sim.workcell.instruments import AIR_TIME, COVERAGE, sensor_range
 
 
-class Scales(NamedTuple):
+class ErrorScales(NamedTuple):
     """Factors on the errors of the instruments; 1 is the cell file's."""
 
     tracker: float = 1.0
@@ -60,7 +59,7 @@ class ErrorDraws:
 
 
 @dataclass(frozen=True, eq=False)
-class QuickErrors:
+class CampaignErrors:
     """Standard deviations of averaged readings; make one with `of`."""
 
     noise: float
@@ -80,7 +79,7 @@ class QuickErrors:
     """Of a stop, in m."""
 
     @classmethod
-    def of(cls, cell: Cell) -> "QuickErrors":
+    def of(cls, cell: Cell) -> "CampaignErrors":
         """Return the errors of a cell's instruments.
 
         Raises
@@ -106,9 +105,9 @@ class QuickErrors:
 
     def readings(
         self,
-        settled: Settled,
+        settled: TrueReadings,
         draws: ErrorDraws,
-        scales: Scales,
+        scales: ErrorScales,
         station: FloatArray,
         load_cases: tuple[str, ...],
     ) -> Readings:
@@ -116,11 +115,11 @@ class QuickErrors:
 
         Parameters
         ----------
-        settled : Settled
+        settled : TrueReadings
             The truth.
         draws : ErrorDraws
             Of these places and load cases.
-        scales : Scales
+        scales : ErrorScales
             How large the errors are.
         station : ndarray, shape (place, 3)
             Tracker station that looks at each place, in base, in m.
@@ -145,7 +144,7 @@ class QuickErrors:
             marker_displacement=(settled.marker_displacement + marker).reshape(rows),
         )
 
-    def _force(self, settled: Settled, draws: ErrorDraws, scale: float) -> FloatArray:
+    def _force(self, settled: TrueReadings, draws: ErrorDraws, scale: float) -> FloatArray:
         """Return the force in base as the sensor shows it, shape (place, load, 3), in N."""
         gain = np.eye(3) + scale * np.einsum("ijkl,kl->ij", self.gain, draws.cross_talk)
         noise = self.force[1] * draws.sensor[:, 1:] - self.force[0] * draws.sensor[:, :1]

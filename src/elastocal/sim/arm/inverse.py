@@ -4,8 +4,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from elastocal.sim.linkage import Linkage
-from elastocal.sim.screws import BoolArray, FloatArray
+from elastocal.arrays import (
+    BoolArray,
+    FloatArray,
+)
+from elastocal.sim.arm.linkage import Linkage
 
 DAMPING = 1e-3
 """Largest damping; it falls with the square of the error, so that the last steps are Newton's."""
@@ -14,7 +17,7 @@ MAX_STEP = 0.5
 
 
 @dataclass(frozen=True)
-class Reached:
+class InverseResult:
     """Joint positions for a batch of poses."""
 
     q: FloatArray
@@ -23,14 +26,14 @@ class Reached:
     """Whether each pose is reached within the tolerance, shape (batch,)."""
 
 
-def reach(
+def solve_inverse(
     linkage: Linkage,
     T_base_tip: FloatArray,
     start: FloatArray,
     tolerance: float = 1e-11,
     iterations: int = 60,
     locked: int = 0,
-) -> Reached:
+) -> InverseResult:
     """Return joint positions that bring the tip of the rigid arm to the poses.
 
     Levenberg's step ``J^T (J J^T + d² I)^{-1} e`` with ``d²`` proportional to ``|e|²`` (Sugihara,
@@ -42,7 +45,7 @@ def reach(
     linkage : Linkage
         The arm.
     T_base_tip : ndarray, shape (batch, 4, 4)
-        Poses to reach.
+        Poses to solve_inverse.
     start : ndarray, shape (batch, joint)
         Where to start; decides the posture that is found.
     tolerance : float
@@ -64,7 +67,7 @@ def reach(
         largest = np.abs(step).max(axis=1, keepdims=True)
         q[:, locked:] += step * np.minimum(1.0, MAX_STEP / np.maximum(largest, 1e-300))
         error = pose_error(linkage.forward(q), T_base_tip)
-    return Reached(q, np.all(np.abs(error) <= tolerance, axis=1))
+    return InverseResult(q, np.all(np.abs(error) <= tolerance, axis=1))
 
 
 def pose_error(T_base_now: FloatArray, T_base_goal: FloatArray) -> FloatArray:

@@ -1,16 +1,19 @@
-"""Straight beams against boxes, balls, cylinders and capsules, in the frame of the solid.
+"""Boxes, balls, cylinders and capsules, and where straight beams are inside them.
 
-These are convex: a line is inside them between two distances, which slabs and quadratics give in
-closed form (Ericson, Real-Time Collision Detection, 2005, section 5.3).
+A line is inside a convex solid between two distances, which slabs and quadratics give in closed
+form (Ericson, Real-Time Collision Detection, 2005, section 5.3).
 """
 
-from abc import ABC, abstractmethod
+import math
+from abc import abstractmethod
 from dataclasses import dataclass
-from typing import Protocol
 
+import coal
 import numpy as np
+import trimesh
 
 from elastocal.arrays import BoolArray, FloatArray
+from elastocal.shapes.solid import Beams, SightSolid
 
 Span = tuple[FloatArray, FloatArray]
 """Distances along each beam between which its line is inside, in m; the first is the larger one
@@ -20,49 +23,8 @@ _PARALLEL = 1e-30
 """Put for a direction that has no part across a face, so that its line meets it at infinity."""
 
 
-@dataclass(frozen=True, eq=False)
-class Beams:
-    """Straight lines of sight from markers to a station."""
-
-    start: FloatArray
-    """Markers, shape (beam, 3), in m."""
-    direction: FloatArray
-    """Unit vectors towards the station, shape (beam, 3)."""
-    length: FloatArray
-    """Distances of the station, shape (beam,), in m."""
-
-    def __len__(self) -> int:
-        return len(self.length)
-
-    def take(self, index: BoolArray) -> "Beams":
-        """Return some of the beams."""
-        return Beams(self.start[index], self.direction[index], self.length[index])
-
-    def seen_from(self, T: FloatArray) -> "Beams":
-        """Return the same beams in other frames, given by their poses, shape (beam, 4, 4)."""
-        start = np.einsum("nji,nj->ni", T[:, :3, :3], self.start - T[:, :3, 3])
-        return Beams(start, np.einsum("nji,nj->ni", T[:, :3, :3], self.direction), self.length)
-
-
-class Solid(Protocol):
-    """A solid that may stand in the way of beams; both in the frame of the solid."""
-
-    def depth(self, point: FloatArray) -> float:
-        """Return how far a point, shape (3,), is under the surface, in m; not positive outside."""
-
-    def crosses(self, beams: Beams, seat: float) -> BoolArray:
-        """Return which beams are inside somewhere beyond ``seat`` (in m) from their start."""
-
-    def crosses_again(self, beams: Beams) -> BoolArray:
-        """Return which beams enter the solid after they have left it."""
-
-
-class Convex(ABC):
+class Convex(SightSolid):
     """A solid without hollows."""
-
-    @abstractmethod
-    def depth(self, point: FloatArray) -> float:
-        """Return how far a point, shape (3,), is under the surface, in m; not positive outside."""
 
     @abstractmethod
     def span(self, beams: Beams) -> Span:
@@ -80,18 +42,33 @@ class Convex(ABC):
 
 @dataclass(frozen=True, eq=False)
 class Box(Convex):
-    """A box about its centre."""
+    """A box about its centre, by the lengths of its edges in m."""
 
-    half: FloatArray
-    """Half of the edges along x, y, z, shape (3,), in m."""
+    x: float
+    y: float
+    z: float
+
+    @property
+    def geometry(self) -> coal.CollisionGeometry:
+        """The box for collision checks."""
+        return coal.Box(self.x, self.y, self.z)
+
+    def triangulated(self, sections: int = 32) -> trimesh.Trimesh:  # noqa: ARG002 - no sides are round
+        """Return two triangles a face."""
+        mesh: trimesh.Trimesh = trimesh.creation.box((self.x, self.y, self.z))
+        return mesh
+
+    @property
+    def _half(self) -> FloatArray:
+        return 0.5 * np.array([self.x, self.y, self.z])
 
     def depth(self, point: FloatArray) -> float:
         """Return the distance under the nearest face, in m."""
-        return float((self.half - np.abs(point)).min())
+        return float((self._half - np.abs(point)).min())
 
     def span(self, beams: Beams) -> Span:
         """Return where each line is between all three pairs of faces."""
-        return _shared(*(_between(beams, axis, half) for axis, half in enumerate(self.half)))
+        return _shared(*(_between(beams, axis, half) for axis, half in enumerate(self._half)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,6 +77,18 @@ class Sphere(Convex):
 
     radius: float
     """In m."""
+
+    @property
+    def geometry(self) -> coal.CollisionGeometry:
+        """The ball for collision checks."""
+        return coal.Sphere(self.radius)
+
+    def triangulated(self, sections: int = 32) -> trimesh.Trimesh:
+        """Return an icosphere: n times halved, it has about 5 · 2^n sides along an equator."""
+        mesh: trimesh.Trimesh = trimesh.creation.icosphere(
+            round(math.log2(sections / 5.0)), self.radius
+        )
+        return mesh
 
     def depth(self, point: FloatArray) -> float:
         """Return the distance under the surface, in m."""
@@ -116,18 +105,30 @@ class Cylinder(Convex):
 
     radius: float
     """In m."""
-    half_length: float
+    length: float
     """In m."""
+
+    @property
+    def geometry(self) -> coal.CollisionGeometry:
+        """The cylinder for collision checks."""
+        return coal.Cylinder(self.radius, self.length)
+
+    def triangulated(self, sections: int = 32) -> trimesh.Trimesh:
+        """Return a prism with as many sides."""
+        mesh: trimesh.Trimesh = trimesh.creation.cylinder(
+            self.radius, self.length, sections=sections
+        )
+        return mesh
 
     def depth(self, point: FloatArray) -> float:
         """Return the distance under wall or end, in m."""
         wall = self.radius - float(np.hypot(point[0], point[1]))
-        return min(wall, self.half_length - abs(float(point[2])))
+        return min(wall, 0.5 * self.length - abs(float(point[2])))
 
     def span(self, beams: Beams) -> Span:
         """Return where each line is inside the wall and between the ends."""
         wall = _within(beams.start[:, :2], beams.direction[:, :2], self.radius)
-        return _shared(wall, _between(beams, 2, self.half_length))
+        return _shared(wall, _between(beams, 2, 0.5 * self.length))
 
 
 @dataclass(frozen=True, eq=False)
@@ -136,18 +137,29 @@ class Capsule(Convex):
 
     radius: float
     """In m."""
-    half_length: float
-    """Of the cylinder, without the half balls, in m."""
+    length: float
+    """Length of the cylinder, without the half balls, in m."""
+
+    @property
+    def geometry(self) -> coal.CollisionGeometry:
+        """The capsule for collision checks."""
+        return coal.Capsule(self.radius, self.length)
+
+    def triangulated(self, sections: int = 32) -> trimesh.Trimesh:  # noqa: ARG002 - always alike fine
+        """Return trimesh's capsule."""
+        mesh: trimesh.Trimesh = trimesh.creation.capsule(self.length, self.radius)
+        return mesh
 
     def depth(self, point: FloatArray) -> float:
         """Return the distance under the surface, in m."""
-        nearest = np.clip(point[2], -self.half_length, self.half_length)
+        half = 0.5 * self.length
+        nearest = np.clip(point[2], -half, half)
         return self.radius - float(np.linalg.norm(point - [0.0, 0.0, nearest]))
 
     def span(self, beams: Beams) -> Span:
         """Return where each line is in the cylinder or in one of the balls."""
-        ends = [np.array([0.0, 0.0, side * self.half_length]) for side in (-1.0, 1.0)]
-        spans = [Cylinder(self.radius, self.half_length).span(beams)]
+        ends = [np.array([0.0, 0.0, side * 0.5 * self.length]) for side in (-1.0, 1.0)]
+        spans = [Cylinder(self.radius, self.length).span(beams)]
         spans += [_within(beams.start - end, beams.direction, self.radius) for end in ends]
         inside = [enters < leaves for enters, leaves in spans]
         enters = [np.where(k, span[0], np.inf) for k, span in zip(inside, spans, strict=True)]
