@@ -20,8 +20,7 @@ from elastocal.identification import (
     write_model,
 )
 from elastocal.records import from_data, to_data
-from elastocal.sim.linkage import Linkage
-from support.cells import robot, urdf
+from support.cells import linkage, robot
 from support.exported import build as compiled_c, needs_gcc, written
 from support.problems import campaign
 from support.spring_kinds import JointTensor, SaturatingGear
@@ -41,11 +40,6 @@ CASES: dict[str, Spring] = {
 REGISTERED = [name for name in CASES if not name.startswith("test:")]
 RNG = np.random.default_rng(5)
 FORCE, MOMENT = RNG.normal(0.0, 800.0, (4, 3)), RNG.normal(0.0, 100.0, (4, 3))
-
-
-@cache
-def linkage() -> Linkage:
-    return Linkage.from_urdf(urdf(), "tcp")
 
 
 @cache
