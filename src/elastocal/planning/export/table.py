@@ -10,7 +10,7 @@ from elastocal.robot import Robot, xyzabc_from_T
 from elastocal.tables import write_table as write_rows
 from elastocal.units import factor
 
-_TABLE = "plan.csv"
+PLAN_TABLE = "plan.csv"
 """Name of the table in its folder."""
 
 _SHOWN = {"rad": ("deg", "angle", 6), "m": ("mm", "length", 4)}
@@ -37,7 +37,7 @@ def write_table(folder: Path, plan: PlanResult) -> Path:
     rank = {pose: number for number, pose in enumerate(plan.search.order)}
     rows = [_row(plan, pose, rank[pose.id], robot.revolute) for pose in plan.poses]
     header = list(dict.fromkeys(key for row in rows for key in row))
-    path = Path(folder) / _TABLE
+    path = Path(folder) / PLAN_TABLE
     write_rows(path, header, ([row.get(key, "") for key in header] for row in rows))
     return path
 
