@@ -1,11 +1,13 @@
 """``elastocal run`` on the simulated cell: refusals, the dry run, a whole run, kill and resume."""
 
+import importlib
 import json
 import shutil
 import signal
 import subprocess
 import sys
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +15,6 @@ import pytest
 import xarray as xr
 
 from elastocal.cell import fingerprint, load_cell
-from elastocal.cli.device_sources import KINDS, SOURCES, DeviceSource
 from elastocal.errors import DatasetError, FileAccessError
 from elastocal.planning import read_plan, write_plan
 from elastocal.procedure import (
@@ -25,6 +26,7 @@ from elastocal.procedure import (
     refuse_foreign_files,
 )
 from elastocal.procedure.record import read_commits
+from elastocal.workflows import KINDS, SOURCES, DeviceSource
 from support.cli import elastocal
 from support.run_cells import PlannedCell, planned_cell
 
@@ -194,11 +196,11 @@ def seen_once_by_another_station(planned):
     more += '\n    range: ["1.0 m", "15 m"]\n'
     cell.write_text(text.replace(first, more + first), encoding="utf-8")
     plan = read_plan(planned.plan)
-    known = plan.cell.model_copy(update={"fingerprint": fingerprint(load_cell(cell))})
-    last = plan.poses[-1].model_copy(update={"seen_by": "station_2"})
+    known = replace(plan.cell, fingerprint=fingerprint(load_cell(cell)))
+    last = replace(plan.poses[-1], seen_by="station_2")
     folder = planned.plan.with_name("few")
     folder.mkdir()
-    write_plan(folder, plan.model_copy(update={"cell": known, "poses": (*plan.poses[:-1], last)}))
+    write_plan(folder, replace(plan, cell=known, poses=(*plan.poses[:-1], last)))
     return PlannedCell(cell, folder)
 
 
@@ -219,7 +221,8 @@ def test_a_run_whose_readings_cannot_be_derived_still_says_how_it_ended(
     def fails(_):
         raise DatasetError("no usable reading among 8")
 
-    monkeypatch.setattr("elastocal.cli.run_session.derive_run", fails)
+    module = importlib.import_module("elastocal.workflows.run")  # its face has the function
+    monkeypatch.setattr(module, "derive_run", fails)
     result = run(planned, tmp_path / "run", "--json")
     assert result.code == 1
     figures = json.loads(result.out)
@@ -250,8 +253,8 @@ def test_a_plan_that_contradicts_its_cell_is_refused_whoever_wrote_it(planned, t
     changed = planned.plan.with_name("contradicting")
     changed.mkdir()
     plan = read_plan(planned.plan)
-    contact = plan.contact.model_copy(update={"near_contact": -0.01})
-    write_plan(changed, plan.model_copy(update={"contact": contact}))
+    contact = replace(plan.contact, near_contact=-0.01)
+    write_plan(changed, replace(plan, contact=contact))
     reason = run(PlannedCell(planned.cell, changed), tmp_path / "run").reason
     assert "contact.near_contact is -0.01 m, engagement.near_contact of the cell 0.003 m" in reason
 

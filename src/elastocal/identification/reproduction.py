@@ -12,13 +12,12 @@ from numpy.random import Generator
 
 from elastocal.arrays import FloatArray, IndexArray
 from elastocal.dataset import Dataset, without
-from elastocal.identification.bootstrap import interval
 from elastocal.identification.calibrated import CalibratedModel
 from elastocal.identification.calibration import Calibration, calibrate
-from elastocal.identification.fit_settings import FitSettings
-from elastocal.identification.options import MINIMUM_DRAWS
+from elastocal.identification.options import MINIMUM_DRAWS, FitSettings
 from elastocal.identification.recertification import Estimate
 from elastocal.identification.summary import CalibrationSummary
+from elastocal.identification.uncertainty import interval
 
 _DRAWS = 1000
 """Draws of whole poses, for the intervals of the errors."""
@@ -101,7 +100,7 @@ def unseen_errors(calibration: Calibration, rng: Generator) -> UnseenErrors:
     """Return the errors at left-out poses with intervals over resampled poses.
 
     The readings at one pose share what the model gets wrong there, so that whole poses are drawn
-    (see `elastocal.identification.bootstrap`).
+    (see `elastocal.identification.uncertainty`).
 
     Parameters
     ----------
