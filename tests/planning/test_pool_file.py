@@ -2,13 +2,14 @@
 
 from dataclasses import fields, replace
 
+import h5netcdf
 import numpy as np
 import pytest
 import xarray as xr
 
 from elastocal.errors import FileAccessError, PlanningError, SchemaError
 from elastocal.planning import POOL, PoolData, check_pool_of, read_pool, write_pool
-from elastocal.planning.pool_file import SCHEMA
+from elastocal.planning.pool_file import _SCHEMA as SCHEMA
 from support import plans
 
 
@@ -164,7 +165,7 @@ def test_a_failed_write_leaves_the_old_file(tmp_path, monkeypatch):
     def fail(*_, **__):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(xr.Dataset, "to_netcdf", fail)
+    monkeypatch.setattr(h5netcdf.File, "create_variable", fail)
     with pytest.raises(KeyboardInterrupt):
         write_pool(tmp_path, plans.pool())
     assert path.read_bytes() == before

@@ -9,14 +9,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import xarray as xr
 
 from elastocal.arrays import FloatArray, IndexArray
-from elastocal.dataset import read_stated, write_netcdf
 from elastocal.errors import PlanningError, SchemaError
 from elastocal.planning.plan_result import POOL, PlanResult
+from elastocal.records import LabelledArray, LabelledArrays, read_arrays, write_arrays
 
-SCHEMA = "elastocal.pool/1"
+_SCHEMA = "elastocal.pool/1"
 NOT_CHOSEN = -1
 """``pose_id`` of a candidate that is no pose of the plan."""
 HAS_POSTURE = -1
@@ -81,7 +80,7 @@ class PoolData:
     refused_by: IndexArray
     """Index into ``refusal_names``, shape (point,); `HAS_POSTURE` for a candidate's point."""
     refusal_names: tuple[str, ...]
-    """What can leave a point without a posture: the reach of the robot, then the checks."""
+    """Names of all that can leave a point without a posture: the robot's reach, then the checks."""
 
     def __post_init__(self) -> None:
         for name, (_, kind, _, _) in _ARRAYS.items():
@@ -110,7 +109,7 @@ def write_pool(folder: Path, data: PoolData) -> Path:
         If it cannot be written.
     """
     path = Path(folder) / POOL
-    write_netcdf(_dataset_of(data), path)
+    write_arrays(path, _arrays_of(data))
     return path
 
 
@@ -126,7 +125,7 @@ def read_pool(folder: Path) -> PoolData:
     """
     path = Path(folder)
     path = path / POOL if path.is_dir() else path
-    found = read_stated(path, SCHEMA)
+    found = read_arrays(path, _SCHEMA)
     try:
         return _pool_of(found)
     except PlanningError as error:
@@ -169,36 +168,34 @@ def check_pool_of(plan: PlanResult, data: PoolData, what: str = POOL) -> None:
             )
 
 
-def _dataset_of(data: PoolData) -> xr.Dataset:
-    variables: dict[str, Any] = {}
+def _arrays_of(data: PoolData) -> LabelledArrays:
+    variables = {}
     for name, (dims, kind, unit, meaning) in _ARRAYS.items():
         values = getattr(data, name)
         values = values.astype(np.int32) if kind is int else values
-        notes = {"long_name": meaning} | ({"units": unit} if unit else {})
-        # Without a fill value NaN and inf are stored as they are, and integers stay integers.
-        encoding: dict[str, Any] = {"_FillValue": None}
-        if values.size:
-            encoding |= {"zlib": True, "shuffle": True, "complevel": 4}
-        variables[name] = xr.Variable(dims, values, notes, encoding)
-    variables["refused_by"].attrs |= {
-        "flag_values": np.arange(HAS_POSTURE, len(data.refusal_names), dtype=np.int32),
-        "flag_meanings": " ".join(["none", *data.refusal_names]),
-    }
+        notes: dict[str, object] = {"long_name": meaning}
+        if unit:
+            notes["units"] = unit
+        if name == "refused_by":
+            notes["flag_values"] = np.arange(HAS_POSTURE, len(data.refusal_names), dtype=np.int32)
+            notes["flag_meanings"] = " ".join(["none", *data.refusal_names])
+        # Packed and so without a fill value: NaN and inf stay as they are, and integers integers.
+        variables[name] = LabelledArray(dims, values, notes, packed=True)
     for name, dim in _LABELS.items():
-        variables[name] = xr.Variable(dim, np.array(getattr(data, name), dtype=np.str_))
-    return xr.Dataset(variables, attrs={"schema": SCHEMA})
+        variables[name] = LabelledArray((dim,), np.array(getattr(data, name), dtype=np.str_))
+    return LabelledArrays(variables, {"schema": _SCHEMA})
 
 
-def _pool_of(found: xr.Dataset) -> PoolData:
-    """Return what a file holds; variables that are not ours are left alone."""
-    lacking = [name for name in (*_ARRAYS, *_LABELS) if name not in found.variables]
+def _pool_of(found: LabelledArrays) -> PoolData:
+    """Return the pool that a file holds; variables that are not ours are left alone."""
+    lacking = [name for name in (*_ARRAYS, *_LABELS) if name not in found]
     if lacking:
         raise PlanningError(f"variable {lacking[0]!r} is missing")
     for name, (dims, _, _, _) in _ARRAYS.items():
         if found[name].dims != dims:
             raise PlanningError(f"{name} has dimensions {found[name].dims}, not {dims}")
-    meanings = str(found["refused_by"].attrs.get("flag_meanings", "")).split()
-    contents: dict[str, Any] = {name: found[name].values for name in _ARRAYS}
+    meanings = str(found["refused_by"].attributes.get("flag_meanings", "")).split()
+    contents: Any = {name: found[name].values for name in _ARRAYS}
     contents |= {name: tuple(found[name].values.tolist()) for name in _LABELS}
     try:
         return PoolData(**contents, refusal_names=tuple(meanings[1:]))
