@@ -2,7 +2,6 @@
 
 from dataclasses import fields, replace
 
-import h5netcdf
 import numpy as np
 import pytest
 import xarray as xr
@@ -165,7 +164,7 @@ def test_a_failed_write_leaves_the_old_file(tmp_path, monkeypatch):
     def fail(*_, **__):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(h5netcdf.File, "create_variable", fail)
+    monkeypatch.setattr("h5netcdf.File.create_variable", fail)
     with pytest.raises(KeyboardInterrupt):
         write_pool(tmp_path, plans.pool())
     assert path.read_bytes() == before
