@@ -16,17 +16,16 @@ from elastocal.cell.examples import write_example
 from elastocal.planning import make_plan
 from elastocal.procedure import (
     Event,
-    Job,
     Journal,
     RunFolder,
     Runner,
     RunRecord,
-    Seams,
+    Session,
+    SessionHooks,
     read_streams,
-    settings_of,
+    run_settings,
 )
-from elastocal.procedure.journal import read_commits
-from elastocal.procedure.pose_recorder import PoseRecorder
+from elastocal.procedure.record import PoseRecorder, read_commits
 from elastocal.sim.workcell import simulated_devices
 
 folder = Path(sys.argv[1]) if len(sys.argv) > 1 else Path(tempfile.mkdtemp(prefix="elastocal-"))
@@ -53,11 +52,10 @@ record = RunRecord(
 )
 with Journal(run.journal) as journal:
     journal.write(devices.clock.now(), Event.START, run=record)
-    seams = Seams(lambda: PoseRecorder(plan.robot.joints))
-    result = Runner(Job(plan, settings_of(cell, plan), run), devices, journal, seams).run()
-print(
-    f"{result.end.value}, arm {result.stand.value}, {devices.clock.now():.1f} s of the cell's time"
-)
+    hooks = SessionHooks(lambda: PoseRecorder(plan.robot.joints))
+    result = Runner(Session(plan, run_settings(cell, plan), run), devices, journal, hooks).run()
+seconds = devices.clock.now()
+print(f"{result.end.value}, arm {result.location.value}, {seconds:.1f} s of the cell's time")
 
 (commit,) = read_commits(run.journal)
 streams = read_streams(run.stream(commit.pose, commit.attempt))

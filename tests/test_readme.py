@@ -19,7 +19,7 @@ from elastocal.cell.description import ProcedureSettings
 from elastocal.cell.description.simulation import FaultKind
 from elastocal.cell.fingerprint import RUN_SECTIONS
 from elastocal.cli.demo_story import chapters
-from elastocal.procedure.faults import Fault
+from elastocal.procedure.run.faults import Fault
 from support.cli import Result, elastocal
 from support.demos import demo_result, finished_demo
 

@@ -9,7 +9,8 @@ import pytest
 
 from elastocal import dataset
 from elastocal.identification import write_model
-from elastocal.identification.recertification import read_comparison
+from elastocal.identification.recertification import CompareSummary
+from elastocal.records import read_json
 from support.cells import Cell, linear_truth, unseen
 from support.cli import elastocal
 from support.recertified import calibrated, soft_truth
@@ -84,7 +85,7 @@ def test_file_and_figure_are_written_and_checked(folder, tmp_path):
     out, figure = tmp_path / "c.json", tmp_path / "c.svg"
     result = run(folder, "--rows", folder / "rows.csv", "--out", out, "--figure", figure)
     assert result.code == 0
-    assert read_comparison(out).moved == ("joint_3.axial",)
+    assert read_json(out, CompareSummary).moved == ("joint_3.axial",)
     assert "joint_3.axial" in figure.read_text()
     checked = json.loads(elastocal("check", out, "--json").out)
     assert checked["kind"] == "comparison of two calibrations"

@@ -6,6 +6,7 @@ import signal
 import subprocess
 import sys
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -16,8 +17,15 @@ from elastocal.cell import fingerprint, load_cell
 from elastocal.cli.device_sources import KINDS, SOURCES, DeviceSource
 from elastocal.errors import DatasetError, FileAccessError
 from elastocal.planning import read_plan, write_plan
-from elastocal.procedure import Journal, RunFolder, cell_place, fill, read_journal, refuse_foreign
-from elastocal.procedure.journal import read_commits
+from elastocal.procedure import (
+    Journal,
+    RunFolder,
+    cell_path_in_run,
+    fill_folder,
+    read_journal,
+    refuse_foreign_files,
+)
+from elastocal.procedure.record import read_commits
 from support.cli import elastocal
 from support.run_cells import PlannedCell, planned_cell
 
@@ -187,11 +195,11 @@ def seen_once_by_another_station(planned):
     more += '\n    range: ["1.0 m", "15 m"]\n'
     cell.write_text(text.replace(first, more + first), encoding="utf-8")
     plan = read_plan(planned.plan)
-    known = plan.cell.model_copy(update={"fingerprint": fingerprint(load_cell(cell))})
-    last = plan.poses[-1].model_copy(update={"seen_by": "station_2"})
+    known = replace(plan.cell, fingerprint=fingerprint(load_cell(cell)))
+    last = replace(plan.poses[-1], seen_by="station_2")
     folder = planned.plan.with_name("few")
     folder.mkdir()
-    write_plan(folder, plan.model_copy(update={"cell": known, "poses": (*plan.poses[:-1], last)}))
+    write_plan(folder, replace(plan, cell=known, poses=(*plan.poses[:-1], last)))
     return PlannedCell(cell, folder)
 
 
@@ -212,7 +220,7 @@ def test_a_run_whose_readings_cannot_be_derived_still_says_how_it_ended(
     def fails(_):
         raise DatasetError("no usable reading among 8")
 
-    monkeypatch.setattr("elastocal.cli.run_session.derive", fails)
+    monkeypatch.setattr("elastocal.cli.run_session.derive_run", fails)
     result = run(planned, tmp_path / "run", "--json")
     assert result.code == 1
     figures = json.loads(result.out)
@@ -243,8 +251,8 @@ def test_a_plan_that_contradicts_its_cell_is_refused_whoever_wrote_it(planned, t
     changed = planned.plan.with_name("contradicting")
     changed.mkdir()
     plan = read_plan(planned.plan)
-    contact = plan.contact.model_copy(update={"near_contact": -0.01})
-    write_plan(changed, plan.model_copy(update={"contact": contact}))
+    contact = replace(plan.contact, near_contact=-0.01)
+    write_plan(changed, replace(plan, contact=contact))
     reason = run(PlannedCell(planned.cell, changed), tmp_path / "run").reason
     assert "contact.near_contact is -0.01 m, engagement.near_contact of the cell 0.003 m" in reason
 
@@ -345,16 +353,16 @@ def test_files_above_the_cell_file_keep_their_places(planned, tmp_path):
     cell.write_text(text.replace("dome.stl", "../meshes/dome.stl"), encoding="utf-8")
     (tmp_path / "meshes" / "dome.stl").write_bytes(planned.cell.with_name("dome.stl").read_bytes())
     loaded, folder = load_cell(cell), RunFolder(tmp_path / "run")
-    fill(folder, loaded, planned.plan)
-    assert cell_place(loaded) == str(Path("cells") / "cell.yaml")
-    assert load_cell(folder.cell / cell_place(loaded)).file == loaded.file
+    fill_folder(folder, loaded, planned.plan)
+    assert cell_path_in_run(loaded) == str(Path("cells") / "cell.yaml")
+    assert load_cell(folder.cell / cell_path_in_run(loaded)).file == loaded.file
 
 
 def test_what_a_run_leaves_before_its_first_entry_is_no_hindrance(tmp_path):
     folder = RunFolder(tmp_path)
     folder.streams.mkdir()
     folder.journal.touch()
-    refuse_foreign(folder)
+    refuse_foreign_files(folder)
     (tmp_path / "other").touch()
     with pytest.raises(FileAccessError, match="holds 'other'"):
-        refuse_foreign(folder)
+        refuse_foreign_files(folder)

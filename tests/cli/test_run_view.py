@@ -9,7 +9,7 @@ from rich.console import Console
 from elastocal.cli import run_view
 from elastocal.cli.run_view import watching
 from elastocal.procedure import Progress
-from elastocal.procedure.steps import Step
+from elastocal.procedure.run import Step
 
 
 def report(pose, attempt=1):

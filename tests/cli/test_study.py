@@ -14,7 +14,7 @@ from elastocal.cli.study_simulation import prepare
 from elastocal.codec.study import Sample, StudyStore, one_after_the_other, run_study
 from elastocal.elastic import ElasticModel, layout
 from elastocal.identification import calibrate
-from elastocal.sim.workcell import ErrorDraws, Scales
+from elastocal.sim.workcell import ErrorDraws, ErrorScales
 from support.cli import elastocal
 from support.simulated import example_cell
 from support.studies import numbers
@@ -82,7 +82,7 @@ def test_a_sample_is_calibrated_as_the_dataset_of_a_run_would_be():
     draws = ErrorDraws.of(POOL, 5, sample.generator(1)).take(poses, np.arange(5))
     settled = arm.settle(simulate.pool.places(poses), simulate.force_tcp)
     readings = simulate.errors.readings(
-        settled, draws, Scales(), simulate.pool.station[poses], simulate.load_cases
+        settled, draws, ErrorScales(), simulate.pool.station[poses], simulate.load_cases
     )
     robot = load_cell(cell_path()).robot
     model = ElasticModel(robot, layout(robot, "bearing"))

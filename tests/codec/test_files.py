@@ -11,13 +11,13 @@ from elastocal.codec import (
     CodecData,
     CodecOptions,
     Variant,
+    codec_summary,
     cross_validate,
     judge,
     read_codec,
-    read_verdicts,
-    verdict_record,
+    read_codec_summary,
     write_codec,
-    write_verdicts,
+    write_codec_summary,
 )
 from elastocal.errors import CodecError, SchemaError
 from support.cells import Cell, linear_truth, robot
@@ -104,7 +104,7 @@ def test_errors_are_picked_by_name_or_refused(data):
 
 
 def test_the_json_has_the_form_of_the_spec(tmp_path, data):
-    path = write_verdicts(tmp_path, verdict_record(data, judge(data)))
+    path = write_codec_summary(tmp_path, codec_summary(data, judge(data)))
     found = json.loads(path.read_text())
     n = len(data.n_train)
     assert list(found["variants"]) == ["six", "one load"]
@@ -118,14 +118,14 @@ def test_the_json_has_the_form_of_the_spec(tmp_path, data):
     assert (first["a"], first["b"]) == ("six", "one load")
     assert first["low"] <= first["difference"] <= first["high"]
     assert len(found["sentences"]) == 3
-    assert read_verdicts(path) == verdict_record(data, judge(data))
+    assert read_codec_summary(path) == codec_summary(data, judge(data))
 
 
 def test_an_unknown_key_of_the_json_is_refused(tmp_path, data):
-    path = write_verdicts(tmp_path, verdict_record(data, judge(data)))
+    path = write_codec_summary(tmp_path, codec_summary(data, judge(data)))
     path.write_text(path.read_text().replace('"sentences"', '"sentence"'))
     with pytest.raises(SchemaError, match="sentence"):
-        read_verdicts(path)
+        read_codec_summary(path)
 
 
 def test_one_split_writes_null_for_an_interval(tmp_path, data):
@@ -135,7 +135,7 @@ def test_one_split_writes_null_for_an_interval(tmp_path, data):
         data.variants,
         CodecOptions(splits=1),
     )
-    found = json.loads(write_verdicts(tmp_path, verdict_record(one, judge(one))).read_text())
+    found = json.loads(write_codec_summary(tmp_path, codec_summary(one, judge(one))).read_text())
     assert found["paired"][0]["low"] is None
     assert found["saturation_interval"]["six"]["high"] is None
     assert "no interval" in found["sentences"][-1]

@@ -23,7 +23,6 @@ from elastocal.codec.index_correlation import (
     _growth,
     correlate,
 )
-from elastocal.codec.index_file import index_records
 from elastocal.codec.indices import index_values
 from elastocal.elastic import layout
 from elastocal.errors import CodecError
@@ -133,17 +132,17 @@ def test_growth_and_equal_size_are_means_of_spearmans(known):
 def test_an_index_that_is_the_accuracy_correlates_fully(known):
     found = planted(known, -known.data.errors("actuated"))
     for kind in KINDS:
-        assert found["o1", kind].value == pytest.approx(1.0)
+        assert found["o1", kind].correlation == pytest.approx(1.0)
         assert found["o1", kind].low > 0.99
-        assert found["covering_radius", kind].value == pytest.approx(-1.0)
+        assert found["covering_radius", kind].correlation == pytest.approx(-1.0)
 
 
 def test_the_number_of_poses_alone_correlates_over_sizes_only(known):
     size = np.broadcast_to(known.data.n_train.astype(float), known.data.errors("actuated").shape)
     found = planted(known, size)
-    assert found["o1", "growth"].value > 0.2
+    assert found["o1", "growth"].correlation > 0.2
     for kind in ("size", "size_and_split"):
-        assert np.isnan([found["o1", kind].value, found["o1", kind].low]).all()
+        assert (found["o1", kind].correlation, found["o1", kind].low) == (None, None)
 
 
 def test_a_hard_verification_set_is_not_taken_for_the_index():
@@ -158,7 +157,7 @@ def test_indices_that_differ_by_round_off_are_ties(known):
     rng = np.random.default_rng(1)
     shape = known.data.errors("actuated").shape
     found = planted(known, 1e-6 * (1.0 + 1e-10 * rng.standard_normal(shape)))
-    assert all(np.isnan(each.value) for each in found.values())
+    assert all(each.correlation is None for each in found.values())
 
 
 def test_intervals_hold_their_value_and_widen_with_what_splits_share(known):
@@ -174,10 +173,10 @@ def test_intervals_hold_their_value_and_widen_with_what_splits_share(known):
         for name, sets in (("alike", alike), ("apart", apart), ("as is", known.data.verification))
     }
     for key, each in found["as is"].items():
-        assert each.low <= each.value <= each.high
+        assert each.low <= each.correlation <= each.high
         narrow = found["apart"][key]
         assert narrow.high - narrow.low < each.high - each.low
-        assert np.isnan(found["alike"][key].low)
+        assert found["alike"][key].low is None
 
 
 def test_every_index_error_and_kind_has_a_correlation(known):
@@ -239,10 +238,3 @@ def test_table_has_a_row_for_every_training_set_without_loss(known, tmp_path):
     assert (
         float(row["covering_radius[m]"]) == known.insight.indices[1].values["covering_radius"][3, 4]
     )
-
-
-def test_records_hold_none_where_nothing_is_known(known):
-    unknown = replace(known.insight.correlations[0], value=np.nan, low=np.nan, high=np.nan)
-    first, second = index_records([unknown, known.insight.correlations[1]])
-    assert (first.correlation, first.low, first.high) == (None, None, None)
-    assert second.correlation == known.insight.correlations[1].value

@@ -225,7 +225,7 @@ def test_indices_show_their_correlation_with_the_mean_error(known):
     assert [text.get_text() for text in growth.get_yticklabels()][:2] == ["O1", "O2"]
     drawn = [line.get_xdata() for line in growth.lines if len(line.get_xdata()) == 10]
     wanted = [
-        each.value
+        each.correlation
         for each in known.insight.correlations
         if (each.variant, each.error, each.kind) == ("bearing", "mean", "growth")
     ]

@@ -17,12 +17,17 @@ from support.recertified import calibrated, made_up, soft_truth
 
 
 @pytest.fixture(scope="module")
-def found():
+def compared():
     loads = unseen(linear_truth())
     return recertify(
         calibrated(linear_truth(), 0), calibrated(soft_truth(), 50_000),
         loads.joint_position, loads.force, limit=1e-4,
     )  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def found(compared):
+    return compared.summary
 
 
 def drawn(found):
@@ -45,7 +50,7 @@ def test_every_spring_is_drawn_with_both_intervals(found):
         for estimate in (change.old, change.new):
             assert any(np.allclose(x, [1e6 * estimate.low, 1e6 * estimate.high]) for x in ends)
     assert len(tested.lines) >= 2 * 14
-    np.testing.assert_allclose(rows.lines[0].get_ydata(), 1e3 * found.deflection.size)
+    np.testing.assert_allclose(rows.lines[0].get_ydata(), 1e3 * np.array(found.deflection.size))
 
 
 def test_what_moved_is_said_in_words_and_set_in_bold(found):
@@ -62,21 +67,21 @@ def test_what_moved_is_said_in_words_and_set_in_bold(found):
 def test_without_rows_there_are_springs_alone(found):
     figure = drawn(replace(found, deflection=None, verdict=None, limit=None))
     assert len(figure.axes) == 2
-    assert "No compared" in words(drawn(recertify(made_up(0), made_up(1))))
+    assert "No compared" in words(drawn(recertify(made_up(0), made_up(1)).summary))
 
 
 def test_nothing_to_compare_still_makes_a_page(found):
-    figure = drawn(replace(found, springs=()))
+    figure = drawn(replace(found, springs=(), moved=()))
     assert "No compared spring moved." in words(figure)
 
 
-def test_many_rows_are_drawn_in_groups_that_keep_the_extremes(found):
-    change = found.deflection
+def test_many_rows_are_drawn_in_groups_that_keep_the_extremes(compared):
+    change = compared.rows
     many = recertify(
         calibrated(linear_truth(), 0), calibrated(soft_truth(), 50_000),
         np.tile(change.q, (20, 1)), np.tile(change.force, (20, 1)),
     )  # fmt: skip
-    line = drawn(many).axes[2].lines[0]
+    line = drawn(many.summary).axes[2].lines[0]
     assert len(line.get_ydata()) <= 1500
     assert line.get_ydata().max() == pytest.approx(1e3 * change.largest.value)
 

@@ -20,17 +20,17 @@ from elastocal.planning.plan_result import (
 )
 from elastocal.procedure import (
     Event,
-    Job,
     Journal,
-    Result,
     RunFolder,
     Runner,
     RunRecord,
-    Seams,
-    Settings,
+    RunSettings,
+    Session,
+    SessionHooks,
+    SessionResult,
+    home_route,
     last_known,
     read_journal,
-    way_home,
 )
 from support.fake_devices import DOWN, FakeCell, fake_cell
 
@@ -120,10 +120,10 @@ def _pose(number: int) -> PoseRecord:
     )
 
 
-def settings(of: PlanResult, **changes: Any) -> Settings:
+def settings(of: PlanResult, **changes: Any) -> RunSettings:
     """Return quick settings; changes are keys of the section ``procedure``."""
     loads = tuple((name, np.array(force)) for name, force in of.contact.load_cases.items())
-    return Settings(
+    return RunSettings(
         procedure=QUICK.model_copy(update=changes),
         override=1.0,
         axes=AxisMotion(np.ones(3), 0.1),
@@ -179,14 +179,16 @@ class FakeRun:
     recorder: Callable[[], Any] | None = None
 
     @property
-    def settings(self) -> Settings:
+    def settings(self) -> RunSettings:
         return settings(self.plan, **self.changes)
 
     @property
     def journal(self) -> Path:
         return RunFolder(self.path).journal
 
-    def start(self, prepare: Callable[[FakeCell], None] = lambda _: None, **journal: Any) -> Result:
+    def start(
+        self, prepare: Callable[[FakeCell], None] = lambda _: None, **journal: Any
+    ) -> SessionResult:
         """Run from the beginning; ``prepare`` scripts the faults."""
         self.path.mkdir(exist_ok=True)
         with Journal(self.journal, **journal) as log:
@@ -198,7 +200,7 @@ class FakeRun:
         prepare: Callable[[FakeCell], None] = lambda _: None,
         cell: FakeCell | None = None,
         **journal: Any,
-    ) -> Result:
+    ) -> SessionResult:
         """Go on, with fresh devices at HOME unless others are given."""
         with Journal(self.journal, **journal) as log:
             known = last_known(read_journal(self.journal))
@@ -212,18 +214,18 @@ class FakeRun:
         start: float,
         prepare: Callable[[FakeCell], None],
         cell: FakeCell | None = None,
-    ) -> Result:
+    ) -> SessionResult:
         self.cell = cell or fake_cell(HOME, start)
         prepare(self.cell)
         known = last_known(read_journal(self.journal))
         state = self.cell.arm.state()
-        job = Job(
+        job = Session(
             self.plan,
             self.settings,
             RunFolder(self.path),
             committed=frozenset(known.committed),
             attempts=known.attempts,
-            home=way_home(
+            home=home_route(
                 self.plan,
                 state.q,
                 state.T_base_tcp,
@@ -232,8 +234,8 @@ class FakeRun:
             ),
         )
         recorder = self.recorder or (lambda: MemoryRecorder(self.kept))
-        seams = Seams(recorder, self.tell, self.interrupted)
-        return Runner(job, self.cell.devices, log, seams).run()
+        hooks = SessionHooks(recorder, self.tell, self.interrupted)
+        return Runner(job, self.cell.devices, log, hooks).run()
 
     def readings(self) -> dict[tuple[int, str | None], np.ndarray]:
         """Return mean force and marker of each committed window."""

@@ -29,7 +29,7 @@ from elastocal.procedure import (
     RunRecord,
     file_sha256,
 )
-from elastocal.procedure.pose_log import ReadingStatus, Window
+from elastocal.procedure.record import ReadingStatus, Window
 from support import plans
 
 RECORD = RunRecord(

@@ -14,24 +14,18 @@ from elastocal.planning import make_plan
 from elastocal.planning.search import Candidates, Cover
 from elastocal.procedure import (
     Event,
-    Job,
     Journal,
     PoseLog,
     RunFolder,
     Runner,
     RunRecord,
-    Seams,
+    Session,
+    SessionHooks,
     read_streams,
-    settings_of,
+    run_settings,
 )
-from elastocal.procedure.journal import read_commits
-from elastocal.procedure.pose_recorder import PoseRecorder
-from elastocal.procedure.streams import Streams
-from elastocal.report.plots import (
-    new_figure,
-    style,
-    write_figure,
-)
+from elastocal.procedure.record import PoseRecorder, Streams, read_commits
+from elastocal.report.plots import new_figure, style, write_figure
 from elastocal.sim.workcell import simulated_devices
 from gallery.campaign import example_cell
 
@@ -101,8 +95,8 @@ def _visit(cell: Cell, run: RunFolder) -> tuple[Streams, PoseLog]:
     )
     with Journal(run.journal) as journal:
         journal.write(devices.clock.now(), Event.START, run=record)
-        seams = Seams(lambda: PoseRecorder(plan.robot.joints))
-        Runner(Job(plan, settings_of(cell, plan), run), devices, journal, seams).run()
+        hooks = SessionHooks(lambda: PoseRecorder(plan.robot.joints))
+        Runner(Session(plan, run_settings(cell, plan), run), devices, journal, hooks).run()
     (commit,) = read_commits(run.journal)
     return read_streams(run.stream(commit.pose, commit.attempt)), commit
 

@@ -81,7 +81,7 @@ def codec(  # noqa: PLR0913 - one parameter an option
     """Cross-validate growing training sets: how many poses, which technique."""
     from elastocal import dataset as datasets
     from elastocal.cli.codec_folder import write_codec_folder
-    from elastocal.cli.codec_options import comparisons, parse_ratio, parse_tolerance
+    from elastocal.cli.codec_options import parse_ratio, parse_tolerance
     from elastocal.cli.codec_table import show_codec
     from elastocal.cli.output import console, print_json
     from elastocal.cli.parsing import parse_point
@@ -90,17 +90,18 @@ def codec(  # noqa: PLR0913 - one parameter an option
         VERDICTS,
         CodecOptions,
         analyse,
+        codec_summary,
         cross_validate,
-        figures,
         judge,
         make_variants,
-        verdict_record,
+        read_comparisons,
     )
     from elastocal.dataset import without
     from elastocal.files import filling
+    from elastocal.records import to_data
     from elastocal.workflows import find_robot
 
-    variants = make_variants(comparisons(compare or []))
+    variants = make_variants(read_comparisons(compare or []))
     options = CodecOptions(splits, parse_ratio(ratio), seed, not keep_blunders, trust_conventions)
     near = parse_tolerance(tolerance)
     measured = datasets.read(data)
@@ -120,10 +121,10 @@ def codec(  # noqa: PLR0913 - one parameter an option
         )
         verdicts = judge(found, near)
         insight = analyse(arm, readings, found, marker_offset=offset, with_indices=indices)
-        record = verdict_record(found, verdicts, insight.correlations)
+        result = codec_summary(found, verdicts, insight.correlations)
         axes = ("x", "y", "z") if per_axis else ()
-        names = write_codec_folder(folder, found, verdicts, record, insight, axes)
+        names = write_codec_folder(folder, found, verdicts, result, insight, axes)
     if as_json:
-        print_json({"folder": str(out), "files": names, **figures(record)})
+        print_json({"folder": str(out), "files": names, **to_data(result)})
     else:
-        show_codec(console(), record, out, names)
+        show_codec(console(), result, out, names)

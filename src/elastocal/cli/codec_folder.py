@@ -6,11 +6,11 @@ from pathlib import Path
 from elastocal.codec import (
     CodecAnalysis,
     CodecData,
-    VerdictRecord,
+    CodecSummary,
     Verdicts,
     write_codec,
+    write_codec_summary,
     write_index_table,
-    write_verdicts,
 )
 from elastocal.report import write_codec_figures
 
@@ -19,7 +19,7 @@ def write_codec_folder(
     folder: Path,
     data: CodecData,
     verdicts: Verdicts,
-    record: VerdictRecord,
+    result: CodecSummary,
     insight: CodecAnalysis,
     axes: Sequence[str] = (),
 ) -> list[str]:
@@ -31,7 +31,7 @@ def write_codec_folder(
         An existing folder.
     data : CodecData
         The arrays.
-    verdicts, record : Verdicts, VerdictRecord
+    verdicts, result : Verdicts, CodecSummary
         What they say, and its file.
     insight : CodecAnalysis
         What the readings tell beyond; its indices are written if there are any.
@@ -43,7 +43,7 @@ def write_codec_folder(
     FileAccessError
         If a file cannot be written.
     """
-    paths = [write_codec(folder, data), write_verdicts(folder, record)]
+    paths = [write_codec(folder, data), write_codec_summary(folder, result)]
     if insight.indices:
         paths.append(write_index_table(folder, data, insight.indices))
     paths += write_codec_figures(folder, data, verdicts, insight, axes)

@@ -9,8 +9,10 @@ from elastocal.codec import (
     ARRAYS_SCHEMA,
     VERDICTS,
     VERDICTS_SCHEMA,
+    CodecData,
     read_codec,
-    read_verdicts,
+    read_codec_folder,
+    read_codec_summary,
 )
 from elastocal.errors import SchemaError
 from elastocal.files import read_text
@@ -37,34 +39,23 @@ def codec_folder(path: Path) -> Described:
     ElastocalError
         If a file is damaged, or the two are not of one codec.
     """
-    data, record = read_codec(path), read_verdicts(path / VERDICTS)
-    names = [each.name for each in data.variants]
-    if names != list(record.variants) or len(data.contact) != record.settings.poses:
-        raise SchemaError(f"{path}: {ARRAYS} and {VERDICTS} are of different codecs")
-    return "folder of a codec", {**arrays(path)[1], "saturation": record.saturation}
+    data, result = read_codec_folder(path)
+    return "folder of a codec", {**_facts(data), "saturation": result.saturation}
 
 
 def arrays(path: Path) -> Described:
     """Describe the arrays of a codec."""
-    data = read_codec(path)
-    return "codec", {
-        "schema": ARRAYS_SCHEMA,
-        "robot": data.robot,
-        "variants": [each.name for each in data.variants],
-        "poses": len(data.contact),
-        "splits": len(data.seed_pose),
-        "training": len(data.n_train),
-    }
+    return "codec", _facts(read_codec(path))
 
 
 def verdicts(path: Path) -> Described:
     """Describe the verdicts of a codec."""
-    record = read_verdicts(path)
+    result = read_codec_summary(path)
     return "verdict file of a codec", {
         "schema": VERDICTS_SCHEMA,
-        "robot": record.robot,
-        "variants": list(record.variants),
-        "saturation": record.saturation,
+        "robot": result.robot,
+        "variants": list(result.variants),
+        "saturation": result.saturation,
     }
 
 
@@ -87,6 +78,17 @@ def table(path: Path) -> Described:
         if len(row) != len(header):
             raise SchemaError(f"{path}, line {number}: {len(row)} cells, not {len(header)}")
     return _TABLES[_first_columns(text)], {"rows": len(rows), "columns": header}
+
+
+def _facts(data: CodecData) -> dict[str, Any]:
+    return {
+        "schema": ARRAYS_SCHEMA,
+        "robot": data.robot,
+        "variants": [each.name for each in data.variants],
+        "poses": len(data.contact),
+        "splits": len(data.seed_pose),
+        "training": len(data.n_train),
+    }
 
 
 def _first_columns(text: str) -> tuple[str, ...]:

@@ -1,27 +1,8 @@
 """Options of ``codec`` that a person types."""
 
-from collections.abc import Sequence
-
-from elastocal.codec import Tolerance, read_comparison
+from elastocal.codec import Tolerance
 from elastocal.errors import CodecError, UnitError
 from elastocal.units import parse_quantity
-
-
-def comparisons(texts: Sequence[str]) -> dict[str, tuple[str, ...]]:
-    """Return the values to compare by key, from texts ``KEY=A,B``.
-
-    Raises
-    ------
-    CodecError
-        If a text does not fit, or a key stands twice.
-    """
-    found: dict[str, tuple[str, ...]] = {}
-    for text in texts:
-        key, values = read_comparison(text)
-        if key in found:
-            raise CodecError(f"--compare {text!r}: {key} stands twice; name all its values at once")
-        found[key] = values
-    return found
 
 
 def parse_ratio(text: str) -> float:

@@ -37,11 +37,9 @@ def compare(
     from elastocal.cli.output import console, print_json
     from elastocal.cli.parsing import parse_limit
     from elastocal.identification.recertification import (
-        comparison_record,
-        figures,
         recertify_files,
-        write_comparison,
     )
+    from elastocal.records import to_data, write_json
     from elastocal.workflows import refuse_overwriting
 
     accepted = None if limit is None else parse_limit(limit)
@@ -51,17 +49,18 @@ def compare(
         refuse_overwriting(path, *inputs)
     loads = (None, None, None) if rows is None else read_rows(rows, new)
     found = recertify_files(old, new, *loads, limit=accepted)
-    record = comparison_record(found)
     if figure is not None:
         from elastocal.report import write_recertification_figure
 
-        write_recertification_figure(figure, found)
+        write_recertification_figure(figure, found.summary)
     if out is not None:
-        write_comparison(out, record)
+        write_json(out, found.summary)
     if as_json:
-        print_json(figures(record))
+        print_json(to_data(found.summary))
         return
-    hint = measured_rows(found.new_provenance) if limit is not None and rows is None else None
+    hint = (
+        measured_rows(found.summary.new_provenance) if limit is not None and rows is None else None
+    )
     show_comparison(console(), found, hint)
     for path in (each for each in outputs.values() if each is not None):
         console().print(f"written to {path}", markup=False, soft_wrap=True)

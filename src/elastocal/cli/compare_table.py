@@ -9,9 +9,9 @@ from rich.table import Table
 
 from elastocal.elastic import unit_of
 from elastocal.identification.recertification import (
-    DeflectionChange,
+    CompareResult,
+    CompareSummary,
     Estimate,
-    Recertification,
     SpringChange,
     Verdict,
 )
@@ -21,18 +21,19 @@ _USUAL_UNIT = unit_of("rad/(N*m)").shown
 _COLOURS = {Verdict.PASS: "green", Verdict.FAIL: "red", Verdict.UNDECIDED: "yellow"}
 
 
-def show_comparison(console: Console, found: Recertification, hint: Path | None = None) -> None:
+def show_comparison(console: Console, compared: CompareResult, hint: Path | None = None) -> None:
     """Print a comparison for a person.
 
     Parameters
     ----------
     console : Console
         Where.
-    found : Recertification
+    compared : CompareResult
         The comparison.
     hint : Path, optional
         A dataset that could serve as rows.
     """
+    found = compared.summary
     console.print(f"[bold]{escape(found.robot)}[/bold]: {_moved(found)}")
     if found.springs:
         sums = {each.name: f"sum {n}" for n, each in enumerate(_sums(found), start=1)}
@@ -51,15 +52,15 @@ def show_comparison(console: Console, found: Recertification, hint: Path | None 
             )
     if found.not_compared:
         console.print(f"not determined by both: {', '.join(found.not_compared)}", markup=False)
-    if found.deflection is not None:
-        _show_deflection(console, found.deflection)
+    if compared.rows is not None:
+        console.print(f"\n{compared.rows.sentence()}", soft_wrap=True)
     _show_verdict(console, found, hint)
     for note in found.notes:
         console.print(f"[yellow]note:[/yellow] {escape(note)}", soft_wrap=True)
 
 
-def _moved(found: Recertification) -> str:
-    moved, count = found.moved, len(found.springs)
+def _moved(found: CompareSummary) -> str:
+    moved, count = found.moved_springs, len(found.springs)
     if not count:
         return "no spring is determined by both calibrations"
     verb = "moved" if found.same_springs else "differ"
@@ -72,11 +73,11 @@ def _moved(found: Recertification) -> str:
     return f"[bold red]{verb}[/bold red]: {escape(names)}"
 
 
-def _sums(found: Recertification) -> list[SpringChange]:
+def _sums(found: CompareSummary) -> list[SpringChange]:
     return [each for each in found.springs if len(each.terms) > 1]
 
 
-def _spring_table(found: Recertification, sums: dict[str, str]) -> Table:
+def _spring_table(found: CompareSummary, sums: dict[str, str]) -> Table:
     """Return a row a spring; linear springs, rare, name their own unit."""
     table = Table(box=None, pad_edge=False)
     table.add_column("spring", no_wrap=True)
@@ -106,24 +107,7 @@ def _between(estimate: Estimate, factor: float) -> str:
     return f"{factor * estimate.low:+.3f} … {factor * estimate.high:+.3f}"
 
 
-def _show_deflection(console: Console, change: DeflectionChange) -> None:
-    place = ", ".join(f"{1e3 * x:.0f}" for x in change.tcp_position[change.where])
-    before = 1e3 * np.linalg.norm(change.old, axis=1)
-    console.print(
-        f"\npredicted deflection over {len(change.q)} rows: {before.mean():.3f} mm mean,"
-        f" {before.max():.3f} mm max by the old model\n"
-        f"   change: {_mm(change.mean)} mean, {_mm(change.largest)} max\n"
-        f"   largest at row {change.where + 1}, tcp at ({place}) mm in base",
-        soft_wrap=True,
-    )
-
-
-def _mm(estimate: Estimate) -> str:
-    low, high = 1e3 * estimate.low, 1e3 * estimate.high
-    return f"{1e3 * estimate.value:.3f} mm ({low:.3f} to {high:.3f}, 95 %)"
-
-
-def _show_verdict(console: Console, found: Recertification, hint: Path | None) -> None:
+def _show_verdict(console: Console, found: CompareSummary, hint: Path | None) -> None:
     if found.limit is None:
         return
     if found.verdict is None:

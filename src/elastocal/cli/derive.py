@@ -15,7 +15,7 @@ def derive(
 ) -> None:
     """Derive dataset.nc and summary.json of a run again from its raw streams."""
     from elastocal.cli.output import console, print_json
-    from elastocal.procedure import RunFolder, derive as derive_run, write_derived
+    from elastocal.procedure import RunFolder, derive_run as derive_run, write_derived
 
     derived = derive_run(run)
     write_derived(run, derived)

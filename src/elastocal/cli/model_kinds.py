@@ -10,7 +10,8 @@ from elastocal.elastic import read_springs
 from elastocal.errors import RobotError
 from elastocal.files import read_text
 from elastocal.identification import read_model
-from elastocal.identification.recertification import read_comparison
+from elastocal.identification.recertification import CompareSummary
+from elastocal.records import read_json
 from elastocal.robot import Robot, leaf_links, parse_urdf
 
 Described = tuple[str, dict[str, Any]]
@@ -97,7 +98,7 @@ def process_table(path: Path) -> Described:
 
 def comparison_file(path: Path) -> Described:
     """Describe a comparison of two calibrations."""
-    record = read_comparison(path)
+    record = read_json(path, CompareSummary)
     return "comparison of two calibrations", {
         "schema": "elastocal.comparison/1",
         "robot": record.robot,

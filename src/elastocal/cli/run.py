@@ -31,7 +31,7 @@ def run(
     from elastocal.cli.output import console, print_json
     from elastocal.cli.run_session import Asked, prepare, run_session
     from elastocal.cli.run_table import dry_figures, figures, show_itinerary, show_result
-    from elastocal.procedure import End
+    from elastocal.procedure import RunEnd
 
     job = prepare(cell, plan, out, seed)
     if dry_run:
@@ -41,11 +41,11 @@ def run(
             show_itinerary(console(), job)
         return
     finished = run_session(job, Asked(resume=resume, yes=yes), console())
-    if as_json and finished.result.end is End.DONE:
+    if as_json and finished.result.end is RunEnd.DONE:
         print_json(figures(job, finished))
     else:
         show_result(console(), job, finished)
     if finished.problem is not None:
         raise finished.problem
-    if finished.result.end is End.INTERRUPTED:
+    if finished.result.end is RunEnd.INTERRUPTED:
         raise typer.Exit(130)

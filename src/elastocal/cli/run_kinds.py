@@ -9,7 +9,7 @@ from elastocal.cli.cell_facts import cell_facts
 from elastocal.errors import SchemaError
 from elastocal.planning import read_plan, read_pool
 from elastocal.procedure import (
-    SCHEMA as STREAMS,
+    STREAMS_SCHEMA as STREAMS,
     RunFolder,
     commits,
     read_journal,

@@ -19,34 +19,34 @@ from elastocal.errors import ElastocalError, ProcedureError
 from elastocal.files import read_text
 from elastocal.planning import PLAN, PlanResult, read_plan
 from elastocal.procedure import (
-    End,
     Entry,
     Event,
-    Job,
     Journal,
     LastKnown,
     PoseRecorder,
-    Result,
+    RunEnd,
     RunFolder,
     Runner,
     RunRecord,
-    Seams,
-    Settings,
-    cell_place,
-    check_fits,
+    RunSettings,
+    Session,
+    SessionHooks,
+    SessionResult,
+    cell_path_in_run,
+    check_compatible,
     check_same_run,
     check_same_settings,
-    derive,
-    fill,
+    derive_run,
+    fill_folder,
+    home_route,
     last_known,
     make_folder,
     read_copies,
     read_journal,
-    refuse_foreign,
-    registration_findings,
+    refuse_foreign_files,
+    registration_warnings,
     run_record,
-    settings_of,
-    way_home,
+    run_settings,
     write_derived,
 )
 
@@ -66,7 +66,7 @@ class Prepared:
     cell: Cell
     plan: PlanResult
     plan_folder: Path
-    settings: Settings
+    settings: RunSettings
     source: DeviceSource
     record: RunRecord
     folder: RunFolder
@@ -78,9 +78,9 @@ class Prepared:
 class Finished:
     """How a stretch of a run ended, and what its streams say when it was the last one."""
 
-    result: Result
+    result: SessionResult
     summary: Mapping[str, Any] | None = None
-    """See `elastocal.procedure.summary`; None where nothing was derived."""
+    """See `elastocal.procedure.derive.summary`; None where nothing was derived."""
     problem: ElastocalError | None = None
     """Why nothing was derived of a run that is done."""
 
@@ -99,17 +99,17 @@ def prepare(cell: Path, plan: Path, out: Path, seed: int | None) -> Prepared:
     now = datetime.now(UTC).isoformat(timespec="seconds")
     text = read_text(folder / PLAN)
     seed = loaded.file.simulation.seed if seed is None else seed
-    record = run_record(loaded, read, text, cell_place(loaded), seed, now)
-    check_fits(read, loaded)
+    record = run_record(loaded, read, text, cell_path_in_run(loaded), seed, now)
+    check_compatible(read, loaded)
     return Prepared(
         loaded,
         read,
         folder,
-        settings_of(loaded, read),
+        run_settings(loaded, read),
         device_source(loaded),
         record,
         RunFolder(out),
-        registration_findings(read),
+        registration_warnings(read),
     )
 
 
@@ -132,7 +132,7 @@ def run_session(job: Prepared, asked: Asked, console: Console) -> Finished:
         if read_journal(job.folder.journal) != entries:
             raise ProcedureError(f"{job.folder.path}: another process has just run here")
         if not entries:
-            fill(job.folder, job.cell, job.plan_folder)
+            fill_folder(job.folder, job.cell, job.plan_folder)
         known = last_known(entries) if entries else None
         devices = job.source.make(job.cell, job.record.seed, known.entry.time if known else 0.0)
         _confirm(job, known, devices, asked, console)
@@ -142,36 +142,36 @@ def run_session(job: Prepared, asked: Asked, console: Console) -> Finished:
         else:
             journal.write(devices.clock.now(), Event.RESUME)
         with interruption() as interrupted, watching(console, len(job.plan.poses)) as tell:
-            seams = Seams(lambda: PoseRecorder(job.plan.robot.joints), tell, interrupted)
-            result = Runner(task, devices, journal, seams).run()
-    if result.end is End.STOPPED:
-        raise ProcedureError(f"{result.message}. The arm is {result.stand.value}")
+            hooks = SessionHooks(lambda: PoseRecorder(job.plan.robot.joints), tell, interrupted)
+            result = Runner(task, devices, journal, hooks).run()
+    if result.end is RunEnd.STOPPED:
+        raise ProcedureError(f"{result.message}. The arm is {result.location.value}")
     return _derived(job, result)
 
 
-def _derived(job: Prepared, result: Result) -> Finished:
+def _derived(job: Prepared, result: SessionResult) -> Finished:
     """Derive the dataset of a run that is done; what keeps it from that is no end of the run."""
-    if result.end is not End.DONE:
+    if result.end is not RunEnd.DONE:
         return Finished(result)
     try:
-        derived = derive(job.folder.path)
+        derived = derive_run(job.folder.path)
         write_derived(job.folder.path, derived)
     except ElastocalError as error:
         return Finished(result, problem=error)
     return Finished(result, derived.summary)
 
 
-def _task(job: Prepared, known: LastKnown | None, devices: Devices) -> Job:
+def _task(job: Prepared, known: LastKnown | None, devices: Devices) -> Session:
     """Return what is left to do, and the way to HOME from where the arm stands."""
     state, limit = devices.arm.state(), job.settings.procedure.travel_limit
     likely = known.uncommitted if known else None
-    return Job(
+    return Session(
         job.plan,
         job.settings,
         job.folder,
         committed=frozenset(known.committed) if known else frozenset(),
         attempts=known.attempts if known else {},
-        home=way_home(job.plan, state.q, state.T_base_tcp, limit, likely),
+        home=home_route(job.plan, state.q, state.T_base_tcp, limit, likely),
     )
 
 
@@ -185,7 +185,7 @@ def _check_folder(job: Prepared, entries: tuple[Entry, ...], resume: bool) -> No
     if not entries:
         if resume:
             raise ProcedureError(f"{out} holds no run to go on with: leave --resume out")
-        refuse_foreign(job.folder)
+        refuse_foreign_files(job.folder)
         return
     record = entries[0].run
     assert record is not None

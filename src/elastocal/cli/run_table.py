@@ -57,7 +57,7 @@ def figures(job: Prepared, finished: Finished) -> dict[str, Any]:
     return {
         "run": str(job.folder.path),
         "state": result.end.value,
-        "arm": result.stand.value,
+        "arm": result.location.value,
         "message": result.message,
         "poses": len(job.plan.poses),
         "committed": len(commits(entries)),
@@ -87,7 +87,7 @@ def show_result(console: Console, job: Prepared, finished: Finished) -> None:
         f"{result.end.value}: {found['committed']} of {found['poses']} poses committed"
         f" ({readings or 'no readings'}{'' if finished.summary else ', not derived'}),"
         f" {found['seconds'] / 60.0:.1f} min,"
-        f" failed attempts: {found['failed_attempts']}; the arm is {result.stand.value}",
+        f" failed attempts: {found['failed_attempts']}; the arm is {result.location.value}",
         soft_wrap=True,
     )
     if result.message:

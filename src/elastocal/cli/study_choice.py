@@ -13,7 +13,7 @@ from elastocal.codec.study import Condition
 from elastocal.errors import CodecError
 from elastocal.planning import SearchPool, cell_surface, sample_pool, sight_check
 from elastocal.planning.search import Candidates, RandomChoice, technique
-from elastocal.sim.workcell import Places
+from elastocal.sim.workcell import ContactPoses
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,9 +34,9 @@ class StudyPool:
     def __len__(self) -> int:
         return len(self.q)
 
-    def places(self, poses: IndexArray) -> Places:
+    def places(self, poses: IndexArray) -> ContactPoses:
         """Return some poses as the simulator wants them."""
-        return Places(self.q[poses], self.normal[poses])
+        return ContactPoses(self.q[poses], self.normal[poses])
 
 
 @dataclass(frozen=True, eq=False)

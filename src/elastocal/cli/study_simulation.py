@@ -26,7 +26,7 @@ from elastocal.codec.study import (
 )
 from elastocal.elastic import ElasticModel, layout
 from elastocal.errors import CodecError, DeviceError, nearest
-from elastocal.sim.workcell import ErrorDraws, QuickCell, QuickErrors, Scales
+from elastocal.sim.workcell import CampaignErrors, CampaignSimulator, ErrorDraws, ErrorScales
 
 _PACKAGES = ("elastocal", "numpy", "scipy", "pin")
 
@@ -40,8 +40,8 @@ class StudySimulation:
     """Of each condition."""
     models: dict[str, ElasticModel]
     """By spring layout."""
-    truth: QuickCell
-    errors: QuickErrors
+    truth: CampaignSimulator
+    errors: CampaignErrors
     pool: StudyPool
     load_cases: tuple[str, ...]
     force_tcp: FloatArray
@@ -72,7 +72,7 @@ class StudySimulation:
     def _calibrated(
         self,
         sample: Sample,
-        arm: QuickCell,
+        arm: CampaignSimulator,
         draws: ErrorDraws,
         numbers: Sequence[int],
         verification: Verification,
@@ -87,7 +87,7 @@ class StudySimulation:
         found = {}
         for number, order in zip(numbers, chosen, strict=True):
             condition = self.conditions[number]
-            scales = Scales(condition.tracker_noise, condition.force_noise)
+            scales = ErrorScales(condition.tracker_noise, condition.force_noise)
             station = self.pool.station[poses]
             readings = self.errors.readings(settled, own, scales, station, cases)
             mine = np.isin(readings.pose, np.searchsorted(poses, order))
@@ -95,7 +95,7 @@ class StudySimulation:
             found[number] = calibrated(model, readings.take(mine), self.marker, verification)
         return found
 
-    def _verification(self, arm: QuickCell) -> Verification:
+    def _verification(self, arm: CampaignSimulator) -> Verification:
         settled = arm.settle(self.pool.places(self.pool.verification), self.force_tcp)
         flat = (settled.q, settled.force, settled.deflection)
         return Verification(*(array.reshape(-1, array.shape[-1]) for array in flat))
@@ -141,7 +141,7 @@ def prepare(
         _check_load_cases(each.load_cases, loads.cases)
     if cell.file.marker is None or not cell.file.trackers:
         raise DeviceError(f"cell {cell.name} has no tracker to simulate (key 'trackers')")
-    truth, errors = QuickCell.of(cell), QuickErrors.of(cell)
+    truth, errors = CampaignSimulator.of(cell), CampaignErrors.of(cell)
     poses = study_poses(cell, verification, jobs)
     chosen = choose(cell, poses, conditions)
     settings = _settings(cell, conditions, models, poses.pool, seed)

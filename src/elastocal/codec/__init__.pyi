@@ -3,16 +3,25 @@ from .analysis import (
     SpringObservability as SpringObservability,
     analyse as analyse,
 )
-from .cross_validation import cross_validate as cross_validate
+from .cross_validation import STAGE as STAGE, Report as Report, cross_validate as cross_validate
 from .data import (
     AXES as AXES,
     NO_POSE as NO_POSE,
     CodecData as CodecData,
     SpringLabels as SpringLabels,
 )
-from .index_correlation import Correlation as Correlation
-from .index_file import write_index_table as write_index_table
-from .indices import INDICES as INDICES, IndexValues as IndexValues
+from .index_correlation import (
+    KINDS as KINDS,
+    Correlation as Correlation,
+    correlate as correlate,
+)
+from .indices import (
+    COVERING_RADIUS as COVERING_RADIUS,
+    INDICES as INDICES,
+    IndexValues as IndexValues,
+    index_values as index_values,
+    write_index_table as write_index_table,
+)
 from .netcdf import (
     ARRAYS as ARRAYS,
     ARRAYS_SCHEMA as ARRAYS_SCHEMA,
@@ -20,17 +29,22 @@ from .netcdf import (
     write_codec as write_codec,
 )
 from .paired_differences import (
+    DifferenceAtSize as DifferenceAtSize,
     PairedDifference as PairedDifference,
+    PairVerdict as PairVerdict,
     paired_difference as paired_difference,
 )
 from .saturation import (
     Saturation as Saturation,
+    SaturationInterval as SaturationInterval,
     Tolerance as Tolerance,
     find_saturation as find_saturation,
 )
 from .splits import (
+    Campaign as Campaign,
     CodecOptions as CodecOptions,
     Split as Split,
+    make_campaign as make_campaign,
     make_splits as make_splits,
     split_sizes as split_sizes,
 )
@@ -39,17 +53,22 @@ from .variants import (
     KEYS as KEYS,
     SOLVERS as SOLVERS,
     Variant as Variant,
+    check_different as check_different,
     make_variants as make_variants,
     read_comparison as read_comparison,
+    read_comparisons as read_comparisons,
     training_cases as training_cases,
 )
-from .verdict_file import (
+from .verdicts import (
     VERDICTS as VERDICTS,
     VERDICTS_SCHEMA as VERDICTS_SCHEMA,
-    VerdictRecord as VerdictRecord,
-    figures as figures,
-    read_verdicts as read_verdicts,
-    verdict_record as verdict_record,
-    write_verdicts as write_verdicts,
+    CodecSetup as CodecSetup,
+    CodecSummary as CodecSummary,
+    Curve as Curve,
+    Verdicts as Verdicts,
+    codec_summary as codec_summary,
+    judge as judge,
+    read_codec_folder as read_codec_folder,
+    read_codec_summary as read_codec_summary,
+    write_codec_summary as write_codec_summary,
 )
-from .verdicts import Verdicts as Verdicts, judge as judge

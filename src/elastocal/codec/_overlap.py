@@ -139,3 +139,8 @@ def _log_median(values: FloatArray) -> FloatArray:
 def micrometres(length: float) -> str:
     """Return a length in m as sentences state it, in µm."""
     return f"{1e6 * length:.1f} µm"
+
+
+def known(value: float) -> float | None:
+    """Return a figure as files hold it: None where it is NaN."""
+    return None if np.isnan(value) else float(value)

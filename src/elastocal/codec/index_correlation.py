@@ -17,14 +17,14 @@ error at held-out poses; +1: a better index always goes with a smaller error, 0:
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 
 from elastocal.arrays import FloatArray, IndexArray
-from elastocal.codec._overlap import Overlap, corrected_mean
+from elastocal.codec._overlap import Overlap, corrected_mean, known
 from elastocal.codec.data import CodecData
 from elastocal.codec.indices import INDICES, IndexValues
+from elastocal.records import record
 
 _ERRORS = ("mean", "max")
 _DIGITS = 7
@@ -33,7 +33,7 @@ _ALMOST = 1.0 - 1e-6
 """Correlations nearer to one than this have no transform."""
 
 
-@dataclass(frozen=True)
+@record()
 class Correlation:
     """How well an index orders training sets by their accuracy."""
 
@@ -43,12 +43,12 @@ class Correlation:
     """``mean`` or ``max`` error norm."""
     kind: str
     """One of `KINDS`."""
-    value: float
-    """Mean rank correlation of the index, turned so that more is better, with accuracy; NaN
+    correlation: float | None
+    """Mean rank correlation of the index, turned so that more is better, with accuracy; None
     where the index never varies."""
-    low: float
-    """Lower end of the 95 % interval; NaN where no spread is known."""
-    high: float
+    low: float | None
+    """Lower end of the 95 % interval; None where no spread is known."""
+    high: float | None
 
 
 def _growth(goodness: FloatArray, accuracy: FloatArray) -> float:
@@ -100,8 +100,8 @@ def correlate(data: CodecData, indices: IndexValues) -> tuple[Correlation, ...]:
         for name in INDICES:
             goodness = _rounded(indices.goodness(name))
             for kind, statistic in KINDS.items():
-                ends = _interval(statistic, goodness, accuracy, overlap)
-                found.append(Correlation(indices.variant, name, error, kind, *ends))
+                figures = map(known, _interval(statistic, goodness, accuracy, overlap))
+                found.append(Correlation(indices.variant, name, error, kind, *figures))
     return tuple(found)
 
 

@@ -1,12 +1,17 @@
 """The indices of each training set: how good it ought to be, by what is known beforehand."""
 
+import csv
+import io
+from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
 from elastocal.arrays import BoolArray, FloatArray
 from elastocal.codec._training import PreparedVariant
 from elastocal.codec.data import CodecData
+from elastocal.files import write_text
 from elastocal.planning.search import Candidates, build_information, covering_radius
 from elastocal.planning.search.criteria import CRITERIA, IOptimal
 
@@ -15,6 +20,8 @@ INDICES = ("o1", "o2", "o3", "o4", "o5", "d", "a", "e", "i", COVERING_RADIUS)
 """Names, in the order of tables."""
 _PLAIN = ("o2", "o3", "o4", "o5", "d", "a", "e")
 """Those that need the information matrix alone."""
+_TABLE = "indices.csv"
+"""Name of the table in a codec's folder."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,6 +80,41 @@ def index_values(data: CodecData, prepared: PreparedVariant) -> IndexValues:
         [[covering_radius(pool, np.flatnonzero(one)) for one in sets] for sets in member]
     )
     return IndexValues(prepared.variant.name, {name: values[name] for name in INDICES})
+
+
+def write_index_table(folder: Path, data: CodecData, indices: Sequence[IndexValues]) -> Path:
+    """Write ``indices.csv`` into a folder, atomically; return its path.
+
+    A row a training set: its variant, the pose its verification set was grown from, its size,
+    its indices, and the mean and largest error norm at the held-out poses.
+
+    Parameters
+    ----------
+    folder : Path
+        An existing folder.
+    data : CodecData
+        The codec.
+    indices : sequence of IndexValues
+        Of its variants.
+
+    Raises
+    ------
+    FileAccessError
+        If it cannot be written.
+    """
+    text = io.StringIO()
+    table = csv.writer(text, lineterminator="\n")
+    names = [f"{name}[m]" if name == COVERING_RADIUS else name for name in INDICES]
+    table.writerow(["variant", "seed_pose", "n_train", *names, "error_mean[m]", "error_max[m]"])
+    for each in indices:
+        errors = [data.errors(each.variant, which) for which in ("mean", "max")]
+        columns = [*(each.values[name] for name in INDICES), *errors]
+        for cv, n in np.ndindex(columns[0].shape):
+            numbers = [repr(float(column[cv, n])) for column in columns]
+            table.writerow([each.variant, data.seed_pose[cv], data.n_train[n], *numbers])
+    path = Path(folder) / _TABLE
+    write_text(path, text.getvalue())
+    return path
 
 
 def _process(rows: FloatArray, scale: FloatArray, basis: FloatArray) -> FloatArray:

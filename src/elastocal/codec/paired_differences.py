@@ -5,11 +5,38 @@ from dataclasses import dataclass
 import numpy as np
 
 from elastocal.arrays import BoolArray, FloatArray
-from elastocal.codec._overlap import Overlap, corrected_mean, micrometres
+from elastocal.codec._overlap import Overlap, corrected_mean, known, micrometres
+from elastocal.records import record
 
 _ROUND_OFF = 1e-9
 """Part of an error below which a difference is round-off: techniques that choose the same poses
 in another order."""
+
+
+@record()
+class DifferenceAtSize:
+    """How the errors of two variants differ at one number of training poses."""
+
+    a: str
+    b: str
+    n_train: int
+    difference: float
+    """Error of ``a`` minus error of ``b``, mean over the verification sets, in m."""
+    low: float | None
+    """Ends of the 95 % interval, in m; None where no spread is known."""
+    high: float | None
+
+
+@record()
+class PairVerdict:
+    """From where on one of two variants is the better one; see `PairedDifference`."""
+
+    a: str
+    b: str
+    at: int
+    better: str | None
+    proved_from: int | None
+    crossing: int | None
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,6 +79,18 @@ class PairedDifference:
         sign = np.sign(self.difference[: self.at])
         since = _since(sign == sign[-1])
         return None if since == 1 or sign[-1] == 0.0 else since
+
+    def at_each_size(self) -> tuple[DifferenceAtSize, ...]:
+        """Return the difference for each number of training poses, as files hold it."""
+        rows = zip(self.difference.tolist(), self.low.tolist(), self.high.tolist(), strict=True)
+        return tuple(
+            DifferenceAtSize(self.a, self.b, n, difference, known(low), known(high))
+            for n, (difference, low, high) in enumerate(rows, start=1)
+        )
+
+    def verdict(self) -> PairVerdict:
+        """Return from where on one of the two is better, as files hold it."""
+        return PairVerdict(self.a, self.b, self.at, self.better, self.proved_from, self.crossing)
 
     def sentence(self, where: str) -> str:
         """Return the verdict at `at` training poses in words.

@@ -1,6 +1,6 @@
 """The saturation verdict: from how many training poses on the error no longer falls."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.random import Generator
@@ -9,6 +9,7 @@ from elastocal.arrays import BoolArray, FloatArray, IndexArray
 from elastocal.codec._overlap import Overlap, median_draws, micrometres
 from elastocal.errors import CodecError
 from elastocal.identification import CONFIDENCE
+from elastocal.records import record
 
 
 @dataclass(frozen=True)
@@ -53,27 +54,25 @@ class Tolerance:
         return np.maximum(self.relative * last, self.floor)
 
 
-@dataclass(frozen=True)
-class Saturation:
-    """The verdict on one variant."""
+@record()
+class SaturationInterval:
+    """How sure a saturation is."""
 
-    variant: str
-    n_train: int
-    """Smallest number of training poses whose error is within the tolerance of the last."""
     low: int | None
     """Lower end of its 95 % interval: with fewer poses, 97.5 % of the bootstrap draws leave the
     tolerance again; None where no spread is known."""
     high: int | None
     """Upper end: by then, 97.5 % of the draws have come within the tolerance."""
+    settled: bool
+    """Whether the interval ends below the largest training set, and the error does not rise.
+    Where it ends there, the error may still be falling: nothing is known beyond the last."""
     error: float
     """Median over the verification sets of the mean error norm there, in m."""
     last_error: float
     """The same with the largest training set, in m."""
-    last: int
-    """Size of the largest training set."""
     stays: int
-    """Number of training poses from which on no error leaves the tolerance again; `n_train` or
-    more."""
+    """Number of training poses from which on no error leaves the tolerance again; no fewer than
+    saturation takes."""
     least: int
     """Number of training poses with the smallest error."""
     least_error: float
@@ -81,13 +80,21 @@ class Saturation:
     rises: bool
     """Whether that is below the last error by more than the tolerance: more poses did harm."""
 
-    @property
-    def settled(self) -> bool:
-        """Whether the interval ends below the largest training set, and the error does not rise.
 
-        Where it ends there, the error may still be falling: nothing is known beyond the last.
-        """
-        return self.high is not None and self.high < self.last and not self.rises
+@dataclass(frozen=True)
+class Saturation(SaturationInterval):
+    """The verdict on one variant."""
+
+    variant: str
+    n_train: int
+    """Smallest number of training poses whose error is within the tolerance of the last."""
+    last: int
+    """Size of the largest training set."""
+    settled: bool = field(init=False)
+
+    def __post_init__(self) -> None:
+        settled = self.high is not None and self.high < self.last and not self.rises
+        object.__setattr__(self, "settled", settled)
 
     def sentence(self, tolerance: Tolerance, largest: FloatArray, where: str) -> str:
         """Return the verdict in words.

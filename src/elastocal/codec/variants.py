@@ -91,6 +91,23 @@ def read_comparison(text: str) -> tuple[str, tuple[str, ...]]:
     return key, values
 
 
+def read_comparisons(texts: Sequence[str]) -> dict[str, tuple[str, ...]]:
+    """Return the values to compare by key; see `read_comparison`.
+
+    Raises
+    ------
+    CodecError
+        If a text does not fit, or a key stands twice.
+    """
+    found: dict[str, tuple[str, ...]] = {}
+    for text in texts:
+        key, values = read_comparison(text)
+        if key in found:
+            raise CodecError(f"--compare {text!r}: {key} stands twice; name all its values at once")
+        found[key] = values
+    return found
+
+
 def make_variants(comparisons: Mapping[str, Sequence[str]]) -> tuple[Variant, ...]:
     """Return every combination of the values to compare, the default for the other keys.
 

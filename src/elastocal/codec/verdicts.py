@@ -1,14 +1,30 @@
-"""What a codec says: saturation of each variant, difference of each pair, and both in words."""
+"""The verdicts on a codec, and its result: the file ``codec.json`` (spec section 4)."""
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
 from itertools import combinations
+from pathlib import Path
 
 import numpy as np
 
 from elastocal.codec._overlap import Overlap
 from elastocal.codec.data import CodecData
-from elastocal.codec.paired_differences import PairedDifference, paired_difference
-from elastocal.codec.saturation import Saturation, Tolerance, find_saturation
+from elastocal.codec.index_correlation import Correlation
+from elastocal.codec.netcdf import ARRAYS, read_codec
+from elastocal.codec.paired_differences import (
+    DifferenceAtSize,
+    PairedDifference,
+    PairVerdict,
+    paired_difference,
+)
+from elastocal.codec.saturation import Saturation, SaturationInterval, Tolerance, find_saturation
+from elastocal.codec.variants import KEYS
+from elastocal.errors import SchemaError
+from elastocal.records import read_json, record, write_json
+
+VERDICTS_SCHEMA = "elastocal.codec_verdicts/1"
+VERDICTS = "codec.json"
+"""Name of the file in a codec's folder."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -22,6 +38,68 @@ class Verdicts:
     tolerance: Tolerance
     sentences: tuple[str, ...]
     """One for each variant, then one for each pair."""
+
+
+@record()
+class Curve:
+    """Errors of a variant over the number of training poses."""
+
+    n_train: tuple[int, ...]
+    error_mean: tuple[float, ...]
+    """Median over the verification sets of the mean error norm, in m."""
+    error_max: tuple[float, ...]
+    """Median over the verification sets of the largest error norm, in m."""
+    search: str
+    springs: str
+    load_cases: str
+    solver: str
+
+
+@record()
+class CodecSetup:
+    """The splits and tolerances that the figures rest on."""
+
+    poses: int
+    training: int
+    verification: int
+    splits: int
+    overlap: float
+    """Part of its poses that a verification set shares with another one, mean over pairs."""
+    ratio: float
+    seed: int
+    tolerance: float
+    floor: float
+    load_cases: tuple[str, ...]
+
+    @property
+    def sentence(self) -> str:
+        """The splits in words."""
+        return (
+            f"{self.poses} poses, {self.splits} splits into up to {self.training} training and"
+            f" {self.verification} verification poses"
+        )
+
+
+@record(VERDICTS_SCHEMA)
+class CodecSummary:
+    """The figures of a codec: contents of ``codec.json``, for people's scripts."""
+
+    robot: str
+    provenance: str
+    settings: CodecSetup
+    variants: dict[str, Curve]
+    saturation: dict[str, int]
+    """By variant: smallest number of training poses whose error is that of the last."""
+    saturation_interval: dict[str, SaturationInterval]
+    paired: tuple[DifferenceAtSize, ...]
+    crossings: tuple[PairVerdict, ...]
+    indices: tuple[Correlation, ...]
+    """Where they were asked for."""
+    sentences: tuple[str, ...]
+    """The verdicts in words: one for each variant, then one for each pair."""
+    findings: tuple[str, ...]
+    """Notes on the data."""
+    versions: dict[str, str]
 
 
 def judge(data: CodecData, tolerance: Tolerance | None = None) -> Verdicts:
@@ -55,3 +133,96 @@ def judge(data: CodecData, tolerance: Tolerance | None = None) -> Verdicts:
         *(each.sentence(where) for each in pairs),
     )
     return Verdicts(found, pairs, tolerance, sentences)
+
+
+def codec_summary(
+    data: CodecData, verdicts: Verdicts, correlations: Sequence[Correlation] = ()
+) -> CodecSummary:
+    """Return the figures of a codec, its verdicts, and correlations of indices if there are."""
+    interval = [each.name for each in fields(SaturationInterval)]
+    return CodecSummary(
+        robot=data.robot,
+        provenance=data.provenance,
+        settings=_setup(data, verdicts.tolerance),
+        variants={each.name: _curve(data, each.name) for each in data.variants},
+        saturation={each.variant: each.n_train for each in verdicts.saturation},
+        saturation_interval={
+            each.variant: SaturationInterval(**{name: getattr(each, name) for name in interval})
+            for each in verdicts.saturation
+        },
+        paired=tuple(one for pair in verdicts.pairs for one in pair.at_each_size()),
+        crossings=tuple(pair.verdict() for pair in verdicts.pairs),
+        indices=tuple(correlations),
+        sentences=verdicts.sentences,
+        findings=data.findings,
+        versions=data.versions,
+    )
+
+
+def write_codec_summary(folder: Path, result: CodecSummary) -> Path:
+    """Write ``codec.json`` into a folder, atomically; return its path.
+
+    Raises
+    ------
+    FileAccessError
+        If it cannot be written.
+    """
+    path = Path(folder) / VERDICTS
+    write_json(path, result)
+    return path
+
+
+def read_codec_summary(path: Path) -> CodecSummary:
+    """Return the validated contents of a ``codec.json``.
+
+    Raises
+    ------
+    SchemaError
+        If it is not JSON, has another schema or does not fit.
+    FileAccessError
+        If it cannot be read.
+    """
+    return read_json(path, CodecSummary)
+
+
+def read_codec_folder(folder: Path) -> tuple[CodecData, CodecSummary]:
+    """Return arrays and result of a codec's folder.
+
+    Raises
+    ------
+    SchemaError
+        If a file is damaged, or the two are not of one codec.
+    FileAccessError
+        If one cannot be read.
+    """
+    data, result = read_codec(folder), read_codec_summary(Path(folder) / VERDICTS)
+    names = [each.name for each in data.variants]
+    if names != list(result.variants) or len(data.contact) != result.settings.poses:
+        raise SchemaError(f"{folder}: {ARRAYS} and {VERDICTS} are of different codecs")
+    return data, result
+
+
+def _setup(data: CodecData, tolerance: Tolerance) -> CodecSetup:
+    sets, size = data.verification.shape
+    return CodecSetup(
+        poses=len(data.contact),
+        training=data.training_poses,
+        verification=size,
+        splits=sets,
+        overlap=Overlap.of(data.verification, len(data.contact)).shared,
+        ratio=data.options.ratio,
+        seed=data.options.seed,
+        tolerance=tolerance.relative,
+        floor=tolerance.floor,
+        load_cases=data.load_cases,
+    )
+
+
+def _curve(data: CodecData, name: str) -> Curve:
+    variant = data.variants[data.index(name)]
+    return Curve(
+        tuple(data.n_train.tolist()),
+        tuple(np.median(data.errors(name, "mean"), axis=0).tolist()),
+        tuple(np.median(data.errors(name, "max"), axis=0).tolist()),
+        **{key: getattr(variant, key) for key in KEYS},
+    )

@@ -1,4 +1,9 @@
-"""Procedure 1 of the paper: run a plan on devices, keep everything, derive the dataset."""
+"""Procedure 1 (paper 2.2): press at every pose of a plan, record it, derive the dataset.
+
+Data flow one way: `run` drives the devices and writes what `record` keeps on the disk, a journal
+and raw streams; `derive` reads those, with `registration` for the tracker stations, and writes the
+dataset and the summary. A run can so be derived again, by a newer program, at any time.
+"""
 
 import lazy_loader
 

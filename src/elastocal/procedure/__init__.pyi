@@ -1,31 +1,49 @@
-from .copies import check_plan as check_plan, file_sha256 as file_sha256, read_copies as read_copies
-from .derivation import derive as derive, write_derived as write_derived
-from .entries import Entry as Entry, Event as Event, RunRecord as RunRecord
-from .itinerary import itinerary as itinerary
-from .job import End as End, Job as Job, Result as Result, Seams as Seams
-from .journal import Journal as Journal, commits as commits, read_journal as read_journal
-from .plan_fit import check_fits as check_fits, registration_findings as registration_findings
-from .pose_log import PoseLog as PoseLog
-from .pose_recorder import SCHEMA as SCHEMA
-from .progress import Progress as Progress
-from .reduction import PoseReadings as PoseReadings, reduce_pose as reduce_pose
-from .resume import (
+from .derive import (
+    DerivedRun as DerivedRun,
+    PoseReadings as PoseReadings,
+    derive_run as derive_run,
+    read_summary as read_summary,
+    reduce_pose as reduce_pose,
+    write_derived as write_derived,
+)
+from .record import (
+    JOURNAL as JOURNAL,
+    STREAMS_SCHEMA as STREAMS_SCHEMA,
+    Entry as Entry,
+    Event as Event,
+    Journal as Journal,
+    PoseLog as PoseLog,
+    PoseRecorder as PoseRecorder,
+    RunFolder as RunFolder,
+    RunRecord as RunRecord,
+    cell_path_in_run as cell_path_in_run,
+    check_plan as check_plan,
+    commits as commits,
+    file_sha256 as file_sha256,
+    fill_folder as fill_folder,
+    make_folder as make_folder,
+    read_commits as read_commits,
+    read_copies as read_copies,
+    read_journal as read_journal,
+    read_streams as read_streams,
+    refuse_foreign_files as refuse_foreign_files,
+)
+from .run import (
     LastKnown as LastKnown,
+    Progress as Progress,
+    RunEnd as RunEnd,
+    Runner as Runner,
+    RunSettings as RunSettings,
+    Session as Session,
+    SessionHooks as SessionHooks,
+    SessionResult as SessionResult,
+    check_compatible as check_compatible,
     check_same_run as check_same_run,
     check_same_settings as check_same_settings,
+    home_route as home_route,
+    itinerary as itinerary,
     last_known as last_known,
+    registration_warnings as registration_warnings,
     run_record as run_record,
+    run_settings as run_settings,
 )
-from .run_folder import (
-    JOURNAL as JOURNAL,
-    RunFolder as RunFolder,
-    cell_place as cell_place,
-    fill as fill,
-    make_folder as make_folder,
-    refuse_foreign as refuse_foreign,
-)
-from .runner import Runner as Runner
-from .settings import Settings as Settings, settings_of as settings_of
-from .streams import PoseRecorder as PoseRecorder, read_streams as read_streams
-from .summary import read_summary as read_summary
-from .ways import way_home as way_home

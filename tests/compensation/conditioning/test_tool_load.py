@@ -3,7 +3,7 @@ import pytest
 
 from elastocal.compensation.conditioning import SensorLoad
 from elastocal.errors import CompensationError
-from elastocal.procedure.tool_weight import RawWrench, ToolLoad, wrench_on_robot
+from elastocal.procedure.derive.tool import RawWrench, ToolLoad, wrench_on_robot
 from support.compensated import load
 from support.static_postures import turned
 

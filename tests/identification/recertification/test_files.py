@@ -24,7 +24,7 @@ def change(path: Path, edit) -> None:
 
 
 def test_files_are_compared_as_their_models(paths):
-    assert recertify_files(*paths).springs == recertify(made_up(0), made_up(1)).springs
+    assert recertify_files(*paths).summary == recertify(made_up(0), made_up(1)).summary
 
 
 def test_one_file_under_two_names_is_refused(paths):
@@ -65,7 +65,7 @@ def test_other_loads_are_noted_where_the_files_state_them(paths, mean):
             data["calibration"]["deflection"]["mean"] = mean
 
     change(paths[1], edit)
-    noted = any("was deflected by" in note for note in recertify_files(*paths).notes)
+    noted = any("was deflected by" in note for note in recertify_files(*paths).summary.notes)
     assert noted == (mean == 3e-3)
 
 

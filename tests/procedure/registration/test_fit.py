@@ -1,7 +1,7 @@
 import numpy as np
 from scipy.optimize import approx_fprime
 
-from elastocal.procedure.registration.fit import fit, motion_columns
+from elastocal.procedure.registration._fit import fit, motion_columns
 from support.stations import LEVER, made
 
 

@@ -3,7 +3,7 @@ import math
 import numpy as np
 import pytest
 
-from elastocal.procedure.registration.geometry import align, determined, rotation_sigma
+from elastocal.procedure.registration._fit import align, determined, rotation_sigma
 from support.stations import station
 
 

@@ -5,7 +5,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from elastocal.procedure.registration import UnloadedReadings, register
-from elastocal.procedure.registration.fit import LEVER_SIGMA
+from elastocal.procedure.registration._fit import LEVER_SIGMA
 from support.stations import LEVER, Made, made, poses, shifted, station
 
 ROUGH = LEVER + np.array([3e-3, -2e-3, 1e-3])

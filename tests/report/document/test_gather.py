@@ -208,5 +208,5 @@ def test_an_earlier_model_is_compared_over_the_readings_of_the_run(finished, tmp
     assert made.code == 0, made.err
     parts = gather(Options(finished, old=old), MADE)
     found = parts.recertification
-    assert len(found.deflection.q) == len(parts.again.unseen.error)
+    assert found.deflection.rows == len(parts.again.unseen.error)
     assert found.limit == pytest.approx(0.1e-3)

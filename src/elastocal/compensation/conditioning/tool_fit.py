@@ -8,7 +8,7 @@ With gravity ``u_i`` in the flange's axes, the rotation ``R`` of the sensor in t
 Thirteen unknowns: mass, a small rotation, ``b``, ``h``, ``b_m``. Gauss-Newton from the best
 rotation between forces and gravity (Kabsch 1976), with singular directions left where they
 started; force and moment are weighed by their own scatter. The intervals are those of the last
-linear step, by Student's t. This extends `elastocal.procedure.tool_estimate`, which knows the
+linear step, by Student's t. This extends `elastocal.procedure.derive.tool`, which knows the
 rotation and looks for drift instead.
 """
 

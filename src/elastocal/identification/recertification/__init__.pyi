@@ -3,17 +3,14 @@ from .comparison import (
     recertify as recertify,
     recertify_files as recertify_files,
 )
-from .record import (
-    ComparisonRecord as ComparisonRecord,
-    comparison_record as comparison_record,
-    figures as figures,
-    read_comparison as read_comparison,
-    write_comparison as write_comparison,
-)
 from .result import (
+    SCHEMA as SCHEMA,
+    CompareResult as CompareResult,
+    CompareSummary as CompareSummary,
     DeflectionChange as DeflectionChange,
     Estimate as Estimate,
-    Recertification as Recertification,
+    LargestChange as LargestChange,
+    RowComparison as RowComparison,
     SpringChange as SpringChange,
     Verdict as Verdict,
 )

@@ -6,7 +6,7 @@ import re
 import numpy as np
 
 from elastocal.identification.calibrated import CalibratedModel
-from elastocal.identification.recertification.result import DeflectionChange, Verdict
+from elastocal.identification.recertification.result import RowComparison, Verdict
 
 _MOST = 20
 """Beyond this many times the poses nobody measures."""
@@ -15,12 +15,12 @@ _LIKE = 1.25
 """Mean measured deflections further apart than by this factor come from other loads."""
 
 
-def judge(deflection: DeflectionChange | None, limit: float | None) -> tuple[Verdict | None, str]:
+def judge(deflection: RowComparison | None, limit: float | None) -> tuple[Verdict | None, str]:
     """Return the verdict on the largest change against a limit in m, and why.
 
     Parameters
     ----------
-    deflection : DeflectionChange, optional
+    deflection : RowComparison, optional
         Over the rows that matter; None: there are none.
     limit : float, optional
         Largest accepted change, in m.
@@ -45,7 +45,7 @@ def judge(deflection: DeflectionChange | None, limit: float | None) -> tuple[Ver
     return Verdict.UNDECIDED, f"{found}, and {allowed} lies in between; {decides}"
 
 
-def _what_decides(deflection: DeflectionChange, limit: float) -> str:
+def _what_decides(deflection: RowComparison, limit: float) -> str:
     """Return what would decide a verdict that is open, if the estimate stays.
 
     The old calibration cannot be repeated: that arm is gone. Only the new one's part of the

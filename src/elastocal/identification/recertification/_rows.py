@@ -13,10 +13,13 @@ if that row's own bound is (intersection-union test; Berger, Technometrics 24, 1
 import numpy as np
 
 from elastocal.arrays import FloatArray
-from elastocal.identification.bootstrap import CONFIDENCE
 from elastocal.identification.calibrated import CalibratedModel
 from elastocal.identification.recertification._spread import Spread, over
-from elastocal.identification.recertification.result import DeflectionChange, Estimate
+from elastocal.identification.recertification.result import (
+    Estimate,
+    RowComparison,
+)
+from elastocal.identification.uncertainty import CONFIDENCE
 
 _CHUNK = 100
 """Rows at a time, so that the pairs of a long path fit into memory."""
@@ -33,7 +36,7 @@ def compare_rows(
     q: FloatArray,
     force: FloatArray,
     moment: FloatArray | None,
-) -> DeflectionChange:
+) -> RowComparison:
     """Return how the deflection changed at every row, on average and at most.
 
     Parameters
@@ -70,7 +73,7 @@ def compare_rows(
     t = np.percentile(farthest, _ONE_SIDE)
     off = float(np.percentile(total / count, 100.0 * CONFIDENCE))
     mean = float(size.mean())
-    return DeflectionChange(
+    return RowComparison(
         q=q,
         force=force,
         moment=moment,

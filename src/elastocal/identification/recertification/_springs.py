@@ -20,12 +20,12 @@ import numpy as np
 from elastocal.arrays import FloatArray
 from elastocal.elastic import Parameter, Spring
 from elastocal.errors import IdentificationError
-from elastocal.identification.bootstrap import CONFIDENCE, interval
+from elastocal.identification._sparse_basis import sparse_basis
 from elastocal.identification.calibrated import CalibratedModel
 from elastocal.identification.observability import Term, describe
 from elastocal.identification.recertification._spread import Spread, over
 from elastocal.identification.recertification.result import Estimate, SpringChange
-from elastocal.identification.sparse_basis import sparse_basis
+from elastocal.identification.uncertainty import CONFIDENCE, interval
 
 _SAME = 1e-4
 """Singular value, over the largest, below which unobservable combinations of the two models
@@ -54,19 +54,28 @@ def compare_springs(
     alone = np.percentile(np.abs(noise), 100.0 * CONFIDENCE, axis=0)
     together = np.maximum(alone, critical(noise) * rms(noise))
     units = {each.name: each.unit.si for each in new.model.parameters}
-    return tuple(
-        SpringChange(
-            sum_text(terms),
-            terms,
-            units[terms[0].spring],
-            *(
-                Estimate(float(c[i]), float(low[i]), float(high[i]))
-                for c, (low, high) in zip(values, ends, strict=True)
-            ),
-            *(_around(values[1][i] - values[0][i], half[i]) for half in (alone, together)),
+    changes = []
+    for i, terms in enumerate(sums):
+        before, after = (
+            Estimate(float(c[i]), float(low[i]), float(high[i]))
+            for c, (low, high) in zip(values, ends, strict=True)
         )
-        for i, terms in enumerate(sums)
-    )
+        difference, simultaneous = (
+            _around(values[1][i] - values[0][i], half[i]) for half in (alone, together)
+        )
+        changes.append(
+            SpringChange(
+                name=sum_text(terms),
+                terms=terms,
+                unit=units[terms[0].spring],
+                old=before,
+                new=after,
+                difference=difference,
+                together=simultaneous,
+                moved=0.0 not in simultaneous,
+            )
+        )
+    return tuple(changes)
 
 
 def rms(noise: FloatArray) -> FloatArray:

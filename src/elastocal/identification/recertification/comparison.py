@@ -15,7 +15,7 @@ from elastocal.identification.recertification._judgement import judge, load_note
 from elastocal.identification.recertification._rows import compare_rows
 from elastocal.identification.recertification._spread import Spread
 from elastocal.identification.recertification._springs import common_springs, compare_springs
-from elastocal.identification.recertification.result import Recertification
+from elastocal.identification.recertification.result import CompareResult, CompareSummary
 from elastocal.records import read_json
 from elastocal.robot import Robot
 
@@ -33,7 +33,7 @@ def recertify_files(
     moment: ArrayLike | None = None,
     *,
     limit: float | None = None,
-) -> Recertification:
+) -> CompareResult:
     """Compare two model files; as `recertify`, with a note where the loads were others.
 
     Parameters
@@ -62,7 +62,9 @@ def recertify_files(
         names=(str(old), str(new)),
     )
     note = load_note(*(_measured_deflection(path) for path in (old, new)))
-    return found if note is None else replace(found, notes=(*found.notes, note))
+    if note is None:
+        return found
+    return replace(found, summary=replace(found.summary, notes=(*found.summary.notes, note)))
 
 
 def recertify(
@@ -74,7 +76,7 @@ def recertify(
     *,
     limit: float | None = None,
     names: tuple[str, str] = ("the old model", "the new model"),
-) -> Recertification:
+) -> CompareResult:
     """Compare two calibrations of one cell.
 
     Parameters
@@ -110,30 +112,35 @@ def recertify(
         )
     spread = Spread.of(old, new)
     loads = None if q is None else _checked_rows(new, q, force, moment)
-    deflection = None if loads is None else compare_rows(old, new, spread, *loads)
-    verdict, reason = judge(deflection, limit)
+    rows = None if loads is None else compare_rows(old, new, spread, *loads)
+    verdict, reason = judge(rows, limit)
     springs = compare_springs(old, new, spread)
+    moved = sorted(
+        (each for each in springs if each.moved), key=lambda each: each.certainty, reverse=True
+    )
     common = [spring.name for spring in common_springs(old, new)]
     compared = {term.spring for change in springs for term in change.terms}
     only_old, only_new = (
         tuple(name for name in each.model.spring_names if name not in common) for each in (old, new)
     )
     outside = 0 if loads is None else _count_outside_limits(new.model.robot, loads[0])
-    return Recertification(
+    result = CompareSummary(
         robot=new.model.robot.name,
         tcp=new.model.robot.tip,
         old_provenance=old.provenance,
         new_provenance=new.provenance,
         springs=springs,
+        moved=tuple(each.name for each in moved),
         not_compared=tuple(name for name in common if name not in compared),
         only_old=only_old,
         only_new=only_new,
-        deflection=deflection,
+        deflection=None if rows is None else rows.summary(),
         limit=limit,
         verdict=verdict,
         reason=reason,
         notes=notes_on(old, new, not only_old and not only_new, outside),
     )
+    return CompareResult(result, rows)
 
 
 def check_same_robot(old: Robot, new: Robot, names: tuple[str, str]) -> None:

@@ -1,4 +1,4 @@
-"""What a comparison of two calibrations says."""
+"""The result of a recertification: the file ``elastocal.comparison/1``, and the rows behind it."""
 
 from dataclasses import dataclass
 from enum import StrEnum
@@ -7,6 +7,10 @@ import numpy as np
 
 from elastocal.arrays import FloatArray
 from elastocal.identification.observability import Term
+from elastocal.records import record
+from elastocal.results import Result
+
+SCHEMA = "elastocal.comparison/1"
 
 
 class Verdict(StrEnum):
@@ -20,7 +24,7 @@ class Verdict(StrEnum):
     """The limit lies within the interval."""
 
 
-@dataclass(frozen=True)
+@record()
 class Estimate:
     """A number with its 95 % interval, in the unit that the field holding it states."""
 
@@ -33,7 +37,7 @@ class Estimate:
         return self.low <= number <= self.high
 
 
-@dataclass(frozen=True)
+@record()
 class SpringChange:
     """One spring, or one combination of springs, that both calibrations determine."""
 
@@ -53,21 +57,113 @@ class SpringChange:
     together: Estimate
     """The same difference with the interval that holds for *all* compared springs at once with
     95 % (at least as wide), in `unit`. It decides `moved`."""
-
-    @property
-    def moved(self) -> bool:
-        """Whether the spring changed beyond what both calibrations leave open."""
-        return 0.0 not in self.together
+    moved: bool
+    """Whether the spring changed beyond what both calibrations leave open."""
 
     @property
     def relative(self) -> float:
         """Difference over the old value; NaN where that is not positive."""
         return self.difference.value / self.old.value if self.old.value > 0.0 else float("nan")
 
+    @property
+    def certainty(self) -> float:
+        """Difference over the half-width of its interval on the side of zero."""
+        d = self.difference
+        width = d.value - d.low if d.value > 0.0 else d.high - d.value
+        return abs(d.value) / width if width > 0.0 else float("inf")
 
-@dataclass(frozen=True, eq=False)
+
+_Triple = tuple[float, float, float]
+
+
+@record()
+class LargestChange:
+    """The row whose deflection changed most."""
+
+    row: int
+    """Its number, from 0."""
+    joints: tuple[float, ...]
+    """In rad or m."""
+    force: _Triple
+    """On the robot at the tcp in base, in N."""
+    moment: _Triple | None
+    """On the robot about the tcp in base, in N·m; None: none."""
+    tcp_position: _Triple
+    """In base, in m."""
+    old: _Triple
+    """Deflection by the old model in base, in m."""
+    new: _Triple
+    """Deflection by the new model in base, in m."""
+
+
+@record()
 class DeflectionChange:
     """How the predicted deflection changed over given poses and loads (rows)."""
+
+    rows: int
+    mean: Estimate
+    """Mean norm of the change, in m."""
+    largest: Estimate
+    """Largest norm of all rows, in m; its interval allows for the search over the rows."""
+    where: LargestChange
+    size: tuple[float, ...]
+    """Norm of the change of each row, in m."""
+    low: tuple[float, ...]
+    """Lower end of the 95 % interval of each `size`, in m; not below 0."""
+    high: tuple[float, ...]
+    """Upper end, in m."""
+
+
+@record(SCHEMA)
+class CompareSummary:
+    """Two calibrations of one cell, compared."""
+
+    robot: str
+    """Name of the robot, as the new model states it."""
+    tcp: str
+    """Link at the tool centre point."""
+    old_provenance: str
+    new_provenance: str
+    springs: tuple[SpringChange, ...]
+    """Springs and combinations that both calibrations determine, in the order of the model."""
+    moved: tuple[str, ...]
+    """Names of the springs and combinations that changed, the most certain first."""
+    not_compared: tuple[str, ...]
+    """Common springs that stand in no comparison: not determined by both, alone or in a sum."""
+    only_old: tuple[str, ...]
+    """Springs that only the old model has."""
+    only_new: tuple[str, ...]
+    """Springs that only the new model has."""
+    deflection: DeflectionChange | None
+    """Over the rows; None without rows."""
+    limit: float | None
+    """Largest change of deflection that is accepted, in m; None: nothing to judge."""
+    verdict: Verdict | None
+    """None without a limit, or without rows to judge it by."""
+    reason: str
+    """One sentence: why this verdict, or why none; if undecided, what would decide."""
+    notes: tuple[str, ...]
+    """What a reader has to know beside the figures, a sentence each."""
+
+    @property
+    def same_springs(self) -> bool:
+        """Whether both models have the same springs.
+
+        If not, a difference of one spring may come from the others in its model rather than
+        from the robot.
+        """
+        return not self.only_old and not self.only_new
+
+    @property
+    def moved_springs(self) -> tuple[SpringChange, ...]:
+        """The springs and combinations that changed, the most certain first."""
+        springs = {each.name: each for each in self.springs}
+        return tuple(springs[name] for name in self.moved)
+
+
+@dataclass(frozen=True, eq=False)
+class RowComparison:
+    """Predicted deflections of both models over given poses and loads (rows)."""
 
     q: FloatArray
     """Joint positions, shape (row, joint), in rad or m."""
@@ -107,55 +203,58 @@ class DeflectionChange:
         """Index of the row whose deflection changed most."""
         return int(self.size.argmax())
 
+    def summary(self) -> "DeflectionChange":
+        """Return how the deflection changed, as files hold it."""
+        row = self.where
+        where = LargestChange(
+            row=row,
+            joints=tuple(self.q[row].tolist()),
+            force=_triple(self.force[row]),
+            moment=None if self.moment is None else _triple(self.moment[row]),
+            tcp_position=_triple(self.tcp_position[row]),
+            old=_triple(self.old[row]),
+            new=_triple(self.new[row]),
+        )
+        size, low, high = (tuple(each.tolist()) for each in (self.size, self.low, self.high))
+        return DeflectionChange(len(self.q), self.mean, self.largest, where, size, low, high)
 
-@dataclass(frozen=True, eq=False)
-class Recertification:
-    """Two calibrations of one cell, compared."""
-
-    robot: str
-    """Name of the robot, as the new model states it."""
-    tcp: str
-    """Link at the tool centre point."""
-    old_provenance: str
-    new_provenance: str
-    springs: tuple[SpringChange, ...]
-    """Springs and combinations that both calibrations determine, in the order of the model."""
-    not_compared: tuple[str, ...]
-    """Common springs that stand in no comparison: not determined by both, alone or in a sum."""
-    only_old: tuple[str, ...]
-    """Springs that only the old model has."""
-    only_new: tuple[str, ...]
-    """Springs that only the new model has."""
-    deflection: DeflectionChange | None
-    """Over the rows; None without rows."""
-    limit: float | None
-    """Largest change of deflection that is accepted, in m; None: nothing to judge."""
-    verdict: Verdict | None
-    """None without a limit, or without rows to judge it by."""
-    reason: str
-    """One sentence: why this verdict, or why none; if undecided, what would decide."""
-    notes: tuple[str, ...]
-    """What a reader has to know beside the figures, a sentence each."""
-
-    @property
-    def same_springs(self) -> bool:
-        """Whether both models have the same springs.
-
-        If not, a difference of one spring may come from the others in its model rather than
-        from the robot.
-        """
-        return not self.only_old and not self.only_new
-
-    @property
-    def moved(self) -> tuple[SpringChange, ...]:
-        """Springs and combinations that changed, the most certain first."""
-        return tuple(
-            sorted((each for each in self.springs if each.moved), key=_certainty, reverse=True)
+    def sentence(self) -> str:
+        """Return the change in words, a line each: before, change, where it is largest."""
+        place = ", ".join(f"{1e3 * x:.0f}" for x in self.tcp_position[self.where])
+        before = 1e3 * np.linalg.norm(self.old, axis=1)
+        return (
+            f"predicted deflection over {len(self.q)} rows: {before.mean():.3f} mm mean,"
+            f" {before.max():.3f} mm max by the old model\n"
+            f"   change: {_in_mm(self.mean)} mean, {_in_mm(self.largest)} max\n"
+            f"   largest at row {self.where + 1}, tcp at ({place}) mm in base"
         )
 
 
-def _certainty(change: SpringChange) -> float:
-    """Return the difference over the half-width of its interval on the side of zero."""
-    d = change.difference
-    width = d.value - d.low if d.value > 0.0 else d.high - d.value
-    return abs(d.value) / width if width > 0.0 else float("inf")
+@dataclass(frozen=True, eq=False, repr=False)
+class CompareResult(Result):
+    """Two calibrations of one cell, compared, with the rows that it rests on."""
+
+    summary: CompareSummary
+    """The figures and the verdict, as files hold them."""
+    rows: RowComparison | None
+    """None without rows."""
+
+    def facts(self) -> tuple[tuple[str, str], ...]:
+        """Return what a person wants to know first."""
+        found = self.summary
+        return (
+            ("robot", found.robot),
+            ("moved", ", ".join(found.moved) or "none"),
+            ("verdict", "none" if found.verdict is None else found.verdict.value),
+            ("reason", found.reason),
+        )
+
+
+def _triple(vector: FloatArray) -> _Triple:
+    x, y, z = vector.tolist()
+    return x, y, z
+
+
+def _in_mm(estimate: Estimate) -> str:
+    low, high = 1e3 * estimate.low, 1e3 * estimate.high
+    return f"{1e3 * estimate.value:.3f} mm ({low:.3f} to {high:.3f}, 95 %)"

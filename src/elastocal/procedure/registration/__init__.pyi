@@ -1,8 +1,10 @@
-from .readings import UnloadedReadings as UnloadedReadings
-from .register import register as register
-from .result import (
+from ._fit import (
+    UnloadedReadings as UnloadedReadings,
+)
+from .register import (
     Blunder as Blunder,
     Registration as Registration,
     StationFit as StationFit,
     StationMove as StationMove,
+    register as register,
 )

@@ -1,28 +1,104 @@
 """Register the stations of a run: fit, look for what moved, part it there, fit again."""
 
+from dataclasses import dataclass
+
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from elastocal.arrays import BoolArray, FloatArray, IndexArray
-from elastocal.procedure.registration.fit import (
+from elastocal.procedure.registration._fit import (
     DEFAULT_SCATTER,
     LEVER_SIGMA,
     Fit,
+    UnloadedReadings,
+    align,
+    determined,
     fit,
 )
-from elastocal.procedure.registration.geometry import align, determined
-from elastocal.procedure.registration.moves import Finding, find
-from elastocal.procedure.registration.readings import UnloadedReadings
-from elastocal.procedure.registration.result import (
-    Blunder,
-    Registration,
-    StationFit,
-    StationMove,
-)
+from elastocal.procedure.registration._moves import Finding, find
 
-MOST_FINDINGS = 0.2
+
+@dataclass(frozen=True, eq=False)
+class StationFit:
+    """A station over the poses between which it did not move."""
+
+    station: str
+    poses: tuple[int, ...]
+    """Ids in the order of time, those set aside included."""
+    T_base_tracker: FloatArray
+    """Shape (4, 4), in m."""
+    rotation_sigma: float
+    """Standard deviation of the rotation about its least certain axis, in rad. A marker
+    displacement of 1 mm is turned by it into one that is off by 1 mm times this."""
+    position_sigma: FloatArray
+    """Standard deviation of the marker's place that the transform gives, at the centre of the
+    poses, in base, shape (3,), in m."""
+    residual: FloatArray
+    """Measured minus expected marker position of each pose, likely errors of the robot taken
+    out, in base, shape (pose, 3), in m."""
+    accuracy: float
+    """Root mean square distance of the marker from where the controller has it, after the best
+    rigid fit of all poses that were not set aside, in m: what the robot's own errors make."""
+
+
+@dataclass(frozen=True)
+class StationMove:
+    """A station that stood elsewhere from some pose on."""
+
+    station: str
+    before: int
+    """Last pose that it measured from the old place."""
+    pose: int
+    """First pose that it measured from the new one."""
+    distance: float
+    """How far the marker seems to have jumped, at the centre of the poses, in m."""
+    angle: float
+    """How far the station turned, in rad."""
+    improbability: float
+    """Decimal logarithm of the probability that chance alone looks like this (F-test)."""
+
+
+@dataclass(frozen=True)
+class Blunder:
+    """An unloaded reading that does not belong to the others; it is not fitted."""
+
+    pose: int
+    station: str
+    distance: float
+    """How far the marker was from where it had to be, in m."""
+
+
+@dataclass(frozen=True, eq=False)
+class Registration:
+    """Stations, marker and what is odd about them."""
+
+    stations: tuple[StationFit, ...]
+    lever_arm: FloatArray
+    """Marker in the tcp frame, shape (3,), in m."""
+    lever_sigma: FloatArray
+    """Its standard deviation, the cell file's value included as a weak prior, shape (3,), in m."""
+    lever_prior: FloatArray
+    """Value of the cell file, shape (3,), in m."""
+    undetermined_lever: tuple[str, ...]
+    """Axes of the tcp frame along which the orientations say nothing about the lever arm: there
+    it is the cell file's."""
+    scatter: float
+    """What is left in one coordinate when station, lever arm and the robot's likely errors are
+    fitted, tracker noise taken out, in m."""
+    moves: tuple[StationMove, ...]
+    blunders: tuple[Blunder, ...]
+    unregistered: dict[str, str]
+    """Stations without a transform, and why."""
+
+    def station_of(self, station: str, pose: int) -> StationFit | None:
+        """Return where a station stood at a pose; None where that is not known."""
+        stood = (each for each in self.stations if each.station == station and pose in each.poses)
+        return next(stood, None)
+
+
+_MOST_FINDINGS = 0.2
 """Largest share of the readings that may be called moves or blunders."""
-UNDETERMINED = 0.5
+_UNDETERMINED = 0.5
 """Share of the prior's standard deviation above which a direction of the lever arm is its."""
 
 
@@ -55,7 +131,7 @@ def register(readings: UnloadedReadings, lever_prior: FloatArray) -> Registratio
         rows = np.flatnonzero(kept)
         result = fit(readings.take(rows), _dense(group[rows]), lever_prior)
         finding = find(readings.take(rows), result)
-        if finding is None or len(findings) >= MOST_FINDINGS * len(readings):
+        if finding is None or len(findings) >= _MOST_FINDINGS * len(readings):
             break
         row = int(rows[finding.row])
         findings.append((row, finding))
@@ -101,7 +177,7 @@ def _dense(group: IndexArray) -> IndexArray:
 
 
 def _undetermined(sigma: FloatArray) -> tuple[str, ...]:
-    free = sigma > UNDETERMINED * LEVER_SIGMA
+    free = sigma > _UNDETERMINED * LEVER_SIGMA
     return tuple(axis for axis, is_free in zip("xyz", free, strict=True) if is_free)
 
 

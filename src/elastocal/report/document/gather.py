@@ -174,7 +174,7 @@ def _with_old(parts: Parts, search: Search, options: Options) -> Parts:
     q, force = _rows_that_matter(parts)
     found = recertify_files(old, new, q, force, limit=parts.limits.drift)
     search.use(old)
-    return replace(parts, recertification=found)
+    return replace(parts, recertification=found.summary)
 
 
 def _rows_that_matter(parts: Parts) -> tuple[FloatArray | None, FloatArray | None]:

@@ -9,7 +9,7 @@ from elastocal.compensation.conditioning import ToolResult
 from elastocal.compensation.process import SimulatedProcess
 from elastocal.dataset import Dataset
 from elastocal.identification import CalibratedModel
-from elastocal.identification.recertification import Recertification
+from elastocal.identification.recertification import CompareSummary
 from elastocal.planning import PlanResult, PoolData
 from elastocal.planning.surface import Surface
 from elastocal.procedure import Entry
@@ -88,7 +88,7 @@ class Parts:
     journal: tuple[Entry, ...] | None = None
     dataset: Dataset | None = None
     summary: dict[str, Any] | None = None
-    """Of the run; see `elastocal.procedure.summary`."""
+    """Of the run; see `elastocal.procedure.derive.summary`."""
     calibrated: Calibrated | None = None
     again: Again | None = None
     """The calibration made once more from the dataset."""
@@ -98,7 +98,7 @@ class Parts:
     codecs: tuple[Codec, ...] = ()
     """One a comparison."""
     process: SimulatedProcess | None = None
-    recertification: Recertification | None = None
+    recertification: CompareSummary | None = None
     """This calibration against an earlier one."""
     limits: Limits = field(default_factory=Limits)
     files: tuple[UsedFile, ...] = ()

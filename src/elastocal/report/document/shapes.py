@@ -156,7 +156,7 @@ class _Times(_Loose):
 
 
 class _Summary(_Loose):
-    """Of a run; see `elastocal.procedure.summary`."""
+    """Of a run; see `elastocal.procedure.derive.summary`."""
 
     readings: _Readings
     registration: _Registration

@@ -10,7 +10,6 @@ from html import escape
 from pathlib import Path
 from string import Template
 
-import numpy as np
 from matplotlib.figure import Figure
 from plotly.offline import get_plotlyjs
 
@@ -191,11 +190,11 @@ def _indices(names: Sequence[str], correlations: Sequence[Correlation]) -> str:
 
 
 def _correlation(found: Correlation) -> str:
-    if not np.isfinite(found.value):
+    if found.correlation is None:
         return "index never varies"
-    if not np.isfinite(found.low):
-        return f"{found.value:+.2f} (no interval)"
-    return f"{found.value:+.2f} ({found.low:+.2f} to {found.high:+.2f})"
+    if found.low is None:
+        return f"{found.correlation:+.2f} (no interval)"
+    return f"{found.correlation:+.2f} ({found.low:+.2f} to {found.high:+.2f})"
 
 
 KINDS = (".svg", ".png")

@@ -141,10 +141,12 @@ def _draw_forest(axes: Axes, found: Sequence[Correlation], styles: Sequence[Vari
         y = np.arange(len(INDICES)) + variant.place
         rows = [of[name] for name in INDICES]
         for at, each in zip(y, rows, strict=True):
-            axes.plot([each.low, each.high], [at, at], color=variant.colour, lw=1.1)
+            ends = np.array([each.low, each.high], dtype=float)  # NaN where none is known
+            axes.plot(ends, [at, at], color=variant.colour, lw=1.1)
+        values = np.array([each.correlation for each in rows], dtype=float)
         axes.plot(
-            [each.value for each in rows], y, ls="none", color=variant.colour,
-            marker=variant.marker, ms=4.5, mfc=variant.fill,
+            values, y, ls="none", color=variant.colour, marker=variant.marker, ms=4.5,
+            mfc=variant.fill,
         )  # fmt: skip
     axes.set_xlim(-1.02, 1.02)
     axes.set_ylim(len(INDICES) - 0.5, -0.5)

@@ -11,9 +11,9 @@ from matplotlib.ticker import FuncFormatter, MaxNLocator
 
 from elastocal.arrays import FloatArray
 from elastocal.identification.recertification import (
+    CompareSummary,
     DeflectionChange,
     Estimate,
-    Recertification,
     SpringChange,
 )
 from elastocal.report.plots import style
@@ -32,14 +32,14 @@ _EDGE = 3.0
 """Changes beyond this many times what chance allows are drawn at the edge, with the number."""
 
 
-def write_recertification_figure(path: Path, found: Recertification) -> Path:
+def write_recertification_figure(path: Path, found: CompareSummary) -> Path:
     """Write the figure, atomically; return its path.
 
     Parameters
     ----------
     path : Path
         Its suffix decides the kind: SVG, PNG or PDF.
-    found : Recertification
+    found : CompareSummary
         The comparison.
 
     Raises
@@ -47,12 +47,12 @@ def write_recertification_figure(path: Path, found: Recertification) -> Path:
     FileAccessError
         If the suffix is another or the file cannot be written.
     """
-    moved = ", ".join(each.name for each in found.moved) or "none"
+    moved = ", ".join(found.moved) or "none"
     description = f"Springs that moved: {moved}. {found.reason}."
     return write_figure(path, lambda: recertification_figure(found), _title(found), description)
 
 
-def recertification_figure(found: Recertification) -> Figure:
+def recertification_figure(found: CompareSummary) -> Figure:
     """Return the figure; see `write_recertification_figure`.
 
     Above, every compared spring or sum with both intervals, and its change over what chance
@@ -133,7 +133,7 @@ def _draw_rows(axes: Axes, change: DeflectionChange, limit: float | None) -> Non
     axes.fill_between(number, low, high, color=_NEW, alpha=0.2, lw=0, step="mid")
     axes.step(number, size, color=_NEW, lw=1.1, where="mid")
     largest = _MM * change.largest.value
-    axes.plot([change.where + 1], [largest], "D", ms=4.0, color=style.INK)
+    axes.plot([change.where.row + 1], [largest], "D", ms=4.0, color=style.INK)
     top = float(high.max())
     if limit is not None:
         axes.axhline(_MM * limit, color=style.INK, lw=1.0, ls=(0, (5, 4)))
@@ -144,7 +144,7 @@ def _draw_rows(axes: Axes, change: DeflectionChange, limit: float | None) -> Non
         )  # fmt: skip
         top = max(top, _MM * limit)
     axes.set_ylim(0.0, 1.12 * top if top > 0.0 else 1.0)
-    axes.set_xlim(0.5, len(change.q) + 0.5)
+    axes.set_xlim(0.5, change.rows + 0.5)
     axes.xaxis.set_major_locator(MaxNLocator(integer=True))
     axes.set_xlabel("Row", fontsize=8.0)
     axes.set_ylabel("Change of predicted\ndeflection in mm", fontsize=8.0)
@@ -154,7 +154,7 @@ def _draw_rows(axes: Axes, change: DeflectionChange, limit: float | None) -> Non
 
 def _grouped(change: DeflectionChange) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
     """Return row numbers from 1, lower ends, sizes and upper ends in mm; groups by extremes."""
-    count = len(change.q)
+    count = change.rows
     starts = np.arange(0, count, -(-count // _MOST_POINTS))
     low = np.minimum.reduceat(change.low, starts)
     size, high = (np.maximum.reduceat(each, starts) for each in (change.size, change.high))
@@ -170,7 +170,7 @@ def _over_chance(together: Estimate) -> float:
     return float(np.sign(together.value) * np.inf) if together.value != 0.0 else 0.0
 
 
-def _draw_frame(figure: Figure, found: Recertification, height: float) -> None:
+def _draw_frame(figure: Figure, found: CompareSummary, height: float) -> None:
     figure.text(
         0.15 / _WIDTH, 1.0 - 0.1 / height, literal(_title(found)), va="top", fontsize=11.5,
         weight="bold",
@@ -200,13 +200,13 @@ def _draw_frame(figure: Figure, found: Recertification, height: float) -> None:
     )  # fmt: skip
 
 
-def _title(found: Recertification) -> str:
+def _title(found: CompareSummary) -> str:
     return f"{found.robot}: two calibrations compared"
 
 
-def _found(found: Recertification) -> str:
+def _found(found: CompareSummary) -> str:
     """Return the finding in a sentence or two."""
-    names = ", ".join(each.name for each in found.moved)
+    names = ", ".join(found.moved)
     verb = "moved" if found.same_springs else "differ"
     springs = f"{verb.capitalize()}: {names}." if names else f"No compared spring {verb}."
     verdict = "" if found.verdict is None else f" {found.verdict.value.capitalize()}:"

@@ -5,9 +5,9 @@ from functools import partial
 
 from elastocal.elastic import unit_of
 from elastocal.identification.recertification import (
+    CompareSummary,
     DeflectionChange,
     Estimate,
-    Recertification,
     Verdict,
 )
 from elastocal.report.document.markup import facts, listed, paragraph, table
@@ -44,7 +44,7 @@ def body(parts: Parts) -> Content:
     return Content(html + listed(_notes(found)), findings=tuple(_findings(found)))
 
 
-def _sentence(found: Recertification) -> str:
+def _sentence(found: CompareSummary) -> str:
     words = {
         Verdict.PASS: "Passed:",
         Verdict.FAIL: "Failed:",
@@ -54,8 +54,8 @@ def _sentence(found: Recertification) -> str:
     return f"{words[found.verdict]} {found.reason}. {_moved(found)}"
 
 
-def _moved(found: Recertification) -> str:
-    names = ", ".join(each.name for each in found.moved)
+def _moved(found: CompareSummary) -> str:
+    names = ", ".join(found.moved)
     if not names:
         return "No compared spring moved beyond its interval."
     return f"Moved beyond their intervals: {names}."
@@ -64,7 +64,7 @@ def _moved(found: Recertification) -> str:
 def _deflections(change: DeflectionChange, limit: float | None) -> str:
     return facts(
         [
-            ("Poses and forces compared", len(change.q)),
+            ("Poses and forces compared", change.rows),
             ("Change, mean", _span(change.mean)),
             ("Change, largest", _span(change.largest)),
             ("Limit", "none given" if limit is None else mm(limit)),
@@ -72,7 +72,7 @@ def _deflections(change: DeflectionChange, limit: float | None) -> str:
     )
 
 
-def _springs(found: Recertification) -> str:
+def _springs(found: CompareSummary) -> str:
     rows = [
         (
             each.name,
@@ -89,13 +89,13 @@ def _springs(found: Recertification) -> str:
     return table("Springs and sums that both calibrations determine", heads, rows, texts=2)
 
 
-def _notes(found: Recertification) -> Iterator[str]:
+def _notes(found: CompareSummary) -> Iterator[str]:
     # The origin of the readings is a path; where a folder lies is no part of a report.
     for note in found.notes:
         yield note.replace(f" ({found.old_provenance})", "")
 
 
-def _findings(found: Recertification) -> Iterator[Finding]:
+def _findings(found: CompareSummary) -> Iterator[Finding]:
     if found.verdict is Verdict.PASS:
         yield Finding(f"against the earlier calibration: {found.reason}", holds_back=False)
     elif found.verdict is not None:

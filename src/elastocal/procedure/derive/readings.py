@@ -1,0 +1,290 @@
+"""From a stretch of the raw streams to one reading: mean, scatter and number of samples.
+
+The standard deviation of a mean of ``n`` samples ``x`` with lag-1 autocorrelation ``r`` is that of
+a first-order autoregressive process (Bayley and Hammersley 1946),
+
+    sigma_mean = s sqrt(1 / n) sqrt((1 + r) / (1 - r)),
+
+with ``r`` cut off below at 0; a sensor's own filter makes samples that are not independent.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from elastocal.arrays import BoolArray, FloatArray
+from elastocal.procedure.derive.tool import ToolLoad, UnloadedWrenches
+from elastocal.procedure.record import SAME_TIME, PoseLog, ReadingStatus, Streams, Window
+from elastocal.procedure.registration import UnloadedReadings
+from elastocal.robot import Robot
+
+LEAST_SAMPLES = 5
+"""Fewer good samples than this make no reading: their scatter says nothing."""
+_MOST_CORRELATED = 0.99
+"""Largest lag-1 autocorrelation that is believed; beyond it the samples drift."""
+
+
+@dataclass(frozen=True, eq=False)
+class Mean:
+    """Mean of some samples."""
+
+    value: FloatArray
+    """Shape (component,)."""
+    deviation: FloatArray
+    """Standard deviation of one sample, shape (component,)."""
+    sigma: FloatArray
+    """Standard deviation of the mean, shape (component,); at least what the maker states for
+    that many samples. 0 only where neither says anything."""
+    count: int
+    """Samples."""
+    time: float
+    """Mean time, in s of the clock."""
+
+
+@dataclass(frozen=True, eq=False)
+class ToolState:
+    """Where the controller had the tool, and what the sensor felt."""
+
+    q: FloatArray
+    """Joint positions, shape (joint,), in rad or m."""
+    T_base_tcp: FloatArray
+    """Tool frame, shape (4, 4), in m."""
+    force: Mean
+    """Raw, sensor frame, in N."""
+    moment: Mean
+    """Raw, sensor frame, in N·m."""
+
+
+@dataclass(frozen=True, eq=False)
+class Reading:
+    """What the devices said during one window."""
+
+    window: Window
+    """Its status is ``missing``, with a note, where a stream has too few good samples."""
+    tool: ToolState | None
+    """None where arm or sensor said too little."""
+    marker: Mean | None
+    """In the frame of the window's station, in m; None where the station said too little."""
+
+
+def average(streams: Streams, window: Window) -> Reading:
+    """Return the means of every stream over a window, its ends included.
+
+    Parameters
+    ----------
+    streams : Streams
+        Of the window's pose.
+    window : Window
+        When, and which station measured.
+
+    Returns
+    -------
+    Reading
+        A stream with fewer than `LEAST_SAMPLES` good samples has no mean, and an ok window is
+        then ``missing``. Samples that are not finite, that the sensor calls bad, or that another
+        station took are not good. One state of the arm is enough: it has no noise.
+    """
+    arm, wrench, points = streams.arm, streams.wrench, streams.points
+    at_arm = _inside(arm.time, window)
+    at_wrench = _inside(wrench.time, window) & wrench.ok & _finite(wrench.force, wrench.moment)
+    at_point = _inside(points.time, window) & _finite(points.position)
+    at_point &= points.station == (window.station or "")
+    stated = wrench.force_sigma[at_wrench, None]
+    force = _mean(wrench.time[at_wrench], wrench.force[at_wrench], stated)
+    moment = _mean(wrench.time[at_wrench], wrench.moment[at_wrench])
+    tool = None
+    if at_arm.any() and force is not None and moment is not None:
+        q, T = arm.q[at_arm].mean(axis=0), _mean_pose(arm.T_base_tcp[at_arm])
+        tool = ToolState(q, T, force, moment)
+    counts = {
+        "states of the arm": (int(at_arm.sum()), 1),
+        "wrenches": (int(at_wrench.sum()), LEAST_SAMPLES),
+    }
+    if window.station:
+        counts[f"points of station {window.station}"] = (int(at_point.sum()), LEAST_SAMPLES)
+    marker = _mean(points.time[at_point], points.position[at_point], points.sigma[at_point])
+    return Reading(_judged(window, counts), tool, marker)
+
+
+def _judged(window: Window, counts: dict[str, tuple[int, int]]) -> Window:
+    """Return the window, missing where a stream has too few samples."""
+    few = [
+        f"{count} {what}, not {least}" for what, (count, least) in counts.items() if count < least
+    ]
+    if not few or window.status is not ReadingStatus.OK:
+        return window
+    note = "; ".join(([window.note] if window.note else []) + [f"only {text}" for text in few])
+    return window.model_copy(update={"status": ReadingStatus.MISSING, "note": note})
+
+
+def _inside(time: FloatArray, window: Window) -> BoolArray:
+    inside: BoolArray = (time >= window.start - SAME_TIME) & (time <= window.end + SAME_TIME)
+    return inside
+
+
+def _finite(*arrays: FloatArray) -> BoolArray:
+    return np.asarray(np.isfinite(np.hstack(arrays)).all(axis=1), dtype=bool)
+
+
+def _mean(time: FloatArray, samples: FloatArray, stated: FloatArray | None = None) -> Mean | None:
+    count = len(samples)
+    if count < LEAST_SAMPLES:
+        return None
+    value = samples.mean(axis=0)
+    deviation = samples.std(axis=0, ddof=1)
+    sigma = deviation * np.sqrt(_inflation(samples - value) / count)
+    if stated is not None and np.all(np.isfinite(stated)):
+        sigma = np.maximum(sigma, np.sqrt((stated**2).mean(axis=0) / count))
+    return Mean(value, deviation, sigma, count, float(time.mean()))
+
+
+def _inflation(centred: FloatArray) -> FloatArray:
+    """Return by how much correlation widens the variance of a mean, shape (component,)."""
+    power = (centred**2).sum(axis=0)
+    lagged = (centred[1:] * centred[:-1]).sum(axis=0)
+    r = np.divide(lagged, power, out=np.zeros_like(power), where=power > 0)
+    r = np.clip(r, 0.0, _MOST_CORRELATED)
+    inflation: FloatArray = (1.0 + r) / (1.0 - r)
+    return inflation
+
+
+def _mean_pose(T: FloatArray) -> FloatArray:
+    """Return the mean of poses that hardly differ: mean position, nearest rotation."""
+    mean: FloatArray = T.mean(axis=0)
+    u, _, vt = np.linalg.svd(mean[:3, :3])
+    mean[:3, :3] = u @ vt
+    return mean
+
+
+@dataclass(frozen=True, eq=False)
+class PoseReadings:
+    """Readings of a committed pose."""
+
+    log: PoseLog
+    reference: Reading | None
+    """The first unloaded window; None when there is none."""
+    loads: tuple[Reading, ...]
+    """One a load case, in the order in which they were applied."""
+    released: Reading | None
+    """A later unloaded window, after the loads; None when there is none."""
+
+    @property
+    def pose(self) -> int:
+        """Id in the plan."""
+        return self.log.pose
+
+
+def reduce_pose(log: PoseLog, streams: Streams) -> PoseReadings:
+    """Return the readings of a pose.
+
+    Parameters
+    ----------
+    log : PoseLog
+        Its windows.
+    streams : Streams
+        Its raw streams.
+    """
+    readings = [average(streams, window) for window in log.windows]
+    unloaded = [reading for reading in readings if reading.window.load_case is None]
+    return PoseReadings(
+        log,
+        unloaded[0] if unloaded else None,
+        tuple(reading for reading in readings if reading.window.load_case is not None),
+        unloaded[-1] if len(unloaded) > 1 else None,
+    )
+
+
+JOINT_ERROR = 0.5e-3
+"""Likely offset of a joint's zero, in rad (m for a rail): it makes the 1 mm or so by which an
+arm of 2.5 m that is not calibrated misses its target (ISO 9283 pose accuracy)."""
+SAG = 1e-3
+"""Likely turn of a joint under the largest gravity torque of the run, in rad (m)."""
+
+
+def marker_readings(
+    poses: Sequence[PoseReadings], robot: Robot, gravity: FloatArray, lever: FloatArray
+) -> UnloadedReadings:
+    """Return the unloaded readings in which a station saw the marker.
+
+    Parameters
+    ----------
+    poses : sequence of PoseReadings
+        In the order of time.
+    robot : Robot
+        Whose errors the residuals may show.
+    gravity : ndarray, shape (3,)
+        In base, in m/s².
+    lever : ndarray, shape (3,)
+        Roughly the marker in the tcp frame, in m.
+    """
+    seen = [
+        (pose.pose, str(r.window.station), r.tool, r.marker)
+        for pose in poses
+        if (r := pose.reference) and r.window.status is ReadingStatus.OK and r.tool and r.marker
+    ]
+    q = np.array([tool.q for *_, tool, _ in seen]).reshape(len(seen), len(robot.joint_names))
+    return UnloadedReadings(
+        pose=np.array([pose for pose, *_ in seen], dtype=np.intp),
+        station=tuple(station for _, station, *_ in seen),
+        position=np.array([marker.value for *_, marker in seen]).reshape(-1, 3),
+        sigma=np.array([marker.sigma.max() for *_, marker in seen]),
+        T_base_tcp=np.array([tool.T_base_tcp for *_, tool, _ in seen]).reshape(-1, 4, 4),
+        robot_error=robot_errors(robot, q, gravity, lever),
+    )
+
+
+def robot_errors(robot: Robot, q: FloatArray, gravity: FloatArray, lever: FloatArray) -> FloatArray:
+    """Return how a robot's likely errors move the marker, shape (pose, 3, error), in m.
+
+    A column for the offset of each joint, and one for its sag under gravity where the robot's
+    link masses are known; each by one standard deviation.
+
+    Parameters
+    ----------
+    robot : Robot
+        The robot.
+    q : ndarray, shape (pose, joint)
+        In rad or m.
+    gravity : ndarray, shape (3,)
+        In base, in m/s².
+    lever : ndarray, shape (3,)
+        Marker in the tcp frame, in m.
+    """
+    if not len(q):
+        return np.empty((0, 3, 0))
+    jacobian = robot.jacobian(q)
+    arm = robot.forward(q)[:, :3, :3] @ lever
+    marker = jacobian.translation + np.cross(jacobian.rotation, arm[..., None], axis=1)
+    offsets: FloatArray = JOINT_ERROR * marker
+    if not any(joint.mass > 0 for joint in robot.chain.joints):
+        return offsets
+    torque = robot.gravity_torques(q, gravity)
+    largest = max(float(np.abs(torque).max()), np.finfo(float).tiny)
+    return np.concatenate([offsets, SAG * marker * (torque / largest)[:, None, :]], axis=2)
+
+
+def weighed_poses(poses: Sequence[PoseReadings]) -> list[int]:
+    """Return the poses of the readings that `tool_readings` returns, in the same order."""
+    return [pose.pose for pose in poses if pose.reference and pose.reference.tool]
+
+
+def tool_readings(poses: Sequence[PoseReadings], tool: ToolLoad) -> UnloadedWrenches:
+    """Return the raw wrenches of the unloaded references.
+
+    Parameters
+    ----------
+    poses : sequence of PoseReadings
+        In the order of time.
+    tool : ToolLoad
+        How the sensor sits.
+    """
+    states = [r.tool for pose in poses if (r := pose.reference) and r.tool]
+    T = np.array([state.T_base_tcp for state in states]).reshape(-1, 4, 4)
+    return UnloadedWrenches(
+        time=np.array([state.force.time for state in states]),
+        force=np.array([state.force.value for state in states]).reshape(-1, 3),
+        moment=np.array([state.moment.value for state in states]).reshape(-1, 3),
+        R_base_sensor=tool.R_base_sensor(T),
+        gravity=tool.gravity,
+    )

@@ -1,0 +1,306 @@
+"""Tool weight and bias, between raw wrench and force on the robot (spec section 2).
+
+The sensor reads, in its own frame,
+
+    F = R^T (f + w) + b,        M = R^T m + c x R^T w + b_m,
+
+with ``R`` its rotation in base, ``f`` and ``m`` force and moment on the robot about the sensor's
+origin, ``w`` the tool's weight, ``c`` the tool's centre of mass and the biases ``b``. The unloaded
+reference of the same pose is the tare: with almost the same ``R`` it takes ``b`` and ``w`` away,
+and what the weight turns by between the two is taken away by the cell file's mass.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import stats
+
+from elastocal.arrays import FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class ToolLoad:
+    """What hangs on the sensor, and how the sensor sits."""
+
+    mass: float
+    """In kg."""
+    centre: FloatArray
+    """Centre of mass in the sensor's frame, shape (3,), in m."""
+    gravity: FloatArray
+    """Acceleration of gravity in base, shape (3,), in m/s²."""
+    T_tcp_sensor: FloatArray
+    """Sensor's measuring frame in the tcp frame, shape (4, 4), in m."""
+
+    def R_base_sensor(self, T_base_tcp: FloatArray) -> FloatArray:
+        """Return the rotation of the sensor, shape (..., 3, 3)."""
+        rotation: FloatArray = T_base_tcp[..., :3, :3] @ self.T_tcp_sensor[:3, :3]
+        return rotation
+
+    def force(self, R_base_sensor: FloatArray) -> FloatArray:
+        """Return the weight as the sensor feels it, shape (..., 3), in N, sensor frame."""
+        return self.mass * (self.gravity @ R_base_sensor)
+
+    def moment(self, R_base_sensor: FloatArray) -> FloatArray:
+        """Return the weight's moment about the sensor's origin, shape (..., 3), in N·m."""
+        moment: FloatArray = np.cross(self.centre, self.force(R_base_sensor))
+        return moment
+
+
+@dataclass(frozen=True, eq=False)
+class RawWrench:
+    """Mean raw wrench at one place of the tool."""
+
+    force: FloatArray
+    """Sensor frame, shape (3,), in N."""
+    moment: FloatArray
+    """Sensor frame, about its origin, shape (3,), in N·m."""
+    T_base_tcp: FloatArray
+    """Where the tool was, shape (4, 4), in m."""
+
+
+@dataclass(frozen=True, eq=False)
+class RobotWrench:
+    """Wrench on the robot at the tool centre point, in base."""
+
+    force: FloatArray
+    """Shape (3,), in N."""
+    moment: FloatArray
+    """About the tool centre point, shape (3,), in N·m."""
+
+
+def wrench_on_robot(loaded: RawWrench, tare: RawWrench, tool: ToolLoad) -> RobotWrench:
+    """Return what presses on the robot, tool weight and bias removed.
+
+    Parameters
+    ----------
+    loaded : RawWrench
+        Under load.
+    tare : RawWrench
+        UnloadedWrenches, at the same pose.
+    tool : ToolLoad
+        Its weight, and the sensor's place.
+    """
+    R, R_tare = tool.R_base_sensor(loaded.T_base_tcp), tool.R_base_sensor(tare.T_base_tcp)
+    force = R @ (loaded.force - tare.force - (tool.force(R) - tool.force(R_tare)))
+    moment = R @ (loaded.moment - tare.moment - (tool.moment(R) - tool.moment(R_tare)))
+    arm = loaded.T_base_tcp[:3, :3] @ tool.T_tcp_sensor[:3, 3]
+    return RobotWrench(force, moment + np.cross(arm, force))
+
+
+def turned_sigma(R: FloatArray, *sigmas: FloatArray) -> FloatArray:
+    """Return the standard deviations of a sum or difference of vectors in other axes.
+
+    Parameters
+    ----------
+    R : ndarray, shape (3, 3)
+        Rotation into these axes.
+    *sigmas : ndarray, shape (3,)
+        Standard deviations of the components of each vector, taken as independent.
+    """
+    turned: FloatArray = np.sqrt(R**2 @ sum(sigma**2 for sigma in sigmas))
+    return turned
+
+
+_CHANCE_OF_STEP = 1e-4
+"""Probability of a step that is only chance, over all places, below which it is believed."""
+_SHARE = 0.05
+"""Smallest step that is told, as a share of the tool's mass."""
+
+
+@dataclass(frozen=True)
+class ToolChange:
+    """A step of the tool's mass."""
+
+    reading: int
+    """First unloaded reading with the new mass, from 0."""
+    mass: float
+    """Change, in kg."""
+
+
+def tool_change(
+    blocks: FloatArray, force: FloatArray, gravity: FloatArray, nominal_mass: float
+) -> ToolChange | None:
+    """Return the step of the mass that the unloaded readings show; None: one mass fits them all.
+
+    Parameters
+    ----------
+    blocks : ndarray, shape (reading, 3, unknown)
+        Equations of the forces with one mass.
+    force : ndarray, shape (reading, 3)
+        Sensor frame, in N.
+    gravity : ndarray, shape (reading, 3)
+        In the sensor's axes, in m/s².
+    nominal_mass : float
+        Mass of the tool by the cell file, in kg.
+    """
+    count, free = len(force), force.size - blocks.shape[2] - 1
+    if free < 1:
+        return None
+    A, b = blocks.reshape(force.size, -1), force.ravel()
+    u, s, _ = np.linalg.svd(A / np.maximum(np.linalg.norm(A, axis=0), 1e-300), full_matrices=False)
+    basis = u[:, s > _DEPENDENT * s[0]]
+    after = np.arange(count)[:, None] >= np.arange(1, count)
+    steps = (gravity[:, :, None] * after[:, None, :]).reshape(force.size, -1)
+    own = steps - basis @ (basis.T @ steps)
+    left = b - basis @ (basis.T @ b)
+    squares = (own**2).sum(axis=0)
+    told = squares > _DEPENDENT * (steps**2).sum(axis=0)
+    change = np.where(told, own.T @ left / np.where(told, squares, 1.0), 0.0)
+    gain = change**2 * squares
+    best = int(np.argmax(gain))
+    rest = max(float(left @ left - gain[best]), np.finfo(float).tiny)
+    chance = (count - 1) * stats.f.sf(gain[best] / (rest / free), 1, free)
+    if not (chance < _CHANCE_OF_STEP and abs(change[best]) > _SHARE * nominal_mass):
+        return None
+    return ToolChange(best + 1, float(change[best]))
+
+
+_LEVEL = 0.95
+"""Of the intervals."""
+_WIDE_MASS = 0.2
+"""Half interval of the mass, as a share of it, beyond which it counts as not determined."""
+_WIDE_CENTRE = 0.05
+"""Half interval of a coordinate of the centre of mass beyond which it is not determined, in m."""
+_DEPENDENT = 1e-8
+"""Ratio of singular values, columns scaled, below which columns depend on one another."""
+
+_NAMES = (
+    "mass",
+    *(f"{what} {axis}" for what in ("force bias", "force drift") for axis in "xyz"),
+)
+_MOMENT_NAMES = tuple(
+    f"{what} {axis}" for what in ("centre of mass", "moment bias", "moment drift") for axis in "xyz"
+)
+
+
+@dataclass(frozen=True, eq=False)
+class UnloadedWrenches:
+    """Raw wrenches of unloaded references, in the order of time."""
+
+    time: FloatArray
+    """Shape (reading,), in s."""
+    force: FloatArray
+    """Sensor frame, shape (reading, 3), in N."""
+    moment: FloatArray
+    """Sensor frame, shape (reading, 3), in N·m."""
+    R_base_sensor: FloatArray
+    """Rotation of the sensor, shape (reading, 3, 3)."""
+    gravity: FloatArray
+    """In base, shape (3,), in m/s²."""
+
+
+@dataclass(frozen=True, eq=False)
+class Interval:
+    """An estimate with the half width of its 95 % interval; both NaN where not determined."""
+
+    value: FloatArray
+    half_width: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class ToolEstimate:
+    """What the unloaded references say of tool and sensor."""
+
+    count: int
+    """UnloadedWrenches references."""
+    mass: Interval
+    """Shape (), in kg."""
+    centre: Interval
+    """In the sensor's frame, shape (3,), in m."""
+    force_bias: Interval
+    """At the middle of the run, shape (3,), in N."""
+    moment_bias: Interval
+    """At the middle of the run, shape (3,), in N·m."""
+    force_drift: Interval
+    """Shape (3,), in N/s."""
+    moment_drift: Interval
+    """Shape (3,), in N·m/s."""
+    force_scatter: float
+    """Standard deviation of what is left of a component, in N; NaN where nothing is left over."""
+    moment_scatter: float
+    """The same of the moment, in N·m."""
+    undetermined: tuple[str, ...]
+    """Names of what the orientations and times do not tell apart."""
+    change: ToolChange | None = None
+    """Where one mass does not fit the whole run: mass, centre and biases are then those of no
+    tool."""
+
+
+def estimate_tool(unloaded: UnloadedWrenches, nominal_mass: float) -> ToolEstimate:
+    """Return what the unloaded references say of tool and sensor.
+
+    Parameters
+    ----------
+    unloaded : UnloadedWrenches
+        At least none; with few or similar orientations little is determined.
+    nominal_mass : float
+        Mass of the tool by the cell file, in kg: the scale of what is too wide, and the divisor
+        of the centre of mass where the mass is not determined.
+    """
+    time = unloaded.time - unloaded.time.mean() if len(unloaded.time) else unloaded.time
+    gravity = unloaded.gravity @ unloaded.R_base_sensor
+    eye = np.broadcast_to(np.eye(3), (len(time), 3, 3))
+    drift = eye * time[:, None, None]
+    blocks = np.concatenate([gravity[:, :, None], eye, drift], axis=2)
+    force = _solve(blocks, unloaded.force)
+    turn = np.cross(np.eye(3)[None], gravity[:, None, :]).swapaxes(1, 2)
+    moment = _solve(np.concatenate([turn, eye, drift], axis=2), unloaded.moment)
+    wide_mass = not force.half_width[0] <= _WIDE_MASS * max(nominal_mass, 1.0)
+    mass = nominal_mass if wide_mass else max(float(force.value[0]), _WIDE_MASS * nominal_mass)
+    centre = Interval(moment.value[:3] / mass, moment.half_width[:3] / mass)
+    wide_centre = ~(centre.half_width <= _WIDE_CENTRE)
+    unknown = [*_named(_NAMES, force.half_width), *_named(_MOMENT_NAMES, moment.half_width)]
+    unknown += ["mass"] * wide_mass
+    unknown += [_MOMENT_NAMES[axis] for axis in np.flatnonzero(wide_centre)]
+    return ToolEstimate(
+        count=len(time),
+        mass=_masked(force.value[0], force.half_width[0], np.array(wide_mass)),
+        centre=_masked(centre.value, centre.half_width, wide_centre),
+        force_bias=_part(force, 1),
+        moment_bias=_part(moment, 3),
+        force_drift=_part(force, 4),
+        moment_drift=_part(moment, 6),
+        force_scatter=force.scatter,
+        moment_scatter=moment.scatter,
+        undetermined=tuple(dict.fromkeys(unknown)),
+        change=tool_change(blocks, unloaded.force, gravity, nominal_mass),
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _Solution(Interval):
+    scatter: float
+
+
+def _solve(blocks: FloatArray, readings: FloatArray) -> _Solution:
+    """Return the least-squares solution of stacked blocks, shape (reading, 3, unknown)."""
+    unknowns = blocks.shape[2]
+    A, b = blocks.reshape(-1, unknowns), readings.ravel()
+    free = len(b) - unknowns
+    nothing = np.full(unknowns, np.nan)
+    if free < 1:
+        return _Solution(nothing, nothing, float("nan"))
+    scale = np.linalg.norm(A, axis=0)
+    scale[scale == 0] = 1.0
+    u, s, vt = np.linalg.svd(A / scale, full_matrices=False)
+    kept = s > _DEPENDENT * s[0]
+    value = (vt[kept].T @ ((u[:, kept].T @ b) / s[kept])) / scale
+    left = b - A @ value
+    scatter = float(np.sqrt(left @ left / (free + int((~kept).sum()))))
+    sigma = scatter * np.sqrt(((vt[kept] / s[kept, None]) ** 2).sum(axis=0)) / scale
+    half = stats.t.ppf(0.5 + _LEVEL / 2, free) * sigma
+    loose = np.linalg.norm(vt[~kept], axis=0) > np.sqrt(_DEPENDENT)
+    return _Solution(np.where(loose, np.nan, value), np.where(loose, np.nan, half), scatter)
+
+
+def _part(solution: _Solution, start: int) -> Interval:
+    rows = slice(start, start + 3)
+    return Interval(solution.value[rows], solution.half_width[rows])
+
+
+def _masked(value: FloatArray, half_width: FloatArray, wide: np.ndarray) -> Interval:
+    return Interval(np.where(wide, np.nan, value), np.where(wide, np.nan, half_width))
+
+
+def _named(names: tuple[str, ...], half_width: FloatArray) -> list[str]:
+    return [name for name, half in zip(names, half_width, strict=True) if np.isnan(half)]

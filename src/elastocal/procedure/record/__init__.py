@@ -1,0 +1,5 @@
+"""What a run keeps on the disk: folder, journal, raw streams, and the record of its result."""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -1,0 +1,344 @@
+"""Journal of a run: JSON lines, only ever appended to, on the disk before anything moves on.
+
+An entry that is on the disk is complete: a line that a crash has torn is known by its missing end
+and cut off before the next entry is written.
+"""
+
+import contextlib
+import errno
+import fcntl
+import os
+from collections.abc import Callable, Iterator
+from enum import Enum
+from pathlib import Path
+from typing import Any
+
+from pydantic import SerializerFunctionWrapHandler, ValidationError, model_serializer
+
+from elastocal.cell.devices import Clock
+from elastocal.errors import FileAccessError, SchemaError
+from elastocal.records import StrictModel
+
+
+class ReadingStatus(Enum):
+    """How a reading came about; the flags of the dataset's ``status`` (spec section 3)."""
+
+    OK = "ok"
+    SLIPPED = "slipped"
+    UNSTABLE = "unstable"
+    ABORTED = "aborted"
+    MISSING = "missing"
+
+
+class Window(StrictModel):
+    """A stretch of time over which the streams are averaged to one reading."""
+
+    load_case: str | None
+    """Name of the load case; None: the unloaded reference."""
+    start: float
+    """In s of the clock."""
+    end: float
+    """In s of the clock, after ``start``; equal to it where nothing could be averaged."""
+    station: str | None
+    """Tracker station that measured; None in a cell without metrology."""
+    status: ReadingStatus
+    note: str = ""
+    """Why it is not ok."""
+
+
+class PoseLog(StrictModel):
+    """One committed pose: its unloaded reference first, then every load case in order."""
+
+    pose: int
+    """Id in the plan."""
+    attempt: int
+    """From 1; earlier attempts failed and were given up."""
+    streams: str
+    """Name of the file with the raw streams, in the run's folder ``streams``."""
+    windows: tuple[Window, ...]
+
+
+_JOURNAL_SCHEMA = "elastocal.journal/1"
+
+
+class Event(Enum):
+    """Why an entry was written."""
+
+    START = "start"
+    """First entry of a run; holds `RunRecord`."""
+    RESUME = "resume"
+    """A person let the run go on."""
+    BEGIN = "begin"
+    """Written before the devices are told to move or press."""
+    END = "end"
+    """Written after that is over."""
+    FAULT = "fault"
+    """Something made an attempt, or the run, fail."""
+    COMMIT = "commit"
+    """A pose is finished and its streams are on the disk; holds its `PoseLog`."""
+    GIVEN_UP = "given up"
+    """All attempts at a pose failed; the run goes on without it."""
+    FINISH = "finish"
+    """Last entry of a run, or of one stretch of it."""
+
+
+class Action(Enum):
+    """What the arm is told between two entries."""
+
+    ENABLE = "enable"
+    MOVE = "move"
+    APPROACH = "approach"
+    HOLD = "hold"
+    RELEASE = "release"
+    RETRACT = "retract"
+    STOP = "stop"
+    DISABLE = "disable"
+
+
+class RunRecord(StrictModel):
+    """Which run a journal belongs to."""
+
+    schema_name: str = _JOURNAL_SCHEMA
+    elastocal: str
+    """Version that started it."""
+    plan: str
+    """SHA-256 of ``plan.json``."""
+    cell: str
+    """Fingerprint of the cell."""
+    cell_file: str
+    """Path of the cell file in the run's folder ``cell``."""
+    seed: int
+    """Of simulated devices."""
+    started: str
+    """Date and time of day, ISO 8601, UTC."""
+
+    @property
+    def origin(self) -> str:
+        """What a dataset says of the run that it comes from."""
+        return (
+            f"started {self.started} with elastocal {self.elastocal}, plan {self.plan[:12]}, cell"
+            f" {self.cell[:12]}, seed {self.seed}"
+        )
+
+    @model_serializer(mode="wrap")
+    def _schema_first(self, rest: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        # An entry leaves out what is at its default; the schema must be there all the same.
+        return {"schema_name": self.schema_name, **rest(self)}
+
+
+class Entry(StrictModel):
+    """One line of a journal."""
+
+    n: int
+    """Running number, from 0."""
+    time: float
+    """In s of the devices' clock."""
+    event: Event
+    pose: int | None = None
+    """Id in the plan; None between poses."""
+    attempt: int | None = None
+    """At this pose, from 1."""
+    step: str | None = None
+    """State of the procedure."""
+    action: Action | None = None
+    target: str | tuple[float, ...] | None = None
+    """Joint positions of a move in rad or m; name of the load case of a hold; distance of a
+    straight motion in m."""
+    text: str = ""
+    """For people: what went wrong, or how a reading came about."""
+    run: RunRecord | None = None
+    log: PoseLog | None = None
+    streams_sha256: str | None = None
+    """Of the file with the raw streams of a finished pose."""
+
+
+Sync = Callable[[int], None]
+"""Forces the contents of an open file, given by its descriptor, to the disk."""
+
+
+class Journal:
+    """An open journal; use it as a context manager.
+
+    A lock keeps a second process from the same run for as long as it is open.
+
+    Parameters
+    ----------
+    path : Path
+        File to append to; made when it is not there.
+    sync : callable
+        ``os.fsync``, or what a test puts in its place.
+
+    Raises
+    ------
+    FileAccessError
+        If the file cannot be opened, read, or is in use.
+    SchemaError
+        If it holds something else than a journal.
+    """
+
+    def __init__(self, path: Path, sync: Sync = os.fsync) -> None:
+        self.path, self._sync = Path(path), sync
+        try:
+            self._file = os.open(path, os.O_RDWR | os.O_CREAT | os.O_APPEND, 0o666)
+        except OSError as error:
+            raise _cannot("write", self.path, error) from error
+        try:
+            self._lock()
+            entries, self._size = _read(self.path)
+            self._cut()
+        except BaseException:
+            os.close(self._file)
+            raise
+        self._count = len(entries)
+
+    def __enter__(self) -> "Journal":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        os.close(self._file)
+
+    def write(self, time: float, event: Event, **fields: Any) -> Entry:
+        """Append an entry and wait until it is on the disk.
+
+        Parameters
+        ----------
+        time : float
+            In s of the devices' clock.
+        event : Event
+            Why it is written.
+        **fields : Any
+            Other fields of `Entry`.
+
+        Raises
+        ------
+        FileAccessError
+            If it cannot be written whole; what was written of it is taken back.
+        """
+        entry = Entry(n=self._count, time=time, event=event, **fields)
+        line = entry.model_dump_json(exclude_defaults=True).encode() + b"\n"
+        before = self._count, self._size
+        try:
+            if os.write(self._file, line) < len(line):
+                raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+            # Counted before the sync: should that be interrupted, the line is there all the same.
+            self._count, self._size = self._count + 1, self._size + len(line)
+            self._sync(self._file)
+        except OSError as error:
+            self._count, self._size = before
+            self._cut()
+            raise _cannot("write", self.path, error) from error
+        return entry
+
+    def _lock(self) -> None:
+        try:
+            fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError as error:
+            raise FileAccessError(f"{self.path} is in use: another process runs here") from error
+
+    def _cut(self) -> None:
+        """Take a torn line back."""
+        try:
+            os.ftruncate(self._file, self._size)
+        except OSError as error:
+            raise _cannot("write", self.path, error) from error
+
+
+def read_journal(path: Path) -> tuple[Entry, ...]:
+    """Return the complete entries of a journal; a torn last line is left out.
+
+    Raises
+    ------
+    SchemaError
+        If it is not a journal, or a line before the last is damaged.
+    FileAccessError
+        If it cannot be read.
+    """
+    return _read(Path(path))[0]
+
+
+def read_commits(path: Path) -> tuple[PoseLog, ...]:
+    """Return the poses that a journal says are finished, in the order in which they were."""
+    return commits(read_journal(path))
+
+
+def commits(entries: tuple[Entry, ...]) -> tuple[PoseLog, ...]:
+    """Return the finished poses among the entries of a journal."""
+    return tuple(entry.log for entry in entries if entry.log is not None)
+
+
+def _read(path: Path) -> tuple[tuple[Entry, ...], int]:
+    """Return the complete entries and the number of bytes that they take."""
+    try:
+        data = path.read_bytes()
+    except OSError as error:
+        raise _cannot("read", path, error) from error
+    whole = data.rfind(b"\n") + 1
+    lines = data[:whole].splitlines()
+    entries = tuple(_entry(path, number, line) for number, line in enumerate(lines))
+    if entries and not _starts(entries[0]):
+        raise SchemaError(f"{path}: line 1 is not the start of a run (schema {_JOURNAL_SCHEMA!r})")
+    return entries, whole
+
+
+def _starts(entry: Entry) -> bool:
+    """Return whether an entry is the start of a run, of the schema that is read here."""
+    run = entry.run
+    return (
+        run is not None
+        and run.schema_name == _JOURNAL_SCHEMA
+        and "schema_name" in run.model_fields_set
+    )
+
+
+def _entry(path: Path, number: int, line: bytes) -> Entry:
+    try:
+        entry = Entry.model_validate_json(line)
+    except ValidationError as error:
+        first = error.errors(include_url=False)[0]
+        place = ".".join(map(str, first["loc"]))
+        raise SchemaError(f"{path}: line {number + 1}: {place}: {first['msg']}") from error
+    if entry.n != number:
+        raise SchemaError(f"{path}: line {number + 1}: n must be {number}, got {entry.n}")
+    return entry
+
+
+def _cannot(verb: str, path: Path, error: OSError) -> FileAccessError:
+    return FileAccessError(f"cannot {verb} {path}: {error.strerror or error}")
+
+
+class Logbook:
+    """Writes entries; knows pose, attempt and step.
+
+    Parameters
+    ----------
+    journal : Journal
+        Where to.
+    clock : Clock
+        Of the devices.
+    """
+
+    def __init__(self, journal: Journal, clock: Clock) -> None:
+        self._journal, self._clock = journal, clock
+        self.pose: int | None = None
+        self.attempt: int | None = None
+        self.step: str | None = None
+        self.must_write = True
+        """False while the cell is made safe: a full disk then must not stop that."""
+
+    def write(self, event: Event, **fields: Any) -> None:
+        """Append an entry; see `Journal.write`."""
+        place = {"pose": self.pose, "attempt": self.attempt, "step": self.step}
+        try:
+            self._journal.write(self._clock.now(), event, **{**place, **fields})
+        except FileAccessError:
+            if self.must_write:
+                raise
+
+    @contextlib.contextmanager
+    def actuation(
+        self, action: Action, target: str | tuple[float, ...] | None = None
+    ) -> Iterator[None]:
+        """Write an entry before and, if nothing goes wrong in between, one after."""
+        self.write(Event.BEGIN, action=action, target=target)
+        yield
+        self.write(Event.END, action=action)

@@ -1,0 +1,281 @@
+"""Least squares of stations, lever arm and robot errors (Gauss-Newton).
+
+Reading ``i`` of a group ``g`` (a station between two moves) says
+
+    R_g p_i + t_g = p_tcp,i + R_tcp,i r + B_i b,
+
+with the marker ``p_i`` in the tracker's frame, the lever arm ``r`` and the robot's own errors ``b``
+(offsets of its joints, gravity sag), whose effects on the marker are the columns of ``B_i``.
+``r`` has the cell file's value as a weak prior, ``b`` is thought to be 0 with standard deviation 1.
+Without ``b`` those errors, smooth over the workspace, would look like stations that move.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from elastocal.arrays import FloatArray, IndexArray
+
+
+@dataclass(frozen=True, eq=False)
+class UnloadedReadings:
+    """Marker and controller at every pose before it was loaded, in the order of time."""
+
+    pose: IndexArray
+    """Ids, shape (reading,)."""
+    station: tuple[str, ...]
+    """Station that measured."""
+    position: FloatArray
+    """Marker in the frame of its station, shape (reading, 3), in m."""
+    sigma: FloatArray
+    """Standard deviation of it, shape (reading,), in m; NaN counts as 0."""
+    T_base_tcp: FloatArray
+    """Tool frame of the controller, shape (reading, 4, 4), in m."""
+    robot_error: FloatArray
+    """Displacement of the marker by one standard deviation of each error that a robot is
+    thought to have, shape (reading, 3, error), in m; no columns: a perfect robot."""
+
+    def __len__(self) -> int:
+        """Return the number of readings."""
+        return len(self.pose)
+
+    def take(self, rows: IndexArray) -> "UnloadedReadings":
+        """Return some readings, in the order of ``rows``."""
+        return UnloadedReadings(
+            self.pose[rows],
+            tuple(self.station[row] for row in rows),
+            self.position[rows],
+            self.sigma[rows],
+            self.T_base_tcp[rows],
+            self.robot_error[rows],
+        )
+
+    def expected(self, lever: FloatArray) -> FloatArray:
+        """Return where the marker is by the controller, in base, shape (reading, 3), in m."""
+        T = self.T_base_tcp
+        place: FloatArray = T[:, :3, 3] + T[:, :3, :3] @ lever
+        return place
+
+    @property
+    def variance(self) -> FloatArray:
+        """Variance of a coordinate of each reading, shape (reading,), in m²."""
+        return np.nan_to_num(self.sigma, nan=0.0) ** 2
+
+
+_ROTATION_SIGMA = 0.02
+"""Largest standard deviation of a rotation that is of use, in rad: it turns a displacement of
+1 mm into one that is off by 20 µm, as much as a tracker's own noise."""
+
+
+def determined(position: FloatArray, scatter: float) -> bool:
+    """Return whether points determine a rotation well enough.
+
+    Points on a line leave the rotation about it free; how far they are off their best line
+    bounds its standard deviation.
+
+    Parameters
+    ----------
+    position : ndarray, shape (point, 3)
+        In any frame, in m.
+    scatter : float
+        Standard deviation of a coordinate, in m.
+    """
+    return rotation_sigma(position, scatter) <= _ROTATION_SIGMA
+
+
+def align(here: FloatArray, there: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return the rotation and translation that bring points nearest to others (Kabsch 1976).
+
+    Parameters
+    ----------
+    here, there : ndarray, shape (point, 3)
+        In m.
+    """
+    u, _, vt = np.linalg.svd((there - there.mean(axis=0)).T @ (here - here.mean(axis=0)))
+    R: FloatArray = u @ np.diag([1.0, 1.0, np.linalg.det(u @ vt)]) @ vt
+    return R, there.mean(axis=0) - R @ here.mean(axis=0)
+
+
+def rotation_sigma(position: FloatArray, scatter: float) -> float:
+    """Return the standard deviation of the rotation about the points' own line, in rad."""
+    if len(position) < 3:
+        return math.inf
+    spread = np.linalg.svd(position - position.mean(axis=0), compute_uv=False)
+    return float(scatter / spread[1]) if spread[1] > 1e-6 else math.inf
+
+
+LEVER_SIGMA = 5e-3
+"""How well the cell file knows the lever arm, in m: a ruler's reading on a probe holder."""
+DEFAULT_SCATTER = 0.1e-3
+"""Scatter of a coordinate where the readings do not show one, in m."""
+_ROUNDS = 4
+"""Times that the weights are adapted to the scatter; it then is steady to a percent."""
+_STEPS = 20
+_SMALL = 1e-12
+"""Step in rad and m below which Gauss-Newton has arrived."""
+
+
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """The minimum, with its linear equations: rows of the readings first, then the priors."""
+
+    group: IndexArray
+    """Group of each reading, shape (reading,)."""
+    R: FloatArray
+    """Rotation of each group, shape (group, 3, 3)."""
+    t: FloatArray
+    """Translation of each group, shape (group, 3), in m."""
+    lever: FloatArray
+    """Shape (3,), in m."""
+    errors: FloatArray
+    """Robot errors, in standard deviations, shape (error,)."""
+    scatter: float
+    """In m."""
+    weight: FloatArray
+    """One over the standard deviation of each reading, shape (reading,), in 1/m."""
+    A: FloatArray
+    """Whitened, shape (row, unknown): per group 3 rotation (about the group's centre) and 3
+    translation, 3 lever arm, then robot errors."""
+    e: FloatArray
+    """What is left of the whitened rows, shape (row,)."""
+
+    @property
+    def covariance(self) -> FloatArray:
+        """Covariance of the unknowns, shape (unknown, unknown)."""
+        return np.asarray(np.linalg.pinv(self.A.T @ self.A, hermitian=True), dtype=float)
+
+    @property
+    def lever_columns(self) -> slice:
+        """Columns of the lever arm."""
+        start = 6 * len(self.R)
+        return slice(start, start + 3)
+
+
+def fit(readings: UnloadedReadings, group: IndexArray, lever_prior: FloatArray) -> Fit:
+    """Return the fit of readings that are parted into groups.
+
+    Parameters
+    ----------
+    readings : UnloadedReadings
+        At least three, not on a line, in each group.
+    group : ndarray of int, shape (reading,)
+        Group of each reading, from 0 without gaps.
+    lever_prior : ndarray, shape (3,)
+        Marker in the tcp frame by the cell file, in m.
+    """
+    scatter = DEFAULT_SCATTER
+    for _ in range(_ROUNDS):
+        result = _gauss_newton(readings, group, lever_prior, scatter)
+        scatter = _scatter(result, readings)
+    return _gauss_newton(readings, group, lever_prior, scatter)
+
+
+def motion_columns(centred: FloatArray) -> FloatArray:
+    """Return what a rotation about the centre and a shift do to points, shape (point, 3, 6).
+
+    Parameters
+    ----------
+    centred : ndarray, shape (point, 3)
+        Points less their centre, in base, in m.
+    """
+    turned = np.cross(np.eye(3)[None], centred[:, None, :]).swapaxes(1, 2)
+    return np.concatenate([turned, np.broadcast_to(np.eye(3), turned.shape)], axis=2)
+
+
+def centred_points(R: FloatArray, position: FloatArray, group: IndexArray) -> FloatArray:
+    """Return points in base axes less the centre of their group, shape (reading, 3), in m."""
+    turned: FloatArray = np.einsum("nij,nj->ni", R[group], position)
+    for number in range(len(R)):
+        turned[group == number] -= turned[group == number].mean(axis=0)
+    return turned
+
+
+def _gauss_newton(
+    readings: UnloadedReadings, group: IndexArray, lever_prior: FloatArray, scatter: float
+) -> Fit:
+    weight = 1.0 / np.sqrt(readings.variance + scatter**2)
+    lever, errors = np.array(lever_prior), np.zeros(readings.robot_error.shape[2])
+    R, t = _start(readings, group, lever)
+    for _ in range(_STEPS):
+        A = _equations(readings, group, R, weight)
+        residual = _residual(readings, group, R, t, lever)
+        e = _right_side(readings, residual, errors, weight, lever - lever_prior)
+        step = np.asarray(-np.linalg.lstsq(A, e, rcond=None)[0], dtype=float)
+        R, t = _moved(readings, group, R, t, step)
+        lever, errors = lever + step[6 * len(R) :][:3], errors + step[6 * len(R) + 3 :]
+        if np.max(np.abs(step)) < _SMALL:
+            break
+    residual = _residual(readings, group, R, t, lever)
+    e = _right_side(readings, residual, errors, weight, lever - lever_prior)
+    A = _equations(readings, group, R, weight)
+    return Fit(group, R, t, lever, errors, scatter, weight, A, e)
+
+
+def _start(
+    readings: UnloadedReadings, group: IndexArray, lever: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return rotations and translations for a given lever arm."""
+    expected = readings.expected(lever)
+    members = [group == number for number in range(int(group.max()) + 1)]
+    placed = [align(readings.position[mine], expected[mine]) for mine in members]
+    return np.array([R for R, _ in placed]), np.array([t for _, t in placed])
+
+
+def _residual(
+    readings: UnloadedReadings, group: IndexArray, R: FloatArray, t: FloatArray, lever: FloatArray
+) -> FloatArray:
+    measured = np.einsum("nij,nj->ni", R[group], readings.position) + t[group]
+    residual: FloatArray = measured - readings.expected(lever)
+    return residual
+
+
+def _right_side(
+    readings: UnloadedReadings,
+    residual: FloatArray,
+    errors: FloatArray,
+    weight: FloatArray,
+    lever_change: FloatArray,
+) -> FloatArray:
+    left = (residual - readings.robot_error @ errors) * weight[:, None]
+    return np.concatenate([left.ravel(), lever_change / LEVER_SIGMA, errors])
+
+
+def _equations(
+    readings: UnloadedReadings, group: IndexArray, R: FloatArray, weight: FloatArray
+) -> FloatArray:
+    count, groups, errors = len(readings), len(R), readings.robot_error.shape[2]
+    A = np.zeros((count, 3, 6 * groups + 3 + errors))
+    motion = motion_columns(centred_points(R, readings.position, group))
+    for number in range(groups):
+        mine = group == number
+        A[mine, :, 6 * number : 6 * number + 6] = motion[mine]
+    A[:, :, 6 * groups : 6 * groups + 3] = -readings.T_base_tcp[:, :3, :3]
+    A[:, :, 6 * groups + 3 :] = -readings.robot_error
+    A *= weight[:, None, None]
+    priors = np.eye(3 + errors, 6 * groups + 3 + errors, k=6 * groups)
+    priors[:3] /= LEVER_SIGMA
+    return np.vstack([A.reshape(3 * count, -1), priors])
+
+
+def _moved(
+    readings: UnloadedReadings, group: IndexArray, R: FloatArray, t: FloatArray, step: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return rotations and translations after a step that turns each group about its centre."""
+    turns, shifts = step[: 6 * len(R)].reshape(-1, 2, 3).swapaxes(0, 1)
+    centre = np.array([readings.position[group == number].mean(0) for number in range(len(R))])
+    place = np.einsum("gij,gj->gi", R, centre) + t + shifts
+    new = Rotation.from_rotvec(turns).as_matrix() @ R
+    return new, place - np.einsum("gij,gj->gi", new, centre)
+
+
+def _scatter(result: Fit, readings: UnloadedReadings) -> float:
+    """Return the scatter that explains what is left, by the trace of the hat matrix."""
+    rows = 3 * len(readings)
+    q, _ = np.linalg.qr(result.A)
+    free = rows - float((q[:rows] ** 2).sum())
+    if not free >= 3.0:
+        return DEFAULT_SCATTER
+    left = (result.e[:rows].reshape(-1, 3) / result.weight[:, None]) ** 2
+    return float(np.sqrt(max(left.sum() / free - readings.variance.mean(), _SMALL**2)))

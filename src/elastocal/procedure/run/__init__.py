@@ -1,0 +1,5 @@
+"""Carry a plan out on devices: runner, sessions, states of an attempt, supervisor, watchdog."""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -1,0 +1,48 @@
+from .faults import (
+    EXPECTED_ERRORS as EXPECTED_ERRORS,
+    Fault as Fault,
+    FaultError as FaultError,
+    FaultScope as FaultScope,
+    as_fault as as_fault,
+)
+from .routes import (
+    HOME_AT_START as HOME_AT_START,
+    ApproachLine as ApproachLine,
+    HomeRoute as HomeRoute,
+    PlannedStep as PlannedStep,
+    home_route as home_route,
+    itinerary as itinerary,
+    remaining_times as remaining_times,
+    route as route,
+    stop_joints as stop_joints,
+)
+from .runner import (
+    Runner as Runner,
+)
+from .session import (
+    LastKnown as LastKnown,
+    RunEnd as RunEnd,
+    Session as Session,
+    SessionHooks as SessionHooks,
+    SessionResult as SessionResult,
+    check_same_run as check_same_run,
+    check_same_settings as check_same_settings,
+    last_known as last_known,
+    run_record as run_record,
+)
+from .settings import (
+    RunSettings as RunSettings,
+    check_compatible as check_compatible,
+    registration_warnings as registration_warnings,
+    run_settings as run_settings,
+)
+from .steps import (
+    MAY_TOUCH as MAY_TOUCH,
+    ON_APPROACH_LINE as ON_APPROACH_LINE,
+    ArmLocation as ArmLocation,
+    BackOffResult as BackOffResult,
+    Progress as Progress,
+    Step as Step,
+    StepResult as StepResult,
+    next_step as next_step,
+)

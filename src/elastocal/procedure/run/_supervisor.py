@@ -1,0 +1,223 @@
+"""The supervision cycle: read every device, record what it says, let the watchdog judge it.
+
+The order within a cycle matters. Time passes first, so that what is read is news. Every device is
+read and recorded before anything is judged: the streams then hold what led to a fault. Only then
+may somebody interrupt, and the watchdog refuse, so that a wish to stop never hides a reading.
+"""
+
+import contextlib
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from elastocal.arrays import FloatArray
+from elastocal.cell.devices import ArmState, Devices, PointBlock, WrenchBlock
+from elastocal.errors import DeviceError
+from elastocal.procedure.record import Action, Logbook, StreamRecorder
+from elastocal.procedure.run._watchdog import (
+    Guard,
+    Snapshot,
+    Watchdog,
+    check_arm,
+    check_points,
+    check_wrenches,
+)
+from elastocal.procedure.run.faults import Fault, FaultError
+from elastocal.procedure.run.settings import RunSettings
+
+TIME_SLACK = 1e-6
+"""Times that differ by less are equal, in s: sums of cycles are not exact."""
+DEVICE_ERRORS = (DeviceError, FaultError, OSError)
+"""A device that is out of order raises one of these."""
+
+
+@dataclass(frozen=True)
+class Observers:
+    """Who may look on, and interrupt."""
+
+    report: Callable[[Snapshot], None]
+    """Called each cycle."""
+    interrupted: Callable[[], bool]
+    """Whether somebody wants the run to stop."""
+
+
+class Supervisor:
+    """Runs the cycle. All waiting of a run happens in `wait`, and all waits end.
+
+    Parameters
+    ----------
+    devices : Devices
+        The devices.
+    settings : RunSettings
+        The run's figures.
+    logbook : Logbook
+        Where actuations are written.
+    observers : Observers
+        Who looks on.
+    """
+
+    def __init__(
+        self, devices: Devices, settings: RunSettings, logbook: Logbook, observers: Observers
+    ) -> None:
+        self.devices, self.settings, self.logbook = devices, settings, logbook
+        self._observers = observers
+        procedure = settings.procedure
+        self.watchdog = Watchdog(procedure.stale, procedure.beam_timeout)
+        self.recorder: StreamRecorder | None = None
+        self.station: str | None = None
+        self._tare = np.zeros(3)
+        self._R_sensor_tcp = settings.R_tcp_sensor.T
+        self._still = 0
+        self._joints = len(devices.arm.joint_names)
+        self._last_look: float | None = None
+        self.arm: ArmState | None = None
+        """The last state of the arm; None before the first."""
+
+    @property
+    def now(self) -> float:
+        """Time in s of the devices' clock."""
+        return self.devices.clock.now()
+
+    def start(self) -> None:
+        """Drop what has come before the run, and start to watch."""
+        self.devices.sensor.read()
+        self.devices.metrology.read()
+        self.watchdog.restart(self.now)
+        self.pause()
+
+    def pause(self) -> None:
+        """Say that until the next cycle nobody needs to watch: the arm stands off the surface."""
+        self._last_look = None
+
+    def tare(self, force_sensor: FloatArray) -> None:
+        """Take a force in the sensor's frame, shape (3,), as that of the free tool, in N."""
+        self._tare = force_sensor
+
+    def aim(self, station: str) -> None:
+        """Let a tracker station look for the marker."""
+        self.station = self.watchdog.station = station
+        self.devices.metrology.look(station)
+        self.watchdog.expect_points(self.now)
+
+    def cycle(self, guard: Guard) -> Snapshot:
+        """Let one cycle pass and return what the devices say.
+
+        Raises
+        ------
+        FaultError
+            If something is wrong, or somebody wants the run to stop.
+        DeviceError
+            If a device does not answer.
+        """
+        seen = self._look()
+        self._observers.report(seen)
+        if self._observers.interrupted():
+            raise FaultError(Fault.INTERRUPTED)
+        if self.watchdog.check(seen, guard) and self.station is not None:
+            self.devices.metrology.look(self.station)
+        return seen
+
+    def look_at_arm(self) -> ArmState | None:
+        """Let one cycle pass and return what the arm says; None when it does not answer.
+
+        For the way off the surface after a fault: the other devices and the clock may be what is
+        out of order, so what they do changes nothing.
+        """
+        self.pause()
+        with contextlib.suppress(*DEVICE_ERRORS):
+            self._pass_time()
+        for look in (self._look_at_sensor, self._look_at_points):
+            with contextlib.suppress(*DEVICE_ERRORS):
+                look()
+        return self.ask_arm()
+
+    def ask_arm(self) -> ArmState | None:
+        """Return what the arm says now; None when it does not answer."""
+        with contextlib.suppress(*DEVICE_ERRORS):
+            return self._look_at_arm()
+        return None
+
+    def _look(self) -> Snapshot:
+        """Let one cycle pass and return what the devices say."""
+        self._pass_time()
+        arm, wrenches, points = (
+            self._look_at_arm(),
+            self._look_at_sensor(),
+            self._look_at_points(),
+        )
+        force_tcp = (wrenches.force - self._tare) @ self._R_sensor_tcp
+        # What happens from here to the next cycle, nobody watches.
+        self._last_look = now = self.devices.clock.now()
+        return Snapshot(now, arm, wrenches, points, force_tcp)
+
+    # What has no form is not recorded either: it could not be written.
+    def _look_at_arm(self) -> ArmState:
+        state = self.devices.arm.state()
+        check_arm(state, self._joints)
+        self.arm = state
+        if self.recorder is not None:
+            self.recorder.arm(state)
+        return state
+
+    def _look_at_sensor(self) -> WrenchBlock:
+        block = self.devices.sensor.read()
+        check_wrenches(block)
+        if self.recorder is not None:
+            self.recorder.wrenches(block)
+        return block
+
+    def _look_at_points(self) -> PointBlock:
+        block = self.devices.metrology.read()
+        check_points(block)
+        if self.recorder is not None:
+            self.recorder.points(block)
+        return block
+
+    def wait(
+        self, guard: Guard, done: Callable[[Snapshot], bool], limit: float, what: str
+    ) -> Snapshot:
+        """Let cycles pass until something is done; return what was seen then.
+
+        Raises
+        ------
+        FaultError
+            If it takes longer than ``limit`` seconds; also see `cycle`.
+        """
+        start, cycles = self.now, 2 * math.ceil(limit / self.settings.procedure.cycle) + 10
+        for _ in range(cycles):
+            seen = self.cycle(guard)
+            if done(seen):
+                return seen
+            if not seen.time - start <= limit:
+                break
+        raise FaultError(Fault.TIME_LIMIT, f"{what} is not done after {limit:.1f} s")
+
+    def stay(self, guard: Guard, duration: float) -> Iterator[Snapshot]:
+        """Yield what is seen each cycle until a duration is over."""
+        start = self.now
+        while self.now - start < duration - TIME_SLACK:
+            yield self.cycle(guard)
+
+    @contextlib.contextmanager
+    def actuation(
+        self, action: Action, target: str | tuple[float, ...] | None = None
+    ) -> Iterator[None]:
+        """Journal what happens in between; see `Logbook.actuation`."""
+        with self.logbook.actuation(action, target):
+            yield
+
+    def _pass_time(self) -> None:
+        clock, procedure = self.devices.clock, self.settings.procedure
+        before, longest = clock.now(), max(procedure.stale, procedure.cycle * 5)
+        if self._last_look is not None and not before - self._last_look <= longest:
+            text = f"{before - self._last_look:.2f} s passed between two cycles"
+            raise FaultError(Fault.CLOCK, text)
+        clock.sleep(procedure.cycle)
+        passed = clock.now() - before
+        self._still = 0 if passed > 0.0 else self._still + 1
+        if not self._still * procedure.cycle <= procedure.stale:
+            raise FaultError(Fault.CLOCK, f"it stands at {before:.3f} s")
+        if not 0.0 <= passed <= longest:
+            raise FaultError(Fault.CLOCK, f"{passed:.2f} s passed in a cycle")

@@ -1,0 +1,238 @@
+"""One session of a run: what it is to do, how far earlier sessions came, and how it ended.
+
+A run takes one session when nothing goes wrong. After a fault, an interruption or a crash, another
+one goes on from what the journal says.
+"""
+
+from collections import Counter
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from enum import Enum
+from typing import Any
+
+from elastocal import __version__
+from elastocal.cell import Cell, fingerprint
+from elastocal.errors import ProcedureError
+from elastocal.files import sha256
+from elastocal.planning import PlanResult
+from elastocal.procedure.record import (
+    Action,
+    Entry,
+    Event,
+    RunFolder,
+    RunRecord,
+    StreamRecorder,
+    commits,
+)
+from elastocal.procedure.run.routes import HomeRoute
+from elastocal.procedure.run.settings import RunSettings
+from elastocal.procedure.run.steps import ArmLocation, Progress
+from elastocal.records import StrictModel
+
+_SAME_SECTIONS = ("procedure", "devices", "simulation")
+"""Sections of the cell file that must not change within a run: its readings would not belong
+together. Those that the plan depends on are in the fingerprint."""
+
+_TOUCHES = frozenset({Action.APPROACH, Action.HOLD, Action.RELEASE, Action.RETRACT})
+
+
+@dataclass(frozen=True, eq=False)
+class Session:
+    """A session that may begin."""
+
+    plan: PlanResult
+    settings: RunSettings
+    folder: RunFolder
+    committed: frozenset[int] = frozenset()
+    """Poses that are finished already."""
+    attempts: Mapping[int, int] = field(default_factory=dict)
+    """Attempts that each pose has seen already."""
+    home: HomeRoute = field(default_factory=lambda: HomeRoute(None, ()))
+    """The way to HOME, which comes first."""
+
+
+@dataclass(frozen=True)
+class SessionHooks:
+    """What a session needs from outside, beside devices."""
+
+    recorder: Callable[[], StreamRecorder]
+    """Makes the recorder of one attempt."""
+    report: Callable[[Progress], None] = lambda _: None
+    """Called several times a second."""
+    interrupted: Callable[[], bool] = lambda: False
+    """Whether somebody wants the run to stop."""
+
+
+class RunEnd(Enum):
+    """How a session ended."""
+
+    DONE = "done"
+    """Every pose was tried; the arm is at HOME."""
+    STOPPED = "stopped"
+    """By a fault."""
+    INTERRUPTED = "interrupted"
+    """By a person."""
+
+
+@dataclass(frozen=True)
+class SessionResult:
+    """How a session ended, and where it left the arm."""
+
+    end: RunEnd
+    location: ArmLocation
+    message: str
+    """Why; empty when all went well."""
+    given_up: tuple[int, ...]
+    """Poses of this session that could not be had."""
+    failed_attempts: int
+    """Attempts of this session that failed."""
+
+
+@dataclass(frozen=True)
+class LastKnown:
+    """How far a run came."""
+
+    entry: Entry
+    """The last one."""
+    committed: tuple[int, ...]
+    """Poses that are finished, in the order in which they were."""
+    given_up: tuple[int, ...]
+    """Poses that could not be had."""
+    attempts: Mapping[int, int]
+    """Attempts that each pose has seen."""
+    may_touch: bool
+    """Whether the tool may have been at the surface when the journal ends."""
+    uncommitted: int | None = None
+    """The pose that was worked on last, if it was not finished."""
+
+    @property
+    def lines(self) -> tuple[str, ...]:
+        """What a person should know before the run goes on."""
+        entry = self.entry
+        done = ", ".join(map(str, self.committed)) or "none"
+        where = "between poses" if entry.pose is None else f"pose {entry.pose}"
+        what = entry.action.value if entry.action else entry.event.value
+        attempt = "" if entry.attempt is None else f", attempt {entry.attempt}"
+        step = f", {entry.step}" if entry.step else ""
+        text = f" ({entry.text})" if entry.text else ""
+        return (
+            f"last entry: {where}{attempt}{step}: {entry.event.value} {what}{text}"
+            if entry.action
+            else f"last entry: {where}{attempt}{step}: {what}{text}",
+            f"at {entry.time:.1f} s of the run's clock",
+            f"poses committed: {done}",
+            *((f"poses given up: {', '.join(map(str, self.given_up))}",) if self.given_up else ()),
+            *(("the tool may have been at the surface",) if self.may_touch else ()),
+        )
+
+
+def last_known(entries: tuple[Entry, ...]) -> LastKnown:
+    """Return how far a run came.
+
+    Parameters
+    ----------
+    entries : tuple of Entry
+        All of its journal; at least the first.
+    """
+    committed = tuple(log.pose for log in commits(entries))
+    attempts: Counter[int] = Counter()
+    for entry in entries:
+        if entry.pose is not None and entry.attempt is not None:
+            attempts[entry.pose] = max(attempts[entry.pose], entry.attempt)
+    worked_on = next((e.pose for e in reversed(entries) if e.pose is not None), None)
+    lost = {e.pose for e in entries if e.event is Event.GIVEN_UP and e.pose is not None}
+    return LastKnown(
+        entry=entries[-1],
+        committed=committed,
+        given_up=tuple(sorted(lost - set(committed))),
+        attempts=attempts,
+        may_touch=_may_touch(entries),
+        uncommitted=None if worked_on in committed else worked_on,
+    )
+
+
+def run_record(
+    cell: Cell, plan: PlanResult, plan_text: str, cell_file: str, seed: int, started: str
+) -> RunRecord:
+    """Return the record by which a run is known again.
+
+    Raises
+    ------
+    ProcedureError
+        If the plan was made for another cell.
+    """
+    found = fingerprint(cell)
+    if plan.cell.fingerprint != found:
+        raise ProcedureError(
+            f"the plan belongs to another cell: it was made for {plan.cell.name!r} with"
+            f" fingerprint {plan.cell.fingerprint[:12]}, {cell.path} has {found[:12]};"
+            " plan again, or run the cell that it was made for"
+        )
+    return RunRecord(
+        elastocal=__version__,
+        plan=sha256(plan_text),
+        cell=found,
+        cell_file=cell_file,
+        seed=seed,
+        started=started,
+    )
+
+
+def check_same_run(record: RunRecord, wanted: RunRecord, where: str) -> None:
+    """Refuse to go on with another run than the one that is in a folder.
+
+    Raises
+    ------
+    ProcedureError
+        With what differs.
+    """
+    for key, what in (("plan", "plan"), ("cell", "cell"), ("seed", "seed")):
+        found, asked = getattr(record, key), getattr(wanted, key)
+        if found != asked:
+            raise ProcedureError(
+                f"{where} holds another run: its {what} is {_short(found)}, not {_short(asked)}"
+            )
+
+
+def check_same_settings(used: Cell, wanted: Cell) -> None:
+    """Refuse to go on with other settings than a run was started with.
+
+    Parameters
+    ----------
+    used, wanted : Cell
+        As it stands in the run's folder, and as it is now.
+
+    Raises
+    ------
+    ProcedureError
+        With the first key that differs.
+    """
+    for section in _SAME_SECTIONS:
+        old, new = (_dump(getattr(cell.file, section, None)) for cell in (used, wanted))
+        for key in {**old, **new}:
+            if old.get(key) != new.get(key):
+                raise ProcedureError(
+                    f"{wanted.path}: {section}.{key} is {new.get(key)!r}, the run was started"
+                    f" with {old.get(key)!r}: set it back, or start another run"
+                )
+
+
+def _may_touch(entries: tuple[Entry, ...]) -> bool:
+    for entry in reversed(entries):
+        if entry.action is Action.RETRACT and entry.event is Event.END:
+            return False
+        if entry.event is Event.COMMIT or entry.action is Action.MOVE:
+            return False
+        if entry.action in _TOUCHES:
+            return True
+    return False
+
+
+def _dump(section: object) -> dict[str, Any]:
+    if isinstance(section, StrictModel):
+        return section.model_dump(mode="json")
+    return {} if section is None else {"": section}
+
+
+def _short(value: object) -> str:
+    return value[:12] if isinstance(value, str) else str(value)

@@ -1,0 +1,267 @@
+"""Settings of a run, taken from cell and plan, which must be compatible before anything moves.
+
+The fingerprint says which cell a plan was made for. It says nothing of the plan's own numbers, and
+those are what the arm is sent to and presses with.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from elastocal.arrays import FloatArray
+from elastocal.cell import Cell
+from elastocal.cell.description import ProcedureSettings
+from elastocal.errors import ProcedureError
+from elastocal.planning import PlanResult
+from elastocal.planning.motion import AxisMotion
+from elastocal.robot import GRAVITY
+
+_LIMIT_PER_LOAD = 1.3
+"""Default force limit, as a multiple of the largest load case."""
+_LEAST_POSES = 3
+"""Unloaded marker readings that the rotation of a station needs."""
+_SAME_PLACE = 1e-5
+"""Largest distance between a frame and where its joints lead, in m."""
+_SAME_TURN = 1e-5
+"""Largest difference between two directions or rotations that are to be the same."""
+_SAME_NUMBER = 1e-9
+"""Largest difference between a number of the cell and the same in its plan, SI."""
+
+
+@dataclass(frozen=True, eq=False)
+class RunSettings:
+    """Figures of one run."""
+
+    procedure: ProcedureSettings
+    override: float
+    """Part of the axis speeds that is used between poses."""
+    axes: AxisMotion
+    """For estimates of time."""
+    R_tcp_sensor: FloatArray
+    """Axes of the force sensor in the tcp frame, shape (3, 3)."""
+    force_limit: float
+    """Largest force that is let happen, in N."""
+    tool_weight: float
+    """In N."""
+    near_contact: float
+    """Distance from the surface at the unloaded reference, in m."""
+    approach_distance: float
+    """Distance from the surface at the approach pose, in m."""
+    loads: tuple[tuple[str, FloatArray], ...]
+    """Name of each load case and force on the robot in the tcp frame, shape (3,), in N."""
+
+    @property
+    def largest_load(self) -> float:
+        """Norm of the largest load case, in N."""
+        return max(float(np.linalg.norm(force)) for _, force in self.loads)
+
+
+def run_settings(cell: Cell, plan: PlanResult) -> RunSettings:
+    """Return the settings of a run.
+
+    Parameters
+    ----------
+    cell : Cell
+        The cell.
+    plan : PlanResult
+        Its plan.
+
+    Raises
+    ------
+    ProcedureError
+        If the cell has no force sensor or no tracker, the force limit leaves no room between the
+        largest load case and the range of the sensor, or the contact force is not below every
+        load case (and with it below the force limit).
+    """
+    T_sensor_tcp = cell.T_sensor_tcp
+    if T_sensor_tcp is None:
+        raise ProcedureError(f"{cell.path}: sensor is missing: a run measures the force")
+    unseen = [pose.id for pose in plan.poses if pose.seen_by is None]
+    if unseen:
+        raise ProcedureError(
+            f"{cell.path}: pose {unseen[0]} is seen by no tracker: a run measures the marker"
+        )
+    loads = tuple((name, np.array(force)) for name, force in plan.contact.load_cases.items())
+    _check_contact_force(cell, loads)
+    motion = cell.file.motion
+    return RunSettings(
+        procedure=cell.file.procedure,
+        override=motion.override,
+        axes=AxisMotion(cell.axis_speeds, motion.acceleration_time),
+        R_tcp_sensor=T_sensor_tcp[:3, :3].T,
+        force_limit=_force_limit(cell, loads, T_sensor_tcp[:3, :3]),
+        tool_weight=cell.file.tool.mass * float(np.linalg.norm(GRAVITY)),
+        near_contact=plan.contact.near_contact,
+        approach_distance=plan.contact.approach_distance,
+        loads=loads,
+    )
+
+
+def _check_contact_force(cell: Cell, loads: tuple[tuple[str, FloatArray], ...]) -> None:
+    """Refuse a guarded approach that would press more than a load case does."""
+    name, least = min(((name, -float(f[2])) for name, f in loads), key=lambda load: load[1])
+    contact_force = cell.file.procedure.contact_force
+    if not contact_force < least:
+        raise ProcedureError(
+            f"{cell.path}: procedure.contact_force must be below {least:g} N (load case {name!r}"
+            f" along the normal), got {contact_force:g} N"
+        )
+
+
+def _force_limit(
+    cell: Cell, loads: tuple[tuple[str, FloatArray], ...], R_sensor_tcp: FloatArray
+) -> float:
+    """Return the force limit; it stays within the sensor's range in the direction of each load."""
+    sensor, asked = cell.file.sensor, cell.file.procedure.force_limit
+    assert sensor is not None
+    norms = [float(np.linalg.norm(force)) for _, force in loads]
+    largest = max(norms)
+    within = min(
+        norm / float(np.max(np.abs(R_sensor_tcp @ force) / sensor.largest_force))
+        for norm, (_, force) in zip(norms, loads, strict=True)
+    )
+    limit = min(_LIMIT_PER_LOAD * largest, within) if asked is None else asked
+    room = largest + cell.file.procedure.force_tolerance
+    if not room < limit <= within:
+        raise ProcedureError(
+            f"{cell.path}: procedure.force_limit must be above {room:g} N (largest load case and"
+            f" force_tolerance) and at most {within:g} N (range of the sensor), got {limit:g} N"
+        )
+    return limit
+
+
+def check_compatible(plan: PlanResult, cell: Cell) -> None:
+    """Refuse a plan that is not the cell's, or whose numbers contradict one another.
+
+    Parameters
+    ----------
+    plan : PlanResult
+        The plan.
+    cell : Cell
+        The cell; the plan carries its fingerprint.
+
+    Raises
+    ------
+    ProcedureError
+        With the first thing that does not fit, in one line.
+    """
+    problems = (_about_robot, _about_contact, _about_limits, _about_poses)
+    for problem in problems:
+        for text in problem(plan, cell):
+            raise ProcedureError(f"the plan does not fit {cell.path}: {text}; plan again")
+
+
+def registration_warnings(plan: PlanResult) -> tuple[str, ...]:
+    """Return a warning for each station that sees too few poses to be registered.
+
+    Parameters
+    ----------
+    plan : PlanResult
+        The plan.
+
+    Raises
+    ------
+    ProcedureError
+        If that holds for every station: no reading of the run would be of use.
+    """
+    seen: dict[str, list[int]] = {}
+    for pose in plan.poses:
+        if pose.seen_by is not None:
+            seen.setdefault(pose.seen_by, []).append(pose.id)
+    few = {station: poses for station, poses in seen.items() if len(poses) < _LEAST_POSES}
+    if seen and len(few) == len(seen):
+        most = max(len(poses) for poses in seen.values())
+        raise ProcedureError(
+            f"no tracker station sees {_LEAST_POSES} poses of the plan, {most} at most: none could"
+            " be registered, and no reading used; plan more poses"
+        )
+    return tuple(
+        f"station {station} sees {len(poses)} of the {_LEAST_POSES} poses that it needs to be"
+        f" registered: the readings at pose {', '.join(map(str, poses))} will be missing"
+        for station, poses in few.items()
+    )
+
+
+def _about_robot(plan: PlanResult, cell: Cell) -> Iterator[str]:
+    if plan.robot.joints != cell.robot.joint_names:
+        yield (
+            f"robot.joints are {', '.join(plan.robot.joints)}, those of the cell"
+            f" {', '.join(cell.robot.joint_names)}"
+        )
+    elif not _same(plan.robot.home, cell.home):
+        yield f"robot.home is {_listed(plan.robot.home)}, HOME of the cell {_listed(cell.home)}"
+
+
+def _about_contact(plan: PlanResult, cell: Cell) -> Iterator[str]:
+    engagement, loads = cell.file.engagement, cell.file.load_cases
+    for key in ("approach_distance", "near_contact"):
+        found, wanted = getattr(plan.contact, key), getattr(engagement, key)
+        if not _same(found, wanted):
+            yield f"contact.{key} is {found:g} m, engagement.{key} of the cell {wanted:g} m"
+    if tuple(plan.contact.load_cases) != tuple(loads.cases):
+        yield (
+            f"contact.load_cases are {', '.join(plan.contact.load_cases)}, those of the cell"
+            f" {', '.join(loads.cases)}"
+        )
+        return
+    for name, wanted in zip(loads.cases, loads.force_tcp, strict=True):
+        if not _same(found := plan.contact.load_cases[name], wanted):
+            yield f"load case {name!r} is {_listed(found)} N, that of the cell {_listed(wanted)} N"
+
+
+def _about_limits(plan: PlanResult, cell: Cell) -> Iterator[str]:
+    """Yield joint positions outside the robot's limits."""
+    for what, joints in _all_joints(plan):
+        margin = cell.robot.limits.margin(np.array(joints))
+        worst = int(np.argmin(margin))
+        if not margin[worst] >= 0.0:
+            yield (
+                f"{what}: {cell.robot.joint_names[worst]} at {joints[worst]:.4g} is outside its"
+                " limits"
+            )
+
+
+def _all_joints(plan: PlanResult) -> Iterator[tuple[str, tuple[float, ...]]]:
+    yield "robot.home", plan.robot.home
+    for pose in plan.poses:
+        yield f"poses.{pose.id}.joints", pose.joints
+        yield f"poses.{pose.id}.approach_joints", pose.approach_joints
+    for number, move in enumerate(plan.moves):
+        for stop, joints in enumerate(move.via):
+            yield f"moves.{number}.via.{stop}", joints
+
+
+def _about_poses(plan: PlanResult, cell: Cell) -> Iterator[str]:
+    """Yield poses that name no tracker of the cell, or whose joints do not lead to their frames."""
+    stations = [tracker.name for tracker in cell.file.trackers]
+    for pose in plan.poses:
+        if pose.seen_by is not None and pose.seen_by not in stations:
+            yield (
+                f"poses.{pose.id}.seen_by: {pose.seen_by!r} is no tracker of the cell"
+                f" (known: {', '.join(stations) or 'none'})"
+            )
+        away = np.array(pose.normal)
+        if not np.abs(pose.T_base_tcp[:3, 2] + away).max() <= _SAME_TURN:
+            yield f"poses.{pose.id}: z of the tcp frame is not against the normal"
+        for key, joints, distance in (
+            ("joints", pose.joints, 0.0),
+            ("approach_joints", pose.approach_joints, plan.contact.approach_distance),
+        ):
+            reached = cell.robot.forward(joints)
+            gap = np.linalg.norm(reached[:3, 3] - pose.T_base_tcp[:3, 3] - distance * away)
+            turn = np.abs(reached[:3, :3] - pose.T_base_tcp[:3, :3]).max()
+            if not (gap <= _SAME_PLACE and turn <= _SAME_TURN):
+                yield (
+                    f"poses.{pose.id}.{key} lead {1e3 * gap:.3g} mm and {turn:.3g} rad away from"
+                    " where its frame and normal say"
+                )
+
+
+def _same(found: object, wanted: object) -> bool:
+    a, b = np.atleast_1d(np.asarray(found, float)), np.atleast_1d(np.asarray(wanted, float))
+    return a.shape == b.shape and bool(np.all(np.abs(a - b) <= _SAME_NUMBER))
+
+
+def _listed(values: object) -> str:
+    return "(" + ", ".join(f"{value:g}" for value in np.asarray(values, float)) + ")"
