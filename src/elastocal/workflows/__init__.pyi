@@ -1,3 +1,5 @@
+from ._device_sources import KINDS as KINDS, SOURCES as SOURCES, DeviceSource as DeviceSource
+from ._operator import Operator as Operator, Supervision as Supervision, Unattended as Unattended
 from ._outputs import refuse_overwriting as refuse_overwriting
 from ._process_trial import (
     ProcessTrial as ProcessTrial,
@@ -15,11 +17,28 @@ from .compensate import (
     CompensateSettings as CompensateSettings,
     compensate as compensate,
 )
+from .derive import DeriveResult as DeriveResult, DeriveSettings as DeriveSettings, derive as derive
 from .export import ExportResult as ExportResult, ExportSettings as ExportSettings, export as export
+from .plan import (
+    PlanFigures as PlanFigures,
+    PlanResult as PlanResult,
+    PlanSettings as PlanSettings,
+    plan as plan,
+    plan_figures as plan_figures,
+)
 from .predict import (
     PredictResult as PredictResult,
     PredictSettings as PredictSettings,
     predict as predict,
+)
+from .run import (
+    POSES_MEASURED as POSES_MEASURED,
+    DryRunResult as DryRunResult,
+    RunFigures as RunFigures,
+    RunResult as RunResult,
+    RunSettings as RunSettings,
+    dry_run as dry_run,
+    run as run,
 )
 from .simulate_process import (
     SimulateProcessResult as SimulateProcessResult,
