@@ -201,7 +201,7 @@ class SpringChain:
 
 
 def build_spring_chain(linkage: Linkage, springs: Sequence[TruthSpring]) -> SpringChain:
-    """Return the skeleton of a linkage with springs.
+    """Return the spring chain of a linkage with springs.
 
     Raises
     ------

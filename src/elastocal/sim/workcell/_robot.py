@@ -58,7 +58,7 @@ BALANCE = 1e-11
 
 @dataclass(frozen=True, eq=False)
 class RobotLayout:
-    """SpringChain and springs of the simulated robot."""
+    """Spring chain of the simulated robot with the laws of its springs."""
 
     linkage: Linkage
     chain: SpringChain
