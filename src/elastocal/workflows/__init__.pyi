@@ -10,3 +10,10 @@ from .predict import (
     PredictSettings as PredictSettings,
     predict as predict,
 )
+from .study import (
+    DEFAULT_VARIATION as DEFAULT_VARIATION,
+    StudyResult as StudyResult,
+    StudySettings as StudySettings,
+    study as study,
+    study_conditions as study_conditions,
+)
