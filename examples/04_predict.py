@@ -11,15 +11,14 @@ import numpy as np
 from elastocal.elastic import ElasticModel, layout
 from elastocal.identification import calibrate, summary
 from elastocal.robot import Robot, T_from_xyzabc, catalogue, with_tool
-from elastocal.sim.layouts import (
+from elastocal.sim.arm.elastic_arm import (
     LINK_BENDING,
     bearing_truth,
     with_link_bending,
     with_stiffening_gears,
 )
-from elastocal.sim.linkage import Linkage
-from elastocal.sim.measurement import SHOP_FLOOR, Noise, measure
-from elastocal.sim.scene import press_forces, press_poses
+from elastocal.sim.arm.linkage import Linkage
+from elastocal.sim.arm.measurement import SHOP_FLOOR, Noise, measure, press_forces, press_poses
 
 urdf = catalogue.urdf("KR 120 R2700 extra HA")
 urdf = with_tool(urdf, "flange", "tcp", T_from_xyzabc(0.15, 0.0, 0.35, 0.0, 0.0, 0.0))

@@ -16,15 +16,14 @@ from elastocal.report.plots import (
     write_figure,
 )
 from elastocal.robot import Robot, T_from_xyzabc, catalogue, with_tool
-from elastocal.sim.layouts import (
+from elastocal.sim.arm.elastic_arm import (
     LINK_BENDING,
     bearing_truth,
     with_link_bending,
     with_stiffening_gears,
 )
-from elastocal.sim.linkage import Linkage
-from elastocal.sim.measurement import SHOP_FLOOR, measure
-from elastocal.sim.scene import press_forces, press_poses
+from elastocal.sim.arm.linkage import Linkage
+from elastocal.sim.arm.measurement import SHOP_FLOOR, measure, press_forces, press_poses
 
 folder = Path(sys.argv[1]) if len(sys.argv) > 1 else Path(tempfile.mkdtemp(prefix="elastocal-"))
 folder.mkdir(parents=True, exist_ok=True)

@@ -10,15 +10,14 @@ import numpy as np
 from elastocal.codec import CodecOptions, cross_validate, judge, make_variants
 from elastocal.planning.search import TECHNIQUES, Candidates, Selection, check_count
 from elastocal.robot import Robot, T_from_xyzabc, catalogue, with_tool
-from elastocal.sim.layouts import (
+from elastocal.sim.arm.elastic_arm import (
     LINK_BENDING,
     bearing_truth,
     with_link_bending,
     with_stiffening_gears,
 )
-from elastocal.sim.linkage import Linkage
-from elastocal.sim.measurement import SHOP_FLOOR, measure
-from elastocal.sim.scene import press_forces, press_poses
+from elastocal.sim.arm.linkage import Linkage
+from elastocal.sim.arm.measurement import SHOP_FLOOR, measure, press_forces, press_poses
 
 
 class Median:

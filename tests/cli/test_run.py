@@ -6,6 +6,7 @@ import signal
 import subprocess
 import sys
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -194,11 +195,11 @@ def seen_once_by_another_station(planned):
     more += '\n    range: ["1.0 m", "15 m"]\n'
     cell.write_text(text.replace(first, more + first), encoding="utf-8")
     plan = read_plan(planned.plan)
-    known = plan.cell.model_copy(update={"fingerprint": fingerprint(load_cell(cell))})
-    last = plan.poses[-1].model_copy(update={"seen_by": "station_2"})
+    known = replace(plan.cell, fingerprint=fingerprint(load_cell(cell)))
+    last = replace(plan.poses[-1], seen_by="station_2")
     folder = planned.plan.with_name("few")
     folder.mkdir()
-    write_plan(folder, plan.model_copy(update={"cell": known, "poses": (*plan.poses[:-1], last)}))
+    write_plan(folder, replace(plan, cell=known, poses=(*plan.poses[:-1], last)))
     return PlannedCell(cell, folder)
 
 
@@ -250,8 +251,8 @@ def test_a_plan_that_contradicts_its_cell_is_refused_whoever_wrote_it(planned, t
     changed = planned.plan.with_name("contradicting")
     changed.mkdir()
     plan = read_plan(planned.plan)
-    contact = plan.contact.model_copy(update={"near_contact": -0.01})
-    write_plan(changed, plan.model_copy(update={"contact": contact}))
+    contact = replace(plan.contact, near_contact=-0.01)
+    write_plan(changed, replace(plan, contact=contact))
     reason = run(PlannedCell(planned.cell, changed), tmp_path / "run").reason
     assert "contact.near_contact is -0.01 m, engagement.near_contact of the cell 0.003 m" in reason
 

@@ -17,7 +17,7 @@ from elastocal.codec.study import (
 )
 from elastocal.elastic import ElasticModel, layout
 from elastocal.identification import calibrate
-from elastocal.sim.workcell import ErrorDraws, Scales
+from elastocal.sim.workcell import ErrorDraws, ErrorScales
 from elastocal.workflows import study_conditions
 from elastocal.workflows._study_simulation import prepare_study
 from support.cli import elastocal
@@ -87,7 +87,7 @@ def test_a_sample_is_calibrated_as_the_dataset_of_a_run_would_be():
     draws = ErrorDraws.of(POOL, 5, sample.generator(1)).take(poses, np.arange(5))
     settled = arm.settle(simulate.places(poses), simulate.force_tcp)
     readings = simulate.errors.readings(
-        settled, draws, Scales(), simulate.pool.station[poses], simulate.load_cases
+        settled, draws, ErrorScales(), simulate.pool.station[poses], simulate.load_cases
     )
     robot = load_cell(cell_path()).robot
     model = ElasticModel(robot, layout(robot, "bearing"))

@@ -3,7 +3,6 @@
 from dataclasses import replace
 from functools import cache
 
-import coal
 import numpy as np
 import pytest
 
@@ -23,17 +22,17 @@ from elastocal.planning.checks import (
     WristCheck,
     verdicts,
 )
-from elastocal.planning.scene import Body
 from elastocal.planning.surface import DiskFit
 from elastocal.robot import Rail, Robot, on_rail
+from elastocal.shapes import Body, Box
 from support.postures import FORCE_TCP, arm, postures
 
 
 def scene() -> CollisionScene:
-    tool = Body("tool", coal.Box(0.2, 0.2, 0.2), np.eye(4))
+    tool = Body("tool", Box(0.2, 0.2, 0.2), np.eye(4))
     away = np.eye(4)
     away[:3, 3] = (0.0, 3.0, 0.5)
-    return CollisionScene(arm(), (tool,), (Body("post", coal.Box(0.2, 0.2, 1.0), away),))
+    return CollisionScene(arm(), (tool,), (Body("post", Box(0.2, 0.2, 1.0), away),))
 
 
 @cache

@@ -15,7 +15,7 @@ from elastocal.elastic import (
     custom,
 )
 from elastocal.robot import Robot
-from elastocal.sim.linkage import Linkage
+from elastocal.sim.arm.linkage import Linkage
 from support.virtual_chain import ARMS, configurations, numerical_column
 
 

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from elastocal.identification import interval, solve
-from elastocal.identification.bootstrap import bootstrap
-from elastocal.identification.grams import PoseGrams
+from elastocal.identification.refits import PoseGrams
+from elastocal.identification.uncertainty import bootstrap
 from support.problems import made_up, planted
 
 

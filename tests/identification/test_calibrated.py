@@ -20,7 +20,7 @@ def calibrated():
 
 
 def rows(count):
-    from elastocal.sim.linkage import Linkage
+    from elastocal.sim.arm.linkage import Linkage
     from support.cells import urdf
 
     q = configurations(Linkage.from_urdf(urdf(), "tcp"), count)

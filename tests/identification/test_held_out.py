@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from elastocal.identification import leave_poses_out, solve
-from elastocal.identification.held_out import MOST_FOLDS, compare
+from elastocal.identification.uncertainty import MOST_FOLDS, compare_layouts
 from support.problems import made_up, planted
 
 
@@ -86,7 +86,7 @@ def test_a_model_that_lacks_a_spring_compares_worse_with_an_interval_above_zero(
     problem, _ = noisy(blocks=12)
     ours = leave_poses_out(problem)
     other = leave_poses_out(problem.with_columns(np.arange(4)))
-    found = compare(ours, other, "four", problem, np.random.default_rng(0))
+    found = compare_layouts(ours, other, "four", problem, np.random.default_rng(0))
     assert found.difference == pytest.approx(other.mean - ours.mean)
     assert 0.0 < found.low < found.difference < found.high
 
@@ -94,7 +94,7 @@ def test_a_model_that_lacks_a_spring_compares_worse_with_an_interval_above_zero(
 def test_a_model_compared_with_itself_differs_by_nothing():
     problem, _ = noisy(blocks=5)
     ours = leave_poses_out(problem)
-    found = compare(ours, ours, "same", problem, np.random.default_rng(0))
+    found = compare_layouts(ours, ours, "same", problem, np.random.default_rng(0))
     assert (found.difference, found.low, found.high) == (0.0, 0.0, 0.0)
 
 
@@ -103,6 +103,7 @@ def test_the_interval_of_a_comparison_is_reproducible_by_seed():
     ours = leave_poses_out(problem)
     other = leave_poses_out(problem.with_columns(np.arange(4)))
     lows = [
-        compare(ours, other, "four", problem, np.random.default_rng(seed)).low for seed in (1, 1, 2)
+        compare_layouts(ours, other, "four", problem, np.random.default_rng(seed)).low
+        for seed in (1, 1, 2)
     ]
     assert lows[0] == lows[1] != lows[2]

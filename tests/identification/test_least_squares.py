@@ -4,7 +4,7 @@ from scipy.optimize import lsq_linear
 
 from elastocal.errors import IdentificationError
 from elastocal.identification import RANK_TOLERANCE, rank
-from elastocal.identification.least_squares import kkt_violation, minimise
+from elastocal.identification._least_squares import kkt_violation, minimise
 
 BOUNDS = ["lower", "upper", "box", "some fixed", "mixed", "free"]
 OPTIMAL = 1e-9

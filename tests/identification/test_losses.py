@@ -3,7 +3,7 @@ import pytest
 from scipy.stats import chi
 
 from elastocal.errors import IdentificationError
-from elastocal.identification.losses import MEDIAN_NORM, cauchy, check_loss, huber, linear
+from elastocal.identification.options import MEDIAN_NORM, cauchy, check_loss, huber, linear
 
 
 def test_the_median_is_that_of_three_normal_components():

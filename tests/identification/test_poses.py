@@ -5,7 +5,7 @@ import pytest
 
 from elastocal.errors import IdentificationError
 from elastocal.identification import pose_blocks, same_configuration
-from elastocal.identification.poses import MINIMUM_BLOCKS
+from elastocal.identification.problem import MINIMUM_BLOCKS
 from support.problems import campaign
 
 

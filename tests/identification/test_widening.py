@@ -5,9 +5,8 @@ import pytest
 from scipy.stats import norm, t
 
 from elastocal.identification import leave_poses_out, solve
-from elastocal.identification.bootstrap import bootstrap
-from elastocal.identification.grams import PoseGrams
-from elastocal.identification.widening import widen, widening
+from elastocal.identification.refits import PoseGrams
+from elastocal.identification.uncertainty import bootstrap, widen_draws, widening_factor
 from support.problems import made_up
 
 
@@ -17,7 +16,7 @@ def stretched(blocks, seed):
     problem = replace(problem, d=problem.d + rng.normal(0.0, 0.1, problem.d.shape))
     compliance = solve(problem).compliance
     draws = bootstrap(PoseGrams.of(problem), 200, rng)
-    return widening(problem, compliance, draws, leave_poses_out(problem).compliance)
+    return widening_factor(problem, compliance, draws, leave_poses_out(problem).compliance)
 
 
 def test_the_factor_is_at_least_one_and_grows_as_poses_fall():
@@ -36,23 +35,25 @@ def test_the_factor_is_the_ratio_of_the_deviations_times_students():
     left_out = c + np.array([[1.0], [-1.0], [2.0], [-2.0], [0.0]]) * step
     jackknife = 4 / 5 * (1 + 1 + 4 + 4)
     students = t.ppf(0.975, 4) / norm.ppf(0.975)
-    assert widening(problem, c, draws, left_out) == pytest.approx(students * np.sqrt(jackknife))
+    assert widening_factor(problem, c, draws, left_out) == pytest.approx(
+        students * np.sqrt(jackknife)
+    )
 
 
 def test_draws_that_do_not_vary_are_not_stretched():
     problem, c = made_up(np.random.default_rng(0), blocks=5)
-    assert widening(problem, c, np.tile(c, (40, 1)), np.tile(c, (5, 1))) == 1.0
+    assert widening_factor(problem, c, np.tile(c, (40, 1)), np.tile(c, (5, 1))) == 1.0
 
 
 def test_draws_are_stretched_about_the_estimate():
     problem, c = made_up(np.random.default_rng(0))
     draws = c * np.array([[0.9], [1.1], [1.0]])
-    np.testing.assert_allclose(widen(problem, c, draws, 3.0), c * [[0.7], [1.3], [1.0]])
-    np.testing.assert_allclose(widen(problem, c, draws, 1.0), draws)
+    np.testing.assert_allclose(widen_draws(problem, c, draws, 3.0), c * [[0.7], [1.3], [1.0]])
+    np.testing.assert_allclose(widen_draws(problem, c, draws, 1.0), draws)
 
 
 def test_stretched_draws_keep_the_bounds():
     problem, c = made_up(np.random.default_rng(0))
     bounded = replace(problem, lower=0.8 * c, upper=1.2 * c)
     draws = c * np.array([[0.9], [1.1]])
-    np.testing.assert_allclose(widen(bounded, c, draws, 10.0), c * [[0.8], [1.2]])
+    np.testing.assert_allclose(widen_draws(bounded, c, draws, 10.0), c * [[0.8], [1.2]])

@@ -1,6 +1,7 @@
 """The plan's record: lossless, and refused by name when it contradicts itself."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -34,13 +35,13 @@ def refusal(folder, error=SchemaError):
 
 
 def altered(**changes) -> PlanResult:
-    return plans.plan().model_copy(update=changes)
+    return replace(plans.plan(), **changes)
 
 
 def pose(number, **changes):
     """The plan's poses with one altered."""
     poses = list(plans.plan().poses)
-    poses[number] = poses[number].model_copy(update=changes)
+    poses[number] = replace(poses[number], **changes)
     return tuple(poses)
 
 
@@ -153,16 +154,16 @@ def test_a_contradiction_is_named_and_never_written(plan, said, tmp_path):
 
 @pytest.mark.parametrize("order", [(), (0, 1, 2, 3, 4, 4), (0, 1, 2, 3, 4, 6)])
 def test_the_search_order_must_hold_each_pose_once(order):
-    search = plans.plan().search.model_copy(update={"order": order})
+    search = replace(plans.plan().search, order=order)
     with pytest.raises(SchemaError, match=r"search\.order: must hold each pose id once"):
         check_plan(altered(search=search))
 
 
 def test_joints_of_home_via_points_and_compared_candidates_are_checked_too():
     plan = plans.plan()
-    robot = plan.robot.model_copy(update={"home": (0.0,)})
-    moves = (plan.moves[0].model_copy(update={"via": ((1.0,),)}), *plan.moves[1:])
-    comparison = plan.comparison.model_copy(update={"candidates": (0, 50)})
+    robot = replace(plan.robot, home=(0.0,))
+    moves = (replace(plan.moves[0], via=((1.0,),)), *plan.moves[1:])
+    comparison = replace(plan.comparison, candidates=(0, 50))
     for changes, said in (
         ({"robot": robot}, r"robot\.home: needs a position of each of 7 joints, got 1"),
         ({"moves": moves}, r"moves\.0\.via\.0: needs"),

@@ -1,4 +1,5 @@
 import dataclasses
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -50,10 +51,10 @@ def moved_onto():
     def move(surface, plan, pool):
         points = sample_uniform(surface, len(pool), np.random.default_rng(0))
         poses = tuple(
-            pose.model_copy(update={"tcp_position": tuple(points.position[pose.candidate])})
+            replace(pose, tcp_position=tuple(points.position[pose.candidate]))
             for pose in plan.poses
         )
         moved = dataclasses.replace(pool, contact=points.position, normal=points.normal)
-        return plan.model_copy(update={"poses": poses}), moved
+        return replace(plan, poses=poses), moved
 
     return move

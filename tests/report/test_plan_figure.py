@@ -1,5 +1,7 @@
 """The printable figure."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import trimesh
@@ -63,7 +65,7 @@ def test_two_techniques_stand_side_by_side(on_block, plan):
 
 def test_without_a_comparison_there_is_one_panel(on_block):
     surface, plan, pool = on_block
-    figure = plan_figure(surface, plan.model_copy(update={"comparison": None}), pool)
+    figure = plan_figure(surface, replace(plan, comparison=None), pool)
     assert len(figure.axes) == 2
     width, _ = figure.get_size_inches()
     assert width < 6.0
@@ -86,16 +88,16 @@ def test_numbers_under_a_panel_carry_their_units(on_block):
 
 def test_a_surface_without_edge_has_no_distance_from_it(ball, plan, pool, moved_onto):
     moved, candidates = moved_onto(ball, plan, pool)
-    spread = moved.search.spread.model_copy(update={"boundary_distance": None})
-    search = moved.search.model_copy(update={"spread": spread})
-    figure = plan_figure(ball, moved.model_copy(update={"search": search}), candidates)
+    spread = replace(moved.search.spread, boundary_distance=None)
+    search = replace(moved.search, spread=spread)
+    figure = plan_figure(ball, replace(moved, search=search), candidates)
     texts = _texts(figure.axes[0])
     assert texts[texts.index("Mean distance from the edge") + 1] == "none"
 
 
 def test_a_dollar_in_a_name_is_no_formula(tmp_path, on_block):
     surface, plan, pool = on_block
-    named = plan.model_copy(update={"cell": plan.cell.model_copy(update={"name": "a$b_$c^"})})
+    named = replace(plan, cell=replace(plan.cell, name="a$b_$c^"))
     assert write_plan_figure(tmp_path / "f.svg", surface, named, pool).stat().st_size > 5000
 
 

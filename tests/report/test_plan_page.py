@@ -4,6 +4,7 @@ import json
 import re
 import shutil
 import subprocess
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -100,12 +101,11 @@ def test_head_tells_the_key_figures_with_units(written, plan):
 
 def test_names_are_escaped(tmp_path, cell, block, plan, pool):
     bad = "<b>x</b></script><script>alert(1)</script>"
-    named = plan.model_copy(
-        update={
-            "cell": plan.cell.model_copy(update={"name": bad}),
-            "findings": (bad,),
-            "poses": tuple(pose.model_copy(update={"seen_by": bad}) for pose in plan.poses),
-        }
+    named = replace(
+        plan,
+        cell=replace(plan.cell, name=bad),
+        findings=(bad,),
+        poses=tuple(replace(pose, seen_by=bad) for pose in plan.poses),
     )
     text = write_plan_page(tmp_path / "p.html", cell, block, named, pool).read_text("utf-8")
     assert "<b>x" not in text

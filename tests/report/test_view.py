@@ -1,5 +1,6 @@
 """The figure behind the page."""
 
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -92,8 +93,8 @@ def test_camera_sees_all_of_the_tooling(view, block, name):
 
 
 def test_a_cell_without_stations_has_no_line_of_sight(cell, block, plan, pool):
-    unseen = tuple(pose.model_copy(update={"seen_by": None}) for pose in plan.poses)
-    view = plan_view(cell, block, plan.model_copy(update={"poses": unseen}), pool)
+    unseen = tuple(replace(pose, seen_by=None) for pose in plan.poses)
+    view = plan_view(cell, block, replace(plan, poses=unseen), pool)
     assert "line of sight" not in {trace.name for trace in view.figure.data}
     assert all(len(frame.data) == 1 for frame in view.figure.frames)
     assert all(np.isfinite(_points(trace)).any() for trace in view.figure.data)

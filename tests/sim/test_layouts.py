@@ -2,14 +2,14 @@ import numpy as np
 import pytest
 
 from elastocal.errors import SpringError
-from elastocal.sim.layouts import (
+from elastocal.sim.arm.elastic_arm import (
     AXIAL_STIFFNESS,
     LINK_BENDING,
     bearing_truth,
     with_link_bending,
     with_stiffening_gears,
 )
-from elastocal.sim.torque_laws import CubicGear, Linear
+from elastocal.sim.arm.springs import CubicGear, Linear
 
 
 def norms(arm, poses, forces):

@@ -3,7 +3,7 @@ import pytest
 
 from elastocal.errors import RobotError
 from elastocal.robot import Robot
-from elastocal.sim.linkage import Linkage
+from elastocal.sim.arm.linkage import Linkage
 
 
 def random_joints(linkage, seed=1, count=20):

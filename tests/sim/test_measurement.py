@@ -2,10 +2,13 @@ import numpy as np
 import pytest
 
 from elastocal.errors import DatasetError, UnreachableError
-from elastocal.sim.layouts import bearing_truth, with_link_bending, with_stiffening_gears
-from elastocal.sim.measurement import SHOP_FLOOR, Blunder, Contact, Noise, measure
-from elastocal.sim.scene import LOAD_CASES
-from elastocal.sim.truth import GRAVITY
+from elastocal.sim.arm.elastic_arm import (
+    GRAVITY,
+    bearing_truth,
+    with_link_bending,
+    with_stiffening_gears,
+)
+from elastocal.sim.arm.measurement import LOAD_CASES, SHOP_FLOOR, Blunder, Contact, Noise, measure
 
 
 @pytest.fixture(scope="module")
@@ -16,7 +19,7 @@ def arm(linkage):
 
 def readings(arm, poses, forces, noise=None, seed=4, **options):
     rng = np.random.default_rng(seed)
-    return measure(arm, poses.joints, forces, noise or Noise(), rng, **options).data
+    return measure(arm, poses.joints, forces, noise or Noise(), rng, **options).to_xarray()
 
 
 def difference(data):
@@ -69,8 +72,8 @@ def test_noise_has_the_size_stated(arm, linkage, poses, forces):
     noise = Noise(force=5.0, marker=30e-6)
     many = np.tile(poses.joints, (5, 1)), np.tile(forces, (5, 1, 1))
     rng = np.random.default_rng(0)
-    data = measure(bearing_truth(linkage), *many, noise, rng).data
-    calm = measure(bearing_truth(linkage), *many, Noise(), np.random.default_rng(0)).data
+    data = measure(bearing_truth(linkage), *many, noise, rng).to_xarray()
+    calm = measure(bearing_truth(linkage), *many, Noise(), np.random.default_rng(0)).to_xarray()
     assert (data["force"] - calm["force"]).values.std() == pytest.approx(5.0, rel=0.1)
     assert (difference(data) - difference(calm)).std() == pytest.approx(30e-6 * 2**0.5, rel=0.15)
     np.testing.assert_allclose(data["marker_sigma"].values, 30e-6 * 2**0.5)

@@ -2,8 +2,8 @@ import numpy as np
 import pytest
 
 from elastocal.errors import UnreachableError
-from elastocal.sim.reach import pose_error, reach
-from elastocal.sim.scene import LOAD_CASES, SphericalCap, press_forces, press_poses
+from elastocal.sim.arm.inverse import pose_error, solve_inverse
+from elastocal.sim.arm.measurement import LOAD_CASES, SphericalCap, press_forces, press_poses
 
 
 def test_the_tool_touches_the_dome_along_its_normal(linkage, poses):
@@ -55,7 +55,7 @@ def test_forces_turn_with_the_tool(poses, forces):
 def test_reach_finds_joints_for_poses_of_the_arm_itself(linkage):
     rng = np.random.default_rng(3)
     q = np.array([0.1, -1.5, 1.6, 0.3, 0.9, -0.2]) + rng.uniform(-0.3, 0.3, (20, 6))
-    found = reach(linkage, linkage.forward(q), q + rng.uniform(-0.2, 0.2, q.shape))
+    found = solve_inverse(linkage, linkage.forward(q), q + rng.uniform(-0.2, 0.2, q.shape))
     assert found.ok.all()
     np.testing.assert_allclose(linkage.forward(found.q), linkage.forward(q), atol=1e-10)
 
@@ -64,7 +64,7 @@ def test_reach_says_which_poses_it_has_not_reached(linkage):
     q = np.tile([0.1, -1.5, 1.6, 0.3, 0.9, -0.2], (2, 1))
     goals = linkage.forward(q)
     goals[1, 0, 3] += 4.0
-    assert reach(linkage, goals, q + 0.1).ok.tolist() == [True, False]
+    assert solve_inverse(linkage, goals, q + 0.1).ok.tolist() == [True, False]
 
 
 @pytest.mark.parametrize("angle", [0.0, 1e-12, 0.4, 2.0, 3.1])

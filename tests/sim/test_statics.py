@@ -1,9 +1,9 @@
 import numpy as np
 import pytest
 
-from elastocal.sim.screws import Screws
-from elastocal.sim.statics import DeadLoads, LoadedMechanism
-from elastocal.sim.torque_laws import CubicGear, Linear, TwoSlopeGear
+from elastocal.sim.arm.linkage import Screws
+from elastocal.sim.arm.springs import CubicGear, Linear, TwoSlopeGear
+from elastocal.sim.arm.statics import DeadLoads, LoadedMechanism
 
 STEP = 1e-6
 

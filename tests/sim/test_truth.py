@@ -5,11 +5,17 @@ import numpy as np
 import pytest
 
 from elastocal.errors import RobotError, SpringError
-from elastocal.sim.layouts import bearing_truth, with_link_bending, with_stiffening_gears
-from elastocal.sim.linkage import Linkage
-from elastocal.sim.newton import EquilibriumError
-from elastocal.sim.torque_laws import CubicGear, Linear
-from elastocal.sim.truth import GRAVITY, ElasticArm, TruthSpring
+from elastocal.sim.arm.elastic_arm import (
+    GRAVITY,
+    ElasticArm,
+    TruthSpring,
+    bearing_truth,
+    with_link_bending,
+    with_stiffening_gears,
+)
+from elastocal.sim.arm.linkage import Linkage
+from elastocal.sim.arm.springs import CubicGear, Linear
+from elastocal.sim.arm.statics import EquilibriumError
 
 LENGTH = 2.0
 K = 1000.0
@@ -215,5 +221,5 @@ def test_what_does_not_fit_is_refused(linkage, q, force, message):
 
 
 def test_the_truth_runs_without_pinocchio():
-    code = "import sys, elastocal.sim.layouts; sys.exit('pinocchio' in sys.modules)"
+    code = "import sys, elastocal.sim.arm.elastic_arm; sys.exit('pinocchio' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0

@@ -3,7 +3,7 @@
 import coal
 import numpy as np
 
-from elastocal.planning.sight_lines import Beams
+from elastocal.shapes import Beams
 
 _POINT = coal.Sphere(1e-12)
 

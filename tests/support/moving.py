@@ -2,15 +2,14 @@
 
 import itertools
 
-import coal
 import numpy as np
 
 from elastocal.arrays import FloatArray
 from elastocal.planning import CollisionScene
 from elastocal.planning.motion import AxisMotion, Mover, Sweep
 from elastocal.planning.postures import Postures
-from elastocal.planning.scene import Body
 from elastocal.robot.inverse import inverse_for
+from elastocal.shapes import Body, Box, Sphere
 from support.postures import arm
 
 CLEARANCE = 5e-3
@@ -23,11 +22,11 @@ BALL = 0.04
 def box(name: str, size, centre) -> Body:
     T = np.eye(4)
     T[:3, 3] = centre
-    return Body(name, coal.Box(*size), T)
+    return Body(name, Box(*size), T)
 
 
 def scene(*obstacles: Body) -> CollisionScene:
-    return CollisionScene(arm(), (Body("ball", coal.Sphere(BALL), np.eye(4)),), obstacles)
+    return CollisionScene(arm(), (Body("ball", Sphere(BALL), np.eye(4)),), obstacles)
 
 
 def mover(*obstacles: Body) -> Mover:

@@ -6,7 +6,7 @@ import numpy as np
 
 from elastocal.elastic import ElasticModel, layout
 from elastocal.planning.search import Candidates
-from elastocal.sim import scene
+from elastocal.sim.arm import measurement as scene
 from support import cells
 
 SPRINGS = 18

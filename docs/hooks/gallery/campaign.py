@@ -18,7 +18,13 @@ from elastocal.dataset import Readings
 from elastocal.elastic import ElasticModel, layout
 from elastocal.identification import Calibration, calibrate, summary
 from elastocal.planning import PlanAndPool, make_plan
-from elastocal.sim.workcell import ErrorDraws, Places, QuickCell, QuickErrors, Scales
+from elastocal.sim.workcell import (
+    CampaignErrors,
+    CampaignSimulator,
+    ContactPoses,
+    ErrorDraws,
+    ErrorScales,
+)
 
 SEED = 0
 
@@ -54,12 +60,12 @@ def campaign(cell: Cell, compare: str | None) -> Campaign:
     """Plan a cell, measure it and calibrate it."""
     planned = make_plan(cell, compare, jobs=1)
     poses, loads = planned.plan.poses, cell.file.load_cases
-    places = Places(np.array([p.joints for p in poses]), np.array([p.normal for p in poses]))
-    settled = QuickCell.of(cell).settle(places, loads.force_tcp)
+    places = ContactPoses(np.array([p.joints for p in poses]), np.array([p.normal for p in poses]))
+    settled = CampaignSimulator.of(cell).settle(places, loads.force_tcp)
     stations = {each.name: each.position_base for each in cell.file.trackers}
     draws = ErrorDraws.of(len(poses), len(loads.cases), np.random.default_rng(SEED))
-    readings = QuickErrors.of(cell).readings(
-        settled, draws, Scales(), np.array([stations[p.seen_by] for p in poses]), loads.cases
+    readings = CampaignErrors.of(cell).readings(
+        settled, draws, ErrorScales(), np.array([stations[p.seen_by] for p in poses]), loads.cases
     )
     model = ElasticModel(cell.robot, layout(cell.robot, "bearing"))
     marker = cell.file.marker.position_tcp

@@ -11,7 +11,6 @@ from collections.abc import Callable
 
 import typer
 
-from elastocal import __version__
 from elastocal.cli.calibrate import calibrate
 from elastocal.cli.check import check
 from elastocal.cli.codec import codec
@@ -67,6 +66,8 @@ for name, command in COMMANDS.items():
 
 def _version(wanted: bool) -> None:
     if wanted:
+        from elastocal import __version__
+
         typer.echo(f"elastocal {__version__}")
         raise typer.Exit
 

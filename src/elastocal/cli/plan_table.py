@@ -8,6 +8,7 @@ from rich.console import Console
 from rich.table import Table
 
 from elastocal.planning import PlanResult, SpreadRecord
+from elastocal.records import to_data
 
 
 def key_figures(plan: PlanResult) -> dict[str, Any]:
@@ -17,11 +18,11 @@ def key_figures(plan: PlanResult) -> dict[str, Any]:
         "cell": plan.cell.name,
         "poses": len(plan.poses),
         "technique": search.name,
-        "spread": search.spread.model_dump(),
+        "spread": to_data(search.spread),
         "d_max": search.d_max,
         "covered": search.covered,
         "comparison": plan.comparison
-        and {"technique": plan.comparison.name, "spread": plan.comparison.spread.model_dump()},
+        and {"technique": plan.comparison.name, "spread": to_data(plan.comparison.spread)},
         "pool": plan.pool.valid,
         "sampled": plan.pool.sampled,
         "refused": {check.name: check.refused for check in plan.pool.checks},

@@ -96,9 +96,9 @@ def _words(known: Callable[[], Iterable[str]]) -> BeforeValidator:
     return BeforeValidator(check)
 
 
-Length = Annotated[float, BeforeValidator(lambda text: parse_quantity(text, "length"))]
-LayoutName = Annotated[str, _words(lambda: tuple(LAYOUTS))]
-Kind = Annotated[str, _words(lambda: (*_MOTIONS, *(word for word in KINDS if word != _HINGE)))]
+_Length = Annotated[float, BeforeValidator(lambda text: parse_quantity(text, "length"))]
+_LayoutName = Annotated[str, _words(lambda: tuple(LAYOUTS))]
+_Kind = Annotated[str, _words(lambda: (*_MOTIONS, *(word for word in KINDS if word != _HINGE)))]
 
 
 class SpringEntry(StrictModel):
@@ -106,17 +106,17 @@ class SpringEntry(StrictModel):
 
     joint: str
     axis: Literal["axial", "x", "y", "z"] | tuple[float, float, float] = "axial"
-    kind: Kind | None = None
+    kind: _Kind | None = None
     """Default: a torsional hinge; one of the joint's own motion for ``axial``."""
     frame: Literal["proximal", "distal"] = "proximal"
-    offset: tuple[Length, Length, Length] = (0.0, 0.0, 0.0)
+    offset: tuple[_Length, _Length, _Length] = (0.0, 0.0, 0.0)
     name: str | None = None
 
 
 class SpringFile(StrictModel):
     """A spring file."""
 
-    include: LayoutName | None = None
+    include: _LayoutName | None = None
     springs: tuple[SpringEntry, ...] = Field(default=())
 
 

@@ -1,16 +1,22 @@
-from .bootstrap import CONFIDENCE as CONFIDENCE, interval as interval
-from .calibrated import CalibratedModel as CalibratedModel, Prediction as Prediction
-from .calibration import Calibration as Calibration, calibrate as calibrate
-from .conventions import check_conventions as check_conventions
-from .fit_settings import FitSettings as FitSettings, parse_bounds as parse_bounds
-from .held_out import (
-    Comparison as Comparison,
-    HeldOut as HeldOut,
-    leave_poses_out as leave_poses_out,
+from ._least_squares import (
+    RANK_TOLERANCE as RANK_TOLERANCE,
+    rank as rank,
 )
-from .joint_check import check_joints as check_joints
-from .least_squares import RANK_TOLERANCE as RANK_TOLERANCE, rank as rank
-from .losses import LOSSES as LOSSES
+from .calibrated import (
+    CalibratedModel as CalibratedModel,
+    Prediction as Prediction,
+)
+from .calibration import (
+    Calibration as Calibration,
+    calibrate as calibrate,
+)
+from .conventions import (
+    POOR as POOR,
+    check_conventions as check_conventions,
+)
+from .joint_check import (
+    check_joints as check_joints,
+)
 from .model_file import (
     CalibrateResult as CalibrateResult,
     RobotRecord as RobotRecord,
@@ -25,14 +31,42 @@ from .observability import (
     observability as observability,
 )
 from .options import (
+    LOSSES as LOSSES,
+    MEDIAN_NORM as MEDIAN_NORM,
     MINIMUM_DRAWS as MINIMUM_DRAWS,
     FitOptions as FitOptions,
+    FitSettings as FitSettings,
     Prior as Prior,
     Weights as Weights,
+    bounds as bounds,
+    cauchy as cauchy,
+    check_loss as check_loss,
+    huber as huber,
+    linear as linear,
+    parse_bounds as parse_bounds,
 )
-from .poses import pose_blocks as pose_blocks, same_configuration as same_configuration
-from .problem import Problem as Problem, build as build, unit_columns as unit_columns
-from .solve import Solution as Solution, factor as factor, solve as solve
+from .problem import (
+    MINIMUM_BLOCKS as MINIMUM_BLOCKS,
+    Problem as Problem,
+    ScaledRows as ScaledRows,
+    build as build,
+    pose_blocks as pose_blocks,
+    relative_sizes as relative_sizes,
+    same_configuration as same_configuration,
+    unit_columns as unit_columns,
+)
+from .refits import (
+    PoseGrams as PoseGrams,
+    PoseTriangles as PoseTriangles,
+)
+from .solve import (
+    OPTIMALITY as OPTIMALITY,
+    Factored as Factored,
+    Solution as Solution,
+    factor as factor,
+    normalised_residuals as normalised_residuals,
+    solve as solve,
+)
 from .summary import (
     CalibrationSummary as CalibrationSummary,
     ComparisonSummary as ComparisonSummary,
@@ -44,5 +78,21 @@ from .summary import (
     SuspiciousReading as SuspiciousReading,
     summary as summary,
 )
-from .suspicious import screen as screen
-from .triangles import PoseTriangles as PoseTriangles
+from .suspicious import (
+    BLUNDER_SCORE as BLUNDER_SCORE,
+    Screening as Screening,
+    leverage as leverage,
+    screen as screen,
+)
+from .uncertainty import (
+    CONFIDENCE as CONFIDENCE,
+    MOST_FOLDS as MOST_FOLDS,
+    Comparison as Comparison,
+    HeldOut as HeldOut,
+    bootstrap as bootstrap,
+    compare_layouts as compare_layouts,
+    interval as interval,
+    leave_poses_out as leave_poses_out,
+    widen_draws as widen_draws,
+    widening_factor as widening_factor,
+)

@@ -8,8 +8,8 @@ from numpy.typing import ArrayLike
 from elastocal.arrays import FloatArray
 from elastocal.elastic import ElasticModel, check_vectors
 from elastocal.errors import SpringError
-from elastocal.identification.bootstrap import interval
 from elastocal.identification.observability import Observability
+from elastocal.identification.uncertainty import interval
 
 _CHUNK = 2000
 """Configurations predicted at a time, so that the draws of a long path fit into memory."""

@@ -10,20 +10,25 @@ from elastocal.arrays import BoolArray, FloatArray
 from elastocal.dataset import Readings
 from elastocal.elastic import LAYOUTS, ElasticModel
 from elastocal.errors import ConventionError, IdentificationError
-from elastocal.identification.bootstrap import bootstrap
+from elastocal.identification._force_offset import force_offset
 from elastocal.identification.calibrated import CalibratedModel
 from elastocal.identification.conventions import POOR, check_conventions
-from elastocal.identification.force_offset import force_offset
-from elastocal.identification.grams import PoseGrams
-from elastocal.identification.held_out import Comparison, HeldOut, compare, leave_poses_out
 from elastocal.identification.joint_check import check_joints
 from elastocal.identification.observability import attainable_rank, observability
 from elastocal.identification.options import FitOptions
-from elastocal.identification.poses import same_configuration
-from elastocal.identification.problem import Problem, build
+from elastocal.identification.problem import Problem, build, same_configuration
+from elastocal.identification.refits import PoseGrams
 from elastocal.identification.solve import Solution, factor, solve
 from elastocal.identification.suspicious import Screening, screen
-from elastocal.identification.widening import widen, widening
+from elastocal.identification.uncertainty import (
+    Comparison,
+    HeldOut,
+    bootstrap,
+    compare_layouts,
+    leave_poses_out,
+    widen_draws,
+    widening_factor,
+)
 from elastocal.parallel import one_blas_thread
 
 
@@ -47,7 +52,7 @@ class Calibration:
     comparison: Comparison | None
     """The 6-spring model on the same left-out poses (or the 18-spring one against it)."""
     widening: float
-    """Factor by which the bootstrap draws were stretched; see `widening`."""
+    """Factor by which the bootstrap draws were stretched; see `widening_factor`."""
     screening: Screening
     solution: Solution
     warnings: tuple[str, ...]
@@ -109,11 +114,11 @@ def calibrate(
     weighted = kept.reweighted(solution.reading_weight)
     held_out = leave_poses_out(weighted)
     draws = bootstrap(PoseGrams.of(weighted), options.draws, rng)
-    by = widening(weighted, solution.compliance, draws, held_out.compliance)
+    by = widening_factor(weighted, solution.compliance, draws, held_out.compliance)
     calibrated = CalibratedModel(
         model,
         solution.compliance,
-        widen(weighted, solution.compliance, draws, by),
+        widen_draws(weighted, solution.compliance, draws, by),
         # A prior makes nothing observable: what was believed before is not measured.
         observability(factor(weighted.without_prior()), model.springs),
         provenance,
@@ -201,4 +206,4 @@ def _compare(
         other = leave_poses_out(problem.with_columns(columns))
     except IdentificationError:
         return None
-    return compare(ours, other, "actuated", problem, rng)
+    return compare_layouts(ours, other, "actuated", problem, rng)

@@ -4,34 +4,38 @@ A force with the wrong sign, in the wrong frame, or joints counted the other way
 a solvable system; only the fit is worse. So the usual mistakes are undone one by one, and if the
 data are explained far better without one of them, the fit is refused with that message (spec
 sections 2 and 6; docs/decisions/0006-conventions-verdict.md).
+
+A new mistake is a function that undoes it and an entry in `_MISTAKES`.
 """
 
-from dataclasses import replace
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from operator import itemgetter
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from elastocal.arrays import FloatArray
 from elastocal.dataset import Readings
 from elastocal.elastic import ElasticModel
 from elastocal.errors import ConventionError, IdentificationError
-from elastocal.identification.mistakes import mistakes_of
 from elastocal.identification.options import FitOptions
 from elastocal.identification.problem import Problem, build
 from elastocal.identification.solve import solve
+from elastocal.robot import Robot
 
 POOR = 0.35
 """Part of the median deflection that may stay unexplained without a warning."""
-DECISIVE = 0.6
+_DECISIVE = 0.6
 """A mistake is named when undoing it leaves at most this part of what was unexplained. Model
 errors and noise stay whichever way correct data are read, so that for correct data every
 mistake leaves more, not less."""
-EXPLAINED = 0.2
+_EXPLAINED = 0.2
 """Part that a mistake's undoing may leave unexplained to be named: it has to fit well itself.
 Springs that the model lacks can make a wrong reading of good data fit less badly, never well."""
-EXACT = 1e-8
+_EXACT = 1e-8
 """Unexplained part below which data are exact and comparing remainders compares round-off."""
-NOTHING = 0.5
+_NOTHING = 0.5
 """Unexplained part above which a mistake is named even when there are fewer than four equations a
 spring; with so few, another reading may fit better by chance."""
 
@@ -63,7 +67,7 @@ def check_conventions(
     robust = solve(problem, "huber")
     stated = _unexplained(problem.reweighted(robust.reading_weight))
     found = []
-    for mistake in mistakes_of(model.robot):
+    for mistake in _mistakes_of(model.robot):
         undone = mistake.undo(model.robot, readings)
         q, force, moment = undone.joint_position, undone.force, undone.moment
         blocks = model.observation_blocks(q, force, moment, marker_offset)
@@ -72,8 +76,8 @@ def check_conventions(
         found.append((_unexplained(other), mistake.message))
     best, message = min(found, key=itemgetter(0))
     few = problem.d.size < 4 * problem.columns
-    enough = stated > (NOTHING if few else EXACT)
-    if enough and best <= min(DECISIVE * stated, EXPLAINED):
+    enough = stated > (_NOTHING if few else _EXACT)
+    if enough and best <= min(_DECISIVE * stated, _EXPLAINED):
         raise ConventionError(
             f"{message}: read that way the fit leaves {best:.1%} of the median deflection"
             f" unexplained, as stated {stated:.1%}"
@@ -85,3 +89,110 @@ def _unexplained(problem: Problem) -> float:
     """Return the median residual of a non-negative fit over the median deflection."""
     residual = np.linalg.norm(problem.residuals(solve(problem).compliance), axis=1)
     return float(np.median(residual) / np.median(np.linalg.norm(problem.d, axis=1)))
+
+
+_Undo = Callable[[Robot, Readings], Readings]
+
+
+@dataclass(frozen=True)
+class _Mistake:
+    """A way of reading the data that differs from the conventions."""
+
+    message: str
+    undo: _Undo
+    """Returns the readings as they would be if the mistake had been made."""
+    six_axes: bool = False
+    """Whether it concerns joints by number and so arms of six axes or more."""
+
+
+def _mistakes_of(robot: Robot) -> tuple[_Mistake, ...]:
+    """Return the mistakes that are possible with a robot, the likeliest first."""
+    six = len(robot.joint_names) >= 6
+    return tuple(mistake for mistake in _MISTAKES if six or not mistake.six_axes)
+
+
+def _turn_force(_: Robot, readings: Readings) -> Readings:
+    return _with_wrench(readings, -readings.force, _negative(readings.moment))
+
+
+def _from_tcp_frame(robot: Robot, readings: Readings) -> Readings:
+    return _rotated(readings, robot.forward(readings.joint_position)[:, :3, :3])
+
+
+def _from_last_link_frame(robot: Robot, readings: Readings) -> Readings:
+    R_base_tcp = robot.forward(readings.joint_position)[:, :3, :3]
+    return _rotated(readings, R_base_tcp @ robot.chain.T_last_tip[:3, :3].T)
+
+
+def _turn_roll_joints(robot: Robot, readings: Readings) -> Readings:
+    """Turn the sign of the first, fourth and sixth joint of the arm."""
+    signs = np.ones(len(robot.joint_names))
+    signs[[robot.external_axes + index for index in (0, 3, 5) if index < len(signs)]] = -1.0
+    return replace(readings, joint_position=readings.joint_position * signs)
+
+
+def _uncouple(robot: Robot, readings: Readings, sign: float) -> Readings:
+    """Return joints whose third one was recorded relative to the horizontal."""
+    q = readings.joint_position.copy()
+    second, third = robot.external_axes + 1, robot.external_axes + 2
+    q[:, third] = sign * q[:, third] - q[:, second]
+    return replace(readings, joint_position=q)
+
+
+def _reverse_joints(_: Robot, readings: Readings) -> Readings:
+    return replace(readings, joint_position=readings.joint_position[:, ::-1])
+
+
+def _both(first: _Undo, second: _Undo) -> _Undo:
+    return lambda robot, readings: second(robot, first(robot, readings))
+
+
+_MISTAKES = (
+    _Mistake(
+        "the force (or the displacement) has its sign turned: elastocal takes the force on the"
+        " robot, and deflection = marker minus controller displacement",
+        _turn_force,
+    ),
+    _Mistake("the forces are in the tcp frame, not in base", _from_tcp_frame),
+    _Mistake(
+        "the forces are in the tcp frame with their sign turned",
+        _both(_from_tcp_frame, _turn_force),
+    ),
+    _Mistake("the forces are in the sensor (last link) frame, not in base", _from_last_link_frame),
+    _Mistake(
+        "the forces are in the sensor (last link) frame with their sign turned",
+        _both(_from_last_link_frame, _turn_force),
+    ),
+    _Mistake(
+        "joints 1, 4 and 6 of the arm turn the other way round than in the URDF (KUKA's A1, A4,"
+        " A6 turn clockwise)",
+        _turn_roll_joints,
+        six_axes=True,
+    ),
+    _Mistake(
+        "the third joint is coupled to the second as on FANUC controllers: use -(q2 + q3)",
+        lambda robot, readings: _uncouple(robot, readings, -1.0),
+        six_axes=True,
+    ),
+    _Mistake(
+        "the third joint is measured against the horizontal: use q3 - q2",
+        lambda robot, readings: _uncouple(robot, readings, 1.0),
+        six_axes=True,
+    ),
+    _Mistake("the joints are in reverse order", _reverse_joints, six_axes=True),
+)
+"""Every mistake that is tried, the likeliest first."""
+
+
+def _rotated(readings: Readings, R: FloatArray) -> Readings:
+    moment = readings.moment
+    turned = None if moment is None else np.einsum("rij,rj->ri", R, moment)
+    return _with_wrench(readings, np.einsum("rij,rj->ri", R, readings.force), turned)
+
+
+def _with_wrench(readings: Readings, force: FloatArray, moment: FloatArray | None) -> Readings:
+    return replace(readings, force=force, moment=moment)
+
+
+def _negative(array: FloatArray | None) -> FloatArray | None:
+    return None if array is None else -array

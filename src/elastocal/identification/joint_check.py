@@ -6,12 +6,12 @@ from elastocal.dataset import Readings
 from elastocal.errors import DatasetError
 from elastocal.robot import Robot
 
-OUTSIDE = np.radians(5.0)
+_OUTSIDE = np.radians(5.0)
 """Distance outside a joint limit that cannot be calibration or rounding, in rad (or m)."""
-TCP_WRONG = 0.05
+_TCP_WRONG = 0.05
 """Median distance between recorded and computed tcp position that geometry errors and
 deflection cannot explain, in m."""
-TCP_OFF = 0.005
+_TCP_OFF = 0.005
 """The same distance above which it is worth a warning, in m."""
 
 
@@ -45,7 +45,7 @@ def _limits(robot: Robot, readings: Readings) -> list[str]:
             f" {limits.lower[joint]:g} to {limits.upper[joint]:g} {unit}"
         )
     assumed = any(assumption.field == "position" for assumption in robot.assumptions)
-    if worst < -OUTSIDE and not assumed:
+    if worst < -_OUTSIDE and not assumed:
         raise DatasetError(f"{message}: degrees, another joint order, or another robot?")
     return [message + (" (limits assumed, no source)" if assumed else "")]
 
@@ -61,6 +61,6 @@ def _positions(robot: Robot, readings: Readings) -> list[str]:
         f"recorded tcp_position is {1e3 * median:.1f} mm (median) from that of the joints of"
         f" {robot.name} at {robot.tip!r}"
     )
-    if median > TCP_WRONG:
+    if median > _TCP_WRONG:
         raise DatasetError(f"{message}: another tcp, joint signs, joint order or base frame?")
-    return [message] if median > TCP_OFF else []
+    return [message] if median > _TCP_OFF else []

@@ -13,10 +13,10 @@ from numpy.typing import ArrayLike
 
 from elastocal.arrays import FloatArray
 from elastocal.elastic import ElasticModel, Parameter, Spring
-from elastocal.identification.least_squares import rank
+from elastocal.identification._least_squares import rank
+from elastocal.identification._sparse_basis import sparse_basis
 from elastocal.identification.problem import relative_sizes, unit_columns
 from elastocal.identification.solve import Factored
-from elastocal.identification.sparse_basis import sparse_basis
 from elastocal.records import record
 
 _PROBES, _PROBE_SEED = 60, 0

@@ -1,5 +1,12 @@
-"""What a user may choose about a fit."""
+"""What a user may choose about a fit: bounds, weights, loss, prior.
 
+A loss is a weight for iterative reweighting (Huber, *Robust Statistics*, 1981). It sees the norm
+``u`` of a reading's three residual components in units of one component's robust standard
+deviation, so that for normal noise ``u`` follows a chi distribution with three degrees of freedom;
+the constants are quantiles of that. A new one is a function and an entry in `LOSSES`.
+"""
+
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal, get_args
 
@@ -7,11 +14,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from elastocal.arrays import FloatArray
-from elastocal.errors import IdentificationError
-from elastocal.identification.losses import check_loss
+from elastocal.errors import IdentificationError, nearest
+from elastocal.records import record
 
 Weights = Literal["none", "sigma"]
-WEIGHTS: tuple[Weights, ...] = get_args(Weights)
+_WEIGHTS: tuple[Weights, ...] = get_args(Weights)
 
 
 @dataclass(frozen=True)
@@ -55,9 +62,9 @@ class FitOptions:
 
     def __post_init__(self) -> None:
         check_loss(self.loss)
-        if self.weights not in WEIGHTS:
+        if self.weights not in _WEIGHTS:
             raise IdentificationError(
-                f"unknown weights {self.weights!r} (allowed: {', '.join(WEIGHTS)})"
+                f"unknown weights {self.weights!r} (allowed: {', '.join(_WEIGHTS)})"
             )
         if not self.draws >= MINIMUM_DRAWS or self.draws != int(self.draws):
             raise IdentificationError(
@@ -105,3 +112,124 @@ def bounds(
             f" between {lower[bad[0]]:g} and {upper[bad[0]]:g}"
         )
     return lower, upper
+
+
+@record(kw_only=True)
+class FitSettings:
+    """What a user chose about springs, readings and fit; the defaults are the paper's."""
+
+    springs: str = "bearing"
+    """Spring layout: a name, or a YAML file."""
+    loss: str = "linear"
+    """``linear``, ``huber`` or ``cauchy``."""
+    weights: Weights = "none"
+    """``sigma``: weigh by the measured standard deviations of the dataset."""
+    bounds: str = "0,inf"
+    """Lowest and highest compliance in SI units."""
+    marker: tuple[float, float, float] | None = None
+    """Metrology marker in the tcp frame, in m; none: the dataset's."""
+    exclude: tuple[str, ...] = ()
+    """Readings left out by name, ``POSE`` or ``POSE:LOAD_CASE``."""
+    keep_blunders: bool = False
+    """Fit also what cannot be a measurement."""
+    trust_conventions: bool = False
+    """Fit data that fit far better with a sign read otherwise."""
+    draws: int = 200
+    """Bootstrap draws."""
+    seed: int = 0
+    """Seed of the bootstrap."""
+
+    def __post_init__(self) -> None:
+        """Refuse bounds that are none.
+
+        Raises
+        ------
+        IdentificationError
+            If they are not two numbers.
+        """
+        parse_bounds(self.bounds)
+
+    def options(self, draws: int | None = None) -> FitOptions:
+        """Return the options of the fit.
+
+        Parameters
+        ----------
+        draws : int, optional
+            Another number of bootstrap draws.
+
+        Raises
+        ------
+        IdentificationError
+            If one of them is not allowed.
+        """
+        lower, upper = parse_bounds(self.bounds)
+        return FitOptions(
+            lower=lower,
+            upper=upper,
+            weights=self.weights,
+            loss=self.loss,
+            set_blunders_aside=not self.keep_blunders,
+            trust_conventions=self.trust_conventions,
+            draws=self.draws if draws is None else draws,
+        )
+
+
+def parse_bounds(text: str) -> tuple[float, float]:
+    """Return two bounds from ``"LOW,HIGH"``.
+
+    >>> parse_bounds("0,inf")
+    (0.0, inf)
+
+    Raises
+    ------
+    IdentificationError
+        If the text is not two numbers.
+    """
+    try:
+        low, high = (float(part) for part in text.split(","))
+    except ValueError as error:
+        raise IdentificationError(f"bounds {text!r} must be two numbers, e.g. '0,inf'") from error
+    return low, high
+
+
+MEDIAN_NORM = 1.5381722544550522
+"""Median of the chi distribution with three degrees of freedom."""
+_HUBER_CORNER = 2.5
+"""About the 90 % quantile (2.500): every tenth reading of normal noise loses weight."""
+_CAUCHY_SCALE = 2.5
+
+
+def linear(u: FloatArray) -> FloatArray:
+    """Least squares: weight 1."""
+    return np.ones_like(u)
+
+
+def huber(u: FloatArray) -> FloatArray:
+    """Huber: weight ``min(1, k / u)``; a blunder keeps a bounded pull."""
+    return _HUBER_CORNER / np.maximum(u, _HUBER_CORNER)
+
+
+def cauchy(u: FloatArray) -> FloatArray:
+    """Cauchy: weight ``1 / (1 + (u / k)^2)``; the pull of a blunder fades out."""
+    return np.asarray(1.0 / (1.0 + np.square(u / _CAUCHY_SCALE)))
+
+
+LOSSES: dict[str, Callable[[FloatArray], FloatArray]] = {
+    "linear": linear,
+    "huber": huber,
+    "cauchy": cauchy,
+}
+
+
+def check_loss(name: str) -> None:
+    """Refuse an unknown loss by name.
+
+    Raises
+    ------
+    IdentificationError
+        With the known ones.
+    """
+    if name not in LOSSES:
+        raise IdentificationError(
+            f"unknown loss {name!r}{nearest(name, LOSSES)} (allowed: {', '.join(LOSSES)})"
+        )

@@ -1,18 +1,33 @@
-"""Build: the observation system ``O c = d`` of a dataset (paper Eq. 14-18)."""
+"""Build: the observation system ``O c = d`` of a dataset (paper Eq. 14-18).
+
+Readings at one pose share what the model gets wrong there, so they form a block that is resampled
+and left out together. A configuration that was measured twice under two labels is still one block;
+treated as two it would be held out against itself.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
 
 from elastocal.arrays import FloatArray, IndexArray
 from elastocal.dataset import Readings
 from elastocal.elastic import ElasticModel, Parameter
 from elastocal.errors import IdentificationError
-from elastocal.identification.least_squares import RANK_TOLERANCE
+from elastocal.identification._least_squares import RANK_TOLERANCE
 from elastocal.identification.options import FitOptions, Prior, bounds
-from elastocal.identification.poses import pose_blocks
+
+_SAME_CONFIGURATION = 5e-3
+"""Distance in joint space (rad, m) below which two poses are the same configuration: more than
+the few millimetres that the controller travels under load, far less than the step between
+calibration poses."""
+
+MINIMUM_BLOCKS = 3
+"""Fewest distinct poses: one to leave out and two to fit, so that the spread is seen."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -194,3 +209,33 @@ def _prior_rows(prior: Prior | None, springs: int) -> FloatArray:
         raise IdentificationError("prior needs finite means, and sigmas and noise above 0")
     gain = prior.noise / sigma
     return np.column_stack([np.diag(gain), gain * mean])
+
+
+def pose_blocks(readings: Readings) -> IndexArray:
+    """Return the block number of each reading, shape (reading,).
+
+    Raises
+    ------
+    IdentificationError
+        If there are fewer than `MINIMUM_BLOCKS` distinct configurations.
+    """
+    labels, pose = np.unique(readings.pose, return_inverse=True)
+    counts = np.bincount(pose)
+    centres = np.stack(
+        [np.bincount(pose, column) / counts for column in readings.joint_position.T], axis=1
+    )
+    pairs = cKDTree(centres).query_pairs(_SAME_CONFIGURATION, output_type="ndarray")
+    graph = coo_matrix((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(len(labels),) * 2)
+    count, component = connected_components(graph, directed=False)
+    if count < MINIMUM_BLOCKS:
+        raise IdentificationError(
+            f"the data hold {count} distinct joint configuration{'s' if count > 1 else ''}"
+            f" ({len(labels)} pose labels): at least {MINIMUM_BLOCKS} are needed"
+        )
+    return np.asarray(component[pose], dtype=np.intp)
+
+
+def same_configuration(readings: Readings, blocks: IndexArray) -> list[tuple[int, ...]]:
+    """Return the groups of pose labels that are one configuration."""
+    groups = (np.unique(readings.pose[blocks == block]) for block in np.unique(blocks))
+    return [tuple(int(label) for label in group) for group in groups if len(group) > 1]

@@ -6,8 +6,8 @@ import numpy as np
 
 from elastocal.arrays import FloatArray
 from elastocal.errors import IdentificationError
-from elastocal.identification.least_squares import kkt_violation, minimise
-from elastocal.identification.losses import LOSSES, MEDIAN_NORM, check_loss
+from elastocal.identification._least_squares import kkt_violation, minimise
+from elastocal.identification.options import LOSSES, MEDIAN_NORM, check_loss
 from elastocal.identification.problem import Problem
 
 OPTIMALITY = 1e-7

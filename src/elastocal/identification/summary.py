@@ -9,10 +9,10 @@ import numpy as np
 from elastocal.arrays import BoolArray
 from elastocal.dataset import Readings
 from elastocal.identification.calibration import Calibration
-from elastocal.identification.fit_settings import FitSettings
-from elastocal.identification.held_out import HeldOut
 from elastocal.identification.observability import Term
+from elastocal.identification.options import FitSettings
 from elastocal.identification.suspicious import Screening
+from elastocal.identification.uncertainty import HeldOut
 from elastocal.records import record
 
 

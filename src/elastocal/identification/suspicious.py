@@ -12,22 +12,22 @@ import numpy as np
 from scipy.special import fdtri
 
 from elastocal.arrays import BoolArray, FloatArray
-from elastocal.identification.least_squares import rank
+from elastocal.identification._least_squares import rank
 from elastocal.identification.problem import Problem
 from elastocal.identification.solve import Solution, normalised_residuals, solve
 
-FALSE_ALARM = 0.01
+_FALSE_ALARM = 0.01
 """Probability that a data set with normal noise and no blunder names any reading."""
 
 BLUNDER_SCORE = 25.0
 """Robust score above which a reading may be set aside ..."""
-BLUNDER_SIZE = 0.25
+_BLUNDER_SIZE = 0.25
 """... if its residual is also above this part of the median deflection. Both together are
 beyond any model error: a broken beam, a marker knocked off, a reading of another pose."""
-MOST_BLUNDERS = 0.1
+_MOST_BLUNDERS = 0.1
 """Largest part of the readings that may be set aside; more is a bad campaign, not blunders."""
 
-REDUNDANCY = 1.5
+_REDUNDANCY = 1.5
 """Fewest equations for each determined direction; with fewer, residuals say nothing."""
 _MOST_LEVERAGE = 0.99
 
@@ -58,18 +58,18 @@ def screen(problem: Problem) -> Screening:
     robust = solve(problem, "cauchy")
     weighted = problem.reweighted(robust.reading_weight)
     h = leverage(weighted, robust)
-    if problem.d.size < REDUNDANCY * rank(robust.factored.s):
+    if problem.d.size < _REDUNDANCY * rank(robust.factored.s):
         nothing = np.zeros(len(problem))
         return Screening(nothing, nothing, h, np.inf, nothing > 0.0)
     score = normalised_residuals(problem, robust.compliance, np.sqrt(1.0 - h))
     residual = np.linalg.norm(problem.residuals(robust.compliance), axis=1)
     typical = float(np.median(np.linalg.norm(problem.d, axis=1)))
-    blunder = (score > BLUNDER_SCORE) & (residual > BLUNDER_SIZE * typical)
-    if blunder.mean() > MOST_BLUNDERS:
+    blunder = (score > BLUNDER_SCORE) & (residual > _BLUNDER_SIZE * typical)
+    if blunder.mean() > _MOST_BLUNDERS:
         blunder = np.zeros_like(blunder)
     # The scale is a median itself, about half as good as a variance of all that is left over.
     freedom = 0.5 * max(problem.d.size - rank(robust.factored.s), 2)
-    threshold = float(np.sqrt(3.0 * fdtri(3, freedom, 1.0 - FALSE_ALARM / len(problem))))
+    threshold = float(np.sqrt(3.0 * fdtri(3, freedom, 1.0 - _FALSE_ALARM / len(problem))))
     return Screening(score, residual, h, threshold, blunder)
 
 

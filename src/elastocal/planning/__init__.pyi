@@ -56,5 +56,5 @@ from .pool_sampling import (
     sample_pool as sample_pool,
 )
 from .postures import Postures as Postures, retreat_joints as retreat_joints
-from .scene import Body as Body, CollisionScene as CollisionScene, mesh_shape as mesh_shape
+from .scene import CollisionScene as CollisionScene
 from .search_pool import SearchPool as SearchPool

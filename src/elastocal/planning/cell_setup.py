@@ -1,15 +1,14 @@
-"""The checks that a cell file asks for."""
+"""What a cell file asks of planning: its surface, its scene, its checks."""
 
 import math
 
-import coal
 import numpy as np
 import trimesh
 from numpy.random import Generator
 
 from elastocal.arrays import FloatArray
-from elastocal.cell import Cell
-from elastocal.cell.description import TOOLING, Box, Cylinder, Shape, Sphere
+from elastocal.cell import Cell, description
+from elastocal.cell.description import TOOLING, Shape
 from elastocal.errors import PlanningError
 from elastocal.planning.checks import (
     Check,
@@ -19,6 +18,7 @@ from elastocal.planning.checks import (
     FlatnessCheck,
     FrictionCheck,
     JointLimitsCheck,
+    MovingSolids,
     SensorCheck,
     SightCheck,
     SingularityCheck,
@@ -27,8 +27,7 @@ from elastocal.planning.checks import (
     TravelLimitsCheck,
     WristCheck,
 )
-from elastocal.planning.checks.sight import MovingSolids
-from elastocal.planning.scene import Body, CollisionScene, mesh_shape
+from elastocal.planning.scene import CollisionScene
 from elastocal.planning.surface import (
     Finding,
     ReachableFrom,
@@ -46,6 +45,97 @@ from elastocal.planning.surface import (
 )
 from elastocal.robot import has_wrist
 from elastocal.robot.inverse import inverse_for
+from elastocal.shapes import Body, Box, Cylinder, Mesh, Solid, Sphere
+
+
+def cell_surface(cell: Cell) -> Surface:
+    """Return the surface that the cell file names, in base, its normals as it says.
+
+    Raises
+    ------
+    SurfaceError, FileAccessError
+        If the mesh cannot be read.
+    """
+    entry = cell.file.surface
+    surface = load_surface(
+        cell.surface_path, entry.metres, cell.T_base_surface, entry.region, entry.crease_angle
+    )
+    return flipped(surface) if entry.flip_normals else surface
+
+
+def surface_findings(cell: Cell, surface: Surface, rng: Generator) -> tuple[Finding, ...]:
+    """Return what a user should know of the mesh and of where it stands.
+
+    Parameters
+    ----------
+    cell : Cell
+        The cell.
+    surface : Surface
+        Its surface.
+    rng : Generator
+        Seeded source of randomness, for the points that are tried.
+
+    Raises
+    ------
+    PlanningError
+        If planning on this surface cannot lead anywhere.
+    SurfaceError
+        If the region holds no part of the surface.
+    """
+    external = cell.external_positions
+    # The middle and the ends of a grid will do to see from which side the robot can work.
+    few = external[np.unique(np.linspace(0, len(external) - 1, 3).astype(int))]
+    found = mesh_findings(surface) + placement_findings(
+        surface,
+        first_joint_positions(cell.robot, external),
+        arm_reach(cell.robot),
+        ReachableFrom(inverse_for(cell.robot), few),
+        rng,
+    )
+    for finding in found:
+        if finding.fatal:
+            raise PlanningError(finding.message)
+    return found
+
+
+def collision_scene(cell: Cell, surface: Surface) -> CollisionScene:
+    """Return robot and tool among tooling and fixtures."""
+    tooling = Body(TOOLING, Mesh(surface.rays), np.eye(4))
+    obstacles = (tooling, *_fixtures(cell))
+    return CollisionScene(cell.robot, _tool(cell), obstacles, frozenset({TOOLING}))
+
+
+def _fixtures(cell: Cell) -> tuple[Body, ...]:
+    """Return the fixtures in base."""
+    return tuple(
+        _body(cell, shape, f"fixture {number}", np.eye(4))
+        for number, shape in enumerate(cell.file.fixtures, start=1)
+    )
+
+
+def _tool(cell: Cell) -> tuple[Body, ...]:
+    """Return the tool's shapes in the tcp frame."""
+    return tuple(
+        _body(cell, shape, f"tool {number}", cell.T_tcp_flange)
+        for number, shape in enumerate(cell.file.tool.shapes, start=1)
+    )
+
+
+def _body(cell: Cell, shape: Shape, name: str, T_frame: FloatArray) -> Body:
+    return Body(shape.name or name, _solid(cell, shape), T_frame @ shape.pose.T)
+
+
+def _solid(cell: Cell, shape: Shape) -> Solid:
+    """Return a shape of a cell file as a solid."""
+    given = shape.solid
+    if isinstance(given, description.Box):
+        return Box(*given.size)
+    if isinstance(given, description.Cylinder):
+        return Cylinder(given.radius, given.length)
+    if isinstance(given, description.Sphere):
+        return Sphere(given.radius)
+    mesh = read_mesh(cell.find(given.file), given.metres)
+    return Mesh.of(mesh.vertices, mesh.faces)
 
 
 def point_checks(
@@ -113,34 +203,6 @@ def torque_check(cell: Cell) -> TorqueCheck:
     )
 
 
-def collision_scene(cell: Cell, surface: Surface) -> CollisionScene:
-    """Return robot and tool among tooling and fixtures."""
-    mould = mesh_shape(surface.mesh.vertices, surface.mesh.faces)
-    tool = _tool(cell)
-    fixtures = tuple(
-        _body(cell, shape, f"fixture {number}", np.eye(4))
-        for number, shape in enumerate(cell.file.fixtures, start=1)
-    )
-    obstacles = (Body(TOOLING, mould, np.eye(4)), *fixtures)
-    return CollisionScene(cell.robot, tool, obstacles, frozenset({TOOLING}))
-
-
-def _body(cell: Cell, shape: Shape, name: str, T_frame: FloatArray) -> Body:
-    return Body(shape.name or name, _solid(cell, shape), T_frame @ shape.pose.T)
-
-
-def _solid(cell: Cell, shape: Shape) -> coal.CollisionGeometry:
-    solid = shape.solid
-    if isinstance(solid, Box):
-        return coal.Box(*solid.size)
-    if isinstance(solid, Cylinder):
-        return coal.Cylinder(solid.radius, solid.length)
-    if isinstance(solid, Sphere):
-        return coal.Sphere(solid.radius)
-    mesh = read_mesh(cell.find(solid.file), solid.metres)
-    return mesh_shape(mesh.vertices, mesh.faces)
-
-
 def _sensor_check(cell: Cell) -> SensorCheck | None:
     sensor, T_sensor_tcp = cell.file.sensor, cell.T_sensor_tcp
     if sensor is None or T_sensor_tcp is None:
@@ -171,8 +233,7 @@ def sight_check(cell: Cell, surface: Surface) -> SightCheck | None:
         for tracker in trackers
         for x, y, z in [tracker.position_base]
     )
-    tooling = trimesh.Trimesh(surface.mesh.vertices, surface.mesh.faces, process=False)
-    solids = [tooling, *(_mesh_of(cell, shape) for shape in cell.file.fixtures)]
+    solids = [surface.rays, *(fixture.triangulated() for fixture in _fixtures(cell))]
     return SightCheck(
         stations,
         marker.position_tcp,
@@ -183,80 +244,7 @@ def sight_check(cell: Cell, surface: Surface) -> SightCheck | None:
     )
 
 
-def _tool(cell: Cell) -> tuple[Body, ...]:
-    """Return the tool's shapes in the tcp frame."""
-    return tuple(
-        _body(cell, shape, f"tool {number}", cell.T_tcp_flange)
-        for number, shape in enumerate(cell.file.tool.shapes, start=1)
-    )
-
-
-def _mesh_of(cell: Cell, shape: Shape) -> trimesh.Trimesh:
-    solid = shape.solid
-    if isinstance(solid, Box):
-        mesh = trimesh.creation.box(solid.size)
-    elif isinstance(solid, Cylinder):
-        mesh = trimesh.creation.cylinder(solid.radius, solid.length)
-    elif isinstance(solid, Sphere):
-        mesh = trimesh.creation.icosphere(3, solid.radius)
-    else:
-        triangles = read_mesh(cell.find(solid.file), solid.metres)
-        mesh = trimesh.Trimesh(triangles.vertices, triangles.faces, process=False)
-    placed: trimesh.Trimesh = mesh.apply_transform(shape.pose.T)
-    return placed
-
-
 def _joined(meshes: list[trimesh.Trimesh]) -> trimesh.Trimesh:
     joined = trimesh.util.concatenate(meshes)
     assert isinstance(joined, trimesh.Trimesh)
     return joined
-
-
-def cell_surface(cell: Cell) -> Surface:
-    """Return the surface that the cell file names, in base, its normals as it says.
-
-    Raises
-    ------
-    SurfaceError, FileAccessError
-        If the mesh cannot be read.
-    """
-    entry = cell.file.surface
-    surface = load_surface(
-        cell.surface_path, entry.metres, cell.T_base_surface, entry.region, entry.crease_angle
-    )
-    return flipped(surface) if entry.flip_normals else surface
-
-
-def surface_findings(cell: Cell, surface: Surface, rng: Generator) -> tuple[Finding, ...]:
-    """Return what a user should know of the mesh and of where it stands.
-
-    Parameters
-    ----------
-    cell : Cell
-        The cell.
-    surface : Surface
-        Its surface.
-    rng : Generator
-        Seeded source of randomness, for the points that are tried.
-
-    Raises
-    ------
-    PlanningError
-        If planning on this surface cannot lead anywhere.
-    SurfaceError
-        If the region holds no part of the surface.
-    """
-    external = cell.external_positions
-    # The middle and the ends of a grid will do to see from which side the robot can work.
-    few = external[np.unique(np.linspace(0, len(external) - 1, 3).astype(int))]
-    found = mesh_findings(surface) + placement_findings(
-        surface,
-        first_joint_positions(cell.robot, external),
-        arm_reach(cell.robot),
-        ReachableFrom(inverse_for(cell.robot), few),
-        rng,
-    )
-    for finding in found:
-        if finding.fatal:
-            raise PlanningError(finding.message)
-    return found

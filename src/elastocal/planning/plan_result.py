@@ -6,6 +6,7 @@ SI; joint positions are in rad (m for prismatic joints) in the order of ``robot.
 
 import json
 from collections.abc import Iterator
+from dataclasses import fields
 from itertools import pairwise
 from pathlib import Path
 
@@ -15,7 +16,7 @@ from scipy.spatial.transform import Rotation
 from elastocal.arrays import FloatArray
 from elastocal.errors import SchemaError
 from elastocal.files import sha256, write_json
-from elastocal.records import StrictModel, read_json
+from elastocal.records import read_json, record, to_data
 
 SCHEMA = "elastocal.plan/1"
 PLAN = "plan.json"
@@ -27,7 +28,8 @@ Vector = tuple[float, float, float]
 Joints = tuple[float, ...]
 
 
-class CellRecord(StrictModel):
+@record()
+class CellRecord:
     """Which cell a plan was made for."""
 
     name: str
@@ -38,7 +40,8 @@ class CellRecord(StrictModel):
     names, not with comments."""
 
 
-class RobotRecord(StrictModel):
+@record()
+class RobotRecord:
     """The robot with rail and tool."""
 
     name: str
@@ -49,7 +52,8 @@ class RobotRecord(StrictModel):
     home: Joints
 
 
-class ContactRecord(StrictModel):
+@record()
+class ContactRecord:
     """How the tool comes to the surface and what it presses with."""
 
     approach_distance: float
@@ -63,7 +67,8 @@ class ContactRecord(StrictModel):
     """Force on the robot in the tcp frame, in N, in the order in which they are applied."""
 
 
-class PoseRecord(StrictModel):
+@record()
+class PoseRecord:
     """One calibration pose."""
 
     id: int
@@ -97,7 +102,8 @@ class PoseRecord(StrictModel):
         return T
 
 
-class MoveRecord(StrictModel):
+@record()
+class MoveRecord:
     """One joint-space move between HOME and approach poses."""
 
     start: int | None
@@ -110,7 +116,8 @@ class MoveRecord(StrictModel):
     """Estimated, in s."""
 
 
-class SpreadRecord(StrictModel):
+@record()
+class SpreadRecord:
     """How the chosen poses lie in their pool: the numbers behind the paper's Fig. 3."""
 
     covering_radius: float
@@ -123,7 +130,8 @@ class SpreadRecord(StrictModel):
     """Observability index O1 over the springs' observable directions (paper Eq. 20)."""
 
 
-class SearchRecord(StrictModel):
+@record()
+class SearchRecord:
     """How the poses were chosen."""
 
     name: str
@@ -148,7 +156,8 @@ class SearchRecord(StrictModel):
     None in a cell without process."""
 
 
-class ComparisonRecord(StrictModel):
+@record()
+class ComparisonRecord:
     """What another technique would have chosen from the same pool, as many poses."""
 
     name: str
@@ -157,7 +166,8 @@ class ComparisonRecord(StrictModel):
     spread: SpreadRecord
 
 
-class CheckRecord(StrictModel):
+@record()
+class CheckRecord:
     """One check, and how many of the sampled points it left without a posture."""
 
     name: str
@@ -167,7 +177,8 @@ class CheckRecord(StrictModel):
     advice: str
 
 
-class PoolRecord(StrictModel):
+@record()
+class PoolRecord:
     """The candidates that the search chose from."""
 
     file: str
@@ -178,8 +189,9 @@ class PoolRecord(StrictModel):
     """The check that refused most points."""
 
 
-class PlanResult(StrictModel):
-    """A plan without its schema key."""
+@record(SCHEMA)
+class PlanResult:
+    """The calibration poses of a cell: what ``plan.json`` holds, but for its hash."""
 
     elastocal: str
     """Version that made it."""
@@ -207,6 +219,7 @@ class PlanResult(StrictModel):
         return self.travel_time + sum(pose.contact_time for pose in self.poses)
 
 
+@record(SCHEMA)
 class _WrittenPlan(PlanResult):
     """A plan as it stands in its file."""
 
@@ -220,9 +233,7 @@ def content_hash(plan: PlanResult) -> str:
     It is taken over the numbers as they are read: line breaks and the way a number is written do
     not count, the order of load cases does.
     """
-    keys = set(PlanResult.model_fields)
-    data = {"schema": SCHEMA, **plan.model_dump(mode="json", include=keys)}
-    return sha256(json.dumps(data, separators=(",", ":"), allow_nan=False))
+    return sha256(json.dumps(to_data(plan), separators=(",", ":"), allow_nan=False))
 
 
 def write_plan(folder: Path, plan: PlanResult) -> Path:
@@ -237,8 +248,8 @@ def write_plan(folder: Path, plan: PlanResult) -> Path:
     """
     path = Path(folder) / PLAN
     check_plan(plan, str(path))
-    data = {"schema": SCHEMA, "sha256": content_hash(plan), **plan.model_dump(mode="json")}
-    write_json(path, data)
+    data = to_data(plan)
+    write_json(path, {"schema": data.pop("schema"), "sha256": content_hash(plan), **data})
     return path
 
 
@@ -255,8 +266,8 @@ def read_plan(folder: Path) -> PlanResult:
     """
     path = Path(folder)
     path = path / PLAN if path.is_dir() else path
-    written = read_json(path, _WrittenPlan, SCHEMA)
-    plan = PlanResult(**{key: getattr(written, key) for key in PlanResult.model_fields})
+    written = read_json(path, _WrittenPlan)
+    plan = PlanResult(**{each.name: getattr(written, each.name) for each in fields(PlanResult)})
     check_plan(plan, str(path))
     if written.sha256 != content_hash(plan):
         raise SchemaError(f"{path} was changed by hand: make it anew with `elastocal plan`")

@@ -2,48 +2,18 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 
-import coal
 import numpy as np
 import pinocchio as pin
 
 from elastocal.arrays import BoolArray, FloatArray, IndexArray
 from elastocal.errors import RobotError
 from elastocal.robot import Robot, collision_model
+from elastocal.shapes import Body, Solid, solid_of
 
 _NEIGHBOURS = 1
 """Links this many joints apart touch by construction and are not checked against each other."""
-
-
-@dataclass(frozen=True, eq=False)
-class Body:
-    """A rigid shape with its place."""
-
-    name: str
-    shape: coal.CollisionGeometry
-    T_frame_body: FloatArray
-    """Place of the shape in its frame (base for obstacles, tcp for tool parts), shape (4, 4)."""
-
-
-def mesh_shape(vertices: FloatArray, faces: IndexArray) -> coal.CollisionGeometry:
-    """Return a triangle mesh as a bounding volume hierarchy.
-
-    Parameters
-    ----------
-    vertices : ndarray, shape (vertex, 3)
-        In m.
-    faces : ndarray of int, shape (face, 3)
-    """
-    points, triangles = coal.StdVec_Vec3s(), coal.StdVec_Triangle()
-    for vertex in np.asarray(vertices, dtype=float):
-        points.append(vertex)
-    for a, b, c in np.asarray(faces):
-        triangles.append(coal.Triangle(int(a), int(b), int(c)))
-    shape = coal.BVHModelOBBRSS()
-    shape.beginModel(len(triangles), len(points))
-    shape.addSubModel(points, triangles)
-    shape.endModel()
-    return shape
 
 
 @dataclass(frozen=True, eq=False)
@@ -155,15 +125,17 @@ class CollisionScene:
             placements[:] = [T.homogeneous for T in data.oMi]
         T_world_base = T_world_joint[:, base.parentJoint] @ base.placement.homogeneous
         T_base_joint = np.linalg.inv(T_world_base)[:, None] @ T_world_joint
-        moving = self._geometry.ngeoms - len(self.obstacles)
         return [
-            Body(
-                body.name,
-                body.geometry,
-                T_base_joint[:, body.parentJoint] @ body.placement.homogeneous,
-            )
-            for body in list(self._geometry.geometryObjects)[:moving]
+            Body(body.name, solid, T_base_joint[:, body.parentJoint] @ body.placement.homogeneous)
+            for body, solid in zip(self._geometry.geometryObjects, self._solids, strict=False)
         ]
+
+    @cached_property
+    def _solids(self) -> tuple[Solid, ...]:
+        """The links and then the tool."""
+        links = self._geometry.ngeoms - len(self.obstacles) - len(self.tool)
+        bodies = list(self._geometry.geometryObjects)[:links]
+        return (*(solid_of(link.geometry) for link in bodies), *(part.solid for part in self.tool))
 
 
 def _add(
@@ -179,7 +151,7 @@ def _add(
                 frame.parentJoint,
                 frame_id,
                 frame.placement * pin.SE3(body.T_frame_body),
-                body.shape,
+                body.solid.geometry,
             )
         )
         for body in bodies

@@ -28,7 +28,13 @@ from elastocal.codec.study import (
 from elastocal.elastic import ElasticModel, layout
 from elastocal.errors import CodecError, DeviceError, nearest
 from elastocal.files import sha256
-from elastocal.sim.workcell import ErrorDraws, Places, QuickCell, QuickErrors, Scales
+from elastocal.sim.workcell import (
+    CampaignErrors,
+    CampaignSimulator,
+    ContactPoses,
+    ErrorDraws,
+    ErrorScales,
+)
 
 _PACKAGES = ("elastocal", "numpy", "scipy", "pin")
 
@@ -42,8 +48,8 @@ class StudySimulation:
     """Of each condition."""
     models: dict[str, ElasticModel]
     """By spring layout."""
-    truth: QuickCell
-    errors: QuickErrors
+    truth: CampaignSimulator
+    errors: CampaignErrors
     pool: StudyPool
     load_cases: tuple[str, ...]
     force_tcp: FloatArray
@@ -71,14 +77,14 @@ class StudySimulation:
                 found |= self._calibrated(sample, arm, draws, numbers, verification)
         return SampleResult(sample.number, tuple(found[i] for i in range(len(self.conditions))))
 
-    def places(self, poses: IndexArray) -> Places:
+    def places(self, poses: IndexArray) -> ContactPoses:
         """Return some poses of the pool as the simulator wants them."""
-        return Places(self.pool.q[poses], self.pool.normal[poses])
+        return ContactPoses(self.pool.q[poses], self.pool.normal[poses])
 
     def _calibrated(
         self,
         sample: Sample,
-        arm: QuickCell,
+        arm: CampaignSimulator,
         draws: ErrorDraws,
         numbers: Sequence[int],
         verification: Verification,
@@ -93,7 +99,7 @@ class StudySimulation:
         found = {}
         for number, order in zip(numbers, chosen, strict=True):
             condition = self.conditions[number]
-            scales = Scales(condition.tracker_noise, condition.force_noise)
+            scales = ErrorScales(condition.tracker_noise, condition.force_noise)
             station = self.pool.station[poses]
             readings = self.errors.readings(settled, own, scales, station, cases)
             mine = np.isin(readings.pose, np.searchsorted(poses, order))
@@ -101,7 +107,7 @@ class StudySimulation:
             found[number] = calibrated(model, readings.take(mine), self.marker, verification)
         return found
 
-    def _verification(self, arm: QuickCell) -> Verification:
+    def _verification(self, arm: CampaignSimulator) -> Verification:
         settled = arm.settle(self.places(self.pool.verification), self.force_tcp)
         flat = (settled.q, settled.force, settled.deflection)
         return Verification(*(array.reshape(-1, array.shape[-1]) for array in flat))
@@ -147,7 +153,7 @@ def prepare_study(
         _check_load_cases(each.load_cases, loads.cases)
     if cell.file.marker is None or not cell.file.trackers:
         raise DeviceError(f"cell {cell.name} has no tracker to simulate (key 'trackers')")
-    truth, errors = QuickCell.of(cell), QuickErrors.of(cell)
+    truth, errors = CampaignSimulator.of(cell), CampaignErrors.of(cell)
     poses = study_poses(cell, verification, jobs)
     chosen = choose_poses(cell, poses, conditions)
     design = _design(cell, conditions, models, poses.pool, seed)

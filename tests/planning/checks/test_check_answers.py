@@ -2,7 +2,6 @@
 
 from dataclasses import replace
 
-import coal
 import numpy as np
 import pytest
 import trimesh
@@ -20,8 +19,8 @@ from elastocal.planning.checks import (
     WristCheck,
 )
 from elastocal.planning.postures import Postures
-from elastocal.planning.scene import Body
 from elastocal.robot import Rail, Robot, on_rail
+from elastocal.shapes import Body, Box, Sphere
 from support.postures import FORCE_TCP, arm, postures
 
 NO_TOOL = (0.0, np.zeros(3))
@@ -113,7 +112,7 @@ def test_a_post_in_the_way_is_a_collision_and_named():
     inside = np.eye(4)
     T_base_tcp = one.T_base_tcp[0]
     inside[:3, 3] = T_base_tcp[:3, :3] @ [-0.15, 0.0, -0.55] + T_base_tcp[:3, 3]
-    obstacles = (Body("post", coal.Box(0.3, 0.3, 0.3), inside),)
+    obstacles = (Body("post", Box(0.3, 0.3, 0.3), inside),)
     scene = CollisionScene(arm(), (), obstacles)
     assert CollisionCheck(scene, 0.01, 0.1, 0.003).margin(one)[0] < 0.0
     assert "post" in scene.nearest(one.q[0])
@@ -123,8 +122,8 @@ def test_in_contact_the_tool_may_touch_what_it_presses_on():
     one = postures().take([0])
     here = np.eye(4)
     here[:3, 3] = one.contact[0]
-    tool = (Body("disk", coal.Sphere(0.02), np.eye(4)),)
-    mould = (Body("mould", coal.Sphere(0.02), here),)
+    tool = (Body("disk", Sphere(0.02), np.eye(4)),)
+    mould = (Body("mould", Sphere(0.02), here),)
     pressed = CollisionScene(arm(), tool, mould, frozenset({"mould"}))
     assert pressed.keeps(one.q, 0.01, -np.inf)[0]
     assert not pressed.keeps(one.q, 0.0)[0]
@@ -137,12 +136,12 @@ def test_a_tool_that_stands_in_the_tooling_is_a_collision():
     mould = np.eye(4)
     mould[:3, :3] = one.T_base_tcp[0, :3, :3]
     mould[:3, 3] = one.contact[0] + 0.1 * one.T_base_tcp[0, :3, 2]
-    block = (Body("mould", coal.Box(0.4, 0.4, 0.2), mould),)
+    block = (Body("mould", Box(0.4, 0.4, 0.2), mould),)
 
     def margin(depth):
         head = np.eye(4)
         head[:3, 3] = (0.0, 0.0, depth - 0.05)
-        tool = (Body("head", coal.Box(0.1, 0.1, 0.1), head),)
+        tool = (Body("head", Box(0.1, 0.1, 0.1), head),)
         scene = CollisionScene(arm(), tool, block, frozenset({"mould"}))
         return CollisionCheck(scene, 1e-3, 0.1, 0.003).margin(one)[0]
 
@@ -154,7 +153,7 @@ def test_a_tool_that_stands_in_the_tooling_is_a_collision():
 def test_what_hangs_on_the_first_joint_must_keep_clear_of_fixtures():
     shoulder = np.eye(4)
     shoulder[:3, 3] = (0.25, 0.0, 0.5)
-    post = (Body("post", coal.Box(0.1, 0.1, 0.1), shoulder),)
+    post = (Body("post", Box(0.1, 0.1, 0.1), shoulder),)
     scene = CollisionScene(arm(), (), post)
     assert not np.any(scene.keeps(postures().q, 0.0))
 
@@ -172,7 +171,7 @@ def test_travel_limits_look_at_the_rail_alone():
 def test_what_is_kept_is_the_exact_distance():
     away = np.eye(4)
     away[:3, 3] = (1.2, 1.2, 0.8)
-    scene = CollisionScene(arm(), (), (Body("post", coal.Box(0.3, 0.3, 0.3), away),))
+    scene = CollisionScene(arm(), (), (Body("post", Box(0.3, 0.3, 0.3), away),))
     exact = scene.distances(postures().q).min(axis=1)
     for distance in (0.01, 0.1, 0.3):
         decided = np.abs(exact - distance) > 1e-4

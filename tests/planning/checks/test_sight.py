@@ -1,6 +1,5 @@
 """The line of sight past the arm itself."""
 
-import coal
 import numpy as np
 import pytest
 import trimesh
@@ -8,7 +7,7 @@ import trimesh
 from elastocal.planning import CollisionScene
 from elastocal.planning.checks import SightCheck, Station
 from elastocal.planning.checks.sight import MovingSolids
-from elastocal.planning.scene import Body
+from elastocal.shapes import Body, Sphere
 from support.postures import arm, postures
 
 MARKER = np.array([0.2, 0.0, -0.1])
@@ -51,7 +50,7 @@ def test_a_part_of_the_tool_hides_it():
     ahead = p + R @ (MARKER + np.array([0.5, 0.0, 0.0]))
     place = np.eye(4)
     place[:3, 3] = MARKER + np.array([0.1, 0.0, 0.0])
-    cover = Body("cover", coal.Sphere(0.03), place)
+    cover = Body("cover", Sphere(0.03), place)
     assert looking_at(ahead)[1].margin(one)[0] == pytest.approx(ACCEPTANCE)
     assert looking_at(ahead, (cover,))[1].margin(one)[0] == -np.pi
 

@@ -1,5 +1,7 @@
 """The comments at the head of the program: what has to be checked, with its numbers."""
 
+from dataclasses import replace
+
 import pytest
 
 from elastocal.planning.export._krl_notes import head_notes
@@ -58,7 +60,7 @@ def test_a_tilted_tool_is_written_in_kukas_angles():
     urdf = urdfs.opw_arm_urdf(**urdfs.KR_LIKE).replace(
         'xyz="0.0 0.0 0.215" rpy="0 0 0"', 'xyz="0.1 0.0 0.215" rpy="0.5 0.25 1.0"'
     )
-    robot = plan.robot.model_copy(update={"urdf": urdf, "base": "base"})
-    said = text(plan=plan.model_copy(update={"robot": robot}))
+    robot = replace(plan.robot, urdf=urdf, base="base")
+    said = text(plan=replace(plan, robot=robot))
     assert "X 100.000, Y 0.000, Z 215.000, A 57.296, B 14.324, C 28.648" in said
     assert "the tcp in link 'link_6'" in said

@@ -1,5 +1,7 @@
 """The KRL program, read back by a reader that shares no code with the writer."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -64,8 +66,8 @@ def test_home_and_via_points_are_the_plans(program, rail):
 
 def test_via_points_on_the_way_home_are_driven(tmp_path):
     plan = plans.plan()
-    last = plan.moves[-1].model_copy(update={"via": (plan.robot.home, plan.robot.home)})
-    plan = plan.model_copy(update={"moves": (*plan.moves[:-1], last)})
+    last = replace(plan.moves[-1], via=(plan.robot.home, plan.robot.home))
+    plan = replace(plan, moves=(*plan.moves[:-1], last))
     moves = krl.read(*write_krl(tmp_path, plan)).moves()
     assert moves[-3:] == [("PTP", "XVIA6_1"), ("PTP", "XVIA6_2"), ("PTP", "XHOME")]
 
@@ -142,13 +144,12 @@ def test_the_number_of_poses_does_not_make_names_too_long(tmp_path):
 def test_names_of_people_cannot_break_out_of_a_comment(tmp_path):
     evil = "Zelle ß\r\nPTP {A1 0}\x1b;%{E}\u2028" + 300 * "x"
     plan = plans.plan()
-    plan = plan.model_copy(
-        update={
-            "cell": plan.cell.model_copy(update={"name": evil}),
-            "robot": plan.robot.model_copy(update={"name": evil}),
-            "contact": plan.contact.model_copy(update={"load_cases": {evil: (0.0, 0.0, -1.0)}}),
-            "poses": tuple(pose.model_copy(update={"seen_by": evil}) for pose in plan.poses),
-        }
+    plan = replace(
+        plan,
+        cell=replace(plan.cell, name=evil),
+        robot=replace(plan.robot, name=evil),
+        contact=replace(plan.contact, load_cases={evil: (0.0, 0.0, -1.0)}),
+        poses=tuple(replace(pose, seen_by=evil) for pose in plan.poses),
     )
     harmless = krl.read(*write_krl(tmp_path, plans.plan()))
     found = krl.read(*write_krl(tmp_path, plan))
@@ -186,4 +187,4 @@ def test_both_files_are_written_or_none(tmp_path):
 def test_a_plan_that_contradicts_itself_is_not_programmed(tmp_path):
     plan = plans.plan()
     with pytest.raises(SchemaError, match="moves"):
-        write_krl(tmp_path, plan.model_copy(update={"moves": plan.moves[1:]}))
+        write_krl(tmp_path, replace(plan, moves=plan.moves[1:]))

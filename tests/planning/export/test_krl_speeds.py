@@ -1,5 +1,7 @@
 """Speeds of the program: the cell's, within the program's own limits; times for these speeds."""
 
+from dataclasses import replace
+
 import pytest
 
 from elastocal.planning.export import write_krl
@@ -9,7 +11,7 @@ from support import krl, plans
 
 def plan_with(**speeds):
     plan = plans.plan()
-    return plan.model_copy(update={"contact": plan.contact.model_copy(update=speeds)})
+    return replace(plan, contact=replace(plan.contact, **speeds))
 
 
 @pytest.mark.parametrize(

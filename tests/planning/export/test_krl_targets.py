@@ -1,5 +1,7 @@
 """Positions of the program: which robots have some, and which poses are refused."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -12,23 +14,24 @@ from support import plans, urdfs
 def plan_of(urdf: str, **changes):
     """The plan with another robot; its poses no longer fit it."""
     robot = Robot.from_urdf(urdf, "tcp")
-    record = plans.plan().robot.model_copy(
-        update={
+    record = replace(
+        plans.plan().robot,
+        **{
             "name": robot.name,
             "urdf": urdf,
             "base": robot.base,
             "joints": robot.joint_names,
             "home": (0.0,) * len(robot.joint_names),
         }
-        | changes
+        | changes,
     )
-    return plans.plan().model_copy(update={"robot": record})
+    return replace(plans.plan(), robot=record)
 
 
 def with_pose(**changes):
     plan = plans.plan()
-    poses = (plan.poses[0].model_copy(update=changes), *plan.poses[1:])
-    return plan.model_copy(update={"poses": poses})
+    poses = (replace(plan.poses[0], **changes), *plan.poses[1:])
+    return replace(plan, poses=poses)
 
 
 def refusal(plan):
@@ -58,8 +61,8 @@ def test_joints_in_another_order_than_the_urdf_are_refused():
 
 def test_a_turntable_is_an_external_axis_in_degrees():
     urdf = urdfs.opw_arm_urdf(**urdfs.KR_LIKE, rail=(-1, 1), turntable=(-3, 3))
-    plan = plan_of(urdf, home=(0.25, np.pi / 2, *(0.1,) * 6)).model_copy(
-        update={"poses": (), "moves": plans.plan().moves[:1]}
+    plan = replace(
+        plan_of(urdf, home=(0.25, np.pi / 2, *(0.1,) * 6)), poses=(), moves=plans.plan().moves[:1]
     )
     home = dict(build_targets(plan, robot_of(plan)).home.values)
     assert home["E1"] == pytest.approx(250.0)
@@ -87,7 +90,7 @@ def test_a_pose_in_another_turn_than_its_approach_is_refused():
 def test_a_declaration_has_no_minus_zero_and_no_exponent():
     plan = plans.plan()
     home = (0.0, -1e-12, 1e-9, *plan.robot.home[3:])
-    plan = plan.model_copy(update={"robot": plan.robot.model_copy(update={"home": home})})
+    plan = replace(plan, robot=replace(plan.robot, home=home))
     text = build_targets(plan, robot_of(plan)).home.declaration
     assert text.startswith("DECL E6AXIS XHOME={A1 0.00000,A2 0.00000,A3 108.86198,")
     assert text.endswith(",E5 0.00000,E6 0.00000}")

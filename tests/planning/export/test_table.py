@@ -2,6 +2,7 @@
 
 import csv
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -67,10 +68,10 @@ def test_every_margin_has_its_unit(rows):
 def test_a_margin_in_another_unit_keeps_it(tmp_path):
     plan = plans.plan()
     checks = tuple(
-        check.model_copy(update={"unit": unit})
+        replace(check, unit=unit)
         for check, unit in zip(plan.pool.checks, (None, "N", "1"), strict=True)
     )
-    plan = plan.model_copy(update={"pool": plan.pool.model_copy(update={"checks": checks})})
+    plan = replace(plan, pool=replace(plan.pool, checks=checks))
     header = write_table(tmp_path, plan).read_text().splitlines()[0].split(",")
     assert header[-2:] == ["margin_joint_limits[N]", "margin_wrist[1]"]
 
@@ -86,8 +87,8 @@ def test_every_number_but_counts_and_normals_has_a_unit(rows):
 def test_nothing_is_shown_as_minus_zero(tmp_path):
     plan = plans.plan()
     joints = (-1e-9, -math.radians(1e-9), *plan.poses[0].joints[2:])
-    poses = (plan.poses[0].model_copy(update={"joints": joints}), *plan.poses[1:])
-    text = write_table(tmp_path, plan.model_copy(update={"poses": poses})).read_text()
+    poses = (replace(plan.poses[0], joints=joints), *plan.poses[1:])
+    text = write_table(tmp_path, replace(plan, poses=poses)).read_text()
     assert ",0.0000,0.000000," in text
     assert "-0.0000," not in text
     assert "-0.000000" not in text
@@ -95,8 +96,8 @@ def test_nothing_is_shown_as_minus_zero(tmp_path):
 
 def test_a_cell_without_trackers_leaves_the_station_empty(tmp_path):
     plan = plans.plan(rail=False)
-    poses = tuple(pose.model_copy(update={"seen_by": None}) for pose in plan.poses)
-    path = write_table(tmp_path, plan.model_copy(update={"poses": poses}))
+    poses = tuple(replace(pose, seen_by=None) for pose in plan.poses)
+    path = write_table(tmp_path, replace(plan, poses=poses))
     with path.open(newline="") as file:
         assert {row["seen_by"] for row in csv.DictReader(file)} == {""}
 
@@ -108,8 +109,8 @@ def test_a_missing_folder_is_named(tmp_path):
 
 def test_a_check_that_a_pose_leaves_out_is_an_empty_cell(tmp_path):
     plan = plans.plan()
-    poses = (plan.poses[0].model_copy(update={"margins": {"wrist": 0.1}}), *plan.poses[1:])
-    path = write_table(tmp_path, plan.model_copy(update={"poses": poses}))
+    poses = (replace(plan.poses[0], margins={"wrist": 0.1}), *plan.poses[1:])
+    path = write_table(tmp_path, replace(plan, poses=poses))
     with path.open(newline="") as file:
         column = [row["margin_joint_limits[deg]"] for row in csv.DictReader(file)]
     assert column[0] == ""

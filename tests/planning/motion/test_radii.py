@@ -3,15 +3,14 @@
 import itertools
 from dataclasses import replace
 
-import coal
 import numpy as np
 import pytest
 
 from elastocal.errors import PlanningError
 from elastocal.planning import CollisionScene
 from elastocal.planning.motion.sweep import joint_radii
-from elastocal.planning.scene import Body
 from elastocal.robot import Rail, Robot, catalogue, on_rail, with_tool
+from elastocal.shapes import Body, Box
 from support.moving import BALL, scene
 from support.postures import T_FLANGE_TCP, arm
 
@@ -23,8 +22,9 @@ def on_a_rail() -> Robot:
 
 def corners(body: Body) -> np.ndarray:
     """Corners of the box about a body at every posture, shape (pose, 8, 3)."""
-    body.shape.computeLocalAABB()
-    box = body.shape.aabb_local
+    geometry = body.solid.geometry
+    geometry.computeLocalAABB()
+    box = geometry.aabb_local
     local = np.array(list(itertools.product(*zip(box.min_, box.max_, strict=True))))
     T = body.T_frame_body
     return local @ np.swapaxes(T[:, :3, :3], 1, 2) + T[:, None, :3, 3]
@@ -32,7 +32,7 @@ def corners(body: Body) -> np.ndarray:
 
 @pytest.mark.parametrize("make", [arm, on_a_rail])
 def test_nothing_moves_farther_than_the_bound(make):
-    robot, tool = make(), (Body("head", coal.Box(0.3, 0.2, 0.4), np.eye(4)),)
+    robot, tool = make(), (Body("head", Box(0.3, 0.2, 0.4), np.eye(4)),)
     lower, upper = np.maximum(robot.limits.lower, -3.0), np.minimum(robot.limits.upper, 3.0)
     rng = np.random.default_rng(0)
     q = rng.uniform(lower, upper, (200, len(lower)))

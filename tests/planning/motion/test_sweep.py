@@ -2,14 +2,13 @@
 
 from functools import cache
 
-import coal
 import numpy as np
 import pytest
 
 from elastocal.planning import CollisionScene
 from elastocal.planning.motion import Sweep
 from elastocal.planning.motion.sweep import _FINEST
-from elastocal.planning.scene import Body
+from elastocal.shapes import Body, Sphere
 from support.moving import BALL, CLEARANCE, box, dense, scene
 from support.postures import arm
 
@@ -73,7 +72,7 @@ def needle(gap: float) -> tuple[Sweep, np.ndarray]:
     q[:, 0] = np.radians([-25.0, 14.0])
     T = np.eye(4)
     T[:3, 3] = x + BALL + 1e-3 + gap, 0.0, z
-    return Sweep(scene(Body("needle", coal.Sphere(1e-3), T)), CLEARANCE), q
+    return Sweep(scene(Body("needle", Sphere(1e-3), T)), CLEARANCE), q
 
 
 @pytest.mark.parametrize(("beyond", "free"), [(1e-3, True), (-5e-5, False)])
@@ -83,7 +82,7 @@ def test_the_clearance_is_told_to_the_finest_piece(beyond, free):
 
 
 def test_a_hair_that_a_needle_crosses_anywhere_is_found():
-    tip = (Body("tip", coal.Sphere(1e-4), np.eye(4)),)
+    tip = (Body("tip", Sphere(1e-4), np.eye(4)),)
     q = np.radians([0.0, -60, 90, 0, 30, 0])
     x, _, z = arm().forward(q)[:3, 3]
     hair = box("hair", (0.05, 1e-4, 0.05), (x, 0.0, z))

@@ -1,5 +1,7 @@
 """Ways of the plan, forwards, backwards, and home from anywhere on them."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
@@ -70,14 +72,13 @@ def test_from_nowhere_it_asks_for_a_hand():
 
 def test_of_two_poses_close_by_the_nearer_line_is_taken_and_the_likely_pose_before_it():
     first, second, third = PLAN.poses
-    close = second.model_copy(
-        update={
-            "joints": (0.11, 0.0, 0.0),
-            "approach_joints": (0.11, 0.0, 0.05),
-            "tcp_position": (0.11, 0.0, 0.0),
-        }
+    close = replace(
+        second,
+        joints=(0.11, 0.0, 0.0),
+        approach_joints=(0.11, 0.0, 0.05),
+        tcp_position=(0.11, 0.0, 0.0),
     )
-    crowded = PLAN.model_copy(update={"poses": (first, close, third)})
+    crowded = replace(PLAN, poses=(first, close, third))
     assert home_from((0.109, 0.0, 0.0), crowded).retract_from == close
     assert home_from((0.101, 0.0, 0.0), crowded).retract_from == first
     T = np.eye(4)

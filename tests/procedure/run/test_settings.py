@@ -1,5 +1,7 @@
 """A plan is held against its cell before anything moves: what the reviewer changed by hand."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -19,12 +21,12 @@ def made(tmp_path_factory):
 
 def with_pose(plan, number, **changes):
     poses = list(plan.poses)
-    poses[number] = poses[number].model_copy(update=changes)
-    return plan.model_copy(update={"poses": tuple(poses)})
+    poses[number] = replace(poses[number], **changes)
+    return replace(plan, poses=tuple(poses))
 
 
 def with_part(plan, part, **changes):
-    return plan.model_copy(update={part: getattr(plan, part).model_copy(update=changes)})
+    return replace(plan, **{part: replace(getattr(plan, part), **changes)})
 
 
 def moved(joints, by=0.2):
@@ -33,8 +35,8 @@ def moved(joints, by=0.2):
 
 def far_via(plan):
     moves = list(plan.moves)
-    moves[2] = moves[2].model_copy(update={"via": ((0.5, 99.0, -1.0, 1.0, 0.0, 1.0, 0.0),)})
-    return plan.model_copy(update={"moves": tuple(moves)})
+    moves[2] = replace(moves[2], via=((0.5, 99.0, -1.0, 1.0, 0.0, 1.0, 0.0),))
+    return replace(plan, moves=tuple(moves))
 
 
 def heavy(plan):
@@ -97,8 +99,8 @@ def test_a_number_that_is_none_is_refused(made):
 
 
 def seen_by(plan, *stations):
-    poses = [p.model_copy(update={"seen_by": s}) for p, s in zip(plan.poses, stations, strict=True)]
-    return plan.model_copy(update={"poses": tuple(poses)})
+    poses = [replace(p, seen_by=s) for p, s in zip(plan.poses, stations, strict=True)]
+    return replace(plan, poses=tuple(poses))
 
 
 def test_a_station_with_too_few_poses_is_told(made):

@@ -19,8 +19,8 @@ PRESS = (0.0, 0.0, -800.0)
 
 
 def true_force_tcp(session):
-    stand = session.sim.plant.stand()
-    return session.sim.plant.statics.robot.forward(stand.q)[:3, :3].T @ stand.force
+    state = session.sim.plant.robot_state()
+    return session.sim.plant.statics.robot.forward(state.q)[:3, :3].T @ state.force
 
 
 def at_surface(simulation=QUIET, like="afp", seed=0, **sections):
@@ -50,7 +50,10 @@ class TestLoadedReading:
         free = robot.rest(near.q, np.zeros(3), robot.springs)
         for wanted in cell.file.load_cases.force_tcp:
             state = session.hold(wanted)
-            force, memory = session.sim.plant.stand().force, session.sim.plant.segment.springs[0]
+            force, memory = (
+                session.sim.plant.robot_state().force,
+                session.sim.plant.segment.springs[0],
+            )
             _, loaded = session.average()
             controller = marker_by_controller(state, cell) - marker_by_controller(near, cell)
             rest = robot.rest(state.q, force, memory)
@@ -77,17 +80,17 @@ class TestLoadedReading:
         session, _ = at_surface(like=like)
         plant, wanted = session.sim.plant, session.sim.plant.cell.file.load_cases.force_tcp[1]
         session.hold(wanted)
-        stand, contact = plant.stand(), plant.contact
-        tool = plant.statics.tool_position(stand)
-        np.testing.assert_allclose(tool, contact.tool_position(stand.force), atol=2e-8)
-        rest = plant.statics.robot.rest(stand.q, stand.force, stand.springs, stand.theta)
+        state, contact = plant.robot_state(), plant.contact
+        tool = plant.statics.tool_position(state)
+        np.testing.assert_allclose(tool, contact.tool_position(state.force), atol=2e-8)
+        rest = plant.statics.robot.rest(state.q, state.force, state.springs, state.theta)
         assert rest.imbalance < 1e-5
 
 
 def test_pressing_is_a_force_on_the_robot_out_of_the_surface():
     session, place = at_surface()
     session.hold(PRESS)
-    force = session.sim.plant.stand().force
+    force = session.sim.plant.robot_state().force
     assert force @ place.normal == pytest.approx(800.0, rel=0.01)
 
 
@@ -199,8 +202,8 @@ def test_an_approach_too_short_to_feel_the_force_is_no_contact_but_can_go_on():
     session, place = Session.of(example_cell(simulation=QUIET)), places()[0]
     reach = session.sim.plant.surface
     session.near(place)
-    stand = session.sim.plant.stand()
-    gap = reach.hit(session.sim.plant.statics.tool_position(stand), -place.normal, 0.1).distance
+    state = session.sim.plant.robot_state()
+    gap = reach.hit(session.sim.plant.statics.tool_position(state), -place.normal, 0.1).distance
     session.arm.approach(-place.normal, gap + 2e-5, 0.002, 200.0)
     state = session.wait(Motion.IDLE)
     assert not state.in_contact

@@ -115,7 +115,7 @@ def test_force_on_deflection_is_the_slope_of_the_stored_energy():
 
 def _work_of_weight(arm, q, one, two):
     def points(rest):
-        mechanism = arm._mechanism(q, np.zeros(3), arm.springs)
+        mechanism = arm._mechanism(q[None], np.zeros((1, 3)), arm.springs)
         return mechanism.load_points(mechanism.motions(rest.theta[None]))[1:, 0]
 
     return float(np.sum((points(two) - points(one)) * arm._weights))

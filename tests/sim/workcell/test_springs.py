@@ -2,9 +2,7 @@ import numpy as np
 import pytest
 
 from elastocal.cell.description import Gears
-from elastocal.sim.workcell.balancer import BalancerSpring
-from elastocal.sim.workcell.robot_layout import gear_laws
-from elastocal.sim.workcell.springs import RobotSprings
+from elastocal.sim.workcell.springs import BalancerSpring, GearLaws, RobotSprings
 
 K = np.array([2e6, 1e6, 5e5])
 ENTRY = Gears()
@@ -13,7 +11,7 @@ STEP = 1e-8
 
 
 def springs(entry=ENTRY, balancer=None, joint_angle=0.4):
-    laws = gear_laws(entry, np.array([0, 2]), K[[0, 2]])
+    laws = GearLaws.of(entry, np.array([0, 2]), K[[0, 2]])
     return RobotSprings(K, laws, None, balancer, 0, joint_angle)
 
 

@@ -39,7 +39,7 @@ class LoadedRobot(Protocol):
 
 
 class TrueCell(Protocol):
-    """The truth of a cell; `elastocal.sim.workcell.process.ProcessCell` is one."""
+    """The truth of a cell; `elastocal.sim.workcell.ProcessCell` is one."""
 
     def lift(self, course: str, q: FloatArray) -> None:
         """Begin a course in the air."""

@@ -13,10 +13,13 @@ if that row's own bound is (intersection-union test; Berger, Technometrics 24, 1
 import numpy as np
 
 from elastocal.arrays import FloatArray
-from elastocal.identification.bootstrap import CONFIDENCE
 from elastocal.identification.calibrated import CalibratedModel
 from elastocal.identification.recertification._spread import Spread, over
-from elastocal.identification.recertification.result import Estimate, RowComparison
+from elastocal.identification.recertification.result import (
+    Estimate,
+    RowComparison,
+)
+from elastocal.identification.uncertainty import CONFIDENCE
 
 _CHUNK = 100
 """Rows at a time, so that the pairs of a long path fit into memory."""

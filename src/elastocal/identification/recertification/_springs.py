@@ -20,12 +20,12 @@ import numpy as np
 from elastocal.arrays import FloatArray
 from elastocal.elastic import Parameter, Spring
 from elastocal.errors import IdentificationError
-from elastocal.identification.bootstrap import CONFIDENCE, interval
+from elastocal.identification._sparse_basis import sparse_basis
 from elastocal.identification.calibrated import CalibratedModel
 from elastocal.identification.observability import Term, describe
 from elastocal.identification.recertification._spread import Spread, over
 from elastocal.identification.recertification.result import Estimate, SpringChange
-from elastocal.identification.sparse_basis import sparse_basis
+from elastocal.identification.uncertainty import CONFIDENCE, interval
 
 _SAME = 1e-4
 """Singular value, over the largest, below which unobservable combinations of the two models

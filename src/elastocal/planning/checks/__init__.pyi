@@ -13,6 +13,13 @@ from .joint_limits import (
     TravelLimitsCheck as TravelLimitsCheck,
 )
 from .sensor import SensorCheck as SensorCheck
-from .sight import SightCheck as SightCheck, Station as Station
+from .sight import (
+    HOUSED as HOUSED,
+    SEAT as SEAT,
+    MovingSolids as MovingSolids,
+    SightCheck as SightCheck,
+    Station as Station,
+    sight_solid as sight_solid,
+)
 from .singularity import SingularityCheck as SingularityCheck, WristCheck as WristCheck
 from .torque import TorqueCheck as TorqueCheck

@@ -14,18 +14,32 @@ import numpy as np
 import trimesh
 
 from elastocal.arrays import BoolArray, FloatArray
+from elastocal.errors import RobotError
 from elastocal.planning.postures import Postures
 from elastocal.planning.scene import CollisionScene
-from elastocal.planning.sight_lines import Beams, Solid
-from elastocal.planning.sight_solids import Triangles, solid_of
+from elastocal.shapes import Beams, Body, Mesh, SightSolid
 
 SEAT = 5e-3
 """Distance from the marker, in m, from which on arm and tool count: a marker sits on something."""
-
 HOUSED = 1e-3
 """A tool shape that the marker lies deeper in than this, in m, is taken as its housing. A marker
 less deep, on a face that is drawn a little too high, still sees through `SEAT` of it: all within
 78 deg (arc cosine of 1 mm over 5 mm) of the face's normal."""
+_OFF_THE_MARKER = 1e-3
+"""Distance from the marker, in m, from which on meshes of the cell count."""
+
+
+@dataclass(frozen=True)
+class Station:
+    """Where a laser tracker stands."""
+
+    name: str
+    position: tuple[float, float, float]
+    """In base, in m."""
+    nearest: float
+    """Shortest distance it measures, in m."""
+    farthest: float
+    """Longest distance it measures, in m."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,12 +58,12 @@ class MovingSolids:
     """Marker in the tcp frame, shape (3,), in m."""
     housings: tuple[str, ...] = field(init=False)
     """Names of the tool's shapes that hold the marker."""
-    _solids: tuple[Solid, ...] = field(init=False, repr=False)
+    _solids: tuple[SightSolid, ...] = field(init=False, repr=False)
     _holds: tuple[bool, ...] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         bodies = self.scene.moving(np.empty((0, len(self.scene.robot.joint_names))))
-        solids = tuple(solid_of(body.name, body.shape) for body in bodies)
+        solids = tuple(sight_solid(body) for body in bodies)
         tool = self.scene.tool
         links = len(bodies) - len(tool)
         holds = [
@@ -81,28 +95,6 @@ class MovingSolids:
             here = beams.seen_from(body.T_frame_body)
             hidden |= solid.crosses_again(here) if holds else solid.crosses(here, SEAT)
         return hidden
-
-
-def _seen_from(T: FloatArray, point: FloatArray) -> FloatArray:
-    seen: FloatArray = T[:3, :3].T @ (point - T[:3, 3])
-    return seen
-
-
-_OFF_THE_MARKER = 1e-3
-"""Distance from the marker, in m, from which on meshes of the cell count."""
-
-
-@dataclass(frozen=True)
-class Station:
-    """Where a laser tracker stands."""
-
-    name: str
-    position: tuple[float, float, float]
-    """In base, in m."""
-    nearest: float
-    """Shortest distance it measures, in m."""
-    farthest: float
-    """Longest distance it measures, in m."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -156,7 +148,28 @@ class SightCheck:
         """Return whether nothing stands in the way of each posture's beam, shape (pose,)."""
         clear = np.ones(len(beams), dtype=bool)
         if self.obstacles is not None:
-            clear = ~Triangles(self.obstacles).crosses(beams, _OFF_THE_MARKER)
+            clear = ~Mesh(self.obstacles).crosses(beams, _OFF_THE_MARKER)
         if self.moving is not None:
             clear[clear] = ~self.moving.hide(q[clear], beams.take(clear))
         return clear
+
+
+def sight_solid(body: Body) -> SightSolid:
+    """Return the solid of a link or a tool's part, of which it must be known what it hides.
+
+    Raises
+    ------
+    RobotError
+        If it is of another kind than box, capsule, cylinder, sphere or triangle mesh.
+    """
+    if isinstance(body.solid, SightSolid):
+        return body.solid
+    raise RobotError(
+        f"collision shape {body.name!r} is a {type(body.solid.geometry).__name__}: the line of"
+        " sight knows Box, Capsule, Cylinder, Sphere and triangle meshes"
+    )
+
+
+def _seen_from(T: FloatArray, point: FloatArray) -> FloatArray:
+    seen: FloatArray = T[:3, :3].T @ (point - T[:3, 3])
+    return seen

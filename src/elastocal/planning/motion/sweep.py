@@ -1,15 +1,14 @@
 """Whether straight moves in joint space are free of collision, between samples too."""
 
-import itertools
 from dataclasses import dataclass, field
 
-import coal
 import numpy as np
 
 from elastocal.arrays import BoolArray, FloatArray, IndexArray
 from elastocal.errors import PlanningError
-from elastocal.planning.scene import Body, CollisionScene
+from elastocal.planning.scene import CollisionScene
 from elastocal.robot import Robot, collision_model
+from elastocal.shapes import Body, box_corners
 
 _COARSEST = 0.064
 """Length in m of the pieces that a move is first cut into: how far its points may move. The
@@ -175,15 +174,14 @@ def _corners_by_joint(robot: Robot, tool: tuple[Body, ...]) -> list[FloatArray]:
             placement = model.jointPlacements[joint] * placement
             joint = model.parents[joint]
         if joint:
-            corners[index_of[joint]].append(_corners(body.geometry, placement.homogeneous))
+            corners[index_of[joint]].append(
+                _placed(box_corners(body.geometry), placement.homogeneous)
+            )
     for part in tool:
-        corners[-1].append(_corners(part.shape, robot.chain.T_last_tip @ part.T_frame_body))
+        corners[-1].append(_placed(part.solid.corners, robot.chain.T_last_tip @ part.T_frame_body))
     return [np.concatenate(parts) for parts in corners]
 
 
-def _corners(shape: coal.CollisionGeometry, T_joint_shape: FloatArray) -> FloatArray:
-    """Return the corners of the box about a shape in the frame of its joint, shape (8, 3)."""
-    shape.computeLocalAABB()
-    box = shape.aabb_local
-    corners = np.array(list(itertools.product(*zip(box.min_, box.max_, strict=True))))
-    return corners @ T_joint_shape[:3, :3].T + T_joint_shape[:3, 3]
+def _placed(points: FloatArray, T: FloatArray) -> FloatArray:
+    """Return points, shape (point, 3), moved by a transform."""
+    return points @ T[:3, :3].T + T[:3, 3]

@@ -111,7 +111,7 @@ def unseen_of(calibration: Calibration, rng: Generator) -> Unseen:
     """Return the errors at left-out poses with intervals over resampled poses.
 
     The readings at one pose share what the model gets wrong there, so that whole poses are drawn
-    (see `elastocal.identification.bootstrap`).
+    (see `elastocal.identification.uncertainty`).
 
     Parameters
     ----------

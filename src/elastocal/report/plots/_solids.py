@@ -13,11 +13,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-import coal
 import numpy as np
 import plotly.graph_objects as go
-import trimesh
 
+from elastocal import shapes
 from elastocal.arrays import BoolArray, FloatArray, IndexArray
 from elastocal.cell import Cell
 from elastocal.cell.description import TOOLING
@@ -130,13 +129,13 @@ def robot_solids(cell: Cell, surface: Surface) -> RobotSolids:
     """Return the solids of a cell's robot and tool."""
     scene = collision_scene(cell, surface)
     nowhere = np.zeros((0, len(cell.robot.joint_names)))
-    return RobotSolids(scene, tuple(solid_of(body.shape) for body in scene.moving(nowhere)))
+    return RobotSolids(scene, tuple(drawn(body.solid) for body in scene.moving(nowhere)))
 
 
 def fixture_solids(cell: Cell, surface: Surface) -> dict[str, Solid]:
     """Return the fixtures of a cell in base, by name; not the tooling."""
     return {
-        body.name: solid_of(body.shape).placed(body.T_frame_body)
+        body.name: drawn(body.solid).placed(body.T_frame_body)
         for body in collision_scene(cell, surface).obstacles
         if body.name != TOOLING
     }
@@ -151,30 +150,10 @@ def joined(solids: Sequence[Solid]) -> Solid:
     return Solid(np.concatenate([solid.vertices for solid in solids]), np.concatenate(faces))
 
 
-def solid_of(shape: coal.CollisionGeometry) -> Solid:
-    """Return the triangles of a collision shape; its bounding box when it is of a rare kind."""
-    if isinstance(shape, coal.BVHModelBase):
-        # A coal triangle is no sequence: it has no end.
-        triangles = map(shape.tri_indices, range(shape.num_tris))
-        faces = [(triangle[0], triangle[1], triangle[2]) for triangle in triangles]
-        return Solid(np.array(shape.vertices()), np.array(faces, dtype=np.intp).reshape(-1, 3))
-    mesh = _primitive(shape)
+def drawn(solid: shapes.Solid) -> Solid:
+    """Return the triangles of a solid, its round sides as fine as they are drawn."""
+    mesh = solid.triangulated(_SECTIONS)
     return Solid(np.array(mesh.vertices), np.array(mesh.faces, dtype=np.intp))
-
-
-def _primitive(shape: coal.CollisionGeometry) -> Any:
-    """Return the trimesh of a shape that is not a mesh."""
-    if isinstance(shape, coal.Cylinder):
-        return trimesh.creation.cylinder(shape.radius, 2.0 * shape.halfLength, sections=_SECTIONS)
-    if isinstance(shape, coal.Sphere):
-        return trimesh.creation.icosphere(2, shape.radius)
-    if isinstance(shape, coal.Capsule):
-        return trimesh.creation.capsule(2.0 * shape.halfLength, shape.radius)
-    if isinstance(shape, coal.Box):
-        return trimesh.creation.box(2.0 * shape.halfSide)
-    shape.computeLocalAABB()
-    box = trimesh.creation.box(np.ptp([shape.aabb_local.min_, shape.aabb_local.max_], axis=0))
-    return box.apply_translation(shape.aabb_center)
 
 
 def coarsened(solid: Solid, most: int) -> CoarseSolid:

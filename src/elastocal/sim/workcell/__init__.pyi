@@ -1,5 +1,12 @@
-from .assembly import SimulatedCell as SimulatedCell, simulated_devices as simulated_devices
-from .clock import SimClock as SimClock
-from .process import ProcessCell as ProcessCell
-from .quick import Places as Places, QuickCell as QuickCell
-from .quick_errors import ErrorDraws as ErrorDraws, QuickErrors as QuickErrors, Scales as Scales
+from .campaign import CampaignSimulator as CampaignSimulator, ContactPoses as ContactPoses
+from .campaign_errors import (
+    CampaignErrors as CampaignErrors,
+    ErrorDraws as ErrorDraws,
+    ErrorScales as ErrorScales,
+)
+from .cell import (
+    ProcessCell as ProcessCell,
+    SimulatedCell as SimulatedCell,
+    simulated_devices as simulated_devices,
+)
+from .timeline import SimClock as SimClock

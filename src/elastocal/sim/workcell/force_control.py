@@ -12,12 +12,11 @@ from elastocal.cell.description import Fault
 from elastocal.cell.devices import Motion
 from elastocal.errors import DeviceError
 from elastocal.sim.workcell.contact import Contact
-from elastocal.sim.workcell.keys import generator
+from elastocal.sim.workcell.paths import force_path, pressed_state
 from elastocal.sim.workcell.plant import Plant
-from elastocal.sim.workcell.quasistatics import ForceReading, Stand
-from elastocal.sim.workcell.segment import Ripple, Segment
-from elastocal.sim.workcell.time_laws import SettlingRamp, TimeLaw, Uniform
-from elastocal.sim.workcell.ways import force_way, pressed
+from elastocal.sim.workcell.quasistatics import ForceReading, RobotState
+from elastocal.sim.workcell.sampling import generator
+from elastocal.sim.workcell.timeline import Ripple, Segment, SettlingRamp, TimeLaw, Uniform
 
 SLIP_TIME = 0.1
 """Time that an injected slip takes, in s."""
@@ -41,12 +40,12 @@ class ForceControl:
     def begin_visit(self) -> None:
         """Zero the sensor and count load cases from 0."""
         plant = self._plant
-        stand, statics = plant.stand(), plant.statics
+        state, statics = plant.robot_state(), plant.statics
         self.load = -1
         self._reading = ForceReading(
             self._gain,
             statics.robot.T_tcp_sensor[:3, :3],
-            statics.R_base_sensor(stand.q, stand.twist),
+            statics.R_base_sensor(state.q, state.twist),
             statics.weight,
         )
 
@@ -76,11 +75,13 @@ class ForceControl:
         plant, contact = self._plant, self._plant.contact
         if contact is None:
             raise DeviceError("simulated arm: no contact to release")
-        start = plant.stand()
-        end = pressed(plant.statics, start, contact, lambda _: np.zeros(3), plant.stop_error())
+        start = plant.robot_state()
+        end = pressed_state(
+            plant.statics, start, contact, lambda _: np.zeros(3), plant.stop_error()
+        )
         law = Uniform(float(np.linalg.norm(start.force)) / rate)
-        way = force_way(plant.statics, start, end)
-        plant.run(way, law, (Motion.RELEASING, Motion.IDLE), start)
+        path = force_path(plant.statics, start, end)
+        plant.run(path, law, (Motion.RELEASING, Motion.IDLE), start)
 
     def let_slip(self, fault: Fault, held: Segment) -> None:
         """Let the contact slip against the lateral force, unless the load case is over."""
@@ -91,15 +92,15 @@ class ForceControl:
         """Go for the wanted force, the contact slipping meanwhile; tcp frame, shape (2,), in m."""
         plant, contact = self._plant, self._plant.contact
         assert contact is not None
-        start = plant.stand()
+        start = plant.robot_state()
         contact = contact.slipped(slip)
         end = self._equilibrium(start, contact)
         plant.contact = contact
         ramp = max(float(np.linalg.norm(end.force - start.force)) / self._rate, least)
         law: TimeLaw = SettlingRamp(ramp, plant.cell.file.simulation.controller.settling)
-        way = force_way(plant.statics, start, end)
+        path = force_path(plant.statics, start, end)
         ripple = self._ripple()
-        return plant.run(way, law, (Motion.HOLDING, Motion.HOLDING), start, ripple=ripple)
+        return plant.run(path, law, (Motion.HOLDING, Motion.HOLDING), start, ripple=ripple)
 
     def _slide(self, held: Segment) -> None:
         """Slide at a steady speed until the controller has had enough."""
@@ -107,25 +108,25 @@ class ForceControl:
         contact = plant.contact
         if plant.segment is not held or contact is None:
             return
-        start, way = plant.stand(), entry.controller.travel_limit
-        plant.contact = contact = contact.slipped(way * self._away())
+        start, slide = plant.robot_state(), entry.controller.travel_limit
+        plant.contact = contact = contact.slipped(slide * self._away())
         end = self._equilibrium(start, contact)
         plant.run(
-            force_way(plant.statics, start, end),
-            Uniform(way / entry.contact.slide_speed),
+            force_path(plant.statics, start, end),
+            Uniform(slide / entry.contact.slide_speed),
             (Motion.HOLDING, Motion.STOPPED),
             start,
-            fault=f"force control gave up: the contact slid by {1e3 * way:g} mm",
+            fault=f"force control gave up: the contact slid by {1e3 * slide:g} mm",
         )
 
-    def _equilibrium(self, start: Stand, contact: Contact) -> Stand:
+    def _equilibrium(self, start: RobotState, contact: Contact) -> RobotState:
         """Return the robot where the sensor reads the wanted force."""
         plant, wanted, reading = self._plant, self._wanted, self._reading
 
         def force(R_base_sensor: FloatArray) -> FloatArray:
             return reading.true_force(wanted, R_base_sensor)
 
-        return pressed(plant.statics, start, contact, force, plant.stop_error())
+        return pressed_state(plant.statics, start, contact, force, plant.stop_error())
 
     def _away(self) -> FloatArray:
         """Return the direction in which the contact gives way, tcp frame, shape (2,)."""

@@ -1,26 +1,142 @@
 """What the simulated devices share: time, the robot, the tooling, and what is going on."""
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
 
-from elastocal.arrays import FloatArray
+from elastocal.arrays import FloatArray, IndexArray
 from elastocal.cell import Cell
+from elastocal.cell.description import Fault
 from elastocal.cell.devices import Motion
+from elastocal.errors import DeviceError, nearest
 from elastocal.robot import (
     inverse_transform,
 )
-from elastocal.sim.workcell.clock import SimClock
-from elastocal.sim.workcell.contact import Contact, ContactLaw
-from elastocal.sim.workcell.keys import generator, posture_key
-from elastocal.sim.workcell.quasistatics import Quasistatics, Stand
+from elastocal.sim.workcell.contact import Contact, ContactLaw, TrueSurface
+from elastocal.sim.workcell.quasistatics import Quasistatics, RobotPath, RobotState
 from elastocal.sim.workcell.robot import TrueRobot
-from elastocal.sim.workcell.schedule import Schedule
-from elastocal.sim.workcell.segment import Ripple, Segment
-from elastocal.sim.workcell.surface import TrueSurface
-from elastocal.sim.workcell.time_laws import TimeLaw, Uniform
-from elastocal.sim.workcell.ways import Way
+from elastocal.sim.workcell.sampling import generator, posture_key
+from elastocal.sim.workcell.timeline import (
+    Ripple,
+    Segment,
+    SimClock,
+    TimeLaw,
+    Uniform,
+    to_microseconds,
+)
+
+FOREVER = 1 << 62
+"""Later than any time, in µs."""
+SPANS = ("beam_break", "ft_dropout", "ft_frozen", "ft_saturation", "stale_clock")
+"""Faults that last for a while, whatever the arm does."""
+
+
+@dataclass(frozen=True)
+class FaultSpan:
+    """From when to when a device is at fault."""
+
+    kind: str
+    begin: int
+    """In µs."""
+    end: int
+    """In µs, not itself in it."""
+    station: str | None
+    """Tracker station; None: all."""
+
+    def holds(self, now: int) -> bool:
+        """Return whether a time in µs lies in it."""
+        return self.begin <= now < self.end
+
+
+class FaultSchedule:
+    """Faults of a cell, and what has become of them."""
+
+    def __init__(self, cell: Cell) -> None:
+        """Take the faults of the cell file.
+
+        Raises
+        ------
+        DeviceError
+            If a fault names a tracker station that is not there.
+        """
+        names = [tracker.name for tracker in cell.file.trackers]
+        for fault in cell.file.faults:
+            if fault.station is not None and fault.station not in names:
+                raise DeviceError(
+                    f"fault {fault.kind}: there is no tracker station {fault.station!r}"
+                    f"{nearest(fault.station, names)} (stations: {', '.join(names)})"
+                )
+        self._faults = cell.file.faults
+        self._spans: list[FaultSpan] = []
+
+    def begin(self, step: str, visit: int, load: int, now: int) -> list[tuple[int, Fault]]:
+        """Note the faults that follow from the beginning of a step.
+
+        Returns those that strike the arm, each with its time in µs.
+
+        Parameters
+        ----------
+        step : str
+            See `elastocal.cell.description.simulation.Fault.step`.
+        visit : int
+            Number of the visit.
+        load : int
+            Number of the load case of the visit.
+        now : int
+            In µs.
+        """
+        moments = []
+        self._spans = [span for span in self._spans if span.end > now]
+        for fault in self.at(visit):
+            if fault.step != step or (step == "hold" and fault.load != load):
+                continue
+            start = now + to_microseconds(fault.after)
+            if fault.kind in SPANS:
+                last = FOREVER if fault.duration is None else to_microseconds(fault.duration)
+                self._spans.append(FaultSpan(fault.kind, start, start + last, fault.station))
+            elif fault.kind in ("slip", "robot_stop"):
+                moments.append((start, fault))
+        return moments
+
+    @property
+    def any_span(self) -> bool:
+        """Whether there is any span to look at."""
+        return bool(self._spans)
+
+    def at(self, visit: int) -> list[Fault]:
+        """Return the faults of a visit."""
+        return [f for f in self._faults if 0 <= visit - f.pose < f.visits]
+
+    def lasting(self, kind: str, visit: int) -> list[Fault]:
+        """Return faults of a kind that stay once they have come."""
+        return [f for f in self._faults if f.kind == kind and f.pose <= visit]
+
+    def spans(self, kind: str) -> list[FaultSpan]:
+        """Return the spans of a kind of fault."""
+        if not self._spans:
+            return []
+        return [span for span in self._spans if span.kind == kind]
+
+    def struck(self, kind: str, times: IndexArray, station: str | None = None) -> IndexArray:
+        """Return which samples a span of some kind of fault covers, as indices.
+
+        Parameters
+        ----------
+        kind : str
+            Of fault.
+        times : ndarray of int, shape (sample,)
+            In µs.
+        station : str, optional
+            Tracker station that measures.
+        """
+        covered = np.zeros(len(times), dtype=bool)
+        for span in self.spans(kind):
+            if span.station in (None, station):
+                covered |= (times >= span.begin) & (times < span.end)
+        return np.flatnonzero(covered)
+
 
 _DRAWS = 64
 """Random stops and slips of a visit; more begin anew."""
@@ -49,7 +165,7 @@ class Plant:
         self._weighed = self.statics = Quasistatics.of(cell, TrueRobot.of(cell))
         self.surface = TrueSurface.of(cell)
         self.contact_law = ContactLaw.of(cell)
-        self.schedule = Schedule(cell)
+        self.schedule = FaultSchedule(cell)
         self.contact: Contact | None = None
         self.instruments: list[Instrument] = []
         self._pressing = _unit_wrench(self.statics.robot)
@@ -59,9 +175,9 @@ class Plant:
         self._drawn = 0
         self._draw()
         self._events: list[tuple[int, Callable[[], None]]] = []
-        stand = self.statics.free(cell.home, self.stop_error(), None)
-        self.segment = self.standing(stand, Motion.DISARMED)
-        self._sag = stand.sag
+        state = self.statics.free(cell.home, self.stop_error(), None)
+        self.segment = self.standing(state, Motion.DISARMED)
+        self._sag = state.sag
         clock.on_wake(self.wake)
 
     @property
@@ -128,10 +244,10 @@ class Plant:
 
     def run(
         self,
-        way: Way,
+        path: RobotPath,
         law: TimeLaw,
         motions: tuple[Motion, Motion],
-        start: Stand,
+        start: RobotState,
         *,
         fault: str | None = None,
         ripple: Ripple | None = None,
@@ -140,28 +256,28 @@ class Plant:
 
         Parameters
         ----------
-        way : Way
+        way : RobotPath
             From ``start`` on.
         law : TimeLaw
             How the time goes.
         motions : tuple of Motion
             What the arm does on the way, and at its end.
-        start : Stand
+        start : RobotState
             Where it is.
         fault : str, optional
             What the controller says at the end.
         ripple : Ripple, optional
             Unrest of the force.
         """
-        theta = way.end.theta
+        theta = path.end.theta
         assert theta is not None
         segment = Segment(
             begin=self.now,
             law=law,
-            knots=way.knots,
+            knots=path.knots,
             motion=motions[0],
             motion_after=motions[1],
-            springs=(start.springs, way.end.springs),
+            springs=(start.springs, path.end.springs),
             theta=theta,
             fault_after=fault,
             ripple=ripple,
@@ -170,7 +286,7 @@ class Plant:
         self.switch(segment)
         return segment
 
-    def stand(self) -> Stand:
+    def robot_state(self) -> RobotState:
         """Return where the robot is now, with the memory that it has gathered so far."""
         segment, progress = self.segment, self.segment.progress(self.now)
         knots, where = segment.knots, np.array([progress])
@@ -181,25 +297,25 @@ class Plant:
         if not done and self.contact is not None:
             rest = self.statics.robot.rest(q, force, springs, theta)
             springs, theta = rest.springs, rest.theta
-        return Stand(q, twist, force, springs, theta, self._sag)
+        return RobotState(q, twist, force, springs, theta, self._sag)
 
-    def note_sag(self, stand: Stand) -> None:
+    def note_sag(self, state: RobotState) -> None:
         """Remember the sag of the last free stand, which the controller partly takes out."""
-        self._sag = stand.sag
+        self._sag = state.sag
 
-    def standing(self, stand: Stand, motion: Motion, fault: str | None = None) -> Segment:
+    def standing(self, state: RobotState, motion: Motion, fault: str | None = None) -> Segment:
         """Return a segment in which nothing moves."""
         both = np.array([0.0, 1.0])
-        columns = (np.stack([c, c]) for c in (stand.q, stand.twist, stand.force))
-        theta = stand.theta
+        columns = (np.stack([c, c]) for c in (state.q, state.twist, state.force))
+        theta = state.theta
         return Segment(
             begin=self.now,
             law=Uniform(0.0),
             knots=self.statics.knots(both, *columns),
             motion=motion,
             motion_after=motion,
-            springs=(stand.springs, stand.springs),
-            theta=np.zeros(len(stand.springs.stiffness)) if theta is None else theta,
+            springs=(state.springs, state.springs),
+            theta=np.zeros(len(state.springs.stiffness)) if theta is None else theta,
             fault_after=fault,
         )
 

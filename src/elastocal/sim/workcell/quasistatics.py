@@ -17,14 +17,14 @@ from elastocal.errors import DeviceError
 from elastocal.robot import (
     inverse_transform,
 )
-from elastocal.sim.reach import reach
-from elastocal.sim.workcell.robot import Rest, TrueRobot
-from elastocal.sim.workcell.segment import Knots
+from elastocal.sim.arm.inverse import solve_inverse
+from elastocal.sim.workcell.robot import RobotEquilibrium, TrueRobot
 from elastocal.sim.workcell.springs import RobotSprings
+from elastocal.sim.workcell.timeline import Knots
 
 
 @dataclass(frozen=True, eq=False)
-class Stand:
+class RobotState:
     """State of the robot between two commands."""
 
     q: FloatArray
@@ -39,6 +39,14 @@ class Stand:
     """Spring positions to start from; None: from none."""
     sag: FloatArray
     """Twist under weight alone that the controller has taken out a part of, shape (9,)."""
+
+
+@dataclass(frozen=True, eq=False)
+class RobotPath:
+    """A path that the robot takes, and where it leads."""
+
+    knots: Knots
+    end: RobotState
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,17 +105,22 @@ class Quasistatics:
         """
         return replace(self, weight=self.weight + mass * self.robot.gravity)
 
-    def twist(self, q: FloatArray, rest: Rest) -> FloatArray:
-        """Return the deviation of a resting robot from the undeformed one, shape (9,)."""
+    def twist(self, q: FloatArray, rest: RobotEquilibrium) -> FloatArray:
+        """Return the deviation of a resting robot from the undeformed one, shape (..., 9)."""
         T = self.robot.forward(q)
-        R_sensor = T[:3, :3] @ self.robot.T_tcp_sensor[:3, :3]
+        R_sensor = T[..., :3, :3] @ self.robot.T_tcp_sensor[:3, :3]
         turns = np.stack(
-            [rest.T_base_tcp[:3, :3] @ T[:3, :3].T, rest.T_base_sensor[:3, :3] @ R_sensor.T]
+            [
+                rest.T_base_tcp[..., :3, :3] @ T[..., :3, :3].swapaxes(-1, -2),
+                rest.T_base_sensor[..., :3, :3] @ R_sensor.swapaxes(-1, -2),
+            ],
+            axis=-3,
         )
-        shift = rest.T_base_tcp[:3, 3] - T[:3, 3]
-        return np.concatenate([shift, Rotation.from_matrix(turns).as_rotvec().ravel()])
+        shift = rest.T_base_tcp[..., :3, 3] - T[..., :3, 3]
+        vectors = Rotation.from_matrix(turns.reshape(-1, 3, 3)).as_rotvec()
+        return np.concatenate([shift, vectors.reshape(*q.shape[:-1], 6)], axis=-1)
 
-    def free(self, q: FloatArray, stop_error: FloatArray, start: FloatArray | None) -> Stand:
+    def free(self, q: FloatArray, stop_error: FloatArray, start: FloatArray | None) -> RobotState:
         """Return the robot free of contact, its gears relaxed.
 
         Parameters
@@ -122,19 +135,21 @@ class Quasistatics:
         rest = self.robot.rest(q, np.zeros(3), self.robot.springs, start)
         sag = self.twist(q, rest)
         twist = self._left(sag, sag, stop_error)
-        return Stand(q, twist, np.zeros(3), rest.springs, rest.theta, sag)
+        return RobotState(q, twist, np.zeros(3), rest.springs, rest.theta, sag)
 
     def _left(self, twist: FloatArray, sag: FloatArray, stop_error: FloatArray) -> FloatArray:
         left = twist - self.compensation * sag
         left[:3] += stop_error
         return left
 
-    def loaded(self, stand: Stand, q: FloatArray, force: FloatArray, error: FloatArray) -> Stand:
+    def loaded(
+        self, state: RobotState, q: FloatArray, force: FloatArray, error: FloatArray
+    ) -> RobotState:
         """Return the robot under a force, from a stand whose gears remember.
 
         Parameters
         ----------
-        stand : Stand
+        stand : RobotState
             Where it comes from.
         q : ndarray, shape (joint,)
             In rad or m.
@@ -143,9 +158,9 @@ class Quasistatics:
         error : ndarray, shape (3,)
             Error of the stop, in base, in m.
         """
-        rest = self.robot.rest(q, force, stand.springs, stand.theta)
-        twist = self._left(self.twist(q, rest), stand.sag, error)
-        return replace(stand, q=q, twist=twist, force=force, springs=rest.springs, theta=rest.theta)
+        rest = self.robot.rest(q, force, state.springs, state.theta)
+        twist = self._left(self.twist(q, rest), state.sag, error)
+        return replace(state, q=q, twist=twist, force=force, springs=rest.springs, theta=rest.theta)
 
     def R_base_sensor(self, q: FloatArray, twist: FloatArray) -> FloatArray:
         """Return the true orientation of the sensor, shape (3, 3)."""
@@ -153,9 +168,9 @@ class Quasistatics:
         turned: FloatArray = Rotation.from_rotvec(twist[6:]).as_matrix() @ nominal
         return turned
 
-    def tool_position(self, stand: Stand) -> FloatArray:
+    def tool_position(self, state: RobotState) -> FloatArray:
         """Return where the tool centre point truly is, in base, shape (3,), in m."""
-        position: FloatArray = self.robot.forward(stand.q)[:3, 3] + stand.twist[:3]
+        position: FloatArray = self.robot.forward(state.q)[:3, 3] + state.twist[:3]
         return position
 
     def along(self, q: FloatArray, R_base_tcp: FloatArray, points: FloatArray) -> FloatArray:
@@ -177,17 +192,17 @@ class Quasistatics:
         Raises
         ------
         DeviceError
-            If the arm does not reach so far.
+            If the arm does not solve_inverse so far.
         """
         goals = np.zeros((len(points), 4, 4))
         goals[:, :3, :3], goals[:, :3, 3], goals[:, 3, 3] = R_base_tcp, points, 1.0
         layout = self.robot.layout
         start = np.repeat(q[None], len(points), axis=0)
-        found = reach(layout.linkage, goals, start, tolerance=1e-10, locked=layout.external)
+        found = solve_inverse(layout.linkage, goals, start, tolerance=1e-10, locked=layout.external)
         if not found.ok.all():
             raise DeviceError(
                 f"the arm cannot follow a straight line to {np.round(points[-1], 4).tolist()} m:"
-                " a singularity or the end of its reach"
+                " a singularity or the end of its solve_inverse"
             )
         return found.q
 

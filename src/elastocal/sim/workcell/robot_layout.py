@@ -6,8 +6,8 @@ each of the two long links, and the end-effector (three turns and three shifts a
 Six or eighteen springs at the joints can express none but the gears and tilts, and those only
 where they are linear.
 
-Figures that the file leaves out are those of `elastocal.sim.layouts` for an arm of 1.1 t, in
-proportion to the mass that the arm moves: an assumption that brings a small robot to the right
+Figures that the file leaves out are those of `elastocal.sim.arm.elastic_arm` for an arm of 1.1 t,
+in proportion to the mass that the arm moves: an assumption that brings a small robot to the right
 order of magnitude.
 """
 
@@ -16,19 +16,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from elastocal.arrays import FloatArray, IndexArray
+from elastocal.arrays import FloatArray
 from elastocal.cell import Cell
-from elastocal.cell.description import Gears
 from elastocal.errors import DeviceError
 from elastocal.robot import (
     inverse_transform,
 )
-from elastocal.sim.layouts import AXIAL_STIFFNESS, LINK_BENDING, across, link_vector, triple
-from elastocal.sim.linkage import Linkage
-from elastocal.sim.skeleton import Skeleton, TruthSpring, lay_out
-from elastocal.sim.torque_laws import Linear
-from elastocal.sim.workcell.balancer import BalancerSpring
-from elastocal.sim.workcell.springs import GearLaws, RobotSprings
+from elastocal.sim.arm.elastic_arm import AXIAL_STIFFNESS, LINK_BENDING, across, link_vector, triple
+from elastocal.sim.arm.linkage import Linkage
+from elastocal.sim.arm.springs import Linear, Skeleton, TruthSpring, lay_out
+from elastocal.sim.workcell.springs import BalancerSpring, GearLaws, RobotSprings
 
 ARM_JOINTS = 6
 MOVED_MASS = 850.0
@@ -38,10 +35,6 @@ BALANCER_RATE = 5.5e4
 HIGH_TORQUE = 1.65
 """Stiffness of a gear at high torque over that of a straight line through measured deflections, to
 which play, bending links and floor add. An assumption."""
-STOPS = 4
-"""Number of sliders of a gear's friction."""
-PLAY_FLOOR = 0.2
-"""Stiffness in the middle of the backlash over that at high torque: soft, not free."""
 _SHORT_LINK = 0.2
 """A link shorter than this does not bend, in m."""
 
@@ -110,36 +103,9 @@ def _robot_springs(
     stiffness = np.array([_stiffness(spring) for spring in skeleton.springs])
     order = [id(spring) for spring in skeleton.springs]
     which = np.array([order.index(id(gear)) for gear in gears])
-    laws = gear_laws(cell.file.simulation.gears, which, stiffness[which])
+    laws = GearLaws.of(cell.file.simulation.gears, which, stiffness[which])
     balancer = _balancer(cell, linkage, size)
-    return RobotSprings(stiffness, laws, None, balancer, int(which[1]), 0.0)
-
-
-def gear_laws(entry: Gears, which: IndexArray, stiffness: FloatArray) -> GearLaws:
-    """Return growth, backlash and friction of gears.
-
-    Parameters
-    ----------
-    entry : Gears
-        What the cell file says.
-    which : ndarray of int, shape (gear,)
-        Which springs they are.
-    stiffness : ndarray, shape (gear,)
-        At high torque, in N·m/rad.
-    """
-    play = 1.0 - entry.growth - PLAY_FLOOR if entry.backlash > 0.0 else 0.0
-    play_angle = entry.backlash / (math.pi * play) if play else 1.0
-    loss = np.multiply.outer(stiffness, [entry.growth, play])
-    angle = np.broadcast_to([entry.growth_angle, play_angle], loss.shape)
-    travel = entry.presliding * np.arange(1, STOPS + 1) / STOPS
-    friction = entry.hysteresis * entry.reference_angle * stiffness
-    return GearLaws(
-        which=which,
-        loss=loss,
-        angle=angle,
-        stop_stiffness=friction[:, None] / (STOPS * travel),
-        stop_travel=np.broadcast_to(travel, (len(which), STOPS)),
-    )
+    return RobotSprings(stiffness, laws, None, balancer, int(which[1]), np.zeros(()))
 
 
 def _size(linkage: Linkage, external: int) -> float:

@@ -1,0 +1,321 @@
+"""The rigid skeleton of the simulated arm, read from a URDF without any robotics library.
+
+Only `xml.etree` and numpy: a mistake in the estimator's URDF reader must show up as a difference,
+not be repeated here.
+"""
+
+import xml.etree.ElementTree as ElementTree
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from elastocal.arrays import BoolArray, FloatArray
+from elastocal.errors import RobotError
+
+
+@dataclass(frozen=True)
+class Screws:
+    """Axes of movement in the order in which they follow one another from base to tip."""
+
+    axis: FloatArray
+    """Unit vectors in base with the arm at zero, shape (element, 3)."""
+    point: FloatArray
+    """A point on each axis, in base with the arm at zero, shape (element, 3), in m."""
+    revolute: BoolArray
+    """Whether each turns (else it slides), shape (element,)."""
+
+    @cached_property
+    def wedge(self) -> FloatArray:
+        """Matrices of the cross product with the axes, shape (element, 3, 3)."""
+        return np.cross(self.axis[:, None, :], np.eye(3)).transpose(0, 2, 1)
+
+    @cached_property
+    def wedge_squared(self) -> FloatArray:
+        """Their squares, shape (element, 3, 3)."""
+        squared: FloatArray = self.wedge @ self.wedge
+        return squared
+
+
+def motions(screws: Screws, positions: FloatArray) -> FloatArray:
+    """Return the rigid motion that all elements in front of each one have made together.
+
+    ``T[e] = exp(S_0 x_0) … exp(S_{e-1} x_{e-1})``; the last entry is the motion of the tip.
+
+    Parameters
+    ----------
+    screws : Screws
+        The elements.
+    positions : ndarray, shape (batch, element)
+        Position of each element in rad or m.
+
+    Returns
+    -------
+    ndarray, shape (element + 1, batch, 4, 4)
+        Motions to apply to points given in base with the arm at zero.
+    """
+    steps = _exponentials(screws, positions)
+    total = np.empty((len(steps) + 1, *steps.shape[1:]))
+    total[0] = np.eye(4)
+    for index, step in enumerate(steps):
+        np.matmul(total[index], step, out=total[index + 1])
+    return total
+
+
+def moved_axes(screws: Screws, before: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return the axes and points of screws after the motions in front of them.
+
+    Parameters
+    ----------
+    screws : Screws
+        The elements.
+    before : ndarray, shape (element, batch, 4, 4)
+        Motion in front of each, from `motions`.
+
+    Returns
+    -------
+    axis, point : ndarray, shape (element, batch, 3)
+        Where the axes are now, in base.
+    """
+    rotation = before[..., :3, :3]
+    axis = (rotation @ screws.axis[:, None, :, None])[..., 0]
+    point = (rotation @ screws.point[:, None, :, None])[..., 0] + before[..., :3, 3]
+    return axis, point
+
+
+def _exponentials(screws: Screws, positions: FloatArray) -> FloatArray:
+    """Return exp(S_e x_e) by Rodrigues' formula, shape (element, batch, 4, 4)."""
+    angle = np.where(screws.revolute, positions, 0.0).T[..., None, None]
+    slide = np.where(screws.revolute, 0.0, positions).T[..., None]
+    rotation = np.sin(angle) * screws.wedge[:, None]
+    rotation += (1.0 - np.cos(angle)) * screws.wedge_squared[:, None]
+    steps = np.zeros((*angle.shape[:2], 4, 4))
+    steps[..., :3, :3] = rotation + np.eye(3)
+    steps[..., :3, 3] = -(rotation @ screws.point[:, None, :, None])[..., 0]
+    steps[..., :3, 3] += slide * screws.axis[:, None]
+    steps[..., 3, 3] = 1.0
+    return steps
+
+
+_MOVABLE = ("revolute", "continuous", "prismatic")
+
+
+@dataclass(frozen=True)
+class PointMass:
+    """The weight of one link."""
+
+    joint: int
+    """Number of joints in front of the link."""
+    mass: float
+    """In kg."""
+    centre: FloatArray
+    """Centre of mass in base with the arm at zero, shape (3,), in m."""
+
+
+@dataclass(frozen=True, eq=False)
+class Linkage:
+    """Joints from a base link to a tip link, all written in base with the arm at zero."""
+
+    joint_names: tuple[str, ...]
+    """Movable joints from base to tip."""
+    T_base_joint: FloatArray
+    """Joint frames with the arm at zero, shape (joint, 4, 4)."""
+    axis: FloatArray
+    """Joint axes, each in its own joint frame, shape (joint, 3)."""
+    revolute: tuple[bool, ...]
+    """Whether each joint turns (else it slides)."""
+    lower: FloatArray
+    """Lower limits in rad or m, -inf when there is none, shape (joint,)."""
+    upper: FloatArray
+    """Upper limits in rad or m, inf when there is none, shape (joint,)."""
+    T_base_tip: FloatArray
+    """Tip frame with the arm at zero, shape (4, 4)."""
+    masses: tuple[PointMass, ...]
+    """Links that move, in no special order; a link without inertial has none."""
+    name: str
+    """Name of the robot."""
+    urdf: str
+    """The text it was read from."""
+    tip: str
+    """Name of the tip link."""
+
+    @classmethod
+    def from_urdf(cls, text: str, tip: str, base: str | None = None) -> "Linkage":
+        """Return the linkage that a URDF text describes; ``base`` defaults to the root link.
+
+        Raises
+        ------
+        RobotError
+            If the text is no URDF, or has no serial chain from base to tip.
+        """
+        try:
+            root = ElementTree.fromstring(text)
+        except ElementTree.ParseError as error:
+            raise RobotError(f"URDF is not valid XML: {error}") from error
+        parents = {_link(joint, "child"): joint for joint in root.findall("joint")}
+        path = _path(parents, tip, base)
+        movable = [joint for joint in path if joint.get("type") != "fixed"]
+        frames = _frames_at_zero(parents, path)
+        limits = np.array([_limits(joint) for joint in movable]).reshape(-1, 2)
+        T_base_joint = [frames[_link(joint, "child")] for joint in movable]
+        return cls(
+            joint_names=tuple(joint.get("name", "") for joint in movable),
+            T_base_joint=np.array(T_base_joint).reshape(-1, 4, 4),
+            axis=np.array([_axis(joint) for joint in movable]).reshape(-1, 3),
+            revolute=tuple(joint.get("type") != "prismatic" for joint in movable),
+            lower=limits[:, 0],
+            upper=limits[:, 1],
+            T_base_tip=frames[tip],
+            masses=_masses(root, parents, movable, frames),
+            name=root.get("name", "unnamed"),
+            urdf=text,
+            tip=tip,
+        )
+
+    @cached_property
+    def screws(self) -> Screws:
+        """Joint axes in base with the arm at zero."""
+        axis = (self.T_base_joint[:, :3, :3] @ self.axis[:, :, None])[..., 0]
+        return Screws(axis, self.T_base_joint[:, :3, 3], np.array(self.revolute, dtype=bool))
+
+    def forward(self, q: ArrayLike) -> FloatArray:
+        """Return T_base_tip of the rigid arm.
+
+        Parameters
+        ----------
+        q : array_like, shape (..., joint)
+            Joint positions in rad or m.
+
+        Returns
+        -------
+        ndarray, shape (..., 4, 4)
+        """
+        q = np.asarray(q, dtype=float)
+        flat = q.reshape(-1, len(self.joint_names))
+        tips: FloatArray = motions(self.screws, flat)[-1] @ self.T_base_tip
+        return tips.reshape(*q.shape[:-1], 4, 4)
+
+    def jacobian(self, q: FloatArray) -> FloatArray:
+        """Return velocity of the tip over its rotation, per joint velocity, in base axes.
+
+        Parameters
+        ----------
+        q : ndarray, shape (batch, joint)
+            Joint positions in rad or m.
+
+        Returns
+        -------
+        ndarray, shape (batch, 6, joint)
+        """
+        total = motions(self.screws, q)
+        axis, point = moved_axes(self.screws, total[:-1])
+        tip = (total[-1] @ self.T_base_tip)[:, :3, 3]
+        turns = self.screws.revolute[:, None, None]
+        linear = np.where(turns, np.cross(axis, tip - point), axis)
+        return np.concatenate([linear, np.where(turns, axis, 0.0)], axis=-1).transpose(1, 2, 0)
+
+
+def _path(
+    parents: dict[str, ElementTree.Element], tip: str, base: str | None
+) -> list[ElementTree.Element]:
+    """Return the joints from base to tip, in that order."""
+    path: list[ElementTree.Element] = []
+    link = tip
+    while link != base and link in parents and parents[link] not in path:
+        path.append(parents[link])
+        link = _link(parents[link], "parent")
+    if not path or (base is not None and link != base):
+        raise RobotError(f"URDF has no chain from base link {base!r} to tip link {tip!r}")
+    for joint in path:
+        if joint.get("type") not in (*_MOVABLE, "fixed"):
+            raise RobotError(
+                f"URDF joint {joint.get('name')!r} is {joint.get('type')}: the simulated arm may"
+                f" have {', '.join(_MOVABLE)} and fixed joints"
+            )
+    return path[::-1]
+
+
+def _frames_at_zero(
+    parents: dict[str, ElementTree.Element], path: list[ElementTree.Element]
+) -> dict[str, FloatArray]:
+    """Return T_base_link of every link that hangs on the path, all joints at zero."""
+    frames = {_link(path[0], "parent"): np.eye(4)}
+    waiting = list(frames)
+    while waiting:
+        parent = waiting.pop()
+        for child, joint in parents.items():
+            if _link(joint, "parent") == parent and child not in frames:
+                frames[child] = frames[parent] @ _origin(joint)
+                waiting.append(child)
+    return frames
+
+
+def _masses(
+    root: ElementTree.Element,
+    parents: dict[str, ElementTree.Element],
+    movable: list[ElementTree.Element],
+    frames: dict[str, FloatArray],
+) -> tuple[PointMass, ...]:
+    """Return the links that move with the chain; joints beside it stay locked at zero."""
+    masses = []
+    for link in root.findall("link"):
+        name, inertial = link.get("name", ""), link.find("inertial")
+        joint = _joints_in_front(name, parents, movable)
+        element = None if inertial is None else inertial.find("mass")
+        if inertial is None or element is None or joint == 0 or name not in frames:
+            continue
+        centre = (frames[name] @ _origin(inertial))[:3, 3]
+        masses.append(PointMass(joint, float(element.get("value", "0")), centre))
+    return tuple(mass for mass in masses if mass.mass > 0.0)
+
+
+def _joints_in_front(
+    link: str, parents: dict[str, ElementTree.Element], movable: list[ElementTree.Element]
+) -> int:
+    while link in parents:
+        if parents[link] in movable:
+            return movable.index(parents[link]) + 1
+        link = _link(parents[link], "parent")
+    return 0
+
+
+def _link(joint: ElementTree.Element, role: str) -> str:
+    element = joint.find(role)
+    if element is None or not element.get("link"):
+        raise RobotError(f"URDF joint {joint.get('name')!r} has no {role} link")
+    return element.get("link", "")
+
+
+def _limits(joint: ElementTree.Element) -> tuple[float, float]:
+    limit = joint.find("limit")
+    if limit is None or joint.get("type") == "continuous":
+        return -np.inf, np.inf
+    return float(limit.get("lower", "0")), float(limit.get("upper", "0"))
+
+
+def _axis(joint: ElementTree.Element) -> FloatArray:
+    element = joint.find("axis")
+    axis = _numbers(element, "xyz", "1 0 0")
+    length = float(np.linalg.norm(axis))
+    if not 0.0 < length < np.inf:
+        raise RobotError(f"URDF joint {joint.get('name')!r} has axis {axis}: not a direction")
+    return axis / length
+
+
+def _origin(owner: ElementTree.Element) -> FloatArray:
+    """Return the transform of an ``<origin>``: roll, pitch, yaw about the fixed x, y, z."""
+    element = owner.find("origin")
+    (sr, sp, sy), (cr, cp, cy) = (f(_numbers(element, "rpy", "0 0 0")) for f in (np.sin, np.cos))
+    about_x = np.array([[1, 0, 0], [0, cr, -sr], [0, sr, cr]])
+    about_y = np.array([[cp, 0, sp], [0, 1, 0], [-sp, 0, cp]])
+    about_z = np.array([[cy, -sy, 0], [sy, cy, 0], [0, 0, 1]])
+    transform = np.eye(4)
+    transform[:3, :3] = about_z @ about_y @ about_x
+    transform[:3, 3] = _numbers(element, "xyz", "0 0 0")
+    return transform
+
+
+def _numbers(element: ElementTree.Element | None, key: str, default: str) -> FloatArray:
+    text = default if element is None else element.get(key, default)
+    return np.array([float(word) for word in text.split()])

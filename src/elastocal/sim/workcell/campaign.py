@@ -1,0 +1,266 @@
+"""Readings of a plan straight from the hidden truth, without stepping the devices through time.
+
+All places are computed side by side: near contact, touch, and the load cases one after the other,
+so that the gears remember. Robot, contact and controller are those of `simulated_devices`. What
+is left out moves a deflection by well under a micrometre: the force of the guarded touch (a larger
+one wipes it from the gears' memory), the curvature of the tooling within the few millimetres
+beside a touch, and what stop errors do to the place that is touched. No fault is injected.
+"""
+
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from elastocal.arrays import FloatArray
+from elastocal.cell import Cell
+from elastocal.errors import DeviceError
+from elastocal.sim.arm.inverse import solve_inverse
+from elastocal.sim.workcell.contact import Contact, ContactLaw
+from elastocal.sim.workcell.quasistatics import Quasistatics
+from elastocal.sim.workcell.robot import RobotEquilibrium, TrueRobot
+
+CLOSED = 1e-6
+"""How far a tool may end from where the contact holds it, in m: nanometres of deflection."""
+_ROUNDS = 8
+
+
+class ContactPoses(NamedTuple):
+    """Where to press."""
+
+    q: FloatArray
+    """Planned joints in contact, shape (place, joint), in rad or m."""
+    normal: FloatArray
+    """Outward unit normals of the tooling in base, shape (place, 3)."""
+
+
+@dataclass(frozen=True, eq=False)
+class TrueReadings:
+    """What is true where the arm stands still: near contact without load, and under each load."""
+
+    q: FloatArray
+    """Joints of the controller under load, shape (place, load, joint), in rad or m."""
+    force: FloatArray
+    """Force on the robot in base, shape (place, load, 3), in N."""
+    deflection: FloatArray
+    """Of the tool in base, against touching without force, shape (place, load, 3), in m."""
+    controller_displacement: FloatArray
+    """Of the marker by the controller, against near contact, shape (place, load, 3), in m."""
+    marker_displacement: FloatArray
+    """True one of the marker, likewise."""
+    marker: FloatArray
+    """Marker near contact in base, shape (place, 3), in m."""
+    felt: FloatArray
+    """Change of the force at the sensor against near contact, with the weight that has turned,
+    in the sensor's true frame, shape (place, load, 3), in N."""
+    R_base_sensor: FloatArray
+    """Orientation of the sensor by the controller, shape (place, 3, 3)."""
+
+
+class _States(NamedTuple):
+    """The robot at all places."""
+
+    q: FloatArray
+    twist: FloatArray
+    """What the controller is off by; see `quasistatics.Knots.twist`, shape (place, 9)."""
+    rest: RobotEquilibrium
+    sag: FloatArray
+    """What the undeformed robot is off by, shape (place, 9)."""
+    force: FloatArray
+    """On the robot in base, shape (place, 3), in N."""
+
+
+@dataclass(frozen=True, eq=False)
+class CampaignSimulator:
+    """The truth of a cell; make one with `of`. It can be sent to another process."""
+
+    statics: Quasistatics
+    law: ContactLaw
+    near: float
+    """Height of near contact, in m."""
+    offset: FloatArray
+    """How far the tooling stands from where the cell file puts it, shape (3,), in m."""
+
+    @classmethod
+    def of(cls, cell: Cell) -> "CampaignSimulator":
+        """Return the truth of a cell.
+
+        Raises
+        ------
+        DeviceError, RobotError
+            If the simulator has no arm for it.
+        """
+        return cls(
+            Quasistatics.of(cell, TrueRobot.of(cell)),
+            ContactLaw.of(cell),
+            cell.file.engagement.near_contact,
+            np.array(cell.file.simulation.contact.surface_offset),
+        )
+
+    @property
+    def springs(self) -> int:
+        """Number of springs of the robot, the balancer not counted."""
+        return len(self.statics.robot.springs.stiffness)
+
+    def stiffened(self, factor: FloatArray, balancer: float = 1.0) -> "CampaignSimulator":
+        """Return the cell with another arm of the same make.
+
+        Parameters
+        ----------
+        factor : ndarray, shape (spring,)
+            On the stiffness of each spring; friction and play of a gear change with it.
+        balancer : float
+            On the rate of the balancer.
+        """
+        robot = self.statics.robot
+        springs, gears, pull = robot.springs, robot.springs.gears, robot.springs.balancer
+        own = factor[gears.which, None]
+        scaled = replace(
+            springs,
+            stiffness=springs.stiffness * factor,
+            gears=replace(gears, loss=gears.loss * own, stop_stiffness=gears.stop_stiffness * own),
+            balancer=None if pull is None else replace(pull, rate=balancer * pull.rate),
+        )
+        layout = replace(robot.layout, springs=scaled)
+        return replace(self, statics=replace(self.statics, robot=replace(robot, layout=layout)))
+
+    def settle(self, places: ContactPoses, force_tcp: FloatArray) -> TrueReadings:
+        """Return what is true at every place under every load case, in this order.
+
+        Parameters
+        ----------
+        places : ContactPoses
+            Where.
+        force_tcp : ndarray, shape (load, 3)
+            Wanted readings of the sensor, tcp frame, in N.
+
+        Raises
+        ------
+        DeviceError
+            If the arm cannot follow.
+        EquilibriumError
+            If the robot cannot carry a load.
+        """
+        T = self.statics.robot.forward(places.q)
+        near = self._free(self._along(places.q, T, self.near * places.normal), None)
+        touch, contacts = self._touch(places, T, near)
+        zero, weight = self._sensor(near), self.statics.weight
+        state, states = touch, []
+        for wanted in force_tcp:
+            # The controller has zeroed the sensor near contact; the arm turns it under load.
+            held = self.statics.robot.T_tcp_sensor[:3, :3].T @ self.law.held(wanted)
+            state = self._press(state, touch, contacts, held + weight @ zero)
+            states.append(state)
+        return self._settled(near, touch, states)
+
+    def _press(
+        self, start: _States, touch: _States, contacts: list[Contact], reading: FloatArray
+    ) -> _States:
+        """Return the robot where the sensor reads a force, shape (place, 3), sensor frame.
+
+        See `ways.pressed`.
+        """
+        statics, weight = self.statics, self.statics.weight
+        q, reached = start.q, start
+        for _ in range(_ROUNDS):
+            force = _turn(self._sensor(reached), reading) - weight
+            rest = statics.robot.rest(q, force, start.rest.springs, reached.rest.theta)
+            sag = statics.twist(q, rest)
+            twist = sag - statics.compensation * touch.sag
+            reached = _States(q, twist, rest, sag, force)
+            goal = [c.tool_position(f) for c, f in zip(contacts, force, strict=True)]
+            missed = np.array(goal) - self._tool(reached)
+            if np.linalg.norm(missed, axis=1).max() < CLOSED:
+                break
+            q = self._along(q, statics.robot.forward(q), missed)
+        return reached
+
+    def _touch(
+        self, places: ContactPoses, T: FloatArray, near: _States
+    ) -> tuple[_States, list[Contact]]:
+        """Return the robot touching the tooling without force; see `ways.touching`."""
+        beside = self._tool(near) - (T[:, :3, 3] + self.offset)
+        height = np.sum(beside * places.normal, axis=1, keepdims=True)
+        anchor = self._tool(near) - height * places.normal
+        reached = near
+        for _ in range(_ROUNDS):
+            missed = anchor - self._tool(reached)
+            if np.linalg.norm(missed, axis=1).max() < CLOSED:
+                break
+            forward = self.statics.robot.forward(reached.q)
+            reached = self._free(self._along(reached.q, forward, missed), reached.rest.theta)
+        each = zip(anchor, T[:, :3, :3], places.normal, reached.q, strict=True)
+        return reached, [Contact(self.law, *parts) for parts in each]
+
+    def _free(self, q: FloatArray, start: FloatArray | None) -> _States:
+        """Return the robot free of contact, its gears relaxed; see `Quasistatics.free`."""
+        nothing = np.zeros((len(q), 3))
+        rest = self.statics.robot.rest(q, nothing, self.statics.robot.springs, start)
+        sag = self.statics.twist(q, rest)
+        return _States(q, (1.0 - self.statics.compensation) * sag, rest, sag, nothing)
+
+    def _along(self, q: FloatArray, T: FloatArray, way: FloatArray) -> FloatArray:
+        """Return joints that move the undeformed tool from T by a way, orientation kept."""
+        layout, goal = self.statics.robot.layout, T.copy()
+        goal[:, :3, 3] += way
+        found = solve_inverse(layout.linkage, goal, q, tolerance=1e-10, locked=layout.external)
+        if not found.ok.all():
+            place = int(np.flatnonzero(~found.ok)[0])
+            raise DeviceError(
+                f"the arm cannot follow to {np.round(goal[place, :3, 3], 4).tolist()} m:"
+                " a singularity or the end of its solve_inverse"
+            )
+        return found.q
+
+    def _tool(self, state: _States) -> FloatArray:
+        """Return where the tool centre points truly are, in base, shape (place, 3), in m."""
+        at: FloatArray = self.statics.robot.forward(state.q)[:, :3, 3] + state.twist[:, :3]
+        return at
+
+    def _sensor(self, state: _States) -> FloatArray:
+        """Return the true orientations of the sensor, shape (place, 3, 3)."""
+        nominal = self.statics.robot.forward(state.q)[:, :3, :3]
+        nominal = nominal @ self.statics.robot.T_tcp_sensor[:3, :3]
+        turned: FloatArray = Rotation.from_rotvec(state.twist[:, 6:]).as_matrix() @ nominal
+        return turned
+
+    def _markers(self, state: _States) -> tuple[FloatArray, FloatArray]:
+        """Return the marker by the controller and where it truly is, each (place, 3), in m."""
+        T = self.statics.robot.forward(state.q)
+        lever = T[:, :3, :3] @ self.statics.marker_tcp
+        turned = Rotation.from_rotvec(state.twist[:, 3:6]).apply(lever)
+        return T[:, :3, 3] + lever, T[:, :3, 3] + state.twist[:, :3] + turned
+
+    def _settled(self, near: _States, touch: _States, states: list[_States]) -> TrueReadings:
+        weight, statics = self.statics.weight, self.statics
+        unloaded, markers = self._markers(near), [self._markers(state) for state in states]
+        tare = weight @ self._sensor(near)
+        felt = [_turn_back(self._sensor(state), state.force + weight) - tare for state in states]
+        R = statics.robot.forward(near.q)[:, :3, :3] @ statics.robot.T_tcp_sensor[:3, :3]
+        return TrueReadings(
+            q=_stack([state.q for state in states]),
+            force=_stack([state.force for state in states]),
+            deflection=_stack([state.twist[:, :3] - touch.twist[:, :3] for state in states]),
+            controller_displacement=_stack([each[0] - unloaded[0] for each in markers]),
+            marker_displacement=_stack([each[1] - unloaded[1] for each in markers]),
+            marker=unloaded[1],
+            felt=_stack(felt),
+            R_base_sensor=R,
+        )
+
+
+def _stack(parts: list[FloatArray]) -> FloatArray:
+    return np.stack(parts, axis=1)
+
+
+def _turn(R: FloatArray, vectors: FloatArray) -> FloatArray:
+    """Return ``R v`` of each place."""
+    turned: FloatArray = np.einsum("pij,pj->pi", R, vectors)
+    return turned
+
+
+def _turn_back(R: FloatArray, vectors: FloatArray) -> FloatArray:
+    """Return ``R^T v`` of each place."""
+    turned: FloatArray = np.einsum("pji,pj->pi", R, vectors)
+    return turned

@@ -1,0 +1,205 @@
+"""The simulated cell at work: a robot that bends under process forces, and what its sensor reads.
+
+Assumptions, beside those of `elastocal.sim.workcell.quasistatics`:
+
+* the robot is at rest at every instant: the forces that it follows change within tenths of a
+  second, its first mode lies above 8 Hz;
+* a ripple at hundreds of Hz reaches the sensor whole and moves the arm not at all: at 200 Hz an
+  arm with a mode at 10 Hz moves (10/200)² = 0.25 % of what it would at rest;
+* what counts is how far a path under force lies from the same path run in the air, as a tracker
+  on the tool measures it: sag under weight is in both;
+* the controller takes out a part of the sag as it was where the course began;
+* the path as a whole is off by the error of one stop, drawn anew for every course.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from elastocal.arrays import FloatArray
+from elastocal.cell import Cell
+from elastocal.cell.devices import Devices
+from elastocal.sim.workcell.controller import SimulatedArm
+from elastocal.sim.workcell.force_control import ForceControl
+from elastocal.sim.workcell.instruments import (
+    SimulatedForceSensor,
+    SimulatedTracker,
+    force_gain,
+    sensor_matrix,
+    sensor_range,
+    sensor_zero,
+)
+from elastocal.sim.workcell.plant import Plant
+from elastocal.sim.workcell.quasistatics import RobotState
+from elastocal.sim.workcell.sampling import generator
+from elastocal.sim.workcell.timeline import SimClock
+
+
+@dataclass(frozen=True, eq=False)
+class SimulatedCell:
+    """Devices, and the truth behind them for those who may know it: tests."""
+
+    devices: Devices
+    plant: Plant
+    arm: SimulatedArm
+    sensor: SimulatedForceSensor
+    tracker: SimulatedTracker
+
+    @classmethod
+    def of(cls, cell: Cell, seed: int, start: float = 0.0) -> "SimulatedCell":
+        """Return a simulated cell; see `simulated_devices`."""
+        sensor_range(cell)  # a cell without sensor is refused before the long work
+        clock = SimClock(start)
+        plant = Plant(cell, seed, clock)
+        arm = SimulatedArm(plant, ForceControl(plant, force_gain(cell, seed)))
+        sensor, tracker = SimulatedForceSensor(plant), SimulatedTracker(plant)
+        plant.instruments = [sensor, tracker]
+        return cls(Devices(arm, sensor, tracker, clock), plant, arm, sensor, tracker)
+
+
+def simulated_devices(cell: Cell, seed: int, start: float = 0.0) -> Devices:
+    """Return arm, force sensor, tracker and clock of a simulated cell.
+
+    Parameters
+    ----------
+    cell : Cell
+        The cell; its sections ``simulation`` and ``faults`` say what is hidden in it.
+    seed : int
+        Of everything random.
+    start : float
+        What the clock shows at the beginning, in s.
+
+    Raises
+    ------
+    DeviceError
+        If the cell has no sensor or no tracker, or its robot fewer than six joints.
+    FileAccessError
+        If the mesh of the surface cannot be read.
+    """
+    return SimulatedCell.of(cell, seed, start).devices
+
+
+@dataclass(frozen=True, eq=False)
+class ProcessState:
+    """The robot under a process force."""
+
+    shift: FloatArray
+    """How far the tool is from where the undeformed robot would have it, in base, shape (3,), m."""
+    wrench: FloatArray
+    """True wrench at the sensor in its frame, weight in, shape (6,), in N and N·m."""
+    felt: FloatArray
+    """The part of the wrench that the process force makes, shape (6,)."""
+
+
+class _SpringTrail:
+    """Spring positions along a course: where they are likely to be next."""
+
+    def __init__(self, state: RobotState | None = None) -> None:
+        self._theta = self._before = np.zeros(0)
+        if state is not None:
+            self.went(state)
+            self._before = self._theta
+
+    def next(self) -> FloatArray:
+        """Return the positions that go on as they came; a third fewer iterations start there."""
+        ahead: FloatArray = 2.0 * self._theta - self._before
+        return ahead
+
+    def went(self, state: RobotState) -> None:
+        """Take the positions that were found."""
+        assert state.theta is not None, "they were sought"
+        self._before, self._theta = self._theta, state.theta
+
+
+class ProcessCell:
+    """The hidden truth of a cell, for a process. Its gears remember what happened since `lift`."""
+
+    def __init__(self, cell: Cell, seed: int) -> None:
+        """Take the cell of the same seed as a run of the procedure: its sensor has its faults.
+
+        Raises
+        ------
+        DeviceError
+            If the cell has no sensor or no tracker, or its robot fewer than six joints.
+        """
+        self._statics = SimulatedCell.of(cell, seed).plant.statics
+        self._entry = cell.file.simulation.sensor
+        self._repeatability = cell.file.simulation.controller.repeatability
+        self._range, self._matrix = sensor_range(cell), sensor_matrix(cell, seed)
+        self._zero = sensor_zero(cell, seed)
+        self._seed = seed
+        self._state: RobotState | None = None
+        self._pressed = self._free = _SpringTrail()
+        self._stop = np.zeros(3)
+        self._rng = generator(seed, "process", "")
+        self._slope = np.zeros(6)
+
+    def lift(self, course: str, q: FloatArray) -> None:
+        """Begin a course in the air: gears relaxed, noise, drift and stop error of its own.
+
+        Parameters
+        ----------
+        course : str
+            Name; the random numbers belong to it.
+        q : ndarray, shape (joint,)
+            In rad or m.
+        """
+        self._rng = generator(self._seed, "process", course)
+        self._stop = self._repeatability * self._rng.standard_normal(3)
+        share = self._entry.drift / 60.0 / self._range[0]
+        self._slope = share * self._range * self._rng.standard_normal(6)
+        self._state = self._statics.free(q, np.zeros(3), None)
+        self._pressed, self._free = _SpringTrail(self._state), _SpringTrail(self._state)
+
+    def free_shift(self, q: FloatArray) -> FloatArray:
+        """Return the shift of the tool in the air, shape (3,), in m.
+
+        The gears remember nothing of it. `lift` comes first.
+        """
+        assert self._state is not None, "lift comes first"
+        state = self._statics.free(q, np.zeros(3), self._free.next())
+        self._free.went(state)
+        return self._left(state.sag)[:3]
+
+    def _left(self, twist: FloatArray) -> FloatArray:
+        """Take out what the controller does of the sag, as it was where the course began."""
+        assert self._state is not None, "lift comes first"
+        left: FloatArray = twist - self._statics.compensation * self._state.sag
+        return left
+
+    def press(self, q: FloatArray, force_base: FloatArray) -> ProcessState:
+        """Go on to joints and a force on the robot.
+
+        Parameters
+        ----------
+        q : ndarray, shape (joint,)
+            In rad or m, near those before.
+        force_base : ndarray, shape (3,)
+            On the robot at the tool centre point, in base, in N.
+        """
+        assert self._state is not None, "lift comes first"
+        statics = self._statics
+        state = replace(self._state, theta=self._pressed.next())
+        state = statics.loaded(state, q, force_base, self._stop)
+        self._pressed.went(state)
+        self._state, twist = state, state.twist
+        joints, twists = (np.stack([a, a]) for a in (q, twist))
+        forces = np.stack([force_base, np.zeros(3)])
+        seen = statics.knots(np.array([0.0, 1.0]), joints, twists, forces).seen[:, 3:]
+        return ProcessState(twist[:3], seen[0], seen[0] - seen[1])
+
+    def read(self, since: FloatArray, wrench: FloatArray) -> FloatArray:
+        """Return what the sensor says: cross-talk, zero, drift, noise, end of its range.
+
+        Parameters
+        ----------
+        since : ndarray, shape (sample,)
+            Time since `lift`, in s.
+        wrench : ndarray, shape (sample, 6)
+            True, in the sensor's frame.
+        """
+        sigma = np.repeat([self._entry.force_noise, self._entry.moment_noise], 3)
+        noise = sigma * self._rng.standard_normal(wrench.shape)
+        values = wrench @ self._matrix.T + self._zero + np.outer(since, self._slope) + noise
+        clipped: FloatArray = np.clip(values, -self._range, self._range)
+        return clipped
