@@ -5,17 +5,29 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 
-.PHONY: demo test nightly docs bench house clean
+.PHONY: demo test lint units end-to-end browser docs-strict nightly docs bench house clean
 
 demo: $(VENV)/installed
 	$(BIN)/elastocal demo afp --out demo --force
 
-test: $(VENV)/installed-dev
+test: lint units end-to-end browser docs-strict
+
+lint: $(VENV)/installed-dev
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
-	$(BIN)/pytest -n auto
+
+units: $(VENV)/installed-dev
+	$(BIN)/pytest -n auto -m 'not slow and not end_to_end and not browser'
+
+end-to-end: $(VENV)/installed-dev
+	$(BIN)/pytest -n auto -m 'end_to_end and not slow and not browser' tests
+
+browser: $(VENV)/installed-dev
+	$(BIN)/pytest -n auto -m 'browser and not slow' tests
+
+docs-strict: $(VENV)/installed-dev
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet
 
 nightly: $(VENV)/installed-dev

@@ -16,8 +16,8 @@ from typing import Any, TypeVar
 
 from elastocal.errors import ElastocalError
 
-Task = TypeVar("Task")
-Result = TypeVar("Result")
+_Task = TypeVar("_Task")
+_Result = TypeVar("_Result")
 
 
 def core_count() -> int:
@@ -58,8 +58,8 @@ def process_count(
 
 
 def map_in_processes(
-    function: Callable[[Task], Result], tasks: Iterable[Task], processes: int
-) -> Iterator[Result]:
+    function: Callable[[_Task], _Result], tasks: Iterable[_Task], processes: int
+) -> Iterator[_Result]:
     """Yield the result of each task, in their order, as soon as it is known.
 
     Parameters
@@ -98,8 +98,8 @@ class ProcessPool:
             self._ready = self._run(_call, [prepare] * processes, at_once=processes, ordered=False)
 
     def map(
-        self, function: Callable[[Task], Result], tasks: Iterable[Task], *, ordered: bool = True
-    ) -> Iterator[Result]:
+        self, function: Callable[[_Task], _Result], tasks: Iterable[_Task], *, ordered: bool = True
+    ) -> Iterator[_Result]:
         """Yield the result of each task.
 
         Parameters
@@ -138,8 +138,8 @@ class ProcessPool:
 
     def _run(
         self,
-        function: Callable[[Task], Result],
-        tasks: Iterable[Task],
+        function: Callable[[_Task], _Result],
+        tasks: Iterable[_Task],
         at_once: int,
         ordered: bool,
     ) -> Any:
@@ -181,8 +181,8 @@ def process_pool(processes: int, prepare: Callable[[], object]) -> Iterator[Proc
 
 
 def map_on_cluster(
-    function: Callable[[Task], Result], tasks: Iterable[Task], client: object, patience: float
-) -> Iterator[Result]:
+    function: Callable[[_Task], _Result], tasks: Iterable[_Task], client: object, patience: float
+) -> Iterator[_Result]:
     """Yield the results of tasks as they are known, done by the workers of a Dask scheduler.
 
     Parameters
@@ -234,7 +234,7 @@ def _one_thread_each(processes: int) -> Any:
     return parallel_config("loky", n_jobs=processes, inner_max_num_threads=1)
 
 
-def _to_the_end(results: Generator[Result]) -> Iterator[Result]:
+def _to_the_end(results: Generator[_Result]) -> Iterator[_Result]:
     """Yield results; whoever does not want the rest of them is told nothing about it."""
     try:
         for result in results:  # noqa: UP028 - `yield from` would close them with complaints

@@ -1,5 +1,6 @@
 """``elastocal run`` on the simulated cell: refusals, the dry run, a whole run, kill and resume."""
 
+import importlib
 import json
 import shutil
 import signal
@@ -14,7 +15,6 @@ import pytest
 import xarray as xr
 
 from elastocal.cell import fingerprint, load_cell
-from elastocal.cli.device_sources import KINDS, SOURCES, DeviceSource
 from elastocal.errors import DatasetError, FileAccessError
 from elastocal.planning import read_plan, write_plan
 from elastocal.procedure import (
@@ -26,6 +26,7 @@ from elastocal.procedure import (
     refuse_foreign_files,
 )
 from elastocal.procedure.record import read_commits
+from elastocal.workflows import KINDS, SOURCES, DeviceSource
 from support.cli import elastocal
 from support.run_cells import PlannedCell, planned_cell
 
@@ -220,7 +221,8 @@ def test_a_run_whose_readings_cannot_be_derived_still_says_how_it_ended(
     def fails(_):
         raise DatasetError("no usable reading among 8")
 
-    monkeypatch.setattr("elastocal.cli.run_session.derive_run", fails)
+    module = importlib.import_module("elastocal.workflows.run")  # its face has the function
+    monkeypatch.setattr(module, "derive_run", fails)
     result = run(planned, tmp_path / "run", "--json")
     assert result.code == 1
     figures = json.loads(result.out)

@@ -1,7 +1,7 @@
 import pytest
 
 from elastocal.dataset import SCHEMA
-from elastocal.dataset.layout import canonical_attributes
+from elastocal.dataset._layout import canonical_attributes
 from elastocal.errors import DatasetError, SchemaError
 
 

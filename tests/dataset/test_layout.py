@@ -1,6 +1,6 @@
 import pytest
 
-from elastocal.dataset.layout import VARIABLES, joint_name_problem
+from elastocal.dataset._layout import VARIABLES, joint_name_problem
 
 
 @pytest.mark.parametrize("name", ["joint_1", "a1", "E1", "joint a é", "rail", "axis_x"])

@@ -164,7 +164,7 @@ def test_a_failed_write_leaves_the_old_file(tmp_path, monkeypatch):
     def fail(*_, **__):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(xr.Dataset, "to_netcdf", fail)
+    monkeypatch.setattr("h5netcdf.File.create_variable", fail)
     with pytest.raises(KeyboardInterrupt):
         write_pool(tmp_path, plans.pool())
     assert path.read_bytes() == before

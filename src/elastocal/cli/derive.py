@@ -5,6 +5,8 @@ from typing import Annotated
 
 import typer
 
+from elastocal import workflows
+
 
 def derive(
     run: Annotated[Path, typer.Argument(help="Folder of a run.")],
@@ -15,16 +17,13 @@ def derive(
 ) -> None:
     """Derive dataset.nc and summary.json of a run again from its raw streams."""
     from elastocal.cli.output import console, print_json
-    from elastocal.procedure import RunFolder, derive_run as derive_run, write_derived
 
-    derived = derive_run(run)
-    write_derived(run, derived)
+    result = workflows.derive(run)
     if as_json:
-        print_json(derived.summary)
+        print_json(result.summary)
         return
-    out, folder, summary = console(), RunFolder(run), derived.summary
-    counts = ", ".join(f"{n} {status}" for status, n in summary["readings"]["counts"].items() if n)
-    out.print(f"{len(derived.dataset.poses)} poses, readings: {counts}")
-    for warning in summary["warnings"]:
+    out, folder = console(), result.folder
+    out.print(f"{len(result.dataset.poses)} poses, readings: {result.counts()}")
+    for warning in result.summary["warnings"]:
         out.print(f"warning: {warning}", markup=False, soft_wrap=True)
     out.print(f"wrote {folder.dataset} and {folder.summary.name}", markup=False, soft_wrap=True)

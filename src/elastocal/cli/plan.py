@@ -5,6 +5,8 @@ from typing import Annotated
 
 import typer
 
+from elastocal import workflows
+
 
 def plan(
     cell: Annotated[Path, typer.Argument(help="Cell file, .yaml.")],
@@ -29,23 +31,15 @@ def plan(
     ] = False,
 ) -> None:
     """Choose calibration poses on the tooling, check them, and put them in order."""
-    from elastocal.cell import load_cell
     from elastocal.cli.output import console, print_json
-    from elastocal.cli.plan_folder import write_plan_folder
-    from elastocal.cli.plan_table import key_figures, show_plan
+    from elastocal.cli.plan_table import show_plan
     from elastocal.cli.progress import progress_bars
-    from elastocal.files import filling
-    from elastocal.planning import PLAN, make_plan
-    from elastocal.planning.export import check_name
 
-    check_name(program)
-    loaded = load_cell(cell)
-    if compare is None:
-        compare = "cover" if loaded.file.search.technique != "cover" else "ioops"
-    with filling(out, PLAN, force) as folder, progress_bars(console()) as report:
-        planned = make_plan(loaded, None if compare == "none" else compare, jobs, report)
-        names = write_plan_folder(folder, loaded, planned, program)
+    settings = workflows.PlanSettings(cell, out, compare, program, jobs, force)
+    with progress_bars(console()) as progress:
+        found = workflows.plan(settings, progress)
+    figures = workflows.plan_figures(found, out, program)
     if as_json:
-        print_json({"folder": str(out), "files": names, **key_figures(planned.plan)})
+        print_json(figures)
     else:
-        show_plan(console(), planned.plan, out, names)
+        show_plan(console(), found, figures)

@@ -1,39 +1,15 @@
 """What ``elastocal plan`` tells: the poses, how they lie, and what refused the others."""
 
 import math
-from pathlib import Path
-from typing import Any
 
 from rich.console import Console
 from rich.table import Table
 
 from elastocal.planning import PlanResult, SpreadRecord
-from elastocal.records import to_data
+from elastocal.workflows import PlanFigures
 
 
-def key_figures(plan: PlanResult) -> dict[str, Any]:
-    """Return the figures of ``plan --json``, in SI units."""
-    search = plan.search
-    return {
-        "cell": plan.cell.name,
-        "poses": len(plan.poses),
-        "technique": search.name,
-        "spread": to_data(search.spread),
-        "d_max": search.d_max,
-        "covered": search.covered,
-        "comparison": plan.comparison
-        and {"technique": plan.comparison.name, "spread": to_data(plan.comparison.spread)},
-        "pool": plan.pool.valid,
-        "sampled": plan.pool.sampled,
-        "refused": {check.name: check.refused for check in plan.pool.checks},
-        "bottleneck": plan.pool.bottleneck,
-        "stations": _stations(plan),
-        "time": {"travel": plan.travel_time, "total": plan.total_time},
-        "findings": list(plan.findings),
-    }
-
-
-def show_plan(console: Console, plan: PlanResult, folder: Path, names: list[str]) -> None:
+def show_plan(console: Console, plan: PlanResult, figures: PlanFigures) -> None:
     """Print the plan for a person."""
     search, pool = plan.search, plan.pool
     console.print(
@@ -44,13 +20,13 @@ def show_plan(console: Console, plan: PlanResult, folder: Path, names: list[str]
     )
     console.print(_spread_table(plan))
     console.print(_check_table(plan))
-    stations = _stations(plan)
-    if stations:
-        seen = ", ".join(f"{name} {count}" for name, count in stations.items())
+    if figures.stations:
+        seen = ", ".join(f"{name} {count}" for name, count in figures.stations.items())
         console.print(f"marker seen by: {seen}", markup=False)
     for finding in plan.findings:
         console.print(f"note: {finding}", markup=False, soft_wrap=True)
-    console.print(f"written to {folder}: {', '.join(names)}", markup=False, soft_wrap=True)
+    written = ", ".join(figures.files)
+    console.print(f"written to {figures.folder}: {written}", markup=False, soft_wrap=True)
 
 
 def _spread_table(plan: PlanResult) -> Table:
@@ -98,11 +74,6 @@ def _with_unit(margin: float, unit: str | None) -> str:
     if unit == "rad":
         return f"{math.degrees(margin):.1f} deg"
     return f"{margin:.3f}" if unit in (None, "1") else f"{margin:.1f} {unit}"
-
-
-def _stations(plan: PlanResult) -> dict[str, int]:
-    names = [pose.seen_by for pose in plan.poses if pose.seen_by is not None]
-    return {name: names.count(name) for name in sorted(set(names))}
 
 
 def _minutes(seconds: float) -> str:

@@ -5,6 +5,8 @@ from typing import Annotated
 
 import typer
 
+from elastocal import workflows
+
 
 def run(
     cell: Annotated[Path, typer.Argument(help="Cell file, .yaml.")],
@@ -28,24 +30,27 @@ def run(
     ] = False,
 ) -> None:
     """Press on the tooling at every pose of a plan and record what happens."""
+    from elastocal.cli.operator import TerminalOperator
     from elastocal.cli.output import console, print_json
-    from elastocal.cli.run_session import Asked, prepare, run_session
-    from elastocal.cli.run_table import dry_figures, figures, show_itinerary, show_result
+    from elastocal.cli.run_table import dry_figures, show_itinerary, show_result
     from elastocal.procedure import RunEnd
 
-    job = prepare(cell, plan, out, seed)
+    settings = workflows.RunSettings(
+        cell, plan, out, resume, yes, seed, TerminalOperator(console())
+    )
     if dry_run:
+        rehearsed = workflows.dry_run(settings)
         if as_json:
-            print_json(dry_figures(job))
+            print_json(dry_figures(rehearsed))
         else:
-            show_itinerary(console(), job)
+            show_itinerary(console(), rehearsed)
         return
-    finished = run_session(job, Asked(resume=resume, yes=yes), console())
-    if as_json and finished.result.end is RunEnd.DONE:
-        print_json(figures(job, finished))
+    finished = workflows.run(settings)
+    if as_json and finished.end is RunEnd.DONE:
+        print_json(finished.figures)
     else:
-        show_result(console(), job, finished)
+        show_result(console(), finished)
     if finished.problem is not None:
         raise finished.problem
-    if finished.result.end is RunEnd.INTERRUPTED:
+    if finished.end is RunEnd.INTERRUPTED:
         raise typer.Exit(130)

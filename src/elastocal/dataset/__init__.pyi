@@ -1,5 +1,5 @@
+from ._layout import SCHEMA as SCHEMA, STATUSES as STATUSES
 from .dataset import Dataset as Dataset
-from .layout import SCHEMA as SCHEMA, STATUSES as STATUSES
 from .load_rows import (
     LoadRows as LoadRows,
     joint_dimensions as joint_dimensions,
@@ -7,6 +7,5 @@ from .load_rows import (
     write_load_rows as write_load_rows,
 )
 from .merging import merge as merge
-from .netcdf import read_stated as read_stated, write_netcdf as write_netcdf
 from .readings import Readings as Readings, without as without
 from .store import read as read, write as write

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from elastocal.dataset.layout import (
+from elastocal.dataset._layout import (
     OK,
     SCHEMA,
     VARIABLE_NAMES,
@@ -20,9 +20,9 @@ from elastocal.dataset.layout import (
     read_point,
     write_point,
 )
+from elastocal.dataset._structure import assemble, canonical, check_labels, check_shapes, labelled
+from elastocal.dataset._validation import check_numbers, check_plausible
 from elastocal.dataset.readings import Readings
-from elastocal.dataset.structure import assemble, canonical, check_labels, check_shapes, labelled
-from elastocal.dataset.validation import check_numbers, check_plausible
 from elastocal.errors import DatasetError, nearest
 from elastocal.records import LabelledArray, LabelledArrays
 

@@ -7,13 +7,13 @@ from typing import Any
 
 import numpy as np
 
+from elastocal.dataset._layout import MISSING, FloatArray
 from elastocal.dataset.dataset import Dataset
-from elastocal.dataset.layout import MISSING, FloatArray
 from elastocal.errors import DatasetError
 
 _SAME_ATTRIBUTES = ("robot_name", "robot_urdf", "tcp_frame")
 
-SAME_MARKER = 1e-3
+_SAME_MARKER = 1e-3
 """Markers that are estimated closer to one another are the same, in m: the displacements of a
 tool that turns by 1 mrad under load then differ by 1 µm."""
 
@@ -106,7 +106,7 @@ def _check_marker(first: Dataset, other: Dataset, index: int) -> None:
     here, there = first.marker, other.marker
     if here is None and there is None:
         return
-    if here is None or there is None or not math.dist(here, there) <= SAME_MARKER:
+    if here is None or there is None or not math.dist(here, there) <= _SAME_MARKER:
         raise DatasetError(
             f"datasets 0 and {index} have different markers: attribute 'marker' is"
             f" {_short(first.attributes.get('marker'))} in one and"

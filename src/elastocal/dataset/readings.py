@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from elastocal.dataset.layout import FloatArray, IntArray, StringArray, freeze
+from elastocal.dataset._layout import FloatArray, IntArray, StringArray, freeze
 from elastocal.errors import DatasetError, nearest
 
 _LARGEST = 1e9

@@ -3,9 +3,9 @@
 from collections.abc import Callable
 from pathlib import Path
 
+from elastocal.dataset._table import read_table, write_table
+from elastocal.dataset._validation import check_plausible
 from elastocal.dataset.dataset import Dataset
-from elastocal.dataset.table import read_table, write_table
-from elastocal.dataset.validation import check_plausible
 from elastocal.errors import DatasetError, SchemaError
 from elastocal.records import LabelledArrays, read_arrays, write_arrays
 

@@ -4,17 +4,15 @@ NetCDF4, all in SI units; any tool that reads NetCDF opens it. What became of ea
 a flag variable (CF conventions, section 3.5).
 """
 
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated
 
 import numpy as np
-import xarray as xr
 
 from elastocal.arrays import FloatArray, IndexArray
-from elastocal.dataset import read_stated, write_netcdf
 from elastocal.errors import PlanningError, SchemaError
 from elastocal.planning.plan_result import POOL, PlanResult
+from elastocal.records import Variable, read_netcdf, record, variables_of, write_netcdf
 
 SCHEMA = "elastocal.pool/1"
 NOT_CHOSEN = -1
@@ -22,26 +20,11 @@ NOT_CHOSEN = -1
 HAS_POSTURE = -1
 """``refused_by`` of a sampled point that became a candidate."""
 
-_ARRAYS: dict[str, tuple[tuple[str, ...], type, str | None, str]] = {
-    "contact": (("candidate", "axis"), float, "m", "contact point in base"),
-    "normal": (("candidate", "axis"), float, "1", "outward unit normal of the surface in base"),
-    "T_base_tcp": (("candidate", "row", "column"), float, None, "tcp frame in base, lengths in m"),
-    "q": (("candidate", "joint"), float, None, "joint positions in contact, in rad or m"),
-    "q_approach": (("candidate", "joint"), float, None, "joint positions off the surface"),
-    "branch": (("candidate",), int, None, "branch of the inverse kinematics"),
-    "margin": (("check", "candidate"), float, None, "distance from refusal, in check_units"),
-    "boundary_distance": (("candidate",), float, "m", "distance from the edge of the surface"),
-    "pose_id": (("candidate",), int, None, "pose of the plan; -1: not chosen"),
-    "point": (("candidate",), int, None, "number of the sampled point"),
-    "sampled": (("point_number", "axis"), float, "m", "every point that was tried, in base"),
-    "refused_by": (("point_number",), int, None, "what left the point without a posture"),
-}
-"""Dimensions, type, unit and meaning of each array; the file's names are the fields' names."""
-_LABELS = {"joint_names": "joint", "check_names": "check", "check_units": "check"}
+_INDICES = ("branch", "pose_id", "point", "refused_by")
 _NAMES = ("joint_names", "check_names", "check_units", "refusal_names")
 
 
-@dataclass(frozen=True, eq=False)
+@record(SCHEMA, eq=False)
 class PoolData:
     """Candidates with their postures and margins, and the points that have none.
 
@@ -53,41 +36,71 @@ class PoolData:
         If shapes contradict each other or a number points at nothing.
     """
 
-    contact: FloatArray
+    contact: Annotated[FloatArray, Variable(("candidate", "axis"), "m", "contact point in base")]
     """Contact points in base, shape (candidate, 3), in m."""
-    normal: FloatArray
+    normal: Annotated[
+        FloatArray,
+        Variable(("candidate", "axis"), "1", "outward unit normal of the surface in base"),
+    ]
     """Outward unit normals in base, shape (candidate, 3)."""
-    T_base_tcp: FloatArray
+    T_base_tcp: Annotated[
+        FloatArray,
+        Variable(("candidate", "row", "column"), meaning="tcp frame in base, lengths in m"),
+    ]
     """Contact frames, z into the surface, shape (candidate, 4, 4), in m."""
-    q: FloatArray
+    q: Annotated[
+        FloatArray,
+        Variable(("candidate", "joint"), meaning="joint positions in contact, in rad or m"),
+    ]
     """Joint positions in contact, shape (candidate, joint), in rad or m."""
-    q_approach: FloatArray
+    q_approach: Annotated[
+        FloatArray, Variable(("candidate", "joint"), meaning="joint positions off the surface")
+    ]
     """Joint positions at the approach pose, shape (candidate, joint), in rad or m."""
-    joint_names: tuple[str, ...]
-    branch: IndexArray
+    joint_names: Annotated[tuple[str, ...], Variable(("joint",))]
+    branch: Annotated[
+        IndexArray, Variable(("candidate",), meaning="branch of the inverse kinematics")
+    ]
     """Inverse kinematics branch, shape (candidate,)."""
-    margin: FloatArray
+    margin: Annotated[
+        FloatArray,
+        Variable(("check", "candidate"), meaning="distance from refusal, in check_units"),
+    ]
     """How far each check is from refusing, shape (check, candidate), in ``check_units``."""
-    check_names: tuple[str, ...]
-    check_units: tuple[str, ...]
-    boundary_distance: FloatArray
+    check_names: Annotated[tuple[str, ...], Variable(("check",))]
+    check_units: Annotated[tuple[str, ...], Variable(("check",))]
+    boundary_distance: Annotated[
+        FloatArray, Variable(("candidate",), "m", "distance from the edge of the surface")
+    ]
     """Distance from the edge of the surface, shape (candidate,), in m; inf where there is none."""
-    pose_id: IndexArray
+    pose_id: Annotated[
+        IndexArray, Variable(("candidate",), meaning="pose of the plan; -1: not chosen")
+    ]
     """Id of the pose in the plan, shape (candidate,); `NOT_CHOSEN` when it is none."""
-    point: IndexArray
+    point: Annotated[IndexArray, Variable(("candidate",), meaning="number of the sampled point")]
     """Which sampled point each candidate touches, shape (candidate,)."""
-    sampled: FloatArray
+    sampled: Annotated[
+        FloatArray, Variable(("point_number", "axis"), "m", "every point that was tried, in base")
+    ]
     """Every point that was tried, in base, shape (point, 3), in m."""
-    refused_by: IndexArray
+    refused_by: Annotated[
+        IndexArray,
+        Variable(
+            ("point_number",),
+            meaning="what left the point without a posture",
+            flags="refusal_names",
+        ),
+    ]
     """Index into ``refusal_names``, shape (point,); `HAS_POSTURE` for a candidate's point."""
     refusal_names: tuple[str, ...]
     """What can leave a point without a posture: the reach of the robot, then the checks."""
 
     def __post_init__(self) -> None:
-        for name, (_, kind, _, _) in _ARRAYS.items():
-            array = np.array(getattr(self, name), dtype=np.intp if kind is int else float)
-            array.flags.writeable = False
-            object.__setattr__(self, name, array)
+        for name in variables_of(PoolData):
+            if name not in _NAMES:
+                array = np.array(getattr(self, name), np.intp if name in _INDICES else float)
+                array.flags.writeable = False
+                object.__setattr__(self, name, array)
         for name in _NAMES:
             object.__setattr__(self, name, tuple(str(text) for text in getattr(self, name)))
         _check_shapes(self)
@@ -110,7 +123,7 @@ def write_pool(folder: Path, data: PoolData) -> Path:
         If it cannot be written.
     """
     path = Path(folder) / POOL
-    write_netcdf(_dataset_of(data), path)
+    write_netcdf(path, data)
     return path
 
 
@@ -126,11 +139,7 @@ def read_pool(folder: Path) -> PoolData:
     """
     path = Path(folder)
     path = path / POOL if path.is_dir() else path
-    found = read_stated(path, SCHEMA)
-    try:
-        return _pool_of(found)
-    except PlanningError as error:
-        raise SchemaError(f"{path}: {error}") from error
+    return read_netcdf(path, PoolData)
 
 
 def check_pool_of(plan: PlanResult, data: PoolData, what: str = POOL) -> None:
@@ -169,43 +178,6 @@ def check_pool_of(plan: PlanResult, data: PoolData, what: str = POOL) -> None:
             )
 
 
-def _dataset_of(data: PoolData) -> xr.Dataset:
-    variables: dict[str, Any] = {}
-    for name, (dims, kind, unit, meaning) in _ARRAYS.items():
-        values = getattr(data, name)
-        values = values.astype(np.int32) if kind is int else values
-        notes = {"long_name": meaning} | ({"units": unit} if unit else {})
-        # Without a fill value NaN and inf are stored as they are, and integers stay integers.
-        encoding: dict[str, Any] = {"_FillValue": None}
-        if values.size:
-            encoding |= {"zlib": True, "shuffle": True, "complevel": 4}
-        variables[name] = xr.Variable(dims, values, notes, encoding)
-    variables["refused_by"].attrs |= {
-        "flag_values": np.arange(HAS_POSTURE, len(data.refusal_names), dtype=np.int32),
-        "flag_meanings": " ".join(["none", *data.refusal_names]),
-    }
-    for name, dim in _LABELS.items():
-        variables[name] = xr.Variable(dim, np.array(getattr(data, name), dtype=np.str_))
-    return xr.Dataset(variables, attrs={"schema": SCHEMA})
-
-
-def _pool_of(found: xr.Dataset) -> PoolData:
-    """Return what a file holds; variables that are not ours are left alone."""
-    lacking = [name for name in (*_ARRAYS, *_LABELS) if name not in found.variables]
-    if lacking:
-        raise PlanningError(f"variable {lacking[0]!r} is missing")
-    for name, (dims, _, _, _) in _ARRAYS.items():
-        if found[name].dims != dims:
-            raise PlanningError(f"{name} has dimensions {found[name].dims}, not {dims}")
-    meanings = str(found["refused_by"].attrs.get("flag_meanings", "")).split()
-    contents: dict[str, Any] = {name: found[name].values for name in _ARRAYS}
-    contents |= {name: tuple(found[name].values.tolist()) for name in _LABELS}
-    try:
-        return PoolData(**contents, refusal_names=tuple(meanings[1:]))
-    except (TypeError, ValueError) as error:
-        raise PlanningError(" ".join(str(error).split())) from error
-
-
 def _check_shapes(data: PoolData) -> None:
     """Refuse an array that does not have the size of its dimensions."""
     sizes = {
@@ -217,9 +189,10 @@ def _check_shapes(data: PoolData) -> None:
         "check": len(data.check_names),
         "point_number": len(data.sampled),
     }
-    for name, (dims, _, _, _) in _ARRAYS.items():
-        shape, wanted = getattr(data, name).shape, tuple(sizes[dim] for dim in dims)
-        if shape != wanted:
+    for name, variable in variables_of(PoolData).items():
+        dims, wanted = variable.dims, tuple(sizes[dim] for dim in variable.dims)
+        if name not in _NAMES and getattr(data, name).shape != wanted:
+            shape = getattr(data, name).shape
             raise PlanningError(f"{name} of the pool has shape {shape}, not {wanted} {dims}")
     if len(data.check_units) != len(data.check_names):
         raise PlanningError(

@@ -12,7 +12,7 @@ from elastocal.planning.plan_result import Joints, PlanResult, PoseRecord
 from elastocal.robot import Robot, xyzabc_from_T
 from elastocal.units import factor
 
-_TABLE = "plan.csv"
+PLAN_TABLE = "plan.csv"
 """Name of the table in its folder."""
 
 _SHOWN = {"rad": ("deg", "angle", 6), "m": ("mm", "length", 4)}
@@ -42,7 +42,7 @@ def write_table(folder: Path, plan: PlanResult) -> Path:
     writer = csv.DictWriter(buffer, list(dict.fromkeys(key for row in rows for key in row)))
     writer.writeheader()
     writer.writerows(rows)
-    path = Path(folder) / _TABLE
+    path = Path(folder) / PLAN_TABLE
     write_text(path, buffer.getvalue().replace("\r\n", "\n"))
     return path
 

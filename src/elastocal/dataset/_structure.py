@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from elastocal.dataset.layout import (
+from elastocal.dataset._layout import (
     AXES,
     COORDINATES,
     JOINT_POSITION,

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from elastocal.dataset.layout import (
+from elastocal.dataset._layout import (
     AXES,
     JOINT_POSITION,
     STATUSES,

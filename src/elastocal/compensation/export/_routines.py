@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 
-from elastocal.compensation.export.comments import remark
+from elastocal.compensation.export._constants import remark
 from elastocal.compensation.kernel import (
     Assignment,
     Call,

@@ -1,5 +1,6 @@
 """The constants of the C file: in one list, so that the self-test can sum them up."""
 
+import string
 import struct
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -8,7 +9,6 @@ from textwrap import wrap
 import numpy as np
 
 from elastocal.arrays import FloatArray
-from elastocal.compensation.export.comments import remark
 from elastocal.compensation.online import JOINT_RANGE, LONG_AGO, Design
 
 _FNV_START, _FNV_PRIME = 14695981039346656037, 1099511628211
@@ -175,3 +175,15 @@ def _compensation(numbers: Design) -> list[Constant]:
         _one("HOLD_CYCLES", settings.hold_cycles, whole=True),
         _one("TOLERANCE", 1e-10, "of the self-test, relative"),
     ]
+
+
+_ALLOWED = set(string.ascii_letters + string.digits + " .,:;_-+()[]#'=<>%^/!")
+
+
+def remark(text: str) -> str:
+    """Return a text that cannot end a C comment or continue its line.
+
+    >>> remark("arm */ int x;")
+    'arm  / int x;'
+    """
+    return "".join(character if character in _ALLOWED else " " for character in text)

@@ -1,0 +1,67 @@
+"""``derive``: from a run's journal and raw streams to its dataset, again."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+from elastocal.dataset import Dataset
+from elastocal.procedure import RunFolder, derive_run, write_derived
+from elastocal.progress import Progress
+from elastocal.results import Result
+from elastocal.workflows._workflow import workflow
+
+
+@dataclass(frozen=True)
+class DeriveSettings:
+    """Which run to derive."""
+
+    run: str | PathLike[str]
+    """Folder of the run; dataset and summary in it are replaced."""
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class DeriveResult(Result):
+    """What the raw streams of a run say."""
+
+    folder: RunFolder
+    dataset: Dataset
+    summary: Mapping[str, Any]
+
+    def facts(self) -> tuple[tuple[str, str], ...]:
+        """Return what a person wants to know first."""
+        return (
+            ("poses", str(len(self.dataset.poses))),
+            ("readings", self.counts()),
+            *(("warning", text) for text in self.summary["warnings"]),
+        )
+
+    def counts(self) -> str:
+        """Return the number of readings of each status, as a phrase."""
+        counts = self.summary["readings"]["counts"]
+        return ", ".join(f"{number} {status}" for status, number in counts.items() if number)
+
+
+@workflow(DeriveSettings)
+def derive(settings: DeriveSettings, progress: Progress) -> DeriveResult:  # noqa: ARG001 - an instant
+    """Derive ``dataset.nc`` and ``summary.json`` of a run again from its raw streams.
+
+    Parameters
+    ----------
+    settings : DeriveSettings
+        Or its ``run``.
+    progress : Progress, optional
+        Hears how far the work is.
+
+    Raises
+    ------
+    ElastocalError
+        If the folder holds no run, or its streams cannot be derived.
+    FileAccessError
+        If a file cannot be read or written.
+    """
+    folder = RunFolder(Path(settings.run))
+    derived = derive_run(folder.path)
+    write_derived(folder.path, derived)
+    return DeriveResult(folder, derived.dataset, derived.summary)

@@ -1,0 +1,157 @@
+"""``plan``: from a cell to an ordered, checked, executable set of poses, with its files."""
+
+from dataclasses import dataclass
+from os import PathLike
+from pathlib import Path
+
+from elastocal.cell import Cell, load_cell
+from elastocal.files import filling
+from elastocal.planning import (
+    PLAN,
+    POOL,
+    PlanAndPool,
+    PlanResult,
+    SpreadRecord,
+    make_plan,
+    write_plan,
+    write_pool,
+)
+from elastocal.planning.export import PLAN_TABLE, check_name, takes_krl, write_krl, write_table
+from elastocal.progress import Progress
+from elastocal.records import record
+from elastocal.report import write_plan_figure, write_plan_page
+from elastocal.workflows._workflow import workflow
+
+__all__ = ["PlanFigures", "PlanResult", "PlanSettings", "plan", "plan_figures"]
+
+_PAGE, _FIGURE = "plan.html", "plan.svg"
+
+
+@dataclass(frozen=True)
+class PlanSettings:
+    """Which cell to plan, and where the files go."""
+
+    cell: str | PathLike[str]
+    """Cell file, ``.yaml``."""
+    out: str | PathLike[str]
+    """Folder to write the plan into."""
+    compare: str | None = None
+    """Search technique to lay beside the cell's, or ``none``; by default ``ioops`` beside
+    ``cover``, else ``cover``."""
+    program: str = "calib"
+    """Name of the KRL program."""
+    jobs: int | None = None
+    """Processes for large pools; by default all cores."""
+    force: bool = False
+    """Replace the files of a plan that is there."""
+
+
+@record()
+class ComparedSpread:
+    """Another technique, and how its choice lies in the pool."""
+
+    technique: str
+    spread: SpreadRecord
+
+
+@record()
+class PlanTimes:
+    """Estimated times in s."""
+
+    travel: float
+    total: float
+
+
+@record()
+class PlanFigures:
+    """The key figures of ``plan --json``."""
+
+    folder: str
+    files: tuple[str, ...]
+    cell: str
+    poses: int
+    technique: str
+    spread: SpreadRecord
+    d_max: float | None
+    covered: bool | None
+    comparison: ComparedSpread | None
+    pool: int
+    """Valid candidates."""
+    sampled: int
+    refused: dict[str, int]
+    """How many points each check refused."""
+    bottleneck: str | None
+    stations: dict[str, int]
+    """How many poses each tracker station sees."""
+    time: PlanTimes
+    findings: tuple[str, ...]
+
+
+@workflow(PlanSettings)
+def plan(settings: PlanSettings, progress: Progress) -> PlanResult:
+    """Choose calibration poses on the tooling, check them, and put them in order.
+
+    Parameters
+    ----------
+    settings : PlanSettings
+        Or its ``cell``, and the other fields by name.
+    progress : Progress, optional
+        Hears how far the work is.
+
+    Raises
+    ------
+    PlanningError
+        If no plan can be made of this cell, or the program's name is none that a controller takes.
+    FileAccessError
+        If a file cannot be read or written, or the folder holds files.
+    """
+    check_name(settings.program)
+    cell = load_cell(Path(settings.cell))
+    compare = settings.compare
+    if compare is None:
+        compare = "cover" if cell.file.search.technique != "cover" else "ioops"
+    with filling(Path(settings.out), PLAN, settings.force) as folder:
+        planned = make_plan(cell, None if compare == "none" else compare, settings.jobs, progress)
+        _write_folder(folder, cell, planned, settings.program)
+    return planned.plan
+
+
+def plan_figures(found: PlanResult, folder: Path, program: str) -> PlanFigures:
+    """Return the key figures of a plan that was written into a folder."""
+    search, other = found.search, found.comparison
+    names = (PLAN, POOL, PLAN_TABLE, f"{program}.src", f"{program}.dat", _PAGE, _FIGURE)
+    return PlanFigures(
+        folder=str(folder),
+        files=tuple(name for name in names if (folder / name).is_file()),
+        cell=found.cell.name,
+        poses=len(found.poses),
+        technique=search.name,
+        spread=search.spread,
+        d_max=search.d_max,
+        covered=search.covered,
+        comparison=None if other is None else ComparedSpread(other.name, other.spread),
+        pool=found.pool.valid,
+        sampled=found.pool.sampled,
+        refused={check.name: check.refused for check in found.pool.checks},
+        bottleneck=found.pool.bottleneck,
+        stations=_stations(found),
+        time=PlanTimes(found.travel_time, found.total_time),
+        findings=found.findings,
+    )
+
+
+def _stations(found: PlanResult) -> dict[str, int]:
+    names = [pose.seen_by for pose in found.poses if pose.seen_by is not None]
+    return {name: names.count(name) for name in sorted(set(names))}
+
+
+def _write_folder(folder: Path, cell: Cell, planned: PlanAndPool, program: str) -> None:
+    """Write every file of a plan; no KRL program for an arm whose axes KRL cannot name."""
+    found, pool, surface = planned.plan, planned.pool, planned.surface
+    write_plan(folder, found)
+    write_pool(folder, pool)
+    write_table(folder, found)
+    if takes_krl(cell.robot):
+        write_krl(folder, found, program)
+    write_plan_page(folder / _PAGE, cell, surface, found, pool)
+    write_plan_figure(folder / _FIGURE, surface, found, pool)

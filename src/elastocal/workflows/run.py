@@ -1,0 +1,359 @@
+"""``run``: Procedure 1 on the devices that a cell names, journaled, derived when it is done.
+
+Nothing moves before cell, plan, folder and devices have been found to fit together, and nothing
+that a person must look at first moves before the operator has agreed.
+"""
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from datetime import UTC, datetime
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+from elastocal.cell import Cell, load_cell
+from elastocal.cell.devices import Devices
+from elastocal.errors import ElastocalError, ProcedureError
+from elastocal.files import read_text
+from elastocal.planning import PLAN, PlanResult, read_plan
+from elastocal.procedure import (
+    Entry,
+    Event,
+    Journal,
+    LastKnown,
+    PoseLog,
+    PoseRecorder,
+    Progress as RunProgress,
+    RunEnd,
+    RunFolder,
+    Runner,
+    RunRecord,
+    RunSettings as SessionSettings,
+    Session,
+    SessionHooks,
+    SessionResult,
+    cell_path_in_run,
+    check_compatible,
+    check_same_run,
+    check_same_settings,
+    commits,
+    derive_run,
+    fill_folder,
+    home_route,
+    itinerary,
+    last_known,
+    make_folder,
+    read_copies,
+    read_journal,
+    refuse_foreign_files,
+    registration_warnings,
+    run_record,
+    run_settings,
+    write_derived,
+)
+from elastocal.procedure.run import PlannedStep
+from elastocal.progress import Progress
+from elastocal.records import record
+from elastocal.results import Result
+from elastocal.workflows._device_sources import DeviceSource, device_source
+from elastocal.workflows._operator import Operator, Unattended
+from elastocal.workflows._workflow import workflow
+
+POSES_MEASURED = "poses measured"
+"""The stage that a run reports to its progress."""
+
+
+@dataclass(frozen=True)
+class RunSettings:
+    """Which cell carries out which plan, and who watches."""
+
+    cell: str | PathLike[str]
+    """Cell file, ``.yaml``."""
+    plan: str | PathLike[str]
+    """Folder with the cell's plan."""
+    out: str | PathLike[str]
+    """Folder of the run."""
+    resume: bool = False
+    """Go on with the run that is in the folder."""
+    confirmed: bool = False
+    """A person has looked at the cell: do not ask."""
+    seed: int | None = None
+    """Seed of simulated devices; by default the cell's."""
+    operator: Operator = field(default_factory=Unattended)
+
+
+@record()
+class RunFigures:
+    """The key figures of ``run --json``."""
+
+    run: str
+    """Folder of the run."""
+    state: str
+    """How this stretch ended: done, interrupted."""
+    arm: str
+    """Where the arm is."""
+    message: str
+    poses: int
+    committed: int
+    given_up: tuple[int, ...]
+    readings: dict[str, int]
+    """Number of readings by status."""
+    failed_attempts: int
+    seconds: float
+    dataset: str | None
+    """None where nothing was derived."""
+    warnings: tuple[str, ...]
+    problem: str | None
+    """Why nothing was derived of a run that is done."""
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class RunResult(Result):
+    """How a stretch of a run ended, and what its streams say when it was the last one."""
+
+    figures: RunFigures
+    end: RunEnd
+    summary: Mapping[str, Any] | None
+    """Of the derived run; None where nothing was derived."""
+    problem: ElastocalError | None
+    """Why nothing was derived of a run that is done."""
+
+    def facts(self) -> tuple[tuple[str, str], ...]:
+        """Return what a person wants to know first."""
+        found = self.figures
+        readings = ", ".join(f"{count} {status}" for status, count in found.readings.items())
+        return (
+            ("run", f"{found.run}, {found.state}"),
+            ("poses", f"{found.committed} of {found.poses} committed"),
+            ("readings", readings or "none"),
+            ("arm", found.arm),
+            ("dataset", found.dataset or "not derived"),
+            *(("warning", text) for text in found.warnings),
+        )
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class DryRunResult(Result):
+    """The steps that a run would take, with their times."""
+
+    steps: tuple[PlannedStep, ...]
+    poses: int
+    load_cases: tuple[str, ...]
+    force_limit: float
+    """In N."""
+    warnings: tuple[str, ...]
+
+    @property
+    def seconds(self) -> float:
+        """How long it would take, in s."""
+        return float(sum(step.seconds for step in self.steps))
+
+
+@dataclass(frozen=True, eq=False)
+class _Job:
+    """A run that may begin: everything has been read and fits together."""
+
+    cell: Cell
+    plan: PlanResult
+    plan_folder: Path
+    settings: SessionSettings
+    source: DeviceSource
+    record: RunRecord
+    folder: RunFolder
+    warnings: tuple[str, ...]
+
+
+@workflow(RunSettings)
+def run(settings: RunSettings, progress: Progress) -> RunResult:
+    """Press on the tooling at every pose of a plan, record what happens, derive the dataset.
+
+    Parameters
+    ----------
+    settings : RunSettings
+        Or its ``cell``, and the other fields by name.
+    progress : Progress, optional
+        Hears how many poses are measured.
+
+    Raises
+    ------
+    ProcedureError
+        If the folder holds something else, the operator does not agree, or the run was stopped
+        by a fault; its message says which and where the arm stands.
+    ElastocalError
+        If cell, plan, a file or a device cannot be used.
+    """
+    job = _prepare(settings)
+    entries = _entries(job.folder)
+    _check_folder(job, entries, settings.resume)
+    make_folder(job.folder.path)
+    with Journal(job.folder.journal) as journal:
+        # Read again: between the look above and the lock another process may have been here.
+        if read_journal(job.folder.journal) != entries:
+            raise ProcedureError(f"{job.folder.path}: another process has just run here")
+        if not entries:
+            fill_folder(job.folder, job.cell, job.plan_folder)
+        known = last_known(entries) if entries else None
+        devices = job.source.make(job.cell, job.record.seed, known.entry.time if known else 0.0)
+        _confirm(job, known, devices, settings)
+        session = _session(job, known, devices)
+        if known is None:
+            journal.write(devices.clock.now(), Event.START, run=job.record)
+        else:
+            journal.write(devices.clock.now(), Event.RESUME)
+        result = _carry_out(session, devices, journal, settings.operator, progress)
+    if result.end is RunEnd.STOPPED:
+        raise ProcedureError(f"{result.message}. The arm is {result.location.value}")
+    return _derived(job, result)
+
+
+@workflow(RunSettings)
+def dry_run(settings: RunSettings, progress: Progress) -> DryRunResult:  # noqa: ARG001 - an instant
+    """Return the steps that a run would take; nothing is written or moved.
+
+    Raises
+    ------
+    ElastocalError
+        As `run`, before anything moves.
+    """
+    job = _prepare(settings)
+    return DryRunResult(
+        steps=itinerary(job.plan, job.settings),
+        poses=len(job.plan.poses),
+        load_cases=tuple(name for name, _ in job.settings.loads),
+        force_limit=job.settings.force_limit,
+        warnings=job.warnings,
+    )
+
+
+def _prepare(settings: RunSettings) -> _Job:
+    """Read cell and plan and refuse what does not fit; nothing is written or moved."""
+    plan = Path(settings.plan)
+    loaded, read = load_cell(Path(settings.cell)), read_plan(plan)
+    folder = plan if plan.is_dir() else plan.parent
+    now = datetime.now(UTC).isoformat(timespec="seconds")
+    text = read_text(folder / PLAN)
+    seed = loaded.file.simulation.seed if settings.seed is None else settings.seed
+    stated = run_record(loaded, read, text, cell_path_in_run(loaded), seed, now)
+    check_compatible(read, loaded)
+    return _Job(
+        loaded,
+        read,
+        folder,
+        run_settings(loaded, read),
+        device_source(loaded),
+        stated,
+        RunFolder(Path(settings.out)),
+        registration_warnings(read),
+    )
+
+
+def _carry_out(
+    session: Session, devices: Devices, journal: Journal, operator: Operator, progress: Progress
+) -> SessionResult:
+    count = len(session.plan.poses)
+    with operator.supervise(count) as supervision:
+
+        def show(step: RunProgress) -> None:
+            supervision.show(step)
+            progress(POSES_MEASURED, step.number - 1, count)
+
+        hooks = SessionHooks(
+            lambda: PoseRecorder(session.plan.robot.joints), show, supervision.interrupted
+        )
+        return Runner(session, devices, journal, hooks).run()
+
+
+def _derived(job: _Job, result: SessionResult) -> RunResult:
+    """Derive the dataset of a run that is done; what keeps it from that is no end of the run."""
+    summary: Mapping[str, Any] | None = None
+    problem: ElastocalError | None = None
+    if result.end is RunEnd.DONE:
+        try:
+            derived = derive_run(job.folder.path)
+            write_derived(job.folder.path, derived)
+            summary = derived.summary
+        except ElastocalError as error:
+            problem = error
+    return RunResult(_figures(job, result, summary, problem), result.end, summary, problem)
+
+
+def _figures(
+    job: _Job,
+    result: SessionResult,
+    summary: Mapping[str, Any] | None,
+    problem: ElastocalError | None,
+) -> RunFigures:
+    entries = read_journal(job.folder.journal)
+    return RunFigures(
+        run=str(job.folder.path),
+        state=result.end.value,
+        arm=result.location.value,
+        message=result.message,
+        poses=len(job.plan.poses),
+        committed=len(commits(entries)),
+        given_up=tuple(result.given_up),
+        readings=_readings(summary, commits(entries)),
+        failed_attempts=sum(entry.event is Event.FAULT for entry in entries),
+        seconds=entries[-1].time - entries[0].time,
+        dataset=str(job.folder.dataset) if summary is not None else None,
+        warnings=tuple(job.warnings if summary is None else summary["warnings"]),
+        problem=str(problem) if problem is not None else None,
+    )
+
+
+def _readings(summary: Mapping[str, Any] | None, logs: Sequence[PoseLog]) -> dict[str, int]:
+    """Return the number of readings by status, as derived; else as the journal has them."""
+    if summary is not None:
+        return {status: n for status, n in summary["readings"]["counts"].items() if n}
+    windows = [window for log in logs for window in log.windows if window.load_case is not None]
+    return dict(Counter(window.status.value for window in windows))
+
+
+def _session(job: _Job, known: LastKnown | None, devices: Devices) -> Session:
+    """Return what is left to do, and the way to HOME from where the arm stands."""
+    state, limit = devices.arm.state(), job.settings.procedure.travel_limit
+    likely = known.uncommitted if known else None
+    return Session(
+        job.plan,
+        job.settings,
+        job.folder,
+        committed=frozenset(known.committed) if known else frozenset(),
+        attempts=known.attempts if known else {},
+        home=home_route(job.plan, state.q, state.T_base_tcp, limit, likely),
+    )
+
+
+def _entries(folder: RunFolder) -> tuple[Entry, ...]:
+    return read_journal(folder.journal) if folder.journal.is_file() else ()
+
+
+def _check_folder(job: _Job, entries: tuple[Entry, ...], resume: bool) -> None:
+    """Refuse a folder that holds something else than what was asked for."""
+    out = job.folder.path
+    if not entries:
+        if resume:
+            raise ProcedureError(f"{out} holds no run to go on with: leave --resume out")
+        refuse_foreign_files(job.folder)
+        return
+    started = entries[0].run
+    assert started is not None
+    check_same_run(started, job.record, str(out))
+    if not resume:
+        done, count = len(last_known(entries).committed), len(job.plan.poses)
+        raise ProcedureError(
+            f"{out} holds this run already ({done} of {count} poses committed):"
+            " go on with --resume, or name another folder"
+        )
+    used, _ = read_copies(job.folder, started)
+    check_same_settings(used, job.cell)
+
+
+def _confirm(job: _Job, known: LastKnown | None, devices: Devices, settings: RunSettings) -> None:
+    """Have the operator agree before anything moves that was not expected to."""
+    settings.operator.warn([f"warning: {warning}" for warning in job.warnings])
+    if known is not None:
+        contact = "in contact" if devices.arm.state().in_contact else "not in contact"
+        settings.operator.warn((*known.lines, f"the arm says that it is {contact}"))
+    if (known or job.source.real) and not settings.confirmed:
+        settings.operator.confirm()

@@ -1,0 +1,28 @@
+"""The stages of the suite: units first, then whole commands and pages, then the browser."""
+
+from pathlib import Path
+
+import pytest
+
+TESTS = Path(__file__).parent
+END_TO_END = (
+    "cli",
+    "end_to_end",
+    "report/document",
+    "contracts/test_report_sections.py",
+    "test_examples.py",
+    "test_readme.py",
+)
+"""Where tests run whole commands or build whole documents."""
+BROWSER = ("test_in_a_browser.py",)
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    for item in items:
+        if not item.path.is_relative_to(TESTS):
+            continue
+        place = item.path.relative_to(TESTS)
+        if place.name in BROWSER or "browser" in item.fixturenames:
+            item.add_marker("browser")
+        elif any(place.is_relative_to(part) for part in END_TO_END):
+            item.add_marker("end_to_end")

@@ -1,0 +1,163 @@
+"""NetCDF files: labelled arrays and records of arrays, lossless and readable by others."""
+
+from dataclasses import replace
+from typing import Annotated
+
+import h5py
+import numpy as np
+import pytest
+import xarray as xr
+
+from elastocal.arrays import FloatArray, IndexArray
+from elastocal.errors import FileAccessError, SchemaError
+from elastocal.records import (
+    LabelledArray,
+    LabelledArrays,
+    Variable,
+    read_arrays,
+    read_netcdf,
+    record,
+    variables_of,
+    write_arrays,
+    write_netcdf,
+)
+
+
+@record("elastocal.spot/1", eq=False)
+class Spots:
+    """A small record of arrays."""
+
+    place: Annotated[FloatArray, Variable(("spot", "axis"), "m", "where it is")]
+    kind: Annotated[IndexArray, Variable(("spot",), meaning="which kind", flags="kinds")]
+    names: Annotated[tuple[str, ...], Variable(("spot",))]
+    kinds: tuple[str, ...]
+    source: str
+
+
+SPOTS = Spots(
+    np.array([[0.0, -0.0, np.nan], [np.inf, 1e-300, 2.5]]),
+    np.array([-1, 1]),
+    ("a", "é"),
+    ("round", "flat"),
+    "made up",
+)
+ARRAYS = LabelledArrays(
+    {
+        "height": LabelledArray(("y", "x"), np.array([[1.5, np.nan]]), {"units": "m"}),
+        "count": LabelledArray(("x",), np.array([3, 4], dtype=np.int8)),
+        "x": LabelledArray(("x",), np.array(["left", "right"])),
+        "colour": LabelledArray(("x",), np.array(["red", ""])),
+        "nothing": LabelledArray(("none", "x"), np.zeros((0, 2)), packed=True),
+        "scalar": LabelledArray((), np.array(7.0)),
+    },
+    {"title": "é", "number": 3},
+    ("colour",),
+)
+
+
+def test_labelled_arrays_come_back_bit_for_bit(tmp_path):
+    write_arrays(tmp_path / "a.nc", ARRAYS)
+    found = read_arrays(tmp_path / "a.nc")
+    assert found.attributes == ARRAYS.attributes
+    assert found.coordinates == ("x", "colour") == ARRAYS.coordinates
+    assert found.sizes == {"y": 1, "x": 2, "none": 0}
+    for name, array in ARRAYS.variables.items():
+        assert found[name].dims == array.dims
+        assert found[name].attributes == array.attributes
+        if array.values.dtype.kind == "U":
+            assert found[name].values.tolist() == array.values.tolist()
+        else:
+            assert found[name].values.dtype == array.values.dtype
+            assert found[name].values.tobytes() == array.values.tobytes()
+
+
+def test_others_find_the_same_in_the_file_and_what_they_write_is_read(tmp_path):
+    write_arrays(tmp_path / "a.nc", ARRAYS)
+    with xr.open_dataset(tmp_path / "a.nc", engine="h5netcdf") as data:
+        assert set(data.coords) == {"x", "colour"}
+        assert data["height"].dims == ("y", "x")
+        assert data["height"].attrs == {"units": "m"}
+        data.load().to_netcdf(tmp_path / "b.nc", engine="h5netcdf")
+    again = read_arrays(tmp_path / "b.nc")
+    assert again.coordinates == ARRAYS.coordinates
+    np.testing.assert_array_equal(again["height"].values, ARRAYS["height"].values)
+
+
+def test_values_are_what_the_file_means_by_what_it_stores(tmp_path):
+    stored = {"dtype": "int16", "scale_factor": 0.5, "add_offset": 10.0, "_FillValue": -1}
+    data = xr.Dataset(
+        {"packed": ("x", [11.0, np.nan]), "letters": ("x", ["ab", "c"])},
+    )
+    data["packed"].encoding = stored
+    data["letters"].encoding = {"dtype": "S1"}
+    data.to_netcdf(tmp_path / "a.nc", engine="h5netcdf")
+    found = read_arrays(tmp_path / "a.nc")
+    np.testing.assert_array_equal(found["packed"].values, [11.0, np.nan])
+    assert found["letters"].values.tolist() == ["ab", "c"]
+    assert found["packed"].attributes == {}
+
+
+def test_arrays_that_contradict_each_other_are_not_written(tmp_path):
+    other = LabelledArray(("x",), np.zeros(3))
+    arrays = replace(ARRAYS, variables={**ARRAYS.variables, "other": other})
+    with pytest.raises(ValueError, match=r"^other has length 3 along x, not 2$"):
+        write_arrays(tmp_path / "a.nc", arrays)
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_record_comes_back_bit_for_bit(tmp_path):
+    write_netcdf(tmp_path / "spots.nc", SPOTS)
+    found = read_netcdf(tmp_path / "spots.nc", Spots)
+    assert found.place.tobytes() == SPOTS.place.tobytes()
+    np.testing.assert_array_equal(found.kind, SPOTS.kind)
+    assert (found.names, found.kinds, found.source) == (SPOTS.names, SPOTS.kinds, SPOTS.source)
+
+
+def test_a_record_tells_others_its_units_and_flags(tmp_path):
+    write_netcdf(tmp_path / "spots.nc", SPOTS)
+    with xr.open_dataset(tmp_path / "spots.nc", engine="h5netcdf") as data:
+        assert data["place"].attrs == {"units": "m", "long_name": "where it is"}
+        assert data["kind"].attrs["flag_values"].tolist() == [-1, 0, 1]
+        assert data["kind"].attrs["flag_meanings"] == "none round flat"
+        assert data.attrs == {"schema": "elastocal.spot/1", "source": "made up"}
+
+
+def test_a_record_names_its_variables():
+    assert list(variables_of(Spots)) == ["place", "kind", "names"]
+    assert variables_of(Spots)["place"].dims == ("spot", "axis")
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (lambda d: d.drop_vars("kind"), r"a.nc: variable 'kind' is missing$"),
+        (lambda d: d.transpose(), r"a.nc: place has dimensions \('axis', 'spot'\), not \('spot'"),
+        (lambda d: d.assign_attrs(schema="elastocal.spot/2"), r"a.nc has schema 'elastocal.spot/2"),
+        (lambda d: d.drop_attrs(deep=False), r"a.nc has schema None; this version reads"),
+    ],
+)
+def test_a_file_that_does_not_fit_the_record_is_refused_by_name(tmp_path, change, said):
+    path = tmp_path / "a.nc"
+    write_netcdf(path, SPOTS)
+    changed = change(xr.load_dataset(path, engine="h5netcdf"))
+    changed.to_netcdf(path, engine="h5netcdf")
+    with pytest.raises(SchemaError, match=said):
+        read_netcdf(path, Spots)
+
+
+def test_a_missing_attribute_of_a_record_is_named(tmp_path):
+    path = tmp_path / "a.nc"
+    write_netcdf(path, SPOTS)
+    with h5py.File(path, "r+") as file:
+        del file.attrs["source"]
+    with pytest.raises(SchemaError, match=r"a.nc: attribute 'source' is missing$"):
+        read_netcdf(path, Spots)
+
+
+def test_a_file_that_is_no_netcdf_is_named(tmp_path):
+    path = tmp_path / "a.nc"
+    with pytest.raises(FileAccessError, match=r"cannot read .*a\.nc: No such file"):
+        read_netcdf(path, Spots)
+    path.write_text("spot,x\n")
+    with pytest.raises(SchemaError, match=r"a\.nc: not a NetCDF4 file: it does not begin"):
+        read_netcdf(path, Spots)
