@@ -28,6 +28,7 @@ from .run import (
     RunSettings as RunSettings,
     dry_run as dry_run,
     run as run,
+)
 from .study import (
     DEFAULT_VARIATION as DEFAULT_VARIATION,
     StudyResult as StudyResult,
