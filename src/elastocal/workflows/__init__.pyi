@@ -20,6 +20,12 @@ from .predict import (
     PredictSettings as PredictSettings,
     predict as predict,
 )
+from .report import (
+    ReportFigures as ReportFigures,
+    ReportResult as ReportResult,
+    ReportSettings as ReportSettings,
+    report as report,
+)
 from .run import (
     POSES_MEASURED as POSES_MEASURED,
     DryRunResult as DryRunResult,

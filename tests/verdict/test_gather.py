@@ -6,13 +6,16 @@ import shutil
 import pytest
 
 from elastocal.errors import FileAccessError, SchemaError
-from elastocal.report.document import Options, gather
+from elastocal.verdict import (
+    EvidenceOptions,
+    gather_evidence,
+)
 from support.cli import elastocal
 from support.reported import MADE, POSES
 
 
 def absent(parts):
-    return {each.name: each.reason for each in parts.absent}
+    return {each.name: each.reason for each in parts.missing}
 
 
 def damage(path):
@@ -36,19 +39,19 @@ def test_everything_is_found_under_its_default_name(parts, finished):
 
 
 def test_the_run_itself_may_be_named_in_place_of_the_folder_around_it(parts, finished):
-    inner = gather(Options(finished / "run"), MADE)
+    inner = gather_evidence(EvidenceOptions(finished / "run"), MADE)
     assert [(each.name, each.sha256) for each in inner.files] == [
         (each.name, each.sha256) for each in parts.files
     ]
-    assert inner.absent == parts.absent
+    assert inner.missing == parts.missing
 
 
 def test_the_calibration_made_again_is_that_of_the_model_file(parts):
-    assert parts.again.same
-    held_out = parts.calibrated.figures["held_out"]
-    unseen = parts.again.unseen
-    assert unseen.mean.value == pytest.approx(held_out["mean"], rel=1e-9)
-    assert unseen.max == pytest.approx(held_out["max"], rel=1e-9)
+    assert parts.reproduction.same
+    held_out = parts.calibrated.figures.held_out
+    unseen = parts.reproduction.unseen
+    assert unseen.mean.value == pytest.approx(held_out.mean, rel=1e-9)
+    assert unseen.max == pytest.approx(held_out.max, rel=1e-9)
     assert unseen.mean.low < unseen.mean.value < unseen.mean.high
     assert unseen.p95.low <= unseen.p95.value <= unseen.p95.high <= unseen.max
     assert unseen.poses == unseen.folds == POSES
@@ -61,10 +64,10 @@ def test_settings_in_the_model_file_are_followed(copied):
         *("--exclude", "2:north", "--loss", "huber", "--draws", 40),
     )
     assert made.code == 0, made.err
-    parts = gather(Options(folder), MADE)
-    assert parts.again.same
+    parts = gather_evidence(EvidenceOptions(folder), MADE)
+    assert parts.reproduction.same
     assert (2, "north") not in zip(
-        parts.again.unseen.pose.tolist(), parts.again.unseen.load_case, strict=True
+        parts.reproduction.unseen.pose.tolist(), parts.reproduction.unseen.load_case, strict=True
     )
 
 
@@ -77,7 +80,7 @@ MADE_BY = {
 
 
 def test_what_is_not_there_is_missing_with_the_command_that_makes_it(copied):
-    reasons = absent(gather(Options(copied("run")), MADE))
+    reasons = absent(gather_evidence(EvidenceOptions(copied("run")), MADE))
     for told, (name, command) in MADE_BY.items():
         assert f"there is no {name}; `elastocal {command}`" in reasons[told]
 
@@ -106,7 +109,11 @@ def test_what_is_damaged_is_told_without_the_folder_that_it_lies_in(copied, dama
             path.write_text("nonsense\n" + path.read_text())
         else:
             damage(path)
-    found = {each.name: each for each in gather(Options(folder), MADE).absent if each.damaged}
+    found = {
+        each.name: each
+        for each in gather_evidence(EvidenceOptions(folder), MADE).missing
+        if each.damaged
+    }
     assert set(found) == set(damaged.values())
     for each in found.values():
         assert str(folder) not in each.reason
@@ -121,13 +128,13 @@ def test_what_is_named_and_damaged_is_refused(copied, key):
     inner = {"codec": named / "codec.nc", "process": named / "table.json"}.get(key, named)
     damage(inner)
     with pytest.raises(SchemaError, match=inner.name):
-        gather(Options(folder, **{key: named}), MADE)
+        gather_evidence(EvidenceOptions(folder, **{key: named}), MADE)
 
 
 @pytest.mark.parametrize("key", ["model", "tool", "codec", "process"])
 def test_what_is_named_and_not_there_is_refused(finished, tmp_path, key):
     with pytest.raises(FileAccessError, match="nowhere"):
-        gather(Options(finished, **{key: tmp_path / "nowhere"}), MADE)
+        gather_evidence(EvidenceOptions(finished, **{key: tmp_path / "nowhere"}), MADE)
 
 
 @pytest.mark.parametrize(
@@ -144,7 +151,7 @@ def test_figures_of_another_kind_make_a_model_unusable(copied, change, path):
     record = json.loads((folder / "model.json").read_text())
     change(record["calibration"])
     (folder / "model.json").write_text(json.dumps(record))
-    assert path in absent(gather(Options(folder), MADE))["calibrated model"]
+    assert path in absent(gather_evidence(EvidenceOptions(folder), MADE))["calibrated model"]
 
 
 def test_a_summary_of_another_kind_is_unusable(copied):
@@ -153,12 +160,12 @@ def test_a_summary_of_another_kind_is_unusable(copied):
     summary = json.loads(path.read_text())
     del summary["noise"]
     path.write_text(json.dumps(summary))
-    assert "noise" in absent(gather(Options(folder), MADE))["summary of the run"]
+    assert "noise" in absent(gather_evidence(EvidenceOptions(folder), MADE))["summary of the run"]
 
 
 def test_a_model_alone_is_enough(finished, tmp_path):
     shutil.copy(finished / "model.json", tmp_path / "mine.json")
-    parts = gather(Options(tmp_path / "mine.json"), MADE)
+    parts = gather_evidence(EvidenceOptions(tmp_path / "mine.json"), MADE)
     assert parts.calibrated is not None
     assert parts.name == parts.robot == "KR 120 R2700 extra HA"
     assert {"run", "codec", "tool file", "process"} <= set(absent(parts))
@@ -169,15 +176,15 @@ def test_every_codec_of_a_folder_of_codecs_is_read(copied):
     (folder / "codec").rename(folder / "inner")
     for name in ("springs", "search"):
         shutil.copytree(folder / "inner", folder / "codec" / name)
-    parts = gather(Options(folder), MADE)
+    parts = gather_evidence(EvidenceOptions(folder), MADE)
     assert len(parts.codecs) == 2
     assert {"codec/search/codec.nc", "codec/springs/codec.nc"} <= {e.name for e in parts.files}
     damage(folder / "codec" / "search" / "codec.nc")
-    parts = gather(Options(folder), MADE)
+    parts = gather_evidence(EvidenceOptions(folder), MADE)
     assert len(parts.codecs) == 1
     assert "codec/search/codec.nc" in absent(parts)["codec"]
     with pytest.raises(SchemaError, match=r"search/codec\.nc"):
-        gather(Options(folder, codec=folder / "codec"), MADE)
+        gather_evidence(EvidenceOptions(folder, codec=folder / "codec"), MADE)
 
 
 @pytest.mark.parametrize("names", [(), ("notes.txt",), ("run",)])
@@ -185,16 +192,16 @@ def test_a_folder_without_any_part_is_refused(tmp_path, names):
     for name in names:
         (tmp_path / name).write_text("x")
     with pytest.raises(FileAccessError, match=r"neither journal\.jsonl"):
-        gather(Options(tmp_path), MADE)
+        gather_evidence(EvidenceOptions(tmp_path), MADE)
 
 
 def test_a_path_that_is_not_there_is_refused(tmp_path):
     with pytest.raises(FileAccessError, match="there is no such file or folder"):
-        gather(Options(tmp_path / "nowhere"), MADE)
+        gather_evidence(EvidenceOptions(tmp_path / "nowhere"), MADE)
 
 
 def test_a_tolerance_on_the_command_line_goes_before_that_of_the_cell(finished):
-    parts = gather(Options(finished, tolerance=1e-3, drift=2e-3), MADE)
+    parts = gather_evidence(EvidenceOptions(finished, tolerance=1e-3, drift=2e-3), MADE)
     assert (parts.limits.tolerance, parts.limits.drift) == (1e-3, 2e-3)
     assert "--tolerance" in parts.limits.source
 
@@ -206,7 +213,7 @@ def test_an_earlier_model_is_compared_over_the_readings_of_the_run(finished, tmp
         *("--exclude", "0", "--draws", 40),
     )
     assert made.code == 0, made.err
-    parts = gather(Options(finished, old=old), MADE)
+    parts = gather_evidence(EvidenceOptions(finished, old=old), MADE)
     found = parts.recertification
-    assert found.deflection.rows == len(parts.again.unseen.error)
+    assert found.deflection.rows == len(parts.reproduction.unseen.error)
     assert found.limit == pytest.approx(0.1e-3)

@@ -11,13 +11,16 @@ from elastocal.codec import read_codec, write_codec
 from elastocal.elastic import ElasticModel, layout
 from elastocal.errors import IdentificationError
 from elastocal.identification import calibrate, write_model
-from elastocal.report.document import Options, gather
+from elastocal.verdict import (
+    EvidenceOptions,
+    gather_evidence,
+)
 from support.cells import Cell, linear_truth, robot
 from support.reported import MADE
 
 
 def absent(parts):
-    return {each.name: each.reason for each in parts.absent}
+    return {each.name: each.reason for each in parts.missing}
 
 
 def test_a_model_of_other_readings_is_doubted(copied):
@@ -26,8 +29,8 @@ def test_a_model_of_other_readings_is_doubted(copied):
     record = json.loads(model.read_text())
     record["calibration"]["held_out"]["mean"] *= 1.01
     model.write_text(json.dumps(record))
-    parts = gather(Options(folder), MADE)
-    assert not parts.again.same
+    parts = gather_evidence(EvidenceOptions(folder), MADE)
+    assert not parts.reproduction.same
     assert any("does not give the figures of the model file" in doubt for doubt in parts.doubts)
 
 
@@ -39,9 +42,12 @@ def test_a_model_of_another_robot_is_no_part_of_the_run(copied, tmp_path):
         ElasticModel(robot(), layout(robot(), "bearing")), readings, np.random.default_rng(0)
     )
     write_model(folder / "model.json", found.calibrated)
-    assert "is a model of" in absent(gather(Options(folder), MADE))["calibrated model"]
+    assert (
+        "is a model of"
+        in absent(gather_evidence(EvidenceOptions(folder), MADE))["calibrated model"]
+    )
     with pytest.raises(IdentificationError, match="is a model of"):
-        gather(Options(folder, model=folder / "model.json"), MADE)
+        gather_evidence(EvidenceOptions(folder, model=folder / "model.json"), MADE)
 
 
 def test_a_codec_of_another_robot_or_of_other_poses_is_no_part_of_the_run(copied):
@@ -54,39 +60,43 @@ def test_a_codec_of_another_robot_or_of_other_poses_is_no_part_of_the_run(copied
         (replace(data, pose_labels=((99,), *data.pose_labels[1:])), "has pose 99"),
     ):
         write_codec(folder / "codec", changed)
-        assert told in absent(gather(Options(folder), MADE))["codec"]
+        assert told in absent(gather_evidence(EvidenceOptions(folder), MADE))["codec"]
 
 
 def test_a_process_of_another_cell_is_no_part_of_the_run(copied):
     folder = copied("run", "process")
     path = folder / "process" / "table.json"
     path.write_text(path.read_text().replace('"cell": "afp"', '"cell": "other"'))
-    assert "of cell 'other'" in absent(gather(Options(folder), MADE))["process"]
+    assert "of cell 'other'" in absent(gather_evidence(EvidenceOptions(folder), MADE))["process"]
 
 
 def test_a_process_with_another_model_is_doubted(copied):
     folder = copied()
     model = folder / "model.json"
     model.write_text(model.read_text() + "\n")
-    assert any("another model" in doubt for doubt in gather(Options(folder), MADE).doubts)
+    assert any(
+        "another model" in doubt for doubt in gather_evidence(EvidenceOptions(folder), MADE).doubts
+    )
 
 
 def test_a_tool_of_another_robot_is_no_part_of_the_run(copied):
     folder = copied("run", "tool.json")
     path = folder / "tool.json"
     path.write_text(path.read_text().replace('"flange": "', '"flange": "no_'))
-    assert "is no link of" in absent(gather(Options(folder), MADE))["tool file"]
+    assert "is no link of" in absent(gather_evidence(EvidenceOptions(folder), MADE))["tool file"]
 
 
 def test_a_cell_file_that_was_changed_after_the_plan_is_doubted(copied):
     folder = copied("run")
     path = folder / "run" / "cell" / "cell.yaml"
     path.write_text(path.read_text().replace('disk_radius: "25 mm"', 'disk_radius: "24 mm"'))
-    assert any("fingerprint" in doubt for doubt in gather(Options(folder), MADE).doubts)
+    assert any(
+        "fingerprint" in doubt for doubt in gather_evidence(EvidenceOptions(folder), MADE).doubts
+    )
 
 
 def doubts(folder):
-    return " | ".join(gather(Options(folder), MADE).doubts)
+    return " | ".join(gather_evidence(EvidenceOptions(folder), MADE).doubts)
 
 
 def edited(path, change):
@@ -97,7 +107,7 @@ def edited(path, change):
 
 
 def test_parts_of_one_run_raise_no_doubt(finished):
-    assert gather(Options(finished), MADE).doubts == ()
+    assert gather_evidence(EvidenceOptions(finished), MADE).doubts == ()
 
 
 def test_a_dataset_of_another_run_is_doubted(copied):
@@ -163,4 +173,4 @@ def test_a_plan_that_was_changed_since_the_run_began_is_no_part_of_it(copied):
     folder = copied("run")
     path = folder / "run" / "plan" / "plan.json"
     path.write_text(path.read_text() + "\n")
-    assert "plan.json" in absent(gather(Options(folder), MADE))["plan"]
+    assert "plan.json" in absent(gather_evidence(EvidenceOptions(folder), MADE))["plan"]

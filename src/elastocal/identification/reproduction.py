@@ -1,4 +1,4 @@
-"""The calibration once more: the report believes no figure that it cannot make again.
+"""Reproduction: a calibration made once more, as no figure is believed that cannot be made again.
 
 From the dataset and the settings that stand in the model file, the fit is repeated. When it gives
 the compliances and the held-out errors of the model file, model and data belong together, and the
@@ -6,40 +6,27 @@ errors of single readings are known, from which intervals follow.
 """
 
 from dataclasses import dataclass
-from typing import Any, cast
 
 import numpy as np
 from numpy.random import Generator
 
 from elastocal.arrays import FloatArray, IndexArray
 from elastocal.dataset import Dataset, without
-from elastocal.identification import (
-    MINIMUM_DRAWS,
-    CalibratedModel,
-    Calibration,
-    FitOptions,
-    Weights,
-    calibrate,
-    interval,
-)
+from elastocal.identification.calibrated import CalibratedModel
+from elastocal.identification.calibration import Calibration, calibrate
+from elastocal.identification.options import MINIMUM_DRAWS, FitSettings
+from elastocal.identification.recertification import Estimate
+from elastocal.identification.summary import CalibrationSummary
+from elastocal.identification.uncertainty import interval
 
-DRAWS = 1000
-"""Of whole poses, for the intervals of the errors."""
+_DRAWS = 1000
+"""Draws of whole poses, for the intervals of the errors."""
 _SAME = 1e-4
 """Relative difference below which two results are of one computation, be it on other machines."""
 
 
-@dataclass(frozen=True)
-class Estimate:
-    """A figure with its 95 % interval, in m."""
-
-    value: float
-    low: float
-    high: float
-
-
 @dataclass(frozen=True, eq=False)
-class Unseen:
+class UnseenErrors:
     """Errors of predicted deflections at poses that were left out of the fit."""
 
     error: FloatArray
@@ -68,24 +55,26 @@ class Unseen:
 
 
 @dataclass(frozen=True, eq=False)
-class Again:
-    """A calibration made once more."""
+class Reproduction:
+    """A calibration that was made once more."""
 
     calibration: Calibration
-    unseen: Unseen
+    unseen: UnseenErrors
     same: bool
     """Whether deflections and held-out errors are those of the model file."""
 
 
-def calibrate_again(found: CalibratedModel, figures: dict[str, Any], dataset: Dataset) -> Again:
+def reproduce_calibration(
+    found: CalibratedModel, figures: CalibrationSummary | None, dataset: Dataset
+) -> Reproduction:
     """Return the calibration of a dataset with the settings of a model file.
 
     Parameters
     ----------
     found : CalibratedModel
         The model.
-    figures : dict
-        Its figures; without ``settings`` among them, defaults are taken.
+    figures : CalibrationSummary, optional
+        Its figures; without settings among them, defaults are taken.
     dataset : Dataset
         The readings that it should be made from.
 
@@ -94,20 +83,20 @@ def calibrate_again(found: CalibratedModel, figures: dict[str, Any], dataset: Da
     ElastocalError
         If these readings give no calibration of this robot.
     """
-    settings = figures.get("settings") or {}
+    settings = (figures and figures.settings) or FitSettings()
     readings = dataset.readings(found.model.robot.joint_names)
     calibration = calibrate(
         found.model,
-        without(readings, settings.get("exclude", ())),
+        without(readings, settings.exclude),
         np.random.default_rng(0),
-        _options(settings),
-        marker_offset=settings.get("marker") or dataset.marker,
+        settings.options(MINIMUM_DRAWS),
+        marker_offset=settings.marker or dataset.marker,
     )
     same = _same_deflections(calibration, found) and _same_errors(calibration, figures)
-    return Again(calibration, unseen_of(calibration, np.random.default_rng(0)), same)
+    return Reproduction(calibration, unseen_errors(calibration, np.random.default_rng(0)), same)
 
 
-def unseen_of(calibration: Calibration, rng: Generator) -> Unseen:
+def unseen_errors(calibration: Calibration, rng: Generator) -> UnseenErrors:
     """Return the errors at left-out poses with intervals over resampled poses.
 
     The readings at one pose share what the model gets wrong there, so that whole poses are drawn
@@ -124,9 +113,9 @@ def unseen_of(calibration: Calibration, rng: Generator) -> Unseen:
     pose = np.asarray(calibration.readings.pose[used])
     cases = calibration.readings.load_case[used]
     blocks = [held.error[held.fold == fold] for fold in np.unique(held.fold)]
-    chosen = rng.integers(len(blocks), size=(DRAWS, len(blocks)))
+    chosen = rng.integers(len(blocks), size=(_DRAWS, len(blocks)))
     drawn = [np.concatenate([blocks[k] for k in row]) for row in chosen]
-    return Unseen(
+    return UnseenErrors(
         error=held.error,
         pose=pose,
         load_case=tuple(map(str, cases.tolist())),
@@ -143,19 +132,6 @@ def _estimate(value: float, draws: FloatArray) -> Estimate:
     return Estimate(value, float(low), float(high))
 
 
-def _options(settings: dict[str, Any]) -> FitOptions:
-    lower, upper = (float(part) for part in str(settings.get("bounds", "0,inf")).split(","))
-    return FitOptions(
-        lower=lower,
-        upper=upper,
-        weights=cast("Weights", settings.get("weights", "none")),
-        loss=str(settings.get("loss", "linear")),
-        set_blunders_aside=not settings.get("keep_blunders", False),
-        trust_conventions=bool(settings.get("trust_conventions", False)),
-        draws=MINIMUM_DRAWS,
-    )
-
-
 def _same_deflections(calibration: Calibration, found: CalibratedModel) -> bool:
     """Return whether both predict the same; single springs may not be determined."""
     readings = calibration.readings
@@ -165,13 +141,11 @@ def _same_deflections(calibration: Calibration, found: CalibratedModel) -> bool:
     return _alike(blocks @ calibration.calibrated.compliance, blocks @ found.compliance)
 
 
-def _same_errors(calibration: Calibration, figures: dict[str, Any]) -> bool:
-    stated = figures.get("held_out") or {}
-    held = calibration.held_out
-    if stated.get("readings") != len(held.error):
+def _same_errors(calibration: Calibration, figures: CalibrationSummary | None) -> bool:
+    held, stated = calibration.held_out, figures.held_out if figures else None
+    if stated is None or stated.readings != len(held.error):
         return False
-    told = np.array([stated.get("mean", np.nan), stated.get("max", np.nan)], dtype=float)
-    return _alike(np.array([held.mean, held.max]), told)
+    return _alike(np.array([held.mean, held.max]), np.array([stated.mean, stated.max]))
 
 
 def _alike(a: FloatArray, b: FloatArray) -> bool:

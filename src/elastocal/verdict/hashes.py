@@ -3,7 +3,7 @@
 A file that holds no time of day is hashed as it is: ``sha256sum`` gives the same. The others
 carry the time at which the run began, the folder it was started from, or hashes of files that
 do. Of those, the hash is taken of what they say beside that: of their JSON, keys sorted, or of
-their arrays, without the fields of `LEFT_OUT`.
+their arrays, without the fields of `_LEFT_OUT`.
 """
 
 import hashlib
@@ -19,7 +19,7 @@ from elastocal.procedure import file_sha256
 from elastocal.records import read_arrays
 
 BYTES, CONTENT = "bytes", "content without times and folders"
-LEFT_OUT = (
+_LEFT_OUT = (
     "provenance", "started", "source", "sha256", "file", "findings", "model", "model_sha256",
     "tool", "tool_sha256", "plan", "streams_sha256",
 )  # fmt: skip
@@ -27,7 +27,7 @@ LEFT_OUT = (
 _STAMPED = (".json", ".jsonl", ".nc")
 
 
-def hash_of(path: Path) -> tuple[str, str]:
+def content_hash(path: Path) -> tuple[str, str]:
     """Return the hash of a file and what it was taken of, `BYTES` or `CONTENT`.
 
     Raises
@@ -51,8 +51,8 @@ def _content(path: Path) -> str:
     documents = text.splitlines() if path.suffix == ".jsonl" else [text]
     digest = hashlib.sha256()
     for document in documents:
-        told = json.dumps(_kept(json.loads(document)), sort_keys=True, separators=(",", ":"))
-        digest.update(told.encode("utf-8") + b"\n")
+        kept = json.dumps(_kept(json.loads(document)), sort_keys=True, separators=(",", ":"))
+        digest.update(kept.encode("utf-8") + b"\n")
     return digest.hexdigest()
 
 
@@ -64,7 +64,7 @@ def _kept(value: Any) -> Any:
 
 def _left_out(key: str, value: Any) -> bool:
     # A section of that name, such as the tool in the summary of a run, says more than where.
-    return key in LEFT_OUT and not isinstance(value, dict)
+    return key in _LEFT_OUT and not isinstance(value, dict)
 
 
 def _arrays(path: Path) -> str:
@@ -73,8 +73,8 @@ def _arrays(path: Path) -> str:
     for name in sorted(data.variables):
         values = np.ascontiguousarray(data[name].values)
         shape = f"{name} {data[name].dims} {values.shape}"
-        told = json.dumps(values.tolist()) if values.dtype.kind in "OU" else ""
-        digest.update(shape.encode() + (told.encode() if told else values.tobytes()))
-    attributes = {k: str(v) for k, v in data.attributes.items() if k not in LEFT_OUT}
+        listed = json.dumps(values.tolist()) if values.dtype.kind in "OU" else ""
+        digest.update(shape.encode() + (listed.encode() if listed else values.tobytes()))
+    attributes = {k: str(v) for k, v in data.attributes.items() if k not in _LEFT_OUT}
     digest.update(json.dumps(attributes, sort_keys=True).encode())
     return digest.hexdigest()

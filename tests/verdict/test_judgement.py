@@ -5,12 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from elastocal.report.document.advice import advised
-from elastocal.report.document.again import Estimate, Unseen
-from elastocal.report.document.heading import verdict_html
-from elastocal.report.document.parts import Limits
-from elastocal.report.document.section import Finding
-from elastocal.report.document.verdict import Light, judge
+from elastocal.identification import UnseenErrors
+from elastocal.identification.recertification import Estimate
+from elastocal.report.document import verdict_html
+from elastocal.verdict import AcceptanceLimits, Finding, Light, advise, judge
 
 
 def errors(worst, low, high, count=20):
@@ -19,13 +17,13 @@ def errors(worst, low, high, count=20):
     error[-1] = 1e-3 * worst
     p95 = Estimate(0.5e-3 * (low + high), 1e-3 * low, 1e-3 * high)
     mean = Estimate(float(error.mean()), 0.04e-3, 0.08e-3)
-    return Unseen(error, np.arange(count), ("normal",) * count, count, mean, p95)
+    return UnseenErrors(error, np.arange(count), ("normal",) * count, count, mean, p95)
 
 
 def judged(parts, worst, low, high, tolerance=0.3e-3, findings=()):
-    again = replace(parts.again, unseen=errors(worst, low, high))
-    limits = Limits(tolerance, None, "of the test")
-    return judge(replace(parts, again=again, limits=limits), findings)
+    again = replace(parts.reproduction, unseen=errors(worst, low, high))
+    limits = AcceptanceLimits(tolerance, None, "of the test")
+    return judge(replace(parts, reproduction=again, limits=limits), findings)
 
 
 def test_green_when_interval_and_every_reading_are_within(parts):
@@ -91,14 +89,14 @@ def test_without_a_tolerance_there_is_no_light_but_a_sentence(parts):
 
 
 def test_without_a_model_there_is_nothing_to_judge(parts):
-    verdict = judge(replace(parts, calibrated=None, again=None), ())
+    verdict = judge(replace(parts, calibrated=None, reproduction=None), ())
     assert verdict.light is None
     assert "no calibrated model" in verdict.reasons[0]
 
 
 def test_errors_that_could_not_be_made_again_give_no_green(parts):
-    for again in (None, replace(parts.again, same=False)):
-        verdict = judge(replace(parts, again=again), ())
+    for again in (None, replace(parts.reproduction, same=False)):
+        verdict = judge(replace(parts, reproduction=again), ())
         assert verdict.light is Light.YELLOW
         assert "no interval" in verdict.reasons[0]
         assert "could not be made again" in verdict.sentence
@@ -120,27 +118,27 @@ def test_a_simulated_cell_is_told_in_the_verdict(parts):
 
 def test_advice_weighs_the_tracker_against_the_errors(parts):
     def told(scatter):
-        registration = {**parts.summary["registration"], "scatter": scatter}
-        noise = {**parts.summary["noise"], "marker_sigma_median": None}
-        summary = {**parts.summary, "registration": registration, "noise": noise}
-        return " ".join(advised(replace(parts, summary=summary)))
+        registration = parts.summary.registration.model_copy(update={"scatter": scatter})
+        noise = parts.summary.noise.model_copy(update={"marker_sigma_median": None})
+        summary = parts.summary.model_copy(update={"registration": registration, "noise": noise})
+        return " ".join(advise(replace(parts, summary=summary)))
 
-    mean = parts.again.unseen.mean.value
+    mean = parts.reproduction.unseen.mean.value
     assert "Average longer" in told(0.5 * mean)
     assert "quieter tracker would not help" in told(0.1 * mean)
     assert "its readings scatter" not in told(None)
 
 
 def test_advice_names_the_pose_of_the_largest_error_when_it_stands_out(parts):
-    again = replace(parts.again, unseen=errors(worst=0.5, low=0.1, high=0.2))
-    found = " ".join(advised(replace(parts, again=again)))
+    again = replace(parts.reproduction, unseen=errors(worst=0.5, low=0.1, high=0.2))
+    found = " ".join(advise(replace(parts, reproduction=again)))
     assert "Look at pose 19 normal first" in found
     assert "0.500 mm" in found
 
 
 def test_advice_stands_behind_that_of_the_findings_and_holds_nothing_back(parts):
-    again = replace(parts.again, unseen=errors(0.2, 0.1, 0.2))
+    again = replace(parts.reproduction, unseen=errors(0.2, 0.1, 0.2))
     findings = (Finding("a note", holds_back=False, advice="One."),)
-    verdict = judge(replace(parts, again=again), findings, ("Two.", "One."))
+    verdict = judge(replace(parts, reproduction=again), findings, ("Two.", "One."))
     assert verdict.light is Light.GREEN
     assert verdict.advice == ("One.", "Two.")
