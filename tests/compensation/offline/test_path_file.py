@@ -18,7 +18,9 @@ from elastocal.elastic import ElasticModel
 from elastocal.identification import CalibratedModel
 from elastocal.robot import Robot
 from elastocal.robot.inverse import inverse_for
-from elastocal.sim.arm.measurement import START
+from elastocal.sim.arm import (
+    START,
+)
 from support.cells import rich_truth, robot, urdf
 from support.paths import (
     FORCE_TCP,

@@ -11,12 +11,12 @@ from elastocal.arrays import FloatArray
 from elastocal.cell.description import Fault
 from elastocal.cell.devices import Motion
 from elastocal.errors import DeviceError
-from elastocal.sim.workcell.contact import Contact
-from elastocal.sim.workcell.paths import force_path, pressed_state
-from elastocal.sim.workcell.plant import Plant
-from elastocal.sim.workcell.quasistatics import ForceReading, RobotState
-from elastocal.sim.workcell.sampling import generator
-from elastocal.sim.workcell.timeline import Ripple, Segment, SettlingRamp, TimeLaw, Uniform
+from elastocal.sim.workcell._contact import Contact
+from elastocal.sim.workcell._paths import force_path, pressed_state
+from elastocal.sim.workcell._plant import Plant
+from elastocal.sim.workcell._quasistatics import ForceReading, RobotState
+from elastocal.sim.workcell._sampling import generator
+from elastocal.sim.workcell._timeline import Ripple, Segment, SettlingRamp, TimeLaw, Uniform
 
 SLIP_TIME = 0.1
 """Time that an injected slip takes, in s."""
@@ -27,7 +27,7 @@ _NEVER_AT_REST = (0.9, 1.7)
 
 
 class ForceControl:
-    """What the controller does while it is in force control."""
+    """The controller in force control."""
 
     def __init__(self, plant: Plant, gain: FloatArray) -> None:
         """Control with a sensor of some gain (`ForceReading.gain`)."""

@@ -2,7 +2,11 @@ import numpy as np
 import pytest
 
 from elastocal.errors import SpringError
-from elastocal.sim.arm.springs import CubicGear, Linear, TwoSlopeGear
+from elastocal.sim.arm import (
+    CubicGear,
+    Linear,
+    TwoSlopeGear,
+)
 
 LAWS = [Linear(2e6), CubicGear(1e6, 2e-3), TwoSlopeGear(4e5, 1.5e6, 8e-4)]
 ANGLES = np.linspace(-5e-3, 5e-3, 41)

@@ -2,14 +2,15 @@ import numpy as np
 import pytest
 
 from elastocal.errors import SpringError
-from elastocal.sim.arm.elastic_arm import (
+from elastocal.sim.arm import (
     AXIAL_STIFFNESS,
     LINK_BENDING,
+    CubicGear,
+    Linear,
     bearing_truth,
     with_link_bending,
     with_stiffening_gears,
 )
-from elastocal.sim.arm.springs import CubicGear, Linear
 
 
 def norms(arm, poses, forces):

@@ -3,7 +3,9 @@ import pytest
 
 from elastocal.errors import RobotError
 from elastocal.robot import Robot
-from elastocal.sim.arm.linkage import Linkage
+from elastocal.sim.arm import (
+    Linkage,
+)
 
 
 def random_joints(linkage, seed=1, count=20):

@@ -2,8 +2,14 @@ import numpy as np
 import pytest
 
 from elastocal.errors import UnreachableError
-from elastocal.sim.arm.inverse import pose_error, solve_inverse
-from elastocal.sim.arm.measurement import LOAD_CASES, SphericalCap, press_forces, press_poses
+from elastocal.sim.arm import (
+    LOAD_CASES,
+    SphericalCap,
+    pose_error,
+    press_forces,
+    press_poses,
+    solve_inverse,
+)
 
 
 def test_the_tool_touches_the_dome_along_its_normal(linkage, poses):

@@ -26,7 +26,9 @@ import numpy as np
 
 from elastocal.arrays import FloatArray, IndexArray
 from elastocal.cell.description import Gears
-from elastocal.sim.arm.springs import gear_softening
+from elastocal.sim.arm import (
+    gear_softening,
+)
 
 _STOPS = 4
 """Number of sliders of a gear's friction."""
@@ -86,7 +88,7 @@ class BalancerSpring:
 
 @dataclass(frozen=True, eq=False)
 class GearLaws:
-    """What the gears have beside their stiffness at high torque."""
+    """Growth, backlash and friction of the gears, beside their stiffness at high torque."""
 
     which: IndexArray
     """Which springs are gears, shape (gear,)."""

@@ -1,4 +1,6 @@
-"""The contact disk on the tooling: what gives way under a force, and when it slips.
+"""The contact disk on the tooling: where it touches, what gives way under a force, when it slips.
+
+The tooling is the triangles of the cell's mesh, met by a straight approach as by a ray.
 
 The disk sinks in by ``f_n / k_n`` and the tooling yields by ``f_n / k_t`` along its normal; both
 are true motion of the tool, which marker and controller see alike. Sideways the disk follows
@@ -24,6 +26,8 @@ from elastocal.errors import FileAccessError, SchemaError
 
 LIMIT = 0.999
 """Part of the friction limit that a sliding contact keeps up: its shear is finite."""
+_GRAZING = 1e-12
+"""A ray less steep to a triangle passes it by (product of its edges and the ray, in m²)."""
 
 
 @dataclass(frozen=True)
@@ -114,10 +118,6 @@ class Contact:
     def slipped(self, lateral_tcp: FloatArray) -> "Contact":
         """Return the contact after a slip, tcp frame, shape (2,), in m."""
         return replace(self, anchor=self.anchor + self.R_base_tcp[:, :2] @ lateral_tcp)
-
-
-_GRAZING = 1e-12
-"""A ray less steep to a triangle passes it by (product of its edges and the ray, in m²)."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,7 +1,8 @@
-"""A stretch of time in which the cell does one thing: the way from one state to the next.
+"""How the simulated cell moves through time: the clock, time laws, and segments.
 
-At the knots everything is exact; between them joints, forces and small deviations are
-interpolated along the progress of the movement.
+Time is in whole microseconds, so that time differences are exact. A segment is a stretch of time in
+which the cell does one thing: at its knots everything is exact; between them joints, forces and
+small deviations are interpolated along the progress of the movement.
 """
 
 import math
@@ -16,10 +17,58 @@ from numpy.typing import ArrayLike
 from elastocal.arrays import FloatArray, IndexArray
 from elastocal.cell.devices import Motion
 from elastocal.errors import DeviceError
-from elastocal.sim.workcell.springs import RobotSprings
+from elastocal.sim.workcell._springs import RobotSprings
 
 SETTLED = 1e-5
-"""What is left of a settling force that counts as nothing, over its change."""
+"""Rest of a settling force that counts as none, over its change."""
+MICROSECONDS = 1_000_000
+
+
+def to_microseconds(seconds: float) -> int:
+    """Return a time rounded to whole microseconds.
+
+    >>> to_microseconds(0.04)
+    40000
+    """
+    return round(seconds * MICROSECONDS)
+
+
+class SimClock:
+    """A clock that stands until somebody sleeps; see `elastocal.cell.devices.Clock`."""
+
+    def __init__(self, start: float = 0.0) -> None:
+        """Let the clock show ``start`` s."""
+        if not 0.0 <= start < 1e9:
+            raise DeviceError(f"start of the simulated clock is {start!r} s: must be 0 to 1e9")
+        self._now = to_microseconds(start)
+        self._woken: list[Callable[[int], None]] = []
+
+    @property
+    def microseconds(self) -> int:
+        """The time in µs."""
+        return self._now
+
+    def now(self) -> float:
+        """Return the time in s."""
+        return self._now / MICROSECONDS
+
+    def sleep(self, seconds: float) -> None:
+        """Let time pass; simulated devices do what was due meanwhile.
+
+        Raises
+        ------
+        DeviceError
+            If the time is negative or not finite.
+        """
+        if not 0.0 <= seconds < math.inf:
+            raise DeviceError(f"sleep of {seconds!r} s: must be 0 or more, and finite")
+        self._now += to_microseconds(seconds)
+        for wake in self._woken:
+            wake(self._now)
+
+    def on_wake(self, wake: Callable[[int], None]) -> None:
+        """Have a function called with the time in µs after every sleep."""
+        self._woken.append(wake)
 
 
 class TimeLaw(Protocol):
@@ -121,59 +170,9 @@ def joint_move(distance: FloatArray, speed: FloatArray, rise: float) -> Trapezoi
     return Trapezoid(at_speed + rise, rise)
 
 
-MICROSECONDS = 1_000_000
-
-
-def to_microseconds(seconds: float) -> int:
-    """Return a time rounded to whole microseconds.
-
-    >>> to_microseconds(0.04)
-    40000
-    """
-    return round(seconds * MICROSECONDS)
-
-
-class SimClock:
-    """A clock that stands until somebody sleeps; see `elastocal.cell.devices.Clock`."""
-
-    def __init__(self, start: float = 0.0) -> None:
-        """Let the clock show ``start`` s."""
-        if not 0.0 <= start < 1e9:
-            raise DeviceError(f"start of the simulated clock is {start!r} s: must be 0 to 1e9")
-        self._now = to_microseconds(start)
-        self._woken: list[Callable[[int], None]] = []
-
-    @property
-    def microseconds(self) -> int:
-        """The time in µs."""
-        return self._now
-
-    def now(self) -> float:
-        """Return the time in s."""
-        return self._now / MICROSECONDS
-
-    def sleep(self, seconds: float) -> None:
-        """Let time pass; simulated devices do what was due meanwhile.
-
-        Raises
-        ------
-        DeviceError
-            If the time is negative or not finite.
-        """
-        if not 0.0 <= seconds < math.inf:
-            raise DeviceError(f"sleep of {seconds!r} s: must be 0 or more, and finite")
-        self._now += to_microseconds(seconds)
-        for wake in self._woken:
-            wake(self._now)
-
-    def on_wake(self, wake: Callable[[int], None]) -> None:
-        """Have a function called with the time in µs after every sleep."""
-        self._woken.append(wake)
-
-
 @dataclass(frozen=True, eq=False)
 class Knots:
-    """States along the way."""
+    """States along a path."""
 
     progress: FloatArray
     """From 0 to 1, ascending, shape (knot,)."""
@@ -185,7 +184,7 @@ class Knots:
     force: FloatArray
     """Force on the robot in base, shape (knot, 3), in N."""
     seen: FloatArray
-    """What instruments see: marker in base in m, true wrench at the sensor in its frame in N and
+    """Truth that instruments see: marker in base in m, wrench at the sensor in its frame in N and
     N·m, weight in; shape (knot, 9)."""
 
     def at(self, array: FloatArray, progress: FloatArray) -> FloatArray:
@@ -233,7 +232,7 @@ class Segment:
     law: TimeLaw
     knots: Knots
     motion: Motion
-    """On the way."""
+    """Motion on the path."""
     motion_after: Motion
     """When it is done."""
     springs: tuple[RobotSprings, RobotSprings]
@@ -241,7 +240,7 @@ class Segment:
     theta: FloatArray
     """Spring positions at the end, shape (spring,), to start from."""
     fault_after: str | None = None
-    """What the controller says when it is done."""
+    """Fault that the controller reports when it is done."""
     ripple: Ripple | None = None
     ripple_wrench: FloatArray = field(default_factory=lambda: np.zeros(6))
     """Wrench at the sensor per N of the ripple, sensor frame, shape (6,)."""

@@ -17,10 +17,12 @@ from elastocal.errors import DeviceError
 from elastocal.robot import (
     inverse_transform,
 )
-from elastocal.sim.arm.inverse import solve_inverse
-from elastocal.sim.workcell.robot import RobotEquilibrium, TrueRobot
-from elastocal.sim.workcell.springs import RobotSprings
-from elastocal.sim.workcell.timeline import Knots
+from elastocal.sim.arm import (
+    solve_inverse,
+)
+from elastocal.sim.workcell._robot import RobotEquilibrium, TrueRobot
+from elastocal.sim.workcell._springs import RobotSprings
+from elastocal.sim.workcell._timeline import Knots
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,7 +62,7 @@ class ForceReading:
     R_base_sensor: FloatArray
     """Truly, when it was zeroed, shape (3, 3)."""
     weight: FloatArray
-    """Of the tool in base, shape (3,), in N."""
+    """Weight of the tool in base, shape (3,), in N."""
 
     def true_force(self, wanted_tcp: FloatArray, R_base_sensor: FloatArray) -> FloatArray:
         """Return the force on the robot in base at which the reading is the wanted one.
@@ -89,7 +91,7 @@ class Quasistatics:
     marker_tcp: FloatArray
     """Shape (3,), in m."""
     weight: FloatArray
-    """Of the tool that the sensor carries, in base, shape (3,), in N."""
+    """Weight of the tool that the sensor carries, in base, shape (3,), in N."""
 
     @classmethod
     def of(cls, cell: Cell, robot: TrueRobot) -> "Quasistatics":

@@ -1,4 +1,4 @@
-"""What the simulated devices share: time, the robot, the tooling, and what is going on."""
+"""The plant that all simulated devices share: time, robot, tooling, faults, current segment."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -14,11 +14,11 @@ from elastocal.errors import DeviceError, nearest
 from elastocal.robot import (
     inverse_transform,
 )
-from elastocal.sim.workcell.contact import Contact, ContactLaw, TrueSurface
-from elastocal.sim.workcell.quasistatics import Quasistatics, RobotPath, RobotState
-from elastocal.sim.workcell.robot import TrueRobot
-from elastocal.sim.workcell.sampling import generator, posture_key
-from elastocal.sim.workcell.timeline import (
+from elastocal.sim.workcell._contact import Contact, ContactLaw, TrueSurface
+from elastocal.sim.workcell._quasistatics import Quasistatics, RobotPath, RobotState
+from elastocal.sim.workcell._robot import TrueRobot
+from elastocal.sim.workcell._sampling import generator, posture_key
+from elastocal.sim.workcell._timeline import (
     Ripple,
     Segment,
     SimClock,
@@ -31,6 +31,10 @@ FOREVER = 1 << 62
 """Later than any time, in µs."""
 SPANS = ("beam_break", "ft_dropout", "ft_frozen", "ft_saturation", "stale_clock")
 """Faults that last for a while, whatever the arm does."""
+_DRAWS = 64
+"""Random stops and slips of a visit; more begin anew."""
+_DONE = 1.0 - 1e-3
+"""A change of force this far along counts as made when the gears' memory is asked."""
 
 
 @dataclass(frozen=True)
@@ -136,12 +140,6 @@ class FaultSchedule:
             if span.station in (None, station):
                 covered |= (times >= span.begin) & (times < span.end)
         return np.flatnonzero(covered)
-
-
-_DRAWS = 64
-"""Random stops and slips of a visit; more begin anew."""
-_DONE = 1.0 - 1e-3
-"""A change of force this far along counts as made when the gears' memory is asked."""
 
 
 class Instrument(Protocol):
@@ -252,16 +250,16 @@ class Plant:
         fault: str | None = None,
         ripple: Ripple | None = None,
     ) -> Segment:
-        """Set out on a way and return the segment.
+        """Set out on a path and return the segment.
 
         Parameters
         ----------
-        way : RobotPath
+        path : RobotPath
             From ``start`` on.
         law : TimeLaw
             How the time goes.
         motions : tuple of Motion
-            What the arm does on the way, and at its end.
+            Motion of the arm on the path, and at its end.
         start : RobotState
             Where it is.
         fault : str, optional
@@ -300,7 +298,7 @@ class Plant:
         return RobotState(q, twist, force, springs, theta, self._sag)
 
     def note_sag(self, state: RobotState) -> None:
-        """Remember the sag of the last free stand, which the controller partly takes out."""
+        """Remember the sag of the last free state, which the controller partly takes out."""
         self._sag = state.sag
 
     def standing(self, state: RobotState, motion: Motion, fault: str | None = None) -> Segment:

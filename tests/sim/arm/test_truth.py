@@ -5,17 +5,18 @@ import numpy as np
 import pytest
 
 from elastocal.errors import RobotError, SpringError
-from elastocal.sim.arm.elastic_arm import (
+from elastocal.sim.arm import (
     GRAVITY,
+    CubicGear,
     ElasticArm,
+    EquilibriumError,
+    Linear,
+    Linkage,
     TruthSpring,
     bearing_truth,
     with_link_bending,
     with_stiffening_gears,
 )
-from elastocal.sim.arm.linkage import Linkage
-from elastocal.sim.arm.springs import CubicGear, Linear
-from elastocal.sim.arm.statics import EquilibriumError
 
 LENGTH = 2.0
 K = 1000.0

@@ -1,9 +1,14 @@
 import numpy as np
 import pytest
 
-from elastocal.sim.arm.linkage import Screws
-from elastocal.sim.arm.springs import CubicGear, Linear, TwoSlopeGear
-from elastocal.sim.arm.statics import DeadLoads, LoadedMechanism
+from elastocal.sim.arm import (
+    CubicGear,
+    DeadLoads,
+    Linear,
+    LoadedMechanism,
+    Screws,
+    TwoSlopeGear,
+)
 
 STEP = 1e-6
 

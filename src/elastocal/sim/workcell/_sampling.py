@@ -11,10 +11,12 @@ from collections.abc import Callable
 import numpy as np
 
 from elastocal.arrays import FloatArray, IndexArray
-from elastocal.sim.workcell.timeline import MICROSECONDS
+from elastocal.sim.workcell._timeline import MICROSECONDS
 
 NEWEST = 500
 """Samples that are kept for a caller that does not look; older ones are lost."""
+BLOCK = 512
+"""Samples that are drawn at once."""
 
 
 class SampleGrid:
@@ -73,35 +75,6 @@ class Samples:
         return times[-NEWEST:] / MICROSECONDS, values[-NEWEST:]
 
 
-BLOCK = 512
-"""Samples that are drawn at once."""
-
-
-def generator(seed: int, *words: object) -> np.random.Generator:
-    """Return the generator of some purpose.
-
-    Parameters
-    ----------
-    seed : int
-        Of the simulated cell.
-    *words : object
-        What it is for; objects with distinct `repr`.
-    """
-    digest = hashlib.sha256(repr((seed, *words)).encode()).digest()
-    return np.random.default_rng(np.frombuffer(digest, dtype=np.uint32))
-
-
-def posture_key(q: FloatArray) -> str:
-    """Return what stands for a posture: its joint positions to a nanoradian.
-
-    Parameters
-    ----------
-    q : ndarray, shape (joint,)
-        In rad or m.
-    """
-    return ",".join(f"{value + 0.0:.9f}" for value in np.round(q, 9))
-
-
 class NoiseStream:
     """Noise by the number of the sample, whichever samples are asked for."""
 
@@ -129,3 +102,28 @@ class NoiseStream:
             self._block = self._draw(generator(self._seed, *self._words, number))
             self._number = number
         return self._block
+
+
+def generator(seed: int, *words: object) -> np.random.Generator:
+    """Return the generator of some purpose.
+
+    Parameters
+    ----------
+    seed : int
+        Of the simulated cell.
+    *words : object
+        What it is for; objects with distinct `repr`.
+    """
+    digest = hashlib.sha256(repr((seed, *words)).encode()).digest()
+    return np.random.default_rng(np.frombuffer(digest, dtype=np.uint32))
+
+
+def posture_key(q: FloatArray) -> str:
+    """Return what stands for a posture: its joint positions to a nanoradian.
+
+    Parameters
+    ----------
+    q : ndarray, shape (joint,)
+        In rad or m.
+    """
+    return ",".join(f"{value + 0.0:.9f}" for value in np.round(q, 9))

@@ -2,13 +2,18 @@ import numpy as np
 import pytest
 
 from elastocal.errors import DatasetError, UnreachableError
-from elastocal.sim.arm.elastic_arm import (
+from elastocal.sim.arm import (
     GRAVITY,
+    LOAD_CASES,
+    SHOP_FLOOR,
+    Blunder,
+    Contact,
+    Noise,
     bearing_truth,
+    measure,
     with_link_bending,
     with_stiffening_gears,
 )
-from elastocal.sim.arm.measurement import LOAD_CASES, SHOP_FLOOR, Blunder, Contact, Noise, measure
 
 
 @pytest.fixture(scope="module")

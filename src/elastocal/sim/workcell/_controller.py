@@ -13,11 +13,11 @@ from elastocal.arrays import FloatArray
 from elastocal.cell.description import Fault
 from elastocal.cell.devices import ArmState, Motion
 from elastocal.errors import DeviceError
-from elastocal.sim.workcell.contact import Contact
-from elastocal.sim.workcell.force_control import ForceControl
-from elastocal.sim.workcell.paths import guarded_move, joint_path, retract_path
-from elastocal.sim.workcell.plant import FOREVER, Plant
-from elastocal.sim.workcell.timeline import (
+from elastocal.sim.workcell._contact import Contact
+from elastocal.sim.workcell._force_control import ForceControl
+from elastocal.sim.workcell._paths import guarded_move, joint_path, retract_path
+from elastocal.sim.workcell._plant import FOREVER, Plant
+from elastocal.sim.workcell._timeline import (
     MICROSECONDS,
     Segment,
     Uniform,
@@ -27,61 +27,6 @@ from elastocal.sim.workcell.timeline import (
 
 _UNIT = 1e-6
 """How far the length of a direction may be from 1."""
-
-
-def require(holds: bool, what: str, value: object, allowed: str) -> None:
-    """Refuse a value.
-
-    Raises
-    ------
-    DeviceError
-        Naming it and what is allowed.
-    """
-    if not holds:
-        raise DeviceError(f"simulated arm: {what} is {value}: must be {allowed}")
-
-
-def check_vector(what: str, values: FloatArray, size: int, *, unit: bool = False) -> FloatArray:
-    """Return numbers as an array of their own.
-
-    Parameters
-    ----------
-    what : str
-        How the message names them.
-    values : ndarray, shape (size,)
-        Finite.
-    size : int
-        How many there must be.
-    unit : bool
-        Whether they must be a unit vector; it is then made one exactly.
-
-    Raises
-    ------
-    DeviceError
-        If they are not as they must be.
-    """
-    array = np.array(values, dtype=float)
-    fits = array.shape == (size,) and bool(np.all(np.isfinite(array)))
-    require(fits, what, array.tolist(), f"{size} finite numbers")
-    if unit:
-        length = float(np.linalg.norm(array))
-        require(abs(length - 1.0) <= _UNIT, f"length of the {what}", length, "1")
-        array /= length
-    return array
-
-
-def check_distance(what: str, distance: float, speed: float) -> None:
-    """Refuse a way or a speed that is not above 0 and finite.
-
-    Raises
-    ------
-    DeviceError
-        Naming it.
-    """
-    require(0.0 < distance < math.inf, f"{what} distance", distance, "above 0 m and finite")
-    require(0.0 < speed < math.inf, f"{what} speed", speed, "above 0 m/s and finite")
-
-
 _SOURCE = "simulated arm"
 _STANDING = (Motion.IDLE,)
 _FORCED = (Motion.IDLE, Motion.HOLDING, Motion.RELEASING)
@@ -299,3 +244,56 @@ class SimulatedArm:
         lasts = FOREVER if fault.duration is None else to_microseconds(fault.duration)
         self._refused_until = self._plant.now + lasts
         self._freeze(Motion.STOPPED, self._fault)
+
+
+def require(holds: bool, what: str, value: object, allowed: str) -> None:
+    """Refuse a value.
+
+    Raises
+    ------
+    DeviceError
+        Naming it and what is allowed.
+    """
+    if not holds:
+        raise DeviceError(f"simulated arm: {what} is {value}: must be {allowed}")
+
+
+def check_vector(what: str, values: FloatArray, size: int, *, unit: bool = False) -> FloatArray:
+    """Return numbers as an array of their own.
+
+    Parameters
+    ----------
+    what : str
+        How the message names them.
+    values : ndarray, shape (size,)
+        Finite.
+    size : int
+        How many there must be.
+    unit : bool
+        Whether they must be a unit vector; it is then made one exactly.
+
+    Raises
+    ------
+    DeviceError
+        If they are not as they must be.
+    """
+    array = np.array(values, dtype=float)
+    fits = array.shape == (size,) and bool(np.all(np.isfinite(array)))
+    require(fits, what, array.tolist(), f"{size} finite numbers")
+    if unit:
+        length = float(np.linalg.norm(array))
+        require(abs(length - 1.0) <= _UNIT, f"length of the {what}", length, "1")
+        array /= length
+    return array
+
+
+def check_distance(what: str, distance: float, speed: float) -> None:
+    """Refuse a distance or a speed that is not above 0 and finite.
+
+    Raises
+    ------
+    DeviceError
+        Naming it.
+    """
+    require(0.0 < distance < math.inf, f"{what} distance", distance, "above 0 m and finite")
+    require(0.0 < speed < math.inf, f"{what} speed", speed, "above 0 m/s and finite")

@@ -1,4 +1,7 @@
-"""The ways that a command can take: from where the robot stands to where it will."""
+"""The paths of the robot from where it stands to where a command leads it.
+
+Straight moves to the surface are guarded by the force; on one away from it the force fades.
+"""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -6,19 +9,23 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from elastocal.arrays import FloatArray
-from elastocal.sim.workcell.contact import Contact
-from elastocal.sim.workcell.plant import Plant
-from elastocal.sim.workcell.quasistatics import Quasistatics, RobotPath, RobotState
+from elastocal.sim.workcell._contact import Contact
+from elastocal.sim.workcell._plant import Plant
+from elastocal.sim.workcell._quasistatics import Quasistatics, RobotPath, RobotState
 
 CLOSED = 1e-8
 """How far the tool may end from where the contact holds it, in m: 0.03 N of the disk."""
 _STEPS = 8
 """Pieces of a free movement between knots."""
 _ROUNDS = 8
+_BEYOND = 0.02
+"""How far beyond its end a move looks for the surface, in m: the arm sags."""
+_LAST_TOUCH = 1e-4
+"""Shortest path on which a force fades when the tool leaves, in m."""
 
 
 def joint_path(statics: Quasistatics, start: RobotState, end: RobotState) -> RobotPath:
-    """Return the straight way in joint space; the small deviations change evenly."""
+    """Return the straight path in joint space; the small deviations change evenly."""
     progress = np.linspace(0.0, 1.0, _STEPS + 1)
     q = _between(start.q, end.q, progress)
     twist = _between(start.twist, end.twist, progress)
@@ -26,7 +33,7 @@ def joint_path(statics: Quasistatics, start: RobotState, end: RobotState) -> Rob
 
 
 def straight_path(statics: Quasistatics, states: list[RobotState]) -> RobotPath:
-    """Return the straight way of the tool through some stands, by its length.
+    """Return the straight path of the tool through some states, by its length.
 
     Parameters
     ----------
@@ -51,10 +58,110 @@ def straight_path(statics: Quasistatics, states: list[RobotState]) -> RobotPath:
 
 
 def force_path(statics: Quasistatics, start: RobotState, end: RobotState) -> RobotPath:
-    """Return the way on which the force goes straight from one to the other."""
+    """Return the path on which the force goes straight from one to the other."""
     both = (start, end)
     q, twist, force = (np.stack([getattr(s, n) for s in both]) for n in ("q", "twist", "force"))
     return RobotPath(statics.knots(np.array([0.0, 1.0]), q, twist, force), end)
+
+
+@dataclass(frozen=True, eq=False)
+class GuardedMove:
+    """How a guarded move ends."""
+
+    path: RobotPath
+    contact: Contact | None
+    """The tooling that is touched."""
+    felt: bool
+    """Whether the contact force was reached."""
+    length: float
+    """In m."""
+    fault: str | None = None
+
+
+def guarded_move(
+    plant: Plant,
+    start: RobotState,
+    direction: FloatArray,
+    distance: float,
+    guard: tuple[float, float],
+) -> GuardedMove:
+    """Return a straight move that ends at a distance or when a force is felt.
+
+    The arm stops a reaction time after the force is felt, so that the force overshoots by what
+    robot, disk and tooling build up meanwhile.
+
+    Parameters
+    ----------
+    plant : Plant
+        The cell.
+    start : RobotState
+        Where the robot stands.
+    direction : ndarray, shape (3,)
+        Unit vector in base.
+    distance : float
+        Longest path, in m.
+    guard : tuple of float
+        Speed in m/s, and the force to stop at, in N.
+    """
+    statics, error = plant.statics, plant.stop_error()
+    found = _touch(plant, start, direction, distance, error)
+    if found is None:
+        end = _moved(plant, start, distance * direction, error)
+        return GuardedMove(straight_path(statics, [start, end]), None, False, distance)
+    contact, touch = found
+    entry = plant.cell.file.simulation.controller
+    speed, limit = guard[0], min(guard[1], entry.collision_force)
+
+    def press(force: float) -> RobotState:
+        return pressed_state(statics, touch, contact, lambda _: -force * direction, error)
+
+    to_touch = _advance(plant, start, touch, direction)
+    stiffness = limit / (_advance(plant, start, press(limit), direction) - to_touch)
+    felt = to_touch + limit / stiffness <= distance
+    force = limit + stiffness * speed * entry.reaction if felt else 0.0
+    force = force or stiffness * max(distance - to_touch, 0.0)
+    end = press(force) if force > 0.0 else touch
+    on_the_way = [touch] if to_touch > 0.0 and end is not touch else []
+    fault = None
+    if felt and guard[1] > entry.collision_force:
+        fault = f"collision: {entry.collision_force:g} N on a straight move"
+    length = max(_advance(plant, start, end, direction), 0.0)
+    path = straight_path(statics, [start, *on_the_way, end])
+    return GuardedMove(path, contact, felt, length, fault)
+
+
+def retract_path(
+    plant: Plant, start: RobotState, direction: FloatArray, distance: float
+) -> tuple[RobotPath, Contact | None]:
+    """Return a straight move away from the surface, and the contact that is left.
+
+    The force fades evenly until the tool is where it touched.
+
+    Parameters
+    ----------
+    plant : Plant
+        The cell.
+    start : RobotState
+        Where the robot stands.
+    direction : ndarray, shape (3,)
+        Unit vector in base, away from the surface.
+    distance : float
+        In m.
+    """
+    statics, error, contact = plant.statics, plant.stop_error(), plant.contact
+    fades = 0.0
+    if contact is not None and np.any(start.force):
+        touched = replace(start, q=contact.q_touch)
+        fades = max(_advance(plant, start, touched, direction), _LAST_TOUCH)
+    if fades > distance:
+        left = (1.0 - distance / fades) * start.force
+        q = _moved(plant, start, distance * direction, error).q
+        return straight_path(statics, [start, statics.loaded(start, q, left, error)]), contact
+    states = [start]
+    if fades > 0.0:
+        states.append(_moved(plant, start, fades * direction, error))
+    states.append(_moved(plant, states[-1], (distance - fades) * direction, error))
+    return straight_path(statics, states), None
 
 
 def pressed_state(
@@ -120,122 +227,6 @@ def touching_state(
     return reached
 
 
-def _between(start: FloatArray, end: FloatArray, progress: FloatArray) -> FloatArray:
-    between: FloatArray = start + progress[:, None] * (end - start)
-    between[-1] = end
-    return between
-
-
-def _interpolated(at: FloatArray, values: FloatArray, fine: FloatArray) -> FloatArray:
-    return np.stack([np.interp(fine, at, column) for column in values.T], axis=1)
-
-
-_BEYOND = 0.02
-"""How far beyond its end a move looks for the surface, in m: the arm sags."""
-_LAST_TOUCH = 1e-4
-"""Shortest way on which a force fades when the tool leaves, in m."""
-
-
-@dataclass(frozen=True, eq=False)
-class GuardedMove:
-    """How a guarded move ends."""
-
-    path: RobotPath
-    contact: Contact | None
-    """The tooling that is touched."""
-    felt: bool
-    """Whether the contact force was reached."""
-    length: float
-    """In m."""
-    fault: str | None = None
-
-
-def guarded_move(
-    plant: Plant,
-    start: RobotState,
-    direction: FloatArray,
-    distance: float,
-    guard: tuple[float, float],
-) -> GuardedMove:
-    """Return a straight move that ends at a distance or when a force is felt.
-
-    The arm stops a reaction time after the force is felt, so that the force overshoots by what
-    robot, disk and tooling build up meanwhile.
-
-    Parameters
-    ----------
-    plant : Plant
-        The cell.
-    start : RobotState
-        Where the robot stands.
-    direction : ndarray, shape (3,)
-        Unit vector in base.
-    distance : float
-        Longest way, in m.
-    guard : tuple of float
-        Speed in m/s, and the force to stop at, in N.
-    """
-    statics, error = plant.statics, plant.stop_error()
-    found = _touch(plant, start, direction, distance, error)
-    if found is None:
-        end = _moved(plant, start, distance * direction, error)
-        return GuardedMove(straight_path(statics, [start, end]), None, False, distance)
-    contact, touch = found
-    entry = plant.cell.file.simulation.controller
-    speed, limit = guard[0], min(guard[1], entry.collision_force)
-
-    def press(force: float) -> RobotState:
-        return pressed_state(statics, touch, contact, lambda _: -force * direction, error)
-
-    to_touch = _advance(plant, start, touch, direction)
-    stiffness = limit / (_advance(plant, start, press(limit), direction) - to_touch)
-    felt = to_touch + limit / stiffness <= distance
-    force = limit + stiffness * speed * entry.reaction if felt else 0.0
-    force = force or stiffness * max(distance - to_touch, 0.0)
-    end = press(force) if force > 0.0 else touch
-    on_the_way = [touch] if to_touch > 0.0 and end is not touch else []
-    fault = None
-    if felt and guard[1] > entry.collision_force:
-        fault = f"collision: {entry.collision_force:g} N on a straight move"
-    length = max(_advance(plant, start, end, direction), 0.0)
-    path = straight_path(statics, [start, *on_the_way, end])
-    return GuardedMove(path, contact, felt, length, fault)
-
-
-def retract_path(
-    plant: Plant, start: RobotState, direction: FloatArray, distance: float
-) -> tuple[RobotPath, Contact | None]:
-    """Return a straight move away from the surface, and the contact that is left.
-
-    The force fades evenly until the tool is where it touched.
-
-    Parameters
-    ----------
-    plant : Plant
-        The cell.
-    start : RobotState
-        Where the robot stands.
-    direction : ndarray, shape (3,)
-        Unit vector in base, away from the surface.
-    distance : float
-        In m.
-    """
-    statics, error, contact = plant.statics, plant.stop_error(), plant.contact
-    fades = 0.0
-    if contact is not None and np.any(start.force):
-        touched = replace(start, q=contact.q_touch)
-        fades = max(_advance(plant, start, touched, direction), _LAST_TOUCH)
-    if fades > distance:
-        left = (1.0 - distance / fades) * start.force
-        q = _moved(plant, start, distance * direction, error).q
-        return straight_path(statics, [start, statics.loaded(start, q, left, error)]), contact
-    states = [start]
-    if fades > 0.0:
-        states.append(_moved(plant, start, fades * direction, error))
-    states.append(_moved(plant, states[-1], (distance - fades) * direction, error))
-    return straight_path(statics, states), None
-
-
 def _touch(
     plant: Plant, start: RobotState, direction: FloatArray, distance: float, error: FloatArray
 ) -> tuple[Contact, RobotState] | None:
@@ -268,3 +259,13 @@ def _advance(plant: Plant, start: RobotState, end: RobotState, direction: FloatA
     """Return how far the commanded tool goes along a direction, in m."""
     T = plant.statics.robot.forward(np.stack([start.q, end.q]))
     return float((T[1, :3, 3] - T[0, :3, 3]) @ direction)
+
+
+def _between(start: FloatArray, end: FloatArray, progress: FloatArray) -> FloatArray:
+    between: FloatArray = start + progress[:, None] * (end - start)
+    between[-1] = end
+    return between
+
+
+def _interpolated(at: FloatArray, values: FloatArray, fine: FloatArray) -> FloatArray:
+    return np.stack([np.interp(fine, at, column) for column in values.T], axis=1)
