@@ -60,4 +60,11 @@ from .stiffness import (
     StiffnessSummary as StiffnessSummary,
     stiffness as stiffness,
 )
+from .study import (
+    DEFAULT_VARIATION as DEFAULT_VARIATION,
+    StudyResult as StudyResult,
+    StudySettings as StudySettings,
+    study as study,
+    study_conditions as study_conditions,
+)
 from .tool import ToolResult as ToolResult, ToolSettings as ToolSettings, tool as tool
