@@ -1,6 +1,5 @@
 """The files of a codec, and the tables of codec and study, as ``elastocal check`` tells of them."""
 
-import csv
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +15,7 @@ from elastocal.codec import (
 )
 from elastocal.errors import SchemaError
 from elastocal.files import read_text
+from elastocal.tables import opened_table
 
 Described = tuple[str, dict[str, Any]]
 
@@ -72,12 +72,13 @@ def table(path: Path) -> Described:
     SchemaError
         If a row has more or fewer cells than the header.
     """
-    text = read_text(path)
-    header, *rows = csv.reader(text.splitlines())
-    for number, row in enumerate(rows, start=2):
-        if len(row) != len(header):
-            raise SchemaError(f"{path}, line {number}: {len(row)} cells, not {len(header)}")
-    return _TABLES[_first_columns(text)], {"rows": len(rows), "columns": header}
+    with opened_table(path) as table:
+        header, rows = list(table.layout.header), table.rows()
+    uneven = rows.uneven(len(header))
+    if uneven:
+        line, cells = uneven
+        raise SchemaError(f"{path}, line {line}: {cells} cells, not {len(header)}")
+    return _TABLES[tuple(header[:3])], {"rows": len(rows), "columns": header}
 
 
 def _facts(data: CodecData) -> dict[str, Any]:

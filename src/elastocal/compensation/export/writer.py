@@ -6,15 +6,27 @@ from pathlib import Path
 import numpy as np
 
 from elastocal import __version__
-from elastocal.compensation.export.comments import remark
-from elastocal.compensation.export.constants import checksum, constants_of
-from elastocal.compensation.export.readme import readme_values
-from elastocal.compensation.export.routines import c_routines
-from elastocal.compensation.export.vectors import episodes, load_cases
+from elastocal.compensation.export._constants import checksum, constants_of, remark
+from elastocal.compensation.export._routines import c_routines
+from elastocal.compensation.export._selftest import selftest_tables
 from elastocal.compensation.online import Design
 from elastocal.files import filling
 
-PARTS = ("head.c", "sin_cos.c", "condition.c", "correct.c", "selftest.c")
+_PARTS = ("head.c", "sin_cos.c", "condition.c", "correct.c", "selftest.c")
+_RAW = "N, N m; raw, as the sensor gives them | sensor"
+_AT_TCP = (
+    "N, N m; **on** the robot, bias and tool weight removed, about the tool centre point | tcp"
+)
+_REMOVED_HERE = (
+    "The sensor's bias, a tool of {mass:g} kg, and the way from sensor to tool centre point are"
+    " taken care of by `elastocal_condition`. Do not zero the sensor after the export: its bias is"
+    " among the constants. With another tool, or after a crash, identify and export again."
+)
+_REMOVED = (
+    "**No tool file was given to this export.** Readings must come with the sensor's bias and the"
+    " tool's weight removed, moved to the tool centre point and turned into its axes. A raw wrench"
+    " that goes in is corrected as if the tool's weight were a process force."
+)
 
 
 def write_c(folder: Path, numbers: Design, force: bool = False) -> tuple[str, ...]:
@@ -33,6 +45,8 @@ def write_c(folder: Path, numbers: Design, force: bool = False) -> tuple[str, ..
     ------
     FileAccessError
         If the folder holds files and ``force`` is not given, or cannot be written.
+    CompensationError
+        If what would be exported does not agree with the model.
     """
     files = c_files(numbers)
     with filling(folder, "elastocal_model.c", force) as temporary:
@@ -42,13 +56,19 @@ def write_c(folder: Path, numbers: Design, force: bool = False) -> tuple[str, ..
 
 
 def c_files(numbers: Design) -> dict[str, str]:
-    """Return the C files of a compensator, by name; the same design gives the same text."""
+    """Return the C files of a compensator, by name; the same design gives the same text.
+
+    Raises
+    ------
+    CompensationError
+        If what would be exported does not agree with the model.
+    """
     values = _values(numbers)
     constants = constants_of(numbers)
-    data = _test_data(numbers)
+    data = selftest_tables(numbers)
     mixing = "\n".join(line for constant in constants for line in constant.mixing())
     values |= data | {"MIXING": mixing, "CHECKSUM": str(checksum(constants))}
-    head, sin_cos, condition, correct, selftest = (_filled(part, values) for part in PARTS)
+    head, sin_cos, condition, correct, selftest = (_filled(part, values) for part in _PARTS)
     definitions = "".join(f"{each.definition()}\n" for each in constants if not each.in_header)
     model = "".join([head, definitions, sin_cos, c_routines(numbers), condition, correct, selftest])
     return {
@@ -56,7 +76,7 @@ def c_files(numbers: Design) -> dict[str, str]:
         "elastocal_model.h": _filled("elastocal_model.h", values),
         "selftest_main.c": _filled("selftest_main.c", values),
         "CMakeLists.txt": _filled("CMakeLists.txt", values),
-        "README.md": _filled("README.md", values | readme_values(numbers)),
+        "README.md": _filled("README.md", values | _readme_values(numbers)),
     }
 
 
@@ -89,42 +109,31 @@ def _values(numbers: Design) -> dict[str, str]:
     }
 
 
-def _test_data(numbers: Design) -> dict[str, str]:
-    loads, course = load_cases(numbers), episodes(numbers)
-    load_rows = [
-        _struct(_array(x.q), _array(x.force), _array(x.moment), _array(x.deflection), x.half_width)
-        for x in loads
-    ]
-    episode_rows = [
-        _struct(
-            str(x.times),
-            _struct(
-                x.reading.time,
-                _array(x.reading.q),
-                _array(x.reading.force),
-                _array(x.reading.moment),
-                "1" if x.reading.ok else "0",
-            ),
-            _array(x.correction),
-            f"{x.status}U",
-        )
-        for x in course
+def _readme_values(numbers: Design) -> dict[str, str]:
+    """Return the values of the README's places."""
+    settings, limits = numbers.settings, numbers.settings.limits
+    robot = numbers.calibrated.model.robot
+    frequencies = np.array([0.0, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0])
+    frequencies = frequencies[frequencies < 0.5 / numbers.filters.sample]
+    delays, gains = numbers.filters.delay(frequencies), numbers.filters.gain(frequencies)
+    rows = [
+        f"| {f:g} | {'none passes' if np.isnan(d) else f'{1e3 * d:.2f}'} | {g:.3f} |"
+        for f, d, g in zip(frequencies, delays, gains, strict=True)
     ]
     return {
-        "LOADS": str(len(loads)),
-        "LOAD_DATA": ",\n".join(f"    {row}" for row in load_rows),
-        "EPISODES": str(len(course)),
-        "EPISODE_DATA": ",\n".join(f"    {row}" for row in episode_rows),
+        "ROBOT": robot.name,
+        "BASE": robot.base,
+        "TIP": robot.tip,
+        "CYCLE_MS": f"{1e3 * settings.cycle:g}",
+        "SAMPLE_MS": f"{1e3 * numbers.filters.sample:g}",
+        "LARGEST_MM": f"{1e3 * limits.correction:g}",
+        "RATE_MM": f"{1e3 * limits.rate:g}",
+        "FADE_MM": f"{1e3 * limits.fade:g}",
+        "HOLD_MS": f"{1e3 * settings.hold:g}",
+        "SENSOR": _REMOVED_HERE.format(mass=numbers.load.mass) if numbers.weighs else _REMOVED,
+        "RAW": _RAW if numbers.weighs else _AT_TCP,
+        "DELAYS": "\n".join(rows),
     }
-
-
-def _struct(*parts: str | float) -> str:
-    texts = (part if isinstance(part, str) else repr(float(part)) for part in parts)
-    return "{" + ",\n     ".join(texts) + "}"
-
-
-def _array(numbers: object) -> str:
-    return "{" + ", ".join(repr(x) for x in np.asarray(numbers, dtype=float).tolist()) + "}"
 
 
 def _template(name: str) -> str:

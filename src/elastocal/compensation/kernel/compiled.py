@@ -2,11 +2,24 @@
 
 import math
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 
 from elastocal.compensation.kernel.program import Assignment, Call, Turn, sum_text, value_text
 from elastocal.compensation.kernel.statics import Routine
 
 Function = Callable[..., tuple[float, ...]]
+
+
+@dataclass(frozen=True)
+class ModelFunctions:
+    """What a compensator asks of a model; arguments and results are sequences of floats."""
+
+    orientation: Function
+    """``(q)``: rotation of the tool centre point in base, by rows."""
+    deflection: Function
+    """``(q, force, moment)``: deflection in base, in m."""
+    block: Function
+    """``(q, force, moment)``: observation block by rows, in m per unit of each parameter."""
 
 
 def compiled(routine: Routine, joints: int, loaded: bool = True) -> Function:

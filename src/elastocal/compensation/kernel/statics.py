@@ -4,7 +4,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from itertools import count
 
-from elastocal.compensation.kernel.chain import (
+from elastocal.compensation.kernel._chain import (
     FORCE,
     MOMENT,
     NOTHING,
@@ -24,10 +24,10 @@ from elastocal.compensation.kernel.program import (
 from elastocal.elastic import ElasticModel, SpringAxis, SpringLoad
 from elastocal.elastic.springs import Expression, Function, Input, Number, Product, Sum
 
-Point = tuple[int, bool, tuple[float, float, float]]
+_Point = tuple[int, bool, tuple[float, float, float]]
 """Joint, whether behind its motion, offset: where the axis of a spring passes."""
 
-Weighted = tuple[Value, Vector]
+_Weighted = tuple[Value, Vector]
 
 
 @dataclass(frozen=True)
@@ -90,7 +90,7 @@ def observation_block(model: ElasticModel) -> Routine:
     program = Program()
     laws = _Laws(program, model)
     jacobian: dict[int, Vector] = {}
-    terms: dict[int, list[Weighted]] = {p: [] for p in range(len(model.parameters))}
+    terms: dict[int, list[_Weighted]] = {p: [] for p in range(len(model.parameters))}
     columns: dict[int, Vector] = {}
     for place in _places(program, model):
         for axis in place.loaded():
@@ -241,13 +241,13 @@ def _places(program: Program, model: ElasticModel) -> Iterator[_Place]:
         yield _Place(program, label, lever, moment, here)
 
 
-def _points(model: ElasticModel, axes: Sequence[SpringAxis]) -> list[tuple[Point, list[int]]]:
+def _points(model: ElasticModel, axes: Sequence[SpringAxis]) -> list[tuple[_Point, list[int]]]:
     """Return where axes pass, from base to tip, with the axes of each place.
 
     A revolute spring about its joint's own axis is the same before and behind the motion.
     """
     names = model.robot.joint_names
-    groups: dict[Point, list[int]] = {}
+    groups: dict[_Point, list[int]] = {}
     for i, axis in enumerate(axes):
         joint = names.index(axis.joint)
         own = tuple(model.robot.chain.joints[joint].axis.tolist()) == axis.axis
@@ -260,7 +260,7 @@ def _frame(chain: Chain, joint: int, behind: bool) -> Frame:
     return chain.joints[joint].distal if behind else chain.joints[joint].proximal
 
 
-def _sum(program: Program, name: str, parts: Sequence[Weighted]) -> Vector:
+def _sum(program: Program, name: str, parts: Sequence[_Weighted]) -> Vector:
     """Return the sum of ``weight * axis``."""
     x, y, z = (
         program.total(f"{name}_{a}", [(weight, axis[i]) for weight, axis in parts])

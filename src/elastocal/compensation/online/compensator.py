@@ -6,7 +6,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from elastocal.compensation.conditioning import SensorLoad
-from elastocal.compensation.kernel import compiled
+from elastocal.compensation.kernel import ModelFunctions
 from elastocal.compensation.online.conditioner import Conditioner
 from elastocal.compensation.online.design import JOINT_RANGE, LONG_AGO, Design, design
 from elastocal.compensation.online.state import Correction, Reading, State, Status, Triple
@@ -22,15 +22,21 @@ class Compensator:
     The length of the correction never exceeds its limit, and from one step to the next it never
     moves farther than the rate allows, whatever the readings are. The C export does the same
     arithmetic in the same order.
+
+    Parameters
+    ----------
+    numbers : Design
+        Of the compensator.
+    functions : ModelFunctions, optional
+        What it asks of the model; by default the compiled kernel.
     """
 
-    def __init__(self, numbers: Design) -> None:
+    def __init__(self, numbers: Design, functions: ModelFunctions | None = None) -> None:
         self.design = numbers
-        joints, limits = numbers.joints, numbers.settings.limits
-        self._conditioner = Conditioner(numbers)
-        self._deflection = compiled(numbers.deflection, joints)
-        self._block = compiled(numbers.block, joints)
-        self._orientation = compiled(numbers.orientation, joints, loaded=False)
+        limits, functions = numbers.settings.limits, functions or numbers.functions()
+        self._conditioner = Conditioner(numbers, functions.orientation)
+        self._deflection, self._block = functions.deflection, functions.block
+        self._orientation = functions.orientation
         self._spread = np.ascontiguousarray(numbers.spread)
         self._shape = (3, len(numbers.spread))
         self._frame = tuple(numbers.frame.ravel().tolist())

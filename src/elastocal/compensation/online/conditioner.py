@@ -2,7 +2,7 @@
 
 import math
 
-from elastocal.compensation.kernel import compiled
+from elastocal.compensation.kernel import Function
 from elastocal.compensation.online.design import JOINT_RANGE, Design
 from elastocal.compensation.online.state import Reading, State, Status
 
@@ -13,8 +13,8 @@ class Conditioner:
     The C of `elastocal_condition` does the same in the same order.
     """
 
-    def __init__(self, design: Design) -> None:
-        self._orientation = compiled(design.orientation, design.joints, loaded=False)
+    def __init__(self, design: Design, orientation: Function) -> None:
+        self._orientation = orientation
         self._bias = (*design.load.force_bias.tolist(), *design.load.moment_bias.tolist())
         self._range = (*design.settings.sensor.force, *design.settings.sensor.moment)
         self._weight = tuple(design.weight.tolist())

@@ -7,7 +7,14 @@ from scipy import stats
 
 from elastocal.arrays import FloatArray
 from elastocal.compensation.conditioning import FilterChain, SensorLoad
-from elastocal.compensation.kernel import Routine, deflection, observation_block, orientation
+from elastocal.compensation.kernel import (
+    ModelFunctions,
+    Routine,
+    compiled,
+    deflection,
+    observation_block,
+    orientation,
+)
 from elastocal.compensation.settings import CompensatorSettings
 from elastocal.errors import CompensationError
 from elastocal.identification import CalibratedModel
@@ -51,6 +58,14 @@ class Design:
     def joints(self) -> int:
         """Number of joints."""
         return len(self.calibrated.model.robot.joint_names)
+
+    def functions(self) -> ModelFunctions:
+        """Return the model as compiled Python, for the online step."""
+        return ModelFunctions(
+            orientation=compiled(self.orientation, self.joints, loaded=False),
+            deflection=compiled(self.deflection, self.joints),
+            block=compiled(self.block, self.joints),
+        )
 
     @property
     def weighs(self) -> bool:

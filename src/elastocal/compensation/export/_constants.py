@@ -1,0 +1,189 @@
+"""The constants of the C file: in one list, so that the self-test can sum them up."""
+
+import string
+import struct
+from collections.abc import Sequence
+from dataclasses import dataclass
+from textwrap import wrap
+
+import numpy as np
+
+from elastocal.arrays import FloatArray
+from elastocal.compensation.online import JOINT_RANGE, LONG_AGO, Design
+
+_FNV_START, _FNV_PRIME = 14695981039346656037, 1099511628211
+"""FNV-1a, 64 bits (Fowler, Noll and Vo)."""
+_COUNTS = ("JOINTS", "SPRINGS", "SECTIONS", "MEDIAN")
+
+
+@dataclass(frozen=True, eq=False)
+class Constant:
+    """A constant of the C file."""
+
+    name: str
+    numbers: FloatArray
+    """Shape () for one number, (n,) or (n, m) for an array."""
+    comment: str = ""
+    whole: bool = False
+    """Whether it is an ``int`` in C."""
+    in_header: bool = False
+    """Whether the header defines it; the C file then has no definition of it."""
+
+    def definition(self) -> str:
+        """Return its C definition."""
+        kind = "int" if self.whole else "double"
+        extents = "".join(f"[{extent}]" for extent in self.numbers.shape)
+        comment = f" /* {remark(self.comment)} */" if self.comment else ""
+        if self.numbers.ndim == 0:
+            return f"static const {kind} {self.name} = {self._literal(self.numbers)};{comment}"
+        rows = self.numbers if self.numbers.ndim == 2 else self.numbers[None]
+        texts = [", ".join(self._literal(x) for x in row) for row in rows]
+        if self.numbers.ndim == 2:
+            texts = [f"{{{text}}}" for text in texts]
+        body = "\n".join("\n".join(wrap(text, 96)) + "," for text in texts)[:-1]
+        indented = "\n".join(f"    {line}" for line in body.splitlines())
+        return f"static const {kind} {self.name}{extents} = {{{comment}\n{indented}\n}};"
+
+    def mixing(self) -> list[str]:
+        """Return the C statements that add it to the sum of constants."""
+        cast = "(double)" if self.whole else ""
+        if self.numbers.ndim == 0:
+            return [f"    sum = mixed(sum, {cast}{self.name});"]
+        if self.numbers.ndim == 1:
+            loop = f"    for (i = 0; i < {len(self.numbers)}; i++) {{"
+            return [loop, f"        sum = mixed(sum, {cast}{self.name}[i]);", "    }"]
+        n, m = self.numbers.shape
+        return [
+            f"    for (i = 0; i < {n}; i++) {{",
+            f"        for (k = 0; k < {m}; k++) {{",
+            f"            sum = mixed(sum, {self.name}[i][k]);",
+            "        }",
+            "    }",
+        ]
+
+    def _literal(self, number: np.floating | FloatArray) -> str:
+        return str(int(number)) if self.whole else repr(float(number))
+
+
+def checksum(constants: Sequence[Constant]) -> int:
+    """Return FNV-1a over the bits of every number, in the order of the list."""
+    total = _FNV_START
+    for constant in constants:
+        for number in constant.numbers.ravel().tolist():
+            (bits,) = struct.unpack("<Q", struct.pack("<d", float(number)))
+            total = ((total ^ bits) * _FNV_PRIME) % 2**64
+    return total
+
+
+def constants_of(numbers: Design) -> list[Constant]:
+    """Return every constant of a compensator's C files, in the order of the self-test's sum."""
+    return [
+        *_header(numbers),
+        *_trigonometry(),
+        *_model(numbers),
+        *_conditioning(numbers),
+        *_compensation(numbers),
+    ]
+
+
+def _header(numbers: Design) -> list[Constant]:
+    """Return what the header defines: edited there, nothing would follow it."""
+    filters = numbers.filters
+    values = {
+        "JOINTS": numbers.joints,
+        "SPRINGS": len(numbers.calibrated.model.parameters),
+        "SECTIONS": len(filters.sections),
+        "MEDIAN": filters.median,
+        "CYCLE": numbers.settings.cycle,
+        "SAMPLE": filters.sample,
+        "DELAY": float(filters.delay()),
+    }
+    return [
+        Constant(f"ELASTOCAL_{name}", np.array(float(value)), whole=name in _COUNTS, in_header=True)
+        for name, value in values.items()
+    ]
+
+
+def _one(name: str, number: float, comment: str = "", whole: bool = False) -> Constant:
+    return Constant(name, np.array(float(number)), comment, whole)
+
+
+def _trigonometry() -> list[Constant]:
+    factorial = np.cumprod(np.arange(1.0, 18.0))
+    signs = np.array([-1.0, 1.0] * 4)
+    return [
+        _one("TWO_BY_PI", 2.0 / np.pi),
+        _one("ROUNDER", 1.5 * 2.0**52, "adding and subtracting it rounds to an integer"),
+        Constant(
+            "HALF_PI",
+            np.array([1.5707963267341256, 6.077100506303966e-11, 2.0222662487959506e-21]),
+            "pi/2, the first two of 33 and 32 bits",
+        ),
+        Constant("SINE", signs[:7] / factorial[2:16:2], "-1/3!, 1/5!, ..."),
+        Constant("COSINE", signs / factorial[1:17:2], "-1/2!, 1/4!, ..."),
+    ]
+
+
+def _model(numbers: Design) -> list[Constant]:
+    """Return the numbers of the chain and the springs, by the names that the routines use."""
+    comments = {
+        f"compliance{i + 1}": f"{parameter.name}, {parameter.unit.si.replace('*', ' ')}"
+        for i, parameter in enumerate(numbers.calibrated.model.parameters)
+    }
+    named = {
+        **numbers.orientation.constants,
+        **numbers.deflection.constants,
+        **numbers.block.constants,
+    }
+    return [
+        *(_one(name.upper(), number, comments.get(name, "")) for name, number in named.items()),
+        _one("DIRECTIONS", numbers.spread.shape[1], "of the bootstrap draws", whole=True),
+        Constant("SPREAD", numbers.spread, "1.96 times a root of the draws' covariance"),
+    ]
+
+
+def _conditioning(numbers: Design) -> list[Constant]:
+    load, settings = numbers.load, numbers.settings
+    sections = np.array(numbers.filters.sections or [(1.0, 0.0, 0.0, 0.0, 0.0)])
+    biases = np.concatenate([load.force_bias, load.moment_bias])
+    return [
+        Constant("BIAS", biases, "of the sensor, N and N m"),
+        Constant("RANGE", np.array([*settings.sensor.force, *settings.sensor.moment])),
+        Constant("WEIGHT", numbers.weight, "of the tool, base, N"),
+        Constant("SENSOR_ROTATION", numbers.sensor_rotation.ravel(), "in the tcp frame, by rows"),
+        Constant("ORIGIN", numbers.sensor_origin, "of the sensor, tcp frame, m"),
+        Constant("CENTRE", numbers.centre, "of mass from that origin, tcp axes, m"),
+        Constant("SECTION", sections, "b0, b1, b2, a1, a2"),
+        _one("LONGEST_GAP", settings.hold, "between readings, s"),
+        _one("LONG_AGO", LONG_AGO, "s"),
+        _one("JOINT_RANGE", JOINT_RANGE, "rad or m"),
+    ]
+
+
+def _compensation(numbers: Design) -> list[Constant]:
+    settings = numbers.settings
+    return [
+        _one("FRAME_IS_TCP", numbers.in_tcp, whole=True),
+        Constant("FRAME", numbers.frame.ravel(), "axes of the correction in base, by rows"),
+        _one("GAIN", settings.gain),
+        _one("DEADBAND", settings.deadband, "m"),
+        _one("DEADBAND_SLOPE", numbers.deadband_slope, "1/m"),
+        _one("LARGEST_CORRECTION", settings.limits.correction, "m"),
+        _one("LARGEST_STEP", numbers.largest_step, "m in a cycle"),
+        _one("FADE_STEP", numbers.fade_step, "m in a cycle"),
+        _one("UNCERTAIN_ABOVE", settings.uncertain_above, "m"),
+        _one("HOLD_CYCLES", settings.hold_cycles, whole=True),
+        _one("TOLERANCE", 1e-10, "of the self-test, relative"),
+    ]
+
+
+_ALLOWED = set(string.ascii_letters + string.digits + " .,:;_-+()[]#'=<>%^/!")
+
+
+def remark(text: str) -> str:
+    """Return a text that cannot end a C comment or continue its line.
+
+    >>> remark("arm */ int x;")
+    'arm  / int x;'
+    """
+    return "".join(character if character in _ALLOWED else " " for character in text)

@@ -1,0 +1,216 @@
+"""Self-test of the C: loads and a course of readings, with what the model itself gives for them.
+
+The C is printed from the statements of `elastocal.compensation.kernel`. What it must give comes
+from `ElasticModel` in Python, never from these statements: a mistake in them would agree with
+itself. A compiler is not on every machine, so before anything is written the statements are
+evaluated in Python and must agree with the model, too.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.random import Generator
+
+from elastocal.arrays import FloatArray
+from elastocal.compensation.kernel import ModelFunctions
+from elastocal.compensation.online import Compensator, Design, Reading
+from elastocal.errors import CompensationError
+from elastocal.identification import CalibratedModel
+
+_LOADS = 8
+_SEED = 20240623
+_MOST_TIMES = 400
+_DIRECTIONS = 20
+_AGREEMENT = 1e-9
+"""Largest difference between statements and model, relative; round-off is some 1e-14."""
+
+
+def selftest_tables(numbers: Design) -> dict[str, str]:
+    """Return the self-test's tables as C, by the names of their places.
+
+    Raises
+    ------
+    CompensationError
+        If the statements that are to be exported do not agree with the model.
+    """
+    exported, model = numbers.functions(), _from_model(numbers.calibrated)
+    loads = _load_cases(numbers, model)
+    for load in loads:
+        _check_statements(exported, model, load)
+    course = _episodes(numbers, model)
+    load_rows = [
+        _struct(_array(x.q), _array(x.force), _array(x.moment), _array(x.deflection), x.half_width)
+        for x in loads
+    ]
+    episode_rows = [
+        _struct(
+            str(x.times),
+            _struct(
+                x.reading.time,
+                _array(x.reading.q),
+                _array(x.reading.force),
+                _array(x.reading.moment),
+                "1" if x.reading.ok else "0",
+            ),
+            _array(x.correction),
+            f"{x.status}U",
+        )
+        for x in course
+    ]
+    return {
+        "LOADS": str(len(loads)),
+        "LOAD_DATA": ",\n".join(f"    {row}" for row in load_rows),
+        "EPISODES": str(len(course)),
+        "EPISODE_DATA": ",\n".join(f"    {row}" for row in episode_rows),
+    }
+
+
+@dataclass(frozen=True)
+class _LoadCase:
+    """A load with its deflection."""
+
+    q: list[float]
+    force: list[float]
+    moment: list[float]
+    deflection: tuple[float, ...]
+    half_width: float
+
+
+@dataclass(frozen=True)
+class _Episode:
+    """A reading that comes some times in a row, with the last correction."""
+
+    times: int
+    reading: Reading
+    """Its time is added to the course's clock."""
+    correction: tuple[float, ...]
+    status: int
+
+
+def _from_model(calibrated: CalibratedModel) -> ModelFunctions:
+    """Return what a compensator asks of a model, answered by the model itself."""
+    model, c = calibrated.model, calibrated.compliance
+    return ModelFunctions(
+        orientation=lambda q: _floats(model.robot.forward(q)[:3, :3]),
+        deflection=lambda q, force, moment: _floats(model.deflection(c, q, force, moment)),
+        block=lambda q, force, moment: _floats(model.observation_blocks(q, force, moment)),
+    )
+
+
+def _floats(array: FloatArray) -> tuple[float, ...]:
+    return tuple(array.ravel().tolist())
+
+
+def _check_statements(exported: ModelFunctions, model: ModelFunctions, load: _LoadCase) -> None:
+    """Refuse statements that give something else than the model."""
+    wrench = (load.force, load.moment)
+    for what, found, expected in (
+        ("orientation", exported.orientation(load.q), model.orientation(load.q)),
+        ("deflection", exported.deflection(load.q, *wrench), load.deflection),
+        ("observation block", exported.block(load.q, *wrench), model.block(load.q, *wrench)),
+    ):
+        off = np.abs(np.subtract(found, expected)).max() / max(np.abs(expected).max(), 1e-300)
+        if not off <= _AGREEMENT:
+            raise CompensationError(
+                f"the {what} that would be exported differs from the model's by {off:.1e} of its"
+                f" size, more than {_AGREEMENT:g}: nothing is written"
+            )
+
+
+def _load_cases(numbers: Design, model: ModelFunctions) -> list[_LoadCase]:
+    """Return random loads with their deflections."""
+    rng = np.random.default_rng(_SEED)
+    cases = []
+    for q in _configurations(numbers, rng, _LOADS).tolist():
+        force, moment = rng.normal(0.0, 800.0, 3).tolist(), rng.normal(0.0, 80.0, 3).tolist()
+        rows = np.reshape(model.block(q, force, moment), (3, -1)) @ numbers.spread
+        half_width = float(np.sqrt((rows**2).sum(axis=1).max()))
+        cases.append(_LoadCase(q, force, moment, model.deflection(q, force, moment), half_width))
+    return cases
+
+
+def _episodes(numbers: Design, model: ModelFunctions) -> list[_Episode]:
+    """Return a course that passes through every way of the step.
+
+    Loads that make a deflection within the deadband, a middle one and more than the limit;
+    readings that fail until the correction fades; readings beyond the range, a good one, one from
+    a clock that was set back, and good ones again.
+    """
+    rng = np.random.default_rng(_SEED + 1)
+    limits, settings = numbers.settings.limits, numbers.settings
+    configurations = _configurations(numbers, rng, 3).tolist()
+    small = max(1.5 * settings.deadband, 0.05 * limits.correction)
+    sizes = (small, 0.5 * limits.correction, 1.5 * limits.correction)
+    first, middle, large = (
+        _reading(numbers, q, size, rng) for q, size in zip(configurations, sizes, strict=True)
+    )
+    arriving = min(_MOST_TIMES, int(2.0 * limits.correction / numbers.largest_step) + 60)
+    course = [
+        *((times, reading) for reading in (first, middle) for times in (1, 2, 5)),
+        (arriving, large),
+        (settings.hold_cycles, middle._replace(ok=False)),
+        (3, middle._replace(force=[2.0 * x for x in settings.sensor.force])),
+        (1, large),
+        (1, middle._replace(time=-1e3)),
+        (2, middle),
+        (4, middle),
+    ]
+    return _played(Compensator(numbers, model), course)
+
+
+def _played(compensator: Compensator, course: list[tuple[int, Reading]]) -> list[_Episode]:
+    state, clock, played = compensator.start(), 0.0, []
+    for times, reading in course:
+        for _ in range(times):
+            clock += compensator.design.filters.sample
+            state, corrected = compensator.step(state, reading._replace(time=reading.time + clock))
+        played.append(_Episode(times, reading, corrected.correction, corrected.status))
+    return played
+
+
+def _reading(numbers: Design, q: list[float], size: float, rng: Generator) -> Reading:
+    """Return a raw reading whose load makes a deflection of a size, in m.
+
+    Where the sensor's range does not allow so much, of the most that it allows.
+    """
+    model, R = numbers.calibrated.model, numbers.calibrated.model.robot.forward(q)[:3, :3]
+    wrenches = rng.normal(size=(_DIRECTIONS, 6)) * [1.0, 1.0, 1.0, 0.03, 0.03, 0.03]
+    turned = wrenches[:, :3] @ R.T, wrenches[:, 3:] @ R.T
+    made = model.deflection(numbers.calibrated.compliance, np.array([q] * _DIRECTIONS), *turned)
+    lengths = np.maximum(np.linalg.norm(made, axis=1), 1e-12)
+    # The softest direction needs the least force.
+    best = int(np.argmax(lengths / np.linalg.norm(wrenches[:, :3], axis=1)))
+    wrench = wrenches[best] * (size / lengths[best])
+    settings = numbers.settings.sensor
+    within = 0.9 * np.array([*settings.force, *settings.moment])
+    for _ in range(60):
+        raw = _raw(numbers, wrench, R)
+        if np.all(np.abs(raw) < within):
+            break
+        wrench = 0.8 * wrench
+    return Reading(0.0, q, raw[:3].tolist(), raw[3:].tolist())
+
+
+def _raw(numbers: Design, wrench: FloatArray, R_base_tcp: FloatArray) -> FloatArray:
+    """Return what the sensor reads of a wrench in the tcp frame: the conditioner backwards."""
+    f, m, weight = wrench[:3], wrench[3:], numbers.weight @ R_base_tcp
+    at_sensor = m - np.cross(numbers.sensor_origin, f) + np.cross(numbers.centre, weight)
+    S = numbers.sensor_rotation
+    return np.concatenate(
+        [(f + weight) @ S + numbers.load.force_bias, at_sensor @ S + numbers.load.moment_bias]
+    )
+
+
+def _configurations(numbers: Design, rng: Generator, count: int) -> FloatArray:
+    limits = numbers.calibrated.model.robot.limits
+    lower, upper = np.maximum(limits.lower, -3.0), np.minimum(limits.upper, 3.0)
+    return rng.uniform(lower, upper, (count, numbers.joints))
+
+
+def _struct(*parts: str | float) -> str:
+    texts = (part if isinstance(part, str) else repr(float(part)) for part in parts)
+    return "{" + ",\n     ".join(texts) + "}"
+
+
+def _array(numbers: object) -> str:
+    return "{" + ", ".join(repr(x) for x in np.asarray(numbers, dtype=float).tolist()) + "}"

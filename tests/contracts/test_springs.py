@@ -1,0 +1,235 @@
+"""What every kind of spring keeps: place, law, tangent, units, files, fit, C."""
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from elastocal.compensation.online import Compensator, Reading, design
+from elastocal.elastic import KINDS, ElasticModel, Hinge, Spring, SpringLoad, axial, unit_of
+from elastocal.elastic.springs import Input
+from elastocal.errors import SchemaError
+from elastocal.identification import (
+    CalibratedModel,
+    Observability,
+    build,
+    calibrate,
+    read_model,
+    solve,
+    write_model,
+)
+from elastocal.records import from_data, to_data
+from support.cells import linkage, robot
+from support.exported import build as compiled_c, needs_gcc, written
+from support.problems import campaign
+from support.spring_kinds import JointTensor, SaturatingGear
+from support.virtual_chain import configurations, numerical_column
+
+AXIS = (0.6, 0.0, 0.8)
+CASES: dict[str, Spring] = {
+    "hinge": Hinge("joint_3.x", "joint_3", (1.0, 0.0, 0.0)),
+    "linear hinge": Hinge("joint_3.slide", "joint_3", AXIS, revolute=False),
+    "distal hinge off the axis": Hinge(
+        "joint_3.tilt", "joint_3", AXIS, distal=True, offset=(0.1, -0.2, 0.3)
+    ),
+    "test: saturating gear": SaturatingGear("joint_3.gear", "joint_3", (0.0, 1.0, 0.0)),
+    "test: joint tensor": JointTensor("joint_3.tensor", "joint_3"),
+}
+"""A spring of each kind at joint 3; kinds of the library, and kinds that tests made up."""
+REGISTERED = [name for name in CASES if not name.startswith("test:")]
+RNG = np.random.default_rng(5)
+FORCE, MOMENT = RNG.normal(0.0, 800.0, (4, 3)), RNG.normal(0.0, 100.0, (4, 3))
+
+
+@cache
+def model(case: str) -> ElasticModel:
+    """Return the arm with the spring between axial springs of the other joints."""
+    others = [axial(joint) for joint in robot().chain.joints if joint.name != "joint_3"]
+    return ElasticModel(robot(), (*others[:2], CASES[case], *others[2:]))
+
+
+def planted(case: str) -> np.ndarray:
+    """Return parameters of sensible sizes, positive."""
+    scales = np.array([parameter.scale for parameter in model(case).parameters])
+    made = scales * np.random.default_rng(1).uniform(0.5, 2.0, len(scales))
+    # What may be negative, as beside the diagonal of a tensor, stays small beside the rest.
+    free = np.array([parameter.lower < 0.0 for parameter in model(case).parameters])
+    return np.where(free, -0.2 * made, made)
+
+
+def calibrated(case: str) -> CalibratedModel:
+    c = planted(case)
+    draws = c * (1.0 + 0.1 * np.random.default_rng(2).normal(size=(50, len(c))))
+    return CalibratedModel(model(case), c, draws, Observability(len(c), 1.0, (True,) * len(c), ()))
+
+
+def test_every_kind_of_the_library_has_a_case():
+    assert {type(CASES[name]) for name in REGISTERED} == set(KINDS.values())
+
+
+@pytest.mark.parametrize("case", CASES)
+class TestEverySpring:
+    def test_parameters_have_names_units_scales_and_bounds(self, case):
+        spring = CASES[case]
+        names = [parameter.name for parameter in spring.parameters]
+        assert len(set(names)) == len(names)
+        if len(names) == 1:
+            assert names == [spring.name]
+        for parameter in spring.parameters:
+            assert parameter.name.startswith(spring.name)
+            assert parameter.joint == spring.joint
+            assert parameter.unit in spring.units
+            assert unit_of(parameter.unit.si) == parameter.unit
+            assert parameter.unit.shown
+            assert parameter.unit.factor > 0.0
+            assert parameter.lower < parameter.scale < np.inf
+
+    def test_it_is_a_value(self, case):
+        spring = CASES[case]
+        assert spring == replace(spring)
+        assert hash(spring) == hash(replace(spring))
+        assert spring != replace(spring, name="other")
+
+    def test_columns_are_finite_differences_of_the_deflection(self, case):
+        """The chain by matrix products, its virtual joints turned by what the law says."""
+        spring, arm = CASES[case], model(case)
+        first = arm.parameter_names.index(spring.parameters[0].name)
+        found = []
+        expected = []
+        qs = configurations(linkage(), 4)
+        for q, f, m in zip(qs, FORCE, MOMENT, strict=True):
+            J, W = zip(*(numerical_column(linkage(), q, axis) for axis in spring.axes), strict=True)
+            torque = tuple(np.array(j @ f + w @ m) for j, w in zip(J, W, strict=True))
+            angles = np.array(spring.angles(SpringLoad(torque)))
+            expected.append(np.transpose(J) @ angles)
+            columns = slice(first, first + len(spring.parameters))
+            found.append(arm.observation_blocks(q, f, m)[:, columns])
+        np.testing.assert_allclose(found, expected, rtol=1e-6, atol=1e-6 * np.abs(expected).max())
+
+    def test_springs_of_one_law_together_are_what_each_is_alone(self, case):
+        spring = CASES[case]
+        springs = [
+            replace(spring, name=name, joint=name) for name in ("joint_2", "joint_3", "joint_5")
+        ]
+        q = configurations(linkage(), 4)
+        together = ElasticModel(robot(), springs).observation_blocks(q, FORCE, MOMENT)
+        alone = [ElasticModel(robot(), [s]).observation_blocks(q, FORCE, MOMENT) for s in springs]
+        np.testing.assert_allclose(together, np.concatenate(alone, axis=-1), rtol=1e-12, atol=1e-9)
+
+    def test_tangents_are_finite_differences_of_the_law_and_symmetric(self, case):
+        spring = CASES[case]
+        n = len(spring.axes)
+        for torque in np.random.default_rng(4).normal(0.0, 500.0, (5, n)):
+            found = np.array(spring.tangents(SpringLoad(tuple(torque))), dtype=float)
+            for other, step in enumerate(1e-2 * np.eye(n)):
+                ahead, behind = (
+                    np.array(spring.angles(SpringLoad(tuple(torque + by)))) for by in (step, -step)
+                )
+                slope = (ahead - behind) / 2e-2
+                np.testing.assert_allclose(found[:, other], slope, rtol=1e-6, atol=1e-8)
+            np.testing.assert_allclose(found, np.swapaxes(found, 0, 1))
+
+    def test_cartesian_compliance_is_the_derivative_of_the_deflection_by_the_load(self, case):
+        arm, c = model(case), planted(case)
+        q, f = configurations(linkage(), 1)[0], FORCE[0]
+        found = arm.cartesian_compliance(c, q, f)
+        for step, column, turned in zip(
+            np.eye(3), found.translation.T, found.coupling.T, strict=True
+        ):
+            by_force = (arm.deflection(c, q, f + step) - arm.deflection(c, q, f - step)) / 2.0
+            np.testing.assert_allclose(column, by_force, rtol=1e-4, atol=1e-12)
+            by_moment = (arm.deflection(c, q, f, step) - arm.deflection(c, q, f, -step)) / 2.0
+            np.testing.assert_allclose(turned, by_moment, rtol=1e-4, atol=1e-12)
+
+    def test_directional_rows_are_the_compliance_without_load_along_a_direction(self, case):
+        arm, c, u = model(case), planted(case), np.array([0.6, 0.0, -0.8])
+        q = configurations(linkage(), 3)
+        C = arm.cartesian_compliance(c, q).translation
+        np.testing.assert_allclose(arm.directional_rows(q, u) @ c, u @ C @ u, rtol=1e-10)
+
+    def test_a_planted_truth_comes_back_exactly_from_exact_readings(self, case):
+        arm, truth = model(case), planted(case)
+        readings = campaign()
+        exact = arm.deflection(truth, readings.joint_position, readings.force)
+        readings = replace(readings, marker_displacement=readings.controller_displacement + exact)
+        found = solve(build(arm, readings)).compliance
+        np.testing.assert_allclose(
+            arm.deflection(found, readings.joint_position, readings.force), exact, atol=1e-9
+        )
+        np.testing.assert_allclose(found, truth, rtol=1e-5)
+
+    def test_it_comes_back_from_noisy_readings_with_a_blunder(self, case):
+        arm, truth = model(case), planted(case)
+        readings = campaign()
+        exact = arm.deflection(truth, readings.joint_position, readings.force)
+        rng = np.random.default_rng(3)
+        marker = readings.controller_displacement + exact + 1e-5 * rng.normal(size=exact.shape)
+        marker[20, 1] += 0.5
+        readings = replace(readings, marker_displacement=marker)
+        found = calibrate(arm, readings, np.random.default_rng(0))
+        assert np.flatnonzero(~found.used).tolist() == [20]
+        predicted = found.calibrated.predict(readings.joint_position, readings.force)
+        error = np.linalg.norm(predicted.deflection - exact, axis=1)
+        assert error.max() < 1e-5
+        inside = (predicted.low <= exact) & (exact <= predicted.high)
+        assert inside.mean() > 0.5
+
+    def test_it_is_the_same_after_a_file(self, case):
+        spring = CASES[case]
+        assert from_data(type(spring), to_data(spring), "a file") == spring
+
+    def test_names_make_statements_that_equal_the_model(self, case):
+        """Load cases and a whole step of the online compensator."""
+        numbers = design(calibrated(case))
+        functions, arm = numbers.functions(), model(case)
+        for q, f, m in zip(configurations(linkage(), 4), FORCE, MOMENT, strict=True):
+            row = q.tolist(), f.tolist(), m.tolist()
+            expected = arm.deflection(planted(case), q, f, m)
+            np.testing.assert_allclose(functions.deflection(*row), expected, rtol=1e-10)
+            block = np.reshape(functions.block(*row), (3, -1))
+            expected = arm.observation_blocks(q, f, m)
+            np.testing.assert_allclose(block, expected, atol=1e-12 * np.abs(expected).max())
+        compensator = Compensator(numbers)
+        q = configurations(linkage(), 1)[0]
+        R = robot().forward(q)[:3, :3]
+        reading = Reading(0.004, q.tolist(), (R.T @ FORCE[0]).tolist(), [0.0] * 3)
+        _, corrected = compensator.step(compensator.start(), reading)
+        assert np.all(np.isfinite(corrected.deflection))
+
+    def test_the_law_of_names_has_a_row_an_axis_and_an_entry_a_parameter(self, case):
+        spring = CASES[case]
+        names = tuple(Input(f"t{k}") for k in range(len(spring.axes)))
+        rows = spring.angles(SpringLoad(names))
+        assert [len(row) for row in rows] == [len(spring.parameters)] * len(spring.axes)
+
+    @needs_gcc
+    def test_exported_c_equals_python(self, case, tmp_path):
+        executable = compiled_c(written(tmp_path, design(calibrated(case))), "-O1")
+        assert executable.selftest() == 0
+        q = configurations(linkage(), 4)
+        found = executable.numbers("loads", np.hstack([q, FORCE, MOMENT]))[:, :3]
+        expected = model(case).deflection(planted(case), q, FORCE, MOMENT)
+        np.testing.assert_allclose(found, expected, atol=1e-12 * np.abs(expected).max())
+
+
+@pytest.mark.parametrize("case", REGISTERED)
+def test_a_model_file_gives_the_same_class_back(case, tmp_path):
+    write_model(tmp_path / "model.json", calibrated(case))
+    found = read_model(tmp_path / "model.json")
+    assert found.model.springs == model(case).springs
+    assert [type(spring) for spring in found.model.springs] == [
+        type(spring) for spring in model(case).springs
+    ]
+    np.testing.assert_array_equal(found.compliance, planted(case))
+
+
+def test_hinges_are_what_a_file_means_that_names_no_kind(tmp_path):
+    write_model(tmp_path / "model.json", calibrated("hinge"))
+    text = (tmp_path / "model.json").read_text()
+    assert '"kind"' not in text
+    name = '"name": "joint_3.x"'
+    assert name in text
+    (tmp_path / "odd.json").write_text(text.replace(name, f'"kind": "odd", {name}'))
+    with pytest.raises(SchemaError, match=r"springs\.2: unknown kind of spring \(allowed: hinge"):
+        read_model(tmp_path / "odd.json")
