@@ -15,10 +15,10 @@ from elastocal.planning import (
     collision_scene,
     read_plan,
     read_pool,
-    refuse_before_the_long_work,
+    require_possible_search,
     surface_findings,
 )
-from elastocal.planning.motion import mover_for, refuse_blocked_home
+from elastocal.planning.motion import mover_for, require_free_home
 from elastocal.procedure import (
     STREAMS_SCHEMA as STREAMS,
     RunFolder,
@@ -52,10 +52,10 @@ def _cell_facts(path: Path) -> dict[str, object]:
     """
     cell = load_cell(path)
     search = cell.file.search
-    refuse_before_the_long_work(cell)
+    require_possible_search(cell)
     surface = cell_surface(cell)
     findings = surface_findings(cell, surface, np.random.default_rng(search.seed))
-    refuse_blocked_home(cell.home, mover_for(cell, collision_scene(cell, surface)))
+    require_free_home(cell.home, mover_for(cell, collision_scene(cell, surface)))
     return {
         "schema": "elastocal.cell/1",
         "cell": cell.name,
