@@ -9,10 +9,10 @@ from elastocal.cell import load_cell
 from elastocal.planning import (
     cell_surface,
     collision_scene,
-    refuse_before_the_long_work,
+    require_possible_search,
     surface_findings,
 )
-from elastocal.planning.motion import mover_for, refuse_blocked_home
+from elastocal.planning.motion import mover_for, require_free_home
 
 
 def cell_facts(path: Path) -> dict[str, Any]:
@@ -29,10 +29,10 @@ def cell_facts(path: Path) -> dict[str, Any]:
     """
     cell = load_cell(path)
     search = cell.file.search
-    refuse_before_the_long_work(cell)
+    require_possible_search(cell)
     surface = cell_surface(cell)
     findings = surface_findings(cell, surface, np.random.default_rng(search.seed))
-    refuse_blocked_home(cell.home, mover_for(cell, collision_scene(cell, surface)))
+    require_free_home(cell.home, mover_for(cell, collision_scene(cell, surface)))
     return {
         "schema": "elastocal.cell/1",
         "cell": cell.name,

@@ -4,15 +4,15 @@ from pathlib import Path
 from typing import Any
 
 from elastocal.codec.study import (
+    DESIGN,
+    DESIGN_SCHEMA,
     PART_SCHEMA,
     PARTS,
-    SETTINGS,
-    SETTINGS_SCHEMA,
     STUDY_SCHEMA,
-    StudySettings,
+    StudyDesign,
     StudyStore,
+    read_design,
     read_part,
-    read_settings,
     read_study,
 )
 
@@ -21,7 +21,7 @@ Described = tuple[str, dict[str, Any]]
 
 def is_study(folder: Path) -> bool:
     """Return whether a folder is that of a study."""
-    return (folder / SETTINGS).is_file() and (folder / PARTS).is_dir()
+    return (folder / DESIGN).is_file() and (folder / PARTS).is_dir()
 
 
 def study_folder(path: Path) -> Described:
@@ -32,19 +32,19 @@ def study_folder(path: Path) -> Described:
     ElastocalError
         If settings or a sample are damaged.
     """
-    settings = read_settings(path / SETTINGS)
+    settings = read_design(path / DESIGN)
     done = StudyStore(path).finished(settings)
-    return "study", {"schema": SETTINGS_SCHEMA, **_facts(settings), "samples": len(done)}
+    return "study", {"schema": DESIGN_SCHEMA, **_facts(settings), "samples": len(done)}
 
 
 def study_settings(path: Path) -> Described:
     """Describe what a study is a study of."""
-    return "settings file of a study", {"schema": SETTINGS_SCHEMA, **_facts(read_settings(path))}
+    return "settings file of a study", {"schema": DESIGN_SCHEMA, **_facts(read_design(path))}
 
 
 def study_samples(path: Path) -> Described:
     """Describe some finished samples, by the settings in the folder above theirs."""
-    results = read_part(path, read_settings(path.resolve().parent.parent / SETTINGS))
+    results = read_part(path, read_design(path.resolve().parent.parent / DESIGN))
     return "part of a study", {
         "schema": PART_SCHEMA,
         "samples": [result.number for result in results],
@@ -65,10 +65,10 @@ def study_record(path: Path) -> Described:
     }
 
 
-def _facts(settings: StudySettings) -> dict[str, Any]:
+def _facts(settings: StudyDesign) -> dict[str, Any]:
     return {
         "cell": settings.cell,
         "seed": settings.seed,
-        "conditions": [settings.name(each.condition) for each in settings.conditions],
+        "conditions": list(settings.names),
         "verification": settings.verification,
     }

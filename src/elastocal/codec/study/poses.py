@@ -8,12 +8,11 @@ from numpy.random import Generator
 
 from elastocal.arrays import FloatArray, IndexArray
 from elastocal.cell import Cell
-from elastocal.codec import training_cases
-from elastocal.codec.study import Condition
+from elastocal.codec.study.conditions import Condition
+from elastocal.codec.variants import training_cases
 from elastocal.errors import CodecError
 from elastocal.planning import SearchPool, cell_surface, sample_pool, sight_check
 from elastocal.planning.search import Candidates, RandomChoice, technique
-from elastocal.sim.workcell import ContactPoses
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,10 +33,6 @@ class StudyPool:
     def __len__(self) -> int:
         return len(self.q)
 
-    def places(self, poses: IndexArray) -> ContactPoses:
-        """Return some poses as the simulator wants them."""
-        return ContactPoses(self.q[poses], self.normal[poses])
-
 
 @dataclass(frozen=True, eq=False)
 class StudyPoses:
@@ -49,7 +44,7 @@ class StudyPoses:
 
 
 @dataclass(frozen=True, eq=False)
-class Chosen:
+class PoseChoice:
     """Calibration poses of a condition."""
 
     order: IndexArray | None
@@ -103,7 +98,9 @@ def study_poses(cell: Cell, verification: int, jobs: int | None) -> StudyPoses:
     return StudyPoses(pool, SearchPool.of(cell, surface, gathered).candidates.take(left))
 
 
-def choose(cell: Cell, poses: StudyPoses, conditions: Sequence[Condition]) -> tuple[Chosen, ...]:
+def choose_poses(
+    cell: Cell, poses: StudyPoses, conditions: Sequence[Condition]
+) -> tuple[PoseChoice, ...]:
     """Return the calibration poses of every condition.
 
     What a technique knows is the same for every arm, so it chooses once, as a plan does. Only
@@ -114,7 +111,7 @@ def choose(cell: Cell, poses: StudyPoses, conditions: Sequence[Condition]) -> tu
     CodecError
         If a condition wants more poses than there are.
     """
-    known: dict[tuple[int, str, str], Chosen] = {}
+    known: dict[tuple[int, str, str], PoseChoice] = {}
     for each in conditions:
         if not each.poses <= len(poses.candidates):
             raise CodecError(
@@ -126,14 +123,14 @@ def choose(cell: Cell, poses: StudyPoses, conditions: Sequence[Condition]) -> tu
     return tuple(known[each.poses, each.search, each.load_cases] for each in conditions)
 
 
-def _choice(cell: Cell, poses: StudyPoses, condition: Condition) -> Chosen:
+def _choice(cell: Cell, poses: StudyPoses, condition: Condition) -> PoseChoice:
     wanted, training = technique(condition.search), poses.pool.training
     if isinstance(wanted, RandomChoice):
-        return Chosen(None, training, condition.poses)
+        return PoseChoice(None, training, condition.poses)
     candidates = _under(cell, poses.candidates, condition.load_cases)
     rng = np.random.default_rng(cell.file.search.seed)
     order = wanted.search(candidates, condition.poses, rng).order
-    return Chosen(training[order], training, condition.poses)
+    return PoseChoice(training[order], training, condition.poses)
 
 
 def _under(cell: Cell, candidates: Candidates, load_cases: str) -> Candidates:

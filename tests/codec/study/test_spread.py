@@ -1,17 +1,14 @@
 """Where samples are simulated: processes that get ready early, schedulers that are none."""
 
 import contextlib
-import signal
 import socket
-import subprocess
-import sys
 import threading
 from functools import partial
 
 import pytest
 
-from elastocal.cli import study_cluster
-from elastocal.cli.study_spread import _deaf_to_ctrl_c, spread_over
+from elastocal.codec.study import _cluster
+from elastocal.codec.study.sampling import spread_over
 from elastocal.errors import CodecError
 from support.cli import elastocal
 from support.simulated import example_cell
@@ -51,20 +48,12 @@ def test_processes_that_find_nothing_to_do_end_without_a_word(recwarn):
     assert not recwarn.list
 
 
-def test_ctrl_c_of_the_terminal_reaches_no_process_that_is_started():
-    masked = "import signal; print(signal.SIGINT in signal.pthread_sigmask(signal.SIG_BLOCK, []))"
-    with _deaf_to_ctrl_c():
-        child = subprocess.run([sys.executable, "-c", masked], capture_output=True, check=True)
-    assert child.stdout.strip() == b"True"
-    assert signal.SIGINT not in signal.pthread_sigmask(signal.SIG_BLOCK, [])
-
-
 @pytest.mark.parametrize("answer", [b"", b"SSH-2.0-OpenSSH_9.6\r\n"])
 def test_a_port_that_speaks_no_dask_is_refused_and_not_waited_for(monkeypatch, answer):
     pytest.importorskip("distributed")
-    monkeypatch.setattr(study_cluster, "PATIENCE", 0.5)
+    monkeypatch.setattr(_cluster, "PATIENCE", 0.5)
     with listening(answer) as address, pytest.raises(CodecError, match="no Dask scheduler answers"):
-        study_cluster.check_scheduler(address)
+        _cluster.check_scheduler(address)
 
 
 @pytest.mark.parametrize("address", ["tcp://127.0.0.1:9", "nonsense://x", "foo", ""])
@@ -72,7 +61,7 @@ def test_an_address_without_a_scheduler_is_refused_before_anything_is_written(
     tmp_path, monkeypatch, address
 ):
     pytest.importorskip("distributed")
-    monkeypatch.setattr(study_cluster, "PATIENCE", 0.3)
+    monkeypatch.setattr(_cluster, "PATIENCE", 0.3)
     cell = example_cell("afp").path
     found = elastocal("study", cell, "--out", tmp_path / "study", "--dask", address)
     assert f"--dask {address}: no Dask scheduler answers there" in found.reason
@@ -85,12 +74,12 @@ def test_a_worker_is_not_taken_for_a_scheduler(monkeypatch):
     async def worker(_):
         return "Worker"
 
-    monkeypatch.setattr(study_cluster, "_identity", worker)
+    monkeypatch.setattr(_cluster, "_identity", worker)
     with pytest.raises(CodecError, match="a Dask worker answers there, not a scheduler"):
-        study_cluster.check_scheduler("tcp://127.0.0.1:1")
+        _cluster.check_scheduler("tcp://127.0.0.1:1")
 
 
 def test_a_missing_extra_says_how_to_install_it(monkeypatch):
     monkeypatch.setitem(__import__("sys").modules, "distributed", None)
     with pytest.raises(CodecError, match=r"pip install 'elastocal\[dask\]'"):
-        study_cluster.check_scheduler("tcp://127.0.0.1:9")
+        _cluster.check_scheduler("tcp://127.0.0.1:9")

@@ -1,4 +1,4 @@
-"""What a study may vary: a short list, each factor with its unit and what it may be.
+"""Conditions of a study, and what it may vary: a short list, each factor with its unit.
 
 A new factor is an entry in `FACTORS`, a field of `Condition`, and its effect in the simulation.
 """
@@ -10,11 +10,12 @@ from itertools import product
 from elastocal.codec.variants import ALL_LOADS
 from elastocal.errors import CodecError, ElastocalError, nearest
 from elastocal.planning.search import technique
+from elastocal.records import record
 
 Value = int | float | str
-LARGEST_SCALE = 100.0
+_LARGEST_SCALE = 100.0
 """Of the instruments' errors."""
-LARGEST_SPREAD = 1.0
+_LARGEST_SPREAD = 1.0
 """Standard deviation of the logarithm of a stiffness: a factor of 2.7 either way."""
 
 
@@ -58,7 +59,7 @@ def _technique(text: str) -> str:
     return text
 
 
-_SCALE = Factor(f"a factor from 0 to {LARGEST_SCALE:g}", "1", _number(LARGEST_SCALE))
+_SCALE = Factor(f"a factor from 0 to {_LARGEST_SCALE:g}", "1", _number(_LARGEST_SCALE))
 FACTORS: dict[str, Factor] = {
     "poses": Factor("a number of calibration poses, 1 or more", "", _count),
     "search": Factor("a search technique", "", _technique),
@@ -67,16 +68,16 @@ FACTORS: dict[str, Factor] = {
     "tracker_noise": _SCALE,
     "force_noise": _SCALE,
     "truth": Factor(
-        f"spread of the stiffness, a standard deviation from 0 to {LARGEST_SPREAD:g} of its"
+        f"spread of the stiffness, a standard deviation from 0 to {_LARGEST_SPREAD:g} of its"
         " natural logarithm",
         "1",
-        _number(LARGEST_SPREAD),
+        _number(_LARGEST_SPREAD),
     ),
 }
 """Factors by name, in the order of the results' columns."""
 
 
-@dataclass(frozen=True)
+@record()
 class Condition:
     """One value of every factor."""
 
@@ -153,6 +154,17 @@ def make_conditions(
         Condition(**dict(zip(columns, values, strict=True)))  # type: ignore[arg-type]
         for values in product(*columns.values())
     )
+
+
+def condition_name(factors: Sequence[str], condition: Condition) -> str:
+    """Return a name of some factors' values, e.g. ``"poses 10, springs bearing"``."""
+    values = (f"{key.replace('_', ' ')} {value_text(condition.value(key))}" for key in factors)
+    return ", ".join(values) or f"poses {condition.poses}"
+
+
+def value_text(value: Value) -> str:
+    """Return a factor's value as text."""
+    return f"{value:g}" if isinstance(value, float) else str(value)
 
 
 def _value(key: str, text: str) -> Value:

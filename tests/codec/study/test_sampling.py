@@ -3,8 +3,14 @@ from pathlib import Path
 
 import pytest
 
-from elastocal.codec.study import PARTS, SETTINGS, StudyStore, one_after_the_other, run_study
-from elastocal.codec.study.running import BATCH
+from elastocal.codec.study import (
+    DESIGN,
+    PARTS,
+    StudyStore,
+    one_after_the_other,
+    run_study,
+)
+from elastocal.codec.study.sampling import _BATCH
 from elastocal.errors import CodecError, FileAccessError, SchemaError
 from support.studies import numbers, settings, simulate
 
@@ -41,7 +47,7 @@ def test_a_killed_study_goes_on_and_ends_with_the_same_numbers(tmp_path):
     with pytest.raises(KeyboardInterrupt):
         run(tmp_path, 9, killed_after(3))
     kept = StudyStore(tmp_path).finished(settings())
-    assert len(kept) == 3 * BATCH
+    assert len(kept) == 3 * _BATCH
     asked = []
 
     def noting(batches):
@@ -49,7 +55,7 @@ def test_a_killed_study_goes_on_and_ends_with_the_same_numbers(tmp_path):
         return (work() for work in asked)
 
     again = run(tmp_path, 9, noting)
-    assert len(asked) == -(-(9 - 3 * BATCH) // BATCH)
+    assert len(asked) == -(-(9 - 3 * _BATCH) // _BATCH)
     assert numbers(again) == numbers(run(tmp_path / "whole", 9))
 
 
@@ -130,7 +136,7 @@ def test_a_part_of_a_study_with_another_seed_is_refused(tmp_path):
 
 def test_settings_of_an_unknown_version_are_refused(tmp_path):
     run(tmp_path, 2)
-    path = tmp_path / SETTINGS
+    path = tmp_path / DESIGN
     path.write_text(path.read_text().replace("study_settings/1", "study_settings/9"))
     with pytest.raises(SchemaError, match="study_settings/9"):
         run(tmp_path, 2)

@@ -1,6 +1,5 @@
-"""Composition root of a study: the simulator's truth on one side, the estimator on the other."""
+"""Samples of a study: the simulator's truth on one side, the estimator on the other."""
 
-import hashlib
 import json
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -8,35 +7,44 @@ from importlib.metadata import version
 
 import numpy as np
 
-from elastocal.arrays import FloatArray
+from elastocal.arrays import FloatArray, IndexArray
 from elastocal.cell import Cell, fingerprint
-from elastocal.cli.study_choice import Chosen, StudyPool, choose, study_poses
 from elastocal.codec import ALL_LOADS, training_cases
 from elastocal.codec.study import (
     Condition,
-    ConditionRecord,
-    Outcome,
+    ConditionResult,
+    PoseChoice,
     Purpose,
     Sample,
     SampleResult,
-    SpringRecord,
-    StudySettings,
+    SpringLabel,
+    StudyDesign,
+    StudyPool,
     Verification,
     calibrated,
+    choose_poses,
+    study_poses,
 )
 from elastocal.elastic import ElasticModel, layout
 from elastocal.errors import CodecError, DeviceError, nearest
-from elastocal.sim.workcell import CampaignErrors, CampaignSimulator, ErrorDraws, ErrorScales
+from elastocal.files import sha256
+from elastocal.sim.workcell import (
+    CampaignErrors,
+    CampaignSimulator,
+    ContactPoses,
+    ErrorDraws,
+    ErrorScales,
+)
 
 _PACKAGES = ("elastocal", "numpy", "scipy", "pin")
 
 
 @dataclass(frozen=True, eq=False)
 class StudySimulation:
-    """Simulates samples of one study; made by `prepare`, sent to other processes as it is."""
+    """Simulates samples of one study; made by `prepare_study`, sent to other processes as it is."""
 
     conditions: tuple[Condition, ...]
-    chosen: tuple[Chosen, ...]
+    chosen: tuple[PoseChoice, ...]
     """Of each condition."""
     models: dict[str, ElasticModel]
     """By spring layout."""
@@ -56,7 +64,7 @@ class StudySimulation:
         draws = ErrorDraws.of(
             len(self.pool), len(self.load_cases), sample.generator(Purpose.ERRORS)
         )
-        found: dict[int, Outcome] = {}
+        found: dict[int, ConditionResult] = {}
         for spread in dict.fromkeys(each.truth for each in self.conditions):
             arm = self.truth.stiffened(np.exp(spread * stiffness), float(np.exp(spread * balancer)))
             verification = self._verification(arm)
@@ -69,6 +77,10 @@ class StudySimulation:
                 found |= self._calibrated(sample, arm, draws, numbers, verification)
         return SampleResult(sample.number, tuple(found[i] for i in range(len(self.conditions))))
 
+    def places(self, poses: IndexArray) -> ContactPoses:
+        """Return some poses of the pool as the simulator wants them."""
+        return ContactPoses(self.pool.q[poses], self.pool.normal[poses])
+
     def _calibrated(
         self,
         sample: Sample,
@@ -76,13 +88,13 @@ class StudySimulation:
         draws: ErrorDraws,
         numbers: Sequence[int],
         verification: Verification,
-    ) -> dict[int, Outcome]:
+    ) -> dict[int, ConditionResult]:
         """Calibrate one arm under conditions with the same load cases, measuring each pose once."""
         chosen = [self.chosen[i].of(sample.generator(Purpose.CHOICE)) for i in numbers]
         poses = np.unique(np.concatenate(chosen))
         cases = training_cases(self.conditions[numbers[0]].load_cases, self.load_cases)
         loads = np.array([self.load_cases.index(case) for case in cases])
-        settled = arm.settle(self.pool.places(poses), self.force_tcp[loads])
+        settled = arm.settle(self.places(poses), self.force_tcp[loads])
         own = draws.take(poses, loads)
         found = {}
         for number, order in zip(numbers, chosen, strict=True):
@@ -96,22 +108,22 @@ class StudySimulation:
         return found
 
     def _verification(self, arm: CampaignSimulator) -> Verification:
-        settled = arm.settle(self.pool.places(self.pool.verification), self.force_tcp)
+        settled = arm.settle(self.places(self.pool.verification), self.force_tcp)
         flat = (settled.q, settled.force, settled.deflection)
         return Verification(*(array.reshape(-1, array.shape[-1]) for array in flat))
 
 
 @dataclass(frozen=True, eq=False)
-class Prepared:
+class PreparedStudy:
     """A study that may begin."""
 
-    settings: StudySettings
+    design: StudyDesign
     simulate: StudySimulation
 
 
-def prepare(
+def prepare_study(
     cell: Cell, conditions: Sequence[Condition], seed: int, verification: int, jobs: int | None
-) -> Prepared:
+) -> PreparedStudy:
     """Make the pool, choose the poses of every condition, and refuse what does not fit.
 
     Parameters
@@ -143,8 +155,8 @@ def prepare(
         raise DeviceError(f"cell {cell.name} has no tracker to simulate (key 'trackers')")
     truth, errors = CampaignSimulator.of(cell), CampaignErrors.of(cell)
     poses = study_poses(cell, verification, jobs)
-    chosen = choose(cell, poses, conditions)
-    settings = _settings(cell, conditions, models, poses.pool, seed)
+    chosen = choose_poses(cell, poses, conditions)
+    design = _design(cell, conditions, models, poses.pool, seed)
     simulate = StudySimulation(
         conditions=tuple(conditions),
         chosen=chosen,
@@ -156,7 +168,7 @@ def prepare(
         force_tcp=loads.force_tcp,
         marker=np.array(cell.file.marker.position_tcp),
     )
-    return Prepared(settings, simulate)
+    return PreparedStudy(design, simulate)
 
 
 def _check_load_cases(spec: str, known: Sequence[str]) -> None:
@@ -169,27 +181,27 @@ def _check_load_cases(spec: str, known: Sequence[str]) -> None:
             )
 
 
-def _settings(
+def _design(
     cell: Cell,
     conditions: Sequence[Condition],
     models: dict[str, ElasticModel],
     pool: StudyPool,
     seed: int,
-) -> StudySettings:
+) -> StudyDesign:
     simulated = cell.file.model_dump(mode="json", include={"simulation", "procedure"})
     springs = {name: repr(model.springs) for name, model in models.items()}
     text = json.dumps([simulated, springs], sort_keys=True, allow_nan=False)
-    return StudySettings(
+    return StudyDesign(
         cell=cell.name,
         cell_fingerprint=fingerprint(cell),
-        simulation_fingerprint=hashlib.sha256(text.encode()).hexdigest(),
+        simulation_fingerprint=sha256(text),
         seed=seed,
         pool=len(pool.training),
         verification=len(pool.verification),
         load_cases=cell.file.load_cases.cases,
-        conditions=tuple(ConditionRecord.of(each) for each in conditions),
+        conditions=tuple(conditions),
         springs={
-            name: tuple(SpringRecord(name=p.name, unit=p.unit.si) for p in model.parameters)
+            name: tuple(SpringLabel(name=p.name, unit=p.unit.si) for p in model.parameters)
             for name, model in models.items()
         },
         versions={name: version(name) for name in _PACKAGES},
