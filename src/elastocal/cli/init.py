@@ -5,6 +5,8 @@ from typing import Annotated
 
 import typer
 
+from elastocal import workflows
+
 
 def init(
     folder: Annotated[Path, typer.Argument(metavar="DIR", help="Folder to write into.")],
@@ -14,15 +16,7 @@ def init(
     force: Annotated[bool, typer.Option("--force", help="Replace files that are there.")] = False,
 ) -> None:
     """Write a commented example cell with its mesh."""
-    from rich.markup import escape
-
-    from elastocal.cell.examples import write_example
     from elastocal.cli.output import console
+    from elastocal.cli.tables import show_init
 
-    cell, *meshes = write_example(folder, like, force)
-    names = ", ".join(mesh.name for mesh in meshes)
-    console().print(
-        f"wrote [bold]{escape(str(cell))}[/bold] and {names}: edit it, then"
-        f" `elastocal check {escape(str(cell))}`",
-        soft_wrap=True,
-    )
+    show_init(console(), workflows.init(folder, like=like, force=force))

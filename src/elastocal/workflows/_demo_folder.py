@@ -5,7 +5,6 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from elastocal import __version__
-from elastocal.cli.demo_story import Chapter
 from elastocal.errors import FileAccessError
 from elastocal.files import write_text
 
@@ -52,7 +51,7 @@ def begin(out: Path, kind: str, force: bool) -> None:
         raise FileAccessError(f"cannot use folder {out}: {error.strerror or error}") from error
 
 
-def finish(out: Path, kind: str, seed: int, story: Sequence[Chapter]) -> None:
+def finish(out: Path, kind: str, seed: int, commands: Sequence[str]) -> None:
     """Write what each file is, and how to make all of them again.
 
     Raises
@@ -61,7 +60,7 @@ def finish(out: Path, kind: str, seed: int, story: Sequence[Chapter]) -> None:
         If it cannot be written.
     """
     rows = "".join(f"| [{name}]({name}) | {text} |\n" for name, text in _FILES)
-    commands = "".join(f"{chapter.line}\n" for chapter in story)
+    lines = "".join(f"{command}\n" for command in commands)
     write_text(
         out / README,
         f"{_FIRST} {kind}\n\n"
@@ -69,7 +68,7 @@ def finish(out: Path, kind: str, seed: int, story: Sequence[Chapter]) -> None:
         " it was simulated, with a truth that the model cannot express; nothing was measured on a"
         " robot.\n\n"
         f"| file | what it is |\n|---|---|\n{rows}\n"
-        f"## How it was made\n\n```sh\n{commands}```\n",
+        f"## How it was made\n\n```sh\n{lines}```\n",
     )
 
 

@@ -1,0 +1,52 @@
+"""``init``: a commented example cell with its mesh, to be edited into one's own."""
+
+from dataclasses import dataclass
+from os import PathLike
+from pathlib import Path
+
+from elastocal.cell.examples import write_example
+from elastocal.progress import Progress
+from elastocal.results import Result
+from elastocal.workflows._workflow import workflow
+
+
+@dataclass(frozen=True)
+class InitSettings:
+    """Which example goes where."""
+
+    folder: str | PathLike[str]
+    """Folder to write into."""
+    like: str = "afp"
+    """``afp`` or ``machining``."""
+    force: bool = False
+    """Replace files that are there."""
+
+
+@dataclass(frozen=True, repr=False)
+class InitResult(Result):
+    """The files of an example cell."""
+
+    cell: Path
+    meshes: tuple[Path, ...]
+
+
+@workflow(InitSettings)
+def init(settings: InitSettings, progress: Progress) -> InitResult:  # noqa: ARG001 - an instant
+    """Write a commented example cell with its mesh.
+
+    Parameters
+    ----------
+    settings : InitSettings
+        Or its ``folder``, and the other fields by name.
+    progress : Progress, optional
+        Hears how far the work is.
+
+    Raises
+    ------
+    SchemaError
+        If there is no such example.
+    FileAccessError
+        If a file is there already or cannot be written.
+    """
+    cell, *meshes = write_example(Path(settings.folder), settings.like, settings.force)
+    return InitResult(cell, tuple(meshes))
