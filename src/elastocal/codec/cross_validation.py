@@ -1,11 +1,10 @@
 """Repeated cross-validation over growing training sets (paper 3.2, Algorithm 1)."""
 
-import os
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
+from functools import partial
 from importlib.metadata import version
 
 import numpy as np
-from joblib import Parallel, delayed
 from numpy.typing import ArrayLike
 
 from elastocal.arrays import IndexArray
@@ -16,13 +15,12 @@ from elastocal.codec.variants import Variant, check_different
 from elastocal.dataset import Readings
 from elastocal.elastic import ElasticModel, layout
 from elastocal.errors import CodecError, IdentificationError
+from elastocal.parallel import map_in_processes, process_count
 from elastocal.planning.search import technique
+from elastocal.progress import Progress, silent
 from elastocal.robot import Robot
 
-Report = Callable[[str, int, int], None]
-"""Told a stage, how much of it is done and how much there is."""
-STAGE = "splits"
-
+_STAGE = "splits"
 _WORTH_PROCESSES = 2000
 """Fits behind a search of their own, or by a robust loss, from which on all cores are used."""
 
@@ -38,7 +36,7 @@ def cross_validate(
     marker_offset: ArrayLike | None = None,
     provenance: str = "",
     jobs: int | None = None,
-    report: Report | None = None,
+    progress: Progress = silent,
 ) -> CodecData:
     """Return the errors at held-out poses of growing training sets, for every variant.
 
@@ -59,8 +57,8 @@ def cross_validate(
     jobs : int, optional
         Processes; default: one, but all cores for long work, where variants search anew for
         every size or fit by a robust loss. The numbers do not depend on it.
-    report : callable, optional
-        Told of each split that is done.
+    progress : Progress, optional
+        Hears of each split that is done.
 
     Raises
     ------
@@ -90,8 +88,8 @@ def cross_validate(
             f"training sets end at {most} of {training} poses: the others have no reading of the"
             " load cases that a variant trains with"
         )
-    processes = _processes(jobs, variants, most * len(splits))
-    curves = _run_splits(prepared, splits, most, options.seed, processes, report or _silent)
+    processes = _processes(jobs, variants, most, len(splits))
+    curves = _run_splits(prepared, splits, most, options.seed, processes, progress)
     for each, found in zip(prepared, curves, strict=True):
         _require_a_fit(each, found)
     return CodecData(
@@ -126,10 +124,10 @@ def _largest_training_set(prepared: PreparedVariant, splits: Sequence[Split]) ->
     return most
 
 
-def _processes(jobs: int | None, variants: Sequence[Variant], fits: int) -> int:
+def _processes(jobs: int | None, variants: Sequence[Variant], most: int, splits: int) -> int:
     """Return the number of processes; starting them takes as long as a thousand slow fits."""
     slow = sum(not technique(v.search).nested or v.options.loss != "linear" for v in variants)
-    return jobs or ((os.cpu_count() or 1) if slow * fits > _WORTH_PROCESSES else 1)
+    return process_count(jobs, splits, worthwhile=slow * most * splits > _WORTH_PROCESSES)
 
 
 def _run_splits(
@@ -138,20 +136,20 @@ def _run_splits(
     most: int,
     seed: int,
     processes: int,
-    report: Report,
+    progress: Progress,
 ) -> list[list[LearningCurve]]:
     """Return the learning curves by variant and split."""
-    parallel = Parallel(n_jobs=min(processes, len(splits)), return_as="generator")
+    run = partial(_run_split, prepared, most, seed)
     found = []
-    report(STAGE, 0, len(splits))
-    for curves in parallel(delayed(_run_split)(prepared, split, most, seed) for split in splits):
+    progress(_STAGE, 0, len(splits))
+    for curves in map_in_processes(run, splits, processes):
         found.append(curves)
-        report(STAGE, len(found), len(splits))
+        progress(_STAGE, len(found), len(splits))
     return [list(column) for column in zip(*found, strict=True)]
 
 
 def _run_split(
-    prepared: Sequence[PreparedVariant], split: Split, most: int, seed: int
+    prepared: Sequence[PreparedVariant], most: int, seed: int, split: Split
 ) -> list[LearningCurve]:
     """Return the learning curve of each variant on one split."""
     curves = []
@@ -182,7 +180,3 @@ def _padded(chosen: Sequence[IndexArray]) -> IndexArray:
     for row, poses in zip(filled, chosen, strict=True):
         row[: len(poses)] = poses
     return filled
-
-
-def _silent(stage: str, done: int, total: int) -> None:
-    """Report to nobody."""

@@ -7,6 +7,13 @@ from .calibrate import (
     CalibrateSettings as CalibrateSettings,
     calibrate as calibrate,
 )
+from .codec import CodecResult as CodecResult, CodecSettings as CodecSettings, codec as codec
+from .compare import (
+    CompareResult as CompareResult,
+    CompareSettings as CompareSettings,
+    compare as compare,
+    measured_rows as measured_rows,
+)
 from .derive import DeriveResult as DeriveResult, DeriveSettings as DeriveSettings, derive as derive
 from .plan import (
     PlanFigures as PlanFigures,
