@@ -15,7 +15,7 @@ from elastocal.codec.variants import Variant, check_different
 from elastocal.dataset import Readings
 from elastocal.elastic import ElasticModel, layout
 from elastocal.errors import CodecError, IdentificationError
-from elastocal.parallel import map_in_processes, process_count
+from elastocal.parallel import map_in_processes, one_blas_thread, process_count
 from elastocal.planning.search import technique
 from elastocal.progress import Progress, silent
 from elastocal.robot import Robot
@@ -27,6 +27,7 @@ _WORTH_PROCESSES = 2000
 _PACKAGES = ("elastocal", "numpy", "scipy")
 
 
+@one_blas_thread()
 def cross_validate(
     robot: Robot,
     readings: Readings,
@@ -127,7 +128,7 @@ def _largest_training_set(prepared: PreparedVariant, splits: Sequence[Split]) ->
 def _processes(jobs: int | None, variants: Sequence[Variant], most: int, splits: int) -> int:
     """Return the number of processes; starting them takes as long as a thousand slow fits."""
     slow = sum(not technique(v.search).nested or v.options.loss != "linear" for v in variants)
-    return process_count(jobs, splits, worthwhile=slow * most * splits > _WORTH_PROCESSES)
+    return process_count(jobs or None, splits, worthwhile=slow * most * splits > _WORTH_PROCESSES)
 
 
 def _run_splits(

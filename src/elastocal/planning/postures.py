@@ -1,7 +1,8 @@
 """Candidates with joints: where the tool touches, and how the robot stands and retreats."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -14,8 +15,31 @@ _STRAIGHT = 2e-5
 _STEPS = 4
 
 
+class Rows:
+    """Base of frozen dataclasses whose fields are arrays of equal length."""
+
+    def __len__(self) -> int:
+        """Return the number of rows."""
+        return len(self._columns()[0])
+
+    def take(self, index: ArrayLike) -> Self:
+        """Return some of the rows (a mask or numbers)."""
+        rows = np.asarray(index)
+        rows = rows.astype(np.intp) if rows.size == 0 else rows
+        return type(self)(*(column[rows] for column in self._columns()))
+
+    @classmethod
+    def joined(cls, parts: Sequence[Self]) -> Self:
+        """Return the rows of several, one after the other."""
+        columns = zip(*(part._columns() for part in parts), strict=True)
+        return cls(*map(np.concatenate, columns))
+
+    def _columns(self) -> tuple[Any, ...]:
+        return tuple(getattr(self, each.name) for each in fields(self))  # type: ignore[arg-type]
+
+
 @dataclass(frozen=True, eq=False)
-class Postures:
+class Postures(Rows):
     """Contact poses on the surface with the robot's configurations; arrays are read-only."""
 
     T_base_tcp: FloatArray
@@ -38,25 +62,10 @@ class Postures:
         point.flags.writeable = False
         object.__setattr__(self, "point", point)
 
-    def __len__(self) -> int:
-        return len(self.q)
-
     @property
     def contact(self) -> FloatArray:
         """Contact points in base, shape (pose, 3), in m."""
         return self.T_base_tcp[:, :3, 3]
-
-    def take(self, index: ArrayLike) -> "Postures":
-        """Return some of the postures (a mask or indices)."""
-        rows = np.asarray(index)
-        rows = rows.astype(np.intp) if rows.size == 0 else rows
-        return Postures(
-            self.T_base_tcp[rows],
-            self.normal[rows],
-            self.q[rows],
-            self.q_approach[rows],
-            self.point[rows],
-        )
 
     def at(self, point: IndexArray) -> "Postures":
         """Return the same postures with their points numbered anew, shape (pose,)."""
@@ -71,17 +80,6 @@ class Postures:
             np.zeros((0, joints)),
             np.zeros((0, joints)),
             np.zeros(0, dtype=np.intp),
-        )
-
-    @staticmethod
-    def joined(parts: Sequence["Postures"]) -> "Postures":
-        """Return the postures of several, one after the other."""
-        return Postures(
-            np.concatenate([part.T_base_tcp for part in parts]),
-            np.concatenate([part.normal for part in parts]),
-            np.concatenate([part.q for part in parts]),
-            np.concatenate([part.q_approach for part in parts]),
-            np.concatenate([part.point for part in parts]),
         )
 
 

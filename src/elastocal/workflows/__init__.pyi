@@ -1,11 +1,23 @@
 from ._device_sources import KINDS as KINDS, SOURCES as SOURCES, DeviceSource as DeviceSource
+from ._kinds_of_measurement import FileDescription as FileDescription
 from ._operator import Operator as Operator, Supervision as Supervision, Unattended as Unattended
 from ._outputs import refuse_overwriting as refuse_overwriting
+from ._process_trial import (
+    ProcessTrial as ProcessTrial,
+    TrialRuns as TrialRuns,
+    run_trial as run_trial,
+)
 from ._robot_source import find_robot as find_robot
 from .calibrate import (
     CalibrateResult as CalibrateResult,
     CalibrateSettings as CalibrateSettings,
     calibrate as calibrate,
+)
+from .check import (
+    CheckResult as CheckResult,
+    CheckSettings as CheckSettings,
+    check as check,
+    describe_file as describe_file,
 )
 from .codec import CodecResult as CodecResult, CodecSettings as CodecSettings, codec as codec
 from .compare import (
@@ -14,7 +26,13 @@ from .compare import (
     compare as compare,
     measured_rows as measured_rows,
 )
+from .compensate import (
+    CompensateResult as CompensateResult,
+    CompensateSettings as CompensateSettings,
+    compensate as compensate,
+)
 from .derive import DeriveResult as DeriveResult, DeriveSettings as DeriveSettings, derive as derive
+from .export import ExportResult as ExportResult, ExportSettings as ExportSettings, export as export
 from .plan import (
     PlanFigures as PlanFigures,
     PlanResult as PlanResult,
@@ -42,6 +60,20 @@ from .run import (
     dry_run as dry_run,
     run as run,
 )
+from .simulate_process import (
+    SimulateProcessResult as SimulateProcessResult,
+    SimulateProcessSettings as SimulateProcessSettings,
+    simulate_process as simulate_process,
+)
+from .stiffness import (
+    ChosenStiffness as ChosenStiffness,
+    ExternalAxis as ExternalAxis,
+    PostureCounts as PostureCounts,
+    StiffnessResult as StiffnessResult,
+    StiffnessSettings as StiffnessSettings,
+    StiffnessSummary as StiffnessSummary,
+    stiffness as stiffness,
+)
 from .study import (
     DEFAULT_VARIATION as DEFAULT_VARIATION,
     StudyResult as StudyResult,
@@ -49,3 +81,4 @@ from .study import (
     study as study,
     study_conditions as study_conditions,
 )
+from .tool import ToolResult as ToolResult, ToolSettings as ToolSettings, tool as tool

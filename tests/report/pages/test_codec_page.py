@@ -110,7 +110,7 @@ def test_indices_stand_in_a_table_with_intervals(text, known):
         if (each.variant, each.index, each.error, each.kind)
         == ("bearing", "covering_radius", "mean", "size")
     ]
-    assert f"<td>{found.value:+.2f} ({found.low:+.2f} to {found.high:+.2f})</td>" in text
+    assert f"<td>{found.correlation:+.2f} ({found.low:+.2f} to {found.high:+.2f})</td>" in text
 
 
 def test_what_is_not_known_has_no_section(tmp_path, known):

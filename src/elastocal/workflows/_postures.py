@@ -1,11 +1,11 @@
-"""Options that a person types for a posture, a limit or a frame."""
+"""Postures and frames as people write them: quantities with units, separated by commas."""
 
 from collections.abc import Sequence
 
 import numpy as np
 
 from elastocal.arrays import FloatArray
-from elastocal.errors import RobotError, UnitError
+from elastocal.errors import ElastocalError, RobotError, UnitError
 from elastocal.robot import Robot, T_from_xyzabc
 from elastocal.units import parse_quantity
 
@@ -39,28 +39,38 @@ def parse_posture(robot: Robot, text: str | None) -> FloatArray | None:
     return q
 
 
-def parse_frame(text: str | None) -> FloatArray | None:
-    """Return a frame, shape (4, 4), from ``"x, y, z, a, b, c"`` (KUKA Z-Y'-X''); None for no text.
-
-    Raises
-    ------
-    UnitError
-        If the text is not three lengths and three angles.
-    """
-    if text is None:
-        return None
-    parts = [part.strip() for part in text.split(",")]
-    if len(parts) != 6:
-        raise UnitError(
-            f"frame {text!r} must be six quantities, e.g. '0 mm, 0 mm, 565 mm, 0 deg, 0 deg, 0 deg'"
-        )
-    kinds = ("length",) * 3 + ("angle",) * 3
-    return T_from_xyzabc(*(parse_quantity(p, kind) for p, kind in zip(parts, kinds, strict=True)))
-
-
-def written_posture(robot: Robot, q: Sequence[float]) -> str:
+def write_posture(robot: Robot, q: Sequence[float]) -> str:
     """Return a posture as `parse_posture` reads it, to 0.1 deg and 0.1 mm."""
     return ", ".join(
         f"{np.degrees(value):.1f} deg" if turns else f"{1e3 * value:.1f} mm"
         for value, turns in zip(q, robot.revolute, strict=True)
     )
+
+
+def parse_frame(
+    text: str,
+    name: str = "frame",
+    example: str = "0 mm, 0 mm, 565 mm, 0 deg, 0 deg, 0 deg",
+    error: type[ElastocalError] = UnitError,
+) -> FloatArray:
+    """Return a frame, shape (4, 4), from ``"x, y, z, a, b, c"`` (KUKA Z-Y'-X'').
+
+    Parameters
+    ----------
+    text : str
+        Three lengths and three angles.
+    name, example : str
+        For the refusal of another number of quantities.
+    error : type
+        What that refusal is raised as.
+
+    Raises
+    ------
+    UnitError
+        If a unit is missing or wrong.
+    """
+    parts = [part.strip() for part in text.split(",")]
+    if len(parts) != 6:
+        raise error(f"{name} {text!r} must be six quantities, e.g. {example!r}")
+    kinds = ("length",) * 3 + ("angle",) * 3
+    return T_from_xyzabc(*(parse_quantity(p, kind) for p, kind in zip(parts, kinds, strict=True)))

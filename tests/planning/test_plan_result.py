@@ -8,7 +8,7 @@ import pytest
 
 from elastocal.errors import FileAccessError, SchemaError
 from elastocal.planning import PLAN, PlanResult, read_plan, write_plan
-from elastocal.planning.plan_result import SCHEMA, check_plan
+from elastocal.planning.plan_result import _SCHEMA as SCHEMA, check_plan
 from support import plans
 
 
@@ -171,3 +171,8 @@ def test_joints_of_home_via_points_and_compared_candidates_are_checked_too():
     ):
         with pytest.raises(SchemaError, match=said):
             check_plan(altered(**changes))
+
+
+def test_a_plan_shows_itself_in_a_few_lines():
+    assert repr(plans.plan()).splitlines()[0] == "PlanResult"
+    assert len(repr(plans.plan()).splitlines()) <= 20

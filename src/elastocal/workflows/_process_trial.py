@@ -1,14 +1,12 @@
-"""A simulated cell at work, corrected by a calibrated model: the composition root of Table 1.
+"""A process on a simulated cell, corrected by a calibrated model.
 
 Beside the demo the only place that brings simulator and estimator together.
 """
 
-import os
-from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from functools import partial
 
 import numpy as np
-from joblib import Parallel, delayed
 
 from elastocal.arrays import FloatArray
 from elastocal.cell import Cell
@@ -19,6 +17,7 @@ from elastocal.compensation.process import (
     Controller,
     Corrector,
     Course,
+    CourseDeviation,
     CourseRun,
     DeviationComparison,
     Effect,
@@ -30,17 +29,18 @@ from elastocal.compensation.process import (
 )
 from elastocal.errors import CompensationError
 from elastocal.identification import CalibratedModel
+from elastocal.parallel import map_in_processes, process_count
+from elastocal.progress import Progress
 from elastocal.robot import inverse_transform
 from elastocal.sim.workcell import ProcessCell
 
-Report = Callable[[str, int, int], None]
 _ZEROING = 250
 """Readings in the air that a sensor is zeroed by when no tool file says its bias."""
 
 
 @dataclass(frozen=True, eq=False)
-class Bench:
-    """What is put together."""
+class ProcessTrial:
+    """A simulated cell, and the compensator that corrects it."""
 
     cell: Cell
     model: CalibratedModel
@@ -60,7 +60,7 @@ class Bench:
 
 
 @dataclass(frozen=True, eq=False)
-class Outcome:
+class TrialRuns:
     """Every course without and with correction."""
 
     before: tuple[CourseRun, ...]
@@ -69,11 +69,16 @@ class Outcome:
     def line(self, name: str) -> DeviationComparison:
         """Return the line of the table."""
         return compare_deviations(
-            name, *([p.deviation for p in side] for side in (self.before, self.after))
+            name, *([run.deviation for run in side] for side in (self.before, self.after))
         )
 
+    def deviations(self, seed: int) -> list[CourseDeviation]:
+        """Return the deviations of each course at every cycle."""
+        pairs = zip(self.before, self.after, strict=True)
+        return [CourseDeviation.of(seed, before, after) for before, after in pairs]
 
-def run_process(bench: Bench, courses: tuple[Course, ...], report: Report) -> Outcome:
+
+def run_trial(trial: ProcessTrial, courses: tuple[Course, ...], progress: Progress) -> TrialRuns:
     """Run courses without and with correction.
 
     Raises
@@ -81,25 +86,25 @@ def run_process(bench: Bench, courses: tuple[Course, ...], report: Report) -> Ou
     DeviceError, EquilibriumError
         If the cell cannot be simulated, or not under these forces.
     """
-    return _passages(bench, courses, None, report)
+    return _run_courses(trial, courses, None, progress)
 
 
 def run_effect(
-    bench: Bench, courses: tuple[Course, ...], effect: Effect, report: Report
-) -> Outcome:
+    trial: ProcessTrial, courses: tuple[Course, ...], effect: Effect, progress: Progress
+) -> TrialRuns:
     """Run courses with something switched off."""
-    late = round(float(bench.settings.chain.delay()) / bench.settings.cycle)
-    changed = replace(bench, cell=effect.changed(bench.cell))
+    late = round(float(trial.settings.chain.delay()) / trial.settings.cycle)
+    changed = replace(trial, cell=effect.changed(trial.cell))
     if effect.prompt:
         none = {"median": 1, "notches": (), "low_pass": None}
-        bare = bench.settings.filter.model_copy(update=none)
+        bare = trial.settings.filter.model_copy(update=none)
         changed = replace(
             changed,
-            settings=bench.settings.model_copy(update={"filter": bare}),
-            controller=replace(bench.controller, dead_cycles=0, lag=0.0),
+            settings=trial.settings.model_copy(update={"filter": bare}),
+            controller=replace(trial.controller, dead_cycles=0, lag=0.0),
         )
         courses = tuple(replace(course, ripple=()) for course in courses)
-    return _passages(changed, courses, late if effect.exact else None, report, effect.name)
+    return _run_courses(changed, courses, late if effect.exact else None, progress, effect.name)
 
 
 def require_same_robot(cell: Cell, model: CalibratedModel, name: str) -> None:
@@ -124,44 +129,42 @@ def require_same_robot(cell: Cell, model: CalibratedModel, name: str) -> None:
         )
 
 
-def _passages(
-    bench: Bench,
+def _run_courses(
+    trial: ProcessTrial,
     courses: tuple[Course, ...],
     late: int | None,
-    report: Report,
+    progress: Progress,
     stage: str = "courses",
-) -> Outcome:
+) -> TrialRuns:
     """Run every course twice; ``late`` is that of a perfect corrector, None: the model corrects."""
-    jobs = min(bench.jobs or os.cpu_count() or 1, len(courses))
-    zeroed_at = courses[0].q[0]
-    pairs: dict[int, tuple[CourseRun, CourseRun]] = {}
+    runs: dict[int, tuple[CourseRun, CourseRun]] = {}
     # The longest first, or the last one would be run while the other processes wait.
     order = sorted(range(len(courses)), key=lambda number: -len(courses[number].q))
-    report(stage, 0, len(courses))
-    with Parallel(n_jobs=jobs, return_as="generator") as parallel:
-        found = parallel(delayed(_twice)(bench, courses[n], zeroed_at, late) for n in order)
-        for number, pair in zip(order, found, strict=True):
-            pairs[number] = pair
-            report(stage, len(pairs), len(courses))
-    ranked = [pairs[number] for number in range(len(courses))]
-    before, after = zip(*ranked, strict=True)
-    return Outcome(before, after)
+    progress(stage, 0, len(courses))
+    run = partial(_run_twice, trial, zeroed_at=courses[0].q[0], late=late)
+    processes = process_count(trial.jobs, len(courses))
+    found = map_in_processes(run, [courses[number] for number in order], processes)
+    for number, pair in zip(order, found, strict=True):
+        runs[number] = pair
+        progress(stage, len(runs), len(courses))
+    before, after = zip(*(runs[number] for number in range(len(courses))), strict=True)
+    return TrialRuns(before, after)
 
 
-def _twice(
-    bench: Bench, course: Course, zeroed_at: FloatArray, late: int | None
+def _run_twice(
+    trial: ProcessTrial, course: Course, *, zeroed_at: FloatArray, late: int | None
 ) -> tuple[CourseRun, CourseRun]:
     """Return a course without and with correction; courses know nothing of one another."""
-    truth, robot = ProcessCell(bench.cell, bench.seed), bench.cell.robot
-    corrects = _corrector(bench, truth, zeroed_at) if late is None else PerfectCorrector(late)
+    truth, robot = ProcessCell(trial.cell, trial.seed), trial.cell.robot
+    corrector = _corrector(trial, truth, zeroed_at) if late is None else PerfectCorrector(late)
     air = air_shifts(truth, course)
-    before = run_course(truth, robot, course, air, bench.clocked, None)
-    return before, run_course(truth, robot, course, air, bench.clocked, corrects)
+    before = run_course(truth, robot, course, air, trial.clocked, None)
+    return before, run_course(truth, robot, course, air, trial.clocked, corrector)
 
 
-def _corrector(bench: Bench, truth: ProcessCell, zeroed_at: FloatArray) -> Corrector:
-    load = bench.load or _zeroed(bench.cell, truth, zeroed_at)
-    return ModelCorrector(Compensator.of(bench.model, bench.settings, load))
+def _corrector(trial: ProcessTrial, truth: ProcessCell, zeroed_at: FloatArray) -> Corrector:
+    load = trial.load or _zeroed(trial.cell, truth, zeroed_at)
+    return ModelCorrector(Compensator.of(trial.model, trial.settings, load))
 
 
 def _zeroed(cell: Cell, truth: ProcessCell, q: FloatArray) -> SensorLoad:
