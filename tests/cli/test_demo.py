@@ -1,15 +1,16 @@
 """`elastocal demo`: the whole story, and what can go wrong before it."""
 
+import importlib
 import json
 import re
 import shlex
+from pathlib import Path
 
 import pytest
 
-from elastocal.cli import demo_display, demo_story
-from elastocal.cli.demo_folder import README, begin
 from elastocal.cli.main import COMMANDS
 from elastocal.errors import FileAccessError
+from elastocal.workflows import README, Chapter, InitResult, begin, chapters
 from support.cli import elastocal
 from support.demos import demo_result, finished_demo
 
@@ -22,7 +23,7 @@ def base(tmp_path_factory):
 def test_a_demo_says_what_it_does_and_what_came_of_it(base):
     told = demo_result("afp", base).err
     folder = finished_demo("afp", base)
-    for chapter in demo_story.chapters("afp", folder, 0):
+    for chapter in chapters("afp", folder, 0):
         assert chapter.line in told
     table = json.loads((folder / "process/table.json").read_text())
     (line,) = table["lines"]
@@ -43,7 +44,7 @@ def test_every_file_that_the_demos_readme_names_is_there(base):
 def test_the_log_of_a_demo_holds_every_command_with_its_output(base):
     log = (finished_demo("afp", base) / "log.txt").read_text(encoding="utf-8")
     commands = re.findall(r"^\$ elastocal (\S+)", log, flags=re.MULTILINE)
-    assert commands == [c.words[0] for c in demo_story.chapters("afp", base, 0)]
+    assert commands == [c.words[0] for c in chapters("afp", base, 0)]
     assert "rank 17 of 21" in log
 
 
@@ -65,7 +66,7 @@ def test_the_machining_demo_reaches_the_papers_reductions(base):
 
 @pytest.mark.parametrize("kind", ["afp", "machining"])
 def test_every_chapter_is_a_public_command(kind, tmp_path):
-    for chapter in demo_story.chapters(kind, tmp_path, 3):
+    for chapter in chapters(kind, tmp_path, 3):
         assert chapter.words[0] in COMMANDS
         assert shlex.split(chapter.line)[1:] == list(chapter.words)
 
@@ -131,13 +132,23 @@ def test_a_file_in_the_place_of_the_folder_is_refused(tmp_path):
     assert str(tmp_path / "demo") in elastocal("demo", "--out", tmp_path / "demo").reason
 
 
+STORY = importlib.import_module("elastocal.workflows.demo")  # its face has the function
+
+
+def look(_show, _operator):
+    return InitResult(Path("cell.yaml"), ())
+
+
 def test_a_chapter_that_fails_ends_the_demo_with_its_reason(tmp_path, monkeypatch):
+    def fail(_show, _operator):
+        raise FileAccessError("cannot read none.yaml")
+
     story = (
-        demo_story.Chapter("look", ("robots",)),
-        demo_story.Chapter("fail", ("check", str(tmp_path / "none.yaml"))),
-        demo_story.Chapter("never", ("robots",)),
+        Chapter("look", ("init",), look),
+        Chapter("fail", ("check", "none.yaml"), fail),
+        Chapter("never", ("init",), look),
     )
-    monkeypatch.setattr(demo_story, "chapters", lambda *_: story)
+    monkeypatch.setattr(STORY, "chapters", lambda *_: story)
     result = elastocal("demo", "--out", tmp_path / "demo")
     assert result.code == 1
     assert result.err.splitlines()[-1].startswith("elastocal: cannot read")
@@ -146,9 +157,11 @@ def test_a_chapter_that_fails_ends_the_demo_with_its_reason(tmp_path, monkeypatc
 
 
 def test_a_chapter_that_is_interrupted_ends_the_demo_with_its_code(tmp_path, monkeypatch):
-    story = (demo_story.Chapter("look", ("robots",)), demo_story.Chapter("never", ("robots",)))
-    monkeypatch.setattr(demo_story, "chapters", lambda *_: story)
-    monkeypatch.setattr(demo_display._Stage, "carry_out", lambda *_: 130)
+    def interrupt(_show, _operator):
+        raise KeyboardInterrupt
+
+    story = (Chapter("look", ("init",), interrupt), Chapter("never", ("init",), look))
+    monkeypatch.setattr(STORY, "chapters", lambda *_: story)
     result = elastocal("demo", "--out", tmp_path / "demo")
     assert result.code == 130
     assert "never" not in result.err

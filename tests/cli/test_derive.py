@@ -3,7 +3,7 @@ import json
 import pytest
 import typer
 
-from elastocal.cli.derive import derive
+from elastocal.cli.commands.derive import derive
 from elastocal.dataset import read
 from elastocal.errors import FileAccessError
 from support.recorded_runs import record_run

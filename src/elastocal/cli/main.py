@@ -5,31 +5,16 @@ Exit codes: 0 done; 1 the work could not be done, with a one-line reason; 2 usag
 """
 
 import contextlib
+import importlib
 import os
+import pkgutil
 import sys
 from collections.abc import Callable
 
 import typer
 
-from elastocal.cli.calibrate import calibrate
-from elastocal.cli.check import check
-from elastocal.cli.codec import codec
-from elastocal.cli.compare import compare
-from elastocal.cli.compensate import compensate
-from elastocal.cli.demo import demo
-from elastocal.cli.derive import derive
-from elastocal.cli.export import export
-from elastocal.cli.init import init
-from elastocal.cli.plan import plan
-from elastocal.cli.predict import predict
-from elastocal.cli.report import report
-from elastocal.cli.robots import robots
-from elastocal.cli.run import run as run_procedure
-from elastocal.cli.simulate_process import simulate_process
-from elastocal.cli.stiffness import stiffness
-from elastocal.cli.study import study
+from elastocal.cli import commands
 from elastocal.cli.termination import ended_cleanly
-from elastocal.cli.tool import tool
 from elastocal.errors import ElastocalError, FileAccessError
 
 app = typer.Typer(
@@ -39,27 +24,41 @@ app = typer.Typer(
     add_completion=False,
     pretty_exceptions_enable=False,
 )
-COMMANDS: dict[str, Callable[..., None]] = {
-    "robots": robots,
-    "init": init,
-    "check": check,
-    "plan": plan,
-    "run": run_procedure,
-    "derive": derive,
-    "calibrate": calibrate,
-    "codec": codec,
-    "study": study,
-    "predict": predict,
-    "tool": tool,
-    "compensate": compensate,
-    "stiffness": stiffness,
-    "export": export,
-    "simulate-process": simulate_process,
-    "compare": compare,
-    "report": report,
-    "demo": demo,
-}
-"""In the order in which help lists them: that of the work."""
+ORDER = (
+    "robots",
+    "init",
+    "check",
+    "plan",
+    "run",
+    "derive",
+    "calibrate",
+    "codec",
+    "study",
+    "predict",
+    "tool",
+    "compensate",
+    "stiffness",
+    "export",
+    "simulate_process",
+    "compare",
+    "report",
+    "demo",
+)
+"""The order in which help lists commands: that of the work; others follow by name."""
+
+
+def _found_commands() -> dict[str, Callable[..., None]]:
+    """Return the function of each file in ``commands``, by the name that people type."""
+    names = {module.name for module in pkgutil.iter_modules(commands.__path__)}
+    ordered = [*(name for name in ORDER if name in names), *sorted(names - set(ORDER))]
+    package = commands.__name__
+    return {
+        name.replace("_", "-"): getattr(importlib.import_module(f"{package}.{name}"), name)
+        for name in ordered
+    }
+
+
+COMMANDS = _found_commands()
 for name, command in COMMANDS.items():
     app.command(name)(command)
 

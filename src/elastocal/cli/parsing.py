@@ -3,6 +3,11 @@
 from elastocal.errors import CompensationError, UnitError
 from elastocal.units import parse_quantity
 
+START_HELP = (
+    "Posture before the first row, a quantity a joint from base to tip:"
+    " '0 deg, -90 deg, 90 deg, 0 deg, 45 deg, 0 deg'."
+)
+
 
 def parse_point(text: str) -> tuple[float, float, float]:
     """Return a point in m from three lengths with units.

@@ -11,7 +11,6 @@ from rich.console import Console
 from rich.live import Live
 from rich.text import Text
 
-from elastocal.cli.progress import Overheard
 from elastocal.procedure import Progress
 
 REFRESH = 0.1
@@ -60,8 +59,6 @@ def watching(console: Console, count: int) -> Iterator[Callable[[Progress], None
 
 
 def _screen(console: Console, count: int) -> "_Screen":
-    if isinstance(console, Overheard):
-        return _Told(console, count)
     return _Terminal(console, count) if console.is_terminal else _Lines(console)
 
 
@@ -154,18 +151,6 @@ class _Lines(_Screen):
 
     def show(self, said: Progress) -> None:
         self._console.print(progress_text(said), soft_wrap=True, markup=False)
-
-
-class _Told(_Lines):
-    """Lines in a log, while another display shows how far the run is."""
-
-    def __init__(self, console: Overheard, count: int) -> None:
-        super().__init__(console)
-        self._report, self._count = console.report, count
-
-    def show(self, said: Progress) -> None:
-        super().show(said)
-        self._report("poses measured", said.number - 1, self._count)
 
 
 def _leave_off() -> None:

@@ -1,3 +1,4 @@
+from ._demo_folder import LOG as LOG, README as README, begin as begin, finish as finish
 from ._device_sources import KINDS as KINDS, SOURCES as SOURCES, DeviceSource as DeviceSource
 from ._kinds_of_measurement import FileDescription as FileDescription
 from ._operator import Operator as Operator, Supervision as Supervision, Unattended as Unattended
@@ -31,8 +32,17 @@ from .compensate import (
     CompensateSettings as CompensateSettings,
     compensate as compensate,
 )
+from .demo import (
+    Chapter as Chapter,
+    DemoDisplay as DemoDisplay,
+    DemoResult as DemoResult,
+    DemoSettings as DemoSettings,
+    chapters as chapters,
+    demo as demo,
+)
 from .derive import DeriveResult as DeriveResult, DeriveSettings as DeriveSettings, derive as derive
 from .export import ExportResult as ExportResult, ExportSettings as ExportSettings, export as export
+from .init import InitResult as InitResult, InitSettings as InitSettings, init as init
 from .plan import (
     PlanFigures as PlanFigures,
     PlanResult as PlanResult,

@@ -118,6 +118,14 @@ class DemoResult(Result):
             ("report", str(self.folder / "report.html")),
         )
 
+    def closing(self) -> tuple[str, ...]:
+        """Return the facts in two sentences."""
+        (_, mean), (_, largest), (_, page) = self.facts()
+        return (
+            f"mean deviation on the process path: {mean}; largest {largest}",
+            f"open {page} in a browser; {self.folder / README} says what each file is",
+        )
+
 
 @workflow(DemoSettings)
 def demo(settings: DemoSettings, progress: Progress) -> DemoResult:
@@ -258,16 +266,6 @@ def chapters(kind: str, out: Path, seed: int) -> tuple[Chapter, ...]:
             ("report", str(out), *to("report.html")),
             lambda show, _: report(out, show, out=out / "report.html"),
         ),
-    )
-
-
-def closing_lines(result: DemoResult) -> tuple[str, ...]:
-    """Return what a person who has watched the demo wants to know."""
-    (_, mean), (_, largest), _ = result.facts()
-    return (
-        f"mean deviation on the process path: {mean}; largest {largest}",
-        f"open {result.folder / 'report.html'} in a browser; {result.folder / README} says what each"
-        " file is",
     )
 
 

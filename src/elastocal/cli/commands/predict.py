@@ -18,21 +18,10 @@ def predict(
 ) -> None:
     """Predict the deflection of each row, with 95 % intervals of the fit and of a measurement."""
     from elastocal.cli.output import console, print_json
+    from elastocal.cli.tables import show_predicted
 
-    figures = workflows.predict(model, rows=rows, out=out).summary
+    result = workflows.predict(model, rows=rows, out=out)
     if as_json:
-        print_json(figures)
+        print_json(result.summary)
     else:
-        size = figures.deflection
-        console().print(
-            f"{figures.rows} rows: predicted deflection {1e3 * size.mean:.3f} mm mean,"
-            f" {1e3 * size.max:.3f} mm max; written to {out}",
-            markup=False,
-            soft_wrap=True,
-        )
-        if figures.misfit is None:
-            console().print(
-                "Note: the model does not know its errors at left-out poses, so that there are no"
-                " intervals of what would be measured; calibrate again to have them",
-                soft_wrap=True,
-            )
+        show_predicted(console(), result, out)

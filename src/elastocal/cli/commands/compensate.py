@@ -6,11 +6,7 @@ from typing import Annotated
 import typer
 
 from elastocal import workflows
-
-START_HELP = (
-    "Posture before the first row, a quantity a joint from base to tip:"
-    " '0 deg, -90 deg, 90 deg, 0 deg, 45 deg, 0 deg'."
-)
+from elastocal.cli.parsing import START_HELP
 
 
 def compensate(
@@ -35,8 +31,8 @@ def compensate(
     ] = False,
 ) -> None:
     """Correct a programmed path so that the loaded tool is where it was programmed."""
-    from elastocal.cli.output import console, print_json
-    from elastocal.cli.progress import progress_bars
+    from elastocal.cli.output import console, print_json, progress_bars
+    from elastocal.cli.tables import show_compensation
     from elastocal.errors import UnitError
     from elastocal.units import parse_quantity
 
@@ -51,23 +47,4 @@ def compensate(
     if as_json:
         print_json(result)
     else:
-        for line in (*_lines(result, out), *(f"Note: {note}" for note in result.notes)):
-            console().print(line)
-
-
-def _lines(result: "workflows.CompensateResult", out: Path) -> list[str]:
-    """Return what was done, for people."""
-    lengths = (
-        ("deviation as programmed", result.deviation),
-        ("left by one first-order step", result.first_order),
-        ("left by this correction", result.residual),
-        ("correction", result.correction),
-    )
-    return [
-        f"{result.rows} rows corrected, predicted by the model; written to {out}",
-        *(
-            f"  {name + ':':30} {1e3 * length.mean:.3g} mm mean, {1e3 * length.max:.3g} mm max"
-            f" ({length.at})"
-            for name, length in lengths
-        ),
-    ]
+        show_compensation(console(), result, out)

@@ -32,7 +32,7 @@ def run(
     """Press on the tooling at every pose of a plan and record what happens."""
     from elastocal.cli.operator import TerminalOperator
     from elastocal.cli.output import console, print_json
-    from elastocal.cli.run_table import dry_figures, show_itinerary, show_result
+    from elastocal.cli.tables import dry_figures, show_itinerary, show_run
     from elastocal.procedure import RunEnd
 
     settings = workflows.RunSettings(
@@ -49,7 +49,7 @@ def run(
     if as_json and finished.end is RunEnd.DONE:
         print_json(finished.figures)
     else:
-        show_result(console(), finished)
+        show_run(console(), finished)
     if finished.problem is not None:
         raise finished.problem
     if finished.end is RunEnd.INTERRUPTED:

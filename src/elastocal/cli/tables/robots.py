@@ -11,7 +11,7 @@ from elastocal.robot import catalogue
 Facts = dict[str, Any]
 
 
-def facts(name: str) -> Facts:
+def robot_facts(name: str) -> Facts:
     """Return a catalogue robot as JSON-ready data, SI units; unknown numbers are null."""
     robot = catalogue.load(name)
     limits = robot.limits
@@ -33,7 +33,7 @@ def facts(name: str) -> Facts:
     }
 
 
-def show_table(console: Console, rows: list[Facts]) -> None:
+def show_robots(console: Console, rows: list[Facts]) -> None:
     """Print a line a robot."""
     table = Table(box=None, pad_edge=False)
     table.add_column("robot")
@@ -50,7 +50,7 @@ def show_table(console: Console, rows: list[Facts]) -> None:
     )
 
 
-def show_one(console: Console, row: Facts) -> None:
+def show_robot(console: Console, row: Facts) -> None:
     """Print one robot with its sources."""
     console.print(f"[bold]{row['name']}[/bold]")
     table = Table(box=None, pad_edge=False)

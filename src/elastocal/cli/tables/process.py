@@ -8,7 +8,7 @@ from rich.table import Table as Printed
 from elastocal.compensation.process import DeviationComparison, SimulateProcessResult
 
 
-def show(console: Console, table: SimulateProcessResult) -> None:
+def show_process(console: Console, table: SimulateProcessResult) -> None:
     """Print the table in mm, and the budget below it."""
     points = f"{table.lines[-1].points} points"
     title = f"{table.cell}, {table.process}: absolute deviation in mm at {points}"

@@ -17,13 +17,10 @@ def derive(
 ) -> None:
     """Derive dataset.nc and summary.json of a run again from its raw streams."""
     from elastocal.cli.output import console, print_json
+    from elastocal.cli.tables import show_derived
 
     result = workflows.derive(run)
     if as_json:
         print_json(result.summary)
         return
-    out, folder = console(), result.folder
-    out.print(f"{len(result.dataset.poses)} poses, readings: {result.counts()}")
-    for warning in result.summary.warnings:
-        out.print(f"warning: {warning}", markup=False, soft_wrap=True)
-    out.print(f"wrote {folder.dataset} and {folder.summary.name}", markup=False, soft_wrap=True)
+    show_derived(console(), result)

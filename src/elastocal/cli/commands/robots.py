@@ -16,7 +16,7 @@ def robots(
 ) -> None:
     """List the robots that elastocal knows, with the source of each number."""
     from elastocal.cli.output import console, print_json
-    from elastocal.cli.robot_table import facts, show_one, show_table
+    from elastocal.cli.tables import robot_facts, show_robot, show_robots
     from elastocal.errors import RobotError
     from elastocal.robot import catalogue
 
@@ -26,10 +26,10 @@ def robots(
         typer.echo(catalogue.urdf(name), nl=False)
         return
     chosen = [catalogue.entry(name).name] if name else list(catalogue.names())
-    rows = [facts(robot) for robot in chosen]
+    rows = [robot_facts(robot) for robot in chosen]
     if as_json:
         print_json({"robots": rows})
     elif name:
-        show_one(console(), rows[0])
+        show_robot(console(), rows[0])
     else:
-        show_table(console(), rows)
+        show_robots(console(), rows)

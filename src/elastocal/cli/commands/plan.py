@@ -31,9 +31,8 @@ def plan(
     ] = False,
 ) -> None:
     """Choose calibration poses on the tooling, check them, and put them in order."""
-    from elastocal.cli.output import console, print_json
-    from elastocal.cli.plan_table import show_plan
-    from elastocal.cli.progress import progress_bars
+    from elastocal.cli.output import console, print_json, progress_bars
+    from elastocal.cli.tables import show_plan
 
     settings = workflows.PlanSettings(cell, out, compare, program, jobs, force)
     with progress_bars(console()) as progress:

@@ -41,9 +41,8 @@ def simulate_process(  # noqa: PLR0913 (a command has as many options as it has)
     ] = False,
 ) -> None:
     """Run a process on the simulated cell without and with correction: how much is left."""
-    from elastocal.cli.output import console, print_json
-    from elastocal.cli.process_table import show
-    from elastocal.cli.progress import progress_bars
+    from elastocal.cli.output import console, print_json, progress_bars
+    from elastocal.cli.tables import show_process
     from elastocal.records import to_data
 
     given = workflows.SimulateProcessSettings(
@@ -64,5 +63,5 @@ def simulate_process(  # noqa: PLR0913 (a command has as many options as it has)
     if as_json:
         print_json(to_data(result) | {"folder": str(out)})
     else:
-        show(console(), result)
+        show_process(console(), result)
         console().print(f"written to {out}")

@@ -41,9 +41,8 @@ def study(  # noqa: PLR0913 - one parameter an option
     ] = False,
 ) -> None:
     """Simulate many calibrations of a cell: what reaches which accuracy."""
-    from elastocal.cli.output import console, print_json
-    from elastocal.cli.progress import progress_bars
-    from elastocal.cli.study_table import show_study
+    from elastocal.cli.output import console, print_json, progress_bars
+    from elastocal.cli.tables import show_study
     from elastocal.records import to_data
 
     with progress_bars(console()) as progress:

@@ -84,10 +84,9 @@ def codec(  # noqa: PLR0913 - one parameter an option
     ] = False,
 ) -> None:
     """Cross-validate growing training sets: how many poses, which technique."""
-    from elastocal.cli.codec_table import show_codec
-    from elastocal.cli.output import console, print_json
+    from elastocal.cli.output import console, print_json, progress_bars
     from elastocal.cli.parsing import parse_point
-    from elastocal.cli.progress import progress_bars
+    from elastocal.cli.tables import show_codec
     from elastocal.codec import CodecOptions
     from elastocal.records import to_data
 

@@ -63,7 +63,7 @@ def show_itinerary(console: Console, found: DryRunResult) -> None:
         console.print(f"warning: {warning}", soft_wrap=True, markup=False)
 
 
-def show_result(console: Console, result: RunResult) -> None:
+def show_run(console: Console, result: RunResult) -> None:
     """Print how a run ended."""
     found = result.figures
     readings = ", ".join(f"{count} {status}" for status, count in found.readings.items())

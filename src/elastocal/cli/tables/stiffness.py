@@ -7,7 +7,7 @@ from rich.table import Table
 from elastocal.workflows import ChosenStiffness, ExternalAxis, StiffnessResult
 
 
-def show(console: Console, result: StiffnessResult) -> None:
+def show_stiffness(console: Console, result: StiffnessResult) -> None:
     """Print the choices as a table, and the notes on them."""
     summary = result.summary
     table = Table("posture", title=f"stiffness along {result.along} in N/µm")

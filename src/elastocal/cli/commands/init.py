@@ -17,6 +17,6 @@ def init(
 ) -> None:
     """Write a commented example cell with its mesh."""
     from elastocal.cli.output import console
-    from elastocal.cli.tables import show_init
+    from elastocal.cli.tables import show_example
 
-    show_init(console(), workflows.init(folder, like=like, force=force))
+    show_example(console(), workflows.init(folder, like=like, force=force))

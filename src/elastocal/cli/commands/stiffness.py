@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from elastocal import workflows
-from elastocal.cli.compensate import START_HELP
+from elastocal.cli.parsing import START_HELP
 
 
 def stiffness(  # noqa: PLR0913 (a command has as many options as it has)
@@ -32,9 +32,8 @@ def stiffness(  # noqa: PLR0913 (a command has as many options as it has)
     ] = False,
 ) -> None:
     """Map the stiffness over spin, rail and path; choose the stiffest posture."""
-    from elastocal.cli.output import console, print_json
-    from elastocal.cli.progress import progress_bars
-    from elastocal.cli.stiffness_table import show
+    from elastocal.cli.output import console, print_json, progress_bars
+    from elastocal.cli.tables import show_stiffness
     from elastocal.records import to_data
 
     given = workflows.StiffnessSettings(
@@ -54,5 +53,5 @@ def stiffness(  # noqa: PLR0913 (a command has as many options as it has)
     if as_json:
         print_json(to_data(result.summary) | {"folder": str(out)})
     else:
-        show(console(), result)
+        show_stiffness(console(), result)
         console().print(f"written to {out}: {', '.join(result.summary.files)}")

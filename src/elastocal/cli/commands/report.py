@@ -56,10 +56,9 @@ def report(  # noqa: PLR0913 - one parameter an option
     ] = False,
 ) -> None:
     """Write the report of a calibration: one HTML file that an inspector can sign."""
-    from rich.markup import escape
-
     from elastocal.cli.output import console, print_json
     from elastocal.cli.parsing import parse_limit
+    from elastocal.cli.tables import show_report
 
     accepted = None if tolerance is None else parse_limit(tolerance, "--tolerance")
     drift = None if limit is None else parse_limit(limit)
@@ -70,10 +69,4 @@ def report(  # noqa: PLR0913 - one parameter an option
     if as_json:
         print_json(result.figures)
         return
-    shown, figures, verdict = console(), result.figures, result.verdict
-    light = f" ({figures.light} light)" if figures.light else ""
-    shown.print(f"[bold]{verdict.word}[/bold]{light}: {escape(verdict.sentence)}")
-    for reason in verdict.reasons:
-        shown.print(f"   {reason}", markup=False)
-    paper = f" and {figures.pdf}" if figures.pdf else ""
-    shown.print(f"written to {figures.report}{paper}", markup=False)
+    show_report(console(), result)

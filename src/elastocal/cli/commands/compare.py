@@ -34,9 +34,9 @@ def compare(
 
     Exits with 0 whatever the verdict; read it from --json.
     """
-    from elastocal.cli.compare_table import show_comparison
     from elastocal.cli.output import console, print_json
     from elastocal.cli.parsing import parse_limit
+    from elastocal.cli.tables import show_comparison
 
     found = workflows.compare(
         old,

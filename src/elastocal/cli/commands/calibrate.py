@@ -53,9 +53,9 @@ def calibrate(  # noqa: PLR0913 - one parameter an option
     ] = False,
 ) -> None:
     """Identify the compliances of a robot from a measured dataset."""
-    from elastocal.cli.calibration_table import show_calibration
     from elastocal.cli.output import console, print_json
     from elastocal.cli.parsing import parse_point
+    from elastocal.cli.tables import show_calibration
 
     result = workflows.calibrate(
         data,

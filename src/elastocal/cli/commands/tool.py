@@ -35,7 +35,7 @@ def tool(
     """Find mass, centre of mass, sensor bias and sensor rotation from static postures."""
     from elastocal.cli.output import console, print_json
     from elastocal.cli.parsing import parse_direction
-    from elastocal.cli.tool_table import show_tool
+    from elastocal.cli.tables import show_tool
     from elastocal.records import to_data
 
     result = workflows.tool(

@@ -25,16 +25,10 @@ def export(
 ) -> None:
     """Write a model as dependency-free C99 with filters, limits and a self-test."""
     from elastocal.cli.output import console, print_json
+    from elastocal.cli.tables import show_export
 
     result = workflows.export(model, c=c, settings=settings, tool=tool, force=force)
     if as_json:
         print_json(result)
         return
-    out = console()
-    out.print(f"{', '.join(result.files)} written to {c}")
-    out.print(f"the filters delay a slow wrench by {1e3 * result.filter_delay:.1f} ms")
-    if tool is None:
-        out.print(
-            "no --tool: wrenches are taken as at the tool centre point, in its axes, bias and tool"
-            " weight removed"
-        )
+    show_export(console(), result, tool is not None)

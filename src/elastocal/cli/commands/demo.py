@@ -1,0 +1,170 @@
+"""``elastocal demo``: the whole story on a simulated cell, command by command."""
+
+import io
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, TextIO
+
+import typer
+
+from elastocal import workflows
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from elastocal.progress import Progress
+    from elastocal.results import Result
+    from elastocal.workflows import Chapter
+
+_WIDTH = 100
+"""Columns of the log."""
+
+
+def demo(
+    kind: Annotated[
+        str,
+        typer.Argument(
+            metavar="afp|machining", help="Fibre placement on a dome, or roughing of a block."
+        ),
+    ] = "afp",
+    out: Annotated[Path, typer.Option(metavar="DIR", help="Folder for the results.")] = Path(
+        "demo"
+    ),
+    *,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of the simulated cell.")] = 0,
+    force: Annotated[
+        bool, typer.Option("--force", help="Remove an earlier demo from the folder first.")
+    ] = False,
+) -> None:
+    """Show the whole story on a simulated cell: from an empty folder to a signed-off report."""
+    from elastocal.cli.output import console
+    from elastocal.cli.tables import show_demo
+
+    screen = console()
+
+    @contextmanager
+    def display(log: TextIO, story: "Sequence[Chapter]") -> "Iterator[_Display]":
+        if screen.is_terminal:
+            with _bars(screen, story) as show:
+                yield _Display(log, out, show)
+        else:
+            yield _Display(log, out, _lines(screen, story))
+
+    result = workflows.demo(kind, out=out, seed=seed, force=force, display=display)
+    show_demo(screen, result)
+
+
+class _Display:
+    """Shows chapters, and logs what their commands print.
+
+    Parameters
+    ----------
+    log : TextIO
+        The open log.
+    out : Path
+        Folder of the demo.
+    show : callable
+        Makes a context in which a chapter is at work.
+    """
+
+    def __init__(self, log: TextIO, out: Path, show: Callable[..., Any]) -> None:
+        from elastocal.cli.operator import TerminalOperator
+
+        self.operator = TerminalOperator(_log_console(log))
+        self.show, self._out = show, out
+
+    def text(self, chapter: "Chapter", result: "Result") -> str:
+        """Return what a chapter's command prints."""
+        printed = io.StringIO()
+        _print(_log_console(printed), chapter, result, self._out)
+        return printed.getvalue()
+
+
+def _log_console(file: TextIO) -> "Console":
+    from rich.console import Console
+
+    return Console(file=file, width=_WIDTH, highlight=False, force_terminal=False)
+
+
+def _print(console: "Console", chapter: "Chapter", result: Any, out: Path) -> None:
+    """Print a result as its command does."""
+    from elastocal.cli import tables
+
+    def show_plan() -> None:
+        figures = workflows.plan_figures(result, out / "plan", "calib")
+        tables.show_plan(console, result, figures)
+
+    def show_codec() -> None:
+        folder = Path(chapter.words[-1])
+        tables.show_codec(console, result.summary, folder, result.files)
+
+    def show_process() -> None:
+        tables.show_process(console, result)
+        console.print(f"written to {out / 'process'}")
+
+    shown: dict[str, Callable[[], None]] = {
+        "init": lambda: tables.show_example(console, result),
+        "plan": show_plan,
+        "run": lambda: tables.show_run(console, result),
+        "calibrate": lambda: tables.show_calibration(console, result, out / "model.json"),
+        "tool": lambda: tables.show_tool(console, result, out / "tool.json"),
+        "codec": show_codec,
+        "simulate-process": show_process,
+        "compensate": lambda: tables.show_compensation(console, result, out / "corrected.csv"),
+        "export": lambda: tables.show_export(console, result, with_tool=True),
+        "report": lambda: tables.show_report(console, result),
+    }
+    shown[chapter.words[0]]()
+
+
+@contextmanager
+def _bars(console: "Console", story: "Sequence[Chapter]") -> Iterator[Callable[..., Any]]:
+    """Yield contexts that show a bar a chapter; the one at work moves."""
+    from rich.progress import BarColumn, Progress as ProgressBars, TextColumn, TimeElapsedColumn
+
+    bars = ProgressBars(
+        TextColumn("{task.description}"),
+        BarColumn(bar_width=24),
+        TimeElapsedColumn(),
+        TextColumn("[dim]{task.fields[stage]}"),
+        console=console,
+    )
+    tasks = {each: bars.add_task(each.title, start=False, total=1.0, stage="") for each in story}
+
+    @contextmanager
+    def show(chapter: "Chapter") -> "Iterator[Progress]":
+        task, mark = tasks[chapter], "not done"
+        bars.start_task(task)
+        bars.update(task, total=None, stage=chapter.words[0])
+
+        def progress(stage: str, done: int, total: int, /) -> None:
+            bars.update(task, completed=done, total=total, stage=stage)
+
+        try:
+            yield progress
+            mark = ""
+        finally:
+            bars.update(task, completed=1.0, total=1.0, stage=mark)
+            bars.stop_task(task)
+
+    with bars:
+        yield show
+
+
+def _lines(console: "Console", story: "Sequence[Chapter]") -> Callable[..., Any]:
+    """Return contexts that print a line a chapter, and how long it took."""
+
+    @contextmanager
+    def show(chapter: "Chapter") -> "Iterator[Progress]":
+        from elastocal.progress import silent
+
+        number = list(story).index(chapter) + 1
+        head = f"{number} of {len(story)}  {chapter.title}: {chapter.line}"
+        console.print(head, soft_wrap=True, markup=False)
+        began = time.monotonic()
+        yield silent
+        console.print(f"    {time.monotonic() - began:.1f} s", markup=False)
+
+    return show

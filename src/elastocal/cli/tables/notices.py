@@ -1,0 +1,97 @@
+"""What the commands print that need no table: some lines each."""
+
+from pathlib import Path
+
+from rich.console import Console
+from rich.markup import escape
+
+from elastocal.workflows import (
+    CompensateResult,
+    DemoResult,
+    DeriveResult,
+    ExportResult,
+    InitResult,
+    PredictResult,
+    ReportResult,
+)
+
+
+def show_example(console: Console, result: InitResult) -> None:
+    """Print where an example cell was written, and what comes next."""
+    cell, names = escape(str(result.cell)), ", ".join(mesh.name for mesh in result.meshes)
+    console.print(
+        f"wrote [bold]{cell}[/bold] and {names}: edit it, then `elastocal check {cell}`",
+        soft_wrap=True,
+    )
+
+
+def show_derived(console: Console, result: DeriveResult) -> None:
+    """Print what the streams of a run gave."""
+    console.print(f"{len(result.dataset.poses)} poses, readings: {result.counts()}")
+    for warning in result.summary.warnings:
+        console.print(f"warning: {warning}", markup=False, soft_wrap=True)
+    folder = result.folder
+    console.print(f"wrote {folder.dataset} and {folder.summary.name}", markup=False, soft_wrap=True)
+
+
+def show_predicted(console: Console, result: PredictResult, out: Path) -> None:
+    """Print how large the predicted deflections are."""
+    figures, size = result.summary, result.summary.deflection
+    console.print(
+        f"{figures.rows} rows: predicted deflection {1e3 * size.mean:.3f} mm mean,"
+        f" {1e3 * size.max:.3f} mm max; written to {out}",
+        markup=False,
+        soft_wrap=True,
+    )
+    if figures.misfit is None:
+        console.print(
+            "Note: the model does not know its errors at left-out poses, so that there are no"
+            " intervals of what would be measured; calibrate again to have them",
+            soft_wrap=True,
+        )
+
+
+def show_compensation(console: Console, result: CompensateResult, out: Path) -> None:
+    """Print what was corrected, and what the model predicts to be left."""
+    lengths = (
+        ("deviation as programmed", result.deviation),
+        ("left by one first-order step", result.first_order),
+        ("left by this correction", result.residual),
+        ("correction", result.correction),
+    )
+    console.print(f"{result.rows} rows corrected, predicted by the model; written to {out}")
+    for name, length in lengths:
+        console.print(
+            f"  {name + ':':30} {1e3 * length.mean:.3g} mm mean, {1e3 * length.max:.3g} mm max"
+            f" ({length.at})"
+        )
+    for note in result.notes:
+        console.print(f"Note: {note}")
+
+
+def show_export(console: Console, result: ExportResult, with_tool: bool) -> None:
+    """Print which C files were written, and what their wrenches are."""
+    console.print(f"{', '.join(result.files)} written to {result.folder}")
+    console.print(f"the filters delay a slow wrench by {1e3 * result.filter_delay:.1f} ms")
+    if not with_tool:
+        console.print(
+            "no --tool: wrenches are taken as at the tool centre point, in its axes, bias and tool"
+            " weight removed"
+        )
+
+
+def show_report(console: Console, result: ReportResult) -> None:
+    """Print the verdict of a report."""
+    figures, verdict = result.figures, result.verdict
+    light = f" ({figures.light} light)" if figures.light else ""
+    console.print(f"[bold]{verdict.word}[/bold]{light}: {escape(verdict.sentence)}")
+    for reason in verdict.reasons:
+        console.print(f"   {reason}", markup=False)
+    paper = f" and {figures.pdf}" if figures.pdf else ""
+    console.print(f"written to {figures.report}{paper}", markup=False)
+
+
+def show_demo(console: Console, result: DemoResult) -> None:
+    """Print what a demo came to."""
+    for line in result.closing():
+        console.print(line, soft_wrap=True, markup=False)
