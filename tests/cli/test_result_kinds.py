@@ -4,7 +4,6 @@ import json
 
 import pytest
 
-from elastocal.cli.file_kinds import describe_file
 from elastocal.codec.study import (
     StudyStore,
     one_after_the_other,
@@ -13,6 +12,7 @@ from elastocal.codec.study import (
     write_study,
 )
 from elastocal.errors import SchemaError
+from elastocal.workflows import describe_file
 from support.studies import settings, simulate
 
 

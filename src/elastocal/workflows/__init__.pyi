@@ -1,4 +1,5 @@
 from ._device_sources import KINDS as KINDS, SOURCES as SOURCES, DeviceSource as DeviceSource
+from ._kinds_of_measurement import FileDescription as FileDescription
 from ._operator import Operator as Operator, Supervision as Supervision, Unattended as Unattended
 from ._outputs import refuse_overwriting as refuse_overwriting
 from ._process_trial import (
@@ -11,6 +12,12 @@ from .calibrate import (
     CalibrateResult as CalibrateResult,
     CalibrateSettings as CalibrateSettings,
     calibrate as calibrate,
+)
+from .check import (
+    CheckResult as CheckResult,
+    CheckSettings as CheckSettings,
+    check as check,
+    describe_file as describe_file,
 )
 from .compensate import (
     CompensateResult as CompensateResult,
