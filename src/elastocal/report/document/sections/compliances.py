@@ -4,6 +4,7 @@ from collections.abc import Iterator
 from functools import partial
 from typing import Any
 
+from elastocal.elastic import spring_units
 from elastocal.identification import Term, describe
 from elastocal.report.document.markup import facts, heading, listed, paragraph, table
 from elastocal.report.document.parts import Calibrated, Parts
@@ -27,12 +28,12 @@ def body(parts: Parts) -> Content:
     springs = list(_springs(parts.calibrated, groups))
     observable = sum(each["group"] is None for each in springs)
     html = _head(parts.calibrated, observable) + _comparison(parts.calibrated.figures)
-    units = dict.fromkeys(each["unit"] for each in springs)
     panels = [
-        (unit.shown, [_bar(each) for each in springs if each["unit"] == unit]) for unit in units
+        (unit.shown, [_bar(each) for each in springs if each["unit"] == unit])
+        for unit in spring_units()
     ]
     html += picture(
-        partial(spring_figure, panels),
+        partial(spring_figure, [panel for panel in panels if panel[1]]),
         f"Compliances of {len(springs)} springs with 95 % intervals; {len(springs) - observable} of"
         " them have no value of their own",
         "Filled: known by itself, with its 95 % interval. Hollow: not known by itself; the number"
@@ -73,6 +74,7 @@ def _row(each: Figures) -> tuple[str, ...]:
     if each["group"] is not None:
         return name, f"not by itself, group {each['group']}", f"({value:.4f})", "none", unit, "none"
     stiff = f"{1.0 / value:.3f} {each['unit'].stiffness}" if value > 0.0 else "rigid"
+    stiff = stiff if each["unit"].stiffness else ""
     known = "at its bound"
     if value > 0.0:
         known = f"±{(each['high'] - each['low']) / 2 / value:.0%}"
