@@ -16,9 +16,14 @@ from timing import seconds
 from elastocal.elastic import ElasticModel, layout
 from elastocal.identification import Problem, build, calibrate, solve
 from elastocal.robot import Robot, catalogue, with_tool
-from elastocal.sim.arm.elastic_arm import bearing_truth
-from elastocal.sim.arm.linkage import Linkage
-from elastocal.sim.arm.measurement import SHOP_FLOOR, measure, press_forces, press_poses
+from elastocal.sim.arm import (
+    SHOP_FLOOR,
+    Linkage,
+    bearing_truth,
+    measure,
+    press_forces,
+    press_poses,
+)
 
 TOOL = np.array([[1.0, 0, 0, 0.15], [0, 1.0, 0, 0], [0, 0, 1.0, 0.35], [0, 0, 0, 1.0]])
 

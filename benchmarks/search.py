@@ -27,8 +27,11 @@ from elastocal.planning.search import (
 )
 from elastocal.planning.search._fields import PlainField
 from elastocal.robot import Robot, catalogue, with_tool
-from elastocal.sim.arm.linkage import Linkage
-from elastocal.sim.arm.measurement import press_forces, press_poses
+from elastocal.sim.arm import (
+    Linkage,
+    press_forces,
+    press_poses,
+)
 
 TOOL = np.array([[1.0, 0, 0, 0.15], [0, 1.0, 0, 0], [0, 0, 1.0, 0.35], [0, 0, 0, 1.0]])
 POOL, POSES = 3000, 31

@@ -10,9 +10,14 @@ import numpy as np
 from elastocal.elastic import ElasticModel, layout
 from elastocal.identification import build, describe, observability, solve
 from elastocal.robot import Robot, T_from_xyzabc, catalogue, with_tool
-from elastocal.sim.arm.elastic_arm import bearing_truth
-from elastocal.sim.arm.linkage import Linkage
-from elastocal.sim.arm.measurement import SHOP_FLOOR, measure, press_forces, press_poses
+from elastocal.sim.arm import (
+    SHOP_FLOOR,
+    Linkage,
+    bearing_truth,
+    measure,
+    press_forces,
+    press_poses,
+)
 
 urdf = catalogue.urdf("KR 120 R2700 extra HA")
 urdf = with_tool(urdf, "flange", "tcp", T_from_xyzabc(0.15, 0.0, 0.35, 0.0, 0.0, 0.0))

@@ -11,14 +11,18 @@ import numpy as np
 from elastocal.elastic import ElasticModel, layout
 from elastocal.identification import calibrate, summary
 from elastocal.robot import Robot, T_from_xyzabc, catalogue, with_tool
-from elastocal.sim.arm.elastic_arm import (
+from elastocal.sim.arm import (
     LINK_BENDING,
+    SHOP_FLOOR,
+    Linkage,
+    Noise,
     bearing_truth,
+    measure,
+    press_forces,
+    press_poses,
     with_link_bending,
     with_stiffening_gears,
 )
-from elastocal.sim.arm.linkage import Linkage
-from elastocal.sim.arm.measurement import SHOP_FLOOR, Noise, measure, press_forces, press_poses
 
 urdf = catalogue.urdf("KR 120 R2700 extra HA")
 urdf = with_tool(urdf, "flange", "tcp", T_from_xyzabc(0.15, 0.0, 0.35, 0.0, 0.0, 0.0))

@@ -20,9 +20,14 @@ from elastocal.compensation.online import Compensator, Reading, Status
 from elastocal.elastic import ElasticModel, layout
 from elastocal.identification import calibrate
 from elastocal.robot import Robot, T_from_xyzabc, catalogue, with_tool
-from elastocal.sim.arm.elastic_arm import bearing_truth
-from elastocal.sim.arm.linkage import Linkage
-from elastocal.sim.arm.measurement import SHOP_FLOOR, measure, press_forces, press_poses
+from elastocal.sim.arm import (
+    SHOP_FLOOR,
+    Linkage,
+    bearing_truth,
+    measure,
+    press_forces,
+    press_poses,
+)
 
 folder = Path(sys.argv[1]) if len(sys.argv) > 1 else Path(tempfile.mkdtemp(prefix="elastocal-"))
 folder.mkdir(parents=True, exist_ok=True)

@@ -16,14 +16,17 @@ from elastocal.elastic import ElasticModel, layout
 from elastocal.identification import calibrate
 from elastocal.robot import Robot, T_from_xyzabc, catalogue, with_tool
 from elastocal.robot.inverse import inverse_for
-from elastocal.sim.arm.elastic_arm import (
+from elastocal.sim.arm import (
     LINK_BENDING,
+    SHOP_FLOOR,
+    Linkage,
     bearing_truth,
+    measure,
+    press_forces,
+    press_poses,
     with_link_bending,
     with_stiffening_gears,
 )
-from elastocal.sim.arm.linkage import Linkage
-from elastocal.sim.arm.measurement import SHOP_FLOOR, measure, press_forces, press_poses
 
 folder = Path(sys.argv[1]) if len(sys.argv) > 1 else Path(tempfile.mkdtemp(prefix="elastocal-"))
 folder.mkdir(parents=True, exist_ok=True)

@@ -12,10 +12,16 @@ import numpy as np
 from elastocal.elastic import ElasticModel, Hinge, layout
 from elastocal.identification import build, calibrate, leave_poses_out
 from elastocal.robot import Robot, T_from_xyzabc, catalogue, with_tool
-from elastocal.sim.arm.elastic_arm import bearing_truth
-from elastocal.sim.arm.linkage import Linkage
-from elastocal.sim.arm.measurement import SHOP_FLOOR, measure, press_forces, press_poses
-from elastocal.sim.arm.springs import Linear, TruthSpring
+from elastocal.sim.arm import (
+    SHOP_FLOOR,
+    Linear,
+    Linkage,
+    TruthSpring,
+    bearing_truth,
+    measure,
+    press_forces,
+    press_poses,
+)
 
 COMPLIANCE = 0.15e-6  # m/N, of the tool along each axis
 AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}

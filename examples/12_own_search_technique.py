@@ -10,14 +10,17 @@ import numpy as np
 from elastocal.codec import CodecOptions, cross_validate, judge, make_variants
 from elastocal.planning.search import TECHNIQUES, Candidates, Selection, check_count
 from elastocal.robot import Robot, T_from_xyzabc, catalogue, with_tool
-from elastocal.sim.arm.elastic_arm import (
+from elastocal.sim.arm import (
     LINK_BENDING,
+    SHOP_FLOOR,
+    Linkage,
     bearing_truth,
+    measure,
+    press_forces,
+    press_poses,
     with_link_bending,
     with_stiffening_gears,
 )
-from elastocal.sim.arm.linkage import Linkage
-from elastocal.sim.arm.measurement import SHOP_FLOOR, measure, press_forces, press_poses
 
 
 class Median:

@@ -17,9 +17,15 @@ from elastocal.identification import calibrate, summary
 from elastocal.procedure.derive import ToolLoad
 from elastocal.procedure.registration import UnloadedReadings, register
 from elastocal.robot import GRAVITY, Robot, T_from_xyzabc, catalogue, with_tool
-from elastocal.sim.arm.elastic_arm import bearing_truth
-from elastocal.sim.arm.linkage import Linkage
-from elastocal.sim.arm.measurement import LOAD_CASES, SHOP_FLOOR, measure, press_forces, press_poses
+from elastocal.sim.arm import (
+    LOAD_CASES,
+    SHOP_FLOOR,
+    Linkage,
+    bearing_truth,
+    measure,
+    press_forces,
+    press_poses,
+)
 
 folder = Path(sys.argv[1]) if len(sys.argv) > 1 else Path(tempfile.mkdtemp(prefix="elastocal-"))
 folder.mkdir(parents=True, exist_ok=True)

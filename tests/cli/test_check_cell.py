@@ -6,9 +6,9 @@ import pytest
 import yaml
 
 from elastocal.cell.examples import write_example
-from elastocal.cli.file_kinds import describe_file
 from elastocal.errors import SchemaError
 from elastocal.planning import write_plan
+from elastocal.workflows import describe_file
 from support import plans
 from support.cli import elastocal
 

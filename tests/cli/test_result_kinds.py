@@ -4,15 +4,15 @@ import json
 
 import pytest
 
-from elastocal.cli.file_kinds import describe_file
 from elastocal.codec.study import (
     StudyStore,
     one_after_the_other,
     run_study,
-    study_record,
+    study_summary,
     write_study,
 )
 from elastocal.errors import SchemaError
+from elastocal.workflows import describe_file
 from support.studies import settings, simulate
 
 
@@ -20,7 +20,7 @@ from support.studies import settings, simulate
 def study(tmp_path):
     folder = tmp_path / "study"
     found = run_study(StudyStore(folder), settings(), 3, simulate, one_after_the_other)
-    write_study(folder, settings(), found, study_record(settings(), found, 5e-5))
+    write_study(folder, settings(), found, study_summary(settings(), found, 5e-5))
     return folder
 
 

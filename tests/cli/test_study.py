@@ -8,13 +8,18 @@ import numpy as np
 import pytest
 
 from elastocal.cell import load_cell
-from elastocal.cli import study_spread
-from elastocal.cli.study_options import study_conditions
-from elastocal.cli.study_simulation import prepare
-from elastocal.codec.study import Sample, StudyStore, one_after_the_other, run_study
+from elastocal.codec.study import (
+    Sample,
+    StudyStore,
+    one_after_the_other,
+    run_study,
+    spread_over,
+)
 from elastocal.elastic import ElasticModel, layout
 from elastocal.identification import calibrate
 from elastocal.sim.workcell import ErrorDraws, ErrorScales
+from elastocal.workflows import study_conditions
+from elastocal.workflows._study_simulation import prepare_study
 from support.cli import elastocal
 from support.simulated import example_cell
 from support.studies import numbers
@@ -30,13 +35,13 @@ def cell_path(**sections):
 @cache
 def prepared(*vary, cell=None):
     cell = load_cell(cell or cell_path())
-    return prepare(cell, study_conditions(cell, vary), seed=0, verification=12, jobs=1)
+    return prepare_study(cell, study_conditions(cell, vary), seed=0, verification=12, jobs=1)
 
 
 def errors(simulation, samples, which="error_mean"):
     """Errors of some samples, shape (sample, condition)."""
     found = [simulation(Sample(0, number)) for number in range(samples)]
-    return np.array([[getattr(o.accuracy, which) for o in each.outcomes] for each in found])
+    return np.array([[getattr(o, which) for o in each.outcomes] for each in found])
 
 
 def study(out, *options, cell=None):
@@ -80,7 +85,7 @@ def test_a_sample_is_calibrated_as_the_dataset_of_a_run_would_be():
     arm = simulate.truth.stiffened(np.exp(0.2 * stiffness), np.exp(0.2 * balancer))
     poses = np.sort(simulate.chosen[0].order)
     draws = ErrorDraws.of(POOL, 5, sample.generator(1)).take(poses, np.arange(5))
-    settled = arm.settle(simulate.pool.places(poses), simulate.force_tcp)
+    settled = arm.settle(simulate.places(poses), simulate.force_tcp)
     readings = simulate.errors.readings(
         settled, draws, ErrorScales(), simulate.pool.station[poses], simulate.load_cases
     )
@@ -114,8 +119,8 @@ def test_only_random_chooses_anew_for_every_sample():
 def test_conditions_of_a_sample_share_arm_and_noise():
     one = prepared("poses=12").simulate(Sample(0, 4)).outcomes[0]
     two = prepared("poses=6,12").simulate(Sample(0, 4)).outcomes[1]
-    assert one.accuracy.deflection_mean == two.accuracy.deflection_mean
-    assert one.accuracy.error_mean == pytest.approx(two.accuracy.error_mean, rel=1e-6)
+    assert one.deflection_mean == two.deflection_mean
+    assert one.error_mean == pytest.approx(two.error_mean, rel=1e-6)
 
 
 def test_more_noise_of_either_instrument_is_worse():
@@ -176,13 +181,15 @@ def test_cores_and_a_dask_cluster_give_the_same_numbers_bit_for_bit(tmp_path):
 
     def run(name, spread):
         store = StudyStore(tmp_path / name)
-        return numbers(run_study(store, made.settings, 12, made.simulate, spread))
+        return numbers(run_study(store, made.design, 12, made.simulate, spread))
 
     here = run("here", one_after_the_other)
-    assert run("one", lambda batches: study_spread.over_cores(batches, 1)) == here
-    assert run("two", lambda batches: study_spread.over_cores(batches, 2)) == here
+    for jobs in (1, 2):
+        with spread_over(jobs, None) as spread:
+            assert run(f"{jobs} jobs", spread) == here
     with distributed.LocalCluster(
         n_workers=2, threads_per_worker=1, dashboard_address=None
     ) as cluster:
         address = cluster.scheduler_address
-        assert run("dask", lambda batches: study_spread.over_cluster(batches, address)) == here
+        with spread_over(None, address) as spread:
+            assert run("dask", spread) == here

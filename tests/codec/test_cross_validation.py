@@ -8,7 +8,9 @@ import pytest
 from elastocal.codec import CodecOptions, Variant, cross_validate, judge, make_variants
 from elastocal.dataset import Readings
 from elastocal.errors import CodecError, ConventionError, DatasetError, IdentificationError
-from elastocal.sim.arm.measurement import Blunder
+from elastocal.sim.arm import (
+    Blunder,
+)
 from support.cells import Cell, linear_truth, robot
 
 SIX = Variant(springs="actuated")

@@ -23,7 +23,9 @@ from elastocal.errors import RobotError
 from elastocal.identification import CalibratedModel
 from elastocal.robot import Robot
 from elastocal.robot.inverse import NumericalInverse, inverse_for
-from elastocal.sim.arm.measurement import START
+from elastocal.sim.arm import (
+    START,
+)
 from support.cells import rich_truth, robot
 from support.paths import calibrated, dome_course, euler_columns, made_up, write_csv
 from support.simulated import example_cell, places

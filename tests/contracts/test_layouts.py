@@ -15,7 +15,9 @@ from elastocal.elastic import (
     custom,
 )
 from elastocal.robot import Robot
-from elastocal.sim.arm.linkage import Linkage
+from elastocal.sim.arm import (
+    Linkage,
+)
 from support.virtual_chain import ARMS, configurations, numerical_column
 
 

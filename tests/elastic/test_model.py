@@ -4,7 +4,9 @@ import pytest
 from elastocal.elastic import ElasticModel, Hinge, layout, spring_torques
 from elastocal.errors import RobotError, SpringError
 from elastocal.robot import Jacobian, Robot
-from elastocal.sim.arm.linkage import Linkage
+from elastocal.sim.arm import (
+    Linkage,
+)
 from support.problems import elastic
 from support.virtual_chain import ARMS, configurations, numerical_column
 

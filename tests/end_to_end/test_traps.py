@@ -12,7 +12,9 @@ import pytest
 from elastocal import dataset
 from elastocal.dataset import Dataset
 from elastocal.robot import Robot
-from elastocal.sim.arm.measurement import Blunder
+from elastocal.sim.arm import (
+    Blunder,
+)
 from support.cells import Cell, linear_truth, robot, urdf
 from support.cli import elastocal
 

@@ -5,7 +5,9 @@ import pytest
 
 from elastocal.elastic import ElasticModel, layout
 from elastocal.identification import Calibration, calibrate
-from elastocal.sim.arm.measurement import Blunder
+from elastocal.sim.arm import (
+    Blunder,
+)
 from support.cells import QUIET, TRACKED, Cell, linear_truth, rich_truth, robot, unseen
 
 

@@ -20,7 +20,9 @@ def calibrated():
 
 
 def rows(count):
-    from elastocal.sim.arm.linkage import Linkage
+    from elastocal.sim.arm import (
+        Linkage,
+    )
     from support.cells import urdf
 
     q = configurations(Linkage.from_urdf(urdf(), "tcp"), count)

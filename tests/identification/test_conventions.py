@@ -9,8 +9,10 @@ from elastocal.elastic import ElasticModel, layout
 from elastocal.errors import ConventionError, IdentificationError
 from elastocal.identification import check_conventions
 from elastocal.robot import Robot
-from elastocal.sim.arm.elastic_arm import bearing_truth
-from elastocal.sim.arm.linkage import Linkage
+from elastocal.sim.arm import (
+    Linkage,
+    bearing_truth,
+)
 from support.cells import QUIET, Cell, linear_truth, rich_truth, urdf
 from support.urdfs import planar_arm_urdf
 

@@ -6,7 +6,9 @@ import pytest
 
 from elastocal.identification import Calibration, DeflectionSummary, FitOptions, calibrate, summary
 from elastocal.records import to_data
-from elastocal.sim.arm.measurement import Blunder
+from elastocal.sim.arm import (
+    Blunder,
+)
 from support.cells import Cell, linear_truth
 from support.problems import elastic
 

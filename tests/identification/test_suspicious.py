@@ -5,7 +5,9 @@ import pytest
 
 from elastocal.identification import build, factor, screen, solve
 from elastocal.identification.suspicious import BLUNDER_SCORE, leverage
-from elastocal.sim.arm.measurement import Blunder
+from elastocal.sim.arm import (
+    Blunder,
+)
 from support.cells import Cell, linear_truth
 from support.problems import campaign, elastic, made_up, planted
 

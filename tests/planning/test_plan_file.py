@@ -8,7 +8,7 @@ import pytest
 
 from elastocal.errors import FileAccessError, SchemaError
 from elastocal.planning import PLAN, PlanResult, read_plan, write_plan
-from elastocal.planning.plan_result import SCHEMA, check_plan
+from elastocal.planning.plan_result import _SCHEMA as SCHEMA, check_plan
 from support import plans
 
 

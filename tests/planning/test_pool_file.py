@@ -8,7 +8,7 @@ import xarray as xr
 
 from elastocal.errors import FileAccessError, PlanningError, SchemaError
 from elastocal.planning import POOL, PoolData, check_pool_of, read_pool, write_pool
-from elastocal.planning.pool_file import SCHEMA
+from elastocal.planning.pool_file import _SCHEMA as SCHEMA
 from support import plans
 
 

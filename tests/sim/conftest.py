@@ -3,8 +3,11 @@
 import numpy as np
 import pytest
 
-from elastocal.sim.arm.linkage import Linkage
-from elastocal.sim.arm.measurement import press_forces, press_poses
+from elastocal.sim.arm import (
+    Linkage,
+    press_forces,
+    press_poses,
+)
 
 
 def joint(name, parent, child, xyz, axis, kind="revolute", rpy="0 0 0", limits=(-3.5, 3.5)):

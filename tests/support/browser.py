@@ -7,7 +7,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from elastocal.report.document.chromium import Message, Tab, open_tab
+from elastocal.report.document import (
+    Message,
+    Tab,
+    open_tab,
+)
 
 PROBE = (Path(__file__).parent / "probe.js").read_text(encoding="utf-8")
 

@@ -7,10 +7,16 @@ import numpy as np
 
 from elastocal.dataset import Dataset, Readings
 from elastocal.robot import Robot
-from elastocal.sim.arm import elastic_arm as layouts, measurement as scene
-from elastocal.sim.arm.elastic_arm import ElasticArm
-from elastocal.sim.arm.linkage import Linkage
-from elastocal.sim.arm.measurement import SHOP_FLOOR, Blunder, Noise, measure
+from elastocal.sim.arm import (
+    SHOP_FLOOR,
+    Blunder,
+    ElasticArm,
+    Linkage,
+    Noise,
+    elastic_arm as layouts,
+    measure,
+    measurement as scene,
+)
 from support.urdfs import opw_arm_urdf
 
 QUIET = Noise()

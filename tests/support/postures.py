@@ -9,7 +9,9 @@ from elastocal.planning.pool import Approach, Pool, make_pool
 from elastocal.planning.postures import Postures
 from elastocal.robot import Robot, catalogue, with_tool
 from elastocal.robot.inverse import inverse_for
-from elastocal.sim.arm.measurement import SphericalCap
+from elastocal.sim.arm import (
+    SphericalCap,
+)
 
 T_FLANGE_TCP = np.array(
     [[1.0, 0.0, 0.0, 0.15], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.35], [0.0, 0.0, 0.0, 1.0]]

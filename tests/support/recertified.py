@@ -7,8 +7,11 @@ import numpy as np
 
 from elastocal.elastic import ElasticModel, layout
 from elastocal.identification import CalibratedModel, Observability, Term, calibrate
-from elastocal.sim.arm.elastic_arm import ElasticArm
-from elastocal.sim.arm.springs import CubicGear, Linear
+from elastocal.sim.arm import (
+    CubicGear,
+    ElasticArm,
+    Linear,
+)
 from support.cells import Cell, linear_truth, robot
 from support.problems import elastic
 

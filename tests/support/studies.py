@@ -3,23 +3,21 @@
 import numpy as np
 
 from elastocal.codec.study import (
-    Accuracy,
     Condition,
-    ConditionRecord,
-    Outcome,
+    ConditionResult,
     Purpose,
     Sample,
     SampleResult,
-    SpringRecord,
-    StudySettings,
+    SpringLabel,
+    StudyDesign,
 )
 
-SPRINGS = (SpringRecord(name="joint_1.axial", unit="rad/(N*m)"),)
+SPRINGS = (SpringLabel(name="joint_1.axial", unit="rad/(N*m)"),)
 
 
-def settings(*poses: int, **changes: object) -> StudySettings:
+def settings(*poses: int, **changes: object) -> StudyDesign:
     """Return the settings of a study of some pose counts."""
-    conditions = tuple(ConditionRecord.of(Condition(poses=count)) for count in poses or (5, 10))
+    conditions = tuple(Condition(poses=count) for count in poses or (5, 10))
     values = {
         "cell": "cell",
         "cell_fingerprint": "a" * 64,
@@ -32,7 +30,7 @@ def settings(*poses: int, **changes: object) -> StudySettings:
         "springs": {"bearing": SPRINGS},
         "versions": {"elastocal": "0"},
     }
-    return StudySettings(**(values | changes))
+    return StudyDesign(**(values | changes))
 
 
 def simulate(sample: Sample) -> SampleResult:
@@ -40,7 +38,7 @@ def simulate(sample: Sample) -> SampleResult:
     error = sample.generator(Purpose.ERRORS).uniform(1e-5, 9e-5, 2)
     compliance = sample.generator(Purpose.TRUTH).uniform(1e-7, 2e-7, (2, 1))
     outcomes = tuple(
-        Outcome(Accuracy(float(e), float(3 * e), 1e-3), np.array(c))
+        ConditionResult(float(e), float(3 * e), 1e-3, np.array(c))
         for e, c in zip(error, compliance, strict=True)
     )
     return SampleResult(sample.number, outcomes)
@@ -49,10 +47,14 @@ def simulate(sample: Sample) -> SampleResult:
 def numbers(results: object) -> list[tuple[object, ...]]:
     """Return results as plain numbers, to be compared bit for bit."""
     return [
-        (result.number, each.accuracy, tuple(each.compliance.tolist()))
+        (result.number, *_errors(each), tuple(each.compliance.tolist()))
         for result in results  # type: ignore[attr-defined]
         for each in result.outcomes
     ]
+
+
+def _errors(each: ConditionResult) -> tuple[float, float, float]:
+    return each.error_mean, each.error_max, each.deflection_mean
 
 
 def batch(number):

@@ -7,7 +7,9 @@ definition of a spring as a virtual joint in a joint's frame.
 import numpy as np
 
 from elastocal.elastic import Spring
-from elastocal.sim.arm.linkage import Linkage
+from elastocal.sim.arm import (
+    Linkage,
+)
 from support.urdfs import (
     KR_LIKE,
     offset_wrist_urdf,

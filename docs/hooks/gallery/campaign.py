@@ -11,13 +11,13 @@ import numpy as np
 
 from elastocal.cell import Cell, load_cell
 from elastocal.cell.examples import write_example
-from elastocal.cli.process_bench import Bench, Outcome, run_process
 from elastocal.compensation import CompensatorSettings
 from elastocal.compensation.process import DeviationComparison, process_courses
 from elastocal.dataset import Readings
 from elastocal.elastic import ElasticModel, layout
 from elastocal.identification import Calibration, calibrate, summary
 from elastocal.planning import PlanAndPool, make_plan
+from elastocal.progress import silent
 from elastocal.sim.workcell import (
     CampaignErrors,
     CampaignSimulator,
@@ -25,6 +25,7 @@ from elastocal.sim.workcell import (
     ErrorDraws,
     ErrorScales,
 )
+from elastocal.workflows import ProcessTrial, TrialRuns, run_trial
 
 SEED = 0
 
@@ -73,11 +74,11 @@ def campaign(cell: Cell, compare: str | None) -> Campaign:
     return Campaign(cell, planned, readings, calibrate(model, readings, rng, marker_offset=marker))
 
 
-def process(done: Campaign, kind: str, settings: CompensatorSettings, count: int) -> Outcome:
+def process(done: Campaign, kind: str, settings: CompensatorSettings, count: int) -> TrialRuns:
     """Run some courses of a process without and with the calibrated model's correction."""
     courses = process_courses(kind, done.cell, SEED, None)[:count]
-    bench = Bench(done.cell, done.calibration.calibrated, None, settings, SEED)
-    return run_process(bench, courses, lambda *_: None)
+    trial = ProcessTrial(done.cell, done.calibration.calibrated, None, settings, SEED)
+    return run_trial(trial, courses, silent)
 
 
 def accuracy(done: Campaign) -> str:

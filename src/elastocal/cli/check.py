@@ -5,6 +5,8 @@ from typing import Annotated
 
 import typer
 
+from elastocal import workflows
+
 
 def check(
     file: Annotated[
@@ -21,13 +23,12 @@ def check(
     """Validate a file and say what it holds."""
     from rich.markup import escape
 
-    from elastocal.cli.file_kinds import describe_file
     from elastocal.cli.output import console, print_json
 
-    kind, facts = describe_file(file)
+    result = workflows.check(file)
     if as_json:
-        print_json({"file": str(file), "kind": kind, **facts})
+        print_json({"file": result.file, "kind": result.kind, **result.holds})
         return
-    console().print(f"[green]ok[/green] {escape(str(file))} is a {kind}")
-    for name, value in facts.items():
+    console().print(f"[green]ok[/green] {escape(result.file)} is a {result.kind}")
+    for name, value in result.holds.items():
         console().print(f"   {name.replace('_', ' ')}: {value}", markup=False)

@@ -1,6 +1,6 @@
 """Small values that a person types on the command line."""
 
-from elastocal.errors import UnitError
+from elastocal.errors import CompensationError, UnitError
 from elastocal.units import parse_quantity
 
 
@@ -40,3 +40,23 @@ def parse_limit(text: str, option: str = "--limit") -> float:
     if not limit > 0.0:
         raise UnitError(f"{option}: {text!r} is not above 0")
     return limit
+
+
+def parse_direction(text: str) -> tuple[float, float, float]:
+    """Return a direction from ``"x, y, z"``.
+
+    >>> parse_direction("0, 0, -1")
+    (0.0, 0.0, -1.0)
+
+    Raises
+    ------
+    CompensationError
+        If the text is not three numbers.
+    """
+    try:
+        x, y, z = (float(part) for part in text.split(","))
+    except ValueError as error:
+        raise CompensationError(
+            f"direction {text!r} must be three numbers, e.g. '0, 0, -1'"
+        ) from error
+    return x, y, z

@@ -1,12 +1,11 @@
 """``elastocal report``: the document that stays when the engineer has left."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated
 
 import typer
 
-if TYPE_CHECKING:
-    from elastocal.report.document import Parts, Written
+from elastocal import workflows
 
 
 def report(  # noqa: PLR0913 - one parameter an option
@@ -57,74 +56,24 @@ def report(  # noqa: PLR0913 - one parameter an option
     ] = False,
 ) -> None:
     """Write the report of a calibration: one HTML file that an inspector can sign."""
-    from datetime import UTC, datetime
-
     from rich.markup import escape
 
     from elastocal.cli.output import console, print_json
     from elastocal.cli.parsing import parse_limit
-    from elastocal.report.document import Options, find_browser, gather, write_pdf, write_report
 
-    paper = out.with_suffix(".pdf") if pdf else None
-    check_places(out, paper, force)
-    browser = find_browser() if pdf else ""
     accepted = None if tolerance is None else parse_limit(tolerance, "--tolerance")
     drift = None if limit is None else parse_limit(limit)
-    made = datetime.now(UTC).isoformat(timespec="seconds")
-    parts = gather(Options(run, model, tool, codec, process, old, accepted, drift), made)
-    written = write_report(out, parts)
-    if paper is not None:
-        write_pdf(out, paper, browser)
+    settings = workflows.ReportSettings(
+        run, out, model, tool, codec, process, old, accepted, drift, pdf, force
+    )
+    result = workflows.report(settings)
     if as_json:
-        print_json(_figures(parts, written, paper))
+        print_json(result.figures)
         return
-    shown = console()
-    verdict = written.verdict
-    light = f" ({verdict.light.value} light)" if verdict.light else ""
+    shown, figures, verdict = console(), result.figures, result.verdict
+    light = f" ({figures.light} light)" if figures.light else ""
     shown.print(f"[bold]{verdict.word}[/bold]{light}: {escape(verdict.sentence)}")
     for reason in verdict.reasons:
         shown.print(f"   {reason}", markup=False)
-    shown.print(f"written to {out}{f' and {paper}' if paper else ''}", markup=False)
-
-
-def check_places(out: Path, paper: Path | None, force: bool) -> None:
-    """Refuse places for a report before the work, so that none is done in vain.
-
-    Raises
-    ------
-    FileAccessError
-        If a file is there and is not to be replaced, or the name is not that of a page: it could
-        be that of a model.
-    """
-    from elastocal.errors import FileAccessError
-
-    if out.suffix.lower() not in (".html", ".htm"):
-        raise FileAccessError(f"--out {out}: the report is a page, its name must end in .html")
-    if not out.parent.is_dir():
-        raise FileAccessError(f"cannot write {out}: there is no folder {out.parent}")
-    for path in (out, paper):
-        if path is not None and path.exists() and not force:
-            raise FileAccessError(f"{path} is there already: name another file, or give --force")
-
-
-def _figures(parts: "Parts", written: "Written", paper: Path | None) -> dict[str, Any]:
-    verdict, again = written.verdict, parts.again
-    unseen = again.unseen if again is not None and again.same else None
-    return {
-        "report": str(written.path),
-        "pdf": str(paper) if paper else None,
-        "light": verdict.light.value if verdict.light else None,
-        "verdict": verdict.sentence,
-        "reasons": list(verdict.reasons),
-        "advice": list(verdict.advice),
-        "tolerance": parts.limits.tolerance,
-        "unseen": None if unseen is None else {
-            "mean": _estimate(unseen.mean), "p95": _estimate(unseen.p95), "max": unseen.max,
-            "poses": unseen.poses, "readings": len(unseen.error),
-        },
-        "missing": [each.name for each in parts.absent],
-    }  # fmt: skip
-
-
-def _estimate(found: Any) -> dict[str, float]:
-    return {"value": found.value, "low": found.low, "high": found.high}
+    paper = f" and {figures.pdf}" if figures.pdf else ""
+    shown.print(f"written to {figures.report}{paper}", markup=False)

@@ -5,6 +5,8 @@ from typing import Annotated
 
 import typer
 
+from elastocal import workflows
+
 
 def simulate_process(  # noqa: PLR0913 (a command has as many options as it has)
     cell: Annotated[Path, typer.Argument(help="Cell file, .yaml.")],
@@ -39,31 +41,28 @@ def simulate_process(  # noqa: PLR0913 (a command has as many options as it has)
     ] = False,
 ) -> None:
     """Run a process on the simulated cell without and with correction: how much is left."""
-    from elastocal.cell import load_cell
     from elastocal.cli.output import console, print_json
-    from elastocal.cli.process_answer import Question, answer, runs_of
     from elastocal.cli.process_table import show
     from elastocal.cli.progress import progress_bars
-    from elastocal.compensation.process import (
-        PROGRAMMED_PATH,
-        TABLE,
-        write_process,
-        write_programmed_path,
-    )
-    from elastocal.dataset import joint_dimensions
-    from elastocal.files import filling
     from elastocal.records import to_data
 
-    runs = runs_of(model, tool or [], seed or [0])
-    made = load_cell(cell)
-    with filling(out, TABLE, force) as folder, progress_bars(console()) as report:
-        found = answer(Question(made, process, runs, settings, courses, budget, jobs), report)
-        units = joint_dimensions(made.robot.joint_names, made.robot.revolute)
-        write_programmed_path(folder / PROGRAMMED_PATH, found.programme, units)
-        write_process(folder, found.record)
-    table = found.record.table
+    given = workflows.SimulateProcessSettings(
+        cell,
+        models=tuple(model),
+        process=process,
+        out=out,
+        tools=tuple(tool or ()),
+        seeds=tuple(seed or (0,)),
+        compensator=settings,
+        courses=courses,
+        budget=budget,
+        jobs=jobs,
+        force=force,
+    )
+    with progress_bars(console()) as progress:
+        result = workflows.simulate_process(given, progress)
     if as_json:
-        print_json(to_data(table) | {"folder": str(out)})
+        print_json(to_data(result) | {"folder": str(out)})
     else:
-        show(console(), table)
+        show(console(), result)
         console().print(f"written to {out}")

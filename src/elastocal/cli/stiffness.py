@@ -5,6 +5,7 @@ from typing import Annotated
 
 import typer
 
+from elastocal import workflows
 from elastocal.cli.compensate import START_HELP
 
 
@@ -32,22 +33,26 @@ def stiffness(  # noqa: PLR0913 (a command has as many options as it has)
 ) -> None:
     """Map the stiffness over spin, rail and path; choose the stiffest posture."""
     from elastocal.cli.output import console, print_json
-    from elastocal.cli.posture_option import parse_posture
     from elastocal.cli.progress import progress_bars
-    from elastocal.cli.stiffness_answer import Question, answer
-    from elastocal.cli.stiffness_folder import write_folder
     from elastocal.cli.stiffness_table import show
-    from elastocal.files import filling
-    from elastocal.identification import read_model
+    from elastocal.records import to_data
 
-    calibrated = read_model(model)
-    posture = parse_posture(calibrated.model.robot, start)
-    question = Question(path, direction, spins, stands, stations, cell, posture)
-    with filling(out, "stiffness.json", force) as folder, progress_bars(console()) as report:
-        found = answer(calibrated, question, report)
-        figures = write_folder(folder, calibrated, found)
+    given = workflows.StiffnessSettings(
+        model,
+        path=path,
+        out=out,
+        direction=direction,
+        spins=spins,
+        stands=stands,
+        stations=stations,
+        cell=cell,
+        start=start,
+        force=force,
+    )
+    with progress_bars(console()) as progress:
+        result = workflows.stiffness(given, progress)
     if as_json:
-        print_json(figures | {"folder": str(out)})
+        print_json(to_data(result.summary) | {"folder": str(out)})
     else:
-        show(console(), found, figures)
-        console().print(f"written to {out}: {', '.join(figures['files'])}")
+        show(console(), result)
+        console().print(f"written to {out}: {', '.join(result.summary.files)}")

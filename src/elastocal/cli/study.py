@@ -5,6 +5,8 @@ from typing import Annotated
 
 import typer
 
+from elastocal import workflows
+
 
 def study(  # noqa: PLR0913 - one parameter an option
     cell: Annotated[Path, typer.Argument(help="Cell file, .yaml.")],
@@ -39,34 +41,43 @@ def study(  # noqa: PLR0913 - one parameter an option
     ] = False,
 ) -> None:
     """Simulate many calibrations of a cell: what reaches which accuracy."""
-    from elastocal.cell import load_cell
     from elastocal.cli.output import console, print_json
     from elastocal.cli.progress import progress_bars
-    from elastocal.cli.study_options import parse_target, study_conditions
-    from elastocal.cli.study_simulation import prepare
-    from elastocal.cli.study_spread import spread_over
     from elastocal.cli.study_table import show_study
-    from elastocal.codec.study import (
-        StudyStore,
-        check_samples,
-        run_study,
-        study_record,
-        write_study,
-    )
-    from elastocal.report import write_study_figures
+    from elastocal.records import to_data
 
-    check_samples(samples)
-    good_enough = parse_target(target)
-    read = load_cell(cell)
-    conditions = study_conditions(read, vary or [])
-    with spread_over(jobs, dask) as spread, progress_bars(console()) as report:
-        prepared = prepare(read, conditions, seed, verification, jobs)
-        store = StudyStore(out)
-        results = run_study(store, prepared.settings, samples, prepared.simulate, spread, report)
-    record = study_record(prepared.settings, results, good_enough)
-    names = write_study(out, prepared.settings, results, record)
-    names += write_study_figures(out, prepared.settings, results, record)
+    with progress_bars(console()) as progress:
+        result = workflows.study(
+            cell,
+            progress,
+            out=out,
+            samples=samples,
+            vary=tuple(vary or ()),
+            target=_parse_target(target),
+            verification=verification,
+            seed=seed,
+            jobs=jobs,
+            dask=dask,
+        )
     if as_json:
-        print_json({"folder": str(out), "files": names, **record.model_dump(mode="json")})
+        figures = to_data(result.summary)
+        del figures["schema"]
+        print_json({"folder": str(out), "files": result.files, **figures})
     else:
-        show_study(console(), record, out, names)
+        show_study(console(), result.summary, out, result.files)
+
+
+def _parse_target(text: str | None) -> float | None:
+    """Return a target in m from a length with its unit."""
+    from elastocal.errors import CodecError, UnitError
+    from elastocal.units import parse_quantity
+
+    if text is None:
+        return None
+    try:
+        length = parse_quantity(text, "length")
+    except UnitError as error:
+        raise CodecError(f"--target: {error}") from error
+    if not length > 0.0:
+        raise CodecError(f"--target {text!r}: must be above 0")
+    return length

@@ -8,45 +8,40 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from elastocal.codec.study import Share, StudyRecord, written
+from elastocal.codec.study import Share, StudySummary, micrometres, value_text
 
-MOST_ROWS = 40
+_MOST_ROWS = 40
 _CAPTION = (
     "mean and largest error at unseen poses in µm: median over the arms, and what 95 % of them stay"
     " below; good: arms within the target, with a 95 % interval"
 )
 
 
-def show_study(console: Console, record: StudyRecord, out: Path, names: Sequence[str]) -> None:
+def show_study(console: Console, summary: StudySummary, out: Path, names: Sequence[str]) -> None:
     """Print what a study says."""
-    console.print(
-        f"[bold]{escape(record.cell)}[/bold]: {record.samples} simulated arms, errors at"
-        f" {record.verification} unseen poses under {', '.join(record.load_cases)};"
-        f" uncalibrated {_um(record.conditions[0].deflection_mean.median)} µm"
-    )
-    console.print(_table(record))
-    if len(record.conditions) > MOST_ROWS:
-        console.print(f"{len(record.conditions) - MOST_ROWS} more conditions in study.json")
-    if record.advice:
-        console.print(record.advice, markup=False)
+    console.print(f"[bold]{escape(summary.cell)}[/bold]: {escape(summary.sentence)}")
+    console.print(_table(summary))
+    if len(summary.conditions) > _MOST_ROWS:
+        console.print(f"{len(summary.conditions) - _MOST_ROWS} more conditions in study.json")
+    if summary.advice:
+        console.print(summary.advice, markup=False)
     console.print(f"\n{', '.join(names)} written to [bold]{escape(str(out))}[/bold]")
 
 
-def _table(record: StudyRecord) -> Table:
-    factors = record.varied or ("poses",)
+def _table(summary: StudySummary) -> Table:
+    factors = summary.varied or ("poses",)
     table = Table(caption=_CAPTION, box=SIMPLE, pad_edge=False, padding=(0, 1, 0, 0))
     titles = [escape(name.replace("_", " ")) for name in factors]
     titles += ["mean", "95 %", "largest", "95 %"]
-    titles += [] if record.target is None else ["mean good", "largest good"]
+    titles += [] if summary.target is None else ["mean good", "largest good"]
     for number, title in enumerate(titles):
         longest = max(map(len, title.split()))
         table.add_column(title, justify="right", no_wrap=number >= len(factors), min_width=longest)
-    for each in record.conditions[:MOST_ROWS]:
-        condition = each.factors.condition
-        cells = [written(condition.value(key)) for key in factors]
+    for each in summary.conditions[:_MOST_ROWS]:
+        cells = [value_text(each.factors.value(key)) for key in factors]
         for found in (each.error_mean, each.error_max):
-            cells += [_um(found.median), _um(found.q95)]
-        if record.target is not None:
+            cells += [micrometres(found.median), micrometres(found.q95)]
+        if summary.target is not None:
             cells += [_share(each.mean_reaches), _share(each.max_reaches)]
         table.add_row(*map(escape, cells))
     return table
@@ -55,9 +50,3 @@ def _table(record: StudyRecord) -> Table:
 def _share(share: Share | None) -> str:
     assert share is not None
     return f"{share.share:.0%} [{100 * share.low:.0f}, {100 * share.high:.0f}]"
-
-
-def _um(length: float) -> str:
-    """Return a length in µm without more digits than it deserves."""
-    micrometres = 1e6 * length
-    return f"{micrometres:.0f}" if micrometres >= 99.95 else f"{micrometres:.3g}"

@@ -5,6 +5,8 @@ from typing import Annotated
 
 import typer
 
+from elastocal import workflows
+
 
 def tool(
     data: Annotated[
@@ -32,29 +34,21 @@ def tool(
 ) -> None:
     """Find mass, centre of mass, sensor bias and sensor rotation from static postures."""
     from elastocal.cli.output import console, print_json
-    from elastocal.cli.tool_inputs import posture_robot, three_numbers, transform
-    from elastocal.cli.tool_source import from_run, from_table
+    from elastocal.cli.parsing import parse_direction
     from elastocal.cli.tool_table import show_tool
-    from elastocal.compensation.conditioning import (
-        fit_tool,
-        refuse_mistakes,
-        tool_result,
-        write_tool,
-    )
     from elastocal.records import to_data
-    from elastocal.workflows import refuse_overwriting
 
-    refuse_overwriting(out, data)
-    if data.is_dir():
-        source = from_run(data)
-    else:
-        arm = posture_robot(robot, flange)
-        source = from_table(data, arm, flange, transform(sensor), three_numbers(down))
-    fit = fit_tool(source.postures, source.R_nominal, keep_rotation)
-    refuse_mistakes(source.postures, fit, source.R_nominal, source.expected_centre, source.points)
-    record = tool_result(fit, source.mount, str(data))
-    write_tool(out, record)
+    result = workflows.tool(
+        data,
+        out=out,
+        robot=robot,
+        flange=flange,
+        sensor=sensor,
+        down=parse_direction(down),
+        keep_rotation=keep_rotation,
+    )
     if as_json:
-        print_json(to_data(record))
+        # What this command always printed: the file without its schema.
+        print_json({key: value for key, value in to_data(result).items() if key != "schema"})
     else:
-        show_tool(console(), record, out)
+        show_tool(console(), result, out)

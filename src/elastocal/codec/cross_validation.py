@@ -1,11 +1,10 @@
 """Repeated cross-validation over growing training sets (paper 3.2, Algorithm 1)."""
 
-import os
 from collections.abc import Callable, Sequence
+from functools import partial
 from importlib.metadata import version
 
 import numpy as np
-from joblib import Parallel, delayed
 from numpy.typing import ArrayLike
 
 from elastocal.arrays import IndexArray
@@ -16,6 +15,7 @@ from elastocal.codec.variants import Variant, check_different
 from elastocal.dataset import Readings
 from elastocal.elastic import ElasticModel, layout
 from elastocal.errors import CodecError, IdentificationError
+from elastocal.parallel import map_in_processes, one_blas_thread, process_count
 from elastocal.planning.search import technique
 from elastocal.robot import Robot
 
@@ -29,6 +29,7 @@ _WORTH_PROCESSES = 2000
 _PACKAGES = ("elastocal", "numpy", "scipy")
 
 
+@one_blas_thread()
 def cross_validate(
     robot: Robot,
     readings: Readings,
@@ -90,7 +91,10 @@ def cross_validate(
             f"training sets end at {most} of {training} poses: the others have no reading of the"
             " load cases that a variant trains with"
         )
-    processes = _processes(jobs, variants, most * len(splits))
+    # Starting processes takes as long as a thousand slow fits.
+    slow = sum(not technique(v.search).nested or v.options.loss != "linear" for v in variants)
+    worthwhile = slow * most * len(splits) > _WORTH_PROCESSES
+    processes = process_count(jobs or None, len(splits), worthwhile=worthwhile)
     curves = _run_splits(prepared, splits, most, options.seed, processes, report or _silent)
     for each, found in zip(prepared, curves, strict=True):
         _require_a_fit(each, found)
@@ -126,12 +130,6 @@ def _largest_training_set(prepared: PreparedVariant, splits: Sequence[Split]) ->
     return most
 
 
-def _processes(jobs: int | None, variants: Sequence[Variant], fits: int) -> int:
-    """Return the number of processes; starting them takes as long as a thousand slow fits."""
-    slow = sum(not technique(v.search).nested or v.options.loss != "linear" for v in variants)
-    return jobs or ((os.cpu_count() or 1) if slow * fits > _WORTH_PROCESSES else 1)
-
-
 def _run_splits(
     prepared: Sequence[PreparedVariant],
     splits: Sequence[Split],
@@ -141,17 +139,17 @@ def _run_splits(
     report: Report,
 ) -> list[list[LearningCurve]]:
     """Return the learning curves by variant and split."""
-    parallel = Parallel(n_jobs=min(processes, len(splits)), return_as="generator")
+    run = partial(_run_split, prepared, most, seed)
     found = []
     report(STAGE, 0, len(splits))
-    for curves in parallel(delayed(_run_split)(prepared, split, most, seed) for split in splits):
+    for curves in map_in_processes(run, splits, processes):
         found.append(curves)
         report(STAGE, len(found), len(splits))
     return [list(column) for column in zip(*found, strict=True)]
 
 
 def _run_split(
-    prepared: Sequence[PreparedVariant], split: Split, most: int, seed: int
+    prepared: Sequence[PreparedVariant], most: int, seed: int, split: Split
 ) -> list[LearningCurve]:
     """Return the learning curve of each variant on one split."""
     curves = []

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import Annotated
 
 import numpy as np
 
@@ -10,9 +11,11 @@ from elastocal.codec.splits import CodecOptions
 from elastocal.codec.variants import Variant
 from elastocal.elastic import Spring
 from elastocal.errors import CodecError, nearest
+from elastocal.records import Variable
 
 AXES = ("x", "y", "z", "norm")
 """Components of an error in base, and the length of the vector."""
+_ERROR_DIMS = ("variant", "cv", "n_train", "axis")
 NO_POSE = -1
 """Fills `CodecData.chosen` behind the last chosen pose."""
 
@@ -52,21 +55,38 @@ class CodecData:
     """Of each variant."""
     pose_labels: tuple[tuple[int, ...], ...]
     """Labels of each physical pose; several where one was measured more than once."""
-    contact: FloatArray
+    contact: Annotated[
+        FloatArray, Variable(("pose", "xyz"), "m", "tcp position of each physical pose in base")
+    ]
     """Tcp position of each pose in base, shape (pose, 3), in m."""
-    seed_pose: IndexArray
+    seed_pose: Annotated[
+        IndexArray, Variable(("cv",), meaning="pose that the verification set was grown from")
+    ]
     """Pose that each verification set was grown from, shape (cv,)."""
-    verification: IndexArray
+    verification: Annotated[
+        IndexArray, Variable(("cv", "place"), meaning="verification poses in the order of choice")
+    ]
     """Poses of each verification set in the order of choice, shape (cv, N_v)."""
-    chosen: IndexArray
+    chosen: Annotated[
+        IndexArray,
+        Variable(
+            ("variant", "cv", "n_train", "training_place"),
+            meaning="training poses in the order of choice; -1 behind the last",
+        ),
+    ]
     """Training poses in the order of choice, `NO_POSE` behind the last, shape
     (variant, cv, n_train, n_train)."""
     compliance: tuple[FloatArray, ...]
     """Of each variant, shape (cv, n_train, spring), in the units of ``springs``."""
-    error_mean: FloatArray
+    error_mean: Annotated[
+        FloatArray, Variable(_ERROR_DIMS, "m", "mean absolute residual at the verification poses")
+    ]
     """Mean absolute residual at the verification poses under all load cases, shape
     (variant, cv, n_train, 4), in m; the last axis is x, y, z in base, and the norm."""
-    error_max: FloatArray
+    error_max: Annotated[
+        FloatArray,
+        Variable(_ERROR_DIMS, "m", "largest absolute residual at the verification poses"),
+    ]
     """Largest absolute residual, likewise."""
     load_cases: tuple[str, ...]
     """Load cases that are verified with."""

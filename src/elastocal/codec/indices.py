@@ -1,8 +1,6 @@
 """The indices of each training set: how good it ought to be, by what is known beforehand."""
 
-import csv
-import io
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -11,9 +9,9 @@ import numpy as np
 from elastocal.arrays import BoolArray, FloatArray
 from elastocal.codec._training import PreparedVariant
 from elastocal.codec.data import CodecData
-from elastocal.files import write_text
 from elastocal.planning.search import Candidates, build_information, covering_radius
 from elastocal.planning.search.criteria import CRITERIA, IOptimal
+from elastocal.tables import write_table
 
 COVERING_RADIUS = "covering_radius"
 INDICES = ("o1", "o2", "o3", "o4", "o5", "d", "a", "e", "i", COVERING_RADIUS)
@@ -102,19 +100,20 @@ def write_index_table(folder: Path, data: CodecData, indices: Sequence[IndexValu
     FileAccessError
         If it cannot be written.
     """
-    text = io.StringIO()
-    table = csv.writer(text, lineterminator="\n")
     names = [f"{name}[m]" if name == COVERING_RADIUS else name for name in INDICES]
-    table.writerow(["variant", "seed_pose", "n_train", *names, "error_mean[m]", "error_max[m]"])
-    for each in indices:
-        errors = [data.errors(each.variant, which) for which in ("mean", "max")]
-        columns = [*(each.values[name] for name in INDICES), *errors]
-        for cv, n in np.ndindex(columns[0].shape):
-            numbers = [repr(float(column[cv, n])) for column in columns]
-            table.writerow([each.variant, data.seed_pose[cv], data.n_train[n], *numbers])
+    header = ["variant", "seed_pose", "n_train", *names, "error_mean[m]", "error_max[m]"]
     path = Path(folder) / _TABLE
-    write_text(path, text.getvalue())
+    write_table(path, header, (row for each in indices for row in _rows(data, each)))
     return path
+
+
+def _rows(data: CodecData, indices: IndexValues) -> Iterator[list[object]]:
+    """Yield the row of each training set of a variant."""
+    errors = [data.errors(indices.variant, which) for which in ("mean", "max")]
+    columns = [*(indices.values[name] for name in INDICES), *errors]
+    for cv, n in np.ndindex(columns[0].shape):
+        numbers = [float(column[cv, n]) for column in columns]
+        yield [indices.variant, data.seed_pose[cv], data.n_train[n], *numbers]
 
 
 def _process(rows: FloatArray, scale: FloatArray, basis: FloatArray) -> FloatArray:

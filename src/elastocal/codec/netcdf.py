@@ -15,28 +15,19 @@ from elastocal.codec.data import AXES, CodecData, SpringLabels
 from elastocal.codec.splits import CodecOptions
 from elastocal.codec.variants import KEYS, Variant
 from elastocal.errors import CodecError, SchemaError
-from elastocal.records import LabelledArray, LabelledArrays, read_arrays, write_arrays
+from elastocal.records import (
+    LabelledArray,
+    LabelledArrays,
+    array_fields,
+    arrays_of,
+    read_arrays,
+    write_arrays,
+)
 
 ARRAYS_SCHEMA = "elastocal.codec/1"
 ARRAYS = "codec.nc"
 """Name of the file in a codec's folder."""
 
-_ERROR_DIMS = ("variant", "cv", "n_train", "axis")
-_FIELDS: dict[str, tuple[tuple[str, ...], type, str | None, str]] = {
-    "contact": (("pose", "xyz"), float, "m", "tcp position of each physical pose in base"),
-    "seed_pose": (("cv",), int, None, "pose that the verification set was grown from"),
-    "verification": (("cv", "place"), int, None, "verification poses in the order of choice"),
-    "chosen": (
-        ("variant", "cv", "n_train", "training_place"),
-        int,
-        None,
-        "training poses in the order of choice; -1 behind the last",
-    ),
-    "error_mean": (_ERROR_DIMS, float, "m", "mean absolute residual at the verification poses"),
-    "error_max": (_ERROR_DIMS, float, "m", "largest absolute residual at the verification poses"),
-}
-"""Dimensions, type, unit and meaning of each array; the file's names are the fields' names."""
-_TEXTS = ("name", *KEYS)
 _OPTIONS = ("ratio", "seed", "set_blunders_aside", "trust_conventions")
 
 
@@ -68,18 +59,13 @@ def read_codec(folder: Path) -> CodecData:
     found = read_arrays(path, ARRAYS_SCHEMA)
     try:
         return _data_of(found)
-    except (CodecError, KeyError, TypeError, ValueError) as error:
+    except (CodecError, SchemaError, KeyError, TypeError, ValueError) as error:
         # A damaged file may lack anything; what it is says the library's own text.
         raise SchemaError(f"{path}: {' '.join(str(error).split())}") from error
 
 
 def _arrays_of(data: CodecData) -> LabelledArrays:
-    variables: dict[str, LabelledArray] = {}
-    for name, (dims, kind, unit, meaning) in _FIELDS.items():
-        values = getattr(data, name)
-        values = values.astype(np.int32) if kind is int else values
-        notes = {"long_name": meaning} | ({"units": unit} if unit else {})
-        variables[name] = LabelledArray(dims, values, notes, packed=True)
+    variables = arrays_of(data)
     for k, (compliance, springs) in enumerate(zip(data.compliance, data.springs, strict=True)):
         dims = ("cv", "n_train", f"spring_{k}")
         notes = {"long_name": f"compliances of variant {data.variants[k].name}"}
@@ -120,11 +106,7 @@ def _texts(dim: str, texts: Any) -> LabelledArray:
 
 def _data_of(found: LabelledArrays) -> CodecData:
     """Return what a file holds; variables that are not ours are left alone."""
-    for name, (dims, _, _, _) in _FIELDS.items():
-        if name not in found:
-            raise CodecError(f"variable {name!r} is missing")
-        if found[name].dims != dims:
-            raise CodecError(f"{name} has dimensions {found[name].dims}, not {dims}")
+    arrays = array_fields(CodecData, found)
     rows = zip(
         found["variant"].values, *(found[f"variant_{key}"].values for key in KEYS), strict=True
     )
@@ -147,7 +129,7 @@ def _data_of(found: LabelledArrays) -> CodecData:
         provenance=str(found.attributes["provenance"]),
         findings=tuple(json.loads(found.attributes["findings"])),
         versions=json.loads(found.attributes["versions"]),
-        **{name: found[name].values for name in _FIELDS},
+        **arrays,
     )
 
 

@@ -27,6 +27,5 @@ from .springs import (
     Unit as Unit,
     axial as axial,
     check_springs as check_springs,
-    spring_units as spring_units,
     unit_of as unit_of,
 )

@@ -59,6 +59,12 @@ from .refits import (
     PoseGrams as PoseGrams,
     PoseTriangles as PoseTriangles,
 )
+from .reproduction import (
+    Reproduction as Reproduction,
+    UnseenErrors as UnseenErrors,
+    reproduce_calibration as reproduce_calibration,
+    unseen_errors as unseen_errors,
+)
 from .solve import (
     OPTIMALITY as OPTIMALITY,
     Factored as Factored,

@@ -10,7 +10,7 @@ from .cell_setup import (
 from .plan import (
     PlanAndPool as PlanAndPool,
     make_plan as make_plan,
-    refuse_before_the_long_work as refuse_before_the_long_work,
+    require_possible_search as require_possible_search,
 )
 from .plan_result import (
     PLAN as PLAN,
@@ -27,22 +27,25 @@ from .plan_result import (
     RobotRecord as RobotRecord,
     SearchRecord as SearchRecord,
     SpreadRecord as SpreadRecord,
+    Vector as Vector,
     check_plan as check_plan,
     read_plan as read_plan,
     write_plan as write_plan,
 )
 from .pool import (
+    REACH_ADVICE as REACH_ADVICE,
     UNREACHABLE as UNREACHABLE,
     Approach as Approach,
     BasePlacement as BasePlacement,
     Options as Options,
     Pool as Pool,
-    Progress as Progress,
     join_pools as join_pools,
     make_pool as make_pool,
     options_at as options_at,
 )
 from .pool_file import (
+    HAS_POSTURE as HAS_POSTURE,
+    NOT_CHOSEN as NOT_CHOSEN,
     PoolData as PoolData,
     check_pool_of as check_pool_of,
     read_pool as read_pool,

@@ -1,4 +1,4 @@
-"""A plan as its file holds it."""
+"""Put the decisions of planning together as the plan's record and its pool."""
 
 from dataclasses import dataclass
 
@@ -33,11 +33,11 @@ from elastocal.planning.search_pool import SearchPool
 
 @dataclass(frozen=True, eq=False)
 class Decisions:
-    """All that a plan was made of."""
+    """Everything that a plan is put together from."""
 
     cell: Cell
-    gathered: SampledPool
-    searched: SearchPool
+    sampled: SampledPool
+    search_pool: SearchPool
     selection: Selection
     """Numbers in the pool, in search order."""
     spread: SpreadRecord
@@ -50,41 +50,43 @@ class Decisions:
     findings: tuple[str, ...]
 
 
-def plan_record(made: Decisions) -> PlanResult:
+def plan_record(decisions: Decisions) -> PlanResult:
     """Return the plan's record."""
-    cell, pool = made.cell, made.gathered.pool
-    compared = made.comparison
+    cell, pool = decisions.cell, decisions.sampled.pool
+    compared = decisions.comparison
     return PlanResult(
         elastocal=__version__,
         cell=CellRecord(name=cell.name, file=str(cell.path), fingerprint=fingerprint(cell)),
         robot=_robot(cell),
         contact=_contact(cell),
-        poses=_poses(made),
-        moves=_moves(made.route),
-        search=_search(made),
-        comparison=None if compared is None else _comparison(made, compared),
+        poses=_poses(decisions),
+        moves=_moves(decisions.route),
+        search=_search(decisions),
+        comparison=None if compared is None else _comparison(decisions, compared),
         pool=_pool(pool),
-        findings=made.findings,
+        findings=decisions.findings,
     )
 
 
-def pool_data(made: Decisions) -> PoolData:
+def pool_data(decisions: Decisions) -> PoolData:
     """Return the pool that goes beside the plan."""
-    pool, points = made.gathered.pool, made.gathered.points
+    pool, points = decisions.sampled.pool, decisions.sampled.points
     pose_id = np.full(len(pool.postures), NOT_CHOSEN, dtype=np.intp)
-    pose_id[made.selection.order[made.route.order]] = np.arange(len(made.route.order))
+    pose_id[decisions.selection.order[decisions.route.order]] = np.arange(
+        len(decisions.route.order)
+    )
     return PoolData(
         contact=pool.postures.contact,
         normal=pool.postures.normal,
         T_base_tcp=pool.postures.T_base_tcp,
         q=pool.postures.q,
         q_approach=pool.postures.q_approach,
-        joint_names=made.cell.robot.joint_names,
+        joint_names=decisions.cell.robot.joint_names,
         branch=pool.branch,
         margin=pool.verdicts.margin,
         check_names=pool.verdicts.names,
         check_units=pool.verdicts.units,
-        boundary_distance=made.searched.boundary_distance,
+        boundary_distance=decisions.search_pool.boundary_distance,
         pose_id=pose_id,
         point=pool.postures.point,
         sampled=points.position,
@@ -118,11 +120,11 @@ def _contact(cell: Cell) -> ContactRecord:
     )
 
 
-def _poses(made: Decisions) -> tuple[PoseRecord, ...]:
-    pool, robot = made.gathered.pool, made.cell.robot
+def _poses(decisions: Decisions) -> tuple[PoseRecord, ...]:
+    pool, robot = decisions.sampled.pool, decisions.cell.robot
     poses = []
-    for number, chosen in enumerate(made.route.order):
-        candidate = int(made.selection.order[chosen])
+    for number, chosen in enumerate(decisions.route.order):
+        candidate = int(decisions.selection.order[chosen])
         posture = pool.postures.take([candidate])
         # From the joints and not from the frame wanted: what the robot will do.
         T = robot.forward(posture.q[0])
@@ -137,8 +139,8 @@ def _poses(made: Decisions) -> tuple[PoseRecord, ...]:
                 tcp_position=_vector(T[:3, 3]),
                 tcp_quaternion=(float(x), float(y), float(z), float(w)),
                 normal=_vector(posture.normal[0]),
-                seen_by=made.seen_by[chosen],
-                contact_time=contact_time(made.cell),
+                seen_by=decisions.seen_by[chosen],
+                contact_time=contact_time(decisions.cell),
                 # JSON has no infinity: a check that cannot refuse is left out.
                 margins={name: float(m) for name, m in margins.items() if np.isfinite(m)},
             )
@@ -146,11 +148,11 @@ def _poses(made: Decisions) -> tuple[PoseRecord, ...]:
     return tuple(poses)
 
 
-def _comparison(made: Decisions, other: Selection) -> ComparisonRecord:
+def _comparison(decisions: Decisions, other: Selection) -> ComparisonRecord:
     return ComparisonRecord(
         name=other.name,
         candidates=tuple(other.order.tolist()),
-        spread=made.searched.spread(other.order),
+        spread=decisions.search_pool.spread(other.order),
     )
 
 
@@ -167,13 +169,13 @@ def _moves(route: Route) -> tuple[MoveRecord, ...]:
     )
 
 
-def _search(made: Decisions) -> SearchRecord:
-    search, selection = made.cell.file.search, made.selection
-    spread = made.spread
+def _search(decisions: Decisions) -> SearchRecord:
+    search, selection = decisions.cell.file.search, decisions.selection
+    spread = decisions.spread
     covers = selection if isinstance(selection, CoverSelection) else None
     place = np.empty(len(selection), dtype=np.intp)
-    place[made.route.order] = np.arange(len(selection))
-    has_process = made.searched.candidates.process is not None
+    place[decisions.route.order] = np.arange(len(selection))
+    has_process = decisions.search_pool.candidates.process is not None
     return SearchRecord(
         name=selection.name,
         metric=search.metric,
@@ -185,7 +187,7 @@ def _search(made: Decisions) -> SearchRecord:
         covered=None if search.d_max is None else spread.covering_radius <= search.d_max,
         order=tuple(place.tolist()),
         spread=spread,
-        process_unseen=made.searched.information.process_unseen if has_process else None,
+        process_unseen=decisions.search_pool.information.process_unseen if has_process else None,
     )
 
 

@@ -1,4 +1,4 @@
-"""What a cell file asks of planning: its surface, its scene, its checks."""
+"""From a cell file to the objects that planning works with: surface, scene, checks."""
 
 import math
 

@@ -22,10 +22,9 @@ from elastocal.planning.motion import (
     clear_retreats,
     mover_for,
     plan_route,
-    refuse_blocked_home,
+    require_free_home,
 )
 from elastocal.planning.plan_result import PlanResult, SpreadRecord
-from elastocal.planning.pool import Progress
 from elastocal.planning.pool_file import PoolData
 from elastocal.planning.pool_sampling import (
     SampledPool,
@@ -35,6 +34,7 @@ from elastocal.planning.postures import Postures
 from elastocal.planning.search import Cover, Selection, technique
 from elastocal.planning.search_pool import SearchPool
 from elastocal.planning.surface import Finding, Surface
+from elastocal.progress import Progress, silent
 
 _SURFACE, _SEARCH = "surface", "search"
 """Stages under which progress is reported, beside `CANDIDATES` and `VISITING`."""
@@ -55,7 +55,7 @@ def make_plan(
     cell: Cell,
     compare: str | None = None,
     jobs: int | None = None,
-    progress: Progress = lambda *_: None,
+    progress: Progress = silent,
 ) -> PlanAndPool:
     """Return the calibration poses of a cell, checked and in visiting order.
 
@@ -71,41 +71,41 @@ def make_plan(
     jobs : int, optional
         Number of processes; all cores by default.
     progress : callable, optional
-        Told the stage (``surface``, ``candidates``, ``search``, ``visiting order``), what is done
+        Hears the stage (``surface``, ``candidates``, ``search``, ``visiting order``), what is done
         of it and how much there is.
 
     Raises
     ------
     PlanningError
-        If no plan can be made: the message says what refused most points and what to move.
+        If no plan can be decisions: the message says what refused most points and what to move.
     SurfaceError, FileAccessError
         If the surface cannot be read, or its region is empty.
     """
     other = None if compare is None else technique(compare)
-    refuse_before_the_long_work(cell, compare)
+    require_possible_search(cell, compare)
     for_findings, for_points, for_search = np.random.default_rng(cell.file.search.seed).spawn(3)
     progress(_SURFACE, 0, 1)
     surface = cell_surface(cell)
     findings = surface_findings(cell, surface, for_findings)
     mover = mover_for(cell, collision_scene(cell, surface))
-    refuse_blocked_home(cell.home, mover)
+    require_free_home(cell.home, mover)
     progress(_SURFACE, 1, 1)
-    gathered = sample_pool(cell, surface, for_points, jobs, progress)
-    _refuse_too_few(cell, gathered, findings)
+    sampled = sample_pool(cell, surface, for_points, jobs, progress)
+    _require_enough(cell, sampled, findings)
     progress(_SEARCH, 0, 1)
-    searched = SearchPool.of(cell, surface, gathered)
-    selection, route = _choose(cell, searched, gathered, mover, for_search, progress)
-    spread = searched.spread(selection.order)
+    search_pool = SearchPool.of(cell, surface, sampled)
+    selection, route = _choose(cell, search_pool, sampled, mover, for_search, progress)
+    spread = search_pool.spread(selection.order)
     progress(_SEARCH, 1, 1)
-    everyone = np.arange(len(searched.candidates))
+    everyone = np.arange(len(search_pool.candidates))
     comparison = (
-        None if other is None else searched.take(other, everyone, len(selection), for_search)
+        None if other is None else search_pool.take(other, everyone, len(selection), for_search)
     )
-    chosen = gathered.pool.postures.take(selection.order)
+    chosen = sampled.pool.postures.take(selection.order)
     decisions = Decisions(
         cell,
-        gathered,
-        searched,
+        sampled,
+        search_pool,
         selection,
         spread,
         comparison,
@@ -113,14 +113,14 @@ def make_plan(
         _stations(cell, surface, chosen),
         (
             *(finding.message for finding in findings),
-            *_notes(cell, gathered, selection, spread),
+            *_notes(cell, sampled, selection, spread),
         ),
     )
     return PlanAndPool(plan_record(decisions), pool_data(decisions), surface)
 
 
-def refuse_before_the_long_work(cell: Cell, compare: str | None = None) -> None:
-    """Refuse what needs no pool to be known as impossible.
+def require_possible_search(cell: Cell, compare: str | None = None) -> None:
+    """Require a search that can be made, as far as no pool is needed to tell.
 
     Parameters
     ----------
@@ -143,9 +143,9 @@ def refuse_before_the_long_work(cell: Cell, compare: str | None = None) -> None:
             )
 
 
-def _refuse_too_few(cell: Cell, gathered: SampledPool, findings: tuple[Finding, ...]) -> None:
-    """Refuse a pool that cannot give the poses wanted, saying what to move."""
-    pool, wanted = gathered.pool, cell.file.search.poses or 1
+def _require_enough(cell: Cell, sampled: SampledPool, findings: tuple[Finding, ...]) -> None:
+    """Require a pool that can give the poses wanted, or say what to move."""
+    pool, wanted = sampled.pool, cell.file.search.poses or 1
     found = len(pool.postures)
     if found >= wanted:
         return
@@ -161,17 +161,17 @@ def _refuse_too_few(cell: Cell, gathered: SampledPool, findings: tuple[Finding, 
 
 def _choose(
     cell: Cell,
-    searched: SearchPool,
-    gathered: SampledPool,
+    search_pool: SearchPool,
+    sampled: SampledPool,
     mover: Mover,
     rng: Generator,
     progress: Progress,
 ) -> tuple[Selection, Route]:
     """Return poses that free ways lead to from HOME, and on to the surface; replace others."""
-    left: IndexArray = np.arange(len(searched.candidates))
+    left: IndexArray = np.arange(len(search_pool.candidates))
     for _ in range(_REPLACEMENTS):
-        selection = searched.choose(cell, left, rng)
-        postures = gathered.pool.postures.take(selection.order)
+        selection = search_pool.choose(cell, left, rng)
+        postures = sampled.pool.postures.take(selection.order)
         route = plan_route(cell.home, postures, mover, progress)
         blocked = np.union1d(
             route.unreachable, np.flatnonzero(~clear_retreats(cell, mover, postures))
@@ -193,10 +193,10 @@ def _stations(cell: Cell, surface: Surface, chosen: Postures) -> tuple[str | Non
 
 
 def _notes(
-    cell: Cell, gathered: SampledPool, selection: Selection, spread: SpreadRecord
+    cell: Cell, sampled: SampledPool, selection: Selection, spread: SpreadRecord
 ) -> tuple[str, ...]:
     """Return what a user should know of how the poses were found, a line each."""
-    search, pool = cell.file.search, gathered.pool
+    search, pool = cell.file.search, sampled.pool
     notes: list[str] = []
     if len(pool.postures) < search.pool:
         notes.append(

@@ -18,7 +18,7 @@ from elastocal.errors import SchemaError
 from elastocal.files import sha256, write_json
 from elastocal.records import read_json, record, to_data
 
-SCHEMA = "elastocal.plan/1"
+_SCHEMA = "elastocal.plan/1"
 PLAN = "plan.json"
 """Name of the plan in its folder."""
 POOL = "pool.nc"
@@ -158,7 +158,7 @@ class SearchRecord:
 
 @record()
 class ComparisonRecord:
-    """What another technique would have chosen from the same pool, as many poses."""
+    """The choice of another technique from the same pool, as many poses."""
 
     name: str
     candidates: tuple[int, ...]
@@ -189,7 +189,7 @@ class PoolRecord:
     """The check that refused most points."""
 
 
-@record(SCHEMA)
+@record(_SCHEMA)
 class PlanResult:
     """The calibration poses of a cell: what ``plan.json`` holds, but for its hash."""
 
@@ -206,7 +206,7 @@ class PlanResult:
     comparison: ComparisonRecord | None
     pool: PoolRecord
     findings: tuple[str, ...]
-    """What a user should know, a line each."""
+    """Findings that a user should know, a line each."""
 
     @property
     def travel_time(self) -> float:
@@ -219,15 +219,15 @@ class PlanResult:
         return self.travel_time + sum(pose.contact_time for pose in self.poses)
 
 
-@record(SCHEMA)
+@record(_SCHEMA)
 class _WrittenPlan(PlanResult):
     """A plan as it stands in its file."""
 
     sha256: str
-    """See `content_hash`."""
+    """See `_content_hash`."""
 
 
-def content_hash(plan: PlanResult) -> str:
+def _content_hash(plan: PlanResult) -> str:
     """Return a SHA-256 over everything that a plan says, by which a change by hand is found.
 
     It is taken over the numbers as they are read: line breaks and the way a number is written do
@@ -249,7 +249,7 @@ def write_plan(folder: Path, plan: PlanResult) -> Path:
     path = Path(folder) / PLAN
     check_plan(plan, str(path))
     data = to_data(plan)
-    write_json(path, {"schema": data.pop("schema"), "sha256": content_hash(plan), **data})
+    write_json(path, {"schema": data.pop("schema"), "sha256": _content_hash(plan), **data})
     return path
 
 
@@ -269,7 +269,7 @@ def read_plan(folder: Path) -> PlanResult:
     written = read_json(path, _WrittenPlan)
     plan = PlanResult(**{each.name: getattr(written, each.name) for each in fields(PlanResult)})
     check_plan(plan, str(path))
-    if written.sha256 != content_hash(plan):
+    if written.sha256 != _content_hash(plan):
         raise SchemaError(f"{path} was changed by hand: make it anew with `elastocal plan`")
     return plan
 

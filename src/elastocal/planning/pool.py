@@ -10,7 +10,7 @@ robot is; the quick checks of every posture of a branch; the slow one (collision
 round by round, until a point has a posture or its branch has run out of them.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
@@ -29,13 +29,10 @@ REACH_ADVICE = (
     "bring the tooling within the robot's reach, turn it towards the robot, or let the external"
     " axes be searched"
 )
-"""What a user can move when most points are out of reach."""
+"""Advice to a user when most points are out of reach."""
 
 _ROUNDS = 6
 """Postures of a point and branch that the slow checks are asked about, at most."""
-
-Progress = Callable[[str, int, int], None]
-"""Called with a stage, how many points are done and how many there are."""
 
 
 @dataclass(frozen=True)
@@ -79,7 +76,7 @@ class Pool:
 
     @property
     def refusals(self) -> tuple[str, ...]:
-        """What may refuse a point: the reach of the robot, then every check."""
+        """Names of all that may refuse a point: the reach of the robot, then every check."""
         return (UNREACHABLE, *self.verdicts.names)
 
     @property
@@ -101,7 +98,7 @@ class Pool:
 
     @property
     def advice(self) -> str:
-        """What the bottleneck leaves to move; empty when there is none."""
+        """Advice on the bottleneck; empty when there is none."""
         texts = dict(zip(self.refusals, (REACH_ADVICE, *self.verdicts.advice), strict=True))
         return texts.get(self.bottleneck or "", "")
 

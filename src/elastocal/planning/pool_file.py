@@ -14,7 +14,7 @@ from elastocal.errors import PlanningError, SchemaError
 from elastocal.planning.plan_result import POOL, PlanResult
 from elastocal.records import Variable, read_netcdf, record, variables_of, write_netcdf
 
-SCHEMA = "elastocal.pool/1"
+_SCHEMA = "elastocal.pool/1"
 NOT_CHOSEN = -1
 """``pose_id`` of a candidate that is no pose of the plan."""
 HAS_POSTURE = -1
@@ -24,7 +24,7 @@ _INDICES = ("branch", "pose_id", "point", "refused_by")
 _NAMES = ("joint_names", "check_names", "check_units", "refusal_names")
 
 
-@record(SCHEMA, eq=False)
+@record(_SCHEMA, eq=False)
 class PoolData:
     """Candidates with their postures and margins, and the points that have none.
 
@@ -93,7 +93,7 @@ class PoolData:
     ]
     """Index into ``refusal_names``, shape (point,); `HAS_POSTURE` for a candidate's point."""
     refusal_names: tuple[str, ...]
-    """What can leave a point without a posture: the reach of the robot, then the checks."""
+    """Names of all that can leave a point without a posture: the reach, then the checks."""
 
     def __post_init__(self) -> None:
         for name in variables_of(PoolData):

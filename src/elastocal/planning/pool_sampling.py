@@ -5,29 +5,25 @@ cores, so neither do the candidates.
 """
 
 import math
-import os
 import pickle
-import warnings
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from functools import lru_cache
-from itertools import repeat
+from functools import lru_cache, partial
 
 import numpy as np
-from joblib import Parallel, delayed
 from numpy.random import Generator
 
 from elastocal.arrays import BoolArray, FloatArray, IndexArray
 from elastocal.cell import Cell
 from elastocal.errors import PlanningError
+from elastocal.parallel import ProcessPool, process_count, process_pool
 from elastocal.planning.cell_setup import point_checks, robot_checks
 from elastocal.planning.checks import Checks, verdicts
 from elastocal.planning.pool import (
     Approach,
     BasePlacement,
     Pool,
-    Progress,
     join_pools,
     make_pool,
     options_at,
@@ -38,6 +34,7 @@ from elastocal.planning.surface import (
     sample_blue_noise,
     sample_uniform,
 )
+from elastocal.progress import Progress, silent
 from elastocal.robot.inverse import InverseKinematics, inverse_for
 
 CANDIDATES = "candidates"
@@ -74,7 +71,7 @@ def sample_pool(
     surface: Surface,
     rng: Generator,
     jobs: int | None = None,
-    progress: Progress = lambda *_: None,
+    progress: Progress = silent,
 ) -> SampledPool:
     """Return as many valid candidates as the cell file asks for, or as there are.
 
@@ -90,7 +87,7 @@ def sample_pool(
         Number of processes; all cores by default. Small pools are made by one. The result does
         not depend on it.
     progress : callable, optional
-        Told how many candidates are valid, and how many are wanted.
+        Hears how many candidates are valid, and how many are wanted.
 
     Raises
     ------
@@ -99,15 +96,11 @@ def sample_pool(
     SurfaceError
         If the region holds no part of the surface.
     """
-    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
-    jobs = (cores or 1) if jobs is None else jobs
-    if not jobs >= 1:
-        raise PlanningError(f"{jobs} jobs: must be at least 1")
     wanted = cell.file.search.pool
     tried: list[SurfacePoints] = []
     pools: list[Pool] = []
     progress(CANDIDATES, 0, wanted)
-    with _started(cell, surface, jobs if wanted >= _WORTH_HELP else 1) as workers:
+    with _workers(cell, surface, _processes(jobs, wanted)) as workers:
         builder = PoolBuilder.of(cell, surface)
         placements = builder.rank(sample_uniform(surface, _PROBES, rng))
         while (missing := wanted - _valid(pools)) > 0 and not _hopeless(pools, wanted):
@@ -185,25 +178,39 @@ class PoolBuilder:
         return make_pool(self.solver, *where, self.approach, checks, placements)
 
 
-class _Workers:
-    """Processes that make pools; they unpack the cell once. See `_started`."""
+def _processes(jobs: int | None, wanted: int) -> int:
+    """Return the number of processes for some candidates; few are not worth a second one."""
+    try:
+        processes = process_count(jobs)
+    except ValueError as error:
+        raise PlanningError(str(error)) from error
+    return processes if wanted >= _WORTH_HELP else 1
 
-    def __init__(self, packed: bytes, parallel: Parallel, jobs: int) -> None:
-        self._packed = packed
-        self._parallel = parallel
-        # They import and unpack while the caller goes on: that takes a second of each.
-        self._preparing = parallel(delayed(_prepare)(packed) for _ in range(jobs))
+
+@dataclass(frozen=True, eq=False)
+class _Workers:
+    """Processes that make pools; each unpacks the cell once, and makes its own builder of it."""
+
+    packed: bytes
+    processes: ProcessPool
 
     def pools(
         self, placements: tuple[BasePlacement, ...], parts: Sequence[SurfacePoints]
     ) -> Iterator[Pool]:
-        """Yield the pool of each part of the points, in their order."""
-        for _ in self._preparing:
-            pass
-        yield from self._parallel(
-            delayed(_make_part)(packed, placements, part)
-            for packed, part in zip(repeat(self._packed), parts, strict=False)
-        )
+        """Return the pool of each part of the points, in their order."""
+        return self.processes.map(partial(_make_part, self.packed, placements), parts)
+
+
+@contextmanager
+def _workers(cell: Cell, surface: Surface, processes: int) -> Iterator[_Workers | None]:
+    """Yield workers that prepare themselves already; None when there is but one process."""
+    if processes == 1:
+        yield None
+        return
+    # Coal's shapes cannot be sent to a process: it makes its own from the cell.
+    packed = pickle.dumps((cell, surface))
+    with process_pool(processes, partial(_prepare, packed)) as pool:
+        yield _Workers(packed, pool)
 
 
 def _made(
@@ -216,20 +223,6 @@ def _made(
     if workers is None or len(parts) == 1:
         return (builder.pool(placements, part) for part in parts)
     return workers.pools(placements, parts)
-
-
-@contextmanager
-def _started(cell: Cell, surface: Surface, jobs: int) -> Iterator[_Workers | None]:
-    """Yield workers that prepare themselves already; None when there is but one job."""
-    if jobs == 1:
-        yield None
-        return
-    # Coal's shapes cannot be sent to a process: it makes its own from the cell.
-    with warnings.catch_warnings():
-        # Ctrl-C leaves tasks unfinished, which is what a user wants and need not be told.
-        warnings.filterwarnings("ignore", message=r"\s*\d+ tasks (have been|which were)")
-        with Parallel(n_jobs=jobs, return_as="generator") as parallel:
-            yield _Workers(pickle.dumps((cell, surface)), parallel, jobs)
 
 
 def _prepare(packed: bytes) -> None:

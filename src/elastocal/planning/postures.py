@@ -1,12 +1,11 @@
 """Candidates with joints: where the tool touches, and how the robot stands and retreats."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from elastocal.arrays import FloatArray, IndexArray
+from elastocal.planning._rows import Rows
 from elastocal.robot import Robot
 
 _STRAIGHT = 2e-5
@@ -15,7 +14,7 @@ _STEPS = 4
 
 
 @dataclass(frozen=True, eq=False)
-class Postures:
+class Postures(Rows):
     """Contact poses on the surface with the robot's configurations; arrays are read-only."""
 
     T_base_tcp: FloatArray
@@ -38,25 +37,10 @@ class Postures:
         point.flags.writeable = False
         object.__setattr__(self, "point", point)
 
-    def __len__(self) -> int:
-        return len(self.q)
-
     @property
     def contact(self) -> FloatArray:
         """Contact points in base, shape (pose, 3), in m."""
         return self.T_base_tcp[:, :3, 3]
-
-    def take(self, index: ArrayLike) -> "Postures":
-        """Return some of the postures (a mask or indices)."""
-        rows = np.asarray(index)
-        rows = rows.astype(np.intp) if rows.size == 0 else rows
-        return Postures(
-            self.T_base_tcp[rows],
-            self.normal[rows],
-            self.q[rows],
-            self.q_approach[rows],
-            self.point[rows],
-        )
 
     def at(self, point: IndexArray) -> "Postures":
         """Return the same postures with their points numbered anew, shape (pose,)."""
@@ -71,17 +55,6 @@ class Postures:
             np.zeros((0, joints)),
             np.zeros((0, joints)),
             np.zeros(0, dtype=np.intp),
-        )
-
-    @staticmethod
-    def joined(parts: Sequence["Postures"]) -> "Postures":
-        """Return the postures of several, one after the other."""
-        return Postures(
-            np.concatenate([part.T_base_tcp for part in parts]),
-            np.concatenate([part.normal for part in parts]),
-            np.concatenate([part.q for part in parts]),
-            np.concatenate([part.q_approach for part in parts]),
-            np.concatenate([part.point for part in parts]),
         )
 
 

@@ -46,10 +46,10 @@ class SearchPool:
     without edge."""
 
     @staticmethod
-    def of(cell: Cell, surface: Surface, gathered: SampledPool) -> "SearchPool":
+    def of(cell: Cell, surface: Surface, sampled: SampledPool) -> "SearchPool":
         """Return the pool of a cell with its observation rows and its metric."""
-        postures = gathered.pool.postures
-        points = gathered.points.take(postures.point)
+        postures = sampled.pool.postures
+        points = sampled.points.take(postures.point)
         model = _elastic_model(cell)
         geodesic = cell.file.search.metric == "geodesic"
         candidates = Candidates(

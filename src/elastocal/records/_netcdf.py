@@ -13,7 +13,6 @@ import numpy as np
 
 from elastocal.errors import FileAccessError, SchemaError
 from elastocal.files import replacing
-from elastocal.records._validation import check_schema
 
 _SIGNATURE = b"\x89HDF\r\n\x1a\n"
 """First bytes of an HDF5 file, which every NetCDF4 file is (HDF5 file format, section II.A)."""
@@ -107,6 +106,9 @@ def read_arrays(path: Path, schema: str = "") -> LabelledArrays:
         reason = " ".join(str(error).split())
         raise SchemaError(f"{path}: not a readable NetCDF4 file: {reason}") from error
     if schema:
+        # Pydantic comes with it, which datasets do without.
+        from elastocal.records._validation import check_schema
+
         check_schema(found.attributes.get("schema"), schema, str(path))
     return found
 

@@ -1,8 +1,8 @@
-from .pages.codec_page import write_codec_figures as write_codec_figures
-from .pages.plan_page import write_plan_page as write_plan_page
-from .plots.plan_figure import write_plan_figure as write_plan_figure
-from .plots.recertification_figure import (
+from .pages import write_codec_figures as write_codec_figures, write_plan_page as write_plan_page
+from .plots import (
+    Curve as Curve,
+    write_plan_figure as write_plan_figure,
     write_recertification_figure as write_recertification_figure,
+    write_stiffness_figure as write_stiffness_figure,
+    write_study_figures as write_study_figures,
 )
-from .plots.stiffness_figure import Curve as Curve, write_stiffness_figure as write_stiffness_figure
-from .plots.study_figure import write_study_figures as write_study_figures

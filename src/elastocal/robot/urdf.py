@@ -37,7 +37,7 @@ class Assumption:
     """
 
     field: str
-    """What is assumed: ``dimension``, ``position``, ``velocity``, ``effort``, ``inertia`` or
+    """Field that is assumed: ``dimension``, ``position``, ``velocity``, ``effort``, ``inertia`` or
     ``shape``."""
     reason: str
     """Where the value comes from, in words."""

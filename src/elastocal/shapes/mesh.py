@@ -13,7 +13,7 @@ from elastocal.shapes.convex import Box, Capsule, Cylinder, Sphere
 from elastocal.shapes.solid import Beams, OtherSolid, SightSolid, Solid
 
 _closest_point: Callable[[FloatArray, FloatArray], FloatArray] = trimesh.triangles.closest_point
-"""Of each triangle to its point; trimesh gives it no types."""
+"""Return the point of each triangle nearest to its point; trimesh gives it no types."""
 
 
 @dataclass(frozen=True, eq=False)

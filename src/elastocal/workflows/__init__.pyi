@@ -1,13 +1,31 @@
 from ._device_sources import KINDS as KINDS, SOURCES as SOURCES, DeviceSource as DeviceSource
+from ._kinds_of_measurement import FileDescription as FileDescription
 from ._operator import Operator as Operator, Supervision as Supervision, Unattended as Unattended
 from ._outputs import refuse_overwriting as refuse_overwriting
+from ._process_trial import (
+    ProcessTrial as ProcessTrial,
+    TrialRuns as TrialRuns,
+    run_trial as run_trial,
+)
 from ._robot_source import find_robot as find_robot
 from .calibrate import (
     CalibrateResult as CalibrateResult,
     CalibrateSettings as CalibrateSettings,
     calibrate as calibrate,
 )
+from .check import (
+    CheckResult as CheckResult,
+    CheckSettings as CheckSettings,
+    check as check,
+    describe_file as describe_file,
+)
+from .compensate import (
+    CompensateResult as CompensateResult,
+    CompensateSettings as CompensateSettings,
+    compensate as compensate,
+)
 from .derive import DeriveResult as DeriveResult, DeriveSettings as DeriveSettings, derive as derive
+from .export import ExportResult as ExportResult, ExportSettings as ExportSettings, export as export
 from .plan import (
     PlanFigures as PlanFigures,
     PlanResult as PlanResult,
@@ -20,6 +38,12 @@ from .predict import (
     PredictSettings as PredictSettings,
     predict as predict,
 )
+from .report import (
+    ReportFigures as ReportFigures,
+    ReportResult as ReportResult,
+    ReportSettings as ReportSettings,
+    report as report,
+)
 from .run import (
     POSES_MEASURED as POSES_MEASURED,
     DryRunResult as DryRunResult,
@@ -29,3 +53,25 @@ from .run import (
     dry_run as dry_run,
     run as run,
 )
+from .simulate_process import (
+    SimulateProcessResult as SimulateProcessResult,
+    SimulateProcessSettings as SimulateProcessSettings,
+    simulate_process as simulate_process,
+)
+from .stiffness import (
+    ChosenStiffness as ChosenStiffness,
+    ExternalAxis as ExternalAxis,
+    PostureCounts as PostureCounts,
+    StiffnessResult as StiffnessResult,
+    StiffnessSettings as StiffnessSettings,
+    StiffnessSummary as StiffnessSummary,
+    stiffness as stiffness,
+)
+from .study import (
+    DEFAULT_VARIATION as DEFAULT_VARIATION,
+    StudyResult as StudyResult,
+    StudySettings as StudySettings,
+    study as study,
+    study_conditions as study_conditions,
+)
+from .tool import ToolResult as ToolResult, ToolSettings as ToolSettings, tool as tool

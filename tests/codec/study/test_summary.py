@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from elastocal.codec.study import Accuracy, Outcome, SampleResult
+from elastocal.codec.study import ConditionResult, SampleResult
 from elastocal.codec.study.summary import advice, distribution, share, summarise
 from support.studies import settings
 
@@ -11,7 +11,7 @@ def results(*errors):
     return [
         SampleResult(
             number,
-            tuple(Outcome(Accuracy(e, 2 * e, 1.0), np.ones(1)) for e in column),
+            tuple(ConditionResult(e, 2 * e, 1.0, np.ones(1)) for e in column),
         )
         for number, column in enumerate(zip(*errors, strict=True))
     ]

@@ -18,7 +18,9 @@ from elastocal.elastic import ElasticModel
 from elastocal.identification import CalibratedModel
 from elastocal.robot import Robot
 from elastocal.robot.inverse import inverse_for
-from elastocal.sim.arm.measurement import START
+from elastocal.sim.arm import (
+    START,
+)
 from support.cells import rich_truth, robot, urdf
 from support.paths import (
     FORCE_TCP,
@@ -262,9 +264,9 @@ class TestPathFile:
             calibrated(), path, tmp_path / "o.csv", SETTINGS, lambda *now: told.append(now)
         )
         figures = tally.figures()
-        assert figures["rows"] == 30
-        assert figures["residual"]["max"] < 1e-7 < 1e-6 < figures["first_order"]["max"]
-        assert figures["first_order"]["max"] < 0.01 * figures["deviation"]["max"]
+        assert figures.rows == 30
+        assert figures.residual.max < 1e-7 < 1e-6 < figures.first_order.max
+        assert figures.first_order.max < 0.01 * figures.deviation.max
         assert told[-1] == ("rows", 30, 30)
 
     def test_pieces_of_any_size_give_the_same_file(self, tmp_path, monkeypatch):

@@ -15,7 +15,9 @@ from elastocal.compensation.programs import compensate_program
 from elastocal.errors import FileAccessError
 from elastocal.robot import Robot, T_from_xyzabc, xyzabc_from_T
 from elastocal.robot.inverse import inverse_for
-from elastocal.sim.arm.measurement import START
+from elastocal.sim.arm import (
+    START,
+)
 from support import krl
 from support.cells import robot
 from support.paths import FORCE_TCP, calibrated, dome_course, made_up

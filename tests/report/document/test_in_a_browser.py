@@ -9,7 +9,14 @@ from pathlib import Path
 import pytest
 
 from elastocal.errors import FileAccessError
-from elastocal.report.document import Parts, find_browser, write_pdf, write_report
+from elastocal.report.document import (
+    find_browser,
+    write_pdf,
+    write_report,
+)
+from elastocal.verdict import (
+    Evidence,
+)
 from support.browser import Look, look
 from support.reported import MADE
 
@@ -116,7 +123,7 @@ def test_the_probe_sees_what_is_wrong(browser, tmp_path):
 
 
 def test_the_page_refuses_itself_the_network(browser, tmp_path):
-    page = write_report(tmp_path / "report.html", Parts(made=MADE)).path
+    page = write_report(tmp_path / "report.html", Evidence(made=MADE)).path
     asked = '<script>fetch("http://127.0.0.1:9/asked").catch(() => {});</script></body>'
     page.write_text(page.read_text("utf-8").replace("</body>", asked), "utf-8")
     seen = look(browser, page, [Look(390, "light")])

@@ -10,8 +10,16 @@ import pytest
 from elastocal import dataset
 from elastocal.codec import read_codec, write_codec
 from elastocal.errors import FileAccessError
-from elastocal.report.document import Absence, Options, Parts, gather, write_report
-from elastocal.report.document.sections import SECTIONS
+from elastocal.report.document import (
+    SECTIONS,
+    write_report,
+)
+from elastocal.verdict import (
+    Evidence,
+    EvidenceOptions,
+    MissingPart,
+    gather_evidence,
+)
 from support.reported import MADE
 
 LATER = "2027-08-09T10:11:12+00:00"
@@ -101,7 +109,7 @@ def test_equal_runs_give_equal_reports_but_for_times(text, copied, tmp_path):
     dataset.write(dataset.Dataset.from_xarray(data), folder / "run" / "dataset.nc")
     codec = read_codec(folder / "codec")
     write_codec(folder / "codec", replace(codec, provenance=STAMP.sub(LATER, codec.provenance)))
-    again = write_report(tmp_path / "b.html", gather(Options(folder), LATER))
+    again = write_report(tmp_path / "b.html", gather_evidence(EvidenceOptions(folder), LATER))
     other = again.path.read_text(encoding="utf-8")
     assert other != text
     assert STAMP.sub("T", other) == STAMP.sub("T", text)
@@ -116,7 +124,7 @@ def test_times_are_marked_as_such(page):
 def test_names_are_escaped(parts, tmp_path):
     bad = '</script><script>alert(1)</script><img src="http://x">'
     spoilt = replace(
-        parts, name=bad, cell=None, plan=None, cell_text=bad, absent=(Absence(bad, bad),)
+        parts, name=bad, cell=None, plan=None, cell_text=bad, missing=(MissingPart(bad, bad),)
     )
     text = write_report(tmp_path / "p.html", spoilt).path.read_text(encoding="utf-8")
     assert "alert(1)</script>" not in text
@@ -125,12 +133,12 @@ def test_names_are_escaped(parts, tmp_path):
 
 
 def test_without_a_view_the_drawing_library_is_left_out(tmp_path):
-    path = write_report(tmp_path / "p.html", Parts(made=MADE)).path
+    path = write_report(tmp_path / "p.html", Evidence(made=MADE)).path
     assert path.stat().st_size < 60_000
     assert "What was not verified" in path.read_text(encoding="utf-8")
 
 
 def test_a_report_that_cannot_be_written_leaves_nothing(tmp_path):
     with pytest.raises(FileAccessError, match="cannot write"):
-        write_report(tmp_path / "no" / "p.html", Parts(made=MADE))
+        write_report(tmp_path / "no" / "p.html", Evidence(made=MADE))
     assert not list(tmp_path.iterdir())

@@ -6,40 +6,45 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from elastocal.identification import describe
-from elastocal.report.document import Absence
-from elastocal.report.document.markup import Markup, plain
-from elastocal.report.document.sections import (
-    cell,
-    codecs,
-    compliances,
-    instruments,
-    not_verified,
-    poses,
-    process,
-    provenance,
-    readings,
+from elastocal.identification import CalibrationSummary, describe
+from elastocal.records import from_data, to_data
+from elastocal.report.document import SECTIONS
+from elastocal.report.document.sections import PAPER
+from elastocal.verdict import (
+    MissingPart,
+    RunFigures,
+    codec_findings,
+    compliance_findings,
+    instrument_findings,
+    missing_findings,
+    process_findings,
+    reading_findings,
+)
+
+cell, poses, readings, instruments, compliances, codecs, process, _, provenance, not_verified = (
+    SECTIONS
 )
 
 
 def words(section, parts):
     """Return the text of a section, without tags."""
-    return " ".join(plain(Markup(section.SECTION.body(parts).html.replace("<", " <"))).split())
+    html = section.body(parts).html
+    return " ".join(re.sub(r"<[^>]*>", "", html.replace("<", " <")).split())
 
 
-def findings(section, parts, holds_back=True):
-    return [
-        each.text for each in section.SECTION.body(parts).findings if each.holds_back is holds_back
-    ]
+def findings(found, parts, holds_back=True):
+    return [each.text for each in found(parts) if each.holds_back is holds_back]
 
 
 def with_figures(parts, **changes):
-    calibrated = replace(parts.calibrated, figures={**parts.calibrated.figures, **changes})
-    return replace(parts, calibrated=calibrated)
+    data = to_data(parts.calibrated.figures) | changes
+    figures = from_data(CalibrationSummary, data, "figures")
+    return replace(parts, calibrated=replace(parts.calibrated, figures=figures))
 
 
 def with_summary(parts, **changes):
-    return replace(parts, summary={**parts.summary, **changes})
+    data = parts.summary.model_dump() | changes
+    return replace(parts, summary=RunFigures.model_validate(data))
 
 
 SUSPICIOUS = {
@@ -59,44 +64,44 @@ def test_poses_stand_with_their_places_and_the_other_technique(parts):
     assert "ioops (not used)" in text
     x = 1e3 * parts.plan.poses[0].tcp_position[0]
     assert f"{x:.1f}" in text
-    data = poses.SECTION.body(parts).data
+    data = poses.body(parts).data
     assert len(data["postures"]) == len(parts.plan.poses) + 1
     assert str(parts.plan.cell.file).rpartition("/")[0] not in text
 
 
 def test_readings_are_counted_and_the_worst_is_named(parts):
     text = words(readings, parts)
-    unseen = parts.again.unseen
+    unseen = parts.reproduction.unseen
     worst = int(unseen.error.argmax())
     assert f"pose {unseen.pose[worst]} {unseen.load_case[worst]} {1e3 * unseen.max:.3f} mm" in text
     assert "No reading looks wrong" in text or "looks wrong" in text
-    deflection = np.linalg.norm(parts.again.calibration.readings.deflection, axis=1)
+    deflection = np.linalg.norm(parts.reproduction.calibration.readings.deflection, axis=1)
     assert f"{1e3 * deflection.max():.3f} mm" in text
 
 
 def test_a_suspicious_reading_that_was_kept_holds_back_by_name(parts):
     found = with_figures(parts, suspicious=[{**SUSPICIOUS, "set_aside": False}])
-    assert findings(readings, found)[0] == (
+    assert findings(reading_findings, found)[0] == (
         "reading pose 3 north looks wrong and was kept in the fit (0.400 mm off)"
     )
-    assert "--exclude 3:north" in readings.SECTION.body(found).findings[0].advice
+    assert "--exclude 3:north" in next(reading_findings(found)).advice
     assert "pose 3 north 0.400 mm 9.5 0.20 kept in the fit" in words(readings, found)
 
 
 def test_a_blunder_that_was_set_aside_is_told_and_holds_nothing_back(parts):
     found = with_figures(parts, suspicious=[{**SUSPICIOUS, "set_aside": True}], warnings=[])
-    assert findings(readings, found) == []
-    assert "set aside as a blunder" in findings(readings, found, holds_back=False)[0]
+    assert findings(reading_findings, found) == []
+    assert "set aside as a blunder" in findings(reading_findings, found, holds_back=False)[0]
 
 
 def test_a_warning_of_the_calibration_holds_back(parts):
     found = with_figures(parts, suspicious=[], warnings=["the springs leave much"])
-    assert findings(readings, found) == ["calibration: the springs leave much"]
+    assert findings(reading_findings, found) == ["calibration: the springs leave much"]
 
 
 def test_a_partial_run_holds_back_and_names_the_poses(parts):
     some = replace(parts, dataset=parts.dataset.select(poses=parts.dataset.poses[2:]))
-    (told, *_) = findings(readings, some)
+    (told, *_) = findings(reading_findings, some)
     total = len(parts.plan.poses)
     assert (
         told == f"the run is partial: 2 of {total} planned poses have no usable reading (pose 0, 1)"
@@ -106,32 +111,34 @@ def test_a_partial_run_holds_back_and_names_the_poses(parts):
 def test_a_pose_without_a_usable_reading_counts_as_missing(parts):
     data = parts.dataset.to_xarray().copy(deep=True)
     data["status"].values[0] = 1
-    (told, *_) = findings(readings, replace(parts, dataset=type(parts.dataset).from_xarray(data)))
+    (told, *_) = findings(
+        reading_findings, replace(parts, dataset=type(parts.dataset).from_xarray(data))
+    )
     assert told.startswith("the run is partial: 1 of")
 
 
 def test_readings_that_were_left_out_by_hand_hold_back_by_name(parts):
-    settings = {**parts.calibrated.figures["settings"], "exclude": ["2", "3:north"]}
-    (told, *_) = findings(readings, with_figures(parts, settings=settings, suspicious=[]))
+    settings = {**to_data(parts.calibrated.figures.settings), "exclude": ["2", "3:north"]}
+    (told, *_) = findings(reading_findings, with_figures(parts, settings=settings, suspicious=[]))
     assert told.startswith("2, 3:north (pose, or pose:load case) was left out by hand")
 
 
 def test_registration_tool_and_noise_are_those_of_the_summary(parts):
     text = words(instruments, parts)
-    registration = parts.summary["registration"]
+    registration = parts.summary.registration.model_dump()
     assert f"{1e6 * registration['stations'][0]['residual_rms']:.1f} µm" in text
-    assert f"{parts.summary['tool']['mass_kg']['value']:.2f}" in text
+    assert f"{parts.summary.tool.mass_kg.value:.2f}" in text
     assert "No station moved" in text
     assert f"{parts.tool.mass:.2f} kg" in text
 
 
 def test_a_station_that_moved_holds_back_with_advice(parts):
     move = {"station": "station_1", "from_pose": 4, "distance": 2e-3, "angle": 0.0}
-    registration = {**parts.summary["registration"], "moves": [move]}
+    registration = {**parts.summary.registration.model_dump(), "moves": [move]}
     warning = "station station_1 moved between poses 3 and 4: the marker seemed to jump"
     found = with_summary(parts, registration=registration, warnings=[warning])
-    assert f"run: {warning}" in findings(instruments, found)
-    assert "Fix the tracker's stand" in instruments.SECTION.body(found).findings[0].advice
+    assert f"run: {warning}" in findings(instrument_findings, found)
+    assert "Fix the tracker's stand" in next(instrument_findings(found)).advice
     assert "moved before pose 4: the marker seemed to jump by 2.000 mm" in words(instruments, found)
 
 
@@ -156,7 +163,7 @@ def test_axial_springs_alone_are_advised_to_be_compared_with_more(parts):
         draws=model.draws[:, keep], observability=seen,
     )  # fmt: skip
     found = replace(parts, calibrated=replace(parts.calibrated, model=smaller))
-    (told,) = [each for each in compliances.SECTION.body(found).findings if each.advice]
+    (told,) = [each for each in compliance_findings(found) if each.advice]
     assert "--springs bearing" in told.advice
 
 
@@ -164,7 +171,10 @@ def test_more_springs_that_predict_worse_hold_back(parts):
     split = {"mean": 1e-5, "max": 2e-5, "readings": 9, "folds": 3}
     worse = {"springs": "actuated", "held_out": split,
              "difference": {"mean": -2e-5, "low": -3e-5, "high": -1e-5}}  # fmt: skip
-    assert "axial springs alone" in findings(compliances, with_figures(parts, comparison=worse))[0]
+    assert (
+        "axial springs alone"
+        in findings(compliance_findings, with_figures(parts, comparison=worse))[0]
+    )
 
 
 def saturated(parts, n_train, high, last=20):
@@ -191,13 +201,13 @@ def saturated(parts, n_train, high, last=20):
 )
 def test_a_codec_holds_back_unless_it_has_settled(parts, n_train, high, told, holds_back):
     found = saturated(parts, n_train, high)
-    (text,) = findings(codecs, found, holds_back)
+    (text,) = findings(codec_findings, found, holds_back)
     assert told in text
-    assert findings(codecs, found, not holds_back) == []
+    assert findings(codec_findings, found, not holds_back) == []
 
 
 def test_without_a_codec_the_number_of_poses_is_not_verified(parts):
-    assert "not verified (no codec)" in findings(codecs, replace(parts, codecs=()))[0]
+    assert "not verified (no codec)" in findings(codec_findings, replace(parts, codecs=()))[0]
 
 
 def test_table_1_has_the_figures_of_the_process_beside_those_of_the_paper(parts):
@@ -209,15 +219,15 @@ def test_table_1_has_the_figures_of_the_process_beside_those_of_the_paper(parts)
 
 
 def test_reductions_of_the_paper_are_those_of_its_own_deviations():
-    for case in process.PAPER.values():
+    for case in PAPER.values():
         for before, after, share in zip(case.before, case.after, case.reduction, strict=True):
             assert share == pytest.approx(1.0 - after / before, abs=3e-3)
 
 
 def test_a_process_beyond_the_tolerance_holds_back(parts):
     limits = replace(parts.limits, tolerance=1e-6)
-    assert "beyond the tolerance" in findings(process, replace(parts, limits=limits))[0]
-    assert findings(process, replace(parts, limits=replace(limits, tolerance=None))) == []
+    assert "beyond the tolerance" in findings(process_findings, replace(parts, limits=limits))[0]
+    assert findings(process_findings, replace(parts, limits=replace(limits, tolerance=None))) == []
 
 
 def test_provenance_has_versions_hashes_seeds_and_every_setting(parts):
@@ -241,18 +251,18 @@ def test_what_was_not_verified_is_never_empty(parts):
 @pytest.mark.parametrize(
     ("absence", "holds_back"),
     [
-        (Absence("dataset", "gone"), True),
-        (Absence("calibrated model", "gone"), True),
-        (Absence("tool file", "gone"), False),
-        (Absence("process", "gone"), False),
-        (Absence("codec", "torn", damaged=True), False),
+        (MissingPart("dataset", "gone"), True),
+        (MissingPart("calibrated model", "gone"), True),
+        (MissingPart("tool file", "gone"), False),
+        (MissingPart("process", "gone"), False),
+        (MissingPart("codec", "torn", damaged=True), False),
     ],
 )
 def test_only_what_is_essential_holds_back_when_it_is_missing(parts, absence, holds_back):
-    found = replace(parts, absent=(absence,))
-    assert len(findings(not_verified, found, holds_back)) == 1
-    assert findings(not_verified, found, not holds_back) == []
+    found = replace(parts, missing=(absence,))
+    assert len(findings(missing_findings, found, holds_back)) == 1
+    assert findings(missing_findings, found, not holds_back) == []
 
 
 def test_doubts_hold_back(parts):
-    assert findings(not_verified, replace(parts, absent=(), doubts=("odd",))) == ["odd"]
+    assert findings(missing_findings, replace(parts, missing=(), doubts=("odd",))) == ["odd"]

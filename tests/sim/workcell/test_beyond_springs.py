@@ -8,7 +8,7 @@ import pytest
 from elastocal.dataset import Dataset
 from elastocal.elastic import ElasticModel, layout
 from elastocal.identification import calibrate
-from elastocal.sim.workcell.robot import TrueRobot
+from elastocal.sim.workcell._robot import TrueRobot
 from support.simulated import example_cell, places
 
 

@@ -13,9 +13,9 @@ from elastocal.sim.workcell import (
     ErrorDraws,
     ErrorScales,
 )
+from elastocal.sim.workcell._instruments import _draw, force_gain
+from elastocal.sim.workcell._sampling import generator
 from elastocal.sim.workcell.campaign import TrueReadings
-from elastocal.sim.workcell.instruments import _draw, force_gain
-from elastocal.sim.workcell.sampling import generator
 from support.simulated import QUIET, Session, example_cell, marker_by_controller, places
 
 NANOMETRE = 1e-9

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from elastocal.sim.workcell.contact import Contact, ContactLaw
+from elastocal.sim.workcell._contact import Contact, ContactLaw
 
 LAW = ContactLaw(4e6, 1.5e6, 2.5e7, 0.5, 8e-6)
 R = np.array([[0.0, 0.0, -1.0], [0.0, 1.0, 0.0], [1.0, 0.0, 0.0]])

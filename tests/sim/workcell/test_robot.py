@@ -7,8 +7,7 @@ import pytest
 from elastocal.errors import DeviceError
 from elastocal.planning import make_plan
 from elastocal.robot import catalogue
-from elastocal.sim.workcell.robot import TrueRobot
-from elastocal.sim.workcell.robot_layout import lay_out_robot
+from elastocal.sim.workcell._robot import TrueRobot, lay_out_robot
 from support.simulated import example_cell, places
 
 STEP = 1e-6
@@ -153,7 +152,7 @@ def test_stiffnesses_of_the_file_are_taken():
     layout = lay_out_robot(example_cell(simulation={"gears": {"stiffness": values}}))
     which = layout.springs.gears.which
     np.testing.assert_allclose(layout.springs.stiffness[which], (1e6, 2e6, 3e6, 4e5, 5e5, 6e5))
-    assert [layout.skeleton.springs[i].joint for i in which] == list(
+    assert [layout.chain.springs[i].joint for i in which] == list(
         example_cell().robot.joint_names[1:]
     )
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from elastocal.errors import SchemaError
-from elastocal.sim.workcell.contact import TrueSurface
+from elastocal.sim.workcell._contact import TrueSurface
 from support.simulated import example_cell, places
 
 SQUARE = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])

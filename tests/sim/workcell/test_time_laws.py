@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from elastocal.sim.workcell.timeline import SettlingRamp, Trapezoid, Uniform, joint_move
+from elastocal.sim.workcell._timeline import SettlingRamp, Trapezoid, Uniform, joint_move
 
 LAWS = [Uniform(2.0), Trapezoid(3.0, 0.5), Trapezoid(1.0, 0.5), SettlingRamp(1.5, 0.1)]
 

@@ -81,13 +81,13 @@ class CellFile(StrictModel):
     search: Search = Field(default_factory=Search)
     process: ProcessFile | None = None
     acceptance: Acceptance = Field(default_factory=Acceptance)
-    """What the result is judged by; neither plan nor run depends on it."""
+    """Tolerances that the result is judged by; neither plan nor run depends on it."""
     procedure: ProcedureSettings = Field(default_factory=ProcedureSettings)
     devices: DeviceNames = Field(default_factory=DeviceNames)
     simulation: Simulation = Field(default_factory=Simulation)
-    """Of the simulated devices; the calibration never reads it."""
+    """Truth of the simulated devices; the calibration never reads it."""
     faults: tuple[Fault, ...] = ()
-    """What the simulated devices get wrong, and when."""
+    """Faults of the simulated devices, and when."""
 
     def __repr__(self) -> str:
         return "\n  ".join([f"CellFile {self.name!r}", *self.summary()])
@@ -176,7 +176,7 @@ class Cell:
 
     @property
     def name(self) -> str:
-        """What the file calls the cell, else the name of its folder."""
+        """Name that the file gives the cell, else the name of its folder."""
         return self.file.name or self.path.resolve().parent.name
 
     @property

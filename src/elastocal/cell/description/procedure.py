@@ -49,7 +49,7 @@ class Search(StrictModel):
     sampling: Literal["blue_noise", "uniform"] = "blue_noise"
     """How candidate points are spread: keeping their distance, or each by itself."""
     seed: Annotated[int, Field(ge=0, lt=2**63)] = 0
-    """Of everything random."""
+    """Seed of everything random."""
 
     @field_validator("pool")
     @classmethod

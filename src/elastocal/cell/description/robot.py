@@ -28,7 +28,7 @@ class RailEntry(StrictModel):
     """A linear axis that carries the robot; its frame is then the base."""
 
     name: str = "rail"
-    """Of its joint."""
+    """Name of its joint."""
     axis: Direction
     """Direction of positive travel in the rail's frame."""
     travel: Travel
@@ -62,7 +62,7 @@ class Tool(StrictModel):
     """Everything behind the flange, in the flange frame."""
 
     mass: Mass
-    """Of all of it, in kg."""
+    """Mass of all of it, in kg."""
     centre_of_mass: Point = (0.0, 0.0, 0.0)
     """In the flange frame, in m."""
     shapes: tuple[Shape, ...] = ()
@@ -79,7 +79,7 @@ class SensorEntry(StrictModel):
 
     name: str = ""
     pose: Pose = IDENTITY
-    """Of its measuring frame in the flange frame."""
+    """Pose of its measuring frame in the flange frame."""
     force_range: tuple[PositiveForce, PositiveForce, PositiveForce]
     """Largest force along each of its axes, in N."""
     moment_range: tuple[PositiveMoment, PositiveMoment, PositiveMoment]
@@ -106,7 +106,7 @@ class Tracker(StrictModel):
 
     name: str
     position: Point
-    """Of its beam's origin in base, in m; a rough value will do."""
+    """Place of its beam's origin in base, in m; a rough value will do."""
     range: Range
     """Nearest and farthest marker that it measures, in m."""
 

@@ -46,7 +46,7 @@ class TruthScale(StrictModel):
 
 
 class Gears(StrictModel):
-    """Gears of the six arm joints (`elastocal.sim.workcell.springs`)."""
+    """Gears of the six arm joints (`elastocal.sim.workcell`)."""
 
     stiffness: Annotated[tuple[RotationalStiffness, ...], _SIX] | None = None
     """At high torque, in N·m/rad; by default those of a 1.1 t arm, scaled with the moved mass."""
@@ -76,15 +76,15 @@ class Links(StrictModel):
     """Bending of the two long links."""
 
     bending: RotationalStiffness | None = None
-    """Of a hinge in the middle of the link, in N·m/rad; by default that of a 1.1 t arm, scaled
-    with the moved mass."""
+    """Stiffness of a hinge in the middle of the link, in N·m/rad; by default that of a 1.1 t arm,
+    scaled with the moved mass."""
 
 
 class Balancer(StrictModel):
     """Spring between carousel and arm, beside the gear of axis 2."""
 
     rate: TranslationalStiffness | None = None
-    """Of the spring, in N/m; by default one that carries about 3 kN·m of a 1.1 t arm stretched
+    """Rate of the spring, in N/m; by default one that carries about 3 kN·m of a 1.1 t arm stretched
     out, scaled with the moved mass."""
     free_length: PositiveLength = 0.3
     """In m."""
@@ -105,7 +105,7 @@ class Balancer(StrictModel):
 
 
 class Floor(StrictModel):
-    """What the robot stands on: foundation, rail carriage, base frame."""
+    """Foot of the robot: foundation, rail carriage, base frame."""
 
     tilt: RotationalStiffness = 4e7
     """About each of three axes through the foot, in N·m/rad."""
@@ -115,9 +115,9 @@ class ExternalAxes(StrictModel):
     """Drives of the axes before the arm."""
 
     linear: TranslationalStiffness = 4e7
-    """Of a rail's drive, in N/m."""
+    """Stiffness of a rail's drive, in N/m."""
     turning: RotationalStiffness = 8e6
-    """Of a turntable's drive, in N·m/rad."""
+    """Stiffness of a turntable's drive, in N·m/rad."""
 
 
 class EndEffector(StrictModel):
@@ -133,9 +133,9 @@ class ContactTruth(StrictModel):
     """Contact disk and tooling."""
 
     normal_stiffness: TranslationalStiffness = 4e6
-    """Of the urethane disk, in N/m: 0.3 mm at 1.1 kN."""
+    """Normal stiffness of the urethane disk, in N/m: 0.3 mm at 1.1 kN."""
     shear_stiffness: TranslationalStiffness = 1.5e6
-    """Of the disk before it slips at all, in N/m: 0.2 mm at 280 N."""
+    """Shear stiffness of the disk before it slips at all, in N/m: 0.2 mm at 280 N."""
     friction: Annotated[FiniteFloat, Field(gt=0.0)] | None = None
     """True coefficient of friction; by default that of the load cases."""
     micro_slip: Distance = 8e-6
@@ -144,7 +144,7 @@ class ContactTruth(StrictModel):
     slide_speed: PositiveSpeed = 5e-3
     """Speed at which a contact beyond its friction limit slides, in m/s."""
     tooling_stiffness: TranslationalStiffness = 2.5e7
-    """Of the tooling along its normal, in N/m."""
+    """Stiffness of the tooling along its normal, in N/m."""
     surface_offset: Point = (0.0, 0.0, 0.0)
     """How far the tooling stands from where the cell file puts it, in base, in m."""
 
@@ -193,7 +193,7 @@ class TrackerTruth(StrictModel):
     noise: Distance = 15e-6
     """Error that 95 % of the samples stay within along each axis, at no distance, in m."""
     noise_per_metre: Distance = 6e-6
-    """What each metre of distance adds, in m."""
+    """Error that each metre of distance adds, in m."""
     turbulence: Share = 0.3
     """Part of the noise that changes slowly, as moving air makes it, so that it averages badly."""
     placing: Distance = 0.02
@@ -204,7 +204,7 @@ class Simulation(StrictModel):
     """Section ``simulation`` of the cell file."""
 
     seed: Annotated[int, Field(ge=0)] = 0
-    """Of everything random in the simulated devices."""
+    """Seed of everything random in the simulated devices."""
     truth: TruthScale = TruthScale()
     """Factors on the stiffness of parts, without dimension."""
     gears: Gears = Gears()
@@ -276,11 +276,11 @@ class Fault(StrictModel):
     distance: PositiveLength = 1e-3
     """How far the contact slips, in m."""
     amplitude: Force = 40.0
-    """Of the force that never comes to rest, in N."""
+    """Amplitude of the force that never comes to rest, in N."""
     offset: Point = (0.5e-3, 0.0, 0.0)
     """How far the station is moved, in base, in m."""
     mass: Annotated[Mass, Field(le=1e3)] = 2.0
-    """What is put on the tool, in kg."""
+    """Mass that is put on the tool, in kg."""
 
     @model_validator(mode="before")
     @classmethod

@@ -71,7 +71,7 @@ class Shape(StrictModel):
 
     name: str = ""
     pose: Pose = IDENTITY
-    """Of the shape in its frame: the flange for parts of the tool, the base for fixtures."""
+    """Pose of the shape in its frame: the flange for parts of the tool, the base for fixtures."""
     box: Box | None = None
     cylinder: Cylinder | None = None
     sphere: Sphere | None = None
@@ -129,7 +129,7 @@ class RegionEntry(StrictModel):
     """A box or a polygon that bounds where poses may be."""
 
     pose: Pose = IDENTITY
-    """Of the box or polygon in the frame of the mesh."""
+    """Pose of the box or polygon in the frame of the mesh."""
     box: RegionBox | None = None
     polygon: RegionPolygon | None = None
 

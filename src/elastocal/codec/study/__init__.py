@@ -1,18 +1,16 @@
 """Study: Monte-Carlo over simulated cells, before anybody travels.
 
 Pure: what is simulated comes in as a function of the sample, where it is done as a function that
-spreads batches. `elastocal.cli.study_simulation` and `elastocal.cli.study_spread` bring both.
+spreads batches. `elastocal.workflows.study` brings the simulation.
 
-==============  =================================================================================
-`factors`       what may be varied; conditions
-`samples`       sample, its generators, its result
-`calibrating`   fit, and accuracy at unseen poses
-`settings`      what a study is a study of
-`store`         folder with finished samples; a killed study goes on
-`running`       batches
-`summary`       medians, quantiles, shares with intervals
-`files`         tidy tables and ``study.json``
-==============  =================================================================================
+============  ===================================================================================
+`conditions`  what may be varied; conditions
+`poses`       one pool of valid poses: verification poses set aside, the choice of each condition
+`samples`     sample, its generators, its fit, accuracy at unseen poses
+`store`       folder with design and finished samples; a killed study goes on
+`sampling`    batches, on processes or a Dask cluster
+`summary`     medians, quantiles, shares with intervals; tidy tables and ``study.json``
+============  ===================================================================================
 """
 
 import lazy_loader

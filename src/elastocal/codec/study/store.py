@@ -1,53 +1,87 @@
-"""Folder of a study: settings first, then finished samples in parts, each written whole or not.
+"""Folder of a study: its design first, then finished samples in parts, each written whole or not.
 
-A part is named after its samples. Its contents depend on nothing else but the settings, so a part
+A part is named after its samples. Its contents depend on nothing else but the design, so a part
 that two processes write is the same; a study that is killed goes on with what is missing. A part
-carries a digest over the settings and its samples: one of another study, or one that was edited,
+carries a digest over the design and its samples: one of another study, or one that was edited,
 is refused.
 """
 
 import json
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
-import numpy as np
-from pydantic import FiniteFloat
-
-from elastocal.codec.study.samples import Accuracy, Outcome, SampleResult
-from elastocal.codec.study.settings import SETTINGS_SCHEMA, StudySettings, check_same
-from elastocal.errors import FileAccessError, SchemaError
+from elastocal.codec.study.conditions import FACTORS, Condition, condition_name
+from elastocal.codec.study.samples import SampleResult
+from elastocal.errors import CodecError, FileAccessError, SchemaError
 from elastocal.files import sha256, write_text
-from elastocal.records import StrictModel, read_json
+from elastocal.records import read_json, record, to_data
 
-SETTINGS = "settings.json"
+DESIGN = "settings.json"
 """Name of the file by which a study's folder is known."""
+DESIGN_SCHEMA = "elastocal.study_settings/1"
 PARTS = "samples"
 """Name of the folder with finished samples."""
 PART_SCHEMA = "elastocal.study_samples/1"
+_LONGEST = 60
+"""Letters of a setting that a refusal still quotes whole; fingerprints are longer."""
 
 
-class OutcomeRecord(StrictModel):
-    """`Outcome` as it stands in files; floating point as text is exact in Python's JSON."""
+@record()
+class SpringLabel:
+    """A spring of a layout."""
 
-    error_mean: FiniteFloat
-    error_max: FiniteFloat
-    deflection_mean: FiniteFloat
-    compliance: tuple[FiniteFloat, ...]
-
-
-class SampleRecord(StrictModel):
-    """`SampleResult` as it stands in files."""
-
-    number: int
-    outcomes: tuple[OutcomeRecord, ...]
+    name: str
+    unit: str
+    """Of its compliance."""
 
 
-class Part(StrictModel):
+@record(DESIGN_SCHEMA)
+class StudyDesign:
+    """All that the numbers of a study depend on, but for the number of samples.
+
+    Two stretches of a study belong together only when this is the same.
+    """
+
+    cell: str
+    """Name of the cell."""
+    cell_fingerprint: str
+    """Over the cell file and the files that it names (`elastocal.cell.fingerprint`)."""
+    simulation_fingerprint: str
+    """Over what is simulated in the cell."""
+    seed: int
+    pool: int
+    """Candidates that calibration poses are chosen from."""
+    verification: int
+    """Verification poses."""
+    load_cases: tuple[str, ...]
+    """Those of the cell; verification takes all of them."""
+    conditions: tuple[Condition, ...]
+    springs: dict[str, tuple[SpringLabel, ...]]
+    """By layout, in the order of the compliances."""
+    versions: dict[str, str]
+    """Of the packages that make the numbers."""
+
+    @property
+    def varied(self) -> tuple[str, ...]:
+        """Factors with more than one value."""
+        return tuple(
+            key for key in FACTORS if len({each.value(key) for each in self.conditions}) > 1
+        )
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """What each condition is called: the values of the factors that are varied."""
+        return tuple(condition_name(self.varied, each) for each in self.conditions)
+
+
+@record(PART_SCHEMA, eq=False)
+class _Part:
     """Some finished samples."""
 
     digest: str
-    """SHA-256 over the settings of the study and these samples."""
-    samples: tuple[SampleRecord, ...]
+    """SHA-256 over the design of the study and these samples."""
+    samples: tuple[SampleResult, ...]
 
 
 class StudyStore:
@@ -57,7 +91,7 @@ class StudyStore:
         """Look at a folder; nothing is read or made yet."""
         self.folder = Path(folder)
 
-    def open(self, settings: StudySettings) -> None:
+    def open(self, design: StudyDesign) -> None:
         """Begin a study in an empty folder, or find the same one there.
 
         Raises
@@ -67,14 +101,14 @@ class StudyStore:
         FileAccessError
             If it holds something else, or cannot be written.
         """
-        path = self.folder / SETTINGS
+        path = self.folder / DESIGN
         if path.exists():
-            check_same(read_settings(path), settings, str(self.folder))
+            _check_same(read_design(path), design, str(self.folder))
             return
         try:
             self.folder.mkdir(parents=True, exist_ok=True)
             others = sorted(entry.name for entry in self.folder.iterdir())
-            # A kill may come between this and the settings.
+            # A kill may come between this and the design.
             if others and others != [PARTS]:
                 raise FileAccessError(
                     f"{self.folder} holds {others[0]} and no study: name another folder"
@@ -84,9 +118,9 @@ class StudyStore:
             raise
         except OSError as error:
             raise FileAccessError(f"cannot write {self.folder}: {error.strerror}") from error
-        write_text(path, _text(SETTINGS_SCHEMA, settings))
+        write_text(path, _on_one_line(design))
 
-    def keep(self, settings: StudySettings, results: Sequence[SampleResult]) -> None:
+    def keep(self, design: StudyDesign, results: Sequence[SampleResult]) -> None:
         """Write finished samples of a study; they are on the disk when this returns.
 
         Raises
@@ -94,12 +128,11 @@ class StudyStore:
         FileAccessError
             If they cannot be written.
         """
-        records = tuple(_record(result) for result in results)
-        part = Part(digest=_digest(settings, records), samples=records)
-        name = "-".join(f"{number:06d}" for number in (records[0].number, records[-1].number))
-        write_text(self.folder / PARTS / f"{name}.json", _text(PART_SCHEMA, part))
+        part = _Part(_digest(design, results), tuple(results))
+        name = "-".join(f"{number:06d}" for number in (results[0].number, results[-1].number))
+        write_text(self.folder / PARTS / f"{name}.json", _on_one_line(part))
 
-    def finished(self, settings: StudySettings) -> dict[int, SampleResult]:
+    def finished(self, design: StudyDesign) -> dict[int, SampleResult]:
         """Return the finished samples by number, rising.
 
         Raises
@@ -109,27 +142,27 @@ class StudyStore:
         """
         found: dict[int, SampleResult] = {}
         for path in sorted((self.folder / PARTS).glob("*.json")):
-            for result in read_part(path, settings):
+            for result in read_part(path, design):
                 found[result.number] = result
         return dict(sorted(found.items()))
 
 
-def read_settings(path: Path) -> StudySettings:
-    """Return the settings of a study.
+def read_design(path: Path) -> StudyDesign:
+    """Return the design of a study.
 
     Raises
     ------
     SchemaError, FileAccessError
         If the file holds none.
     """
-    settings = read_json(path, StudySettings, SETTINGS_SCHEMA)
-    missing = {each.springs for each in settings.conditions} - set(settings.springs)
-    if missing or not settings.conditions:
+    design = read_json(path, StudyDesign)
+    missing = {each.springs for each in design.conditions} - set(design.springs)
+    if missing or not design.conditions:
         raise SchemaError(f"{path}: springs of {', '.join(sorted(missing)) or 'any'} are missing")
-    return settings
+    return design
 
 
-def read_part(path: Path, settings: StudySettings) -> tuple[SampleResult, ...]:
+def read_part(path: Path, design: StudyDesign) -> tuple[SampleResult, ...]:
     """Return some finished samples of a study from their file.
 
     Raises
@@ -139,43 +172,41 @@ def read_part(path: Path, settings: StudySettings) -> tuple[SampleResult, ...]:
     FileAccessError
         If it cannot be read.
     """
-    part = read_json(path, Part, PART_SCHEMA)
-    if part.digest != _digest(settings, part.samples):
+    part = read_json(path, _Part)
+    if part.digest != _digest(design, part.samples):
         raise SchemaError(
             f"{path} was edited, or belongs to a study with other settings: delete it to have its"
             " samples simulated again"
         )
-    return tuple(_result(record) for record in part.samples)
+    return part.samples
 
 
-def _digest(settings: StudySettings, samples: Sequence[SampleRecord]) -> str:
-    contents = [settings.model_dump(mode="json"), [s.model_dump(mode="json") for s in samples]]
-    return sha256(json.dumps(contents, sort_keys=True, allow_nan=False))
+def _check_same(found: StudyDesign, wanted: StudyDesign, where: str) -> None:
+    """Refuse to go on with another study, with the first setting that differs."""
+    before, now = to_data(found), to_data(wanted)
+    for key in before:
+        if before[key] != now[key]:
+            raise CodecError(
+                f"{where} holds another study ({key.replace('_', ' ')}: {_short(before[key])}, not"
+                f" {_short(now[key])}): name another folder"
+            )
 
 
-def _text(schema: str, model: StrictModel) -> str:
-    return json.dumps(model.stated(schema), allow_nan=False) + "\n"
+def _short(value: object) -> str:
+    """Return a setting in so few letters that the difference is in sight."""
+    if isinstance(value, list):
+        return "; ".join(_short(each) for each in value)
+    if isinstance(value, dict):
+        return " ".join(str(each) for each in value.values())
+    text = str(value)
+    return text if len(text) < _LONGEST else f"{text[:12]}…"
 
 
-def _record(result: SampleResult) -> SampleRecord:
-    outcomes = tuple(
-        OutcomeRecord(
-            error_mean=each.accuracy.error_mean,
-            error_max=each.accuracy.error_max,
-            deflection_mean=each.accuracy.deflection_mean,
-            compliance=tuple(each.compliance.tolist()),
-        )
-        for each in result.outcomes
-    )
-    return SampleRecord(number=result.number, outcomes=outcomes)
+def _digest(design: StudyDesign, samples: Sequence[SampleResult]) -> str:
+    stated = to_data(design)
+    del stated["schema"]
+    return sha256(json.dumps([stated, to_data(samples)], sort_keys=True, allow_nan=False))
 
 
-def _result(record: SampleRecord) -> SampleResult:
-    outcomes = tuple(
-        Outcome(
-            Accuracy(each.error_mean, each.error_max, each.deflection_mean),
-            np.array(each.compliance),
-        )
-        for each in record.outcomes
-    )
-    return SampleResult(record.number, outcomes)
+def _on_one_line(value: Any) -> str:
+    return json.dumps(to_data(value), allow_nan=False) + "\n"

@@ -1,48 +1,62 @@
-"""What the samples of a study say about each condition, with intervals."""
+"""What the samples of a study say about each condition, with intervals; its tables and summary."""
 
 from collections.abc import Sequence
+from pathlib import Path
 
 import numpy as np
-from pydantic import FiniteFloat
 from scipy.special import bdtr, ndtri
 
 from elastocal.arrays import FloatArray
+from elastocal.codec.study.conditions import FACTORS, Condition, value_text
 from elastocal.codec.study.samples import SampleResult
-from elastocal.codec.study.settings import ConditionRecord, StudySettings
+from elastocal.codec.study.store import StudyDesign
+from elastocal.errors import CodecError
 from elastocal.identification import CONFIDENCE
-from elastocal.records import StrictModel
+from elastocal.records import read_json, record, write_json
+from elastocal.tables import write_table
 
-RELIABLE = 0.9
+STUDY_SCHEMA = "elastocal.study/1"
+_SUMMARY, _TABLE, _COMPLIANCES = "study.json", "study.csv", "compliance.csv"
+"""Names of the files in a study's folder."""
+_RELIABLE = 0.9
 """Share of the arms that a condition has to bring to the target before it is recommended."""
 
+_FACTOR_COLUMNS = tuple(
+    f"{key}[{factor.unit}]" if factor.unit else key for key, factor in FACTORS.items()
+)
+_ERRORS = ("error_mean", "error_max", "deflection_mean")
 
-class Distribution(StrictModel):
+
+@record()
+class Distribution:
     """Of an error over the arms, in m."""
 
-    median: FiniteFloat
-    median_low: FiniteFloat
+    median: float
+    median_low: float
     """Ends of the 95 % interval of the median."""
-    median_high: FiniteFloat
-    q05: FiniteFloat
-    q25: FiniteFloat
-    q75: FiniteFloat
-    q95: FiniteFloat
+    median_high: float
+    q05: float
+    q25: float
+    q75: float
+    q95: float
 
 
-class Share(StrictModel):
+@record()
+class Share:
     """Part of the arms that reach the target."""
 
-    share: FiniteFloat
-    low: FiniteFloat
+    share: float
+    low: float
     """Ends of its 95 % interval."""
-    high: FiniteFloat
+    high: float
 
 
-class ConditionSummary(StrictModel):
+@record()
+class ConditionSummary:
     """One condition."""
 
     name: str
-    factors: ConditionRecord
+    factors: Condition
     n: int
     """Arms."""
     error_mean: Distribution
@@ -55,14 +69,134 @@ class ConditionSummary(StrictModel):
     """Arms whose largest error is."""
 
 
+@record(STUDY_SCHEMA)
+class StudySummary:
+    """What a study says: contents of ``study.json``; all lengths in m."""
+
+    cell: str
+    seed: int
+    samples: int
+    """Arms."""
+    verification: int
+    """Poses at which every calibration was judged, none of which any has seen."""
+    load_cases: tuple[str, ...]
+    """Under which it was judged."""
+    target: float | None
+    """Error that is good enough, in m."""
+    advice: str
+    """What the study says about the target; empty without one."""
+    varied: tuple[str, ...]
+    """Factors with more than one value."""
+    conditions: tuple[ConditionSummary, ...]
+    versions: dict[str, str]
+
+    @property
+    def sentence(self) -> str:
+        """What was studied, and the error without any calibration."""
+        uncalibrated = micrometres(self.conditions[0].deflection_mean.median)
+        return (
+            f"{self.samples} simulated arms, errors at {self.verification} unseen poses under"
+            f" {', '.join(self.load_cases)}; uncalibrated {uncalibrated} µm"
+        )
+
+
+def study_summary(
+    design: StudyDesign, results: Sequence[SampleResult], target: float | None
+) -> StudySummary:
+    """Return what a study says.
+
+    Parameters
+    ----------
+    design : StudyDesign
+        Of the study.
+    results : sequence of SampleResult
+        Its samples.
+    target : float, optional
+        Error that is good enough, in m.
+
+    Raises
+    ------
+    CodecError
+        If the target is not above 0.
+    """
+    if target is not None and not target > 0.0:
+        raise CodecError(f"target of {target:g} m: must be above 0")
+    conditions = summarise(design, results, target)
+    return StudySummary(
+        cell=design.cell,
+        seed=design.seed,
+        samples=len(results),
+        verification=design.verification,
+        load_cases=design.load_cases,
+        target=target,
+        advice=advice(conditions, target),
+        varied=design.varied,
+        conditions=conditions,
+        versions=design.versions,
+    )
+
+
+def write_study(
+    folder: Path, design: StudyDesign, results: Sequence[SampleResult], summary: StudySummary
+) -> list[str]:
+    """Write tables and summary, each atomically; return the names of the files.
+
+    Raises
+    ------
+    FileAccessError
+        If a file cannot be written.
+    """
+    factors = [
+        tuple(value_text(condition.value(key)) for key in FACTORS)
+        for condition in design.conditions
+    ]
+    springs = [design.springs[condition.springs] for condition in design.conditions]
+    numbered = [
+        (result.number, number, outcome)
+        for result in results
+        for number, outcome in enumerate(result.outcomes)
+    ]
+    write_table(
+        folder / _TABLE,
+        ("sample", *_FACTOR_COLUMNS, *(f"{name}[m]" for name in _ERRORS)),
+        (
+            (sample, *factors[number], *(getattr(outcome, error) for error in _ERRORS))
+            for sample, number, outcome in numbered
+        ),
+    )
+    write_table(
+        folder / _COMPLIANCES,
+        ("sample", *_FACTOR_COLUMNS, "spring", "unit", "compliance"),
+        (
+            (sample, *factors[number], spring.name, spring.unit, value)
+            for sample, number, outcome in numbered
+            for spring, value in zip(springs[number], outcome.compliance.tolist(), strict=True)
+        ),
+    )
+    write_json(folder / _SUMMARY, summary)
+    return [_TABLE, _COMPLIANCES, _SUMMARY]
+
+
+def read_study(path: Path) -> StudySummary:
+    """Return what a study says, from its folder or its `_SUMMARY`.
+
+    Raises
+    ------
+    SchemaError, FileAccessError
+        If the file holds none.
+    """
+    path = Path(path)
+    return read_json(path / _SUMMARY if path.is_dir() else path, StudySummary)
+
+
 def summarise(
-    settings: StudySettings, results: Sequence[SampleResult], target: float | None
+    design: StudyDesign, results: Sequence[SampleResult], target: float | None
 ) -> tuple[ConditionSummary, ...]:
     """Return the summary of every condition.
 
     Parameters
     ----------
-    settings : StudySettings
+    design : StudyDesign
         Of the study.
     results : sequence of SampleResult
         Its samples.
@@ -70,28 +204,24 @@ def summarise(
         Error that is good enough, in m.
     """
     return tuple(
-        _summary(settings, number, record, results, target)
-        for number, record in enumerate(settings.conditions)
+        _summarise_condition(design, number, results, target)
+        for number in range(len(design.conditions))
     )
 
 
-def _summary(
-    settings: StudySettings,
-    number: int,
-    record: ConditionRecord,
-    results: Sequence[SampleResult],
-    target: float | None,
+def _summarise_condition(
+    design: StudyDesign, number: int, results: Sequence[SampleResult], target: float | None
 ) -> ConditionSummary:
-    accuracies = [result.outcomes[number].accuracy for result in results]
-    mean = np.array([each.error_mean for each in accuracies])
-    largest = np.array([each.error_max for each in accuracies])
+    outcomes = [result.outcomes[number] for result in results]
+    mean = np.array([each.error_mean for each in outcomes])
+    largest = np.array([each.error_max for each in outcomes])
     return ConditionSummary(
-        name=settings.name(record.condition),
-        factors=record,
-        n=len(accuracies),
+        name=design.names[number],
+        factors=design.conditions[number],
+        n=len(outcomes),
         error_mean=distribution(mean),
         error_max=distribution(largest),
-        deflection_mean=distribution(np.array([each.deflection_mean for each in accuracies])),
+        deflection_mean=distribution(np.array([each.deflection_mean for each in outcomes])),
         mean_reaches=None if target is None else share(int(np.sum(mean <= target)), len(mean)),
         max_reaches=None if target is None else share(int(np.sum(largest <= target)), len(mean)),
     )
@@ -148,22 +278,28 @@ def advice(conditions: Sequence[ConditionSummary], target: float | None) -> str:
     if target is None:
         return ""
     wanted = f"a mean error of {1e3 * target:.4g} mm at unseen poses"
-    good = [c for c in conditions if c.mean_reaches and c.mean_reaches.low >= RELIABLE]
+    good = [c for c in conditions if c.mean_reaches and c.mean_reaches.low >= _RELIABLE]
     if good:
         best = min(good, key=lambda c: (c.factors.poses, -c.mean_reaches.low))  # type: ignore[union-attr]
         reached = best.mean_reaches
         assert reached is not None
         return (
-            f"{best.factors.poses} poses are the fewest tried that bring {RELIABLE:.0%} of the arms"
-            f" to {wanted} ({best.name}: {reached.share:.0%} of {best.n}, 95 % interval"
+            f"{best.factors.poses} poses are the fewest tried that bring {_RELIABLE:.0%} of the"
+            f" arms to {wanted} ({best.name}: {reached.share:.0%} of {best.n}, 95 % interval"
             f" {reached.low:.0%} to {reached.high:.0%})"
         )
     shares = [(c.mean_reaches.share, c) for c in conditions if c.mean_reaches]
     most, best = max(shares, key=lambda each: each[0])
     text = (
-        f"no condition is shown to bring {RELIABLE:.0%} of the arms to {wanted}; the best,"
+        f"no condition is shown to bring {_RELIABLE:.0%} of the arms to {wanted}; the best,"
         f" {best.name}, brings {most:.0%} of {best.n}"
     )
-    if most >= RELIABLE:
+    if most >= _RELIABLE:
         return f"{text}: too few arms to prove it, take more --samples"
     return text
+
+
+def micrometres(length: float) -> str:
+    """Return a length in m in µm, without more digits than it deserves."""
+    value = 1e6 * length
+    return f"{value:.0f}" if value >= 99.95 else f"{value:.3g}"

@@ -21,6 +21,7 @@ from .tool import (
     SensorLoad as SensorLoad,
     SensorMount as SensorMount,
     ToolResult as ToolResult,
+    read_sensor_load as read_sensor_load,
     read_tool as read_tool,
     sensor_load as sensor_load,
     tool_result as tool_result,

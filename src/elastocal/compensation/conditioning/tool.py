@@ -9,6 +9,7 @@ from elastocal.arrays import FloatArray
 from elastocal.compensation.conditioning.tool_fit import TOOL_UNKNOWNS, ToolFit
 from elastocal.errors import CompensationError, nearest
 from elastocal.records import read_json, record, write_json
+from elastocal.results import Result
 from elastocal.robot import GRAVITY, Robot, inverse_transform, parse_urdf
 
 _RIGID = 1e-6
@@ -97,7 +98,7 @@ _Triple = tuple[float, float, float]
 
 
 @record("elastocal.tool/1")
-class ToolResult:
+class ToolResult(Result):
     """Tool and sensor from static postures: the contents of a tool file; SI units."""
 
     flange: str
@@ -223,6 +224,22 @@ def sensor_load(tool: ToolResult, robot: Robot) -> SensorLoad:
         T_tcp_sensor=inverse_transform(robot.forward(home)) @ T_base_sensor,
         gravity=np.array(tool.gravity),
     )
+
+
+def read_sensor_load(tool: Path | None, robot: Robot) -> SensorLoad | None:
+    """Return the tool of a file at a robot's tool centre point; None for no file.
+
+    Raises
+    ------
+    CompensationError
+        If it does not fit the robot; the message names the file.
+    """
+    if tool is None:
+        return None
+    try:
+        return sensor_load(read_tool(tool), robot)
+    except CompensationError as error:
+        raise CompensationError(f"{tool}: {error}") from error
 
 
 def _flange(robot: Robot, link: str) -> Robot:

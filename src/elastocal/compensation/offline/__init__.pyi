@@ -33,4 +33,9 @@ from .path_rows import (
     row_blocks as row_blocks,
     turned_to_base as turned_to_base,
 )
-from .summary import CorrectionSummary as CorrectionSummary, LengthSummary as LengthSummary
+from .summary import (
+    CorrectionFigures as CorrectionFigures,
+    CorrectionSummary as CorrectionSummary,
+    LengthStatistics as LengthStatistics,
+    LengthSummary as LengthSummary,
+)

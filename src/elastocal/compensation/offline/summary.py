@@ -6,11 +6,43 @@ import numpy as np
 
 from elastocal.arrays import FloatArray
 from elastocal.compensation.offline.correct import PathCorrection
+from elastocal.records import record
+
+
+@record()
+class LengthStatistics:
+    """A length over the rows, in m."""
+
+    mean: float
+    max: float
+    at: str
+    """Name of the row with the largest."""
+
+
+@record()
+class CorrectionFigures:
+    """Figures of a whole correction, predicted by the model."""
+
+    rows: int
+    deviation: LengthStatistics
+    """Deviation of the path as programmed."""
+    first_order: LengthStatistics
+    """Deviation that one first-order step would leave."""
+    residual: LengthStatistics
+    """Deviation that the correction leaves."""
+    correction: LengthStatistics
+    """Distance between programmed and corrected position."""
+    posture_jumps: int
+    """Rows at which the posture changes from the row before."""
+    first_jump: str
+    """Name of the first of them."""
+    pulled: int
+    """Rows at which the force draws the tool out, which a surface cannot."""
 
 
 @dataclass(frozen=True)
 class LengthSummary:
-    """Mean and largest of a length over the rows."""
+    """Sum and largest of a length over the rows so far."""
 
     total: float = 0.0
     """Sum, in m."""
@@ -79,19 +111,19 @@ class CorrectionSummary:
             pulled=self.pulled + int(correction.pulled.sum()),
         )
 
-    def figures(self) -> dict[str, object]:
-        """Return the figures by name, lengths in m."""
-        lengths = ("deviation", "first_order", "residual", "correction")
-        figures: dict[str, object] = {"rows": self.rows}
-        for name in lengths:
-            figure: LengthSummary = getattr(self, name)
-            figures[name] = {
-                "mean": figure.total / max(self.rows, 1),
-                "max": figure.largest,
-                "at": figure.label,
-            }
-        return figures | {
-            "posture_jumps": self.jumps,
-            "first_jump": self.first_jump,
-            "pulled": self.pulled,
-        }
+    def figures(self) -> CorrectionFigures:
+        """Return the figures over all rows so far."""
+
+        def statistics(length: LengthSummary) -> LengthStatistics:
+            return LengthStatistics(length.total / max(self.rows, 1), length.largest, length.label)
+
+        return CorrectionFigures(
+            rows=self.rows,
+            deviation=statistics(self.deviation),
+            first_order=statistics(self.first_order),
+            residual=statistics(self.residual),
+            correction=statistics(self.correction),
+            posture_jumps=self.jumps,
+            first_jump=self.first_jump,
+            pulled=self.pulled,
+        )

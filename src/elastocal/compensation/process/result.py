@@ -13,6 +13,7 @@ import numpy as np
 from elastocal.arrays import FloatArray
 from elastocal.compensation.process.loop import CourseDeviation
 from elastocal.records import record
+from elastocal.results import Result
 
 
 @record()
@@ -72,7 +73,7 @@ class ProcessRun:
 
 
 @record("elastocal.process/1")
-class SimulateProcessResult:
+class SimulateProcessResult(Result):
     """The contents of ``table.json``."""
 
     cell: str

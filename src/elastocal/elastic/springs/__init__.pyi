@@ -13,7 +13,6 @@ from .kinds import (
     KINDS as KINDS,
     AnySpring as AnySpring,
     check_springs as check_springs,
-    spring_units as spring_units,
     unit_of as unit_of,
 )
 from .spring import (

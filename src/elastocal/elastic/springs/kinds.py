@@ -37,14 +37,10 @@ else:
     """A spring of any kind, as a field of a file's record."""
 
 
-def spring_units() -> tuple[Unit, ...]:
-    """Return every unit that parameters of springs have, each once."""
-    return tuple(dict.fromkeys(unit for kind in KINDS.values() for unit in kind.units))
-
-
 def unit_of(si: str) -> Unit:
     """Return the unit that files state so; one that no kind has is shown as it is."""
-    return next((unit for unit in spring_units() if unit.si == si), Unit(si, si))
+    known = (unit for kind in KINDS.values() for unit in kind.units if unit.si == si)
+    return next(known, Unit(si, si))
 
 
 def check_springs(springs: Sequence[Spring], joint_names: Sequence[str]) -> None:

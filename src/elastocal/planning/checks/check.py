@@ -1,4 +1,4 @@
-"""What every check of a calibration pose offers.
+"""The interface of all checks of a calibration pose.
 
 A check is one small class with two verbs' worth of interface: a name with a unit, and the margin
 of many candidates at once. Positive is fine. A check that lacks the numbers to judge says so; it
@@ -29,7 +29,7 @@ class Check(Protocol):
 
     @property
     def advice(self) -> str:
-        """What a user can move when this check refuses most candidates."""
+        """Advice to a user when this check refuses most candidates."""
 
     def margin(self, postures: Postures) -> FloatArray:
         """Return how far each posture is from being refused, shape (pose,); positive is fine."""
@@ -45,7 +45,7 @@ class PointCheck(Check, Protocol):
 
 @dataclass(frozen=True, eq=False)
 class Checks:
-    """What a pose has to pass, in the order of what it costs to ask."""
+    """All that a pose has to pass, in the order of what it costs to ask."""
 
     point: tuple[PointCheck, ...] = ()
     """Asked of the sampled points, before any robot."""

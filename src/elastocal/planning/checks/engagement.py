@@ -14,7 +14,7 @@ class EdgeCheck:
     """Distance from the contact point to the nearest edge, less disk radius and margin."""
 
     edge_distance: FloatArray
-    """Of each sampled point, shape (point,), in m."""
+    """Distance of each sampled point from the edge, shape (point,), in m."""
     radius: float
     """Radius of the contact disk in m."""
     keep: float

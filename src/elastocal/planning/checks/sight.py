@@ -109,7 +109,7 @@ class SightCheck:
     acceptance: float
     """Half angle of the cone within which the marker returns the beam, in rad."""
     obstacles: trimesh.Trimesh | None = None
-    """What stands still and may be in the way, in base."""
+    """All that stands still and may be in the way, in base."""
     moving: MovingSolids | None = None
     """Links and tool, which may be in the way too."""
     name: str = "sight"

@@ -227,7 +227,7 @@ class Speeds:
     """Speeds of a program: those of the cell, but never above the limits of this module."""
 
     ptp_percent: int
-    """Of PTP moves, in percent of the axes' largest speeds."""
+    """Speed of PTP moves, in percent of the axes' largest speeds."""
     lin: float
     """Between approach pose and near contact, in m/s."""
     touch: float

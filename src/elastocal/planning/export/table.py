@@ -3,13 +3,11 @@
 The plan itself is ``plan.json``; this table is rounded and nothing reads it back.
 """
 
-import csv
-import io
 from pathlib import Path
 
-from elastocal.files import write_text
 from elastocal.planning.plan_result import Joints, PlanResult, PoseRecord
 from elastocal.robot import Robot, xyzabc_from_T
+from elastocal.tables import write_table as write_rows
 from elastocal.units import factor
 
 PLAN_TABLE = "plan.csv"
@@ -38,12 +36,9 @@ def write_table(folder: Path, plan: PlanResult) -> Path:
     robot = Robot.from_urdf(plan.robot.urdf, plan.robot.tcp, plan.robot.base)
     rank = {pose: number for number, pose in enumerate(plan.search.order)}
     rows = [_row(plan, pose, rank[pose.id], robot.revolute) for pose in plan.poses]
-    buffer = io.StringIO()
-    writer = csv.DictWriter(buffer, list(dict.fromkeys(key for row in rows for key in row)))
-    writer.writeheader()
-    writer.writerows(rows)
+    header = list(dict.fromkeys(key for row in rows for key in row))
     path = Path(folder) / PLAN_TABLE
-    write_text(path, buffer.getvalue().replace("\r\n", "\n"))
+    write_rows(path, header, ([row.get(key, "") for key in header] for row in rows))
     return path
 
 

@@ -1,4 +1,4 @@
-"""What moves a robot in its cell: speeds, surroundings, via poses to try, retreats."""
+"""Moves of a robot in its cell: speeds, surroundings, via poses to try, retreats."""
 
 import math
 from dataclasses import dataclass
@@ -40,7 +40,7 @@ class AxisMotion:
     """
 
     speed: FloatArray
-    """Of each joint, shape (joint,), in rad/s or m/s, above 0."""
+    """Speed of each joint, shape (joint,), in rad/s or m/s, above 0."""
     acceleration_time: float
     """t_a in s, above 0."""
 
@@ -92,12 +92,12 @@ class Mover:
     solver: InverseKinematics
 
     def lifted(self, q_approach: FloatArray, normal: FloatArray) -> FloatArray:
-        """Return via postures off an approach pose, shape (lift, joint); see `vias.lifted`."""
-        return lifted(self.solver, q_approach, normal)
+        """Return via postures off an approach pose, shape (lift, joint); see `lifted_vias`."""
+        return lifted_vias(self.solver, q_approach, normal)
 
     def detours(self, start: FloatArray, end: FloatArray) -> FloatArray:
-        """Return via postures about a way, shape (detour, joint); see `vias.detours`."""
-        return detours(self.solver.robot, start, end)
+        """Return via postures about a way, shape (detour, joint); see `detour_vias`."""
+        return detour_vias(self.solver.robot, start, end)
 
 
 def mover_for(cell: Cell, scene: CollisionScene) -> Mover:
@@ -160,7 +160,7 @@ def clear_retreats(cell: Cell, mover: Mover, postures: Postures) -> BoolArray:
     return clear
 
 
-def lifted(
+def lifted_vias(
     solver: InverseKinematics,
     q_approach: FloatArray,
     normal: FloatArray,
@@ -197,7 +197,7 @@ def lifted(
     return np.array(postures).reshape(-1, len(q_approach))
 
 
-def detours(robot: Robot, start: FloatArray, end: FloatArray) -> FloatArray:
+def detour_vias(robot: Robot, start: FloatArray, end: FloatArray) -> FloatArray:
     """Return postures spread evenly about a way: the beginning of a Halton sequence (1960).
 
     They fill the box that the two ends span in joint space, widened by `_WIDTH` within the joint

@@ -15,8 +15,8 @@ from elastocal.arrays import FloatArray, IndexArray
 from elastocal.errors import PlanningError
 from elastocal.planning.motion.mover import Mover
 from elastocal.planning.motion.tour import _Cuts, shortest_tour
-from elastocal.planning.pool import Progress
 from elastocal.planning.postures import Postures
+from elastocal.progress import Progress, silent
 
 VISITING = "visiting order"
 """Stage under which progress is reported."""
@@ -179,7 +179,7 @@ def plan_route(
     home: ArrayLike,
     postures: Postures,
     mover: Mover,
-    progress: Progress = lambda *_: None,
+    progress: Progress = silent,
 ) -> Route:
     """Return the quickest round through the approach poses that is free of collision.
 
@@ -197,7 +197,7 @@ def plan_route(
     mover : Mover
         What moves the robot; see `mover_for`.
     progress : callable, optional
-        Told how many moves of the present tour are known to be free, and how many it has.
+        Hears how many moves of the present tour are known to be free, and how many it has.
 
     Raises
     ------
@@ -207,7 +207,7 @@ def plan_route(
         If HOME is not free of collision.
     """
     home = mover.sweep.scene.robot.check_positions(home)
-    refuse_blocked_home(home, mover)
+    require_free_home(home, mover)
     roadmap = _Roadmap(mover, np.concatenate([home[None], postures.q_approach]), postures.normal)
     nodes = np.array([_HOME_NODE, *sorted(roadmap.stems)], dtype=np.intp)
     cost, cuts = mover.axes.between(roadmap.q[nodes]), _Cuts()
@@ -238,8 +238,8 @@ def _pose(node: int) -> int | None:
     return None if node == _HOME_NODE else node - 1
 
 
-def refuse_blocked_home(home: FloatArray, mover: Mover) -> None:
-    """Refuse a HOME that is not free of collision, by the two bodies that are nearest.
+def require_free_home(home: FloatArray, mover: Mover) -> None:
+    """Require a HOME that is free of collision, or name the two bodies that are nearest.
 
     Parameters
     ----------

@@ -1,6 +1,7 @@
 """COVER: poses spread over the pool by Gonzalez' heuristic (paper Pseudocode 2)."""
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -74,22 +75,14 @@ class Cover:
         If ``d_max`` is not above 0.
     """
 
+    name: ClassVar[str] = "cover"
+    nested: ClassVar[bool] = True
     d_max: float | None = None
     first: int | None = None
 
     def __post_init__(self) -> None:
         if self.d_max is not None and not self.d_max > 0.0:
             raise PlanningError(f"d_max {self.d_max!r} m: must be above 0, or left out")
-
-    @property
-    def name(self) -> str:
-        """Name of the technique."""
-        return "cover"
-
-    @property
-    def nested(self) -> bool:
-        """Whether smaller choices are prefixes of larger ones: they are."""
-        return True
 
     def search(
         self,

@@ -6,6 +6,7 @@ robot calibration with the local convergence method and Tabu search", IJRR 24, 2
 """
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -82,6 +83,8 @@ class ExchangeSearch:
         If the criterion is unknown, or a number is below 1.
     """
 
+    nested: ClassVar[bool] = False
+    """A search for fewer poses is a search of its own."""
     criterion: str = "d"
     starts: int = 5
     cap: int = 1000
@@ -97,11 +100,6 @@ class ExchangeSearch:
     def name(self) -> str:
         """Name of the technique."""
         return self.label or f"exchange-{self.criterion}"
-
-    @property
-    def nested(self) -> bool:
-        """Whether smaller choices are prefixes of larger ones: each is a search of its own."""
-        return False
 
     def search(
         self, candidates: Candidates, count: int, rng: np.random.Generator | None = None

@@ -1,4 +1,4 @@
-"""What every search technique is given (candidates), offers, and returns (a selection)."""
+"""The interface of all search techniques: candidates in, selection out."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -128,7 +128,7 @@ class Selection:
     name: str
     """Name of the technique that chose them."""
     trace: Mapping[str, FloatArray] = field(default_factory=dict)
-    """What the technique saw of the first 1, 2, … n poses, by name, each of shape (n,)."""
+    """Figures of the first 1, 2, … n poses, by name, each of shape (n,)."""
 
     def __post_init__(self) -> None:
         order = np.array(self.order, dtype=np.intp)

@@ -1,6 +1,7 @@
 """Poses drawn at random: what every other technique has to beat."""
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
@@ -11,15 +12,9 @@ from elastocal.planning.search.protocol import Candidates, Selection, check_coun
 class RandomChoice:
     """Draw without replacement, every candidate as likely as any other."""
 
-    @property
-    def name(self) -> str:
-        """Name of the technique."""
-        return "random"
-
-    @property
-    def nested(self) -> bool:
-        """Whether smaller choices are prefixes of larger ones: from equal generators they are."""
-        return True
+    name: ClassVar[str] = "random"
+    nested: ClassVar[bool] = True
+    """Smaller choices are prefixes of larger ones if the generators are equal."""
 
     def search(
         self, candidates: Candidates, count: int, rng: np.random.Generator | None = None

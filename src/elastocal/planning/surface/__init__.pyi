@@ -11,6 +11,7 @@ from .distances import (
 )
 from .findings import (
     Finding as Finding,
+    Reachable as Reachable,
     ReachableFrom as ReachableFrom,
     arm_reach as arm_reach,
     first_joint_positions as first_joint_positions,

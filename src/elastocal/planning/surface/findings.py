@@ -1,4 +1,4 @@
-"""What is odd about a surface, said in one line each, before a robot is sent there."""
+"""Oddities of a surface, in one line each, before a robot is sent there."""
 
 from collections.abc import Callable
 from dataclasses import dataclass

@@ -1,7 +1,6 @@
 """The tooling surface S of the paper (2.2): triangles in base, their normals and their borders."""
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -12,9 +11,10 @@ import trimesh
 from numpy.typing import ArrayLike
 
 from elastocal.arrays import BoolArray, FloatArray, IndexArray
-from elastocal.planning.surface import topology
+from elastocal.planning._rows import Rows
+from elastocal.planning.surface import _topology as topology
+from elastocal.planning.surface._topology import corner_normals, face_normals_and_areas
 from elastocal.planning.surface.mesh import SurfaceError, TriangleMesh, read_mesh
-from elastocal.planning.surface.topology import corner_normals, face_normals_and_areas
 
 CREASE_ANGLE = math.radians(30.0)
 """Normals of neighbouring faces further apart than this meet in a crease, by default.
@@ -44,7 +44,7 @@ class Region(Protocol):
 
 
 @dataclass(frozen=True, eq=False)
-class SurfacePoints:
+class SurfacePoints(Rows):
     """Points on a surface."""
 
     position: FloatArray
@@ -55,26 +55,6 @@ class SurfacePoints:
     """Shape (point,)."""
     barycentric: FloatArray
     """Weights of the face's corners, shape (point, 3)."""
-
-    def __len__(self) -> int:
-        return len(self.position)
-
-    def take(self, chosen: ArrayLike) -> "SurfacePoints":
-        """Return some of the points, by number or by mask."""
-        keep = np.asarray(chosen)
-        return SurfacePoints(
-            self.position[keep], self.normal[keep], self.face[keep], self.barycentric[keep]
-        )
-
-    @staticmethod
-    def joined(parts: "Sequence[SurfacePoints]") -> "SurfacePoints":
-        """Return the points of several, one after the other."""
-        return SurfacePoints(
-            np.concatenate([part.position for part in parts]),
-            np.concatenate([part.normal for part in parts]),
-            np.concatenate([part.face for part in parts]),
-            np.concatenate([part.barycentric for part in parts]),
-        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,7 +89,7 @@ class Surface:
 
     @property
     def area(self) -> float:
-        """Of all faces, in m², whatever the region."""
+        """Area of all faces, in m², whatever the region."""
         return float(self.face_areas.sum())
 
     @cached_property

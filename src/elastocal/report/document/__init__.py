@@ -1,13 +1,13 @@
 """The report of a calibration: one HTML file that an inspector can sign.
 
-================  ==================================================================
-`places`          where the files of a run lie
-`gather`          from files to `parts`, with what is missing and why
-`again`           the calibration once more from its readings, and its errors
-`verdict`         light, reasons, and what would improve the result
-`sections`        one file a section: from parts to HTML
-`page`, `pdf`     the whole document
-================  ==================================================================
+==========  =====================================================================
+`sections`  one file a section: from the evidence to blocks
+`blocks`    paragraphs, tables, pictures; `blocks.html` shows them
+`page`      the whole document, with the order of its sections
+`chromium`  the document on paper, where a Chromium is present
+==========  =====================================================================
+
+The evidence and the verdict come from `elastocal.verdict`.
 """
 
 import lazy_loader

@@ -1,5 +1,35 @@
-from .chromium import find_browser as find_browser
-from .gather import Options as Options, gather as gather
-from .page import Written as Written, write_report as write_report
-from .parts import Absence as Absence, Parts as Parts
-from .pdf import write_pdf as write_pdf
+from .blocks import (
+    Block as Block,
+    Bullets as Bullets,
+    Cell as Cell,
+    Code as Code,
+    Content as Content,
+    Details as Details,
+    Facts as Facts,
+    Heading as Heading,
+    Paragraph as Paragraph,
+    Picture as Picture,
+    PlanScene as PlanScene,
+    PoseButton as PoseButton,
+    Row as Row,
+    Section as Section,
+    Stamp as Stamp,
+    Table as Table,
+    Verbatim as Verbatim,
+    flattened as flattened,
+    picture as picture,
+)
+from .chromium import (
+    BROWSERS as BROWSERS,
+    Message as Message,
+    Tab as Tab,
+    find_browser as find_browser,
+    open_tab as open_tab,
+    write_pdf as write_pdf,
+)
+from .page import (
+    SECTIONS as SECTIONS,
+    WrittenReport as WrittenReport,
+    verdict_html as verdict_html,
+    write_report as write_report,
+)

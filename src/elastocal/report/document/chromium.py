@@ -5,6 +5,7 @@ DevTools protocol goes over two pipes (file descriptors 3 and 4 of the child): n
 any port, and nothing is asked of the network.
 """
 
+import base64
 import fcntl
 import json
 import os
@@ -19,6 +20,7 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 from elastocal.errors import FileAccessError
+from elastocal.files import replacing
 
 BROWSERS = ("chromium", "chromium-browser", "google-chrome", "chrome")
 """Names that are looked for on the search path, in order."""
@@ -56,6 +58,30 @@ def find_browser() -> str:
     raise FileAccessError(f"--pdf needs a Chromium: none of {', '.join(BROWSERS)} is on the path")
 
 
+def write_pdf(page: Path, path: Path, browser: str) -> Path:
+    """Print a page to a PDF file, atomically; return its path.
+
+    Parameters
+    ----------
+    page : Path
+        HTML file that sets ``data-ready`` of its root to ``yes`` when it is drawn.
+    path : Path
+        PDF file.
+    browser : str
+        From `find_browser`.
+
+    Raises
+    ------
+    FileAccessError
+        If the browser fails or the file cannot be written.
+    """
+    with replacing(path) as temporary, open_tab(browser) as tab:
+        tab.open(page)
+        printed = tab.call("Page.printToPDF", preferCSSPageSize=True, printBackground=True)
+        temporary.write_bytes(base64.b64decode(printed["data"]))
+    return path
+
+
 class Tab:
     """One page in a browser that was started by `open_tab`."""
 
@@ -63,7 +89,7 @@ class Tab:
         self._browser, self._read, self._write = browser, read, write
         self._buffer, self._count, self._session = b"", 0, ""
         self.events: list[Message] = []
-        """What the page and the browser said by themselves."""
+        """Messages that the page and the browser sent by themselves."""
         target = self.call("Target.createTarget", url="about:blank")["targetId"]
         attached = self.call("Target.attachToTarget", targetId=target, flatten=True)
         self._session = attached["sessionId"]

@@ -1,41 +1,42 @@
 """The whole document: verdict, contents, sections, a place to sign."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
-from html import escape
 from pathlib import Path
-from string import Template
 from typing import Any
-
-from plotly.offline import get_plotlyjs
 
 from elastocal import __version__
 from elastocal.files import write_text
-from elastocal.report.document.advice import advised
-from elastocal.report.document.heading import verdict_html
-from elastocal.report.document.markup import stamp
-from elastocal.report.document.parts import Parts
-from elastocal.report.document.section import Content
-from elastocal.report.document.sections import SECTIONS
-from elastocal.report.document.verdict import Verdict, judge
-from elastocal.report.pages.templating import POLICY, embedded, template
+from elastocal.identification import UnseenErrors
+from elastocal.report.document import sections as exported
+from elastocal.report.document.blocks import Block, Facts, Paragraph, Section
+from elastocal.report.pages import render
+from elastocal.verdict import Evidence, Verdict, judge_evidence
+from elastocal.wording import mm
+
+_EXPORTED = (getattr(exported, name) for name in dir(exported))
+SECTIONS: tuple[Section, ...] = tuple(
+    sorted((each for each in _EXPORTED if isinstance(each, Section)), key=lambda each: each.place)
+)
+"""Every section that `elastocal.report.document.sections` exports, in order."""
 
 
 @dataclass(frozen=True)
-class Written:
+class WrittenReport:
     """A report that was written."""
 
     path: Path
     verdict: Verdict
 
 
-def write_report(path: Path, parts: Parts) -> Written:
+def write_report(path: Path, evidence: Evidence) -> WrittenReport:
     """Write the report, atomically.
 
     Parameters
     ----------
     path : Path
         An HTML file.
-    parts : Parts
+    evidence : Evidence
         Whatever is there.
 
     Raises
@@ -43,38 +44,67 @@ def write_report(path: Path, parts: Parts) -> Written:
     FileAccessError
         If it cannot be written.
     """
-    contents = {section.identifier: section.body(parts) for section in SECTIONS}
-    findings = [finding for content in contents.values() for finding in content.findings]
-    verdict = judge(parts, findings, tuple(advised(parts)))
-    write_text(path, _page(parts, verdict, contents))
-    return Written(Path(path), verdict)
+    verdict = judge_evidence(evidence)
+    write_text(path, _page(evidence, verdict))
+    return WrittenReport(Path(path), verdict)
 
 
-def _page(parts: Parts, verdict: Verdict, contents: dict[str, Content]) -> str:
-    data: dict[str, Any] = {key: each.data for key, each in contents.items() if each.data}
-    return Template(template("report.html")).substitute(
-        policy=escape(POLICY),
-        title=escape(f"Calibration report: {parts.name}"),
-        subtitle=escape(_subtitle(parts)),
-        css=template("report.css"),
-        verdict=verdict_html(parts, verdict),
-        contents="".join(
-            f'<li><a href="#{section.identifier}">{escape(section.title)}</a></li>'
-            for section in SECTIONS
-        ),
-        sections="".join(
-            f'<section aria-labelledby="{section.identifier}"><h2 id="{section.identifier}">'
-            f"{number}. {escape(section.title)}</h2>{contents[section.identifier].html}</section>"
-            for number, section in enumerate(SECTIONS, start=1)
-        ),
-        footer=f"Made by elastocal {escape(__version__)}, {stamp(parts.made)}.",
-        data=embedded(data),
-        # Four and a half megabytes that only the view in three dimensions needs.
-        plotly=get_plotlyjs() if "poses" in data else "",
-        script=template("view.js") + template("report.js"),
+def _page(evidence: Evidence, verdict: Verdict) -> str:
+    sections = [(section, section.body(evidence)) for section in SECTIONS]
+    data = {section.identifier: content.data for section, content in sections if content.data}
+    return render(
+        "report.html",
+        title=f"Calibration report: {evidence.name}",
+        styles=("report.css",),
+        scripts=("view.js", "report.js"),
+        # Only the view in three dimensions needs the drawing library.
+        interactive="poses" in data,
+        data=data,
+        evidence=evidence,
+        sections=sections,
+        version=__version__,
+        **_verdict_values(evidence, verdict),
     )
 
 
-def _subtitle(parts: Parts) -> str:
-    robot = parts.robot or "robot not known"
-    return f"Elastic calibration of {robot}{', simulated cell' if parts.simulated else ''}"
+def verdict_html(evidence: Evidence, verdict: Verdict) -> str:
+    """Return the verdict as HTML."""
+    return render("verdict.html", **_verdict_values(evidence, verdict))
+
+
+def _verdict_values(evidence: Evidence, verdict: Verdict) -> dict[str, Any]:
+    """Return the values of the template of the verdict."""
+    return {
+        "light": verdict.light.value if verdict.light else "",
+        "verdict": verdict,
+        "blocks": tuple(_accuracy(evidence, verdict)),
+    }
+
+
+def _accuracy(evidence: Evidence, verdict: Verdict) -> Iterator[Block]:
+    if evidence.simulated:
+        yield Paragraph("A simulated cell: no real robot was measured.", "banner")
+    yield Paragraph(verdict.sentence, "sentence")
+    if evidence.unseen is not None:
+        yield from _unseen(evidence.unseen)
+
+
+def _unseen(unseen: UnseenErrors) -> Iterator[Block]:
+    def span(low: float, high: float) -> str:
+        return f"({mm(low)} to {mm(high)})"
+
+    mean, p95 = unseen.mean, unseen.p95
+    yield Facts(
+        (
+            ("Mean error (95 % interval)", f"{mm(mean.value)} {span(mean.low, mean.high)}"),
+            ("95 % of errors below (95 % interval)", f"{mm(p95.value)} {span(p95.low, p95.high)}"),
+            ("Largest error", mm(unseen.max)),
+            ("Held out", f"{unseen.poses} poses, {len(unseen.error)} readings"),
+        )
+    )
+    yield Paragraph(
+        f"Every pose was left out of the fit once ({unseen.folds} refits) and predicted by the"
+        " others. Intervals: whole poses drawn with replacement. If one more pose were drawn"
+        " like these, the chance that its error is larger than the largest here is at most 1 in"
+        f" {unseen.poses + 1}.", "sub",
+    )  # fmt: skip

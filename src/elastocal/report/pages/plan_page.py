@@ -1,27 +1,21 @@
-"""One HTML file that shows a plan: a view to turn, its key figures and a table of its poses.
-
-It holds all that it needs, the drawing library included, and asks the network for nothing: its
-content security policy forbids it to.
-"""
+"""One HTML page that shows a plan: a view to turn, its key figures and a table of its poses."""
 
 import json
-from html import escape
 from pathlib import Path
-from string import Template
 from typing import Any
-
-from plotly.offline import get_plotlyjs
 
 from elastocal.cell import Cell
 from elastocal.files import write_text
 from elastocal.planning import PlanResult, PoolData, PoseRecord, check_pool_of
 from elastocal.planning.surface import Surface
-from elastocal.report.belongs import check_robot
-from elastocal.report.pages.templating import POLICY, embedded, template
+from elastocal.report.pages.templating import render
 from elastocal.report.plots import (
     PlanView,
     plan_view,
     weakest_margins,
+)
+from elastocal.verdict import (
+    check_plan_robot,
 )
 from elastocal.wording import duration, millimetres, readable
 
@@ -50,77 +44,55 @@ def write_plan_page(
         If the page cannot be written.
     """
     check_pool_of(plan, pool)
-    check_robot(plan, cell)
+    check_plan_robot(plan, cell)
     write_text(path, _page(plan_view(cell, surface, plan, pool), plan, pool))
     return Path(path)
 
 
 def _page(view: PlanView, plan: PlanResult, pool: PoolData) -> str:
     worst = weakest_margins(pool).label
-    made = f"{len(plan.poses)} poses chosen by {plan.search.name} for {plan.robot.name}"
-    return Template(template("plan.html")).substitute(
-        policy=escape(POLICY),
-        title=escape(f"Calibration plan: {plan.cell.name}"),
-        subtitle=escape(f"{made}. Lengths in the base frame of the robot."),
-        css=template("plan.css"),
-        figures="".join(_figure(name, value) for name, value in key_figures(plan)),
-        findings=_findings(plan),
-        last=len(plan.poses),
-        first=min(1, len(plan.poses)),
-        rows="".join(_row(plan, pose, worst[pose.candidate]) for pose in plan.poses),
-        footer=escape(
-            f"Made by elastocal {plan.elastocal} from {plan.cell.file}"
-            f" (fingerprint {plan.cell.fingerprint[:12]}). Times are estimates."
-            + "".join(f" {layer.note}" for layer in view.layers if layer.note)
-        ),
-        data=embedded(view_data(view, plan, pool)),
-        plotly=get_plotlyjs(),
-        script=template("view.js") + template("plan.js"),
+    return render(
+        "plan.html",
+        title=f"Calibration plan: {plan.cell.name}",
+        styles=("plan.css",),
+        scripts=("view.js", "plan.js"),
+        interactive=True,
+        data=view_data(view, plan, pool),
+        plan=plan,
+        figures=key_figures(plan),
+        rows=[(pose.id, _cells(plan, pose, worst[pose.candidate])) for pose in plan.poses],
+        notes=[layer.note for layer in view.layers if layer.note],
     )
 
 
-def key_figures(plan: PlanResult) -> list[tuple[str, str]]:
+def key_figures(plan: PlanResult) -> tuple[tuple[str, str], ...]:
     """Return the figures at the head of the page, as name and value with its unit."""
     search, pool = plan.search, plan.pool
     asked = f" (asked: {readable(search.d_max, 'm')})" if search.d_max is not None else ""
-    return [
+    return (
         ("Poses", str(len(plan.poses))),
         ("Covering radius", readable(search.covering_radius, "m") + asked),
         ("Total time", duration(plan.total_time)),
         ("of it on the way", duration(plan.travel_time)),
         ("Points with a posture", f"{pool.valid} of {pool.sampled}"),
         ("Check that refused most", pool.bottleneck or "none"),
-    ]
+    )
 
 
-def _figure(name: str, value: str) -> str:
-    return f"<div><dt>{escape(name)}</dt><dd>{escape(value)}</dd></div>"
-
-
-def _findings(plan: PlanResult) -> str:
-    if not plan.findings:
-        return ""
-    items = "".join(f"<li>{escape(finding)}</li>" for finding in plan.findings)
-    return f'<section class="findings"><h2>Findings</h2><ul>{items}</ul></section>'
-
-
-def _row(plan: PlanResult, pose: PoseRecord, worst: str) -> str:
-    rank = plan.search.order.index(pose.id) + 1
+def _cells(plan: PlanResult, pose: PoseRecord, worst: str) -> list[str]:
     way = sum(move.duration for move in plan.moves if move.end == pose.id)
-    cells = [
-        str(rank),
+    return [
+        str(plan.search.order.index(pose.id) + 1),
         *(f"{1e3 * value + 0.0:.1f}" for value in pose.tcp_position),
         worst,
         pose.seen_by or "no station",
         duration(way),
         duration(pose.contact_time),
     ]
-    first = f'<td><button type="button" aria-label="Show pose {pose.id}">{pose.id}</button></td>'
-    return f"<tr>{first}{''.join(f'<td>{escape(cell)}</td>' for cell in cells)}</tr>"
 
 
 def view_data(view: PlanView, plan: PlanResult, pool: PoolData) -> dict[str, Any]:
-    """Return what the script of a page reads to show a view.
+    """Return the data from which the script of a page shows a view.
 
     Parameters
     ----------

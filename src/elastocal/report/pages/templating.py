@@ -1,19 +1,42 @@
-"""Pages that hold all they need and ask the network for nothing."""
+"""The one place that renders templates: Jinja2, every value escaped, no undefined name.
 
-import importlib.resources
+Pages hold all they need, the drawing library included, and ask the network for nothing: their
+content security policy forbids it to them.
+"""
+
 import json
-from typing import Any
+import re
+from functools import cache
+from importlib import resources
+from typing import TYPE_CHECKING, Any
 
-POLICY = (
+if TYPE_CHECKING:
+    from jinja2 import Environment
+    from markupsafe import Markup
+
+_POLICY = (
     "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data: blob:"
 )
-"""What the page may load: nothing but what stands in it."""
+"""Lets a page load nothing but what stands in it."""
 
 
-def embedded(data: dict[str, Any]) -> str:
+def render(template: str, **values: Any) -> str:
+    """Return a template with its values.
+
+    Parameters
+    ----------
+    template : str
+        Name of a file in the folder ``templates``.
+    **values
+        For the names in it; one that is missing is an error.
+    """
+    return _environment().get_template(template).render(values)
+
+
+def embedded(data: Any) -> "Markup":
     r"""Return JSON that no HTML parser takes for markup.
 
-    >>> embedded({"name": "</script>"})
+    >>> str(embedded({"name": "</script>"}))
     '{"name":"\\u003c/script\\u003e"}'
 
     Raises
@@ -21,11 +44,48 @@ def embedded(data: dict[str, Any]) -> str:
     ValueError
         If a number is not finite: JSON has no sign for it.
     """
+    from markupsafe import Markup
+
     text = json.dumps(data, ensure_ascii=True, separators=(",", ":"), allow_nan=False)
-    return text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")
+    return Markup(text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026"))
 
 
-def template(name: str) -> str:
-    """Return the text of a file beside the templates of pages."""
-    folder = importlib.resources.files(__package__).joinpath("templates")
-    return folder.joinpath(name).read_text(encoding="utf-8")
+@cache
+def _environment() -> "Environment":
+    from jinja2 import Environment, PackageLoader, StrictUndefined
+
+    environment = Environment(
+        loader=PackageLoader("elastocal.report.pages"),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    environment.globals |= {"policy": _POLICY, "asset": _asset, "plotly": _plotly}
+    environment.filters |= {"embedded": embedded, "pieces": _pieces}
+    return environment
+
+
+def _asset(name: str) -> "Markup":
+    """Return a style sheet or a script from the folder of the templates, as it stands."""
+    from markupsafe import Markup
+
+    folder = resources.files("elastocal.report.pages").joinpath("templates")
+    return Markup(folder.joinpath(name).read_text(encoding="utf-8"))
+
+
+def _plotly() -> "Markup":
+    """Return the drawing library: four and a half megabytes."""
+    from markupsafe import Markup
+    from plotly.offline import get_plotlyjs
+
+    return Markup(get_plotlyjs())
+
+
+def _pieces(text: str) -> list[str]:
+    """Return a text in pieces, every second of which stood in backticks.
+
+    >>> _pieces("run `elastocal tool` & see")
+    ['run ', 'elastocal tool', ' & see']
+    """
+    return re.split(r"`([^`]+)`", text)

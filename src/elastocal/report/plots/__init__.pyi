@@ -2,6 +2,7 @@ from . import style as style
 from ._plan_layers import weakest_margins as weakest_margins
 from .calibration_figures import (
     SpringBar as SpringBar,
+    StationResiduals as StationResiduals,
     displacement_figure as displacement_figure,
     pose_grid as pose_grid,
     spring_figure as spring_figure,

@@ -17,7 +17,7 @@ from elastocal.report.plots.printing import literal
 from elastocal.report.plots.style import VariantStyle, tint
 
 REACH = 1.5
-"""How far a whisker may reach, in heights of the box."""
+"""Longest reach of a whisker, in heights of the box."""
 BAND = "#f4f4f1"
 """Behind every second number of training poses: shows which boxes belong together."""
 _LABEL = 0.26

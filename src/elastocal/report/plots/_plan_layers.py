@@ -49,13 +49,13 @@ class Layer:
 
     label: str
     colour: str
-    """Of the switch's swatch."""
+    """Colour of the switch's swatch."""
     traces: tuple[Any, ...]
     """Plotly traces, at least one."""
     shown: bool = True
     """Whether the layer is on when the page opens."""
     note: str = ""
-    """What is to be said of how it is drawn."""
+    """A remark for readers on how it is drawn."""
 
 
 def still_layers(

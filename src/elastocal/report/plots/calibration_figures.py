@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import matplotlib
 import numpy as np
@@ -35,6 +34,16 @@ class SpringBar:
     high: float
     group: int | None
     """Number of the group of springs that it cannot be told apart from."""
+
+
+@dataclass(frozen=True, eq=False)
+class StationResiduals:
+    """Residuals of the registration of one tracker station."""
+
+    station: str
+    poses: tuple[int, ...]
+    residual: FloatArray
+    """Shape (pose, 3), in m."""
 
 
 def displacement_figure(
@@ -198,27 +207,22 @@ def _draw(axes: Axes, unit: str, bars: Sequence[SpringBar]) -> None:
     axes.tick_params(length=0)
 
 
-def station_figure(stations: Sequence[dict[str, Any]]) -> Figure:
+def station_figure(stations: Sequence[StationResiduals]) -> Figure:
     """Return the figure: length of the residual vector at each pose, a style a station.
 
     Parameters
     ----------
-    stations : sequence of dict
-        Of the summary of a run; at least one.
+    stations : sequence of StationResiduals
+        At least one.
     """
     figure = new_figure(9.0, 2.6)
     axes = figure.subplots()
-    names = [f"{each['station']}, {len(each['poses'])} poses" for each in stations]
-    for each, name, drawn in zip(stations, names, variant_styles(names), strict=True):
-        size = 1e6 * np.linalg.norm(np.array(each["residual"], dtype=float), axis=1)
-        axes.vlines(each["poses"], 0.0, size, color=drawn.colour, lw=1.0)
+    names = [f"{each.station}, {len(each.poses)} poses" for each in stations]
+    for each, drawn in zip(stations, variant_styles(names), strict=True):
+        size = 1e6 * np.linalg.norm(each.residual, axis=1)
+        axes.vlines(each.poses, 0.0, size, color=drawn.colour, lw=1.0)
         axes.scatter(
-            each["poses"],
-            size,
-            s=18,
-            c=drawn.colour,
-            marker=drawn.marker,
-            label=literal(name),
+            each.poses, size, s=18, c=drawn.colour, marker=drawn.marker, label=literal(drawn.name)
         )
     axes.set(xlabel="pose", ylabel="residual in µm")
     axes.set_ylim(bottom=0.0)

@@ -1,4 +1,4 @@
-"""How identified compliances settle with the number of training poses, spring by spring."""
+"""Chart of compliances: how each settles with the number of training poses, spring by spring."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -25,14 +25,14 @@ from elastocal.wording import counted
 
 @dataclass(frozen=True)
 class _IndexName:
-    """What an index is called, and how its values are shown."""
+    """Title of an index, and how its values are shown."""
 
     title: str
     unit: str
     factor: float
     """From the value of the criterion to what is shown."""
     more_is_better: bool = True
-    """Of what is shown."""
+    """Whether more of the value shown is better."""
 
     def shown(self, values: FloatArray) -> FloatArray:
         """Return values as they are shown."""
@@ -58,7 +58,7 @@ KIND_TITLES = {
     "size": "Equal size",
     "size_and_split": "Equal size, beyond its split",
 }
-"""What the correlations compare."""
+"""Titles of the comparisons that correlations are made over."""
 
 
 _LEFT, _RIGHT, _HEAD, _FOOT = 1.25, 0.2, 0.98, 1.05

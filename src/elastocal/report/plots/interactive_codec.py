@@ -18,7 +18,7 @@ from elastocal.report.plots.compliance_chart import (
 )
 from elastocal.report.plots.style import VariantStyle, tint, variant_styles
 
-_Trace = dict[str, Any]
+_PlotTrace = dict[str, Any]
 _PALE = 0.55
 _View = dict[str, Any]
 """A figure as plotly reads it, with its name and what it shows in words."""
@@ -44,7 +44,7 @@ def error_views(data: CodecData, verdicts: Verdicts) -> list[_View]:
 
 def _error_view(data: CodecData, verdicts: Verdicts, axis: str) -> _View:
     styles = variant_styles([each.name for each in data.variants])
-    traces: list[_Trace] = []
+    traces: list[_PlotTrace] = []
     panels = []
     for k, (which, title) in enumerate(ERROR_PANELS.items()):
         found = error_boxes(data, which, axis)
@@ -64,7 +64,7 @@ def _error_view(data: CodecData, verdicts: Verdicts, axis: str) -> _View:
 
 def _saturation_traces(
     verdicts: Verdicts, styles: Sequence[VariantStyle], layout: dict[str, Any]
-) -> list[_Trace]:
+) -> list[_PlotTrace]:
     """Return a dashed line in the upper panel where each variant has saturated."""
     low, high = layout["yaxis"]["range"]
     ends = [10.0**low, 10.0**high] if layout["yaxis"]["type"] == "log" else [low, high]
@@ -109,7 +109,7 @@ def compliance_views(data: CodecData, seen: Sequence[SpringObservability]) -> li
 
 
 def _compliance_view(each: SpringBoxes, styles: Sequence[VariantStyle], last: int) -> _View:
-    traces: list[_Trace] = []
+    traces: list[_PlotTrace] = []
     for number, variant in enumerate(styles):
         if variant.name in each.boxes:
             boxes, hollow = each.boxes[variant.name], each.hollow[variant.name]
@@ -138,7 +138,7 @@ def _box_traces(
     unit: str,
     axes: str = "",
     hollow: BoolArray | None = None,
-) -> list[_Trace]:
+) -> list[_PlotTrace]:
     """Return the traces of one variant in one panel.
 
     The same numbers as in print. What a box holds stands as text in an unseen trace that has a
@@ -257,7 +257,9 @@ def _band(n: int, axis: str) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _boxes(boxes: Boxes, variant: VariantStyle, which: BoolArray, colour: str, fill: str) -> _Trace:
+def _boxes(
+    boxes: Boxes, variant: VariantStyle, which: BoolArray, colour: str, fill: str
+) -> _PlotTrace:
     return {
         "type": "box",
         "x": _listed(variant.at(boxes.n)[which]),

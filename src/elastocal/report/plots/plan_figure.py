@@ -33,7 +33,7 @@ _PULL = 0.02
 _GOLDEN = np.pi * (3.0 - np.sqrt(5.0))
 """Turn between the first steps of labels that share an anchor, in rad."""
 _WIDTH = 5.1
-"""Of a panel, in inches."""
+"""Width of a panel, in inches."""
 _DISC, _CROWD = 13.0, 200.0
 """Diameter of a numbered disc in points; with many it shrinks to the second over their root."""
 _MANY = 20_000
@@ -55,7 +55,7 @@ class _Choice:
     """Candidates in search order."""
     spread: SpreadRecord
     metric: str
-    """Of the covering radius: ``euclidean`` or ``geodesic``."""
+    """Metric of the covering radius: ``euclidean`` or ``geodesic``."""
 
     def distance(self, pool: PoolData) -> FloatArray:
         """Return how far each candidate is from the nearest chosen one, straight, in m."""

@@ -28,7 +28,7 @@ from elastocal.report.plots._solids import (
 )
 
 _FIELD_OF_VIEW = np.radians(45.0)
-"""Of Plotly's perspective camera."""
+"""Field of view of Plotly's perspective camera, in rad."""
 _ASPECT = 1.5
 """Width by height of the picture that cameras are set for; the page steps back if narrower."""
 _ROOM = 1.08
@@ -72,7 +72,7 @@ class _MovingParts:
     """From marker to station and a gap, each of shape (3, 3); NaN where no station sees. Empty in
     a cell without stations."""
     note: str = ""
-    """What is to be said of how the robot is drawn."""
+    """A remark for readers on how the robot is drawn."""
 
     def layers(self, shown: int) -> tuple[Layer, ...]:
         """Return the layers at one posture (0: HOME)."""

@@ -26,7 +26,7 @@ _COLOURS = (style.INK, style.BLUE, style.VERMILLION)
 _LINES = ("-", "--", ":")
 _WIDTHS = (2.6, 1.9, 1.3)
 _SIZES = (10.0, 7.0, 4.0)
-"""Of lines and of the dots of a single station, in points: each shows under the next one."""
+"""Widths of lines and sizes of single dots, in points: each shows under the next one."""
 _CASING = 2.0
 
 

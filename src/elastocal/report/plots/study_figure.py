@@ -9,7 +9,13 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
 from elastocal.arrays import FloatArray
-from elastocal.codec.study import SampleResult, StudyRecord, StudySettings, name_of, written
+from elastocal.codec.study import (
+    SampleResult,
+    StudyDesign,
+    StudySummary,
+    condition_name,
+    value_text,
+)
 from elastocal.report.plots import style
 from elastocal.report.plots._box_plots import (
     draw_boxes,
@@ -31,14 +37,14 @@ _PANELS = {"error_max": "Maximum error in mm", "error_mean": "Mean error in mm"}
 
 
 def write_study_figures(
-    folder: Path, settings: StudySettings, results: Sequence[SampleResult], record: StudyRecord
+    folder: Path, settings: StudyDesign, results: Sequence[SampleResult], record: StudySummary
 ) -> list[str]:
     """Write the chart of a study for print; return the names of the files.
 
     Raises
     ------
     FileAccessError
-        If a file cannot be written.
+        If a file cannot be value_text.
     """
     title = f"{record.cell}: error at unseen poses of {record.samples} simulated arms"
     description = "; ".join(
@@ -51,7 +57,7 @@ def write_study_figures(
 
 
 def study_figure(
-    settings: StudySettings, results: Sequence[SampleResult], record: StudyRecord
+    settings: StudyDesign, results: Sequence[SampleResult], record: StudySummary
 ) -> Figure:
     """Return the chart: mean errors above, largest errors below, a group of boxes a pose count.
 
@@ -94,26 +100,25 @@ _Values = dict[str, list[FloatArray]]
 
 
 def _grouped(
-    settings: StudySettings, results: Sequence[SampleResult]
+    settings: StudyDesign, results: Sequence[SampleResult]
 ) -> tuple[str, list[str], list[str], _Values]:
     """Return the factor along the axis, its values, the names beside one another, and errors."""
     varied = settings.varied or ("poses",)
     along = "poses" if "poses" in varied else varied[0]
     others = [key for key in varied if key != along]
-    conditions = [each.condition for each in settings.conditions]
-    groups = list(dict.fromkeys(each.value(along) for each in conditions))
+    groups = list(dict.fromkeys(each.value(along) for each in settings.conditions))
     if along == "poses":
         groups.sort()
-    names = [name_of(others, each) if others else _ALONE for each in conditions]
+    names = [condition_name(others, each) if others else _ALONE for each in settings.conditions]
     beside = list(dict.fromkeys(names))
     empty = np.full((len(results), len(groups)), np.nan)
     values: _Values = {error: [empty.copy() for _ in beside] for error in _PANELS}
-    for number, condition in enumerate(conditions):
+    for number, condition in enumerate(settings.conditions):
         column = groups.index(condition.value(along))
         for error in _PANELS:
-            errors = [getattr(each.outcomes[number].accuracy, error) for each in results]
+            errors = [getattr(each.outcomes[number], error) for each in results]
             values[error][beside.index(names[number])][:, column] = errors
-    return along, [written(each) for each in groups], beside, values
+    return along, [value_text(each) for each in groups], beside, values
 
 
 def _label_groups(axes: Axes, along: str, groups: Sequence[str], shown: bool) -> None:
@@ -124,7 +129,7 @@ def _label_groups(axes: Axes, along: str, groups: Sequence[str], shown: bool) ->
         )
 
 
-def _draw_frame(figure: Figure, record: StudyRecord, height: float) -> None:
+def _draw_frame(figure: Figure, record: StudySummary, height: float) -> None:
     title = f"{record.cell}: error at unseen poses, {record.samples} simulated arms"
     figure.text(
         _LEFT / _WIDTH,

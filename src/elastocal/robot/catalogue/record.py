@@ -27,7 +27,7 @@ class Group(StrictModel):
     """Why they are not to be taken as fact, or why there are none; None for sourced numbers."""
 
     @model_validator(mode="after")
-    def _has_an_origin(self) -> Self:
+    def _require_origin(self) -> Self:
         if self.source is None and self.assumption is None:
             raise ValueError("numbers need a source or an assumption")
         return self
@@ -70,7 +70,7 @@ class Maxima(Group):
     maximum: _Six | None = None
 
     @model_validator(mode="after")
-    def _unknown_is_said(self) -> Self:
+    def _require_reason(self) -> Self:
         if self.maximum is None and self.assumption is None:
             raise ValueError("maxima that are not known need an assumption that says so")
         return self

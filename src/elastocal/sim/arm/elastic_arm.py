@@ -1,8 +1,9 @@
-"""The true arm: an elastic mechanism at its exact loaded equilibrium.
+"""The true arm: an elastic mechanism at its exact loaded equilibrium; and ready-made arms.
 
 The estimator assumes ``deflection = J diag(c) J^T force`` with Jacobians of the undeformed arm
 (paper Eq. 10). The truth is where the potential energy of the *deformed* arm is least, with torque
-laws that need not be linear, springs that need not sit at joints, and gravity.
+laws that need not be linear, springs that need not sit at joints, and gravity. The ready-made arms
+go from what the estimator can express to what it cannot.
 """
 
 from collections.abc import Mapping, Sequence
@@ -16,14 +17,38 @@ from elastocal.arrays import (
 )
 from elastocal.errors import RobotError, SpringError, nearest
 from elastocal.sim.arm.linkage import Linkage
-from elastocal.sim.arm.springs import CubicGear, Linear, Skeleton, TorqueLaw, TruthSpring, lay_out
+from elastocal.sim.arm.springs import (
+    CubicGear,
+    Linear,
+    SpringChain,
+    TorqueLaw,
+    TruthSpring,
+    build_spring_chain,
+)
 from elastocal.sim.arm.statics import DeadLoads, LoadedMechanism, minimise
 
 GRAVITY = (0.0, 0.0, -9.80665)
 """Standard gravity (CGPM 1901) in the base of an upright robot, in m/s²."""
-
-BALANCE = 1e-12
+_BALANCE = 1e-12
 """Torque imbalance that counts as none, over the largest torque that the loads can exert."""
+AXIAL_STIFFNESS = (2.4e6, 2.9e6, 2.6e6, 8.0e5, 6.0e5, 3.0e5)
+"""Axial stiffnesses of the six joints of a 1.1 t arm, in N·m/rad.
+
+Of the size measured on a FANUC R-2000iC, a robot of the same class (2.8e5 … 2.9e6 N·m/rad by
+least squares on its 43 published readings: github.com/longton2001-pixel,
+breakthrough-surge-suppression-in-high-speed-robotic-drilling, commit e5c2f795). That fit has six
+springs, so its axial ones carry the tilt of the bearings too; within its range they are therefore
+taken stiffer, so that arm and tilt together deflect as much.
+"""
+TRANSVERSE_RATIO = (4.0, 6.0)
+"""Stiffness of the two tilts of a bearing over that of its gear. An assumption: tilt is left to
+crossed-roller bearings, which are stiffer than gears, but not so stiff as to be negligible."""
+LINK_BENDING = 9.0e6
+"""Bending stiffness of an arm-sized link hinged at its middle, in N·m/rad. An assumption: that
+is ``E I / length`` of a 1.15 m iron box of 0.25 m with 10 mm walls (1.1e11 Pa, 9.2e-5 m⁴)."""
+GEAR_SCALE = 2.0e-3
+"""Angle in rad at which a stiffening gear has twice the torque of a linear one. An assumption:
+2 kN·m on joint 2 (1100 N at 1.8 m, 0.7 mrad) then raise its torque by about a tenth."""
 
 
 @dataclass(frozen=True)
@@ -51,12 +76,12 @@ class ElasticArm:
     """Acceleration in base, in m/s²; zero leaves the weight of the links out.
 
     A link's weight acts behind all springs of its joint."""
-    _skeleton: Skeleton = field(init=False, repr=False)
+    _chain: SpringChain = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
-        skeleton = lay_out(self.linkage, self.springs)
-        object.__setattr__(self, "_skeleton", skeleton)
-        object.__setattr__(self, "springs", skeleton.springs)
+        chain = build_spring_chain(self.linkage, self.springs)
+        object.__setattr__(self, "_chain", chain)
+        object.__setattr__(self, "springs", chain.springs)
 
     def equilibrium(
         self, q: ArrayLike, force: ArrayLike, moment: ArrayLike = (0.0, 0.0, 0.0)
@@ -110,29 +135,29 @@ class ElasticArm:
         return tip
 
     def _mechanism(self, q: FloatArray, force: FloatArray, moment: FloatArray) -> LoadedMechanism:
-        skeleton = self._skeleton
-        held = np.zeros((len(q), skeleton.ends[-1]))
-        held[:, skeleton.motor_elements] = q
+        chain = self._chain
+        held = np.zeros((len(q), chain.ends[-1]))
+        held[:, chain.motor_elements] = q
         laws = [spring.law for spring in self.springs]
         loads = self._loads(q, force, moment)
-        return LoadedMechanism(skeleton.screws, skeleton.spring_elements, laws, held, loads)
+        return LoadedMechanism(chain.screws, chain.spring_elements, laws, held, loads)
 
     def _loads(self, q: FloatArray, force: FloatArray, moment: FloatArray) -> DeadLoads:
         """Return the tip force, the moment's cross of forces, and the links' weights."""
         T_base_tip = self.linkage.T_base_tip
         tip = T_base_tip[:3, 3]
-        points, after = [tip], [self._skeleton.ends[-1]]
+        points, after = [tip], [self._chain.ends[-1]]
         forces = [force]
         if np.any(moment):
             tool = self.linkage.forward(q)[:, :3, :3]
             for k in range(3):
                 arm_force = 0.5 * np.cross(moment, tool[:, :, k])
                 points += [tip + T_base_tip[:3, k], tip]
-                after += 2 * [self._skeleton.ends[-1]]
+                after += 2 * [self._chain.ends[-1]]
                 forces += [arm_force, -arm_force]
         for body in self.linkage.masses if any(self.gravity) else ():
             points.append(body.centre)
-            after.append(self._skeleton.ends[body.joint - 1])
+            after.append(self._chain.ends[body.joint - 1])
             forces.append(np.broadcast_to(body.mass * np.array(self.gravity), force.shape))
         return DeadLoads(np.array(points), np.array(after), np.stack(forces, axis=1))
 
@@ -153,32 +178,9 @@ def _rest(mechanism: LoadedMechanism, start: FloatArray) -> tuple[FloatArray, Fl
     reach = np.linalg.norm(undeformed, axis=-1).T
     scale = np.sum(np.linalg.norm(mechanism.loads.force, axis=-1) * (1.0 + reach), axis=1)
     theta, state = minimise(
-        lambda positions: mechanism.evaluate(positions, undeformed), start, BALANCE * scale
+        lambda positions: mechanism.evaluate(positions, undeformed), start, _BALANCE * scale
     )
     return theta, np.abs(state.gradient).max(axis=1)
-
-
-AXIAL_STIFFNESS = (2.4e6, 2.9e6, 2.6e6, 8.0e5, 6.0e5, 3.0e5)
-"""Axial stiffnesses of the six joints of a 1.1 t arm, in N·m/rad.
-
-Of the size measured on a FANUC R-2000iC, a robot of the same class (2.8e5 … 2.9e6 N·m/rad by
-least squares on its 43 published readings: github.com/longton2001-pixel,
-breakthrough-surge-suppression-in-high-speed-robotic-drilling, commit e5c2f795). That fit has six
-springs, so its axial ones carry the tilt of the bearings too; within its range they are therefore
-taken stiffer, so that arm and tilt together deflect as much.
-"""
-
-TRANSVERSE_RATIO = (4.0, 6.0)
-"""Stiffness of the two tilts of a bearing over that of its gear. An assumption: tilt is left to
-crossed-roller bearings, which are stiffer than gears, but not so stiff as to be negligible."""
-
-LINK_BENDING = 9.0e6
-"""Bending stiffness of an arm-sized link hinged at its middle, in N·m/rad. An assumption: that
-is ``E I / length`` of a 1.15 m iron box of 0.25 m with 10 mm walls (1.1e11 Pa, 9.2e-5 m⁴)."""
-
-GEAR_SCALE = 2.0e-3
-"""Angle in rad at which a stiffening gear has twice the torque of a linear one. An assumption:
-2 kN·m on joint 2 (1100 N at 1.8 m, 0.7 mrad) then raise its torque by about a tenth."""
 
 
 def bearing_truth(
@@ -224,9 +226,9 @@ def bearing_truth(
     for joint, name in enumerate(linkage.joint_names):
         axis = linkage.axis[joint]
         law = Linear(float(axial[joint]))
-        springs.append(TruthSpring(name, triple(axis), law, linkage.revolute[joint]))
-        for direction, stiffness in zip(across(axis), transverse[joint], strict=True):
-            springs.append(TruthSpring(name, triple(direction), Linear(float(stiffness))))
+        springs.append(TruthSpring(name, as_triple(axis), law, linkage.revolute[joint]))
+        for direction, stiffness in zip(transverse_axes(axis), transverse[joint], strict=True):
+            springs.append(TruthSpring(name, as_triple(direction), Linear(float(stiffness))))
     return ElasticArm(linkage, tuple(springs), gravity)
 
 
@@ -255,9 +257,9 @@ def with_link_bending(
     hinges = []
     for joint, k in stiffness.items():
         link = link_vector(arm.linkage, joint)
-        at = triple(fraction * link)
-        for direction in across(link / np.linalg.norm(link)):
-            hinges.append(TruthSpring(joint, triple(direction), Linear(k), distal=True, at=at))
+        at = as_triple(fraction * link)
+        for direction in transverse_axes(link / np.linalg.norm(link)):
+            hinges.append(TruthSpring(joint, as_triple(direction), Linear(k), distal=True, at=at))
     return replace(arm, springs=(*arm.springs, *hinges))
 
 
@@ -318,7 +320,7 @@ def _joint_index(linkage: Linkage, joint: str) -> int:
     return names.index(joint)
 
 
-def across(axis: FloatArray) -> list[FloatArray]:
+def transverse_axes(axis: FloatArray) -> list[FloatArray]:
     """Return the coordinate axes least aligned with a unit vector, made orthonormal to it."""
     least = sorted(range(3), key=lambda k: (round(abs(float(axis[k])), 9), k))[:2]
     first, second = (np.eye(3)[k] for k in sorted(least))
@@ -328,7 +330,7 @@ def across(axis: FloatArray) -> list[FloatArray]:
     return [first, second / np.linalg.norm(second)]
 
 
-def triple(vector: FloatArray) -> tuple[float, float, float]:
+def as_triple(vector: FloatArray) -> tuple[float, float, float]:
     """Return a vector of three as plain numbers."""
     x, y, z = (float(value) for value in vector)
     return x, y, z

@@ -10,9 +10,9 @@ from elastocal.arrays import (
 )
 from elastocal.sim.arm.linkage import Linkage
 
-DAMPING = 1e-3
+_DAMPING = 1e-3
 """Largest damping; it falls with the square of the error, so that the last steps are Newton's."""
-MAX_STEP = 0.5
+_MAX_STEP = 0.5
 """Largest change of a joint in one iteration, in rad or m."""
 
 
@@ -61,11 +61,11 @@ def solve_inverse(
         if np.all(np.abs(error) <= tolerance):
             break
         J = linkage.jacobian(q)[:, :, locked:]
-        damping = DAMPING * np.minimum(1.0, np.sum(error**2, axis=1))
+        damping = _DAMPING * np.minimum(1.0, np.sum(error**2, axis=1))
         normal = J @ J.transpose(0, 2, 1) + (damping + 1e-14)[:, None, None] * np.eye(6)
         step = (J.transpose(0, 2, 1) @ np.linalg.solve(normal, error[..., None]))[..., 0]
         largest = np.abs(step).max(axis=1, keepdims=True)
-        q[:, locked:] += step * np.minimum(1.0, MAX_STEP / np.maximum(largest, 1e-300))
+        q[:, locked:] += step * np.minimum(1.0, _MAX_STEP / np.maximum(largest, 1e-300))
         error = pose_error(linkage.forward(q), T_base_tip)
     return InverseResult(q, np.all(np.abs(error) <= tolerance, axis=1))
 

@@ -1,7 +1,9 @@
-"""The rigid skeleton of the simulated arm, read from a URDF without any robotics library.
+"""The rigid linkage of the simulated arm, read from a URDF without any robotics library.
 
 Only `xml.etree` and numpy: a mistake in the estimator's URDF reader must show up as a difference,
-not be repeated here.
+not be repeated here. Every movement, of a joint or of a spring, is a screw written down once, in
+base, with the arm at zero (Brockett's product of exponentials; Lynch and Park, "Modern Robotics",
+2017, chapter 4). The estimator chains link frames instead, so the two share no equation.
 """
 
 import xml.etree.ElementTree as ElementTree
@@ -13,6 +15,8 @@ from numpy.typing import ArrayLike
 
 from elastocal.arrays import BoolArray, FloatArray
 from elastocal.errors import RobotError
+
+_MOVABLE = ("revolute", "continuous", "prismatic")
 
 
 @dataclass(frozen=True)
@@ -96,9 +100,6 @@ def _exponentials(screws: Screws, positions: FloatArray) -> FloatArray:
     steps[..., :3, 3] += slide * screws.axis[:, None]
     steps[..., 3, 3] = 1.0
     return steps
-
-
-_MOVABLE = ("revolute", "continuous", "prismatic")
 
 
 @dataclass(frozen=True)

@@ -185,7 +185,7 @@ class TruthSpring:
 
 
 @dataclass(frozen=True)
-class Skeleton:
+class SpringChain:
     """Motors and springs in the order in which they follow one another from base to tip."""
 
     screws: Screws
@@ -200,8 +200,8 @@ class Skeleton:
     """Number of screws up to and with those of each joint."""
 
 
-def lay_out(linkage: Linkage, springs: Sequence[TruthSpring]) -> Skeleton:
-    """Return the skeleton of a linkage with springs.
+def build_spring_chain(linkage: Linkage, springs: Sequence[TruthSpring]) -> SpringChain:
+    """Return the spring chain of a linkage with springs.
 
     Raises
     ------
@@ -217,7 +217,7 @@ def lay_out(linkage: Linkage, springs: Sequence[TruthSpring]) -> Skeleton:
         ends.append(len(row))
     axes, points, turns = zip(*(_screw(linkage, item) for item in row), strict=True)
     is_motor = np.array([isinstance(item, int) for item in row])
-    return Skeleton(
+    return SpringChain(
         screws=Screws(np.array(axes), np.array(points), np.array(turns, dtype=bool)),
         springs=tuple(item for item in row if isinstance(item, TruthSpring)),
         spring_elements=np.flatnonzero(~is_motor),

@@ -13,7 +13,9 @@ has carried them, and sums over the loads behind the spring,
     d²U/dtheta_i dtheta_j = phi_i'' [i = j] - z_i · sum_k (z_j × a_k) × F_k      (i in front of j)
 
 (Goldstein, "Classical Mechanics", 3rd ed., section 1.4, for virtual work; the second line is the
-derivative of the first, `tests/sim/test_statics.py` holds them together).
+derivative of the first, `tests/sim/arm/test_statics.py` holds them together).
+
+Newton's method with a line search on the energy finds the minima of a batch at once.
 """
 
 from collections.abc import Callable, Sequence
@@ -34,6 +36,15 @@ from elastocal.sim.arm.linkage import (
     moved_axes,
 )
 from elastocal.sim.arm.springs import TorqueLaw
+
+_MAX_ITERATIONS = 60
+_MAX_HALVINGS = 40
+_SUFFICIENT_DECREASE = 1e-4
+"""Armijo's constant (Nocedal and Wright, "Numerical Optimization", 2nd ed., section 3.1)."""
+
+
+class EquilibriumError(ElastocalError, ArithmeticError):
+    """The simulated arm finds no stable equilibrium: a load it cannot carry."""
 
 
 @dataclass(frozen=True)
@@ -194,16 +205,6 @@ def _load_stiffness(
     return mirrored
 
 
-MAX_ITERATIONS = 60
-MAX_HALVINGS = 40
-SUFFICIENT_DECREASE = 1e-4
-"""Armijo's constant (Nocedal and Wright, "Numerical Optimization", 2nd ed., section 3.1)."""
-
-
-class EquilibriumError(ElastocalError, ArithmeticError):
-    """The simulated arm finds no stable equilibrium: a load it cannot carry."""
-
-
 def minimise(
     evaluate: Callable[[FloatArray], EnergyState], start: FloatArray, tolerance: FloatArray
 ) -> tuple[FloatArray, EnergyState]:
@@ -224,14 +225,14 @@ def minimise(
         If a member of the batch does not reach balance, or is balanced but unstable.
     """
     theta, state = start, evaluate(start)
-    for _ in range(MAX_ITERATIONS):
+    for _ in range(_MAX_ITERATIONS):
         if np.all(_imbalance(state) <= tolerance):
             _require_stable(state)
             return theta, state
         theta, state = _line_search(evaluate, theta, state, tolerance)
     worst = int(np.argmax(_imbalance(state) - tolerance))
     raise EquilibriumError(
-        f"no equilibrium after {MAX_ITERATIONS} iterations for reading {worst}: largest torque"
+        f"no equilibrium after {_MAX_ITERATIONS} iterations for reading {worst}: largest torque"
         f" imbalance {_imbalance(state)[worst]:.3g} N·m, allowed {tolerance[worst]:.3g}"
     )
 
@@ -268,16 +269,16 @@ def _line_search(
     step = np.where(moving[:, None], _descent(state), 0.0)
     slope = np.sum(step * state.gradient, axis=1)
     length = np.ones(len(theta))
-    for _ in range(MAX_HALVINGS):
+    for _ in range(_MAX_HALVINGS):
         trial = theta + length[:, None] * step
         reached = evaluate(trial)
-        enough = reached.energy <= state.energy + SUFFICIENT_DECREASE * length * slope + tolerance
+        enough = reached.energy <= state.energy + _SUFFICIENT_DECREASE * length * slope + tolerance
         if enough.all():
             return trial, reached
         length = np.where(enough, length, 0.5 * length)
     raise EquilibriumError(
         f"no lower energy along the step of reading {int(np.argmin(enough))}"
-        f" after {MAX_HALVINGS} halvings"
+        f" after {_MAX_HALVINGS} halvings"
     )
 
 

@@ -1,24 +1,21 @@
 """A simulated cell: devices that behave like a robot that bends, a sensor that drifts, and so on.
 
-====================  =========================================================================
-`assembly`            `simulated_devices`: the devices of a cell file
-`arm`                 the robot controller: what it allows, what it says
-`force_control`       builds up a load case and holds it
-`guarded`, `ways`     straight moves to the surface and away; the ways between two states
-`force_sensor`        cross-talk, zero, drift, noise, tool weight
-`tracker`             stations, noise by distance
-`plant`               what is shared: time, robot, tooling, what is going on
-`quasistatics`        where tool, marker and sensor truly are
-`robot`               nonlinear equilibrium with a memory
-`robot_layout`        where the robot gives way
-`springs`             gears that stiffen, lose way and remember
-`balancer`            gravity balancer of axis 2
-`contact`, `surface`  disk, friction, tooling; ray against its mesh
-`schedule`            injected faults
-`process`             the cell at work, under forces that are given
-`segment`             a stretch of time; `time_laws`: how the time goes
-`keys`, `clock`       noise without history; time in µs
-====================  =========================================================================
+===================  ==========================================================================
+`cell`               `simulated_devices`: the devices of a cell file; the cell under a process
+`campaign`           readings of a whole plan at once, without stepping through time
+`campaign_errors`    what the instruments add to them
+`_controller`        the robot controller: what it allows, what it says
+`_force_control`     builds up a load case and holds it
+`_paths`             the paths of the robot: joint moves, guarded approach, retract, change of force
+`_instruments`       force sensor and trackers: cross-talk, zero, drift, noise, stations
+`_plant`             what is shared: time, robot, tooling, faults, what is going on
+`_quasistatics`      where tool, marker and sensor truly are
+`_robot`              where the robot gives way; its nonlinear equilibrium with a memory
+`_springs`           gears that stiffen, lose way and remember; the balancer of axis 2
+`_contact`           disk, friction, tooling; ray against its mesh
+`_timeline`          the clock in µs, time laws, and segments: the cell doing one thing
+`_sampling`          samples on a grid of time, noise without history
+===================  ==========================================================================
 """
 
 import lazy_loader

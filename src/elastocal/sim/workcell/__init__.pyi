@@ -1,3 +1,4 @@
+from ._timeline import SimClock as SimClock
 from .campaign import CampaignSimulator as CampaignSimulator, ContactPoses as ContactPoses
 from .campaign_errors import (
     CampaignErrors as CampaignErrors,
@@ -9,4 +10,3 @@ from .cell import (
     SimulatedCell as SimulatedCell,
     simulated_devices as simulated_devices,
 )
-from .timeline import SimClock as SimClock

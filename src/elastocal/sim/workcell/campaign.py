@@ -1,4 +1,4 @@
-"""Readings of a plan straight from the hidden truth, without stepping the devices through time.
+"""Readings of a whole plan from the hidden truth, without stepping the devices through time.
 
 All places are computed side by side: near contact, touch, and the load cases one after the other,
 so that the gears remember. Robot, contact and controller are those of `simulated_devices`. What
@@ -16,10 +16,12 @@ from scipy.spatial.transform import Rotation
 from elastocal.arrays import FloatArray
 from elastocal.cell import Cell
 from elastocal.errors import DeviceError
-from elastocal.sim.arm.inverse import solve_inverse
-from elastocal.sim.workcell.contact import Contact, ContactLaw
-from elastocal.sim.workcell.quasistatics import Quasistatics
-from elastocal.sim.workcell.robot import RobotEquilibrium, TrueRobot
+from elastocal.sim.arm import (
+    solve_inverse,
+)
+from elastocal.sim.workcell._contact import Contact, ContactLaw
+from elastocal.sim.workcell._quasistatics import Quasistatics
+from elastocal.sim.workcell._robot import RobotEquilibrium, TrueRobot
 
 CLOSED = 1e-6
 """How far a tool may end from where the contact holds it, in m: nanometres of deflection."""
@@ -37,16 +39,16 @@ class ContactPoses(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class TrueReadings:
-    """What is true where the arm stands still: near contact without load, and under each load."""
+    """Truth where the arm stands still: near contact without load, and under each load."""
 
     q: FloatArray
     """Joints of the controller under load, shape (place, load, joint), in rad or m."""
     force: FloatArray
     """Force on the robot in base, shape (place, load, 3), in N."""
     deflection: FloatArray
-    """Of the tool in base, against touching without force, shape (place, load, 3), in m."""
+    """Deflection of the tool in base against touching without force, (place, load, 3), in m."""
     controller_displacement: FloatArray
-    """Of the marker by the controller, against near contact, shape (place, load, 3), in m."""
+    """Displacement of the marker by the controller against near contact, (place, load, 3), in m."""
     marker_displacement: FloatArray
     """True one of the marker, likewise."""
     marker: FloatArray
@@ -63,10 +65,10 @@ class _States(NamedTuple):
 
     q: FloatArray
     twist: FloatArray
-    """What the controller is off by; see `quasistatics.Knots.twist`, shape (place, 9)."""
+    """Error of the controller; see `Knots.twist`, shape (place, 9)."""
     rest: RobotEquilibrium
     sag: FloatArray
-    """What the undeformed robot is off by, shape (place, 9)."""
+    """Error of the undeformed robot, shape (place, 9)."""
     force: FloatArray
     """On the robot in base, shape (place, 3), in N."""
 
@@ -159,7 +161,7 @@ class CampaignSimulator:
     ) -> _States:
         """Return the robot where the sensor reads a force, shape (place, 3), sensor frame.
 
-        See `ways.pressed`.
+        See `pressed_state`.
         """
         statics, weight = self.statics, self.statics.weight
         q, reached = start.q, start
@@ -179,7 +181,7 @@ class CampaignSimulator:
     def _touch(
         self, places: ContactPoses, T: FloatArray, near: _States
     ) -> tuple[_States, list[Contact]]:
-        """Return the robot touching the tooling without force; see `ways.touching`."""
+        """Return the robot touching the tooling without force; see `touching_state`."""
         beside = self._tool(near) - (T[:, :3, 3] + self.offset)
         height = np.sum(beside * places.normal, axis=1, keepdims=True)
         anchor = self._tool(near) - height * places.normal
@@ -200,10 +202,10 @@ class CampaignSimulator:
         sag = self.statics.twist(q, rest)
         return _States(q, (1.0 - self.statics.compensation) * sag, rest, sag, nothing)
 
-    def _along(self, q: FloatArray, T: FloatArray, way: FloatArray) -> FloatArray:
-        """Return joints that move the undeformed tool from T by a way, orientation kept."""
+    def _along(self, q: FloatArray, T: FloatArray, shift: FloatArray) -> FloatArray:
+        """Return joints that move the undeformed tool from T by a shift, orientation kept."""
         layout, goal = self.statics.robot.layout, T.copy()
-        goal[:, :3, 3] += way
+        goal[:, :3, 3] += shift
         found = solve_inverse(layout.linkage, goal, q, tolerance=1e-10, locked=layout.external)
         if not found.ok.all():
             place = int(np.flatnonzero(~found.ok)[0])

@@ -1,4 +1,4 @@
-"""What the instruments of a simulated cell add to the truth of a reading; see `quick`.
+"""Errors that the instruments of a simulated cell add to the truth of a reading; see `campaign`.
 
 The devices sample, the procedure averages; here the averages are drawn at once, with the standard
 deviations that follow from the same figures of the cell file. Assumed perfect: weight of the tool
@@ -15,8 +15,8 @@ import numpy as np
 from elastocal.arrays import FloatArray, IndexArray
 from elastocal.cell import Cell
 from elastocal.dataset import Readings
+from elastocal.sim.workcell._instruments import AIR_TIME, COVERAGE, sensor_range
 from elastocal.sim.workcell.campaign import TrueReadings
-from elastocal.sim.workcell.instruments import AIR_TIME, COVERAGE, sensor_range
 
 
 class ErrorScales(NamedTuple):
@@ -63,20 +63,20 @@ class CampaignErrors:
     """Standard deviations of averaged readings; make one with `of`."""
 
     noise: float
-    """Of a sample of the tracker at no distance, in m."""
+    """Noise of a sample of the tracker at no distance, in m."""
     noise_per_metre: float
     average: float
     """Standard deviation of a loaded average of the tracker over that of a sample."""
     unloaded_average: float
     """The same of an unloaded one."""
     force: tuple[float, float]
-    """Of an unloaded and of a loaded average of the sensor, in N."""
+    """Noise of an unloaded and of a loaded average of the sensor, in N."""
     drift: FloatArray
-    """Of each force axis per load case, in N, shape (3,)."""
+    """Drift of each force axis per load case, in N, shape (3,)."""
     gain: FloatArray
-    """What each unit of cross-talk adds to the gain, shape (3, 3, 6, 6)."""
+    """Change of the gain per unit of cross-talk, shape (3, 3, 6, 6)."""
     repeatability: float
-    """Of a stop, in m."""
+    """Error of a stop, in m."""
 
     @classmethod
     def of(cls, cell: Cell) -> "CampaignErrors":
@@ -168,7 +168,7 @@ def _averaged(slow: float, time: float, rate: float) -> float:
 
 
 def _gain(cell: Cell, ranges: FloatArray) -> FloatArray:
-    """Return d gain / d cross-talk; see `force_sensor.force_gain`. Shape (3, 3, 6, 6)."""
+    """Return d gain / d cross-talk; see `force_gain`. Shape (3, 3, 6, 6)."""
     T_sensor_tcp = cell.T_sensor_tcp
     assert T_sensor_tcp is not None
     wrench = np.vstack([np.eye(3), np.cross(T_sensor_tcp[:3, 3], np.eye(3)).T])

@@ -1,6 +1,6 @@
-"""The simulated cell at work: a robot that bends under process forces, and what its sensor reads.
+"""The simulated cell: its devices, and the robot that bends under process forces.
 
-Assumptions, beside those of `elastocal.sim.workcell.quasistatics`:
+Assumptions of the process, beside those of `elastocal.sim.workcell._quasistatics`:
 
 * the robot is at rest at every instant: the forces that it follows change within tenths of a
   second, its first mode lies above 8 Hz;
@@ -19,9 +19,9 @@ import numpy as np
 from elastocal.arrays import FloatArray
 from elastocal.cell import Cell
 from elastocal.cell.devices import Devices
-from elastocal.sim.workcell.controller import SimulatedArm
-from elastocal.sim.workcell.force_control import ForceControl
-from elastocal.sim.workcell.instruments import (
+from elastocal.sim.workcell._controller import SimulatedArm
+from elastocal.sim.workcell._force_control import ForceControl
+from elastocal.sim.workcell._instruments import (
     SimulatedForceSensor,
     SimulatedTracker,
     force_gain,
@@ -29,10 +29,10 @@ from elastocal.sim.workcell.instruments import (
     sensor_range,
     sensor_zero,
 )
-from elastocal.sim.workcell.plant import Plant
-from elastocal.sim.workcell.quasistatics import RobotState
-from elastocal.sim.workcell.sampling import generator
-from elastocal.sim.workcell.timeline import SimClock
+from elastocal.sim.workcell._plant import Plant
+from elastocal.sim.workcell._quasistatics import RobotState
+from elastocal.sim.workcell._sampling import generator
+from elastocal.sim.workcell._timeline import SimClock
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,5 +1,10 @@
 from .a_optimal import AOptimal as AOptimal
-from .criterion import Criterion as Criterion, singular_values as singular_values
+from .criterion import (
+    Criterion as Criterion,
+    inverse_trace_loss as inverse_trace_loss,
+    log_determinant_gain as log_determinant_gain,
+    singular_values as singular_values,
+)
 from .d_optimal import DOptimal as DOptimal, o1 as o1
 from .e_optimal import EOptimal as EOptimal
 from .i_optimal import IOptimal as IOptimal

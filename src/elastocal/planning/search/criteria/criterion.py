@@ -1,4 +1,4 @@
-"""What every criterion offers: a number that says how much a choice of poses tells.
+"""The interface of all criteria: a number that says how much a choice of poses tells.
 
 With low-rank updates for all candidates at once, by matrices as small as a pose's rows. With
 ``S = L L^T`` and the rows ``B`` of a pose, ``K = L^-1 B^T`` transposed times itself:

@@ -1,4 +1,4 @@
-"""The sections of the report, in their order. The verdict comes before them; see `verdict`."""
+"""Sections of the report: one file each, and its export here; each knows its place."""
 
 import lazy_loader
 

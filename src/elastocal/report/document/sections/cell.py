@@ -5,41 +5,38 @@ from collections.abc import Iterator
 import numpy as np
 
 from elastocal.cell import Cell
-from elastocal.report.document.markup import paragraph, table
-from elastocal.report.document.parts import Parts
-from elastocal.report.document.section import Content, Section
+from elastocal.report.document.blocks import Block, Content, Paragraph, Section, Table
+from elastocal.verdict import Evidence
 from elastocal.wording import mm, point
 
-Row = tuple[str, str]
 
-
-def body(parts: Parts) -> Content:
+def _body(evidence: Evidence) -> Content:
     """Return the section."""
-    if parts.cell is None:
-        robot = f" The robot of the model is {parts.robot}." if parts.robot else ""
-        return Content(paragraph(f"The cell is not known: no cell file could be read.{robot}"))
-    cell = parts.cell
-    top = paragraph(
-        "The devices are simulated: no real robot, sensor or tracker took part.", "banner"
-    )
-    return Content(
-        (top if parts.simulated else "")
-        + table("Robot, tool and instruments", ("What", "Value"), _facts(cell), texts=2)
-        + table(
-            "Load cases: force on the robot in the tcp frame, in N",
-            ("Load case", "x", "y", "z"),
-            [
-                (name, *(f"{value + 0.0:.0f}" for value in force))
-                for name, force in zip(
-                    cell.file.load_cases.cases, cell.file.load_cases.force_tcp, strict=True
-                )
-            ],
-        )
-        + table("Limits of the poses", ("What", "Value"), _limits(cell), texts=2)
-    )
+    if evidence.cell is None:
+        robot = f" The robot of the model is {evidence.robot}." if evidence.robot else ""
+        text = f"The cell is not known: no cell file could be read.{robot}"
+        return Content((Paragraph(text),))
+    text = "The devices are simulated: no real robot, sensor or tracker took part."
+    banner = (Paragraph(text, "banner"),) if evidence.simulated else ()
+    return Content((*banner, *_tables(evidence.cell)))
 
 
-def _facts(cell: Cell) -> Iterator[Row]:
+def _tables(cell: Cell) -> Iterator[Block]:
+    heads = ("What", "Value")
+    yield Table("Robot, tool and instruments", heads, tuple(_instruments(cell)), texts=2)
+    cases = cell.file.load_cases
+    yield Table(
+        "Load cases: force on the robot in the tcp frame, in N",
+        ("Load case", "x", "y", "z"),
+        tuple(
+            (name, *(f"{value + 0.0:.0f}" for value in force))
+            for name, force in zip(cases.cases, cases.force_tcp, strict=True)
+        ),
+    )
+    yield Table("Limits of the poses", heads, tuple(_limits(cell)), texts=2)
+
+
+def _instruments(cell: Cell) -> Iterator[tuple[str, str]]:
     file = cell.file
     yield "Robot", cell.robot.name
     yield "Joints", ", ".join(cell.robot.joint_names)
@@ -68,7 +65,7 @@ def _facts(cell: Cell) -> Iterator[Row]:
     yield "Devices", f"arm {devices.arm}, sensor {devices.sensor}, metrology {devices.metrology}"
 
 
-def _limits(cell: Cell) -> Iterator[Row]:
+def _limits(cell: Cell) -> Iterator[tuple[str, str]]:
     file = cell.file
     yield "Contact disk, radius", mm(file.engagement.disk_radius, 1)
     yield "Normals within", f"{np.degrees(file.engagement.normal_tolerance):.1f}°"
@@ -81,8 +78,8 @@ def _limits(cell: Cell) -> Iterator[Row]:
         yield "Payload", f"{file.limits.payload:g} kg"
     known = np.isfinite(cell.torque_limits)
     pairs = zip(cell.robot.joint_names, cell.torque_limits, known, strict=True)
-    told = ", ".join(f"{name} {value:.0f}" for name, value, there in pairs if there)
-    yield "Torques that may be used, in N·m", told or "not known"
+    torques = ", ".join(f"{name} {value:.0f}" for name, value, there in pairs if there)
+    yield "Torques that may be used, in N·m", torques or "not known"
 
 
-SECTION = Section("cell", "The cell", body)
+CELL = Section("cell", "The cell", 10, _body)

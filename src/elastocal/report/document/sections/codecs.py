@@ -3,61 +3,56 @@
 from collections.abc import Iterator
 from functools import partial
 
-from elastocal.codec import CodecData, Saturation
+from elastocal.codec import CodecData
 from elastocal.errors import CodecError
-from elastocal.report.document.leading import leading
-from elastocal.report.document.markup import facts, heading, listed, paragraph, table
-from elastocal.report.document.parts import Codec, Parts
-from elastocal.report.document.pictures import picture
-from elastocal.report.document.section import Content, Finding, Section
-from elastocal.report.plots import (
-    codec_chart,
-    headline,
-    how_to_read,
+from elastocal.report.document.blocks import (
+    Block,
+    Bullets,
+    Content,
+    Facts,
+    Heading,
+    Paragraph,
+    Section,
+    Table,
+    picture,
 )
-from elastocal.wording import counted, mm
+from elastocal.report.plots import codec_chart, headline, how_to_read
+from elastocal.verdict import CodecEvidence, Evidence
+from elastocal.wording import mm
 
 _FIGURES = {
     "search": ("Search", "Fig. 7"),
     "springs": ("Springs", "Fig. 9"),
     "load_cases": ("Load cases", "Fig. 10"),
 }
-"""What a codec may compare: in words, and the figure of the paper that does; in its order."""
+"""Comparisons of the paper, in its order: title and figure of each."""
 
 
-def body(parts: Parts) -> Content:
+def _body(evidence: Evidence) -> Content:
     """Return the section."""
-    if not parts.codecs:
-        return Content(
-            paragraph("There is no codec, so it is not known whether there were enough poses."),
-            findings=(
-                Finding(
-                    "whether there were enough poses was not verified (no codec)",
-                    advice="Make a codec with `elastocal codec`: it tells whether more poses would"
-                    " help.",
-                ),
-            ),
-        )
-    data = parts.codecs[0].data
+    if not evidence.codecs:
+        text = "There is no codec, so it is not known whether there were enough poses."
+        return Content((Paragraph(text),))
+    data = evidence.codecs[0].data
     sets, size = data.verification.shape
-    html = facts(
-        [
+    facts = Facts(
+        (
             ("Poses", len(data.contact)),
             ("Splits", sets),
             ("Held-out poses in each", size),
             ("Training poses", f"1 to {data.n_train[-1]}"),
-        ]
+        )
     )
-    html += "".join(_codec(codec) for codec in sorted(parts.codecs, key=_order))
-    best = leading(parts)
-    return Content(html, findings=() if best is None else tuple(_findings(best)))
+    codecs = sorted(evidence.codecs, key=_order)
+    return Content((facts, *(block for codec in codecs for block in _codec(codec))))
 
 
-def _codec(codec: Codec) -> str:
+def _codec(codec: CodecEvidence) -> Iterator[Block]:
     data, verdicts = codec.data, codec.verdicts
-    html = heading(_title(data)) + listed(_micro(each) for each in verdicts.sentences)
+    yield Heading(_title(data))
+    yield Bullets(tuple(map(_micro, verdicts.sentences)))
     try:
-        html += picture(
+        yield picture(
             partial(codec_chart, data, verdicts),
             f"{headline(data)}: box plots of mean and maximum error at held-out poses over the"
             f" number of training poses. {_micro(' '.join(verdicts.sentences))}",
@@ -65,8 +60,8 @@ def _codec(codec: Codec) -> str:
             ".png",
         )
     except CodecError as error:
-        html += paragraph(f"No chart: {error}.")
-    return html + _table(codec)
+        yield Paragraph(f"No chart: {error}.")
+    yield _saturation(codec)
 
 
 def _title(data: CodecData) -> str:
@@ -82,14 +77,14 @@ def _like(data: CodecData) -> str:
 
 
 def _compared(data: CodecData) -> str | None:
-    """Return what the variants differ in, as far as the paper compares it."""
+    """Return the key in which the variants differ, as far as the paper compares it."""
     for key in _FIGURES:
         if len({getattr(each, key) for each in data.variants}) > 1:
             return key
     return None
 
 
-def _order(codec: Codec) -> int:
+def _order(codec: CodecEvidence) -> int:
     key = _compared(codec.data)
     return list(_FIGURES).index(key) if key else len(_FIGURES)
 
@@ -99,8 +94,8 @@ def _micro(sentence: str) -> str:
     return sentence.replace(" um", " µm")
 
 
-def _table(codec: Codec) -> str:
-    rows = [
+def _saturation(codec: CodecEvidence) -> Block:
+    rows = tuple(
         (
             each.variant,
             str(each.n_train),
@@ -110,30 +105,10 @@ def _table(codec: Codec) -> str:
             "yes" if each.settled else "not sure",
         )
         for each in codec.verdicts.saturation
-    ]
+    )
     heads = ("Variant", "Saturated from", "95 % interval", "Error there", "Error with all",
              "Settled?")  # fmt: skip
-    return table("Saturation: training poses from which on more do not help", heads, rows)
+    return Table("Saturation: training poses from which on more do not help", heads, rows)
 
 
-def _findings(best: Saturation) -> Iterator[Finding]:
-    last = counted(best.last, "training pose")
-    if best.n_train == best.last:
-        yield Finding(
-            f"the codec has not saturated: the error still falls at {last}",
-            advice="Measure more poses: the error still falls with every one.",
-        )
-    elif not best.settled:
-        yield Finding(
-            f"the codec does not show that the error has saturated: its interval reaches {last}",
-            advice="Measure some more poses to see that the error no longer falls.",
-        )
-    else:
-        yield Finding(
-            f"the error no longer fell from {counted(best.n_train, 'training pose')} on (95 %"
-            f" interval {best.low} to {best.high}), so there were enough poses",
-            holds_back=False,
-        )
-
-
-SECTION = Section("codecs", "Number of poses: codecs", body)
+CODECS = Section("codecs", "Number of poses: codecs", 60, _body)

@@ -1,137 +1,142 @@
 """Registration of the stations, noise, drift, and the tool's weight."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from functools import partial
-from typing import Any
 
 import numpy as np
 
-from elastocal.report.document.markup import heading, listed, paragraph, table
-from elastocal.report.document.parts import Parts
-from elastocal.report.document.pictures import picture
-from elastocal.report.document.section import Content, Finding, Section
-from elastocal.report.plots import (
-    station_figure,
+from elastocal.compensation.conditioning import ToolResult
+from elastocal.report.document.blocks import (
+    Block,
+    Bullets,
+    Content,
+    Heading,
+    Paragraph,
+    Section,
+    Table,
+    picture,
+)
+from elastocal.report.plots import StationResiduals, station_figure
+from elastocal.verdict import (
+    Evidence,
+    RegistrationFigures,
+    RunFigures,
+    StationMove,
+    ToolFigures,
 )
 from elastocal.wording import counted, mm, point, spans, um
 
-Figures = dict[str, Any]
 
-
-def body(parts: Parts) -> Content:
+def _body(evidence: Evidence) -> Content:
     """Return the section."""
-    summary = parts.summary
+    summary = evidence.summary
     if summary is None:
-        text = paragraph("The summary of the run is not known: stations and sensor are not judged.")
-        return Content(text + _tool_file(parts))
-    html = _stations(summary["registration"]) + _noise(summary) + _tool(summary["tool"])
-    warnings = listed(summary["warnings"]) or paragraph("The run gave no warning.")
-    html += _tool_file(parts) + heading("Warnings of the run") + warnings
-    return Content(html, findings=tuple(_findings(summary)))
-
-
-def _stations(registration: Figures) -> str:
-    stations = registration["stations"]
-    rows = [
+        text = "The summary of the run is not known: stations and sensor are not judged."
+        return Content((Paragraph(text), _tool_file(evidence.tool)))
+    none = Paragraph("The run gave no warning.")
+    return Content(
         (
-            each["station"],
-            spans(each["poses"]),
-            um(each["residual_rms"]),
-            um(each["residual_max"]),
-            f"{1e3 * each['rotation_sigma']:.2f} mrad",
-            um(each["displacement_sigma"]),
+            *_stations(summary.registration),
+            _noise(summary),
+            *_tool(summary.tool),
+            _tool_file(evidence.tool),
+            Heading("Warnings of the run"),
+            Bullets(summary.warnings) if summary.warnings else none,
         )
-        for each in stations
-    ]
+    )
+
+
+def _stations(registration: RegistrationFigures) -> Iterator[Block]:
+    rows = tuple(
+        (
+            each.station,
+            spans(each.poses),
+            um(each.residual_rms),
+            um(each.residual_max),
+            f"{1e3 * each.rotation_sigma:.2f} mrad",
+            um(each.displacement_sigma),
+        )
+        for each in registration.stations
+    )
     heads = ("Station", "Poses", "Residual, rms", "Residual, largest", "Rotation known to",
              "Effect on a displacement")  # fmt: skip
-    html = table("Tracker stations, registered from the unloaded readings", heads, rows, texts=2)
-    if stations:
-        html += picture(
-            partial(station_figure, stations),
+    yield Table("Tracker stations, registered from the unloaded readings", heads, rows, texts=2)
+    residuals = [
+        StationResiduals(each.station, each.poses, np.array(each.residual, dtype=float))
+        for each in registration.stations
+    ]
+    if residuals:
+        yield picture(
+            partial(station_figure, residuals),
             "Length of the registration's residual at each pose, for each station",
             "Unloaded marker readings against the robot's own position, after the fit of station"
             " and lever arm.",
         )
-    lever = f"{point(registration['lever_arm'])} mm"
-    html += paragraph(
-        f"Marker in the tcp frame: {lever} measured, {point(registration['lever_arm_of_cell'])} mm"
-        f" in the cell file. Scatter of the readings: {_or_unknown(registration['scatter'], um)}."
+    lever = f"{point(registration.lever_arm)} mm"
+    yield Paragraph(
+        f"Marker in the tcp frame: {lever} measured, {point(registration.lever_arm_of_cell)} mm"
+        f" in the cell file. Scatter of the readings: {_or_unknown(registration.scatter, um)}."
     )
-    html += paragraph(_moves(registration["moves"]))
-    lost = [f"station {name}: {why}" for name, why in registration["unregistered"].items()]
-    return html + (paragraph("Stations without registration:") + listed(lost) if lost else "")
+    yield Paragraph(_moves(registration.moves))
+    lost = tuple(f"station {name}: {why}" for name, why in registration.unregistered.items())
+    if lost:
+        yield Paragraph("Stations without registration:")
+        yield Bullets(lost)
 
 
-def _moves(moves: list[Figures]) -> str:
+def _moves(moves: tuple[StationMove, ...]) -> str:
     if not moves:
         return "No station moved during the run."
     return " ".join(
-        f"Station {each['station']} moved before pose {each['from_pose']}: the marker seemed to"
-        f" jump by {mm(each['distance'])}."
+        f"Station {each.station} moved before pose {each.from_pose}: the marker seemed to"
+        f" jump by {mm(each.distance)}."
         for each in moves
     )
 
 
-def _noise(summary: Figures) -> str:
-    noise, drift, moment = summary["noise"], summary["drift"], summary["contact_moment"]
-    rows = [
+def _noise(summary: RunFigures) -> Block:
+    noise, drift, moment = summary.noise, summary.drift, summary.contact_moment
+    at_pose = "" if drift.pose is None else f" at pose {drift.pose}"
+    rows = (
         ("Force of a reading, median standard deviation",
-         _or_unknown(noise["force_sigma_median_N"], "{:.2f} N".format)),
+         _or_unknown(noise.force_sigma_median_N, "{:.2f} N".format)),
         ("Marker of a reading, median standard deviation",
-         _or_unknown(noise["marker_sigma_median"], um)),
-        ("Sensor drift within a pose, largest", _or_unknown(drift["largest_N"], "{:.2f} N".format)
-         + ("" if drift["pose"] is None else f" at pose {drift['pose']}")),
+         _or_unknown(noise.marker_sigma_median, um)),
+        ("Sensor drift within a pose, largest",
+         _or_unknown(drift.largest_N, "{:.2f} N".format) + at_pose),
         ("Moment at the contact, median and largest",
-         f"{_or_unknown(moment['median_Nm'], '{:.2f}'.format)} and"
-         f" {_or_unknown(moment['largest_Nm'], '{:.2f}'.format)} N·m"),
-    ]  # fmt: skip
-    return table("Noise and drift", ("What", "Value"), rows, texts=2)
+         f"{_or_unknown(moment.median_Nm, '{:.2f}'.format)} and"
+         f" {_or_unknown(moment.largest_Nm, '{:.2f}'.format)} N·m"),
+    )  # fmt: skip
+    return Table("Noise and drift", ("What", "Value"), rows, texts=2)
 
 
-def _tool(tool: Figures) -> str:
-    rows = [
-        _compared("Mass in kg", tool["mass_kg"], 1.0),
-        *(
-            _compared(
-                f"Centre of mass, {axis} of the sensor in mm", _axis(tool["centre_of_mass"], k), 1e3
-            )
-            for k, axis in enumerate("xyz")
-        ),
-    ]
-    heads = ("What", "Measured", "± (95 %)", "Cell file")
-    html = table(
-        f"Tool weight from {counted(tool['unloaded_references'], 'unloaded reference')}",
-        heads,
-        rows,
+def _tool(tool: ToolFigures) -> Iterator[Block]:
+    mass, centre = tool.mass_kg, tool.centre_of_mass
+    rows = [("Mass in kg", *_scaled(1.0, mass.value, mass.half_width_95, mass.cell))]
+    for k, axis in enumerate("xyz"):
+        values = (each[k] if each else None for each in (centre.value, centre.half_width_95,
+                                                         centre.cell))  # fmt: skip
+        rows.append((f"Centre of mass, {axis} of the sensor in mm", *_scaled(1e3, *values)))
+    yield Table(
+        f"Tool weight from {counted(tool.unloaded_references, 'unloaded reference')}",
+        ("What", "Measured", "± (95 %)", "Cell file"),
+        tuple(rows),
     )
-    open_ones = tool["not_determined"]
-    return html + (
-        paragraph(f"Not determined by these poses: {', '.join(open_ones)}.") if open_ones else ""
-    )
+    if tool.not_determined:
+        yield Paragraph(f"Not determined by these poses: {', '.join(tool.not_determined)}.")
 
 
-def _axis(found: Figures, axis: int) -> Figures:
-    return {key: values[axis] if values else None for key, values in found.items()}
+def _scaled(scale: float, *values: float | None) -> tuple[str, ...]:
+    return tuple(_or_unknown(value, lambda v: f"{scale * v:.2f}") for value in values)
 
 
-def _compared(name: str, found: Figures, scale: float) -> tuple[str, str, str, str]:
-    return (
-        name,
-        *(
-            _or_unknown(found[key], lambda v: f"{scale * v:.2f}")
-            for key in ("value", "half_width_95", "cell")
-        ),
-    )  # type: ignore[return-value]
-
-
-def _tool_file(parts: Parts) -> str:
-    tool = parts.tool
+def _tool_file(tool: ToolResult | None) -> Block:
     if tool is None:
-        return paragraph("There is no tool file: sensor rotation and bias were not identified.")
+        return Paragraph("There is no tool file: sensor rotation and bias were not identified.")
     R = np.array(tool.R_flange_sensor)
     turned = np.degrees(np.arccos(np.clip(0.5 * (np.trace(R) - 1.0), -1.0, 1.0)))
-    rows = [
+    rows = (
         ("Mass", f"{tool.mass:.2f} kg"),
         ("Centre of mass in the sensor's frame", f"{point(tool.centre)} mm"),
         ("Force bias", f"{point(tool.force_bias, 1.0)} N"),
@@ -139,25 +144,12 @@ def _tool_file(parts: Parts) -> str:
         ("Sensor turned against its mounting by", f"{turned:.2f}°"),
         ("Static postures", str(tool.postures)),
         ("Not determined", ", ".join(tool.undetermined) or "nothing"),
-    ]
-    return table("Tool file, for the compensation", ("What", "Value"), rows, texts=2)
+    )
+    return Table("Tool file, for the compensation", ("What", "Value"), rows, texts=2)
 
 
-def _findings(summary: Figures) -> Iterator[Finding]:
-    for warning in summary["warnings"]:
-        yield Finding(f"run: {warning}", advice=_advice(warning))
-    for each in summary["attempts"]["given_up"]:
-        yield Finding(f"run: pose {each} was given up after its attempts failed")
+def _or_unknown(value: float | None, written: Callable[[float], str]) -> str:
+    return "not known" if value is None else written(value)
 
 
-def _advice(warning: str) -> str:
-    if "moved between" in warning:
-        return "Fix the tracker's stand before the next run: a station that moves splits its poses."
-    return ""
-
-
-def _or_unknown(value: float | None, told: Any) -> str:
-    return "not known" if value is None else str(told(value))
-
-
-SECTION = Section("instruments", "Stations, sensor and tool", body)
+INSTRUMENTS = Section("instruments", "Stations, sensor and tool", 40, _body)

@@ -1,13 +1,12 @@
-"""What this report does not show. The list is never empty."""
+"""Limits of this report: what it does not show. The list is never empty."""
 
 from collections.abc import Iterator
 
-from elastocal.report.document.markup import coded, heading, listed, paragraph
-from elastocal.report.document.parts import Parts
-from elastocal.report.document.section import Content, Finding, Section
+from elastocal.report.document.blocks import Block, Bullets, Content, Heading, Paragraph, Section
+from elastocal.verdict import Evidence
 from elastocal.wording import mm
 
-ALWAYS = (
+_ALWAYS = (
     "Geometric calibration and the sag under the arm's own weight: only deflection under a force"
     " is modelled, and both must be corrected before it.",
     "Absolute accuracy: deflections are differences to the unloaded reading at the same pose.",
@@ -18,58 +17,45 @@ ALWAYS = (
     "The controller that will apply the correction, and its delay.",
     "Safety: a calibrated model is not a safety function.",
 )
-ESSENTIAL = ("run", "journal", "cell", "plan", "summary of the run", "dataset", "calibrated model",
-             "calibration made again")  # fmt: skip
-"""Parts without which no light is green; the codec has a finding of its own."""
-TOLD_ELSEWHERE = ("codec", "earlier calibration")
-"""A codec has a finding of its own; a first calibration has no earlier one."""
 
 
-def body(parts: Parts) -> Content:
+def _body(evidence: Evidence) -> Content:
     """Return the section."""
-    html = paragraph("Whatever the light says, this was not verified:") + listed(_always(parts))
-    absent = [
+    return Content(tuple(_blocks(evidence)))
+
+
+def _blocks(evidence: Evidence) -> Iterator[Block]:
+    yield Paragraph("Whatever the light says, this was not verified:")
+    yield Bullets(tuple(_always(evidence)))
+    yield Heading("Missing in this report")
+    missing = tuple(
         f"{each.name[0].upper()}{each.name[1:]}{' (cannot be used)' if each.damaged else ''}:"
         f" {each.reason}"
-        for each in parts.absent
-    ]
-    html += heading("Missing in this report")
-    html += listed(map(coded, absent)) or paragraph("No part of the report is missing.")
-    if parts.doubts:
-        html += heading("What does not fit together") + listed(parts.doubts)
-    return Content(html, findings=tuple(_findings(parts)))
+        for each in evidence.missing
+    )
+    none = Paragraph("No part of the report is missing.")
+    yield Bullets(missing, code=True) if missing else none
+    if evidence.doubts:
+        yield Heading("What does not fit together")
+        yield Bullets(evidence.doubts)
 
 
-def _always(parts: Parts) -> Iterator[str]:
-    if parts.simulated:
+def _always(evidence: Evidence) -> Iterator[str]:
+    if evidence.simulated:
         yield "A real robot: all devices of this run are simulated."
-    yield from ALWAYS
-    if parts.calibrated is not None and parts.calibrated.model.observability.unobservable:
+    yield from _ALWAYS
+    calibrated = evidence.calibrated
+    if calibrated is not None and calibrated.model.observability.unobservable:
         yield (
             "Single springs that no reading tells apart (see Compliances): their numbers are not"
             " findings."
         )
-    if parts.plan is not None:
+    if evidence.plan is not None:
         yield (
             "Places on the surface farther than"
-            f" {mm(parts.plan.search.covering_radius, 1)} from every pose; that is how far the"
+            f" {mm(evidence.plan.search.covering_radius, 1)} from every pose; that is how far the"
             " worst covered candidate is from one."
         )
 
 
-def _findings(parts: Parts) -> Iterator[Finding]:
-    for each in parts.absent:
-        if each.name in TOLD_ELSEWHERE and not each.damaged:
-            continue
-        word = "cannot be used" if each.damaged else "is missing"
-        advice = ""
-        if each.name == "tool file" and not each.damaged:
-            advice = (
-                "Run `elastocal tool`: without it the compensation relies on the cell file's tool."
-            )
-        yield Finding(f"the {each.name} {word}: {each.reason}", each.name in ESSENTIAL, advice)
-    for doubt in parts.doubts:
-        yield Finding(doubt)
-
-
-SECTION = Section("not-verified", "What was not verified", body)
+NOT_VERIFIED = Section("not-verified", "What was not verified", 100, _body)

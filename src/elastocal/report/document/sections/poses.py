@@ -1,76 +1,74 @@
 """Surface, pool and chosen poses (paper Fig. 2 and 3)."""
 
 from functools import partial
-from html import escape
-from typing import Any
 
 from elastocal.planning import PlanResult
-from elastocal.report.document.markup import Markup, facts, folded, paragraph, table
-from elastocal.report.document.parts import Parts
-from elastocal.report.document.pictures import picture
-from elastocal.report.document.section import Content, Section
-from elastocal.report.pages.plan_page import key_figures, view_data
-from elastocal.report.pages.templating import template
-from elastocal.report.plots import (
-    plan_figure,
-    plan_view,
+from elastocal.report.document.blocks import (
+    Block,
+    Bullets,
+    Content,
+    Details,
+    Facts,
+    Paragraph,
+    PlanScene,
+    PoseButton,
+    Section,
+    Table,
+    picture,
 )
+from elastocal.report.pages import key_figures, view_data
+from elastocal.report.plots import plan_figure, plan_view
+from elastocal.verdict import Evidence
 from elastocal.wording import counted, mm
 
 
-def body(parts: Parts) -> Content:
+def _body(evidence: Evidence) -> Content:
     """Return the section."""
-    plan, pool = parts.plan, parts.pool
+    plan, pool = evidence.plan, evidence.pool
     if plan is None:
-        return Content(
-            paragraph("The plan is not known, so nothing is said of how the poses were chosen.")
-        )
-    html = facts(key_figures(plan)) + _choice(plan)
-    if pool is None or parts.surface is None or parts.cell is None:
-        told = paragraph("Without cell, mesh and pool there is no picture.")
-        return Content(html + told + _notes(plan) + _poses(plan))
-    view = plan_view(parts.cell, parts.surface, plan, pool)
-    data: dict[str, Any] = view_data(view, plan, pool)
-    labels = {"last": str(len(plan.poses)), "first": str(min(1, len(plan.poses)))}
-    html += _filled(template("report_view.html"), labels)
-    html += picture(
-        partial(plan_figure, parts.surface, plan, pool),
+        text = "The plan is not known, so nothing is said of how the poses were chosen."
+        return Content((Paragraph(text),))
+    head = (Facts(key_figures(plan)), _spreads(plan))
+    if pool is None or evidence.surface is None or evidence.cell is None:
+        text = "Without cell, mesh and pool there is no picture."
+        return Content((*head, Paragraph(text), *_notes(plan), _poses(plan, buttons=False)))
+    view = plan_view(evidence.cell, evidence.surface, plan, pool)
+    flat_map = picture(
+        partial(plan_figure, evidence.surface, plan, pool),
         _alt(plan),
         "After the paper's Fig. 3: the surface unrolled; colour is the distance of each candidate"
         " from its nearest chosen pose.",
         ".png",
     )
-    return Content(html + _notes(plan) + _poses(plan, shown=True), data)
+    scene = PlanScene(len(plan.poses))
+    blocks = (*head, scene, flat_map, *_notes(plan), _poses(plan, buttons=True))
+    return Content(blocks, view_data(view, plan, pool))
 
 
-def _poses(plan: PlanResult, shown: bool = False) -> str:
-    """Return the table of the poses, with buttons where there is a view that shows them."""
-    rows = [
+def _poses(plan: PlanResult, buttons: bool) -> Block:
+    """Return the table of the poses, with buttons where there is a scene that shows them."""
+    rows = tuple(
         (
-            _button(pose.id) if shown else str(pose.id),
+            PoseButton(pose.id) if buttons else str(pose.id),
             str(plan.search.order.index(pose.id) + 1),
             *(f"{1e3 * value + 0.0:.1f}" for value in pose.tcp_position),
             pose.seen_by or "no station",
         )
         for pose in plan.poses
-    ]
+    )
     heads = ("Pose", "Chosen as no.", "x in mm", "y in mm", "z in mm", "Seen by")
-    inner = table("Poses in visiting order, contact point in base", heads, rows)
-    told = f"The {counted(len(plan.poses), 'pose')} in visiting order"
-    return folded(told, f'<div id="pose-table">{inner}</div>')
+    caption = "Poses in visiting order, contact point in base"
+    table = Table(caption, heads, rows, name="pose-table")
+    return Details(f"The {counted(len(plan.poses), 'pose')} in visiting order", (table,))
 
 
-def _button(pose: int) -> Markup:
-    return Markup(f'<button type="button" aria-label="Show pose {pose}">{pose}</button>')
-
-
-def _choice(plan: PlanResult) -> str:
+def _spreads(plan: PlanResult) -> Block:
     search, other = plan.search, plan.comparison
     rows = [(search.name, search.spread)] + ([(other.name, other.spread)] if other else [])
-    return table(
+    return Table(
         "How the poses lie in the pool",
         ("Technique", "Covering radius", "To the edge, mean", "To the next pose, mean", "O1"),
-        [
+        tuple(
             (
                 f"{name}{'' if name == search.name else ' (not used)'}",
                 mm(spread.covering_radius, 1),
@@ -79,7 +77,7 @@ def _choice(plan: PlanResult) -> str:
                 f"{spread.o1:.4f}",
             )
             for name, spread in rows
-        ],
+        ),
     )
 
 
@@ -91,19 +89,13 @@ def _alt(plan: PlanResult) -> str:
     )
 
 
-def _notes(plan: PlanResult) -> str:
+def _notes(plan: PlanResult) -> tuple[Block, ...]:
     if not plan.findings:
-        return ""
+        return ()
+    # Where the folder lies is no part of a report.
     folder = plan.cell.file.rpartition("/")[0]
-    told = [text.replace(f"{folder}/", "") if folder else text for text in plan.findings]
-    items = "".join(f"<li>{escape(text)}</li>" for text in told)
-    return folded("Notes of the planner", f"<ul>{items}</ul>")
+    notes = tuple(text.replace(f"{folder}/", "") if folder else text for text in plan.findings)
+    return (Details("Notes of the planner", (Bullets(notes),)),)
 
 
-def _filled(text: str, values: dict[str, str]) -> str:
-    for name, value in values.items():
-        text = text.replace(f"${name}", value)
-    return text
-
-
-SECTION = Section("poses", "Surface, pool and poses", body)
+POSES = Section("poses", "Surface, pool and poses", 20, _body)

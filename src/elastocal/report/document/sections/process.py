@@ -12,19 +12,24 @@ from elastocal.compensation.process import (
     DeviationStatistics,
     SimulatedProcess,
 )
-from elastocal.report.document.markup import flattened, folded, paragraph, table
-from elastocal.report.document.parts import Parts
-from elastocal.report.document.pictures import picture
-from elastocal.report.document.section import Content, Finding, Section
-from elastocal.report.plots import (
-    course_figure,
-    process_maps,
+from elastocal.report.document.blocks import (
+    Block,
+    Content,
+    Details,
+    Paragraph,
+    Row,
+    Section,
+    Table,
+    flattened,
+    picture,
 )
+from elastocal.report.plots import course_figure, process_maps
+from elastocal.verdict import Evidence
 from elastocal.wording import counted, mm
 
 
 @dataclass(frozen=True)
-class Published:
+class PublishedCase:
     """A case of the paper's Table 1, in mm and parts of 1."""
 
     title: str
@@ -34,52 +39,51 @@ class Published:
 
 
 PAPER = {
-    "afp": Published(
+    "afp": PublishedCase(
         "Robotized AFP processing of a 3D thermoplastic aerostructure",
         (0.570, 0.956, 0.100), (0.061, 0.285, 0.046), (0.8930, 0.7019, 0.5400),
     ),
-    "machining": Published(
+    "machining": PublishedCase(
         "Robotized roughing of an Al-7075 aerospace part",
         (0.597, 2.050, 0.725), (0.101, 0.520, 0.342), (0.8308, 0.7463, 0.5283),
     ),
 }  # fmt: skip
 """Table 1 of Monsarrat et al., RCIM 2024: mean, maximum and standard deviation."""
-_WHAT = {
+_DEVIATIONS = {
     "afp": "Absolute value of lateral deviation",
     "machining": "Absolute value of the error normal to the part",
 }
 _HEADS = ("", "Mean", "Max", "St. dev.")
 
 
-def body(parts: Parts) -> Content:
+def _body(evidence: Evidence) -> Content:
     """Return the section."""
-    record = parts.process
-    if record is None:
-        return Content(
-            paragraph("No process path was run, so the effect of the correction was not verified.")
-        )
-    table_ = record.table
-    html = paragraph(
+    if evidence.process is None:
+        text = "No process path was run, so the effect of the correction was not verified."
+        return Content((Paragraph(text),))
+    return Content(tuple(_blocks(evidence.process, evidence.limits.tolerance)))
+
+
+def _blocks(record: SimulatedProcess, tolerance: float | None) -> Iterator[Block]:
+    yield Paragraph(
         "Simulated: the simulated robot followed the path under process forces, once as programmed"
         " and once with the online compensator of a calibrated model.", "banner",
-    ) + _table_1(record)  # fmt: skip
+    )  # fmt: skip
+    yield from _table_1(record)
     seed = record.courses[0].seed
-    own = [trace for trace in record.courses if trace.seed == seed]
-    html += _pictures(own, parts.limits.tolerance)
-    if table_.budget:
-        html += folded("Error budget", _lines("Error budget of the first seed", table_.budget))
-    settings = flattened(table_.settings)
-    html += folded(
-        "Settings of the compensator", table("Settings, SI units", ("Key", "Value"), settings, 2)
-    )
-    return Content(html, findings=tuple(_findings(record, parts.limits.tolerance)))
+    yield from _pictures([trace for trace in record.courses if trace.seed == seed], tolerance)
+    if record.table.budget:
+        yield Details("Error budget", (_budget(record.table.budget),))
+    settings = Table("Settings, SI units", ("Key", "Value"),
+                     tuple(flattened(record.table.settings)), 2)  # fmt: skip
+    yield Details("Settings of the compensator", (settings,))
 
 
-def _table_1(record: SimulatedProcess) -> str:
-    what = _WHAT.get(record.table.process, "Absolute deviation")
-    rows: list[tuple[str, ...]] = []
+def _table_1(record: SimulatedProcess) -> Iterator[Block]:
+    deviation = _DEVIATIONS.get(record.table.process, "Absolute deviation")
+    rows: list[Row] = []
     for line in record.table.lines:
-        head = f"{what}, {line.name} ({line.points} points)"
+        head = f"{deviation}, {line.name} ({line.points} points)"
         rows += [
             (f"{head}, without correction in mm", *_mm(line.before)),
             ("With correction in mm", *_mm(line.after)),
@@ -92,15 +96,16 @@ def _table_1(record: SimulatedProcess) -> str:
             ("Paper, with correction in mm", *(f"{value:.3f}" for value in paper.after)),
             ("Paper, reduction", *(f"{share:.2%}" for share in paper.reduction)),
         ]
-    note = paragraph(
-        "The paper's figures are of its real cell; those above them of the simulated one. They are"
-        " set side by side for their size, not as a repetition.", "sub",
-    )  # fmt: skip
-    return table("In the form of the paper's Table 1", _HEADS, rows) + (note if paper else "")
+    yield Table("In the form of the paper's Table 1", _HEADS, tuple(rows))
+    if paper is not None:
+        yield Paragraph(
+            "The paper's figures are of its real cell; those above them of the simulated one. They"
+            " are set side by side for their size, not as a repetition.", "sub",
+        )  # fmt: skip
 
 
-def _lines(title: str, lines: tuple[DeviationComparison, ...]) -> str:
-    rows = [
+def _budget(lines: tuple[DeviationComparison, ...]) -> Block:
+    rows = tuple(
         (
             line.name,
             *(
@@ -111,41 +116,31 @@ def _lines(title: str, lines: tuple[DeviationComparison, ...]) -> str:
             ),
         )
         for line in lines
-    ]
-    return table(f"{title}, before to after in mm (reduction)", _HEADS, rows)
+    )
+    caption = "Error budget of the first seed, before to after in mm (reduction)"
+    return Table(caption, _HEADS, rows)
 
 
-def _pictures(traces: list[CourseDeviation], tolerance: float | None) -> str:
+def _pictures(traces: list[CourseDeviation], tolerance: float | None) -> Iterator[Block]:
     worst = max(traces, key=lambda trace: float(np.abs(trace.before).max()))
     before, after = (
         np.concatenate([getattr(t, key) for t in traces]) for key in ("before", "after")
     )
-    told = (
+    text = (
         f"mean {mm(float(np.abs(before).mean()))} without and {mm(float(np.abs(after).mean()))}"
         f" with correction, over {counted(len(traces), 'course')}"
     )
-    return picture(
+    yield picture(
         partial(process_maps, traces),
-        f"Two maps of the path, coloured by absolute deviation: {told}",
+        f"Two maps of the path, coloured by absolute deviation: {text}",
         f"After the paper's Fig. 11e, 11f and 13b, 13c, in the plane that fits the path best:"
-        f" {told}.", ".png",
-    ) + picture(
+        f" {text}.", ".png",
+    )  # fmt: skip
+    yield picture(
         partial(course_figure, worst, tolerance),
         f"Deviation over time of course {worst.course}, without and with correction",
         f"After the paper's Fig. 11g: the course with the largest deviation, {worst.course}.",
-    )  # fmt: skip
-
-
-def _findings(record: SimulatedProcess, tolerance: float | None) -> Iterator[Finding]:
-    line = record.table.lines[-1]
-    told = (
-        f"on the simulated process path the mean deviation fell by {line.reduction.mean:.1%}, from"
-        f" {mm(line.before.mean)} to {mm(line.after.mean)}; largest left {mm(line.after.max)}"
     )
-    if tolerance is not None and not line.after.max <= tolerance:
-        yield Finding(f"{told}, beyond the tolerance of {mm(tolerance)}")
-    else:
-        yield Finding(told, holds_back=False)
 
 
 def _three(values: DeviationStatistics) -> tuple[float, float, float]:
@@ -156,4 +151,4 @@ def _mm(values: DeviationStatistics) -> tuple[str, ...]:
     return tuple(f"{1e3 * value:.3f}" for value in _three(values))
 
 
-SECTION = Section("process", "The process path, before and after", body)
+PROCESS = Section("process", "The process path, before and after", 70, _body)

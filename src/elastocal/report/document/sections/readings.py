@@ -1,71 +1,89 @@
-"""What was measured, reading by reading (paper Fig. 8g and 12b)."""
+"""Readings, one by one: what was measured, and how well it fits (paper Fig. 8g and 12b)."""
 
 from collections.abc import Iterator
 from functools import partial
-from typing import Any
 
 import numpy as np
 
 from elastocal.arrays import FloatArray
 from elastocal.dataset import Dataset
-from elastocal.identification import Calibration
-from elastocal.report.document.again import Again
-from elastocal.report.document.markup import facts, folded, heading, listed, paragraph, table
-from elastocal.report.document.parts import Parts
-from elastocal.report.document.pictures import picture
-from elastocal.report.document.section import Content, Finding, Section
-from elastocal.report.plots import (
-    displacement_figure,
-    pose_grid,
+from elastocal.identification import (
+    Calibration,
+    CalibrationSummary,
+    Reproduction,
+    UnseenErrors,
 )
-from elastocal.wording import counted, mm, spans
+from elastocal.report.document.blocks import (
+    Block,
+    Bullets,
+    Content,
+    Details,
+    Facts,
+    Heading,
+    Paragraph,
+    Section,
+    Table,
+    picture,
+)
+from elastocal.report.plots import displacement_figure, pose_grid
+from elastocal.verdict import Evidence, RunFigures
+from elastocal.wording import counted, mm
 
-Figures = dict[str, Any]
+_PoseValues = dict[tuple[int, str], float]
+"""Values in m by pose and load case."""
 
 
-def body(parts: Parts) -> Content:
+def _body(evidence: Evidence) -> Content:
     """Return the section."""
-    findings = (*_of_run(parts), *_of_readings(parts))
-    if parts.dataset is None:
-        text = paragraph("The dataset is not known, so no reading is shown.")
-        return Content(text + _suspicious(parts), findings=findings)
-    html = _counts(parts.dataset, parts.summary)
-    if parts.again is not None:
-        html += _residuals(parts.again.calibration)
-    html += _grids(parts.dataset, parts.again)
-    return Content(html + _suspicious(parts) + _worst(parts), findings=findings)
+    return Content(tuple(_blocks(evidence)))
 
 
-def _counts(dataset: Dataset, summary: Figures | None) -> str:
+def _blocks(evidence: Evidence) -> Iterator[Block]:
+    dataset, reproduction = evidence.dataset, evidence.reproduction
+    if dataset is None:
+        yield Paragraph("The dataset is not known, so no reading is shown.")
+        yield from _suspicious(evidence)
+        return
+    yield from _counts(dataset, evidence.summary)
+    if reproduction is not None:
+        yield _residuals(reproduction.calibration)
+    yield from _grids(dataset, reproduction)
+    yield from _suspicious(evidence)
+    if reproduction is not None:
+        yield _worst(reproduction.unseen)
+
+
+def _counts(dataset: Dataset, summary: RunFigures | None) -> Iterator[Block]:
     readings = dataset.readings(dataset.joint_names)
     size = np.linalg.norm(readings.deflection, axis=1)
-    html = facts(
-        [
+    yield Facts(
+        (
             ("Poses", len(dataset.poses)),
             ("Load cases", ", ".join(dataset.load_cases)),
             ("Usable readings", len(readings)),
             ("Deflection, mean", mm(float(size.mean()))),
             ("Deflection, largest", mm(float(size.max()))),
-        ]
+        )
     )
     if summary is None:
-        return html
-    counts = summary["readings"]["counts"]
-    html += table("Readings by status", ("Status", "Readings"), list(counts.items()))
-    lost = [
-        f"pose {each['pose']} {each['load_case']}: {each['status']}"
-        + (f" ({each['note']})" if each["note"] else "")
-        for each in summary["readings"]["not_ok"]
-    ]
-    return html + (heading("Readings that are not ok") + listed(lost) if lost else "")
+        return
+    counts = tuple(summary.readings.counts.items())
+    yield Table("Readings by status", ("Status", "Readings"), counts)
+    lost = tuple(
+        f"pose {each.pose} {each.load_case}: {each.status}"
+        + (f" ({each.note})" if each.note else "")
+        for each in summary.readings.not_ok
+    )
+    if lost:
+        yield Heading("Readings that are not ok")
+        yield Bullets(lost)
 
 
-def _residuals(again: Calibration) -> str:
-    readings = again.readings
+def _residuals(calibration: Calibration) -> Block:
+    readings, used = calibration.readings, calibration.used
     commanded = np.linalg.norm(readings.controller_displacement, axis=1)
-    residual = np.linalg.norm(again.residual, axis=1)
-    used = again.used
-    told = (
+    residual = np.linalg.norm(calibration.residual, axis=1)
+    text = (
         f"Commanded displacement {mm(float(commanded.mean()))} on average,"
         f" {mm(float(commanded.max()))} at most; residual of the fit"
         f" {mm(float(residual[used].mean()))} on average, {mm(float(residual[used].max()))} at most"
@@ -73,44 +91,34 @@ def _residuals(again: Calibration) -> str:
     )
     return picture(
         partial(displacement_figure, readings.pose, commanded, residual, used),
-        f"Norms of commanded displacements and of residuals of each reading. {told}",
-        f"After the paper's Fig. 8g and 12b. {told}.",
+        f"Norms of commanded displacements and of residuals of each reading. {text}",
+        f"After the paper's Fig. 8g and 12b. {text}.",
     )
 
 
-def _grids(dataset: Dataset, again: Again | None) -> str:
+def _grids(dataset: Dataset, reproduction: Reproduction | None) -> Iterator[Block]:
     panels = [("Measured deflection, norm in mm", _grid(dataset, _deflection(dataset)))]
-    if again is not None:
-        unseen = again.unseen
-        error = {
-            (int(pose), case): float(value)
-            for pose, case, value in zip(unseen.pose, unseen.load_case, unseen.error, strict=True)
-        }
-        panels.append(
-            ("Error where the pose was left out of the fit, norm in mm", _grid(dataset, error))
-        )
-    return picture(
+    if reproduction is not None:
+        error = _grid(dataset, _errors(reproduction.unseen))
+        panels.append(("Error where the pose was left out of the fit, norm in mm", error))
+    yield picture(
         partial(pose_grid, panels, dataset.poses, dataset.load_cases),
         "Shaded table of poses and load cases: " + "; ".join(title for title, _ in panels),
         "Each pose under each load case. Bright is large; the two scales differ.",
-    ) + folded("The same numbers as a table", _number_table(dataset, panels))
-
-
-def _number_table(dataset: Dataset, panels: list[tuple[str, FloatArray]]) -> str:
-    return "".join(
-        table(
-            title,
-            ("Pose", *dataset.load_cases),
-            [
-                (label, *("none" if np.isnan(v) else f"{v:.3f}" for v in row))
-                for label, row in zip(dataset.poses, values, strict=True)
-            ],
-        )
-        for title, values in panels
     )
+    tables = tuple(_number_table(dataset, title, values) for title, values in panels)
+    yield Details("The same numbers as a table", tables)
 
 
-def _deflection(dataset: Dataset) -> dict[tuple[int, str], float]:
+def _number_table(dataset: Dataset, title: str, values: FloatArray) -> Table:
+    rows = tuple(
+        (str(label), *("none" if np.isnan(v) else f"{v:.3f}" for v in row))
+        for label, row in zip(dataset.poses, values, strict=True)
+    )
+    return Table(title, ("Pose", *dataset.load_cases), rows)
+
+
+def _deflection(dataset: Dataset) -> _PoseValues:
     readings = dataset.readings(dataset.joint_names)
     size = np.linalg.norm(readings.deflection, axis=1)
     return {
@@ -119,7 +127,14 @@ def _deflection(dataset: Dataset) -> dict[tuple[int, str], float]:
     }
 
 
-def _grid(dataset: Dataset, values: dict[tuple[int, str], float]) -> FloatArray:
+def _errors(unseen: UnseenErrors) -> _PoseValues:
+    return {
+        (int(pose), case): float(value)
+        for pose, case, value in zip(unseen.pose, unseen.load_case, unseen.error, strict=True)
+    }
+
+
+def _grid(dataset: Dataset, values: _PoseValues) -> FloatArray:
     """Return values in mm, shape (pose, load_case), NaN where there is none."""
     return np.array(
         [
@@ -129,82 +144,35 @@ def _grid(dataset: Dataset, values: dict[tuple[int, str], float]) -> FloatArray:
     )
 
 
-def _figures(parts: Parts) -> Figures:
-    return parts.calibrated.figures if parts.calibrated is not None else {}
-
-
-def _suspicious(parts: Parts) -> str:
-    if parts.calibrated is None:
-        return ""
-    found = _figures(parts).get("suspicious", [])
-    if not found:
-        return heading("Suspicious readings") + paragraph("No reading looks wrong.")
-    rows = [
+def _suspicious(evidence: Evidence) -> Iterator[Block]:
+    if evidence.calibrated is None:
+        return
+    figures: CalibrationSummary | None = evidence.figures
+    if figures is None or not figures.suspicious:
+        yield Heading("Suspicious readings")
+        yield Paragraph("No reading looks wrong.")
+        return
+    rows = tuple(
         (
-            f"pose {each['pose']} {each['load_case']}",
-            mm(each["residual"]),
-            f"{each['score']:.1f}",
-            f"{each['leverage']:.2f}",
-            "set aside as a blunder" if each["set_aside"] else "kept in the fit",
+            f"pose {each.pose} {each.load_case}",
+            mm(each.residual),
+            f"{each.score:.1f}",
+            f"{each.leverage:.2f}",
+            "set aside as a blunder" if each.set_aside else "kept in the fit",
         )
-        for each in found
-    ]
+        for each in figures.suspicious
+    )
     heads = ("Reading", "Off by", "Robust score", "Leverage", "What was done")
-    return table("Readings that look wrong", heads, rows)
+    yield Table("Readings that look wrong", heads, rows)
 
 
-def _worst(parts: Parts) -> str:
+def _worst(unseen: UnseenErrors) -> Block:
     """Return where the model errs most."""
-    if parts.again is None:
-        return ""
-    unseen = parts.again.unseen
     order = np.argsort(-unseen.error, kind="stable")[:5]
-    rows = [
+    rows = tuple(
         (f"pose {unseen.pose[k]} {unseen.load_case[k]}", mm(float(unseen.error[k]))) for k in order
-    ]
-    heads = ("Reading", "Error")
-    return table("Largest errors, each at a left-out pose", heads, rows)
+    )
+    return Table("Largest errors, each at a left-out pose", ("Reading", "Error"), rows)
 
 
-def _of_run(parts: Parts) -> Iterator[Finding]:
-    if parts.plan is not None and parts.dataset is not None:
-        usable = parts.dataset.readings(parts.dataset.joint_names).pose
-        missing = sorted({pose.id for pose in parts.plan.poses} - set(map(int, usable)))
-        if missing:
-            yield Finding(
-                f"the run is partial: {len(missing)} of"
-                f" {counted(len(parts.plan.poses), 'planned pose')}"
-                f" {'has' if len(missing) == 1 else 'have'} no usable reading"
-                f" (pose {spans(missing)})",
-                advice="Finish the run: `elastocal run --resume` measures the missing poses.",
-            )
-
-
-def _of_readings(parts: Parts) -> Iterator[Finding]:
-    figures = _figures(parts)
-    for each in figures.get("suspicious", []):
-        name = f"pose {each['pose']} {each['load_case']}"
-        if each["set_aside"]:
-            yield Finding(
-                f"reading {name} was set aside as a blunder ({mm(each['residual'])} off)",
-                holds_back=False,
-                advice=f"Measure {name} again: its reading cannot be a measurement of this arm.",
-            )
-        else:
-            yield Finding(
-                f"reading {name} looks wrong and was kept in the fit ({mm(each['residual'])} off)",
-                advice=f"Look at {name}, and leave it out with `--exclude"
-                f" {each['pose']}:{each['load_case']}` if it is wrong.",
-            )
-    excluded = (figures.get("settings") or {}).get("exclude", ())
-    if excluded:
-        yield Finding(
-            f"{', '.join(map(str, excluded))} (pose, or pose:load case) was left out by hand: no"
-            " figure of this report speaks of it",
-            advice="Measure again what was left out, so that nothing has to be.",
-        )
-    for warning in figures.get("warnings", []):
-        yield Finding(f"calibration: {warning}")
-
-
-SECTION = Section("readings", "What was measured", body)
+READINGS = Section("readings", "What was measured", 30, _body)

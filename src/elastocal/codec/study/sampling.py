@@ -1,0 +1,160 @@
+"""Simulate the samples that are missing, in batches, on cores of this machine or a Dask cluster.
+
+Every worker keeps its linear algebra to one thread: the systems are small, the processes already
+use all cores, and sums split over threads would be rounded otherwise. For the same reason nothing
+is simulated in the process of the command itself, whose linear algebra may use all cores.
+"""
+
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from concurrent.futures import CancelledError
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import closing, contextmanager
+from functools import partial
+
+from elastocal.codec.study import _cluster
+from elastocal.codec.study.samples import Sample, SampleResult, Simulate
+from elastocal.codec.study.store import StudyDesign, StudyStore
+from elastocal.errors import CodecError
+from elastocal.parallel import ProcessPool, map_on_cluster, process_count, process_pool
+from elastocal.progress import Progress, silent
+
+_STAGE = "samples"
+_BATCH = 2
+"""Samples that are done and kept together: some seconds of work are lost when a study is killed."""
+
+Work = Callable[[], list[SampleResult]]
+"""One batch."""
+Spread = Callable[[Iterable[Work]], Iterator[list[SampleResult]]]
+"""Has the batches done, somewhere and in any order, and yields each result when it is there."""
+
+
+def run_study(
+    store: StudyStore,
+    design: StudyDesign,
+    samples: int,
+    simulate: Simulate,
+    spread: Spread,
+    progress: Progress = silent,
+) -> tuple[SampleResult, ...]:
+    """Return the results of samples 0 to ``samples - 1``; those in the folder are not done again.
+
+    Parameters
+    ----------
+    store : StudyStore
+        Folder of the study.
+    design : StudyDesign
+        What it is a study of.
+    samples : int
+        Number of samples; a finished study goes on with a larger one.
+    simulate : callable
+        See `Simulate`.
+    spread : callable
+        Has batches done: see `one_after_the_other`, `spread_over`.
+    progress : Progress
+        Hears of finished samples.
+
+    Raises
+    ------
+    CodecError
+        If less than one sample is wanted, or the folder holds another study.
+    ElastocalError
+        If a sample cannot be simulated, or a file not be written.
+    """
+    check_samples(samples)
+    store.open(design)
+    found = store.finished(design)
+    missing = [number for number in range(samples) if number not in found]
+    done = samples - len(missing)
+    progress(_STAGE, done, samples)
+    if missing:
+        parts = [missing[start : start + _BATCH] for start in range(0, len(missing), _BATCH)]
+        work = [partial(_simulate_batch, simulate, design.seed, part) for part in parts]
+        for results in spread(work):
+            store.keep(design, results)
+            done += len(results)
+            progress(_STAGE, done, samples)
+            found |= {result.number: result for result in results}
+    return tuple(found[number] for number in range(samples))
+
+
+def check_samples(samples: int) -> None:
+    """Refuse less than one sample.
+
+    Raises
+    ------
+    CodecError
+        If there is less than one.
+    """
+    if not samples >= 1:
+        raise CodecError(f"{samples} samples: must be at least 1")
+
+
+def one_after_the_other(batches: Iterable[Work]) -> Iterator[list[SampleResult]]:
+    """Do the batches here and now."""
+    return (work() for work in batches)
+
+
+@contextmanager
+def spread_over(
+    jobs: int | None, address: str | None, prepare: Callable[[], object] = list
+) -> Iterator[Spread]:
+    """Yield what has batches done; processes of this machine get ready in the meantime.
+
+    Parameters
+    ----------
+    jobs : int, optional
+        Processes on this machine; all cores by default.
+    address : str, optional
+        Of a Dask scheduler, whose workers are used instead, e.g. ``tcp://10.0.0.5:8786``.
+    prepare : callable
+        What each process does first, such as imports; can be pickled.
+
+    Raises
+    ------
+    CodecError
+        If Dask is not installed, the scheduler does not answer or is lost, or a process dies.
+    """
+    if address is not None:
+        _cluster.check_scheduler(address)  # refused before the long work
+        yield partial(_over_cluster, address=address)
+        return
+    with _dead_process_named(), process_pool(process_count(jobs), prepare) as pool:
+        yield partial(_over_cores, pool=pool)
+
+
+def _over_cores(batches: Iterable[Work], pool: ProcessPool) -> Iterator[list[SampleResult]]:
+    return pool.map(_do, batches, ordered=False)
+
+
+def _over_cluster(batches: Iterable[Work], address: str) -> Iterator[list[SampleResult]]:
+    client = _cluster.connected(address)
+    with closing(client):
+        from distributed import KilledWorker
+        from distributed.comm.core import CommClosedError
+
+        try:
+            yield from map_on_cluster(_do, batches, client, _cluster.PATIENCE)
+        except (CancelledError, CommClosedError, KilledWorker, TimeoutError) as error:
+            raise CodecError(
+                f"--dask {address}: the cluster was lost or has no worker"
+                f" ({type(error).__name__}); finished samples are kept: give the same command again"
+            ) from error
+
+
+@contextmanager
+def _dead_process_named() -> Iterator[None]:
+    try:
+        yield
+    except BrokenProcessPool as error:
+        raise CodecError(
+            "a process of the study died (out of memory?); finished samples are kept: give the"
+            " same command again, with fewer --jobs"
+        ) from error
+
+
+def _simulate_batch(simulate: Simulate, seed: int, numbers: Sequence[int]) -> list[SampleResult]:
+    return [simulate(Sample(seed, number)) for number in numbers]
+
+
+def _do(work: Work) -> list[SampleResult]:
+    return work()

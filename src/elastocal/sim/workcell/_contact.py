@@ -1,0 +1,204 @@
+"""The contact disk on the tooling: where it touches, what gives way under a force, when it slips.
+
+The tooling is the triangles of the cell's mesh, met by a straight approach as by a ray.
+
+The disk sinks in by ``f_n / k_n`` and the tooling yields by ``f_n / k_t`` along its normal; both
+are true motion of the tool, which marker and controller see alike. Sideways the disk follows
+Mindlin's law for a contact of which an outer ring slips already (R. D. Mindlin, "Compliance of
+elastic bodies in contact", J. Appl. Mech. 16, 1949; K. L. Johnson, "Contact Mechanics", 1985, 7.2),
+
+    shear = (3 mu f_n / 2 k_s) (1 - (1 - f_l / mu f_n)^(2/3)),
+
+which starts as ``f_l / k_s`` and ends in full sliding at Coulomb's limit ``f_l = mu f_n``. It is
+taken without its own hysteresis. The ring does not slip the same way twice: a random part of the
+slip grows towards the limit.
+"""
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+import trimesh
+
+from elastocal.arrays import FloatArray
+from elastocal.cell import Cell
+from elastocal.errors import FileAccessError, SchemaError
+
+LIMIT = 0.999
+"""Part of the friction limit that a sliding contact keeps up: its shear is finite."""
+_GRAZING = 1e-12
+"""A ray less steep to a triangle passes it by (product of its edges and the ray, in m²)."""
+
+
+@dataclass(frozen=True)
+class ContactLaw:
+    """Disk, tooling and friction between them."""
+
+    normal_stiffness: float
+    """k_n in N/m."""
+    shear_stiffness: float
+    """k_s in N/m."""
+    tooling_stiffness: float
+    """k_t in N/m."""
+    friction: float
+    """mu."""
+    micro_slip: float
+    """Standard deviation of the random slip along each axis at half the limit, in m."""
+
+    @classmethod
+    def of(cls, cell: Cell) -> "ContactLaw":
+        """Return the contact of a cell."""
+        entry = cell.file.simulation.contact
+        friction = entry.friction
+        return cls(
+            entry.normal_stiffness,
+            entry.shear_stiffness,
+            entry.tooling_stiffness,
+            cell.file.load_cases.friction if friction is None else friction,
+            entry.micro_slip,
+        )
+
+    def effort(self, force_tcp: FloatArray) -> float:
+        """Return the lateral force over the friction limit; above 1 the contact slides.
+
+        Parameters
+        ----------
+        force_tcp : ndarray, shape (3,)
+            Force on the robot in the tcp frame, in N; it presses where z is below 0.
+        """
+        lateral = float(np.hypot(force_tcp[0], force_tcp[1]))
+        if lateral == 0.0:
+            return 0.0
+        limit = self.friction * -float(force_tcp[2])
+        return lateral / limit if limit > 0.0 else np.inf
+
+    def held(self, force_tcp: FloatArray) -> FloatArray:
+        """Return the force that friction lets build up, shape (3,), in N."""
+        part = min(1.0, LIMIT / max(self.effort(force_tcp), 1e-12))
+        held: FloatArray = force_tcp * np.array([part, part, 1.0])
+        return held
+
+    def shear(self, force_tcp: FloatArray) -> FloatArray:
+        """Return how far the tool goes sideways, tcp frame, shape (3,), in m."""
+        effort = self.effort(force_tcp)
+        if effort == 0.0:
+            return np.zeros(3)
+        growth = 1.5 * (1.0 - (1.0 - min(effort, LIMIT)) ** (2.0 / 3.0)) / effort
+        shear: FloatArray = -growth / self.shear_stiffness * force_tcp * np.array([1.0, 1.0, 0.0])
+        return shear
+
+    def slip_sigma(self, force_tcp: FloatArray) -> float:
+        """Return the standard deviation of the random slip, in m."""
+        effort = min(self.effort(force_tcp), 0.95)
+        return self.micro_slip * effort / (1.0 - effort)
+
+
+@dataclass(frozen=True, eq=False)
+class Contact:
+    """The disk on one place of the tooling."""
+
+    law: ContactLaw
+    anchor: FloatArray
+    """Where the tool is without any force, in base, shape (3,), in m; moves when it slips."""
+    R_base_tcp: FloatArray
+    """Orientation that the controller keeps, shape (3, 3)."""
+    normal: FloatArray
+    """Outward normal of the tooling in base, shape (3,)."""
+    q_touch: FloatArray
+    """Joints at which the tool touches without force, shape (joint,), in rad or m."""
+
+    def tool_position(self, force_base: FloatArray) -> FloatArray:
+        """Return where the tool is under a force on the robot, in base, shape (3,), in m."""
+        force_tcp = self.R_base_tcp.T @ force_base
+        sunk = -force_tcp * np.array([0.0, 0.0, 1.0]) / self.law.normal_stiffness
+        tooling = -self.normal * (self.normal @ force_base) / self.law.tooling_stiffness
+        moved: FloatArray = self.R_base_tcp @ (sunk + self.law.shear(force_tcp)) + tooling
+        return self.anchor + moved
+
+    def slipped(self, lateral_tcp: FloatArray) -> "Contact":
+        """Return the contact after a slip, tcp frame, shape (2,), in m."""
+        return replace(self, anchor=self.anchor + self.R_base_tcp[:, :2] @ lateral_tcp)
+
+
+@dataclass(frozen=True, eq=False)
+class Hit:
+    """Where a ray meets the surface."""
+
+    distance: float
+    """Along the ray, in m."""
+    normal: FloatArray
+    """Unit normal of the triangle on the side that the ray comes from, shape (3,)."""
+
+
+@dataclass(frozen=True, eq=False)
+class TrueSurface:
+    """The tooling where it really stands."""
+
+    corners: FloatArray
+    """Triangles in base, shape (face, 3, 3), in m."""
+
+    @classmethod
+    def of(cls, cell: Cell) -> "TrueSurface":
+        """Return the surface of a cell.
+
+        Raises
+        ------
+        FileAccessError, SchemaError
+            If the mesh cannot be read.
+        """
+        T = cell.T_base_surface
+        offset = np.array(cell.file.simulation.contact.surface_offset)
+        corners = cell.file.surface.metres * _triangles(cell.surface_path)
+        return cls(corners @ T[:3, :3].T + T[:3, 3] + offset)
+
+    def hit(self, origin: FloatArray, direction: FloatArray, reach: float) -> Hit | None:
+        """Return the nearest point of the surface ahead; None when there is none within reach.
+
+        Source: T. Möller, B. Trumbore, "Fast, minimum storage ray-triangle intersection", Journal
+        of Graphics Tools 2(1), 1997.
+
+        Parameters
+        ----------
+        origin : ndarray, shape (3,)
+            In base, in m.
+        direction : ndarray, shape (3,)
+            Unit vector.
+        reach : float
+            In m.
+        """
+        first = self.corners[:, 0]
+        edge_1, edge_2 = self.corners[:, 1] - first, self.corners[:, 2] - first
+        across = np.cross(direction, edge_2)
+        steep = np.sum(edge_1 * across, axis=1)
+        crossed = np.abs(steep) > _GRAZING
+        scale = np.where(crossed, steep, 1.0)
+        from_first = origin - first
+        u = np.sum(from_first * across, axis=1) / scale
+        turned = np.cross(from_first, edge_1)
+        v = turned @ direction / scale
+        distance = np.sum(edge_2 * turned, axis=1) / scale
+        edge = 1e-9
+        inside = crossed & (u >= -edge) & (v >= -edge) & (u + v <= 1.0 + edge)
+        ahead = inside & (distance >= 0.0) & (distance <= reach)
+        if not ahead.any():
+            return None
+        face = int(np.argmin(np.where(ahead, distance, np.inf)))
+        normal = np.cross(edge_1[face], edge_2[face])
+        normal *= -np.sign(normal @ direction) / np.linalg.norm(normal)
+        return Hit(float(distance[face]), normal)
+
+
+def _triangles(path: Path) -> FloatArray:
+    """Return the triangles of a mesh file in its own unit, shape (face, 3, 3)."""
+    try:
+        with path.open("rb") as file:
+            mesh = trimesh.load_mesh(file, file_type=path.suffix[1:].lower(), process=False)
+    except OSError as error:
+        raise FileAccessError(f"cannot read {path}: {error.strerror or error}") from error
+    except (ValueError, IndexError, KeyError, TypeError, AttributeError) as error:
+        reason = " ".join(str(error).split()) or type(error).__name__
+        raise SchemaError(f"mesh {path} cannot be read: {reason}") from error
+    triangles: FloatArray = np.asarray(getattr(mesh, "triangles", ()), dtype=np.float64)
+    if not len(triangles):
+        raise SchemaError(f"mesh {path} has no triangle")
+    return triangles

@@ -1,0 +1,271 @@
+"""The paths of the robot from where it stands to where a command leads it.
+
+Straight moves to the surface are guarded by the force; on one away from it the force fades.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from elastocal.arrays import FloatArray
+from elastocal.sim.workcell._contact import Contact
+from elastocal.sim.workcell._plant import Plant
+from elastocal.sim.workcell._quasistatics import Quasistatics, RobotPath, RobotState
+
+CLOSED = 1e-8
+"""How far the tool may end from where the contact holds it, in m: 0.03 N of the disk."""
+_STEPS = 8
+"""Pieces of a free movement between knots."""
+_ROUNDS = 8
+_BEYOND = 0.02
+"""How far beyond its end a move looks for the surface, in m: the arm sags."""
+_LAST_TOUCH = 1e-4
+"""Shortest path on which a force fades when the tool leaves, in m."""
+
+
+def joint_path(statics: Quasistatics, start: RobotState, end: RobotState) -> RobotPath:
+    """Return the straight path in joint space; the small deviations change evenly."""
+    progress = np.linspace(0.0, 1.0, _STEPS + 1)
+    q = _between(start.q, end.q, progress)
+    twist = _between(start.twist, end.twist, progress)
+    return RobotPath(statics.knots(progress, q, twist, np.zeros((len(q), 3))), end)
+
+
+def straight_path(statics: Quasistatics, states: list[RobotState]) -> RobotPath:
+    """Return the straight path of the tool through some states, by its length.
+
+    Parameters
+    ----------
+    statics : Quasistatics
+        The robot.
+    stands : list of RobotState
+        All with the same commanded orientation, on one line; those where nothing moves are left
+        out, but for the last.
+    """
+    T = statics.robot.forward(np.stack([state.q for state in states]))
+    at = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(T[:, :3, 3], axis=0), axis=1))])
+    at = at / at[-1] if at[-1] > 0.0 else np.linspace(0.0, 1.0, len(states))
+    fine = np.unique(np.concatenate([at, np.linspace(0.0, 1.0, _STEPS + 1)]))
+    columns = (
+        np.stack([getattr(state, name) for state in states]) for name in ("twist", "force", "q")
+    )
+    twist, force, coarse = (_interpolated(at, column, fine) for column in columns)
+    points = _interpolated(at, T[:, :3, 3], fine)
+    q = statics.along(states[0].q, T[0, :3, :3], points[1:-1])
+    q = np.concatenate([coarse[:1], q, coarse[-1:]])
+    return RobotPath(statics.knots(fine, q, twist, force), states[-1])
+
+
+def force_path(statics: Quasistatics, start: RobotState, end: RobotState) -> RobotPath:
+    """Return the path on which the force goes straight from one to the other."""
+    both = (start, end)
+    q, twist, force = (np.stack([getattr(s, n) for s in both]) for n in ("q", "twist", "force"))
+    return RobotPath(statics.knots(np.array([0.0, 1.0]), q, twist, force), end)
+
+
+@dataclass(frozen=True, eq=False)
+class GuardedMove:
+    """How a guarded move ends."""
+
+    path: RobotPath
+    contact: Contact | None
+    """The tooling that is touched."""
+    felt: bool
+    """Whether the contact force was reached."""
+    length: float
+    """In m."""
+    fault: str | None = None
+
+
+def guarded_move(
+    plant: Plant,
+    start: RobotState,
+    direction: FloatArray,
+    distance: float,
+    guard: tuple[float, float],
+) -> GuardedMove:
+    """Return a straight move that ends at a distance or when a force is felt.
+
+    The arm stops a reaction time after the force is felt, so that the force overshoots by what
+    robot, disk and tooling build up meanwhile.
+
+    Parameters
+    ----------
+    plant : Plant
+        The cell.
+    start : RobotState
+        Where the robot stands.
+    direction : ndarray, shape (3,)
+        Unit vector in base.
+    distance : float
+        Longest path, in m.
+    guard : tuple of float
+        Speed in m/s, and the force to stop at, in N.
+    """
+    statics, error = plant.statics, plant.stop_error()
+    found = _touch(plant, start, direction, distance, error)
+    if found is None:
+        end = _moved(plant, start, distance * direction, error)
+        return GuardedMove(straight_path(statics, [start, end]), None, False, distance)
+    contact, touch = found
+    entry = plant.cell.file.simulation.controller
+    speed, limit = guard[0], min(guard[1], entry.collision_force)
+
+    def press(force: float) -> RobotState:
+        return pressed_state(statics, touch, contact, lambda _: -force * direction, error)
+
+    to_touch = _advance(plant, start, touch, direction)
+    stiffness = limit / (_advance(plant, start, press(limit), direction) - to_touch)
+    felt = to_touch + limit / stiffness <= distance
+    force = limit + stiffness * speed * entry.reaction if felt else 0.0
+    force = force or stiffness * max(distance - to_touch, 0.0)
+    end = press(force) if force > 0.0 else touch
+    on_the_way = [touch] if to_touch > 0.0 and end is not touch else []
+    fault = None
+    if felt and guard[1] > entry.collision_force:
+        fault = f"collision: {entry.collision_force:g} N on a straight move"
+    length = max(_advance(plant, start, end, direction), 0.0)
+    path = straight_path(statics, [start, *on_the_way, end])
+    return GuardedMove(path, contact, felt, length, fault)
+
+
+def retract_path(
+    plant: Plant, start: RobotState, direction: FloatArray, distance: float
+) -> tuple[RobotPath, Contact | None]:
+    """Return a straight move away from the surface, and the contact that is left.
+
+    The force fades evenly until the tool is where it touched.
+
+    Parameters
+    ----------
+    plant : Plant
+        The cell.
+    start : RobotState
+        Where the robot stands.
+    direction : ndarray, shape (3,)
+        Unit vector in base, away from the surface.
+    distance : float
+        In m.
+    """
+    statics, error, contact = plant.statics, plant.stop_error(), plant.contact
+    fades = 0.0
+    if contact is not None and np.any(start.force):
+        touched = replace(start, q=contact.q_touch)
+        fades = max(_advance(plant, start, touched, direction), _LAST_TOUCH)
+    if fades > distance:
+        left = (1.0 - distance / fades) * start.force
+        q = _moved(plant, start, distance * direction, error).q
+        return straight_path(statics, [start, statics.loaded(start, q, left, error)]), contact
+    states = [start]
+    if fades > 0.0:
+        states.append(_moved(plant, start, fades * direction, error))
+    states.append(_moved(plant, states[-1], (distance - fades) * direction, error))
+    return straight_path(statics, states), None
+
+
+def pressed_state(
+    statics: Quasistatics,
+    start: RobotState,
+    contact: Contact,
+    force: Callable[[FloatArray], FloatArray],
+    stop_error: FloatArray,
+) -> RobotState:
+    """Return the equilibrium of robot, disk and tooling under a force.
+
+    The commanded pose moves, orientation kept, until the tool is where disk and tooling hold it;
+    the robot gives a little differently there, so it is done in rounds.
+
+    Parameters
+    ----------
+    statics : Quasistatics
+        The robot.
+    start : RobotState
+        Where it comes from, with its memory.
+    contact : Contact
+        The disk on the tooling.
+    force : callable
+        Returns the force on the robot in base, shape (3,), in N, from the true orientation of the
+        sensor in base, shape (3, 3).
+    stop_error : ndarray, shape (3,)
+        Error of the stop, in base, in m.
+    """
+    q, reached = start.q, start
+    for _ in range(_ROUNDS):
+        wanted = force(statics.R_base_sensor(q, reached.twist))
+        reached = statics.loaded(replace(start, theta=reached.theta), q, wanted, stop_error)
+        goal = contact.tool_position(wanted)
+        if np.linalg.norm(goal - statics.tool_position(reached)) < CLOSED:
+            break
+        q = statics.along(q, contact.R_base_tcp, (goal - reached.twist[:3])[None])[0]
+    return reached
+
+
+def touching_state(
+    statics: Quasistatics, start: RobotState, at: FloatArray, error: FloatArray
+) -> RobotState:
+    """Return the robot with its tool truly at a point, without force, orientation kept.
+
+    Parameters
+    ----------
+    statics : Quasistatics
+        The robot.
+    start : RobotState
+        Where it comes from.
+    at : ndarray, shape (3,)
+        In base, in m.
+    error : ndarray, shape (3,)
+        Error of the stop, in base, in m.
+    """
+    R = statics.robot.forward(start.q)[:3, :3]
+    reached = start
+    for _ in range(_ROUNDS):
+        q = statics.along(reached.q, R, (at - reached.twist[:3])[None])[0]
+        reached = statics.free(q, error, reached.theta)
+        if np.linalg.norm(at - statics.tool_position(reached)) < CLOSED:
+            break
+    return reached
+
+
+def _touch(
+    plant: Plant, start: RobotState, direction: FloatArray, distance: float, error: FloatArray
+) -> tuple[Contact, RobotState] | None:
+    """Return contact and stand where the tool touches the tooling; None when it does not."""
+    statics = plant.statics
+    if plant.contact is not None:
+        return plant.contact, statics.free(plant.contact.q_touch, error, start.theta)
+    if any(fault.kind == "contact_missed" for fault in plant.schedule.at(plant.visit)):
+        return None
+    tool = statics.tool_position(start)
+    hit = plant.surface.hit(tool, direction, distance + _BEYOND)
+    if hit is None:
+        return None
+    point = tool + hit.distance * direction
+    touch = touching_state(statics, start, point, error)
+    if _advance(plant, start, touch, direction) > distance:
+        return None
+    R = statics.robot.forward(start.q)[:3, :3]
+    return Contact(plant.contact_law, point, R, hit.normal, touch.q), touch
+
+
+def _moved(plant: Plant, start: RobotState, shift: FloatArray, error: FloatArray) -> RobotState:
+    """Return the robot free, its tool commanded elsewhere, orientation kept."""
+    T = plant.statics.robot.forward(start.q)
+    q = plant.statics.along(start.q, T[:3, :3], (T[:3, 3] + shift)[None])[0]
+    return plant.statics.free(q, error, start.theta)
+
+
+def _advance(plant: Plant, start: RobotState, end: RobotState, direction: FloatArray) -> float:
+    """Return how far the commanded tool goes along a direction, in m."""
+    T = plant.statics.robot.forward(np.stack([start.q, end.q]))
+    return float((T[1, :3, 3] - T[0, :3, 3]) @ direction)
+
+
+def _between(start: FloatArray, end: FloatArray, progress: FloatArray) -> FloatArray:
+    between: FloatArray = start + progress[:, None] * (end - start)
+    between[-1] = end
+    return between
+
+
+def _interpolated(at: FloatArray, values: FloatArray, fine: FloatArray) -> FloatArray:
+    return np.stack([np.interp(fine, at, column) for column in values.T], axis=1)

@@ -1,0 +1,325 @@
+"""The plant that all simulated devices share: time, robot, tooling, faults, current segment."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from elastocal.arrays import FloatArray, IndexArray
+from elastocal.cell import Cell
+from elastocal.cell.description import Fault
+from elastocal.cell.devices import Motion
+from elastocal.errors import DeviceError, nearest
+from elastocal.robot import (
+    inverse_transform,
+)
+from elastocal.sim.workcell._contact import Contact, ContactLaw, TrueSurface
+from elastocal.sim.workcell._quasistatics import Quasistatics, RobotPath, RobotState
+from elastocal.sim.workcell._robot import TrueRobot
+from elastocal.sim.workcell._sampling import generator, posture_key
+from elastocal.sim.workcell._timeline import (
+    Ripple,
+    Segment,
+    SimClock,
+    TimeLaw,
+    Uniform,
+    to_microseconds,
+)
+
+FOREVER = 1 << 62
+"""Later than any time, in µs."""
+SPANS = ("beam_break", "ft_dropout", "ft_frozen", "ft_saturation", "stale_clock")
+"""Faults that last for a while, whatever the arm does."""
+_DRAWS = 64
+"""Random stops and slips of a visit; more begin anew."""
+_DONE = 1.0 - 1e-3
+"""A change of force this far along counts as made when the gears' memory is asked."""
+
+
+@dataclass(frozen=True)
+class FaultSpan:
+    """From when to when a device is at fault."""
+
+    kind: str
+    begin: int
+    """In µs."""
+    end: int
+    """In µs, not itself in it."""
+    station: str | None
+    """Tracker station; None: all."""
+
+    def holds(self, now: int) -> bool:
+        """Return whether a time in µs lies in it."""
+        return self.begin <= now < self.end
+
+
+class FaultSchedule:
+    """Faults of a cell, and what has become of them."""
+
+    def __init__(self, cell: Cell) -> None:
+        """Take the faults of the cell file.
+
+        Raises
+        ------
+        DeviceError
+            If a fault names a tracker station that is not there.
+        """
+        names = [tracker.name for tracker in cell.file.trackers]
+        for fault in cell.file.faults:
+            if fault.station is not None and fault.station not in names:
+                raise DeviceError(
+                    f"fault {fault.kind}: there is no tracker station {fault.station!r}"
+                    f"{nearest(fault.station, names)} (stations: {', '.join(names)})"
+                )
+        self._faults = cell.file.faults
+        self._spans: list[FaultSpan] = []
+
+    def begin(self, step: str, visit: int, load: int, now: int) -> list[tuple[int, Fault]]:
+        """Note the faults that follow from the beginning of a step.
+
+        Returns those that strike the arm, each with its time in µs.
+
+        Parameters
+        ----------
+        step : str
+            See `elastocal.cell.description.simulation.Fault.step`.
+        visit : int
+            Number of the visit.
+        load : int
+            Number of the load case of the visit.
+        now : int
+            In µs.
+        """
+        moments = []
+        self._spans = [span for span in self._spans if span.end > now]
+        for fault in self.at(visit):
+            if fault.step != step or (step == "hold" and fault.load != load):
+                continue
+            start = now + to_microseconds(fault.after)
+            if fault.kind in SPANS:
+                last = FOREVER if fault.duration is None else to_microseconds(fault.duration)
+                self._spans.append(FaultSpan(fault.kind, start, start + last, fault.station))
+            elif fault.kind in ("slip", "robot_stop"):
+                moments.append((start, fault))
+        return moments
+
+    @property
+    def any_span(self) -> bool:
+        """Whether there is any span to look at."""
+        return bool(self._spans)
+
+    def at(self, visit: int) -> list[Fault]:
+        """Return the faults of a visit."""
+        return [f for f in self._faults if 0 <= visit - f.pose < f.visits]
+
+    def lasting(self, kind: str, visit: int) -> list[Fault]:
+        """Return faults of a kind that stay once they have come."""
+        return [f for f in self._faults if f.kind == kind and f.pose <= visit]
+
+    def spans(self, kind: str) -> list[FaultSpan]:
+        """Return the spans of a kind of fault."""
+        if not self._spans:
+            return []
+        return [span for span in self._spans if span.kind == kind]
+
+    def struck(self, kind: str, times: IndexArray, station: str | None = None) -> IndexArray:
+        """Return which samples a span of some kind of fault covers, as indices.
+
+        Parameters
+        ----------
+        kind : str
+            Of fault.
+        times : ndarray of int, shape (sample,)
+            In µs.
+        station : str, optional
+            Tracker station that measures.
+        """
+        covered = np.zeros(len(times), dtype=bool)
+        for span in self.spans(kind):
+            if span.station in (None, station):
+                covered |= (times >= span.begin) & (times < span.end)
+        return np.flatnonzero(covered)
+
+
+class Instrument(Protocol):
+    """A device that samples what goes on."""
+
+    def catch_up(self, now: int) -> None:
+        """Take the samples that are due at a time in µs."""
+        ...
+
+    def restart(self, now: int, key: str) -> None:
+        """Begin to count samples, with the noise that belongs to a key."""
+        ...
+
+
+class Plant:
+    """The cell as it really is. Devices look into it; nothing else does."""
+
+    def __init__(self, cell: Cell, seed: int, clock: SimClock) -> None:
+        """Set the cell up, the arm at HOME."""
+        self.cell, self.seed, self.clock = cell, seed, clock
+        self._weighed = self.statics = Quasistatics.of(cell, TrueRobot.of(cell))
+        self.surface = TrueSurface.of(cell)
+        self.contact_law = ContactLaw.of(cell)
+        self.schedule = FaultSchedule(cell)
+        self.contact: Contact | None = None
+        self.instruments: list[Instrument] = []
+        self._pressing = _unit_wrench(self.statics.robot)
+        self.visit = -1
+        self.key = posture_key(cell.home)
+        self._stops, self._slips = np.zeros((_DRAWS, 3)), np.zeros((_DRAWS, 2))
+        self._drawn = 0
+        self._draw()
+        self._events: list[tuple[int, Callable[[], None]]] = []
+        state = self.statics.free(cell.home, self.stop_error(), None)
+        self.segment = self.standing(state, Motion.DISARMED)
+        self._sag = state.sag
+        clock.on_wake(self.wake)
+
+    @property
+    def now(self) -> int:
+        """The time in µs; while something due is done, the time at which it was due."""
+        return self._now if self._now is not None else self.clock.microseconds
+
+    _now: int | None = None
+
+    def wake(self, now: int) -> None:
+        """Do what was due until a time in µs, in its order."""
+        while self._events and self._events[0][0] <= now:
+            self._now, act = self._events.pop(0)
+            act()
+        self._now = None
+
+    def later(self, time: int, act: Callable[[], None]) -> None:
+        """Have something done at a time in µs."""
+        self._events.append((time, act))
+        self._events.sort(key=lambda event: event[0])
+
+    def begin_journey(self, target: FloatArray) -> None:
+        """Set out for a posture: stop errors and slips are those that belong to it."""
+        self.key = posture_key(target)
+        self._draw()
+        self._restart_instruments("on the way to")
+
+    def begin_visit(self) -> None:
+        """Begin to approach the surface from the posture that the arm was last sent to."""
+        self.visit += 1
+        more = sum(fault.mass for fault in self.schedule.lasting("tool_weight", self.visit))
+        self.statics = self._weighed.heavier(more) if more else self._weighed
+        self._drawn = 1
+        self._restart_instruments("from")
+
+    def _draw(self) -> None:
+        entry = self.cell.file.simulation.controller
+        stops = generator(self.seed, "stops", self.key).standard_normal((_DRAWS, 3))
+        self._stops = entry.repeatability * stops
+        self._slips = generator(self.seed, "slips", self.key).standard_normal((_DRAWS, 2))
+        self._drawn = 0
+
+    def _restart_instruments(self, what: str) -> None:
+        for instrument in self.instruments:
+            instrument.catch_up(self.now)
+            instrument.restart(self.now, f"{what} {self.key}")
+
+    def stop_error(self) -> FloatArray:
+        """Return the error of the next stop, shape (3,), in m."""
+        self._drawn += 1
+        error: FloatArray = self._stops[self._drawn % _DRAWS]
+        return error
+
+    def slip(self, load: int) -> FloatArray:
+        """Return the random slip of a load case in standard deviations, shape (2,)."""
+        slip: FloatArray = self._slips[load % _DRAWS]
+        return slip
+
+    def switch(self, segment: Segment) -> None:
+        """Go over to another segment now."""
+        for instrument in self.instruments:
+            instrument.catch_up(self.now)
+        self.segment = segment
+
+    def run(
+        self,
+        path: RobotPath,
+        law: TimeLaw,
+        motions: tuple[Motion, Motion],
+        start: RobotState,
+        *,
+        fault: str | None = None,
+        ripple: Ripple | None = None,
+    ) -> Segment:
+        """Set out on a path and return the segment.
+
+        Parameters
+        ----------
+        path : RobotPath
+            From ``start`` on.
+        law : TimeLaw
+            How the time goes.
+        motions : tuple of Motion
+            Motion of the arm on the path, and at its end.
+        start : RobotState
+            Where it is.
+        fault : str, optional
+            What the controller says at the end.
+        ripple : Ripple, optional
+            Unrest of the force.
+        """
+        theta = path.end.theta
+        assert theta is not None
+        segment = Segment(
+            begin=self.now,
+            law=law,
+            knots=path.knots,
+            motion=motions[0],
+            motion_after=motions[1],
+            springs=(start.springs, path.end.springs),
+            theta=theta,
+            fault_after=fault,
+            ripple=ripple,
+            ripple_wrench=self._pressing,
+        )
+        self.switch(segment)
+        return segment
+
+    def robot_state(self) -> RobotState:
+        """Return where the robot is now, with the memory that it has gathered so far."""
+        segment, progress = self.segment, self.segment.progress(self.now)
+        knots, where = segment.knots, np.array([progress])
+        columns = (knots.q, knots.twist, knots.force)
+        q, twist, force = (knots.at(column, where)[0] for column in columns)
+        done = progress >= _DONE
+        springs, theta = segment.springs[int(done)], segment.theta
+        if not done and self.contact is not None:
+            rest = self.statics.robot.rest(q, force, springs, theta)
+            springs, theta = rest.springs, rest.theta
+        return RobotState(q, twist, force, springs, theta, self._sag)
+
+    def note_sag(self, state: RobotState) -> None:
+        """Remember the sag of the last free state, which the controller partly takes out."""
+        self._sag = state.sag
+
+    def standing(self, state: RobotState, motion: Motion, fault: str | None = None) -> Segment:
+        """Return a segment in which nothing moves."""
+        both = np.array([0.0, 1.0])
+        columns = (np.stack([c, c]) for c in (state.q, state.twist, state.force))
+        theta = state.theta
+        return Segment(
+            begin=self.now,
+            law=Uniform(0.0),
+            knots=self.statics.knots(both, *columns),
+            motion=motion,
+            motion_after=motion,
+            springs=(state.springs, state.springs),
+            theta=np.zeros(len(state.springs.stiffness)) if theta is None else theta,
+            fault_after=fault,
+        )
+
+
+def _unit_wrench(robot: TrueRobot) -> FloatArray:
+    """Return the wrench of 1 N that presses on the tool, sensor frame, shape (6,)."""
+    T_sensor_tcp = inverse_transform(robot.T_tcp_sensor)
+    force = -T_sensor_tcp[:3, 2]
+    return np.concatenate([force, np.cross(T_sensor_tcp[:3, 3], force)])

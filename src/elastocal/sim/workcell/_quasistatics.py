@@ -1,0 +1,242 @@
+"""Where the tool, the marker and the sensor truly are, and what the sensor truly feels.
+
+The controller believes in the undeformed robot. What it is off by is the *twist*: shift and turn
+of the tool, and turn of the sensor, in base. Assumption: the controller takes out a part of the
+sag under weight that it knows from its load data, so the part is subtracted from the twist as it
+was when the tool last was free.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from elastocal.arrays import FloatArray
+from elastocal.cell import Cell
+from elastocal.errors import DeviceError
+from elastocal.robot import (
+    inverse_transform,
+)
+from elastocal.sim.arm import (
+    solve_inverse,
+)
+from elastocal.sim.workcell._robot import RobotEquilibrium, TrueRobot
+from elastocal.sim.workcell._springs import RobotSprings
+from elastocal.sim.workcell._timeline import Knots
+
+
+@dataclass(frozen=True, eq=False)
+class RobotState:
+    """State of the robot between two commands."""
+
+    q: FloatArray
+    """Joints of the controller, shape (joint,), in rad or m."""
+    twist: FloatArray
+    """See `Knots.twist`, shape (9,)."""
+    force: FloatArray
+    """Force on the robot in base, shape (3,), in N."""
+    springs: RobotSprings
+    """With the memory of the gears."""
+    theta: FloatArray | None
+    """Spring positions to start from; None: from none."""
+    sag: FloatArray
+    """Twist under weight alone that the controller has taken out a part of, shape (9,)."""
+
+
+@dataclass(frozen=True, eq=False)
+class RobotPath:
+    """A path that the robot takes, and where it leads."""
+
+    knots: Knots
+    end: RobotState
+
+
+@dataclass(frozen=True, eq=False)
+class ForceReading:
+    """How the controller reads the wrist sensor: with its faults, zeroed before contact."""
+
+    gain: FloatArray
+    """Force that the sensor reads per force at the tool, sensor frame, shape (3, 3)."""
+    R_tcp_sensor: FloatArray
+    """As the controller knows it, shape (3, 3)."""
+    R_base_sensor: FloatArray
+    """Truly, when it was zeroed, shape (3, 3)."""
+    weight: FloatArray
+    """Weight of the tool in base, shape (3,), in N."""
+
+    def true_force(self, wanted_tcp: FloatArray, R_base_sensor: FloatArray) -> FloatArray:
+        """Return the force on the robot in base at which the reading is the wanted one.
+
+        The sensor turns with the arm, so that it sees another part of the weight than before.
+
+        Parameters
+        ----------
+        wanted_tcp : ndarray, shape (3,)
+            Wanted reading in the tcp frame, in N.
+        R_base_sensor : ndarray, shape (3, 3)
+            True orientation of the sensor under load.
+        """
+        felt = np.linalg.solve(self.gain, self.R_tcp_sensor.T @ wanted_tcp)
+        force: FloatArray = R_base_sensor @ (felt + self.R_base_sensor.T @ self.weight)
+        return force - self.weight
+
+
+@dataclass(frozen=True, eq=False)
+class Quasistatics:
+    """The robot with its tool, and how well the controller knows it."""
+
+    robot: TrueRobot
+    compensation: float
+    """Part of the sag that the controller takes out."""
+    marker_tcp: FloatArray
+    """Shape (3,), in m."""
+    weight: FloatArray
+    """Weight of the tool that the sensor carries, in base, shape (3,), in N."""
+
+    @classmethod
+    def of(cls, cell: Cell, robot: TrueRobot) -> "Quasistatics":
+        """Return the statics of a cell."""
+        marker = np.zeros(3) if cell.file.marker is None else cell.file.marker.position_tcp
+        compensation = cell.file.simulation.controller.gravity_compensation
+        return cls(robot, compensation, marker, cell.file.tool.mass * cell.gravity_base)
+
+    def heavier(self, mass: float) -> "Quasistatics":
+        """Return the same with some kg more on the tool than was weighed.
+
+        Only the sensor notices: the sag that it causes is the same with and without contact.
+        """
+        return replace(self, weight=self.weight + mass * self.robot.gravity)
+
+    def twist(self, q: FloatArray, rest: RobotEquilibrium) -> FloatArray:
+        """Return the deviation of a resting robot from the undeformed one, shape (..., 9)."""
+        T = self.robot.forward(q)
+        R_sensor = T[..., :3, :3] @ self.robot.T_tcp_sensor[:3, :3]
+        turns = np.stack(
+            [
+                rest.T_base_tcp[..., :3, :3] @ T[..., :3, :3].swapaxes(-1, -2),
+                rest.T_base_sensor[..., :3, :3] @ R_sensor.swapaxes(-1, -2),
+            ],
+            axis=-3,
+        )
+        shift = rest.T_base_tcp[..., :3, 3] - T[..., :3, 3]
+        vectors = Rotation.from_matrix(turns.reshape(-1, 3, 3)).as_rotvec()
+        return np.concatenate([shift, vectors.reshape(*q.shape[:-1], 6)], axis=-1)
+
+    def free(self, q: FloatArray, stop_error: FloatArray, start: FloatArray | None) -> RobotState:
+        """Return the robot free of contact, its gears relaxed.
+
+        Parameters
+        ----------
+        q : ndarray, shape (joint,)
+            In rad or m.
+        stop_error : ndarray, shape (3,)
+            How far the tool stops from where it should, in base, in m.
+        start : ndarray, shape (spring,), optional
+            Spring positions near the result.
+        """
+        rest = self.robot.rest(q, np.zeros(3), self.robot.springs, start)
+        sag = self.twist(q, rest)
+        twist = self._left(sag, sag, stop_error)
+        return RobotState(q, twist, np.zeros(3), rest.springs, rest.theta, sag)
+
+    def _left(self, twist: FloatArray, sag: FloatArray, stop_error: FloatArray) -> FloatArray:
+        left = twist - self.compensation * sag
+        left[:3] += stop_error
+        return left
+
+    def loaded(
+        self, state: RobotState, q: FloatArray, force: FloatArray, error: FloatArray
+    ) -> RobotState:
+        """Return the robot under a force, from a stand whose gears remember.
+
+        Parameters
+        ----------
+        stand : RobotState
+            Where it comes from.
+        q : ndarray, shape (joint,)
+            In rad or m.
+        force : ndarray, shape (3,)
+            On the robot, in base, in N.
+        error : ndarray, shape (3,)
+            Error of the stop, in base, in m.
+        """
+        rest = self.robot.rest(q, force, state.springs, state.theta)
+        twist = self._left(self.twist(q, rest), state.sag, error)
+        return replace(state, q=q, twist=twist, force=force, springs=rest.springs, theta=rest.theta)
+
+    def R_base_sensor(self, q: FloatArray, twist: FloatArray) -> FloatArray:
+        """Return the true orientation of the sensor, shape (3, 3)."""
+        nominal = self.robot.forward(q)[:3, :3] @ self.robot.T_tcp_sensor[:3, :3]
+        turned: FloatArray = Rotation.from_rotvec(twist[6:]).as_matrix() @ nominal
+        return turned
+
+    def tool_position(self, state: RobotState) -> FloatArray:
+        """Return where the tool centre point truly is, in base, shape (3,), in m."""
+        position: FloatArray = self.robot.forward(state.q)[:3, 3] + state.twist[:3]
+        return position
+
+    def along(self, q: FloatArray, R_base_tcp: FloatArray, points: FloatArray) -> FloatArray:
+        """Return joints that bring the undeformed tool to points, orientation kept.
+
+        Parameters
+        ----------
+        q : ndarray, shape (joint,)
+            Where to start; external axes stay there.
+        R_base_tcp : ndarray, shape (3, 3)
+            Orientation.
+        points : ndarray, shape (point, 3)
+            In base, in m.
+
+        Returns
+        -------
+        ndarray, shape (point, joint)
+
+        Raises
+        ------
+        DeviceError
+            If the arm does not solve_inverse so far.
+        """
+        goals = np.zeros((len(points), 4, 4))
+        goals[:, :3, :3], goals[:, :3, 3], goals[:, 3, 3] = R_base_tcp, points, 1.0
+        layout = self.robot.layout
+        start = np.repeat(q[None], len(points), axis=0)
+        found = solve_inverse(layout.linkage, goals, start, tolerance=1e-10, locked=layout.external)
+        if not found.ok.all():
+            raise DeviceError(
+                f"the arm cannot follow a straight line to {np.round(points[-1], 4).tolist()} m:"
+                " a singularity or the end of its solve_inverse"
+            )
+        return found.q
+
+    def knots(
+        self, progress: FloatArray, q: FloatArray, twist: FloatArray, force: FloatArray
+    ) -> Knots:
+        """Return knots with what instruments see there.
+
+        Parameters
+        ----------
+        progress : ndarray, shape (knot,)
+        q : ndarray, shape (knot, joint)
+        twist : ndarray, shape (knot, 9)
+        force : ndarray, shape (knot, 3)
+        """
+        T = self.robot.forward(q)
+        turn = Rotation.from_rotvec(twist[:, 3:].reshape(-1, 3)).as_matrix().reshape(-1, 2, 3, 3)
+        R_tcp = turn[:, 0] @ T[:, :3, :3]
+        marker = T[:, :3, 3] + twist[:, :3] + R_tcp @ self.marker_tcp
+        R_sensor = turn[:, 1] @ T[:, :3, :3] @ self.robot.T_tcp_sensor[:3, :3]
+        wrench = self._wrench(R_sensor, force)
+        return Knots(progress, q, twist, force, np.concatenate([marker, wrench], axis=1))
+
+    def _wrench(self, R_base_sensor: FloatArray, force_base: FloatArray) -> FloatArray:
+        """Return force and moment at the sensor, in its frame, shape (knot, 6).
+
+        The levers are those of the undeformed tool.
+        """
+        felt = np.einsum("kji,kj->ki", R_base_sensor, force_base)
+        weight = np.einsum("kji,j->ki", R_base_sensor, self.weight)
+        T_sensor_tcp = inverse_transform(self.robot.T_tcp_sensor)
+        tip = T_sensor_tcp[:3, 3]
+        centre = T_sensor_tcp[:3, :3] @ self.robot.tool_centre_tcp + tip
+        moment = np.cross(tip, felt) + np.cross(centre, weight)
+        return np.concatenate([felt + weight, moment], axis=1)

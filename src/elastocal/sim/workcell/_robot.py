@@ -1,0 +1,364 @@
+"""The simulated robot: where it gives way, and where it comes to rest.
+
+From the foot to the tool: floor or rail carriage (three turns about the foot), the drives of
+external axes, per arm joint a gear and two tilts of its bearing, a hinge pair in the middle of
+each of the two long links, and the end-effector (three turns and three shifts at the sensor).
+Six or eighteen springs at the joints can express none but the gears and tilts, and those only
+where they are linear. Figures that the file leaves out are those of `elastocal.sim.arm` for an arm
+of 1.1 t, in proportion to the mass that the arm moves: an assumption that brings a small robot to
+the right order of magnitude.
+
+At rest the potential energy of the deformed robot under its own weight, the tool's and the contact
+force is least (`elastocal.sim.arm.statics`, with the laws of `elastocal.sim.workcell._springs`): a
+nonlinear equilibrium with a memory, of one posture or many.
+"""
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from elastocal.arrays import FloatArray, IndexArray
+from elastocal.cell import Cell
+from elastocal.errors import DeviceError
+from elastocal.robot import (
+    inverse_transform,
+)
+from elastocal.sim.arm import (
+    AXIAL_STIFFNESS,
+    LINK_BENDING,
+    DeadLoads,
+    EnergyState,
+    Linear,
+    Linkage,
+    LoadedMechanism,
+    SpringChain,
+    TruthSpring,
+    as_triple,
+    build_spring_chain,
+    link_vector,
+    minimise,
+    transverse_axes,
+)
+from elastocal.sim.workcell._springs import BalancerSpring, GearLaws, RobotSprings
+
+ARM_JOINTS = 6
+MOVED_MASS = 850.0
+"""Mass in kg that an arm of 1.1 t moves: all but its foot."""
+BALANCER_RATE = 5.5e4
+"""Rate of the balancer's spring on such an arm, in N/m: 3 kN·m with the arm stretched out."""
+HIGH_TORQUE = 1.65
+"""Stiffness of a gear at high torque over that of a straight line through measured deflections, to
+which play, bending links and floor add. An assumption."""
+_SHORT_LINK = 0.2
+"""A link shorter than this does not bend, in m."""
+BALANCE = 1e-11
+"""Torque imbalance that counts as none, over the largest torque that the loads can exert."""
+
+
+@dataclass(frozen=True, eq=False)
+class RobotLayout:
+    """Spring chain of the simulated robot with the laws of its springs."""
+
+    linkage: Linkage
+    chain: SpringChain
+    springs: RobotSprings
+    sensor_after: int
+    """Number of elements in front of the body that carries the sensor."""
+    external: int
+    """Number of joints before the arm."""
+
+
+@dataclass(frozen=True, eq=False)
+class RobotEquilibrium:
+    """The robot where it comes to rest; the leading axes are those of the joints given."""
+
+    theta: FloatArray
+    """Spring positions, shape (..., spring), in rad or m."""
+    springs: RobotSprings
+    """With what the gears remember from now on."""
+    T_base_tcp: FloatArray
+    """True tool frame, shape (..., 4, 4)."""
+    T_base_sensor: FloatArray
+    """True sensor frame, shape (..., 4, 4)."""
+    imbalance: FloatArray
+    """Largest torque left over at any spring, shape (...), in N·m."""
+
+
+@dataclass(frozen=True, eq=False)
+class TrueRobot:
+    """A robot on its floor with its tool; make one with `of`."""
+
+    layout: RobotLayout
+    gravity: FloatArray
+    """Acceleration in base, shape (3,), in m/s²."""
+    tool_mass: float
+    """In kg."""
+    tool_centre_tcp: FloatArray
+    """Shape (3,), in m."""
+    T_tcp_sensor: FloatArray
+    """Sensor in the tcp frame of the undeformed robot, shape (4, 4)."""
+    _points: FloatArray = field(init=False, repr=False)
+    _after: IndexArray = field(init=False, repr=False)
+    _weights: FloatArray = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        linkage, ends = self.layout.linkage, self.layout.chain.ends
+        T = linkage.T_base_tip
+        tool = T[:3, :3] @ self.tool_centre_tcp + T[:3, 3]
+        bodies = [(b.centre, ends[b.joint - 1], b.mass) for b in linkage.masses]
+        bodies.append((tool, ends[-1], self.tool_mass))
+        points, after, masses = zip(*bodies, strict=True)
+        object.__setattr__(self, "_points", np.array([T[:3, 3], *points]))
+        object.__setattr__(self, "_after", np.array([ends[-1], *after], dtype=np.intp))
+        object.__setattr__(self, "_weights", np.multiply.outer(masses, self.gravity))
+
+    @classmethod
+    def of(cls, cell: Cell) -> "TrueRobot":
+        """Return the robot of a cell.
+
+        Raises
+        ------
+        DeviceError, RobotError
+            If the simulator has no arm for it.
+        """
+        sensor = cell.T_sensor_tcp
+        T_tcp_sensor = cell.T_tcp_flange if sensor is None else inverse_transform(sensor)
+        return cls(
+            lay_out_robot(cell),
+            cell.gravity_base,
+            cell.file.tool.mass,
+            cell.tool_centre_tcp,
+            T_tcp_sensor,
+        )
+
+    @property
+    def springs(self) -> RobotSprings:
+        """The springs, without friction and memory."""
+        return self.layout.springs
+
+    def forward(self, q: FloatArray) -> FloatArray:
+        """Return T_base_tcp of the undeformed robot: what its controller believes.
+
+        Parameters
+        ----------
+        q : ndarray, shape (..., joint)
+            In rad or m.
+        """
+        return self.layout.linkage.forward(q)
+
+    def rest(
+        self,
+        q: FloatArray,
+        force_base: FloatArray,
+        springs: RobotSprings,
+        start: FloatArray | None = None,
+    ) -> RobotEquilibrium:
+        """Return where the robot rests, in one posture or in many side by side.
+
+        Fifty postures side by side take a tenth of the time of one after the other.
+
+        Parameters
+        ----------
+        q : ndarray, shape (joint,) or (posture, joint)
+            Positions that the motors hold, in rad or m.
+        force_base : ndarray, shape (3,) or (posture, 3)
+            Force on the robot at its tool centre point, in N.
+        springs : RobotSprings
+            The springs, with what they remember; see `RobotSprings.frictionless`.
+        start : ndarray, shape (spring,) or (posture, spring), optional
+            Spring positions near the result.
+
+        Raises
+        ------
+        EquilibriumError
+            If the robot cannot carry the load.
+        """
+        springs = springs.at_joint(q[..., self.layout.external + 1])
+        batch = q.shape[:-1]
+        mechanism = self._mechanism(np.atleast_2d(q), np.atleast_2d(force_base), springs)
+        theta = np.zeros((*batch, len(springs.stiffness))) if start is None else start
+        theta, state = _minimum(mechanism, np.atleast_2d(theta))
+        total = mechanism.motions(theta)
+        T_base_tip = self.layout.linkage.T_base_tip
+        tool = total[-1] @ T_base_tip
+        sensor = total[self.layout.sensor_after] @ T_base_tip @ self.T_tcp_sensor
+        theta = theta.reshape(*batch, -1)
+        return RobotEquilibrium(
+            theta=theta,
+            springs=springs.drawn_along(theta),
+            T_base_tcp=tool.reshape(*batch, 4, 4),
+            T_base_sensor=sensor.reshape(*batch, 4, 4),
+            imbalance=np.abs(state.gradient).max(axis=1).reshape(batch),
+        )
+
+    def _mechanism(
+        self, q: FloatArray, force_base: FloatArray, springs: RobotSprings
+    ) -> LoadedMechanism:
+        """Return the robot with its loads in postures of shape (posture, joint)."""
+        chain = self.layout.chain
+        held = np.zeros((len(q), chain.ends[-1]))
+        held[:, chain.motor_elements] = q
+        weights = np.repeat(self._weights[None], len(q), axis=0)
+        forces = np.concatenate([force_base[:, None], weights], axis=1)
+        loads = DeadLoads(self._points, self._after, forces)
+        return LoadedMechanism(chain.screws, chain.spring_elements, springs, held, loads)
+
+
+def _minimum(mechanism: LoadedMechanism, start: FloatArray) -> tuple[FloatArray, EnergyState]:
+    """Return spring positions of least energy, shape (posture, spring), and the state there."""
+    points = mechanism.load_points(mechanism.motions(start))
+    reach = np.linalg.norm(points, axis=-1).T
+    scale = np.sum(np.linalg.norm(mechanism.loads.force, axis=-1) * (1.0 + reach), axis=1)
+    return minimise(lambda theta: mechanism.evaluate(theta, points), start, BALANCE * scale)
+
+
+def lay_out_robot(cell: Cell) -> RobotLayout:
+    """Return the simulated robot of a cell.
+
+    Raises
+    ------
+    DeviceError
+        If the robot has fewer than six joints.
+    RobotError
+        If the simulator cannot read its URDF.
+    """
+    linkage = Linkage.from_urdf(cell.robot.urdf, cell.robot.tip, cell.robot.base)
+    names, external = linkage.joint_names, len(linkage.joint_names) - ARM_JOINTS
+    if external < 0:
+        raise DeviceError(
+            f"the simulated arm needs six joints; {linkage.name} has {len(names)}"
+            f" ({', '.join(names)})"
+        )
+    truth, scale = cell.file.simulation, cell.file.simulation.truth
+    size = _size(linkage, external)
+    usual = size * HIGH_TORQUE * np.array(AXIAL_STIFFNESS)
+    stiffness = scale.gears * np.array(truth.gears.stiffness or usual)
+    gears = [
+        _spring(linkage, external + i, linkage.axis[external + i], float(k))
+        for i, k in enumerate(stiffness)
+    ]
+    bearings = scale.bearings / scale.gears * np.array(truth.bearings.ratio)
+    bending = scale.links * (truth.links.bending or size * LINK_BENDING)
+    springs = [
+        *_drives(cell, linkage, external),
+        *_floor(linkage, external, scale.floor * truth.floor.tilt),
+        *gears,
+        *(s for i, k in enumerate(stiffness) for s in _tilts(linkage, external + i, k * bearings)),
+        *(s for i in (1, 2) for s in _bending(linkage, names[external + i], bending)),
+        *_end_effector(cell, linkage),
+    ]
+    chain = build_spring_chain(linkage, springs)
+    return RobotLayout(
+        linkage,
+        chain,
+        _robot_springs(cell, linkage, chain, gears, size),
+        chain.ends[-1] - 6,
+        external,
+    )
+
+
+def _robot_springs(
+    cell: Cell, linkage: Linkage, chain: SpringChain, gears: list[TruthSpring], size: float
+) -> RobotSprings:
+    stiffness = np.array([_stiffness(spring) for spring in chain.springs])
+    order = [id(spring) for spring in chain.springs]
+    which = np.array([order.index(id(gear)) for gear in gears])
+    laws = GearLaws.of(cell.file.simulation.gears, which, stiffness[which])
+    balancer = _balancer(cell, linkage, size)
+    return RobotSprings(stiffness, laws, None, balancer, int(which[1]), np.zeros(()))
+
+
+def _size(linkage: Linkage, external: int) -> float:
+    """Return the mass that the arm moves over that of a 1.1 t arm; 1 when it is not known."""
+    moved = sum(body.mass for body in linkage.masses if body.joint > external)
+    return moved / MOVED_MASS if moved > 0.0 else 1.0
+
+
+def _stiffness(spring: TruthSpring) -> float:
+    law = spring.law
+    assert isinstance(law, Linear)
+    return law.k
+
+
+def _spring(linkage: Linkage, joint: int, axis: FloatArray, stiffness: float) -> TruthSpring:
+    name, revolute = linkage.joint_names[joint], linkage.revolute[joint]
+    return TruthSpring(name, as_triple(axis), Linear(stiffness), revolute)
+
+
+def _drives(cell: Cell, linkage: Linkage, external: int) -> list[TruthSpring]:
+    entry, scale = cell.file.simulation.external, cell.file.simulation.truth.external
+    stiffness = {True: scale * entry.turning, False: scale * entry.linear}
+    return [
+        _spring(linkage, joint, linkage.axis[joint], stiffness[linkage.revolute[joint]])
+        for joint in range(external)
+    ]
+
+
+def _floor(linkage: Linkage, external: int, tilt: float) -> list[TruthSpring]:
+    """Return turns about the point of axis 1 that is nearest to the origin of base."""
+    T_base_joint, screws = linkage.T_base_joint[external], linkage.screws
+    axis, point = screws.axis[external], screws.point[external]
+    foot = point - axis * (axis @ point)
+    at = as_triple(T_base_joint[:3, :3].T @ (foot - point))
+    name = linkage.joint_names[external]
+    return [
+        TruthSpring(name, as_triple(T_base_joint[k, :3]), Linear(tilt), at=at) for k in range(3)
+    ]
+
+
+def _tilts(linkage: Linkage, joint: int, stiffness: FloatArray) -> list[TruthSpring]:
+    name = linkage.joint_names[joint]
+    return [
+        TruthSpring(name, as_triple(direction), Linear(float(k)))
+        for direction, k in zip(transverse_axes(linkage.axis[joint]), stiffness, strict=True)
+    ]
+
+
+def _bending(linkage: Linkage, joint: str, stiffness: float) -> list[TruthSpring]:
+    """Return two hinges in the middle of a link transverse_axes it; none for a short one."""
+    index = linkage.joint_names.index(joint)
+    ends = linkage.T_base_joint[index : index + 2, :3, 3]
+    if not np.linalg.norm(ends[1] - ends[0]) > _SHORT_LINK:
+        return []
+    link = link_vector(linkage, joint)
+    at = as_triple(0.5 * link)
+    return [
+        TruthSpring(joint, as_triple(direction), Linear(stiffness), distal=True, at=at)
+        for direction in transverse_axes(link / np.linalg.norm(link))
+    ]
+
+
+def _end_effector(cell: Cell, linkage: Linkage) -> list[TruthSpring]:
+    """Return three turns and three shifts at the sensor, last of all springs."""
+    entry, scale = cell.file.simulation.end_effector, cell.file.simulation.truth.end_effector
+    T_tcp_sensor = cell.T_tcp_flange
+    if cell.file.sensor is not None:
+        T_tcp_sensor = cell.T_tcp_flange @ cell.file.sensor.T_flange_sensor
+    T = inverse_transform(linkage.T_base_joint[-1]) @ linkage.T_base_tip @ T_tcp_sensor
+    at, name = as_triple(T[:3, 3]), linkage.joint_names[-1]
+    kinds = ((True, scale * entry.turn), (False, scale * entry.shift))
+    return [
+        TruthSpring(name, as_triple(T[:3, k]), Linear(stiffness), turns, distal=True, at=at)
+        for turns, stiffness in kinds
+        for k in range(3)
+    ]
+
+
+def _balancer(cell: Cell, linkage: Linkage, size: float) -> BalancerSpring | None:
+    """Return the balancer of axis 2, tuned for the way the robot is mounted.
+
+    Upright is where the link behind axis 2 points along axis 1 against gravity. Without a link,
+    or with axis 1 level (a robot on a wall), no spring balances the arm.
+    """
+    entry, scale = cell.file.simulation.balancer, cell.file.simulation.truth.balancer
+    first = len(linkage.joint_names) - ARM_JOINTS
+    screws, arm = linkage.screws, linkage.T_base_joint[first + 2, :3, 3]
+    up = -screws.axis[first] * (screws.axis[first] @ cell.gravity_base)
+    axis = screws.axis[first + 1]
+    link, up = (v - axis * (axis @ v) for v in (arm - screws.point[first + 1], up))
+    if not entry.fitted or not min(np.linalg.norm(link), np.linalg.norm(up)) > 1e-6:
+        return None
+    upright = math.atan2(float(axis @ np.cross(link, up)), float(link @ up))
+    rate = scale * (entry.rate or size * BALANCER_RATE)
+    return BalancerSpring(rate, entry.free_length, entry.anchor, entry.lever, upright)

@@ -1,0 +1,217 @@
+"""All springs of the simulated robot at once: gears that stiffen, lose way and remember.
+
+The torque of a gear over its twist is
+
+    tau(x) = k x - sum_m L_m a_m atan(x / a_m) + sum_i kappa_i clip(x - s_i, -d_i, d_i)
+
+*Growth and backlash* (the sum over m): near rest the stiffness is smaller by ``L_m``, and half of
+that is back at the twist ``a_m``; see `elastocal.sim.arm.springs.gear_softening`. A small ``a_m``
+with nearly all of ``k`` is a smoothed play: beyond it the twist is larger by ``b / 2`` with
+``b = pi a_m L_m / k``, so that a torque and its opposite are ``b`` further apart.
+
+*Friction in the teeth* (the sum over i): springs ``kappa_i`` in parallel, each with a slider that
+gives way at the travel ``d_i``: the stop operators of Prandtl and Ishlinskii (A. Visintin,
+"Differential Models of Hysteresis", Springer 1994, chapter III). The torque then depends on where
+the sliders ``s_i`` stand, which is the memory; it does not depend on speed. A reversal starts stiff
+and ends ``2 sum kappa_i d_i`` below the torque of the way up; loops close at once (Masing's rule).
+
+At given sliders the torque has a potential, so that an equilibrium is a minimum; afterwards the
+sliders are drawn along. That is exact as long as no gear turns back within one step of load.
+"""
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from elastocal.arrays import FloatArray, IndexArray
+from elastocal.cell.description import Gears
+from elastocal.sim.arm import (
+    gear_softening,
+)
+
+_STOPS = 4
+"""Number of sliders of a gear's friction."""
+_PLAY_FLOOR = 0.2
+"""Stiffness in the middle of the backlash over that at high torque: soft, not free."""
+
+
+@dataclass(frozen=True)
+class BalancerSpring:
+    """A gravity balancer: a spring between carousel and arm, beside the gear of axis 2.
+
+    One end sits at the distance ``a`` from the axis on the carousel, above it, the other at the
+    distance ``b`` on the arm. With ``alpha`` the angle of the arm from upright the spring is
+
+        L(alpha)² = a² + b² - 2 a b cos(alpha)
+
+    long, stores ``E = k (L - L_0)² / 2``, and pulls the arm up with ``dE/dalpha``. With
+    ``L_0 = 0`` that is ``k a b sin(alpha)``, which balances a weight at every angle (the
+    zero-free-length spring); a real one has a free length, so that its torque and its stiffness
+    depend on the angle. Source of the mechanism: A. Klimchik, Y. Wu, C. Dumas, S. Caro, B. Furet,
+    A. Pashkevich, "Identification of geometrical and elastostatic parameters of heavy industrial
+    robots", ICRA 2013, who find that a compensator makes the stiffness of axis 2 depend on its
+    angle.
+    """
+
+    rate: float
+    """k in N/m."""
+    free_length: float
+    """L_0 in m."""
+    anchor: float
+    """a in m."""
+    lever: float
+    """b in m, other than ``anchor``."""
+    upright: float
+    """Joint angle at which the arm is upright, in rad."""
+
+    def evaluate(self, angle: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return energy in J, torque dE/dalpha in N·m and stiffness d²E/dalpha² in N·m/rad.
+
+        Parameters
+        ----------
+        angle : ndarray
+            Angle of the joint, twist of its gear included, in rad.
+        """
+        alpha = angle - self.upright
+        product = self.anchor * self.lever
+        length = np.sqrt(self.anchor**2 + self.lever**2 - 2.0 * product * np.cos(alpha))
+        stretch = length - self.free_length
+        slope = product * np.sin(alpha) / length
+        bend = product * np.cos(alpha) / length - slope**2 / length
+        return (
+            0.5 * self.rate * stretch**2,
+            self.rate * stretch * slope,
+            self.rate * (slope**2 + stretch * bend),
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class GearLaws:
+    """Growth, backlash and friction of the gears, beside their stiffness at high torque."""
+
+    which: IndexArray
+    """Which springs are gears, shape (gear,)."""
+    loss: FloatArray
+    """L: stiffness that is missing at rest, shape (gear, effect), in N·m/rad."""
+    angle: FloatArray
+    """a: twist at which half of it is back, shape (gear, effect), in rad."""
+    stop_stiffness: FloatArray
+    """kappa, shape (gear, stop), in N·m/rad."""
+    stop_travel: FloatArray
+    """d, shape (gear, stop), in rad."""
+
+    @classmethod
+    def of(cls, entry: Gears, which: IndexArray, stiffness: FloatArray) -> "GearLaws":
+        """Return growth, backlash and friction of gears.
+
+        Parameters
+        ----------
+        entry : Gears
+            What the cell file says.
+        which : ndarray of int, shape (gear,)
+            Which springs they are.
+        stiffness : ndarray, shape (gear,)
+            At high torque, in N·m/rad.
+        """
+        play = 1.0 - entry.growth - _PLAY_FLOOR if entry.backlash > 0.0 else 0.0
+        play_angle = entry.backlash / (math.pi * play) if play else 1.0
+        loss = np.multiply.outer(stiffness, [entry.growth, play])
+        angle = np.broadcast_to([entry.growth_angle, play_angle], loss.shape)
+        travel = entry.presliding * np.arange(1, _STOPS + 1) / _STOPS
+        friction = entry.hysteresis * entry.reference_angle * stiffness
+        return cls(
+            which=which,
+            loss=loss,
+            angle=angle,
+            stop_stiffness=friction[:, None] / (_STOPS * travel),
+            stop_travel=np.broadcast_to(travel, (len(which), _STOPS)),
+        )
+
+    @property
+    def friction(self) -> FloatArray:
+        """Torque of all stops of each gear, shape (gear,), in N·m: half the height of its loop."""
+        height: FloatArray = np.sum(self.stop_stiffness * self.stop_travel, axis=1)
+        return height
+
+
+@dataclass(frozen=True, eq=False)
+class RobotSprings:
+    """Springs of the robot with the memory of its gears: an `elastocal.sim.arm` `SpringBank`."""
+
+    stiffness: FloatArray
+    """k: at high torque, shape (spring,), in N·m/rad or N/m."""
+    gears: GearLaws
+    slider: FloatArray | None
+    """s: where the sliders stand, shape (gear, stop) or (posture, gear, stop), in rad; None: no
+    friction at all."""
+    balancer: BalancerSpring | None
+    balanced: int
+    """Which spring the balancer lies beside."""
+    joint_angle: FloatArray
+    """Angle that the motor of the balanced joint holds, shape () or (posture,), in rad."""
+
+    def evaluate(self, theta: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return energy (batch,), torques and stiffnesses (batch, spring); see the module.
+
+        Parameters
+        ----------
+        theta : ndarray, shape (batch, spring)
+            Spring positions in rad or m.
+        """
+        torque = self.stiffness * theta
+        energy = 0.5 * np.sum(torque * theta, axis=1)
+        stiffness = np.empty_like(theta)
+        stiffness[:] = self.stiffness
+        which, law = self.gears.which, self.gears
+        twist = theta[:, which, None]
+        lost = gear_softening(twist, law.loss, law.angle)
+        torque[:, which] -= np.sum(lost[1], axis=2)
+        stiffness[:, which] -= np.sum(lost[2], axis=2)
+        energy -= np.sum(lost[0], axis=(1, 2))
+        if self.slider is not None:
+            drawn = twist - self.slider
+            held = np.clip(drawn, -law.stop_travel, law.stop_travel)
+            torque[:, which] += np.sum(law.stop_stiffness * held, axis=2)
+            stiffness[:, which] += np.sum(law.stop_stiffness * (held == drawn), axis=2)
+            energy += np.sum(law.stop_stiffness * (held * drawn - 0.5 * held**2), axis=(1, 2))
+        if self.balancer is not None:
+            angle = self.joint_angle + theta[:, self.balanced]
+            stored, moment, rate = self.balancer.evaluate(angle)
+            energy += stored
+            torque[:, self.balanced] += moment
+            stiffness[:, self.balanced] += rate
+        return energy, torque, stiffness
+
+    def at_joint(self, angle: FloatArray) -> "RobotSprings":
+        """Return the springs with the balanced joint's motor elsewhere, in rad."""
+        return replace(self, joint_angle=angle)
+
+    def frictionless(self) -> "RobotSprings":
+        """Return the springs without friction, as in free motion, which shakes it off."""
+        return replace(self, slider=None)
+
+    def relaxed(self, theta: FloatArray) -> "RobotSprings":
+        """Return the springs with every slider drawn to where nothing strains it.
+
+        Parameters
+        ----------
+        theta : ndarray, shape (..., spring)
+            Where the springs are.
+        """
+        stops = np.zeros_like(self.gears.stop_travel)
+        return replace(self, slider=theta[..., self.gears.which, None] + stops)
+
+    def drawn_along(self, theta: FloatArray) -> "RobotSprings":
+        """Return the springs with the sliders where the equilibrium has left them.
+
+        Parameters
+        ----------
+        theta : ndarray, shape (..., spring)
+            Where the springs are now.
+        """
+        if self.slider is None:
+            return self.relaxed(theta)
+        travel = self.gears.stop_travel
+        twist = theta[..., self.gears.which, None]
+        return replace(self, slider=twist - np.clip(twist - self.slider, -travel, travel))

@@ -1,0 +1,14 @@
+"""The verdict on a calibration: evidence gathered, held together, judged; nothing is rendered.
+
+=============  ==================================================================
+`gather`       from the files of a run to its `evidence`, with what is missing
+`consistency`  whether the parts belong together
+`hashes`       hashes of files that equal runs share
+`findings`     what a reader has to know, part by part
+`judgement`    light, sentence, reasons, advice
+=============  ==================================================================
+"""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -1,0 +1,43 @@
+from ._figures import (
+    RegistrationFigures as RegistrationFigures,
+    RunFigures as RunFigures,
+    StationMove as StationMove,
+    ToolFigures as ToolFigures,
+)
+from .consistency import (
+    check_codec as check_codec,
+    check_model as check_model,
+    check_plan_robot as check_plan_robot,
+    check_process as check_process,
+    check_tool as check_tool,
+    find_doubts as find_doubts,
+)
+from .evidence import (
+    AcceptanceLimits as AcceptanceLimits,
+    CodecEvidence as CodecEvidence,
+    Evidence as Evidence,
+    MissingPart as MissingPart,
+    ModelEvidence as ModelEvidence,
+    UsedFile as UsedFile,
+)
+from .findings import (
+    FINDINGS as FINDINGS,
+    Finding as Finding,
+    codec_findings as codec_findings,
+    compliance_findings as compliance_findings,
+    find_everything as find_everything,
+    instrument_findings as instrument_findings,
+    missing_findings as missing_findings,
+    process_findings as process_findings,
+    reading_findings as reading_findings,
+    recertification_findings as recertification_findings,
+)
+from .gather import EvidenceOptions as EvidenceOptions, gather_evidence as gather_evidence
+from .hashes import BYTES as BYTES, CONTENT as CONTENT, content_hash as content_hash
+from .judgement import (
+    Light as Light,
+    Verdict as Verdict,
+    advise as advise,
+    judge as judge,
+    judge_evidence as judge_evidence,
+)

@@ -1,0 +1,139 @@
+"""Folders of a run, and a reader that notes which of their files were used and which could not."""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TypeVar
+
+from elastocal.codec import ARRAYS, VERDICTS
+from elastocal.compensation.process import DEVIATIONS, TABLE
+from elastocal.errors import ElastocalError, FileAccessError
+from elastocal.procedure import JOURNAL, RunFolder
+from elastocal.verdict.evidence import MissingPart, UsedFile
+from elastocal.verdict.hashes import content_hash
+
+MODEL, TOOL, CODEC, PROCESS = "model.json", "tool.json", "codec", "process"
+"""Default names of what is not part of the run's own folder."""
+_RUN = "run"
+"""Name of a run's folder in the folder that holds everything."""
+Part = TypeVar("Part")
+
+
+@dataclass(frozen=True)
+class EvidenceFolders:
+    """Folders in which the parts of the evidence lie."""
+
+    run: RunFolder | None
+    """None where there is only a model."""
+    roots: tuple[Path, ...]
+    """Folders in which default names are looked for, in order."""
+    model: Path | None = None
+    """A model that was named in place of a run."""
+
+    def default(self, name: str) -> Path | None:
+        """Return where a default name is, or None."""
+        return next((root / name for root in self.roots if (root / name).exists()), None)
+
+    def shown(self, path: Path) -> str:
+        """Return a path as the report shows it: the same wherever the folder stands."""
+        whole = path.resolve()
+        for root in sorted({each.resolve() for each in self.roots}, key=lambda p: len(p.parts)):
+            if whole.is_relative_to(root):
+                return whole.relative_to(root).as_posix()
+        return path.name
+
+
+@dataclass
+class PartReader:
+    """Reads part by part; notes the hashes of what was used, and what could not be."""
+
+    folders: EvidenceFolders
+    files: list[UsedFile] = field(default_factory=list)
+    missing: list[MissingPart] = field(default_factory=list)
+
+    def read(self, name: str, path: Path, read: Callable[[], Part], named: bool) -> Part | None:
+        """Return a part, or None and a note of why there is none."""
+        try:
+            part = read()
+        except ElastocalError as error:
+            if named:
+                raise
+            self.missing.append(MissingPart(name, self._without_folders(error), damaged=True))
+            return None
+        self.use(path)
+        return part
+
+    def find(
+        self, name: str, given: Path | None, default: str, read: Callable[[Path], Part], hint: str
+    ) -> Part | None:
+        """Return a part that may be named or lie under a default name."""
+        path = given or self.folders.default(default)
+        if path is None:
+            self.missing.append(MissingPart(name, f"there is no {default}; {hint}"))
+            return None
+        return self.read(name, path, lambda: read(path), named=given is not None)
+
+    def use(self, path: Path) -> None:
+        """Note the hash of a file, or of every file in a folder that belongs to a part."""
+        for file in sorted(_files_of(path)):
+            shown = self.folders.shown(file)
+            if shown not in {each.name for each in self.files}:
+                self.files.append(UsedFile(shown, *content_hash(file)))
+
+    def _without_folders(self, error: ElastocalError) -> str:
+        """Return a reason without the folder that the run happens to lie in."""
+        text = " ".join(str(error).split())
+        for root in self.folders.roots:
+            for form in {str(root), str(root.resolve())} - {"."}:
+                text = text.replace(f"{form}/", "")
+        return text
+
+
+def find_folders(run: Path) -> EvidenceFolders:
+    """Return where the files of a run lie.
+
+    Parameters
+    ----------
+    run : Path
+        A run folder, a folder that holds one called ``run``, a folder with other parts but
+        no run, or a model file.
+
+    Raises
+    ------
+    FileAccessError
+        If it is none of these.
+    """
+    if run.is_file():
+        return EvidenceFolders(None, (run.parent,), run)
+    if not run.is_dir():
+        raise FileAccessError(f"cannot read {run}: there is no such file or folder")
+    if (run / JOURNAL).exists():
+        return EvidenceFolders(RunFolder(run), (run, _parent(run)))
+    if (run / _RUN / JOURNAL).exists():
+        return EvidenceFolders(RunFolder(run / _RUN), (run / _RUN, run))
+    if any((run / name).exists() for name in (MODEL, CODEC, PROCESS)):
+        return EvidenceFolders(None, (run,))
+    raise FileAccessError(
+        f"{run} is no folder of a run: it holds neither {JOURNAL}, {_RUN}/{JOURNAL} nor {MODEL}"
+    )
+
+
+def run_files(run: RunFolder) -> Iterator[Path]:
+    """Yield the files of a run's own that a report is made from, if they are there."""
+    cell = sorted(path for path in run.cell.rglob("*") if path.is_file())
+    plan = sorted(path for path in run.plan.glob("*") if path.is_file())
+    for path in (*cell, *plan, run.journal, run.dataset, run.summary):
+        if path.is_file():
+            yield path
+
+
+def _parent(run: Path) -> Path:
+    return run.resolve().parent
+
+
+def _files_of(path: Path) -> list[Path]:
+    """Return a file, or the files of a folder that a report reads; pictures are none of them."""
+    if path.is_file():
+        return [path]
+    read = (ARRAYS, VERDICTS, TABLE, DEVIATIONS)
+    return [path / name for name in read if (path / name).is_file()]

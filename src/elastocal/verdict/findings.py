@@ -1,0 +1,204 @@
+"""Findings: what a reader of the verdict has to know, part by part, in the order of the report."""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+from elastocal.identification import SuspiciousReading
+from elastocal.identification.recertification import Verdict as Recertified
+from elastocal.verdict.evidence import Evidence
+from elastocal.wording import counted, mm, spans
+
+_ESSENTIAL = ("run", "journal", "cell", "plan", "summary of the run", "dataset",
+              "calibrated model", "calibration made again")  # fmt: skip
+"""Parts without which no light is green; the codec has a finding of its own."""
+_TOLD_ELSEWHERE = ("codec", "earlier calibration")
+"""A codec has a finding of its own; a first calibration has no earlier one."""
+_MOVED_ADVICE = (
+    "Fix the tracker's stand before the next run: a station that moves splits its poses."
+)
+
+
+@dataclass(frozen=True)
+class Finding:
+    """Something that a reader of the verdict has to know."""
+
+    text: str
+    holds_back: bool = True
+    """Whether it keeps the light from being green."""
+    advice: str = ""
+    """Advice that follows; empty where the text says it."""
+
+
+def find_everything(evidence: Evidence) -> tuple[Finding, ...]:
+    """Return the findings of all parts, in the order of the report's sections."""
+    return tuple(finding for findings in FINDINGS for finding in findings(evidence))
+
+
+def reading_findings(evidence: Evidence) -> Iterator[Finding]:
+    """Yield findings on single readings: missing, suspicious, left out."""
+    yield from _missing_poses(evidence)
+    figures = evidence.figures
+    if figures is None:
+        return
+    yield from map(_suspicious, figures.suspicious)
+    excluded = figures.settings.exclude if figures.settings else ()
+    if excluded:
+        yield Finding(
+            f"{', '.join(map(str, excluded))} (pose, or pose:load case) was left out by hand: no"
+            " figure of this report speaks of it",
+            advice="Measure again what was left out, so that nothing has to be.",
+        )
+    for warning in figures.warnings:
+        yield Finding(f"calibration: {warning}")
+
+
+def _missing_poses(evidence: Evidence) -> Iterator[Finding]:
+    if evidence.plan is None or evidence.dataset is None:
+        return
+    usable = evidence.dataset.readings(evidence.dataset.joint_names).pose
+    missing = sorted({pose.id for pose in evidence.plan.poses} - set(map(int, usable)))
+    if missing:
+        yield Finding(
+            f"the run is partial: {len(missing)} of"
+            f" {counted(len(evidence.plan.poses), 'planned pose')}"
+            f" {'has' if len(missing) == 1 else 'have'} no usable reading"
+            f" (pose {spans(missing)})",
+            advice="Finish the run: `elastocal run --resume` measures the missing poses.",
+        )
+
+
+def _suspicious(each: SuspiciousReading) -> Finding:
+    name = f"pose {each.pose} {each.load_case}"
+    if each.set_aside:
+        return Finding(
+            f"reading {name} was set aside as a blunder ({mm(each.residual)} off)",
+            holds_back=False,
+            advice=f"Measure {name} again: its reading cannot be a measurement of this arm.",
+        )
+    return Finding(
+        f"reading {name} looks wrong and was kept in the fit ({mm(each.residual)} off)",
+        advice=f"Look at {name}, and leave it out with `--exclude"
+        f" {each.pose}:{each.load_case}` if it is wrong.",
+    )
+
+
+def instrument_findings(evidence: Evidence) -> Iterator[Finding]:
+    """Yield findings on stations, sensor and tool: the warnings of the run."""
+    if evidence.summary is None:
+        return
+    for warning in evidence.summary.warnings:
+        moved = "moved between" in warning
+        advice = (
+            "Fix the tracker's stand before the next run: a station that moves splits its poses."
+        )
+        yield Finding(f"run: {warning}", advice=advice if moved else "")
+    for pose in evidence.summary.attempts.given_up:
+        yield Finding(f"run: pose {pose} was given up after its attempts failed")
+
+
+def compliance_findings(evidence: Evidence) -> Iterator[Finding]:
+    """Yield findings on the choice of springs."""
+    if evidence.calibrated is None:
+        return
+    other = evidence.figures.comparison if evidence.figures else None
+    if other is not None and other.difference.high < 0.0:
+        yield Finding(
+            "axial springs alone predict left-out poses better than this layout",
+            advice="Calibrate with `--springs actuated`: these poses do not carry more springs.",
+        )
+    springs = evidence.calibrated.model.model.springs
+    if not any("." in each.name and not each.name.endswith(".axial") for each in springs):
+        yield Finding(
+            "the model has one axial spring a joint and no bearing springs",
+            holds_back=False,
+            advice="Calibrate with `--springs bearing` (18 springs on a 6-axis arm) and compare.",
+        )
+
+
+def codec_findings(evidence: Evidence) -> Iterator[Finding]:
+    """Yield whether there were enough poses."""
+    best = evidence.saturation
+    if not evidence.codecs:
+        yield Finding(
+            "whether there were enough poses was not verified (no codec)",
+            advice="Make a codec with `elastocal codec`: it tells whether more poses would help.",
+        )
+    if best is None:
+        return
+    last = counted(best.last, "training pose")
+    if best.n_train == best.last:
+        yield Finding(
+            f"the codec has not saturated: the error still falls at {last}",
+            advice="Measure more poses: the error still falls with every one.",
+        )
+    elif not best.settled:
+        yield Finding(
+            f"the codec does not show that the error has saturated: its interval reaches {last}",
+            advice="Measure some more poses to see that the error no longer falls.",
+        )
+    else:
+        yield Finding(
+            f"the error no longer fell from {counted(best.n_train, 'training pose')} on (95 %"
+            f" interval {best.low} to {best.high}), so there were enough poses",
+            holds_back=False,
+        )
+
+
+def process_findings(evidence: Evidence) -> Iterator[Finding]:
+    """Yield how far the correction brought the process path."""
+    if evidence.process is None:
+        return
+    line, tolerance = evidence.process.table.lines[-1], evidence.limits.tolerance
+    text = (
+        f"on the simulated process path the mean deviation fell by {line.reduction.mean:.1%}, from"
+        f" {mm(line.before.mean)} to {mm(line.after.mean)}; largest left {mm(line.after.max)}"
+    )
+    if tolerance is not None and not line.after.max <= tolerance:
+        yield Finding(f"{text}, beyond the tolerance of {mm(tolerance)}")
+    else:
+        yield Finding(text, holds_back=False)
+
+
+def recertification_findings(evidence: Evidence) -> Iterator[Finding]:
+    """Yield how far the cell changed since an earlier calibration."""
+    found = evidence.recertification
+    if found is None:
+        return
+    if found.verdict is Recertified.PASS:
+        yield Finding(f"against the earlier calibration: {found.reason}", holds_back=False)
+    elif found.verdict is not None:
+        yield Finding(f"against the earlier calibration: {found.reason}")
+    elif found.moved:
+        yield Finding(
+            f"{counted(len(found.moved), 'spring')} moved since the earlier calibration, and no"
+            " limit was given",
+            holds_back=False,
+        )
+
+
+def missing_findings(evidence: Evidence) -> Iterator[Finding]:
+    """Yield what is missing, damaged or contradictory."""
+    for each in evidence.missing:
+        if each.name in _TOLD_ELSEWHERE and not each.damaged:
+            continue
+        word = "cannot be used" if each.damaged else "is missing"
+        advice = ""
+        if each.name == "tool file" and not each.damaged:
+            advice = (
+                "Run `elastocal tool`: without it the compensation relies on the cell file's tool."
+            )
+        yield Finding(f"the {each.name} {word}: {each.reason}", each.name in _ESSENTIAL, advice)
+    for doubt in evidence.doubts:
+        yield Finding(doubt)
+
+
+FINDINGS: tuple[Callable[[Evidence], Iterator[Finding]], ...] = (
+    reading_findings,
+    instrument_findings,
+    compliance_findings,
+    codec_findings,
+    process_findings,
+    recertification_findings,
+    missing_findings,
+)
+"""All findings, in the order of the report's sections; new ones are added here."""

@@ -1,0 +1,292 @@
+"""Gather the evidence of a report from the files of a run.
+
+What a person names must be there and sound, or the report is refused. What lies under a default
+name and cannot be used is left out, and the report says why. Parts that belong to another robot
+or another cell count as unusable.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
+
+from elastocal import dataset as datasets
+from elastocal.arrays import FloatArray
+from elastocal.cell import Cell, load_cell
+from elastocal.codec import ARRAYS, judge, read_codec
+from elastocal.compensation.conditioning import ToolResult, read_tool
+from elastocal.compensation.process import TABLE, SimulatedProcess, read_process
+from elastocal.dataset import Dataset
+from elastocal.errors import ElastocalError
+from elastocal.files import read_text
+from elastocal.identification import (
+    CalibrateResult,
+    reproduce_calibration,
+)
+from elastocal.identification.recertification import recertify_files
+from elastocal.planning import (
+    PLAN,
+    POOL,
+    PlanResult,
+    PoolData,
+    cell_surface,
+    check_pool_of,
+    read_plan,
+    read_pool,
+)
+from elastocal.procedure import (
+    Entry,
+    RunFolder,
+    check_plan,
+    file_sha256,
+    read_journal,
+    read_summary,
+)
+from elastocal.records import read_json, validate
+from elastocal.verdict._figures import RunFigures
+from elastocal.verdict._folders import (
+    CODEC,
+    MODEL,
+    PROCESS,
+    TOOL,
+    Part,
+    PartReader,
+    find_folders,
+    run_files,
+)
+from elastocal.verdict.consistency import (
+    check_codec,
+    check_model,
+    check_plan_robot,
+    check_process,
+    check_tool,
+    find_doubts,
+)
+from elastocal.verdict.evidence import (
+    AcceptanceLimits,
+    CodecEvidence,
+    Evidence,
+    MissingPart,
+    ModelEvidence,
+)
+
+
+@dataclass(frozen=True)
+class EvidenceOptions:
+    """Files and limits that a person names."""
+
+    run: Path
+    model: Path | None = None
+    tool: Path | None = None
+    codec: Path | None = None
+    process: Path | None = None
+    old: Path | None = None
+    """Model file of an earlier calibration of the cell; there is no default name."""
+    tolerance: float | None = None
+    """In m; in place of that of the cell file."""
+    drift: float | None = None
+    """In m; likewise."""
+
+
+def gather_evidence(options: EvidenceOptions, made: str) -> Evidence:
+    """Return the evidence of a report.
+
+    Parameters
+    ----------
+    options : EvidenceOptions
+        Files and limits that are named.
+    made : str
+        Date and time of the report, ISO 8601, UTC.
+
+    Raises
+    ------
+    ElastocalError
+        If there is nothing to report on, or a part that is named cannot be used.
+    """
+    reader = PartReader(find_folders(options.run))
+    evidence = _with_run(Evidence(made=made), reader)
+    evidence = _with_model(evidence, reader, options)
+    evidence = replace(evidence, limits=_limits(evidence.cell, options))
+    evidence = _with_rest(evidence, reader, options)
+    evidence = _with_old(evidence, reader, options)
+    return replace(
+        evidence,
+        name=evidence.cell.name if evidence.cell else evidence.robot or "robot",
+        files=tuple(reader.files),
+        missing=tuple(reader.missing),
+        doubts=find_doubts(evidence),
+    )
+
+
+def _with_run(evidence: Evidence, reader: PartReader) -> Evidence:
+    """Return the evidence with the parts that a run folder holds."""
+    run = reader.folders.run
+    if run is None:
+        reason = "no folder of a run was given: nothing is known of how the readings came about"
+        reader.missing.append(MissingPart("run", reason))
+        return evidence
+    journal = reader.read("journal", run.journal, lambda: read_journal(run.journal), named=False)
+    cell = _cell(reader, run, journal)
+    evidence = replace(evidence, journal=journal, cell=cell)
+    if cell is not None:
+        surface = reader.read("surface", cell.path, lambda: cell_surface(cell), named=False)
+        evidence = replace(evidence, surface=surface, cell_text=read_text(cell.path))
+    evidence = _with_plan(evidence, reader, run, journal)
+    summary = _derived(
+        reader,
+        "summary of the run",
+        run.summary,
+        lambda path: validate(read_summary(path), RunFigures, str(path)),
+    )
+    evidence = replace(evidence, dataset=_derived(reader, "dataset", run.dataset, datasets.read))
+    for file in run_files(run):
+        reader.use(file)
+    return replace(evidence, summary=summary)
+
+
+def _cell(reader: PartReader, run: RunFolder, journal: tuple[Entry, ...] | None) -> Cell | None:
+    record = journal[0].run if journal else None
+    path = run.cell / (record.cell_file if record else "cell.yaml")
+    return reader.read("cell", path, lambda: load_cell(path), named=False)
+
+
+def _with_plan(
+    evidence: Evidence, reader: PartReader, run: RunFolder, journal: tuple[Entry, ...] | None
+) -> Evidence:
+    cell, record = evidence.cell, journal[0].run if journal else None
+
+    def plan_of_cell() -> PlanResult:
+        plan = read_plan(run.plan)
+        if record is not None:
+            check_plan(run, record)
+        if cell is not None:
+            check_plan_robot(plan, cell)
+        return plan
+
+    plan = reader.read("plan", run.plan / PLAN, plan_of_cell, named=False)
+    if plan is None:
+        return evidence
+
+    def pool_of_plan() -> PoolData:
+        pool = read_pool(run.plan)
+        check_pool_of(plan, pool)
+        return pool
+
+    pool = reader.read("pool", run.plan / POOL, pool_of_plan, named=False)
+    return replace(evidence, plan=plan, pool=pool)
+
+
+def _derived(
+    reader: PartReader, name: str, path: Path, read: Callable[[Path], Part]
+) -> Part | None:
+    if not path.is_file():
+        reason = f"there is no {reader.folders.shown(path)}; `elastocal derive` makes it"
+        reader.missing.append(MissingPart(name, reason))
+        return None
+    return reader.read(name, path, lambda: read(path), named=False)
+
+
+def _with_model(evidence: Evidence, reader: PartReader, options: EvidenceOptions) -> Evidence:
+    given = options.model or reader.folders.model
+    calibrated = reader.find(
+        "calibrated model", given, MODEL, lambda path: _calibrated(path, evidence.dataset),
+        "`elastocal calibrate` makes one",
+    )  # fmt: skip
+    evidence = replace(evidence, calibrated=calibrated)
+    if calibrated is None or evidence.dataset is None:
+        return evidence
+    try:
+        reproduction = reproduce_calibration(calibrated.model, calibrated.figures, evidence.dataset)
+    except ElastocalError as error:
+        reason = " ".join(str(error).split())
+        reader.missing.append(MissingPart("calibration made again", reason, damaged=True))
+        return evidence
+    return replace(evidence, reproduction=reproduction)
+
+
+def _calibrated(path: Path, dataset: Dataset | None) -> ModelEvidence:
+    result = read_json(path, CalibrateResult)
+    check_model(result.calibrated, dataset, path)
+    hashes = result.robot.urdf_sha256, file_sha256(path)
+    return ModelEvidence(result.calibrated, result.calibration, *hashes)
+
+
+def _with_rest(evidence: Evidence, reader: PartReader, options: EvidenceOptions) -> Evidence:
+    def tool(path: Path) -> ToolResult:
+        return check_tool(read_tool(path), evidence, path)
+
+    def process(path: Path) -> SimulatedProcess:
+        folder = path.parent if path.name == TABLE else path
+        return check_process(read_process(folder), evidence, folder / TABLE)
+
+    place = options.tool or reader.folders.default(TOOL)
+    found = reader.find("tool file", options.tool, TOOL, tool, "`elastocal tool` makes one")
+    return replace(
+        evidence,
+        tool=found,
+        tool_sha256=file_sha256(place) if found is not None and place is not None else None,
+        codecs=_codecs(evidence, reader, options.codec),
+        process=reader.find(
+            "process", options.process, PROCESS, process,
+            "`elastocal simulate-process` makes one for a simulated cell",
+        ),
+    )  # fmt: skip
+
+
+def _codecs(
+    evidence: Evidence, reader: PartReader, given: Path | None
+) -> tuple[CodecEvidence, ...]:
+    """Return the codec of a folder, or every one of the folders in it."""
+
+    def codec(path: Path) -> CodecEvidence:
+        data = check_codec(read_codec(path), evidence, path)
+        return CodecEvidence(data, judge(data))
+
+    root = given or reader.folders.default(CODEC)
+    inner = sorted(path.parent for path in root.glob(f"*/{ARRAYS}")) if root else []
+    if root is None or not inner or (root / ARRAYS).exists():
+        hint = "`elastocal codec` makes one"
+        found = reader.find("codec", given, CODEC, codec, hint)
+        return () if found is None else (found,)
+    read = (
+        reader.read("codec", path, partial(codec, path), named=given is not None) for path in inner
+    )
+    return tuple(each for each in read if each is not None)
+
+
+def _with_old(evidence: Evidence, reader: PartReader, options: EvidenceOptions) -> Evidence:
+    """Return the evidence with a comparison to an earlier model, where one is named."""
+    old = options.old
+    new = options.model or reader.folders.model or reader.folders.default(MODEL)
+    if old is None:
+        reason = "no earlier calibration was given (--old), so nothing is known of any change"
+        reader.missing.append(MissingPart("earlier calibration", reason))
+        return evidence
+    if new is None or evidence.calibrated is None:
+        reason = "there is no calibrated model to compare it with"
+        reader.missing.append(MissingPart("comparison with the earlier calibration", reason))
+        return evidence
+    q, force = _rows_that_matter(evidence)
+    found = recertify_files(old, new, q, force, limit=evidence.limits.drift)
+    reader.use(old)
+    return replace(evidence, recertification=found.summary)
+
+
+def _rows_that_matter(evidence: Evidence) -> tuple[FloatArray | None, FloatArray | None]:
+    """Return joints and forces of production, else those of the run."""
+    if evidence.cell is not None and evidence.cell.process is not None:
+        return evidence.cell.process.joint_position, evidence.cell.process.force
+    if evidence.dataset is None or evidence.calibrated is None:
+        return None, None
+    readings = evidence.dataset.readings(evidence.calibrated.model.model.robot.joint_names)
+    return readings.joint_position, readings.force
+
+
+def _limits(cell: Cell | None, options: EvidenceOptions) -> AcceptanceLimits:
+    stated = cell.file.acceptance if cell is not None else None
+    drift = options.drift or (stated.drift if stated else None)
+    if options.tolerance is not None:
+        return AcceptanceLimits(options.tolerance, drift, "given with --tolerance")
+    if stated is not None and stated.tolerance is not None:
+        return AcceptanceLimits(stated.tolerance, drift, "of the cell file")
+    return AcceptanceLimits(None, drift)

@@ -1,0 +1,206 @@
+"""The verdict on a calibration: light, sentence, reasons, advice.
+
+Green: the upper end of the interval of the 95 % error is within the tolerance, no reading at an
+unseen pose is beyond it, and nothing holds it back. Red: the lower end is beyond it. Otherwise
+yellow, with every reason. Without a tolerance there is no light.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from enum import Enum
+
+from elastocal.identification import (
+    UnseenErrors,
+)
+from elastocal.verdict.evidence import Evidence
+from elastocal.verdict.findings import Finding, find_everything
+from elastocal.wording import counted, mm, um
+
+_LOUD = 0.3
+"""Part of the mean error from which on the noise of a reading is worth less of it."""
+
+
+class Light(Enum):
+    """Colour."""
+
+    GREEN = "green"
+    YELLOW = "yellow"
+    RED = "red"
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """The first words of the report."""
+
+    light: Light | None
+    """None where no tolerance was given or there is nothing to judge."""
+    word: str
+    """Says the same as the colour."""
+    sentence: str
+    reasons: tuple[str, ...]
+    """Why the light is not green; what else has to be known where there is none."""
+    notes: tuple[str, ...]
+    """Further things to know."""
+    advice: tuple[str, ...]
+    """Ways to improve the result."""
+
+
+def judge_evidence(evidence: Evidence) -> Verdict:
+    """Return the verdict on a calibration with the findings and the advice of all its parts."""
+    return judge(evidence, find_everything(evidence), tuple(advise(evidence)))
+
+
+def judge(evidence: Evidence, findings: Sequence[Finding], advice: Sequence[str] = ()) -> Verdict:
+    """Return the verdict on a calibration.
+
+    Parameters
+    ----------
+    evidence : Evidence
+        With the errors at unseen poses, where they are known.
+    findings : sequence of Finding
+        Those of all parts.
+    advice : sequence of str
+        Advice that no single part can give; it follows that of the findings.
+    """
+    unseen, tolerance = evidence.unseen, evidence.limits.tolerance
+    held = list(dict.fromkeys(each.text for each in findings if each.holds_back))
+    notes = list(dict.fromkeys(each.text for each in findings if not each.holds_back))
+    all_advice = dict.fromkeys((*(each.advice for each in findings if each.advice), *advice))
+    light, own = _light(unseen, tolerance, bool(held))
+    if evidence.calibrated is None:
+        light, own = None, ["there is no calibrated model, so there is no accuracy to judge"]
+    word = _word(light, bool(own))
+    sentence = _sentence(evidence, unseen, light)
+    return Verdict(light, word, sentence, (*own, *held), tuple(notes), tuple(all_advice))
+
+
+def _word(light: Light | None, by_the_errors: bool) -> str:
+    """Return the word that says what the colour says."""
+    if light is Light.YELLOW:
+        return "Not proved" if by_the_errors else "Within, with open points"
+    words = {Light.GREEN: "Within the tolerance", Light.RED: "Beyond the tolerance"}
+    return words[light] if light is not None else "Not judged"
+
+
+def _light(
+    unseen: UnseenErrors | None, tolerance: float | None, held: bool
+) -> tuple[Light | None, list[str]]:
+    """Return the light, and the reasons that the errors themselves give."""
+    if tolerance is None:
+        return None, []
+    if unseen is None:
+        return Light.YELLOW, ["the errors at unseen poses have no interval"]
+    own = list(_against(unseen, tolerance))
+    if not unseen.p95.low <= tolerance:
+        return Light.RED, own
+    return (Light.YELLOW if own or held else Light.GREEN), own
+
+
+def _against(unseen: UnseenErrors, tolerance: float) -> Iterator[str]:
+    p95 = unseen.p95
+    span = f"{mm(p95.low)} to {mm(p95.high)}"
+    if not p95.low <= tolerance:
+        yield f"the whole interval of the 95 % error ({span}) is beyond {mm(tolerance)}"
+    elif not p95.high <= tolerance:
+        yield f"the interval of the 95 % error ({span}) reaches beyond {mm(tolerance)}"
+    beyond = unseen.beyond(tolerance)
+    if beyond:
+        yield (
+            f"{beyond} of {counted(len(unseen.error), 'reading')} at unseen poses"
+            f" {'is' if beyond == 1 else 'are'} beyond {mm(tolerance)}, the largest with"
+            f" {mm(unseen.max)}"
+        )
+
+
+def _sentence(evidence: Evidence, unseen: UnseenErrors | None, light: Light | None) -> str:
+    tolerance = evidence.limits.tolerance
+    against = (
+        "No tolerance was given, so this report does not say whether that is enough."
+        if tolerance is None
+        else f"The tolerance is {mm(tolerance)} ({evidence.limits.source})."
+    )
+    if evidence.calibrated is None:
+        return "No calibrated model was found."
+    if unseen is None:
+        return f"{_stated(evidence)} {against}"
+    accuracy = (
+        f"At poses that the fit had not seen, the model predicted the deflection to"
+        f" {mm(unseen.mean.value)} on average; 95 % of {counted(len(unseen.error), 'reading')} at"
+        f" {counted(unseen.poses, 'pose')} were within {mm(unseen.p95.value)}, all within"
+        f" {mm(unseen.max)}."
+    )
+    closing = {
+        Light.GREEN: "The errors are within it, and nothing essential is missing.",
+        Light.YELLOW: "Not everything that a green light needs is there; the reasons follow.",
+        Light.RED: "The errors are beyond it.",
+    }
+    return " ".join([accuracy, against, *([closing[light]] if light else [])])
+
+
+def _stated(evidence: Evidence) -> str:
+    held_out = evidence.figures.held_out if evidence.figures else None
+    if held_out is None:
+        return "The model file tells no error at unseen poses."
+    return (
+        f"The model file states {mm(held_out.mean)} on average and {mm(held_out.max)}"
+        f" at most at poses left out of the fit; this could not be made again here."
+    )
+
+
+def advise(evidence: Evidence) -> Iterator[str]:
+    """Yield advice that no single part can give, a sentence or two each.
+
+    Parameters
+    ----------
+    evidence : Evidence
+        Whatever is there.
+    """
+    unseen = evidence.unseen
+    if unseen is None:
+        return
+    yield from _noise(evidence, unseen)
+    yield from _largest(unseen)
+    yield from _spare_poses(evidence)
+
+
+def _noise(evidence: Evidence, unseen: UnseenErrors) -> Iterator[str]:
+    """Tell how much of the error the tracker explains."""
+    if evidence.summary is None:
+        return
+    sigma = evidence.summary.noise.marker_sigma_median
+    scatter = evidence.summary.registration.scatter
+    known = [value for value in (sigma, scatter) if value is not None]
+    if not known:
+        return
+    compared = f"its readings scatter by {um(max(known))}, the errors are {um(unseen.mean.value)}"
+    if max(known) > _LOUD * unseen.mean.value:
+        yield f"Average longer or bring the tracker nearer: {compared} on average."
+    else:
+        yield (
+            f"A quieter tracker would not help much: {compared} on average. Most of the error is"
+            " what springs cannot express, such as play, friction in the gears and links that bend."
+        )
+
+
+def _largest(unseen: UnseenErrors) -> Iterator[str]:
+    """Name the pose at which the model errs most when it stands out."""
+    k = int(unseen.error.argmax())
+    if unseen.max > 2.0 * unseen.mean.value:
+        yield (
+            f"Look at pose {unseen.pose[k]} {unseen.load_case[k]} first, contact, stand and line of"
+            f" sight: it has the largest error, {mm(unseen.max)}."
+        )
+
+
+def _spare_poses(evidence: Evidence) -> Iterator[str]:
+    """Tell how many poses would have been enough."""
+    best = evidence.saturation
+    if best is None:
+        return
+    measured = len(evidence.codecs[0].data.contact)
+    if best.settled and best.high is not None and best.high < measured:
+        yield (
+            f"{counted(best.high, 'pose')} would have done here in place of {measured}: the error"
+            " no longer falls from there on. A next robot of this kind may do with about as many;"
+            " its own codec tells."
+        )

@@ -1,0 +1,208 @@
+"""Samples of a study: the simulator's truth on one side, the estimator on the other."""
+
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass
+from importlib.metadata import version
+
+import numpy as np
+
+from elastocal.arrays import FloatArray, IndexArray
+from elastocal.cell import Cell, fingerprint
+from elastocal.codec import ALL_LOADS, training_cases
+from elastocal.codec.study import (
+    Condition,
+    ConditionResult,
+    PoseChoice,
+    Purpose,
+    Sample,
+    SampleResult,
+    SpringLabel,
+    StudyDesign,
+    StudyPool,
+    Verification,
+    calibrated,
+    choose_poses,
+    study_poses,
+)
+from elastocal.elastic import ElasticModel, layout
+from elastocal.errors import CodecError, DeviceError, nearest
+from elastocal.files import sha256
+from elastocal.sim.workcell import (
+    CampaignErrors,
+    CampaignSimulator,
+    ContactPoses,
+    ErrorDraws,
+    ErrorScales,
+)
+
+_PACKAGES = ("elastocal", "numpy", "scipy", "pin")
+
+
+@dataclass(frozen=True, eq=False)
+class StudySimulation:
+    """Simulates samples of one study; made by `prepare_study`, sent to other processes as it is."""
+
+    conditions: tuple[Condition, ...]
+    chosen: tuple[PoseChoice, ...]
+    """Of each condition."""
+    models: dict[str, ElasticModel]
+    """By spring layout."""
+    truth: CampaignSimulator
+    errors: CampaignErrors
+    pool: StudyPool
+    load_cases: tuple[str, ...]
+    force_tcp: FloatArray
+    """Of each load case, shape (load_case, 3), in N."""
+    marker: FloatArray
+    """In the tcp frame, shape (3,), in m."""
+
+    def __call__(self, sample: Sample) -> SampleResult:
+        """Return the sample's arm, calibrated under every condition."""
+        rng = sample.generator(Purpose.TRUTH)
+        stiffness, balancer = rng.standard_normal(self.truth.springs), rng.standard_normal()
+        draws = ErrorDraws.of(
+            len(self.pool), len(self.load_cases), sample.generator(Purpose.ERRORS)
+        )
+        found: dict[int, ConditionResult] = {}
+        for spread in dict.fromkeys(each.truth for each in self.conditions):
+            arm = self.truth.stiffened(np.exp(spread * stiffness), float(np.exp(spread * balancer)))
+            verification = self._verification(arm)
+            for cases in dict.fromkeys(each.load_cases for each in self.conditions):
+                numbers = [
+                    number
+                    for number, each in enumerate(self.conditions)
+                    if each.truth == spread and each.load_cases == cases
+                ]
+                found |= self._calibrated(sample, arm, draws, numbers, verification)
+        return SampleResult(sample.number, tuple(found[i] for i in range(len(self.conditions))))
+
+    def places(self, poses: IndexArray) -> ContactPoses:
+        """Return some poses of the pool as the simulator wants them."""
+        return ContactPoses(self.pool.q[poses], self.pool.normal[poses])
+
+    def _calibrated(
+        self,
+        sample: Sample,
+        arm: CampaignSimulator,
+        draws: ErrorDraws,
+        numbers: Sequence[int],
+        verification: Verification,
+    ) -> dict[int, ConditionResult]:
+        """Calibrate one arm under conditions with the same load cases, measuring each pose once."""
+        chosen = [self.chosen[i].of(sample.generator(Purpose.CHOICE)) for i in numbers]
+        poses = np.unique(np.concatenate(chosen))
+        cases = training_cases(self.conditions[numbers[0]].load_cases, self.load_cases)
+        loads = np.array([self.load_cases.index(case) for case in cases])
+        settled = arm.settle(self.places(poses), self.force_tcp[loads])
+        own = draws.take(poses, loads)
+        found = {}
+        for number, order in zip(numbers, chosen, strict=True):
+            condition = self.conditions[number]
+            scales = ErrorScales(condition.tracker_noise, condition.force_noise)
+            station = self.pool.station[poses]
+            readings = self.errors.readings(settled, own, scales, station, cases)
+            mine = np.isin(readings.pose, np.searchsorted(poses, order))
+            model = self.models[condition.springs]
+            found[number] = calibrated(model, readings.take(mine), self.marker, verification)
+        return found
+
+    def _verification(self, arm: CampaignSimulator) -> Verification:
+        settled = arm.settle(self.places(self.pool.verification), self.force_tcp)
+        flat = (settled.q, settled.force, settled.deflection)
+        return Verification(*(array.reshape(-1, array.shape[-1]) for array in flat))
+
+
+@dataclass(frozen=True, eq=False)
+class PreparedStudy:
+    """A study that may begin."""
+
+    design: StudyDesign
+    simulate: StudySimulation
+
+
+def prepare_study(
+    cell: Cell, conditions: Sequence[Condition], seed: int, verification: int, jobs: int | None
+) -> PreparedStudy:
+    """Make the pool, choose the poses of every condition, and refuse what does not fit.
+
+    Parameters
+    ----------
+    cell : Cell
+        The cell.
+    conditions : sequence of Condition
+        What is studied.
+    seed : int
+        Of the study; poses are drawn from the cell file's ``search.seed``.
+    verification : int
+        Number of verification poses.
+    jobs : int, optional
+        Processes that make the pool.
+
+    Raises
+    ------
+    ElastocalError
+        If the cell cannot be simulated, a value does not fit it, or the pool is too small.
+    """
+    loads = cell.file.load_cases
+    models = {
+        name: ElasticModel(cell.robot, layout(cell.robot, name))
+        for name in dict.fromkeys(each.springs for each in conditions)
+    }
+    for each in conditions:
+        _check_load_cases(each.load_cases, loads.cases)
+    if cell.file.marker is None or not cell.file.trackers:
+        raise DeviceError(f"cell {cell.name} has no tracker to simulate (key 'trackers')")
+    truth, errors = CampaignSimulator.of(cell), CampaignErrors.of(cell)
+    poses = study_poses(cell, verification, jobs)
+    chosen = choose_poses(cell, poses, conditions)
+    design = _design(cell, conditions, models, poses.pool, seed)
+    simulate = StudySimulation(
+        conditions=tuple(conditions),
+        chosen=chosen,
+        models=models,
+        truth=truth,
+        errors=errors,
+        pool=poses.pool,
+        load_cases=loads.cases,
+        force_tcp=loads.force_tcp,
+        marker=np.array(cell.file.marker.position_tcp),
+    )
+    return PreparedStudy(design, simulate)
+
+
+def _check_load_cases(spec: str, known: Sequence[str]) -> None:
+    """Refuse a set of load cases that the cell lacks."""
+    for name in spec.split("+"):
+        if spec != ALL_LOADS and name.strip() not in known:
+            raise CodecError(
+                f"load_cases={spec}: the cell has no load case {name.strip()!r}"
+                f"{nearest(name.strip(), known)} (known: {', '.join(known)}, or {ALL_LOADS})"
+            )
+
+
+def _design(
+    cell: Cell,
+    conditions: Sequence[Condition],
+    models: dict[str, ElasticModel],
+    pool: StudyPool,
+    seed: int,
+) -> StudyDesign:
+    simulated = cell.file.model_dump(mode="json", include={"simulation", "procedure"})
+    springs = {name: repr(model.springs) for name, model in models.items()}
+    text = json.dumps([simulated, springs], sort_keys=True, allow_nan=False)
+    return StudyDesign(
+        cell=cell.name,
+        cell_fingerprint=fingerprint(cell),
+        simulation_fingerprint=sha256(text),
+        seed=seed,
+        pool=len(pool.training),
+        verification=len(pool.verification),
+        load_cases=cell.file.load_cases.cases,
+        conditions=tuple(conditions),
+        springs={
+            name: tuple(SpringLabel(name=p.name, unit=p.unit.si) for p in model.parameters)
+            for name, model in models.items()
+        },
+        versions={name: version(name) for name in _PACKAGES},
+    )

@@ -1,0 +1,167 @@
+"""``check``: validate any of our files, and say what it holds.
+
+The kind of a file is found by its suffix and the schema that it states; a new kind
+is a function that reads (and so validates) the file, and its entry in a table here.
+"""
+
+import re
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from os import PathLike
+from pathlib import Path
+
+from elastocal.compensation.process import TABLE
+from elastocal.errors import DatasetError, SchemaError
+from elastocal.files import read_text
+from elastocal.planning import PLAN
+from elastocal.procedure import JOURNAL
+from elastocal.progress import Progress
+from elastocal.records import read_arrays
+from elastocal.results import Result, brief
+from elastocal.workflows import _kinds_of_measurement as measurement, _kinds_of_results as results
+from elastocal.workflows._kinds_of_measurement import FileDescription
+from elastocal.workflows._workflow import workflow
+
+Describe = Callable[[Path], FileDescription]
+
+_IN_JSON = re.compile(r'"schema":\s*"(elastocal\.[\w-]+)/')
+_IN_YAML = re.compile(r"^schema:\s*[\"']?(elastocal\.[\w-]+)/", re.MULTILINE)
+
+
+@dataclass(frozen=True)
+class CheckSettings:
+    """Which file to validate."""
+
+    file: str | PathLike[str]
+    """Any file of ours, a dataset, a robot, or a folder that a command made."""
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class CheckResult(Result):
+    """A valid file: its kind and what it holds."""
+
+    file: str
+    kind: str
+    holds: Mapping[str, object]
+    """Figures by name, JSON-ready."""
+
+    def facts(self) -> tuple[tuple[str, str], ...]:
+        """Return what a person wants to know first."""
+        held = ((name.replace("_", " "), brief(value)) for name, value in self.holds.items())
+        return (("file", self.file), ("kind", self.kind), *held)
+
+
+@workflow(CheckSettings)
+def check(settings: CheckSettings, progress: Progress) -> CheckResult:  # noqa: ARG001 - an instant
+    """Validate a file and say what it holds.
+
+    Parameters
+    ----------
+    settings : CheckSettings
+        Or its ``file``.
+    progress : Progress, optional
+        Hears how far the work is.
+
+    Raises
+    ------
+    SchemaError
+        If the suffix is not one of ours, or a folder holds nothing of ours.
+    ElastocalError
+        If the contents are not valid.
+    """
+    kind, holds = describe_file(Path(settings.file))
+    return CheckResult(str(settings.file), kind, holds)
+
+
+def describe_file(path: Path) -> FileDescription:
+    """Return the kind of a file, or of a folder that a command made, and what it holds.
+
+    Raises
+    ------
+    SchemaError
+        If the suffix is not one of ours, or a folder holds nothing of ours.
+    ElastocalError
+        If the contents are not valid.
+    """
+    if path.is_dir():
+        return _folder(path)
+    known: dict[str, Describe] = {
+        ".nc": _netcdf,
+        ".csv": _table,
+        ".json": _json,
+        ".urdf": measurement.robot_file,
+        ".jsonl": measurement.journal_file,
+        ".mcap": measurement.streams_file,
+        ".yaml": _settings,
+        ".yml": _settings,
+    }
+    describe = known.get(path.suffix.lower())
+    if describe is None:
+        raise SchemaError(f"{path}: suffix {path.suffix!r} is not one of {', '.join(known)}")
+    return describe(path)
+
+
+def _folder(path: Path) -> FileDescription:
+    """Describe the folder of a plan, a run, a simulated process, a codec or a study."""
+    if (path / PLAN).is_file():
+        return measurement.plan_file(path / PLAN)
+    if (path / JOURNAL).is_file():
+        return measurement.run_folder(path)
+    if (path / TABLE).is_file():
+        return results.process_folder(path)
+    if results.is_study(path):
+        return results.study_folder(path)
+    if results.is_codec(path):
+        return results.codec_folder(path)
+    raise SchemaError(
+        f"{path} is a folder with none of {PLAN}, {JOURNAL}, {TABLE} in it, nor the files of a"
+        " codec or a study"
+    )
+
+
+def _netcdf(path: Path) -> FileDescription:
+    """Describe a NetCDF file by the schema that it states."""
+    try:
+        stated = read_arrays(path).attributes.get("schema")
+    except SchemaError as error:
+        raise DatasetError(str(error)) from error
+    kinds: dict[str, Describe] = {
+        "elastocal.codec": results.arrays,
+        "elastocal.pool": measurement.pool_file,
+    }
+    return kinds.get(str(stated).partition("/")[0], measurement.dataset_file)(path)
+
+
+def _json(path: Path) -> FileDescription:
+    """Describe a JSON file by the schema that it states; what states none is read as a model."""
+    kinds: dict[str, Describe] = {
+        "elastocal.plan": measurement.plan_file,
+        "elastocal.run-summary": measurement.summary_file,
+        "elastocal.tool": results.tool_file,
+        "elastocal.codec_verdicts": results.verdicts,
+        "elastocal.study": results.study_record,
+        "elastocal.study_settings": results.study_settings,
+        "elastocal.study_samples": results.study_samples,
+        "elastocal.process": results.process_table,
+        "elastocal.comparison": results.comparison_file,
+    }
+    return kinds.get(_stated(_IN_JSON, read_text(path)[:200]), results.model_file)(path)
+
+
+def _table(path: Path) -> FileDescription:
+    return results.table(path) if results.is_table(path) else measurement.dataset_file(path)
+
+
+def _stated(pattern: re.Pattern[str], text: str) -> str:
+    """Return the schema that a text states, without its version; empty when it states none."""
+    found = pattern.search(text)
+    return found[1] if found else ""
+
+
+def _settings(path: Path) -> FileDescription:
+    """Describe a YAML file by the schema that it states."""
+    kinds: dict[str, Describe] = {
+        "elastocal.cell": measurement.cell_file,
+        "elastocal.compensator": results.compensator_file,
+    }
+    return kinds.get(_stated(_IN_YAML, read_text(path)), results.springs_file)(path)

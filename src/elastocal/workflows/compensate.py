@@ -1,0 +1,133 @@
+"""``compensate``: a programmed path with its forces, corrected offline."""
+
+from dataclasses import dataclass, fields
+from os import PathLike
+from pathlib import Path
+
+from elastocal.compensation.offline import (
+    LARGEST_DEFLECTION,
+    CorrectionFigures,
+    CorrectionSettings,
+    CorrectionSummary,
+    compensate_path,
+)
+from elastocal.compensation.programs import PROGRAM_READERS, compensate_program
+from elastocal.errors import FileAccessError
+from elastocal.identification import CalibratedModel, read_model
+from elastocal.progress import Progress
+from elastocal.records import record
+from elastocal.results import Result
+from elastocal.robot import Robot
+from elastocal.workflows._coverage import coverage_notes
+from elastocal.workflows._outputs import refuse_overwriting
+from elastocal.workflows._postures import parse_frame, parse_posture, write_posture
+from elastocal.workflows._workflow import workflow
+
+
+@dataclass(frozen=True)
+class CompensateSettings:
+    """Which model corrects which path."""
+
+    model: str | PathLike[str]
+    """Model file of `calibrate`."""
+    path: Path
+    """Path, ``.csv``, or program of a controller, such as a KUKA ``.src`` beside its ``.dat``."""
+    out: Path
+    """File of the same kind to write."""
+    forces: Path | None = None
+    """Forces of a program: CSV with the columns ``point``, ``force_x[N] …``."""
+    base: str | None = None
+    """A program's frame in the model's base, ``"x, y, z, a, b, c"`` with units."""
+    start: str | None = None
+    """Posture before the first row, a quantity a joint from base to tip."""
+    largest: float = LARGEST_DEFLECTION
+    """Largest deflection that is taken for one, in m."""
+
+
+@record()
+class CompensateResult(Result, CorrectionFigures):
+    """The figures of a correction, predicted by the model."""
+
+    notes: tuple[str, ...]
+    """Sentences that a person must know."""
+
+
+@workflow(CompensateSettings)
+def compensate(settings: CompensateSettings, progress: Progress) -> CompensateResult:
+    """Correct a programmed path so that the loaded tool is where it was programmed.
+
+    Parameters
+    ----------
+    settings : CompensateSettings
+        Or its ``model``, and the other fields by name.
+    progress : Progress, optional
+        Hears how many rows are done.
+
+    Raises
+    ------
+    PathError
+        If the path or program is not understood, or a row cannot be corrected; by its line.
+    RobotError, UnitError
+        If ``start`` or ``base`` does not fit.
+    FileAccessError
+        If a file cannot be read or written, is an input, or does not belong to this kind of path.
+    """
+    path, forces = settings.path, settings.forces
+    refuse_overwriting(settings.out, Path(settings.model), path, *([forces] if forces else []))
+    is_program = path.suffix.lower() in PROGRAM_READERS
+    if is_program != (settings.out.suffix.lower() in PROGRAM_READERS):
+        raise FileAccessError(f"--out {settings.out} must end in {path.suffix} like {path}")
+    if not is_program and (forces or settings.base):
+        raise FileAccessError(f"--forces and --base are for KUKA programs (.src), not for {path}")
+    calibrated = read_model(Path(settings.model))
+    robot = calibrated.model.robot
+    how = CorrectionSettings(parse_posture(robot, settings.start), settings.largest)
+    if is_program:
+        summary, notes = _correct_program(calibrated, settings, how)
+    else:
+        summary = compensate_path(calibrated, path, settings.out, how, progress)
+        notes = _path_notes(summary, robot, settings.start)
+    figures = summary.figures()
+    return CompensateResult(
+        **{each.name: getattr(figures, each.name) for each in fields(figures)},
+        notes=(*coverage_notes(calibrated), *notes, *_force_notes(summary)),
+    )
+
+
+def _correct_program(
+    calibrated: CalibratedModel, settings: CompensateSettings, how: CorrectionSettings
+) -> tuple[CorrectionSummary, tuple[str, ...]]:
+    if settings.forces is None:
+        raise FileAccessError(f"{settings.path} has no forces: name a table of them with --forces")
+    T_base_frame = None if settings.base is None else parse_frame(settings.base)
+    found = compensate_program(
+        calibrated, settings.path, settings.forces, settings.out, how, T_base_frame
+    )
+    return found.summary, found.notes
+
+
+def _path_notes(summary: CorrectionSummary, robot: Robot, start: str | None) -> tuple[str, ...]:
+    notes = []
+    if summary.jumps:
+        rows = "row" if summary.jumps == 1 else "rows"
+        notes.append(
+            f"the posture changes at {summary.jumps} {rows} (first:"
+            f" {summary.first_jump}): a joint turns by more than 90 deg from the row before"
+        )
+    if summary.start and start is None:
+        notes.append(
+            "the first row is taken to be reached in the posture nearest to zero:"
+            f" {write_posture(robot, summary.start)}; another"
+            " posture deflects otherwise, give --start if it is another"
+        )
+    return tuple(notes)
+
+
+def _force_notes(summary: CorrectionSummary) -> tuple[str, ...]:
+    if not 2 * summary.pulled > summary.rows:
+        return ()
+    return (
+        f"at {summary.pulled} of {summary.rows} rows the force on the robot draws the tool out"
+        " (along +z of the tcp), which a surface cannot: is it the force on the part? Then turn"
+        " its sign",
+    )

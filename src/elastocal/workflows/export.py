@@ -1,0 +1,89 @@
+"""``export``: C99 of a model and its compensator for a real-time target."""
+
+from dataclasses import dataclass
+from os import PathLike
+from pathlib import Path
+
+import numpy as np
+
+from elastocal.compensation import CorrectionLimits, read_settings
+from elastocal.compensation.conditioning import read_sensor_load
+from elastocal.compensation.export import write_c
+from elastocal.compensation.online import design
+from elastocal.errors import CompensationError
+from elastocal.identification import read_model
+from elastocal.progress import Progress
+from elastocal.records import record
+from elastocal.results import Result
+from elastocal.workflows._workflow import workflow
+
+
+@dataclass(frozen=True)
+class ExportSettings:
+    """Which model is written, and how it corrects."""
+
+    model: str | PathLike[str]
+    """Model file of `calibrate`."""
+    c: Path
+    """Folder to write the C files into."""
+    settings: Path | None = None
+    """Settings of the compensator (.yaml)."""
+    tool: Path | None = None
+    """Tool file of `tool`: weight, bias, sensor."""
+    force: bool = False
+    """Replace files that are there."""
+
+
+@record()
+class ExportResult(Result):
+    """The C files that were written, and the key figures of their compensator."""
+
+    folder: str
+    files: tuple[str, ...]
+    robot: str
+    joints: int
+    springs: int
+    cycle: float
+    """Time between two corrections, in s."""
+    filter_delay: float
+    """Delay of a slow wrench, in s."""
+    limits: CorrectionLimits
+
+
+@workflow(ExportSettings)
+def export(settings: ExportSettings, progress: Progress) -> ExportResult:  # noqa: ARG001 - done in an instant
+    """Write a model as dependency-free C99 with filters, limits and a self-test.
+
+    Parameters
+    ----------
+    settings : ExportSettings
+        Or its ``model``, and the other fields by name.
+    progress : Progress, optional
+        Hears how far the work is.
+
+    Raises
+    ------
+    CompensationError, SchemaError
+        If model, settings or tool do not fit.
+    FileAccessError
+        If a file cannot be read or written, or the folder holds files and ``force`` is not given.
+    """
+    model = Path(settings.model)
+    calibrated = read_model(model)
+    chosen = None if settings.settings is None else read_settings(settings.settings)
+    load = read_sensor_load(settings.tool, calibrated.model.robot)
+    try:
+        numbers = design(calibrated, chosen, load)
+    except CompensationError as error:
+        raise CompensationError(f"{model}: {error}") from error
+    files = write_c(settings.c, numbers, settings.force)
+    return ExportResult(
+        folder=str(settings.c),
+        files=tuple(files),
+        robot=calibrated.model.robot.name,
+        joints=numbers.joints,
+        springs=len(calibrated.model.springs),
+        cycle=numbers.settings.cycle,
+        filter_delay=float(np.asarray(numbers.filters.delay())),
+        limits=numbers.settings.limits,
+    )

@@ -1,0 +1,178 @@
+"""``report``: the document that stays when the engineer has left."""
+
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from os import PathLike
+from pathlib import Path
+
+from elastocal.errors import FileAccessError
+from elastocal.identification import UnseenErrors
+from elastocal.progress import Progress
+from elastocal.records import record
+from elastocal.report.document import find_browser, write_pdf, write_report
+from elastocal.results import Result
+from elastocal.verdict import EvidenceOptions, Verdict, gather_evidence
+from elastocal.workflows._workflow import workflow
+
+
+@dataclass(frozen=True)
+class ReportSettings:
+    """What to report on, and where to."""
+
+    run: str | PathLike[str]
+    """Folder of a run, a folder that holds one, or a model file."""
+    out: str | PathLike[str]
+    """HTML file to write."""
+    model: Path | None = None
+    """Model file; by default ``model.json`` beside the run."""
+    tool: Path | None = None
+    """Tool file; by default ``tool.json`` beside the run."""
+    codec: Path | None = None
+    """Codec; by default ``codec`` beside the run."""
+    process: Path | None = None
+    """Simulated process; by default ``process`` beside the run."""
+    old: Path | None = None
+    """Model file of an earlier calibration."""
+    tolerance: float | None = None
+    """Largest error at unseen poses in m; by default the cell file's."""
+    limit: float | None = None
+    """Largest change since ``old`` in m; by default the cell file's drift."""
+    pdf: bool = False
+    """Also print a PDF beside it; needs a Chromium."""
+    force: bool = False
+    """Replace a report that is there."""
+
+
+@record()
+class EstimateFigures:
+    """A figure with its 95 % interval, in m."""
+
+    value: float
+    low: float
+    high: float
+
+
+@record()
+class UnseenFigures:
+    """Errors at poses that were left out of the fit, in m."""
+
+    mean: EstimateFigures
+    p95: EstimateFigures
+    max: float
+    poses: int
+    readings: int
+
+
+@record()
+class ReportFigures:
+    """The figures of ``report --json``."""
+
+    report: str
+    pdf: str | None
+    light: str | None
+    """None where nothing can be judged."""
+    verdict: str
+    reasons: tuple[str, ...]
+    advice: tuple[str, ...]
+    tolerance: float | None
+    unseen: UnseenFigures | None
+    """None where the calibration could not be made again."""
+    missing: tuple[str, ...]
+    """Parts that were not found."""
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class ReportResult(Result):
+    """A written report and its verdict."""
+
+    verdict: Verdict
+    figures: ReportFigures
+
+    def facts(self) -> tuple[tuple[str, str], ...]:
+        """Return what a person wants to know first."""
+        light = f" ({self.figures.light} light)" if self.figures.light else ""
+        return (
+            (f"{self.verdict.word}{light}", self.verdict.sentence),
+            *(("because", reason) for reason in self.verdict.reasons),
+            ("written to", " and ".join(filter(None, (self.figures.report, self.figures.pdf)))),
+        )
+
+
+@workflow(ReportSettings)
+def report(settings: ReportSettings, progress: Progress) -> ReportResult:
+    """Write the report of a calibration: one HTML file that an inspector can sign.
+
+    Parameters
+    ----------
+    settings : ReportSettings
+        Or its ``run``, and the other fields by name.
+    progress : Progress, optional
+        Hears how far the work is.
+
+    Raises
+    ------
+    FileAccessError
+        If a file cannot be read, or the report cannot be written where it should be.
+    ElastocalError
+        If a part that was named cannot be used.
+    """
+    out = Path(settings.out)
+    paper = out.with_suffix(".pdf") if settings.pdf else None
+    _check_places(out, paper, settings.force)
+    browser = find_browser() if settings.pdf else ""
+    made = datetime.now(UTC).isoformat(timespec="seconds")
+    options = EvidenceOptions(
+        Path(settings.run),
+        settings.model,
+        settings.tool,
+        settings.codec,
+        settings.process,
+        settings.old,
+        settings.tolerance,
+        settings.limit,
+    )
+    steps = 3 if settings.pdf else 2
+    progress("report", 0, steps)
+    evidence = gather_evidence(options, made)
+    progress("report", 1, steps)
+    written = write_report(out, evidence)
+    progress("report", 2, steps)
+    if paper is not None:
+        write_pdf(out, paper, browser)
+        progress("report", 3, steps)
+    verdict, again = written.verdict, evidence.reproduction
+    figures = ReportFigures(
+        report=str(written.path),
+        pdf=str(paper) if paper else None,
+        light=verdict.light.value if verdict.light else None,
+        verdict=verdict.sentence,
+        reasons=tuple(verdict.reasons),
+        advice=tuple(verdict.advice),
+        tolerance=evidence.limits.tolerance,
+        unseen=_unseen(again.unseen) if again is not None and again.same else None,
+        missing=tuple(each.name for each in evidence.missing),
+    )
+    return ReportResult(verdict, figures)
+
+
+def _unseen(errors: UnseenErrors) -> UnseenFigures:
+    mean, p95 = errors.mean, errors.p95
+    return UnseenFigures(
+        mean=EstimateFigures(mean.value, mean.low, mean.high),
+        p95=EstimateFigures(p95.value, p95.low, p95.high),
+        max=errors.max,
+        poses=errors.poses,
+        readings=len(errors.error),
+    )
+
+
+def _check_places(out: Path, paper: Path | None, force: bool) -> None:
+    """Refuse places for a report before the work, so that none is done in vain."""
+    if out.suffix.lower() not in (".html", ".htm"):
+        # Any other name could be that of a model.
+        raise FileAccessError(f"--out {out}: the report is a page, its name must end in .html")
+    if not out.parent.is_dir():
+        raise FileAccessError(f"cannot write {out}: there is no folder {out.parent}")
+    for path in (out, paper):
+        if path is not None and path.exists() and not force:
+            raise FileAccessError(f"{path} is there already: name another file, or give --force")

@@ -1,0 +1,343 @@
+"""``stiffness``: which posture is stiffest along a path (paper section 4.3.1)."""
+
+import itertools
+from contextlib import nullcontext
+from dataclasses import dataclass
+from os import PathLike
+from pathlib import Path
+
+import numpy as np
+
+from elastocal.arrays import FloatArray
+from elastocal.cell import load_cell
+from elastocal.compensation.offline import PathError, posture_jumps
+from elastocal.compensation.stiffness import (
+    PathPostures,
+    PathStations,
+    PostureChoice,
+    PostureConstraint,
+    PostureGrid,
+    PostureSurvey,
+    cell_constraints,
+    choose_postures,
+    directional_stiffness,
+    read_stations,
+    require_same_robot,
+    survey_postures,
+    write_choice,
+    write_survey,
+)
+from elastocal.files import filling
+from elastocal.identification import CalibratedModel, read_model
+from elastocal.progress import Progress
+from elastocal.records import record, write_json
+from elastocal.report import Curve, write_stiffness_figure
+from elastocal.results import Result
+from elastocal.robot import Robot
+from elastocal.robot.inverse import InverseKinematics, inverse_for
+from elastocal.workflows._coverage import coverage_notes
+from elastocal.workflows._postures import parse_posture
+from elastocal.workflows._workflow import workflow
+
+_SUMMARY = "stiffness.json"
+"""Name of the file by which the folder is known."""
+
+
+@dataclass(frozen=True)
+class StiffnessSettings:
+    """Which model, along which path, and what may be chosen."""
+
+    model: str | PathLike[str]
+    """Model file of `calibrate`."""
+    path: Path
+    """CSV as for `compensate`; forces are not needed."""
+    out: Path | None = None
+    """Folder to write tables and figures into; none: they are only returned."""
+    direction: str = "normal"
+    """``normal`` (axis of the tool) or a vector in base, ``"1,0,0"``."""
+    spins: int = 36
+    """Turns about the tool's axis to try."""
+    stands: int = 9
+    """Positions of each external axis to try; with a cell, its own are taken."""
+    stations: int = 60
+    """Rows of the path to look at."""
+    cell: Path | None = None
+    """Cell file, for its margins, tooling and fixtures."""
+    start: str | None = None
+    """Posture before the first row, a quantity a joint from base to tip."""
+    force: bool = False
+    """Replace files that are there."""
+
+
+@record()
+class ExternalAxis:
+    """An axis that carries the arm, and the unit of its positions."""
+
+    name: str
+    unit: str
+
+
+@record()
+class PostureCounts:
+    """Numbers of postures."""
+
+    tried: int
+    allowed: int
+    refused: dict[str, int]
+    """By what refused them."""
+
+
+@record()
+class ChosenStiffness:
+    """One choice of postures along the path."""
+
+    name: str
+    stations: int
+    """Stations at which there is a posture."""
+    softest: float
+    """In N/m; 0 without a posture."""
+    mean: float
+    """In N/m."""
+    spin: float | None
+    """In rad; none where it varies."""
+    stand: float | None
+    """Position of the first external axis, in rad or m; none where it varies."""
+    posture_jumps: int
+    """Stations at which a joint turns by more than 90 deg from the one before."""
+
+
+@record("elastocal.stiffness/1")
+class StiffnessSummary:
+    """The contents of ``stiffness.json``."""
+
+    direction: str
+    stations: int
+    external_axes: tuple[ExternalAxis, ...]
+    postures: PostureCounts
+    choices: tuple[ChosenStiffness, ...]
+    files: tuple[str, ...]
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class StiffnessResult(Result):
+    """All postures along a path, and which to choose."""
+
+    summary: StiffnessSummary
+    stations: PathStations
+    direction: FloatArray
+    """Unit vectors in base, shape (station, 3)."""
+    survey: PostureSurvey
+    choice: PostureChoice
+    notes: tuple[str, ...]
+    """Sentences that a person must know."""
+
+    def facts(self) -> tuple[tuple[str, str], ...]:
+        """Return what a person wants to know first."""
+        counts = self.summary.postures
+        return (
+            ("stiffness along", self.along),
+            ("postures", f"{counts.allowed} of {counts.tried} are allowed"),
+            *(
+                (each.name, f"{1e-6 * each.softest:.3g} N/µm where softest")
+                for each in self.summary.choices
+            ),
+        )
+
+    @property
+    def along(self) -> str:
+        """The direction in words."""
+        text = self.summary.direction
+        return "the tool's axis (normal)" if text == "normal" else f"({text}) in base"
+
+
+@workflow(StiffnessSettings)
+def stiffness(settings: StiffnessSettings, progress: Progress) -> StiffnessResult:
+    """Map the stiffness over spin, rail and path; choose the stiffest posture.
+
+    Parameters
+    ----------
+    settings : StiffnessSettings
+        Or its ``model``, and the other fields by name.
+    progress : Progress, optional
+        Hears how many stations are done.
+
+    Raises
+    ------
+    PathError
+        If the path, the direction or the size of the survey is refused.
+    RobotError, UnitError
+        If the cell has another robot, or ``start`` does not fit.
+    FileAccessError
+        If a file cannot be read or written, or the folder holds files and ``force`` is not given.
+    """
+    calibrated = read_model(Path(settings.model))
+    start = parse_posture(calibrated.model.robot, settings.start)
+    out = settings.out
+    with nullcontext() if out is None else filling(out, _SUMMARY, settings.force) as folder:
+        return _surveyed(calibrated, settings, start, folder, progress)
+
+
+def _surveyed(
+    calibrated: CalibratedModel,
+    settings: StiffnessSettings,
+    start: FloatArray | None,
+    folder: Path | None,
+    progress: Progress,
+) -> StiffnessResult:
+    robot = calibrated.model.robot
+    solver = inverse_for(robot)
+    grid, constraints = _grid(robot, settings)
+    stations = read_stations(settings.path, solver, settings.stations, start)
+    direction = _parse_direction(settings.direction, stations)
+    survey, choice = _survey(calibrated, solver, stations, direction, grid, constraints, progress)
+    choices = _choices(stations, choice)
+    curves = [_curve(calibrated, direction, postures) for postures in choices]
+    files: tuple[str, ...] = ()
+    if folder is not None:
+        tables = (
+            write_survey(folder / "postures.csv", robot, stations, survey),
+            write_choice(folder / "choice.csv", calibrated, stations, direction, choices),
+        )
+        files = (*(path.name for path in tables), "stiffness.svg", "stiffness.png", _SUMMARY)
+    summary = StiffnessSummary(
+        direction=settings.direction,
+        stations=len(stations),
+        external_axes=tuple(
+            ExternalAxis(name, "rad" if turns else "m")
+            for name, turns in zip(robot.joint_names, robot.revolute, strict=True)
+        )[: robot.external_axes],
+        postures=PostureCounts(
+            survey.stiffness.size, int(np.sum(~np.isnan(survey.stiffness))), survey.refused
+        ),
+        choices=tuple(
+            _chosen(curve, _count_jumps(robot, postures))
+            for curve, postures in zip(curves, choices, strict=True)
+        ),
+        files=files,
+    )
+    notes = (*_notes(summary, choice), *coverage_notes(calibrated))
+    result = StiffnessResult(summary, stations, direction, survey, choice, notes)
+    if folder is not None:
+        title = f"{robot.name}: stiffness along {result.along}"
+        for name in ("stiffness.svg", "stiffness.png"):
+            write_stiffness_figure(folder / name, title, stations, survey, curves)
+        write_json(folder / _SUMMARY, summary)
+    return result
+
+
+def _grid(
+    robot: Robot, settings: StiffnessSettings
+) -> tuple[PostureGrid, tuple[PostureConstraint, ...]]:
+    """Return what may be chosen at every station, and what a posture must pass."""
+    spins = np.linspace(0.0, 2.0 * np.pi, settings.spins, endpoint=False)
+    external = _external_grid(robot, settings.stands)
+    if settings.cell is None:
+        return PostureGrid(spins, external), ()
+    cell = load_cell(settings.cell)
+    require_same_robot(robot, cell.robot)
+    return PostureGrid(spins, cell.external_positions), cell_constraints(cell)
+
+
+def _external_grid(robot: Robot, count: int) -> FloatArray:
+    """Return evenly spread positions of the external axes, shape (position, external axis)."""
+    ends = zip(robot.limits.lower, robot.limits.upper, strict=True)
+    axes = []
+    for name, (low, high) in itertools.islice(
+        zip(robot.joint_names, ends, strict=True), robot.external_axes
+    ):
+        if not (np.isfinite(low) and np.isfinite(high)):
+            raise PathError(f"external axis {name} has no limits: give a --cell with its positions")
+        axes.append(np.linspace(low, high, count))
+    grid = list(itertools.product(*axes))
+    return np.array(grid, dtype=float).reshape(len(grid), robot.external_axes)
+
+
+def _parse_direction(text: str, stations: PathStations) -> FloatArray:
+    """Return unit vectors in base, shape (station, 3)."""
+    if text == "normal":
+        return stations.normal
+    try:
+        vector = np.array([float(part) for part in text.split(",")])
+    except ValueError:
+        vector = np.zeros(0)
+    length = float(np.linalg.norm(vector))
+    if vector.shape != (3,) or not 0.0 < length < np.inf:
+        raise PathError(
+            f"direction {text!r} must be 'normal' or three numbers, not all 0, e.g. '1,0,0'"
+        )
+    return np.tile(vector / length, (len(stations), 1))
+
+
+def _survey(
+    calibrated: CalibratedModel,
+    solver: InverseKinematics,
+    stations: PathStations,
+    direction: FloatArray,
+    grid: PostureGrid,
+    constraints: tuple[PostureConstraint, ...],
+    progress: Progress,
+) -> tuple[PostureSurvey, PostureChoice]:
+    count = len(stations)
+    survey = survey_postures(
+        calibrated,
+        solver,
+        stations.T_base_tcp,
+        direction,
+        grid,
+        constraints,
+        lambda done: progress("stations", done, count),
+    )
+    return survey, choose_postures(survey, solver)
+
+
+def _choices(stations: PathStations, choice: PostureChoice) -> list[PathPostures]:
+    """Return the postures as programmed, and those chosen."""
+    programmed = PathPostures("as programmed", stations.q, np.zeros(len(stations)))
+    one = [] if choice.one is None else [choice.one]
+    return [programmed, *one, choice.each]
+
+
+def _curve(calibrated: CalibratedModel, direction: FloatArray, postures: PathPostures) -> Curve:
+    there = np.flatnonzero(np.isfinite(postures.q).all(axis=1))
+    k = directional_stiffness(calibrated, postures.q[there], direction[there])
+    stiffness, low, high = (np.full(len(postures.q), np.nan) for _ in range(3))
+    stiffness[there], low[there], high[there] = k.stiffness, k.low, k.high
+    railed = calibrated.model.robot.external_axes > 0
+    rail = postures.q[:, 0] if railed else np.full(len(postures.q), np.nan)
+    return Curve(postures.name, stiffness, low, high, postures.spin, rail)
+
+
+def _count_jumps(robot: Robot, postures: PathPostures) -> int:
+    """Return at how many stations a joint turns by more than 90 deg from the one before."""
+    q = postures.q[np.isfinite(postures.q).all(axis=1)]
+    return len(posture_jumps(robot, q, q[0])) if len(q) else 0
+
+
+def _chosen(curve: Curve, jumps: int) -> ChosenStiffness:
+    k = curve.stiffness[np.isfinite(curve.stiffness)]
+
+    def only(values: FloatArray) -> float | None:
+        found = np.unique(values[np.isfinite(values)])
+        return float(found[0]) if len(found) == 1 else None
+
+    return ChosenStiffness(
+        name=curve.name,
+        stations=len(k),
+        softest=float(k.min()) if len(k) else 0.0,
+        mean=float(k.mean()) if len(k) else 0.0,
+        spin=only(curve.spin),
+        stand=only(curve.rail),
+        posture_jumps=jumps,
+    )
+
+
+def _notes(summary: StiffnessSummary, choice: PostureChoice) -> list[str]:
+    notes = []
+    for each in summary.choices:
+        if each.spin is not None and each.posture_jumps:
+            count = each.posture_jumps
+            where = "1 station" if count == 1 else f"{count} stations"
+            notes.append(f"{each.name}: at {where} a joint turns by more than 90 deg")
+    if choice.one is None:
+        notes.append("no single posture is allowed at every station")
+    return notes

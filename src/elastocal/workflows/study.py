@@ -1,0 +1,130 @@
+"""``study``: Monte-Carlo over simulated calibrations of a cell, before anybody travels."""
+
+import importlib
+from dataclasses import dataclass
+from functools import partial
+from os import PathLike
+from pathlib import Path
+
+from elastocal.cell import Cell, load_cell
+from elastocal.cell.description import DEFAULT_POSES
+from elastocal.codec.study import (
+    Condition,
+    SampleResult,
+    StudyDesign,
+    StudyStore,
+    StudySummary,
+    check_samples,
+    make_conditions,
+    read_variations,
+    run_study,
+    spread_over,
+    study_summary,
+    write_study,
+)
+from elastocal.progress import Progress
+from elastocal.report import write_study_figures
+from elastocal.results import Result
+from elastocal.workflows._workflow import workflow
+
+DEFAULT_VARIATION = "poses=6,10,15,20,31"
+"""What is varied when nothing is said."""
+_SIMULATION = "elastocal.workflows._study_simulation"
+
+
+@dataclass(frozen=True)
+class StudySettings:
+    """Which cell is studied, what is varied, and where it is simulated."""
+
+    cell: str | PathLike[str]
+    """Cell file, ``.yaml``."""
+    out: Path
+    """Folder of the study; one that is there goes on."""
+    samples: int = 200
+    """Simulated arms, each calibrated anew."""
+    vary: tuple[str, ...] = (DEFAULT_VARIATION,)
+    """What to vary, each ``"KEY=A,B"``; see `codec.study.FACTORS`. Every combination is a
+    condition; what is not varied is as the cell file has it."""
+    target: float | None = None
+    """Error that is good enough, in m."""
+    verification: int = 25
+    """Poses at which every calibration is judged; none of them is chosen."""
+    seed: int = 0
+    """Of arms and noise."""
+    jobs: int | None = None
+    """Processes; all cores by default."""
+    dask: str | None = None
+    """Address of a Dask scheduler to work on."""
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class StudyResult(Result):
+    """A finished study."""
+
+    summary: StudySummary
+    """What it says about each condition: contents of ``study.json``."""
+    design: StudyDesign
+    """What it is a study of."""
+    samples: tuple[SampleResult, ...]
+    files: tuple[str, ...]
+    """Names of the files with tables, summary and charts in its folder."""
+
+    def facts(self) -> tuple[tuple[str, str], ...]:
+        """Return what a person wants to know first."""
+        conditions = tuple(
+            (each.name, f"{1e3 * each.error_mean.median:.4f} mm median mean error")
+            for each in self.summary.conditions
+        )
+        advice = (("advice", self.summary.advice),) if self.summary.advice else ()
+        return (("study", self.summary.sentence), *conditions, *advice)
+
+
+@workflow(StudySettings)
+def study(settings: StudySettings, progress: Progress) -> StudyResult:
+    """Simulate many calibrations of a cell: what reaches which accuracy.
+
+    Parameters
+    ----------
+    settings : StudySettings
+        Or its ``cell``, and the other fields by name.
+    progress : Progress, optional
+        Hears of finished samples.
+
+    Raises
+    ------
+    CodecError
+        If a factor or value is unknown, the pool is too small, the folder holds another study, a
+        process dies, or no Dask scheduler answers.
+    ElastocalError
+        If the cell cannot be read or simulated, or a file not be written.
+    """
+    check_samples(settings.samples)
+    cell = load_cell(Path(settings.cell))
+    conditions = study_conditions(cell, settings.vary)
+    # Processes import the simulation while this one makes the pool.
+    prepare = partial(importlib.import_module, _SIMULATION)
+    with spread_over(settings.jobs, settings.dask, prepare) as spread:
+        from elastocal.workflows._study_simulation import prepare_study
+
+        prepared = prepare_study(
+            cell, conditions, settings.seed, settings.verification, settings.jobs
+        )
+        store, design = StudyStore(settings.out), prepared.design
+        results = run_study(store, design, settings.samples, prepared.simulate, spread, progress)
+    summary = study_summary(design, results, settings.target)
+    names = write_study(settings.out, design, results, summary)
+    names += write_study_figures(settings.out, design, results, summary)
+    return StudyResult(summary, design, results, tuple(names))
+
+
+def study_conditions(cell: Cell, vary: tuple[str, ...]) -> tuple[Condition, ...]:
+    """Return the conditions of a study; what is not varied is as the cell file has it.
+
+    Raises
+    ------
+    CodecError, PlanningError
+        If a factor or a value is unknown.
+    """
+    search = cell.file.search
+    base = Condition(poses=search.most or DEFAULT_POSES, search=search.technique)
+    return make_conditions(read_variations(vary or (DEFAULT_VARIATION,)), base)

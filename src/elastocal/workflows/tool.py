@@ -1,0 +1,169 @@
+"""``tool``: tool weight, sensor bias and sensor rotation from static postures."""
+
+from dataclasses import dataclass, field
+from os import PathLike
+from pathlib import Path
+
+import numpy as np
+
+from elastocal.arrays import FloatArray
+from elastocal.cell import Cell, load_cell
+from elastocal.compensation.conditioning import (
+    SensorMount,
+    StaticPostures,
+    ToolResult,
+    fit_tool,
+    read_postures,
+    refuse_mistakes,
+    static_postures,
+    tool_result,
+    write_tool,
+)
+from elastocal.errors import CompensationError, ProcedureError
+from elastocal.identification import read_model
+from elastocal.procedure import (
+    PoseReadings,
+    RunFolder,
+    commits,
+    read_journal,
+    read_streams,
+    reduce_pose,
+)
+from elastocal.progress import Progress
+from elastocal.robot import GRAVITY, Robot
+from elastocal.workflows._outputs import refuse_overwriting
+from elastocal.workflows._postures import parse_frame
+from elastocal.workflows._robot_source import find_robot
+from elastocal.workflows._workflow import workflow
+
+__all__ = ["ToolResult", "ToolSettings", "tool"]
+
+_AS_FLANGE = "0 mm, 0 mm, 0 mm, 0 deg, 0 deg, 0 deg"
+"""A sensor whose frame is that of its link."""
+
+
+@dataclass(frozen=True)
+class ToolSettings:
+    """Which static postures, and how the sensor was mounted."""
+
+    data: str | PathLike[str]
+    """CSV of postures with raw wrenches, or the folder of a run."""
+    out: Path | None = None
+    """Tool file to write; none: the result is only returned."""
+    robot: str | None = None
+    """URDF file, catalogue name or model file, for a CSV with joints."""
+    flange: str = "flange"
+    """Link that the sensor sits on; a run's cell says it itself."""
+    sensor: str = _AS_FLANGE
+    """Sensor in that link as mounted, ``"x, y, z, a, b, c"`` with units (Z-Y'-X'')."""
+    down: tuple[float, float, float] = (0.0, 0.0, -1.0)
+    """Direction of gravity in base, of any length."""
+    keep_rotation: bool = False
+    """Take the mounted rotation as it is."""
+
+
+@dataclass(frozen=True, eq=False)
+class _PostureSource:
+    """Postures, and what is known of the sensor beside them."""
+
+    postures: StaticPostures
+    mount: SensorMount
+    R_nominal: FloatArray
+    """Rotation of the sensor in the flange, as mounted."""
+    expected_centre: FloatArray | None = None
+    """Centre of mass in the sensor's frame, in m."""
+    points: dict[str, FloatArray] = field(default_factory=dict)
+    """Points that moments may be about by mistake, in the sensor's frame, in m."""
+
+
+@workflow(ToolSettings)
+def tool(settings: ToolSettings, progress: Progress) -> ToolResult:  # noqa: ARG001 - done in an instant
+    """Find mass, centre of mass, sensor bias and sensor rotation from static postures.
+
+    Parameters
+    ----------
+    settings : ToolSettings
+        Or its ``data``, and the other fields by name.
+    progress : Progress, optional
+        Hears how far the work is.
+
+    Raises
+    ------
+    CompensationError
+        If the postures are too few, or another reading of their numbers explains them.
+    DatasetError, ProcedureError, RobotError, UnitError
+        If table, run, robot or a text of the settings does not fit.
+    FileAccessError
+        If a file cannot be read or written, or ``out`` is an input.
+    """
+    data = Path(settings.data)
+    refuse_overwriting(settings.out, data)
+    source = _from_run(data) if data.is_dir() else _from_table(data, settings)
+    fit = fit_tool(source.postures, source.R_nominal, settings.keep_rotation)
+    refuse_mistakes(source.postures, fit, source.R_nominal, source.expected_centre, source.points)
+    result = tool_result(fit, source.mount, str(data))
+    if settings.out is not None:
+        write_tool(settings.out, result)
+    return result
+
+
+def _from_table(path: Path, settings: ToolSettings) -> _PostureSource:
+    """Return the postures of a CSV file."""
+    robot = _posture_robot(settings.robot, settings.flange)
+    example = "0 mm, 0 mm, 45 mm, 0 deg, 0 deg, 0 deg"
+    T_flange_sensor = parse_frame(settings.sensor, "sensor", example, CompensationError)
+    down = np.array(settings.down)
+    length = float(np.linalg.norm(down))
+    if not 0.0 < length < np.inf:
+        raise CompensationError(f"direction of gravity {down.tolist()} must be finite and not zero")
+    gravity = down * (-GRAVITY[2] / length)
+    arm = None if robot is None else Robot.from_urdf(robot.urdf, settings.flange, robot.base)
+    R, origin = T_flange_sensor[:3, :3], T_flange_sensor[:3, 3]
+    points = {} if not np.any(origin) else {"flange": -origin @ R}
+    mount = SensorMount(settings.flange, origin, gravity)
+    return _PostureSource(read_postures(path, arm, gravity), mount, R, points=points)
+
+
+def _posture_robot(robot: str | None, flange: str) -> Robot | None:
+    """Return the robot of a model file, a URDF file or the catalogue, up to the flange."""
+    if robot is None:
+        return None
+    if Path(robot).suffix.lower() == ".json":
+        return read_model(Path(robot)).model.robot
+    return find_robot(robot, flange, None)
+
+
+def _from_run(run: Path) -> _PostureSource:
+    """Return the unloaded references of a run as postures, the cell's sensor as mounted."""
+    folder = RunFolder(run)
+    entries = read_journal(folder.journal)
+    latest = {log.pose: log for log in commits(entries)}
+    if not entries or entries[0].run is None or not latest:
+        raise ProcedureError(f"{folder.journal}: no pose is committed")
+    cell = load_cell(folder.cell / entries[0].run.cell_file)
+    sensor, T_sensor_tcp = cell.file.sensor, cell.T_sensor_tcp
+    if sensor is None or T_sensor_tcp is None:
+        raise ProcedureError(f"cell {cell.name!r} has no force sensor (key 'sensor')")
+    poses = [
+        reduce_pose(
+            log,
+            read_streams(folder.streams / log.streams, [(w.start, w.end) for w in log.windows]),
+        )
+        for log in latest.values()
+    ]
+    T = sensor.T_flange_sensor
+    centre = (cell.file.tool.centre - T[:3, 3]) @ T[:3, :3]
+    points = {"tool centre point": T_sensor_tcp[:3, 3], "flange": -T[:3, 3] @ T[:3, :3]}
+    mount = SensorMount(cell.file.robot.flange, T[:3, 3], cell.gravity_base)
+    return _PostureSource(_unloaded(poses, cell), mount, T[:3, :3], centre, points)
+
+
+def _unloaded(poses: list[PoseReadings], cell: Cell) -> StaticPostures:
+    states = [r.tool for pose in poses if (r := pose.reference) and r.tool]
+    R_base_tcp = np.array([state.T_base_tcp[:3, :3] for state in states]).reshape(-1, 3, 3)
+    return static_postures(
+        R_base_tcp @ cell.T_flange_tcp[:3, :3].T,
+        np.array([state.force.value for state in states]).reshape(-1, 3),
+        np.array([state.moment.value for state in states]).reshape(-1, 3),
+        cell.gravity_base,
+    )

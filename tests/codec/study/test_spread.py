@@ -1,0 +1,85 @@
+"""Where samples are simulated: processes that get ready early, schedulers that are none."""
+
+import contextlib
+import socket
+import threading
+from functools import partial
+
+import pytest
+
+from elastocal.codec.study import _cluster
+from elastocal.codec.study.sampling import spread_over
+from elastocal.errors import CodecError
+from support.cli import elastocal
+from support.simulated import example_cell
+from support.studies import batch, numbers
+
+
+@contextlib.contextmanager
+def listening(answer=b""):
+    """Yield the address of a port where nobody speaks Dask."""
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        kept = []
+
+        def serve():
+            with contextlib.suppress(OSError):
+                while True:
+                    kept.append(server.accept()[0])
+                    kept[-1].sendall(answer)
+
+        threading.Thread(target=serve, daemon=True).start()
+        yield f"tcp://127.0.0.1:{server.getsockname()[1]}"
+        for each in kept:
+            each.close()
+
+
+@pytest.mark.parametrize("jobs", [1, 2])
+def test_processes_that_got_ready_early_do_every_batch(jobs):
+    with spread_over(jobs, None) as spread:
+        found = list(spread([partial(batch, number) for number in range(5)]))
+    assert sorted(numbers(each)[0] for each in found) == [
+        numbers(batch(number))[0] for number in range(5)
+    ]
+
+
+def test_processes_that_find_nothing_to_do_end_without_a_word(recwarn):
+    with spread_over(2, None):
+        pass
+    assert not recwarn.list
+
+
+@pytest.mark.parametrize("answer", [b"", b"SSH-2.0-OpenSSH_9.6\r\n"])
+def test_a_port_that_speaks_no_dask_is_refused_and_not_waited_for(monkeypatch, answer):
+    pytest.importorskip("distributed")
+    monkeypatch.setattr(_cluster, "PATIENCE", 0.5)
+    with listening(answer) as address, pytest.raises(CodecError, match="no Dask scheduler answers"):
+        _cluster.check_scheduler(address)
+
+
+@pytest.mark.parametrize("address", ["tcp://127.0.0.1:9", "nonsense://x", "foo", ""])
+def test_an_address_without_a_scheduler_is_refused_before_anything_is_written(
+    tmp_path, monkeypatch, address
+):
+    pytest.importorskip("distributed")
+    monkeypatch.setattr(_cluster, "PATIENCE", 0.3)
+    cell = example_cell("afp").path
+    found = elastocal("study", cell, "--out", tmp_path / "study", "--dask", address)
+    assert f"--dask {address}: no Dask scheduler answers there" in found.reason
+    assert not (tmp_path / "study").exists()
+
+
+def test_a_worker_is_not_taken_for_a_scheduler(monkeypatch):
+    pytest.importorskip("distributed")
+
+    async def worker(_):
+        return "Worker"
+
+    monkeypatch.setattr(_cluster, "_identity", worker)
+    with pytest.raises(CodecError, match="a Dask worker answers there, not a scheduler"):
+        _cluster.check_scheduler("tcp://127.0.0.1:1")
+
+
+def test_a_missing_extra_says_how_to_install_it(monkeypatch):
+    monkeypatch.setitem(__import__("sys").modules, "distributed", None)
+    with pytest.raises(CodecError, match=r"pip install 'elastocal\[dask\]'"):
+        _cluster.check_scheduler("tcp://127.0.0.1:9")

@@ -1,0 +1,61 @@
+import numpy as np
+
+from elastocal.codec.study import Condition, Sample, study_summary
+from elastocal.report import write_study_figures
+from elastocal.report.plots import (
+    study_figure,
+)
+from support.studies import settings, simulate
+
+RESULTS = [simulate(Sample(3, number)) for number in range(6)]
+
+
+def drawn(made):
+    return study_figure(made, RESULTS, study_summary(made, RESULTS, 5e-5))
+
+
+def ticks(figure):
+    return [label.get_text() for label in figure.axes[0].get_xticklabels()]
+
+
+def test_groups_are_pose_counts_in_rising_order():
+    figure = drawn(settings(10, 5))
+    assert ticks(figure) == ["5", "10"]
+    assert figure.axes[0].get_xlabel() == "Number of calibration poses"
+    assert not figure.legends
+
+
+def test_boxes_show_the_samples_of_their_condition():
+    figure = drawn(settings(10, 5))
+    lower = figure.axes[0]
+    medians = [each.get_segments() for each in lower.collections if hasattr(each, "get_segments")]
+    heights = {round(float(s[0][1]), 9) for s in medians[-1]}
+    expected = {
+        round(1e3 * float(np.median([r.outcomes[k].error_max for r in RESULTS])), 9) for k in (0, 1)
+    }
+    assert heights == expected
+
+
+def test_where_poses_do_not_vary_the_first_factor_that_does_is_the_axis():
+    conditions = tuple(Condition(poses=10, tracker_noise=scale) for scale in (1.0, 5.0))
+    figure = drawn(settings(conditions=conditions))
+    assert ticks(figure) == ["1", "5"]
+    assert figure.axes[0].get_xlabel() == "tracker noise"
+
+
+def test_another_factor_stands_beside_with_a_legend():
+    conditions = tuple(Condition(poses=poses, tracker_noise=1.0 + poses) for poses in (5, 10))
+    figure = drawn(settings(conditions=conditions))
+    texts = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert texts == ["tracker noise 6", "tracker noise 11"]
+
+
+def test_the_same_study_draws_the_same_bytes(tmp_path):
+    made = settings()
+    record = study_summary(made, RESULTS, None)
+    found = []
+    for name in ("a", "b"):
+        (tmp_path / name).mkdir()
+        names = write_study_figures(tmp_path / name, made, RESULTS, record)
+        found.append([(tmp_path / name / each).read_bytes() for each in names])
+    assert found[0] == found[1]

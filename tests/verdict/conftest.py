@@ -1,0 +1,1 @@
+from support.evidence import copied, finished, parts  # noqa: F401 - fixtures

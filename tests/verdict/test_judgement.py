@@ -1,0 +1,144 @@
+"""The light: what makes it green, yellow or red, and what is said beside it."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from elastocal.identification import UnseenErrors
+from elastocal.identification.recertification import Estimate
+from elastocal.report.document import verdict_html
+from elastocal.verdict import AcceptanceLimits, Finding, Light, advise, judge
+
+
+def errors(worst, low, high, count=20):
+    """Errors at unseen poses with a given largest one and interval, in mm."""
+    error = np.full(count, 0.05e-3)
+    error[-1] = 1e-3 * worst
+    p95 = Estimate(0.5e-3 * (low + high), 1e-3 * low, 1e-3 * high)
+    mean = Estimate(float(error.mean()), 0.04e-3, 0.08e-3)
+    return UnseenErrors(error, np.arange(count), ("normal",) * count, count, mean, p95)
+
+
+def judged(parts, worst, low, high, tolerance=0.3e-3, findings=()):
+    again = replace(parts.reproduction, unseen=errors(worst, low, high))
+    limits = AcceptanceLimits(tolerance, None, "of the test")
+    return judge(replace(parts, reproduction=again, limits=limits), findings)
+
+
+def test_green_when_interval_and_every_reading_are_within(parts):
+    verdict = judged(parts, worst=0.29, low=0.1, high=0.3)
+    assert verdict.light is Light.GREEN
+    assert verdict.word == "Within the tolerance"
+    assert verdict.reasons == ()
+    assert "nothing essential is missing" in verdict.sentence
+
+
+def test_yellow_when_the_interval_reaches_beyond(parts):
+    verdict = judged(parts, worst=0.29, low=0.1, high=0.31)
+    assert (verdict.light, verdict.word) == (Light.YELLOW, "Not proved")
+    assert "0.100 mm to 0.310 mm" in verdict.reasons[0]
+
+
+def test_yellow_when_a_single_reading_is_beyond(parts):
+    verdict = judged(parts, worst=0.4, low=0.1, high=0.2)
+    assert verdict.light is Light.YELLOW
+    (reason,) = verdict.reasons
+    assert reason == (
+        "1 of 20 readings at unseen poses is beyond 0.300 mm, the largest with 0.400 mm"
+    )
+
+
+def test_red_when_the_whole_interval_is_beyond(parts):
+    verdict = judged(parts, worst=0.9, low=0.31, high=0.5)
+    assert (verdict.light, verdict.word) == (Light.RED, "Beyond the tolerance")
+    assert "the whole interval" in verdict.reasons[0]
+
+
+def test_what_is_not_a_number_is_never_within(parts):
+    assert judged(parts, worst=np.nan, low=np.nan, high=np.nan).light is Light.RED
+    assert judged(parts, worst=np.nan, low=0.1, high=0.2).light is Light.YELLOW
+
+
+def test_a_finding_that_holds_back_makes_it_yellow_and_is_told(parts):
+    findings = (Finding("the station moved", advice="Fix it."), Finding("a note", False))
+    verdict = judged(parts, 0.2, 0.1, 0.2, findings=findings)
+    assert (verdict.light, verdict.word) == (Light.YELLOW, "Within, with open points")
+    assert verdict.reasons == ("the station moved",)
+    assert verdict.notes == ("a note",)
+    assert verdict.advice == ("Fix it.",)
+
+
+def test_a_note_alone_leaves_it_green(parts):
+    assert judged(parts, 0.2, 0.1, 0.2, findings=(Finding("n", False),)).light is Light.GREEN
+
+
+def test_red_stays_red_whatever_is_missing(parts):
+    verdict = judged(parts, 0.9, 0.4, 0.5, findings=(Finding("x"),))
+    assert verdict.light is Light.RED
+
+
+def test_without_a_tolerance_there_is_no_light_but_a_sentence(parts):
+    verdict = judged(parts, 0.2, 0.1, 0.2, tolerance=None, findings=(Finding("x"),))
+    assert verdict.light is None
+    assert "No tolerance was given" in verdict.sentence
+    assert verdict.reasons == ("x",)
+    html = verdict_html(parts, verdict)
+    assert "<svg" not in html
+    assert "What has to be known" in html
+
+
+def test_without_a_model_there_is_nothing_to_judge(parts):
+    verdict = judge(replace(parts, calibrated=None, reproduction=None), ())
+    assert verdict.light is None
+    assert "no calibrated model" in verdict.reasons[0]
+
+
+def test_errors_that_could_not_be_made_again_give_no_green(parts):
+    for again in (None, replace(parts.reproduction, same=False)):
+        verdict = judge(replace(parts, reproduction=again), ())
+        assert verdict.light is Light.YELLOW
+        assert "no interval" in verdict.reasons[0]
+        assert "could not be made again" in verdict.sentence
+
+
+@pytest.mark.parametrize("light", list(Light))
+def test_colour_is_never_alone(parts, light):
+    verdict = replace(judged(parts, 0.2, 0.1, 0.2), light=light)
+    html = verdict_html(parts, verdict)
+    assert f"{light.value} light" in html
+    assert verdict.word in html
+    shapes = {Light.GREEN: "<circle", Light.YELLOW: "M24 3L46", Light.RED: "M15 3h18"}
+    assert [shape in html for shape in shapes.values()] == [each is light for each in Light]
+
+
+def test_a_simulated_cell_is_told_in_the_verdict(parts):
+    assert "no real robot was measured" in verdict_html(parts, judge(parts, ()))
+
+
+def test_advice_weighs_the_tracker_against_the_errors(parts):
+    def told(scatter):
+        registration = parts.summary.registration.model_copy(update={"scatter": scatter})
+        noise = parts.summary.noise.model_copy(update={"marker_sigma_median": None})
+        summary = parts.summary.model_copy(update={"registration": registration, "noise": noise})
+        return " ".join(advise(replace(parts, summary=summary)))
+
+    mean = parts.reproduction.unseen.mean.value
+    assert "Average longer" in told(0.5 * mean)
+    assert "quieter tracker would not help" in told(0.1 * mean)
+    assert "its readings scatter" not in told(None)
+
+
+def test_advice_names_the_pose_of_the_largest_error_when_it_stands_out(parts):
+    again = replace(parts.reproduction, unseen=errors(worst=0.5, low=0.1, high=0.2))
+    found = " ".join(advise(replace(parts, reproduction=again)))
+    assert "Look at pose 19 normal first" in found
+    assert "0.500 mm" in found
+
+
+def test_advice_stands_behind_that_of_the_findings_and_holds_nothing_back(parts):
+    again = replace(parts.reproduction, unseen=errors(0.2, 0.1, 0.2))
+    findings = (Finding("a note", holds_back=False, advice="One."),)
+    verdict = judge(replace(parts, reproduction=again), findings, ("Two.", "One."))
+    assert verdict.light is Light.GREEN
+    assert verdict.advice == ("One.", "Two.")
