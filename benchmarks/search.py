@@ -25,7 +25,7 @@ from elastocal.planning.search import (
     o1,
     technique,
 )
-from elastocal.planning.search._fields import PlainField
+from elastocal.planning.search.cover import PlainField
 from elastocal.robot import Robot, catalogue, with_tool
 from elastocal.sim.arm import (
     Linkage,

@@ -17,6 +17,7 @@ from elastocal.arrays import FloatArray
 from elastocal.errors import SchemaError
 from elastocal.files import sha256, write_json
 from elastocal.records import read_json, record, to_data
+from elastocal.results import Result
 
 _SCHEMA = "elastocal.plan/1"
 PLAN = "plan.json"
@@ -190,7 +191,7 @@ class PoolRecord:
 
 
 @record(_SCHEMA)
-class PlanResult:
+class PlanResult(Result):
     """The calibration poses of a cell: what ``plan.json`` holds, but for its hash."""
 
     elastocal: str
@@ -207,6 +208,17 @@ class PlanResult:
     pool: PoolRecord
     findings: tuple[str, ...]
     """Findings that a user should know, a line each."""
+
+    def facts(self) -> tuple[tuple[str, str], ...]:
+        """Return the plan in a few words, for a console or a notebook."""
+        search = self.search
+        return (
+            ("cell", self.cell.name),
+            ("robot", self.robot.name),
+            ("poses", f"{len(self.poses)} by {search.name} from {self.pool.valid} candidates"),
+            ("covering radius", f"{1e3 * search.covering_radius:.4g} mm"),
+            ("estimated time", f"{self.total_time / 60.0:.0f} min"),
+        )
 
     @property
     def travel_time(self) -> float:

@@ -1,16 +1,41 @@
 """Candidates with joints: where the tool touches, and how the robot stands and retreats."""
 
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import dataclass, fields, replace
+from typing import Any, Self
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from elastocal.arrays import FloatArray, IndexArray
-from elastocal.planning._rows import Rows
 from elastocal.robot import Robot
 
 _STRAIGHT = 2e-5
 """Distance (m) and angle (rad) from the straight way that are let pass."""
 _STEPS = 4
+
+
+class Rows:
+    """Base of frozen dataclasses whose fields are arrays of equal length."""
+
+    def __len__(self) -> int:
+        """Return the number of rows."""
+        return len(self._columns()[0])
+
+    def take(self, index: ArrayLike) -> Self:
+        """Return some of the rows (a mask or numbers)."""
+        rows = np.asarray(index)
+        rows = rows.astype(np.intp) if rows.size == 0 else rows
+        return type(self)(*(column[rows] for column in self._columns()))
+
+    @classmethod
+    def joined(cls, parts: Sequence[Self]) -> Self:
+        """Return the rows of several, one after the other."""
+        columns = zip(*(part._columns() for part in parts), strict=True)
+        return cls(*map(np.concatenate, columns))
+
+    def _columns(self) -> tuple[Any, ...]:
+        return tuple(getattr(self, each.name) for each in fields(self))  # type: ignore[arg-type]
 
 
 @dataclass(frozen=True, eq=False)

@@ -4,7 +4,7 @@ import pytest
 
 from elastocal.errors import PlanningError
 from elastocal.planning.export import check_name
-from elastocal.planning.export._krl_notes import comment_text
+from elastocal.planning.export.krl_program import _comment_text
 
 
 @pytest.mark.parametrize("name", ["calib", "_x", "Plan_2", 20 * "Z"])
@@ -32,8 +32,8 @@ def test_a_reserved_word_inside_a_name_is_fine():
     ],
 )
 def test_a_comment_is_one_line_of_ascii(text, plain):
-    assert comment_text(text) == plain
+    assert _comment_text(text) == plain
 
 
 def test_a_comment_is_cut_short():
-    assert len(comment_text(1000 * "x")) == 80
+    assert len(_comment_text(1000 * "x")) == 80

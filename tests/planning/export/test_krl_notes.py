@@ -4,12 +4,12 @@ from dataclasses import replace
 
 import pytest
 
-from elastocal.planning.export._krl_notes import head_notes
+from elastocal.planning.export.krl_program import _head_notes
 from support import plans, urdfs
 
 
 def text(rail=True, plan=None):
-    lines = head_notes(plan or plans.plan(rail), plans.robot(rail))
+    lines = _head_notes(plan or plans.plan(rail), plans.robot(rail))
     assert all(line.startswith("; ") for line in lines)
     assert max(map(len, lines)) <= 100
     return " ".join(line.removeprefix("; ") for line in lines)

@@ -1,6 +1,11 @@
 from .cover import (
+    CellField as CellField,
     Cover as Cover,
     CoverSelection as CoverSelection,
+    DistanceField as DistanceField,
+    Farthest as Farthest,
+    MetricField as MetricField,
+    PlainField as PlainField,
     covering_radius as covering_radius,
     nearest_neighbour as nearest_neighbour,
 )

@@ -1,19 +1,47 @@
-"""COVER: poses spread over the pool by Gonzalez' heuristic (paper Pseudocode 2)."""
+"""COVER: poses spread over the pool by Gonzalez' heuristic (paper Pseudocode 2).
+
+Distances of every candidate from the nearest chosen one are kept up to date pick by pick, by a
+field. `PlainField` and `CellField` give the same picks bit for bit, because both compute
+``dx dx + dy dy + dz dz`` in this order.
+"""
 
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import ClassVar, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from elastocal.arrays import FloatArray
+from elastocal.arrays import FloatArray, IndexArray
 from elastocal.errors import PlanningError
-from elastocal.planning.search._fields import CellField, DistanceField, MetricField, PlainField
-from elastocal.planning.search.protocol import Candidates, Selection, check_count
+from elastocal.planning.search.protocol import Candidates, Metric, Selection, check_count
 
 _LARGE_POOL = 50_000
 _MANY_PICKS = 100
 """Candidates and picks from which on sorting the pool into cells pays for itself."""
+_CHOSEN = -1.0
+"""Stands for the distance of a chosen candidate, so that one at the same place comes first."""
+_CELL = 256
+"""Candidates in a cell: smaller cells visit fewer candidates but cost more boxes a pick. Of 64,
+128, 256 and 512 the fastest for 10^6 -> 500 (docs/decisions/0010-pose-search.md)."""
+
+
+class Farthest(NamedTuple):
+    """The worst-covered candidate."""
+
+    pose: int
+    """Its number; the lowest where several are equally far."""
+    distance: float
+    """From the nearest chosen candidate, in m; 0 when all are chosen."""
+
+
+class DistanceField(Protocol):
+    """Distances of all candidates from the chosen ones."""
+
+    def add(self, index: int) -> None:
+        """Choose a candidate."""
+
+    def farthest(self) -> Farthest:
+        """Return the candidate that is farthest from the chosen ones, at least one of which is."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -128,6 +156,162 @@ def _field(candidates: Candidates, count: int) -> DistanceField:
     if len(candidates) >= _LARGE_POOL and count >= _MANY_PICKS:
         return CellField(candidates.contact)
     return PlainField(candidates.contact)
+
+
+class PlainField:
+    """Euclidean distances, every candidate visited at every pick."""
+
+    def __init__(self, contact: FloatArray) -> None:
+        self._axes = [np.ascontiguousarray(axis) for axis in contact.T]
+        self._squared = np.full(len(contact), np.inf)
+        self._work = np.empty((2, len(contact)))
+
+    def add(self, index: int) -> None:
+        """Choose a candidate."""
+        total, term = self._work
+        for number, axis in enumerate(self._axes):
+            into = term if number else total
+            np.subtract(axis, axis[index], out=into)
+            np.multiply(into, into, out=into)
+            if number:
+                np.add(total, term, out=total)
+        np.minimum(self._squared, total, out=self._squared)
+        self._squared[index] = _CHOSEN
+
+    def farthest(self) -> Farthest:
+        """Return the candidate that is farthest from the chosen ones."""
+        index = int(self._squared.argmax())
+        return Farthest(index, float(np.sqrt(max(self._squared[index], 0.0))))
+
+
+class MetricField:
+    """Distances by a metric of the pool's own."""
+
+    def __init__(self, metric: Metric, candidates: Candidates) -> None:
+        self._metric = metric
+        self._distance = np.full(len(candidates), np.inf)
+
+    def add(self, index: int) -> None:
+        """Choose a candidate.
+
+        Raises
+        ------
+        PlanningError
+            If the metric does not give one distance, 0 or more, for each candidate.
+        """
+        distance = np.asarray(self._metric.from_point(index), dtype=float)
+        expected = self._distance.shape
+        if distance.shape != expected or not np.all(distance >= 0.0):
+            raise PlanningError(
+                f"the metric's distances from candidate {index}: must be {expected[0]} numbers"
+                f" not below 0, got shape {distance.shape}, least {distance.min(initial=np.inf)}"
+            )
+        np.minimum(self._distance, distance, out=self._distance)
+        self._distance[index] = _CHOSEN
+
+    def farthest(self) -> Farthest:
+        """Return the candidate that is farthest from the chosen ones."""
+        index = int(self._distance.argmax())
+        return Farthest(index, max(float(self._distance[index]), 0.0))
+
+
+class CellField:
+    """Euclidean distances in cells; picks equal those of `PlainField` bit for bit.
+
+    The bounding cube is halved along x, y, z in turn, as in a k-d tree with middle splits; the
+    candidates in the order of its leaves (Morton's Z-order) are cut into cells of equal size, so
+    that every step is a whole-array operation. Only cells that a new centre can improve are
+    visited: one whose box is no nearer to the centre than its own worst-covered candidate is to
+    the old ones cannot change.
+
+    Subtraction, squaring and addition round monotonically, so the distance to a box, computed
+    in the same order of operations, is never above the computed distance of a candidate in it.
+    """
+
+    def __init__(self, contact: FloatArray, size: int = _CELL) -> None:
+        columns = np.ascontiguousarray(contact.T)
+        order = _z_order(columns)
+        cells = -(-len(order) // size)
+        # The last cell is filled up with copies of its last candidate, which change nothing.
+        filled = np.concatenate([order, np.full(cells * size - len(order), order[-1])])
+        # Rising numbers within a cell: its first maximum is the one with the lowest number.
+        self._number = np.sort(filled.reshape(cells, size), axis=1)
+        self._cell = np.empty(len(contact), dtype=np.intp)
+        self._cell[self._number] = np.arange(cells)[:, None]
+        self._contact = contact
+        self._axes = [column[self._number] for column in columns]
+        self._low = np.array([axis.min(axis=1) for axis in self._axes])
+        self._high = np.array([axis.max(axis=1) for axis in self._axes])
+        self._squared = np.full((cells, size), np.inf)
+        self._worst = np.full(cells, np.inf)
+        self._best = self._number[:, 0].copy()
+
+    def add(self, index: int) -> None:
+        """Choose a candidate."""
+        centre = self._contact[index]
+        visited = np.flatnonzero(self._squared_box_distance(centre) < self._worst)
+        squared = np.square(self._axes[0][visited] - centre[0])
+        for axis in (1, 2):
+            squared += np.square(self._axes[axis][visited] - centre[axis])
+        self._squared[visited] = np.minimum(squared, self._squared[visited])
+        own = self._cell[index]
+        self._squared[own][self._number[own] == index] = _CHOSEN
+        self._summarise(np.append(visited, own))
+
+    def farthest(self) -> Farthest:
+        """Return the candidate that is farthest from the chosen ones."""
+        worst = self._worst.max()
+        index = int(self._best[self._worst == worst].min())
+        return Farthest(index, float(np.sqrt(max(worst, 0.0))))
+
+    def _squared_box_distance(self, centre: FloatArray) -> FloatArray:
+        outside = np.maximum(self._low - centre[:, None], centre[:, None] - self._high)
+        np.maximum(outside, 0.0, out=outside)
+        np.square(outside, out=outside)
+        total: FloatArray = outside[0] + outside[1] + outside[2]
+        return total
+
+    def _summarise(self, cells: IndexArray) -> None:
+        squared = self._squared[cells]
+        column = squared.argmax(axis=1)
+        self._worst[cells] = squared[np.arange(len(cells)), column]
+        self._best[cells] = self._number[cells, column]
+
+
+def _z_order(columns: FloatArray) -> IndexArray:
+    """Return the numbers of points in the order of a k-d tree's leaves (Morton, 1966).
+
+    G. M. Morton, "A computer oriented geodetic data base and a new technique in file
+    sequencing", IBM, 1966. Points in the same finest leaf come by rising number.
+
+    Parameters
+    ----------
+    columns : ndarray, shape (3, point)
+        Coordinates of at least one point, finite.
+    """
+    count = columns.shape[1]
+    number_bits = max(count - 1, 1).bit_length()
+    bits = min((63 - number_bits) // 3, 16)
+    low = columns.min(axis=1)
+    # Points all in one place have no width; they share one leaf.
+    width = float((columns.max(axis=1) - low).max()) or 1.0
+    spaced = _spaced(bits)
+    key = np.zeros(count, dtype=np.int64)
+    for axis, (column, least) in enumerate(zip(columns, low, strict=True)):
+        leaf = ((column - least) / width * (2**bits - 1)).astype(np.intp)
+        key |= spaced[leaf] << axis
+    # Sorting plain numbers is faster than sorting an index by them.
+    key = np.sort(key << number_bits | np.arange(count))
+    return np.asarray(key & ((1 << number_bits) - 1), dtype=np.intp)
+
+
+def _spaced(bits: int) -> IndexArray:
+    """Return the numbers below ``2**bits`` with two zeros put between their binary digits."""
+    value = np.arange(2**bits, dtype=np.int64)
+    spaced = np.zeros_like(value)
+    for bit in range(bits):
+        spaced |= (value >> bit & 1) << 3 * bit
+    return spaced.astype(np.intp)
 
 
 def covering_radius(candidates: Candidates, chosen: ArrayLike) -> float:

@@ -11,7 +11,7 @@ import trimesh
 from numpy.typing import ArrayLike
 
 from elastocal.arrays import BoolArray, FloatArray, IndexArray
-from elastocal.planning._rows import Rows
+from elastocal.planning.postures import Rows
 from elastocal.planning.surface import _topology as topology
 from elastocal.planning.surface._topology import corner_normals, face_normals_and_areas
 from elastocal.planning.surface.mesh import SurfaceError, TriangleMesh, read_mesh

@@ -171,3 +171,8 @@ def test_joints_of_home_via_points_and_compared_candidates_are_checked_too():
     ):
         with pytest.raises(SchemaError, match=said):
             check_plan(altered(**changes))
+
+
+def test_a_plan_shows_itself_in_a_few_lines():
+    assert repr(plans.plan()).splitlines()[0] == "PlanResult"
+    assert len(repr(plans.plan()).splitlines()) <= 20
