@@ -185,28 +185,19 @@ def chapters(kind: str, out: Path, seed: int) -> tuple[Chapter, ...]:
         If there is no such example cell.
     """
     check_like(kind)
-    cell, data, model, weights = (
-        out / name for name in ("cell.yaml", "run/dataset.nc", "model.json", "tool.json")
+    return (
+        *_measuring(kind, out, str(seed)),
+        _compared(out, "were there enough poses", "springs", "actuated,bearing"),
+        _compared(out, "did the load cases help", "load_cases", "normal,all"),
+        _compared(out, "did the search help", "search", "cover,ioops"),
+        *_using(kind, out, str(seed)),
     )
-    path, at = out / "process/path.csv", ("--seed", str(seed))
-    known = ("--model", str(model), "--tool", str(weights))
 
-    def to(name: str) -> tuple[str, str]:
-        return "--out", str(out / name)
 
-    def compared(key: str, values: str) -> Chapter:
-        titles = {
-            "springs": "were there enough poses",
-            "load_cases": "did the load cases help",
-            "search": "did the search help",
-        }
-        choice, folder = f"{key}={values}", out / "codec" / key
-        return Chapter(
-            titles[key],
-            ("codec", str(data), "--compare", choice, "--out", str(folder)),
-            lambda show, _: codec(data, show, compare=(choice,), out=folder),
-        )
-
+def _measuring(kind: str, out: Path, seed: str) -> tuple[Chapter, ...]:
+    """Return the story from the cell to model and tool."""
+    cell, data, planned = out / "cell.yaml", out / "run/dataset.nc", out / "plan"
+    model, weights, done = out / "model.json", out / "tool.json", out / "run"
     return (
         Chapter(
             "describe the cell",
@@ -215,46 +206,62 @@ def chapters(kind: str, out: Path, seed: int) -> tuple[Chapter, ...]:
         ),
         Chapter(
             "plan the poses",
-            ("plan", str(cell), *to("plan")),
-            lambda show, _: plan(cell, show, out=out / "plan"),
+            ("plan", str(cell), "--out", str(planned)),
+            lambda show, _: plan(cell, show, out=planned),
         ),
         Chapter(
             "measure",
-            ("run", str(cell), "--plan", str(out / "plan"), *to("run"), *at),
+            ("run", str(cell), "--plan", str(planned), "--out", str(done), "--seed", seed),
             lambda show, operator: run(
-                cell, show, plan=out / "plan", out=out / "run", seed=seed, operator=operator
+                cell, show, plan=planned, out=done, seed=int(seed), operator=operator
             ),
         ),
         Chapter(
             "identify the springs",
-            ("calibrate", str(data), *to("model.json")),
+            ("calibrate", str(data), "--out", str(model)),
             lambda show, _: calibrate(data, show, out=model),
         ),
         Chapter(
             "weigh the tool",
-            ("tool", str(out / "run"), *to("tool.json")),
-            lambda show, _: tool(out / "run", show, out=weights),
+            ("tool", str(done), "--out", str(weights)),
+            lambda show, _: tool(done, show, out=weights),
         ),
-        compared("springs", "actuated,bearing"),
-        compared("load_cases", "normal,all"),
-        compared("search", "cover,ioops"),
+    )
+
+
+def _compared(out: Path, title: str, key: str, values: str) -> Chapter:
+    data, choice, folder = out / "run/dataset.nc", f"{key}={values}", out / "codec" / key
+    return Chapter(
+        title,
+        ("codec", str(data), "--compare", choice, "--out", str(folder)),
+        lambda show, _: codec(data, show, compare=(choice,), out=folder),
+    )
+
+
+def _using(kind: str, out: Path, seed: str) -> tuple[Chapter, ...]:
+    """Return the story from the model to the report."""
+    cell, model, weights = out / "cell.yaml", out / "model.json", out / "tool.json"
+    process, corrected, page = out / "process", out / "corrected.csv", out / "report.html"
+    path, known = process / "path.csv", ("--model", str(model), "--tool", str(weights))
+    rest = ("--process", kind, "--seed", seed, "--out", str(process))
+    return (
         Chapter(
             "correct in real time",
-            ("simulate-process", str(cell), *known, "--process", kind, *at, *to("process")),
+            ("simulate-process", str(cell), *known, *rest),
             lambda show, _: simulate_process(
                 cell,
                 show,
                 models=(model,),
                 tools=(weights,),
                 process=kind,
-                seeds=(seed,),
-                out=out / "process",
+                seeds=(int(seed),),
+                out=process,
             ),
         ),
         Chapter(
             "correct offline",
-            ("compensate", str(model), str(path), *to("corrected.csv")),
-            lambda show, _: compensate(model, show, path=path, out=out / "corrected.csv"),
+            ("compensate", str(model), str(path), "--out", str(corrected)),
+            lambda show, _: compensate(model, show, path=path, out=corrected),
         ),
         Chapter(
             "write C for the robot",
@@ -263,8 +270,8 @@ def chapters(kind: str, out: Path, seed: int) -> tuple[Chapter, ...]:
         ),
         Chapter(
             "report",
-            ("report", str(out), *to("report.html")),
-            lambda show, _: report(out, show, out=out / "report.html"),
+            ("report", str(out), "--out", str(page)),
+            lambda show, _: report(out, show, out=page),
         ),
     )
 
