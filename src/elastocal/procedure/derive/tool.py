@@ -24,7 +24,7 @@ F test, with the number of places allowed for, says whether that is more than ch
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import special
+from scipy.special import fdtrc, stdtrit
 
 from elastocal.arrays import FloatArray
 
@@ -160,7 +160,7 @@ def tool_change(
     gain = change**2 * squares
     best = int(np.argmax(gain))
     rest = max(float(left @ left - gain[best]), np.finfo(float).tiny)
-    chance = (count - 1) * special.fdtrc(1, free, gain[best] / (rest / free))
+    chance = (count - 1) * fdtrc(1, free, gain[best] / (rest / free))
     if not (chance < _CHANCE_OF_STEP and abs(change[best]) > _SHARE * nominal_mass):
         return None
     return ToolChange(best + 1, float(change[best]))
@@ -296,7 +296,7 @@ def _solve(blocks: FloatArray, readings: FloatArray) -> _Solution:
     left = b - A @ value
     scatter = float(np.sqrt(left @ left / (free + int((~kept).sum()))))
     sigma = scatter * np.sqrt(((vt[kept] / s[kept, None]) ** 2).sum(axis=0)) / scale
-    half = special.stdtrit(free, 0.5 + _LEVEL / 2) * sigma
+    half = stdtrit(free, 0.5 + _LEVEL / 2) * sigma
     loose = np.linalg.norm(vt[~kept], axis=0) > np.sqrt(_DEPENDENT)
     return _Solution(np.where(loose, np.nan, value), np.where(loose, np.nan, half), scatter)
 
