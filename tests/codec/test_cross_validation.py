@@ -50,7 +50,7 @@ def test_the_seed_moves_random_choices_and_nothing_else(readings):
 def test_every_split_is_reported(readings):
     told = []
     cross_validate(
-        robot(), readings, [SIX], CodecOptions(splits=3), report=lambda *what: told.append(what)
+        robot(), readings, [SIX], CodecOptions(splits=3), progress=lambda *what: told.append(what)
     )
     assert told == [("splits", k, 3) for k in range(4)]
 

@@ -1,9 +1,14 @@
 """``elastocal codec``: were there enough poses, and which technique is better."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
+
+from elastocal import workflows
+
+if TYPE_CHECKING:
+    from elastocal.codec import Tolerance
 
 
 def codec(  # noqa: PLR0913 - one parameter an option
@@ -79,52 +84,82 @@ def codec(  # noqa: PLR0913 - one parameter an option
     ] = False,
 ) -> None:
     """Cross-validate growing training sets: how many poses, which technique."""
-    from elastocal import dataset as datasets
-    from elastocal.cli.codec_folder import write_codec_folder
-    from elastocal.cli.codec_options import parse_ratio, parse_tolerance
     from elastocal.cli.codec_table import show_codec
     from elastocal.cli.output import console, print_json
     from elastocal.cli.parsing import parse_point
     from elastocal.cli.progress import progress_bars
-    from elastocal.codec import (
-        VERDICTS,
-        CodecOptions,
-        analyse,
-        codec_summary,
-        cross_validate,
-        judge,
-        make_variants,
-        read_comparisons,
-    )
-    from elastocal.dataset import without
-    from elastocal.files import filling
+    from elastocal.codec import CodecOptions
     from elastocal.records import to_data
-    from elastocal.workflows import find_robot
 
-    variants = make_variants(read_comparisons(compare or []))
-    options = CodecOptions(splits, parse_ratio(ratio), seed, not keep_blunders, trust_conventions)
-    near = parse_tolerance(tolerance)
-    measured = datasets.read(data)
-    arm = find_robot(robot, tcp, tool, measured)
-    readings = without(measured.readings(arm.joint_names), exclude or [])
-    offset = measured.marker if marker is None else parse_point(marker)
-    with filling(out, VERDICTS, force) as folder, progress_bars(console()) as report:
-        found = cross_validate(
-            arm,
-            readings,
-            variants,
-            options,
-            marker_offset=offset,
-            provenance=f"{data}; {measured.provenance}" if measured.provenance else str(data),
+    options = CodecOptions(splits, _parse_ratio(ratio), seed, not keep_blunders, trust_conventions)
+    with progress_bars(console()) as progress:
+        result = workflows.codec(
+            data,
+            progress,
+            out=out,
+            compare=tuple(compare or ()),
+            robot=robot,
+            tcp=tcp,
+            tool=tool,
+            marker=None if marker is None else parse_point(marker),
+            exclude=tuple(exclude or ()),
+            options=options,
+            tolerance=_parse_tolerance(tolerance),
+            indices=indices,
+            per_axis=per_axis,
             jobs=jobs,
-            report=report,
+            force=force,
         )
-        verdicts = judge(found, near)
-        insight = analyse(arm, readings, found, marker_offset=offset, with_indices=indices)
-        result = codec_summary(found, verdicts, insight.correlations)
-        axes = ("x", "y", "z") if per_axis else ()
-        names = write_codec_folder(folder, found, verdicts, result, insight, axes)
     if as_json:
-        print_json({"folder": str(out), "files": names, **to_data(result)})
+        print_json({"folder": str(out), "files": result.files, **to_data(result.summary)})
     else:
-        show_codec(console(), result, out, names)
+        show_codec(console(), result.summary, out, result.files)
+
+
+def _parse_ratio(text: str) -> float:
+    """Return training over verification poses from ``"A/B"`` or a number.
+
+    >>> _parse_ratio("70/30") == 70 / 30
+    True
+
+    Raises
+    ------
+    CodecError
+        If the text is neither.
+    """
+    from elastocal.errors import CodecError
+
+    above, _, below = text.partition("/")
+    try:
+        return float(above) / float(below or 1.0)
+    except (ValueError, ZeroDivisionError) as error:
+        raise CodecError(f"ratio {text!r} must be two numbers above 0, e.g. '70/30'") from error
+
+
+def _parse_tolerance(text: str) -> "Tolerance":
+    """Return a tolerance from ``"PART %, LENGTH"``; the length may be left out.
+
+    >>> _parse_tolerance("5 %, 0.01 mm")
+    Tolerance(relative=0.05, floor=1e-05)
+    >>> _parse_tolerance("0.1").relative
+    0.1
+
+    Raises
+    ------
+    CodecError
+        If the text does not fit.
+    """
+    from elastocal.codec import Tolerance
+    from elastocal.errors import CodecError, UnitError
+    from elastocal.units import parse_quantity
+
+    part, _, length = (each.strip() for each in text.partition(","))
+    percent = part.endswith("%")
+    try:
+        relative = float(part.removesuffix("%")) / (100.0 if percent else 1.0)
+        floor = parse_quantity(length, "length") if length else Tolerance.floor
+    except (ValueError, UnitError) as error:
+        raise CodecError(
+            f"tolerance {text!r} must be a part and a length, e.g. '5 %, 5 um'"
+        ) from error
+    return Tolerance(relative, floor)

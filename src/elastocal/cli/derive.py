@@ -24,6 +24,6 @@ def derive(
         return
     out, folder = console(), result.folder
     out.print(f"{len(result.dataset.poses)} poses, readings: {result.counts()}")
-    for warning in result.summary["warnings"]:
+    for warning in result.summary.warnings:
         out.print(f"warning: {warning}", markup=False, soft_wrap=True)
     out.print(f"wrote {folder.dataset} and {folder.summary.name}", markup=False, soft_wrap=True)

@@ -3,7 +3,7 @@ from .analysis import (
     SpringObservability as SpringObservability,
     analyse as analyse,
 )
-from .cross_validation import STAGE as STAGE, Report as Report, cross_validate as cross_validate
+from .cross_validation import cross_validate as cross_validate
 from .data import (
     AXES as AXES,
     NO_POSE as NO_POSE,

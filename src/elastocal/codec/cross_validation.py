@@ -1,6 +1,6 @@
 """Repeated cross-validation over growing training sets (paper 3.2, Algorithm 1)."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from functools import partial
 from importlib.metadata import version
 
@@ -17,12 +17,10 @@ from elastocal.elastic import ElasticModel, layout
 from elastocal.errors import CodecError, IdentificationError
 from elastocal.parallel import map_in_processes, one_blas_thread, process_count
 from elastocal.planning.search import technique
+from elastocal.progress import Progress, silent
 from elastocal.robot import Robot
 
-Report = Callable[[str, int, int], None]
-"""Told a stage, how much of it is done and how much there is."""
-STAGE = "splits"
-
+_STAGE = "splits"
 _WORTH_PROCESSES = 2000
 """Fits behind a search of their own, or by a robust loss, from which on all cores are used."""
 
@@ -39,7 +37,7 @@ def cross_validate(
     marker_offset: ArrayLike | None = None,
     provenance: str = "",
     jobs: int | None = None,
-    report: Report | None = None,
+    progress: Progress = silent,
 ) -> CodecData:
     """Return the errors at held-out poses of growing training sets, for every variant.
 
@@ -60,8 +58,8 @@ def cross_validate(
     jobs : int, optional
         Processes; default: one, but all cores for long work, where variants search anew for
         every size or fit by a robust loss. The numbers do not depend on it.
-    report : callable, optional
-        Told of each split that is done.
+    progress : Progress, optional
+        Hears of each split that is done.
 
     Raises
     ------
@@ -91,11 +89,8 @@ def cross_validate(
             f"training sets end at {most} of {training} poses: the others have no reading of the"
             " load cases that a variant trains with"
         )
-    # Starting processes takes as long as a thousand slow fits.
-    slow = sum(not technique(v.search).nested or v.options.loss != "linear" for v in variants)
-    worthwhile = slow * most * len(splits) > _WORTH_PROCESSES
-    processes = process_count(jobs or None, len(splits), worthwhile=worthwhile)
-    curves = _run_splits(prepared, splits, most, options.seed, processes, report or _silent)
+    processes = _processes(jobs, variants, most, len(splits))
+    curves = _run_splits(prepared, splits, most, options.seed, processes, progress)
     for each, found in zip(prepared, curves, strict=True):
         _require_a_fit(each, found)
     return CodecData(
@@ -130,21 +125,27 @@ def _largest_training_set(prepared: PreparedVariant, splits: Sequence[Split]) ->
     return most
 
 
+def _processes(jobs: int | None, variants: Sequence[Variant], most: int, splits: int) -> int:
+    """Return the number of processes; starting them takes as long as a thousand slow fits."""
+    slow = sum(not technique(v.search).nested or v.options.loss != "linear" for v in variants)
+    return process_count(jobs or None, splits, worthwhile=slow * most * splits > _WORTH_PROCESSES)
+
+
 def _run_splits(
     prepared: Sequence[PreparedVariant],
     splits: Sequence[Split],
     most: int,
     seed: int,
     processes: int,
-    report: Report,
+    progress: Progress,
 ) -> list[list[LearningCurve]]:
     """Return the learning curves by variant and split."""
     run = partial(_run_split, prepared, most, seed)
     found = []
-    report(STAGE, 0, len(splits))
+    progress(_STAGE, 0, len(splits))
     for curves in map_in_processes(run, splits, processes):
         found.append(curves)
-        report(STAGE, len(found), len(splits))
+        progress(_STAGE, len(found), len(splits))
     return [list(column) for column in zip(*found, strict=True)]
 
 
@@ -180,7 +181,3 @@ def _padded(chosen: Sequence[IndexArray]) -> IndexArray:
     for row, poses in zip(filled, chosen, strict=True):
         row[: len(poses)] = poses
     return filled
-
-
-def _silent(stage: str, done: int, total: int) -> None:
-    """Report to nobody."""

@@ -1,6 +1,7 @@
 from .derive import (
     DerivedRun as DerivedRun,
     PoseReadings as PoseReadings,
+    RunSummary as RunSummary,
     derive_run as derive_run,
     read_summary as read_summary,
     reduce_pose as reduce_pose,

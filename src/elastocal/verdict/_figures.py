@@ -125,7 +125,7 @@ class RunTimes(_Figures):
 
 
 class RunFigures(_Figures):
-    """The summary of a run; see `elastocal.procedure.summary`."""
+    """The summary of a run; see `elastocal.procedure.RunSummary`."""
 
     readings: ReadingFigures
     registration: RegistrationFigures

@@ -19,6 +19,13 @@ from .check import (
     check as check,
     describe_file as describe_file,
 )
+from .codec import CodecResult as CodecResult, CodecSettings as CodecSettings, codec as codec
+from .compare import (
+    CompareResult as CompareResult,
+    CompareSettings as CompareSettings,
+    compare as compare,
+    measured_rows as measured_rows,
+)
 from .compensate import (
     CompensateResult as CompensateResult,
     CompensateSettings as CompensateSettings,

@@ -22,11 +22,13 @@ from elastocal.planning.motion import mover_for, require_free_home
 from elastocal.procedure import (
     STREAMS_SCHEMA as STREAMS,
     RunFolder,
+    RunSummary,
     commits,
     read_journal,
     read_streams,
     read_summary,
 )
+from elastocal.records import schema_of
 from elastocal.robot import Robot, leaf_links, parse_urdf
 
 
@@ -165,9 +167,9 @@ def summary_file(path: Path) -> FileDescription:
     return FileDescription(
         "summary of a run",
         {
-            "schema": summary["schema"],
-            "readings": summary["readings"]["counts"],
-            "warnings": len(summary["warnings"]),
+            "schema": schema_of(RunSummary),
+            "readings": summary.readings.counts,
+            "warnings": len(summary.warnings),
         },
     )
 

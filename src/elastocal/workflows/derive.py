@@ -1,13 +1,11 @@
 """``derive``: from a run's journal and raw streams to its dataset, again."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
-from typing import Any
 
 from elastocal.dataset import Dataset
-from elastocal.procedure import RunFolder, derive_run, write_derived
+from elastocal.procedure import RunFolder, RunSummary, derive_run, write_derived
 from elastocal.progress import Progress
 from elastocal.results import Result
 from elastocal.workflows._workflow import workflow
@@ -27,19 +25,19 @@ class DeriveResult(Result):
 
     folder: RunFolder
     dataset: Dataset
-    summary: Mapping[str, Any]
+    summary: RunSummary
 
     def facts(self) -> tuple[tuple[str, str], ...]:
         """Return what a person wants to know first."""
         return (
             ("poses", str(len(self.dataset.poses))),
             ("readings", self.counts()),
-            *(("warning", text) for text in self.summary["warnings"]),
+            *(("warning", text) for text in self.summary.warnings),
         )
 
     def counts(self) -> str:
         """Return the number of readings of each status, as a phrase."""
-        counts = self.summary["readings"]["counts"]
+        counts = self.summary.readings.counts
         return ", ".join(f"{number} {status}" for status, number in counts.items() if number)
 
 

@@ -5,12 +5,11 @@ that a person must look at first moves before the operator has agreed.
 """
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from os import PathLike
 from pathlib import Path
-from typing import Any
 
 from elastocal.cell import Cell, load_cell
 from elastocal.cell.devices import Devices
@@ -30,6 +29,7 @@ from elastocal.procedure import (
     Runner,
     RunRecord,
     RunSettings as SessionSettings,
+    RunSummary,
     Session,
     SessionHooks,
     SessionResult,
@@ -114,7 +114,7 @@ class RunResult(Result):
 
     figures: RunFigures
     end: RunEnd
-    summary: Mapping[str, Any] | None
+    summary: RunSummary | None
     """Of the derived run; None where nothing was derived."""
     problem: ElastocalError | None
     """Why nothing was derived of a run that is done."""
@@ -266,7 +266,7 @@ def _carry_out(
 
 def _derived(job: _Job, result: SessionResult) -> RunResult:
     """Derive the dataset of a run that is done; what keeps it from that is no end of the run."""
-    summary: Mapping[str, Any] | None = None
+    summary: RunSummary | None = None
     problem: ElastocalError | None = None
     if result.end is RunEnd.DONE:
         try:
@@ -281,7 +281,7 @@ def _derived(job: _Job, result: SessionResult) -> RunResult:
 def _figures(
     job: _Job,
     result: SessionResult,
-    summary: Mapping[str, Any] | None,
+    summary: RunSummary | None,
     problem: ElastocalError | None,
 ) -> RunFigures:
     entries = read_journal(job.folder.journal)
@@ -297,15 +297,15 @@ def _figures(
         failed_attempts=sum(entry.event is Event.FAULT for entry in entries),
         seconds=entries[-1].time - entries[0].time,
         dataset=str(job.folder.dataset) if summary is not None else None,
-        warnings=tuple(job.warnings if summary is None else summary["warnings"]),
+        warnings=tuple(job.warnings if summary is None else summary.warnings),
         problem=str(problem) if problem is not None else None,
     )
 
 
-def _readings(summary: Mapping[str, Any] | None, logs: Sequence[PoseLog]) -> dict[str, int]:
+def _readings(summary: RunSummary | None, logs: Sequence[PoseLog]) -> dict[str, int]:
     """Return the number of readings by status, as derived; else as the journal has them."""
     if summary is not None:
-        return {status: n for status, n in summary["readings"]["counts"].items() if n}
+        return {status: n for status, n in summary.readings.counts.items() if n}
     windows = [window for log in logs for window in log.windows if window.load_case is not None]
     return dict(Counter(window.status.value for window in windows))
 

@@ -10,7 +10,6 @@ from elastocal.cell import Cell, load_cell
 from elastocal.compensation import CompensatorSettings, read_settings
 from elastocal.compensation.conditioning import read_sensor_load
 from elastocal.compensation.process import (
-    BUDGET,
     PROCESSES,
     PROGRAMMED_PATH,
     TABLE,
@@ -31,6 +30,7 @@ from elastocal.files import filling, read_text, sha256
 from elastocal.identification import read_model
 from elastocal.progress import Progress
 from elastocal.workflows._process_trial import (
+    BUDGET,
     ProcessTrial,
     require_same_robot,
     run_effect,

@@ -10,6 +10,7 @@ from elastocal.errors import DatasetError, ElastocalError, ProcedureError, Schem
 from elastocal.procedure import RunFolder, derive_run, read_journal, write_derived
 from elastocal.procedure.derive.derivation import DerivedRun
 from elastocal.procedure.record import ReadingStatus, Window
+from elastocal.records import to_data
 from support.recorded_runs import Run, Truth, record_run
 
 
@@ -64,20 +65,20 @@ def test_provenance_names_run_version_and_seed(derived):
 
 
 def test_the_summary_finds_station_and_tool(run, derived):
-    station = derived.summary["registration"]["stations"][0]
+    station = to_data(derived.summary)["registration"]["stations"][0]
     np.testing.assert_allclose(station["T_base_tracker"], run.truth.T_base_tracker, atol=2e-3)
-    tool = derived.summary["tool"]
+    tool = to_data(derived.summary)["tool"]
     assert tool["mass_kg"]["cell"] == 60.0
     assert tool["mass_kg"]["value"] == pytest.approx(60.0, abs=2 * tool["mass_kg"]["half_width_95"])
-    assert derived.summary["readings"]["counts"] == {
+    assert to_data(derived.summary)["readings"]["counts"] == {
         "ok": 30,
         "slipped": 0,
         "unstable": 0,
         "aborted": 0,
         "missing": 0,
     }
-    assert derived.summary["poses"] == {"planned": 6, "committed": 6, "missing": []}
-    assert derived.summary["warnings"] == []
+    assert to_data(derived.summary)["poses"] == {"planned": 6, "committed": 6, "missing": []}
+    assert to_data(derived.summary)["warnings"] == []
 
 
 def test_deriving_again_gives_the_same_files(run, derived):
@@ -100,10 +101,12 @@ def test_a_reading_that_slipped_keeps_its_numbers_and_its_status(tmp_path):
     cell = derived.dataset.to_xarray().sel(pose=2, load_case="east")
     assert cell["status"] == 1
     assert np.all(np.isfinite(cell["force"]))
-    assert derived.summary["readings"]["not_ok"] == [
+    assert to_data(derived.summary)["readings"]["not_ok"] == [
         {"pose": 2, "load_case": "east", "status": "slipped", "note": "slid"}
     ]
-    assert derived.summary["warnings"] == ["1 of 30 readings are not ok; the list says why"]
+    assert to_data(derived.summary)["warnings"] == [
+        "1 of 30 readings are not ok; the list says why"
+    ]
 
 
 def test_a_window_without_samples_is_missing_and_says_how_many_there_are(tmp_path):
@@ -116,7 +119,7 @@ def test_a_window_without_samples_is_missing_and_says_how_many_there_are(tmp_pat
     cell = derived.dataset.to_xarray().sel(pose=1, load_case="west")
     assert cell["status"] == 4
     assert np.all(np.isnan(cell["force"]))
-    assert derived.summary["readings"]["not_ok"][0]["note"] == (
+    assert to_data(derived.summary)["readings"]["not_ok"][0]["note"] == (
         "only 3 wrenches, not 5; only 3 points of station station_1, not 5"
     )
 
@@ -129,7 +132,7 @@ def test_a_pose_with_a_bad_reference_is_missing_as_a_whole(tmp_path):
 
     derived = derive_run(record_run(tmp_path / "run", change=spoil).path)
     assert derived.dataset.to_xarray()["status"].sel(pose=4).values.tolist() == [4] * 5
-    notes = {entry["note"] for entry in derived.summary["readings"]["not_ok"]}
+    notes = {entry["note"] for entry in to_data(derived.summary)["readings"]["not_ok"]}
     assert notes == {"the unloaded reference is missing: no beam"}
 
 
@@ -141,7 +144,7 @@ def test_a_load_case_that_was_never_had_is_left_out_with_a_warning(tmp_path):
 
     derived = derive_run(record_run(tmp_path / "run", change=without_north).path)
     assert derived.dataset.load_cases == ("normal", "south", "east", "west")
-    assert derived.summary["warnings"][0] == (
+    assert to_data(derived.summary)["warnings"][0] == (
         "load case 'north' has no usable reading at any pose: the dataset leaves it out"
     )
 
@@ -151,7 +154,7 @@ def test_a_tool_that_is_heavier_than_the_cell_says_is_told(tmp_path):
     derived = derive_run(record_run(tmp_path / "run", truth).path)
     assert any(
         warning.startswith("the tool weighs 75.") and "60.0 kg by the cell file" in warning
-        for warning in derived.summary["warnings"]
+        for warning in to_data(derived.summary)["warnings"]
     )
 
 
@@ -169,7 +172,7 @@ def test_a_drift_after_release_is_told(tmp_path):
         )
 
     derived = derive_run(record_run(tmp_path / "run", change=two_references).path)
-    drift = derived.summary["drift"]
+    drift = to_data(derived.summary)["drift"]
     assert drift["released_windows"] == 6
     assert drift["seconds"] == pytest.approx(15.0)
     assert drift["largest_N"] == pytest.approx(np.hypot(280.0, 1100.0), abs=1.0)
@@ -227,7 +230,7 @@ def test_a_folder_that_is_no_run_is_refused(tmp_path):
 
 def test_a_tool_that_gets_heavier_is_told_with_its_pose(tmp_path):
     run = record_run(tmp_path / "run", Truth(heavier_from=3, heavier_by=20.0))
-    found = derive_run(run.path).summary
+    found = to_data(derive_run(run.path).summary)
     assert found["warnings"][0].startswith("the tool weight changed near pose 3, by about +")
     assert found["tool"]["changed"]["from_pose"] == 3
     assert not any("kg by the cell file" in line for line in found["warnings"])

@@ -1,9 +1,13 @@
-from .arm import ArmState as ArmState, Motion as Motion, RobotArm as RobotArm
-from .clock import Clock as Clock
-from .devices import Devices as Devices
-from .force_sensor import (
+from .protocols import (
+    ArmState as ArmState,
+    BeamState as BeamState,
+    Clock as Clock,
+    Devices as Devices,
     ForceSensor as ForceSensor,
+    Metrology as Metrology,
+    Motion as Motion,
+    PointBlock as PointBlock,
+    RobotArm as RobotArm,
     SensorStatus as SensorStatus,
     WrenchBlock as WrenchBlock,
 )
-from .metrology import BeamState as BeamState, Metrology as Metrology, PointBlock as PointBlock

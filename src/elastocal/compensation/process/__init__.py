@@ -7,7 +7,6 @@
 `postures`     the processes by name; one spin and rail position for their courses
 `correctors`   the online compensator, or a perfect one with delay
 `loop`         cycle by cycle: readings, correction, delay, deviation
-`effects`      the error budget: effects that are switched off in turn
 `result`       mean, max and standard deviation; reduction: Table 1
 `folder`       the result's folder, written and read
 =============  ====================================================================

@@ -14,7 +14,6 @@ from .course import (
     tool_frames as tool_frames,
     unit_tangents as unit_tangents,
 )
-from .effects import BUDGET as BUDGET, Effect as Effect
 from .folder import (
     DEVIATIONS as DEVIATIONS,
     PROGRAMMED_PATH as PROGRAMMED_PATH,

@@ -10,16 +10,21 @@ from elastocal.arrays import FloatArray
 from elastocal.compensation.offline import (
     CorrectionSettings,
     CorrectionSummary,
+    PathColumns,
     PathCorrection,
     PathError,
     RowName,
+    WrenchColumns,
     check_limits,
     correct_rows,
+    find_wrench_columns,
     in_file,
     joints_along_path,
+    read_layout,
+    read_values,
+    row_blocks,
     turned_to_base,
 )
-from elastocal.compensation.programs.forces import PointForces, read_forces
 from elastocal.compensation.programs.krl import read_krl
 from elastocal.compensation.programs.program import (
     ControllerProgram,
@@ -34,6 +39,10 @@ from elastocal.robot.inverse import InverseKinematics, inverse_for
 
 PROGRAM_READERS: Mapping[str, Callable[[Path], ControllerProgram]] = {".src": read_krl}
 """Readers of programs by the suffix of their main file."""
+_POINT = "point"
+"""The column that names the points in a table of forces."""
+_BLOCK = 10_000
+"""Rows of that table that are read at a time."""
 _SAME = 1e-3
 """Postures nearer than this in every joint (rad or m) are one."""
 
@@ -105,6 +114,60 @@ def compensate_program(
     files = program.write(out, corrected)
     notes = program.notes(assumed, files[0], T_base_frame is not None)
     return ProgramCorrection(program, summary, files, assumed, notes)
+
+
+@dataclass(frozen=True, eq=False)
+class PointForces:
+    """Forces and moments by point."""
+
+    rows: dict[str, int]
+    """Row of each point, by its name in capitals."""
+    force: FloatArray
+    """As the table has it, shape (row, 3), in N."""
+    moment: FloatArray | None
+    """The same in N·m."""
+    force_columns: WrenchColumns
+    moment_columns: WrenchColumns | None
+
+
+def read_forces(path: Path) -> PointForces:
+    """Return the forces of a table.
+
+    Raises
+    ------
+    PathError
+        If a column is missing, a cell is not a number, or a point stands twice.
+    FileAccessError
+        If the file cannot be read.
+    """
+    with in_file(path):
+        return _read_forces(path)
+
+
+def _read_forces(path: Path) -> PointForces:
+    layout = read_layout(path)
+    force, moment = find_wrench_columns(layout.header)
+    header = [name.strip() for name in layout.header]
+    if header.count(_POINT) != 1:
+        raise PathError(
+            f"one column {_POINT!r} must name the points; the columns are {', '.join(header)}"
+        )
+    place, columns = header.index(_POINT), PathColumns((), (), (), force, moment)
+    rows: dict[str, int] = {}
+    forces: list[FloatArray] = []
+    moments: list[FloatArray] = []
+    for block in row_blocks(path, layout, _BLOCK):
+        for line, cells in zip(block.lines, block.cells, strict=True):
+            name = cells[place].strip().upper()
+            if not name or name in rows:
+                raise PathError(f"row {line}: point {name!r} stands twice or has no name")
+            rows[name] = len(rows)
+        values = read_values(block, columns)
+        forces += [] if values.force is None else [values.force]
+        moments += [] if values.moment is None else [values.moment]
+    return PointForces(
+        rows, np.vstack(forces), np.vstack(moments) if moments else None, force, moment
+    )
 
 
 def _targets(program: ControllerProgram, table: PointForces, forces: Path) -> frozenset[str]:

@@ -12,13 +12,14 @@ from .directional import (
     principal_stiffness as principal_stiffness,
     stiffness_along as stiffness_along,
 )
-from .stations import PathStations as PathStations, read_stations as read_stations
 from .survey import (
+    PathStations as PathStations,
     PostureConstraint as PostureConstraint,
     PostureGrid as PostureGrid,
     PostureSurvey as PostureSurvey,
     cell_constraints as cell_constraints,
     joint_limit_constraint as joint_limit_constraint,
+    read_stations as read_stations,
     require_same_robot as require_same_robot,
     survey_postures as survey_postures,
 )

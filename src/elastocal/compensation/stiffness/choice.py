@@ -8,8 +8,7 @@ import numpy as np
 
 from elastocal.arrays import FloatArray
 from elastocal.compensation.stiffness.directional import directional_stiffness, principal_stiffness
-from elastocal.compensation.stiffness.stations import PathStations
-from elastocal.compensation.stiffness.survey import PostureSurvey
+from elastocal.compensation.stiffness.survey import PathStations, PostureSurvey
 from elastocal.identification import CalibratedModel
 from elastocal.robot import Robot
 from elastocal.robot.inverse import InverseKinematics, OpwInverse

@@ -10,6 +10,11 @@ from .displacement import (
     load_rows as load_rows,
     make_dataset as make_dataset,
 )
+from .findings import (
+    RunFindings as RunFindings,
+    run_warnings as run_warnings,
+    summarise as summarise,
+)
 from .readings import (
     Mean as Mean,
     PoseReadings as PoseReadings,
@@ -23,10 +28,27 @@ from .readings import (
     weighed_poses as weighed_poses,
 )
 from .summary import (
-    RunFindings as RunFindings,
+    AttemptSummary as AttemptSummary,
+    DriftSummary as DriftSummary,
+    FaultSummary as FaultSummary,
+    LostReading as LostReading,
+    MomentSummary as MomentSummary,
+    MoveSummary as MoveSummary,
+    NoiseSummary as NoiseSummary,
+    Number as Number,
+    PoseCounts as PoseCounts,
+    ReadingCounts as ReadingCounts,
+    RegistrationSummary as RegistrationSummary,
+    RunSummary as RunSummary,
+    ScalarEstimate as ScalarEstimate,
+    StationSummary as StationSummary,
+    TimeSummary as TimeSummary,
+    ToolStep as ToolStep,
+    ToolSummary as ToolSummary,
+    Vector as Vector,
+    VectorEstimate as VectorEstimate,
+    VectorInterval as VectorInterval,
     read_summary as read_summary,
-    run_warnings as run_warnings,
-    summarise as summarise,
 )
 from .tool import (
     Interval as Interval,

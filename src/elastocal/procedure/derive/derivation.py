@@ -3,7 +3,6 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -11,16 +10,16 @@ from elastocal.arrays import FloatArray
 from elastocal.cell import Cell
 from elastocal.dataset import Dataset, write
 from elastocal.errors import DatasetError, FileAccessError, ProcedureError, SchemaError
-from elastocal.files import write_json
 from elastocal.planning import PlanResult
 from elastocal.procedure.derive.displacement import LoadRow, load_rows, make_dataset
+from elastocal.procedure.derive.findings import RunFindings, summarise
 from elastocal.procedure.derive.readings import (
     PoseReadings,
     marker_readings,
     reduce_pose,
     tool_readings,
 )
-from elastocal.procedure.derive.summary import RunFindings, summarise
+from elastocal.procedure.derive.summary import RunSummary
 from elastocal.procedure.derive.tool import ToolLoad, estimate_tool
 from elastocal.procedure.record import (
     Entry,
@@ -36,16 +35,16 @@ from elastocal.procedure.record import (
     read_streams,
 )
 from elastocal.procedure.registration import Registration, register
+from elastocal.records import write_json
 from elastocal.robot import inverse_transform
 
 
 @dataclass(frozen=True, eq=False)
 class DerivedRun:
-    """What a run's raw streams say."""
+    """The dataset of a run, and how it came about."""
 
     dataset: Dataset
-    summary: dict[str, Any]
-    """Plain numbers, texts, lists and mappings; see `elastocal.procedure.derive.summary`."""
+    summary: RunSummary
 
 
 def derive_run(run: Path) -> DerivedRun:

@@ -16,6 +16,7 @@ from elastocal.procedure.registration._fit import (
     fit,
 )
 from elastocal.procedure.registration._moves import Finding, find
+from elastocal.records import record
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,7 +59,7 @@ class StationMove:
     """Decimal logarithm of the probability that chance alone looks like this (F-test)."""
 
 
-@dataclass(frozen=True)
+@record()
 class Blunder:
     """An unloaded reading that does not belong to the others; it is not fitted."""
 

@@ -64,6 +64,9 @@ class Equilibrium:
     imbalance: FloatArray
     """Largest torque left over at any spring, shape (...), in N·m."""
 
+    def __repr__(self) -> str:
+        return f"Equilibrium({self.imbalance.size} loads, {self.theta.shape[-1]} springs)"
+
 
 @dataclass(frozen=True, eq=False)
 class ElasticArm:
@@ -77,6 +80,9 @@ class ElasticArm:
 
     A link's weight acts behind all springs of its joint."""
     _chain: SpringChain = field(init=False, repr=False)
+
+    def __repr__(self) -> str:
+        return f"ElasticArm({self.linkage!r}, {len(self.springs)} springs)"
 
     def __post_init__(self) -> None:
         chain = build_spring_chain(self.linkage, self.springs)

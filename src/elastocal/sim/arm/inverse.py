@@ -45,7 +45,7 @@ def solve_inverse(
     linkage : Linkage
         The arm.
     T_base_tip : ndarray, shape (batch, 4, 4)
-        Poses to solve_inverse.
+        Poses to reach.
     start : ndarray, shape (batch, joint)
         Where to start; decides the posture that is found.
     tolerance : float

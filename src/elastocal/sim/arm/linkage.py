@@ -141,6 +141,9 @@ class Linkage:
     tip: str
     """Name of the tip link."""
 
+    def __repr__(self) -> str:
+        return f"Linkage({self.name!r}, {len(self.joint_names)} joints to {self.tip!r})"
+
     @classmethod
     def from_urdf(cls, text: str, tip: str, base: str | None = None) -> "Linkage":
         """Return the linkage that a URDF text describes; ``base`` defaults to the root link.

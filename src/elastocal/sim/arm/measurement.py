@@ -149,7 +149,7 @@ def measure(
         robot_name=arm.linkage.name,
         robot_urdf=arm.linkage.urdf,
         tcp_frame=arm.linkage.tip,
-        provenance="simulated by elastocal.sim.arm.measurement",
+        provenance="simulated by elastocal.sim.measurement",
     )
 
 
@@ -271,6 +271,9 @@ class PressPoses:
     """Shape (pose, joint), in rad or m."""
     T_base_tcp: FloatArray
     """TCP frames with z into the surface, shape (pose, 4, 4)."""
+
+    def __repr__(self) -> str:
+        return f"PressPoses({len(self.joints)} poses)"
 
 
 def press_poses(

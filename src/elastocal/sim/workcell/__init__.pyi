@@ -1,5 +1,9 @@
 from ._timeline import SimClock as SimClock
-from .campaign import CampaignSimulator as CampaignSimulator, ContactPoses as ContactPoses
+from .campaign import (
+    CampaignSimulator as CampaignSimulator,
+    ContactPoses as ContactPoses,
+    TrueReadings as TrueReadings,
+)
 from .campaign_errors import (
     CampaignErrors as CampaignErrors,
     ErrorDraws as ErrorDraws,
@@ -7,6 +11,7 @@ from .campaign_errors import (
 )
 from .cell import (
     ProcessCell as ProcessCell,
+    ProcessState as ProcessState,
     SimulatedCell as SimulatedCell,
     simulated_devices as simulated_devices,
 )

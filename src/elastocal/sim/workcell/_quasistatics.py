@@ -27,20 +27,20 @@ from elastocal.sim.workcell._timeline import Knots
 
 @dataclass(frozen=True, eq=False)
 class RobotState:
-    """State of the robot between two commands."""
+    """State of the robot between two commands; in many postures at once with a leading axis."""
 
     q: FloatArray
-    """Joints of the controller, shape (joint,), in rad or m."""
+    """Joints of the controller, shape (..., joint), in rad or m."""
     twist: FloatArray
-    """See `Knots.twist`, shape (9,)."""
+    """See `Knots.twist`, shape (..., 9)."""
     force: FloatArray
-    """Force on the robot in base, shape (3,), in N."""
+    """Force on the robot in base, shape (..., 3), in N."""
     springs: RobotSprings
     """With the memory of the gears."""
     theta: FloatArray | None
     """Spring positions to start from; None: from none."""
     sag: FloatArray
-    """Twist under weight alone that the controller has taken out a part of, shape (9,)."""
+    """Twist under weight alone that the controller has taken out a part of, shape (..., 9)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -134,14 +134,15 @@ class Quasistatics:
         start : ndarray, shape (spring,), optional
             Spring positions near the result.
         """
-        rest = self.robot.rest(q, np.zeros(3), self.robot.springs, start)
+        nothing = np.zeros((*q.shape[:-1], 3))
+        rest = self.robot.rest(q, nothing, self.robot.springs, start)
         sag = self.twist(q, rest)
         twist = self._left(sag, sag, stop_error)
-        return RobotState(q, twist, np.zeros(3), rest.springs, rest.theta, sag)
+        return RobotState(q, twist, nothing, rest.springs, rest.theta, sag)
 
     def _left(self, twist: FloatArray, sag: FloatArray, stop_error: FloatArray) -> FloatArray:
         left = twist - self.compensation * sag
-        left[:3] += stop_error
+        left[..., :3] += stop_error
         return left
 
     def loaded(
@@ -165,14 +166,14 @@ class Quasistatics:
         return replace(state, q=q, twist=twist, force=force, springs=rest.springs, theta=rest.theta)
 
     def R_base_sensor(self, q: FloatArray, twist: FloatArray) -> FloatArray:
-        """Return the true orientation of the sensor, shape (3, 3)."""
-        nominal = self.robot.forward(q)[:3, :3] @ self.robot.T_tcp_sensor[:3, :3]
-        turned: FloatArray = Rotation.from_rotvec(twist[6:]).as_matrix() @ nominal
+        """Return the true orientation of the sensor, shape (..., 3, 3)."""
+        nominal = self.robot.forward(q)[..., :3, :3] @ self.robot.T_tcp_sensor[:3, :3]
+        turned: FloatArray = Rotation.from_rotvec(twist[..., 6:]).as_matrix() @ nominal
         return turned
 
     def tool_position(self, state: RobotState) -> FloatArray:
-        """Return where the tool centre point truly is, in base, shape (3,), in m."""
-        position: FloatArray = self.robot.forward(state.q)[:3, 3] + state.twist[:3]
+        """Return where the tool centre point truly is, in base, shape (..., 3), in m."""
+        position: FloatArray = self.robot.forward(state.q)[..., :3, 3] + state.twist[..., :3]
         return position
 
     def along(self, q: FloatArray, R_base_tcp: FloatArray, points: FloatArray) -> FloatArray:
@@ -194,7 +195,7 @@ class Quasistatics:
         Raises
         ------
         DeviceError
-            If the arm does not solve_inverse so far.
+            If the arm does not reach so far.
         """
         goals = np.zeros((len(points), 4, 4))
         goals[:, :3, :3], goals[:, :3, 3], goals[:, 3, 3] = R_base_tcp, points, 1.0
@@ -204,7 +205,7 @@ class Quasistatics:
         if not found.ok.all():
             raise DeviceError(
                 f"the arm cannot follow a straight line to {np.round(points[-1], 4).tolist()} m:"
-                " a singularity or the end of its solve_inverse"
+                " a singularity or the end of its reach"
             )
         return found.q
 

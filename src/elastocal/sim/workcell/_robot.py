@@ -316,7 +316,7 @@ def _tilts(linkage: Linkage, joint: int, stiffness: FloatArray) -> list[TruthSpr
 
 
 def _bending(linkage: Linkage, joint: str, stiffness: float) -> list[TruthSpring]:
-    """Return two hinges in the middle of a link transverse_axes it; none for a short one."""
+    """Return two hinges in the middle of a link across it; none for a short one."""
     index = linkage.joint_names.index(joint)
     ends = linkage.T_base_joint[index : index + 2, :3, 3]
     if not np.linalg.norm(ends[1] - ends[0]) > _SHORT_LINK:

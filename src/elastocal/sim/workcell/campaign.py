@@ -20,10 +20,10 @@ from elastocal.sim.arm import (
     solve_inverse,
 )
 from elastocal.sim.workcell._contact import Contact, ContactLaw
-from elastocal.sim.workcell._quasistatics import Quasistatics
-from elastocal.sim.workcell._robot import RobotEquilibrium, TrueRobot
+from elastocal.sim.workcell._quasistatics import Quasistatics, RobotState
+from elastocal.sim.workcell._robot import TrueRobot
 
-CLOSED = 1e-6
+_CLOSED = 1e-6
 """How far a tool may end from where the contact holds it, in m: nanometres of deflection."""
 _ROUNDS = 8
 
@@ -59,18 +59,8 @@ class TrueReadings:
     R_base_sensor: FloatArray
     """Orientation of the sensor by the controller, shape (place, 3, 3)."""
 
-
-class _States(NamedTuple):
-    """The robot at all places."""
-
-    q: FloatArray
-    twist: FloatArray
-    """Error of the controller; see `Knots.twist`, shape (place, 9)."""
-    rest: RobotEquilibrium
-    sag: FloatArray
-    """Error of the undeformed robot, shape (place, 9)."""
-    force: FloatArray
-    """On the robot in base, shape (place, 3), in N."""
+    def __repr__(self) -> str:
+        return "TrueReadings({} places, {} loads)".format(*self.force.shape)
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,6 +73,11 @@ class CampaignSimulator:
     """Height of near contact, in m."""
     offset: FloatArray
     """How far the tooling stands from where the cell file puts it, shape (3,), in m."""
+
+    def __repr__(self) -> str:
+        return (
+            f"CampaignSimulator({self.statics.robot.layout.linkage.name!r}, {self.springs} springs)"
+        )
 
     @classmethod
     def of(cls, cell: Cell) -> "CampaignSimulator":
@@ -147,18 +142,16 @@ class CampaignSimulator:
         T = self.statics.robot.forward(places.q)
         near = self._free(self._along(places.q, T, self.near * places.normal), None)
         touch, contacts = self._touch(places, T, near)
-        zero, weight = self._sensor(near), self.statics.weight
+        zero, weight = self.statics.R_base_sensor(near.q, near.twist), self.statics.weight
         state, states = touch, []
         for wanted in force_tcp:
             # The controller has zeroed the sensor near contact; the arm turns it under load.
             held = self.statics.robot.T_tcp_sensor[:3, :3].T @ self.law.held(wanted)
-            state = self._press(state, touch, contacts, held + weight @ zero)
+            state = self._press(state, contacts, held + weight @ zero)
             states.append(state)
         return self._settled(near, touch, states)
 
-    def _press(
-        self, start: _States, touch: _States, contacts: list[Contact], reading: FloatArray
-    ) -> _States:
+    def _press(self, start: RobotState, contacts: list[Contact], reading: FloatArray) -> RobotState:
         """Return the robot where the sensor reads a force, shape (place, 3), sensor frame.
 
         See `pressed_state`.
@@ -166,41 +159,36 @@ class CampaignSimulator:
         statics, weight = self.statics, self.statics.weight
         q, reached = start.q, start
         for _ in range(_ROUNDS):
-            force = _turn(self._sensor(reached), reading) - weight
-            rest = statics.robot.rest(q, force, start.rest.springs, reached.rest.theta)
-            sag = statics.twist(q, rest)
-            twist = sag - statics.compensation * touch.sag
-            reached = _States(q, twist, rest, sag, force)
+            force = _turn(statics.R_base_sensor(reached.q, reached.twist), reading) - weight
+            reached = statics.loaded(replace(start, theta=reached.theta), q, force, np.zeros(3))
             goal = [c.tool_position(f) for c, f in zip(contacts, force, strict=True)]
-            missed = np.array(goal) - self._tool(reached)
-            if np.linalg.norm(missed, axis=1).max() < CLOSED:
+            missed = np.array(goal) - statics.tool_position(reached)
+            if np.linalg.norm(missed, axis=1).max() < _CLOSED:
                 break
             q = self._along(q, statics.robot.forward(q), missed)
         return reached
 
     def _touch(
-        self, places: ContactPoses, T: FloatArray, near: _States
-    ) -> tuple[_States, list[Contact]]:
+        self, places: ContactPoses, T: FloatArray, near: RobotState
+    ) -> tuple[RobotState, list[Contact]]:
         """Return the robot touching the tooling without force; see `touching_state`."""
-        beside = self._tool(near) - (T[:, :3, 3] + self.offset)
+        beside = self.statics.tool_position(near) - (T[:, :3, 3] + self.offset)
         height = np.sum(beside * places.normal, axis=1, keepdims=True)
-        anchor = self._tool(near) - height * places.normal
+        anchor = self.statics.tool_position(near) - height * places.normal
         reached = near
         for _ in range(_ROUNDS):
-            missed = anchor - self._tool(reached)
-            if np.linalg.norm(missed, axis=1).max() < CLOSED:
+            missed = anchor - self.statics.tool_position(reached)
+            if np.linalg.norm(missed, axis=1).max() < _CLOSED:
                 break
             forward = self.statics.robot.forward(reached.q)
-            reached = self._free(self._along(reached.q, forward, missed), reached.rest.theta)
+            reached = self._free(self._along(reached.q, forward, missed), reached.theta)
         each = zip(anchor, T[:, :3, :3], places.normal, reached.q, strict=True)
         return reached, [Contact(self.law, *parts) for parts in each]
 
-    def _free(self, q: FloatArray, start: FloatArray | None) -> _States:
+    def _free(self, q: FloatArray, start: FloatArray | None) -> RobotState:
         """Return the robot free of contact, its gears relaxed; see `Quasistatics.free`."""
-        nothing = np.zeros((len(q), 3))
-        rest = self.statics.robot.rest(q, nothing, self.statics.robot.springs, start)
-        sag = self.statics.twist(q, rest)
-        return _States(q, (1.0 - self.statics.compensation) * sag, rest, sag, nothing)
+        state = self.statics.free(q, np.zeros(3), start)
+        return replace(state, twist=(1.0 - self.statics.compensation) * state.sag)
 
     def _along(self, q: FloatArray, T: FloatArray, shift: FloatArray) -> FloatArray:
         """Return joints that move the undeformed tool from T by a shift, orientation kept."""
@@ -211,34 +199,27 @@ class CampaignSimulator:
             place = int(np.flatnonzero(~found.ok)[0])
             raise DeviceError(
                 f"the arm cannot follow to {np.round(goal[place, :3, 3], 4).tolist()} m:"
-                " a singularity or the end of its solve_inverse"
+                " a singularity or the end of its reach"
             )
         return found.q
 
-    def _tool(self, state: _States) -> FloatArray:
-        """Return where the tool centre points truly are, in base, shape (place, 3), in m."""
-        at: FloatArray = self.statics.robot.forward(state.q)[:, :3, 3] + state.twist[:, :3]
-        return at
-
-    def _sensor(self, state: _States) -> FloatArray:
-        """Return the true orientations of the sensor, shape (place, 3, 3)."""
-        nominal = self.statics.robot.forward(state.q)[:, :3, :3]
-        nominal = nominal @ self.statics.robot.T_tcp_sensor[:3, :3]
-        turned: FloatArray = Rotation.from_rotvec(state.twist[:, 6:]).as_matrix() @ nominal
-        return turned
-
-    def _markers(self, state: _States) -> tuple[FloatArray, FloatArray]:
+    def _markers(self, state: RobotState) -> tuple[FloatArray, FloatArray]:
         """Return the marker by the controller and where it truly is, each (place, 3), in m."""
         T = self.statics.robot.forward(state.q)
         lever = T[:, :3, :3] @ self.statics.marker_tcp
         turned = Rotation.from_rotvec(state.twist[:, 3:6]).apply(lever)
         return T[:, :3, 3] + lever, T[:, :3, 3] + state.twist[:, :3] + turned
 
-    def _settled(self, near: _States, touch: _States, states: list[_States]) -> TrueReadings:
+    def _settled(
+        self, near: RobotState, touch: RobotState, states: list[RobotState]
+    ) -> TrueReadings:
         weight, statics = self.statics.weight, self.statics
         unloaded, markers = self._markers(near), [self._markers(state) for state in states]
-        tare = weight @ self._sensor(near)
-        felt = [_turn_back(self._sensor(state), state.force + weight) - tare for state in states]
+        tare = weight @ statics.R_base_sensor(near.q, near.twist)
+        felt = [
+            _turn_back(statics.R_base_sensor(state.q, state.twist), state.force + weight) - tare
+            for state in states
+        ]
         R = statics.robot.forward(near.q)[:, :3, :3] @ statics.robot.T_tcp_sensor[:3, :3]
         return TrueReadings(
             q=_stack([state.q for state in states]),

@@ -7,7 +7,7 @@ and zero of the sensor (identified at every pose), registration of the tracker (
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
@@ -41,6 +41,10 @@ class ErrorDraws:
     cross_talk: FloatArray
     """Shape (6, 6)."""
 
+    def __repr__(self) -> str:
+        places, readings, _ = self.marker.shape
+        return f"ErrorDraws({places} places, {readings - 1} loads)"
+
     @classmethod
     def of(cls, places: int, loads: int, rng: np.random.Generator) -> "ErrorDraws":
         """Draw for some places under some load cases."""
@@ -73,7 +77,7 @@ class CampaignErrors:
     """Noise of an unloaded and of a loaded average of the sensor, in N."""
     drift: FloatArray
     """Drift of each force axis per load case, in N, shape (3,)."""
-    gain: FloatArray
+    gain: FloatArray = field(repr=False)
     """Change of the gain per unit of cross-talk, shape (3, 3, 6, 6)."""
     repeatability: float
     """Error of a stop, in m."""

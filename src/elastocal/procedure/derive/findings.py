@@ -1,0 +1,345 @@
+"""Sum up what was found on the way to a dataset, and warn of what a person should know of it."""
+
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from elastocal import __version__
+from elastocal.arrays import FloatArray
+from elastocal.dataset import Dataset
+from elastocal.procedure.derive.displacement import LoadRow, LoadValues
+from elastocal.procedure.derive.readings import PoseReadings, weighed_poses
+from elastocal.procedure.derive.summary import (
+    AttemptSummary,
+    DriftSummary,
+    FaultSummary,
+    LostReading,
+    MomentSummary,
+    MoveSummary,
+    NoiseSummary,
+    Number,
+    PoseCounts,
+    ReadingCounts,
+    RegistrationSummary,
+    RunSummary,
+    ScalarEstimate,
+    StationSummary,
+    TimeSummary,
+    ToolStep,
+    ToolSummary,
+    Vector,
+    VectorEstimate,
+    VectorInterval,
+)
+from elastocal.procedure.derive.tool import Interval, ToolEstimate, ToolLoad
+from elastocal.procedure.record import Entry, Event, ReadingStatus
+from elastocal.procedure.registration import Registration, StationFit, UnloadedReadings
+
+_SIGMAS = ("force_sigma", "marker_sigma")
+_MASS_SHARE = 0.1
+"""Difference from the cell file's mass that is told, as a share of it; the sensor's own half
+that does not hang on it is within."""
+_CENTRE = 20e-3
+"""Difference from the cell file's centre of mass that is told, along an axis, in m."""
+_ZEROED = 0.2
+"""Share of the tool's mass below which the sensor seems to take the tool weight away itself."""
+_LEVER = 5e-3
+"""Difference from the cell file's lever arm that is told, in m."""
+_LARGE_ROTATION = 5e-3
+"""Standard deviation of a station's rotation that is told, in rad: 5 µm for each mm."""
+
+
+@dataclass(frozen=True, eq=False)
+class RunFindings:
+    """Everything that was found on the way to the dataset."""
+
+    poses: Sequence[PoseReadings]
+    rows: Sequence[LoadRow]
+    seen: UnloadedReadings
+    registration: Registration
+    tool: ToolLoad
+    estimate: ToolEstimate
+    dataset: Dataset
+
+
+def summarise(
+    found: RunFindings, planned: Sequence[int], load_cases: Sequence[str], entries: Sequence[Entry]
+) -> RunSummary:
+    """Return the summary of a run.
+
+    Parameters
+    ----------
+    found : RunFindings
+        Everything that the streams say.
+    planned : sequence of int
+        Poses of the plan.
+    load_cases : sequence of str
+        Load cases of the plan.
+    entries : sequence of Entry
+        The journal.
+    """
+    committed, weighed = [pose.pose for pose in found.poses], weighed_poses(found.poses)
+    registration, tool, estimate = found.registration, found.tool, found.estimate
+    missing = tuple(pose for pose in planned if pose not in committed)
+    warnings = run_warnings(found.rows, registration, tool, estimate, load_cases, weighed)
+    return RunSummary(
+        elastocal=__version__,
+        poses=PoseCounts(len(planned), len(committed), missing),
+        readings=_readings(found.rows),
+        registration=_registration(registration, found.dataset),
+        tool=_tool(tool, estimate, weighed),
+        drift=_drift(found.poses),
+        contact_moment=_moments(found.rows),
+        noise=_noise(found.rows),
+        attempts=_attempts(found.poses, entries),
+        times=_times(found.poses, entries),
+        warnings=tuple(warnings),
+    )
+
+
+def _readings(rows: Sequence[LoadRow]) -> ReadingCounts:
+    counts = Counter(row.status.value for row in rows)
+    lost = (LostReading(row.pose, row.load_case, row.status, row.note) for row in _not_ok(rows))
+    return ReadingCounts({s.value: counts[s.value] for s in ReadingStatus}, tuple(lost))
+
+
+def _registration(found: Registration, dataset: Dataset) -> RegistrationSummary:
+    typical = np.linalg.norm(dataset.marker_displacement, axis=-1)
+    displacement = float(np.nanmedian(typical))
+    return RegistrationSummary(
+        stations=tuple(_station(fit, displacement) for fit in found.stations),
+        unregistered=found.unregistered,
+        lever_arm=_vector(found.lever_arm),
+        lever_arm_sigma=_vector(found.lever_sigma),
+        lever_arm_of_cell=_vector(found.lever_prior),
+        lever_arm_from_cell_along=found.undetermined_lever,
+        scatter=_number(found.scatter),
+        moves=tuple(
+            MoveSummary(move.station, move.pose, move.distance, move.angle, move.improbability)
+            for move in found.moves
+        ),
+        blunders=found.blunders,
+    )
+
+
+def _station(fit: StationFit, displacement: float) -> StationSummary:
+    norms = np.linalg.norm(fit.residual, axis=1)
+    return StationSummary(
+        station=fit.station,
+        poses=fit.poses,
+        T_base_tracker=tuple(map(tuple, fit.T_base_tracker.tolist())),
+        rotation_sigma=fit.rotation_sigma,
+        position_sigma=_vector(fit.position_sigma),
+        residual=tuple(map(_vector, fit.residual)),
+        residual_rms=float(np.sqrt((norms**2).mean())),
+        robot_accuracy=fit.accuracy,
+        residual_max=float(norms.max()),
+        displacement_sigma=fit.rotation_sigma * displacement,
+    )
+
+
+def _tool(tool: ToolLoad, found: ToolEstimate, weighed: Sequence[int]) -> ToolSummary:
+    step = found.change
+    mass, half = (_number(float(part)) for part in (found.mass.value, found.mass.half_width))
+    centre = _interval(found.centre)
+    return ToolSummary(
+        unloaded_references=found.count,
+        mass_kg=ScalarEstimate(mass, half, tool.mass),
+        centre_of_mass=VectorEstimate(centre.value, centre.half_width_95, _vector(tool.centre)),
+        force_bias_N=_interval(found.force_bias),
+        moment_bias_Nm=_interval(found.moment_bias),
+        force_drift_N_per_s=_interval(found.force_drift),
+        moment_drift_Nm_per_s=_interval(found.moment_drift),
+        force_scatter_N=_number(found.force_scatter),
+        moment_scatter_Nm=_number(found.moment_scatter),
+        not_determined=found.undetermined,
+        changed=ToolStep(weighed[step.reading], step.mass) if step else None,
+    )
+
+
+def _drift(poses: Sequence[PoseReadings]) -> DriftSummary:
+    """Return how far the sensor is from its tare when the tool is free again, pose by pose."""
+    found = []
+    for pose in poses:
+        before = pose.reference.tool if pose.reference else None
+        after = pose.released.tool if pose.released else None
+        if before is not None and after is not None:
+            change = float(np.linalg.norm(after.force.value - before.force.value))
+            found.append((change, pose.pose, after.force.time - before.force.time))
+    if not found:
+        return DriftSummary(0, None, None, None)
+    return DriftSummary(len(found), *max(found, key=lambda each: each[0]))
+
+
+def _moments(rows: Sequence[LoadRow]) -> MomentSummary:
+    sizes = [float(np.linalg.norm(row.numbers.wrench.moment)) for row in rows if row.numbers]
+    return MomentSummary(len(sizes), _median(sizes), max(sizes, default=None))
+
+
+def _noise(rows: Sequence[LoadRow]) -> NoiseSummary:
+    good = _good(rows)
+    forces, markers = ([getattr(each, name) for each in good] for name in _SIGMAS)
+    return NoiseSummary(len(good), _median(forces), _median(markers))
+
+
+def _attempts(poses: Sequence[PoseReadings], entries: Sequence[Entry]) -> AttemptSummary:
+    faults = (e for e in entries if e.event is Event.FAULT)
+    return AttemptSummary(
+        retried={str(p.pose): p.log.attempt for p in poses if p.log.attempt > 1},
+        given_up=tuple(entry.pose for entry in entries if entry.event is Event.GIVEN_UP),
+        resumed=sum(entry.event is Event.RESUME for entry in entries),
+        faults=tuple(FaultSummary(e.pose, e.attempt, e.step, e.text) for e in faults),
+    )
+
+
+def _times(poses: Sequence[PoseReadings], entries: Sequence[Entry]) -> TimeSummary:
+    windows = [pose.log.windows for pose in poses if pose.log.windows]
+    spans = [max(w.end for w in each) - min(w.start for w in each) for each in windows]
+    record = entries[0].run if entries else None
+    return TimeSummary(
+        started=record.started if record else None,
+        measuring_per_pose_median=_median(spans),
+        total=entries[-1].time - entries[0].time if entries else None,
+    )
+
+
+def _good(rows: Sequence[LoadRow]) -> list[LoadValues]:
+    """Return the numbers of the readings that are ok."""
+    return [r.numbers for r in rows if r.numbers is not None and r.status is ReadingStatus.OK]
+
+
+def _not_ok(rows: Sequence[LoadRow]) -> list[LoadRow]:
+    return [row for row in rows if row.status is not ReadingStatus.OK]
+
+
+def _interval(interval: Interval) -> VectorInterval:
+    return VectorInterval(_vector(interval.value), _vector(interval.half_width))
+
+
+def _median(values: Sequence[float] | Sequence[FloatArray]) -> Number:
+    return float(np.median(np.array(values))) if len(values) else None
+
+
+def _vector(values: FloatArray) -> Vector:
+    return tuple(_number(float(value)) for value in values)
+
+
+def _number(value: float) -> Number:
+    """Return a number, or None where there is none: JSON has no NaN."""
+    return value if np.isfinite(value) else None
+
+
+def run_warnings(
+    rows: Sequence[LoadRow],
+    registration: Registration,
+    tool: ToolLoad,
+    estimate: ToolEstimate,
+    load_cases: Sequence[str],
+    weighed: Sequence[int],
+) -> list[str]:
+    """Return the warnings of a run.
+
+    Parameters
+    ----------
+    rows : sequence of LoadRow
+        Readings of all poses.
+    registration : Registration
+        Stations and marker.
+    tool, estimate : ToolLoad, ToolEstimate
+        The tool by the cell file and by the unloaded references.
+    load_cases : sequence of str
+        Load cases of the plan.
+    weighed : sequence of int
+        Poses of the unloaded references that the tool was estimated from.
+    """
+    return [
+        *_about_readings(rows, load_cases),
+        *_about_stations(registration),
+        *_about_lever(registration),
+        *_about_tool(tool, estimate, weighed),
+    ]
+
+
+def _about_readings(rows: Sequence[LoadRow], load_cases: Sequence[str]) -> Iterator[str]:
+    had = {row.load_case for row in rows if row.status is ReadingStatus.OK}
+    for case in load_cases:
+        if case not in had:
+            yield f"load case {case!r} has no usable reading at any pose: the dataset leaves it out"
+    if lost := len(_not_ok(rows)):
+        yield f"{lost} of {len(rows)} readings are not ok; the list says why"
+    for name in _SIGMAS:
+        if any(not np.all(getattr(numbers, name) > 0) for numbers in _good(rows)):
+            yield f"{name} is left out: some readings show no scatter and no maker's value"
+
+
+def _about_stations(registration: Registration) -> Iterator[str]:
+    for station, reason in registration.unregistered.items():
+        yield f"station {station} is not registered, its readings are missing: {reason}"
+    for move in registration.moves:
+        yield (
+            f"station {move.station} moved between poses {move.before} and {move.pose}: the marker"
+            f" seemed to jump by {1e3 * move.distance:.2f} mm, the station turned by"
+            f" {1e3 * move.angle:.2f} mrad; both stretches are registered by themselves"
+        )
+    for blunder in registration.blunders:
+        yield (
+            f"pose {blunder.pose}: the unloaded marker reading of station {blunder.station} is"
+            f" {1e3 * blunder.distance:.2f} mm off: its displacements are doubtful"
+        )
+    for fit in registration.stations:
+        if not fit.rotation_sigma <= _LARGE_ROTATION:
+            yield (
+                f"station {fit.station}: its rotation is known to"
+                f" {1e3 * fit.rotation_sigma:.1f} mrad only, an error of"
+                f" {1e3 * fit.rotation_sigma:.1f} µm for each mm of displacement"
+            )
+
+
+def _about_lever(registration: Registration) -> Iterator[str]:
+    if registration.undetermined_lever:
+        yield (
+            "the orientations of the poses are too similar to tell the lever arm of the marker"
+            f" along {', '.join(registration.undetermined_lever)} of the tcp: there it is the cell"
+            " file's"
+        )
+    away = float(np.linalg.norm(registration.lever_arm - registration.lever_prior))
+    if not away <= _LEVER:
+        yield (
+            f"the marker is {1e3 * away:.1f} mm from where the cell file has it"
+            f" ({_millimetres(registration.lever_arm)} in the tcp frame)"
+        )
+
+
+def _about_tool(tool: ToolLoad, estimate: ToolEstimate, weighed: Sequence[int]) -> Iterator[str]:
+    if estimate.change is not None:
+        yield (
+            f"the tool weight changed near pose {weighed[estimate.change.reading]}, by about"
+            f" {estimate.change.mass:+.1f} kg (or the sensor's zero by as much): no one mass fits"
+            " the run"
+        )
+        return
+    mass, half = float(estimate.mass.value), float(estimate.mass.half_width)
+    if mass + half < _ZEROED * tool.mass:
+        yield (
+            f"the sensor shows {mass:.1f} ± {half:.1f} kg of the tool's {tool.mass:.1f} kg: it"
+            " seems to take the tool weight away itself"
+        )
+    elif abs(mass - tool.mass) > max(half, _MASS_SHARE * tool.mass):
+        yield (
+            f"the tool weighs {mass:.1f} ± {half:.1f} kg by {estimate.count} unloaded references,"
+            f" {tool.mass:.1f} kg by the cell file"
+        )
+    away = np.abs(estimate.centre.value - tool.centre)
+    far = away > np.maximum(estimate.centre.half_width, _CENTRE)
+    if np.any(far):
+        axis = int(np.argmax(np.where(far, away, 0.0)))
+        yield (
+            f"the tool's centre of mass is {1e3 * away[axis]:.0f} mm along {'xyz'[axis]} of the"
+            " sensor from where the cell file has it"
+        )
+
+
+def _millimetres(point: np.ndarray) -> str:
+    return ", ".join(f"{1e3 * value:.1f} mm" for value in point)

@@ -1,0 +1,143 @@
+"""``codec``: were there enough poses, and which technique is better (paper Algorithm 1)."""
+
+from dataclasses import dataclass, field, replace
+from os import PathLike
+from pathlib import Path
+
+from elastocal.codec import (
+    VERDICTS,
+    CodecAnalysis,
+    CodecData,
+    CodecOptions,
+    CodecSummary,
+    Tolerance,
+    Verdicts,
+    analyse,
+    codec_summary,
+    cross_validate,
+    judge,
+    make_variants,
+    read_comparisons,
+    write_codec,
+    write_codec_summary,
+    write_index_table,
+)
+from elastocal.dataset import read, without
+from elastocal.files import filling
+from elastocal.progress import Progress
+from elastocal.results import Result
+from elastocal.workflows._robot_source import find_robot
+from elastocal.workflows._workflow import workflow
+
+
+@dataclass(frozen=True)
+class CodecSettings:
+    """Which readings are cross-validated, what is compared, and where the files go."""
+
+    data: str | PathLike[str]
+    """Dataset, ``.nc`` or ``.csv``."""
+    out: Path
+    """Folder to write the codec into."""
+    compare: tuple[str, ...] = ()
+    """What to compare, each ``"KEY=A,B"`` with a key of `codec.KEYS`; every combination is a
+    variant."""
+    robot: str | None = None
+    """URDF file or catalogue name; by default the dataset's own."""
+    tcp: str | None = None
+    """Link at the tool centre point; by default the dataset's."""
+    tool: str | None = None
+    """Tcp behind that link, ``"x, y, z, a, b, c"`` with units (Z-Y'-X'')."""
+    marker: tuple[float, float, float] | None = None
+    """Metrology marker in the tcp frame, in m; none: the dataset's."""
+    exclude: tuple[str, ...] = ()
+    """Readings to leave out, each ``POSE`` or ``POSE:LOAD_CASE``."""
+    options: CodecOptions = field(default_factory=CodecOptions)
+    """Number of splits, ratio, seed; whether blunders are set aside and conventions trusted."""
+    tolerance: Tolerance = field(default_factory=Tolerance)
+    """How near to the last error counts as saturated."""
+    indices: bool = False
+    """Correlate observability indices and covering radius with accuracy."""
+    per_axis: bool = False
+    """Also draw the errors along x, y and z."""
+    jobs: int | None = None
+    """Processes; by default all cores for long work."""
+    force: bool = False
+    """Replace the files of a codec that is there."""
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class CodecResult(Result):
+    """A finished codec."""
+
+    summary: CodecSummary
+    """Its figures and verdicts: contents of ``codec.json``."""
+    data: CodecData
+    """Every array of Algorithm 1: contents of ``codec.nc``."""
+    verdicts: Verdicts
+    analysis: CodecAnalysis
+    """Which springs the training sets tell apart, and their indices."""
+    files: tuple[str, ...]
+    """Names of the files in the folder."""
+
+    def facts(self) -> tuple[tuple[str, str], ...]:
+        """Return what a person wants to know first."""
+        found = self.summary
+        verdicts = tuple(("verdict", sentence) for sentence in found.sentences)
+        return (("robot", found.robot), ("splits", found.settings.sentence), *verdicts)
+
+
+@workflow(CodecSettings)
+def codec(settings: CodecSettings, progress: Progress) -> CodecResult:
+    """Cross-validate growing training sets: how many poses, which technique.
+
+    Parameters
+    ----------
+    settings : CodecSettings
+        Or its ``data``, and the other fields by name.
+    progress : Progress, optional
+        Hears of each split that is done.
+
+    Raises
+    ------
+    CodecError
+        If a comparison does not fit, there are too few poses, or a variant fits nothing.
+    DatasetError, ConventionError, IdentificationError, RobotError, SpringError, PlanningError
+        If the readings, the robot or a value do not fit; see `cross_validate`.
+    FileAccessError
+        If a file cannot be read or written, or the folder holds files.
+    """
+    variants = make_variants(read_comparisons(settings.compare))
+    path = Path(settings.data)
+    measured = read(path)
+    arm = find_robot(settings.robot, settings.tcp, settings.tool, measured)
+    readings = without(measured.readings(arm.joint_names), settings.exclude)
+    marker = measured.marker if settings.marker is None else settings.marker
+    with filling(Path(settings.out), VERDICTS, settings.force) as folder:
+        data = cross_validate(
+            arm,
+            readings,
+            variants,
+            settings.options,
+            marker_offset=marker,
+            provenance=f"{path}; {measured.provenance}" if measured.provenance else str(path),
+            jobs=settings.jobs,
+            progress=progress,
+        )
+        verdicts = judge(data, settings.tolerance)
+        analysis = analyse(arm, readings, data, marker_offset=marker, with_indices=settings.indices)
+        summary = codec_summary(data, verdicts, analysis.correlations)
+        axes = ("x", "y", "z") if settings.per_axis else ()
+        result = CodecResult(summary, data, verdicts, analysis, ())
+        return replace(result, files=_write_folder(folder, result, axes))
+
+
+def _write_folder(folder: Path, result: CodecResult, axes: tuple[str, ...]) -> tuple[str, ...]:
+    """Write everything that a codec leaves behind; return the names of the files."""
+    from elastocal.report import write_codec_figures
+
+    data, analysis = result.data, result.analysis
+    paths = [write_codec(folder, data), write_codec_summary(folder, result.summary)]
+    if analysis.indices:
+        paths.append(write_index_table(folder, data, analysis.indices))
+    paths += write_codec_figures(folder, data, result.verdicts, analysis, axes)
+    return tuple(path.name for path in paths)

@@ -1,0 +1,115 @@
+"""``compare``: two calibrations of one cell (recertification)."""
+
+from dataclasses import dataclass
+from os import PathLike
+from pathlib import Path
+
+from elastocal import dataset
+from elastocal.arrays import FloatArray
+from elastocal.dataset import joint_dimensions, read_load_rows
+from elastocal.errors import DatasetError
+from elastocal.identification import read_model
+from elastocal.identification.recertification import (
+    CompareResult,
+    check_same_robot,
+    recertify_files,
+)
+from elastocal.progress import Progress
+from elastocal.records import write_json
+from elastocal.robot import Robot
+from elastocal.workflows._outputs import refuse_overwriting
+from elastocal.workflows._workflow import workflow
+
+__all__ = ["CompareResult", "CompareSettings", "compare", "measured_rows"]
+
+_Loads = tuple[FloatArray, FloatArray, FloatArray | None]
+"""Joint positions, forces, and moments if there are any, a row each."""
+
+
+@dataclass(frozen=True)
+class CompareSettings:
+    """Which calibrations are compared, over which rows, against which limit."""
+
+    old: str | PathLike[str]
+    """Model file of the earlier calibration."""
+    new: str | PathLike[str]
+    """Model file of the later one."""
+    rows: Path | None = None
+    """Poses and forces that matter: CSV as for `predict`, or a dataset; none: springs only."""
+    limit: float | None = None
+    """Largest accepted change of deflection at the rows, in m."""
+    out: Path | None = None
+    """Comparison file to write, ``.json``."""
+    figure: Path | None = None
+    """Figure to write: ``.svg``, ``.png`` or ``.pdf``."""
+
+
+@workflow(CompareSettings)
+def compare(settings: CompareSettings, progress: Progress) -> CompareResult:  # noqa: ARG001 - done in an instant
+    """Say which springs moved between two calibrations, and whether predictions changed.
+
+    Parameters
+    ----------
+    settings : CompareSettings
+        Or its ``old``, and the other fields by name.
+    progress : Progress, optional
+        Hears how far the work is.
+
+    Raises
+    ------
+    IdentificationError, SchemaError, SpringError, RobotError
+        If a file is no model, or the two cannot be compared; see `recertify`.
+    DatasetError
+        If the rows cannot be used.
+    FileAccessError
+        If a file cannot be read or written, or an output is an input.
+    """
+    old, new = Path(settings.old), Path(settings.new)
+    inputs = [old, new] if settings.rows is None else [old, new, settings.rows]
+    for path in (settings.out, settings.figure):
+        refuse_overwriting(path, *inputs)
+    loads = (None, None, None) if settings.rows is None else _read_rows(settings.rows, new)
+    found = recertify_files(old, new, *loads, limit=settings.limit)
+    if settings.figure is not None:
+        from elastocal.report import write_recertification_figure
+
+        write_recertification_figure(settings.figure, found.summary)
+    if settings.out is not None:
+        write_json(settings.out, found.summary)
+    return found
+
+
+def measured_rows(provenance: str) -> Path | None:
+    """Return the dataset that a model says it was calibrated on, if it is there."""
+    path = Path(provenance.partition(";")[0].strip())
+    return path if path.suffix.lower() in (".nc", ".csv") and path.is_file() else None
+
+
+def _read_rows(path: Path, model: Path) -> _Loads:
+    """Return the rows of a CSV file or the readings of a dataset, for the robot of a model."""
+    robot = read_model(model).model.robot
+    suffix = path.suffix.lower()
+    if suffix not in (".csv", ".nc"):
+        raise DatasetError(f"{path}: suffix {path.suffix!r} is not one of .csv, .nc")
+    loads = _of_dataset(path, robot, model) if suffix == ".nc" else _of_table(path, robot)
+    if not len(loads[0]):
+        raise DatasetError(f"{path} holds no row")
+    return loads
+
+
+def _of_table(path: Path, robot: Robot) -> _Loads:
+    rows = read_load_rows(path, joint_dimensions(robot.joint_names, robot.revolute))
+    return rows.joint_position, rows.force, rows.moment
+
+
+def _of_dataset(path: Path, robot: Robot, model: Path) -> _Loads:
+    data = dataset.read(path)
+    if data.robot_urdf is not None and data.tcp_frame is not None:
+        base = robot.base if data.robot_urdf == robot.urdf else None
+        measured = Robot.from_urdf(data.robot_urdf, data.tcp_frame, base)
+        check_same_robot(measured, robot, (str(path), str(model)))
+    try:
+        readings = data.readings(robot.joint_names)
+    except DatasetError as error:
+        raise DatasetError(f"{path}: {error}") from error
+    return readings.joint_position, readings.force, readings.moment

@@ -1,0 +1,48 @@
+"""What every filter of the wrench keeps."""
+
+import numpy as np
+import pytest
+
+from elastocal.compensation.conditioning import FilterChain, FilterSettings, LowPass, Notch
+from elastocal.errors import CompensationError
+
+SAMPLE = 0.004
+EXAMPLES = {
+    "low_pass": LowPass(cutoff="15 Hz"),
+    "notches": Notch(frequency="50 Hz", width="5 Hz"),
+}
+TOO_QUICK = {
+    "low_pass": LowPass(cutoff="125 Hz"),
+    "notches": Notch(frequency="130 Hz", width="5 Hz"),
+}
+"""At and above half the rate of readings."""
+
+
+def test_every_filter_of_the_settings_has_an_example():
+    assert (
+        set(FilterSettings.model_fields) - {"sample", "median"} == set(EXAMPLES) == set(TOO_QUICK)
+    )
+
+
+@pytest.mark.parametrize("name", EXAMPLES)
+class TestEveryFilter:
+    def chain(self, name):
+        return FilterChain(SAMPLE, 1, EXAMPLES[name].sections(SAMPLE))
+
+    def test_a_constant_passes_unchanged(self, name):
+        for b0, b1, b2, a1, a2 in EXAMPLES[name].sections(SAMPLE):
+            assert b0 + b1 + b2 == pytest.approx(1.0 + a1 + a2, rel=1e-12)
+
+    def test_it_is_stable(self, name):
+        for *_, a1, a2 in EXAMPLES[name].sections(SAMPLE):
+            assert np.abs(np.roots([1.0, a1, a2])).max() < 1.0
+
+    def test_nothing_is_amplified(self, name):
+        assert self.chain(name).gain(np.linspace(0.0, 124.0, 500)).max() < 1.0 + 1e-9
+
+    def test_it_delays_a_slow_wrench_and_says_so(self, name):
+        assert 0.0 < self.chain(name).delay() < 0.5
+
+    def test_what_readings_cannot_show_is_refused(self, name):
+        with pytest.raises(CompensationError, match="half the rate"):
+            TOO_QUICK[name].sections(SAMPLE)
