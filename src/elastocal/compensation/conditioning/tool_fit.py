@@ -15,8 +15,8 @@ rotation and looks for drift instead.
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import stats
 from scipy.spatial.transform import Rotation
+from scipy.special import stdtrit
 
 from elastocal.arrays import BoolArray, FloatArray
 from elastocal.compensation.conditioning.postures import StaticPostures
@@ -235,7 +235,7 @@ def _result(
     # Columns that are weighed have scatter 1; those that are not have what is left of them.
     unit = 1.0 if np.all(scatter > 0.0) else float(np.nan_to_num(scatter).max())
     degrees = 6 * len(postures) - int(free.sum())
-    half = stats.t.ppf(0.5 + _LEVEL / 2, max(degrees, 1)) * sigma * unit
+    half = stdtrit(max(degrees, 1), 0.5 + _LEVEL / 2) * sigma * unit
     loose = np.zeros(len(TOOL_UNKNOWNS), dtype=bool)
     loose[free] = np.linalg.norm(vt[~kept], axis=0) > _LOADING
     if degrees < 1:
