@@ -53,6 +53,8 @@ def _row(spring: SpringBar) -> Row:
         known = f"not by itself, group {spring.group}"
         return name, known, f"({value:.4f})", "none", unit.shown, "none"
     stiff = f"{1.0 / value:.3f} {unit.stiffness}" if value > 0.0 else "rigid"
+    if not unit.stiffness:
+        stiff = "none"
     known = "at its bound"
     if value > 0.0:
         known = f"±{(spring.high - spring.low) / 2 / value:.0%}"
