@@ -61,7 +61,7 @@ def minimise(
     if np.all((lower <= x) & (x <= upper)):
         return np.asarray(x)
     A = s[:, None] * Vt
-    # Moved to the lower bound the problem is a non-negative one, which is ten times quicker.
+    # Moved to the lower bound the problem is a non-negative one, which `nnls` solves at once.
     if np.all(np.isfinite(lower)) and np.all(np.isposinf(upper)):
         return lower + _nonnegative(A, y - A @ lower)
     return _boxed(A, y, lower, upper)
