@@ -66,6 +66,11 @@ class SpringChange:
         return self.difference.value / self.old.value if self.old.value > 0.0 else float("nan")
 
     @property
+    def label(self) -> str:
+        """Its name with the relative change, where there is one: ``joint_3.axial (+20%)``."""
+        return self.name if np.isnan(self.relative) else f"{self.name} ({self.relative:+.0%})"
+
+    @property
     def certainty(self) -> float:
         """Difference over the half-width of its interval on the side of zero."""
         d = self.difference
@@ -153,6 +158,23 @@ class CompareSummary:
         from the robot.
         """
         return not self.only_old and not self.only_new
+
+    @property
+    def verb(self) -> str:
+        """The word for springs that changed: those of different models only *differ*."""
+        return "moved" if self.same_springs else "differ"
+
+    @property
+    def unmoved_sentence(self) -> str:
+        """The sentence where no spring changed; empty where one did."""
+        count = len(self.springs)
+        if not count:
+            return "no spring is determined by both calibrations"
+        if self.moved:
+            return ""
+        return (
+            f"none of {count} compared springs and sums of springs {self.verb} beyond its interval"
+        )
 
     @property
     def moved_springs(self) -> tuple[SpringChange, ...]:
