@@ -41,7 +41,7 @@ def calibrated() -> CalibratedModel:
     rng, n = np.random.default_rng(0), len(model.springs)
     compliance = rng.uniform(1e-7, 1e-6, n)
     draws = compliance * (1.0 + 0.1 * rng.normal(size=(200, n)))
-    return CalibratedModel(model, compliance, draws, Observability(n, n, 1.0, (True,) * n, ()))
+    return CalibratedModel(model, compliance, draws, Observability(n, 1.0, (True,) * n, ()))
 
 
 def rows(model: ElasticModel) -> np.ndarray:

@@ -9,6 +9,7 @@ END_TO_END = (
     "cli",
     "end_to_end",
     "report/document",
+    "verdict",
     "contracts/test_report_sections.py",
     "test_examples.py",
     "test_readme.py",

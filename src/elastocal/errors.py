@@ -65,6 +65,10 @@ class CompensationError(ElastocalError, ValueError):
     """A correction that cannot be made: bad limits, a filter beyond Nyquist, an unknown tool."""
 
 
+class ReportError(ElastocalError, ValueError):
+    """A picture or page that cannot be made."""
+
+
 class FileAccessError(ElastocalError, OSError):
     """A file that cannot be read or written."""
 

@@ -119,3 +119,11 @@ def test_an_unknown_example_and_a_folder_that_cannot_be_made_are_refused(tmp_pat
     (tmp_path / "file").write_text("")
     with pytest.raises(FileAccessError, match="cannot make folder"):
         write_example(tmp_path / "file" / "inner", "afp")
+
+
+@pytest.mark.parametrize("like", EXAMPLES)
+def test_a_cell_shows_itself_in_a_few_lines(tmp_path, like):
+    cell = load_cell(write_example(tmp_path, like)[0])
+    for shown in (repr(cell), repr(cell.file)):
+        assert repr(cell.name) in shown
+        assert len(shown.splitlines()) <= 20

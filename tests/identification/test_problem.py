@@ -144,3 +144,14 @@ def test_readings_that_do_not_turn_a_spring_do_not_see_it():
     part = problem.take(np.arange(20))
     assert np.linalg.matrix_rank(factor(part).s[:, None] * factor(part).Vt, tol=1e-6) == 4
     assert abs(solve(part).compliance[2]) < 1.0
+
+
+def test_a_column_in_another_unit_is_judged_by_what_a_sensible_value_makes():
+    """Metres to a newton beside radians to a newton metre: norms alone say nothing."""
+    unit = np.array([1.0, 1.0, 1e-9, 1.0, 1.0])
+    problem, truth = made_up(np.random.default_rng(0))
+    other = replace(problem, O=problem.O * unit)
+    assert np.any(np.all(other.scaled().rows == 0.0, axis=(0, 1)))
+    told = replace(other, size=1.0 / unit)
+    assert not np.any(np.all(told.scaled().rows == 0.0, axis=(0, 1)))
+    np.testing.assert_allclose(solve(told).compliance, truth / unit, rtol=1e-9)

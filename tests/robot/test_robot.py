@@ -210,3 +210,11 @@ class TestGolden:
         theirs = Robot.from_file(GOLDEN / "golden_6r.urdf", "link_6")
         q = golden["joint_position"]
         np.testing.assert_allclose(ours.forward(q), theirs.forward(q), atol=1e-12)
+
+
+def test_every_robot_of_the_catalogue_shows_itself_in_a_few_lines():
+    for name in catalogue.names():
+        shown = repr(catalogue.load(name))
+        assert name in shown
+        assert "joint_a6: " in shown
+        assert len(shown.splitlines()) <= 20

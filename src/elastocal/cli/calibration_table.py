@@ -10,7 +10,7 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from elastocal.elastic import unit_of
+from elastocal.elastic import Unit, unit_of
 from elastocal.identification import (
     CalibrateResult,
     CalibrationSummary,
@@ -114,8 +114,7 @@ def _spring_row(spring: SpringSummary, group: int | None) -> tuple[str, ...]:
     shown = unit_of(spring.unit)
     values = (spring.compliance, spring.low, spring.high)
     value, low, high = (shown.factor * each for each in values)
-    usual = shown == _USUAL_UNIT
-    unit, stiff = ("", "") if usual else (f" {shown.shown}", f" {shown.stiffness}")
+    unit = "" if shown == _USUAL_UNIT else f" {shown.shown}"
     if not spring.observable:
         note = f"[yellow]not by itself[/yellow], group {group}"
         return escape(spring.name), f"[dim]({value:.4f}{unit})[/dim]", "", "", note
@@ -123,9 +122,16 @@ def _spring_row(spring: SpringSummary, group: int | None) -> tuple[str, ...]:
         escape(spring.name),
         f"{value:.4f}{unit}",
         f"{low:.3f} … {high:.3f}",
-        f"{1.0 / value:.3f}{stiff}" if value > 0.0 else "rigid",
+        _stiffness(value, shown),
         _known(value, low, high),
     )
+
+
+def _stiffness(value: float, unit: Unit) -> str:
+    if not value > 0.0:
+        return "rigid"
+    name = "" if unit == _USUAL_UNIT else f" {unit.stiffness}"
+    return f"{1.0 / value:.3f}{name}" if unit.stiffness else ""
 
 
 def _known(value: float, low: float, high: float) -> str:

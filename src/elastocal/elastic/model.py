@@ -167,14 +167,14 @@ class ElasticModel:
             rotation = self.robot.forward(q)[..., :3, :3]
             lever = rotation @ check_vectors("marker_offset", marker_offset)
             observed = observed + np.cross(jacobian.rotation, lever[..., None], axis=-2)
-        loaded = np.broadcast_shapes(observed.shape[:-2], torques.shape[:-1])
-        blocks = np.empty((*loaded, 3, len(self.parameters)))
+        places: list[_Columns] = []
+        columns: list[FloatArray] = []
         for group in self._groups:
             J = [observed[..., axis] for axis in group.axes]
-            columns = group.law.columns(J, group.load(torques))
-            for place, column in zip(group.parameters, columns, strict=True):
-                blocks[..., place] = column
-        return blocks
+            places += group.parameters
+            columns += group.law.columns(J, group.load(torques))
+        # Springs of one law and one parameter, as hinges are, stand side by side already.
+        return columns[0] if len(columns) == 1 else _assembled(columns, places)
 
     def deflection(
         self,
@@ -359,6 +359,15 @@ def _alike(springs: Sequence[Spring]) -> Iterator[_Alike]:
             tuple(_side_by_side(first_axis[indices] + k) for k in range(len(law.axes))),
             tuple(_side_by_side(first_parameter[indices] + k) for k in range(len(law.parameters))),
         )
+
+
+def _assembled(columns: Sequence[FloatArray], places: Sequence[_Columns]) -> FloatArray:
+    """Return columns of shape (..., 3, spring) as one array, each group at its places."""
+    n = sum(column.shape[-1] for column in columns)
+    blocks = np.empty((*columns[0].shape[:-1], n))
+    for place, column in zip(places, columns, strict=True):
+        blocks[..., place] = column
+    return blocks
 
 
 def _side_by_side(columns: IndexArray) -> _Columns:

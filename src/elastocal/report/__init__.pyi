@@ -1,6 +1,7 @@
 from .pages import write_codec_figures as write_codec_figures, write_plan_page as write_plan_page
 from .plots import (
     Curve as Curve,
+    plot_result as plot_result,
     write_plan_figure as write_plan_figure,
     write_recertification_figure as write_recertification_figure,
     write_stiffness_figure as write_stiffness_figure,

@@ -3,12 +3,15 @@
 import re
 import shutil
 import subprocess
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from elastocal.compensation.export import write_c
 from elastocal.compensation.online import Compensator, Reading, design
 from elastocal.elastic import SpringEntry, axial, custom
+from elastocal.errors import CompensationError
 from elastocal.robot import Robot
 from support import compensated, exported
 from support.exported import SANITIZED, build, needs_gcc, written
@@ -252,3 +255,14 @@ def test_cmake_builds_it_and_runs_the_self_test(tmp_path):
     for command in (["-S", folder, "-B", tmp_path / "b"], ["--build", tmp_path / "b"]):
         subprocess.run([cmake, *command], check=True, capture_output=True)
     assert subprocess.run([tmp_path / "b" / "elastocal_selftest"], check=False).returncode == 0
+
+
+def test_what_does_not_agree_with_the_model_is_not_exported(tmp_path):
+    numbers = design(compensated.arm("one joint"))
+    wrong = dict(numbers.deflection.constants)
+    name = next(name for name in wrong if name.startswith("compliance"))
+    wrong[name] *= 1.0 + 1e-8
+    numbers = replace(numbers, deflection=replace(numbers.deflection, constants=wrong))
+    with pytest.raises(CompensationError, match=r"the deflection that would be exported differs"):
+        write_c(tmp_path / "c", numbers)
+    assert not (tmp_path / "c").exists()

@@ -28,4 +28,5 @@ from .statics import (
     deflection as deflection,
     observation_block as observation_block,
     orientation as orientation,
+    written as written,
 )

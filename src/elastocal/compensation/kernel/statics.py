@@ -178,17 +178,17 @@ class _Laws:
         names = (f"x{s + 1}_{k}" for k in count(1))
         load = SpringLoad[Expression](tuple(Input(name) for name in inputs))
         for number, row in zip(axes, self._springs[s].angles(load), strict=True):
-            values = [_written(self._program, x, inputs, names) for x in row]
+            values = [written(self._program, x, inputs, names) for x in row]
             yield number, list(zip(parameters, values, strict=True))
 
 
-def _written(
+def written(
     program: Program, x: Expression, inputs: dict[str, Value], names: Iterator[str]
 ) -> Value:
     """Write the statements of a formula and return its value."""
 
     def value(part: Expression) -> Value:
-        return _written(program, part, inputs, names)
+        return written(program, part, inputs, names)
 
     match x:
         case Input(name):

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import stats
+from scipy.special import ndtri
 
 from elastocal.arrays import FloatArray
 from elastocal.compensation.conditioning import FilterChain, SensorLoad
@@ -27,7 +27,7 @@ _LARGEST_COMPLIANCE = 1.0
 """In rad/(N·m) or m/N: a spring that yields a metre under a newton is a broken file."""
 _NEGLIGIBLE = 1e-9
 """Share of the largest standard deviation below which a direction of the draws is left out."""
-_Z = float(stats.norm.ppf(0.975))
+_Z = float(ndtri(0.975))
 
 
 @dataclass(frozen=True, eq=False)

@@ -123,7 +123,9 @@ class Spring(ABC):
 
     units: ClassVar[tuple[Unit, ...]]
     """Every unit that parameters of this kind may have."""
-    places: ClassVar[frozenset[str]] = frozenset({"name", "joint", "axis", "distal", "offset"})
+    places: ClassVar[frozenset[str]] = frozenset(
+        {"name", "joint", "axis", "revolute", "distal", "offset"}
+    )
     """Fields that say where a spring is; the law may not depend on them."""
 
     @classmethod

@@ -5,7 +5,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.stats import qmc
 
 from elastocal.arrays import BoolArray, FloatArray
 from elastocal.cell import Cell
@@ -216,6 +215,9 @@ def detour_vias(robot: Robot, start: FloatArray, end: FloatArray) -> FloatArray:
     """
     lower = np.maximum(np.minimum(start, end) - _WIDTH, robot.limits.lower)
     upper = np.minimum(np.maximum(start, end) + _WIDTH, robot.limits.upper)
+    # Takes half a second to import, and few paths need a detour.
+    from scipy.stats import qmc
+
     # The first point of the sequence is the corner of the box.
     unit = qmc.Halton(len(start), scramble=False).random(_DETOURS + 1)[1:]
     return np.asarray(lower + unit * (upper - lower))

@@ -13,7 +13,7 @@ and what the weight turns by between the two is taken away by the cell file's ma
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import stats
+from scipy.special import fdtrc, stdtrit
 
 from elastocal.arrays import FloatArray
 
@@ -149,7 +149,7 @@ def tool_change(
     gain = change**2 * squares
     best = int(np.argmax(gain))
     rest = max(float(left @ left - gain[best]), np.finfo(float).tiny)
-    chance = (count - 1) * stats.f.sf(gain[best] / (rest / free), 1, free)
+    chance = (count - 1) * fdtrc(1, free, gain[best] / (rest / free))
     if not (chance < _CHANCE_OF_STEP and abs(change[best]) > _SHARE * nominal_mass):
         return None
     return ToolChange(best + 1, float(change[best]))
@@ -288,7 +288,7 @@ def _solve(blocks: FloatArray, readings: FloatArray) -> _Solution:
     left = b - A @ value
     scatter = float(np.sqrt(left @ left / (free + int((~kept).sum()))))
     sigma = scatter * np.sqrt(((vt[kept] / s[kept, None]) ** 2).sum(axis=0)) / scale
-    half = stats.t.ppf(0.5 + _LEVEL / 2, free) * sigma
+    half = stdtrit(free, 0.5 + _LEVEL / 2) * sigma
     loose = np.linalg.norm(vt[~kept], axis=0) > np.sqrt(_DEPENDENT)
     return _Solution(np.where(loose, np.nan, value), np.where(loose, np.nan, half), scatter)
 

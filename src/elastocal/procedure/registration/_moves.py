@@ -12,7 +12,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import stats
+from scipy.special import fdtrc
 
 from elastocal.arrays import BoolArray, FloatArray, IndexArray
 from elastocal.procedure.registration._fit import (
@@ -85,8 +85,8 @@ def _judge(
     explained = float(((beside @ shift) ** 2).sum())
     left = max(float(fit.e @ fit.e) - explained, np.finfo(float).tiny)
     f = explained / rank / (left / (free - rank)) if rank else 0.0
-    log10 = float(stats.f.logsf(f, max(rank, 1), free - rank)) / math.log(10.0)
-    log10 += math.log10(tried)
+    with np.errstate(divide="ignore"):  # a chance of nothing is the smallest of all
+        log10 = float(np.log10(fdtrc(max(rank, 1), free - rank, f))) + math.log10(tried)
     size = np.sqrt((np.square(hypothesis.columns @ shift)).sum(axis=1).mean())
     if not (log10 < math.log10(_CHANCE) and size >= _LEAST_MOVE):
         return None

@@ -5,6 +5,7 @@ from .calibration_figures import (
     StationResiduals as StationResiduals,
     displacement_figure as displacement_figure,
     pose_grid as pose_grid,
+    spring_bars as spring_bars,
     spring_figure as spring_figure,
     station_figure as station_figure,
 )
@@ -50,6 +51,7 @@ from .recertification_figure import (
     recertification_figure as recertification_figure,
     write_recertification_figure as write_recertification_figure,
 )
+from .results import plot_result as plot_result
 from .stiffness_figure import (
     Curve as Curve,
     stiffness_figure as stiffness_figure,

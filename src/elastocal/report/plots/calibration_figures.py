@@ -1,5 +1,6 @@
 """Printed figures of one calibration: readings, registration and springs (paper Fig. 8g, 12b)."""
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -10,6 +11,8 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from elastocal.arrays import BoolArray, FloatArray, IndexArray
+from elastocal.elastic import Unit
+from elastocal.identification import CalibratedModel
 from elastocal.report.plots import style
 from elastocal.report.plots.printing import literal, new_figure
 from elastocal.report.plots.style import variant_styles
@@ -29,6 +32,7 @@ class SpringBar:
     """One spring in the unit that people read."""
 
     name: str
+    unit: Unit
     value: float
     low: float
     high: float
@@ -156,14 +160,42 @@ def _brief(value: float) -> str:
     return f"{value:.2f}" if value >= 1.0 else f"{value:.3f}".lstrip("0")
 
 
-def spring_figure(panels: Sequence[tuple[str, Sequence[SpringBar]]]) -> Figure:
+def spring_bars(model: CalibratedModel) -> list[SpringBar]:
+    """Return the compliances of a model, each with the first group that it is mixed up in."""
+    numbered = list(enumerate(model.observability.unobservable, start=1))
+    groups = {term.spring: number for number, group in reversed(numbered) for term in group}
+    low, high = model.interval()
+    bars = []
+    for k, parameter in enumerate(model.model.parameters):
+        factor = parameter.unit.factor
+        by_itself = model.observability.observable[k]
+        bars.append(
+            SpringBar(
+                parameter.name,
+                parameter.unit,
+                factor * float(model.compliance[k]),
+                factor * float(low[k]),
+                factor * float(high[k]),
+                None if by_itself else groups.get(parameter.name, 0),
+            )
+        )
+    return bars
+
+
+def spring_figure(springs: Sequence[SpringBar]) -> Figure:
     """Return the figure: a panel for each unit, springs downwards.
 
     Parameters
     ----------
-    panels : sequence of (str, sequence of SpringBar)
-        Unit and its springs; none is empty.
+    springs : sequence of SpringBar
+        From `spring_bars`; not empty.
     """
+    counts = Counter(bar.unit for bar in springs)
+    # The unit of most springs comes first, so that a rail does not stand above the joints.
+    panels = [
+        (unit.shown, [bar for bar in springs if bar.unit == unit])
+        for unit, _ in counts.most_common()
+    ]
     rows = [len(bars) for _, bars in panels]
     height = _ROW * sum(rows) + _FOOT * len(panels)
     figure = new_figure(9.0, height)

@@ -1,4 +1,4 @@
-"""Inverse kinematics by descent from many seeded starts, for arms without a closed form."""
+"""Inverse kinematics by descent from many seeded starts, and which solver a robot gets."""
 
 from dataclasses import dataclass
 

@@ -1,10 +1,8 @@
 """Compliances with intervals, and what the readings tell apart."""
 
-from collections import Counter
 from collections.abc import Iterator
 from functools import partial
 
-from elastocal.elastic import Unit
 from elastocal.identification import CalibrationSummary, Term, describe
 from elastocal.report.document.blocks import (
     Block,
@@ -18,7 +16,7 @@ from elastocal.report.document.blocks import (
     Table,
     picture,
 )
-from elastocal.report.plots import SpringBar, spring_figure
+from elastocal.report.plots import SpringBar, spring_bars, spring_figure
 from elastocal.verdict import Evidence, ModelEvidence
 from elastocal.wording import mm
 
@@ -33,52 +31,30 @@ def _body(evidence: Evidence) -> Content:
 
 
 def _blocks(found: ModelEvidence) -> Iterator[Block]:
-    springs = list(_springs(found))
-    observable = sum(each.group is None for _, each in springs)
+    springs = spring_bars(found.model)
+    observable = sum(each.group is None for each in springs)
     yield _head(found, observable)
     yield from _comparison(found.figures)
-    counts = Counter(unit for unit, _ in springs)
-    # The unit of most springs comes first, so that a rail does not stand above the joints.
-    units = [unit for unit, _ in counts.most_common()]
-    panels = [(unit.shown, [bar for own, bar in springs if own == unit]) for unit in units]
     yield picture(
-        partial(spring_figure, panels),
+        partial(spring_figure, springs),
         f"Compliances of {len(springs)} springs with 95 % intervals; {len(springs) - observable} of"
         " them have no value of their own",
         "Filled: known by itself, with its 95 % interval. Hollow: not known by itself; the number"
         " is the smallest one that explains the readings.",
     )
     heads = ("Spring", "Known?", "Compliance", "95 % interval", "Unit", "Stiffness")
-    yield Table("Compliances", heads, tuple(_row(*each) for each in springs), texts=2)
+    yield Table("Compliances", heads, tuple(map(_row, springs)), texts=2)
     yield from _not_told_apart(found)
 
 
-def _springs(found: ModelEvidence) -> Iterator[tuple[Unit, SpringBar]]:
-    """Yield unit and compliance of each spring, and the first group that it is mixed up in."""
-    numbered = list(enumerate(found.model.observability.unobservable, start=1))
-    groups = {term.spring: number for number, group in reversed(numbered) for term in group}
-    low, high = found.model.interval()
-    for k, parameter in enumerate(found.model.model.parameters):
-        unit = parameter.unit
-        by_itself = found.model.observability.observable[k]
-        yield (
-            unit,
-            SpringBar(
-                parameter.name,
-                unit.factor * float(found.model.compliance[k]),
-                unit.factor * float(low[k]),
-                unit.factor * float(high[k]),
-                None if by_itself else groups.get(parameter.name, 0),
-            ),
-        )
-
-
-def _row(unit: Unit, spring: SpringBar) -> Row:
-    name, value = spring.name, spring.value
+def _row(spring: SpringBar) -> Row:
+    name, unit, value = spring.name, spring.unit, spring.value
     if spring.group is not None:
         known = f"not by itself, group {spring.group}"
         return name, known, f"({value:.4f})", "none", unit.shown, "none"
     stiff = f"{1.0 / value:.3f} {unit.stiffness}" if value > 0.0 else "rigid"
+    if not unit.stiffness:
+        stiff = "none"
     known = "at its bound"
     if value > 0.0:
         known = f"±{(spring.high - spring.low) / 2 / value:.0%}"

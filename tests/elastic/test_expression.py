@@ -1,0 +1,47 @@
+import numpy as np
+import pytest
+
+from elastocal.compensation.kernel import Call, Program, Value, written
+from elastocal.elastic.springs import Expression, Function, Input, Number, Product, Sum, atan
+
+X, Y = Input("x"), Input("y")
+
+
+def law(x, y):
+    return (2.0 * x - y / 4.0 + 1.0) * -x + (3.0 - atan(x * y)) + (0.5 + y)
+
+
+def evaluated(formula: Expression, values: dict[str, float]) -> float:
+    match formula:
+        case Input(name):
+            return values[name]
+        case Number(value):
+            return value
+        case Sum(terms):
+            return sum(evaluated(term, values) for term in terms)
+        case Product(factors):
+            return float(np.prod([evaluated(factor, values) for factor in factors]))
+        case Function("atan", argument):
+            return float(np.arctan(evaluated(argument, values)))
+    raise AssertionError(formula)
+
+
+@pytest.mark.parametrize(("x", "y"), [(0.0, 0.0), (1.5, -2.0), (-300.0, 0.25)])
+def test_a_law_of_names_is_the_law_of_numbers(x, y):
+    expected = law(np.array(x), np.array(y))
+    assert evaluated(law(X, Y), {"x": x, "y": y}) == pytest.approx(float(expected), rel=1e-14)
+
+
+def test_statements_of_a_formula_are_sums_of_products_and_calls():
+    program = Program()
+    names = iter(["a", "b", "c", "d"])
+    found = written(program, atan(X * Y), {"x": Value(1, "q1"), "y": Value(-1, "q2")}, names)
+    assert found == Value(1, "a")
+    assert program.statements[-1] == Call("a", "atan", Value(1, "b"))
+
+
+def test_a_small_number_of_a_law_is_not_taken_for_zero():
+    program = Program()
+    found = written(program, 1e-17 * X, {"x": Value(1, "q1")}, iter("abc"))
+    assert found.sign == 1
+    assert 1e-17 in program.constants.values()
