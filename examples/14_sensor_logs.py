@@ -39,15 +39,13 @@ pressed = press_poses(linkage, 31, rng)
 data = measure(
     bearing_truth(linkage), pressed.joints, press_forces(pressed.T_base_tcp), SHOP_FLOOR, rng
 )
-q, contact_force, moved = (
-    data.data[name].values for name in ("joint_position", "force", "marker_displacement")
-)
+q, contact_force, moved = data.joint_position, data.force, data.marker_displacement
 tool = ToolLoad(  # mass, centre of mass, gravity, place of the sensor
     60.0, np.array([0.0, 0.0, 0.15]), np.array(GRAVITY), T_from_xyzabc(0, 0, -0.3, 0.5, 0, 0)
 )
 T_tracker_base = T_from_xyzabc(2.0, 5.0, 1.0, 2.5, 0.02, -0.01)  # nobody knows it
 before = pressed.T_base_tcp.copy()  # the controller's pose unloaded, 3 mm before contact
-before[:, :3, 3] = data.data["tcp_position"].values
+before[:, :3, 3] = data.tcp_position
 loaded = robot.forward(q)  # and under each load
 bias = np.array([12.0, -7.0, 30.0])
 R, R_0 = tool.R_base_sensor(loaded), tool.R_base_sensor(before)

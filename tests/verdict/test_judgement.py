@@ -118,9 +118,9 @@ def test_a_simulated_cell_is_told_in_the_verdict(parts):
 
 def test_advice_weighs_the_tracker_against_the_errors(parts):
     def told(scatter):
-        registration = parts.summary.registration.model_copy(update={"scatter": scatter})
-        noise = parts.summary.noise.model_copy(update={"marker_sigma_median": None})
-        summary = parts.summary.model_copy(update={"registration": registration, "noise": noise})
+        registration = replace(parts.summary.registration, scatter=scatter)
+        noise = replace(parts.summary.noise, marker_sigma_median=None)
+        summary = replace(parts.summary, registration=registration, noise=noise)
         return " ".join(advise(replace(parts, summary=summary)))
 
     mean = parts.reproduction.unseen.mean.value

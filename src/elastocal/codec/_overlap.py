@@ -1,4 +1,4 @@
-"""How sure a figure over verification sets is, when the sets share poses.
+"""Intervals of figures over verification sets that share poses.
 
 The sets are all drawn from the same N poses, so that their spread, taken for that of independent
 ones, is too small. C. Nadeau and Y. Bengio ("Inference for the generalization error", Machine
@@ -28,7 +28,7 @@ _ALL = 1.0 - 1e-9
 
 @dataclass(frozen=True)
 class Overlap:
-    """How far verification sets are from independent."""
+    """The poses that verification sets share: how far they are from independent."""
 
     sets: int
     """Number of sets, J."""

@@ -23,7 +23,7 @@ _SAME = 1e-9
 
 @dataclass(frozen=True, eq=False)
 class PreparedVariant:
-    """What a variant needs of the campaign, prepared once for all splits."""
+    """A variant with all that it needs of the campaign, prepared once for all splits."""
 
     variant: Variant
     problem: Problem
@@ -31,7 +31,7 @@ class PreparedVariant:
     trains: BoolArray
     """Whether the variant may train with each reading, shape (reading,)."""
     triangles: PoseTriangles
-    """Of the training readings of each pose."""
+    """Triangles of the training readings of each pose."""
     contact: FloatArray
     """Tcp positions, shape (pose, 3), in m."""
 
@@ -75,7 +75,7 @@ class PreparedVariant:
 
 @dataclass(frozen=True, eq=False)
 class LearningCurve:
-    """What a variant reached on a split, for 1, 2, … training poses."""
+    """Choices, fits and errors of a variant on a split, for 1, 2, … training poses."""
 
     chosen: tuple[IndexArray, ...]
     """Numbers of the training poses, in the order of choice."""

@@ -25,7 +25,7 @@ _SHARE = 1e-6
 
 @dataclass(frozen=True, eq=False)
 class SpringObservability:
-    """What the training sets of one variant tell apart."""
+    """The springs that the training sets of one variant tell apart."""
 
     variant: str
     determined: BoolArray
@@ -50,11 +50,11 @@ class CodecAnalysis:
     """The training sets of every variant, in order of the variants."""
 
     seen: tuple[SpringObservability, ...]
-    """Which springs its training sets tell apart."""
+    """The springs that its training sets tell apart."""
     indices: tuple[IndexValues, ...] = ()
     """Indices of its training sets; empty where they were not asked for."""
     correlations: tuple[Correlation, ...] = ()
-    """How those correlate with accuracy."""
+    """Their correlations with accuracy."""
 
 
 def analyse(

@@ -52,7 +52,7 @@ class CodecData:
 
     variants: tuple[Variant, ...]
     springs: tuple[SpringLabels, ...]
-    """Of each variant."""
+    """Labels of the springs of each variant."""
     pose_labels: tuple[tuple[int, ...], ...]
     """Labels of each physical pose; several where one was measured more than once."""
     contact: Annotated[
@@ -77,7 +77,7 @@ class CodecData:
     """Training poses in the order of choice, `NO_POSE` behind the last, shape
     (variant, cv, n_train, n_train)."""
     compliance: tuple[FloatArray, ...]
-    """Of each variant, shape (cv, n_train, spring), in the units of ``springs``."""
+    """Compliances of each variant, shape (cv, n_train, spring), in the units of ``springs``."""
     error_mean: Annotated[
         FloatArray, Variable(_ERROR_DIMS, "m", "mean absolute residual at the verification poses")
     ]
@@ -94,9 +94,9 @@ class CodecData:
     robot: str = ""
     """Name of the robot."""
     provenance: str = ""
-    """Where the readings came from."""
+    """Origin of the readings."""
     findings: tuple[str, ...] = ()
-    """What a user should know of the data."""
+    """Notes on the data for the user."""
     versions: dict[str, str] = field(default_factory=dict)
     """Version of each package that the numbers come from."""
 

@@ -35,7 +35,7 @@ _ALMOST = 1.0 - 1e-6
 
 @record()
 class Correlation:
-    """How well an index orders training sets by their accuracy."""
+    """The rank correlation of an index of training sets with their accuracy."""
 
     variant: str
     index: str

@@ -15,7 +15,7 @@ in another order."""
 
 @record()
 class DifferenceAtSize:
-    """How the errors of two variants differ at one number of training poses."""
+    """The difference of the errors of two variants at one number of training poses."""
 
     a: str
     b: str
@@ -29,7 +29,7 @@ class DifferenceAtSize:
 
 @record()
 class PairVerdict:
-    """From where on one of two variants is the better one; see `PairedDifference`."""
+    """The better one of two variants, and from where on; see `PairedDifference`."""
 
     a: str
     b: str
@@ -41,7 +41,7 @@ class PairVerdict:
 
 @dataclass(frozen=True, eq=False)
 class PairedDifference:
-    """How the errors of two variants differ, for 1, 2, … training poses."""
+    """The difference of the errors of two variants, for 1, 2, … training poses."""
 
     a: str
     b: str

@@ -14,7 +14,7 @@ from elastocal.records import record
 
 @dataclass(frozen=True)
 class Tolerance:
-    """How near to the last error counts as saturated.
+    """The distance from the last error within which an error counts as saturated.
 
     Raises
     ------
@@ -56,7 +56,7 @@ class Tolerance:
 
 @record()
 class SaturationInterval:
-    """How sure a saturation is."""
+    """The interval of a saturation, and the errors about it."""
 
     low: int | None
     """Lower end of its 95 % interval: with fewer poses, 97.5 % of the bootstrap draws leave the

@@ -31,14 +31,14 @@ _RATIO = 70.0 / 30.0
 
 @dataclass(frozen=True)
 class CodecOptions:
-    """How the poses are split."""
+    """Choices about the splits, and about the readings that are split."""
 
     splits: int | None = None
     """Number ``N_cv`` of verification sets; None: as many as there are poses."""
     ratio: float = _RATIO
     """Training to verification poses, ``r``."""
     seed: int = 0
-    """Of the techniques that draw."""
+    """Seed of the techniques that draw."""
     set_blunders_aside: bool = True
     """Leave out readings that cannot be measurements of this robot."""
     trust_conventions: bool = False
@@ -61,7 +61,7 @@ class Campaign:
     """
 
     readings: Readings
-    """What is trained and verified with."""
+    """Readings to train and to verify with."""
     pose: IndexArray
     """Number of the physical pose of each reading, shape (reading,), from 0 without gaps."""
     contact: FloatArray
@@ -70,7 +70,7 @@ class Campaign:
     labels: tuple[tuple[int, ...], ...]
     """Labels of each pose in the dataset."""
     findings: tuple[str, ...]
-    """What a user should know of the data."""
+    """Notes on the data for the user."""
 
     def __len__(self) -> int:
         """Return the number of physical poses."""

@@ -57,12 +57,12 @@ class Variant:
 
     @property
     def options(self) -> FitOptions:
-        """How the variant fits."""
+        """Options of the variant's fit."""
         return SOLVERS[self.solver]
 
 
 KEYS = ("search", "springs", "load_cases", "solver")
-"""What variants can differ in."""
+"""Keys that variants can differ in."""
 
 
 def read_comparison(text: str) -> tuple[str, tuple[str, ...]]:

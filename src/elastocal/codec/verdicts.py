@@ -32,7 +32,7 @@ class Verdicts:
     """The verdicts on a codec."""
 
     saturation: tuple[Saturation, ...]
-    """Of each variant, in order."""
+    """One for each variant, in order."""
     pairs: tuple[PairedDifference, ...]
     """Every two variants."""
     tolerance: Tolerance
@@ -94,7 +94,7 @@ class CodecSummary:
     paired: tuple[DifferenceAtSize, ...]
     crossings: tuple[PairVerdict, ...]
     indices: tuple[Correlation, ...]
-    """Where they were asked for."""
+    """Rank correlations of indices with accuracy; empty where they were not asked for."""
     sentences: tuple[str, ...]
     """The verdicts in words: one for each variant, then one for each pair."""
     findings: tuple[str, ...]

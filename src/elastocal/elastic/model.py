@@ -229,6 +229,7 @@ class ElasticModel:
         translation, rotation, coupling = np.zeros(shape), np.zeros(shape), np.zeros(shape)
         for group in self._groups:
             tangents = group.law.tangents(group.load(torques))
+            # A spring of several axes couples them: all pairs, of which a hinge has one.
             for (a, axis), (b, other) in product(enumerate(group.axes), repeat=2):
                 terms = zip(group.parameters, tangents[a][b], strict=True)
                 # Each of shape (spring,) or (..., spring).

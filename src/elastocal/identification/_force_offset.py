@@ -154,9 +154,12 @@ def _step(problem: Problem, columns: FloatArray) -> _Step:
     O = problem.scaled().rows.reshape(-1, problem.columns)  # noqa: E741
     A = (columns * w).reshape(-1, 3)
     d = (problem.d * problem.weight).ravel()
+    # What compliances can explain is projected out of columns and data, so that the small problem
+    # in the offset alone has the solution of the joint one (Frisch, Waugh and Lovell).
     Q, s, _ = np.linalg.svd(O, full_matrices=False)
     Q = Q[:, s > RANK_TOLERANCE * s[0]]
     A, d = A - Q @ (Q.T @ A), d - Q @ (Q.T @ d)
+    # An axis that no reading sees gets no offset: the pseudo-inverse of unit columns drops it.
     norms = np.linalg.norm(A, axis=0)
     size = np.where(norms > 0.0, norms, 1.0)
     inverse = np.linalg.pinv(A / size, rcond=RANK_TOLERANCE)

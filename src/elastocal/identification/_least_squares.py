@@ -54,11 +54,14 @@ def minimise(
     if determined == 0:
         raise IdentificationError("the forces load no spring: nothing can be identified")
     s, y = s.copy(), y.copy()
+    # Undetermined directions are asked to be zero, with a weight too small to pull on the others:
+    # of all minima the bounded solver then finds the one of least norm.
     s[determined:], y[determined:] = _FLOOR * s[0], 0.0
     x = Vt.T @ (y / s)
     if np.all((lower <= x) & (x <= upper)):
         return np.asarray(x)
     A = s[:, None] * Vt
+    # Moved to the lower bound the problem is a non-negative one, which `nnls` solves at once.
     if np.all(np.isfinite(lower)) and np.all(np.isposinf(upper)):
         return lower + _nonnegative(A, y - A @ lower)
     return _boxed(A, y, lower, upper)

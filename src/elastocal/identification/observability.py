@@ -64,6 +64,7 @@ def observability(system: Factored, springs: Sequence[Spring]) -> Observability:
     parameters = [parameter for spring in springs for parameter in spring.parameters]
     determined = rank(system.s)
     null_space = system.Vt[determined:].T
+    # The system was solved in x = scale c, so a combination of x is one of c over the scale.
     groups = _readable(null_space / system.scale[:, None], parameters)
     condition = system.s[0] / system.s[determined - 1] if determined else np.inf
     mixed = {term.spring for group in groups for term in group}

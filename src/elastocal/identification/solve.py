@@ -50,6 +50,7 @@ def factor(problem: Problem) -> Factored:
     deflection = (problem.d * problem.weight).ravel()
     system = np.column_stack([scaled.rows.reshape(-1, n), deflection])
     system = np.vstack([system, problem.prior_rows / np.append(scaled.scale, 1.0)])
+    # With fewer rows than columns the triangle would not be square.
     if len(system) < n + 1:
         system = np.vstack([system, np.zeros((n + 1 - len(system), n + 1))])
     triangle = np.asarray(np.linalg.qr(system, mode="r"), dtype=float)

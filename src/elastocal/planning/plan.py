@@ -77,7 +77,7 @@ def make_plan(
     Raises
     ------
     PlanningError
-        If no plan can be decisions: the message says what refused most points and what to move.
+        If no plan can be made: the message says what refused most points and what to move.
     SurfaceError, FileAccessError
         If the surface cannot be read, or its region is empty.
     """

@@ -6,7 +6,7 @@ cores, so neither do the candidates.
 
 import math
 import pickle
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import lru_cache, partial
@@ -17,7 +17,7 @@ from numpy.random import Generator
 from elastocal.arrays import BoolArray, FloatArray, IndexArray
 from elastocal.cell import Cell
 from elastocal.errors import PlanningError
-from elastocal.parallel import ProcessPool, process_count, process_pool
+from elastocal.parallel import process_count, process_pool
 from elastocal.planning.cell_setup import point_checks, robot_checks
 from elastocal.planning.checks import Checks, verdicts
 from elastocal.planning.pool import (
@@ -100,12 +100,14 @@ def sample_pool(
     tried: list[SurfacePoints] = []
     pools: list[Pool] = []
     progress(CANDIDATES, 0, wanted)
-    with _workers(cell, surface, _processes(jobs, wanted)) as workers:
+    with _workers(cell, surface, _processes(jobs, wanted)) as make_in_processes:
         builder = PoolBuilder.of(cell, surface)
         placements = builder.rank(sample_uniform(surface, _PROBES, rng))
         while (missing := wanted - _valid(pools)) > 0 and not _hopeless(pools, wanted):
             tried.append(_sample(cell, surface, missing, pools, rng))
-            for pool in _made(builder, workers, placements, _parts(tried[-1])):
+            parts = _parts(tried[-1])
+            make = builder.pools if len(parts) == 1 else make_in_processes or builder.pools
+            for pool in make(placements, parts):
                 pools.append(pool)
                 progress(CANDIDATES, min(_valid(pools), wanted), wanted)
     pool = join_pools(pools).first(wanted)
@@ -177,6 +179,15 @@ class PoolBuilder:
         where = points.position, points.normal
         return make_pool(self.solver, *where, self.approach, checks, placements)
 
+    def pools(
+        self, placements: tuple[BasePlacement, ...], parts: Sequence[SurfacePoints]
+    ) -> Iterator[Pool]:
+        """Yield the pool of each part of the points, in their order."""
+        return (self.pool(placements, part) for part in parts)
+
+
+_PoolsOfParts = Callable[[tuple[BasePlacement, ...], Sequence[SurfacePoints]], Iterator[Pool]]
+
 
 def _processes(jobs: int | None, wanted: int) -> int:
     """Return the number of processes for some candidates; few are not worth a second one."""
@@ -187,42 +198,16 @@ def _processes(jobs: int | None, wanted: int) -> int:
     return processes if wanted >= _WORTH_HELP else 1
 
 
-@dataclass(frozen=True, eq=False)
-class _Workers:
-    """Processes that make pools; each unpacks the cell once, and makes its own builder of it."""
-
-    packed: bytes
-    processes: ProcessPool
-
-    def pools(
-        self, placements: tuple[BasePlacement, ...], parts: Sequence[SurfacePoints]
-    ) -> Iterator[Pool]:
-        """Return the pool of each part of the points, in their order."""
-        return self.processes.map(partial(_make_part, self.packed, placements), parts)
-
-
 @contextmanager
-def _workers(cell: Cell, surface: Surface, processes: int) -> Iterator[_Workers | None]:
-    """Yield workers that prepare themselves already; None when there is but one process."""
+def _workers(cell: Cell, surface: Surface, processes: int) -> Iterator[_PoolsOfParts | None]:
+    """Yield what makes pools in processes, as `PoolBuilder.pools` does; None with but one."""
     if processes == 1:
         yield None
         return
-    # Coal's shapes cannot be sent to a process: it makes its own from the cell.
+    # Coal's shapes cannot be sent to a process: each unpacks the cell and makes its own of it.
     packed = pickle.dumps((cell, surface))
-    with process_pool(processes, partial(_prepare, packed)) as pool:
-        yield _Workers(packed, pool)
-
-
-def _made(
-    builder: PoolBuilder,
-    workers: _Workers | None,
-    placements: tuple[BasePlacement, ...],
-    parts: Sequence[SurfacePoints],
-) -> Iterator[Pool]:
-    """Return the pools of the parts, in their order."""
-    if workers is None or len(parts) == 1:
-        return (builder.pool(placements, part) for part in parts)
-    return workers.pools(placements, parts)
+    with process_pool(processes, partial(_prepare, packed)) as workers:
+        yield lambda placements, parts: workers.map(partial(_make_part, packed, placements), parts)
 
 
 def _prepare(packed: bytes) -> None:
@@ -254,7 +239,7 @@ class _Survey:
     """Whether the slow checks have been asked."""
 
     def rank(self, left: BoolArray) -> tuple[int, float, float]:
-        """Return what counts, most important first, for points that no better stand serves."""
+        """Return the ranks, most important first, for points that no better placement serves."""
         return int(np.count_nonzero(self.served & left)), self.nearness, self.quality
 
 

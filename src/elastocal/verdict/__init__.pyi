@@ -1,9 +1,3 @@
-from ._figures import (
-    RegistrationFigures as RegistrationFigures,
-    RunFigures as RunFigures,
-    StationMove as StationMove,
-    ToolFigures as ToolFigures,
-)
 from .consistency import (
     check_codec as check_codec,
     check_model as check_model,

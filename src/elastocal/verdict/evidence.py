@@ -16,8 +16,7 @@ from elastocal.identification import (
 from elastocal.identification.recertification import CompareSummary
 from elastocal.planning import PlanResult, PoolData
 from elastocal.planning.surface import Surface
-from elastocal.procedure import Entry, RunRecord
-from elastocal.verdict._figures import RunFigures
+from elastocal.procedure import Entry, RunRecord, RunSummary
 
 
 @dataclass(frozen=True)
@@ -91,7 +90,7 @@ class Evidence:
     pool: PoolData | None = None
     journal: tuple[Entry, ...] | None = None
     dataset: Dataset | None = None
-    summary: RunFigures | None = None
+    summary: RunSummary | None = None
     """The summary of the run."""
     calibrated: ModelEvidence | None = None
     reproduction: Reproduction | None = None

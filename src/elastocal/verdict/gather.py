@@ -42,8 +42,7 @@ from elastocal.procedure import (
     read_journal,
     read_summary,
 )
-from elastocal.records import read_json, to_data, validate
-from elastocal.verdict._figures import RunFigures
+from elastocal.records import read_json
 from elastocal.verdict._folders import (
     CODEC,
     MODEL,
@@ -136,7 +135,7 @@ def _with_run(evidence: Evidence, reader: PartReader) -> Evidence:
         reader,
         "summary of the run",
         run.summary,
-        lambda path: validate(to_data(read_summary(path)), RunFigures, str(path)),
+        read_summary,
     )
     evidence = replace(evidence, dataset=_derived(reader, "dataset", run.dataset, datasets.read))
     for file in run_files(run):

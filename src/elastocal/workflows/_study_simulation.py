@@ -45,7 +45,7 @@ class StudySimulation:
 
     conditions: tuple[Condition, ...]
     chosen: tuple[PoseChoice, ...]
-    """Of each condition."""
+    """Calibration poses of each condition."""
     models: dict[str, ElasticModel]
     """By spring layout."""
     truth: CampaignSimulator
@@ -53,7 +53,7 @@ class StudySimulation:
     pool: StudyPool
     load_cases: tuple[str, ...]
     force_tcp: FloatArray
-    """Of each load case, shape (load_case, 3), in N."""
+    """Force of each load case in the tcp frame, shape (load_case, 3), in N."""
     marker: FloatArray
     """In the tcp frame, shape (3,), in m."""
 

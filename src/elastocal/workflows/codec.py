@@ -32,7 +32,7 @@ from elastocal.workflows._workflow import workflow
 
 @dataclass(frozen=True)
 class CodecSettings:
-    """Which readings are cross-validated, what is compared, and where the files go."""
+    """The readings that are cross-validated, what is compared, and where the files go."""
 
     data: str | PathLike[str]
     """Dataset, ``.nc`` or ``.csv``."""
@@ -54,7 +54,7 @@ class CodecSettings:
     options: CodecOptions = field(default_factory=CodecOptions)
     """Number of splits, ratio, seed; whether blunders are set aside and conventions trusted."""
     tolerance: Tolerance = field(default_factory=Tolerance)
-    """How near to the last error counts as saturated."""
+    """Distance from the last error that counts as saturated."""
     indices: bool = False
     """Correlate observability indices and covering radius with accuracy."""
     per_axis: bool = False

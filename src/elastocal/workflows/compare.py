@@ -28,7 +28,7 @@ _Loads = tuple[FloatArray, FloatArray, FloatArray | None]
 
 @dataclass(frozen=True)
 class CompareSettings:
-    """Which calibrations are compared, over which rows, against which limit."""
+    """The calibrations that are compared, over which rows, against which limit."""
 
     old: str | PathLike[str]
     """Model file of the earlier calibration."""

@@ -28,13 +28,13 @@ from elastocal.results import Result
 from elastocal.workflows._workflow import workflow
 
 DEFAULT_VARIATION = "poses=6,10,15,20,31"
-"""What is varied when nothing is said."""
+"""Variation of a study that names none."""
 _SIMULATION = "elastocal.workflows._study_simulation"
 
 
 @dataclass(frozen=True)
 class StudySettings:
-    """Which cell is studied, what is varied, and where it is simulated."""
+    """The cell that is studied, what is varied, and where it is simulated."""
 
     cell: str | PathLike[str]
     """Cell file, ``.yaml``."""
@@ -50,7 +50,7 @@ class StudySettings:
     verification: int = 25
     """Poses at which every calibration is judged; none of them is chosen."""
     seed: int = 0
-    """Of arms and noise."""
+    """Seed of arms and noise."""
     jobs: int | None = None
     """Processes; all cores by default."""
     dask: str | None = None
@@ -62,9 +62,9 @@ class StudyResult(Result):
     """A finished study."""
 
     summary: StudySummary
-    """What it says about each condition: contents of ``study.json``."""
+    """Its figures for each condition: contents of ``study.json``."""
     design: StudyDesign
-    """What it is a study of."""
+    """All that its numbers depend on."""
     samples: tuple[SampleResult, ...]
     files: tuple[str, ...]
     """Names of the files with tables, summary and charts in its folder."""

@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 
 from elastocal.identification import CalibrationSummary, describe
+from elastocal.procedure import RunSummary
 from elastocal.records import from_data, to_data
 from elastocal.report.document import SECTIONS
 from elastocal.report.document.sections import PAPER
 from elastocal.verdict import (
     MissingPart,
-    RunFigures,
     codec_findings,
     compliance_findings,
     instrument_findings,
@@ -43,8 +43,8 @@ def with_figures(parts, **changes):
 
 
 def with_summary(parts, **changes):
-    data = parts.summary.model_dump() | changes
-    return replace(parts, summary=RunFigures.model_validate(data))
+    data = to_data(parts.summary) | changes
+    return replace(parts, summary=from_data(RunSummary, data, "summary"))
 
 
 SUSPICIOUS = {
@@ -125,7 +125,7 @@ def test_readings_that_were_left_out_by_hand_hold_back_by_name(parts):
 
 def test_registration_tool_and_noise_are_those_of_the_summary(parts):
     text = words(instruments, parts)
-    registration = parts.summary.registration.model_dump()
+    registration = to_data(parts.summary.registration)
     assert f"{1e6 * registration['stations'][0]['residual_rms']:.1f} µm" in text
     assert f"{parts.summary.tool.mass_kg.value:.2f}" in text
     assert "No station moved" in text
@@ -133,8 +133,11 @@ def test_registration_tool_and_noise_are_those_of_the_summary(parts):
 
 
 def test_a_station_that_moved_holds_back_with_advice(parts):
-    move = {"station": "station_1", "from_pose": 4, "distance": 2e-3, "angle": 0.0}
-    registration = {**parts.summary.registration.model_dump(), "moves": [move]}
+    move = {
+        "station": "station_1", "from_pose": 4, "distance": 2e-3, "angle": 0.0,
+        "log10_probability_of_chance": -9.0,
+    }  # fmt: skip
+    registration = {**to_data(parts.summary.registration), "moves": [move]}
     warning = "station station_1 moved between poses 3 and 4: the marker seemed to jump"
     found = with_summary(parts, registration=registration, warnings=[warning])
     assert f"run: {warning}" in findings(instrument_findings, found)

@@ -2,8 +2,8 @@
 
 An arm does the steps of paper Procedure 1 (4-25). Every command returns at once; the arm is asked
 how far it is by `RobotArm.state`. A caller looks again each supervision cycle, so that a watchdog
-can stop the arm at any step. Forces are those on the robot at the
-tool centre point (spec section 1).
+can stop the arm at any step. Forces are those on the robot at the tool centre point (conventions
+of spec section 1).
 """
 
 from dataclasses import dataclass
@@ -14,7 +14,7 @@ from elastocal.arrays import FloatArray
 
 
 class Motion(Enum):
-    """What the arm is doing."""
+    """States of motion of an arm."""
 
     DISARMED = "disarmed"
     """Drives off, or not released for motion by `RobotArm.enable`."""
@@ -36,7 +36,7 @@ class Motion(Enum):
 
 @dataclass(frozen=True, eq=False)
 class ArmState:
-    """What the controller says of the arm."""
+    """State of an arm, as its controller states it."""
 
     time: float
     """When, in s of the clock."""
@@ -234,7 +234,7 @@ class Metrology(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class Devices:
-    """Everything that is switched on during a run, with the time that they share."""
+    """The devices of a run, with the clock that they share."""
 
     arm: RobotArm
     sensor: ForceSensor

@@ -2,7 +2,6 @@
 
 from pathlib import Path
 
-import numpy as np
 from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
@@ -60,17 +59,10 @@ def show_comparison(console: Console, compared: CompareResult, hint: Path | None
 
 
 def _moved(found: CompareSummary) -> str:
-    moved, count = found.moved_springs, len(found.springs)
-    if not count:
-        return "no spring is determined by both calibrations"
-    verb = "moved" if found.same_springs else "differ"
-    if not moved:
-        return f"none of {count} compared springs and sums of springs {verb} beyond its interval"
-    names = ", ".join(
-        each.name if np.isnan(each.relative) else f"{each.name} ({each.relative:+.0%})"
-        for each in moved
-    )
-    return f"[bold red]{verb}[/bold red]: {escape(names)}"
+    if found.unmoved_sentence:
+        return found.unmoved_sentence
+    names = ", ".join(each.label for each in found.moved_springs)
+    return f"[bold red]{found.verb}[/bold red]: {escape(names)}"
 
 
 def _sums(found: CompareSummary) -> list[SpringChange]:

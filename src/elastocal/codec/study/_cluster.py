@@ -12,7 +12,7 @@ from typing import Any
 from elastocal.errors import CodecError
 
 PATIENCE = 10.0
-"""How long a scheduler or its first worker may take to answer, in s."""
+"""Longest time that a scheduler or its first worker may take to answer, in s."""
 _SCHEDULER = "Scheduler"
 _LOGGERS = ("distributed", "distributed.client")
 """They print tracebacks of what is refused here in one line."""

@@ -14,7 +14,7 @@ from elastocal.records import record
 
 Value = int | float | str
 _LARGEST_SCALE = 100.0
-"""Of the instruments' errors."""
+"""Largest factor on the instruments' errors."""
 _LARGEST_SPREAD = 1.0
 """Standard deviation of the logarithm of a stiffness: a factor of 2.7 either way."""
 
@@ -24,7 +24,7 @@ class Factor:
     """One thing that a study may vary."""
 
     allowed: str
-    """What a value may be, for people."""
+    """Allowed values, in words."""
     unit: str
     """As in a column header; empty for names and counts."""
     read: Callable[[str], Value]

@@ -50,7 +50,7 @@ class PoseChoice:
     order: IndexArray | None
     """In the order of choice; None: every sample draws its own."""
     pool: IndexArray
-    """What is drawn from."""
+    """Poses that samples draw from."""
     count: int
 
     def of(self, rng: Generator) -> IndexArray:

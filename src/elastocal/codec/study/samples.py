@@ -19,7 +19,7 @@ from elastocal.records import record
 
 
 class Purpose(IntEnum):
-    """What a sample draws for; each has a generator of its own."""
+    """A purpose that a sample draws for; each has a generator of its own."""
 
     TRUTH = 0
     """The true arm."""
@@ -34,9 +34,9 @@ class Sample:
     """One of the arms to be simulated."""
 
     seed: int
-    """Of the study."""
+    """Seed of the study."""
     number: int
-    """Of the sample, from 0."""
+    """Number of the sample, from 0."""
 
     def generator(self, purpose: Purpose) -> Generator:
         """Return the generator of a purpose.
@@ -88,7 +88,7 @@ class Verification:
     force: FloatArray
     """True force on the robot in base, shape (reading, 3), in N."""
     deflection: FloatArray
-    """Of the tool in base, shape (reading, 3), in m."""
+    """True deflection of the tool in base, shape (reading, 3), in m."""
 
     def judge(self, model: ElasticModel, compliance: FloatArray) -> ConditionResult:
         """Return how well a calibrated model predicts the deflections."""

@@ -33,7 +33,7 @@ class SpringLabel:
 
     name: str
     unit: str
-    """Of its compliance."""
+    """Unit of its compliance."""
 
 
 @record(DESIGN_SCHEMA)
@@ -60,7 +60,7 @@ class StudyDesign:
     springs: dict[str, tuple[SpringLabel, ...]]
     """By layout, in the order of the compliances."""
     versions: dict[str, str]
-    """Of the packages that make the numbers."""
+    """Versions of the packages that make the numbers."""
 
     @property
     def varied(self) -> tuple[str, ...]:
@@ -71,7 +71,7 @@ class StudyDesign:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """What each condition is called: the values of the factors that are varied."""
+        """Name of each condition: the values of the factors that are varied."""
         return tuple(condition_name(self.varied, each) for each in self.conditions)
 
 

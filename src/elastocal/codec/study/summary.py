@@ -1,4 +1,4 @@
-"""What the samples of a study say about each condition, with intervals; its tables and summary."""
+"""The summary of a study's samples for each condition, with intervals; its tables and files."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -29,7 +29,7 @@ _ERRORS = ("error_mean", "error_max", "deflection_mean")
 
 @record()
 class Distribution:
-    """Of an error over the arms, in m."""
+    """Quantiles of an error over the arms, in m."""
 
     median: float
     median_low: float
@@ -71,7 +71,7 @@ class ConditionSummary:
 
 @record(STUDY_SCHEMA)
 class StudySummary:
-    """What a study says: contents of ``study.json``; all lengths in m."""
+    """The summary of a study: contents of ``study.json``; all lengths in m."""
 
     cell: str
     seed: int
@@ -84,7 +84,7 @@ class StudySummary:
     target: float | None
     """Error that is good enough, in m."""
     advice: str
-    """What the study says about the target; empty without one."""
+    """Fewest poses that reach the target, in words; empty without one."""
     varied: tuple[str, ...]
     """Factors with more than one value."""
     conditions: tuple[ConditionSummary, ...]
@@ -92,7 +92,7 @@ class StudySummary:
 
     @property
     def sentence(self) -> str:
-        """What was studied, and the error without any calibration."""
+        """Arms, poses and loads in words, and the error without any calibration."""
         uncalibrated = micrometres(self.conditions[0].deflection_mean.median)
         return (
             f"{self.samples} simulated arms, errors at {self.verification} unseen poses under"

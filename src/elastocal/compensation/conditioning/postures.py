@@ -1,4 +1,9 @@
-"""Static postures: raw wrenches of a sensor that carries nothing but its tool."""
+"""Static postures: raw wrenches of a sensor that carries nothing but its tool.
+
+A CSV file of them has ``force_x[N] … moment_x[N*m] …`` in the sensor's frame, and either the
+robot's joints, or the flange's orientation in base as ``a[deg] b[deg] c[deg]`` (KUKA Z-Y'-X'') or
+``qx qy qz qw``.
+"""
 
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -17,6 +22,10 @@ from elastocal.tables import opened_table
 
 LEAST_POSTURES = 3
 """Postures; with fewer nothing is left to tell whether the numbers fit."""
+_ANGLES = ("a", "b", "c")
+_QUATERNION = ("qx", "qy", "qz", "qw")
+_UNIT = 1e-2
+"""Largest distance of the length of a quaternion from 1."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,12 +111,6 @@ def static_postures(
         if not np.all(np.isfinite(getattr(made, name))):
             raise CompensationError(f"{name} of the postures holds a value that is not finite")
     return made
-
-
-_ANGLES = ("a", "b", "c")
-_QUATERNION = ("qx", "qy", "qz", "qw")
-_UNIT = 1e-2
-"""Largest distance of the length of a quaternion from 1."""
 
 
 def read_postures(

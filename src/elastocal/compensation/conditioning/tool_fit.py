@@ -31,6 +31,24 @@ TOOL_UNKNOWNS = (
 """The unknowns, in the order of every vector of them; in place of the centre of mass itself the
 vectors hold mass times centre."""
 _ROTATION = slice(1, 4)
+_LEVEL = 0.95
+"""Confidence level of the intervals."""
+_DEPENDENT = 1e-6
+"""Ratio of singular values, columns scaled, below which unknowns depend on one another."""
+_LOADING = 1e-3
+"""Part of an unknown in a dependent direction from which on it counts as not determined."""
+_STEPS = 30
+_DONE = 1e-13
+_NO_MASS = 1e-9
+"""In kg; what divides by the mass divides by no less."""
+_WIDE_MASS = 0.2
+"""Half interval of the mass, as a share of it, beyond which it counts as not determined."""
+_WIDE_ROTATION = np.radians(5.0)
+"""Half interval of a rotation beyond which it is not determined, in rad."""
+_WIDE_CENTRE = 0.05
+"""Half interval of a coordinate of the centre of mass beyond which it is not, in m."""
+_WIDE_BIAS = 0.2
+"""Half interval of a bias, as a share of the weight (of weight times 0.1 m), beyond which."""
 
 
 def tool_wrenches(postures: StaticPostures, values: FloatArray, R: FloatArray) -> FloatArray:
@@ -64,26 +82,6 @@ def _skew(v: FloatArray) -> FloatArray:
     S[..., 1, 0], S[..., 1, 2] = v[..., 2], -v[..., 0]
     S[..., 2, 0], S[..., 2, 1] = -v[..., 1], v[..., 0]
     return S
-
-
-_LEVEL = 0.95
-"""Confidence level of the intervals."""
-_DEPENDENT = 1e-6
-"""Ratio of singular values, columns scaled, below which unknowns depend on one another."""
-_LOADING = 1e-3
-"""Part of an unknown in a dependent direction from which on it counts as not determined."""
-_STEPS = 30
-_DONE = 1e-13
-_NO_MASS = 1e-9
-"""In kg; what divides by the mass divides by no less."""
-_WIDE_MASS = 0.2
-"""Half interval of the mass, as a share of it, beyond which it counts as not determined."""
-_WIDE_ROTATION = np.radians(5.0)
-"""Half interval of a rotation beyond which it is not determined, in rad."""
-_WIDE_CENTRE = 0.05
-"""Half interval of a coordinate of the centre of mass beyond which it is not, in m."""
-_WIDE_BIAS = 0.2
-"""Half interval of a bias, as a share of the weight (of weight times 0.1 m), beyond which."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -131,6 +131,8 @@ class Program:
         products : iterable of tuples of Value
             The summands.
         """
+        # Products are flattened to a sign and names: factors 0 and 1, of which the transforms of a
+        # robot are full, leave no arithmetic behind.
         terms = []
         for product in products:
             sign = 1
@@ -176,6 +178,7 @@ class Program:
 
     def cross(self, name: str, a: Vector, b: Vector, start: Vector = (ZERO, ZERO, ZERO)) -> Vector:
         """Return ``start + a x b``."""
+        # x of a x b is a_y b_z - a_z b_y, and so on round the axes.
         pairs = ((1, 2), (2, 0), (0, 1))
         return _vector(
             self.total(f"{name}_{axis}", [(start[i],), (a[j], b[k]), (-a[k], b[j])])
@@ -203,6 +206,7 @@ def used_names(statements: Iterable[Statement], outputs: Iterable[Value]) -> set
 
 def needed(statements: Sequence[Statement], outputs: Iterable[Value]) -> tuple[Statement, ...]:
     """Return the statements that the outputs depend on, in their order, remarks kept."""
+    # From the last statement back: what follows a statement has already said what it reads.
     wanted = {value.name for value in outputs}
     kept: list[Statement] = []
     for statement in reversed(statements):

@@ -194,6 +194,7 @@ def written(
         case Input(name):
             return inputs[name]
         case Number(number):
+            # Unlike lengths of a URDF, numbers of a law may be tiny and still count.
             plain = number in (0.0, 1.0, -1.0)
             return Value(int(number)) if plain else program.quantity(next(names), number)
         case Product(factors):

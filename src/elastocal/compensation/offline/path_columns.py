@@ -11,6 +11,15 @@ from elastocal.robot import Robot
 from elastocal.tables import Column
 from elastocal.units import factor, split_column
 
+_AXES = ("x", "y", "z")
+_EULER = ("a", "b", "c")
+_QUATERNION = ("qx", "qy", "qz", "qw")
+_FORCES = ("force_", "force_tcp_")
+_MOMENTS = ("moment_", "moment_tcp_")
+"""In base axes, and in those of the programmed tcp."""
+_EXAMPLES = {"angle": "deg", "length": "mm", "force": "N", "moment": "N*m"}
+_Found = Mapping[str, tuple[tuple[int, str | None], ...]]
+
 
 class PathError(CompensationError):
     """A programmed path that cannot be corrected; the message names its line or point."""
@@ -29,15 +38,6 @@ def in_file(path: Path) -> Iterator[None]:
         yield
     except PathError as error:
         raise PathError(f"{path}: {error}") from error
-
-
-_AXES = ("x", "y", "z")
-_EULER = ("a", "b", "c")
-_QUATERNION = ("qx", "qy", "qz", "qw")
-_FORCES = ("force_", "force_tcp_")
-_MOMENTS = ("moment_", "moment_tcp_")
-"""In base axes, and in those of the programmed tcp."""
-_EXAMPLES = {"angle": "deg", "length": "mm", "force": "N", "moment": "N*m"}
 
 
 @dataclass(frozen=True)
@@ -128,9 +128,6 @@ def find_wrench_columns(header: Sequence[str]) -> tuple[WrenchColumns, WrenchCol
     if force is None:
         raise PathError("path has no forces")
     return force, moment
-
-
-_Found = Mapping[str, tuple[tuple[int, str | None], ...]]
 
 
 def _split(header: Sequence[str]) -> _Found:

@@ -13,9 +13,11 @@ from elastocal.robot.inverse import TURN, InverseKinematics
 
 RowName = Callable[[int], str]
 """Names a row for a person, e.g. ``row 12``."""
-
 _ON_LIMIT = 1e-9
 """Outside by less than this, in rad or m, is on the limit."""
+_JUMP = 0.5 * np.pi
+"""A joint that turns farther than this from one row to the next has changed its posture, in rad."""
+_OUTSIDE = 1e-9
 
 
 def check_limits(robot: Robot, q: FloatArray, where: RowName, what: str) -> None:
@@ -66,11 +68,6 @@ def turned_inside(robot: Robot, q: FloatArray) -> FloatArray:
     turned = q - TURN * np.sign(q)
     swap = revolute & (limits.margin(q) < -_ON_LIMIT) & (limits.margin(turned) >= -_ON_LIMIT)
     return np.where(swap, turned, q)
-
-
-_JUMP = 0.5 * np.pi
-"""A joint that turns farther than this from one row to the next has changed its posture, in rad."""
-_OUTSIDE = 1e-9
 
 
 def nearest_zero_posture(robot: Robot) -> FloatArray:

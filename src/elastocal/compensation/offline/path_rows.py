@@ -15,6 +15,10 @@ from elastocal.robot import T_from_xyzabc
 from elastocal.tables import Column, TableError, TableLayout, TableRows, opened_table
 
 _BLOCK = 1 << 20
+_MOST = 2.0 * np.pi * (1.0 + 1e-6)
+"""In rad; controllers write orientations within half a turn, some within a whole one."""
+_UNIT_NORM = 1e-3
+"""Largest distance of the norm of a quaternion from 1."""
 
 
 def read_layout(path: Path) -> TableLayout:
@@ -81,10 +85,6 @@ def _as_path_errors() -> Iterator[None]:
         raise PathError(str(error)) from error
 
 
-_MOST = 2.0 * np.pi * (1.0 + 1e-6)
-"""In rad; controllers write orientations within half a turn, some within a whole one."""
-
-
 def beyond_a_turn(angles: FloatArray) -> tuple[int, int] | None:
     """Return row and column of the first angle of an orientation that is more than a turn.
 
@@ -98,10 +98,6 @@ def beyond_a_turn(angles: FloatArray) -> tuple[int, int] | None:
     """
     found = np.argwhere(~(np.abs(angles) <= _MOST))
     return (int(found[0, 0]), int(found[0, 1])) if len(found) else None
-
-
-_UNIT_NORM = 1e-3
-"""Largest distance of the norm of a quaternion from 1."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,4 +1,4 @@
-"""How the predicted deflection changed along rows of joints and forces.
+"""The change of the predicted deflection along rows of joints and forces.
 
 With ``delta`` the difference of two predictions at a row and ``noise`` how far it may be from the
 true difference ``Delta``, the triangle inequality gives, whatever ``Delta``,

@@ -1,4 +1,4 @@
-"""How far two calibrations may be from each other by chance alone.
+"""The distance that two calibrations may have from each other by chance alone.
 
 The draws of the two models say how far each estimate may be from its truth; the campaigns are
 independent, so a draw of the one goes with any draw of the other. Draws with the same number are
@@ -14,7 +14,7 @@ from elastocal.arrays import FloatArray
 from elastocal.identification.calibrated import CalibratedModel
 
 _SHIFTS = 10
-"""How many draws of the new model each draw of the old one is paired with."""
+"""Number of draws of the new model that each draw of the old one is paired with."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,4 +1,4 @@
-"""Which springs moved: differences of compliances that both calibrations determine, judged at once.
+"""Springs that moved: differences of compliances that both calibrations determine, judged at once.
 
 A calibration does not tell all springs apart: adding any multiple of one of its unobservable
 combinations ``v`` changes no deflection that was measured. A weighted sum ``w . c`` is

@@ -42,16 +42,16 @@ class SpringChange:
     """One spring, or one combination of springs, that both calibrations determine."""
 
     name: str
-    """Of the spring, or the combination as a person would write it:
+    """Name of the spring, or the combination as a person would write it:
     ``joint_a4.axial + joint_a5.x``."""
     terms: tuple[Term, ...]
     """The sum that is compared, ``sum(weight * compliance)``; one term for a single spring."""
     unit: str
     """``rad/(N*m)`` or ``m/N``: of the first spring; the weights bring the others to it."""
     old: Estimate
-    """Of the old calibration, in `unit`."""
+    """Value of the old calibration, in `unit`."""
     new: Estimate
-    """Of the new calibration, in `unit`."""
+    """Value of the new calibration, in `unit`."""
     difference: Estimate
     """New minus old, with the 95 % interval that this difference has by itself, in `unit`."""
     together: Estimate
@@ -64,6 +64,11 @@ class SpringChange:
     def relative(self) -> float:
         """Difference over the old value; NaN where that is not positive."""
         return self.difference.value / self.old.value if self.old.value > 0.0 else float("nan")
+
+    @property
+    def label(self) -> str:
+        """Its name with the relative change, where there is one: ``joint_3.axial (+20%)``."""
+        return self.name if np.isnan(self.relative) else f"{self.name} ({self.relative:+.0%})"
 
     @property
     def certainty(self) -> float:
@@ -98,7 +103,7 @@ class LargestChange:
 
 @record()
 class DeflectionChange:
-    """How the predicted deflection changed over given poses and loads (rows)."""
+    """The change of the predicted deflection over given poses and loads (rows)."""
 
     rows: int
     mean: Estimate
@@ -143,7 +148,7 @@ class CompareSummary:
     reason: str
     """One sentence: why this verdict, or why none; if undecided, what would decide."""
     notes: tuple[str, ...]
-    """What a reader has to know beside the figures, a sentence each."""
+    """Caveats that belong to the figures, a sentence each."""
 
     @property
     def same_springs(self) -> bool:
@@ -153,6 +158,23 @@ class CompareSummary:
         from the robot.
         """
         return not self.only_old and not self.only_new
+
+    @property
+    def verb(self) -> str:
+        """The word for springs that changed: those of different models only *differ*."""
+        return "moved" if self.same_springs else "differ"
+
+    @property
+    def unmoved_sentence(self) -> str:
+        """The sentence where no spring changed; empty where one did."""
+        count = len(self.springs)
+        if not count:
+            return "no spring is determined by both calibrations"
+        if self.moved:
+            return ""
+        return (
+            f"none of {count} compared springs and sums of springs {self.verb} beyond its interval"
+        )
 
     @property
     def moved_springs(self) -> tuple[SpringChange, ...]:
@@ -172,7 +194,7 @@ class RowComparison:
     moment: FloatArray | None
     """Moment on the robot about the tcp in base, shape (row, 3), in N·m; None: none."""
     tcp_position: FloatArray
-    """Where the tcp is, in base, shape (row, 3), in m."""
+    """Position of the tcp in base, shape (row, 3), in m."""
     old: FloatArray
     """Deflection by the old model in base, shape (row, 3), in m."""
     new: FloatArray

@@ -16,6 +16,9 @@ from .findings import (
     summarise as summarise,
 )
 from .readings import (
+    JOINT_ERROR as JOINT_ERROR,
+    LEAST_SAMPLES as LEAST_SAMPLES,
+    SAG as SAG,
     Mean as Mean,
     PoseReadings as PoseReadings,
     Reading as Reading,

@@ -1,4 +1,4 @@
-"""One reading of the dataset: displacements and force of a load against the unloaded reference.
+"""The dataset: displacements and force of every load against the unloaded reference of its pose.
 
 Both displacements are those of the marker: the tracker's, turned into base, and the controller's,
 of the point at the lever arm ``r`` that moves rigidly with its tool frame,
@@ -34,7 +34,7 @@ from elastocal.robot import Robot
 
 @dataclass(frozen=True, eq=False)
 class LoadRow:
-    """What the dataset says of one load case at one pose."""
+    """One load case at one pose, as the dataset holds it."""
 
     pose: int
     load_case: str
@@ -52,7 +52,7 @@ class LoadValues:
     q: FloatArray
     """Shape (joint,)."""
     controller_displacement: FloatArray
-    """Of the marker, shape (3,), in m."""
+    """Displacement of the marker by the controller, shape (3,), in m."""
     marker_displacement: FloatArray
     """Shape (3,), in m."""
     marker_sigma: FloatArray

@@ -39,21 +39,21 @@ from elastocal.procedure.registration import Registration, StationFit, UnloadedR
 
 _SIGMAS = ("force_sigma", "marker_sigma")
 _MASS_SHARE = 0.1
-"""Difference from the cell file's mass that is told, as a share of it; the sensor's own half
+"""Difference from the cell file's mass that is warned of, as a share of it; the sensor's own half
 that does not hang on it is within."""
 _CENTRE = 20e-3
-"""Difference from the cell file's centre of mass that is told, along an axis, in m."""
+"""Difference from the cell file's centre of mass that is warned of, along an axis, in m."""
 _ZEROED = 0.2
 """Share of the tool's mass below which the sensor seems to take the tool weight away itself."""
 _LEVER = 5e-3
-"""Difference from the cell file's lever arm that is told, in m."""
+"""Difference from the cell file's lever arm that is warned of, in m."""
 _LARGE_ROTATION = 5e-3
-"""Standard deviation of a station's rotation that is told, in rad: 5 µm for each mm."""
+"""Standard deviation of a station's rotation that is warned of, in rad: 5 µm for each mm."""
 
 
 @dataclass(frozen=True, eq=False)
 class RunFindings:
-    """Everything that was found on the way to the dataset."""
+    """All that was found on the way to the dataset."""
 
     poses: Sequence[PoseReadings]
     rows: Sequence[LoadRow]

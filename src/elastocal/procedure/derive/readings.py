@@ -1,4 +1,4 @@
-"""From a stretch of the raw streams to one reading: mean, scatter and number of samples.
+"""From windows of the raw streams to readings: mean, scatter and number of samples.
 
 The standard deviation of a mean of ``n`` samples ``x`` with lag-1 autocorrelation ``r`` is that of
 a first-order autoregressive process (Bayley and Hammersley 1946),
@@ -44,7 +44,7 @@ class Mean:
 
 @dataclass(frozen=True, eq=False)
 class ToolState:
-    """Where the controller had the tool, and what the sensor felt."""
+    """Pose of the tool by the controller, and the raw wrench on the sensor."""
 
     q: FloatArray
     """Joint positions, shape (joint,), in rad or m."""
@@ -58,7 +58,7 @@ class ToolState:
 
 @dataclass(frozen=True, eq=False)
 class Reading:
-    """What the devices said during one window."""
+    """Means of every stream over one window."""
 
     window: Window
     """Its status is ``missing``, with a note, where a stream has too few good samples."""

@@ -1,4 +1,4 @@
-"""Tool weight and bias, between raw wrench and force on the robot (spec section 2).
+"""The tool's weight: taken off each reading, estimated from a run, and watched for a change.
 
 The sensor reads, in its own frame,
 
@@ -7,7 +7,18 @@ The sensor reads, in its own frame,
 with ``R`` its rotation in base, ``f`` and ``m`` force and moment on the robot about the sensor's
 origin, ``w`` the tool's weight, ``c`` the tool's centre of mass and the biases ``b``. The unloaded
 reference of the same pose is the tare: with almost the same ``R`` it takes ``b`` and ``w`` away,
-and what the weight turns by between the two is taken away by the cell file's mass.
+and what the weight turns by between the two is taken away by the cell file's mass (spec section 2).
+
+`estimate_tool` finds mass, centre of mass, bias and drift by the unloaded references of a run. With
+a bias that drifts linearly they are linear in the mass, ``h = mass c``, biases and drifts:
+
+    F_i = R_i^T g mass + b + d (t_i - t_mean),
+    M_i = -[R_i^T g]x h + b_m + d_m (t_i - t_mean).
+
+Ordinary least squares with intervals by Student's t; what the orientations do not tell apart is
+NaN, and named. `tool_change` asks whether one mass fits the whole run: a step of it at some reading
+is one more unknown; the best place for it is the one that takes most off the sum of squares, and an
+F test, with the number of places allowed for, says whether that is more than chance.
 """
 
 from dataclasses import dataclass
@@ -20,7 +31,7 @@ from elastocal.arrays import FloatArray
 
 @dataclass(frozen=True, eq=False)
 class ToolLoad:
-    """What hangs on the sensor, and how the sensor sits."""
+    """The tool on the sensor, and how the sensor sits."""
 
     mass: float
     """In kg."""
@@ -55,7 +66,7 @@ class RawWrench:
     moment: FloatArray
     """Sensor frame, about its origin, shape (3,), in N·m."""
     T_base_tcp: FloatArray
-    """Where the tool was, shape (4, 4), in m."""
+    """Tool frame then, shape (4, 4), in m."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,7 +115,7 @@ def turned_sigma(R: FloatArray, *sigmas: FloatArray) -> FloatArray:
 _CHANCE_OF_STEP = 1e-4
 """Probability of a step that is only chance, over all places, below which it is believed."""
 _SHARE = 0.05
-"""Smallest step that is told, as a share of the tool's mass."""
+"""Smallest step that is warned of, as a share of the tool's mass."""
 
 
 @dataclass(frozen=True)
@@ -144,8 +155,8 @@ def tool_change(
     own = steps - basis @ (basis.T @ steps)
     left = b - basis @ (basis.T @ b)
     squares = (own**2).sum(axis=0)
-    told = squares > _DEPENDENT * (steps**2).sum(axis=0)
-    change = np.where(told, own.T @ left / np.where(told, squares, 1.0), 0.0)
+    own_part = squares > _DEPENDENT * (steps**2).sum(axis=0)
+    change = np.where(own_part, own.T @ left / np.where(own_part, squares, 1.0), 0.0)
     gain = change**2 * squares
     best = int(np.argmax(gain))
     rest = max(float(left @ left - gain[best]), np.finfo(float).tiny)
@@ -156,7 +167,7 @@ def tool_change(
 
 
 _LEVEL = 0.95
-"""Of the intervals."""
+"""Probability of the intervals."""
 _WIDE_MASS = 0.2
 """Half interval of the mass, as a share of it, beyond which it counts as not determined."""
 _WIDE_CENTRE = 0.05
@@ -164,10 +175,7 @@ _WIDE_CENTRE = 0.05
 _DEPENDENT = 1e-8
 """Ratio of singular values, columns scaled, below which columns depend on one another."""
 
-_NAMES = (
-    "mass",
-    *(f"{what} {axis}" for what in ("force bias", "force drift") for axis in "xyz"),
-)
+_NAMES = ("mass", *(f"{what} {axis}" for what in ("force bias", "force drift") for axis in "xyz"))
 _MOMENT_NAMES = tuple(
     f"{what} {axis}" for what in ("centre of mass", "moment bias", "moment drift") for axis in "xyz"
 )
@@ -199,10 +207,10 @@ class Interval:
 
 @dataclass(frozen=True, eq=False)
 class ToolEstimate:
-    """What the unloaded references say of tool and sensor."""
+    """Tool and sensor by the unloaded references of a run."""
 
     count: int
-    """UnloadedWrenches references."""
+    """Unloaded references."""
     mass: Interval
     """Shape (), in kg."""
     centre: Interval
@@ -222,12 +230,12 @@ class ToolEstimate:
     undetermined: tuple[str, ...]
     """Names of what the orientations and times do not tell apart."""
     change: ToolChange | None = None
-    """Where one mass does not fit the whole run: mass, centre and biases are then those of no
+    """Set where one mass does not fit the whole run: mass, centre and biases are then those of no
     tool."""
 
 
 def estimate_tool(unloaded: UnloadedWrenches, nominal_mass: float) -> ToolEstimate:
-    """Return what the unloaded references say of tool and sensor.
+    """Return tool and sensor as the unloaded references show them.
 
     Parameters
     ----------

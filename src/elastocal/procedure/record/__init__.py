@@ -1,4 +1,4 @@
-"""What a run keeps on the disk: folder, journal, raw streams, and the record of its result."""
+"""The record of a run on the disk: its folder, its journal, its raw streams."""
 
 import lazy_loader
 

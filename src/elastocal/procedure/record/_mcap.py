@@ -1,4 +1,8 @@
-"""Write an MCAP file: compressed chunks in order of time, then the index that viewers jump by."""
+"""MCAP files: written in compressed chunks with the index that viewers jump by, and read whole.
+
+The library's records are used for everything but the messages themselves: one Python object a
+sample, at thousands of samples a second, would take longer than the pose (see `_framed`).
+"""
 
 import struct
 import zlib
@@ -70,7 +74,7 @@ class Topic:
 CHUNK = 4096
 """Messages in a chunk: half a megabyte of JSON, which is what viewers load at a time."""
 _LEVEL = 1
-"""Of the compression: the fastest; higher ones save a tenth of the size for twice the time."""
+"""Of zstd, the fastest: higher levels save a tenth of the size for twice the time."""
 
 _HEAD = np.dtype(
     [
@@ -245,7 +249,7 @@ class Messages:
 
 @dataclass(frozen=True)
 class Contents:
-    """What a file holds."""
+    """Contents of a file."""
 
     metadata: Mapping[str, Mapping[str, str]]
     """Key and value texts by the name of their record."""

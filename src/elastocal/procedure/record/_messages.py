@@ -1,4 +1,4 @@
-"""What one message of a raw stream says: JSON schemas, and samples as JSON text.
+"""Messages of the raw streams: their JSON schemas, and samples as JSON text.
 
 One message a sample, because that is what both viewers draw: Foxglove plots ``/wrench.force.z``
 and PlotJuggler lists ``/wrench/force/z``. A block of samples as arrays would be three times as
@@ -25,7 +25,7 @@ ARM, WRENCH, MARKER, MARKS = "/arm", "/wrench", "/marker", "/marks"
 _NUMBER = {"type": "number"}
 """Not ``["number", "null"]``: one type a field is what every viewer's schema reader knows."""
 _HERE = "\0"
-"""Where a number belongs; no JSON text holds this letter."""
+"""Place of a number; no JSON text holds this letter."""
 _XYZ = f'{{"x":{_HERE},"y":{_HERE},"z":{_HERE}}}'
 _XYZW = f'{_XYZ[:-1]},"w":{_HERE}}}'
 

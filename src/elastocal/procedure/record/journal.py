@@ -21,7 +21,7 @@ from elastocal.records import StrictModel
 
 
 class ReadingStatus(Enum):
-    """How a reading came about; the flags of the dataset's ``status`` (spec section 3)."""
+    """Quality of a reading; the flags of the dataset's ``status`` (spec section 3)."""
 
     OK = "ok"
     SLIPPED = "slipped"
@@ -79,11 +79,11 @@ class Event(Enum):
     GIVEN_UP = "given up"
     """All attempts at a pose failed; the run goes on without it."""
     FINISH = "finish"
-    """Last entry of a run, or of one stretch of it."""
+    """Last entry of a session."""
 
 
 class Action(Enum):
-    """What the arm is told between two entries."""
+    """Command to the arm between two entries."""
 
     ENABLE = "enable"
     MOVE = "move"
@@ -108,13 +108,13 @@ class RunRecord(StrictModel):
     cell_file: str
     """Path of the cell file in the run's folder ``cell``."""
     seed: int
-    """Of simulated devices."""
+    """Seed of simulated devices."""
     started: str
     """Date and time of day, ISO 8601, UTC."""
 
     @property
     def origin(self) -> str:
-        """What a dataset says of the run that it comes from."""
+        """Provenance that a dataset states."""
         return (
             f"started {self.started} with elastocal {self.elastocal}, plan {self.plan[:12]}, cell"
             f" {self.cell[:12]}, seed {self.seed}"
@@ -149,7 +149,7 @@ class Entry(StrictModel):
     run: RunRecord | None = None
     log: PoseLog | None = None
     streams_sha256: str | None = None
-    """Of the file with the raw streams of a finished pose."""
+    """SHA-256 of the file with the raw streams of a finished pose."""
 
 
 Sync = Callable[[int], None]

@@ -20,13 +20,7 @@ from elastocal import __version__
 from elastocal.arrays import BoolArray, FloatArray
 from elastocal.cell.devices import ArmState, PointBlock, SensorStatus, WrenchBlock
 from elastocal.errors import ProcedureError, SchemaError
-from elastocal.procedure.record._mcap import (
-    Messages,
-    TimeArray,
-    Topic,
-    read_mcap,
-    write_mcap,
-)
+from elastocal.procedure.record._mcap import Messages, TimeArray, Topic, read_mcap, write_mcap
 from elastocal.procedure.record._messages import (
     ARM,
     MARKER,
@@ -207,7 +201,8 @@ class WrenchStream:
     moment: FloatArray
     """About the sensor's origin, shape (sample, 3), in N·m."""
     force_sigma: FloatArray
-    """Of one sample and axis by the maker, shape (sample,), in N; NaN where not known."""
+    """Standard deviation of one sample and axis by the maker, shape (sample,), in N; NaN where
+    not known."""
     ok: BoolArray
     """Whether the sensor called the sample good, shape (sample,)."""
 
@@ -221,14 +216,15 @@ class PointStream:
     position: FloatArray
     """Shape (sample, 3), in m."""
     sigma: FloatArray
-    """Of one sample by the maker, shape (sample, 3), in m; NaN where not known."""
+    """Standard deviation of one sample by the maker, shape (sample, 3), in m; NaN where not
+    known."""
     station: NDArray[np.str_]
     """Station of each sample, shape (sample,)."""
 
 
 @dataclass(frozen=True, eq=False)
 class Streams:
-    """Everything that the devices messages during one pose attempt; the arrays are read-only."""
+    """All that the devices said during one pose attempt; the arrays are read-only."""
 
     joint_names: tuple[str, ...]
     arm: ArmStream

@@ -1,6 +1,4 @@
-from ._fit import (
-    UnloadedReadings as UnloadedReadings,
-)
+from ._fit import UnloadedReadings as UnloadedReadings
 from .register import (
     Blunder as Blunder,
     Registration as Registration,

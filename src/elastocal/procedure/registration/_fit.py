@@ -107,7 +107,7 @@ def rotation_sigma(position: FloatArray, scatter: float) -> float:
 
 
 LEVER_SIGMA = 5e-3
-"""How well the cell file knows the lever arm, in m: a ruler's reading on a probe holder."""
+"""Standard deviation of the cell file's lever arm, in m: a ruler's reading on a probe holder."""
 DEFAULT_SCATTER = 0.1e-3
 """Scatter of a coordinate where the readings do not show one, in m."""
 _ROUNDS = 4
@@ -139,7 +139,7 @@ class Fit:
     """Whitened, shape (row, unknown): per group 3 rotation (about the group's centre) and 3
     translation, 3 lever arm, then robot errors."""
     e: FloatArray
-    """What is left of the whitened rows, shape (row,)."""
+    """Residuals of the whitened rows, shape (row,)."""
 
     @property
     def covariance(self) -> FloatArray:

@@ -49,7 +49,7 @@ class _Hypothesis:
     rows: BoolArray
     """Readings that it concerns, shape (reading,)."""
     columns: FloatArray
-    """What its unknowns do to them, shape (reading concerned, 3, unknown)."""
+    """Effect of its unknowns on them, shape (reading concerned, 3, unknown)."""
 
 
 def find(readings: UnloadedReadings, fit: Fit) -> Finding | None:

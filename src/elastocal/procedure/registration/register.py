@@ -84,8 +84,8 @@ class Registration:
     """Axes of the tcp frame along which the orientations say nothing about the lever arm: there
     it is the cell file's."""
     scatter: float
-    """What is left in one coordinate when station, lever arm and the robot's likely errors are
-    fitted, tracker noise taken out, in m."""
+    """Scatter that is left in one coordinate when station, lever arm and the robot's likely
+    errors are fitted, tracker noise taken out, in m."""
     moves: tuple[StationMove, ...]
     blunders: tuple[Blunder, ...]
     unregistered: dict[str, str]

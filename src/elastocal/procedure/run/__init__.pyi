@@ -16,9 +16,7 @@ from .routes import (
     route as route,
     stop_joints as stop_joints,
 )
-from .runner import (
-    Runner as Runner,
-)
+from .runner import Runner as Runner
 from .session import (
     LastKnown as LastKnown,
     RunEnd as RunEnd,

@@ -27,7 +27,7 @@ class Attempt:
     pose: PoseRecord
     station: str
     number: int
-    """From 1, over all stretches of the run."""
+    """From 1, over all sessions of the run."""
     legs: tuple[Joints, ...]
     """Joint positions to pass on the way to the approach pose, which is the last."""
     streams: str
@@ -44,7 +44,7 @@ class Attempt:
     """Marker at the approach pose, shape (3,), in m, tracker frame."""
     slip_reference: SlipReference | None = None
     slide: SlideDetector | None = None
-    """Of the present load case."""
+    """Slides of the present load case."""
     slip_origin: float = 0.0
     """Lateral movement that has been reported as slip already, in m."""
     slip: float = 0.0

@@ -16,13 +16,7 @@ from elastocal.procedure.run import _press
 from elastocal.procedure.run._attempt import Attempt
 from elastocal.procedure.run._motion import has_gone, is_idle, release_limit, retract_limit
 from elastocal.procedure.run._supervisor import DEVICE_ERRORS, Supervisor
-from elastocal.procedure.run.faults import (
-    EXPECTED_ERRORS,
-    Fault,
-    FaultError,
-    FaultScope,
-    as_fault,
-)
+from elastocal.procedure.run.faults import EXPECTED_ERRORS, Fault, FaultError, FaultScope, as_fault
 from elastocal.procedure.run.steps import (
     MAY_TOUCH,
     ON_APPROACH_LINE,

@@ -35,7 +35,7 @@ DEVICE_ERRORS = (DeviceError, FaultError, OSError)
 
 @dataclass(frozen=True)
 class Observers:
-    """Who may look on, and interrupt."""
+    """Listeners of the cycle, who may also interrupt."""
 
     report: Callable[[Snapshot], None]
     """Called each cycle."""

@@ -28,7 +28,7 @@ _LOOK_AGAIN = 1.0
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Snapshot:
-    """What the devices said in one cycle."""
+    """State and samples of every device in one cycle."""
 
     time: float
     arm: ArmState
@@ -40,7 +40,7 @@ class Snapshot:
 
 @dataclass(frozen=True, eq=False)
 class Guard:
-    """What must hold during a state, beyond live devices."""
+    """Conditions that must hold during a state, beyond live devices."""
 
     force: float = np.inf
     """Largest force, in N."""

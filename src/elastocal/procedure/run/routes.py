@@ -165,7 +165,7 @@ def home_route(
 def _stands_before(
     plan: PlanResult, pose: PoseRecord, q: FloatArray, T_base_tcp: FloatArray, travel_limit: float
 ) -> bool:
-    """Whether the arm is on the line between approach pose and surface."""
+    """Return whether the arm is on the line between approach pose and surface."""
     line, posture = ApproachLine.of_pose(pose, travel_limit), np.abs(q - pose.approach_joints)
     height = line.height(T_base_tcp)
     return (

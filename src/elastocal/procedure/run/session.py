@@ -53,7 +53,7 @@ class Session:
 
 @dataclass(frozen=True)
 class SessionHooks:
-    """What a session needs from outside, beside devices."""
+    """Recorder, listener and interruption of a session."""
 
     recorder: Callable[[], StreamRecorder]
     """Makes the recorder of one attempt."""
@@ -107,7 +107,7 @@ class LastKnown:
 
     @property
     def lines(self) -> tuple[str, ...]:
-        """What a person should know before the run goes on."""
+        """Lines that a person should read before the run goes on."""
         entry = self.entry
         done = ", ".join(map(str, self.committed)) or "none"
         where = "between poses" if entry.pose is None else f"pose {entry.pose}"

@@ -6,6 +6,7 @@ from functools import partial
 import numpy as np
 
 from elastocal.compensation.conditioning import ToolResult
+from elastocal.procedure.derive import MoveSummary, RegistrationSummary, RunSummary, ToolSummary
 from elastocal.report.document.blocks import (
     Block,
     Bullets,
@@ -19,10 +20,6 @@ from elastocal.report.document.blocks import (
 from elastocal.report.plots import StationResiduals, station_figure
 from elastocal.verdict import (
     Evidence,
-    RegistrationFigures,
-    RunFigures,
-    StationMove,
-    ToolFigures,
 )
 from elastocal.wording import counted, mm, point, spans, um
 
@@ -46,7 +43,7 @@ def _body(evidence: Evidence) -> Content:
     )
 
 
-def _stations(registration: RegistrationFigures) -> Iterator[Block]:
+def _stations(registration: RegistrationSummary) -> Iterator[Block]:
     rows = tuple(
         (
             each.station,
@@ -84,7 +81,7 @@ def _stations(registration: RegistrationFigures) -> Iterator[Block]:
         yield Bullets(lost)
 
 
-def _moves(moves: tuple[StationMove, ...]) -> str:
+def _moves(moves: tuple[MoveSummary, ...]) -> str:
     if not moves:
         return "No station moved during the run."
     return " ".join(
@@ -94,7 +91,7 @@ def _moves(moves: tuple[StationMove, ...]) -> str:
     )
 
 
-def _noise(summary: RunFigures) -> Block:
+def _noise(summary: RunSummary) -> Block:
     noise, drift, moment = summary.noise, summary.drift, summary.contact_moment
     at_pose = "" if drift.pose is None else f" at pose {drift.pose}"
     rows = (
@@ -111,7 +108,7 @@ def _noise(summary: RunFigures) -> Block:
     return Table("Noise and drift", ("What", "Value"), rows, texts=2)
 
 
-def _tool(tool: ToolFigures) -> Iterator[Block]:
+def _tool(tool: ToolSummary) -> Iterator[Block]:
     mass, centre = tool.mass_kg, tool.centre_of_mass
     rows = [("Mass in kg", *_scaled(1.0, mass.value, mass.half_width_95, mass.cell))]
     for k, axis in enumerate("xyz"):

@@ -13,6 +13,7 @@ from elastocal.identification import (
     Reproduction,
     UnseenErrors,
 )
+from elastocal.procedure.derive import RunSummary
 from elastocal.report.document.blocks import (
     Block,
     Bullets,
@@ -26,7 +27,7 @@ from elastocal.report.document.blocks import (
     picture,
 )
 from elastocal.report.plots import displacement_figure, pose_grid
-from elastocal.verdict import Evidence, RunFigures
+from elastocal.verdict import Evidence
 from elastocal.wording import counted, mm
 
 _PoseValues = dict[tuple[int, str], float]
@@ -53,7 +54,7 @@ def _blocks(evidence: Evidence) -> Iterator[Block]:
         yield _worst(reproduction.unseen)
 
 
-def _counts(dataset: Dataset, summary: RunFigures | None) -> Iterator[Block]:
+def _counts(dataset: Dataset, summary: RunSummary | None) -> Iterator[Block]:
     readings = dataset.readings(dataset.joint_names)
     size = np.linalg.norm(readings.deflection, axis=1)
     yield Facts(
