@@ -10,7 +10,7 @@ from elastocal.identification import UnseenErrors
 from elastocal.progress import Progress
 from elastocal.records import record
 from elastocal.report.document import find_browser, write_pdf, write_report
-from elastocal.results import Result
+from elastocal.results import Result, brief_repr
 from elastocal.verdict import EvidenceOptions, Verdict, gather_evidence
 from elastocal.workflows._workflow import workflow
 
@@ -63,6 +63,7 @@ class UnseenFigures:
     readings: int
 
 
+@brief_repr
 @record()
 class ReportFigures:
     """The figures of ``report --json``."""

@@ -27,8 +27,10 @@ import numpy as np
 from scipy.special import fdtrc, stdtrit
 
 from elastocal.arrays import FloatArray
+from elastocal.results import brief_repr
 
 
+@brief_repr
 @dataclass(frozen=True, eq=False)
 class ToolLoad:
     """The tool on the sensor, and how the sensor sits."""
@@ -57,6 +59,7 @@ class ToolLoad:
         return moment
 
 
+@brief_repr
 @dataclass(frozen=True, eq=False)
 class RawWrench:
     """Mean raw wrench at one place of the tool."""
@@ -69,6 +72,7 @@ class RawWrench:
     """Tool frame then, shape (4, 4), in m."""
 
 
+@brief_repr
 @dataclass(frozen=True, eq=False)
 class RobotWrench:
     """Wrench on the robot at the tool centre point, in base."""
@@ -181,6 +185,7 @@ _MOMENT_NAMES = tuple(
 )
 
 
+@brief_repr
 @dataclass(frozen=True, eq=False)
 class UnloadedWrenches:
     """Raw wrenches of unloaded references, in the order of time."""
@@ -197,6 +202,7 @@ class UnloadedWrenches:
     """In base, shape (3,), in m/s²."""
 
 
+@brief_repr
 @dataclass(frozen=True, eq=False)
 class Interval:
     """An estimate with the half width of its 95 % interval; both NaN where not determined."""
@@ -205,6 +211,7 @@ class Interval:
     half_width: FloatArray
 
 
+@brief_repr
 @dataclass(frozen=True, eq=False)
 class ToolEstimate:
     """Tool and sensor by the unloaded references of a run."""
