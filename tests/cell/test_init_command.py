@@ -2,7 +2,7 @@
 
 import pytest
 
-from elastocal.cli.init import init
+from elastocal.cli.commands.init import init
 from elastocal.errors import FileAccessError
 
 
