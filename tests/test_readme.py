@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import get_args
 
 import pytest
+from elastocal.cli.demo_story import chapters
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
@@ -18,7 +19,6 @@ from elastocal.cell import CellFile
 from elastocal.cell.description import ProcedureSettings
 from elastocal.cell.description.simulation import FaultKind
 from elastocal.cell.fingerprint import RUN_SECTIONS
-from elastocal.cli.demo_story import chapters
 from elastocal.procedure.run.faults import Fault
 from support.cli import Result, elastocal
 from support.demos import demo_result, finished_demo
