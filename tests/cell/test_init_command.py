@@ -1,8 +1,13 @@
 """``elastocal init``, called as a function; the command line registers it."""
 
 import pytest
-from elastocal.cli.init import init
+<<<<<<< HEAD
+from elastocal.cli.commands.init import init
 
+=======
+
+from elastocal.cli.commands.init import init
+>>>>>>> ec3f11d537dd3fcae0dd83106972b0821d20d5e0
 from elastocal.errors import FileAccessError
 
 
