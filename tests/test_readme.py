@@ -20,7 +20,6 @@ from elastocal.cell.description.simulation import FaultKind
 from elastocal.cell.fingerprint import RUN_SECTIONS
 from elastocal.procedure.run.faults import Fault
 from elastocal.workflows import chapters
-from elastocal.workflows.demo import chapters
 from support.cli import Result, elastocal
 from support.demos import demo_result, finished_demo
 

@@ -1,13 +1,8 @@
 """``elastocal init``, called as a function; the command line registers it."""
 
 import pytest
-<<<<<<< HEAD
-from elastocal.cli.commands.init import init
-
-=======
 
 from elastocal.cli.commands.init import init
->>>>>>> ec3f11d537dd3fcae0dd83106972b0821d20d5e0
 from elastocal.errors import FileAccessError
 
 
