@@ -22,9 +22,13 @@ def faces(measured):
     return house.find_faces(measured.modules)
 
 
+def test_imports_across_packages_go_through_a_face(measured):
+    assert measured.bypasses == []
+
+
 def test_a_face_holds_no_logic(measured):
     for module in measured.modules.values():
-        if module.is_face:
+        if module.is_face and module.name != "elastocal":
             assert house.defined_names(module) <= {"__getattr__", "__dir__", "__all__"}, module.name
             assert module.path.with_suffix(".pyi").is_file() or len(module.code) == 0, module.name
 
@@ -42,6 +46,8 @@ def test_no_module_hides_what_its_face_exports_under_the_same_name(measured, fac
         for package, names in faces.items()
         for name, source in names.items()
         if f"{package}.{name}" in measured.modules and source != f"{package}.{name}"
+        # The top face keeps two commands in sight of packages; tests/test_top_face.py holds it.
+        if package != "elastocal"
     ]
     assert hidden == []
 

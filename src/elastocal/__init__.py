@@ -13,6 +13,25 @@ The work of every command is a function here; equations and parts are in the sub
 Nothing is imported before it is used.
 """
 
+import sys
+import types
+
 import lazy_loader
 
 __getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
+
+
+class _Face(types.ModuleType):
+    """Keeps the commands `codec` and `report` in sight of the packages that bear their names.
+
+    Python sets a package's attribute when a subpackage is imported; ``ec.codec(...)`` is to stay
+    the command. ``from elastocal.codec import ...`` finds the package as ever.
+    """
+
+    def __setattr__(self, name: str, value: object) -> None:
+        """Set an attribute, but no subpackage under the name of a command."""
+        if not (name in __all__ and isinstance(value, types.ModuleType)):
+            super().__setattr__(name, value)
+
+
+sys.modules[__name__].__class__ = _Face

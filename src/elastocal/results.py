@@ -103,8 +103,10 @@ def brief(value: Any) -> str:
 
 
 def _literally(value: Any) -> str:
-    text = brief(value)
-    return repr(text) if isinstance(value, str) else text
+    if not isinstance(value, str):
+        return brief(value)
+    lines = value.count("\n") + 1
+    return repr(brief(value)) if lines == 1 else f"{lines} lines"
 
 
 def _entries(value: Collection[Any]) -> str:

@@ -1,8 +1,8 @@
 """``elastocal init``, called as a function; the command line registers it."""
 
 import pytest
-from elastocal.cli.init import init
 
+from elastocal.cli.commands.init import init
 from elastocal.errors import FileAccessError
 
 

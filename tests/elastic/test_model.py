@@ -139,21 +139,6 @@ def test_the_torque_of_a_force_through_the_axis_is_zero():
     assert spring_torques(jacobian, [3.0, 4.0, 5.0], [0.0, 0.0, 7.0]) == pytest.approx(7.0)
 
 
-def test_translational_stiffness_is_the_inverse_of_the_compliance(model):
-    compliance = model.cartesian_compliance(C, Q)
-    np.testing.assert_allclose(
-        compliance.translational_stiffness() @ compliance.translation,
-        np.tile(np.eye(3), (6, 1, 1)),
-        atol=1e-8,
-    )
-
-
-def test_a_direction_that_does_not_yield_has_no_stiffness(model):
-    one = np.eye(18)[0] * 1e-6
-    with pytest.raises(SpringError, match="does not yield"):
-        model.cartesian_compliance(one, Q).translational_stiffness()
-
-
 @pytest.mark.parametrize("c", [np.ones(17), np.full(18, np.nan), 1.0, np.ones((18, 1))])
 def test_compliances_of_another_shape_or_not_finite_are_refused(model, c):
     with pytest.raises(SpringError, match="18 finite numbers"):

@@ -8,4 +8,4 @@ from .load_rows import (
 )
 from .merging import merge as merge
 from .readings import Readings as Readings, without as without
-from .store import read as read, write as write
+from .store import read as read, read_dataset as read_dataset, write as write

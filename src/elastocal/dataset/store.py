@@ -95,3 +95,7 @@ _FORMATS: dict[str, tuple[_Read, _Write]] = {
     ".nc": (_read_netcdf, _write_netcdf),
     ".csv": (_read_csv, write_table),
 }
+
+
+read_dataset = read
+"""`read` under the name that it has in the face of `elastocal`."""

@@ -50,18 +50,6 @@ class CartesianCompliance:
     """Displacement per moment, shape (..., 3, 3), in m/(N·m); its transpose is rotation per
     force."""
 
-    def translational_stiffness(self) -> FloatArray:
-        """Return the force per displacement when the tool may turn, shape (..., 3, 3), in N/m.
-
-        Raises
-        ------
-        SpringError
-            If a direction has no compliance at all.
-        """
-        if not np.all(np.linalg.cond(self.translation) < 1.0 / np.finfo(float).eps):
-            raise SpringError("Cartesian compliance is singular: some direction does not yield")
-        return np.asarray(np.linalg.inv(self.translation), dtype=float)
-
 
 @dataclass(frozen=True, eq=False)
 class _Alike:

@@ -21,7 +21,6 @@ from .robot import (
 from .singularity import (
     characteristic_length as characteristic_length,
     has_wrist as has_wrist,
-    manipulability as manipulability,
     scaled_singular_values as scaled_singular_values,
     smallest_singular_value as smallest_singular_value,
     wrist_angle as wrist_angle,

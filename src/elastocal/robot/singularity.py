@@ -103,21 +103,6 @@ def smallest_singular_value(robot: Robot, q: ArrayLike, length: float | None = N
     return scaled_singular_values(robot, q, length)[..., -1]
 
 
-def manipulability(robot: Robot, q: ArrayLike, length: float | None = None) -> FloatArray:
-    """Return Yoshikawa's manipulability, ``sqrt(det(J Jᵀ))``, of the length-scaled Jacobian.
-
-    T. Yoshikawa, "Manipulability of robotic mechanisms", Int. J. Robotics Research 4(2), 1985.
-    Parameters and errors: see `scaled_singular_values`.
-
-    Returns
-    -------
-    ndarray, shape (...)
-        Without dimension.
-    """
-    product: FloatArray = np.prod(scaled_singular_values(robot, q, length), axis=-1)
-    return product
-
-
 def has_wrist(robot: Robot) -> bool:
     """Return whether the arm has six joints, the fourth and the sixth revolute."""
     arm = robot.revolute[robot.external_axes :]

@@ -13,9 +13,6 @@ _ESSENTIAL = ("run", "journal", "cell", "plan", "summary of the run", "dataset",
 """Parts without which no light is green; the codec has a finding of its own."""
 _TOLD_ELSEWHERE = ("codec", "earlier calibration")
 """A codec has a finding of its own; a first calibration has no earlier one."""
-_MOVED_ADVICE = (
-    "Fix the tracker's stand before the next run: a station that moves splits its poses."
-)
 
 
 @dataclass(frozen=True)

@@ -24,6 +24,29 @@ from elastocal.workflows._workflow import workflow
 
 Describe = Callable[[Path], FileDescription]
 
+_JSON_KINDS: dict[str, Describe] = {
+    "elastocal.plan": measurement.plan_file,
+    "elastocal.run-summary": measurement.summary_file,
+    "elastocal.tool": results.tool_file,
+    "elastocal.codec_verdicts": results.verdicts,
+    "elastocal.study": results.study_record,
+    "elastocal.study_settings": results.study_settings,
+    "elastocal.study_samples": results.study_samples,
+    "elastocal.process": results.process_table,
+    "elastocal.comparison": results.comparison_file,
+}
+"""JSON files by the schema that they state, without its version; others are read as a model."""
+_NETCDF_KINDS: dict[str, Describe] = {
+    "elastocal.codec": results.arrays,
+    "elastocal.pool": measurement.pool_file,
+}
+"""NetCDF files likewise; others are read as a dataset."""
+_YAML_KINDS: dict[str, Describe] = {
+    "elastocal.cell": measurement.cell_file,
+    "elastocal.compensator": results.compensator_file,
+}
+"""YAML files likewise; others are read as springs."""
+
 _IN_JSON = re.compile(r'"schema":\s*"(elastocal\.[\w-]+)/')
 _IN_YAML = re.compile(r"^schema:\s*[\"']?(elastocal\.[\w-]+)/", re.MULTILINE)
 
@@ -85,19 +108,9 @@ def describe_file(path: Path) -> FileDescription:
     """
     if path.is_dir():
         return _folder(path)
-    known: dict[str, Describe] = {
-        ".nc": _netcdf,
-        ".csv": _table,
-        ".json": _json,
-        ".urdf": measurement.robot_file,
-        ".jsonl": measurement.journal_file,
-        ".mcap": measurement.streams_file,
-        ".yaml": _settings,
-        ".yml": _settings,
-    }
-    describe = known.get(path.suffix.lower())
+    describe = _BY_SUFFIX.get(path.suffix.lower())
     if describe is None:
-        raise SchemaError(f"{path}: suffix {path.suffix!r} is not one of {', '.join(known)}")
+        raise SchemaError(f"{path}: suffix {path.suffix!r} is not one of {', '.join(_BY_SUFFIX)}")
     return describe(path)
 
 
@@ -125,27 +138,12 @@ def _netcdf(path: Path) -> FileDescription:
         stated = read_arrays(path).attributes.get("schema")
     except SchemaError as error:
         raise DatasetError(str(error)) from error
-    kinds: dict[str, Describe] = {
-        "elastocal.codec": results.arrays,
-        "elastocal.pool": measurement.pool_file,
-    }
-    return kinds.get(str(stated).partition("/")[0], measurement.dataset_file)(path)
+    return _NETCDF_KINDS.get(str(stated).partition("/")[0], measurement.dataset_file)(path)
 
 
 def _json(path: Path) -> FileDescription:
     """Describe a JSON file by the schema that it states; what states none is read as a model."""
-    kinds: dict[str, Describe] = {
-        "elastocal.plan": measurement.plan_file,
-        "elastocal.run-summary": measurement.summary_file,
-        "elastocal.tool": results.tool_file,
-        "elastocal.codec_verdicts": results.verdicts,
-        "elastocal.study": results.study_record,
-        "elastocal.study_settings": results.study_settings,
-        "elastocal.study_samples": results.study_samples,
-        "elastocal.process": results.process_table,
-        "elastocal.comparison": results.comparison_file,
-    }
-    return kinds.get(_stated(_IN_JSON, read_text(path)[:200]), results.model_file)(path)
+    return _JSON_KINDS.get(_stated(_IN_JSON, read_text(path)[:200]), results.model_file)(path)
 
 
 def _table(path: Path) -> FileDescription:
@@ -160,8 +158,17 @@ def _stated(pattern: re.Pattern[str], text: str) -> str:
 
 def _settings(path: Path) -> FileDescription:
     """Describe a YAML file by the schema that it states."""
-    kinds: dict[str, Describe] = {
-        "elastocal.cell": measurement.cell_file,
-        "elastocal.compensator": results.compensator_file,
-    }
-    return kinds.get(_stated(_IN_YAML, read_text(path)), results.springs_file)(path)
+    return _YAML_KINDS.get(_stated(_IN_YAML, read_text(path)), results.springs_file)(path)
+
+
+_BY_SUFFIX: dict[str, Describe] = {
+    ".nc": _netcdf,
+    ".csv": _table,
+    ".json": _json,
+    ".urdf": measurement.robot_file,
+    ".jsonl": measurement.journal_file,
+    ".mcap": measurement.streams_file,
+    ".yaml": _settings,
+    ".yml": _settings,
+}
+"""Files by their suffix."""

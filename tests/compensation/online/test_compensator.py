@@ -3,6 +3,7 @@ import pytest
 
 from elastocal.compensation.conditioning import SensorLoad
 from elastocal.compensation.online import Compensator, Reading, Status, rkorr
+from elastocal.procedure.derive.tool import RawWrench, ToolLoad, wrench_on_robot
 from support.compensated import arm, load, settings
 
 Q = [0.3, -0.8, 1.2, 0.4, -0.7, 0.2]
@@ -80,9 +81,14 @@ class TestCorrection:
         compensator = Compensator.of(arm(), settings(**PLAIN), tool)
         state = compensator.condition(compensator.start(), pushed()._replace(time=1.0))
         state = compensator.condition(state, pushed()._replace(time=1.004))
-        R = arm().model.robot.forward(Q)[:3, :3]
-        force, moment = tool.wrench_tcp(R, np.array(pushed().force), np.array(pushed().moment))
-        np.testing.assert_allclose(state.wrench, [*force, *moment], rtol=1e-12)
+        T = arm().model.robot.forward(Q)
+        air = tool.mass * tool.gravity @ T[:3, :3] @ tool.T_tcp_sensor[:3, :3]
+        bias = air + tool.force_bias, np.cross(tool.centre, air) + tool.moment_bias
+        known = ToolLoad(tool.mass, tool.centre, tool.gravity, tool.T_tcp_sensor)
+        raw = RawWrench(np.array(pushed().force), np.array(pushed().moment), T)
+        found = wrench_on_robot(raw, RawWrench(*bias, T), known)
+        expected = np.concatenate([found.force @ T[:3, :3], found.moment @ T[:3, :3]])
+        np.testing.assert_allclose(state.wrench, expected, rtol=1e-12)
 
     def test_half_width_is_1_96_deviations_of_the_draws(self):
         compensator = plain()

@@ -1,22 +1,27 @@
-"""What the commands print that need no table: some lines each."""
+"""What the commands print that need no table: some lines each.
+
+Results are named for type checkers only: no command imports another one's work.
+"""
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from rich.console import Console
 from rich.markup import escape
 
-from elastocal.workflows import (
-    CompensateResult,
-    DemoResult,
-    DeriveResult,
-    ExportResult,
-    InitResult,
-    PredictResult,
-    ReportResult,
-)
+if TYPE_CHECKING:
+    from elastocal.workflows import (
+        CompensateResult,
+        DemoResult,
+        DeriveResult,
+        ExportResult,
+        InitResult,
+        PredictResult,
+        ReportResult,
+    )
 
 
-def show_example(console: Console, result: InitResult) -> None:
+def show_example(console: Console, result: "InitResult") -> None:
     """Print where an example cell was written, and what comes next."""
     cell, names = escape(str(result.cell)), ", ".join(mesh.name for mesh in result.meshes)
     console.print(
@@ -25,7 +30,7 @@ def show_example(console: Console, result: InitResult) -> None:
     )
 
 
-def show_derived(console: Console, result: DeriveResult) -> None:
+def show_derived(console: Console, result: "DeriveResult") -> None:
     """Print what the streams of a run gave."""
     console.print(f"{len(result.dataset.poses)} poses, readings: {result.counts()}")
     for warning in result.summary.warnings:
@@ -34,7 +39,7 @@ def show_derived(console: Console, result: DeriveResult) -> None:
     console.print(f"wrote {folder.dataset} and {folder.summary.name}", markup=False, soft_wrap=True)
 
 
-def show_predicted(console: Console, result: PredictResult, out: Path) -> None:
+def show_predicted(console: Console, result: "PredictResult", out: Path) -> None:
     """Print how large the predicted deflections are."""
     figures, size = result.summary, result.summary.deflection
     console.print(
@@ -51,7 +56,7 @@ def show_predicted(console: Console, result: PredictResult, out: Path) -> None:
         )
 
 
-def show_compensation(console: Console, result: CompensateResult, out: Path) -> None:
+def show_compensation(console: Console, result: "CompensateResult", out: Path) -> None:
     """Print what was corrected, and what the model predicts to be left."""
     lengths = (
         ("deviation as programmed", result.deviation),
@@ -69,7 +74,7 @@ def show_compensation(console: Console, result: CompensateResult, out: Path) -> 
         console.print(f"Note: {note}")
 
 
-def show_export(console: Console, result: ExportResult, with_tool: bool) -> None:
+def show_export(console: Console, result: "ExportResult", with_tool: bool) -> None:
     """Print which C files were written, and what their wrenches are."""
     console.print(f"{', '.join(result.files)} written to {result.folder}")
     console.print(f"the filters delay a slow wrench by {1e3 * result.filter_delay:.1f} ms")
@@ -80,7 +85,7 @@ def show_export(console: Console, result: ExportResult, with_tool: bool) -> None
         )
 
 
-def show_report(console: Console, result: ReportResult) -> None:
+def show_report(console: Console, result: "ReportResult") -> None:
     """Print the verdict of a report."""
     figures, verdict = result.figures, result.verdict
     light = f" ({figures.light} light)" if figures.light else ""
@@ -91,7 +96,7 @@ def show_report(console: Console, result: ReportResult) -> None:
     console.print(f"written to {figures.report}{paper}", markup=False)
 
 
-def show_demo(console: Console, result: DemoResult) -> None:
+def show_demo(console: Console, result: "DemoResult") -> None:
     """Print what a demo came to."""
     for line in result.closing():
         console.print(line, soft_wrap=True, markup=False)

@@ -68,32 +68,6 @@ class SensorLoad:
         if not np.abs(R @ R.T - np.eye(3)).max() <= _RIGID or not np.linalg.det(R) > 0.0:
             raise CompensationError("T_tcp_sensor of the tool does not hold a rotation")
 
-    def wrench_tcp(
-        self, R_base_tcp: FloatArray, force: FloatArray, moment: FloatArray
-    ) -> tuple[FloatArray, FloatArray]:
-        """Return the wrench on the robot about the tool centre point, in the tcp frame.
-
-        Bias and weight are taken away, then the moment is moved from the sensor's origin:
-        ``m_tcp = m_sensor + p x f`` with ``p`` the sensor's origin in the tcp frame.
-
-        Parameters
-        ----------
-        R_base_tcp : ndarray, shape (..., 3, 3)
-            Rotation of the tool centre point in base.
-        force, moment : ndarray, shape (..., 3)
-            Raw, in the sensor's frame, in N and N·m.
-
-        Returns
-        -------
-        tuple of ndarray, shape (..., 3)
-            Force in N and moment in N·m.
-        """
-        R, p = self.T_tcp_sensor[:3, :3], self.T_tcp_sensor[:3, 3]
-        weight = self.mass * (self.gravity @ R_base_tcp)
-        f = (force - self.force_bias) @ R.T - weight
-        m = (moment - self.moment_bias) @ R.T - np.cross(R @ self.centre, weight)
-        return f, m + np.cross(p, f)
-
 
 _Triple = tuple[float, float, float]
 

@@ -53,11 +53,6 @@ class RunSettings:
     loads: tuple[tuple[str, FloatArray], ...]
     """Name of each load case and force on the robot in the tcp frame, shape (3,), in N."""
 
-    @property
-    def largest_load(self) -> float:
-        """Norm of the largest load case, in N."""
-        return max(float(np.linalg.norm(force)) for _, force in self.loads)
-
 
 def run_settings(cell: Cell, plan: PlanResult) -> RunSettings:
     """Return the settings of a run.

@@ -165,7 +165,7 @@ class TrueRobot:
         force_base : ndarray, shape (3,) or (posture, 3)
             Force on the robot at its tool centre point, in N.
         springs : RobotSprings
-            The springs, with what they remember; see `RobotSprings.frictionless`.
+            The springs, with what they remember.
         start : ndarray, shape (spring,) or (posture, spring), optional
             Spring positions near the result.
 

@@ -187,10 +187,6 @@ class RobotSprings:
         """Return the springs with the balanced joint's motor elsewhere, in rad."""
         return replace(self, joint_angle=angle)
 
-    def frictionless(self) -> "RobotSprings":
-        """Return the springs without friction, as in free motion, which shakes it off."""
-        return replace(self, slider=None)
-
     def relaxed(self, theta: FloatArray) -> "RobotSprings":
         """Return the springs with every slider drawn to where nothing strains it.
 

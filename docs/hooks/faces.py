@@ -1,0 +1,72 @@
+"""List in the reference what the face of a package exports, so that neither can get ahead.
+
+A comment ``<!-- face: elastocal.codec -->`` in a page of the reference is replaced by an entry for
+each name that the package exports from its own modules and the page does not show yet.
+"""
+
+import ast
+import re
+from pathlib import Path
+
+from mkdocs.structure.pages import Page
+
+SOURCE = Path(__file__).resolve().parents[2] / "src"
+MARK = re.compile(r"<!-- face: (elastocal[\w.]*) -->")
+_ENTRY = re.compile(r"^::: elastocal[\w.]*\.(\w+)$", flags=re.MULTILINE)
+_MEMBER = re.compile(r"^\s+- (\w+)$", flags=re.MULTILINE)
+
+
+def exported(package: str) -> dict[str, str]:
+    """Return the names that a package exports, each with the module below it that has it."""
+    stub = SOURCE.joinpath(*package.split("."), "__init__.pyi")
+    tree = ast.parse(stub.read_text(encoding="utf-8"))
+    return {
+        alias.name: node.module or ""
+        for node in tree.body
+        if isinstance(node, ast.ImportFrom)
+        for alias in node.names
+    }
+
+
+def defined(package: str, home: str) -> set[str]:
+    """Return the names that a module of a package defines; none of a package's own face."""
+    path = SOURCE.joinpath(*package.split("."), *home.split(".")).with_suffix(".py")
+    if not path.is_file():
+        return set()
+    names: set[str] = set()
+    for node in ast.parse(path.read_text(encoding="utf-8")).body:
+        if isinstance(node, ast.FunctionDef | ast.ClassDef):
+            names.add(node.name)
+        elif isinstance(node, ast.Assign | ast.AnnAssign):
+            targets = node.targets if isinstance(node, ast.Assign) else [node.target]
+            names.update(each.id for each in targets if isinstance(each, ast.Name))
+    return names
+
+
+def shown(markdown: str) -> set[str]:
+    """Return the names that a page shows."""
+    return {*_ENTRY.findall(markdown), *_MEMBER.findall(markdown)}
+
+
+def on_page_markdown(markdown: str, page: Page, **_: object) -> str:
+    """Return the page with an entry for every exported name."""
+    if not page.file.src_uri.startswith("reference/api/"):
+        return markdown
+    known = shown(markdown)
+
+    def entries(match: re.Match[str]) -> str:
+        package = match[1]
+        # What comes from another package's face has its entry there.
+        rest = {
+            name: home
+            for name, home in exported(package).items()
+            if name not in known and name in defined(package, home)
+        }
+        # A function called like its module would show the module.
+        paths = (
+            f"{package}.{home}.{name}" if name == home else f"{package}.{name}"
+            for name, home in sorted(rest.items())
+        )
+        return "\n\n".join(f"::: {path}" for path in paths)
+
+    return MARK.sub(entries, markdown)
