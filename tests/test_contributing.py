@@ -130,7 +130,7 @@ class TestEveryRow:
         for path, symbol in row.registrations:
             if symbol is None:
                 face = resolve(path).parent
-                assert all(folder.is_relative_to(face) for folder in folders), path
+                assert any(folder.is_relative_to(face) for folder in folders), path
 
     def test_its_contract_test_is_collected(self, row):
         (path,) = QUOTED.findall(row.test)
@@ -140,4 +140,6 @@ class TestEveryRow:
         assert re.search(r"^\s*def test_\w+\(", test.read_text(encoding="utf-8"), re.MULTILINE)
 
     def test_few_files_are_touched(self, row):
-        assert len(row.touched) <= (4 if "input file" in row.kind else 3)
+        # A command is also a function of two faces.
+        many = row.kind == "command" or "input file" in row.kind
+        assert len(row.touched) <= (4 if many else 3)
