@@ -17,6 +17,7 @@ from elastocal.compensation.offline import (
 )
 from elastocal.dataset import LoadRows, joint_dimensions, read_load_rows
 from elastocal.errors import CompensationError
+from elastocal.results import brief_repr
 from elastocal.robot import GRAVITY, Robot, T_from_xyzabc
 from elastocal.tables import opened_table
 
@@ -28,6 +29,7 @@ _UNIT = 1e-2
 """Largest distance of the length of a quaternion from 1."""
 
 
+@brief_repr
 @dataclass(frozen=True, eq=False)
 class StaticPostures:
     """Raw wrenches with the flange's orientation, nothing touching the tool."""
