@@ -13,6 +13,7 @@ from elastocal.arrays import FloatArray, IndexArray
 from elastocal.errors import PlanningError, SchemaError
 from elastocal.planning.plan_result import POOL, PlanResult
 from elastocal.records import Variable, read_netcdf, record, variables_of, write_netcdf
+from elastocal.results import brief_repr
 
 _SCHEMA = "elastocal.pool/1"
 NOT_CHOSEN = -1
@@ -24,6 +25,7 @@ _INDICES = ("branch", "pose_id", "point", "refused_by")
 _NAMES = ("joint_names", "check_names", "check_units", "refusal_names")
 
 
+@brief_repr
 @record(_SCHEMA, eq=False)
 class PoolData:
     """Candidates with their postures and margins, and the points that have none.

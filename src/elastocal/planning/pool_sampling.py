@@ -35,6 +35,7 @@ from elastocal.planning.surface import (
     sample_uniform,
 )
 from elastocal.progress import Progress, silent
+from elastocal.results import brief_repr
 from elastocal.robot.inverse import InverseKinematics, inverse_for
 
 CANDIDATES = "candidates"
@@ -55,6 +56,7 @@ _WORTH = 0.02
 """Share of the points that a further base placement must serve alone."""
 
 
+@brief_repr
 @dataclass(frozen=True, eq=False)
 class SampledPool:
     """A pool with the points that it was made of."""

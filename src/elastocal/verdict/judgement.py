@@ -12,6 +12,7 @@ from enum import Enum
 from elastocal.identification import (
     UnseenErrors,
 )
+from elastocal.results import brief_repr
 from elastocal.verdict.evidence import Evidence
 from elastocal.verdict.findings import Finding, find_everything
 from elastocal.wording import counted, mm, um
@@ -28,6 +29,7 @@ class Light(Enum):
     RED = "red"
 
 
+@brief_repr
 @dataclass(frozen=True)
 class Verdict:
     """The first words of the report."""

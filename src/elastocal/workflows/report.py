@@ -7,10 +7,11 @@ from pathlib import Path
 
 from elastocal.errors import FileAccessError
 from elastocal.identification import UnseenErrors
+from elastocal.identification.recertification import Estimate
 from elastocal.progress import Progress
 from elastocal.records import record
 from elastocal.report.document import find_browser, write_pdf, write_report
-from elastocal.results import Result
+from elastocal.results import Result, brief_repr
 from elastocal.verdict import EvidenceOptions, Verdict, gather_evidence
 from elastocal.workflows._workflow import workflow
 
@@ -44,25 +45,17 @@ class ReportSettings:
 
 
 @record()
-class EstimateFigures:
-    """A figure with its 95 % interval, in m."""
-
-    value: float
-    low: float
-    high: float
-
-
-@record()
 class UnseenFigures:
     """Errors at poses that were left out of the fit, in m."""
 
-    mean: EstimateFigures
-    p95: EstimateFigures
+    mean: Estimate
+    p95: Estimate
     max: float
     poses: int
     readings: int
 
 
+@brief_repr
 @record()
 class ReportFigures:
     """The figures of ``report --json``."""
@@ -156,14 +149,7 @@ def report(settings: ReportSettings, progress: Progress) -> ReportResult:
 
 
 def _unseen(errors: UnseenErrors) -> UnseenFigures:
-    mean, p95 = errors.mean, errors.p95
-    return UnseenFigures(
-        mean=EstimateFigures(mean.value, mean.low, mean.high),
-        p95=EstimateFigures(p95.value, p95.low, p95.high),
-        max=errors.max,
-        poses=errors.poses,
-        readings=len(errors.error),
-    )
+    return UnseenFigures(errors.mean, errors.p95, errors.max, errors.poses, len(errors.error))
 
 
 def _check_places(out: Path, paper: Path | None, force: bool) -> None:

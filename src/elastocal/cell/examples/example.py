@@ -10,6 +10,7 @@ import numpy as np
 from elastocal.arrays import FloatArray, IndexArray
 from elastocal.errors import FileAccessError, SchemaError, nearest
 from elastocal.files import replacing, write_text
+from elastocal.results import brief_repr
 
 _DOME_RADII = (2.4, 1.5)
 """Radius and height in m of the ellipsoid of revolution that a rear pressure dome resembles."""
@@ -61,8 +62,7 @@ def block() -> FloatArray:
             quad[:, (axis + 1) % 3] = (-1.0, 1.0, 1.0, -1.0)
             quad[:, (axis + 2) % 3] = (-side, -side, side, side)
             triangles += [quad[[0, 1, 2]], quad[[0, 2, 3]]]
-    corners: FloatArray = 0.5 * np.array(triangles) * (x, y, z) + (0.0, 0.0, 0.5 * z)
-    return corners
+    return 0.5 * np.array(triangles) * (x, y, z) + (0.0, 0.0, 0.5 * z)
 
 
 def _on_dome(t: FloatArray, a: FloatArray) -> FloatArray:
@@ -92,6 +92,7 @@ def _grid_faces(n: int) -> IndexArray:
     return np.concatenate([half.reshape(-1, 3) for half in halves])
 
 
+@brief_repr
 @dataclass(frozen=True)
 class Example:
     """A cell file of this package with the meshes that it names."""

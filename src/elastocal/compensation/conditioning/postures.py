@@ -17,6 +17,7 @@ from elastocal.compensation.offline import (
 )
 from elastocal.dataset import LoadRows, joint_dimensions, read_load_rows
 from elastocal.errors import CompensationError
+from elastocal.results import brief_repr
 from elastocal.robot import GRAVITY, Robot, T_from_xyzabc
 from elastocal.tables import opened_table
 
@@ -28,6 +29,7 @@ _UNIT = 1e-2
 """Largest distance of the length of a quaternion from 1."""
 
 
+@brief_repr
 @dataclass(frozen=True, eq=False)
 class StaticPostures:
     """Raw wrenches with the flange's orientation, nothing touching the tool."""
@@ -182,5 +184,4 @@ def _from_quaternions(path: Path, rows: LoadRows, header: list[str]) -> FloatArr
         raise CompensationError(
             f"{path}: quaternion {quaternions[row].tolist()} of posture {row + 1} has not length 1"
         )
-    rotations: FloatArray = Rotation.from_quat(quaternions).as_matrix()
-    return rotations
+    return Rotation.from_quat(quaternions).as_matrix()

@@ -19,6 +19,7 @@ from elastocal.compensation.offline import (
 )
 from elastocal.compensation.offline.path_joints import RowName, check_limits, turned_inside
 from elastocal.identification import CalibratedModel
+from elastocal.results import brief_repr
 from elastocal.robot import Robot
 from elastocal.robot.inverse import TURN, InverseKinematics, pose_error
 
@@ -33,6 +34,7 @@ _SMALL_TURN = 1.0
 """Largest step of a joint (rad or m) that still is one of a correction."""
 
 
+@brief_repr
 @dataclass(frozen=True, eq=False)
 class PathCorrection:
     """Corrected rows."""

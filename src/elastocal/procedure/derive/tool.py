@@ -27,8 +27,10 @@ import numpy as np
 from scipy.special import fdtrc, stdtrit
 
 from elastocal.arrays import FloatArray
+from elastocal.results import brief_repr
 
 
+@brief_repr
 @dataclass(frozen=True, eq=False)
 class ToolLoad:
     """The tool on the sensor, and how the sensor sits."""
@@ -44,8 +46,7 @@ class ToolLoad:
 
     def R_base_sensor(self, T_base_tcp: FloatArray) -> FloatArray:
         """Return the rotation of the sensor, shape (..., 3, 3)."""
-        rotation: FloatArray = T_base_tcp[..., :3, :3] @ self.T_tcp_sensor[:3, :3]
-        return rotation
+        return T_base_tcp[..., :3, :3] @ self.T_tcp_sensor[:3, :3]
 
     def force(self, R_base_sensor: FloatArray) -> FloatArray:
         """Return the weight as the sensor feels it, shape (..., 3), in N, sensor frame."""
@@ -53,10 +54,10 @@ class ToolLoad:
 
     def moment(self, R_base_sensor: FloatArray) -> FloatArray:
         """Return the weight's moment about the sensor's origin, shape (..., 3), in N·m."""
-        moment: FloatArray = np.cross(self.centre, self.force(R_base_sensor))
-        return moment
+        return np.cross(self.centre, self.force(R_base_sensor))
 
 
+@brief_repr
 @dataclass(frozen=True, eq=False)
 class RawWrench:
     """Mean raw wrench at one place of the tool."""
@@ -69,6 +70,7 @@ class RawWrench:
     """Tool frame then, shape (4, 4), in m."""
 
 
+@brief_repr
 @dataclass(frozen=True, eq=False)
 class RobotWrench:
     """Wrench on the robot at the tool centre point, in base."""
@@ -108,8 +110,7 @@ def turned_sigma(R: FloatArray, *sigmas: FloatArray) -> FloatArray:
     *sigmas : ndarray, shape (3,)
         Standard deviations of the components of each vector, taken as independent.
     """
-    turned: FloatArray = np.sqrt(R**2 @ sum(sigma**2 for sigma in sigmas))
-    return turned
+    return np.sqrt(R**2 @ sum(sigma**2 for sigma in sigmas))
 
 
 _CHANCE_OF_STEP = 1e-4
@@ -181,6 +182,7 @@ _MOMENT_NAMES = tuple(
 )
 
 
+@brief_repr
 @dataclass(frozen=True, eq=False)
 class UnloadedWrenches:
     """Raw wrenches of unloaded references, in the order of time."""
@@ -197,6 +199,7 @@ class UnloadedWrenches:
     """In base, shape (3,), in m/s²."""
 
 
+@brief_repr
 @dataclass(frozen=True, eq=False)
 class Interval:
     """An estimate with the half width of its 95 % interval; both NaN where not determined."""
@@ -205,6 +208,7 @@ class Interval:
     half_width: FloatArray
 
 
+@brief_repr
 @dataclass(frozen=True, eq=False)
 class ToolEstimate:
     """Tool and sensor by the unloaded references of a run."""

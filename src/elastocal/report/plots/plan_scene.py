@@ -26,6 +26,7 @@ from elastocal.report.plots._solids import (
     solid_trace,
     tones,
 )
+from elastocal.results import brief_repr
 
 _FIELD_OF_VIEW = np.radians(45.0)
 """Field of view of Plotly's perspective camera, in rad."""
@@ -50,8 +51,7 @@ class _Bounds:
 
     def scene(self, point: FloatArray) -> FloatArray:
         """Return points in the camera's units, from the middle of the box."""
-        inside: FloatArray = (point - 0.5 * (self.low + self.high)) / self._unit
-        return inside
+        return (point - 0.5 * (self.low + self.high)) / self._unit
 
     @property
     def _unit(self) -> float:
@@ -101,6 +101,7 @@ class _MovingParts:
         return go.Frame(name=str(number), data=data, traces=list(range(len(data))))
 
 
+@brief_repr
 @dataclass(frozen=True, eq=False)
 class PlanView:
     """A figure, its layers and its camera places."""
@@ -265,8 +266,7 @@ def _up(cell: Cell) -> FloatArray:
 
 
 def _unit(vector: FloatArray) -> FloatArray:
-    result: FloatArray = vector / np.linalg.norm(vector)
-    return result
+    return vector / np.linalg.norm(vector)
 
 
 def _xyz(vector: FloatArray) -> dict[str, float]:

@@ -15,10 +15,12 @@ from numpy.typing import ArrayLike
 
 from elastocal.arrays import BoolArray, FloatArray
 from elastocal.errors import RobotError
+from elastocal.results import brief_repr
 
 _MOVABLE = ("revolute", "continuous", "prismatic")
 
 
+@brief_repr
 @dataclass(frozen=True)
 class Screws:
     """Axes of movement in the order in which they follow one another from base to tip."""
@@ -38,8 +40,7 @@ class Screws:
     @cached_property
     def wedge_squared(self) -> FloatArray:
         """Their squares, shape (element, 3, 3)."""
-        squared: FloatArray = self.wedge @ self.wedge
-        return squared
+        return self.wedge @ self.wedge
 
 
 def motions(screws: Screws, positions: FloatArray) -> FloatArray:
@@ -102,6 +103,7 @@ def _exponentials(screws: Screws, positions: FloatArray) -> FloatArray:
     return steps
 
 
+@brief_repr
 @dataclass(frozen=True)
 class PointMass:
     """The weight of one link."""

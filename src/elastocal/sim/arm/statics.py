@@ -30,6 +30,7 @@ from elastocal.arrays import (
     FloatArray,
 )
 from elastocal.errors import ElastocalError
+from elastocal.results import brief_repr
 from elastocal.sim.arm.linkage import (
     Screws,
     motions,
@@ -47,6 +48,7 @@ class EquilibriumError(ElastocalError, ArithmeticError):
     """The simulated arm finds no stable equilibrium: a load it cannot carry."""
 
 
+@brief_repr
 @dataclass(frozen=True)
 class DeadLoads:
     """Forces that keep their direction in base, however the arm moves."""
@@ -59,6 +61,7 @@ class DeadLoads:
     """Shape (batch, load, 3), in N."""
 
 
+@brief_repr
 @dataclass(frozen=True)
 class EnergyState:
     """Energy and its derivatives at a batch of spring positions."""
@@ -87,6 +90,7 @@ class SpringBank(Protocol):
         ...
 
 
+@brief_repr
 @dataclass(frozen=True)
 class LoadedMechanism:
     """Screws of which some are held (the motors) and some are springs, with loads."""
