@@ -97,7 +97,8 @@ def test_the_table_has_the_kinds_that_a_contributor_may_want():
 def test_every_contract_suite_has_a_row():
     named = {path for row in ROWS for path in QUOTED.findall(row.test)}
     suites = {f"tests/contracts/{path.name}" for path in ROOT.glob("tests/contracts/test_*.py")}
-    assert suites <= named
+    # What every public object keeps is no matter of a kind.
+    assert suites - {"tests/contracts/test_public_objects.py"} <= named
 
 
 @pytest.mark.parametrize("row", ROWS, ids=lambda row: row.kind)
