@@ -107,8 +107,7 @@ class TableRows:
             pairs = zip(self.lines, cells, strict=True)
             values = np.array([_parsed(cell, line, column, parse) for line, cell in pairs])
         # x * 1.0 is x, bit for bit: data in SI units pass unchanged.
-        scaled: FloatArray = values * column.scale
-        return scaled
+        return values * column.scale
 
 
 class TableReader:

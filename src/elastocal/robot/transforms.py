@@ -50,8 +50,7 @@ def T_from_xyzabc(
         [-sb, cb * sc, cb * cc, z],
         [zero, zero, zero, one],
     ]
-    T: FloatArray = np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
-    return T
+    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
 
 
 def xyzabc_from_T(T: ArrayLike) -> FloatArray:
@@ -77,7 +76,6 @@ def xyzabc_from_T(T: ArrayLike) -> FloatArray:
     sa, ca = np.sin(a), np.cos(a)
     sin_c = sa * R[..., 0, 2] - ca * R[..., 1, 2]
     cos_c = ca * R[..., 1, 1] - sa * R[..., 0, 1]
-    pose: FloatArray = np.concatenate(
+    return np.concatenate(
         [T[..., :3, 3], np.stack([a, b, np.arctan2(sin_c, cos_c)], axis=-1)], axis=-1
     )
-    return pose

@@ -147,8 +147,7 @@ class Capsule(Convex):
 
     def triangulated(self, sections: int = 32) -> trimesh.Trimesh:  # noqa: ARG002 - always alike fine
         """Return trimesh's capsule."""
-        mesh: trimesh.Trimesh = trimesh.creation.capsule(self.length, self.radius)
-        return mesh
+        return trimesh.creation.capsule(self.length, self.radius)
 
     def depth(self, point: FloatArray) -> float:
         """Return the distance under the surface, in m."""

@@ -5,8 +5,8 @@ from pathlib import Path
 from elastocal.dataset import Dataset
 from elastocal.errors import RobotError
 from elastocal.files import read_text
-from elastocal.robot import Robot, T_from_xyzabc, catalogue, leaf_links, parse_urdf, with_tool
-from elastocal.units import parse_quantity
+from elastocal.robot import Robot, catalogue, leaf_links, parse_urdf, with_tool
+from elastocal.workflows._postures import parse_frame
 
 TOOL_LINK = "tcp"
 """Name of the link that a tool given by numbers gets."""
@@ -42,7 +42,7 @@ def find_robot(
             raise RobotError(f"name the tool centre point with --tcp: {', '.join(leaves)}")
         tcp = leaves[0]
     if tool is not None:
-        urdf = with_tool(urdf, tcp, TOOL_LINK, T_from_xyzabc(*_six(tool)))
+        urdf = with_tool(urdf, tcp, TOOL_LINK, parse_frame(tool, "tool", error=RobotError))
         tcp = TOOL_LINK
     return Robot.from_urdf(urdf, tcp)
 
@@ -66,13 +66,3 @@ def _is_file(path: Path) -> bool:
         return path.is_file()
     except OSError:
         return False
-
-
-def _six(text: str) -> tuple[float, ...]:
-    parts = [part.strip() for part in text.split(",")]
-    if len(parts) != 6:
-        raise RobotError(
-            f"tool {text!r} must be six quantities, e.g. '0 mm, 0 mm, 565 mm, 0 deg, 0 deg, 0 deg'"
-        )
-    dimensions = ("length",) * 3 + ("angle",) * 3
-    return tuple(parse_quantity(part, of) for part, of in zip(parts, dimensions, strict=True))

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from elastocal.errors import FileAccessError
 from elastocal.identification import UnseenErrors
+from elastocal.identification.recertification import Estimate
 from elastocal.progress import Progress
 from elastocal.records import record
 from elastocal.report.document import find_browser, write_pdf, write_report
@@ -44,20 +45,11 @@ class ReportSettings:
 
 
 @record()
-class EstimateFigures:
-    """A figure with its 95 % interval, in m."""
-
-    value: float
-    low: float
-    high: float
-
-
-@record()
 class UnseenFigures:
     """Errors at poses that were left out of the fit, in m."""
 
-    mean: EstimateFigures
-    p95: EstimateFigures
+    mean: Estimate
+    p95: Estimate
     max: float
     poses: int
     readings: int
@@ -157,14 +149,7 @@ def report(settings: ReportSettings, progress: Progress) -> ReportResult:
 
 
 def _unseen(errors: UnseenErrors) -> UnseenFigures:
-    mean, p95 = errors.mean, errors.p95
-    return UnseenFigures(
-        mean=EstimateFigures(mean.value, mean.low, mean.high),
-        p95=EstimateFigures(p95.value, p95.low, p95.high),
-        max=errors.max,
-        poses=errors.poses,
-        readings=len(errors.error),
-    )
+    return UnseenFigures(errors.mean, errors.p95, errors.max, errors.poses, len(errors.error))
 
 
 def _check_places(out: Path, paper: Path | None, force: bool) -> None:

@@ -16,12 +16,6 @@ def _read(dimension: str) -> BeforeValidator:
     return BeforeValidator(lambda text: parse_quantity(text, dimension))
 
 
-def _finite(value: float) -> float:
-    if not math.isfinite(value):
-        raise ValueError("must be finite")
-    return value
-
-
 def _not_zero(values: tuple[float, ...]) -> tuple[float, ...]:
     # The square of a number must neither vanish nor overflow when the direction is normed.
     if not 1e-6 <= math.hypot(*values) <= 1e6:
@@ -35,28 +29,25 @@ def _ascending(values: tuple[float, float]) -> tuple[float, float]:
     return values
 
 
-_FINITE = AfterValidator(_finite)
-
-
 _POSITIVE = Field(gt=0.0)
 
 
 _NOT_NEGATIVE = Field(ge=0.0)
 
 
-Length = Annotated[float, _read("length"), _FINITE]
+Length = Annotated[float, _read("length")]
 """In m."""
 
 
-PositiveLength = Annotated[float, _read("length"), _POSITIVE, _FINITE]
+PositiveLength = Annotated[float, _read("length"), _POSITIVE]
 """In m, above 0."""
 
 
-Distance = Annotated[float, _read("length"), _NOT_NEGATIVE, _FINITE]
+Distance = Annotated[float, _read("length"), _NOT_NEGATIVE]
 """In m, 0 or above."""
 
 
-Angle = Annotated[float, _read("angle"), _FINITE]
+Angle = Annotated[float, _read("angle")]
 """In rad."""
 
 
@@ -68,23 +59,23 @@ SpanAngle = Annotated[float, _read("angle"), _NOT_NEGATIVE, Field(le=math.pi)]
 """In rad, from 0 to π."""
 
 
-Force = Annotated[float, _read("force"), _NOT_NEGATIVE, _FINITE]
+Force = Annotated[float, _read("force"), _NOT_NEGATIVE]
 """In N, 0 or above."""
 
 
-PositiveForce = Annotated[float, _read("force"), _POSITIVE, _FINITE]
+PositiveForce = Annotated[float, _read("force"), _POSITIVE]
 """In N, above 0."""
 
 
-PositiveMoment = Annotated[float, _read("moment"), _POSITIVE, _FINITE]
+PositiveMoment = Annotated[float, _read("moment"), _POSITIVE]
 """In N·m, above 0."""
 
 
-Mass = Annotated[float, _read("mass"), _NOT_NEGATIVE, _FINITE]
+Mass = Annotated[float, _read("mass"), _NOT_NEGATIVE]
 """In kg, 0 or above."""
 
 
-PositiveMass = Annotated[float, _read("mass"), _POSITIVE, _FINITE]
+PositiveMass = Annotated[float, _read("mass"), _POSITIVE]
 """In kg, above 0."""
 
 
@@ -92,15 +83,15 @@ Time = Annotated[float, _read("time"), Field(ge=0.0, le=1e6)]
 """In s, 0 or above."""
 
 
-PositiveTime = Annotated[float, _read("time"), _POSITIVE, _FINITE]
+PositiveTime = Annotated[float, _read("time"), _POSITIVE]
 """In s, above 0."""
 
 
-PositiveSpeed = Annotated[float, _read("speed"), _POSITIVE, _FINITE]
+PositiveSpeed = Annotated[float, _read("speed"), _POSITIVE]
 """In m/s, above 0."""
 
 
-PositiveForceRate = Annotated[float, _read("force rate"), _POSITIVE, _FINITE]
+PositiveForceRate = Annotated[float, _read("force rate"), _POSITIVE]
 """In N/s, above 0."""
 
 
@@ -112,9 +103,7 @@ SampleRate = Annotated[float, _read("frequency"), Field(ge=1.0, le=1000.0)]
 """Samples a second, from 1 to 1000."""
 
 
-TranslationalCompliance = Annotated[
-    float, _read("translational compliance"), _NOT_NEGATIVE, _FINITE
-]
+TranslationalCompliance = Annotated[float, _read("translational compliance"), _NOT_NEGATIVE]
 """In m/N, 0 or above."""
 
 

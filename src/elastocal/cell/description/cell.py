@@ -308,8 +308,7 @@ def _torque_limits(robot: Robot, file: CellFile) -> FloatArray:
             )
         index = robot.joint_names.index(joint)
         limits[index] = torque.figure(joint, robot.revolute[index])
-    result: FloatArray = torque.factor * limits
-    return result
+    return torque.factor * limits
 
 
 def _margins(robot: Robot, limits: Limits) -> FloatArray:

@@ -77,8 +77,7 @@ class LoadCases(StrictModel):
     def force_tcp(self) -> FloatArray:
         """Force on the robot in each case, tcp frame, shape (load_case, 3), in N."""
         signs = np.array([DIRECTIONS[name] for name in self.cases])
-        force: FloatArray = signs * (self.fx, self.fy, self.fz)
-        return force
+        return signs * (self.fx, self.fy, self.fz)
 
 
 class Engagement(StrictModel):

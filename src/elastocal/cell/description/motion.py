@@ -135,8 +135,7 @@ def axis_speeds(robot: Robot, entry: MotionEntry) -> FloatArray:
             )
         if not speeds[index] >= _SLOWEST:
             raise RobotError(f"speed.{name}: {entry.speed[name]} must be above 0")
-    used: FloatArray = entry.override * speeds
-    return used
+    return entry.override * speeds
 
 
 def external_positions(robot: Robot, entry: RobotEntry, margin: FloatArray) -> FloatArray:

@@ -62,8 +62,7 @@ def block() -> FloatArray:
             quad[:, (axis + 1) % 3] = (-1.0, 1.0, 1.0, -1.0)
             quad[:, (axis + 2) % 3] = (-side, -side, side, side)
             triangles += [quad[[0, 1, 2]], quad[[0, 2, 3]]]
-    corners: FloatArray = 0.5 * np.array(triangles) * (x, y, z) + (0.0, 0.0, 0.5 * z)
-    return corners
+    return 0.5 * np.array(triangles) * (x, y, z) + (0.0, 0.0, 0.5 * z)
 
 
 def _on_dome(t: FloatArray, a: FloatArray) -> FloatArray:

@@ -6,22 +6,16 @@ from typing import Annotated
 import typer
 
 from elastocal import workflows
+from elastocal.cli import options
 
 
 def calibrate(  # noqa: PLR0913 - one parameter an option
     data: Annotated[Path, typer.Argument(help="Dataset, .nc or .csv.")],
     out: Annotated[Path, typer.Option(help="Model file to write.")],
     *,
-    robot: Annotated[
-        str | None, typer.Option(help="URDF file or catalogue name; default: the dataset's own.")
-    ] = None,
-    tcp: Annotated[
-        str | None, typer.Option(help="Link at the tool centre point; default: the dataset's.")
-    ] = None,
-    tool: Annotated[
-        str | None,
-        typer.Option(help="Tcp behind that link: 'x, y, z, a, b, c' with units (Z-Y'-X'')."),
-    ] = None,
+    robot: options.RobotName = None,
+    tcp: options.TcpLink = None,
+    tool: options.ToolFrame = None,
     springs: Annotated[
         str, typer.Option(help="Spring layout: actuated, bearing, or a .yaml file.")
     ] = "bearing",
@@ -30,13 +24,8 @@ def calibrate(  # noqa: PLR0913 - one parameter an option
     bounds: Annotated[
         str, typer.Option(help="Lowest and highest compliance in SI units.")
     ] = "0,inf",
-    marker: Annotated[
-        str | None,
-        typer.Option(help="Marker in the tcp frame: 'x, y, z' with units; default: the dataset's."),
-    ] = None,
-    exclude: Annotated[
-        list[str] | None, typer.Option(help="Leave out POSE or POSE:LOAD_CASE; repeatable.")
-    ] = None,
+    marker: options.Marker = None,
+    exclude: options.Exclude = None,
     keep_blunders: Annotated[
         bool, typer.Option("--keep-blunders", help="Fit also what cannot be a measurement.")
     ] = False,
@@ -48,9 +37,7 @@ def calibrate(  # noqa: PLR0913 - one parameter an option
     ] = False,
     draws: Annotated[int, typer.Option(help="Bootstrap draws.")] = 200,
     seed: Annotated[int, typer.Option(min=0, help="Seed of the bootstrap.")] = 0,
-    as_json: Annotated[
-        bool, typer.Option("--json", help="Print the figures as one JSON object.")
-    ] = False,
+    as_json: options.Figures = False,
 ) -> None:
     """Identify the compliances of a robot from a measured dataset."""
     from elastocal.cli.output import console, print_json

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from elastocal import workflows
+from elastocal.cli import options
 
 if TYPE_CHECKING:
     from elastocal.codec import Tolerance
@@ -23,23 +24,11 @@ def codec(  # noqa: PLR0913 - one parameter an option
             " then every combination.",
         ),
     ] = None,
-    robot: Annotated[
-        str | None, typer.Option(help="URDF file or catalogue name; default: the dataset's own.")
-    ] = None,
-    tcp: Annotated[
-        str | None, typer.Option(help="Link at the tool centre point; default: the dataset's.")
-    ] = None,
-    tool: Annotated[
-        str | None,
-        typer.Option(help="Tcp behind that link: 'x, y, z, a, b, c' with units (Z-Y'-X'')."),
-    ] = None,
-    marker: Annotated[
-        str | None,
-        typer.Option(help="Marker in the tcp frame: 'x, y, z' with units; default: the dataset's."),
-    ] = None,
-    exclude: Annotated[
-        list[str] | None, typer.Option(help="Leave out POSE or POSE:LOAD_CASE; repeatable.")
-    ] = None,
+    robot: options.RobotName = None,
+    tcp: options.TcpLink = None,
+    tool: options.ToolFrame = None,
+    marker: options.Marker = None,
+    exclude: options.Exclude = None,
     keep_blunders: Annotated[
         bool, typer.Option("--keep-blunders", help="Use also what cannot be a measurement.")
     ] = False,
@@ -79,9 +68,7 @@ def codec(  # noqa: PLR0913 - one parameter an option
     force: Annotated[
         bool, typer.Option("--force", help="Replace the files of a codec that is there.")
     ] = False,
-    as_json: Annotated[
-        bool, typer.Option("--json", help="Print the figures as one JSON object.")
-    ] = False,
+    as_json: options.Figures = False,
 ) -> None:
     """Cross-validate growing training sets: how many poses, which technique."""
     from elastocal.cli.output import console, print_json, progress_bars
@@ -90,7 +77,7 @@ def codec(  # noqa: PLR0913 - one parameter an option
     from elastocal.codec import CodecOptions
     from elastocal.records import to_data
 
-    options = CodecOptions(splits, _parse_ratio(ratio), seed, not keep_blunders, trust_conventions)
+    chosen = CodecOptions(splits, _parse_ratio(ratio), seed, not keep_blunders, trust_conventions)
     with progress_bars(console()) as progress:
         result = workflows.codec(
             data,
@@ -102,7 +89,7 @@ def codec(  # noqa: PLR0913 - one parameter an option
             tool=tool,
             marker=None if marker is None else parse_point(marker),
             exclude=tuple(exclude or ()),
-            options=options,
+            options=chosen,
             tolerance=_parse_tolerance(tolerance),
             indices=indices,
             per_axis=per_axis,

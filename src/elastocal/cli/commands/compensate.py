@@ -6,6 +6,7 @@ from typing import Annotated
 import typer
 
 from elastocal import workflows
+from elastocal.cli import options
 from elastocal.cli.parsing import START_HELP
 
 
@@ -26,9 +27,7 @@ def compensate(
     largest: Annotated[
         str, typer.Option("--limit", help="Largest deflection that is taken for one.")
     ] = "20 mm",
-    as_json: Annotated[
-        bool, typer.Option("--json", help="Print the figures as one JSON object.")
-    ] = False,
+    as_json: options.Figures = False,
 ) -> None:
     """Correct a programmed path so that the loaded tool is where it was programmed."""
     from elastocal.cli.output import console, print_json, progress_bars

@@ -6,22 +6,19 @@ from typing import Annotated
 import typer
 
 from elastocal import workflows
+from elastocal.cli import options
 
 
 def export(
     model: Annotated[Path, typer.Argument(help="Model file from calibrate.")],
     c: Annotated[Path, typer.Option("--c", help="Folder to write the C files into.")],
     *,
-    settings: Annotated[
-        Path | None, typer.Option(help="Settings of the compensator (.yaml).")
-    ] = None,
+    settings: options.CompensatorFile = None,
     tool: Annotated[
         Path | None, typer.Option(help="Tool file from `elastocal tool`: weight, bias, sensor.")
     ] = None,
     force: Annotated[bool, typer.Option("--force", help="Replace files that are there.")] = False,
-    as_json: Annotated[
-        bool, typer.Option("--json", help="Print what was written as one JSON object.")
-    ] = False,
+    as_json: options.Written = False,
 ) -> None:
     """Write a model as dependency-free C99 with filters, limits and a self-test."""
     from elastocal.cli.output import console, print_json

@@ -6,6 +6,7 @@ from typing import Annotated
 import typer
 
 from elastocal import workflows
+from elastocal.cli import options
 
 
 def plan(
@@ -26,9 +27,7 @@ def plan(
     force: Annotated[
         bool, typer.Option("--force", help="Replace the files of a plan that is there.")
     ] = False,
-    as_json: Annotated[
-        bool, typer.Option("--json", help="Print the key figures as one JSON object.")
-    ] = False,
+    as_json: options.KeyFigures = False,
 ) -> None:
     """Choose calibration poses on the tooling, check them, and put them in order."""
     from elastocal.cli.output import console, print_json, progress_bars

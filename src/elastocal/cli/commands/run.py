@@ -6,6 +6,7 @@ from typing import Annotated
 import typer
 
 from elastocal import workflows
+from elastocal.cli import options
 
 
 def run(
@@ -25,9 +26,7 @@ def run(
     seed: Annotated[
         int | None, typer.Option(min=0, help="Seed of simulated devices; default: the cell's.")
     ] = None,
-    as_json: Annotated[
-        bool, typer.Option("--json", help="Print the figures as one JSON object.")
-    ] = False,
+    as_json: options.Figures = False,
 ) -> None:
     """Press on the tooling at every pose of a plan and record what happens."""
     from elastocal.cli.operator import TerminalOperator

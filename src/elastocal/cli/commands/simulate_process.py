@@ -6,6 +6,7 @@ from typing import Annotated
 import typer
 
 from elastocal import workflows
+from elastocal.cli import options
 
 
 def simulate_process(  # noqa: PLR0913 (a command has as many options as it has)
@@ -25,9 +26,7 @@ def simulate_process(  # noqa: PLR0913 (a command has as many options as it has)
         list[int] | None,
         typer.Option(min=0, help="Of forces and devices; as for run. Repeat it for more."),
     ] = None,
-    settings: Annotated[
-        Path | None, typer.Option(help="Settings of the compensator (.yaml).")
-    ] = None,
+    settings: options.CompensatorFile = None,
     courses: Annotated[
         int | None, typer.Option(min=1, help="Courses or rings; default: 5.")
     ] = None,
@@ -36,9 +35,7 @@ def simulate_process(  # noqa: PLR0913 (a command has as many options as it has)
     ] = False,
     jobs: Annotated[int | None, typer.Option(min=1, help="Processes; default: all cores.")] = None,
     force: Annotated[bool, typer.Option("--force", help="Replace files that are there.")] = False,
-    as_json: Annotated[
-        bool, typer.Option("--json", help="Print the figures as one JSON object.")
-    ] = False,
+    as_json: options.Figures = False,
 ) -> None:
     """Run a process on the simulated cell without and with correction: how much is left."""
     from elastocal.cli.output import console, print_json, progress_bars

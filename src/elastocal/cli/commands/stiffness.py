@@ -6,6 +6,7 @@ from typing import Annotated
 import typer
 
 from elastocal import workflows
+from elastocal.cli import options
 from elastocal.cli.parsing import START_HELP
 
 
@@ -27,9 +28,7 @@ def stiffness(  # noqa: PLR0913 (a command has as many options as it has)
     ] = None,
     start: Annotated[str | None, typer.Option(help=START_HELP)] = None,
     force: Annotated[bool, typer.Option("--force", help="Replace files that are there.")] = False,
-    as_json: Annotated[
-        bool, typer.Option("--json", help="Print the key figures as one JSON object.")
-    ] = False,
+    as_json: options.KeyFigures = False,
 ) -> None:
     """Map the stiffness over spin, rail and path; choose the stiffest posture."""
     from elastocal.cli.output import console, print_json, progress_bars

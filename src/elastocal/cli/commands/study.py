@@ -6,6 +6,7 @@ from typing import Annotated
 import typer
 
 from elastocal import workflows
+from elastocal.cli import options
 
 
 def study(  # noqa: PLR0913 - one parameter an option
@@ -36,9 +37,7 @@ def study(  # noqa: PLR0913 - one parameter an option
         str | None,
         typer.Option(metavar="ADDRESS", help="Dask scheduler to work on, e.g. tcp://host:8786."),
     ] = None,
-    as_json: Annotated[
-        bool, typer.Option("--json", help="Print the figures as one JSON object.")
-    ] = False,
+    as_json: options.Figures = False,
 ) -> None:
     """Simulate many calibrations of a cell: what reaches which accuracy."""
     from elastocal.cli.output import console, print_json, progress_bars

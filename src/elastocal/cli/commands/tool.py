@@ -6,6 +6,7 @@ from typing import Annotated
 import typer
 
 from elastocal import workflows
+from elastocal.cli import options
 
 
 def tool(
@@ -28,9 +29,7 @@ def tool(
     keep_rotation: Annotated[
         bool, typer.Option("--keep-rotation", help="Take the mounted rotation as it is.")
     ] = False,
-    as_json: Annotated[
-        bool, typer.Option("--json", help="Print what was written as one JSON object.")
-    ] = False,
+    as_json: options.Written = False,
 ) -> None:
     """Find mass, centre of mass, sensor bias and sensor rotation from static postures."""
     from elastocal.cli.output import console, print_json

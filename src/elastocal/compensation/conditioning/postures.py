@@ -184,5 +184,4 @@ def _from_quaternions(path: Path, rows: LoadRows, header: list[str]) -> FloatArr
         raise CompensationError(
             f"{path}: quaternion {quaternions[row].tolist()} of posture {row + 1} has not length 1"
         )
-    rotations: FloatArray = Rotation.from_quat(quaternions).as_matrix()
-    return rotations
+    return Rotation.from_quat(quaternions).as_matrix()

@@ -190,8 +190,7 @@ def _descend(
 
 def _least_squares(J: FloatArray, b: FloatArray) -> FloatArray:
     u, s, vt, scale, kept = _decomposed(J)
-    solution: FloatArray = (vt[kept].T @ ((u[:, kept].T @ b) / s[kept])) / scale
-    return solution
+    return (vt[kept].T @ ((u[:, kept].T @ b) / s[kept])) / scale
 
 
 def _decomposed(

@@ -163,8 +163,7 @@ def turned_to_base(
     """
     if vectors is None or wrench is None or not wrench.in_tcp:
         return vectors
-    turned: FloatArray = (T_base_tcp[:, :3, :3] @ vectors[:, :, None])[:, :, 0]
-    return turned
+    return (T_base_tcp[:, :3, :3] @ vectors[:, :, None])[:, :, 0]
 
 
 def _finite(cell: str) -> float:

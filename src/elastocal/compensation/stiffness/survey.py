@@ -295,8 +295,7 @@ def _spun(T_base_tcp: FloatArray, spins: FloatArray) -> FloatArray:
     turn[:, 0, 0] = turn[:, 1, 1] = np.cos(spins)
     turn[:, 1, 0] = np.sin(spins)
     turn[:, 0, 1] = -turn[:, 1, 0]
-    turned: FloatArray = T_base_tcp @ turn
-    return turned
+    return T_base_tcp @ turn
 
 
 def _postures(solver: InverseKinematics, T: FloatArray, grid: PostureGrid) -> FloatArray:

@@ -60,8 +60,7 @@ class Spread:
         ndarray, shape (pair, ...)
             New minus old.
         """
-        noise: FloatArray = np.moveaxis(new_rows @ self.second.T - old_rows @ self.first.T, -1, 0)
-        return noise
+        return np.moveaxis(new_rows @ self.second.T - old_rows @ self.first.T, -1, 0)
 
     def covariance(self) -> tuple[FloatArray, FloatArray]:
         """Return the second moments of the deviations, each of shape (spring, spring)."""

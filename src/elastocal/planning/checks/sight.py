@@ -174,5 +174,4 @@ def sight_solid(body: Body) -> SightSolid:
 
 
 def _seen_from(T: FloatArray, point: FloatArray) -> FloatArray:
-    seen: FloatArray = T[:3, :3].T @ (point - T[:3, 3])
-    return seen
+    return T[:3, :3].T @ (point - T[:3, 3])

@@ -122,8 +122,7 @@ def _judged(window: Window, counts: dict[str, tuple[int, int]]) -> Window:
 
 
 def _inside(time: FloatArray, window: Window) -> BoolArray:
-    inside: BoolArray = (time >= window.start - SAME_TIME) & (time <= window.end + SAME_TIME)
-    return inside
+    return (time >= window.start - SAME_TIME) & (time <= window.end + SAME_TIME)
 
 
 def _finite(*arrays: FloatArray) -> BoolArray:

@@ -46,8 +46,7 @@ class ToolLoad:
 
     def R_base_sensor(self, T_base_tcp: FloatArray) -> FloatArray:
         """Return the rotation of the sensor, shape (..., 3, 3)."""
-        rotation: FloatArray = T_base_tcp[..., :3, :3] @ self.T_tcp_sensor[:3, :3]
-        return rotation
+        return T_base_tcp[..., :3, :3] @ self.T_tcp_sensor[:3, :3]
 
     def force(self, R_base_sensor: FloatArray) -> FloatArray:
         """Return the weight as the sensor feels it, shape (..., 3), in N, sensor frame."""
@@ -55,8 +54,7 @@ class ToolLoad:
 
     def moment(self, R_base_sensor: FloatArray) -> FloatArray:
         """Return the weight's moment about the sensor's origin, shape (..., 3), in N·m."""
-        moment: FloatArray = np.cross(self.centre, self.force(R_base_sensor))
-        return moment
+        return np.cross(self.centre, self.force(R_base_sensor))
 
 
 @brief_repr
@@ -112,8 +110,7 @@ def turned_sigma(R: FloatArray, *sigmas: FloatArray) -> FloatArray:
     *sigmas : ndarray, shape (3,)
         Standard deviations of the components of each vector, taken as independent.
     """
-    turned: FloatArray = np.sqrt(R**2 @ sum(sigma**2 for sigma in sigmas))
-    return turned
+    return np.sqrt(R**2 @ sum(sigma**2 for sigma in sigmas))
 
 
 _CHANCE_OF_STEP = 1e-4

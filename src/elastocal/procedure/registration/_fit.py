@@ -57,8 +57,7 @@ class UnloadedReadings:
     def expected(self, lever: FloatArray) -> FloatArray:
         """Return where the marker is by the controller, in base, shape (reading, 3), in m."""
         T = self.T_base_tcp
-        place: FloatArray = T[:, :3, 3] + T[:, :3, :3] @ lever
-        return place
+        return T[:, :3, 3] + T[:, :3, :3] @ lever
 
     @property
     def variance(self) -> FloatArray:

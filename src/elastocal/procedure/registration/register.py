@@ -211,8 +211,7 @@ def _stations(
 
 def _residual(readings: UnloadedReadings, T: FloatArray, result: Fit) -> FloatArray:
     expected = readings.expected(result.lever) + readings.robot_error @ result.errors
-    residual: FloatArray = readings.position @ T[:3, :3].T + T[:3, 3] - expected
-    return residual
+    return readings.position @ T[:3, :3].T + T[:3, 3] - expected
 
 
 def _accuracy(readings: UnloadedReadings, lever: FloatArray) -> float:

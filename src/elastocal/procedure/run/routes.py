@@ -238,8 +238,7 @@ def remaining_times(plan: PlanResult, settings: RunSettings) -> FloatArray:
     seconds = np.zeros(len(plan.poses) + 1)
     for step in itinerary(plan, settings):
         seconds[-1 if step.pose is None else step.pose] += step.seconds
-    left: FloatArray = seconds[::-1].cumsum()[::-1]
-    return left
+    return seconds[::-1].cumsum()[::-1]
 
 
 def _travel(plan: PlanResult, settings: RunSettings, start: int, end: int) -> PlannedStep:

@@ -124,8 +124,7 @@ def tool_path(cell: Cell, plan: PlanResult, steps: int = 12) -> FloatArray:
         stops += [*(np.array(via) for via in move.via), end]
     part = np.arange(1, steps + 1)[:, None] / steps
     legs = [a + part * (b - a) for a, b in pairwise(stops)]
-    path: FloatArray = cell.robot.forward(np.concatenate([home[None], *legs]))[:, :3, 3]
-    return path
+    return cell.robot.forward(np.concatenate([home[None], *legs]))[:, :3, 3]
 
 
 def _tooling(surface: Surface, towards_light: FloatArray) -> Layer:

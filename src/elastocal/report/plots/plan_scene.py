@@ -51,8 +51,7 @@ class _Bounds:
 
     def scene(self, point: FloatArray) -> FloatArray:
         """Return points in the camera's units, from the middle of the box."""
-        inside: FloatArray = (point - 0.5 * (self.low + self.high)) / self._unit
-        return inside
+        return (point - 0.5 * (self.low + self.high)) / self._unit
 
     @property
     def _unit(self) -> float:
@@ -267,8 +266,7 @@ def _up(cell: Cell) -> FloatArray:
 
 
 def _unit(vector: FloatArray) -> FloatArray:
-    result: FloatArray = vector / np.linalg.norm(vector)
-    return result
+    return vector / np.linalg.norm(vector)
 
 
 def _xyz(vector: FloatArray) -> dict[str, float]:

@@ -112,8 +112,7 @@ class NumericalInverse(InverseKinematics):
         wide = revolute & (upper - lower > 2.0 * np.pi)
         lower, upper = np.where(wide, -np.pi, lower), np.where(wide, np.pi, upper)
         rng = np.random.default_rng(self.seed)
-        starts: FloatArray = rng.uniform(lower, np.maximum(lower, upper), (self.starts, len(lower)))
-        return starts
+        return rng.uniform(lower, np.maximum(lower, upper), (self.starts, len(lower)))
 
     def _descend(self, q: FloatArray, T_base_tcp: FloatArray, length: float) -> FloatArray:
         """Return ``q`` after damped Gauss-Newton steps on the pose error, each row its own."""

@@ -40,8 +40,7 @@ class Screws:
     @cached_property
     def wedge_squared(self) -> FloatArray:
         """Their squares, shape (element, 3, 3)."""
-        squared: FloatArray = self.wedge @ self.wedge
-        return squared
+        return self.wedge @ self.wedge
 
 
 def motions(screws: Screws, positions: FloatArray) -> FloatArray:

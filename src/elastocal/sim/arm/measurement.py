@@ -205,8 +205,7 @@ def _difference_of_readings(
 ) -> FloatArray:
     """Return the error of loaded minus unloaded reading; a pose has one unloaded reading."""
     unloaded = rng.standard_normal((shape[0], 1, 3))
-    errors: FloatArray = sigma * (rng.standard_normal(shape) - unloaded)
-    return errors
+    return sigma * (rng.standard_normal(shape) - unloaded)
 
 
 def _offsets(

@@ -113,20 +113,17 @@ class TwoSlopeGear:
     def energy(self, angle: FloatArray) -> FloatArray:
         """Return the integral of `torque`."""
         lost, _, _ = self._lost(angle)
-        energy: FloatArray = 0.5 * self.stiff * angle**2 - lost
-        return energy
+        return 0.5 * self.stiff * angle**2 - lost
 
     def torque(self, angle: FloatArray) -> FloatArray:
         """Return ``stiff angle - (stiff - soft) knee atan(angle / knee)``."""
         _, lost, _ = self._lost(angle)
-        torque: FloatArray = self.stiff * angle - lost
-        return torque
+        return self.stiff * angle - lost
 
     def stiffness(self, angle: FloatArray) -> FloatArray:
         """Return ``stiff - (stiff - soft) / (1 + (angle / knee)²)``."""
         _, _, lost = self._lost(angle)
-        stiffness: FloatArray = self.stiff - lost
-        return stiffness
+        return self.stiff - lost
 
     def _lost(self, angle: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         return gear_softening(angle, self.stiff - self.soft, self.knee)

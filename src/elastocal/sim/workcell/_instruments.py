@@ -112,8 +112,7 @@ class SimulatedForceSensor:
         unrest = segment.unrest(times)
         if unrest is None:
             return reading
-        shaken: FloatArray = reading + unrest * (self._matrix @ segment.ripple_wrench)
-        return shaken
+        return reading + unrest * (self._matrix @ segment.ripple_wrench)
 
     def _clipped(self, times: IndexArray, values: FloatArray) -> FloatArray:
         """Keep the readings within the ranges, and notice when they were not."""
@@ -263,16 +262,14 @@ def sensor_range(cell: Cell) -> FloatArray:
 def sensor_zero(cell: Cell, seed: int) -> FloatArray:
     """Return what the sensor reads under nothing, shape (6,), in N and N·m."""
     zero = generator(seed, "sensor", "zero").standard_normal(6)
-    bias: FloatArray = cell.file.simulation.sensor.bias * sensor_range(cell) * zero
-    return bias
+    return cell.file.simulation.sensor.bias * sensor_range(cell) * zero
 
 
 def sensor_matrix(cell: Cell, seed: int) -> FloatArray:
     """Return what the sensor reads per true wrench, shape (6, 6)."""
     scale, share = sensor_range(cell), cell.file.simulation.sensor.cross_talk
     talk = share * generator(seed, "sensor", "cross-talk").standard_normal((6, 6))
-    matrix: FloatArray = np.eye(6) + talk * np.divide.outer(scale, scale)
-    return matrix
+    return np.eye(6) + talk * np.divide.outer(scale, scale)
 
 
 def force_gain(cell: Cell, seed: int) -> FloatArray:
@@ -280,8 +277,7 @@ def force_gain(cell: Cell, seed: int) -> FloatArray:
     matrix, T_sensor_tcp = sensor_matrix(cell, seed), cell.T_sensor_tcp
     assert T_sensor_tcp is not None
     moment = np.cross(T_sensor_tcp[:3, 3], np.eye(3)).T
-    gain: FloatArray = matrix[:3, :3] + matrix[:3, 3:] @ moment
-    return gain
+    return matrix[:3, :3] + matrix[:3, 3:] @ moment
 
 
 def _station(seed: int, name: str, position: FloatArray, placing: float) -> FloatArray:

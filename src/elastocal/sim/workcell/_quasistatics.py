@@ -168,13 +168,11 @@ class Quasistatics:
     def R_base_sensor(self, q: FloatArray, twist: FloatArray) -> FloatArray:
         """Return the true orientation of the sensor, shape (..., 3, 3)."""
         nominal = self.robot.forward(q)[..., :3, :3] @ self.robot.T_tcp_sensor[:3, :3]
-        turned: FloatArray = Rotation.from_rotvec(twist[..., 6:]).as_matrix() @ nominal
-        return turned
+        return Rotation.from_rotvec(twist[..., 6:]).as_matrix() @ nominal
 
     def tool_position(self, state: RobotState) -> FloatArray:
         """Return where the tool centre point truly is, in base, shape (..., 3), in m."""
-        position: FloatArray = self.robot.forward(state.q)[..., :3, 3] + state.twist[..., :3]
-        return position
+        return self.robot.forward(state.q)[..., :3, 3] + state.twist[..., :3]
 
     def along(self, q: FloatArray, R_base_tcp: FloatArray, points: FloatArray) -> FloatArray:
         """Return joints that bring the undeformed tool to points, orientation kept.

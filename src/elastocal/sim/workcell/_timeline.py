@@ -93,8 +93,7 @@ class Uniform:
         """Return the progress at times in s."""
         if self.duration <= 0.0:
             return np.ones_like(np.asarray(time, dtype=float))
-        progress: FloatArray = np.clip(np.asarray(time) / self.duration, 0.0, 1.0)
-        return progress
+        return np.clip(np.asarray(time) / self.duration, 0.0, 1.0)
 
 
 @dataclass(frozen=True)
@@ -115,10 +114,7 @@ class Trapezoid:
         rising = 0.5 * speed * t**2 / self.rise
         falling = 1.0 - 0.5 * speed * left**2 / self.rise
         level = speed * (t - 0.5 * self.rise)
-        progress: FloatArray = np.where(
-            t < self.rise, rising, np.where(left < self.rise, falling, level)
-        )
-        return progress
+        return np.where(t < self.rise, rising, np.where(left < self.rise, falling, level))
 
 
 @dataclass(frozen=True)
@@ -147,8 +143,7 @@ class SettlingRamp:
             reached = (on + self.tau * np.expm1(-on / self.tau)) / self.ramp
             progress = 1.0 - (1.0 - reached) * np.exp(-(t - on) / self.tau)
             progress = np.where(t < self.ramp, reached, progress)
-        settled: FloatArray = np.where(t >= self.duration, 1.0, progress)
-        return settled
+        return np.where(t >= self.duration, 1.0, progress)
 
 
 def joint_move(distance: FloatArray, speed: FloatArray, rise: float) -> Trapezoid:
@@ -198,8 +193,7 @@ class Knots:
         )
         low, high = self.progress[after - 1], self.progress[after]
         part = ((progress - low) / (high - low))[:, None]
-        between: FloatArray = (1.0 - part) * array[after - 1] + part * array[after]
-        return between
+        return (1.0 - part) * array[after - 1] + part * array[after]
 
 
 @dataclass(frozen=True)
@@ -219,8 +213,7 @@ class Ripple:
             np.sin(2.0 * np.pi * f * time + p)
             for f, p in zip(self.frequency, self.phase, strict=True)
         )
-        force: FloatArray = 0.5 * self.amplitude * (first + second)
-        return force
+        return 0.5 * self.amplitude * (first + second)
 
 
 @dataclass(frozen=True, eq=False)

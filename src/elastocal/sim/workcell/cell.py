@@ -104,8 +104,7 @@ class _SpringTrail:
 
     def next(self) -> FloatArray:
         """Return the positions that go on as they came; a third fewer iterations start there."""
-        ahead: FloatArray = 2.0 * self._theta - self._before
-        return ahead
+        return 2.0 * self._theta - self._before
 
     def went(self, state: RobotState) -> None:
         """Take the positions that were found."""
@@ -166,8 +165,7 @@ class ProcessCell:
     def _left(self, twist: FloatArray) -> FloatArray:
         """Take out what the controller does of the sag, as it was where the course began."""
         assert self._state is not None, "lift comes first"
-        left: FloatArray = twist - self._statics.compensation * self._state.sag
-        return left
+        return twist - self._statics.compensation * self._state.sag
 
     def press(self, q: FloatArray, force_base: FloatArray) -> ProcessState:
         """Go on to joints and a force on the robot.
@@ -203,5 +201,4 @@ class ProcessCell:
         sigma = np.repeat([self._entry.force_noise, self._entry.moment_noise], 3)
         noise = sigma * self._rng.standard_normal(wrench.shape)
         values = wrench @ self._matrix.T + self._zero + np.outer(since, self._slope) + noise
-        clipped: FloatArray = np.clip(values, -self._range, self._range)
-        return clipped
+        return np.clip(values, -self._range, self._range)
