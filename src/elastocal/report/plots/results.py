@@ -1,14 +1,16 @@
 """Pictures of results: what `plot` of a workflow's result shows."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import singledispatch
 from typing import ParamSpec
 
 import matplotlib
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
+from elastocal.arrays import FloatArray
 from elastocal.compensation.offline import CorrectionFigures
 from elastocal.compensation.process import SimulateProcessResult
 from elastocal.dataset import Dataset
@@ -97,30 +99,46 @@ def _run(summary: RunSummary) -> Figure:
 
 @_draw.register
 def _plan(plan: PlanResult) -> Figure:
-    """Return the contact points in visiting order, seen along base's z axis."""
-    x, y, _ = _MM * np.array([pose.tcp_position for pose in plan.poses]).T
-    across, up = (max(float(np.ptp(each)), 1.0) for each in (x, y))
-    tall = float(np.clip((_WIDTH - 1.0) * up / across, 1.5, 7.0))
-    height = tall + 1.1
+    """Return the contact points in visiting order, from above and from the side."""
+    position = _MM * np.array([pose.tcp_position for pose in plan.poses])
+    spans = 1.15 * np.maximum(np.ptp(position, axis=0), 0.05 * np.ptp(position) + 1.0)
+    middle = 0.5 * (position.max(axis=0) + position.min(axis=0))
+    # One scale for both views, at most as tall as a page.
+    scale = min((_WIDTH - 1.0) / spans[0], 7.5 / (spans[1] + spans[2]))
+    height = float(scale * (spans[1] + spans[2])) + 1.55
     figure = new_figure(_WIDTH, height)
-    axes = figure.add_axes((0.8 / _WIDTH, 0.6 / height, 1.0 - 1.0 / _WIDTH, tall / height))
-    axes.plot(x, y, color=style.FAINT, lw=1.0, zorder=1)
-    axes.scatter(x, y, s=170, c=style.BLUE, lw=0, zorder=2)
-    for pose, at in zip(plan.poses, zip(x, y, strict=True), strict=True):
-        axes.annotate(
-            str(pose.id), at, ha="center", va="center", color=style.PAPER, fontsize=7.5, zorder=3
-        )
-    axes.set_aspect("equal", adjustable="datalim")
-    axes.margins(0.08)
-    axes.set(xlabel="x of base in mm", ylabel="y of base in mm")
+    bottom = height - 0.45
+    for axis in (1, 2):
+        tall = float(scale * spans[axis])
+        bottom -= tall + (0.5 if axis == 2 else 0.0)
+        box = (0.8 / _WIDTH, bottom / height, float(scale * spans[0]) / _WIDTH, tall / height)
+        axes = figure.add_axes(box)
+        _draw_tour(axes, position[:, [0, axis]], [pose.id for pose in plan.poses])
+        for set_limits, k in ((axes.set_xlim, 0), (axes.set_ylim, axis)):
+            set_limits(middle[k] - 0.5 * spans[k], middle[k] + 0.5 * spans[k])
+        axes.set(xlabel="x of base in mm" if axis == 2 else "", ylabel=f"{'xyz'[axis]} in mm")
     search = plan.search
     title = (
         f"{plan.cell.name}: {len(plan.poses)} poses by {search.name} in visiting order,"
         f" covering radius {_MM * search.covering_radius:.0f} mm"
     )
-    axes.set_title(literal(title), loc="left", fontsize=9.5, weight="bold")
-    axes.spines[["top", "right"]].set_visible(False)
+    figure.text(
+        0.8 / _WIDTH, 1.0 - 0.12 / height, literal(title), va="top", fontsize=9.5, weight="bold"
+    )
     return figure
+
+
+def _draw_tour(axes: Axes, place: FloatArray, numbers: Sequence[int]) -> None:
+    size = 8.0 if len(numbers) <= 40 else 5.0
+    axes.plot(*place.T, color=style.MUTED, lw=0.7, zorder=1)
+    for at, number in zip(place, numbers, strict=True):
+        # Each number lies on its disc, so that of two places in one both are never mixed.
+        axes.annotate(
+            str(number), at, ha="center", va="center", color=style.PAPER, fontsize=0.85 * size,
+            bbox={"boxstyle": "circle,pad=0.25", "fc": style.BLUE, "ec": style.PAPER, "lw": 0.5},
+        )  # fmt: skip
+    axes.spines[["top", "right"]].set_visible(False)
+    axes.tick_params(labelsize=7.5)
 
 
 @_draw.register
@@ -175,11 +193,11 @@ def _process(found: SimulateProcessResult) -> Figure:
             (f"{line.name}, {word}", _MM * side.mean, _MM * side.max, colour)
             for line in (*found.lines, *found.budget)
             for word, side, colour in (
-                ("without correction", line.before, _BEFORE),
-                ("with correction", line.after, _AFTER),
+                ("before", line.before, _BEFORE),
+                ("after", line.after, _AFTER),
             )
         ],
-        f"{found.process} in cell {found.cell}: absolute deviation on the path",
+        f"{found.process} in cell {found.cell}: absolute deviation before and after correction",
         decades=False,
     )
 
@@ -193,7 +211,7 @@ def _mean_to_largest(bars: list[_Bar], title: str, decades: bool) -> Figure:
     height = 0.34 * len(bars) + 1.15
     figure = new_figure(_WIDTH, height)
     longest = max(len(name) for name, *_ in bars)
-    left = min(0.45, 0.05 + 0.0105 * longest)
+    left = min(0.5, 0.05 + 0.009 * longest)
     axes = figure.add_axes((left, 0.6 / height, 0.82 - left, 0.34 * len(bars) / height))
     for number, (_, mean, largest, colour) in enumerate(bars):
         axes.plot([mean, largest], [number, number], color=colour, lw=2.5, alpha=0.5)
@@ -207,7 +225,7 @@ def _mean_to_largest(bars: list[_Bar], title: str, decades: bool) -> Figure:
         "mean / largest", (1.03, -0.5), va="bottom", fontsize=7.5, color=style.MUTED,
         xycoords=("axes fraction", "data"), annotation_clip=False,
     )  # fmt: skip
-    axes.set_yticks(range(len(bars)), [literal(name) for name, *_ in bars])
+    axes.set_yticks(range(len(bars)), [literal(name) for name, *_ in bars], size=8)
     axes.set_ylim(len(bars) - 0.5, -0.5)
     if decades:
         axes.set_xscale("log")
