@@ -24,11 +24,7 @@ from elastocal.planning.search import (
     o1,
     technique,
 )
-from elastocal.planning.surface import (
-    Surface,
-    distance_to_boundary,
-    geodesic_distance,
-)
+from elastocal.planning.surface import Surface, distance_to_boundary, geodesic_distance
 
 _SPRINGS = "bearing"
 """Spring layout that poses are judged by: the paper's 18 on a six-axis arm."""

@@ -9,9 +9,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from enum import Enum
 
-from elastocal.identification import (
-    UnseenErrors,
-)
+from elastocal.identification import UnseenErrors
 from elastocal.verdict.evidence import Evidence
 from elastocal.verdict.findings import Finding, find_everything
 from elastocal.wording import counted, mm, um

@@ -48,11 +48,7 @@ def springs_file(path: Path) -> FileDescription:
     file = read_springs(path)
     return FileDescription(
         "spring file",
-        {
-            "schema": "elastocal.springs/1",
-            "include": file.include,
-            "springs": len(file.springs),
-        },
+        {"schema": "elastocal.springs/1", "include": file.include, "springs": len(file.springs)},
     )
 
 

@@ -4,10 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from elastocal.arrays import (
-    BoolArray,
-    FloatArray,
-)
+from elastocal.arrays import BoolArray, FloatArray
 from elastocal.sim.arm.linkage import Linkage
 
 _DAMPING = 1e-3

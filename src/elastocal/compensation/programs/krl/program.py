@@ -220,8 +220,5 @@ def _fdats(data: Sequence[str]) -> Iterator[tuple[str, dict[str, str]]]:
             )
         yield (
             match[1].upper(),
-            {
-                "BASE": f"BASE_DATA[{parts['BASE_NO']}]",
-                "TOOL": f"TOOL_DATA[{parts['TOOL_NO']}]",
-            },
+            {"BASE": f"BASE_DATA[{parts['BASE_NO']}]", "TOOL": f"TOOL_DATA[{parts['TOOL_NO']}]"},
         )
