@@ -129,7 +129,7 @@ def test_the_python_of_the_tour_runs_and_prints_its_figures(toured):
     printed = io.StringIO()
     with contextlib.chdir(toured.folder), contextlib.redirect_stdout(printed):
         exec(compile(blocks("python")[0], "README.md", "exec"), {})
-    assert "'split': 'leave-poses-out'" in printed.getvalue()
+    assert "split='leave-poses-out'" in printed.getvalue()
 
 
 def test_the_files_that_the_readme_links_to_exist():

@@ -1,13 +1,19 @@
-"""What workflows return: short in a console, a table in a notebook, a picture when asked for."""
+"""How results and data show themselves: short in a console, a table in a notebook, a picture."""
 
 import dataclasses
 import html
 import importlib
-from typing import Any
+from collections.abc import Collection
+from typing import Any, TypeVar
 
 MOST_LINES = 20
 """Longest representation in a console."""
+MOST_CHARACTERS = 1500
+"""Longest representation in a console."""
 _LONGEST = 60
+_LONGEST_LINE = 200
+
+T = TypeVar("T")
 
 
 class Result:
@@ -37,11 +43,12 @@ class Result:
 
     def __repr__(self) -> str:
         """Return the facts, at most 20 lines of them."""
-        facts = self.facts()
-        lines = [f"  {label}: {text}" for label, text in facts]
-        if len(lines) >= MOST_LINES:
-            lines = [*lines[: MOST_LINES - 2], f"  … and {len(lines) - MOST_LINES + 2} more"]
-        return "\n".join([type(self).__name__, *lines])
+        lines = [_cut(f"  {label}: {text}", _LONGEST_LINE) for label, text in self.facts()]
+        shown = len(lines) if len(lines) < MOST_LINES else MOST_LINES - 2
+        while sum(map(len, lines[:shown])) > MOST_CHARACTERS - 100:
+            shown -= 1
+        rest = [f"  … and {len(lines) - shown} more"] if shown < len(lines) else []
+        return "\n".join([type(self).__name__, *lines[:shown], *rest])
 
     def _repr_html_(self) -> str:
         """Return the facts as a table, for notebooks."""
@@ -50,6 +57,29 @@ class Result:
             for label, text in self.facts()
         )
         return f"<table><caption>{type(self).__name__}</caption>{rows}</table>"
+
+
+def brief_repr(cls: type[T]) -> type[T]:
+    """Let a dataclass of arrays, long texts or many items show itself in a line.
+
+    >>> @brief_repr
+    ... @dataclasses.dataclass
+    ... class Way:
+    ...     name: str
+    ...     stops: tuple[int, ...]
+    >>> Way("a", tuple(range(99)))
+    Way(name='a', stops=99 entries)
+    """
+
+    def show(self: Any) -> str:
+        values = {
+            each.name: getattr(self, each.name) for each in dataclasses.fields(self) if each.repr
+        }
+        texts = ", ".join(f"{name}={_literally(value)}" for name, value in values.items())
+        return _cut(f"{type(self).__qualname__}({texts})", MOST_CHARACTERS)
+
+    cls.__repr__ = show  # type: ignore[method-assign]
+    return cls
 
 
 def brief(value: Any) -> str:
@@ -66,8 +96,22 @@ def brief(value: Any) -> str:
         return f"array of shape {value.shape}"
     if isinstance(value, tuple | list):
         text = ", ".join(brief(each) for each in value) if len(value) <= 6 else ""
-        return text if 0 < len(text) <= _LONGEST else f"{len(value)} entries"
-    if isinstance(value, dict):
-        return f"{len(value)} entries"
-    text = " ".join(str(value).split())
-    return text if len(text) <= _LONGEST else f"{text[:_LONGEST]}…"
+        return text if 0 < len(text) <= _LONGEST else _entries(value)
+    if isinstance(value, Collection) and not isinstance(value, str | bytes):
+        return _entries(value)
+    return _cut(" ".join(str(value).split()), _LONGEST)
+
+
+def _literally(value: Any) -> str:
+    if not isinstance(value, str):
+        return brief(value)
+    lines = value.count("\n") + 1
+    return repr(brief(value)) if lines == 1 else f"{lines} lines"
+
+
+def _entries(value: Collection[Any]) -> str:
+    return f"{len(value)} entries" if len(value) != 1 else "1 entry"
+
+
+def _cut(text: str, longest: int) -> str:
+    return text if len(text) <= longest else f"{text[: longest - 1]}…"

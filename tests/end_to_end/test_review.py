@@ -83,9 +83,9 @@ def test_trusted_conventions_are_fitted_with_the_doubt_in_the_model():
 
 def test_names_that_look_like_markup_are_shown_as_they_are(tmp_path):
     measured = Cell(linear_truth(), poses=12).measure()
-    arrays = {name: measured.data[name].to_numpy() for name in ("joint_position", "force")}
+    arrays = {name: getattr(measured, name) for name in ("joint_position", "force")}
     moved = ("controller_displacement", "marker_displacement")
-    arrays |= {name: measured.data[name].to_numpy() for name in moved}
+    arrays |= {name: getattr(measured, name) for name in moved}
     odd = dataset.Dataset.from_arrays(
         **arrays,
         joint_names=robot().joint_names,

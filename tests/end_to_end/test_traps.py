@@ -27,9 +27,9 @@ def good() -> Dataset:
 
 
 def arrays(measured: Dataset | None = None) -> dict:
-    data = (measured or good()).data
+    data = measured or good()
     names = ("joint_position", "force", "controller_displacement", "marker_displacement")
-    return {name: data[name].to_numpy().copy() for name in names}
+    return {name: getattr(data, name).copy() for name in names}
 
 
 def changed(**changes) -> Dataset:

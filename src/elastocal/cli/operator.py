@@ -1,16 +1,212 @@
-"""The person at a terminal, as a run's operator."""
+"""The person at a terminal: sees a run live, agrees before it moves, and stops it by Ctrl-C.
 
+The view is one line that changes on a terminal, a line a pose elsewhere. Signals that would end
+the program ask the run to stop instead: the arm is brought to safety first.
+"""
+
+import abc
+import contextlib
+import signal
 import sys
-from collections.abc import Iterator, Sequence
+import threading
+import time
+from collections import deque
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from types import FrameType
 
 import typer
 from rich.console import Console
+from rich.live import Live
+from rich.text import Text
 
-from elastocal.cli.interruption import interruption
-from elastocal.cli.run_view import watching
 from elastocal.errors import ProcedureError
+from elastocal.procedure import Progress
 from elastocal.workflows import Supervision
+
+REFRESH = 0.1
+"""Shortest time between two changes of the line, in s of the wall."""
+PATIENCE = 2.0
+"""How long the end of a run waits for its view to be written, in s of the wall."""
+_BAR = 20
+
+
+def progress_text(step: Progress) -> str:
+    """Return a progress report as one line.
+
+    >>> from elastocal.procedure.run import Step
+    >>> progress_text(Progress(1.0, 3, 31, 2, 1, Step.SETTLE, "north", 1135.2, 4e-5, 754.0))
+    'pose 3 of 31  settle north  1135 N  slip 0.04 mm  13 min left'
+    """
+    where = f"pose {step.number} of {step.count}" if step.pose is not None else "to HOME"
+    again = f" (attempt {step.attempt})" if step.attempt > 1 else ""
+    what = f"{step.step.value} {step.load_case or ''}".rstrip()
+    return (
+        f"{where}{again}  {what}  {step.force:.0f} N  slip {step.slip * 1e3:.2f} mm"
+        f"  {_duration(step.left)} left"
+    )
+
+
+@contextlib.contextmanager
+def watching(console: Console, count: int) -> Iterator[Callable[[Progress], None]]:
+    """Yield a function that shows progress reports.
+
+    It returns at once: a thread of its own does the writing, as a terminal that takes nothing
+    would stop whoever writes to it, and with it the watchdog. One that is gone is left alone.
+
+    Parameters
+    ----------
+    console : Console
+        Where; a line is rewritten only where it is a terminal.
+    count : int
+        Number of poses.
+    """
+    screen = _screen(console, count)
+    screen.start()
+    try:
+        yield screen.tell
+    finally:
+        screen.close()
+
+
+def _screen(console: Console, count: int) -> "_Screen":
+    return _Terminal(console, count) if console.is_terminal else _Lines(console)
+
+
+class _Screen(threading.Thread, abc.ABC):
+    """Writes reports that wait to be written.
+
+    Parameters
+    ----------
+    console : Console
+        Where.
+    most : int
+        Reports that wait at most; older ones are dropped.
+    """
+
+    def __init__(self, console: Console, most: int) -> None:
+        super().__init__(name="view of the run", daemon=True)
+        self._console = console
+        self._waiting: deque[Progress] = deque(maxlen=most)
+        self._news, self._closed = threading.Event(), False
+
+    def tell(self, step: Progress) -> None:
+        """Take a report; called by the run."""
+        self._waiting.append(step)
+        self._news.set()
+
+    def close(self) -> None:
+        """Write what waits, if that can be done within `PATIENCE`."""
+        self._closed = True
+        self._news.set()
+        self.join(PATIENCE)
+
+    def run(self) -> None:
+        """Write reports until closed, or until they cannot be written."""
+        # Rich ends the program, SystemExit, when nobody reads a pipe any more, and before that
+        # it cuts standard output off, which may still be asked for data.
+        self._console.on_broken_pipe = _leave_off  # type: ignore[method-assign]
+        with contextlib.suppress(OSError, ValueError):
+            self.write()
+
+    def write(self) -> None:
+        """Write reports until closed."""
+        for step in self.reports():
+            self.show(step)
+
+    def reports(self) -> Iterator[Progress]:
+        """Yield reports until closed."""
+        while True:
+            self._news.wait()
+            self._news.clear()
+            closed = self._closed
+            while self._waiting:
+                yield self._waiting.popleft()
+            if closed:
+                return
+
+    @abc.abstractmethod
+    def show(self, step: Progress) -> None:
+        """Write one report."""
+
+
+class _Terminal(_Screen):
+    """One line that changes."""
+
+    def __init__(self, console: Console, count: int) -> None:
+        super().__init__(console, most=1)
+        self._count, self._live = count, Live(console=console, transient=True, auto_refresh=False)
+
+    def write(self) -> None:
+        with self._live:
+            super().write()
+
+    def show(self, step: Progress) -> None:
+        done = step.number if step.pose is None else step.number - 1
+        line = Text(f"{_bar(done, self._count)} {progress_text(step)}")
+        self._live.update(line, refresh=True)
+        time.sleep(0.0 if self._closed else REFRESH)
+
+
+class _Lines(_Screen):
+    """A line whenever another pose is begun."""
+
+    def __init__(self, console: Console) -> None:
+        super().__init__(console, most=1000)
+        self._last: tuple[int | None, int] | None = None
+
+    def tell(self, step: Progress) -> None:
+        if (step.pose, step.attempt) != self._last:
+            self._last = (step.pose, step.attempt)
+            super().tell(step)
+
+    def show(self, step: Progress) -> None:
+        self._console.print(progress_text(step), soft_wrap=True, markup=False)
+
+
+def _leave_off() -> None:
+    raise OSError("nobody reads the view any more")
+
+
+def _bar(done: int, count: int) -> str:
+    filled = _BAR * done // max(count, 1)
+    return f"[{'#' * filled}{'.' * (_BAR - filled)}]"
+
+
+def _duration(seconds: float) -> str:
+    if seconds < 90.0:
+        return f"{seconds:.0f} s"
+    minutes = round(seconds / 60.0)
+    return f"{minutes} min" if minutes < 90 else f"{minutes // 60} h {minutes % 60:02d} min"
+
+
+NAMES = ("SIGINT", "SIGTERM", "SIGHUP", "SIGQUIT", "SIGTSTP")
+"""What a person, a terminal or a system sends to end a program, or to halt it, which would leave
+the arm pressing with nobody to watch. Not every system has all of them."""
+
+
+@contextlib.contextmanager
+def interruption() -> Iterator[Callable[[], bool]]:
+    """Yield a function that says whether somebody wants the run to stop.
+
+    Meanwhile the signals of `NAMES` do not break into the middle of a step: the runner asks once
+    a cycle, releases, retracts and stops.
+    """
+    asked = threading.Event()
+
+    def note(number: int, frame: FrameType | None) -> None:  # noqa: ARG001 - signal's form
+        asked.set()
+
+    if threading.current_thread() is not threading.main_thread():
+        yield asked.is_set
+        return
+    numbers = [getattr(signal, name) for name in NAMES if hasattr(signal, name)]
+    before = {number: signal.signal(number, note) for number in numbers}
+    try:
+        yield asked.is_set
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
 
 
 class TerminalOperator:

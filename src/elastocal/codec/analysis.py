@@ -17,12 +17,14 @@ from elastocal.codec.indices import IndexValues, index_values
 from elastocal.dataset import Readings
 from elastocal.elastic import layout
 from elastocal.identification import Term, factor, observability, rank, unit_columns
+from elastocal.results import brief_repr
 from elastocal.robot import Robot
 
 _SHARE = 1e-6
 """Least part in a direction that the data do not see by which a spring counts as mixed up."""
 
 
+@brief_repr
 @dataclass(frozen=True, eq=False)
 class SpringObservability:
     """The springs that the training sets of one variant tell apart."""
@@ -45,6 +47,7 @@ class SpringObservability:
         return np.asarray(~self.determined.any(axis=(0, 1)))
 
 
+@brief_repr
 @dataclass(frozen=True, eq=False)
 class CodecAnalysis:
     """The training sets of every variant, in order of the variants."""

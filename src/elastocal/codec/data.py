@@ -12,6 +12,7 @@ from elastocal.codec.variants import Variant
 from elastocal.elastic import Spring
 from elastocal.errors import CodecError, nearest
 from elastocal.records import Variable
+from elastocal.results import brief_repr
 
 AXES = ("x", "y", "z", "norm")
 """Components of an error in base, and the length of the vector."""
@@ -20,6 +21,7 @@ NO_POSE = -1
 """Fills `CodecData.chosen` behind the last chosen pose."""
 
 
+@brief_repr
 @dataclass(frozen=True)
 class SpringLabels:
     """Names and units of the springs of a variant."""
@@ -37,6 +39,7 @@ class SpringLabels:
         )
 
 
+@brief_repr
 @dataclass(frozen=True, eq=False)
 class CodecData:
     """Everything that a repeated cross-validation found; arrays are read-only copies.

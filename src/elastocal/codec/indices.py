@@ -11,6 +11,7 @@ from elastocal.codec._training import PreparedVariant
 from elastocal.codec.data import CodecData
 from elastocal.planning.search import Candidates, build_information, covering_radius
 from elastocal.planning.search.criteria import CRITERIA, IOptimal
+from elastocal.results import brief_repr
 from elastocal.tables import write_table
 
 COVERING_RADIUS = "covering_radius"
@@ -22,6 +23,7 @@ _TABLE = "indices.csv"
 """Name of the table in a codec's folder."""
 
 
+@brief_repr
 @dataclass(frozen=True, eq=False)
 class IndexValues:
     """Indices of the training sets of one variant."""

@@ -7,6 +7,7 @@ import numpy as np
 from elastocal.arrays import BoolArray, FloatArray
 from elastocal.codec._overlap import Overlap, corrected_mean, known, micrometres
 from elastocal.records import record
+from elastocal.results import brief_repr
 
 _ROUND_OFF = 1e-9
 """Part of an error below which a difference is round-off: techniques that choose the same poses
@@ -39,6 +40,7 @@ class PairVerdict:
     crossing: int | None
 
 
+@brief_repr
 @dataclass(frozen=True, eq=False)
 class PairedDifference:
     """The difference of the errors of two variants, for 1, 2, … training poses."""

@@ -23,6 +23,7 @@ from elastocal.identification import (
     screen,
 )
 from elastocal.planning.search import Candidates, Cover
+from elastocal.results import brief_repr
 from elastocal.robot import Robot
 
 _RATIO = 70.0 / 30.0
@@ -53,6 +54,7 @@ class CodecOptions:
             raise CodecError(f"seed {self.seed}: must be 0 or above")
 
 
+@brief_repr
 @dataclass(frozen=True, eq=False)
 class Campaign:
     """Readings grouped by physical pose.
@@ -155,6 +157,7 @@ def _blunders(
     return np.asarray(np.all(found, axis=0))
 
 
+@brief_repr
 @dataclass(frozen=True, eq=False)
 class Split:
     """One verification set and what is left to train with."""

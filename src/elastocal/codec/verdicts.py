@@ -21,12 +21,14 @@ from elastocal.codec.saturation import Saturation, SaturationInterval, Tolerance
 from elastocal.codec.variants import KEYS
 from elastocal.errors import SchemaError
 from elastocal.records import read_json, record, write_json
+from elastocal.results import brief_repr
 
 VERDICTS_SCHEMA = "elastocal.codec_verdicts/1"
 VERDICTS = "codec.json"
 """Name of the file in a codec's folder."""
 
 
+@brief_repr
 @dataclass(frozen=True, eq=False)
 class Verdicts:
     """The verdicts on a codec."""
@@ -40,6 +42,7 @@ class Verdicts:
     """One for each variant, then one for each pair."""
 
 
+@brief_repr
 @record()
 class Curve:
     """Errors of a variant over the number of training poses."""
@@ -55,6 +58,7 @@ class Curve:
     solver: str
 
 
+@brief_repr
 @record()
 class CodecSetup:
     """The splits and tolerances that the figures rest on."""
@@ -80,6 +84,7 @@ class CodecSetup:
         )
 
 
+@brief_repr
 @record(VERDICTS_SCHEMA)
 class CodecSummary:
     """The figures of a codec: contents of ``codec.json``, for people's scripts."""

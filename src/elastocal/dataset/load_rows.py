@@ -13,12 +13,14 @@ from elastocal.dataset._layout import AXES, FloatArray
 from elastocal.dataset._table import cut
 from elastocal.errors import DatasetError, UnitError, nearest
 from elastocal.files import read_text
+from elastocal.results import brief_repr
 from elastocal.tables import Column, TableError, write_table
 from elastocal.units import factor, split_column
 
 _EXAMPLES = {"angle": "rad", "length": "m", "force": "N", "moment": "N*m"}
 
 
+@brief_repr
 @dataclass(frozen=True, eq=False)
 class LoadRows:
     """Configurations under load, with the text they were read from."""

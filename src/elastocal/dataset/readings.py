@@ -9,11 +9,13 @@ from numpy.typing import ArrayLike
 
 from elastocal.dataset._layout import FloatArray, IntArray, StringArray, freeze
 from elastocal.errors import DatasetError, nearest
+from elastocal.results import brief_repr
 
 _LARGEST = 1e9
 """No SI number of a robot's reading comes near; what does is a damaged file."""
 
 
+@brief_repr
 @dataclass(frozen=True, eq=False)
 class Readings:
     """Readings that are ok, in (pose, load case) order; all arrays are read-only copies.

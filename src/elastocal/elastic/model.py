@@ -23,6 +23,7 @@ from numpy.typing import ArrayLike
 from elastocal.arrays import FloatArray, IndexArray
 from elastocal.elastic.springs import Parameter, Spring, SpringLoad, check_springs
 from elastocal.errors import SpringError
+from elastocal.results import brief_repr
 from elastocal.robot import (
     ChainModel,
     InsertedJoint,
@@ -36,6 +37,7 @@ _Columns = IndexArray | slice
 """Columns of an array; those that lie side by side as a slice, which copies nothing."""
 
 
+@brief_repr
 @dataclass(frozen=True)
 class CartesianCompliance:
     """How a pose yields to a wrench at the tool centre point, in base axes."""
@@ -65,6 +67,7 @@ class _Alike:
         return SpringLoad(tuple(torques[..., axis] for axis in self.axes))
 
 
+@brief_repr
 @dataclass(frozen=True, eq=False)
 class ElasticModel:
     """A robot with springs; compliances are arguments, so that one model serves many fits."""

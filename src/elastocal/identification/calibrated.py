@@ -10,11 +10,13 @@ from elastocal.elastic import ElasticModel, check_vectors
 from elastocal.errors import SpringError
 from elastocal.identification.observability import Observability
 from elastocal.identification.uncertainty import interval
+from elastocal.results import brief_repr
 
 _CHUNK = 2000
 """Configurations predicted at a time, so that the draws of a long path fit into memory."""
 
 
+@brief_repr
 @dataclass(frozen=True)
 class Prediction:
     """Predicted deflections with 95 % intervals: of the fit, and of what would be measured."""
@@ -32,6 +34,7 @@ class Prediction:
     """Upper ends of that, shape (row, 3), in m."""
 
 
+@brief_repr
 @dataclass(frozen=True, eq=False)
 class CalibratedModel:
     """An elastic model with identified compliances and their bootstrap draws."""

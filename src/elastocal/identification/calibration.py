@@ -30,8 +30,10 @@ from elastocal.identification.uncertainty import (
     widening_factor,
 )
 from elastocal.parallel import one_blas_thread
+from elastocal.results import brief_repr
 
 
+@brief_repr
 @dataclass(frozen=True, eq=False)
 class Calibration:
     """A calibrated model with everything that says how far to trust it."""

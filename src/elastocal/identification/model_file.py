@@ -14,10 +14,11 @@ from elastocal.identification.observability import Observability
 from elastocal.identification.options import MINIMUM_DRAWS
 from elastocal.identification.summary import CalibrationSummary
 from elastocal.records import read_json, record, write_json
-from elastocal.results import Result
+from elastocal.results import Result, brief_repr
 from elastocal.robot import Robot
 
 
+@brief_repr
 @record()
 class RobotRecord:
     """The robot, whole, so that a model file needs no other file."""

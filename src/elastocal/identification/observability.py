@@ -18,6 +18,7 @@ from elastocal.identification._sparse_basis import sparse_basis
 from elastocal.identification.problem import relative_sizes, unit_columns
 from elastocal.identification.solve import Factored
 from elastocal.records import record
+from elastocal.results import brief_repr
 
 _PROBES, _PROBE_SEED = 60, 0
 """Number and seed of the configurations that show what could be observed at all."""
@@ -31,6 +32,7 @@ class Term:
     weight: float
 
 
+@brief_repr
 @record()
 class Observability:
     """Rank, conditioning, and the springs that cannot be told apart."""

@@ -16,11 +16,13 @@ from numpy.typing import ArrayLike
 from elastocal.arrays import FloatArray
 from elastocal.errors import IdentificationError, nearest
 from elastocal.records import record
+from elastocal.results import brief_repr
 
 Weights = Literal["none", "sigma"]
 _WEIGHTS: tuple[Weights, ...] = get_args(Weights)
 
 
+@brief_repr
 @dataclass(frozen=True)
 class Prior:
     """What is known of the compliances before the data, e.g. from last year's calibration.
@@ -37,6 +39,7 @@ class Prior:
     in m."""
 
 
+@brief_repr
 @dataclass(frozen=True)
 class FitOptions:
     """Options of the identification; the defaults are the paper's (Eq. 19, `lsqlin`)."""
@@ -114,6 +117,7 @@ def bounds(
     return lower, upper
 
 
+@brief_repr
 @record(kw_only=True)
 class FitSettings:
     """What a user chose about springs, readings and fit; the defaults are the paper's."""

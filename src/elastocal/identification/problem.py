@@ -20,6 +20,7 @@ from elastocal.elastic import ElasticModel, Parameter
 from elastocal.errors import IdentificationError
 from elastocal.identification._least_squares import RANK_TOLERANCE
 from elastocal.identification.options import FitOptions, Prior, bounds
+from elastocal.results import brief_repr
 
 _SAME_CONFIGURATION = 5e-3
 """Distance in joint space (rad, m) below which two poses are the same configuration: more than
@@ -30,6 +31,7 @@ MINIMUM_BLOCKS = 3
 """Fewest distinct poses: one to leave out and two to fit, so that the spread is seen."""
 
 
+@brief_repr
 @dataclass(frozen=True, eq=False)
 class ScaledRows:
     """Weighted observation blocks whose columns are comparable."""
@@ -40,6 +42,7 @@ class ScaledRows:
     """What each column was divided by, shape (parameter,); the largest for an unloaded spring."""
 
 
+@brief_repr
 @dataclass(frozen=True, eq=False)
 class Problem:
     """An inspectable, weighted and bounded least-squares problem.

@@ -20,8 +20,10 @@ from elastocal.errors import IdentificationError
 from elastocal.identification._least_squares import RANK_TOLERANCE, kkt_violation, minimise
 from elastocal.identification.problem import Problem
 from elastocal.identification.solve import OPTIMALITY
+from elastocal.results import brief_repr
 
 
+@brief_repr
 @dataclass(frozen=True, eq=False)
 class PoseGrams:
     """Gram blocks of the column-scaled, weighted system."""
@@ -73,6 +75,7 @@ class PoseGrams:
         return np.array(fits) / self.scale
 
 
+@brief_repr
 @dataclass(frozen=True, eq=False)
 class PoseTriangles:
     """Triangles of the weighted rows of each pose block, without any prior."""

@@ -18,6 +18,7 @@ from elastocal.identification.options import MINIMUM_DRAWS, FitSettings
 from elastocal.identification.recertification import Estimate
 from elastocal.identification.summary import CalibrationSummary
 from elastocal.identification.uncertainty import interval
+from elastocal.results import brief_repr
 
 _DRAWS = 1000
 """Draws of whole poses, for the intervals of the errors."""
@@ -25,6 +26,7 @@ _SAME = 1e-4
 """Relative difference below which two results are of one computation, be it on other machines."""
 
 
+@brief_repr
 @dataclass(frozen=True, eq=False)
 class UnseenErrors:
     """Errors of predicted deflections at poses that were left out of the fit."""

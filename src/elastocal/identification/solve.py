@@ -9,6 +9,7 @@ from elastocal.errors import IdentificationError
 from elastocal.identification._least_squares import kkt_violation, minimise
 from elastocal.identification.options import LOSSES, MEDIAN_NORM, check_loss
 from elastocal.identification.problem import Problem
+from elastocal.results import brief_repr
 
 OPTIMALITY = 1e-7
 """Largest accepted violation of the optimality conditions, relative to the start."""
@@ -17,6 +18,7 @@ _SETTLED = 1e-6
 """Largest change of a weight at which reweighting has converged."""
 
 
+@brief_repr
 @dataclass(frozen=True)
 class Factored:
     """The column-scaled system in its singular basis."""
@@ -31,6 +33,7 @@ class Factored:
     """Column norms that were divided out, shape (spring,)."""
 
 
+@brief_repr
 @dataclass(frozen=True)
 class Solution:
     """A solved problem that can prove itself."""

@@ -14,6 +14,7 @@ from elastocal.identification.options import FitSettings
 from elastocal.identification.suspicious import Screening
 from elastocal.identification.uncertainty import HeldOut
 from elastocal.records import record
+from elastocal.results import brief_repr
 
 
 @record()
@@ -33,6 +34,7 @@ class SpringSummary:
     """Whether the data determine it by itself."""
 
 
+@brief_repr
 @record()
 class ResidualSummary:
     """Residual norms of the readings that entered the fit, in m."""
@@ -100,6 +102,7 @@ class SuspiciousReading:
     """Whether it was left out of the fit as a blunder."""
 
 
+@brief_repr
 @record("elastocal.calibration/1")
 class CalibrationSummary:
     """The figures of a calibration (spec section 4)."""

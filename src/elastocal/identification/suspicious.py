@@ -15,6 +15,7 @@ from elastocal.arrays import BoolArray, FloatArray
 from elastocal.identification._least_squares import rank
 from elastocal.identification.problem import Problem
 from elastocal.identification.solve import Solution, normalised_residuals, solve
+from elastocal.results import brief_repr
 
 _FALSE_ALARM = 0.01
 """Probability that a data set with normal noise and no blunder names any reading."""
@@ -32,6 +33,7 @@ _REDUNDANCY = 1.5
 _MOST_LEVERAGE = 0.99
 
 
+@brief_repr
 @dataclass(frozen=True)
 class Screening:
     """How each reading looks to a robust fit."""

@@ -24,6 +24,7 @@ from scipy.special import ndtri, stdtrit
 from elastocal.arrays import FloatArray, IndexArray
 from elastocal.identification.problem import Problem
 from elastocal.identification.refits import PoseGrams
+from elastocal.results import brief_repr
 
 CONFIDENCE = 0.95
 
@@ -32,6 +33,7 @@ MOST_FOLDS = 100
 """With more pose blocks than this, several are left out together."""
 
 
+@brief_repr
 @dataclass(frozen=True)
 class HeldOut:
     """Prediction errors at left-out poses."""

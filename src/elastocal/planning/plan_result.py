@@ -17,7 +17,7 @@ from elastocal.arrays import FloatArray
 from elastocal.errors import SchemaError
 from elastocal.files import sha256, write_json
 from elastocal.records import read_json, record, to_data
-from elastocal.results import Result
+from elastocal.results import Result, brief_repr
 
 _SCHEMA = "elastocal.plan/1"
 PLAN = "plan.json"
@@ -41,6 +41,7 @@ class CellRecord:
     names, not with comments."""
 
 
+@brief_repr
 @record()
 class RobotRecord:
     """The robot with rail and tool."""
@@ -53,6 +54,7 @@ class RobotRecord:
     home: Joints
 
 
+@brief_repr
 @record()
 class ContactRecord:
     """How the tool comes to the surface and what it presses with."""
@@ -68,6 +70,7 @@ class ContactRecord:
     """Force on the robot in the tcp frame, in N, in the order in which they are applied."""
 
 
+@brief_repr
 @record()
 class PoseRecord:
     """One calibration pose."""
@@ -103,6 +106,7 @@ class PoseRecord:
         return T
 
 
+@brief_repr
 @record()
 class MoveRecord:
     """One joint-space move between HOME and approach poses."""
@@ -131,6 +135,7 @@ class SpreadRecord:
     """Observability index O1 over the springs' observable directions (paper Eq. 20)."""
 
 
+@brief_repr
 @record()
 class SearchRecord:
     """How the poses were chosen."""
@@ -157,6 +162,7 @@ class SearchRecord:
     None in a cell without process."""
 
 
+@brief_repr
 @record()
 class ComparisonRecord:
     """The choice of another technique from the same pool, as many poses."""
@@ -178,6 +184,7 @@ class CheckRecord:
     advice: str
 
 
+@brief_repr
 @record()
 class PoolRecord:
     """The candidates that the search chose from."""

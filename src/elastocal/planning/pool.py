@@ -21,6 +21,7 @@ from elastocal.errors import PlanningError
 from elastocal.planning.checks import Checks, Verdicts, verdicts
 from elastocal.planning.postures import Postures
 from elastocal.planning.surface import contact_frames
+from elastocal.results import brief_repr
 from elastocal.robot.inverse import InverseKinematics
 
 UNREACHABLE = "reach"
@@ -45,6 +46,7 @@ class Approach:
     """Number of turns of the tool about its axis that are tried."""
 
 
+@brief_repr
 @dataclass(frozen=True)
 class BasePlacement:
     """Where the external axes carry the arm, and which branches are asked there, the best first."""
@@ -55,6 +57,7 @@ class BasePlacement:
     """Branches of the inverse kinematics; in their own order when not given."""
 
 
+@brief_repr
 @dataclass(frozen=True, eq=False)
 class Pool:
     """Candidates with a posture each, and why the other points have none."""
@@ -179,6 +182,7 @@ def join_pools(pools: Sequence[Pool]) -> Pool:
     )
 
 
+@brief_repr
 @dataclass(frozen=True, eq=False)
 class Options:
     """Every turn of the tool and branch of the arm that reaches its point, flat."""

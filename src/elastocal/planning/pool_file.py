@@ -13,6 +13,7 @@ from elastocal.arrays import FloatArray, IndexArray
 from elastocal.errors import PlanningError, SchemaError
 from elastocal.planning.plan_result import POOL, PlanResult
 from elastocal.records import Variable, read_netcdf, record, variables_of, write_netcdf
+from elastocal.results import brief_repr
 
 _SCHEMA = "elastocal.pool/1"
 NOT_CHOSEN = -1
@@ -24,6 +25,7 @@ _INDICES = ("branch", "pose_id", "point", "refused_by")
 _NAMES = ("joint_names", "check_names", "check_units", "refusal_names")
 
 
+@brief_repr
 @record(_SCHEMA, eq=False)
 class PoolData:
     """Candidates with their postures and margins, and the points that have none.
@@ -142,7 +144,7 @@ def read_pool(folder: Path) -> PoolData:
     return read_netcdf(path, PoolData)
 
 
-def check_pool_of(plan: PlanResult, data: PoolData, what: str = POOL) -> None:
+def check_pool_of(plan: PlanResult, data: PoolData) -> None:
     """Refuse a pool that a plan was not chosen from.
 
     Parameters
@@ -151,8 +153,6 @@ def check_pool_of(plan: PlanResult, data: PoolData, what: str = POOL) -> None:
         The plan.
     data : PoolData
         The pool that lies beside it.
-    what : str
-        How the message names the pool.
 
     Raises
     ------
@@ -167,14 +167,14 @@ def check_pool_of(plan: PlanResult, data: PoolData, what: str = POOL) -> None:
     ):
         if ours != wanted:
             raise SchemaError(
-                f"{what} belongs to another plan: {quantity} {ours}, in the plan {wanted}"
+                f"{POOL} belongs to another plan: {quantity} {ours}, in the plan {wanted}"
             )
     for pose in plan.poses:
         row = pose.candidate
         same = data.pose_id[row] == pose.id and tuple(data.q[row].tolist()) == pose.joints
         if not (same and np.allclose(data.contact[row], pose.tcp_position, rtol=0.0, atol=1e-6)):
             raise SchemaError(
-                f"{what} belongs to another plan: its candidate {row} is not pose {pose.id}"
+                f"{POOL} belongs to another plan: its candidate {row} is not pose {pose.id}"
             )
 
 

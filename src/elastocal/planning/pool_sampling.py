@@ -23,6 +23,7 @@ from elastocal.planning.checks import Checks, verdicts
 from elastocal.planning.pool import Approach, BasePlacement, Pool, join_pools, make_pool, options_at
 from elastocal.planning.surface import Surface, SurfacePoints, sample_blue_noise, sample_uniform
 from elastocal.progress import Progress, silent
+from elastocal.results import brief_repr
 from elastocal.robot.inverse import InverseKinematics, inverse_for
 
 CANDIDATES = "candidates"
@@ -43,6 +44,7 @@ _WORTH = 0.02
 """Share of the points that a further base placement must serve alone."""
 
 
+@brief_repr
 @dataclass(frozen=True, eq=False)
 class SampledPool:
     """A pool with the points that it was made of."""

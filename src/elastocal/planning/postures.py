@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from elastocal.arrays import FloatArray, IndexArray
+from elastocal.results import brief_repr
 from elastocal.robot import Robot
 
 _STRAIGHT = 2e-5
@@ -38,6 +39,7 @@ class Rows:
         return tuple(getattr(self, each.name) for each in fields(self))  # type: ignore[arg-type]
 
 
+@brief_repr
 @dataclass(frozen=True, eq=False)
 class Postures(Rows):
     """Contact poses on the surface with the robot's configurations; arrays are read-only."""

@@ -9,6 +9,7 @@ import pinocchio as pin
 
 from elastocal.arrays import BoolArray, FloatArray, IndexArray
 from elastocal.errors import RobotError
+from elastocal.results import brief_repr
 from elastocal.robot import Robot, collision_model
 from elastocal.shapes import Body, Solid, solid_of
 
@@ -16,6 +17,7 @@ _NEIGHBOURS = 1
 """Links this many joints apart touch by construction and are not checked against each other."""
 
 
+@brief_repr
 @dataclass(frozen=True, eq=False)
 class CollisionScene:
     """Which bodies must stay apart: links and tool from obstacles and from one another.

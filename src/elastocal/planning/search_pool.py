@@ -25,12 +25,14 @@ from elastocal.planning.search import (
     technique,
 )
 from elastocal.planning.surface import Surface, distance_to_boundary, geodesic_distance
+from elastocal.results import brief_repr
 
 _SPRINGS = "bearing"
 """Spring layout that poses are judged by: the paper's 18 on a six-axis arm."""
 _CHUNK = 5000
 
 
+@brief_repr
 @dataclass(frozen=True, eq=False)
 class SearchPool:
     """The pool as a search sees it: observation rows, metric, and the edge of the surface."""

@@ -16,10 +16,12 @@ import numpy as np
 from elastocal.errors import ElastocalError, SchemaError
 from elastocal.records._codec import schema_of
 from elastocal.records._netcdf import LabelledArray, LabelledArrays, read_arrays, write_arrays
+from elastocal.results import brief_repr
 
 T = TypeVar("T")
 
 
+@brief_repr
 @dataclass(frozen=True)
 class Variable:
     """How a field lies in a NetCDF file."""

@@ -13,6 +13,7 @@ import numpy as np
 
 from elastocal.errors import FileAccessError, SchemaError
 from elastocal.files import replacing
+from elastocal.results import brief_repr
 
 _SIGNATURE = b"\x89HDF\r\n\x1a\n"
 """First bytes of an HDF5 file, which every NetCDF4 file is (HDF5 file format, section II.A)."""
@@ -21,6 +22,7 @@ _STORAGE = ("_FillValue", "missing_value", "scale_factor", "add_offset", "_Encod
 """Attributes that say how values are stored (CF section 2.5.1, 8.1), not what they mean."""
 
 
+@brief_repr
 @dataclass(frozen=True, eq=False)
 class LabelledArray:
     """An array whose dimensions have names."""
@@ -35,6 +37,7 @@ class LabelledArray:
     """Whether the file holds it compressed and without a fill value."""
 
 
+@brief_repr
 @dataclass(frozen=True, eq=False)
 class LabelledArrays:
     """The contents of a NetCDF file: variables that share their dimensions, and attributes."""

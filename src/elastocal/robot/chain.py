@@ -11,8 +11,10 @@ import numpy as np
 import pinocchio as pin
 
 from elastocal.arrays import FloatArray, IndexArray
+from elastocal.results import brief_repr
 
 
+@brief_repr
 @dataclass(frozen=True)
 class ChainJoint:
     """One movable joint, with everything that is rigidly fixed behind it."""
@@ -54,6 +56,7 @@ class SerialChain:
         return f"{len(self.joints)} joints from {self.base!r} to {self.tip!r}"
 
 
+@brief_repr
 @dataclass(frozen=True)
 class InsertedJoint:
     """A virtual joint, always at zero, that a spring acts about."""

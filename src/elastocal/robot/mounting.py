@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from elastocal.arrays import FloatArray
 from elastocal.errors import RobotError, nearest
+from elastocal.results import brief_repr
 from elastocal.robot.transforms import xyzabc_from_T
 from elastocal.robot.urdf import parse_urdf, robot_name, root_link
 
@@ -17,6 +18,7 @@ _RIGID = 1e-6
 """How far R R^T of a transform that a person wrote may be from identity."""
 
 
+@brief_repr
 @dataclass(frozen=True, eq=False)
 class Rail:
     """A linear axis that carries a robot."""

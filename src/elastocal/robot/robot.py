@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 from elastocal.arrays import FloatArray, IndexArray
 from elastocal.errors import RobotError
 from elastocal.files import read_text, sha256
+from elastocal.results import brief_repr
 from elastocal.robot.chain import ChainJoint, ChainModel, SerialChain, build_model
 from elastocal.robot.urdf import Assumption, assumptions, parse_urdf, read_chain, robot_name
 
@@ -36,6 +37,7 @@ class Jacobian:
         return f"Jacobian(translation and rotation of shape {self.translation.shape})"
 
 
+@brief_repr
 @dataclass(frozen=True)
 class JointLimits:
     """Limits of the joints, in SI units; what is not known is infinite or NaN."""

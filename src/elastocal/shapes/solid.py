@@ -9,8 +9,10 @@ import numpy as np
 import trimesh
 
 from elastocal.arrays import BoolArray, FloatArray
+from elastocal.results import brief_repr
 
 
+@brief_repr
 @dataclass(frozen=True, eq=False)
 class Beams:
     """Straight lines of sight from markers to a station."""
@@ -94,6 +96,7 @@ class OtherSolid(Solid):
         return box
 
 
+@brief_repr
 @dataclass(frozen=True, eq=False)
 class Body:
     """A solid with its name and its place."""

@@ -12,6 +12,7 @@ from elastocal.identification.recertification import CompareSummary
 from elastocal.planning import PlanResult, PoolData
 from elastocal.planning.surface import Surface
 from elastocal.procedure import Entry, RunRecord, RunSummary
+from elastocal.results import brief_repr
 
 
 @dataclass(frozen=True)
@@ -69,6 +70,7 @@ class CodecEvidence:
     verdicts: Verdicts
 
 
+@brief_repr
 @dataclass(frozen=True, eq=False)
 class Evidence:
     """Everything that was found, and what was not."""

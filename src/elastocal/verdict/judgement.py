@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from enum import Enum
 
 from elastocal.identification import UnseenErrors
+from elastocal.results import brief_repr
 from elastocal.verdict.evidence import Evidence
 from elastocal.verdict.findings import Finding, find_everything
 from elastocal.wording import counted, mm, um
@@ -26,6 +27,7 @@ class Light(Enum):
     RED = "red"
 
 
+@brief_repr
 @dataclass(frozen=True)
 class Verdict:
     """The first words of the report."""

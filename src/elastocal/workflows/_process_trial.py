@@ -30,6 +30,7 @@ from elastocal.errors import CompensationError
 from elastocal.identification import CalibratedModel
 from elastocal.parallel import map_in_processes, process_count
 from elastocal.progress import Progress
+from elastocal.results import brief_repr
 from elastocal.robot import inverse_transform
 from elastocal.sim.workcell import ProcessCell
 
@@ -97,6 +98,7 @@ BUDGET = (
 )
 
 
+@brief_repr
 @dataclass(frozen=True, eq=False)
 class TrialRuns:
     """Every course without and with correction."""

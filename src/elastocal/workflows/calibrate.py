@@ -12,6 +12,7 @@ from elastocal.elastic import ElasticModel, layout
 from elastocal.identification import CalibrateResult, FitSettings, summary
 from elastocal.progress import Progress
 from elastocal.records import write_json
+from elastocal.results import brief_repr
 from elastocal.workflows._outputs import refuse_overwriting
 from elastocal.workflows._robot_source import find_robot
 from elastocal.workflows._workflow import workflow
@@ -19,6 +20,7 @@ from elastocal.workflows._workflow import workflow
 __all__ = ["CalibrateResult", "CalibrateSettings", "calibrate"]
 
 
+@brief_repr
 @dataclass(frozen=True)
 class CalibrateSettings(FitSettings):
     """What to calibrate, from which readings, and how."""

@@ -25,11 +25,12 @@ from elastocal.codec import (
 from elastocal.dataset import read, without
 from elastocal.files import filling
 from elastocal.progress import Progress
-from elastocal.results import Result
+from elastocal.results import Result, brief_repr
 from elastocal.workflows._robot_source import find_robot
 from elastocal.workflows._workflow import workflow
 
 
+@brief_repr
 @dataclass(frozen=True)
 class CodecSettings:
     """The readings that are cross-validated, what is compared, and where the files go."""

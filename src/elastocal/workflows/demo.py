@@ -13,7 +13,7 @@ from elastocal.compensation.process import SimulateProcessResult
 from elastocal.errors import FileAccessError
 from elastocal.procedure import RunEnd
 from elastocal.progress import Progress
-from elastocal.results import Result
+from elastocal.results import Result, brief_repr
 from elastocal.workflows._demo_folder import LOG, README, begin, finish
 from elastocal.workflows._operator import Operator, Unattended
 from elastocal.workflows._workflow import workflow
@@ -29,6 +29,7 @@ from elastocal.workflows.simulate_process import simulate_process
 from elastocal.workflows.tool import tool
 
 
+@brief_repr
 @dataclass(frozen=True)
 class Chapter:
     """A command of the story."""
@@ -80,6 +81,7 @@ MakeDisplay = Callable[[TextIO, Sequence[Chapter]], AbstractContextManager[DemoD
 """From the open log and the story to a display."""
 
 
+@brief_repr
 @dataclass(frozen=True)
 class DemoSettings:
     """Which story, and where its files go."""

@@ -20,6 +20,7 @@ from elastocal.planning.export import PLAN_TABLE, check_name, takes_krl, write_k
 from elastocal.progress import Progress
 from elastocal.records import record
 from elastocal.report import write_plan_figure, write_plan_page
+from elastocal.results import brief_repr
 from elastocal.workflows._workflow import workflow
 
 __all__ = ["PlanFigures", "PlanResult", "PlanSettings", "plan", "plan_figures"]
@@ -62,6 +63,7 @@ class PlanTimes:
     total: float
 
 
+@brief_repr
 @record()
 class PlanFigures:
     """The key figures of ``plan --json``."""

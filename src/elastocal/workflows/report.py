@@ -11,7 +11,7 @@ from elastocal.identification.recertification import Estimate
 from elastocal.progress import Progress
 from elastocal.records import record
 from elastocal.report.document import find_browser, write_pdf, write_report
-from elastocal.results import Result
+from elastocal.results import Result, brief_repr
 from elastocal.verdict import EvidenceOptions, Verdict, gather_evidence
 from elastocal.workflows._workflow import workflow
 
@@ -55,6 +55,7 @@ class UnseenFigures:
     readings: int
 
 
+@brief_repr
 @record()
 class ReportFigures:
     """The figures of ``report --json``."""

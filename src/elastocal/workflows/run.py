@@ -55,7 +55,7 @@ from elastocal.procedure import (
 from elastocal.procedure.run import PlannedStep
 from elastocal.progress import Progress
 from elastocal.records import record
-from elastocal.results import Result
+from elastocal.results import Result, brief_repr
 from elastocal.workflows._device_sources import DeviceSource, device_source
 from elastocal.workflows._operator import Operator, Unattended
 from elastocal.workflows._workflow import workflow
@@ -83,6 +83,7 @@ class RunSettings:
     operator: Operator = field(default_factory=Unattended)
 
 
+@brief_repr
 @record()
 class RunFigures:
     """The key figures of ``run --json``."""

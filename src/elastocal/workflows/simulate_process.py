@@ -29,6 +29,7 @@ from elastocal.errors import CompensationError
 from elastocal.files import filling, read_text, sha256
 from elastocal.identification import read_model
 from elastocal.progress import Progress
+from elastocal.results import brief_repr
 from elastocal.workflows._process_trial import (
     BUDGET,
     ProcessTrial,
@@ -42,6 +43,7 @@ __all__ = ["SimulateProcessResult", "SimulateProcessSettings", "simulate_process
 _PACKAGES = ("elastocal", "numpy", "scipy")
 
 
+@brief_repr
 @dataclass(frozen=True)
 class SimulateProcessSettings:
     """Which process on which cell, corrected by which models."""

@@ -32,7 +32,7 @@ from elastocal.identification import CalibratedModel, read_model
 from elastocal.progress import Progress
 from elastocal.records import record, write_json
 from elastocal.report import Curve, write_stiffness_figure
-from elastocal.results import Result
+from elastocal.results import Result, brief_repr
 from elastocal.robot import Robot
 from elastocal.robot.inverse import InverseKinematics, inverse_for
 from elastocal.workflows._coverage import coverage_notes
@@ -77,6 +77,7 @@ class ExternalAxis:
     unit: str
 
 
+@brief_repr
 @record()
 class PostureCounts:
     """Numbers of postures."""
@@ -106,6 +107,7 @@ class ChosenStiffness:
     """Stations at which a joint turns by more than 90 deg from the one before."""
 
 
+@brief_repr
 @record("elastocal.stiffness/1")
 class StiffnessSummary:
     """The contents of ``stiffness.json``."""

@@ -24,7 +24,7 @@ from elastocal.codec.study import (
 )
 from elastocal.progress import Progress
 from elastocal.report import write_study_figures
-from elastocal.results import Result
+from elastocal.results import Result, brief_repr
 from elastocal.workflows._workflow import workflow
 
 DEFAULT_VARIATION = "poses=6,10,15,20,31"
@@ -32,6 +32,7 @@ DEFAULT_VARIATION = "poses=6,10,15,20,31"
 _SIMULATION = "elastocal.workflows._study_simulation"
 
 
+@brief_repr
 @dataclass(frozen=True)
 class StudySettings:
     """The cell that is studied, what is varied, and where it is simulated."""

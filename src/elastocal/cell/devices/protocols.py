@@ -11,6 +11,7 @@ from enum import Enum
 from typing import Protocol
 
 from elastocal.arrays import FloatArray
+from elastocal.results import brief_repr
 
 
 class Motion(Enum):
@@ -34,6 +35,7 @@ class Motion(Enum):
     """Stopped by a fault, a limit or `RobotArm.stop`; needs `RobotArm.enable` again."""
 
 
+@brief_repr
 @dataclass(frozen=True, eq=False)
 class ArmState:
     """State of an arm, as its controller states it."""
@@ -142,6 +144,7 @@ class SensorStatus(Enum):
     """The device says that it cannot measure."""
 
 
+@brief_repr
 @dataclass(frozen=True, eq=False)
 class WrenchBlock:
     """Samples since the last look, as the sensor measures them.
@@ -189,6 +192,7 @@ class BeamState(Enum):
     BROKEN = "broken"
 
 
+@brief_repr
 @dataclass(frozen=True, eq=False)
 class PointBlock:
     """Marker positions since the last look, in the station's own frame."""

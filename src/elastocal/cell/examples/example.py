@@ -10,6 +10,7 @@ import numpy as np
 from elastocal.arrays import FloatArray, IndexArray
 from elastocal.errors import FileAccessError, SchemaError, nearest
 from elastocal.files import replacing, write_text
+from elastocal.results import brief_repr
 
 _DOME_RADII = (2.4, 1.5)
 """Radius and height in m of the ellipsoid of revolution that a rear pressure dome resembles."""
@@ -91,6 +92,7 @@ def _grid_faces(n: int) -> IndexArray:
     return np.concatenate([half.reshape(-1, 3) for half in halves])
 
 
+@brief_repr
 @dataclass(frozen=True)
 class Example:
     """A cell file of this package with the meshes that it names."""

@@ -13,8 +13,10 @@ from elastocal.codec.variants import training_cases
 from elastocal.errors import CodecError
 from elastocal.planning import SearchPool, cell_surface, sample_pool, sight_check
 from elastocal.planning.search import Candidates, RandomChoice, technique
+from elastocal.results import brief_repr
 
 
+@brief_repr
 @dataclass(frozen=True, eq=False)
 class StudyPool:
     """Valid poses of a cell; numbers of poses count in them. Can be sent to another process."""
@@ -43,6 +45,7 @@ class StudyPoses:
     """Those of ``pool.training``."""
 
 
+@brief_repr
 @dataclass(frozen=True, eq=False)
 class PoseChoice:
     """Calibration poses of a condition."""

@@ -16,6 +16,7 @@ from elastocal.dataset import Readings
 from elastocal.elastic import ElasticModel
 from elastocal.identification import build, solve
 from elastocal.records import record
+from elastocal.results import brief_repr
 
 
 class Purpose(IntEnum):
@@ -48,6 +49,7 @@ class Sample:
         return np.random.default_rng(np.random.SeedSequence(self.seed, spawn_key=key))
 
 
+@brief_repr
 @record(eq=False)
 class ConditionResult:
     """A calibration under one condition, and how accurate it is at poses that it has not seen.
@@ -65,6 +67,7 @@ class ConditionResult:
     """Shape (spring,), in rad/(N·m) or m/N."""
 
 
+@brief_repr
 @record(eq=False)
 class SampleResult:
     """A finished sample."""
@@ -79,6 +82,7 @@ Simulate = Callable[[Sample], SampleResult]
 function: the same sample gives the same result bit for bit."""
 
 
+@brief_repr
 @dataclass(frozen=True, eq=False)
 class Verification:
     """True deflections without any noise, at poses that no calibration has seen."""

@@ -16,6 +16,7 @@ from elastocal.codec.study.samples import SampleResult
 from elastocal.errors import CodecError, FileAccessError, SchemaError
 from elastocal.files import sha256, write_text
 from elastocal.records import read_json, record, to_data
+from elastocal.results import brief_repr
 
 DESIGN = "settings.json"
 """Name of the file by which a study's folder is known."""
@@ -36,6 +37,7 @@ class SpringLabel:
     """Unit of its compliance."""
 
 
+@brief_repr
 @record(DESIGN_SCHEMA)
 class StudyDesign:
     """All that the numbers of a study depend on, but for the number of samples.

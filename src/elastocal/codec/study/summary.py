@@ -13,6 +13,7 @@ from elastocal.codec.study.store import StudyDesign
 from elastocal.errors import CodecError
 from elastocal.identification import CONFIDENCE
 from elastocal.records import read_json, record, write_json
+from elastocal.results import brief_repr
 from elastocal.tables import write_table
 
 STUDY_SCHEMA = "elastocal.study/1"
@@ -69,6 +70,7 @@ class ConditionSummary:
     """Arms whose largest error is."""
 
 
+@brief_repr
 @record(STUDY_SCHEMA)
 class StudySummary:
     """The summary of a study: contents of ``study.json``; all lengths in m."""

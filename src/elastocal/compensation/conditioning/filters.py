@@ -23,6 +23,7 @@ from scipy import signal
 from elastocal.arrays import FloatArray
 from elastocal.errors import CompensationError
 from elastocal.records import StrictModel
+from elastocal.results import brief_repr
 from elastocal.units import parse_quantity
 
 Section = tuple[float, float, float, float, float]
@@ -53,6 +54,7 @@ Speed = Annotated[float, _quantity("speed"), AfterValidator(_positive)]
 """In m/s, above 0."""
 
 
+@brief_repr
 @dataclass(frozen=True)
 class FilterChain:
     """A median and second-order sections, for one sampling time."""

@@ -15,6 +15,7 @@ from elastocal.arrays import FloatArray
 from elastocal.compensation.offline import beyond_a_turn
 from elastocal.dataset import LoadRows, joint_dimensions, read_load_rows
 from elastocal.errors import CompensationError
+from elastocal.results import brief_repr
 from elastocal.robot import GRAVITY, Robot, T_from_xyzabc
 from elastocal.tables import opened_table
 
@@ -26,6 +27,7 @@ _UNIT = 1e-2
 """Largest distance of the length of a quaternion from 1."""
 
 
+@brief_repr
 @dataclass(frozen=True, eq=False)
 class StaticPostures:
     """Raw wrenches with the flange's orientation, nothing touching the tool."""

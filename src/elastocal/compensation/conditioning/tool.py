@@ -9,7 +9,7 @@ from elastocal.arrays import FloatArray
 from elastocal.compensation.conditioning.tool_fit import TOOL_UNKNOWNS, ToolFit
 from elastocal.errors import CompensationError, nearest
 from elastocal.records import read_json, record, write_json
-from elastocal.results import Result
+from elastocal.results import Result, brief_repr
 from elastocal.robot import GRAVITY, Robot, inverse_transform, parse_urdf
 
 _RIGID = 1e-6
@@ -20,6 +20,7 @@ def _zero() -> FloatArray:
     return np.zeros(3)
 
 
+@brief_repr
 @dataclass(frozen=True, eq=False)
 class SensorLoad:
     """Tool weight and bias of a force sensor, and its place at the tool centre point.
@@ -97,6 +98,7 @@ class ToolResult(Result):
     source: str
 
 
+@brief_repr
 @dataclass(frozen=True, eq=False)
 class SensorMount:
     """Place of a sensor on the arm; static postures do not see it."""

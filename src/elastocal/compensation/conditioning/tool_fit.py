@@ -20,6 +20,7 @@ from scipy.special import stdtrit
 
 from elastocal.arrays import BoolArray, FloatArray
 from elastocal.compensation.conditioning.postures import StaticPostures
+from elastocal.results import brief_repr
 
 TOOL_UNKNOWNS = (
     "mass",
@@ -84,6 +85,7 @@ def _skew(v: FloatArray) -> FloatArray:
     return S
 
 
+@brief_repr
 @dataclass(frozen=True, eq=False)
 class ToolFit:
     """Tool and sensor, as static postures show them."""

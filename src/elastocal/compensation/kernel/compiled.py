@@ -6,10 +6,12 @@ from dataclasses import dataclass
 
 from elastocal.compensation.kernel.program import Assignment, Call, Turn, sum_text, value_text
 from elastocal.compensation.kernel.statics import Routine
+from elastocal.results import brief_repr
 
 Function = Callable[..., tuple[float, ...]]
 
 
+@brief_repr
 @dataclass(frozen=True)
 class ModelFunctions:
     """What a compensator asks of a model; arguments and results are sequences of floats."""

@@ -9,6 +9,8 @@ out when the list is made.
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 
+from elastocal.results import brief_repr
+
 _SNAP = 4e-16
 """Numbers nearer than this to 0, 1 or -1 are these: ``rpy="0 1.5707963267948966 0"`` of a URDF
 means a right angle."""
@@ -36,6 +38,7 @@ Naming = Callable[[str], str]
 """From the name of a value to how it is written, in C or in Python."""
 
 
+@brief_repr
 @dataclass(frozen=True)
 class Assignment:
     """``name = ± a * b ± c * d …``."""
@@ -78,6 +81,7 @@ class Call:
 Statement = Assignment | Turn | Call | Remark
 
 
+@brief_repr
 @dataclass
 class Program:
     """A list of statements under construction."""

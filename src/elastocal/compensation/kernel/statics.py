@@ -23,6 +23,7 @@ from elastocal.compensation.kernel.program import (
 )
 from elastocal.elastic import ElasticModel, SpringAxis, SpringLoad
 from elastocal.elastic.springs import Expression, Function, Input, Number, Product, Sum
+from elastocal.results import brief_repr
 
 _Point = tuple[int, bool, tuple[float, float, float]]
 """Joint, whether behind its motion, offset: where the axis of a spring passes."""
@@ -30,6 +31,7 @@ _Point = tuple[int, bool, tuple[float, float, float]]
 _Weighted = tuple[Value, Vector]
 
 
+@brief_repr
 @dataclass(frozen=True)
 class Routine:
     """A finished program."""

@@ -17,6 +17,7 @@ from elastocal.arrays import BoolArray, FloatArray, IndexArray
 from elastocal.compensation.offline import PathError
 from elastocal.compensation.offline.path_joints import RowName, check_limits, turned_inside
 from elastocal.identification import CalibratedModel
+from elastocal.results import brief_repr
 from elastocal.robot import Robot
 from elastocal.robot.inverse import TURN, InverseKinematics, pose_error
 
@@ -31,6 +32,7 @@ _SMALL_TURN = 1.0
 """Largest step of a joint (rad or m) that still is one of a correction."""
 
 
+@brief_repr
 @dataclass(frozen=True, eq=False)
 class PathCorrection:
     """Corrected rows."""

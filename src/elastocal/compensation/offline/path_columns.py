@@ -7,6 +7,7 @@ from pathlib import Path
 
 from elastocal.dataset import joint_dimensions
 from elastocal.errors import CompensationError, UnitError, nearest
+from elastocal.results import brief_repr
 from elastocal.robot import Robot
 from elastocal.tables import Column
 from elastocal.units import factor, split_column
@@ -49,6 +50,7 @@ class WrenchColumns:
     """Whether in axes of the programmed tcp, else in base."""
 
 
+@brief_repr
 @dataclass(frozen=True)
 class PathColumns:
     """The columns that are read; all others are carried through."""

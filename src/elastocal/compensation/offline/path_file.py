@@ -30,6 +30,7 @@ from elastocal.compensation.offline.path_joints import (
 from elastocal.compensation.offline.summary import CorrectionSummary
 from elastocal.identification import CalibratedModel
 from elastocal.progress import Progress, silent
+from elastocal.results import brief_repr
 from elastocal.robot.inverse import InverseKinematics, inverse_for
 from elastocal.tables import TableRows, new_table
 
@@ -38,6 +39,7 @@ _ROWS_AT_A_TIME = 2000
 _ADDED = tuple(f"deflection_{axis}{end}[m]" for end in ("", "_low", "_high") for axis in "xyz")
 
 
+@brief_repr
 @dataclass(frozen=True, eq=False)
 class CorrectionSettings:
     """Settings of the correction of a path."""

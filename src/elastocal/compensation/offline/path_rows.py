@@ -11,6 +11,7 @@ from scipy.spatial.transform import Rotation
 from elastocal.arrays import FloatArray
 from elastocal.compensation.offline.path_columns import PathColumns, PathError, WrenchColumns
 from elastocal.errors import FileAccessError
+from elastocal.results import brief_repr
 from elastocal.robot import T_from_xyzabc
 from elastocal.tables import Column, TableError, TableLayout, TableRows, opened_table
 
@@ -100,6 +101,7 @@ def beyond_a_turn(angles: FloatArray) -> tuple[int, int] | None:
     return (int(found[0, 0]), int(found[0, 1])) if len(found) else None
 
 
+@brief_repr
 @dataclass(frozen=True, eq=False)
 class PathValues:
     """Some rows of a path; joints or poses, as the file has them."""

@@ -7,6 +7,7 @@ import numpy as np
 from elastocal.arrays import FloatArray
 from elastocal.compensation.offline.correct import PathCorrection
 from elastocal.records import record
+from elastocal.results import brief_repr
 
 
 @record()
@@ -61,6 +62,7 @@ class LengthSummary:
         return LengthSummary(self.total + float(lengths.sum()), largest, label)
 
 
+@brief_repr
 @dataclass(frozen=True)
 class CorrectionSummary:
     """Figures of a correction, predicted by the model."""

@@ -18,6 +18,7 @@ from elastocal.compensation.kernel import (
 from elastocal.compensation.settings import CompensatorSettings
 from elastocal.errors import CompensationError
 from elastocal.identification import CalibratedModel
+from elastocal.results import brief_repr
 
 LONG_AGO = -1.0e300
 """Time of a reading that never was, in s."""
@@ -30,6 +31,7 @@ _NEGLIGIBLE = 1e-9
 _Z = float(ndtri(0.975))
 
 
+@brief_repr
 @dataclass(frozen=True, eq=False)
 class Design:
     """A compensator as numbers."""

@@ -15,6 +15,7 @@ from numpy.random import Generator
 from elastocal.arrays import FloatArray
 from elastocal.compensation.settings import CompensatorSettings
 from elastocal.planning.surface import Surface
+from elastocal.results import brief_repr
 
 _PERIODS = (1.0, 2.3, 5.1)
 """Periods of three sines, in s; no two of them keep step."""
@@ -30,6 +31,7 @@ class Ripple:
     """Amplitude over the mean force."""
 
 
+@brief_repr
 @dataclass(frozen=True, eq=False)
 class Course:
     """A stretch of path from the first contact to the last."""

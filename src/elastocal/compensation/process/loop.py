@@ -16,6 +16,7 @@ from elastocal.arrays import FloatArray
 from elastocal.compensation.process.correctors import Corrector
 from elastocal.compensation.process.course import Course
 from elastocal.errors import CompensationError
+from elastocal.results import brief_repr
 from elastocal.robot import Robot
 
 
@@ -89,6 +90,7 @@ class Controller:
         return 1.0 - float(np.exp(-self.cycle / self.lag)) if self.lag > 0.0 else 1.0
 
 
+@brief_repr
 @dataclass(frozen=True, eq=False)
 class CourseRun:
     """A course that was run: where the tool was at every cycle."""
@@ -250,6 +252,7 @@ def _course_run(
     return CourseRun(course, time, shift, between(course.T_base_tcp[:, :3, 3]), deviation)
 
 
+@brief_repr
 @dataclass(frozen=True, eq=False)
 class CourseDeviation:
     """One course of one seed, at every cycle, without and with correction."""

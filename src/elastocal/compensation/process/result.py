@@ -13,7 +13,7 @@ import numpy as np
 from elastocal.arrays import FloatArray
 from elastocal.compensation.process.loop import CourseDeviation
 from elastocal.records import record
-from elastocal.results import Result
+from elastocal.results import Result, brief_repr
 
 
 @record()
@@ -87,6 +87,7 @@ class SimulateProcessResult(Result):
     budget: tuple[DeviationComparison, ...] = ()
 
 
+@brief_repr
 @dataclass(frozen=True, eq=False)
 class SimulatedProcess:
     """A simulated process, as its folder keeps it."""

@@ -24,11 +24,13 @@ from elastocal.compensation.process.course import (
 )
 from elastocal.compensation.settings import CompensatorSettings
 from elastocal.planning.surface import Surface
+from elastocal.results import brief_repr
 
 _SPINDLE = 12_000.0 / 60.0
 """In Hz."""
 
 
+@brief_repr
 @dataclass(frozen=True)
 class Roughing(Process):
     """Rings about the middle of a block's top; deviations count normal to the dome.

@@ -34,6 +34,7 @@ from elastocal.compensation.programs.program import (
 )
 from elastocal.errors import nearest
 from elastocal.identification import CalibratedModel
+from elastocal.results import brief_repr
 from elastocal.robot import inverse_transform
 from elastocal.robot.inverse import InverseKinematics, inverse_for
 
@@ -47,6 +48,7 @@ _SAME = 1e-3
 """Postures nearer than this in every joint (rad or m) are one."""
 
 
+@brief_repr
 @dataclass(frozen=True)
 class ProgramCorrection:
     """A program that was corrected."""
@@ -116,6 +118,7 @@ def compensate_program(
     return ProgramCorrection(program, summary, files, assumed, notes)
 
 
+@brief_repr
 @dataclass(frozen=True, eq=False)
 class PointForces:
     """Forces and moments by point."""

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Protocol
 
 from elastocal.arrays import FloatArray
+from elastocal.results import brief_repr
 
 
 class ProgramPoint(Protocol):
@@ -82,6 +83,7 @@ class Move:
         return f"line {self.line}, {self.order} {self.name}"
 
 
+@brief_repr
 @dataclass(frozen=True)
 class CorrectedPoint:
     """New numbers for a point."""

@@ -10,11 +10,13 @@ from elastocal.arrays import FloatArray
 from elastocal.compensation.stiffness.directional import directional_stiffness, principal_stiffness
 from elastocal.compensation.stiffness.survey import PathStations, PostureSurvey
 from elastocal.identification import CalibratedModel
+from elastocal.results import brief_repr
 from elastocal.robot import Robot
 from elastocal.robot.inverse import InverseKinematics, OpwInverse
 from elastocal.tables import write_table
 
 
+@brief_repr
 @dataclass(frozen=True, eq=False)
 class PathPostures:
     """Postures along the path, one a station."""

@@ -18,8 +18,10 @@ from numpy.typing import ArrayLike
 
 from elastocal.arrays import FloatArray
 from elastocal.identification import CalibratedModel, interval
+from elastocal.results import brief_repr
 
 
+@brief_repr
 @dataclass(frozen=True, eq=False)
 class DirectionalStiffness:
     """Directional stiffness with its 95 % interval (bootstrap draws of the model)."""
@@ -30,6 +32,7 @@ class DirectionalStiffness:
     high: FloatArray
 
 
+@brief_repr
 @dataclass(frozen=True, eq=False)
 class PrincipalStiffness:
     """Principal stiffnesses of the tool centre point."""

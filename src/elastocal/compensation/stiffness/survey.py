@@ -27,6 +27,7 @@ from elastocal.compensation.stiffness.directional import stiffness_along
 from elastocal.errors import RobotError
 from elastocal.identification import CalibratedModel
 from elastocal.planning import cell_surface, collision_scene
+from elastocal.results import brief_repr
 from elastocal.robot import Robot, characteristic_length, smallest_singular_value
 from elastocal.robot.inverse import InverseKinematics
 from elastocal.tables import TableRows
@@ -39,6 +40,7 @@ _SAME = 1e-6
 """Difference of their poses by rounding, in m or as a number of a rotation."""
 
 
+@brief_repr
 @dataclass(frozen=True, eq=False)
 class PathStations:
     """Rows of a path, evenly taken."""
@@ -115,6 +117,7 @@ def _rows(path: Path, wanted: np.ndarray) -> TableRows:
     return TableRows(cells, lines)
 
 
+@brief_repr
 @dataclass(frozen=True, eq=False)
 class PostureConstraint:
     """A condition that a posture must pass to be chosen."""
@@ -191,6 +194,7 @@ _MOST = 3_000_000
 """Postures of one survey; bounds memory and time."""
 
 
+@brief_repr
 @dataclass(frozen=True, eq=False)
 class PostureGrid:
     """The choices at every station."""
@@ -201,6 +205,7 @@ class PostureGrid:
     """Positions of the external axes, shape (external, external axis), in rad or m."""
 
 
+@brief_repr
 @dataclass(frozen=True, eq=False)
 class PostureSurvey:
     """Postures by station, spin, external position and branch."""

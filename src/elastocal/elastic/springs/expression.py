@@ -11,6 +11,7 @@ from typing import TypeVar, overload
 import numpy as np
 
 from elastocal.arrays import FloatArray
+from elastocal.results import brief_repr
 
 
 @dataclass(frozen=True)
@@ -56,6 +57,7 @@ class Number(Expression):
     value: float
 
 
+@brief_repr
 @dataclass(frozen=True)
 class Sum(Expression):
     """A sum, left to right."""
@@ -63,6 +65,7 @@ class Sum(Expression):
     terms: tuple[Expression, ...]
 
 
+@brief_repr
 @dataclass(frozen=True)
 class Product(Expression):
     """A product, left to right."""

@@ -11,6 +11,7 @@ from elastocal.arrays import FloatArray
 from elastocal.elastic.springs.expression import Quantity
 from elastocal.errors import SpringError, nearest
 from elastocal.records import record
+from elastocal.results import brief_repr
 from elastocal.robot import ChainJoint
 
 _UNIT_LENGTH = 1e-9
@@ -89,6 +90,7 @@ class SpringAxis:
             raise SpringError(f"offset of spring {self.name!r} is {self.offset}, not finite")
 
 
+@brief_repr
 @dataclass(frozen=True)
 class SpringLoad(Generic[Quantity]):
     """The load on a spring; everything that a law may depend on stands here."""

@@ -8,7 +8,7 @@ import numpy as np
 from elastocal.arrays import FloatArray
 from elastocal.identification.observability import Term
 from elastocal.records import record
-from elastocal.results import Result
+from elastocal.results import Result, brief_repr
 
 SCHEMA = "elastocal.comparison/1"
 
@@ -37,6 +37,7 @@ class Estimate:
         return self.low <= number <= self.high
 
 
+@brief_repr
 @record()
 class SpringChange:
     """One spring, or one combination of springs, that both calibrations determine."""
@@ -81,6 +82,7 @@ class SpringChange:
 _Triple = tuple[float, float, float]
 
 
+@brief_repr
 @record()
 class LargestChange:
     """The row whose deflection changed most."""
@@ -101,6 +103,7 @@ class LargestChange:
     """Deflection by the new model in base, in m."""
 
 
+@brief_repr
 @record()
 class DeflectionChange:
     """The change of the predicted deflection over given poses and loads (rows)."""
@@ -119,6 +122,7 @@ class DeflectionChange:
     """Upper end, in m."""
 
 
+@brief_repr
 @record(SCHEMA)
 class CompareSummary:
     """Two calibrations of one cell, compared."""
@@ -183,6 +187,7 @@ class CompareSummary:
         return tuple(springs[name] for name in self.moved)
 
 
+@brief_repr
 @dataclass(frozen=True, eq=False)
 class RowComparison:
     """Predicted deflections of both models over given poses and loads (rows)."""

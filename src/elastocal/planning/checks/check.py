@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike
 
 from elastocal.arrays import BoolArray, FloatArray
 from elastocal.planning.postures import Postures
+from elastocal.results import brief_repr
 
 
 class Check(Protocol):
@@ -43,6 +44,7 @@ class PointCheck(Check, Protocol):
         """Margin of every sampled point, shape (point,)."""
 
 
+@brief_repr
 @dataclass(frozen=True, eq=False)
 class Checks:
     """All that a pose has to pass, in the order of what it costs to ask."""
@@ -60,6 +62,7 @@ class Checks:
         return (*self.point, *self.quick, *self.slow)
 
 
+@brief_repr
 @dataclass(frozen=True, eq=False)
 class Verdicts:
     """The margins of many postures under many checks."""

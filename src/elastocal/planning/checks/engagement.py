@@ -7,8 +7,10 @@ import numpy as np
 from elastocal.arrays import FloatArray
 from elastocal.planning.postures import Postures
 from elastocal.planning.surface import DiskFit
+from elastocal.results import brief_repr
 
 
+@brief_repr
 @dataclass(frozen=True, eq=False)
 class EdgeCheck:
     """Distance from the contact point to the nearest edge, less disk radius and margin."""

@@ -6,8 +6,10 @@ import numpy as np
 
 from elastocal.arrays import FloatArray
 from elastocal.planning.postures import Postures
+from elastocal.results import brief_repr
 
 
+@brief_repr
 @dataclass(frozen=True, eq=False)
 class FrictionCheck:
     """``mu fz / safety - |f_lateral|``, the smallest over the load cases; alike at every pose."""

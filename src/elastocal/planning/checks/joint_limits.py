@@ -10,9 +10,11 @@ import numpy as np
 
 from elastocal.arrays import FloatArray
 from elastocal.planning.postures import Postures
+from elastocal.results import brief_repr
 from elastocal.robot import Robot
 
 
+@brief_repr
 @dataclass(frozen=True, eq=False)
 class JointLimitsCheck:
     """Smallest distance of any revolute joint to its nearer limit, less the margin asked for."""
@@ -29,6 +31,7 @@ class JointLimitsCheck:
         return _left(self.robot, postures, self.keep, np.array(self.robot.revolute))
 
 
+@brief_repr
 @dataclass(frozen=True, eq=False)
 class TravelLimitsCheck:
     """Smallest distance of any prismatic joint to its nearer limit, less the margin asked for."""

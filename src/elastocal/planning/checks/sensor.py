@@ -6,8 +6,10 @@ import numpy as np
 
 from elastocal.arrays import FloatArray
 from elastocal.planning.postures import Postures
+from elastocal.results import brief_repr
 
 
+@brief_repr
 @dataclass(frozen=True, eq=False)
 class SensorCheck:
     """Smallest part of a sensor range that is left, over axes and load cases.

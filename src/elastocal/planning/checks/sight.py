@@ -17,6 +17,7 @@ from elastocal.arrays import BoolArray, FloatArray
 from elastocal.errors import RobotError
 from elastocal.planning.postures import Postures
 from elastocal.planning.scene import CollisionScene
+from elastocal.results import brief_repr
 from elastocal.shapes import Beams, Body, Mesh, SightSolid
 
 SEAT = 5e-3
@@ -42,6 +43,7 @@ class Station:
     """Longest distance it measures, in m."""
 
 
+@brief_repr
 @dataclass(frozen=True, eq=False)
 class MovingSolids:
     """The collision shapes of links and tool, as solids that stop a beam.
@@ -97,6 +99,7 @@ class MovingSolids:
         return hidden
 
 
+@brief_repr
 @dataclass(frozen=True, eq=False)
 class SightCheck:
     """Acceptance angle of the marker, less the angle at which the best station is seen."""

@@ -15,9 +15,11 @@ import numpy as np
 
 from elastocal.arrays import FloatArray
 from elastocal.planning.postures import Postures
+from elastocal.results import brief_repr
 from elastocal.robot import GRAVITY, Robot
 
 
+@brief_repr
 @dataclass(frozen=True, eq=False)
 class TorqueCheck:
     """Smallest part of a joint's allowed torque that is left, over joints, loads and places."""

@@ -11,6 +11,7 @@ from elastocal.cell import Cell
 from elastocal.planning.motion.sweep import Sweep
 from elastocal.planning.postures import Postures, retreat_joints
 from elastocal.planning.scene import CollisionScene
+from elastocal.results import brief_repr
 from elastocal.robot import Robot
 from elastocal.robot.inverse import InverseKinematics, inverse_for, turns
 
@@ -25,6 +26,7 @@ _STEP = 2e-3
 clearance at both ends of a step keeps the clearance in between."""
 
 
+@brief_repr
 @dataclass(frozen=True, eq=False)
 class AxisMotion:
     """Synchronous point-to-point motion with trapezoidal velocity (Biagiotti, Melchiorri 2008).

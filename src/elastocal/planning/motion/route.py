@@ -17,6 +17,7 @@ from elastocal.planning.motion.mover import Mover
 from elastocal.planning.motion.tour import _Cuts, shortest_tour
 from elastocal.planning.postures import Postures
 from elastocal.progress import Progress, silent
+from elastocal.results import brief_repr
 
 VISITING = "visiting order"
 """Stage under which progress is reported."""
@@ -24,6 +25,7 @@ _HOME_NODE = 0
 """Number of HOME among the nodes; pose ``i`` is node ``i + 1``."""
 
 
+@brief_repr
 @dataclass(frozen=True, eq=False)
 class Move:
     """One move between HOME and approach poses, straight in joint space from via to via."""
@@ -38,6 +40,7 @@ class Move:
     """Estimated, in s."""
 
 
+@brief_repr
 @dataclass(frozen=True, eq=False)
 class Route:
     """A round from HOME through the poses and back; arrays are read-only."""

@@ -18,6 +18,7 @@ from scipy.sparse.csgraph import connected_components
 
 from elastocal.arrays import BoolArray, FloatArray, IndexArray
 from elastocal.errors import PlanningError
+from elastocal.results import brief_repr
 
 _ALL_EDGES = 60
 """Up to as many nodes every edge may be chosen; beyond, those to the nearest neighbours and those
@@ -37,6 +38,7 @@ _Cuts = list[frozenset[int]]
 """Parts of the nodes that no tour may close on itself in."""
 
 
+@brief_repr
 @dataclass(frozen=True, eq=False)
 class Tour:
     """A closed tour."""

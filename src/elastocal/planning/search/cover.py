@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike
 from elastocal.arrays import FloatArray, IndexArray
 from elastocal.errors import PlanningError
 from elastocal.planning.search.protocol import Candidates, Metric, Selection, check_count
+from elastocal.results import brief_repr
 
 _LARGE_POOL = 50_000
 _MANY_PICKS = 100
@@ -44,6 +45,7 @@ class DistanceField(Protocol):
         """Return the candidate that is farthest from the chosen ones, at least one of which is."""
 
 
+@brief_repr
 @dataclass(frozen=True, eq=False)
 class CoverSelection(Selection):
     """A choice by COVER; its trace holds ``covering_radius`` of each prefix in m."""

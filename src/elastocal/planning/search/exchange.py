@@ -16,11 +16,13 @@ from elastocal.errors import PlanningError
 from elastocal.planning.search.criteria import Criterion, criterion_class
 from elastocal.planning.search.information import Information, build_information
 from elastocal.planning.search.protocol import Candidates, Selection, check_count
+from elastocal.results import brief_repr
 
 _TIE = 1e-9
 """Values closer than this part of the best are equal but for round-off."""
 
 
+@brief_repr
 @dataclass(frozen=True, eq=False)
 class Exchange:
     """One run of exchanges from one start."""
@@ -41,6 +43,7 @@ class Exchange:
     ``whole pool`` when there is nothing to exchange."""
 
 
+@brief_repr
 @dataclass(frozen=True, eq=False)
 class ExchangeSelection(Selection):
     """A choice by exchange; its trace holds ``value``, the criterion of each prefix.

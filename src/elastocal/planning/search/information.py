@@ -13,6 +13,7 @@ from elastocal.arrays import BoolArray, FloatArray
 from elastocal.errors import PlanningError
 from elastocal.identification import RANK_TOLERANCE, rank
 from elastocal.planning.search.protocol import Candidates
+from elastocal.results import brief_repr
 
 EPSILON = 1e-6
 """Prior information on every direction. A typical pose gives 1; a direction a thousandth as
@@ -31,6 +32,7 @@ _NEGLIGIBLE = 1e-13
 """Part of a pose's own information below which a further row is round-off."""
 
 
+@brief_repr
 @dataclass(frozen=True, eq=False)
 class Information:
     """Information of each candidate about the ``r`` observable directions."""

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from elastocal.arrays import FloatArray, IndexArray
 from elastocal.errors import PlanningError
+from elastocal.results import brief_repr
 
 
 class Metric(Protocol):
@@ -22,6 +23,7 @@ class Metric(Protocol):
         """
 
 
+@brief_repr
 @dataclass(frozen=True, eq=False)
 class Candidates:
     """A pool of poses that pass every check; arrays are copied and read-only.
@@ -119,6 +121,7 @@ def _check_each(values: FloatArray, what: str, item: str = "candidate") -> None:
     )
 
 
+@brief_repr
 @dataclass(frozen=True, eq=False)
 class Selection:
     """Chosen candidates, in an order whose every beginning is a sensible smaller choice."""

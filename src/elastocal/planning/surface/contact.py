@@ -8,6 +8,7 @@ import numpy as np
 from elastocal.arrays import BoolArray, FloatArray
 from elastocal.planning.surface.mesh import SurfaceError
 from elastocal.planning.surface.surface import Surface, SurfacePoints
+from elastocal.results import brief_repr
 
 _RINGS = ((1.0, 16), (0.5, 8))
 """Radius, as part of the disk's, and number of the probes on each ring."""
@@ -55,6 +56,7 @@ def contact_frames(position: FloatArray, normal: FloatArray, spin: FloatArray) -
     return T
 
 
+@brief_repr
 @dataclass(frozen=True, eq=False)
 class DiskFit:
     """How disks lie on the surface, from 24 probes each; infinite where a disk hangs over."""

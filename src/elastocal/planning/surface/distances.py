@@ -10,6 +10,7 @@ from scipy.spatial import cKDTree
 from elastocal.arrays import FloatArray, IndexArray
 from elastocal.planning.surface.mesh import SurfaceError
 from elastocal.planning.surface.surface import Surface, SurfacePoints
+from elastocal.results import brief_repr
 
 _PIECES = 5000
 """Border edges are cut so that no piece is longer than this part of the whole border."""
@@ -94,6 +95,7 @@ def _nearest(position: FloatArray, pieces: FloatArray) -> FloatArray:
     return distance
 
 
+@brief_repr
 @dataclass(frozen=True, eq=False)
 class GeodesicDistance:
     """Lengths of ways along the surface between points on it; see `geodesic_distance`."""

@@ -10,6 +10,7 @@ from elastocal.arrays import BoolArray, FloatArray
 from elastocal.planning.surface.contact import contact_poses
 from elastocal.planning.surface.sampling import sample_uniform
 from elastocal.planning.surface.surface import Surface, SurfacePoints
+from elastocal.results import brief_repr
 from elastocal.robot import Robot
 from elastocal.robot.inverse import InverseKinematics, arm_base
 
@@ -188,6 +189,7 @@ def first_joint_positions(robot: Robot, external: FloatArray) -> FloatArray:
     return (arm_base(robot, external) @ first)[:, :3, 3]
 
 
+@brief_repr
 @dataclass(frozen=True, eq=False)
 class ReachableFrom:
     """Whether a robot reaches poses from any of some positions of its external axes."""

@@ -15,6 +15,7 @@ import trimesh
 
 from elastocal.arrays import FloatArray, IndexArray
 from elastocal.errors import ElastocalError, FileAccessError
+from elastocal.results import brief_repr
 
 _SUFFIXES = (".stl", ".obj", ".ply")
 _WELD = 1e-6
@@ -32,6 +33,7 @@ class SurfaceError(ElastocalError, ValueError):
     """A tooling surface that cannot be used: unreadable mesh, no faces, empty region."""
 
 
+@brief_repr
 @dataclass(frozen=True, eq=False)
 class TriangleMesh:
     """Welded triangles."""

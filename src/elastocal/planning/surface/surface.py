@@ -15,6 +15,7 @@ from elastocal.planning.postures import Rows
 from elastocal.planning.surface import _topology as topology
 from elastocal.planning.surface._topology import corner_normals, face_normals_and_areas
 from elastocal.planning.surface.mesh import SurfaceError, TriangleMesh, read_mesh
+from elastocal.results import brief_repr
 
 CREASE_ANGLE = math.radians(30.0)
 """Normals of neighbouring faces further apart than this meet in a crease, by default.
@@ -43,6 +44,7 @@ class Region(Protocol):
         """
 
 
+@brief_repr
 @dataclass(frozen=True, eq=False)
 class SurfacePoints(Rows):
     """Points on a surface."""
@@ -57,6 +59,7 @@ class SurfacePoints(Rows):
     """Weights of the face's corners, shape (point, 3)."""
 
 
+@brief_repr
 @dataclass(frozen=True, eq=False)
 class Surface:
     """A tooling surface in base. Make one with `load_surface` or `build_surface`."""

@@ -29,6 +29,7 @@ from elastocal.procedure.derive.tool import (
 )
 from elastocal.procedure.record import ReadingStatus
 from elastocal.procedure.registration import Registration
+from elastocal.results import brief_repr
 from elastocal.robot import Robot
 
 
@@ -45,6 +46,7 @@ class LoadRow:
     """None where something that they need is missing."""
 
 
+@brief_repr
 @dataclass(frozen=True, eq=False)
 class LoadValues:
     """The numbers of a reading, in base and SI units."""

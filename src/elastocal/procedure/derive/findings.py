@@ -36,6 +36,7 @@ from elastocal.procedure.derive.summary import (
 from elastocal.procedure.derive.tool import Interval, ToolEstimate, ToolLoad
 from elastocal.procedure.record import Entry, Event, ReadingStatus
 from elastocal.procedure.registration import Registration, StationFit, UnloadedReadings
+from elastocal.results import brief_repr
 
 _SIGMAS = ("force_sigma", "marker_sigma")
 _MASS_SHARE = 0.1
@@ -51,6 +52,7 @@ _LARGE_ROTATION = 5e-3
 """Standard deviation of a station's rotation that is warned of, in rad: 5 µm for each mm."""
 
 
+@brief_repr
 @dataclass(frozen=True, eq=False)
 class RunFindings:
     """All that was found on the way to the dataset."""

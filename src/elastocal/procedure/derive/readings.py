@@ -17,6 +17,7 @@ from elastocal.arrays import BoolArray, FloatArray
 from elastocal.procedure.derive.tool import ToolLoad, UnloadedWrenches
 from elastocal.procedure.record import SAME_TIME, PoseLog, ReadingStatus, Streams, Window
 from elastocal.procedure.registration import UnloadedReadings
+from elastocal.results import brief_repr
 from elastocal.robot import Robot
 
 LEAST_SAMPLES = 5
@@ -25,6 +26,7 @@ _MOST_CORRELATED = 0.99
 """Largest lag-1 autocorrelation that is believed; beyond it the samples drift."""
 
 
+@brief_repr
 @dataclass(frozen=True, eq=False)
 class Mean:
     """Mean of some samples."""
@@ -42,6 +44,7 @@ class Mean:
     """Mean time, in s of the clock."""
 
 
+@brief_repr
 @dataclass(frozen=True, eq=False)
 class ToolState:
     """Pose of the tool by the controller, and the raw wrench on the sensor."""
@@ -156,6 +159,7 @@ def _mean_pose(T: FloatArray) -> FloatArray:
     return mean
 
 
+@brief_repr
 @dataclass(frozen=True, eq=False)
 class PoseReadings:
     """Readings of a committed pose."""

@@ -9,12 +9,13 @@ from pathlib import Path
 from elastocal.procedure.record import ReadingStatus
 from elastocal.procedure.registration import Blunder
 from elastocal.records import read_json, record
-from elastocal.results import Result
+from elastocal.results import Result, brief_repr
 
 Number = float | None
 Vector = tuple[Number, ...]
 
 
+@brief_repr
 @record()
 class PoseCounts:
     """Poses of the plan, and those that the run has committed."""
@@ -36,6 +37,7 @@ class LostReading:
     """The reason."""
 
 
+@brief_repr
 @record()
 class ReadingCounts:
     """Readings by their status."""
@@ -44,6 +46,7 @@ class ReadingCounts:
     not_ok: tuple[LostReading, ...]
 
 
+@brief_repr
 @record()
 class StationSummary:
     """A registered station; see `elastocal.procedure.registration.StationFit`."""
@@ -72,6 +75,7 @@ class MoveSummary:
     log10_probability_of_chance: float
 
 
+@brief_repr
 @record()
 class RegistrationSummary:
     """Stations, marker and what is odd about them."""
@@ -99,6 +103,7 @@ class ScalarEstimate:
     cell: Number
 
 
+@brief_repr
 @record()
 class VectorInterval:
     """A vector with half its 95 % interval along each axis."""
@@ -107,6 +112,7 @@ class VectorInterval:
     half_width_95: Vector
 
 
+@brief_repr
 @record()
 class VectorEstimate(VectorInterval):
     """A vector with half its 95 % interval, beside the cell file's."""
@@ -122,6 +128,7 @@ class ToolStep:
     mass_kg: float
 
 
+@brief_repr
 @record()
 class ToolSummary:
     """Tool and sensor by the unloaded references; vectors are in the sensor's frame."""
@@ -178,6 +185,7 @@ class FaultSummary:
     text: str
 
 
+@brief_repr
 @record()
 class AttemptSummary:
     """Attempts, faults and sessions beyond the first of each."""

@@ -27,8 +27,10 @@ import numpy as np
 from scipy.special import fdtrc, stdtrit
 
 from elastocal.arrays import FloatArray
+from elastocal.results import brief_repr
 
 
+@brief_repr
 @dataclass(frozen=True, eq=False)
 class ToolLoad:
     """The tool on the sensor, and how the sensor sits."""
@@ -55,6 +57,7 @@ class ToolLoad:
         return np.cross(self.centre, self.force(R_base_sensor))
 
 
+@brief_repr
 @dataclass(frozen=True, eq=False)
 class RawWrench:
     """Mean raw wrench at one place of the tool."""
@@ -67,6 +70,7 @@ class RawWrench:
     """Tool frame then, shape (4, 4), in m."""
 
 
+@brief_repr
 @dataclass(frozen=True, eq=False)
 class RobotWrench:
     """Wrench on the robot at the tool centre point, in base."""
@@ -178,6 +182,7 @@ _MOMENT_NAMES = tuple(
 )
 
 
+@brief_repr
 @dataclass(frozen=True, eq=False)
 class UnloadedWrenches:
     """Raw wrenches of unloaded references, in the order of time."""
@@ -194,6 +199,7 @@ class UnloadedWrenches:
     """In base, shape (3,), in m/s²."""
 
 
+@brief_repr
 @dataclass(frozen=True, eq=False)
 class Interval:
     """An estimate with the half width of its 95 % interval; both NaN where not determined."""
@@ -202,6 +208,7 @@ class Interval:
     half_width: FloatArray
 
 
+@brief_repr
 @dataclass(frozen=True, eq=False)
 class ToolEstimate:
     """Tool and sensor by the unloaded references of a run."""

@@ -34,6 +34,7 @@ from elastocal.procedure.record._messages import (
 )
 from elastocal.procedure.record.folder import file_sha256
 from elastocal.records import check_schema
+from elastocal.results import brief_repr
 
 STREAMS_SCHEMA = "elastocal.streams/1"
 SAME_TIME = 1e-6
@@ -178,6 +179,7 @@ def _joined(arrays: Sequence[FloatArray]) -> FloatArray:
     return np.concatenate(arrays) if arrays else np.empty(0)
 
 
+@brief_repr
 @dataclass(frozen=True, eq=False)
 class ArmStream:
     """States of the arm, as the controller says them."""
@@ -190,6 +192,7 @@ class ArmStream:
     """Tool frame, shape (sample, 4, 4), in m."""
 
 
+@brief_repr
 @dataclass(frozen=True, eq=False)
 class WrenchStream:
     """Raw wrenches, in the sensor's frame, bias and tool weight still in."""
@@ -207,6 +210,7 @@ class WrenchStream:
     """Whether the sensor called the sample good, shape (sample,)."""
 
 
+@brief_repr
 @dataclass(frozen=True, eq=False)
 class PointStream:
     """Marker positions in the frame of the station that measured them."""
@@ -222,6 +226,7 @@ class PointStream:
     """Station of each sample, shape (sample,)."""
 
 
+@brief_repr
 @dataclass(frozen=True, eq=False)
 class Streams:
     """All that the devices said during one pose attempt; the arrays are read-only."""

@@ -17,8 +17,10 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from elastocal.arrays import FloatArray, IndexArray
+from elastocal.results import brief_repr
 
 
+@brief_repr
 @dataclass(frozen=True, eq=False)
 class UnloadedReadings:
     """Marker and controller at every pose before it was loaded, in the order of time."""

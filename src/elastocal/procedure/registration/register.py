@@ -17,8 +17,10 @@ from elastocal.procedure.registration._fit import (
 )
 from elastocal.procedure.registration._moves import Finding, find
 from elastocal.records import record
+from elastocal.results import brief_repr
 
 
+@brief_repr
 @dataclass(frozen=True, eq=False)
 class StationFit:
     """A station over the poses between which it did not move."""
@@ -69,6 +71,7 @@ class Blunder:
     """How far the marker was from where it had to be, in m."""
 
 
+@brief_repr
 @dataclass(frozen=True, eq=False)
 class Registration:
     """Stations, marker and what is odd about them."""

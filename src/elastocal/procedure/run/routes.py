@@ -16,6 +16,7 @@ from elastocal.planning import Joints, PlanResult, PoseRecord
 from elastocal.procedure.run.faults import Fault, FaultError
 from elastocal.procedure.run.settings import RunSettings
 from elastocal.procedure.run.steps import Step
+from elastocal.results import brief_repr
 
 HOME_AT_START = -1
 """Stop before the first pose; the stop after the last one, HOME too, is the number of poses."""
@@ -30,6 +31,7 @@ _SAME_POSTURE = 0.5
 """Joints of one posture differ by less between approach pose and contact, in rad or m."""
 
 
+@brief_repr
 @dataclass(frozen=True, eq=False)
 class ApproachLine:
     """The straight way between approach pose and surface, along the normal."""
@@ -104,6 +106,7 @@ def stop_joints(plan: PlanResult, stop: int) -> Joints:
     return plan.robot.home
 
 
+@brief_repr
 @dataclass(frozen=True, eq=False)
 class HomeRoute:
     """How to get to HOME from where the arm stands."""

@@ -28,6 +28,7 @@ from elastocal.procedure.run.routes import HomeRoute
 from elastocal.procedure.run.settings import RunSettings
 from elastocal.procedure.run.steps import ArmLocation, Progress
 from elastocal.records import StrictModel
+from elastocal.results import brief_repr
 
 _SAME_SECTIONS = ("procedure", "devices", "simulation")
 """Sections of the cell file that must not change within a run: its readings would not belong
@@ -36,6 +37,7 @@ together. Those that the plan depends on are in the fingerprint."""
 _TOUCHES = frozenset({Action.APPROACH, Action.HOLD, Action.RELEASE, Action.RETRACT})
 
 
+@brief_repr
 @dataclass(frozen=True, eq=False)
 class Session:
     """A session that may begin."""
@@ -74,6 +76,7 @@ class RunEnd(Enum):
     """By a person."""
 
 
+@brief_repr
 @dataclass(frozen=True)
 class SessionResult:
     """How a session ended, and where it left the arm."""
@@ -88,6 +91,7 @@ class SessionResult:
     """Attempts of this session that failed."""
 
 
+@brief_repr
 @dataclass(frozen=True)
 class LastKnown:
     """How far a run came."""

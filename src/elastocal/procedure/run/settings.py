@@ -15,6 +15,7 @@ from elastocal.cell.description import ProcedureSettings
 from elastocal.errors import ProcedureError
 from elastocal.planning import PlanResult
 from elastocal.planning.motion import AxisMotion
+from elastocal.results import brief_repr
 from elastocal.robot import GRAVITY
 
 _LIMIT_PER_LOAD = 1.3
@@ -29,6 +30,7 @@ _SAME_NUMBER = 1e-9
 """Largest difference between a number of the cell and the same in its plan, SI."""
 
 
+@brief_repr
 @dataclass(frozen=True, eq=False)
 class RunSettings:
     """Figures of one run."""

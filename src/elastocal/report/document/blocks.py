@@ -13,6 +13,7 @@ from matplotlib.figure import Figure
 
 from elastocal.report.pages import render
 from elastocal.report.plots import figure_bytes
+from elastocal.results import brief_repr
 from elastocal.verdict import Evidence
 
 _DPI = 130
@@ -60,6 +61,7 @@ class Heading:
     text: str
 
 
+@brief_repr
 @dataclass(frozen=True)
 class Bullets:
     """A list; nothing without items."""
@@ -70,6 +72,7 @@ class Bullets:
     """Whether parts in backticks are commands."""
 
 
+@brief_repr
 @dataclass(frozen=True)
 class Facts:
     """Key figures: name, and value with its unit."""
@@ -77,6 +80,7 @@ class Facts:
     pairs: tuple[tuple[str, str | int], ...]
 
 
+@brief_repr
 @dataclass(frozen=True)
 class Table:
     """A table that scrolls by itself where the page is narrow."""
@@ -116,6 +120,7 @@ class PlanScene:
     poses: int
 
 
+@brief_repr
 @dataclass(frozen=True)
 class Details:
     """Blocks that a reader may open; of the kind ``long``, they stay folded on paper."""
@@ -128,6 +133,7 @@ class Details:
 Block = Paragraph | Heading | Bullets | Facts | Table | Picture | Verbatim | PlanScene | Details
 
 
+@brief_repr
 @dataclass(frozen=True)
 class Content:
     """Everything that a section shows."""

@@ -16,6 +16,7 @@ from elastocal.identification import CalibratedModel
 from elastocal.report.plots import style
 from elastocal.report.plots.printing import literal, new_figure
 from elastocal.report.plots.style import variant_styles
+from elastocal.results import brief_repr
 
 _WIDTH, _HEIGHT = 9.0, 4.0
 _MM = 1e3
@@ -40,6 +41,7 @@ class SpringBar:
     """Number of the group of springs that it cannot be told apart from."""
 
 
+@brief_repr
 @dataclass(frozen=True, eq=False)
 class StationResiduals:
     """Residuals of the registration of one tracker station."""

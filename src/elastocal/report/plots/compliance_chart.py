@@ -24,6 +24,7 @@ from elastocal.report.plots._box_plots import (
 )
 from elastocal.report.plots.printing import literal, new_figure, wrapped
 from elastocal.report.plots.style import VariantStyle, variant_styles
+from elastocal.results import brief_repr
 from elastocal.wording import counted
 
 _COLUMNS = 3
@@ -40,6 +41,7 @@ _ROOMY = 1.8
 """Factor by which the scale may grow so that nothing is cut."""
 
 
+@brief_repr
 @dataclass(frozen=True, eq=False)
 class SpringBoxes:
     """The boxes of one spring in the variants that have it."""

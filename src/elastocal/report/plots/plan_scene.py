@@ -26,6 +26,7 @@ from elastocal.report.plots._solids import (
     solid_trace,
     tones,
 )
+from elastocal.results import brief_repr
 
 _FIELD_OF_VIEW = np.radians(45.0)
 """Field of view of Plotly's perspective camera, in rad."""
@@ -100,6 +101,7 @@ class _MovingParts:
         return go.Frame(name=str(number), data=data, traces=list(range(len(data))))
 
 
+@brief_repr
 @dataclass(frozen=True, eq=False)
 class PlanView:
     """A figure, its layers and its camera places."""

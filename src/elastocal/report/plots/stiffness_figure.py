@@ -17,6 +17,7 @@ from elastocal.arrays import FloatArray
 from elastocal.compensation.stiffness import PathStations, PostureSurvey
 from elastocal.report.plots import style
 from elastocal.report.plots.printing import new_figure, write_figure
+from elastocal.results import brief_repr
 
 _WIDTH, _MAP, _CURVES = 6.6, 2.3, 2.3
 """In inches: of the figure, height of a map and of the curves."""
@@ -30,6 +31,7 @@ _SIZES = (10.0, 7.0, 4.0)
 _CASING = 2.0
 
 
+@brief_repr
 @dataclass(frozen=True, eq=False)
 class Curve:
     """One choice of postures along the path."""

@@ -11,10 +11,12 @@ from numpy.typing import ArrayLike
 
 from elastocal.arrays import FloatArray
 from elastocal.errors import RobotError
+from elastocal.results import brief_repr
 from elastocal.robot.chain import ChainJoint
 from elastocal.robot.robot import Robot
 
 
+@brief_repr
 @dataclass(frozen=True)
 class AxisLines:
     """Axes of the arm's joints as lines, at q = 0, in the arm frame."""

@@ -12,6 +12,7 @@ import numpy as np
 
 from elastocal.arrays import FloatArray
 from elastocal.errors import RobotError
+from elastocal.results import brief_repr
 from elastocal.robot.inverse.arm import AxisLines, arm_axes, arm_base, arm_joints, arm_tip_at_zero
 from elastocal.robot.inverse.solver import InverseKinematics
 from elastocal.robot.robot import Robot
@@ -33,6 +34,7 @@ class NotOrthoParallelError(RobotError):
     """An arm that has no analytic solution of the OPW kind; the message says why."""
 
 
+@brief_repr
 @dataclass(frozen=True)
 class OpwParameters:
     """Lengths of the OPW arm in m, named as in its paper, and its joint conventions.
@@ -71,6 +73,7 @@ class OpwParameters:
         return T @ _shift(0.0, 0.0, self.c4)
 
 
+@brief_repr
 @dataclass(frozen=True)
 class OpwGeometry:
     """An arm as an OPW arm between two constant transforms.

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from elastocal.arrays import BoolArray, FloatArray
+from elastocal.results import brief_repr
 from elastocal.sim.arm.linkage import Linkage
 
 _DAMPING = 1e-3
@@ -13,6 +14,7 @@ _MAX_STEP = 0.5
 """Largest change of a joint in one iteration, in rad or m."""
 
 
+@brief_repr
 @dataclass(frozen=True)
 class InverseResult:
     """Joint positions for a batch of poses."""

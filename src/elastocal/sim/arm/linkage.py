@@ -15,10 +15,12 @@ from numpy.typing import ArrayLike
 
 from elastocal.arrays import BoolArray, FloatArray
 from elastocal.errors import RobotError
+from elastocal.results import brief_repr
 
 _MOVABLE = ("revolute", "continuous", "prismatic")
 
 
+@brief_repr
 @dataclass(frozen=True)
 class Screws:
     """Axes of movement in the order in which they follow one another from base to tip."""
@@ -101,6 +103,7 @@ def _exponentials(screws: Screws, positions: FloatArray) -> FloatArray:
     return steps
 
 
+@brief_repr
 @dataclass(frozen=True)
 class PointMass:
     """The weight of one link."""

@@ -13,6 +13,7 @@ import numpy as np
 
 from elastocal.arrays import FloatArray, IndexArray
 from elastocal.errors import SpringError, nearest
+from elastocal.results import brief_repr
 from elastocal.sim.arm.linkage import Linkage, Screws
 
 
@@ -178,6 +179,7 @@ class TruthSpring:
     """Where it sits in that frame, in m; off the origin for a flexure within the link."""
 
 
+@brief_repr
 @dataclass(frozen=True)
 class SpringChain:
     """Motors and springs in the order in which they follow one another from base to tip."""

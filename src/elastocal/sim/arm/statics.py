@@ -27,6 +27,7 @@ from numpy.typing import NDArray
 
 from elastocal.arrays import BoolArray, FloatArray
 from elastocal.errors import ElastocalError
+from elastocal.results import brief_repr
 from elastocal.sim.arm.linkage import Screws, motions, moved_axes
 from elastocal.sim.arm.springs import TorqueLaw
 
@@ -40,6 +41,7 @@ class EquilibriumError(ElastocalError, ArithmeticError):
     """The simulated arm finds no stable equilibrium: a load it cannot carry."""
 
 
+@brief_repr
 @dataclass(frozen=True)
 class DeadLoads:
     """Forces that keep their direction in base, however the arm moves."""
@@ -52,6 +54,7 @@ class DeadLoads:
     """Shape (batch, load, 3), in N."""
 
 
+@brief_repr
 @dataclass(frozen=True)
 class EnergyState:
     """Energy and its derivatives at a batch of spring positions."""
@@ -80,6 +83,7 @@ class SpringBank(Protocol):
         ...
 
 
+@brief_repr
 @dataclass(frozen=True)
 class LoadedMechanism:
     """Screws of which some are held (the motors) and some are springs, with loads."""

@@ -15,6 +15,7 @@ import numpy as np
 from elastocal.arrays import FloatArray, IndexArray
 from elastocal.cell import Cell
 from elastocal.dataset import Readings
+from elastocal.results import brief_repr
 from elastocal.sim.workcell._instruments import AIR_TIME, COVERAGE, sensor_range
 from elastocal.sim.workcell.campaign import TrueReadings
 
@@ -62,6 +63,7 @@ class ErrorDraws:
         )  # fmt: skip
 
 
+@brief_repr
 @dataclass(frozen=True, eq=False)
 class CampaignErrors:
     """Standard deviations of averaged readings; make one with `of`."""

@@ -19,6 +19,7 @@ import numpy as np
 from elastocal.arrays import FloatArray
 from elastocal.cell import Cell
 from elastocal.cell.devices import Devices
+from elastocal.results import brief_repr
 from elastocal.sim.workcell._controller import SimulatedArm
 from elastocal.sim.workcell._force_control import ForceControl
 from elastocal.sim.workcell._instruments import (
@@ -79,6 +80,7 @@ def simulated_devices(cell: Cell, seed: int, start: float = 0.0) -> Devices:
     return SimulatedCell.of(cell, seed, start).devices
 
 
+@brief_repr
 @dataclass(frozen=True, eq=False)
 class ProcessState:
     """The robot under a process force."""

@@ -22,6 +22,7 @@ from elastocal.compensation.programs.krl._points import (
 from elastocal.compensation.programs.program import CorrectedPoint, Move, Words
 from elastocal.errors import FileAccessError
 from elastocal.files import replacing
+from elastocal.results import brief_repr
 
 _MOVE = re.compile(
     r"(S?PTP|S?LIN|S?CIRC|SPL|ASYPTP|(?:S?PTP|S?LIN|S?CIRC|SPL)_REL)\b(?!\s*[=(\[.])\s*(.*)",
@@ -41,6 +42,7 @@ _ASSIGNED = re.compile(r"(\w+)\s*(?:\.\s*\w+\s*)?=(?!=)", re.IGNORECASE)
 _NUMBERED = {"BASE": "BASE_DATA", "TOOL": "TOOL_DATA"}
 
 
+@brief_repr
 @dataclass(frozen=True)
 class KrlProgram:
     """A program of a KUKA controller: a `ControllerProgram`."""

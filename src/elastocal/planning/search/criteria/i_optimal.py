@@ -9,8 +9,10 @@ from elastocal.arrays import FloatArray
 from elastocal.errors import PlanningError
 from elastocal.planning.search.criteria.criterion import Criterion, inverse_trace_loss
 from elastocal.planning.search.information import Information
+from elastocal.results import brief_repr
 
 
+@brief_repr
 @dataclass(frozen=True, eq=False)
 class IOptimal(Criterion):
     """``-mean over process rows of z^T S^-1 z``: minus the mean variance of the predictions.
