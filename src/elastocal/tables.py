@@ -215,7 +215,12 @@ def finite_number(cell: str) -> float:
     return value
 
 
-def write_table(path: Path, header: Sequence[str], rows: Iterable[Sequence[object]]) -> None:
+def write_table(
+    path: Path,
+    header: Sequence[str],
+    rows: Iterable[Sequence[object]],
+    preamble: Sequence[str] = (),
+) -> None:
     """Write a table, whole or not at all; rows are taken one by one.
 
     Floating-point numbers keep all their digits.
@@ -228,13 +233,15 @@ def write_table(path: Path, header: Sequence[str], rows: Iterable[Sequence[objec
         Name of each column, with its unit.
     rows : iterable of sequence
         Cells: texts and numbers.
+    preamble : sequence of str
+        Lines above the header, with their line ends.
 
     Raises
     ------
     FileAccessError
         If the file cannot be written.
     """
-    with new_table(path, TableLayout(tuple(header))) as write:
+    with new_table(path, TableLayout(tuple(header), tuple(preamble))) as write:
         write(rows)
 
 
