@@ -37,6 +37,7 @@ from .demo import (
     DemoDisplay as DemoDisplay,
     DemoResult as DemoResult,
     DemoSettings as DemoSettings,
+    MakeDisplay as MakeDisplay,
     chapters as chapters,
     demo as demo,
 )
@@ -44,15 +45,18 @@ from .derive import DeriveResult as DeriveResult, DeriveSettings as DeriveSettin
 from .export import ExportResult as ExportResult, ExportSettings as ExportSettings, export as export
 from .init import InitResult as InitResult, InitSettings as InitSettings, init as init
 from .plan import (
+    ComparedSpread as ComparedSpread,
     PlanFigures as PlanFigures,
     PlanResult as PlanResult,
     PlanSettings as PlanSettings,
+    PlanTimes as PlanTimes,
     plan as plan,
     plan_figures as plan_figures,
 )
 from .predict import (
     PredictResult as PredictResult,
     PredictSettings as PredictSettings,
+    PredictSummary as PredictSummary,
     predict as predict,
 )
 from .report import (

@@ -22,9 +22,9 @@ from elastocal.workflows import _kinds_of_measurement as measurement, _kinds_of_
 from elastocal.workflows._kinds_of_measurement import FileDescription
 from elastocal.workflows._workflow import workflow
 
-Describe = Callable[[Path], FileDescription]
+_Describe = Callable[[Path], FileDescription]
 
-_JSON_KINDS: dict[str, Describe] = {
+_JSON_KINDS: dict[str, _Describe] = {
     "elastocal.plan": measurement.plan_file,
     "elastocal.run-summary": measurement.summary_file,
     "elastocal.tool": results.tool_file,
@@ -36,12 +36,12 @@ _JSON_KINDS: dict[str, Describe] = {
     "elastocal.comparison": results.comparison_file,
 }
 """JSON files by the schema that they state, without its version; others are read as a model."""
-_NETCDF_KINDS: dict[str, Describe] = {
+_NETCDF_KINDS: dict[str, _Describe] = {
     "elastocal.codec": results.arrays,
     "elastocal.pool": measurement.pool_file,
 }
 """NetCDF files likewise; others are read as a dataset."""
-_YAML_KINDS: dict[str, Describe] = {
+_YAML_KINDS: dict[str, _Describe] = {
     "elastocal.cell": measurement.cell_file,
     "elastocal.compensator": results.compensator_file,
 }
@@ -161,7 +161,7 @@ def _settings(path: Path) -> FileDescription:
     return _YAML_KINDS.get(_stated(_IN_YAML, read_text(path)), results.springs_file)(path)
 
 
-_BY_SUFFIX: dict[str, Describe] = {
+_BY_SUFFIX: dict[str, _Describe] = {
     ".nc": _netcdf,
     ".csv": _table,
     ".json": _json,
