@@ -76,7 +76,7 @@ def to_data(value: Any) -> Any:
     return dump(mode="json") if dump else value
 
 
-def from_data(cls: type[T], data: Any, what: str) -> T:
+def from_data(cls: type[T], data: Any, what: str, schema: str = "") -> T:
     """Return data as a record, or refuse them in one line.
 
     Parameters
@@ -87,6 +87,8 @@ def from_data(cls: type[T], data: Any, what: str) -> T:
         JSON-ready data; a record with a schema must state it.
     what : str
         The file, for messages.
+    schema : str
+        What the data must state; by default, what the record says.
 
     Raises
     ------
@@ -95,7 +97,7 @@ def from_data(cls: type[T], data: Any, what: str) -> T:
     """
     from elastocal.records._validation import validate_record
 
-    return validate_record(_unstated(cls, data, what), cls, what)
+    return validate_record(_unstated(cls, data, what, schema), cls, what)
 
 
 def write_json(path: Path, value: Any) -> None:
@@ -111,7 +113,7 @@ def write_json(path: Path, value: Any) -> None:
     files.write_json(path, to_data(value))
 
 
-def read_json(path: Path, cls: type[T]) -> T:
+def read_json(path: Path, cls: type[T], schema: str = "") -> T:
     """Return the record of a file.
 
     Parameters
@@ -120,6 +122,8 @@ def read_json(path: Path, cls: type[T]) -> T:
         The file.
     cls : type
         A record, or a `StrictModel`.
+    schema : str
+        What the file must state; by default, what the record says.
 
     Raises
     ------
@@ -132,14 +136,15 @@ def read_json(path: Path, cls: type[T]) -> T:
         data = json.loads(read_text(path))
     except (ValueError, RecursionError) as error:
         raise SchemaError(f"{path} is not valid JSON: {error}") from error
-    return from_data(cls, data, str(path))
+    return from_data(cls, data, str(path), schema)
 
 
-def _unstated(cls: Any, data: Any, what: str) -> Any:
+def _unstated(cls: Any, data: Any, what: str, schema: str = "") -> Any:
     """Return data without the schemas that they state, each of them checked."""
     from elastocal.records._validation import check_schema
 
-    if schema := schema_of(cls):
+    schema = schema or schema_of(cls)
+    if schema:
         if not isinstance(data, dict):
             raise SchemaError(f"{what} must hold keys and values, among them the schema {schema!r}")
         data = dict(data)

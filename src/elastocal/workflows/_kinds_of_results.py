@@ -166,7 +166,7 @@ def verdicts(path: Path) -> FileDescription:
 
 def is_table(path: Path) -> bool:
     """Return whether a CSV file begins as a table that a codec or a study writes."""
-    return _first_columns(read_text(path)) in _TABLES
+    return tuple(read_text(path).partition("\n")[0].strip().split(",")[:3]) in _TABLES
 
 
 def table(path: Path) -> FileDescription:
@@ -196,10 +196,6 @@ def _facts(data: CodecData) -> dict[str, object]:
         "splits": len(data.seed_pose),
         "training": len(data.n_train),
     }
-
-
-def _first_columns(text: str) -> tuple[str, ...]:
-    return tuple(text.partition("\n")[0].strip().split(",")[:3])
 
 
 def is_study(folder: Path) -> bool:

@@ -127,7 +127,7 @@ def _dat_of(src: Path) -> Path:
 
 def _read_moves(lines: Sequence[str], data: Sequence[str]) -> tuple[tuple[Move, ...], str, str]:
     """Return the motions, and the base and tool of the straight ones."""
-    frames = _frame_data(data)
+    frames = dict(_fdats(data))
     active = {"BASE": "", "TOOL": ""}
     moves: list[Move] = []
     used: dict[str, tuple[str, int]] = {}
@@ -202,11 +202,6 @@ def _frame_change(
     if _PART.fullmatch(code) or _IN_TOOL.search(code):
         raise PathError(f"line {number}: {code!r:.60} moves the frame: this is not understood")
     return {}
-
-
-def _frame_data(data: Sequence[str]) -> dict[str, dict[str, str]]:
-    """Return tool and base of each FDAT that a pendant's inline form has left."""
-    return dict(_fdats(data))
 
 
 def _fdats(data: Sequence[str]) -> Iterator[tuple[str, dict[str, str]]]:
