@@ -7,16 +7,17 @@ deflection of its tool centre point, and see that the deflection is linear in th
 
 import numpy as np
 
-from elastocal.elastic import ElasticModel, layout
-from elastocal.robot import Robot, T_from_xyzabc, catalogue, with_tool
+import elastocal as ec
+from elastocal.elastic import layout
+from elastocal.robot import T_from_xyzabc, catalogue, with_tool
 
 # A tool that stands 350 mm out of the flange and 150 mm aside; its z axis points out of it.
 urdf = catalogue.urdf("KR 120 R2700 extra HA")
 urdf = with_tool(urdf, "flange", "tcp", T_from_xyzabc(0.15, 0.0, 0.35, 0.0, 0.0, 0.0))
-robot = Robot.from_urdf(urdf, "tcp")
+robot = ec.Robot.from_urdf(urdf, "tcp")
 
 # Compliances in rad/(N·m). These are guesses of a plausible size; a calibration would know them.
-model = ElasticModel(robot, layout(robot, "bearing"))
+model = ec.ElasticModel(robot, layout(robot, "bearing"))
 axial = [0.4e-6, 0.35e-6, 0.4e-6, 1.2e-6, 1.6e-6, 3.0e-6]
 compliance = np.array(axial + [0.2 * c for c in axial for _ in range(2)])
 

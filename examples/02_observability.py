@@ -7,9 +7,10 @@ directions are seen. Fourteen springs fit as well, and each has a value of its o
 
 import numpy as np
 
-from elastocal.elastic import ElasticModel, layout
+import elastocal as ec
+from elastocal.elastic import layout
 from elastocal.identification import build, describe, observability, solve
-from elastocal.robot import Robot, T_from_xyzabc, catalogue, with_tool
+from elastocal.robot import T_from_xyzabc, catalogue, with_tool
 from elastocal.sim.arm import (
     SHOP_FLOOR,
     Linkage,
@@ -21,7 +22,7 @@ from elastocal.sim.arm import (
 
 urdf = catalogue.urdf("KR 120 R2700 extra HA")
 urdf = with_tool(urdf, "flange", "tcp", T_from_xyzabc(0.15, 0.0, 0.35, 0.0, 0.0, 0.0))
-robot = Robot.from_urdf(urdf, "tcp")
+robot = ec.Robot.from_urdf(urdf, "tcp")
 
 # Readings of a simulated arm at 31 poses on a dome, five load cases each.
 rng = np.random.default_rng(1)
@@ -35,7 +36,7 @@ readings = data.readings(robot.joint_names)
 
 def seen(springs, chosen):
     """Return what some of the readings tell about springs, and the median error of their fit."""
-    problem = build(ElasticModel(robot, springs), chosen)
+    problem = build(ec.ElasticModel(robot, springs), chosen)
     solution = solve(problem)
     error = np.linalg.norm(problem.residuals(solution.compliance), axis=1)
     return observability(solution.factored, springs), 1e6 * float(np.median(error))

@@ -12,10 +12,9 @@ from pathlib import Path
 
 import numpy as np
 
-from elastocal.dataset import read, write
-from elastocal.elastic import ElasticModel, layout
-from elastocal.identification import calibrate, summary, write_model
-from elastocal.robot import Robot, T_from_xyzabc, catalogue, with_tool
+import elastocal as ec
+from elastocal.dataset import write
+from elastocal.robot import T_from_xyzabc, catalogue, with_tool
 from elastocal.sim.arm import (
     LINK_BENDING,
     SHOP_FLOOR,
@@ -45,12 +44,8 @@ spoilt = (Blunder(12, "north", (0.0, 4e-3, 0.0)),)
 write(measure(arm, pressed.joints, forces, SHOP_FLOOR, rng, blunders=spoilt), folder / "dataset.nc")
 
 # From here on it is as with your own data. The dataset carries the URDF and the tcp's name.
-data = read(folder / "dataset.nc")
-robot = Robot.from_urdf(data.robot_urdf, data.tcp_frame)
-model = ElasticModel(robot, layout(robot, "bearing"))
-calibration = calibrate(model, data.readings(robot.joint_names), np.random.default_rng(0))
-figures = summary(calibration)
-write_model(folder / "model.json", calibration.calibrated, figures)
+result = ec.calibrate(folder / "dataset.nc", out=folder / "model.json")
+figures = result.calibration
 mm = 1e3
 print(f"{figures.readings} readings at {figures.poses} poses")
 print(f"deflection measured: {mm * figures.deflection.mean:.3f} mm mean")

@@ -8,9 +8,10 @@ misfit and the noise of a measurement as well; the truth, which has no noise, li
 
 import numpy as np
 
-from elastocal.elastic import ElasticModel, layout
+import elastocal as ec
+from elastocal.elastic import layout
 from elastocal.identification import calibrate, summary
-from elastocal.robot import Robot, T_from_xyzabc, catalogue, with_tool
+from elastocal.robot import T_from_xyzabc, catalogue, with_tool
 from elastocal.sim.arm import (
     LINK_BENDING,
     SHOP_FLOOR,
@@ -26,8 +27,8 @@ from elastocal.sim.arm import (
 
 urdf = catalogue.urdf("KR 120 R2700 extra HA")
 urdf = with_tool(urdf, "flange", "tcp", T_from_xyzabc(0.15, 0.0, 0.35, 0.0, 0.0, 0.0))
-robot, linkage = Robot.from_urdf(urdf, "tcp"), Linkage.from_urdf(urdf, "tcp")
-model = ElasticModel(robot, layout(robot, "bearing"))
+robot, linkage = ec.Robot.from_urdf(urdf, "tcp"), Linkage.from_urdf(urdf, "tcp")
+model = ec.ElasticModel(robot, layout(robot, "bearing"))
 
 hinges = bearing_truth(linkage)
 bending = dict.fromkeys(linkage.joint_names[1:3], LINK_BENDING)

@@ -11,9 +11,8 @@ from pathlib import Path
 
 import numpy as np
 
-from elastocal.cell import load_cell
-from elastocal.cell.examples import write_example
-from elastocal.elastic import ElasticModel, layout
+import elastocal as ec
+from elastocal.elastic import layout
 from elastocal.planning import sample_pool
 from elastocal.planning.search import (
     Candidates,
@@ -28,11 +27,11 @@ from elastocal.planning.surface import distance_to_boundary, load_surface
 
 folder = Path(sys.argv[1]) if len(sys.argv) > 1 else Path(tempfile.mkdtemp(prefix="elastocal-"))
 folder.mkdir(parents=True, exist_ok=True)
-cell_file, *_ = write_example(folder / "cell", "afp")
+cell_file = ec.init(folder / "cell", like="afp").cell
 text = cell_file.read_text(encoding="utf-8").replace("pool: 3000", "pool: 1000")
 cell_file.write_text(text, encoding="utf-8")
 
-cell = load_cell(cell_file)
+cell = ec.load_cell(cell_file)
 entry = cell.file.surface
 surface = load_surface(cell.surface_path, entry.metres, cell.T_base_surface, entry.region)
 gathered = sample_pool(cell, surface, np.random.default_rng(1), jobs=1)
@@ -43,7 +42,7 @@ for check, count in gathered.pool.refused.items():
         print(f"  {count} points refused by the check {check!r}")
 
 # What each pose would show of the springs under every load case (paper Eq. 15, 17).
-model = ElasticModel(cell.robot, layout(cell.robot, "bearing"))
+model = ec.ElasticModel(cell.robot, layout(cell.robot, "bearing"))
 R_base_tcp = postures.T_base_tcp[:, :3, :3]
 force = np.einsum("pij,lj->pli", R_base_tcp, cell.file.load_cases.force_tcp)
 rows = model.observation_blocks(postures.q[:, None], force)

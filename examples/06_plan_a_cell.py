@@ -8,25 +8,18 @@ import sys
 import tempfile
 from pathlib import Path
 
-from elastocal.cell import load_cell
-from elastocal.cell.examples import write_example
-from elastocal.planning import make_plan, read_plan, write_plan, write_pool
+import elastocal as ec
 
 folder = Path(sys.argv[1]) if len(sys.argv) > 1 else Path(tempfile.mkdtemp(prefix="elastocal-"))
 folder.mkdir(parents=True, exist_ok=True)
 
 # A smaller pool than the example's 3000 keeps this short.
-cell_file, *_ = write_example(folder / "cell", "machining")
+cell_file = ec.init(folder / "cell", like="machining").cell
 text = cell_file.read_text(encoding="utf-8").replace("pool: 3000", "pool: 200")
 cell_file.write_text(text, encoding="utf-8")
 
-planned = make_plan(load_cell(cell_file), compare="ioops", jobs=1)
-plan_folder = folder / "plan"
-plan_folder.mkdir(exist_ok=True)
-write_plan(plan_folder, planned.plan)
-write_pool(plan_folder, planned.pool)
-
-plan = read_plan(plan_folder)
+ec.plan(cell_file, out=folder / "plan", jobs=1)
+plan = ec.read_plan(folder / "plan")
 print(f"{len(plan.poses)} poses from {plan.pool.valid} candidates, by {plan.search.name}")
 print(f"covering radius {1e3 * plan.search.covering_radius:.0f} mm")
 for note in plan.findings:

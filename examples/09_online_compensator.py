@@ -14,12 +14,13 @@ from pathlib import Path
 
 import numpy as np
 
+import elastocal as ec
 from elastocal.compensation import CompensatorSettings
 from elastocal.compensation.export import write_c
 from elastocal.compensation.online import Compensator, Reading, Status
-from elastocal.elastic import ElasticModel, layout
+from elastocal.elastic import layout
 from elastocal.identification import calibrate
-from elastocal.robot import Robot, T_from_xyzabc, catalogue, with_tool
+from elastocal.robot import T_from_xyzabc, catalogue, with_tool
 from elastocal.sim.arm import (
     SHOP_FLOOR,
     Linkage,
@@ -34,12 +35,12 @@ folder.mkdir(parents=True, exist_ok=True)
 
 urdf = catalogue.urdf("KR 120 R2700 extra HA")
 urdf = with_tool(urdf, "flange", "tcp", T_from_xyzabc(0.15, 0.0, 0.35, 0.0, 0.0, 0.0))
-robot, linkage = Robot.from_urdf(urdf, "tcp"), Linkage.from_urdf(urdf, "tcp")
+robot, linkage = ec.Robot.from_urdf(urdf, "tcp"), Linkage.from_urdf(urdf, "tcp")
 rng = np.random.default_rng(4)
 pressed = press_poses(linkage, 20, rng)
 forces = press_forces(pressed.T_base_tcp)
 data = measure(bearing_truth(linkage), pressed.joints, forces, SHOP_FLOOR, rng)
-model = ElasticModel(robot, layout(robot, "bearing"))
+model = ec.ElasticModel(robot, layout(robot, "bearing"))
 calibrated = calibrate(model, data.readings(robot.joint_names), rng).calibrated
 
 # A wrench at the tool centre point, bias and weight removed; corrections in base, every 4 ms.

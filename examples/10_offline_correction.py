@@ -11,10 +11,11 @@ from pathlib import Path
 
 import numpy as np
 
+import elastocal as ec
 from elastocal.compensation.offline import compensate_path, joints_along_path
-from elastocal.elastic import ElasticModel, layout
+from elastocal.elastic import layout
 from elastocal.identification import calibrate
-from elastocal.robot import Robot, T_from_xyzabc, catalogue, with_tool
+from elastocal.robot import T_from_xyzabc, catalogue, with_tool
 from elastocal.robot.inverse import inverse_for
 from elastocal.sim.arm import (
     LINK_BENDING,
@@ -33,13 +34,13 @@ folder.mkdir(parents=True, exist_ok=True)
 
 urdf = catalogue.urdf("KR 120 R2700 extra HA")
 urdf = with_tool(urdf, "flange", "tcp", T_from_xyzabc(0.15, 0.0, 0.35, 0.0, 0.0, 0.0))
-robot, linkage = Robot.from_urdf(urdf, "tcp"), Linkage.from_urdf(urdf, "tcp")
+robot, linkage = ec.Robot.from_urdf(urdf, "tcp"), Linkage.from_urdf(urdf, "tcp")
 bending = dict.fromkeys(linkage.joint_names[1:3], LINK_BENDING)
 arm = with_stiffening_gears(with_link_bending(bearing_truth(linkage), bending))
 rng = np.random.default_rng(5)
 pressed = press_poses(linkage, 31, rng)
 data = measure(arm, pressed.joints, press_forces(pressed.T_base_tcp), SHOP_FLOOR, rng)
-model = ElasticModel(robot, layout(robot, "bearing"))
+model = ec.ElasticModel(robot, layout(robot, "bearing"))
 calibrated = calibrate(model, data.readings(robot.joint_names), rng).calibrated
 
 # A straight course of 0.8 m across the dome, the tool pointing down, pressing with 1100 N and

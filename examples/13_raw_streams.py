@@ -11,8 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from elastocal.cell import load_cell
-from elastocal.cell.examples import write_example
+import elastocal as ec
 from elastocal.planning import make_plan
 from elastocal.procedure import (
     Event,
@@ -32,11 +31,11 @@ folder = Path(sys.argv[1]) if len(sys.argv) > 1 else Path(tempfile.mkdtemp(prefi
 folder.mkdir(parents=True, exist_ok=True)
 
 # A plan of a single pose: this is about the streams, not about the calibration.
-cell_file, *_ = write_example(folder / "cell", "afp")
+cell_file = ec.init(folder / "cell", like="afp").cell
 text = cell_file.read_text(encoding="utf-8")
 text = text.replace("pool: 3000", "pool: 20").replace('d_max: "175 mm"', "poses: 1")
 cell_file.write_text(text, encoding="utf-8")
-cell = load_cell(cell_file)
+cell = ec.load_cell(cell_file)
 plan = make_plan(cell, jobs=1).plan
 
 run = RunFolder(folder / "run")

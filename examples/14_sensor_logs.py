@@ -11,12 +11,11 @@ from pathlib import Path
 
 import numpy as np
 
-from elastocal.dataset import Dataset, read, write
-from elastocal.elastic import ElasticModel, layout
-from elastocal.identification import calibrate, summary
+import elastocal as ec
+from elastocal.dataset import write
 from elastocal.procedure.derive import ToolLoad
 from elastocal.procedure.registration import UnloadedReadings, register
-from elastocal.robot import GRAVITY, Robot, T_from_xyzabc, catalogue, with_tool
+from elastocal.robot import GRAVITY, T_from_xyzabc, catalogue, with_tool
 from elastocal.sim.arm import (
     LOAD_CASES,
     SHOP_FLOOR,
@@ -31,7 +30,7 @@ folder = Path(sys.argv[1]) if len(sys.argv) > 1 else Path(tempfile.mkdtemp(prefi
 folder.mkdir(parents=True, exist_ok=True)
 urdf = catalogue.urdf("KR 120 R2700 extra HA")
 urdf = with_tool(urdf, "flange", "tcp", T_from_xyzabc(0.15, 0.0, 0.35, 0.0, 0.0, 0.0))
-robot, linkage = Robot.from_urdf(urdf, "tcp"), Linkage.from_urdf(urdf, "tcp")
+robot, linkage = ec.Robot.from_urdf(urdf, "tcp"), Linkage.from_urdf(urdf, "tcp")
 
 # What the instruments logged, averaged over a second each. Simulated here; yours come from files.
 rng = np.random.default_rng(8)
@@ -68,7 +67,7 @@ print(f"marker in the tcp frame: {np.round(1e3 * found.lever_arm, 2) + 0.0} mm")
 # 2. Forces on the robot in base, f = R (F - F_0 - m (R^T g - R_0^T g)); displacements in base.
 shown = raw - raw_0[:, None] - (tool.force(R) - tool.force(R_0)[:, None])
 force = np.einsum("plij,plj->pli", R, shown)
-dataset = Dataset.from_arrays(
+dataset = ec.Dataset.from_arrays(
     joint_position=q,
     force=force,
     controller_displacement=loaded[..., :3, 3] - before[:, None, :3, 3],
@@ -79,11 +78,12 @@ dataset = Dataset.from_arrays(
     provenance="sensor logs of an example",
 )
 write(dataset, folder / "readings.csv")
+(folder / "robot.urdf").write_text(urdf, encoding="utf-8")
 
-# 3. The file is what `elastocal calibrate readings.csv --robot URDF --tcp tcp` takes.
-readings = read(folder / "readings.csv").readings(robot.joint_names)
-calibration = calibrate(ElasticModel(robot, layout(robot, "bearing")), readings, rng)
-figures = summary(calibration)
+# 3. As `elastocal calibrate readings.csv --robot robot.urdf --tcp tcp` does.
+figures = ec.calibrate(
+    folder / "readings.csv", robot=str(folder / "robot.urdf"), tcp="tcp"
+).calibration
 print(
     f"{figures.readings} readings written to readings.csv; first force {np.round(force[0, 0], 1)} N"
 )
