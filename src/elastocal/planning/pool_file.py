@@ -144,7 +144,7 @@ def read_pool(folder: Path) -> PoolData:
     return read_netcdf(path, PoolData)
 
 
-def check_pool_of(plan: PlanResult, data: PoolData) -> None:
+def check_pool_of(plan: PlanResult, data: PoolData, what: str = POOL) -> None:
     """Refuse a pool that a plan was not chosen from.
 
     Parameters
@@ -153,6 +153,8 @@ def check_pool_of(plan: PlanResult, data: PoolData) -> None:
         The plan.
     data : PoolData
         The pool that lies beside it.
+    what : str
+        How the message names the pool.
 
     Raises
     ------
@@ -167,14 +169,14 @@ def check_pool_of(plan: PlanResult, data: PoolData) -> None:
     ):
         if ours != wanted:
             raise SchemaError(
-                f"{POOL} belongs to another plan: {quantity} {ours}, in the plan {wanted}"
+                f"{what} belongs to another plan: {quantity} {ours}, in the plan {wanted}"
             )
     for pose in plan.poses:
         row = pose.candidate
         same = data.pose_id[row] == pose.id and tuple(data.q[row].tolist()) == pose.joints
         if not (same and np.allclose(data.contact[row], pose.tcp_position, rtol=0.0, atol=1e-6)):
             raise SchemaError(
-                f"{POOL} belongs to another plan: its candidate {row} is not pose {pose.id}"
+                f"{what} belongs to another plan: its candidate {row} is not pose {pose.id}"
             )
 
 
