@@ -61,16 +61,12 @@ def watching(console: Console, count: int) -> Iterator[Callable[[Progress], None
     count : int
         Number of poses.
     """
-    screen = _screen(console, count)
+    screen = _Terminal(console, count) if console.is_terminal else _Lines(console)
     screen.start()
     try:
         yield screen.tell
     finally:
         screen.close()
-
-
-def _screen(console: Console, count: int) -> "_Screen":
-    return _Terminal(console, count) if console.is_terminal else _Lines(console)
 
 
 class _Screen(threading.Thread, abc.ABC):

@@ -21,12 +21,7 @@ from pathlib import Path
 from typing import Annotated, Literal
 
 import numpy as np
-from pydantic import (
-    Discriminator,
-    Field,
-    Tag,
-    model_validator,
-)
+from pydantic import Discriminator, Field, Tag, model_validator
 
 from elastocal.arrays import FloatArray
 from elastocal.cell.description import (
@@ -36,12 +31,7 @@ from elastocal.cell.description import (
     PositiveLength,
     PositiveMoment,
 )
-from elastocal.compensation.conditioning import (
-    Duration,
-    FilterChain,
-    FilterSettings,
-    Speed,
-)
+from elastocal.compensation.conditioning import Duration, FilterChain, FilterSettings, Speed
 from elastocal.errors import CompensationError
 from elastocal.records import StrictModel, read_yaml
 from elastocal.robot import T_from_xyzabc

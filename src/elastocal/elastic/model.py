@@ -168,11 +168,7 @@ class ElasticModel:
         return columns[0] if len(columns) == 1 else _assembled(columns, places)
 
     def deflection(
-        self,
-        compliance: ArrayLike,
-        q: ArrayLike,
-        force: ArrayLike,
-        moment: ArrayLike | None = None,
+        self, compliance: ArrayLike, q: ArrayLike, force: ArrayLike, moment: ArrayLike | None = None
     ) -> FloatArray:
         """Return the deflection ``O c``: real minus commanded position of the tcp.
 

@@ -136,10 +136,7 @@ def _settle(
 
 
 def _yield(
-    model: ElasticModel,
-    readings: Readings,
-    compliance: FloatArray,
-    marker_offset: ArrayLike | None,
+    model: ElasticModel, readings: Readings, compliance: FloatArray, marker_offset: ArrayLike | None
 ) -> FloatArray:
     """Return the displacement of the marker per force at the tcp, shape (reading, 3, 3)."""
     unit = model.observation_blocks(

@@ -154,7 +154,10 @@ def _doubts(
     marker_offset: ArrayLike | None,
 ) -> list[str]:
     """Return what is odd about the data before they are fitted, or refuse them."""
-    doubts = list(check_joints(model.robot, readings)) + _repeated(readings, problem)
+    doubts = list(check_joints(model.robot, readings)) + [
+        f"poses {', '.join(map(str, group))} are one configuration: resampled and left out together"
+        for group in same_configuration(readings, problem.block)
+    ]
     try:
         left = check_conventions(model, readings, marker_offset)
     except ConventionError as error:
@@ -186,13 +189,6 @@ def _worth(
     if held_out.mean >= deflection:
         doubts.append("at left-out poses the model predicts no better than none at all")
     return doubts
-
-
-def _repeated(readings: Readings, problem: Problem) -> list[str]:
-    return [
-        f"poses {', '.join(map(str, group))} are one configuration: resampled and left out together"
-        for group in same_configuration(readings, problem.block)
-    ]
 
 
 def _compare(

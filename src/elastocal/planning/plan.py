@@ -26,10 +26,7 @@ from elastocal.planning.motion import (
 )
 from elastocal.planning.plan_result import PlanResult, SpreadRecord
 from elastocal.planning.pool_file import PoolData
-from elastocal.planning.pool_sampling import (
-    SampledPool,
-    sample_pool,
-)
+from elastocal.planning.pool_sampling import SampledPool, sample_pool
 from elastocal.planning.postures import Postures
 from elastocal.planning.search import Cover, Selection, technique
 from elastocal.planning.search_pool import SearchPool
@@ -52,10 +49,7 @@ class PlanAndPool:
 
 
 def make_plan(
-    cell: Cell,
-    compare: str | None = None,
-    jobs: int | None = None,
-    progress: Progress = silent,
+    cell: Cell, compare: str | None = None, jobs: int | None = None, progress: Progress = silent
 ) -> PlanAndPool:
     """Return the calibration poses of a cell, checked and in visiting order.
 
@@ -111,10 +105,7 @@ def make_plan(
         comparison,
         route,
         _stations(cell, surface, chosen),
-        (
-            *(finding.message for finding in findings),
-            *_notes(cell, sampled, selection, spread),
-        ),
+        (*(finding.message for finding in findings), *_notes(cell, sampled, selection, spread)),
     )
     return PlanAndPool(plan_record(decisions), pool_data(decisions), surface)
 

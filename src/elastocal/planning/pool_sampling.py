@@ -20,20 +20,8 @@ from elastocal.errors import PlanningError
 from elastocal.parallel import process_count, process_pool
 from elastocal.planning.cell_setup import point_checks, robot_checks
 from elastocal.planning.checks import Checks, verdicts
-from elastocal.planning.pool import (
-    Approach,
-    BasePlacement,
-    Pool,
-    join_pools,
-    make_pool,
-    options_at,
-)
-from elastocal.planning.surface import (
-    Surface,
-    SurfacePoints,
-    sample_blue_noise,
-    sample_uniform,
-)
+from elastocal.planning.pool import Approach, BasePlacement, Pool, join_pools, make_pool, options_at
+from elastocal.planning.surface import Surface, SurfacePoints, sample_blue_noise, sample_uniform
 from elastocal.progress import Progress, silent
 from elastocal.results import brief_repr
 from elastocal.robot.inverse import InverseKinematics, inverse_for

@@ -24,11 +24,7 @@ from elastocal.planning.search import (
     o1,
     technique,
 )
-from elastocal.planning.surface import (
-    Surface,
-    distance_to_boundary,
-    geodesic_distance,
-)
+from elastocal.planning.surface import Surface, distance_to_boundary, geodesic_distance
 from elastocal.results import brief_repr
 
 _SPRINGS = "bearing"
@@ -52,7 +48,7 @@ class SearchPool:
         """Return the pool of a cell with its observation rows and its metric."""
         postures = sampled.pool.postures
         points = sampled.points.take(postures.point)
-        model = _elastic_model(cell)
+        model = ElasticModel(cell.robot, layout(cell.robot, _SPRINGS))
         geodesic = cell.file.search.metric == "geodesic"
         candidates = Candidates(
             postures.contact,
@@ -115,11 +111,6 @@ class SearchPool:
             )
         found = wanted.search(self.candidates.take(left), count, rng)
         return replace(found, order=left[found.order])
-
-
-def _elastic_model(cell: Cell) -> ElasticModel:
-    """Return the elastic model whose springs are to be identified."""
-    return ElasticModel(cell.robot, layout(cell.robot, _SPRINGS))
 
 
 def _pose_rows(cell: Cell, model: ElasticModel, postures: Postures) -> FloatArray:

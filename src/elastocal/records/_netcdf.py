@@ -210,11 +210,7 @@ def _write(file: Any, name: str, array: LabelledArray) -> None:
     # HDF5 cannot cut nothing into chunks.
     storage = _PACKED if array.packed and array.values.size else {}
     variable = file.create_variable(
-        name,
-        array.dims,
-        _text_type() if texts else array.values.dtype,
-        fillvalue=fill,
-        **storage,
+        name, array.dims, _text_type() if texts else array.values.dtype, fillvalue=fill, **storage
     )
     for key, value in array.attributes.items():
         variable.attrs[key] = value

@@ -98,11 +98,7 @@ class Robot:
 
     @classmethod
     def from_urdf(
-        cls,
-        text: str,
-        tip: str,
-        base: str | None = None,
-        meshes: tuple[tuple[str, Path], ...] = (),
+        cls, text: str, tip: str, base: str | None = None, meshes: tuple[tuple[str, Path], ...] = ()
     ) -> "Robot":
         """Return the robot that a URDF text describes.
 

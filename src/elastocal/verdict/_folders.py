@@ -108,7 +108,7 @@ def find_folders(run: Path) -> EvidenceFolders:
     if not run.is_dir():
         raise FileAccessError(f"cannot read {run}: there is no such file or folder")
     if (run / JOURNAL).exists():
-        return EvidenceFolders(RunFolder(run), (run, _parent(run)))
+        return EvidenceFolders(RunFolder(run), (run, run.resolve().parent))
     if (run / _RUN / JOURNAL).exists():
         return EvidenceFolders(RunFolder(run / _RUN), (run / _RUN, run))
     if any((run / name).exists() for name in (MODEL, CODEC, PROCESS)):
@@ -125,10 +125,6 @@ def run_files(run: RunFolder) -> Iterator[Path]:
     for path in (*cell, *plan, run.journal, run.dataset, run.summary):
         if path.is_file():
             yield path
-
-
-def _parent(run: Path) -> Path:
-    return run.resolve().parent
 
 
 def _files_of(path: Path) -> list[Path]:

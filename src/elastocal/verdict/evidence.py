@@ -7,12 +7,7 @@ from elastocal.codec import ALL_LOADS, CodecData, Saturation, Variant, Verdicts
 from elastocal.compensation.conditioning import ToolResult
 from elastocal.compensation.process import SimulatedProcess
 from elastocal.dataset import Dataset
-from elastocal.identification import (
-    CalibratedModel,
-    CalibrationSummary,
-    Reproduction,
-    UnseenErrors,
-)
+from elastocal.identification import CalibratedModel, CalibrationSummary, Reproduction, UnseenErrors
 from elastocal.identification.recertification import CompareSummary
 from elastocal.planning import PlanResult, PoolData
 from elastocal.planning.surface import Surface

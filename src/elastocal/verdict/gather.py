@@ -19,10 +19,7 @@ from elastocal.compensation.process import TABLE, SimulatedProcess, read_process
 from elastocal.dataset import Dataset
 from elastocal.errors import ElastocalError
 from elastocal.files import read_text
-from elastocal.identification import (
-    CalibrateResult,
-    reproduce_calibration,
-)
+from elastocal.identification import CalibrateResult, reproduce_calibration
 from elastocal.identification.recertification import recertify_files
 from elastocal.planning import (
     PLAN,
@@ -131,12 +128,7 @@ def _with_run(evidence: Evidence, reader: PartReader) -> Evidence:
         surface = reader.read("surface", cell.path, lambda: cell_surface(cell), named=False)
         evidence = replace(evidence, surface=surface, cell_text=read_text(cell.path))
     evidence = _with_plan(evidence, reader, run, journal)
-    summary = _derived(
-        reader,
-        "summary of the run",
-        run.summary,
-        read_summary,
-    )
+    summary = _derived(reader, "summary of the run", run.summary, read_summary)
     evidence = replace(evidence, dataset=_derived(reader, "dataset", run.dataset, datasets.read))
     for file in run_files(run):
         reader.use(file)

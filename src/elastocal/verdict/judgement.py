@@ -9,9 +9,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from enum import Enum
 
-from elastocal.identification import (
-    UnseenErrors,
-)
+from elastocal.identification import UnseenErrors
 from elastocal.results import brief_repr
 from elastocal.verdict.evidence import Evidence
 from elastocal.verdict.findings import Finding, find_everything

@@ -39,6 +39,11 @@ class FileDescription(NamedTuple):
     facts: Mapping[str, object]
     """Figures by name, JSON-ready."""
 
+    @classmethod
+    def of(cls, kind: str, /, **facts: object) -> "FileDescription":
+        """Return the description of a file of a kind."""
+        return cls(kind, facts)
+
 
 def _cell_facts(path: Path) -> dict[str, object]:
     """Return what a cell file describes.
@@ -78,31 +83,27 @@ def cell_file(path: Path) -> FileDescription:
 def plan_file(path: Path) -> FileDescription:
     """Describe a plan."""
     plan = read_plan(path)
-    return FileDescription(
+    return FileDescription.of(
         "plan",
-        {
-            "schema": "elastocal.plan/1",
-            "cell": plan.cell.name,
-            "robot": plan.robot.name,
-            "poses": len(plan.poses),
-            "load_cases": list(plan.contact.load_cases),
-            "technique": plan.search.name,
-            "covering_radius": plan.search.covering_radius,
-        },
+        schema="elastocal.plan/1",
+        cell=plan.cell.name,
+        robot=plan.robot.name,
+        poses=len(plan.poses),
+        load_cases=list(plan.contact.load_cases),
+        technique=plan.search.name,
+        covering_radius=plan.search.covering_radius,
     )
 
 
 def pool_file(path: Path) -> FileDescription:
     """Describe a pool of candidates."""
     pool = read_pool(path)
-    return FileDescription(
+    return FileDescription.of(
         "pool of candidates",
-        {
-            "schema": "elastocal.pool/1",
-            "candidates": len(pool),
-            "sampled": len(pool.sampled),
-            "checks": list(pool.check_names),
-        },
+        schema="elastocal.pool/1",
+        candidates=len(pool),
+        sampled=len(pool.sampled),
+        checks=list(pool.check_names),
     )
 
 
@@ -114,17 +115,15 @@ def run_folder(path: Path) -> FileDescription:
     if start is None:
         raise SchemaError(f"{run.journal} has no entry: nothing has moved in this run")
     cell, plan = load_cell(run.cell / start.cell_file), read_plan(run.plan)
-    return FileDescription(
+    return FileDescription.of(
         "run",
-        {
-            "schema": start.schema_name,
-            "cell": cell.name,
-            "robot": cell.robot.name,
-            "started": start.started,
-            "poses": len(plan.poses),
-            "committed": [log.pose for log in commits(entries)],
-            "readings": dataset_file(run.dataset)[1]["readings"] if run.dataset.exists() else None,
-        },
+        schema=start.schema_name,
+        cell=cell.name,
+        robot=cell.robot.name,
+        started=start.started,
+        poses=len(plan.poses),
+        committed=[log.pose for log in commits(entries)],
+        readings=dataset_file(run.dataset)[1]["readings"] if run.dataset.exists() else None,
     )
 
 
@@ -134,59 +133,51 @@ def journal_file(path: Path) -> FileDescription:
     start = entries[0].run if entries else None
     if start is None:
         raise SchemaError(f"{path} has no entry: nothing has moved in this run")
-    return FileDescription(
+    return FileDescription.of(
         "journal of a run",
-        {
-            "schema": start.schema_name,
-            "started": start.started,
-            "entries": len(entries),
-            "committed": [log.pose for log in commits(entries)],
-            "last_entry": f"{entries[-1].event.value} at {entries[-1].time:.1f} s",
-        },
+        schema=start.schema_name,
+        started=start.started,
+        entries=len(entries),
+        committed=[log.pose for log in commits(entries)],
+        last_entry=f"{entries[-1].event.value} at {entries[-1].time:.1f} s",
     )
 
 
 def streams_file(path: Path) -> FileDescription:
     """Describe a recording of raw streams."""
     streams = read_streams(path)
-    return FileDescription(
+    return FileDescription.of(
         "recording of raw streams",
-        {
-            "schema": STREAMS,
-            "joints": list(streams.joint_names),
-            "arm_states": len(streams.arm.time),
-            "wrenches": len(streams.wrench.time),
-            "marker_points": len(streams.points.time),
-        },
+        schema=STREAMS,
+        joints=list(streams.joint_names),
+        arm_states=len(streams.arm.time),
+        wrenches=len(streams.wrench.time),
+        marker_points=len(streams.points.time),
     )
 
 
 def summary_file(path: Path) -> FileDescription:
     """Describe a summary of a run."""
     summary = read_summary(path)
-    return FileDescription(
+    return FileDescription.of(
         "summary of a run",
-        {
-            "schema": schema_of(RunSummary),
-            "readings": summary.readings.counts,
-            "warnings": len(summary.warnings),
-        },
+        schema=schema_of(RunSummary),
+        readings=summary.readings.counts,
+        warnings=len(summary.warnings),
     )
 
 
 def dataset_file(path: Path) -> FileDescription:
     """Describe a dataset."""
     data = dataset.read(path)
-    return FileDescription(
+    return FileDescription.of(
         "dataset",
-        {
-            "readings": len(data.readings(data.joint_names)),
-            "poses": len(data.poses),
-            "load_cases": list(data.load_cases),
-            "joints": list(data.joint_names),
-            "robot": data.robot_name or None,
-            "tcp": data.tcp_frame,
-        },
+        readings=len(data.readings(data.joint_names)),
+        poses=len(data.poses),
+        load_cases=list(data.load_cases),
+        joints=list(data.joint_names),
+        robot=data.robot_name or None,
+        tcp=data.tcp_frame,
     )
 
 
@@ -197,12 +188,10 @@ def robot_file(path: Path) -> FileDescription:
     if not leaves:
         raise RobotError(f"{path}: URDF has no link at the end of a chain")
     robots = [Robot.from_urdf(text, leaf) for leaf in leaves]
-    return FileDescription(
+    return FileDescription.of(
         "robot description",
-        {
-            "robot": robots[0].name,
-            "tips": leaves,
-            "joints": list(max(robots, key=lambda robot: len(robot.joint_names)).joint_names),
-            "assumptions": [f"{a.field}: {a.reason}" for a in robots[0].assumptions],
-        },
+        robot=robots[0].name,
+        tips=leaves,
+        joints=list(max(robots, key=lambda robot: len(robot.joint_names)).joint_names),
+        assumptions=[f"{a.field}: {a.reason}" for a in robots[0].assumptions],
     )

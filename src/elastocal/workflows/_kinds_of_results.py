@@ -46,13 +46,8 @@ _TABLES: dict[tuple[str, ...], str] = {
 def springs_file(path: Path) -> FileDescription:
     """Describe a file of springs."""
     file = read_springs(path)
-    return FileDescription(
-        "spring file",
-        {
-            "schema": "elastocal.springs/1",
-            "include": file.include,
-            "springs": len(file.springs),
-        },
+    return FileDescription.of(
+        "spring file", schema="elastocal.springs/1", include=file.include, springs=len(file.springs)
     )
 
 
@@ -60,46 +55,40 @@ def model_file(path: Path) -> FileDescription:
     """Describe a calibrated model."""
     calibrated = read_model(path)
     seen = calibrated.observability
-    return FileDescription(
+    return FileDescription.of(
         "calibrated model",
-        {
-            "robot": calibrated.model.robot.name,
-            "tcp": calibrated.model.robot.tip,
-            "springs": seen.springs,
-            "rank": seen.rank,
-            "draws": len(calibrated.draws),
-            "provenance": calibrated.provenance,
-        },
+        robot=calibrated.model.robot.name,
+        tcp=calibrated.model.robot.tip,
+        springs=seen.springs,
+        rank=seen.rank,
+        draws=len(calibrated.draws),
+        provenance=calibrated.provenance,
     )
 
 
 def tool_file(path: Path) -> FileDescription:
     """Describe a tool file."""
     record = read_tool(path)
-    return FileDescription(
+    return FileDescription.of(
         "tool file",
-        {
-            "schema": "elastocal.tool/1",
-            "flange": record.flange,
-            "mass": record.mass,
-            "postures": record.postures,
-            "undetermined": list(record.undetermined),
-        },
+        schema="elastocal.tool/1",
+        flange=record.flange,
+        mass=record.mass,
+        postures=record.postures,
+        undetermined=list(record.undetermined),
     )
 
 
 def compensator_file(path: Path) -> FileDescription:
     """Describe a settings of a compensator."""
     settings = read_settings(path)
-    return FileDescription(
+    return FileDescription.of(
         "settings of a compensator",
-        {
-            "schema": "elastocal.compensator/1",
-            "cycle": settings.cycle,
-            "filter_delay": float(settings.chain.delay()),
-            "correction": settings.limits.correction,
-            "rate": settings.limits.rate,
-        },
+        schema="elastocal.compensator/1",
+        cycle=settings.cycle,
+        filter_delay=float(settings.chain.delay()),
+        correction=settings.limits.correction,
+        rate=settings.limits.rate,
     )
 
 
@@ -107,34 +96,30 @@ def process_table(path: Path) -> FileDescription:
     """Describe a table of a simulated process."""
     table = read_table(path)
     last = table.lines[-1]
-    return FileDescription(
+    return FileDescription.of(
         "simulated process",
-        {
-            "schema": "elastocal.process/1",
-            "cell": table.cell,
-            "process": table.process,
-            "seeds": [run.seed for run in table.runs],
-            "points": last.points,
-            "mean_after": last.after.mean,
-            "max_after": last.after.max,
-        },
+        schema="elastocal.process/1",
+        cell=table.cell,
+        process=table.process,
+        seeds=[run.seed for run in table.runs],
+        points=last.points,
+        mean_after=last.after.mean,
+        max_after=last.after.max,
     )
 
 
 def comparison_file(path: Path) -> FileDescription:
     """Describe a comparison of two calibrations."""
     record = read_json(path, CompareSummary)
-    return FileDescription(
+    return FileDescription.of(
         "comparison of two calibrations",
-        {
-            "schema": "elastocal.comparison/1",
-            "robot": record.robot,
-            "compared": len(record.springs),
-            "moved": list(record.moved),
-            "rows": 0 if record.deflection is None else record.deflection.rows,
-            "limit": record.limit,
-            "verdict": record.verdict,
-        },
+        schema="elastocal.comparison/1",
+        robot=record.robot,
+        compared=len(record.springs),
+        moved=list(record.moved),
+        rows=0 if record.deflection is None else record.deflection.rows,
+        limit=record.limit,
+        verdict=record.verdict,
     )
 
 
@@ -142,7 +127,7 @@ def process_folder(path: Path) -> FileDescription:
     """Describe the folder of a simulated process; its deviations are validated, too."""
     record = read_process(path)
     kind, facts = process_table(path / TABLE)
-    return FileDescription(kind, {**facts, "courses": len(record.courses)})
+    return FileDescription.of(kind, **facts, courses=len(record.courses))
 
 
 def is_codec(folder: Path) -> bool:
@@ -159,7 +144,7 @@ def codec_folder(path: Path) -> FileDescription:
         If a file is damaged, or the two are not of one codec.
     """
     data, result = read_codec_folder(path)
-    return FileDescription("folder of a codec", {**_facts(data), "saturation": result.saturation})
+    return FileDescription.of("folder of a codec", **_facts(data), saturation=result.saturation)
 
 
 def arrays(path: Path) -> FileDescription:
@@ -170,20 +155,18 @@ def arrays(path: Path) -> FileDescription:
 def verdicts(path: Path) -> FileDescription:
     """Describe the verdicts of a codec."""
     result = read_codec_summary(path)
-    return FileDescription(
+    return FileDescription.of(
         "verdict file of a codec",
-        {
-            "schema": VERDICTS_SCHEMA,
-            "robot": result.robot,
-            "variants": list(result.variants),
-            "saturation": result.saturation,
-        },
+        schema=VERDICTS_SCHEMA,
+        robot=result.robot,
+        variants=list(result.variants),
+        saturation=result.saturation,
     )
 
 
 def is_table(path: Path) -> bool:
     """Return whether a CSV file begins as a table that a codec or a study writes."""
-    return _first_columns(read_text(path)) in _TABLES
+    return tuple(read_text(path).partition("\n")[0].strip().split(",")[:3]) in _TABLES
 
 
 def table(path: Path) -> FileDescription:
@@ -201,7 +184,7 @@ def table(path: Path) -> FileDescription:
         line, cells = uneven
         raise SchemaError(f"{path}, line {line}: {cells} cells, not {len(header)}")
     kind = _TABLES[tuple(header[:3])]
-    return FileDescription(kind, {"rows": len(rows), "columns": header})
+    return FileDescription.of(kind, rows=len(rows), columns=header)
 
 
 def _facts(data: CodecData) -> dict[str, object]:
@@ -213,10 +196,6 @@ def _facts(data: CodecData) -> dict[str, object]:
         "splits": len(data.seed_pose),
         "training": len(data.n_train),
     }
-
-
-def _first_columns(text: str) -> tuple[str, ...]:
-    return tuple(text.partition("\n")[0].strip().split(",")[:3])
 
 
 def is_study(folder: Path) -> bool:
@@ -234,44 +213,40 @@ def study_folder(path: Path) -> FileDescription:
     """
     settings = read_design(path / DESIGN)
     done = StudyStore(path).finished(settings)
-    return FileDescription(
-        "study", {"schema": DESIGN_SCHEMA, **_design_facts(settings), "samples": len(done)}
+    return FileDescription.of(
+        "study", schema=DESIGN_SCHEMA, **_design_facts(settings), samples=len(done)
     )
 
 
 def study_settings(path: Path) -> FileDescription:
     """Describe what a study is a study of."""
-    return FileDescription(
-        "settings file of a study", {"schema": DESIGN_SCHEMA, **_design_facts(read_design(path))}
+    return FileDescription.of(
+        "settings file of a study", schema=DESIGN_SCHEMA, **_design_facts(read_design(path))
     )
 
 
 def study_samples(path: Path) -> FileDescription:
     """Describe some finished samples, by the settings in the folder above theirs."""
     results = read_part(path, read_design(path.resolve().parent.parent / DESIGN))
-    return FileDescription(
+    return FileDescription.of(
         "part of a study",
-        {
-            "schema": PART_SCHEMA,
-            "samples": [result.number for result in results],
-            "conditions": len(results[0].outcomes) if results else 0,
-        },
+        schema=PART_SCHEMA,
+        samples=[result.number for result in results],
+        conditions=len(results[0].outcomes) if results else 0,
     )
 
 
 def study_record(path: Path) -> FileDescription:
     """Describe the results of a study."""
     record = read_study(path)
-    return FileDescription(
+    return FileDescription.of(
         "record of a study",
-        {
-            "schema": STUDY_SCHEMA,
-            "cell": record.cell,
-            "samples": record.samples,
-            "verification": record.verification,
-            "median_error_m": {each.name: each.error_mean.median for each in record.conditions},
-            "advice": record.advice or None,
-        },
+        schema=STUDY_SCHEMA,
+        cell=record.cell,
+        samples=record.samples,
+        verification=record.verification,
+        median_error_m={each.name: each.error_mean.median for each in record.conditions},
+        advice=record.advice or None,
     )
 
 

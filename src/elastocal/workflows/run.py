@@ -295,10 +295,7 @@ def _derived(job: _Job, result: SessionResult) -> RunResult:
 
 
 def _figures(
-    job: _Job,
-    result: SessionResult,
-    summary: RunSummary | None,
-    problem: ElastocalError | None,
+    job: _Job, result: SessionResult, summary: RunSummary | None, problem: ElastocalError | None
 ) -> RunFigures:
     entries = read_journal(job.folder.journal)
     return RunFigures(

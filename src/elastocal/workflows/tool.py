@@ -146,8 +146,7 @@ def _from_run(run: Path) -> _PostureSource:
         raise ProcedureError(f"cell {cell.name!r} has no force sensor (key 'sensor')")
     poses = [
         reduce_pose(
-            log,
-            read_streams(folder.streams / log.streams, [(w.start, w.end) for w in log.windows]),
+            log, read_streams(folder.streams / log.streams, [(w.start, w.end) for w in log.windows])
         )
         for log in latest.values()
     ]

@@ -65,11 +65,7 @@ def _show_fit(console: Console, figures: CalibrationSummary) -> None:
         _mm(held_out.max),
     )
     table.add_row(
-        "at the poses fitted",
-        _mm(fit.mean),
-        f"{fit.mean / mean:.2%}",
-        _mm(fit.p95),
-        _mm(fit.max),
+        "at the poses fitted", _mm(fit.mean), f"{fit.mean / mean:.2%}", _mm(fit.p95), _mm(fit.max)
     )
     console.print(table)
 

@@ -16,13 +16,7 @@ _SHOWN |= {"centre": ("mm", 1e3), "moment": ("N*m", 1.0)}
 def show_tool(console: Console, record: ToolResult, out: Path) -> None:
     """Print the unknowns with their intervals."""
     rotation = Rotation.from_matrix(record.R_flange_sensor).as_rotvec()
-    values = [
-        record.mass,
-        *rotation,
-        *record.force_bias,
-        *record.centre,
-        *record.moment_bias,
-    ]
+    values = [record.mass, *rotation, *record.force_bias, *record.centre, *record.moment_bias]
     table = Table("", "value", "± (95 %)", "", title=f"{record.postures} static postures")
     for name, value in zip(TOOL_UNKNOWNS, values, strict=True):
         unit, scale = _SHOWN[name.split()[0]]

@@ -105,10 +105,7 @@ class Verification:
 
 
 def calibrated(
-    model: ElasticModel,
-    readings: Readings,
-    marker_offset: ArrayLike,
-    verification: Verification,
+    model: ElasticModel, readings: Readings, marker_offset: ArrayLike, verification: Verification
 ) -> ConditionResult:
     """Return compliances and accuracy of a calibration with the default options (Eq. 15-19).
 

@@ -12,9 +12,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from elastocal.arrays import FloatArray
-from elastocal.compensation.offline import (
-    beyond_a_turn,
-)
+from elastocal.compensation.offline import beyond_a_turn
 from elastocal.dataset import LoadRows, joint_dimensions, read_load_rows
 from elastocal.errors import CompensationError
 from elastocal.results import brief_repr

@@ -117,9 +117,7 @@ class ToolFit:
 
 
 def fit_tool(
-    postures: StaticPostures,
-    R_nominal: FloatArray | None = None,
-    rotation_known: bool = False,
+    postures: StaticPostures, R_nominal: FloatArray | None = None, rotation_known: bool = False
 ) -> ToolFit:
     """Return tool and sensor from static postures.
 
@@ -193,9 +191,7 @@ def _least_squares(J: FloatArray, b: FloatArray) -> FloatArray:
     return (vt[kept].T @ ((u[:, kept].T @ b) / s[kept])) / scale
 
 
-def _decomposed(
-    J: FloatArray,
-) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, BoolArray]:
+def _decomposed(J: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, BoolArray]:
     scale = np.linalg.norm(J, axis=0)
     scale[scale <= _DEPENDENT * scale.max()] = scale.max()
     u, s, vt = np.linalg.svd(J / scale, full_matrices=False)

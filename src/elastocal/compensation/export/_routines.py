@@ -46,11 +46,7 @@ def c_routines(numbers: Design) -> str:
 
 
 def _function(
-    head: str,
-    routine: Routine,
-    outputs: Sequence[str],
-    inputs: Sequence[str],
-    joints: int,
+    head: str, routine: Routine, outputs: Sequence[str], inputs: Sequence[str], joints: int
 ) -> str:
     names = {f"q{k + 1}": f"q[{k}]" for k in range(joints)}
     for letter, vector in _VECTORS.items():

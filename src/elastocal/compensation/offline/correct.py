@@ -14,9 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from elastocal.arrays import BoolArray, FloatArray, IndexArray
-from elastocal.compensation.offline import (
-    PathError,
-)
+from elastocal.compensation.offline import PathError
 from elastocal.compensation.offline.path_joints import RowName, check_limits, turned_inside
 from elastocal.identification import CalibratedModel
 from elastocal.results import brief_repr

@@ -111,10 +111,7 @@ def find_columns(header: Sequence[str], robot: Robot, forces: bool = True) -> Pa
         raise PathError(f"column '{missing}[…]' is missing: a path gives all external axes or none")
     position = () if arm else tuple(_column(found, name, "length") for name in _AXES)
     return PathColumns(
-        joints,
-        position,
-        () if arm else _orientation(found),
-        *_wrenches(found, forces),
+        joints, position, () if arm else _orientation(found), *_wrenches(found, forces)
     )
 
 

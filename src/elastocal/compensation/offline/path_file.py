@@ -130,10 +130,7 @@ def _correct_blocks(
 
 
 def programmed_rows(
-    solver: InverseKinematics,
-    values: PathValues,
-    previous: FloatArray | None,
-    where: RowName,
+    solver: InverseKinematics, values: PathValues, previous: FloatArray | None, where: RowName
 ) -> tuple[FloatArray, FloatArray]:
     """Return joints and poses as programmed, shapes (row, joint) and (row, 4, 4).
 

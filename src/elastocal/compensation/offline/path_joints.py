@@ -5,9 +5,7 @@ from collections.abc import Callable
 import numpy as np
 
 from elastocal.arrays import FloatArray, IndexArray
-from elastocal.compensation.offline import (
-    PathError,
-)
+from elastocal.compensation.offline import PathError
 from elastocal.robot import Robot
 from elastocal.robot.inverse import TURN, InverseKinematics
 

@@ -10,11 +10,7 @@ import numpy as np
 
 from elastocal.arrays import FloatArray
 from elastocal.cell import Cell
-from elastocal.compensation.offline import (
-    PathError,
-    joints_along_path,
-    posture_jumps,
-)
+from elastocal.compensation.offline import PathError, joints_along_path, posture_jumps
 from elastocal.compensation.process.course import Course
 from elastocal.compensation.process.placement import FibrePlacement
 from elastocal.compensation.process.roughing import Roughing

@@ -127,10 +127,7 @@ def compare_deviations(
     """
     uncorrected, corrected = np.concatenate(before), np.concatenate(after)
     return DeviationComparison.of(
-        name,
-        len(corrected),
-        DeviationStatistics.of(uncorrected),
-        DeviationStatistics.of(corrected),
+        name, len(corrected), DeviationStatistics.of(uncorrected), DeviationStatistics.of(corrected)
     )
 
 

@@ -15,10 +15,7 @@ import numpy as np
 from elastocal.arrays import FloatArray
 from elastocal.identification.calibrated import CalibratedModel
 from elastocal.identification.recertification._spread import Spread, over
-from elastocal.identification.recertification.result import (
-    Estimate,
-    RowComparison,
-)
+from elastocal.identification.recertification.result import Estimate, RowComparison
 from elastocal.identification.uncertainty import CONFIDENCE
 
 _CHUNK = 100

@@ -106,7 +106,7 @@ def recertify(
     if limit is not None and not 0.0 < limit < np.inf:
         raise IdentificationError(f"limit {limit:g} m: a largest accepted change is above 0")
     check_same_robot(old.model.robot, new.model.robot, names)
-    if _are_one(old, new):
+    if np.array_equal(old.compliance, new.compliance) and np.array_equal(old.draws, new.draws):
         raise IdentificationError(
             f"{names[0]} and {names[1]} are one and the same calibration: nothing to compare"
         )
@@ -178,10 +178,6 @@ def check_same_robot(old: Robot, new: Robot, names: tuple[str, str]) -> None:
             f"{a} (tcp {old.tip}) and {b} (tcp {new.tip}) have different tool centre points,"
             f" {1e3 * off:.3g} mm and {np.degrees(turned):.3g}° apart: calibrate both for one"
         )
-
-
-def _are_one(old: CalibratedModel, new: CalibratedModel) -> bool:
-    return np.array_equal(old.compliance, new.compliance) and np.array_equal(old.draws, new.draws)
 
 
 def _checked_rows(

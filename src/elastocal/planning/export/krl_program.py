@@ -327,7 +327,7 @@ def _time_notes(plan: PlanResult) -> list[str]:
         f" faster than the cell file has it ({100.0 * contact.axis_override:.4g} percent,"
         f" {1e3 * contact.contact_speed:.4g} mm/s). The times here are for these speeds at an"
         " override of 100 percent, without the waiting at HALT. Those of the plan's other files are"
-        f" for the cell file's speeds: {plan.total_time / 60.0:.0f} min in all.",
+        f" for the cell file's speeds: {plan.total_time / 60.0:.0f} min in all."
     ]
 
 

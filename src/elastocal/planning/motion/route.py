@@ -179,10 +179,7 @@ class _Roadmap:
 
 
 def plan_route(
-    home: ArrayLike,
-    postures: Postures,
-    mover: Mover,
-    progress: Progress = silent,
+    home: ArrayLike, postures: Postures, mover: Mover, progress: Progress = silent
 ) -> Route:
     """Return the quickest round through the approach poses that is free of collision.
 

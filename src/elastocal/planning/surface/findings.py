@@ -75,11 +75,7 @@ def mesh_findings(surface: Surface) -> tuple[Finding, ...]:
 
 
 def placement_findings(
-    surface: Surface,
-    first_joints: FloatArray,
-    reach: float,
-    reachable: Reachable,
-    rng: Generator,
+    surface: Surface, first_joints: FloatArray, reach: float, reachable: Reachable, rng: Generator
 ) -> tuple[Finding, ...]:
     """Return what is odd about where the surface is, seen from the robot.
 

@@ -130,7 +130,7 @@ def write_mcap(path: Path, topics: Sequence[Topic], library: str, metadata: Meta
     note = _records(metadata)
     index = MetadataIndex(offset=len(opening), length=len(note), name=metadata.name)
     data, chunks = bytearray(opening + note), []
-    messages, described = _merged(topics), _descriptions(topics)
+    messages, described = _merged(topics), _records(*_descriptive(topics))
     for start in range(0, len(messages), CHUNK):
         chunk, entry = _chunk(messages.take(slice(start, start + CHUNK)), described, len(data))
         data += chunk
@@ -152,11 +152,6 @@ def _merged(topics: Sequence[Topic]) -> _Messages:
         np.concatenate([none, *(np.arange(count) for count in counts)])[order],
         [data[row] for row in order.tolist()],
     )
-
-
-def _descriptions(topics: Sequence[Topic]) -> bytes:
-    """Return schema and channel of every topic, with which each chunk begins."""
-    return _records(*_descriptive(topics))
 
 
 def _descriptive(topics: Sequence[Topic]) -> Iterator[McapRecord]:

@@ -222,12 +222,7 @@ def _draw_frame(
     width, height = figure.get_size_inches()
     title = f"{data.robot or 'Robot'}: compliances over the number of training poses"
     figure.text(
-        _LEFT / width,
-        1.0 - 0.1 / height,
-        literal(title),
-        va="top",
-        fontsize=11.5,
-        weight="bold",
+        _LEFT / width, 1.0 - 0.1 / height, literal(title), va="top", fontsize=11.5, weight="bold"
     )
     draw_legend(figure, styles, _LEFT, 0.42, width - _LEFT - _RIGHT)
     sets = len(data.seed_pose)

@@ -132,12 +132,7 @@ def _label_groups(axes: Axes, along: str, groups: Sequence[str], shown: bool) ->
 def _draw_frame(figure: Figure, record: StudySummary, height: float) -> None:
     title = f"{record.cell}: error at unseen poses, {record.samples} simulated arms"
     figure.text(
-        _LEFT / _WIDTH,
-        1.0 - 0.1 / height,
-        literal(title),
-        va="top",
-        fontsize=11.5,
-        weight="bold",
+        _LEFT / _WIDTH, 1.0 - 0.1 / height, literal(title), va="top", fontsize=11.5, weight="bold"
     )
     target = "" if record.target is None else f" Dashed: target, {_MM * record.target:g} mm."
     figure.text(

@@ -12,10 +12,7 @@ from typing import Any
 import yaml
 
 from elastocal.errors import RobotError, SchemaError, nearest
-from elastocal.records import (
-    check_schema,
-    validate,
-)
+from elastocal.records import check_schema, validate
 from elastocal.robot.catalogue.record import CatalogueEntry, Dimensions, inertias_like
 from elastocal.robot.catalogue.writer import urdf_of
 from elastocal.robot.robot import Robot

@@ -8,12 +8,7 @@ from elastocal.arrays import FloatArray
 from elastocal.errors import RobotError
 from elastocal.robot.inverse.arm import nearest_zero
 from elastocal.robot.inverse.opw import NotOrthoParallelError, OpwInverse
-from elastocal.robot.inverse.solver import (
-    InverseKinematics,
-    distinct,
-    pose_error,
-    reaches,
-)
+from elastocal.robot.inverse.solver import InverseKinematics, distinct, pose_error, reaches
 from elastocal.robot.robot import Robot
 from elastocal.robot.singularity import characteristic_length
 

@@ -13,18 +13,10 @@ import numpy as np
 from elastocal.arrays import FloatArray
 from elastocal.errors import RobotError
 from elastocal.results import brief_repr
-from elastocal.robot.inverse.arm import (
-    AxisLines,
-    arm_axes,
-    arm_base,
-    arm_joints,
-    arm_tip_at_zero,
-)
+from elastocal.robot.inverse.arm import AxisLines, arm_axes, arm_base, arm_joints, arm_tip_at_zero
 from elastocal.robot.inverse.solver import InverseKinematics
 from elastocal.robot.robot import Robot
-from elastocal.robot.transforms import (
-    inverse_transform,
-)
+from elastocal.robot.transforms import inverse_transform
 
 _EXACT = 1e-9
 """Largest deviation of an axis (rad, m) and of the forward kinematics (rad, m) from OPW."""

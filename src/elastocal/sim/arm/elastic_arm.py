@@ -12,9 +12,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from elastocal.arrays import (
-    FloatArray,
-)
+from elastocal.arrays import FloatArray
 from elastocal.errors import RobotError, SpringError, nearest
 from elastocal.sim.arm.linkage import Linkage
 from elastocal.sim.arm.springs import (
@@ -222,10 +220,7 @@ def bearing_truth(
     if transverse is None:
         transverse = np.multiply.outer(axial, TRANSVERSE_RATIO)
     transverse = np.asarray(transverse, dtype=float)
-    for label, array, shape in (
-        ("axial", axial, (count,)),
-        ("transverse", transverse, (count, 2)),
-    ):
+    for label, array, shape in (("axial", axial, (count,)), ("transverse", transverse, (count, 2))):
         if array.shape != shape:
             raise SpringError(f"{label} stiffness has shape {array.shape}, must be {shape}")
     springs = []

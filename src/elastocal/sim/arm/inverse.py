@@ -4,10 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from elastocal.arrays import (
-    BoolArray,
-    FloatArray,
-)
+from elastocal.arrays import BoolArray, FloatArray
 from elastocal.results import brief_repr
 from elastocal.sim.arm.linkage import Linkage
 

@@ -15,9 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from elastocal.arrays import (
-    FloatArray,
-)
+from elastocal.arrays import FloatArray
 from elastocal.dataset import Dataset
 from elastocal.errors import DatasetError, UnreachableError
 from elastocal.sim.arm.elastic_arm import ElasticArm

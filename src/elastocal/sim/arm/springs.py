@@ -14,10 +14,7 @@ import numpy as np
 from elastocal.arrays import FloatArray, IndexArray
 from elastocal.errors import SpringError, nearest
 from elastocal.results import brief_repr
-from elastocal.sim.arm.linkage import (
-    Linkage,
-    Screws,
-)
+from elastocal.sim.arm.linkage import Linkage, Screws
 
 
 class TorqueLaw(Protocol):

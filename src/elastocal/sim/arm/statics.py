@@ -25,17 +25,10 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from elastocal.arrays import (
-    BoolArray,
-    FloatArray,
-)
+from elastocal.arrays import BoolArray, FloatArray
 from elastocal.errors import ElastocalError
 from elastocal.results import brief_repr
-from elastocal.sim.arm.linkage import (
-    Screws,
-    motions,
-    moved_axes,
-)
+from elastocal.sim.arm.linkage import Screws, motions, moved_axes
 from elastocal.sim.arm.springs import TorqueLaw
 
 _MAX_ITERATIONS = 60

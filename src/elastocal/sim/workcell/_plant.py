@@ -11,9 +11,7 @@ from elastocal.cell import Cell
 from elastocal.cell.description import Fault
 from elastocal.cell.devices import Motion
 from elastocal.errors import DeviceError, nearest
-from elastocal.robot import (
-    inverse_transform,
-)
+from elastocal.robot import inverse_transform
 from elastocal.sim.workcell._contact import Contact, ContactLaw, TrueSurface
 from elastocal.sim.workcell._quasistatics import Quasistatics, RobotPath, RobotState
 from elastocal.sim.workcell._robot import TrueRobot

@@ -14,12 +14,8 @@ from scipy.spatial.transform import Rotation
 from elastocal.arrays import FloatArray
 from elastocal.cell import Cell
 from elastocal.errors import DeviceError
-from elastocal.robot import (
-    inverse_transform,
-)
-from elastocal.sim.arm import (
-    solve_inverse,
-)
+from elastocal.robot import inverse_transform
+from elastocal.sim.arm import solve_inverse
 from elastocal.sim.workcell._robot import RobotEquilibrium, TrueRobot
 from elastocal.sim.workcell._springs import RobotSprings
 from elastocal.sim.workcell._timeline import Knots

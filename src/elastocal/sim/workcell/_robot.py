@@ -21,9 +21,7 @@ import numpy as np
 from elastocal.arrays import FloatArray, IndexArray
 from elastocal.cell import Cell
 from elastocal.errors import DeviceError
-from elastocal.robot import (
-    inverse_transform,
-)
+from elastocal.robot import inverse_transform
 from elastocal.sim.arm import (
     AXIAL_STIFFNESS,
     LINK_BENDING,

@@ -26,9 +26,7 @@ import numpy as np
 
 from elastocal.arrays import FloatArray, IndexArray
 from elastocal.cell.description import Gears
-from elastocal.sim.arm import (
-    gear_softening,
-)
+from elastocal.sim.arm import gear_softening
 
 _STOPS = 4
 """Number of sliders of a gear's friction."""

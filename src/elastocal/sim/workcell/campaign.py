@@ -16,9 +16,7 @@ from scipy.spatial.transform import Rotation
 from elastocal.arrays import FloatArray
 from elastocal.cell import Cell
 from elastocal.errors import DeviceError
-from elastocal.sim.arm import (
-    solve_inverse,
-)
+from elastocal.sim.arm import solve_inverse
 from elastocal.sim.workcell._contact import Contact, ContactLaw
 from elastocal.sim.workcell._quasistatics import Quasistatics, RobotState
 from elastocal.sim.workcell._robot import TrueRobot

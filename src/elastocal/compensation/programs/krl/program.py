@@ -127,7 +127,7 @@ def _dat_of(src: Path) -> Path:
 
 def _read_moves(lines: Sequence[str], data: Sequence[str]) -> tuple[tuple[Move, ...], str, str]:
     """Return the motions, and the base and tool of the straight ones."""
-    frames = _frame_data(data)
+    frames = dict(_fdats(data))
     active = {"BASE": "", "TOOL": ""}
     moves: list[Move] = []
     used: dict[str, tuple[str, int]] = {}
@@ -204,11 +204,6 @@ def _frame_change(
     return {}
 
 
-def _frame_data(data: Sequence[str]) -> dict[str, dict[str, str]]:
-    """Return tool and base of each FDAT that a pendant's inline form has left."""
-    return dict(_fdats(data))
-
-
 def _fdats(data: Sequence[str]) -> Iterator[tuple[str, dict[str, str]]]:
     for number, line in enumerate(data, start=1):
         match = _FDAT_VALUE.fullmatch(code_of(line))
@@ -222,8 +217,5 @@ def _fdats(data: Sequence[str]) -> Iterator[tuple[str, dict[str, str]]]:
             )
         yield (
             match[1].upper(),
-            {
-                "BASE": f"BASE_DATA[{parts['BASE_NO']}]",
-                "TOOL": f"TOOL_DATA[{parts['TOOL_NO']}]",
-            },
+            {"BASE": f"BASE_DATA[{parts['BASE_NO']}]", "TOOL": f"TOOL_DATA[{parts['TOOL_NO']}]"},
         )

@@ -18,9 +18,7 @@ from elastocal.report.document.blocks import (
     picture,
 )
 from elastocal.report.plots import StationResiduals, station_figure
-from elastocal.verdict import (
-    Evidence,
-)
+from elastocal.verdict import Evidence
 from elastocal.wording import counted, mm, point, spans, um
 
 

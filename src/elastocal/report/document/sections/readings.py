@@ -7,12 +7,7 @@ import numpy as np
 
 from elastocal.arrays import FloatArray
 from elastocal.dataset import Dataset
-from elastocal.identification import (
-    Calibration,
-    CalibrationSummary,
-    Reproduction,
-    UnseenErrors,
-)
+from elastocal.identification import Calibration, CalibrationSummary, Reproduction, UnseenErrors
 from elastocal.procedure.derive import RunSummary
 from elastocal.report.document.blocks import (
     Block,
