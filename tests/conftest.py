@@ -11,6 +11,7 @@ END_TO_END = (
     "report/document",
     "verdict",
     "contracts/test_report_sections.py",
+    "contracts/test_workflow_results.py",
     "test_examples.py",
     "test_readme.py",
 )

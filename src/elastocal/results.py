@@ -30,6 +30,10 @@ class Result:
             for each in dataclasses.fields(self)  # type: ignore[arg-type]
         )
 
+    def pictured(self) -> object:
+        """Return what a picture is drawn of: the result itself, or data that it holds."""
+        return self
+
     def plot(self) -> Any:
         """Return a Matplotlib figure that shows the result.
 
@@ -39,7 +43,7 @@ class Result:
             If there is no picture of this kind of result.
         """
         # Pictures stand above results in the layers: they are looked up only when asked for.
-        return importlib.import_module("elastocal.report").plot_result(self)
+        return importlib.import_module("elastocal.report").plot_result(self.pictured())
 
     def __repr__(self) -> str:
         """Return the facts, at most 20 lines of them."""

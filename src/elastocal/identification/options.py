@@ -53,7 +53,7 @@ class FitOptions:
     weights: Weights = "none"
     """``sigma``: weigh by the measured standard deviations of the dataset."""
     loss: str = "linear"
-    """One of `losses.LOSSES`; anything but ``linear`` is solved by reweighting."""
+    """One of `LOSSES`; anything but ``linear`` is solved by reweighting."""
     prior: Prior | None = None
     set_blunders_aside: bool = True
     """Leave readings out of the fit that cannot be measurements of this robot (see

@@ -3,6 +3,7 @@
 from dataclasses import dataclass, field, replace
 from os import PathLike
 from pathlib import Path
+from typing import Any
 
 from elastocal.codec import (
     VERDICTS,
@@ -85,6 +86,12 @@ class CodecResult(Result):
         found = self.summary
         verdicts = tuple(("verdict", sentence) for sentence in found.sentences)
         return (("robot", found.robot), ("splits", found.settings.sentence), *verdicts)
+
+    def plot(self) -> Any:
+        """Return the chart of errors over training poses, as a Matplotlib figure."""
+        from elastocal.report import codec_chart, drawn
+
+        return drawn(codec_chart, self.data, self.verdicts)
 
 
 @workflow(CodecSettings)

@@ -51,6 +51,26 @@ class CompensateResult(Result, CorrectionFigures):
     notes: tuple[str, ...]
     """Sentences that a person must know."""
 
+    def facts(self) -> tuple[tuple[str, str], ...]:
+        """Return what a person wants to know first."""
+        lengths = {
+            "deviation as programmed": self.deviation,
+            "a first-order step would leave": self.first_order,
+            "the correction leaves": self.residual,
+            "correction": self.correction,
+        }
+        first = f", first at {self.first_jump}" if self.posture_jumps else ""
+        return (
+            ("rows", str(self.rows)),
+            *(
+                (label, f"{1e3 * each.mean:.3g} mm mean, {1e3 * each.max:.3g} mm max at {each.at}")
+                for label, each in lengths.items()
+            ),
+            ("posture jumps", f"{self.posture_jumps}{first}"),
+            ("rows where the force pulls", str(self.pulled)),
+            *(("note", text) for text in self.notes),
+        )
+
 
 @workflow(CompensateSettings)
 def compensate(settings: CompensateSettings, progress: Progress) -> CompensateResult:

@@ -120,6 +120,10 @@ class DemoResult(Result):
             ("report", str(self.folder / "report.html")),
         )
 
+    def pictured(self) -> object:
+        """Return the simulated process."""
+        return self.process
+
     def closing(self) -> tuple[str, ...]:
         """Return the facts in two sentences."""
         (_, mean), (_, largest), (_, page) = self.facts()

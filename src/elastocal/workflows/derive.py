@@ -35,6 +35,10 @@ class DeriveResult(Result):
             *(("warning", text) for text in self.summary.warnings),
         )
 
+    def pictured(self) -> object:
+        """Return the readings: the picture shows their deflections."""
+        return self.dataset
+
     def counts(self) -> str:
         """Return the number of readings of each status, as a phrase."""
         counts = self.summary.readings.counts

@@ -49,6 +49,18 @@ class ExportResult(Result):
     """Delay of a slow wrench, in s."""
     limits: CorrectionLimits
 
+    def facts(self) -> tuple[tuple[str, str], ...]:
+        """Return what a person wants to know first."""
+        limits = self.limits
+        return (
+            ("robot", f"{self.robot}: {self.joints} joints, {self.springs} springs"),
+            ("folder", self.folder),
+            ("files", ", ".join(self.files)),
+            ("cycle", f"{1e3 * self.cycle:g} ms"),
+            ("delay of the filters", f"{1e3 * self.filter_delay:.3g} ms"),
+            ("largest correction", f"{1e3 * limits.correction:g} mm, {1e3 * limits.rate:g} mm/s"),
+        )
+
 
 @workflow(ExportSettings)
 def export(settings: ExportSettings, progress: Progress) -> ExportResult:  # noqa: ARG001 - done in an instant

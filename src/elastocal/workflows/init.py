@@ -29,6 +29,10 @@ class InitResult(Result):
     cell: Path
     meshes: tuple[Path, ...]
 
+    def facts(self) -> tuple[tuple[str, str], ...]:
+        """Return what was written."""
+        return (("cell", str(self.cell)), ("meshes", ", ".join(map(str, self.meshes)) or "none"))
+
 
 @workflow(InitSettings)
 def init(settings: InitSettings, progress: Progress) -> InitResult:  # noqa: ARG001 - an instant

@@ -55,6 +55,10 @@ class PredictResult(Result):
             ("largest", f"{1e3 * figures.deflection.max:.3f} mm"),
         )
 
+    def pictured(self) -> object:
+        """Return the deflections: the picture shows them by row."""
+        return self.prediction
+
 
 @workflow(PredictSettings)
 def predict(settings: PredictSettings, progress: Progress) -> PredictResult:  # noqa: ARG001 - done in an instant

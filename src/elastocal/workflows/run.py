@@ -133,6 +133,10 @@ class RunResult(Result):
             *(("warning", text) for text in found.warnings),
         )
 
+    def pictured(self) -> object:
+        """Return what was derived: the picture shows how well the stations are registered."""
+        return self if self.summary is None else self.summary
+
 
 @dataclass(frozen=True, eq=False, repr=False)
 class DryRunResult(Result):
@@ -149,6 +153,17 @@ class DryRunResult(Result):
     def seconds(self) -> float:
         """How long it would take, in s."""
         return float(sum(step.seconds for step in self.steps))
+
+    def facts(self) -> tuple[tuple[str, str], ...]:
+        """Return what a person wants to know first."""
+        return (
+            ("steps", str(len(self.steps))),
+            ("poses", str(self.poses)),
+            ("load cases", ", ".join(self.load_cases)),
+            ("force limit", f"{self.force_limit:.6g} N"),
+            ("time", f"{self.seconds / 60.0:.0f} min"),
+            *(("warning", text) for text in self.warnings),
+        )
 
 
 @dataclass(frozen=True, eq=False)

@@ -5,6 +5,7 @@ from contextlib import nullcontext
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -31,7 +32,7 @@ from elastocal.files import filling
 from elastocal.identification import CalibratedModel, read_model
 from elastocal.progress import Progress
 from elastocal.records import record, write_json
-from elastocal.report import Curve, write_stiffness_figure
+from elastocal.report import Curve, drawn, stiffness_figure, write_stiffness_figure
 from elastocal.results import Result, brief_repr
 from elastocal.robot import Robot
 from elastocal.robot.inverse import InverseKinematics, inverse_for
@@ -132,6 +133,9 @@ class StiffnessResult(Result):
     choice: PostureChoice
     notes: tuple[str, ...]
     """Sentences that a person must know."""
+    robot: str
+    curves: tuple[Curve, ...]
+    """Stiffness of each choice along the path."""
 
     def facts(self) -> tuple[tuple[str, str], ...]:
         """Return what a person wants to know first."""
@@ -144,6 +148,15 @@ class StiffnessResult(Result):
                 for each in self.summary.choices
             ),
         )
+
+    def plot(self) -> Any:
+        """Return the map of all postures and the curves of the choices, as a Matplotlib figure."""
+        return drawn(stiffness_figure, self.title, self.stations, self.survey, self.curves)
+
+    @property
+    def title(self) -> str:
+        """Title of its figure."""
+        return f"{self.robot}: stiffness along {self.along}"
 
     @property
     def along(self) -> str:
@@ -193,7 +206,7 @@ def _surveyed(
     direction = _parse_direction(settings.direction, stations)
     survey, choice = _survey(calibrated, solver, stations, direction, grid, constraints, progress)
     choices = _choices(stations, choice)
-    curves = [_curve(calibrated, direction, postures) for postures in choices]
+    curves = tuple(_curve(calibrated, direction, postures) for postures in choices)
     files: tuple[str, ...] = ()
     if folder is not None:
         tables = (
@@ -218,11 +231,12 @@ def _surveyed(
         files=files,
     )
     notes = (*_notes(summary, choice), *coverage_notes(calibrated))
-    result = StiffnessResult(summary, stations, direction, survey, choice, notes)
+    result = StiffnessResult(
+        summary, stations, direction, survey, choice, notes, robot.name, curves
+    )
     if folder is not None:
-        title = f"{robot.name}: stiffness along {result.along}"
         for name in ("stiffness.svg", "stiffness.png"):
-            write_stiffness_figure(folder / name, title, stations, survey, curves)
+            write_stiffness_figure(folder / name, result.title, stations, survey, curves)
         write_json(folder / _SUMMARY, summary)
     return result
 

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from functools import partial
 from os import PathLike
 from pathlib import Path
+from typing import Any
 
 from elastocal.cell import Cell, load_cell
 from elastocal.cell.description import DEFAULT_POSES
@@ -23,7 +24,7 @@ from elastocal.codec.study import (
     write_study,
 )
 from elastocal.progress import Progress
-from elastocal.report import write_study_figures
+from elastocal.report import drawn, study_figure, write_study_figures
 from elastocal.results import Result, brief_repr
 from elastocal.workflows._workflow import workflow
 
@@ -78,6 +79,10 @@ class StudyResult(Result):
         )
         advice = (("advice", self.summary.advice),) if self.summary.advice else ()
         return (("study", self.summary.sentence), *conditions, *advice)
+
+    def plot(self) -> Any:
+        """Return the box plots of all conditions, as a Matplotlib figure."""
+        return drawn(study_figure, self.design, self.samples, self.summary)
 
 
 @workflow(StudySettings)

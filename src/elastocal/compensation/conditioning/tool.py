@@ -97,6 +97,23 @@ class ToolResult(Result):
     moment_scatter: float | None
     source: str
 
+    def facts(self) -> tuple[tuple[str, str], ...]:
+        """Return what a person wants to know first."""
+
+        def vector(values: _Triple, unit: str, scale: float = 1.0) -> str:
+            return f"({', '.join(f'{scale * value:.4g}' for value in values)}) {unit}"
+
+        return (
+            ("mass", f"{self.mass:.4g} kg"),
+            ("centre of mass in the sensor's frame", vector(self.centre, "mm", 1e3)),
+            ("force bias", vector(self.force_bias, "N")),
+            ("moment bias", vector(self.moment_bias, "N·m")),
+            ("sensor's origin in the flange frame", vector(self.sensor_origin, "mm", 1e3)),
+            ("not determined", ", ".join(self.undetermined) or "none"),
+            ("static postures", str(self.postures)),
+            ("source", self.source),
+        )
+
 
 @brief_repr
 @dataclass(frozen=True, eq=False)

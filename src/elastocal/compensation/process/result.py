@@ -49,6 +49,15 @@ class DeviationComparison:
     reduction: DeviationStatistics
     """1 is all of it, below 0 it grew."""
 
+    @property
+    def sentence(self) -> str:
+        """The line in words."""
+        return (
+            f"{1e3 * self.before.mean:.3f} mm mean before, {1e3 * self.after.mean:.3f} mm after"
+            f" correction ({self.reduction.mean:.1%} less); largest {1e3 * self.before.max:.3f} mm,"
+            f" then {1e3 * self.after.max:.3f} mm"
+        )
+
     @classmethod
     def of(
         cls, name: str, points: int, before: DeviationStatistics, after: DeviationStatistics
@@ -85,6 +94,13 @@ class SimulateProcessResult(Result):
     lines: tuple[DeviationComparison, ...]
     """One a seed, in the order of ``runs``; with several seeds a last one over all."""
     budget: tuple[DeviationComparison, ...] = ()
+
+    def facts(self) -> tuple[tuple[str, str], ...]:
+        """Return what a person wants to know first."""
+        return (
+            ("process", f"{self.process} in cell {self.cell}"),
+            *((line.name, line.sentence) for line in (*self.lines, *self.budget)),
+        )
 
 
 @brief_repr

@@ -51,7 +51,7 @@ from .recertification_figure import (
     recertification_figure as recertification_figure,
     write_recertification_figure as write_recertification_figure,
 )
-from .results import plot_result as plot_result
+from .results import drawn as drawn, plot_result as plot_result
 from .stiffness_figure import (
     Curve as Curve,
     stiffness_figure as stiffness_figure,

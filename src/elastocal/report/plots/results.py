@@ -1,33 +1,64 @@
 """Pictures of results: what `plot` of a workflow's result shows."""
 
+from collections.abc import Callable
 from functools import singledispatch
+from typing import ParamSpec
 
 import matplotlib
+import numpy as np
 from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 
+from elastocal.compensation.offline import CorrectionFigures
+from elastocal.compensation.process import SimulateProcessResult
+from elastocal.dataset import Dataset
 from elastocal.errors import ReportError
-from elastocal.identification import CalibrateResult
+from elastocal.identification import CalibrateResult, Prediction
 from elastocal.identification.recertification import CompareResult
+from elastocal.planning import PlanResult
+from elastocal.procedure import RunSummary
 from elastocal.report.plots import style
-from elastocal.report.plots.calibration_figures import spring_bars, spring_figure
+from elastocal.report.plots.calibration_figures import (
+    StationResiduals,
+    pose_grid,
+    spring_bars,
+    spring_figure,
+    station_figure,
+)
+from elastocal.report.plots.printing import literal, new_figure
 from elastocal.report.plots.recertification_figure import recertification_figure
+
+P = ParamSpec("P")
+_MM = 1e3
+_WIDTH = 7.5
+"""Width of a figure in inches."""
+_BEFORE, _AFTER = style.VERMILLION, style.BLUE
 
 
 def plot_result(result: object) -> Figure:
-    """Return the figure of a result: compliances of a calibration, changes of a comparison.
+    """Return the figure of a result, or of the data that it holds.
 
     Raises
     ------
     ReportError
         If there is no picture of this kind of result.
     """
+    return drawn(_draw, result)
+
+
+def drawn(figure: Callable[P, Figure], *arguments: P.args, **options: P.kwargs) -> Figure:
+    """Return what a function draws, with the settings of print."""
     with matplotlib.rc_context(style.print_settings()):
-        return _draw(result)
+        return figure(*arguments, **options)
 
 
 @singledispatch
 def _draw(result: object) -> Figure:
-    raise ReportError(f"there is no picture of a {type(result).__name__}")
+    raise ReportError(
+        f"there is no picture of a {type(result).__name__}: pictures show calibrations,"
+        " comparisons, plans, runs, readings, predictions, corrections, processes, codecs, studies"
+        " and stiffness"
+    )
 
 
 @_draw.register
@@ -38,3 +69,154 @@ def _calibration(result: CalibrateResult) -> Figure:
 @_draw.register
 def _comparison(result: CompareResult) -> Figure:
     return recertification_figure(result.summary)
+
+
+@_draw.register
+def _readings(dataset: Dataset) -> Figure:
+    """Return the measured deflections, a cell a reading."""
+    readings = dataset.readings(dataset.joint_names)
+    poses, cases = list(dataset.poses), list(dataset.load_cases)
+    size = np.full((len(poses), len(cases)), np.nan)
+    rows = [poses.index(pose) for pose in readings.pose]
+    columns = [cases.index(case) for case in readings.load_case]
+    size[rows, columns] = _MM * np.linalg.norm(readings.deflection, axis=1)
+    return pose_grid([("Measured deflection, norm in mm", size)], poses, cases)
+
+
+@_draw.register
+def _run(summary: RunSummary) -> Figure:
+    """Return how well the tracker stations of a run are registered."""
+    stations = [
+        StationResiduals(each.station, each.poses, np.array(each.residual, dtype=float))
+        for each in summary.registration.stations
+    ]
+    if not stations:
+        raise ReportError("there is no picture of a run without a registered station")
+    return station_figure(stations)
+
+
+@_draw.register
+def _plan(plan: PlanResult) -> Figure:
+    """Return the contact points in visiting order, seen along base's z axis."""
+    x, y, _ = _MM * np.array([pose.tcp_position for pose in plan.poses]).T
+    across, up = (max(float(np.ptp(each)), 1.0) for each in (x, y))
+    tall = float(np.clip((_WIDTH - 1.0) * up / across, 1.5, 7.0))
+    height = tall + 1.1
+    figure = new_figure(_WIDTH, height)
+    axes = figure.add_axes((0.8 / _WIDTH, 0.6 / height, 1.0 - 1.0 / _WIDTH, tall / height))
+    axes.plot(x, y, color=style.FAINT, lw=1.0, zorder=1)
+    axes.scatter(x, y, s=170, c=style.BLUE, lw=0, zorder=2)
+    for pose, at in zip(plan.poses, zip(x, y, strict=True), strict=True):
+        axes.annotate(
+            str(pose.id), at, ha="center", va="center", color=style.PAPER, fontsize=7.5, zorder=3
+        )
+    axes.set_aspect("equal", adjustable="datalim")
+    axes.margins(0.08)
+    axes.set(xlabel="x of base in mm", ylabel="y of base in mm")
+    search = plan.search
+    title = (
+        f"{plan.cell.name}: {len(plan.poses)} poses by {search.name} in visiting order,"
+        f" covering radius {_MM * search.covering_radius:.0f} mm"
+    )
+    axes.set_title(literal(title), loc="left", fontsize=9.5, weight="bold")
+    axes.spines[["top", "right"]].set_visible(False)
+    return figure
+
+
+@_draw.register
+def _prediction(prediction: Prediction) -> Figure:
+    """Return each component of the deflection by row, with its 95 % interval."""
+    figure = new_figure(_WIDTH, 5.2)
+    row = np.arange(1, len(prediction.deflection) + 1)
+    marker = "o" if len(row) <= 60 else None
+    panels = figure.subplots(3, 1, sharex=True)
+    for number, (axis, axes) in enumerate(zip("xyz", panels, strict=True)):
+        low, value, high = (
+            _MM * each[:, number]
+            for each in (prediction.low, prediction.deflection, prediction.high)
+        )
+        axes.fill_between(row, low, high, color=style.BLUE, alpha=0.3, lw=0)
+        axes.plot(row, value, color=style.BLUE, lw=1.1, marker=marker, ms=3.0)
+        axes.axhline(0.0, color=style.FAINT, lw=0.7, zorder=0)
+        axes.set_ylabel(f"along {axis} in mm")
+        axes.margins(x=0.01)
+        axes.spines[["top", "right"]].set_visible(False)
+    axes.set_xlabel("row; band: 95 % interval of the fit")
+    axes.xaxis.set_major_locator(MaxNLocator(integer=True))
+    figure.suptitle(
+        "Predicted deflection of the tool centre point in base", x=0.1, y=0.98, ha="left",
+        fontsize=9.5, weight="bold",
+    )  # fmt: skip
+    figure.align_ylabels()
+    figure.subplots_adjust(left=0.1, right=0.98, bottom=0.1, top=0.92, hspace=0.12)
+    return figure
+
+
+@_draw.register
+def _correction(found: CorrectionFigures) -> Figure:
+    """Return the deviation as programmed and what is left, mean and largest, in decades."""
+    lines = (
+        ("as programmed", found.deviation, _BEFORE),
+        ("after one first-order step", found.first_order, style.MUTED),
+        ("after the correction", found.residual, _AFTER),
+    )
+    return _mean_to_largest(
+        [(name, _MM * each.mean, _MM * each.max, colour) for name, each, colour in lines],
+        f"Deviation predicted over {found.rows} rows",
+        decades=True,
+    )
+
+
+@_draw.register
+def _process(found: SimulateProcessResult) -> Figure:
+    """Return the deviation of each line of the table, before and after correction."""
+    return _mean_to_largest(
+        [
+            (f"{line.name}, {word}", _MM * side.mean, _MM * side.max, colour)
+            for line in (*found.lines, *found.budget)
+            for word, side, colour in (
+                ("without correction", line.before, _BEFORE),
+                ("with correction", line.after, _AFTER),
+            )
+        ],
+        f"{found.process} in cell {found.cell}: absolute deviation on the path",
+        decades=False,
+    )
+
+
+_Bar = tuple[str, float, float, str]
+"""Name, mean and largest in mm, colour."""
+
+
+def _mean_to_largest(bars: list[_Bar], title: str, decades: bool) -> Figure:
+    """Return a line from mean to largest for each name, with both numbers beside it."""
+    height = 0.34 * len(bars) + 1.15
+    figure = new_figure(_WIDTH, height)
+    longest = max(len(name) for name, *_ in bars)
+    left = min(0.45, 0.05 + 0.0105 * longest)
+    axes = figure.add_axes((left, 0.6 / height, 0.82 - left, 0.34 * len(bars) / height))
+    for number, (_, mean, largest, colour) in enumerate(bars):
+        axes.plot([mean, largest], [number, number], color=colour, lw=2.5, alpha=0.5)
+        axes.plot([mean], [number], "o", color=colour, ms=6)
+        axes.plot([largest], [number], "D", color=colour, ms=5, mfc=style.PAPER)
+        axes.annotate(
+            f"{mean:.3g} / {largest:.3g}", (1.03, number), va="center", fontsize=8,
+            xycoords=("axes fraction", "data"),
+        )  # fmt: skip
+    axes.annotate(
+        "mean / largest", (1.03, -0.5), va="bottom", fontsize=7.5, color=style.MUTED,
+        xycoords=("axes fraction", "data"), annotation_clip=False,
+    )  # fmt: skip
+    axes.set_yticks(range(len(bars)), [literal(name) for name, *_ in bars])
+    axes.set_ylim(len(bars) - 0.5, -0.5)
+    if decades:
+        axes.set_xscale("log")
+    else:
+        axes.set_xlim(left=0.0)
+    axes.set_xlabel("mm; dot: mean, diamond: largest")
+    axes.tick_params(axis="y", length=0)
+    axes.grid(axis="x", color="#e6e6e2", lw=0.5)
+    axes.set_axisbelow(True)
+    axes.spines[["top", "right", "left"]].set_visible(False)
+    figure.text(0.02, 1.0 - 0.12 / height, literal(title), va="top", fontsize=9.5, weight="bold")
+    return figure

@@ -1,0 +1,98 @@
+"""Every result of a workflow: short in a console, a table in a notebook, a picture or a reason."""
+
+import re
+
+import pytest
+from matplotlib.figure import Figure
+
+from elastocal import workflows
+from elastocal.codec.study import study_summary
+from elastocal.compensation.process import read_process
+from elastocal.errors import ReportError
+from elastocal.procedure import RunEnd
+from elastocal.results import MOST_CHARACTERS, MOST_LINES, Result
+from support import plans, reported, studies
+
+CLASSES = {
+    name: getattr(workflows, name)
+    for name in dir(workflows)
+    if name.endswith("Result") and issubclass(getattr(workflows, name), Result)
+}
+WITHOUT = {
+    "CheckResult",
+    "DryRunResult",
+    "ExportResult",
+    "InitResult",
+    "ReportResult",
+    "ToolResult",
+}
+"""Results that no picture shows."""
+
+
+@pytest.fixture(scope="module")
+def results(tmp_path_factory) -> dict[str, Result]:
+    """One result of each workflow, by the name of its class."""
+    done = reported.finished(tmp_path_factory)
+    out = tmp_path_factory.mktemp("results")
+    run = reported.copied(done, out) / "run"
+    model, path, cell = done / "model.json", done / "process" / "path.csv", done / "cell/cell.yaml"
+    derived = workflows.derive(run)
+    process = read_process(done / "process").table
+    design = studies.settings()
+    samples = tuple(studies.batch(number)[0] for number in (0, 1, 2))
+    figures = workflows.RunFigures(
+        str(run), "done", "at HOME", "", 7, 7, (), {"ok": 14}, 0, 60.0, "dataset.nc", (), None
+    )
+    settings = workflows.RunSettings(cell, plan=done / "plan", out=out / "dry")
+    made = (
+        workflows.calibrate(run / "dataset.nc", springs="actuated", out=out / "other.json"),
+        workflows.check(run),
+        workflows.codec(run / "dataset.nc", out=out / "codec_again"),
+        workflows.compare(model, new=out / "other.json", rows=path),
+        workflows.compensate(model, path=path, out=out / "corrected.csv"),
+        derived,
+        workflows.dry_run(settings),
+        workflows.DemoResult(out, process),
+        workflows.export(model, c=out / "c"),
+        workflows.init(out / "new"),
+        plans.plan(),
+        workflows.predict(model, rows=path),
+        workflows.report(run, out=out / "report.html"),
+        workflows.RunResult(figures, RunEnd.DONE, derived.summary, None),
+        process,
+        workflows.stiffness(model, path=path, spins=4, stands=3, stations=5),
+        workflows.StudyResult(study_summary(design, samples, None), design, samples, ()),
+        workflows.tool(run),
+    )
+    return {type(each).__name__: each for each in made}
+
+
+def test_every_result_is_tried(results):
+    assert results.keys() == CLASSES.keys()
+
+
+@pytest.mark.parametrize("name", CLASSES)
+def test_it_is_short_in_a_console(results, name):
+    text = repr(results[name])
+    assert text.splitlines()[0] == name
+    assert 2 < len(text.splitlines()) <= MOST_LINES
+    assert len(text) <= MOST_CHARACTERS
+    assert not re.search(r"array|object at 0x|\w\(\w+=", text), "no dump of fields"
+
+
+@pytest.mark.parametrize("name", CLASSES)
+def test_it_is_a_table_in_a_notebook(results, name):
+    html = results[name]._repr_html_()
+    assert html.startswith(f"<table><caption>{name}</caption><tr>")
+    assert html.count("<tr>") == len(results[name].facts())
+
+
+@pytest.mark.parametrize("name", CLASSES)
+def test_it_has_a_picture_or_says_what_has(results, name):
+    if name in WITHOUT:
+        with pytest.raises(ReportError, match=r"^there is no picture of .*: pictures show [^\n]*$"):
+            results[name].plot()
+    else:
+        figure = results[name].plot()
+        assert isinstance(figure, Figure)
+        assert figure.axes
