@@ -36,13 +36,15 @@ class Factored:
 @brief_repr
 @dataclass(frozen=True)
 class Solution:
-    """A solved problem."""
+    """A solved problem that can prove itself."""
 
     compliance: FloatArray
     """Shape (spring,), in rad/(N·m) or m/N."""
     factored: Factored
     reading_weight: FloatArray
     """Weight that the loss gave each reading, shape (reading,); 1 for the linear loss."""
+    kkt_violation: float
+    """Largest violation of the optimality conditions, relative; see `least_squares`."""
 
 
 def factor(problem: Problem) -> Factored:
@@ -117,4 +119,4 @@ def _solve_linear(problem: Problem, reading_weight: FloatArray) -> Solution:
         )
     # Scaling back may miss a bound by a rounding.
     compliance = np.clip(x / system.scale, problem.lower, problem.upper)
-    return Solution(compliance, system, reading_weight)
+    return Solution(compliance, system, reading_weight, violation)
