@@ -52,8 +52,6 @@ class SampledPool:
     points: SurfacePoints
     """Every point that was tried; ``pool.postures.point`` counts in them."""
     pool: Pool
-    placements: tuple[BasePlacement, ...]
-    """Where the external axes carry the arm, the first choice first."""
 
 
 def sample_pool(
@@ -101,7 +99,7 @@ def sample_pool(
                 pools.append(pool)
                 progress(CANDIDATES, min(_valid(pools), wanted), wanted)
     pool = join_pools(pools).first(wanted)
-    return SampledPool(SurfacePoints.joined(tried).take(np.arange(pool.sampled)), pool, placements)
+    return SampledPool(SurfacePoints.joined(tried).take(np.arange(pool.sampled)), pool)
 
 
 def _valid(pools: Sequence[Pool]) -> int:

@@ -53,11 +53,6 @@ class Course:
         """Return the course with joints, shape (row, joint)."""
         return replace(self, q=q)
 
-    def shortened(self, rows: int) -> "Course":
-        """Return the first rows of the course."""
-        cut = (self.T_base_tcp[:rows], self.force[:rows], self.direction[:rows], self.q[:rows])
-        return replace(self, T_base_tcp=cut[0], force=cut[1], direction=cut[2], q=cut[3])
-
 
 @dataclass(frozen=True)
 class Process(ABC):
