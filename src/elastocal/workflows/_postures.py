@@ -50,7 +50,7 @@ def write_posture(robot: Robot, q: Sequence[float]) -> str:
 def parse_frame(
     text: str,
     name: str = "frame",
-    example: str = "0 mm, 0 mm, 565 mm, 0 deg, 0 deg, 0 deg",
+    rule: str = "must be six quantities, e.g. '0 mm, 0 mm, 565 mm, 0 deg, 0 deg, 0 deg'",
     error: type[ElastocalError] = UnitError,
 ) -> FloatArray:
     """Return a frame, shape (4, 4), from ``"x, y, z, a, b, c"`` (KUKA Z-Y'-X'').
@@ -59,7 +59,7 @@ def parse_frame(
     ----------
     text : str
         Three lengths and three angles.
-    name, example : str
+    name, rule : str
         For the refusal of another number of quantities.
     error : type
         What that refusal is raised as.
@@ -71,6 +71,6 @@ def parse_frame(
     """
     parts = [part.strip() for part in text.split(",")]
     if len(parts) != 6:
-        raise error(f"{name} {text!r} must be six quantities, e.g. {example!r}")
+        raise error(f"{name} {text!r} {rule}")
     kinds = ("length",) * 3 + ("angle",) * 3
     return T_from_xyzabc(*(parse_quantity(p, kind) for p, kind in zip(parts, kinds, strict=True)))

@@ -110,8 +110,8 @@ def tool(settings: ToolSettings, progress: Progress) -> ToolResult:  # noqa: ARG
 def _from_table(path: Path, settings: ToolSettings) -> _PostureSource:
     """Return the postures of a CSV file."""
     robot = _posture_robot(settings.robot, settings.flange)
-    example = "0 mm, 0 mm, 45 mm, 0 deg, 0 deg, 0 deg"
-    T_flange_sensor = parse_frame(settings.sensor, "sensor", example, CompensationError)
+    rule = "must be six quantities, e.g. '0 mm, 0 mm, 45 mm, 0 deg, 0 deg, 0 deg'"
+    T_flange_sensor = parse_frame(settings.sensor, "sensor", rule, CompensationError)
     down = np.array(settings.down)
     length = float(np.linalg.norm(down))
     if not 0.0 < length < np.inf:
