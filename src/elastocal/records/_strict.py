@@ -14,7 +14,7 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, ValidationInfo, fie
 
 from elastocal.errors import SchemaError
 from elastocal.files import read_text
-from elastocal.records._validation import check_schema, validate
+from elastocal.records._codec import from_data
 
 
 class StrictModel(BaseModel):
@@ -68,10 +68,7 @@ def read_yaml(path: Path, model: type[Model], schema: str) -> Model:
         data = yaml.load(read_text(path), _UniqueKeyLoader)
     except (yaml.YAMLError, ValueError, RecursionError) as error:
         raise SchemaError(f"{path} is not valid YAML: {' '.join(str(error).split())}") from error
-    if not isinstance(data, dict):
-        raise SchemaError(f"{path} must hold keys and values, among them the schema {schema!r}")
-    check_schema(data.pop("schema", None), schema, str(path))
-    return validate(data, model, str(path))
+    return from_data(model, data, str(path), schema)
 
 
 def _holds_truth(value: Any) -> bool:

@@ -83,12 +83,21 @@ class ReportResult(Result):
 
     def facts(self) -> tuple[tuple[str, str], ...]:
         """Return what a person wants to know first."""
-        light = f" ({self.figures.light} light)" if self.figures.light else ""
         return (
-            (f"{self.verdict.word}{light}", self.verdict.sentence),
+            (f"{self.verdict.word}{self.light}", self.verdict.sentence),
             *(("because", reason) for reason in self.verdict.reasons),
-            ("written to", " and ".join(filter(None, (self.figures.report, self.figures.pdf)))),
+            ("written to", self.files),
         )
+
+    @property
+    def light(self) -> str:
+        """The colour of the light as it follows the verdict's word; empty without one."""
+        return f" ({self.figures.light} light)" if self.figures.light else ""
+
+    @property
+    def files(self) -> str:
+        """The files that were written, as a phrase."""
+        return " and ".join(filter(None, (self.figures.report, self.figures.pdf)))
 
 
 @workflow(ReportSettings)

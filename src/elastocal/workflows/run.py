@@ -108,6 +108,10 @@ class RunFigures:
     problem: str | None
     """Why nothing was derived of a run that is done."""
 
+    def counts(self) -> str:
+        """Return the number of readings of each status, as a phrase."""
+        return ", ".join(f"{count} {status}" for status, count in self.readings.items())
+
 
 @dataclass(frozen=True, eq=False, repr=False)
 class RunResult(Result):
@@ -123,11 +127,10 @@ class RunResult(Result):
     def facts(self) -> tuple[tuple[str, str], ...]:
         """Return what a person wants to know first."""
         found = self.figures
-        readings = ", ".join(f"{count} {status}" for status, count in found.readings.items())
         return (
             ("run", f"{found.run}, {found.state}"),
             ("poses", f"{found.committed} of {found.poses} committed"),
-            ("readings", readings or "none"),
+            ("readings", found.counts() or "none"),
             ("arm", found.arm),
             ("dataset", found.dataset or "not derived"),
             *(("warning", text) for text in found.warnings),

@@ -87,13 +87,11 @@ def show_export(console: Console, result: "ExportResult", with_tool: bool) -> No
 
 def show_report(console: Console, result: "ReportResult") -> None:
     """Print the verdict of a report."""
-    figures, verdict = result.figures, result.verdict
-    light = f" ({figures.light} light)" if figures.light else ""
-    console.print(f"[bold]{verdict.word}[/bold]{light}: {escape(verdict.sentence)}")
+    verdict = result.verdict
+    console.print(f"[bold]{verdict.word}[/bold]{result.light}: {escape(verdict.sentence)}")
     for reason in verdict.reasons:
         console.print(f"   {reason}", markup=False)
-    paper = f" and {figures.pdf}" if figures.pdf else ""
-    console.print(f"written to {figures.report}{paper}", markup=False)
+    console.print(f"written to {result.files}", markup=False)
 
 
 def show_demo(console: Console, result: "DemoResult") -> None:

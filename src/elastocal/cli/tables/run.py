@@ -66,11 +66,10 @@ def show_itinerary(console: Console, found: DryRunResult) -> None:
 def show_run(console: Console, result: RunResult) -> None:
     """Print how a run ended."""
     found = result.figures
-    readings = ", ".join(f"{count} {status}" for status, count in found.readings.items())
     derived = "" if found.dataset else ", not derived"
     console.print(
         f"{found.state}: {found.committed} of {found.poses} poses committed"
-        f" ({readings or 'no readings'}{derived}),"
+        f" ({found.counts() or 'no readings'}{derived}),"
         f" {found.seconds / 60.0:.1f} min,"
         f" failed attempts: {found.failed_attempts}; the arm is {found.arm}",
         soft_wrap=True,
