@@ -16,7 +16,7 @@ from elastocal.robot.catalogue import (
     CatalogueEntry,
     catalogue as table,
 )
-from elastocal.robot.catalogue.record import LINKS
+from elastocal.robot.catalogue import LINKS
 
 NAMES = catalogue.names()
 TRANSPORT = np.radians([0.0, -90.0, 90.0, 0.0, 45.0, 0.0])
