@@ -1,3 +1,4 @@
+from .friction import FrictionElements as FrictionElements
 from .layouts import (
     AXES as AXES,
     LAYOUTS as LAYOUTS,
@@ -19,12 +20,14 @@ from .model import (
 from .springs import (
     KINDS as KINDS,
     AnySpring as AnySpring,
+    Gear as Gear,
     Hinge as Hinge,
     OneAxisSpring as OneAxisSpring,
     Parameter as Parameter,
     Spring as Spring,
     SpringAxis as SpringAxis,
     SpringLoad as SpringLoad,
+    Tensor as Tensor,
     Unit as Unit,
     as_axis as as_axis,
     axial as axial,

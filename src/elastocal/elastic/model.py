@@ -11,6 +11,10 @@ and, with compliances ``c`` of linear springs, the deflection
 
 Every kind of spring is linear in its parameters, so that ``O c = deflection`` holds for all; what
 a column of ``O`` is, the spring knows (`elastocal.elastic.springs`).
+
+The deflection is against the unloaded arm at the *same* joints, which gravity has bent already.
+Against the arm without weight it is ``(O + S) c`` with the sag ``S c``; a displacement between a
+reference and a loaded reading, millimetres apart, holds ``S(q) - S(q_0)`` besides ``O``.
 """
 
 from collections.abc import Hashable, Iterator, Sequence
@@ -21,6 +25,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from elastocal.arrays import FloatArray, IndexArray
+from elastocal.elastic.friction import FrictionElements
 from elastocal.elastic.springs import Parameter, Spring, SpringLoad, check_springs
 from elastocal.errors import SpringError
 from elastocal.results import brief_repr
@@ -31,6 +36,7 @@ from elastocal.robot import (
     Robot,
     build_model,
     evaluate_jacobian,
+    evaluate_weight,
 )
 
 _Columns = IndexArray | slice
@@ -61,10 +67,24 @@ class _Alike:
     """For each axis of the law, the column of the Jacobian of each spring."""
     parameters: tuple[_Columns, ...]
     """For each parameter of the law, its place in the compliance vector for each spring."""
+    friction: tuple[_Columns, ...]
+    """For each friction element of the law, its place among all for each spring."""
 
-    def load(self, torques: FloatArray) -> SpringLoad[FloatArray]:
-        """Return the loads of these springs, of torques of shape (..., axis)."""
-        return SpringLoad(tuple(torques[..., axis] for axis in self.axes))
+    def load(
+        self,
+        torque: FloatArray,
+        weight: FloatArray | None = None,
+        friction: FloatArray | None = None,
+    ) -> SpringLoad[FloatArray]:
+        """Return the loads of these springs.
+
+        Of torques of load and weight of shape (..., axis), friction of shape (..., element).
+        """
+        return SpringLoad(
+            tuple(torque[..., axis] for axis in self.axes),
+            () if weight is None else tuple(weight[..., axis] for axis in self.axes),
+            () if friction is None else tuple(friction[..., place] for place in self.friction),
+        )
 
 
 @brief_repr
@@ -76,6 +96,8 @@ class ElasticModel:
     springs: tuple[Spring, ...]
     parameters: tuple[Parameter, ...] = field(init=False, repr=False)
     """Of all springs, in the order of every compliance vector."""
+    friction: FrictionElements = field(init=False, repr=False)
+    """Of all springs."""
     _chain: ChainModel = field(init=False, repr=False)
     _columns: IndexArray = field(init=False, repr=False)
     _groups: tuple[_Alike, ...] = field(init=False, repr=False)
@@ -86,6 +108,7 @@ class ElasticModel:
         chain, columns = _insert_springs(self.robot, self.springs)
         parameters = tuple(p for spring in self.springs for p in spring.parameters)
         object.__setattr__(self, "parameters", parameters)
+        object.__setattr__(self, "friction", FrictionElements.of(self.springs))
         object.__setattr__(self, "_chain", chain)
         object.__setattr__(self, "_columns", columns)
         object.__setattr__(self, "_groups", tuple(_alike(self.springs)))
@@ -115,12 +138,45 @@ class ElasticModel:
         """
         return evaluate_jacobian(self._chain, self.robot.check_positions(q), self._columns)
 
+    @property
+    def bears_weight(self) -> bool:
+        """Whether a law depends on the torques of the arm's own weight."""
+        return any(group.law.bears_weight for group in self._groups)
+
+    def load_torques(
+        self, q: ArrayLike, force: ArrayLike, moment: ArrayLike | None = None
+    ) -> FloatArray:
+        """Return the torque of a load about each axis (paper Eq. 9), shape (..., axis), in N·m.
+
+        Arguments as for `observation_blocks`.
+        """
+        return spring_torques(self.spring_jacobian(q), check_vectors("force", force), moment)
+
+    def weight_torques(self, q: ArrayLike) -> FloatArray:
+        """Return the torque of the arm's own weight about each axis.
+
+        Parameters
+        ----------
+        q : array_like, shape (..., joint)
+            Joint positions in rad or m.
+
+        Returns
+        -------
+        ndarray, shape (..., axis)
+            In N·m, or N; zero where the robot's links have no masses.
+        """
+        q = self.robot.check_positions(q)
+        if not self.robot.has_masses:
+            return np.zeros((*q.shape[:-1], len(self._columns)))
+        return evaluate_weight(self._chain, q, self._columns, self.robot.gravity)
+
     def observation_blocks(
         self,
         q: ArrayLike,
         force: ArrayLike,
         moment: ArrayLike | None = None,
         marker_offset: ArrayLike | None = None,
+        friction: FloatArray | None = None,
     ) -> FloatArray:
         """Return the rows of the observation matrix (paper Eq. 11, 14): ``O c = deflection``.
 
@@ -138,6 +194,9 @@ class ElasticModel:
         marker_offset : array_like, shape (3,), optional
             Point whose displacement is observed, in the tcp frame, in m: a metrology marker
             that is not at the tool centre point has its own Jacobian. Default: the tcp.
+        friction : ndarray, shape (..., element), optional
+            Torque that each friction element bears, in N·m (`friction`). Default: each load is
+            pressed straight from rest, after a free motion.
 
         Returns
         -------
@@ -152,31 +211,72 @@ class ElasticModel:
         force = check_vectors("force", force)
         moment = None if moment is None else check_vectors("moment", moment)
         jacobian = self.spring_jacobian(q)
-        torques = spring_torques(jacobian, force, moment)
-        observed = jacobian.translation
-        if marker_offset is not None and np.any(marker_offset):
-            rotation = self.robot.forward(q)[..., :3, :3]
-            lever = rotation @ check_vectors("marker_offset", marker_offset)
-            observed = observed + np.cross(jacobian.rotation, lever[..., None], axis=-2)
+        torque = spring_torques(jacobian, force, moment)
+        weight = self.weight_torques(q) if self.bears_weight else None
+        if friction is None and len(self.friction):
+            friction = self.friction.press(torque)
+        return self._blocks(self._observed(q, jacobian, marker_offset), torque, weight, friction)
+
+    def sag_blocks(self, q: ArrayLike, marker_offset: ArrayLike | None = None) -> FloatArray:
+        """Return the rows ``S`` of the sag: ``S c`` is what the arm's own weight deflects.
+
+        Parameters
+        ----------
+        q, marker_offset : array_like
+            As for `observation_blocks`.
+
+        Returns
+        -------
+        ndarray, shape (..., 3, parameter)
+            Against the arm without weight; zero where the robot's links have no masses.
+        """
+        observed = self._observed(q, self.spring_jacobian(q), marker_offset)
+        return self._blocks(observed, self.weight_torques(q))
+
+    def _observed(
+        self, q: ArrayLike, jacobian: Jacobian, marker_offset: ArrayLike | None
+    ) -> FloatArray:
+        """Return the translational Jacobian of the observed point, shape (..., 3, axis)."""
+        if marker_offset is None or not np.any(marker_offset):
+            return jacobian.translation
+        rotation = self.robot.forward(q)[..., :3, :3]
+        lever = rotation @ check_vectors("marker_offset", marker_offset)
+        return jacobian.translation + np.cross(jacobian.rotation, lever[..., None], axis=-2)
+
+    def _blocks(
+        self,
+        observed: FloatArray,
+        torque: FloatArray,
+        weight: FloatArray | None = None,
+        friction: FloatArray | None = None,
+    ) -> FloatArray:
+        """Return the columns of all springs, shape (..., 3, parameter)."""
         places: list[_Columns] = []
         columns: list[FloatArray] = []
         for group in self._groups:
             J = [observed[..., axis] for axis in group.axes]
             places += group.parameters
-            columns += group.law.columns(J, group.load(torques))
+            columns += group.law.columns(J, group.load(torque, weight, friction))
         # Springs of one law and one parameter, as hinges are, stand side by side already.
         return columns[0] if len(columns) == 1 else _assembled(columns, places)
 
     def deflection(
-        self, compliance: ArrayLike, q: ArrayLike, force: ArrayLike, moment: ArrayLike | None = None
+        self,
+        compliance: ArrayLike,
+        q: ArrayLike,
+        force: ArrayLike,
+        moment: ArrayLike | None = None,
+        friction: FloatArray | None = None,
     ) -> FloatArray:
         """Return the deflection ``O c``: real minus commanded position of the tcp.
+
+        Against the unloaded arm at the same joints.
 
         Parameters
         ----------
         compliance : array_like, shape (parameter,)
             In the units of the parameters: rad/(N·m) or m/N of hinges.
-        q, force, moment : array_like
+        q, force, moment, friction : array_like
             As for `observation_blocks`.
 
         Returns
@@ -185,7 +285,7 @@ class ElasticModel:
             In base, in m.
         """
         c = self.check_compliance(compliance)
-        return self.observation_blocks(q, force, moment) @ c
+        return self.observation_blocks(q, force, moment, friction=friction) @ c
 
     def cartesian_compliance(
         self,
@@ -212,10 +312,11 @@ class ElasticModel:
         jacobian = self.spring_jacobian(q)
         J, W = jacobian.translation, jacobian.rotation
         torques = spring_torques(jacobian, check_vectors("force", force), moment)
+        weights = self.weight_torques(q) if self.bears_weight else None
         shape = (*torques.shape[:-1], 3, 3)
         translation, rotation, coupling = np.zeros(shape), np.zeros(shape), np.zeros(shape)
         for group in self._groups:
-            tangents = group.law.tangents(group.load(torques))
+            tangents = group.law.tangents(group.load(torques, weights))
             # A spring of several axes couples them: all pairs, of which a hinge has one.
             for (a, axis), (b, other) in product(enumerate(group.axes), repeat=2):
                 terms = zip(group.parameters, tangents[a][b], strict=True)
@@ -246,8 +347,9 @@ class ElasticModel:
         """
         along = spring_torques(self.spring_jacobian(q), check_vectors("direction", direction))
         rows = np.empty((*along.shape[:-1], len(self.parameters)))
+        weights = self.weight_torques(q) if self.bears_weight else None
         for group in self._groups:
-            tangents = group.law.tangents(group.load(np.zeros_like(along)))
+            tangents = group.law.tangents(group.load(np.zeros_like(along), weights))
             for p, place in enumerate(group.parameters):
                 rows[..., place] = sum(
                     along[..., axis] * tangents[a][b][p] * along[..., other]
@@ -340,12 +442,16 @@ def _alike(springs: Sequence[Spring]) -> Iterator[_Alike]:
         members.setdefault(spring.law, []).append(index)
     first_axis = np.cumsum([0, *(len(spring.axes) for spring in springs)])
     first_parameter = np.cumsum([0, *(len(spring.parameters) for spring in springs)])
+    first_element = np.cumsum([0, *(len(spring.friction_limits) for spring in springs)])
     for indices in members.values():
         law = springs[indices[0]]
         yield _Alike(
             law,
             tuple(_side_by_side(first_axis[indices] + k) for k in range(len(law.axes))),
             tuple(_side_by_side(first_parameter[indices] + k) for k in range(len(law.parameters))),
+            tuple(
+                _side_by_side(first_element[indices] + k) for k in range(len(law.friction_limits))
+            ),
         )
 
 

@@ -13,6 +13,7 @@ from .robot import (
     Robot as Robot,
     collision_model as collision_model,
     evaluate_jacobian as evaluate_jacobian,
+    evaluate_weight as evaluate_weight,
 )
 from .singularity import (
     characteristic_length as characteristic_length,

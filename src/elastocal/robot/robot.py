@@ -82,6 +82,8 @@ class Robot:
     meshes: tuple[tuple[str, Path], ...] = ()
     """Files of its collision shapes by their names in the URDF, where they were looked for
     (`find_meshes`)."""
+    gravity: tuple[float, float, float] = GRAVITY
+    """Acceleration of gravity in base, in m/s²; the default is that of an upright robot."""
     _rigid: ChainModel = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
@@ -202,15 +204,20 @@ class Robot:
         q = self.check_positions(q)
         return evaluate_jacobian(self._rigid, q, self._rigid.joint_columns)
 
-    def gravity_torques(self, q: ArrayLike, gravity: ArrayLike = GRAVITY) -> FloatArray:
+    @property
+    def has_masses(self) -> bool:
+        """Whether any link has a mass, so that gravity torques are known."""
+        return any(joint.mass > 0.0 for joint in self.chain.joints)
+
+    def gravity_torques(self, q: ArrayLike, gravity: ArrayLike | None = None) -> FloatArray:
         """Return the joint torques that hold the robot still under its own weight.
 
         Parameters
         ----------
         q : array_like, shape (..., joint)
             Joint positions in rad or m.
-        gravity : array_like, shape (3,)
-            Acceleration of gravity in base, in m/s².
+        gravity : array_like, shape (3,), optional
+            Acceleration of gravity in base, in m/s². Default: the robot's own.
 
         Returns
         -------
@@ -222,15 +229,11 @@ class Robot:
         RobotError
             If no link of the robot has a mass.
         """
-        if not any(joint.mass > 0 for joint in self.chain.joints):
+        if not self.has_masses:
             raise RobotError(f"robot {self.name!r} has no link masses: gravity torques unknown")
+        acceleration = self.gravity if gravity is None else gravity
         q = self.check_positions(q)
-        model = self._rigid.model.copy()
-        model.gravity.linear = np.asarray(gravity, dtype=float)
-        data = model.createData()
-        flat = q.reshape(-1, q.shape[-1])
-        torques = [pin.computeGeneralizedGravity(model, data, row).copy() for row in flat]
-        return np.array(torques).reshape(q.shape)
+        return -evaluate_weight(self._rigid, q, self._rigid.joint_columns, acceleration)
 
     def check_positions(self, q: ArrayLike) -> FloatArray:
         """Return ``q`` as a float array, or refuse it by shape or value.
@@ -261,6 +264,46 @@ def _joint_row(joint: ChainJoint) -> str:
     return ", ".join([f"{joint.name}: {ends}", *known])
 
 
+def evaluate_weight(
+    chain: ChainModel, q: FloatArray, columns: IndexArray, gravity: ArrayLike
+) -> FloatArray:
+    """Return the torques that the weight of the links exerts about named columns of a chain.
+
+    Parameters
+    ----------
+    chain : ChainModel
+        The model; inserted joints stay at zero.
+    q : ndarray, shape (..., joint)
+        Positions of the chain's own joints in rad or m.
+    columns : ndarray of int, shape (column,)
+        Which columns of the model to return, in which order.
+    gravity : array_like, shape (3,)
+        Acceleration of gravity in base, in m/s².
+
+    Returns
+    -------
+    ndarray, shape (..., column)
+        In N·m; forces in N along prismatic joints.
+    """
+    model = chain.model.copy()
+    model.gravity.linear = np.asarray(gravity, dtype=float)
+    data = model.createData()
+    held = [
+        pin.computeGeneralizedGravity(model, data, configuration).copy()
+        for configuration in _configurations(chain, q)
+    ]
+    torques: FloatArray = -np.array(held).reshape(-1, model.nv)[:, columns]
+    return torques.reshape(*q.shape[:-1], len(columns))
+
+
+def _configurations(chain: ChainModel, q: FloatArray) -> FloatArray:
+    """Return the positions of all joints of a model, those inserted at zero, as rows."""
+    flat = q.reshape(-1, q.shape[-1])
+    full = np.zeros((len(flat), chain.model.nq))
+    full[:, chain.joint_columns] = flat
+    return full
+
+
 def evaluate_jacobian(chain: ChainModel, q: FloatArray, columns: IndexArray) -> Jacobian:
     """Return the named columns of a chain model's tip Jacobian in base axes.
 
@@ -274,10 +317,8 @@ def evaluate_jacobian(chain: ChainModel, q: FloatArray, columns: IndexArray) -> 
         Which columns of the model to return, in which order.
     """
     model, data = chain.model, chain.model.createData()
-    flat = q.reshape(-1, q.shape[-1])
-    full = np.zeros((len(flat), model.nq))
-    full[:, chain.joint_columns] = flat
-    rows = np.empty((len(flat), 6, model.nv))
+    full = _configurations(chain, q)
+    rows = np.empty((len(full), 6, model.nv))
     # A chain of one joint comes back from Pinocchio flat.
     targets = rows if model.nv > 1 else rows[:, :, 0]
     frame, axes = chain.tip_frame, pin.ReferenceFrame.LOCAL_WORLD_ALIGNED

@@ -8,7 +8,13 @@ from .expression import (
     Sum as Sum,
     atan as atan,
 )
-from .hinge import Hinge as Hinge, axial as axial
+from .gear import Gear as Gear
+from .hinge import (
+    COMPLIANCE_SCALE as COMPLIANCE_SCALE,
+    TORSIONAL as TORSIONAL,
+    Hinge as Hinge,
+    axial as axial,
+)
 from .kinds import (
     KINDS as KINDS,
     AnySpring as AnySpring,
@@ -26,3 +32,4 @@ from .spring import (
     Unit as Unit,
     as_axis as as_axis,
 )
+from .tensor import Tensor as Tensor

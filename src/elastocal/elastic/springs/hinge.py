@@ -14,9 +14,10 @@ from elastocal.elastic.springs.spring import (
 from elastocal.records import record
 from elastocal.robot import ChainJoint
 
-_TORSIONAL = Unit("rad/(N*m)", "µrad/(N·m)", 1e6, "MN·m/rad")
+TORSIONAL = Unit("rad/(N*m)", "µrad/(N·m)", 1e6, "MN·m/rad")
+"""Unit of the compliance of a torsional spring."""
 _LINEAR = Unit("m/N", "µm/N", 1e6, "MN/m")
-_SCALE = 1e-6
+COMPLIANCE_SCALE = 1e-6
 """A gear of a heavy arm yields about a microradian to a newton metre, a soft guideway a micrometre
 to a newton."""
 
@@ -25,7 +26,7 @@ to a newton."""
 class Hinge(OneAxisSpring):
     """A virtual joint that yields in proportion to its load: ``theta = c t`` (paper Eq. 10)."""
 
-    units = (_TORSIONAL, _LINEAR)
+    units = (TORSIONAL, _LINEAR)
 
     @property
     def kind(self) -> str:
@@ -35,8 +36,8 @@ class Hinge(OneAxisSpring):
     @property
     def parameters(self) -> tuple[Parameter, ...]:
         """One compliance, in rad/(N·m) or m/N."""
-        unit = _TORSIONAL if self.revolute else _LINEAR
-        return (Parameter(self.name, self.joint, unit, _SCALE),)
+        unit = TORSIONAL if self.revolute else _LINEAR
+        return (Parameter(self.name, self.joint, unit, COMPLIANCE_SCALE),)
 
     def angles(self, load: SpringLoad[Quantity]) -> Angles[Quantity]:
         """Return the load torque itself."""

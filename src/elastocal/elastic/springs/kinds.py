@@ -7,14 +7,16 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
 
 from pydantic import Discriminator, Tag
 
+from elastocal.elastic.springs.gear import Gear
 from elastocal.elastic.springs.hinge import Hinge
 from elastocal.elastic.springs.spring import Spring, Unit
+from elastocal.elastic.springs.tensor import Tensor
 from elastocal.errors import SpringError
 
 _USUAL = "hinge"
 """The kind of a spring whose kind a file does not name."""
 
-KINDS: dict[str, type[Spring]] = {_USUAL: Hinge}
+KINDS: dict[str, type[Spring]] = {_USUAL: Hinge, "gear": Gear, "tensor": Tensor}
 """Kinds of springs by the word that files have for them."""
 
 

@@ -97,7 +97,12 @@ class SpringLoad(Generic[Quantity]):
     """The load on a spring; everything that a law may depend on stands here."""
 
     torque: tuple[Quantity, ...]
-    """Torque about each axis of the spring, in N·m; force along it, in N, where it slides."""
+    """Torque of the load about each axis of the spring, in N·m; force along it, in N, where it
+    slides."""
+    weight: tuple[Quantity, ...] = ()
+    """Torque of the arm's own weight about each axis, likewise; empty: the arm is weightless."""
+    friction: tuple[Quantity, ...] = ()
+    """Torque that each friction element of the spring bears, in N·m; empty: none bears any."""
 
 
 Angles = tuple[tuple[Quantity, ...], ...]
@@ -110,7 +115,8 @@ Tangents = tuple[tuple[tuple[FloatArray | float, ...], ...], ...]
 class Spring(ABC):
     """A place where a robot is soft.
 
-    A spring inserts virtual joints, its `axes`, into the chain. Under a load they move by
+    A spring inserts virtual joints, its `axes`, into the chain. A load moves them, from where the
+    arm's own weight holds them, by
 
         theta_a = sum over parameters p of angle_ap(load) c_p,
 
@@ -126,6 +132,8 @@ class Spring(ABC):
 
     units: ClassVar[tuple[Unit, ...]]
     """Every unit that parameters of this kind may have."""
+    bears_weight: ClassVar[bool] = False
+    """Whether the law depends on the torque of the arm's own weight."""
     places: ClassVar[frozenset[str]] = frozenset(
         {"name", "joint", "axis", "revolute", "distal", "offset"}
     )
@@ -150,6 +158,11 @@ class Spring(ABC):
     @abstractmethod
     def parameters(self) -> tuple[Parameter, ...]:
         """The coefficients, in the order of every compliance vector."""
+
+    @property
+    def friction_limits(self) -> tuple[float, ...]:
+        """Torques about the first axis at which its friction elements slide, in N·m or N."""
+        return ()
 
     @abstractmethod
     def angles(self, load: SpringLoad[Quantity]) -> Angles[Quantity]:

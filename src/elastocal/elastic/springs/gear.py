@@ -1,0 +1,81 @@
+"""Gear: an axial spring that stiffens with its total torque and remembers friction."""
+
+from typing import Literal
+
+import numpy as np
+
+from elastocal.arrays import FloatArray
+from elastocal.elastic.springs.expression import Quantity, atan
+from elastocal.elastic.springs.hinge import COMPLIANCE_SCALE, TORSIONAL
+from elastocal.elastic.springs.spring import (
+    Angles,
+    OneAxisSpring,
+    Parameter,
+    SpringLoad,
+    Tangents,
+)
+from elastocal.records import record
+
+
+@record()
+class Gear(OneAxisSpring):
+    """A gear under gravity and load together.
+
+    With the torque ``w`` of the arm's own weight and ``t`` of the load, the load turns it by
+
+        theta = c_0 t + sum_k c_k (T_k atan((w + t) / T_k) - T_k atan(w / T_k)) - sum_j f_j s_j.
+
+    Every ``c >= 0``, so the angle grows with the torque and the gear stiffens with its size: the
+    compliance falls from ``sum c`` without any torque to ``c_0`` far beyond every knee ``T_k``,
+    and never below. Harmonic drives and RV gears stiffen like that; makers state it as three
+    stiffnesses K1, K2, K3. Which of K1/K2/K3 a torque meets depends on the *total* torque, so a
+    gear that gravity preloads is stiffer.
+
+    The ``s_j`` are torques that friction bears, each a stop operator of the torque's history: it
+    follows the torque's changes until it slides at ``+-r_j``. Their sum is a Prandtl-Ishlinskii
+    operator (A. Visintin, *Differential Models of Hysteresis*, 1994, ch. III; in robot gears:
+    M. Ruderman, F. Hoffmann, T. Bertram, "Modeling and identification of elastic robot joints
+    with hysteresis and backlash", IEEE Trans. Industrial Electronics 56, 2009). Lost motion is
+    twice ``sum f_j r_j``.
+    """
+
+    knees: tuple[float, ...] = (300.0, 1000.0, 3000.0)
+    """``T_k``: torques about which the stiffness changes, in N·m."""
+    slips: tuple[float, ...] = ()
+    """``r_j``: torques at which friction elements slide, in N·m; empty: no friction."""
+    kind: Literal["gear"] = "gear"
+
+    units = (TORSIONAL,)
+    bears_weight = True
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        """``c_0``, the ``c_k`` and the ``f_j``, all in rad/(N·m)."""
+        names = ["hard", *(f"soft{T:.3g}" for T in self.knees)]
+        names += [f"friction{r:.3g}" for r in self.slips]
+        return tuple(
+            Parameter(f"{self.name}.{name}", self.joint, TORSIONAL, COMPLIANCE_SCALE)
+            for name in names
+        )
+
+    @property
+    def friction_limits(self) -> tuple[float, ...]:
+        """The ``r_j``."""
+        return self.slips
+
+    def angles(self, load: SpringLoad[Quantity]) -> Angles[Quantity]:
+        """Return the angle of one unit of each parameter."""
+        (t,) = load.torque
+        soft = [T * atan(t / T) for T in self.knees]
+        if load.weight:
+            (w,) = load.weight
+            soft = [T * (atan((w + t) / T) - atan(w / T)) for T in self.knees]
+        friction = load.friction or (0.0 * t,) * len(self.slips)
+        return ((t, *soft, *(-1.0 * s for s in friction)),)
+
+    def tangents(self, load: SpringLoad[FloatArray]) -> Tangents:
+        """Return 1, ``1 / (1 + ((w + t) / T_k)^2)``, and 0: friction that slides adds none."""
+        (t,) = load.torque
+        total = t + load.weight[0] if load.weight else t
+        soft = (1.0 / (1.0 + np.square(total / T)) for T in self.knees)
+        return (((1.0, *soft, *(0.0,) * len(self.slips)),),)
