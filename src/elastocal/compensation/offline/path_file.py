@@ -19,7 +19,12 @@ from elastocal.compensation.offline import (
     row_blocks,
     turned_to_base,
 )
-from elastocal.compensation.offline.correct import LARGEST_DEFLECTION, PathCorrection, correct_rows
+from elastocal.compensation.offline.correct import (
+    LARGEST_DEFLECTION,
+    CorrectionSummary,
+    PathCorrection,
+    correct_rows,
+)
 from elastocal.compensation.offline.path_joints import (
     RowName,
     check_limits,
@@ -27,7 +32,6 @@ from elastocal.compensation.offline.path_joints import (
     nearest_zero_posture,
     posture_jumps,
 )
-from elastocal.compensation.offline.summary import CorrectionSummary
 from elastocal.identification import CalibratedModel
 from elastocal.progress import Progress, silent
 from elastocal.results import brief_repr
