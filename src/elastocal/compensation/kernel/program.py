@@ -3,7 +3,8 @@
 The deflection of an elastic model at given joints is a fixed sequence of products and sums. Sums
 of products read the same in C and in Python, so both come from one list, with the same arithmetic
 in the same order; products with 0 and 1, of which the transforms of a robot are full, are left
-out when the list is made.
+out when the list is made. As Python functions of plain floats they are three times quicker than
+arrays of three.
 """
 
 import math

@@ -1,4 +1,4 @@
-"""Springs as statements: deflection and observation block at given joints and load."""
+"""Chain and springs as statements: joint frames, deflection and observation block at a load."""
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field

@@ -3,7 +3,6 @@ from .correct import (
     CorrectionFigures as CorrectionFigures,
     CorrectionSummary as CorrectionSummary,
     LengthStatistics as LengthStatistics,
-    LengthSummary as LengthSummary,
     PathCorrection as PathCorrection,
     correct_rows as correct_rows,
 )
@@ -25,13 +24,13 @@ from .path_table import (
     PathError as PathError,
     PathValues as PathValues,
     WrenchColumns as WrenchColumns,
-    beyond_a_turn as beyond_a_turn,
-    count_lines as count_lines,
     find_columns as find_columns,
     find_wrench_columns as find_wrench_columns,
     in_file as in_file,
     read_layout as read_layout,
     read_values as read_values,
+    require_within_a_turn as require_within_a_turn,
     row_blocks as row_blocks,
     turned_to_base as turned_to_base,
+    wrench_in_base as wrench_in_base,
 )

@@ -6,10 +6,11 @@ With programmed tcp position ``p``, orientation ``R`` and force ``f``, find ``q`
 
 by Newton steps of the rigid arm: ``J_arm dq = [p - p(q) - C(q) f; log(R R(q)^T)]``. What is left
 out of the derivative, ``d(C f)/dq``, is a deflection per metre, some 1e-3, so that each step gains
-three digits. The first step alone is what is usually done; its residual is reported.
+three digits. The first step alone is what is usually done; its residual is reported. The figures of
+a whole path are added up block by block.
 """
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -258,40 +259,32 @@ class CorrectionFigures:
 
 
 @dataclass(frozen=True)
-class LengthSummary:
-    """Sum and largest of a length over the rows so far."""
+class _LengthSum:
+    """Sum and largest of a length over the rows so far, in m."""
 
     total: float = 0.0
-    """Sum, in m."""
     largest: float = 0.0
-    """In m."""
-    label: str = ""
+    at: str = ""
     """Name of the row with the largest."""
 
-    def plus(self, lengths: FloatArray, labels: list[str]) -> "LengthSummary":
-        """Return the figure with further rows."""
+    def plus(self, lengths: FloatArray, labels: list[str]) -> "_LengthSum":
+        """Return the sum with further rows."""
         worst = int(lengths.argmax())
-        here = float(lengths[worst])
-        label, largest = self.label, self.largest
-        if here > largest or not label:
-            label, largest = labels[worst], here
-        return LengthSummary(self.total + float(lengths.sum()), largest, label)
+        largest, at = self.largest, self.at
+        if float(lengths[worst]) > largest or not at:
+            largest, at = float(lengths[worst]), labels[worst]
+        return _LengthSum(self.total + float(lengths.sum()), largest, at)
 
 
 @brief_repr
 @dataclass(frozen=True)
 class CorrectionSummary:
-    """Figures of a correction, predicted by the model."""
+    """Figures of a correction over the rows so far, predicted by the model."""
 
     rows: int = 0
-    deviation: LengthSummary = field(default_factory=LengthSummary)
-    """Deviation of the path as programmed."""
-    first_order: LengthSummary = field(default_factory=LengthSummary)
-    """Deviation that one first-order step would leave."""
-    residual: LengthSummary = field(default_factory=LengthSummary)
-    """Deviation that the correction leaves."""
-    correction: LengthSummary = field(default_factory=LengthSummary)
-    """Distance between programmed and corrected position."""
+    lengths: tuple[_LengthSum, ...] = (_LengthSum(),) * 4
+    """Deviation as programmed, deviation that one first-order step would leave, deviation that the
+    correction leaves, distance of the corrected from the programmed position."""
     jumps: int = 0
     """Rows at which the posture changes from the row before."""
     first_jump: str = ""
@@ -316,31 +309,35 @@ class CorrectionSummary:
         jumps : list of int
             Rows among them at which the posture changes.
         """
-        first = self.first_jump or (labels[jumps[0]] if jumps else "")
+        further = (
+            np.linalg.norm(correction.uncorrected, axis=1),
+            correction.first_order,
+            correction.residual,
+            np.linalg.norm(shift, axis=1),
+        )
         return replace(
             self,
             rows=self.rows + len(labels),
-            deviation=self.deviation.plus(np.linalg.norm(correction.uncorrected, axis=1), labels),
-            first_order=self.first_order.plus(correction.first_order, labels),
-            residual=self.residual.plus(correction.residual, labels),
-            correction=self.correction.plus(np.linalg.norm(shift, axis=1), labels),
+            lengths=tuple(
+                sums.plus(new, labels) for sums, new in zip(self.lengths, further, strict=True)
+            ),
             jumps=self.jumps + len(jumps),
-            first_jump=first,
+            first_jump=self.first_jump or (labels[jumps[0]] if jumps else ""),
             pulled=self.pulled + int(correction.pulled.sum()),
         )
 
     def figures(self) -> CorrectionFigures:
         """Return the figures over all rows so far."""
-
-        def statistics(length: LengthSummary) -> LengthStatistics:
-            return LengthStatistics(length.total / max(self.rows, 1), length.largest, length.label)
-
+        deviation, first_order, residual, correction = (
+            LengthStatistics(each.total / max(self.rows, 1), each.largest, each.at)
+            for each in self.lengths
+        )
         return CorrectionFigures(
             rows=self.rows,
-            deviation=statistics(self.deviation),
-            first_order=statistics(self.first_order),
-            residual=statistics(self.residual),
-            correction=statistics(self.correction),
+            deviation=deviation,
+            first_order=first_order,
+            residual=residual,
+            correction=correction,
             posture_jumps=self.jumps,
             first_jump=self.first_jump,
             pulled=self.pulled,

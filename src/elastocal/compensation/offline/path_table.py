@@ -1,6 +1,9 @@
-"""Which column of a path holds what (spec section 4, ``PATH.csv``)."""
+"""A programmed path as a table (spec section 4, ``PATH.csv``): columns, and rows in SI units.
 
-from collections.abc import Iterator, Mapping, Sequence
+Rows are read in blocks, so that a path of any length fits into memory.
+"""
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,7 +13,7 @@ from scipy.spatial.transform import Rotation
 
 from elastocal.arrays import FloatArray
 from elastocal.dataset import joint_dimensions
-from elastocal.errors import CompensationError, FileAccessError, UnitError, nearest
+from elastocal.errors import CompensationError, UnitError, nearest
 from elastocal.results import brief_repr
 from elastocal.robot import Robot, T_from_xyzabc
 from elastocal.tables import Column, TableError, TableLayout, TableRows, opened_table
@@ -19,10 +22,11 @@ from elastocal.units import factor, split_column
 _AXES = ("x", "y", "z")
 _EULER = ("a", "b", "c")
 _QUATERNION = ("qx", "qy", "qz", "qw")
-_FORCES = ("force_", "force_tcp_")
-_MOMENTS = ("moment_", "moment_tcp_")
-"""In base axes, and in those of the programmed tcp."""
 _EXAMPLES = {"angle": "deg", "length": "mm", "force": "N", "moment": "N*m"}
+_MOST = 2.0 * np.pi * (1.0 + 1e-6)
+"""In rad; controllers write orientations within half a turn, some within a whole one."""
+_UNIT_NORM = 1e-3
+"""Largest distance of the norm of a quaternion from 1."""
 _Found = Mapping[str, tuple[tuple[int, str | None], ...]]
 
 
@@ -107,7 +111,12 @@ def find_columns(header: Sequence[str], robot: Robot, forces: bool = True) -> Pa
             f"path has both joints ({', '.join(arm)}) and a tcp pose ({', '.join(pose)}): keep one"
         )
     if not arm and not pose:
-        raise PathError(_neither(found, robot))
+        known = ", ".join(f"{name}[…]" for name in robot.joint_names)
+        raise PathError(
+            f"path has neither the joints of {robot.name} ({known}) nor a tcp pose (x[mm] y[mm]"
+            " z[mm] with a[deg] b[deg] c[deg] or qx qy qz qw); its columns are"
+            f" {', '.join(found)}"
+        )
     names = robot.joint_names if arm else tuple(name for name in external if name in found)
     joints = tuple(_column(found, name, dimensions[name]) for name in names)
     if names and not arm and names != external:
@@ -119,18 +128,15 @@ def find_columns(header: Sequence[str], robot: Robot, forces: bool = True) -> Pa
     )
 
 
-def find_wrench_columns(header: Sequence[str]) -> tuple[WrenchColumns, WrenchColumns | None]:
-    """Return the columns of the force, and of the moment if there are any.
+def find_wrench_columns(header: Sequence[str]) -> PathColumns:
+    """Return the columns of the force alone, and of the moment if there are any.
 
     Raises
     ------
     PathError
         As for `find_columns`.
     """
-    force, moment = _wrenches(_split(header), True)
-    if force is None:
-        raise PathError("path has no forces")
-    return force, moment
+    return PathColumns((), (), (), *_wrenches(_split(header), True))
 
 
 def _split(header: Sequence[str]) -> _Found:
@@ -183,13 +189,13 @@ def _orientation(found: _Found) -> tuple[Column, ...]:
 
 
 def _wrenches(found: _Found, forces: bool) -> tuple[WrenchColumns | None, WrenchColumns | None]:
-    force = _wrench(found, "force", _FORCES, forces)
-    return force, _wrench(found, "moment", _MOMENTS, False)
+    force = _wrench(found, "force", forces)
+    return force, _wrench(found, "moment", False)
 
 
-def _wrench(
-    found: _Found, dimension: str, prefixes: tuple[str, str], required: bool
-) -> WrenchColumns | None:
+def _wrench(found: _Found, dimension: str, required: bool) -> WrenchColumns | None:
+    """Return the columns of a force or a moment, in base or in axes of the programmed tcp."""
+    prefixes = (f"{dimension}_", f"{dimension}_tcp_")
     given = [prefix for prefix in prefixes if any(f"{prefix}{axis}" in found for axis in _AXES)]
     in_base, in_tcp = (f"{prefix}x" for prefix in prefixes)
     if len(given) > 1:
@@ -206,21 +212,6 @@ def _wrench(
         return None
     x, y, z = (_column(found, f"{given[0]}{axis}", dimension) for axis in _AXES)
     return WrenchColumns((x, y, z), given[0] == prefixes[1])
-
-
-def _neither(found: _Found, robot: Robot) -> str:
-    joints = ", ".join(f"{name}[…]" for name in robot.joint_names)
-    return (
-        f"path has neither the joints of {robot.name} ({joints}) nor a tcp pose (x[mm] y[mm] z[mm]"
-        f" with a[deg] b[deg] c[deg] or qx qy qz qw); its columns are {', '.join(found)}"
-    )
-
-
-_BLOCK = 1 << 20
-_MOST = 2.0 * np.pi * (1.0 + 1e-6)
-"""In rad; controllers write orientations within half a turn, some within a whole one."""
-_UNIT_NORM = 1e-3
-"""Largest distance of the norm of a quaternion from 1."""
 
 
 def read_layout(path: Path) -> TableLayout:
@@ -263,21 +254,6 @@ def row_blocks(path: Path, layout: TableLayout, size: int) -> Iterator[TableRows
         raise PathError("path has a header but no row")
 
 
-def count_lines(path: Path) -> int:
-    """Return the number of lines of a file, for a progress bar.
-
-    Raises
-    ------
-    FileAccessError
-        If it cannot be read.
-    """
-    try:
-        with Path(path).open("rb") as file:
-            return sum(block.count(b"\n") for block in iter(lambda: file.read(_BLOCK), b""))
-    except OSError as error:
-        raise FileAccessError(f"cannot read {path}: {error.strerror or error}") from error
-
-
 @contextmanager
 def _as_path_errors() -> Iterator[None]:
     """Raise what is wrong with a table as what is wrong with a path."""
@@ -287,19 +263,26 @@ def _as_path_errors() -> Iterator[None]:
         raise PathError(str(error)) from error
 
 
-def beyond_a_turn(angles: FloatArray) -> tuple[int, int] | None:
-    """Return row and column of the first angle of an orientation that is more than a turn.
-
-    >>> beyond_a_turn(np.array([[0.0, 3.1, -6.28], [0.0, 90.0, 0.0]]))
-    (1, 1)
+def require_within_a_turn(angles: FloatArray, name: Callable[[int, int], str]) -> None:
+    """Refuse angles of an orientation beyond a turn, which are degrees that were called radians.
 
     Parameters
     ----------
     angles : ndarray, shape (row, 3)
         In rad.
+    name : callable
+        Names the angle of a row and a column for a person.
+
+    Raises
+    ------
+    PathError
+        If there is one.
     """
-    found = np.argwhere(~(np.abs(angles) <= _MOST))
-    return (int(found[0, 0]), int(found[0, 1])) if len(found) else None
+    for row, k in np.argwhere(~(np.abs(angles) <= _MOST)).tolist():
+        raise PathError(
+            f"{name(row, k)} of {np.degrees(angles[row, k]):.4g} deg is more than a turn: is it in"
+            " degrees?"
+        )
 
 
 @brief_repr
@@ -340,7 +323,13 @@ def read_values(block: TableRows, columns: PathColumns) -> PathValues:
     if columns.by_pose:
         position, orientation = numbers(columns.position), numbers(columns.orientation)
         if len(columns.orientation) == 3:
-            _check_angles(block, columns.orientation, orientation)
+            require_within_a_turn(
+                orientation,
+                lambda row, k: (
+                    f"row {block.lines[row]}, column {columns.orientation[k].header!r}:"
+                    " an orientation"
+                ),
+            )
         pose = _poses(block, position, orientation)
     wrenches = [
         None if each is None else numbers(each.columns) for each in (columns.force, columns.moment)
@@ -367,6 +356,22 @@ def turned_to_base(
     return (T_base_tcp[:, :3, :3] @ vectors[:, :, None])[:, :, 0]
 
 
+def wrench_in_base(
+    values: PathValues, columns: PathColumns, T_base_tcp: FloatArray
+) -> tuple[FloatArray, FloatArray | None]:
+    """Return forces and moments of rows in base axes; see `turned_to_base`.
+
+    Raises
+    ------
+    PathError
+        If there are no forces.
+    """
+    force = turned_to_base(values.force, columns.force, T_base_tcp)
+    if force is None:
+        raise PathError("path has no forces")
+    return force, turned_to_base(values.moment, columns.moment, T_base_tcp)
+
+
 def _finite(cell: str) -> float:
     try:
         value = float(cell)
@@ -375,16 +380,6 @@ def _finite(cell: str) -> float:
     if not np.isfinite(value):
         raise ValueError("is not a finite number")
     return value
-
-
-def _check_angles(block: TableRows, columns: Sequence[Column], angles: FloatArray) -> None:
-    found = beyond_a_turn(angles)
-    if found is not None:
-        row, k = found
-        raise PathError(
-            f"row {block.lines[row]}, column {columns[k].header!r}: an orientation of"
-            f" {np.degrees(angles[row, k]):.4g} deg is more than a turn: is it in degrees?"
-        )
 
 
 def _poses(block: TableRows, position: FloatArray, orientation: FloatArray) -> FloatArray:

@@ -1,4 +1,8 @@
-"""The online compensator: a pure step from state and reading to state and correction."""
+"""The online compensator: a pure step from state and reading to state and correction.
+
+Its first half conditions a raw reading into the filtered wrench on the robot at the tool centre
+point; its second corrects the deflection that the model predicts from that wrench.
+"""
 
 import math
 from collections.abc import Sequence

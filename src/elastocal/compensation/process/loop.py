@@ -3,7 +3,8 @@
 The truth costs milliseconds, so it is asked at the rows of the course only (every 20 or 40 ms, in
 which the forces change by a few percent) and taken as linear in between; readings, correction and
 deviation go at their own rates. A row is asked with the correction of the row before: the robot
-stands at most 0.1 mm elsewhere, by which its compliance changes less than one part in 10^4.
+stands at most 0.1 mm elsewhere, by which its compliance changes less than one part in 10^4. The
+corrector is the online compensator, or one that knows the deflection but is late.
 """
 
 from collections import deque

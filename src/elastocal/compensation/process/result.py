@@ -1,8 +1,16 @@
 """The result of a simulated process: the paper's Table 1 and every point behind it.
 
 Table 1 gives mean, maximum and standard deviation of the absolute deviation, before and after
-correction, and the reduction. In the file ``table.json`` lengths are in m, reductions are shares
-of 1; see `folder`.
+correction, and the reduction. The folder that keeps them has, lengths in m and reductions as shares
+of 1 where no unit is named:
+
+==================  ==============================================================
+``table.json``      the table with what it rests on: `SimulateProcessResult`
+``table.csv``       the same lines for a spreadsheet, in mm and %
+``budget.csv``      the error budget, where it was asked for
+``deviations.csv``  a row a cycle: seed, course, time, place, deviation
+``path.csv``        the programmed path with its expected forces
+==================  ==============================================================
 """
 
 from collections.abc import Mapping, Sequence

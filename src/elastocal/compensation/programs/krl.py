@@ -34,6 +34,22 @@ _LITERAL_AXES = re.compile(r"\{\s*(?:E6AXIS\s*:|AXIS\s*:)?\s*(A1\s[^{}]*)\}", re
 _COMPONENT = re.compile(
     r"\s*([A-Z]\d?)\s+([-+]?(?:\d+\.?\d*|\.\d+)(?:E[-+]?\d+)?)\s*", re.IGNORECASE
 )
+_MOVE = re.compile(
+    r"(S?PTP|S?LIN|S?CIRC|SPL|ASYPTP|(?:S?PTP|S?LIN|S?CIRC|SPL)_REL)\b(?!\s*[=(\[.])\s*(.*)",
+    re.IGNORECASE,
+)
+_TO_NAME = re.compile(
+    r"(\w+)(?:\s+(?:C_DIS|C_VEL|C_ORI|C_PTP|C_SPL)(?:\s+C_\w+)*)?(?:\s+WITH\s.*)?", re.IGNORECASE
+)
+_FRAME = re.compile(r"\$(BASE|TOOL)\s*=\s*(.+)", re.IGNORECASE)
+_BAS = re.compile(r"BAS\s*\(\s*#(BASE|TOOL)\s*,\s*(\d+)\s*\)", re.IGNORECASE)
+_PART = re.compile(r"\$(BASE|TOOL)\s*\.\s*\w+\s*=.*", re.IGNORECASE)
+_IN_TOOL = re.compile(r"\$IPO_MODE\s*=\s*#TCP", re.IGNORECASE)
+_FDAT = re.compile(r"FDAT_ACT\s*=\s*(\w+)", re.IGNORECASE)
+_FDAT_VALUE = re.compile(r"\s*(?:DECL\s+)?(?:GLOBAL\s+)?FDAT\s+(\w+)\s*=\s*\{(.*)\}", re.IGNORECASE)
+_DEF = re.compile(r"(?:GLOBAL\s+)?DEF\s+(\w+)", re.IGNORECASE)
+_ASSIGNED = re.compile(r"(\w+)\s*(?:\.\s*\w+\s*)?=(?!=)", re.IGNORECASE)
+_NUMBERED = {"BASE": "BASE_DATA", "TOOL": "TOOL_DATA"}
 _DECIMALS = {"X": 4, "Y": 4, "Z": 4}
 """Least decimals of a length: 1e-4 mm. A KRL REAL holds seven digits."""
 _DECIMALS_ANGLE = 6
@@ -51,7 +67,7 @@ class _Component:
 
 
 @dataclass(frozen=True)
-class KrlPoint:
+class _KrlPoint:
     """A declared position."""
 
     name: str
@@ -126,7 +142,7 @@ def _code_of(line: str) -> str:
     return match[0].strip() if match else ""
 
 
-def _read_points(lines: Sequence[str]) -> dict[str, KrlPoint]:
+def _read_points(lines: Sequence[str]) -> dict[str, _KrlPoint]:
     """Return the positions that a ``.dat`` file declares with a value, by name in capitals.
 
     Raises
@@ -134,7 +150,7 @@ def _read_points(lines: Sequence[str]) -> dict[str, KrlPoint]:
     PathError
         If one is declared twice, or its value is not a list of components with numbers.
     """
-    points: dict[str, KrlPoint] = {}
+    points: dict[str, _KrlPoint] = {}
     for number, line in enumerate(lines):
         match = _DECLARED.fullmatch(_code_of(line))
         if match is None or match["body"] is None:
@@ -144,55 +160,32 @@ def _read_points(lines: Sequence[str]) -> dict[str, KrlPoint]:
         if name in points:
             raise PathError(f"line {number + 1}: {match[2]} is declared twice")
         components = _components(match["body"], match.start("body") + offset, number, match[2])
-        points[name] = KrlPoint(match[2], match[1].upper(), number, components)
+        points[name] = _KrlPoint(match[2], match[1].upper(), number, components)
     return points
 
 
-def _read_axes(text: str, number: int) -> KrlPoint | None:
+def _read_axes(text: str, number: int) -> _KrlPoint | None:
     """Return axis positions that stand in a motion itself, ``{A1 0.0, …}``; None if it is not such.
 
-    Parameters
-    ----------
-    text : str
-        What the motion goes to.
-    number : int
-        Index of the line, from 0.
-
-    Raises
-    ------
-    PathError
-        If a component is not a name and a number.
+    The line counts from 0.
     """
     match = _LITERAL_AXES.match(text)
     if match is None:
         return None
-    return KrlPoint("", "E6AXIS", number, _components(match[1], 0, number, "the motion"))
+    return _KrlPoint("", "E6AXIS", number, _components(match[1], 0, number, "the motion"))
 
 
-def _replaced(line: str, point: KrlPoint, values: Mapping[str, float]) -> str:
-    """Return a declaration with some numbers _replaced, all else as it stood.
-
-    Parameters
-    ----------
-    line : str
-        The line that ``point`` was read from.
-    point : KrlPoint
-        What it declares.
-    values : mapping of str to float
-        New numbers by component, in mm or deg.
-    """
+def _replaced(line: str, point: _KrlPoint, values: Mapping[str, float]) -> str:
+    """Return a declaration with new numbers (mm or deg), all else as it stood."""
+    # From the end of the line, so that the places before it stay where they were.
     for name in sorted(values, key=lambda name: -point.components[name].start):
         old = point.components[name]
         text = line[old.start : old.end]
-        decimals = max(_DECIMALS.get(name, _DECIMALS_ANGLE), _decimals(text))
+        mantissa = re.split("[eE]", text)[0]
+        decimals = max(_DECIMALS.get(name, _DECIMALS_ANGLE), len(mantissa.partition(".")[2]))
         number = f"{round(values[name], decimals) + 0.0:.{decimals}f}"
         line = f"{line[: old.start]}{number}{line[old.end :]}"
     return line
-
-
-def _decimals(text: str) -> int:
-    mantissa = re.split("[eE]", text)[0]
-    return len(mantissa.partition(".")[2])
 
 
 def _components(body: str, offset: int, number: int, name: str) -> dict[str, _Component]:
@@ -214,24 +207,6 @@ def _components(body: str, offset: int, number: int, name: str) -> dict[str, _Co
     return components
 
 
-_MOVE = re.compile(
-    r"(S?PTP|S?LIN|S?CIRC|SPL|ASYPTP|(?:S?PTP|S?LIN|S?CIRC|SPL)_REL)\b(?!\s*[=(\[.])\s*(.*)",
-    re.IGNORECASE,
-)
-_TO_NAME = re.compile(
-    r"(\w+)(?:\s+(?:C_DIS|C_VEL|C_ORI|C_PTP|C_SPL)(?:\s+C_\w+)*)?(?:\s+WITH\s.*)?", re.IGNORECASE
-)
-_FRAME = re.compile(r"\$(BASE|TOOL)\s*=\s*(.+)", re.IGNORECASE)
-_BAS = re.compile(r"BAS\s*\(\s*#(BASE|TOOL)\s*,\s*(\d+)\s*\)", re.IGNORECASE)
-_PART = re.compile(r"\$(BASE|TOOL)\s*\.\s*\w+\s*=.*", re.IGNORECASE)
-_IN_TOOL = re.compile(r"\$IPO_MODE\s*=\s*#TCP", re.IGNORECASE)
-_FDAT = re.compile(r"FDAT_ACT\s*=\s*(\w+)", re.IGNORECASE)
-_FDAT_VALUE = re.compile(r"\s*(?:DECL\s+)?(?:GLOBAL\s+)?FDAT\s+(\w+)\s*=\s*\{(.*)\}", re.IGNORECASE)
-_DEF = re.compile(r"(?:GLOBAL\s+)?DEF\s+(\w+)", re.IGNORECASE)
-_ASSIGNED = re.compile(r"(\w+)\s*(?:\.\s*\w+\s*)?=(?!=)", re.IGNORECASE)
-_NUMBERED = {"BASE": "BASE_DATA", "TOOL": "TOOL_DATA"}
-
-
 @brief_repr
 @dataclass(frozen=True)
 class KrlProgram:
@@ -242,7 +217,7 @@ class KrlProgram:
     lines: Sequence[str]
     data: Sequence[str]
     """Lines of both files; each character is one byte."""
-    points: Mapping[str, KrlPoint]
+    points: Mapping[str, _KrlPoint]
     moves: tuple[Move, ...]
     base: str
     """Base of the LIN targets, as the program says it; empty when it does not."""
