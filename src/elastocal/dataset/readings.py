@@ -1,7 +1,7 @@
 """Readings: the usable part of a dataset as flat arrays, one row a reading."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -12,6 +12,8 @@ from elastocal.results import brief_repr
 
 _LARGEST = 1e9
 """No SI number of a robot's reading comes near; what does is a damaged file."""
+_NO_NUMBERS = ("pose", "load_case", "sequence", "conditioned")
+"""Fields that are labels or say how all readings were taken."""
 
 
 @brief_repr
@@ -45,13 +47,26 @@ class Readings:
     """Standard deviation of the marker displacement, shape (reading, 3), in m; None: not known."""
     tcp_position: FloatArray | None = None
     """Unloaded TCP position in base, shape (reading, 3), in m; None: not known."""
+    reference_joint_position: FloatArray | None = None
+    """Joint positions when the zero of both displacements was read, shape (reading, joint), in rad
+    or m; None: where the controller displacement at constant orientation began."""
+    reference_force: FloatArray | None = None
+    """Force on the robot at the TCP in base then, shape (reading, 3), in N; None: none."""
+    sequence: IntArray | None = None
+    """Place of each reading in time among those of its pose, shape (reading,); None: their order
+    here."""
+    conditioned: bool = False
+    """Whether each pose's first reading is a press made before the zero was read; else the arm
+    came to the zero by free moves."""
 
     def __post_init__(self) -> None:
         self._own("pose", np.array(self.pose, dtype=np.int64), (len(self.pose),))
         self._own("load_case", np.array(self.load_case, dtype=np.str_), (len(self.pose),))
+        if self.sequence is not None:
+            self._own("sequence", np.array(self.sequence, dtype=np.int64), (len(self.pose),))
         for name, value in self._numbers():
             array = np.array(value, dtype=np.float64)
-            width = array.shape[-1] if name == "joint_position" and array.ndim else 3
+            width = array.shape[-1] if name.endswith("joint_position") and array.ndim else 3
             self._own(name, array, (len(self.pose), width))
             usable = np.abs(array) < _LARGEST
             if not np.all(usable):
@@ -92,12 +107,15 @@ class Readings:
         chosen = np.asarray(index)
         rows = np.arange(len(self))[chosen.astype(np.intp) if chosen.size == 0 else chosen]
         numbers = {name: value[rows] for name, value in self._numbers()}
-        return Readings(self.pose[rows], self.load_case[rows], **numbers)
+        sequence = None if self.sequence is None else self.sequence[rows]
+        return replace(
+            self, pose=self.pose[rows], load_case=self.load_case[rows], sequence=sequence, **numbers
+        )
 
     def _numbers(self) -> Iterator[tuple[str, FloatArray]]:
-        for field in fields(self)[2:]:
+        for field in fields(self):
             value = getattr(self, field.name)
-            if value is not None:
+            if field.name not in _NO_NUMBERS and value is not None:
                 yield field.name, value
 
     def _own(self, name: str, array: np.ndarray, shape: tuple[int, ...]) -> None:

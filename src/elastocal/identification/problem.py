@@ -19,6 +19,7 @@ from elastocal.dataset import Readings
 from elastocal.elastic import ElasticModel, Parameter
 from elastocal.errors import IdentificationError
 from elastocal.identification._least_squares import RANK_TOLERANCE
+from elastocal.identification.displacement import displacement_blocks
 from elastocal.identification.options import FitOptions, Prior, bounds
 from elastocal.results import brief_repr
 
@@ -175,12 +176,10 @@ def build(
         If there are too few poses, impossible bounds, or weights without sigmas.
     """
     options = options or FitOptions()
-    q, force = readings.joint_position, readings.force
-    blocks = model.observation_blocks(q, force, readings.moment, marker_offset)
     natural = [parameter.lower for parameter in model.parameters]
     lower, upper = bounds(options, len(natural), natural)
     return Problem(
-        O=blocks,
+        O=displacement_blocks(model, readings, marker_offset),
         d=np.array(readings.deflection),
         weight=_weights(readings, options),
         block=pose_blocks(readings),

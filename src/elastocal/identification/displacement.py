@@ -1,0 +1,129 @@
+"""What the readings show: a displacement between a reference and a loaded state of the arm.
+
+Both displacements of a reading count from a reference that was read some millimetres away, so
+their difference is not the deflection at the loaded joints alone: the arm's own weight bends it
+differently at the two. With the sag ``S c`` (`ElasticModel.sag_blocks`) a reading shows
+
+    d = (O(q, f) + S(q) - S(q_0) - O(q_0, f_0)) c
+
+at loaded joints ``q`` and reference joints ``q_0``, the last term where the reference itself was
+loaded. Friction remembers: its elements are run over what the arm felt at the pose, in order in
+time, from a state that a free motion has worn off.
+"""
+
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from elastocal.arrays import FloatArray, IndexArray
+from elastocal.dataset import Readings
+from elastocal.elastic import ElasticModel
+from elastocal.robot import Robot
+
+_ROUNDS = 3
+"""Newton steps to the reference; each squares the error of some millimetres."""
+_DAMPING = 1e-6
+"""Part of the largest singular value below which a direction is not followed: a wrist in line."""
+_ARM_JOINTS = 6
+
+
+def displacement_blocks(
+    model: ElasticModel, readings: Readings, marker_offset: ArrayLike | None = None
+) -> FloatArray:
+    """Return the rows that times ``c`` are what each reading shows as its deflection.
+
+    Parameters
+    ----------
+    model : ElasticModel
+        Robot and springs.
+    readings : Readings
+        With joints in the robot's order.
+    marker_offset : array_like, shape (3,), optional
+        Marker in the tcp frame, in m; see `ElasticModel.observation_blocks`.
+
+    Returns
+    -------
+    ndarray, shape (reading, 3, parameter)
+        In m per unit of each parameter.
+    """
+    q, q_0 = readings.joint_position, reference_joints(model.robot, readings)
+    loaded, reference = None, None
+    if len(model.friction):
+        loaded, reference = friction_states(model, readings, q_0)
+    rows = model.observation_blocks(q, readings.force, readings.moment, marker_offset, loaded)
+    rows = rows + model.sag_blocks(q, marker_offset) - model.sag_blocks(q_0, marker_offset)
+    if readings.reference_force is None and reference is None:
+        return rows
+    force = np.zeros_like(readings.force)
+    if readings.reference_force is not None:
+        force = readings.reference_force
+    return rows - model.observation_blocks(q_0, force, None, marker_offset, reference)
+
+
+def reference_joints(robot: Robot, readings: Readings) -> FloatArray:
+    """Return where the zero of both displacements was read, shape (reading, joint), in rad or m.
+
+    As recorded; else where the controller displacement began, the orientation being kept, the
+    external axes standing still.
+    """
+    if readings.reference_joint_position is not None:
+        return readings.reference_joint_position
+    q = readings.joint_position.copy()
+    here = robot.forward(q)
+    goal = here[:, :3, 3] - readings.controller_displacement
+    moving = slice(max(0, q.shape[1] - _ARM_JOINTS), None)
+    for _ in range(_ROUNDS):
+        now, J = robot.forward(q), robot.jacobian(q)
+        turn = np.cross(now[:, :3, :3], here[:, :3, :3], axis=1).sum(axis=2) / 2.0
+        error = np.concatenate([goal - now[:, :3, 3], turn], axis=1)
+        jacobian = np.concatenate([J.translation, J.rotation], axis=1)[:, :, moving]
+        q[:, moving] += (np.linalg.pinv(jacobian, rcond=_DAMPING) @ error[..., None])[..., 0]
+    return q
+
+
+def friction_states(
+    model: ElasticModel, readings: Readings, q_0: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return what each friction element bears under load, and when the zero was read.
+
+    Parameters
+    ----------
+    model : ElasticModel
+        Robot and springs.
+    readings : Readings
+        Those of a pose are taken to be all that the arm felt there.
+    q_0 : ndarray, shape (reading, joint)
+        From `reference_joints`.
+
+    Returns
+    -------
+    loaded, reference : ndarray, shape (reading, element)
+        In N·m.
+    """
+    q, rest = readings.joint_position, np.zeros((len(readings), 3))
+    lightly = rest if readings.reference_force is None else readings.reference_force
+    total = model.load_torques(q, readings.force, readings.moment) + model.weight_torques(q)
+    zero = model.load_torques(q_0, lightly) + model.weight_torques(q_0)
+    free = model.weight_torques(q_0)
+    loaded = np.zeros((len(readings), len(model.friction)))
+    reference = np.zeros_like(loaded)
+    for rows in _visits(readings):
+        first = rows[:1]
+        if readings.conditioned:
+            # Free, pressed, then lightly loaded: there the zero was read.
+            way = np.concatenate([free[first], total[first], zero[first], total[rows[1:]]])
+            states = model.friction.path(way)
+            loaded[rows], reference[rows] = np.delete(states[1:], 1, axis=0), states[2]
+        else:
+            states = model.friction.path(np.concatenate([free[first], zero[first], total[rows]]))
+            loaded[rows], reference[rows] = states[2:], states[1]
+    return loaded, reference
+
+
+def _visits(readings: Readings) -> Iterator[IndexArray]:
+    """Yield the readings of each pose, in order in time."""
+    order = np.arange(len(readings)) if readings.sequence is None else readings.sequence
+    for pose in np.unique(readings.pose):
+        rows = np.flatnonzero(readings.pose == pose)
+        yield rows[np.argsort(order[rows], kind="stable")]
