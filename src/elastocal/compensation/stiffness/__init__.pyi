@@ -20,6 +20,5 @@ from .survey import (
     cell_constraints as cell_constraints,
     joint_limit_constraint as joint_limit_constraint,
     read_stations as read_stations,
-    require_same_robot as require_same_robot,
     survey_postures as survey_postures,
 )
