@@ -3,11 +3,7 @@
 import numpy as np
 import pytest
 
-from elastocal.compensation.offline import (
-    PathError,
-    joints_along_path,
-)
-from elastocal.compensation.stiffness import (
+from elastocal.compensation import (
     PostureConstraint,
     PostureGrid,
     cell_constraints,
@@ -17,6 +13,10 @@ from elastocal.compensation.stiffness import (
     principal_stiffness,
     read_stations,
     survey_postures,
+)
+from elastocal.compensation.offline import (
+    PathError,
+    joints_along_path,
 )
 from elastocal.identification import CalibratedModel
 from elastocal.robot import Robot
