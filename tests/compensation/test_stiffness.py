@@ -3,11 +3,7 @@
 import numpy as np
 import pytest
 
-from elastocal.compensation.offline import (
-    PathError,
-    joints_along_path,
-)
-from elastocal.compensation.stiffness import (
+from elastocal.compensation import (
     PostureConstraint,
     PostureGrid,
     cell_constraints,
@@ -18,6 +14,10 @@ from elastocal.compensation.stiffness import (
     read_stations,
     require_same_robot,
     survey_postures,
+)
+from elastocal.compensation.offline import (
+    PathError,
+    joints_along_path,
 )
 from elastocal.errors import RobotError
 from elastocal.identification import CalibratedModel

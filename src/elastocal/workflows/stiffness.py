@@ -11,8 +11,7 @@ import numpy as np
 
 from elastocal.arrays import FloatArray
 from elastocal.cell import load_cell
-from elastocal.compensation.offline import PathError, posture_jumps
-from elastocal.compensation.stiffness import (
+from elastocal.compensation import (
     PathPostures,
     PathStations,
     PostureChoice,
@@ -28,6 +27,7 @@ from elastocal.compensation.stiffness import (
     write_choice,
     write_survey,
 )
+from elastocal.compensation.offline import PathError, posture_jumps
 from elastocal.files import filling
 from elastocal.identification import CalibratedModel, read_model
 from elastocal.progress import Progress
