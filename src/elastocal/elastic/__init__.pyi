@@ -6,16 +6,23 @@ from .layouts import (
     SpringFile as SpringFile,
     actuated as actuated,
     bearing as bearing,
+    bearing_joint as bearing_joint,
     custom as custom,
     layout as layout,
     orthogonal_axes as orthogonal_axes,
     read_springs as read_springs,
+    tensor as tensor,
 )
 from .model import (
     CartesianCompliance as CartesianCompliance,
     ElasticModel as ElasticModel,
     check_vectors as check_vectors,
     spring_torques as spring_torques,
+)
+from .origins import (
+    PARALLEL as PARALLEL,
+    JointOrigin as JointOrigin,
+    joint_origins as joint_origins,
 )
 from .springs import (
     KINDS as KINDS,

@@ -19,7 +19,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 from pydantic import BeforeValidator, Field
 
-from elastocal.elastic.springs import KINDS, Hinge, Spring, SpringAxis, as_axis, axial
+from elastocal.elastic.origins import joint_origins
+from elastocal.elastic.springs import KINDS, Hinge, Spring, SpringAxis, Tensor, as_axis, axial
 from elastocal.errors import SpringError, nearest
 from elastocal.records import StrictModel, read_yaml
 from elastocal.robot import ChainJoint, Robot
@@ -40,11 +41,26 @@ def actuated(robot: Robot) -> tuple[Spring, ...]:
     return tuple(axial(joint) for joint in robot.chain.joints)
 
 
-def bearing(robot: Robot, distal: bool = False) -> tuple[Spring, ...]:
+def bearing(robot: Robot) -> tuple[Spring, ...]:
     """Return the paper's lumped kinetostatic model (section 4.1; 18 springs on a 6R arm).
 
     Order: all axial springs, then the virtual ones joint by joint, the paper's
-    ``[c_a; c_v]`` of Eq. 11.
+    ``[c_a; c_v]`` of Eq. 11. The virtual ones sit at the Hartenberg-Denavit origins
+    (`elastocal.elastic.origins`), so that they do not depend on where a joint's frame is drawn.
+    """
+    virtual = (
+        Hinge(f"{joint.name}.{name}", joint.name, axis, offset=origin.offset)
+        for joint, origin in zip(robot.chain.joints, joint_origins(robot.chain), strict=True)
+        for name, axis in origin.directions.items()
+    )
+    return (*actuated(robot), *virtual)
+
+
+def bearing_joint(robot: Robot, distal: bool = False) -> tuple[Spring, ...]:
+    """Return the same with the virtual springs at the origins of the URDF's joint frames.
+
+    Their directions are the coordinate axes of those frames; the answer depends on how the URDF
+    was drawn.
 
     Parameters
     ----------
@@ -59,6 +75,17 @@ def bearing(robot: Robot, distal: bool = False) -> tuple[Spring, ...]:
         for name, axis in orthogonal_axes(joint.axis).items()
     )
     return (*actuated(robot), *virtual)
+
+
+def tensor(robot: Robot) -> tuple[Spring, ...]:
+    """Return a symmetric compliance tensor at every joint, at its Hartenberg-Denavit origin.
+
+    What 18 springs of any directions can express and more: bearings that tilt about axes which
+    are not the frame's. Joints that slide have a linear spring as well, first.
+    """
+    pairs = list(zip(robot.chain.joints, joint_origins(robot.chain), strict=True))
+    sliding = tuple(axial(joint) for joint, _ in pairs if not joint.revolute)
+    return (*sliding, *(Tensor(f"{j.name}.tensor", j.name, origin.offset) for j, origin in pairs))
 
 
 def orthogonal_axes(axis: ArrayLike) -> dict[str, tuple[float, float, float]]:
@@ -92,6 +119,8 @@ def orthogonal_axes(axis: ArrayLike) -> dict[str, tuple[float, float, float]]:
 LAYOUTS: dict[str, Callable[[Robot], tuple[Spring, ...]]] = {
     "actuated": actuated,
     "bearing": bearing,
+    "bearing-joint": bearing_joint,
+    "tensor": tensor,
 }
 """Layouts by name."""
 

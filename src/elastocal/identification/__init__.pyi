@@ -14,8 +14,22 @@ from .conventions import (
     POOR as POOR,
     check_conventions as check_conventions,
 )
+from .displacement import (
+    displacement_blocks as displacement_blocks,
+    friction_states as friction_states,
+    reference_joints as reference_joints,
+)
 from .joint_check import (
     check_joints as check_joints,
+)
+from .ladder import (
+    RUNGS as RUNGS,
+    Climbed as Climbed,
+    Rung as Rung,
+    climb as climb,
+    find_rung as find_rung,
+    gears as gears,
+    has_levels as has_levels,
 )
 from .model_file import (
     CalibrateResult as CalibrateResult,

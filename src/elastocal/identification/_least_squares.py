@@ -61,9 +61,8 @@ def minimise(
     if np.all((lower <= x) & (x <= upper)):
         return np.asarray(x)
     A = s[:, None] * Vt
-    # Moved to the lower bound the problem is a non-negative one, which `nnls` solves at once.
-    if np.all(np.isfinite(lower)) and np.all(np.isposinf(upper)):
-        return lower + _nonnegative(A, y - A @ lower)
+    if np.all(np.isposinf(upper)):
+        return _bounded_below(A, y, lower)
     return _boxed(A, y, lower, upper)
 
 
@@ -86,6 +85,25 @@ def kkt_violation(
     excess = np.where(x >= upper, np.maximum(excess, 0.0), excess)
     reference = float(np.linalg.norm(Vt.T @ (s * y)))
     return float(np.abs(excess).max() / reference) if reference > 0.0 else 0.0
+
+
+def _bounded_below(A: FloatArray, y: FloatArray, lower: FloatArray) -> FloatArray:
+    """Return the minimum with bounds from below, minus infinity where there is none."""
+    bounded = np.isfinite(lower)
+    # Moved to the lower bound the problem is a non-negative one, which `nnls` solves at once, in
+    # what the free variables cannot explain.
+    x = np.where(bounded, lower, 0.0)
+    rest = y - A @ x
+    Q, R = np.linalg.qr(A[:, ~bounded])
+    A_bounded = A[:, bounded]
+    if Q.size:
+        projected = A_bounded - Q @ (Q.T @ A_bounded)
+        step = _nonnegative(projected, rest - Q @ (Q.T @ rest))
+        x[~bounded] = np.linalg.solve(R, Q.T @ (rest - A_bounded @ step))
+    else:
+        step = _nonnegative(A_bounded, rest)
+    x[bounded] += step
+    return x
 
 
 def _nonnegative(A: FloatArray, y: FloatArray) -> FloatArray:

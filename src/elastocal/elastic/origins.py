@@ -1,0 +1,117 @@
+"""Where the virtual springs of a joint sit: its Hartenberg-Denavit origin (paper Eq. 2).
+
+The origin of a joint is where the common normal with the axis before it meets its own axis (J.
+Angeles, *Fundamentals of Robotic Mechanical Systems*, 2014, section 4.2). It belongs to the two
+axes, not to the frame that somebody drew: sliding a URDF's joint frame along its own axis, or
+turning it about it, moves nothing. Special cases:
+
+* parallel axes have many common normals: the one through the previous origin counts. Axes are
+  taken as parallel up to `PARALLEL`, beyond which a calibrated arm's nearly parallel axes would
+  meet kilometres away;
+* the first axis has none before it: the foot of the base's origin on it, and the base's axes;
+* a prismatic joint has a direction and no place: the axes on its two sides are neighbours, at
+  the position zero of the joint.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from elastocal.arrays import FloatArray
+from elastocal.elastic.springs import as_axis
+from elastocal.results import brief_repr
+from elastocal.robot import SerialChain
+
+PARALLEL = 1e-2
+"""Angle in rad below which two axes count as parallel."""
+_SAME_AXIS = 1e-6
+"""Distance in m below which two parallel axes count as one line."""
+_ALIGNED = 1.0 - 1e-9
+"""Cosine above which a direction counts as a coordinate axis."""
+
+Triple = tuple[float, float, float]
+
+
+@brief_repr
+@dataclass(frozen=True)
+class JointOrigin:
+    """Origin of a joint and the directions of its virtual springs, in the joint's frame."""
+
+    offset: Triple
+    """The origin in the joint's proximal frame, in m."""
+    directions: dict[str, Triple]
+    """Unit vectors orthogonal to the joint axis by name: the common normal, and the direction
+    orthogonal to it. Named after the frame's coordinate axes where they are those, else
+    ``normal`` and ``binormal``."""
+
+
+def joint_origins(chain: SerialChain) -> tuple[JointOrigin, ...]:
+    """Return the Hartenberg-Denavit origin of every joint of a chain."""
+    return tuple(_origins(chain))
+
+
+def _origins(chain: SerialChain) -> Iterator[JointOrigin]:
+    T_base_joint = np.eye(4)
+    before: tuple[FloatArray, FloatArray] | None = None
+    for joint in chain.joints:
+        T_base_joint = T_base_joint @ joint.placement
+        R, drawn = T_base_joint[:3, :3], T_base_joint[:3, 3]
+        axis = R @ joint.axis
+        origin, normal = _meeting(axis, drawn, before)
+        yield JointOrigin(
+            _triple(R.T @ (origin - drawn)),
+            _named(R.T @ normal, R.T @ np.cross(axis, normal)),
+        )
+        if joint.revolute:
+            before = axis, origin
+
+
+def _meeting(
+    axis: FloatArray, point: FloatArray, before: tuple[FloatArray, FloatArray] | None
+) -> tuple[FloatArray, FloatArray]:
+    """Return the origin on an axis through a point, and the unit normal there, in base."""
+    if before is None:
+        return _foot(np.zeros(3), axis, point), _transverse(axis)
+    previous, start = before
+    across = np.cross(previous, axis)
+    sine = float(np.linalg.norm(across))
+    if sine > PARALLEL:
+        # Where the plane of the previous axis and the common normal cuts the axis.
+        along = np.cross(previous, across) / sine**2 @ (point - start)
+        return point - along / float(np.cross(previous, across) / sine**2 @ axis) * axis, (
+            across / sine
+        )
+    origin = _foot(start, axis, point)
+    normal = origin - start
+    distance = float(np.linalg.norm(normal))
+    return origin, normal / distance if distance > _SAME_AXIS else _transverse(axis)
+
+
+def _foot(of: FloatArray, axis: FloatArray, point: FloatArray) -> FloatArray:
+    """Return the point of a line that is nearest to a point."""
+    return np.asarray(point + axis * float(axis @ (of - point)))
+
+
+def _transverse(axis: FloatArray) -> FloatArray:
+    """Return the base's coordinate axis least aligned with an axis, made orthogonal to it."""
+    least = np.eye(3)[int(np.argmin(np.round(np.abs(axis), 9)))]
+    normal = least - axis * float(axis @ least)
+    return np.asarray(normal / np.linalg.norm(normal))
+
+
+def _named(normal: FloatArray, binormal: FloatArray) -> dict[str, Triple]:
+    """Return two directions by name, coordinate axes in their order and positive."""
+    found = []
+    for name, direction in (("normal", normal), ("binormal", binormal)):
+        along = int(np.argmax(np.abs(direction)))
+        plain = abs(direction[along]) >= _ALIGNED
+        found.append(("xyz"[along], _triple(np.eye(3)[along])) if plain else (name, direction))
+    pairs = sorted(found, key=lambda pair: pair[0]) if found[0][0] in "xyz" else found
+    return {name: as_axis(direction) for name, direction in pairs}
+
+
+def _triple(vector: FloatArray) -> Triple:
+    # A picometre is a rounding, and a zero has no sign.
+    x, y, z = (float(round(value, 12)) + 0.0 for value in vector)
+    return x, y, z

@@ -1,0 +1,233 @@
+"""A ladder of spring models, from few springs to gears that remember, and how high to climb.
+
+More springs always fit better; whether they predict better is seen at poses that a refit has not
+seen, and at a low load that it has not seen, where there is one. (A refit without the full load
+would have to extrapolate, which no rung is asked to.) The rung taken is the simplest that is not
+worse than the best by a paired 95 % interval. Refits without one pose each share nearly all their
+poses, so that their errors are not independent; the interval counts that by the corrected
+resampled t-test (C. Nadeau, Y. Bengio, "Inference for the generalization error", Machine Learning
+52, 2003): the variance of a mean over ``J`` test sets is ``s^2 (1 / J + n_test / n_train)``.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.special import stdtrit
+
+from elastocal.arrays import BoolArray, FloatArray, IndexArray
+from elastocal.dataset import Readings
+from elastocal.elastic import ElasticModel, Gear, Spring, actuated, bearing, tensor
+from elastocal.errors import IdentificationError, nearest
+from elastocal.identification.options import FitOptions
+from elastocal.identification.problem import Problem, build
+from elastocal.identification.refits import PoseGrams
+from elastocal.identification.uncertainty import CONFIDENCE, HeldOut, leave_poses_out
+from elastocal.results import brief_repr
+from elastocal.robot import Robot
+
+KNEES = (0.3, 1.0, 3.0)
+"""Knees of the gears, in typical load torques of the joint: one below, at and above it."""
+SLIPS = (0.03, 0.1, 0.3)
+"""Limits of the friction elements, likewise: from what barely matters to what reverses a press."""
+_LOADED = 0.01
+"""Part of the largest typical torque below which a joint counts as never loaded."""
+_LOW_LEVEL = 0.6
+"""A load case is of low load below this part of the largest force at its pose."""
+
+
+@dataclass(frozen=True)
+class Rung:
+    """A model of the ladder."""
+
+    name: str
+    springs: Callable[[Robot, Readings], tuple[Spring, ...]]
+    """Makes its springs for a robot, scaled to the loads of the readings."""
+    needs_levels: bool = False
+    """Whether it needs load cases of low and full load."""
+
+
+@brief_repr
+@dataclass(frozen=True, eq=False)
+class Climbed:
+    """A rung that was tried."""
+
+    name: str
+    model: ElasticModel
+    held_out: HeldOut
+    """Errors at left-out poses."""
+    score: FloatArray
+    """Mean error of each pose block, its low load left out too, shape (block,), in m."""
+    difference: float
+    """Mean score minus that of the best rung, in m."""
+    low: float
+    """Lower end of its 95 % interval, in m."""
+    high: float
+    """Upper end, in m."""
+    chosen: bool = False
+
+
+def gears(robot: Robot, readings: Readings, slips: tuple[float, ...] = ()) -> tuple[Spring, ...]:
+    """Return the bearing layout with gears for axial springs.
+
+    Parameters
+    ----------
+    robot : Robot
+        The robot; joints that slide keep linear springs.
+    readings : Readings
+        Their median torque about each joint scales its gear; joints that they do not load keep
+        linear springs.
+    slips : tuple of float
+        Limits of friction elements, in that torque; none without.
+    """
+    springs = bearing(robot)
+    model = ElasticModel(robot, actuated(robot))
+    torque = model.load_torques(readings.joint_position, readings.force, readings.moment)
+    typical = dict(zip(robot.joint_names, np.median(np.abs(torque), axis=0), strict=True))
+    least = _LOADED * max(typical.values())
+
+    def geared(spring: Spring, axial: bool) -> Spring:
+        axis = spring.axes[0]
+        size = float(typical[spring.joint])
+        if not (axial and axis.revolute and size > least):
+            return spring
+        knees = tuple(_rounded(size * part) for part in KNEES)
+        limits = tuple(_rounded(size * part) for part in slips)
+        return Gear(spring.name, spring.joint, axis.axis, knees=knees, slips=limits)
+
+    count = len(robot.joint_names)
+    return tuple(geared(spring, index < count) for index, spring in enumerate(springs))
+
+
+RUNGS: dict[str, Rung] = {
+    rung.name: rung
+    for rung in (
+        Rung("actuated", lambda robot, _: actuated(robot)),
+        Rung("bearing", lambda robot, _: bearing(robot)),
+        Rung("tensor", lambda robot, _: tensor(robot)),
+        Rung("gears", gears),
+        Rung(
+            "gears+friction",
+            lambda robot, readings: gears(robot, readings, SLIPS),
+            needs_levels=True,
+        ),
+    )
+}
+"""Rungs by name, the simplest first."""
+
+
+def climb(
+    robot: Robot,
+    readings: Readings,
+    options: FitOptions,
+    marker_offset: ArrayLike | None = None,
+    rungs: tuple[str, ...] = tuple(RUNGS),
+) -> tuple[Climbed, ...]:
+    """Return the rungs that the readings allow, one of them chosen.
+
+    Parameters
+    ----------
+    robot : Robot
+        The robot.
+    readings : Readings
+        Without blunders: they would decide.
+    options : FitOptions
+        Bounds, weights; a prior speaks of one model and is left out.
+    marker_offset : array_like, shape (3,), optional
+        Marker in the tcp frame, in m.
+    rungs : tuple of str
+        Names of the rungs to try.
+
+    Raises
+    ------
+    IdentificationError
+        If a rung is unknown, or none can be fitted.
+    """
+    options, several = replace(options, prior=None), has_levels(readings)
+    tried = [
+        _tried(rung, robot, readings, options, marker_offset)
+        for rung in map(find_rung, rungs)
+        if several or not rung.needs_levels
+    ]
+    if not tried:
+        raise IdentificationError(
+            f"rungs {', '.join(rungs)} need load cases of low load: none has less than"
+            f" {_LOW_LEVEL:.0%} of the largest force at its pose"
+        )
+    best = min(tried, key=lambda each: float(each.score.mean()))
+    compared = [_against(each, best) for each in tried]
+    chosen = next(index for index, each in enumerate(compared) if each.low <= 0.0)
+    compared[chosen] = replace(compared[chosen], chosen=True)
+    return tuple(compared)
+
+
+def find_rung(name: str) -> Rung:
+    """Return a rung by name.
+
+    Raises
+    ------
+    IdentificationError
+        If there is none, with those that there are.
+    """
+    if name not in RUNGS:
+        raise IdentificationError(
+            f"unknown rung {name!r}{nearest(name, RUNGS)} (allowed: {', '.join(RUNGS)})"
+        )
+    return RUNGS[name]
+
+
+def has_levels(readings: Readings) -> bool:
+    """Return whether load cases of low load stand beside those of full load."""
+    low = load_levels(readings) == 0
+    return bool(np.any(low) and not np.all(low))
+
+
+def load_levels(readings: Readings) -> IndexArray:
+    """Return 0 for readings of low load, 1 for those of full load, shape (reading,)."""
+    force = np.linalg.norm(readings.force, axis=1)
+    labels, pose = np.unique(readings.pose, return_inverse=True)
+    largest = np.zeros(len(labels))
+    np.maximum.at(largest, pose, force)
+    return np.asarray(force >= _LOW_LEVEL * largest[pose], dtype=np.intp)
+
+
+def _tried(
+    rung: Rung,
+    robot: Robot,
+    readings: Readings,
+    options: FitOptions,
+    marker_offset: ArrayLike | None,
+) -> Climbed:
+    model = ElasticModel(robot, rung.springs(robot, readings))
+    problem = build(model, readings, options, marker_offset)
+    held_out = leave_poses_out(problem)
+    error = held_out.error.copy()
+    low = load_levels(readings) == 0
+    if has_levels(readings):
+        error[low] = 0.5 * (error[low] + _left_out(problem, low))
+    blocks, index = np.unique(problem.block, return_inverse=True)
+    score = np.bincount(index, error, len(blocks)) / np.bincount(index, minlength=len(blocks))
+    return Climbed(rung.name, model, held_out, score, 0.0, 0.0, 0.0)
+
+
+def _left_out(problem: Problem, rows: BoolArray) -> FloatArray:
+    """Return the errors of some readings under a refit to the others, shape (row,), in m."""
+    rest = PoseGrams.of(problem.take(~rows))
+    compliance = rest.refit(np.ones((1, len(rest.gram))))[0]
+    return np.asarray(np.linalg.norm(problem.take(rows).residuals(compliance), axis=1))
+
+
+def _against(rung: Climbed, best: Climbed) -> Climbed:
+    """Return the rung with its difference from the best, and the interval of that."""
+    difference = rung.score - best.score
+    count = len(difference)
+    spread = float(difference.std(ddof=1)) * np.sqrt(1.0 / count + 1.0 / (count - 1))
+    reach = float(stdtrit(count - 1, 0.5 * (1.0 + CONFIDENCE))) * spread
+    mean = float(difference.mean())
+    return replace(rung, difference=mean, low=mean - reach, high=mean + reach)
+
+
+def _rounded(torque: float) -> float:
+    """Return a torque of two digits, which is all that its choice deserves."""
+    return float(f"{torque:.2g}")
