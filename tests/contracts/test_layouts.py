@@ -11,7 +11,7 @@ from elastocal.elastic import (
     Spring,
     SpringEntry,
     axial,
-    bearing,
+    bearing_joint,
     custom,
 )
 from elastocal.robot import Robot
@@ -35,7 +35,9 @@ def everything(robot: Robot) -> tuple[Spring, ...]:
     return (*LAYOUTS["actuated"](robot), *custom(robot, entries))
 
 
-CASES = {**LAYOUTS, "bearing, distal": partial(bearing, distal=True), "custom": everything}
+HINGED = {name: each for name, each in LAYOUTS.items() if name != "tensor"}
+"""Layouts of springs with one axis each; tensors are tried with the kinds of springs."""
+CASES = {**HINGED, "bearing-joint, distal": partial(bearing_joint, distal=True), "custom": everything}
 
 
 @cache

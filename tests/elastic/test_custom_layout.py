@@ -78,7 +78,7 @@ def test_an_axial_spring_takes_the_kind_of_its_joint(tmp_path):
         ("springs: [{joint: joint_6, offset: [1, 2, 3]}]", "1 is not a length with its unit"),
         ("springs: [{joint: joint_6, offset: [1 mm, 2 N, 3 mm]}]", "'N' is not a length"),
         ("springs: [{joint: joint_6, axis: [.nan, 0, 1]}]", "axis"),
-        ("include: bearings", "'bearing', got 'bearings'"),
+        ("include: bearings", "'bearing', .*got 'bearings'"),
         ("springs: 3", "springs"),
         ("1: 2", "1"),
     ],

@@ -23,7 +23,7 @@ def golden():
 @pytest.fixture(scope="module")
 def model():
     robot = Robot.from_file(GOLDEN / "golden_6r.urdf", "tcp")
-    return ElasticModel(robot, layout(robot, "bearing"))
+    return ElasticModel(robot, layout(robot, "bearing-joint"))
 
 
 def agree(found, expected):

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from elastocal.dataset import Readings
-from elastocal.elastic import ElasticModel, bearing, layout
+from elastocal.elastic import ElasticModel, bearing_joint, layout
 from elastocal.identification import (
     FitOptions,
     Prior,
@@ -53,14 +53,14 @@ def golden(make):
 
 @needs_shared
 def test_golden_6r_shows_fourteen_of_eighteen_and_names_the_rest():
-    found = golden(bearing)
+    found = golden(bearing_joint)
     assert (found.rank, found.springs) == (14, 18)
     assert [describe(group) for group in found.unobservable] == WRIST
 
 
 @needs_shared
 def test_golden_6r_shows_thirteen_with_distal_frames():
-    found = golden(partial(bearing, distal=True))
+    found = golden(partial(bearing_joint, distal=True))
     assert found.rank == 13
     assert len(found.unobservable) == 5
 
