@@ -63,6 +63,7 @@ class SurfacePoints(Rows):
     """Weights of the face's corners, shape (point, 3)."""
 
 
+@brief_repr
 @dataclass(frozen=True, eq=False)
 class Edges:
     """The edges of a mesh. Half-edge ``3 f + k`` runs from corner k of face f to the next one."""
