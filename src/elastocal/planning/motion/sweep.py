@@ -178,7 +178,9 @@ def _corners_by_joint(robot: Robot, tool: tuple[Body, ...]) -> list[FloatArray]:
                 _placed(box_corners(body.geometry), placement.homogeneous)
             )
     for part in tool:
-        corners[-1].append(_placed(part.solid.corners, robot.chain.T_last_tip @ part.T_frame_body))
+        corners[-1].append(
+            _placed(box_corners(part.solid.geometry), robot.chain.T_last_tip @ part.T_frame_body)
+        )
     return [np.concatenate(parts) for parts in corners]
 
 

@@ -7,8 +7,12 @@ from pathlib import Path
 import numpy as np
 
 from elastocal.arrays import FloatArray
-from elastocal.compensation.stiffness.directional import directional_stiffness, principal_stiffness
-from elastocal.compensation.stiffness.survey import PathStations, PostureSurvey
+from elastocal.compensation.posture_survey import (
+    PathStations,
+    PostureSurvey,
+    directional_stiffness,
+    principal_stiffness,
+)
 from elastocal.identification import CalibratedModel
 from elastocal.results import brief_repr
 from elastocal.robot import Robot
@@ -106,7 +110,7 @@ def write_survey(path: Path, robot: Robot, stations: PathStations, survey: Postu
         held = _shown(robot, externals[place])
         arm = _shown(robot, q)[robot.external_axes :]
         line = str(stations.lines[station])
-        rows.append([line, _number(float(np.degrees(spins[spin]))), *held, _number(k), *arm])
+        rows.append([line, _cell(float(np.degrees(spins[spin]))), *held, _cell(k), *arm])
     write_table(path, header, rows)
     return path
 
@@ -146,10 +150,10 @@ def write_choice(
             rows.append(
                 [
                     *(postures.name, str(stations.lines[station])),
-                    _number(np.degrees(postures.spin[station])),
+                    _cell(np.degrees(postures.spin[station])),
                     *_shown(robot, postures.q[station]),
-                    *map(_number, numbers),
-                    *map(_number, shape.axes[place].T.ravel()),
+                    *map(_cell, numbers),
+                    *map(_cell, shape.axes[place].T.ravel()),
                 ]
             )
     write_table(path, header, rows)
@@ -167,8 +171,8 @@ def _header(robot: Robot, name: str) -> str:
 def _shown(robot: Robot, q: FloatArray) -> list[str]:
     """Return positions of the robot's first joints in deg or mm."""
     scale = np.where(robot.revolute, 180.0 / np.pi, 1e3)[: len(q)]
-    return [_number(value) for value in (q * scale).tolist()]
+    return [_cell(value) for value in (q * scale).tolist()]
 
 
-def _number(value: float) -> str:
+def _cell(value: float) -> str:
     return "" if np.isnan(value) else f"{value:.9g}"

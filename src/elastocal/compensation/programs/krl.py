@@ -4,26 +4,36 @@ What is not understood is refused by line. A correction changes numbers in the `
 ``.src`` file and all other bytes stay as they were.
 """
 
+import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import ClassVar
 
+import numpy as np
+
+from elastocal.arrays import FloatArray
 from elastocal.compensation.offline import PathError, in_file
-from elastocal.compensation.programs.krl._points import (
-    KrlPoint,
-    code_of,
-    read_axes,
-    read_lines,
-    read_points,
-    replaced,
-)
 from elastocal.compensation.programs.program import CorrectedPoint, Move, Words
 from elastocal.errors import FileAccessError
 from elastocal.files import replacing
 from elastocal.results import brief_repr
+from elastocal.robot import T_from_xyzabc
 
+_CODE = re.compile(r'(?:"[^"]*"|[^";])*')
+_AXIS_KINDS = ("E6AXIS", "AXIS")
+_FRAME_NUMBERS = ("X", "Y", "Z", "A", "B", "C")
+_ARM = tuple(f"A{number}" for number in range(1, 7))
+_DECLARED = re.compile(
+    r"\s*(?:DECL\s+)?(?:GLOBAL\s+)?(?:CONST\s+)?(E6POS|POS|FRAME|E6AXIS|AXIS)\s+(\w+)\s*"
+    r"(?:=\s*\{(?:\s*(?:E6POS|POS|FRAME|E6AXIS|AXIS)\s*:)?(?P<body>[^{}]*)\}\s*)?",
+    re.IGNORECASE,
+)
+_LITERAL_AXES = re.compile(r"\{\s*(?:E6AXIS\s*:|AXIS\s*:)?\s*(A1\s[^{}]*)\}", re.IGNORECASE)
+_COMPONENT = re.compile(
+    r"\s*([A-Z]\d?)\s+([-+]?(?:\d+\.?\d*|\.\d+)(?:E[-+]?\d+)?)\s*", re.IGNORECASE
+)
 _MOVE = re.compile(
     r"(S?PTP|S?LIN|S?CIRC|SPL|ASYPTP|(?:S?PTP|S?LIN|S?CIRC|SPL)_REL)\b(?!\s*[=(\[.])\s*(.*)",
     re.IGNORECASE,
@@ -40,6 +50,161 @@ _FDAT_VALUE = re.compile(r"\s*(?:DECL\s+)?(?:GLOBAL\s+)?FDAT\s+(\w+)\s*=\s*\{(.*
 _DEF = re.compile(r"(?:GLOBAL\s+)?DEF\s+(\w+)", re.IGNORECASE)
 _ASSIGNED = re.compile(r"(\w+)\s*(?:\.\s*\w+\s*)?=(?!=)", re.IGNORECASE)
 _NUMBERED = {"BASE": "BASE_DATA", "TOOL": "TOOL_DATA"}
+_DECIMALS = {"X": 4, "Y": 4, "Z": 4}
+"""Least decimals of a length: 1e-4 mm. A KRL REAL holds seven digits."""
+_DECIMALS_ANGLE = 6
+
+
+@dataclass(frozen=True)
+class _Component:
+    """One number of a position."""
+
+    value: float
+    """In mm or deg."""
+    start: int
+    end: int
+    """Start and end of its text on the line."""
+
+
+@dataclass(frozen=True)
+class _KrlPoint:
+    """A declared position."""
+
+    name: str
+    """As declared; KRL does not tell capitals from small letters."""
+    kind: str
+    line: int
+    """Index of its line in the file, from 0."""
+    components: Mapping[str, _Component]
+
+    @property
+    def by_axes(self) -> bool:
+        """Whether it holds axis positions, else a frame."""
+        return self.kind in _AXIS_KINDS
+
+    def T_frame_tcp(self) -> FloatArray:
+        """Return the pose of a frame; see `ProgramPoint`."""
+        x, y, z, a, b, c = self._values(_FRAME_NUMBERS)
+        return T_from_xyzabc(1e-3 * x, 1e-3 * y, 1e-3 * z, *np.radians((a, b, c)))
+
+    def arm_joints(self) -> FloatArray:
+        """Return A1 to A6 in rad; see `ProgramPoint`."""
+        return np.radians(self._values(_ARM))
+
+    def external_joints(self, revolute: Sequence[bool]) -> FloatArray | None:
+        """Return E1 and on in rad or m; see `ProgramPoint`."""
+        names = [f"E{number}" for number in range(1, len(revolute) + 1)]
+        if names and not any(name in self.components for name in names):
+            return None
+        scale = [np.pi / 180.0 if turns else 1e-3 for turns in revolute]
+        external: FloatArray = np.array(self._values(names)) * np.array(scale)
+        return external
+
+    def corrected(self, new: CorrectedPoint) -> dict[str, float]:
+        """Return the numbers that a correction changes by component, in mm or deg."""
+        if self.by_axes:
+            return dict(zip(_ARM, np.degrees(new.arm_joints).tolist(), strict=True))
+        return dict(zip("XYZ", (1e3 * new.T_frame_tcp[:3, 3]).tolist(), strict=True))
+
+    def _values(self, names: Sequence[str]) -> list[float]:
+        missing = [name for name in names if name not in self.components]
+        if missing:
+            raise PathError(
+                f"line {self.line + 1}: {self.kind} {self.name} has no {missing[0]}: it must have"
+                f" {', '.join(names)}"
+            )
+        return [self.components[name].value for name in names]
+
+
+def _read_lines(path: Path) -> list[str]:
+    """Return the lines of a KRL file with their line ends; each character is one byte.
+
+    Raises
+    ------
+    FileAccessError
+        If the file cannot be read.
+    """
+    try:
+        text = Path(path).read_bytes().decode("latin-1")
+    except OSError as error:
+        raise FileAccessError(f"cannot read {path}: {error.strerror or error}") from error
+    # Not splitlines(): it also splits at bytes that only look like line ends, such as 0x85.
+    return re.findall(r"[^\n]*\n|[^\n]+", text)
+
+
+def _code_of(line: str) -> str:
+    """Return what stands on a line before its comment.
+
+    >>> _code_of('LIN XP1 ; not "this"')
+    'LIN XP1'
+    """
+    match = _CODE.match(line)
+    return match[0].strip() if match else ""
+
+
+def _read_points(lines: Sequence[str]) -> dict[str, _KrlPoint]:
+    """Return the positions that a ``.dat`` file declares with a value, by name in capitals.
+
+    Raises
+    ------
+    PathError
+        If one is declared twice, or its value is not a list of components with numbers.
+    """
+    points: dict[str, _KrlPoint] = {}
+    for number, line in enumerate(lines):
+        match = _DECLARED.fullmatch(_code_of(line))
+        if match is None or match["body"] is None:
+            continue
+        offset = len(line) - len(line.lstrip())
+        name = match[2].upper()
+        if name in points:
+            raise PathError(f"line {number + 1}: {match[2]} is declared twice")
+        components = _components(match["body"], match.start("body") + offset, number, match[2])
+        points[name] = _KrlPoint(match[2], match[1].upper(), number, components)
+    return points
+
+
+def _read_axes(text: str, number: int) -> _KrlPoint | None:
+    """Return axis positions that stand in a motion itself, ``{A1 0.0, …}``; None if it is not such.
+
+    The line counts from 0.
+    """
+    match = _LITERAL_AXES.match(text)
+    if match is None:
+        return None
+    return _KrlPoint("", "E6AXIS", number, _components(match[1], 0, number, "the motion"))
+
+
+def _replaced(line: str, point: _KrlPoint, values: Mapping[str, float]) -> str:
+    """Return a declaration with new numbers (mm or deg), all else as it stood."""
+    # From the end of the line, so that the places before it stay where they were.
+    for name in sorted(values, key=lambda name: -point.components[name].start):
+        old = point.components[name]
+        text = line[old.start : old.end]
+        mantissa = re.split("[eE]", text)[0]
+        decimals = max(_DECIMALS.get(name, _DECIMALS_ANGLE), len(mantissa.partition(".")[2]))
+        number = f"{round(values[name], decimals) + 0.0:.{decimals}f}"
+        line = f"{line[: old.start]}{number}{line[old.end :]}"
+    return line
+
+
+def _components(body: str, offset: int, number: int, name: str) -> dict[str, _Component]:
+    components: dict[str, _Component] = {}
+    place = offset
+    for part in body.split(","):
+        match = _COMPONENT.fullmatch(part)
+        if match is None or not math.isfinite(float(match[2])):
+            raise PathError(
+                f"line {number + 1}: {name} has a component {part.strip()!r:.60}: it must be a name"
+                " and a finite number"
+            )
+        if match[1].upper() in components:
+            raise PathError(f"line {number + 1}: {name} has {match[1]} twice")
+        components[match[1].upper()] = _Component(
+            float(match[2]), place + match.start(2), place + match.end(2)
+        )
+        place += len(part) + 1
+    return components
 
 
 @brief_repr
@@ -52,7 +217,7 @@ class KrlProgram:
     lines: Sequence[str]
     data: Sequence[str]
     """Lines of both files; each character is one byte."""
-    points: Mapping[str, KrlPoint]
+    points: Mapping[str, _KrlPoint]
     moves: tuple[Move, ...]
     base: str
     """Base of the LIN targets, as the program says it; empty when it does not."""
@@ -66,7 +231,7 @@ class KrlProgram:
         data = list(self.data)
         for name, new in corrected.items():
             point = self.points[name]
-            data[point.line] = replaced(data[point.line], point, point.corrected(new))
+            data[point.line] = _replaced(data[point.line], point, point.corrected(new))
         files = (Path(out), Path(out).with_suffix(".dat"))
         with replacing(files[0]) as new_src, replacing(files[1]) as new_dat:
             new_src.write_bytes("".join(self.lines).encode("latin-1"))
@@ -107,12 +272,12 @@ def read_krl(src: Path) -> KrlProgram:
         If a file cannot be read.
     """
     dat = _dat_of(src)
-    lines, data = read_lines(src), read_lines(dat)
+    lines, data = _read_lines(src), _read_lines(dat)
     with in_file(dat):
-        points = read_points(data)
+        points = _read_points(data)
     with in_file(src):
         moves, base, tool = _read_moves(lines, data)
-    names = [match[1] for line in lines if (match := _DEF.match(code_of(line)))]
+    names = [match[1] for line in lines if (match := _DEF.match(_code_of(line)))]
     name = names[0] if names else ""
     return KrlProgram((Path(src), dat), lines, data, points, moves, base, tool, name)
 
@@ -133,7 +298,7 @@ def _read_moves(lines: Sequence[str], data: Sequence[str]) -> tuple[tuple[Move, 
     used: dict[str, tuple[str, int]] = {}
     assigned: dict[str, int] = {}
     for number, line in enumerate(lines, start=1):
-        code = code_of(line)
+        code = _code_of(line)
         if move := _move(code, number):
             moves.append(move)
             if move.straight:
@@ -166,7 +331,7 @@ def _move(code: str, number: int) -> Move | None:
             )
         return Move(number, True, order, named[1].upper())
     if order in ("PTP", "SPTP"):
-        axes = None if named else read_axes(target, number - 1)
+        axes = None if named else _read_axes(target, number - 1)
         return Move(number, False, order, named[1].upper() if named else None, axes)
     raise PathError(
         f"line {number}: {order} cannot be corrected: allowed are LIN and SLIN to named points,"
@@ -206,7 +371,7 @@ def _frame_change(
 
 def _fdats(data: Sequence[str]) -> Iterator[tuple[str, dict[str, str]]]:
     for number, line in enumerate(data, start=1):
-        match = _FDAT_VALUE.fullmatch(code_of(line))
+        match = _FDAT_VALUE.fullmatch(_code_of(line))
         if match is None:
             continue
         parts = dict(re.findall(r"(TOOL_NO|BASE_NO|IPO_FRAME)\s+(#?\w+)", match[2].upper()))

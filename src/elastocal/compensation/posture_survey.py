@@ -1,4 +1,14 @@
-"""Every posture in which the tool can be held along a path, and how stiff each is.
+"""Every posture in which the tool can be held along a path, and how stiff each is (paper 4.3.1).
+
+With the Cartesian compliance ``C = J diag(c) J^T`` of the tool centre point (paper Eq. 10), a force
+of 1 N along the unit vector ``u`` moves the tool by ``u^T C u`` along ``u``. The directional
+stiffness is its inverse,
+
+    k(u) = 1 / (u^T C u),    u^T C u = sum_i (J_i^T u)^2 c_i,
+
+while the tool is free to yield sideways. The second form is a row of the observation matrix
+(Eq. 11) times the compliances: of springs that cannot be told apart only the sum counts, which is
+determined. The principal stiffnesses are the inverse eigenvalues of C.
 
 Postures are compared at stations, rows of the path that are evenly taken. What may be chosen: the
 spin about the tool's axis, the positions of the external axes, and the branch of the arm (elbow,
@@ -11,6 +21,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from elastocal.arrays import BoolArray, FloatArray
 from elastocal.cell import Cell
@@ -23,9 +34,8 @@ from elastocal.compensation.offline import (
     read_values,
     row_blocks,
 )
-from elastocal.compensation.stiffness.directional import stiffness_along
-from elastocal.errors import RobotError
-from elastocal.identification import CalibratedModel
+from elastocal.compensation.process import arc_length
+from elastocal.identification import CalibratedModel, interval
 from elastocal.planning import cell_surface, collision_scene
 from elastocal.results import brief_repr
 from elastocal.robot import Robot, characteristic_length, smallest_singular_value
@@ -34,10 +44,84 @@ from elastocal.tables import TableRows
 
 _BLOCK = 20_000
 """Rows of a path that are read at a time."""
-_SAMPLES = 5
-"""Joint positions at which two robots are compared."""
-_SAME = 1e-6
-"""Difference of their poses by rounding, in m or as a number of a rotation."""
+_MOST = 3_000_000
+"""Postures of one survey; bounds memory and time."""
+
+
+@brief_repr
+@dataclass(frozen=True, eq=False)
+class DirectionalStiffness:
+    """Directional stiffness with its 95 % interval (bootstrap draws of the model)."""
+
+    stiffness: FloatArray
+    """Shape (row,), in N/m; infinite where nothing yields."""
+    low: FloatArray
+    high: FloatArray
+
+
+@brief_repr
+@dataclass(frozen=True, eq=False)
+class PrincipalStiffness:
+    """Principal stiffnesses of the tool centre point."""
+
+    stiffness: FloatArray
+    """Softest first, shape (row, 3), in N/m; infinite where nothing yields."""
+    axes: FloatArray
+    """Unit vectors in base as columns, in the same order, shape (row, 3, 3)."""
+
+
+def directional_stiffness(
+    calibrated: CalibratedModel, q: ArrayLike, direction: ArrayLike
+) -> DirectionalStiffness:
+    """Return the stiffness along a direction.
+
+    Parameters
+    ----------
+    calibrated : CalibratedModel
+        The model.
+    q : array_like, shape (row, joint)
+        Joint positions in rad or m.
+    direction : array_like, shape (3,) or (row, 3)
+        Unit vectors in base.
+    """
+    rows = _squared_torques(calibrated, q, direction)
+    with np.errstate(divide="ignore"):
+        low, high = interval((rows @ calibrated.draws.T).T)
+        # What is most compliant is least stiff.
+        return DirectionalStiffness(1.0 / (rows @ calibrated.compliance), 1.0 / high, 1.0 / low)
+
+
+def stiffness_along(calibrated: CalibratedModel, q: ArrayLike, direction: ArrayLike) -> FloatArray:
+    """Return the stiffness along a direction without its interval; see `directional_stiffness`."""
+    with np.errstate(divide="ignore"):
+        stiffness: FloatArray = 1.0 / (
+            _squared_torques(calibrated, q, direction) @ calibrated.compliance
+        )
+    return stiffness
+
+
+def _squared_torques(calibrated: CalibratedModel, q: ArrayLike, direction: ArrayLike) -> FloatArray:
+    """Return the squares ``(J_i^T u)^2``, shape (row, spring): times ``c`` they are ``u^T C u``."""
+    q = calibrated.model.robot.check_positions(q)
+    return calibrated.model.directional_rows(q, np.broadcast_to(direction, (len(q), 3)))
+
+
+def principal_stiffness(calibrated: CalibratedModel, q: ArrayLike) -> PrincipalStiffness:
+    """Return the principal stiffnesses and their axes.
+
+    Parameters
+    ----------
+    calibrated : CalibratedModel
+        The model.
+    q : array_like, shape (row, joint)
+        Joint positions in rad or m.
+    """
+    C = calibrated.model.cartesian_compliance(calibrated.compliance, q).translation
+    values, axes = np.linalg.eigh(C)
+    # Of a compliance with bounds at zero, round-off may leave an eigenvalue just below.
+    values = np.maximum(values[..., ::-1], 0.0)
+    with np.errstate(divide="ignore"):
+        return PrincipalStiffness(1.0 / values, axes[..., ::-1])
 
 
 @brief_repr
@@ -58,8 +142,7 @@ class PathStations:
     @property
     def arc_length(self) -> FloatArray:
         """Length of the path up to each station, straight from one to the next, in m."""
-        steps = np.linalg.norm(np.diff(self.T_base_tcp[:, :3, 3], axis=0), axis=1)
-        return np.concatenate([[0.0], np.cumsum(steps)])
+        return arc_length(self.T_base_tcp[:, :3, 3])
 
     @property
     def normal(self) -> FloatArray:
@@ -167,33 +250,6 @@ def cell_constraints(cell: Cell) -> tuple[PostureConstraint, ...]:
     )
 
 
-def require_same_robot(model: Robot, cell: Robot) -> None:
-    """Refuse a cell whose robot, or whose tcp, is not that of the model.
-
-    Raises
-    ------
-    RobotError
-        If joints have other names, or the same joints lead elsewhere.
-    """
-    if model.joint_names != cell.joint_names:
-        raise RobotError(
-            f"the cell's robot has joints {', '.join(cell.joint_names)}, the model's"
-            f" {', '.join(model.joint_names)}: they must be the same"
-        )
-    low, high = (np.clip(end, -np.pi, np.pi) for end in (cell.limits.lower, cell.limits.upper))
-    q = np.linspace(low, high, _SAMPLES)
-    gap = float(np.abs(model.forward(q) - cell.forward(q)).max())
-    if not gap <= _SAME:
-        raise RobotError(
-            f"the same joints lead {1e3 * gap:.3g} mm apart in the cell and in the model: another"
-            " tool centre point, base or robot"
-        )
-
-
-_MOST = 3_000_000
-"""Postures of one survey; bounds memory and time."""
-
-
 @brief_repr
 @dataclass(frozen=True, eq=False)
 class PostureGrid:
@@ -222,13 +278,12 @@ class PostureSurvey:
     @property
     def best_by_spin(self) -> FloatArray:
         """Stiffest posture of each spin, shape (station, spin), in N/m; NaN where there is none."""
-        return _largest(self.stiffness.reshape(*self.stiffness.shape[:2], -1))
+        return np.asarray(np.fmax.reduce(self.stiffness, axis=(2, 3)))
 
     @property
     def best_by_external(self) -> FloatArray:
         """Stiffest posture of each external position, shape (station, external), in N/m."""
-        moved = np.moveaxis(self.stiffness, 2, 1)
-        return _largest(moved.reshape(*moved.shape[:2], -1))
+        return np.asarray(np.fmax.reduce(self.stiffness, axis=(1, 3)))
 
 
 def survey_postures(
@@ -279,7 +334,8 @@ def survey_postures(
         allowed = np.isfinite(rows).all(axis=1)
         refused["reach and joint limits"] += int(np.sum(~allowed))
         for constraint in constraints:
-            passed = _passed(constraint, rows, allowed)
+            passed = allowed.copy()
+            passed[allowed] = constraint.allows(rows[allowed])
             refused[constraint.name] += int(np.sum(allowed & ~passed))
             allowed = passed
         found = np.full(len(rows), np.nan)
@@ -305,14 +361,3 @@ def _postures(solver: InverseKinematics, T: FloatArray, grid: PostureGrid) -> Fl
     external = np.tile(grid.external, (spins, 1))
     found = solver.solve_many(poses, external).q
     return found.reshape(spins, externals, *found.shape[1:])
-
-
-def _passed(constraint: PostureConstraint, q: FloatArray, allowed: BoolArray) -> BoolArray:
-    passed = allowed.copy()
-    passed[allowed] = constraint.allows(q[allowed])
-    return passed
-
-
-def _largest(stiffness: FloatArray) -> FloatArray:
-    largest = np.where(np.isnan(stiffness), -np.inf, stiffness).max(axis=-1)
-    return np.where(np.isneginf(largest), np.nan, largest)
