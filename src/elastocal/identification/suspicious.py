@@ -113,6 +113,7 @@ _SETTLED = 1e-3
 """Step at which the offset stands still, relative to its size."""
 
 
+@brief_repr
 @dataclass(frozen=True)
 class ForceOffset:
     """A constant that the forces seem to contain."""
