@@ -37,7 +37,11 @@ def everything(robot: Robot) -> tuple[Spring, ...]:
 
 HINGED = {name: each for name, each in LAYOUTS.items() if name != "tensor"}
 """Layouts of springs with one axis each; tensors are tried with the kinds of springs."""
-CASES = {**HINGED, "bearing-joint, distal": partial(bearing_joint, distal=True), "custom": everything}
+CASES = {
+    **HINGED,
+    "bearing-joint, distal": partial(bearing_joint, distal=True),
+    "custom": everything,
+}
 
 
 @cache

@@ -39,7 +39,7 @@ def _softer(law, by: float):
 
 @cache
 def calibrated(
-    arm: ElasticArm, seed: int, springs: str = "bearing", poses: int = 31
+    arm: ElasticArm, seed: int, springs: str = "bearing-joint", poses: int = 31
 ) -> CalibratedModel:
     """Return the calibration of a campaign; all bootstraps have one seed, as by default."""
     model = ElasticModel(robot(), layout(robot(), springs))

@@ -2,7 +2,7 @@
 
 from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -364,7 +364,7 @@ class Dataset:
             )
         order = [self.joint_names.index(name) for name in wanted]
         pose, case = np.nonzero(self.usable)
-        flat = {
+        flat: dict[str, Any] = {
             name: values[pose] if name == "tcp_position" else values[pose, case]
             for name, values in self.arrays.items()
         }

@@ -22,7 +22,7 @@ from elastocal.elastic import ElasticModel, Gear, Spring, actuated, bearing, ten
 from elastocal.errors import IdentificationError, nearest
 from elastocal.identification.options import FitOptions
 from elastocal.identification.problem import Problem, build
-from elastocal.identification.refits import PoseGrams
+from elastocal.identification.solve import PoseGrams
 from elastocal.identification.uncertainty import CONFIDENCE, HeldOut, leave_poses_out
 from elastocal.results import brief_repr
 from elastocal.robot import Robot

@@ -66,12 +66,19 @@ class Gear(OneAxisSpring):
     def angles(self, load: SpringLoad[Quantity]) -> Angles[Quantity]:
         """Return the angle of one unit of each parameter."""
         (t,) = load.torque
-        soft = [T * atan(t / T) for T in self.knees]
-        if load.weight:
-            (w,) = load.weight
-            soft = [T * (atan((w + t) / T) - atan(w / T)) for T in self.knees]
-        friction = load.friction or (0.0 * t,) * len(self.slips)
-        return ((t, *soft, *(-1.0 * s for s in friction)),)
+        row: list[Quantity] = [t]
+        row.extend(self._softness(load, T) for T in self.knees)
+        row.extend(-1.0 * s for s in load.friction or [0.0 * t for _ in self.slips])
+        return (tuple(row),)
+
+    @staticmethod
+    def _softness(load: SpringLoad[Quantity], T: float) -> Quantity:
+        """Return ``T atan((w + t) / T) - T atan(w / T)``."""
+        (t,) = load.torque
+        if not load.weight:
+            return T * atan(t / T)
+        (w,) = load.weight
+        return T * (atan((w + t) / T) - atan(w / T))
 
     def tangents(self, load: SpringLoad[FloatArray]) -> Tangents:
         """Return 1, ``1 / (1 + ((w + t) / T_k)^2)``, and 0: friction that slides adds none."""
