@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from elastocal.cell import load_cell
-from elastocal.cell.examples import EXAMPLES, write_example
-from elastocal.cell.examples.example import block, dome_section
+from elastocal.cell.examples import EXAMPLES, block, dome_section, write_example
 from elastocal.planning.surface import (
     ReachableFrom,
     arm_reach,
