@@ -1,3 +1,23 @@
+__all__ = [
+    "calibrate",
+    "check",
+    "codec",
+    "compare",
+    "compensate",
+    "demo",
+    "derive",
+    "export",
+    "init",
+    "plan",
+    "predict",
+    "report",
+    "run",
+    "simulate_process",
+    "stiffness",
+    "study",
+    "tool",
+]  # the commands: what the package itself exports of these
+
 from ._demo_folder import LOG as LOG, README as README, begin as begin, finish as finish
 from ._device_sources import KINDS as KINDS, SOURCES as SOURCES, DeviceSource as DeviceSource
 from ._file_kinds import FileDescription as FileDescription
