@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from elastocal.identification import leave_poses_out, solve
-from elastocal.identification.uncertainty import MOST_FOLDS, compare_layouts
+from elastocal.identification.uncertainty import MOST_FOLDS
 from support.problems import made_up, planted
 
 
@@ -80,30 +80,3 @@ def test_the_misfit_where_nothing_is_predicted_is_not_known():
 def test_mean_and_max_are_those_of_the_errors():
     found = leave_poses_out(noisy(blocks=4)[0])
     assert (found.mean, found.max) == (found.error.mean(), found.error.max())
-
-
-def test_a_model_that_lacks_a_spring_compares_worse_with_an_interval_above_zero():
-    problem, _ = noisy(blocks=12)
-    ours = leave_poses_out(problem)
-    other = leave_poses_out(problem.with_columns(np.arange(4)))
-    found = compare_layouts(ours, other, "four", problem, np.random.default_rng(0))
-    assert found.difference == pytest.approx(other.mean - ours.mean)
-    assert 0.0 < found.low < found.difference < found.high
-
-
-def test_a_model_compared_with_itself_differs_by_nothing():
-    problem, _ = noisy(blocks=5)
-    ours = leave_poses_out(problem)
-    found = compare_layouts(ours, ours, "same", problem, np.random.default_rng(0))
-    assert (found.difference, found.low, found.high) == (0.0, 0.0, 0.0)
-
-
-def test_the_interval_of_a_comparison_is_reproducible_by_seed():
-    problem, _ = noisy(blocks=6)
-    ours = leave_poses_out(problem)
-    other = leave_poses_out(problem.with_columns(np.arange(4)))
-    lows = [
-        compare_layouts(ours, other, "four", problem, np.random.default_rng(seed)).low
-        for seed in (1, 1, 2)
-    ]
-    assert lows[0] == lows[1] != lows[2]

@@ -86,15 +86,6 @@ def test_accuracy_is_stated_with_its_split_and_only_of_poses_left_out():
     assert held_out.mean > figures.residual.mean
 
 
-def test_the_six_spring_model_is_compared_on_the_same_poses():
-    comparison = summary(calibration()).comparison
-    alone = summary(calibration("actuated"))
-    assert comparison.springs == "actuated"
-    assert comparison.held_out.mean == pytest.approx(alone.held_out.mean, rel=1e-6)
-    assert comparison.difference.low > 0.0
-    assert alone.comparison is None
-
-
 def test_the_same_seed_gives_the_same_figures():
     made = calibrate(elastic(), calibration().readings, np.random.default_rng(0))
     assert summary(made) == summary(calibration())

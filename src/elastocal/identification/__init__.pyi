@@ -21,11 +21,13 @@ from .displacement import (
     reference_joints as reference_joints,
 )
 from .ladder import (
+    AUTO as AUTO,
     RUNGS as RUNGS,
+    Choice as Choice,
     Climbed as Climbed,
     Rung as Rung,
+    choose_model as choose_model,
     climb as climb,
-    find_rung as find_rung,
     gears as gears,
     has_levels as has_levels,
 )
@@ -38,6 +40,7 @@ from .model_file import (
     HeldOutSummary as HeldOutSummary,
     ResidualSummary as ResidualSummary,
     RobotRecord as RobotRecord,
+    RungSummary as RungSummary,
     SpringSummary as SpringSummary,
     SuspiciousReading as SuspiciousReading,
     read_model as read_model,
@@ -104,10 +107,8 @@ from .suspicious import (
 from .uncertainty import (
     CONFIDENCE as CONFIDENCE,
     MOST_FOLDS as MOST_FOLDS,
-    Comparison as Comparison,
     HeldOut as HeldOut,
     bootstrap as bootstrap,
-    compare_layouts as compare_layouts,
     interval as interval,
     leave_poses_out as leave_poses_out,
     widen_draws as widen_draws,

@@ -3,6 +3,7 @@
 The calibrated model is what the compensation and every prediction work with.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,19 +12,18 @@ from numpy.typing import ArrayLike
 
 from elastocal.arrays import BoolArray, FloatArray
 from elastocal.dataset import Readings
-from elastocal.elastic import LAYOUTS, ElasticModel, check_vectors
+from elastocal.elastic import ElasticModel, check_vectors
 from elastocal.errors import ConventionError, IdentificationError, SpringError
 from elastocal.identification.conventions import POOR, check_conventions, check_joints
+from elastocal.identification.ladder import Climbed
 from elastocal.identification.observability import Observability, attainable_rank, observability
 from elastocal.identification.options import FitOptions
 from elastocal.identification.problem import Problem, build, same_configuration
 from elastocal.identification.solve import PoseGrams, Solution, factor, solve
 from elastocal.identification.suspicious import Screening, force_offset, screen
 from elastocal.identification.uncertainty import (
-    Comparison,
     HeldOut,
     bootstrap,
-    compare_layouts,
     interval,
     leave_poses_out,
     widen_draws,
@@ -165,8 +165,8 @@ class Calibration:
     """Rank that any number of poses and forces would reach; see `observability`."""
     held_out: HeldOut
     """Errors at left-out poses of the readings that entered the fit."""
-    comparison: Comparison | None
-    """The 6-spring model on the same left-out poses (or the 18-spring one against it)."""
+    ladder: tuple[Climbed, ...]
+    """Simpler and richer models at the same left-out poses; empty where none were tried."""
     widening: float
     """Factor by which the bootstrap draws were stretched; see `widening_factor`."""
     screening: Screening
@@ -193,6 +193,7 @@ def calibrate(
     *,
     marker_offset: ArrayLike | None = None,
     provenance: str = "",
+    ladder: Sequence[Climbed] = (),
 ) -> Calibration:
     """Identify the compliances of a robot from measured readings.
 
@@ -210,6 +211,8 @@ def calibrate(
         Metrology marker in the tcp frame, in m.
     provenance : str
         Where the readings came from; kept with the model.
+    ladder : sequence of Climbed
+        What the model was chosen from (`choose_model`); kept with the calibration.
 
     Raises
     ------
@@ -252,7 +255,7 @@ def calibrate(
         poses=len(np.unique(kept.block)),
         attainable_rank=reach,
         held_out=held_out,
-        comparison=_compare(model, weighted, held_out, rng),
+        ladder=tuple(ladder),
         widening=by,
         screening=screening,
         solution=solution,
@@ -303,19 +306,3 @@ def _worth(
     if held_out.mean >= deflection:
         doubts.append("at left-out poses the model predicts no better than none at all")
     return doubts
-
-
-def _compare(
-    model: ElasticModel, problem: Problem, ours: HeldOut, rng: Generator
-) -> Comparison | None:
-    """Fit the 6-spring model to the same readings when ours contains it."""
-    actuated = [spring.name for spring in LAYOUTS["actuated"](model.robot)]
-    names = list(model.parameter_names)
-    if names == actuated or not set(actuated) <= set(names):
-        return None
-    columns = np.array([names.index(name) for name in actuated], dtype=np.intp)
-    try:
-        other = leave_poses_out(problem.with_columns(columns))
-    except IdentificationError:
-        return None
-    return compare_layouts(ours, other, "actuated", problem, rng)

@@ -9,7 +9,7 @@ resampled t-test (C. Nadeau, Y. Bengio, "Inference for the generalization error"
 52, 2003): the variance of a mean over ``J`` test sets is ``s^2 (1 / J + n_test / n_train)``.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -18,15 +18,18 @@ from scipy.special import stdtrit
 
 from elastocal.arrays import BoolArray, FloatArray, IndexArray
 from elastocal.dataset import Readings
-from elastocal.elastic import ElasticModel, Gear, Spring, actuated, bearing, tensor
-from elastocal.errors import IdentificationError, nearest
+from elastocal.elastic import ElasticModel, Gear, Spring, actuated, bearing, layout, tensor
+from elastocal.errors import IdentificationError
 from elastocal.identification.options import FitOptions
 from elastocal.identification.problem import Problem, build
 from elastocal.identification.solve import PoseGrams
+from elastocal.identification.suspicious import screen
 from elastocal.identification.uncertainty import CONFIDENCE, HeldOut, leave_poses_out
 from elastocal.results import brief_repr
 from elastocal.robot import Robot
 
+AUTO = "auto"
+"""Asks for the rung that the readings carry."""
 KNEES = (0.3, 1.0, 3.0)
 """Knees of the gears, in typical load torques of the joint: one below, at and above it."""
 SLIPS = (0.03, 0.1, 0.3)
@@ -117,64 +120,107 @@ RUNGS: dict[str, Rung] = {
 """Rungs by name, the simplest first."""
 
 
-def climb(
+@brief_repr
+@dataclass(frozen=True, eq=False)
+class Choice:
+    """A model chosen for readings, and the ladder that it stands on."""
+
+    model: ElasticModel
+    ladder: tuple[Climbed, ...]
+    """Every rung that the readings allow, the simplest first."""
+
+
+def choose_model(
     robot: Robot,
     readings: Readings,
+    springs: str,
     options: FitOptions,
     marker_offset: ArrayLike | None = None,
-    rungs: tuple[str, ...] = tuple(RUNGS),
-) -> tuple[Climbed, ...]:
-    """Return the rungs that the readings allow, one of them chosen.
+) -> Choice:
+    """Return the elastic model that a user asks for.
 
     Parameters
     ----------
     robot : Robot
         The robot.
     readings : Readings
-        Without blunders: they would decide.
+        Measurements, joints in the robot's order.
+    springs : str
+        ``auto``: the rung that the readings carry; ``gears``: gears, with friction memory where
+        they carry it; the name of a layout; a spring file.
     options : FitOptions
-        Bounds, weights; a prior speaks of one model and is left out.
+        Bounds, weights; a prior speaks of one model and has no part in the choice.
     marker_offset : array_like, shape (3,), optional
         Marker in the tcp frame, in m.
-    rungs : tuple of str
-        Names of the rungs to try.
+
+    Raises
+    ------
+    SpringError
+        If ``springs`` is none of these.
+    IdentificationError
+        If the readings carry no model that was asked for.
+    """
+    allowed = {AUTO: tuple(RUNGS), "gears": ("gears", "gears+friction")}.get(springs, (springs,))
+    rungs = dict(RUNGS)
+    if springs not in (AUTO, *RUNGS):
+        # Refused here, before anything is fitted.
+        asked = layout(robot, springs)
+        rungs[springs] = Rung(springs, lambda *_: asked)
+    options = replace(options, prior=None)
+    if options.set_blunders_aside:
+        # Judged by springs that every reading can be judged by; they would decide otherwise.
+        plain = build(ElasticModel(robot, bearing(robot)), readings, options, marker_offset)
+        readings = readings.take(~screen(plain).blunder)
+    return climb(robot, readings, tuple(rungs.values()), allowed, options, marker_offset)
+
+
+def climb(
+    robot: Robot,
+    readings: Readings,
+    rungs: Sequence[Rung],
+    allowed: Sequence[str],
+    options: FitOptions,
+    marker_offset: ArrayLike | None = None,
+) -> Choice:
+    """Return the simplest of the allowed rungs that is not worse than the best of them.
+
+    Parameters
+    ----------
+    robot : Robot
+        The robot.
+    readings : Readings
+        Without blunders.
+    rungs : sequence of Rung
+        What to try, the simplest first.
+    allowed : sequence of str
+        Names of the rungs to choose from; the others are shown beside them.
+    options : FitOptions
+        Bounds and weights.
+    marker_offset : array_like, shape (3,), optional
+        Marker in the tcp frame, in m.
 
     Raises
     ------
     IdentificationError
-        If a rung is unknown, or none can be fitted.
+        If the readings allow none of them.
     """
-    options, several = replace(options, prior=None), has_levels(readings)
-    tried = [
-        _tried(rung, robot, readings, options, marker_offset)
-        for rung in map(find_rung, rungs)
-        if several or not rung.needs_levels
-    ]
-    if not tried:
-        raise IdentificationError(
-            f"rungs {', '.join(rungs)} need load cases of low load: none has less than"
-            f" {_LOW_LEVEL:.0%} of the largest force at its pose"
-        )
-    best = min(tried, key=lambda each: float(each.score.mean()))
+    tried: list[Climbed] = []
+    reason = f"no load case has less than {_LOW_LEVEL:.0%} of the largest force at its pose"
+    for rung in rungs:
+        if rung.needs_levels and not has_levels(readings):
+            continue
+        try:
+            tried.append(_tried(rung, robot, readings, options, marker_offset))
+        except IdentificationError as error:
+            reason = str(error)
+    candidates = [each for each in tried if each.name in allowed]
+    if not candidates:
+        raise IdentificationError(reason)
+    best = min(candidates, key=lambda each: float(each.score.mean()))
     compared = [_against(each, best) for each in tried]
-    chosen = next(index for index, each in enumerate(compared) if each.low <= 0.0)
-    compared[chosen] = replace(compared[chosen], chosen=True)
-    return tuple(compared)
-
-
-def find_rung(name: str) -> Rung:
-    """Return a rung by name.
-
-    Raises
-    ------
-    IdentificationError
-        If there is none, with those that there are.
-    """
-    if name not in RUNGS:
-        raise IdentificationError(
-            f"unknown rung {name!r}{nearest(name, RUNGS)} (allowed: {', '.join(RUNGS)})"
-        )
-    return RUNGS[name]
+    chosen = next(e for e in compared if e.name in allowed and e.low <= 0.0)
+    ladder = tuple(replace(each, chosen=each is chosen) for each in compared)
+    return Choice(chosen.model, ladder)
 
 
 def has_levels(readings: Readings) -> bool:

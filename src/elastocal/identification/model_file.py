@@ -15,6 +15,7 @@ from elastocal.elastic import AnySpring, ElasticModel
 from elastocal.errors import SchemaError
 from elastocal.files import sha256
 from elastocal.identification.calibration import CalibratedModel, Calibration
+from elastocal.identification.ladder import Climbed
 from elastocal.identification.observability import Observability, Term
 from elastocal.identification.options import MINIMUM_DRAWS, FitSettings
 from elastocal.identification.suspicious import Screening
@@ -77,7 +78,7 @@ class HeldOutSummary:
 
 @record()
 class DifferenceSummary:
-    """Mean error of another layout minus ours, with its 95 % interval, in m."""
+    """Difference of two mean errors, with its 95 % interval, in m."""
 
     mean: float
     low: float
@@ -85,8 +86,22 @@ class DifferenceSummary:
 
 
 @record()
+class RungSummary:
+    """A model of the ladder, at left-out poses."""
+
+    springs: str
+    """Name of the rung."""
+    held_out: float
+    """Mean error at left-out poses, in m."""
+    difference: DifferenceSummary
+    """What it is judged by: its error at left-out poses and left-out low load, against the best."""
+    parameters: int
+    chosen: bool
+
+
+@record()
 class ComparisonSummary:
-    """Another spring layout on the same left-out poses."""
+    """Another spring layout on the same left-out poses; calibrations before the ladder have it."""
 
     springs: str
     """Name of the other layout."""
@@ -129,12 +144,14 @@ class CalibrationSummary:
     suspicious: tuple[SuspiciousReading, ...]
     """The worst first."""
     held_out: HeldOutSummary
-    comparison: ComparisonSummary | None
     draws: int
     interval_widening: float
     warnings: tuple[str, ...]
     settings: FitSettings | None = None
     """With these a report makes the calibration again."""
+    comparison: ComparisonSummary | None = None
+    ladder: tuple[RungSummary, ...] = ()
+    """The simplest model first; empty in calibrations before the ladder."""
 
 
 def summary(calibration: Calibration, settings: FitSettings | None = None) -> CalibrationSummary:
@@ -162,11 +179,11 @@ def summary(calibration: Calibration, settings: FitSettings | None = None) -> Ca
         poses=calibration.poses,
         suspicious=_suspicious(calibration.readings, calibration.screening, calibration.used),
         held_out=_held_out(calibration.held_out),
-        comparison=_comparison(calibration),
         draws=len(calibrated.draws),
         interval_widening=calibration.widening,
         warnings=calibration.warnings,
         settings=settings,
+        ladder=tuple(map(_rung, calibration.ladder)),
     )
 
 
@@ -216,14 +233,13 @@ def _held_out(held_out: HeldOut) -> HeldOutSummary:
     )
 
 
-def _comparison(calibration: Calibration) -> ComparisonSummary | None:
-    other = calibration.comparison
-    if other is None:
-        return None
-    return ComparisonSummary(
-        springs=other.layout,
-        held_out=_held_out(other.held_out),
-        difference=DifferenceSummary(other.difference, other.low, other.high),
+def _rung(rung: Climbed) -> RungSummary:
+    return RungSummary(
+        springs=rung.name,
+        held_out=rung.held_out.mean,
+        difference=DifferenceSummary(rung.difference, rung.low, rung.high),
+        parameters=len(rung.model.parameters),
+        chosen=rung.chosen,
     )
 
 

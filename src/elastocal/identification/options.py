@@ -122,8 +122,8 @@ def bounds(
 class FitSettings:
     """What a user chose about springs, readings and fit; the defaults are the paper's."""
 
-    springs: str = "bearing"
-    """Spring layout: a name, or a YAML file."""
+    springs: str = "auto"
+    """Spring layout: a name, or a YAML file; ``auto``: the model that the readings carry."""
     loss: str = "linear"
     """``linear``, ``huber`` or ``cauchy``."""
     weights: Weights = "none"

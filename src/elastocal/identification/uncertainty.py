@@ -79,22 +79,6 @@ class HeldOut:
         return len(self.compliance)
 
 
-@dataclass(frozen=True)
-class Comparison:
-    """Two spring layouts on the same left-out poses."""
-
-    layout: str
-    """Name of the other layout."""
-    held_out: HeldOut
-    """Its errors."""
-    difference: float
-    """Mean error of the other minus mean error of ours, in m; positive: ours is better."""
-    low: float
-    """Lower end of the difference's 95 % interval (poses resampled in pairs), in m."""
-    high: float
-    """Upper end, in m."""
-
-
 def leave_poses_out(problem: Problem) -> HeldOut:
     """Refit without each pose block in turn and predict its readings.
 
@@ -110,21 +94,6 @@ def leave_poses_out(problem: Problem) -> HeldOut:
     error, norm = predicted - problem.d, np.linalg.norm(predicted, axis=1, keepdims=True)
     share = np.divide(np.abs(error), norm, out=np.full_like(error, np.inf), where=norm > 0.0)
     return HeldOut(np.linalg.norm(error, axis=1), fold, compliance, share)
-
-
-def compare_layouts(
-    ours: HeldOut, other: HeldOut, layout: str, problem: Problem, rng: Generator
-) -> Comparison:
-    """Return the paired difference of two layouts with an interval.
-
-    Whole pose blocks are resampled, with both errors of a reading kept together.
-    """
-    blocks, index = np.unique(problem.block, return_inverse=True)
-    counts = np.bincount(index)
-    sums = np.bincount(index, other.error - ours.error)
-    chosen = rng.integers(len(blocks), size=(1000, len(blocks)))
-    low, high = interval(sums[chosen].sum(axis=1) / counts[chosen].sum(axis=1))
-    return Comparison(layout, other, other.mean - ours.mean, float(low), float(high))
 
 
 def bootstrap(grams: PoseGrams, draws: int, rng: Generator) -> FloatArray:

@@ -97,11 +97,12 @@ def compliance_findings(evidence: Evidence) -> Iterator[Finding]:
     """Yield findings on the choice of springs."""
     if evidence.calibrated is None:
         return
-    other = evidence.figures.comparison if evidence.figures else None
-    if other is not None and other.difference.high < 0.0:
+    ladder = evidence.figures.ladder if evidence.figures else ()
+    worse = [rung for rung in ladder if rung.chosen and rung.difference.low > 0.0]
+    if worse:
         yield Finding(
-            "axial springs alone predict left-out poses better than this layout",
-            advice="Calibrate with `--springs actuated`: these poses do not carry more springs.",
+            f"other springs predict left-out poses better than {worse[0].springs}",
+            advice="Calibrate with `--springs auto`: it takes the model that the readings carry.",
         )
     springs = evidence.calibrated.model.model.springs
     if not any("." in each.name and not each.name.endswith(".axial") for each in springs):

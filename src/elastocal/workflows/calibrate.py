@@ -8,8 +8,7 @@ import numpy as np
 
 from elastocal import identification
 from elastocal.dataset import read, without
-from elastocal.elastic import ElasticModel, layout
-from elastocal.identification import CalibrateResult, FitSettings, summary
+from elastocal.identification import CalibrateResult, FitSettings, choose_model, summary
 from elastocal.progress import Progress
 from elastocal.records import write_json
 from elastocal.results import brief_repr
@@ -63,12 +62,16 @@ def calibrate(settings: CalibrateSettings, progress: Progress) -> CalibrateResul
     refuse_overwriting(settings.out, data)
     measured = read(data)
     arm = find_robot(settings.robot, settings.tcp, settings.tool, measured)
+    readings = without(measured.readings(arm.joint_names), settings.exclude)
+    marker = measured.marker if settings.marker is None else settings.marker
+    choice = choose_model(arm, readings, settings.springs, options, marker)
     calibration = identification.calibrate(
-        ElasticModel(arm, layout(arm, settings.springs)),
-        without(measured.readings(arm.joint_names), settings.exclude),
+        choice.model,
+        readings,
         np.random.default_rng(settings.seed),
         options,
-        marker_offset=measured.marker if settings.marker is None else settings.marker,
+        marker_offset=marker,
+        ladder=choice.ladder,
         provenance=f"{data}; {measured.provenance}" if measured.provenance else str(data),
     )
     result = CalibrateResult.of(calibration.calibrated, summary(calibration, settings.fit))

@@ -17,8 +17,11 @@ def _calibrate(  # noqa: PLR0913 - one parameter an option
     tcp: options.TcpLink = None,
     tool: options.ToolFrame = None,
     springs: Annotated[
-        str, typer.Option(help="Spring layout: actuated, bearing, or a .yaml file.")
-    ] = "bearing",
+        str,
+        typer.Option(
+            help="auto, actuated, bearing, bearing-joint, tensor, gears, or a .yaml file."
+        ),
+    ] = "auto",
     loss: Annotated[str, typer.Option(help="linear, huber or cauchy.")] = "linear",
     weights: Annotated[str, typer.Option(help="none, or sigma from the dataset.")] = "none",
     bounds: Annotated[

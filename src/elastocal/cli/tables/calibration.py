@@ -1,9 +1,11 @@
 """What ``calibrate`` and ``compare`` print: a user's first questions, in their order.
 
-How well does it fit; is it better than 6 springs; which springs are really known, and how well;
-which readings look wrong. Of two calibrations: which springs moved, what it does, the verdict.
+How well does it fit; is it better than simpler models; which springs are really known, and how
+well; which readings look wrong. Of two calibrations: which springs moved, what it does, the
+verdict.
 """
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -15,7 +17,7 @@ from elastocal.elastic import Unit, unit_of
 from elastocal.identification import (
     CalibrateResult,
     CalibrationSummary,
-    ComparisonSummary,
+    RungSummary,
     SpringSummary,
     SuspiciousReading,
     describe,
@@ -47,7 +49,7 @@ def show_calibration(console: Console, result: CalibrateResult, out: Path) -> No
 
 def _show_figures(console: Console, figures: CalibrationSummary) -> None:
     _show_fit(console, figures)
-    _show_comparison(console, figures.comparison)
+    _show_ladder(console, figures.ladder)
     console.print()
     console.print(_spring_table(figures))
     _show_groups(console, figures)
@@ -80,22 +82,27 @@ def _show_fit(console: Console, figures: CalibrationSummary) -> None:
     console.print(table)
 
 
-def _show_comparison(console: Console, comparison: ComparisonSummary | None) -> None:
-    if comparison is None:
+def _show_ladder(console: Console, ladder: Sequence[RungSummary]) -> None:
+    """Print the models that were tried, and the one that was taken."""
+    if len(ladder) < 2:
         return
-    other, difference = comparison.held_out.mean, comparison.difference
-    low, high = difference.low, difference.high
-    if low > 0.0:
-        verdict = "[green]more springs are better[/green]"
-    elif high < 0.0:
-        verdict = "[red]fewer springs are better[/red]: use --springs actuated"
-    else:
-        verdict = "[yellow]no clear difference[/yellow]: the poses do not decide"
-    console.print(
-        f"axial springs alone: {mm(other)} at left-out poses,"
-        f" {1e3 * difference.mean:+.3f} mm ({1e3 * low:+.3f} to {1e3 * high:+.3f}, 95 %);"
-        f" {verdict}"
-    )
+    table = Table(box=None, pad_edge=False)
+    for heading in ("springs", "numbers", "at left-out poses", "worse than the best by", ""):
+        table.add_column(heading, justify="left" if heading in ("springs", "") else "right")
+    for rung in ladder:
+        mean, low, high = (
+            1e6 * value
+            for value in (rung.difference.mean, rung.difference.low, rung.difference.high)
+        )
+        worse = f"{mean:.1f} µm ({low:.1f} to {high:.1f})" if low != high else ""
+        table.add_row(
+            escape(rung.springs),
+            str(rung.parameters),
+            mm(rung.held_out),
+            worse,
+            "[bold]taken[/bold]" if rung.chosen else "",
+        )
+    console.print(table)
 
 
 def _spring_table(figures: CalibrationSummary) -> Table:

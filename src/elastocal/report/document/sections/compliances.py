@@ -34,7 +34,7 @@ def _blocks(found: ModelEvidence) -> Iterator[Block]:
     springs = spring_bars(found.model)
     observable = sum(each.group is None for each in springs)
     yield _head(found, observable)
-    yield from _comparison(found.figures)
+    yield from _ladder(found.figures)
     yield picture(
         partial(spring_figure, springs),
         f"Compliances of {len(springs)} springs with 95 % intervals; {len(springs) - observable} of"
@@ -77,20 +77,25 @@ def _head(found: ModelEvidence, observable: int) -> Block:
     )
 
 
-def _comparison(figures: CalibrationSummary | None) -> Iterator[Block]:
-    other = figures.comparison if figures else None
-    if other is None:
+def _ladder(figures: CalibrationSummary | None) -> Iterator[Block]:
+    """Yield the models that were tried on the same left-out poses."""
+    if figures is None or len(figures.ladder) < 2:
         return
-    low, high = other.difference.low, other.difference.high
-    judged = (
-        "more springs are better" if low > 0.0
-        else "fewer springs are better" if high < 0.0
-        else "the poses do not decide"
-    )  # fmt: skip
-    yield Paragraph(
-        f"With one axial spring a joint alone the error at left-out poses is"
-        f" {mm(other.held_out.mean)} on average: {1e3 * other.difference.mean:+.3f} mm"
-        f" ({1e3 * low:+.3f} to {1e3 * high:+.3f}, 95 %); {judged}."
+    yield Heading("Which model the readings carry")
+    yield Table(
+        "Models at the same left-out poses",
+        ("Springs", "Numbers", "Error at left-out poses", "Worse than the best by (95 %)", ""),
+        tuple(
+            (
+                rung.springs,
+                str(rung.parameters),
+                mm(rung.held_out),
+                f"{mm(rung.difference.mean)} ({mm(rung.difference.low)} to"
+                f" {mm(rung.difference.high)})",
+                "taken" if rung.chosen else "",
+            )
+            for rung in figures.ladder
+        ),
     )
 
 

@@ -1,0 +1,154 @@
+"""The ladder climbs as high as readings carry it, and never higher."""
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from elastocal.dataset import Readings
+from elastocal.elastic import ElasticModel, Gear, bearing
+from elastocal.errors import IdentificationError, SpringError
+from elastocal.identification import (
+    RUNGS,
+    Climbed,
+    FitOptions,
+    choose_model,
+    climb,
+    displacement_blocks,
+    gears,
+    has_levels,
+)
+from support.cells import Cell, linear_truth, rich_truth, robot
+from support.problems import campaign
+
+OPTIONS = FitOptions()
+
+
+@cache
+def chosen(truth: str, poses: int, springs: str = "auto") -> dict[str, Climbed]:
+    arm = {"linear": linear_truth, "rich": rich_truth}[truth]()
+    readings = Cell(arm, seed=3, poses=poses).readings()
+    ladder = choose_model(robot(), readings, springs, OPTIONS).ladder
+    return {rung.name: rung for rung in ladder}
+
+
+def taken(ladder: dict[str, Climbed]) -> str:
+    (name,) = [name for name, rung in ladder.items() if rung.chosen]
+    return name
+
+
+def with_low_load(readings: Readings) -> Readings:
+    """Return the readings with those of the normal load case at 45 % besides, planted exactly."""
+    low = readings.take(readings.load_case == "normal")
+    parts = {
+        name: np.concatenate([getattr(readings, name), part * getattr(low, name)])
+        for name, part in (
+            ("joint_position", 1.0),
+            ("force", 0.45),
+            ("controller_displacement", 0.45),
+            ("marker_displacement", 0.45),
+        )
+    }
+    return Readings(
+        np.concatenate([readings.pose, low.pose]),
+        np.concatenate([readings.load_case, np.full(len(low), "low")]),
+        **parts,
+    )
+
+
+def test_few_springs_are_left_where_more_predict_better():
+    assert taken(chosen("linear", 31)) == "bearing"
+
+
+def test_gears_are_taken_on_an_arm_whose_gears_stiffen():
+    ladder = chosen("rich", 60)
+    assert taken(ladder) == "gears"
+    assert ladder["bearing"].low > 0.0
+
+
+def test_few_poses_do_not_carry_what_many_do():
+    assert taken(chosen("rich", 31)) == "bearing"
+    assert taken(chosen("rich", 60)) == "gears"
+
+
+def test_the_best_rung_differs_from_itself_by_nothing():
+    ladder = chosen("rich", 31)
+    best = min(ladder.values(), key=lambda rung: rung.score.mean())
+    assert (best.difference, best.low, best.high) == (0.0, 0.0, 0.0)
+
+
+def test_the_interval_counts_that_refits_overlap():
+    """Nadeau and Bengio: wider by sqrt(2) than for independent errors, but for 1 / (n - 1)."""
+    rung = chosen("rich", 31)["actuated"]
+    best = min(chosen("rich", 31).values(), key=lambda rung: rung.score.mean())
+    difference = rung.score - best.score
+    naive = difference.std(ddof=1) / np.sqrt(31)
+    assert (rung.high - rung.low) / (2.0 * 2.0423 * naive) == pytest.approx(
+        np.sqrt(1.0 + 31.0 / 30.0), rel=1e-3
+    )
+
+
+@pytest.mark.parametrize("name", ["actuated", "bearing", "tensor", "gears"])
+def test_each_rung_can_be_forced(name):
+    assert taken(chosen("rich", 8, name)) == name
+
+
+def test_a_layout_beside_the_ladder_is_taken_and_shown_with_it():
+    ladder = chosen("linear", 8, "bearing-joint")
+    assert taken(ladder) == "bearing-joint"
+    assert set(ladder) > {"actuated", "bearing"}
+
+
+def test_an_unknown_layout_is_refused_by_name():
+    with pytest.raises(SpringError, match="'bering'; did you mean 'bearing'"):
+        choose_model(robot(), campaign(), "bering", OPTIONS)
+
+
+def test_friction_is_not_offered_without_a_load_case_of_low_load():
+    assert not has_levels(campaign())
+    assert "gears+friction" not in chosen("rich", 8)
+    with pytest.raises(IdentificationError, match="no load case has less than 60%"):
+        climb(robot(), campaign(), [RUNGS["gears+friction"]], ["gears+friction"], OPTIONS)
+
+
+def test_planted_friction_is_found_where_there_is_a_low_load():
+    readings = with_low_load(campaign())
+    assert has_levels(readings)
+    springs = gears(robot(), readings, (0.03, 0.1, 0.3))
+    model = ElasticModel(robot(), springs)
+    c = np.array([1e-6 if "friction" in name else 2e-6 for name in model.parameter_names])
+    exact = displacement_blocks(model, readings) @ c
+    noise = 1e-6 * np.random.default_rng(0).normal(size=exact.shape)
+    planted = replace(
+        readings, marker_displacement=readings.controller_displacement + exact + noise
+    )
+    ladder = choose_model(robot(), planted, "auto", OPTIONS).ladder
+    assert taken({rung.name: rung for rung in ladder}) == "gears+friction"
+
+
+def test_gears_are_scaled_to_the_load_of_each_joint():
+    readings = campaign()
+    springs = gears(robot(), readings)
+    model = ElasticModel(robot(), bearing(robot()))
+    torque = model.load_torques(readings.joint_position, readings.force)
+    for index, spring in enumerate(springs[:5]):
+        assert isinstance(spring, Gear)
+        typical = np.median(np.abs(torque[:, index]))
+        np.testing.assert_allclose(spring.knees, np.array([0.3, 1.0, 3.0]) * typical, rtol=0.06)
+
+
+def test_a_joint_that_is_never_loaded_keeps_a_linear_spring():
+    readings = campaign()
+    springs = gears(robot(), replace(readings, force=0.0 * readings.force + [0.0, 0.0, -1000.0]))
+    assert springs[0].kind == "revolute"
+    assert springs[1].kind == "gear"
+
+
+def test_a_blunder_does_not_decide():
+    readings = Cell(rich_truth(), seed=3, poses=60).readings()
+    marker = readings.marker_displacement.copy()
+    marker[7] += 0.5
+    spoiled = replace(readings, marker_displacement=marker)
+    ladder = choose_model(robot(), spoiled, "auto", OPTIONS).ladder
+    assert taken({rung.name: rung for rung in ladder}) == "gears"
