@@ -1,6 +1,6 @@
 """A compensator as a folder of C: model, header, self-test, CMake file and page for integrators."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from importlib import resources
 from pathlib import Path
 
@@ -58,7 +58,10 @@ def _function(
     names = {f"q{k + 1}": f"q[{k}]" for k in range(joints)}
     for letter, vector in _VECTORS.items():
         names |= {f"{letter}{axis}": f"{vector}[{i}]" for i, axis in enumerate("xyz")}
-    naming = _naming(names, routine.constants)
+
+    def naming(name: str) -> str:
+        return name.upper() if name in routine.constants else names.get(name, name)
+
     lines = [line for statement in routine.statements for line in _lines(statement, naming)]
     results = [
         f"    {output} = {value_text(value, naming)};"
@@ -71,10 +74,6 @@ def _function(
         if not any(names.get(value, "").startswith(f"{name}[") for value in used)
     ]
     return "\n".join([head, "{", *lines, *idle, *results, "}", ""])
-
-
-def _naming(names: Mapping[str, str], constants: Mapping[str, float]) -> Naming:
-    return lambda name: name.upper() if name in constants else names.get(name, name)
 
 
 def _lines(statement: Statement, naming: Naming) -> list[str]:
@@ -94,6 +93,7 @@ def _lines(statement: Statement, naming: Naming) -> list[str]:
 
 
 _PARTS = ("head.c", "sin_cos.c", "condition.c", "correct.c", "selftest.c")
+_BESIDE = ("elastocal_model.h", "selftest_main.c", "CMakeLists.txt", "README.md")
 _RAW = "N, N m; raw, as the sensor gives them | sensor"
 _AT_TCP = (
     "N, N m; **on** the robot, bias and tool weight removed, about the tool centre point | tcp"
@@ -152,13 +152,8 @@ def c_files(numbers: Design) -> dict[str, str]:
     head, sin_cos, condition, correct, selftest = (_filled(part, values) for part in _PARTS)
     definitions = "".join(f"{each.definition()}\n" for each in constants if not each.in_header)
     model = "".join([head, definitions, sin_cos, c_routines(numbers), condition, correct, selftest])
-    return {
-        "elastocal_model.c": model,
-        "elastocal_model.h": _filled("elastocal_model.h", values),
-        "selftest_main.c": _filled("selftest_main.c", values),
-        "CMakeLists.txt": _filled("CMakeLists.txt", values),
-        "README.md": _filled("README.md", values | _readme_values(numbers)),
-    }
+    values |= _readme_values(numbers)
+    return {"elastocal_model.c": model} | {name: _filled(name, values) for name in _BESIDE}
 
 
 def _values(numbers: Design) -> dict[str, str]:

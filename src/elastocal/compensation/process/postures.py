@@ -11,7 +11,7 @@ import numpy as np
 from elastocal.arrays import FloatArray
 from elastocal.cell import Cell
 from elastocal.compensation.offline import PathError, joints_along_path, posture_jumps
-from elastocal.compensation.process.course import Course
+from elastocal.compensation.process.course import Course, Process
 from elastocal.compensation.process.placement import FibrePlacement
 from elastocal.compensation.process.roughing import Roughing
 from elastocal.errors import CompensationError
@@ -57,10 +57,7 @@ class _Trial:
         )
 
 
-PROCESSES: Mapping[str, type[FibrePlacement] | type[Roughing]] = {
-    "afp": FibrePlacement,
-    "machining": Roughing,
-}
+PROCESSES: Mapping[str, type[Process]] = {"afp": FibrePlacement, "machining": Roughing}
 """The processes that can be simulated, by the name that a command gives them."""
 
 
