@@ -18,7 +18,6 @@ from .posture_survey import (
     principal_stiffness as principal_stiffness,
     read_stations as read_stations,
     require_same_robot as require_same_robot,
-    stiffness_along as stiffness_along,
     survey_postures as survey_postures,
 )
 from .settings import (

@@ -289,7 +289,7 @@ Function = Callable[..., tuple[float, ...]]
 @brief_repr
 @dataclass(frozen=True)
 class ModelFunctions:
-    """What a compensator asks of a model; arguments and results are sequences of floats."""
+    """Functions of a model that a compensator needs; they take and return sequences of floats."""
 
     orientation: Function
     """``(q)``: rotation of the tool centre point in base, by rows."""
@@ -324,6 +324,7 @@ def compiled(routine: Routine, joints: int, loaded: bool = True) -> Function:
     functions = {"sin", "cos"}
     functions |= {each.function for each in routine.statements if isinstance(each, Call)}
     namespace: dict[str, Function] = {name: getattr(math, name) for name in functions}
+    # Compiled once, run every cycle: an interpreter of the statements would be slower than arrays.
     exec(compile(source, "<elastic model>", "exec"), namespace)
     return namespace["routine"]
 

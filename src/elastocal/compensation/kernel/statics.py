@@ -58,6 +58,7 @@ def _write_chain(program: Program, chain: SerialChain) -> _Chain:
     Joint ``k`` counts from 1. Its names are ``p<k>`` (rotation before the motion), ``r<k>``
     (behind it), ``o<k>`` (origin before), ``d<k>`` (origin behind a linear motion).
     """
+    # From the base out: what is 0 or 1 in the first frames leaves no statement in those behind.
     here = _Frame(_IDENTITY, _NOTHING)
     joints = []
     for k, joint in enumerate(chain.joints, start=1):
@@ -220,14 +221,14 @@ class _Place:
     lever: Vector
     """From it to the tool centre point."""
     moment: Vector
-    """Of the load, about the point."""
+    """Moment of the load about the point."""
     axes: dict[int, tuple[SpringAxis, _Frame]]
     """By number, with the frame that each is fixed in."""
     directions: dict[int, Vector] = field(default_factory=dict)
 
     @property
     def numbers(self) -> tuple[int, ...]:
-        """Of its axes."""
+        """Numbers of its axes."""
         return tuple(self.axes)
 
     def loaded(self) -> Iterator[_LoadedAxis]:
@@ -242,7 +243,7 @@ class _Place:
 
 
 class _Laws:
-    """What the springs make of the torques about their axes, as statements."""
+    """The laws of the springs as statements: from torques about their axes to angles."""
 
     def __init__(self, program: Program, model: ElasticModel) -> None:
         self._program = program

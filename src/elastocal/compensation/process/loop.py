@@ -21,28 +21,29 @@ from elastocal.results import brief_repr
 from elastocal.robot import Robot
 
 
+@brief_repr
+@dataclass(frozen=True, eq=False)
+class CycleInput:
+    """Measurements of a cycle that a correction is made from."""
+
+    time: FloatArray
+    """Time of each reading, shape (reading,), in s."""
+    q: FloatArray
+    """Measured joints, shape (joint,), in rad or m."""
+    raw: FloatArray
+    """Readings of the sensor, shape (reading, 6), in N and N·m."""
+    deflection: FloatArray
+    """True deflection, shape (3,), in m, for a corrector that may know it."""
+
+
 class Corrector(Protocol):
     """Corrects the commanded position every cycle."""
 
     def start(self) -> None:
         """Forget what was."""
 
-    def correct(
-        self, time: FloatArray, q: FloatArray, raw: FloatArray, deflection: FloatArray
-    ) -> FloatArray:
-        """Return the correction in base, shape (3,), in m.
-
-        Parameters
-        ----------
-        time : ndarray, shape (reading,)
-            Of the readings of the cycle, in s.
-        q : ndarray, shape (joint,)
-            Measured joints, in rad or m.
-        raw : ndarray, shape (reading, 6)
-            What the sensor says.
-        deflection : ndarray, shape (3,)
-            The truth, for a corrector that may know it.
-        """
+    def correct(self, cycle: CycleInput) -> FloatArray:
+        """Return the correction in base, shape (3,), in m."""
 
 
 class ModelCorrector:
@@ -66,16 +67,10 @@ class ModelCorrector:
         """Forget what was."""
         self._state = self._compensator.start()
 
-    def correct(
-        self,
-        time: FloatArray,
-        q: FloatArray,
-        raw: FloatArray,
-        deflection: FloatArray,  # noqa: ARG002 (it measures, it does not know)
-    ) -> FloatArray:
-        """Return the correction; see `Corrector.correct`."""
-        state, joints = self._state, q.tolist()
-        for t, values in zip(time.tolist(), raw.tolist(), strict=True):
+    def correct(self, cycle: CycleInput) -> FloatArray:
+        """Return the correction from the readings; the deflection is not looked at."""
+        state, joints = self._state, cycle.q.tolist()
+        for t, values in zip(cycle.time.tolist(), cycle.raw.tolist(), strict=True):
             state = self._compensator.condition(state, Reading(t, joints, values[:3], values[3:]))
         self._state, answer = self._compensator.correct(state, joints)
         return np.array(answer.correction)
@@ -93,15 +88,9 @@ class PerfectCorrector:
         """Forget what was."""
         self._line = deque(np.zeros(3) for _ in range(self._cycles))
 
-    def correct(
-        self,
-        time: FloatArray,  # noqa: ARG002
-        q: FloatArray,  # noqa: ARG002
-        raw: FloatArray,  # noqa: ARG002 (it knows, it does not measure)
-        deflection: FloatArray,
-    ) -> FloatArray:
-        """Return the correction; see `Corrector.correct`."""
-        self._line.append(-deflection)
+    def correct(self, cycle: CycleInput) -> FloatArray:
+        """Return the correction from the deflection; the readings are not looked at."""
+        self._line.append(-cycle.deflection)
         return self._line.popleft()
 
 
@@ -247,7 +236,7 @@ def run_course(
             # The correction of this cycle acts from the next on, later by the dead cycles.
             if corrector is not None:
                 q = joints[n] + into_joints[row] @ drives.done
-                drives.command(corrector.correct(time[n], q, raw[n], deflection[n]))
+                drives.command(corrector.correct(CycleInput(time[n], q, raw[n], deflection[n])))
             shifts.append(deflection[n] + drives.done)
         before = now
     return _course_run(course, controller, cycles, np.array(shifts))

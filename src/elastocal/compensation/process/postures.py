@@ -4,7 +4,7 @@ The tool is turned by one angle for all courses; the rail stands still along eac
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -117,7 +117,7 @@ def with_postures(cell: Cell, courses: tuple[Course, ...]) -> tuple[Course, ...]
             " the tool is turned about its axis"
         )
     return tuple(
-        course.with_joints(trial.joints(course, float(_SPINS[chosen]), external, slice(None)))
+        replace(course, q=trial.joints(course, float(_SPINS[chosen]), external, slice(None)))
         for course, (_, external) in zip(courses, found[chosen], strict=True)
     )
 
