@@ -35,7 +35,6 @@ from elastocal.compensation.offline import (
     row_blocks,
 )
 from elastocal.compensation.process import arc_length
-from elastocal.errors import RobotError
 from elastocal.identification import CalibratedModel, interval
 from elastocal.planning import cell_surface, collision_scene
 from elastocal.results import brief_repr
@@ -47,10 +46,6 @@ _BLOCK = 20_000
 """Rows of a path that are read at a time."""
 _MOST = 3_000_000
 """Postures of one survey; bounds memory and time."""
-_SAMPLES = 5
-"""Joint positions at which two robots are compared."""
-_SAME = 1e-6
-"""Difference of their poses by rounding, in m or as a number of a rotation."""
 
 
 @brief_repr
@@ -244,29 +239,6 @@ def cell_constraints(cell: Cell) -> tuple[PostureConstraint, ...]:
         ),
         PostureConstraint("collision", lambda q: scene.keeps(q, limits.clearance, -math.inf)),
     )
-
-
-def require_same_robot(model: Robot, cell: Robot) -> None:
-    """Refuse a cell whose robot, or whose tcp, is not that of the model.
-
-    Raises
-    ------
-    RobotError
-        If joints have other names, or the same joints lead elsewhere.
-    """
-    if model.joint_names != cell.joint_names:
-        raise RobotError(
-            f"the cell's robot has joints {', '.join(cell.joint_names)}, the model's"
-            f" {', '.join(model.joint_names)}: they must be the same"
-        )
-    low, high = (np.clip(end, -np.pi, np.pi) for end in (cell.limits.lower, cell.limits.upper))
-    q = np.linspace(low, high, _SAMPLES)
-    gap = float(np.abs(model.forward(q) - cell.forward(q)).max())
-    if not gap <= _SAME:
-        raise RobotError(
-            f"the same joints lead {1e3 * gap:.3g} mm apart in the cell and in the model: another"
-            " tool centre point, base or robot"
-        )
 
 
 @brief_repr
