@@ -132,7 +132,7 @@ class Options:
 
 
 class _PoolSearch:
-    """The postures found so far, and the points that wait for one; lives in `PostureSolver.pool`."""
+    """The postures found so far, and the points that wait for one, while a pool is made."""
 
     def __init__(self, checks: Checks, points: int) -> None:
         self.checks = checks
