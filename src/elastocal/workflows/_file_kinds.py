@@ -1,4 +1,4 @@
-"""What each kind of file holds, as ``check`` says: a function a kind, which reads and so validates.
+"""Describe what files hold, as ``check`` says: a function a kind, which reads and so validates.
 
 A new kind is a function here and its entry in a table of `elastocal.workflows.check`.
 """

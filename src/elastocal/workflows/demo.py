@@ -115,7 +115,7 @@ class DemoSettings:
     out: str | PathLike[str] = "demo"
     """Folder for the results."""
     seed: int = 0
-    """Of the simulated cell."""
+    """Seed of the simulated cell."""
     force: bool = False
     """Remove an earlier demo from the folder first."""
     display: MakeDisplay | None = None

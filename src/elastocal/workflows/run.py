@@ -89,7 +89,7 @@ class RunResult(Result):
     figures: RunFigures
     end: RunEnd
     summary: RunSummary | None
-    """Of the derived run; None where nothing was derived."""
+    """Summary of the derived run; None where nothing was derived."""
     problem: ElastocalError | None
     """Why nothing was derived of a run that is done."""
 
