@@ -1,3 +1,23 @@
+__all__ = [
+    "calibrate",
+    "check",
+    "codec",
+    "compare",
+    "compensate",
+    "demo",
+    "derive",
+    "export",
+    "init",
+    "plan",
+    "predict",
+    "report",
+    "run",
+    "simulate_process",
+    "stiffness",
+    "study",
+    "tool",
+]  # the commands: what the package itself exports of these
+
 from ._file_kinds import FileDescription as FileDescription
 from ._inputs import find_robot as find_robot, refuse_overwriting as refuse_overwriting
 from ._operator_and_devices import (

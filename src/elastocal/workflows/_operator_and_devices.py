@@ -9,9 +9,7 @@ from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
 from typing import Protocol
 
-from elastocal.cell import Cell
-from elastocal.cell.description import SIMULATED, DeviceNames
-from elastocal.cell.devices import Devices
+from elastocal.cell import SIMULATED, Cell, DeviceNames, Devices
 from elastocal.errors import DeviceError, ProcedureError, nearest
 from elastocal.procedure import Progress as RunProgress
 

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any, Protocol, TextIO
 
 from elastocal import __version__
-from elastocal.cell.examples import check_like
+from elastocal.cell import require_example
 from elastocal.compensation.process import SimulateProcessResult
 from elastocal.errors import FileAccessError
 from elastocal.files import write_text
@@ -214,7 +214,7 @@ def chapters(kind: str, out: Path, seed: int) -> tuple[Chapter, ...]:
     SchemaError
         If there is no such example cell.
     """
-    check_like(kind)
+    require_example(kind)
     cell, run_folder, planned, process = (
         out / name for name in ("cell.yaml", "run", "plan", "process")
     )

@@ -109,7 +109,7 @@ EXAMPLES = {
 """Fibre placement on a dome section, and machining of a block: the paper's two case studies."""
 
 
-def check_like(like: str) -> None:
+def require_example(like: str) -> None:
     """Refuse the name of an example that there is not.
 
     Raises
@@ -142,7 +142,7 @@ def write_example(folder: Path, like: str, force: bool = False) -> tuple[Path, .
     FileAccessError
         If a file is there already, or the folder cannot be written.
     """
-    check_like(like)
+    require_example(like)
     example = EXAMPLES[like]
     paths = (folder / _CELL_FILE, *(folder / name for name in example.meshes))
     for path in paths:
@@ -156,7 +156,7 @@ def write_example(folder: Path, like: str, force: bool = False) -> tuple[Path, .
     for name, triangles in example.meshes.items():
         with replacing(folder / name) as temporary:
             temporary.write_bytes(binary_stl(triangles()))
-    text = importlib.resources.files(__package__).joinpath(example.template)
+    text = importlib.resources.files(__package__).joinpath("templates", example.template)
     write_text(paths[0], text.read_text(encoding="utf-8"))
     return paths
 

@@ -9,7 +9,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, FiniteFloat, field_validator, model_validator
 
-from elastocal.cell.description._quantities import (
+from elastocal.cell._quantities import (
     Distance,
     Force,
     Mass,

@@ -1,4 +1,4 @@
-"""How the robot moves between poses: HOME, axis speeds, where the external axes may stand."""
+"""How the robot moves: HOME, speeds, margins, torques, and where the external axes may stand."""
 
 import itertools
 import math
@@ -9,8 +9,9 @@ import numpy as np
 from pydantic import Field, FiniteFloat, field_validator
 
 from elastocal.arrays import FloatArray
-from elastocal.cell.description._quantities import PositiveSpeed, PositiveTime
-from elastocal.cell.description.robot import RobotEntry
+from elastocal.cell._quantities import PositiveSpeed, PositiveTime, vector
+from elastocal.cell.hardware import RobotEntry
+from elastocal.cell.procedure import Limits, TorqueLimits
 from elastocal.errors import RobotError, UnitError, nearest
 from elastocal.records import StrictModel
 from elastocal.robot import Robot
@@ -82,7 +83,7 @@ def home_position(robot: Robot, entry: MotionEntry) -> FloatArray:
     UnitError
         If a position has no unit or a wrong one.
     """
-    _refuse_unknown(robot, "home", entry.home)
+    _require_joints(robot, "home: ", entry.home)
     limits, home = robot.limits, np.empty(len(robot.joint_names))
     for index, name in enumerate(robot.joint_names):
         if name not in entry.home:
@@ -123,7 +124,7 @@ def axis_speeds(robot: Robot, entry: MotionEntry) -> FloatArray:
     UnitError
         If a speed has no unit or a wrong one.
     """
-    _refuse_unknown(robot, "speed", entry.speed)
+    _require_joints(robot, "speed: ", entry.speed)
     speeds = np.array(robot.limits.velocity)
     for index, name in enumerate(robot.joint_names):
         if name in entry.speed:
@@ -136,6 +137,46 @@ def axis_speeds(robot: Robot, entry: MotionEntry) -> FloatArray:
         if not speeds[index] >= _SLOWEST:
             raise RobotError(f"speed.{name}: {entry.speed[name]} must be above 0")
     return entry.override * speeds
+
+
+def joint_margins(robot: Robot, limits: Limits) -> FloatArray:
+    """Return the least distance of each joint to its limits, shape (joint,), in rad or m.
+
+    Raises
+    ------
+    RobotError
+        If a margin leaves a joint nothing of its range.
+    """
+    margins = [limits.joint_margin if turns else limits.rail_margin for turns in robot.revolute]
+    for index, (name, margin) in enumerate(zip(robot.joint_names, margins, strict=True)):
+        lower, upper = robot.limits.lower[index], robot.limits.upper[index]
+        if not 2.0 * margin < upper - lower:
+            turns = robot.revolute[index]
+            key, unit = ("joint_margin", "deg") if turns else ("rail_margin", "m")
+            scale = 180.0 / math.pi if turns else 1.0
+            raise RobotError(
+                f"limits.{key}: {scale * margin:g} {unit} leaves nothing of the range of"
+                f" {name}, which is {scale * lower:g} to {scale * upper:g} {unit}"
+            )
+    return vector(tuple(margins))
+
+
+def torque_limits(robot: Robot, torque: TorqueLimits) -> FloatArray:
+    """Return the torques that may be used, shape (joint,), in N·m (N); NaN where not known.
+
+    Raises
+    ------
+    RobotError
+        If a figure is of no joint.
+    UnitError
+        If a figure is a force where a moment is needed, or the other way round.
+    """
+    _require_joints(robot, "", torque.values)
+    limits = np.array(robot.limits.effort)
+    for joint in torque.values:
+        index = robot.joint_names.index(joint)
+        limits[index] = torque.figure(joint, robot.revolute[index])
+    return torque.factor * limits
 
 
 def external_positions(robot: Robot, entry: RobotEntry, margin: FloatArray) -> FloatArray:
@@ -186,11 +227,11 @@ def external_positions(robot: Robot, entry: RobotEntry, margin: FloatArray) -> F
     return np.array(combinations, dtype=float).reshape(len(combinations), len(names))
 
 
-def _refuse_unknown(robot: Robot, key: str, names: Iterable[str]) -> None:
+def _require_joints(robot: Robot, key: str, names: Iterable[str]) -> None:
     for name in names:
         if name not in robot.joint_names:
             raise RobotError(
-                f"{key}: {robot.name} has no joint {name!r}{nearest(name, robot.joint_names)}"
+                f"{key}{robot.name} has no joint {name!r}{nearest(name, robot.joint_names)}"
                 f" (joints: {', '.join(robot.joint_names)})"
             )
 

@@ -1,8 +1,10 @@
 """The cell file, validated, and the cell ready to compute with: robot made, files found."""
 
-import math
+import hashlib
+import json
+import os
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeVar
@@ -11,27 +13,37 @@ import numpy as np
 from pydantic import Field, field_validator
 
 from elastocal.arrays import FloatArray
-from elastocal.cell.description._quantities import IDENTITY, Pose, vector
-from elastocal.cell.description.loads import Engagement, Limits, LoadCases
-from elastocal.cell.description.motion import (
+from elastocal.cell._quantities import IDENTITY, Pose
+from elastocal.cell.hardware import (
+    Marker,
+    MeshFile,
+    RobotEntry,
+    SensorEntry,
+    Shape,
+    SurfaceEntry,
+    Tool,
+    Tracker,
+)
+from elastocal.cell.motion import (
     MotionEntry,
     axis_speeds,
     external_positions,
     home_position,
+    joint_margins,
+    torque_limits,
 )
-from elastocal.cell.description.procedure import Acceptance, DeviceNames, ProcedureSettings, Search
-from elastocal.cell.description.robot import (
-    Marker,
-    RailEntry,
-    RobotEntry,
-    SensorEntry,
-    Tool,
-    Tracker,
+from elastocal.cell.procedure import (
+    Acceptance,
+    DeviceNames,
+    Engagement,
+    Limits,
+    LoadCases,
+    ProcedureSettings,
+    Search,
 )
-from elastocal.cell.description.simulation import Fault, Simulation
-from elastocal.cell.description.surface import MeshFile, Shape, SurfaceEntry
+from elastocal.cell.simulation import Fault, Simulation
 from elastocal.dataset import LoadRows, joint_dimensions, read_load_rows
-from elastocal.errors import ElastocalError, FileAccessError, RobotError, SchemaError, nearest
+from elastocal.errors import ElastocalError, FileAccessError, SchemaError
 from elastocal.files import read_text
 from elastocal.records import StrictModel, read_yaml
 from elastocal.robot import (
@@ -41,6 +53,7 @@ from elastocal.robot import (
     catalogue,
     find_meshes,
     inverse_transform,
+    is_relative,
     on_rail,
     parse_urdf,
     with_tool,
@@ -226,7 +239,7 @@ class Cell:
     @property
     def joint_margin(self) -> FloatArray:
         """Least distance of each joint to its limits, shape (joint,), in rad or m."""
-        return _margins(self.robot, self.file.limits)
+        return joint_margins(self.robot, self.file.limits)
 
     def find(self, file: str) -> Path:
         """Return the path of a file that the cell file names."""
@@ -251,30 +264,29 @@ def load_cell(path: Path) -> Cell:
     """
     path = Path(path)
     file = read_yaml(path, CellFile, SCHEMA)
-    robot = _at(path, "robot", lambda: _robot(path, file))
-    _check_margins(path, robot, file)
-    margins = _margins(robot, file.limits)
-    positions = _at(path, "robot", lambda: external_positions(robot, file.robot, margins))
-    torques = _at(path, "limits.torque.values", lambda: _torque_limits(robot, file))
-    home = _at(path, "motion", lambda: home_position(robot, file.motion))
-    speeds = _at(path, "motion", lambda: axis_speeds(robot, file.motion))
+    robot = _at(f"{path}: robot", lambda: _robot(path, file))
+    margins = _at(str(path), lambda: joint_margins(robot, file.limits))
+    positions = _at(f"{path}: robot", lambda: external_positions(robot, file.robot, margins))
+    torques = _at(f"{path}: limits.torque.values", lambda: torque_limits(robot, file.limits.torque))
+    home = _at(f"{path}: motion", lambda: home_position(robot, file.motion))
+    speeds = _at(f"{path}: motion", lambda: axis_speeds(robot, file.motion))
     for key, mesh in _meshes(file):
         if not (path.parent / mesh.file).is_file():
             raise FileAccessError(f"{path}: {key}.file: there is no file {path.parent / mesh.file}")
-    process = _at(path, "process.file", lambda: _process(path, file, robot))
+    process = _at(f"{path}: process.file", lambda: _process(path, file, robot))
     for array in (positions, torques, home, speeds):
         array.setflags(write=False)
     return Cell(path, file, robot, positions, torques, home, speeds, process)
 
 
-def _at(path: Path, key: str, make: Callable[[], _Result]) -> _Result:
+def _at(place: str, make: Callable[[], _Result]) -> _Result:
     """Return what ``make`` makes; its refusal names the place in the cell file."""
     try:
         return make()
     except FileAccessError as error:
-        raise FileAccessError(f"{path}: {key}: {error}") from error
+        raise FileAccessError(f"{place}: {error}") from error
     except ElastocalError as error:
-        raise SchemaError(f"{path}: {key}: {error}") from error
+        raise SchemaError(f"{place}: {error}") from error
 
 
 def _robot(path: Path, file: CellFile) -> Robot:
@@ -290,44 +302,9 @@ def _robot(path: Path, file: CellFile) -> Robot:
     tip = f"cell_{_TCP}" if _TCP in links else _TCP
     urdf = with_tool(urdf, entry.flange, tip, file.tcp.T)
     if entry.rail is not None:
-        urdf = on_rail(urdf, _rail(entry.rail))
+        rail = entry.rail
+        urdf = on_rail(urdf, Rail(rail.name, rail.axis, *rail.travel, T_rail_base=rail.pose.T))
     return Robot.from_urdf(urdf, tip, meshes=meshes)
-
-
-def _rail(entry: RailEntry) -> Rail:
-    return Rail(entry.name, entry.axis, *entry.travel, T_rail_base=entry.pose.T)
-
-
-def _torque_limits(robot: Robot, file: CellFile) -> FloatArray:
-    torque, limits = file.limits.torque, np.array(robot.limits.effort)
-    for joint in torque.values:
-        if joint not in robot.joint_names:
-            raise RobotError(
-                f"{robot.name} has no joint {joint!r}{nearest(joint, robot.joint_names)}"
-                f" (joints: {', '.join(robot.joint_names)})"
-            )
-        index = robot.joint_names.index(joint)
-        limits[index] = torque.figure(joint, robot.revolute[index])
-    return torque.factor * limits
-
-
-def _margins(robot: Robot, limits: Limits) -> FloatArray:
-    return vector(tuple(limits.joint_margin if r else limits.rail_margin for r in robot.revolute))
-
-
-def _check_margins(path: Path, robot: Robot, file: CellFile) -> None:
-    """Refuse margins that leave a joint nothing of its range."""
-    for index, name in enumerate(robot.joint_names):
-        turns = robot.revolute[index]
-        key, unit = ("joint_margin", "deg") if turns else ("rail_margin", "m")
-        margin = getattr(file.limits, key)
-        lower, upper = robot.limits.lower[index], robot.limits.upper[index]
-        if not 2.0 * margin < upper - lower:
-            scale = 180.0 / math.pi if turns else 1.0
-            raise SchemaError(
-                f"{path}: limits.{key}: {scale * margin:g} {unit} leaves nothing of the range of"
-                f" {name}, which is {scale * lower:g} to {scale * upper:g} {unit}"
-            )
 
 
 def _meshes(file: CellFile) -> list[tuple[str, MeshFile]]:
@@ -343,3 +320,68 @@ def _process(path: Path, file: CellFile, robot: Robot) -> LoadRows | None:
         return None
     joints = joint_dimensions(robot.joint_names, robot.revolute)
     return read_load_rows(path.parent / file.process.file, joints)
+
+
+RUN_SECTIONS = ("acceptance", "procedure", "devices", "simulation", "faults")
+"""Sections of the cell file that say how a plan is carried out and its result is judged; a plan
+does not depend on them."""
+
+
+def fingerprint(cell: Cell) -> str:
+    """Return a SHA-256 over what a cell file says and the files that it names.
+
+    It changes with every value of the cell file, defaults included, and with every byte of the
+    surface, the mesh shapes, the robot's URDF with the meshes of its collision shapes, and the
+    process file. It does not change with
+    comments, the order of keys, the way a number is written, the place of the folder, or the
+    sections that say how a plan is carried out (`RUN_SECTIONS`).
+
+    Parameters
+    ----------
+    cell : Cell
+        The cell.
+
+    Returns
+    -------
+    str
+        64 hexadecimal digits.
+
+    Raises
+    ------
+    FileAccessError
+        If a file that the cell names cannot be read.
+    """
+    contents = cell.file.model_dump(mode="json", exclude=set(RUN_SECTIONS))
+    content = json.dumps(contents, sort_keys=True, allow_nan=False)
+    digest = hashlib.sha256(content.encode("utf-8"))
+    for name in named_files(cell):
+        # Digests have one length, so that no byte can move from one file to the next unseen.
+        digest.update(hashlib.sha256(_bytes_of(cell, name)).digest())
+    return digest.hexdigest()
+
+
+def named_files(cell: Cell) -> Iterator[str]:
+    """Yield the files that a cell file or its URDF names, relative to the cell file.
+
+    A file that is named by an absolute path comes with that path.
+    """
+    file = cell.file
+    yield file.surface.file
+    for shape in (*file.tool.shapes, *file.fixtures):
+        if shape.mesh is not None:
+            yield shape.mesh.file
+    if file.robot.urdf is not None:
+        yield file.robot.urdf
+    folder = cell.path.absolute().parent
+    for name, place in cell.robot.meshes:
+        yield os.path.relpath(place, folder) if is_relative(name) else str(place)
+    if file.process is not None:
+        yield file.process.file
+
+
+def _bytes_of(cell: Cell, name: str) -> bytes:
+    path = cell.find(name)
+    try:
+        return path.read_bytes()
+    except OSError as error:
+        raise FileAccessError(f"cannot read {path}: {error.strerror or error}") from error
