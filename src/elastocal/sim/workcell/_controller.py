@@ -96,7 +96,7 @@ class SimulatedArm:
 
     def move_joints(self, q: FloatArray, speed: float) -> None:
         """Start a synchronous joint-space move; see `RobotArm.move_joints`."""
-        plant, linkage = self._plant, self._plant.statics.robot.layout.linkage
+        plant, linkage = self._plant, self._plant.statics.robot.linkage
         target = check_vector("joint target", q, len(self.joint_names))
         for name, value, low, high in zip(
             self.joint_names, target, linkage.lower, linkage.upper, strict=True

@@ -15,9 +15,8 @@ from elastocal.arrays import FloatArray
 from elastocal.cell import Cell
 from elastocal.errors import DeviceError
 from elastocal.robot import inverse_transform
-from elastocal.sim.arm import solve_inverse
+from elastocal.sim.arm import RobotSprings
 from elastocal.sim.workcell._robot import RobotEquilibrium, TrueRobot
-from elastocal.sim.workcell._springs import RobotSprings
 from elastocal.sim.workcell._timeline import Knots
 
 
@@ -193,9 +192,7 @@ class Quasistatics:
         """
         goals = np.zeros((len(points), 4, 4))
         goals[:, :3, :3], goals[:, :3, 3], goals[:, 3, 3] = R_base_tcp, points, 1.0
-        layout = self.robot.layout
-        start = np.repeat(q[None], len(points), axis=0)
-        found = solve_inverse(layout.linkage, goals, start, tolerance=1e-10, locked=layout.external)
+        found = self.robot.solve(goals, np.repeat(q[None], len(points), axis=0))
         if not found.ok.all():
             raise DeviceError(
                 f"the arm cannot follow a straight line to {np.round(points[-1], 4).tolist()} m:"

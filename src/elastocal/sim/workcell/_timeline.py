@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 from elastocal.arrays import FloatArray, IndexArray
 from elastocal.cell import Motion
 from elastocal.errors import DeviceError
-from elastocal.sim.workcell._springs import RobotSprings
+from elastocal.sim.arm import RobotSprings
 
 SETTLED = 1e-5
 """Rest of a settling force that counts as none, over its change."""
