@@ -11,11 +11,18 @@ from elastocal.arrays import FloatArray
 from elastocal.cell import Fault, Motion
 from elastocal.errors import DeviceError
 from elastocal.sim.workcell._contact import Contact
-from elastocal.sim.workcell._paths import force_path, pressed_state
+from elastocal.sim.workcell._paths import pressed_state
 from elastocal.sim.workcell._plant import Plant
-from elastocal.sim.workcell._quasistatics import ForceReading, RobotState
+from elastocal.sim.workcell._quasistatics import ForceReading
 from elastocal.sim.workcell._sampling import generator
-from elastocal.sim.workcell._timeline import Ripple, Segment, SettlingRamp, TimeLaw, Uniform
+from elastocal.sim.workcell._timeline import (
+    Ripple,
+    RobotState,
+    Segment,
+    SettlingRamp,
+    TimeLaw,
+    Uniform,
+)
 
 SLIP_TIME = 0.1
 """Time that an injected slip takes, in s."""
@@ -79,8 +86,7 @@ class ForceControl:
             plant.statics, start, contact, lambda _: np.zeros(3), plant.stop_error()
         )
         law = Uniform(float(np.linalg.norm(start.force)) / rate)
-        path = force_path(plant.statics, start, end)
-        plant.run(path, law, (Motion.RELEASING, Motion.IDLE), start)
+        plant.run(plant.statics.path(start, end), law, (Motion.RELEASING, Motion.IDLE))
 
     def let_slip(self, fault: Fault, held: Segment) -> None:
         """Let the contact slip against the lateral force, unless the load case is over."""
@@ -97,9 +103,8 @@ class ForceControl:
         plant.contact = contact
         ramp = max(float(np.linalg.norm(end.force - start.force)) / self._rate, least)
         law: TimeLaw = SettlingRamp(ramp, plant.cell.file.simulation.controller.settling)
-        path = force_path(plant.statics, start, end)
-        ripple = self._ripple()
-        return plant.run(path, law, (Motion.HOLDING, Motion.HOLDING), start, ripple=ripple)
+        path, holding = plant.statics.path(start, end), (Motion.HOLDING, Motion.HOLDING)
+        return plant.run(path, law, holding, ripple=self._ripple())
 
     def _slide(self, held: Segment) -> None:
         """Slide at a steady speed until the controller has had enough."""
@@ -111,10 +116,9 @@ class ForceControl:
         plant.contact = contact = contact.slipped(slide * self._away())
         end = self._equilibrium(start, contact)
         plant.run(
-            force_path(plant.statics, start, end),
+            plant.statics.path(start, end),
             Uniform(slide / entry.contact.slide_speed),
             (Motion.HOLDING, Motion.STOPPED),
-            start,
             fault=f"force control gave up: the contact slid by {1e3 * slide:g} mm",
         )
 

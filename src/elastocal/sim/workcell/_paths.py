@@ -11,7 +11,8 @@ import numpy as np
 from elastocal.arrays import FloatArray
 from elastocal.sim.workcell._contact import Contact
 from elastocal.sim.workcell._plant import Plant
-from elastocal.sim.workcell._quasistatics import Quasistatics, RobotPath, RobotState
+from elastocal.sim.workcell._quasistatics import Quasistatics
+from elastocal.sim.workcell._timeline import RobotPath, RobotState
 
 CLOSED = 1e-8
 """How far the tool may end from where the contact holds it, in m: 0.03 N of the disk."""
@@ -29,7 +30,7 @@ def joint_path(statics: Quasistatics, start: RobotState, end: RobotState) -> Rob
     progress = np.linspace(0.0, 1.0, _STEPS + 1)
     q = _between(start.q, end.q, progress)
     twist = _between(start.twist, end.twist, progress)
-    return RobotPath(statics.knots(progress, q, twist, np.zeros((len(q), 3))), end)
+    return RobotPath(statics.knots(progress, q, twist, np.zeros((len(q), 3))), start, end)
 
 
 def straight_path(statics: Quasistatics, states: list[RobotState]) -> RobotPath:
@@ -54,14 +55,7 @@ def straight_path(statics: Quasistatics, states: list[RobotState]) -> RobotPath:
     points = _interpolated(at, T[:, :3, 3], fine)
     q = statics.along(states[0].q, T[0, :3, :3], points[1:-1])
     q = np.concatenate([coarse[:1], q, coarse[-1:]])
-    return RobotPath(statics.knots(fine, q, twist, force), states[-1])
-
-
-def force_path(statics: Quasistatics, start: RobotState, end: RobotState) -> RobotPath:
-    """Return the path on which the force goes straight from one to the other."""
-    both = (start, end)
-    q, twist, force = (np.stack([getattr(s, n) for s in both]) for n in ("q", "twist", "force"))
-    return RobotPath(statics.knots(np.array([0.0, 1.0]), q, twist, force), end)
+    return RobotPath(statics.knots(fine, q, twist, force), states[0], states[-1])
 
 
 @dataclass(frozen=True, eq=False)

@@ -15,35 +15,8 @@ from elastocal.arrays import FloatArray
 from elastocal.cell import Cell
 from elastocal.errors import DeviceError
 from elastocal.robot import inverse_transform
-from elastocal.sim.arm import RobotSprings
 from elastocal.sim.workcell._robot import RobotEquilibrium, TrueRobot
-from elastocal.sim.workcell._timeline import Knots
-
-
-@dataclass(frozen=True, eq=False)
-class RobotState:
-    """State of the robot between two commands; in many postures at once with a leading axis."""
-
-    q: FloatArray
-    """Joints of the controller, shape (..., joint), in rad or m."""
-    twist: FloatArray
-    """See `Knots.twist`, shape (..., 9)."""
-    force: FloatArray
-    """Force on the robot in base, shape (..., 3), in N."""
-    springs: RobotSprings
-    """With the memory of the gears."""
-    theta: FloatArray | None
-    """Spring positions to start from; None: from none."""
-    sag: FloatArray
-    """Twist under weight alone that the controller has taken out a part of, shape (..., 9)."""
-
-
-@dataclass(frozen=True, eq=False)
-class RobotPath:
-    """A path that the robot takes, and where it leads."""
-
-    knots: Knots
-    end: RobotState
+from elastocal.sim.workcell._timeline import Knots, RobotPath, RobotState
 
 
 @dataclass(frozen=True, eq=False)
@@ -199,6 +172,12 @@ class Quasistatics:
                 " a singularity or the end of its reach"
             )
         return found.q
+
+    def path(self, start: RobotState, end: RobotState) -> RobotPath:
+        """Return the path on which joints, force and deviation change evenly together."""
+        both = (start, end)
+        columns = (np.stack([getattr(s, name) for s in both]) for name in ("q", "twist", "force"))
+        return RobotPath(self.knots(np.array([0.0, 1.0]), *columns), start, end)
 
     def knots(
         self, progress: FloatArray, q: FloatArray, twist: FloatArray, force: FloatArray

@@ -7,7 +7,7 @@ small deviations are interpolated along the progress of the movement.
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Protocol
 
@@ -196,6 +196,33 @@ class Knots:
         return (1.0 - part) * array[after - 1] + part * array[after]
 
 
+@dataclass(frozen=True, eq=False)
+class RobotState:
+    """State of the robot between two commands; in many postures at once with a leading axis."""
+
+    q: FloatArray
+    """Joints of the controller, shape (..., joint), in rad or m."""
+    twist: FloatArray
+    """See `Knots.twist`, shape (..., 9)."""
+    force: FloatArray
+    """Force on the robot in base, shape (..., 3), in N."""
+    springs: RobotSprings
+    """With the memory of the gears."""
+    theta: FloatArray
+    """Spring positions, shape (..., spring), in rad or m."""
+    sag: FloatArray
+    """Twist under weight alone that the controller has taken out a part of, shape (..., 9)."""
+
+
+@dataclass(frozen=True, eq=False)
+class RobotPath:
+    """A path that the robot takes."""
+
+    knots: Knots
+    start: RobotState
+    end: RobotState
+
+
 @dataclass(frozen=True)
 class Ripple:
     """Unrest of a held force: two sines, never in step."""
@@ -223,19 +250,15 @@ class Segment:
     begin: int
     """In µs of the clock."""
     law: TimeLaw
-    knots: Knots
+    path: RobotPath
     motion: Motion
     """Motion on the path."""
     motion_after: Motion
     """When it is done."""
-    springs: tuple[RobotSprings, RobotSprings]
-    """Memory of the gears at the beginning and at the end."""
-    theta: FloatArray
-    """Spring positions at the end, shape (spring,), to start from."""
-    fault_after: str | None = None
+    fault_after: str | None
     """Fault that the controller reports when it is done."""
-    ripple: Ripple | None = None
-    ripple_wrench: FloatArray = field(default_factory=lambda: np.zeros(6))
+    ripple: Ripple | None
+    ripple_wrench: FloatArray
     """Wrench at the sensor per N of the ripple, sensor frame, shape (6,)."""
 
     @cached_property
@@ -255,8 +278,9 @@ class Segment:
         Shape (time, 9), or (1, 9) where nothing changes any more; see `Knots.seen`.
         """
         if times[0] >= self.end:
-            return self.knots.seen[-1:]
-        return self.knots.at(self.knots.seen, self.law.at((times - self.begin) / MICROSECONDS))
+            return self.path.knots.seen[-1:]
+        progress = self.law.at((times - self.begin) / MICROSECONDS)
+        return self.path.knots.at(self.path.knots.seen, progress)
 
     def unrest(self, times: IndexArray) -> FloatArray | None:
         """Return the unrest of the force at times in µs, shape (time, 1), in N; None: none."""

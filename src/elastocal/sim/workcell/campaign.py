@@ -26,8 +26,9 @@ from elastocal.errors import DeviceError
 from elastocal.results import brief_repr
 from elastocal.sim.workcell._contact import Contact, ContactLaw
 from elastocal.sim.workcell._instruments import AIR_TIME, COVERAGE, sensor_range
-from elastocal.sim.workcell._quasistatics import Quasistatics, RobotState
+from elastocal.sim.workcell._quasistatics import Quasistatics
 from elastocal.sim.workcell._robot import TrueRobot
+from elastocal.sim.workcell._timeline import RobotState
 
 _CLOSED = 1e-6
 """How far a tool may end from where the contact holds it, in m: nanometres of deflection."""

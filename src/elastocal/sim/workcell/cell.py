@@ -30,9 +30,8 @@ from elastocal.sim.workcell._instruments import (
     sensor_zero,
 )
 from elastocal.sim.workcell._plant import Plant
-from elastocal.sim.workcell._quasistatics import RobotState
 from elastocal.sim.workcell._sampling import generator
-from elastocal.sim.workcell._timeline import SimClock
+from elastocal.sim.workcell._timeline import RobotState, SimClock
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,7 +106,6 @@ class _SpringTrail:
 
     def went(self, state: RobotState) -> None:
         """Take the positions that were found."""
-        assert state.theta is not None, "they were sought"
         self._before, self._theta = self._theta, state.theta
 
 
@@ -182,9 +180,7 @@ class ProcessCell:
         state = statics.loaded(state, q, force_base, self._stop)
         self._pressed.went(state)
         self._state, twist = state, state.twist
-        joints, twists = (np.stack([a, a]) for a in (q, twist))
-        forces = np.stack([force_base, np.zeros(3)])
-        seen = statics.knots(np.array([0.0, 1.0]), joints, twists, forces).seen[:, 3:]
+        seen = statics.path(state, replace(state, force=np.zeros(3))).knots.seen[:, 3:]
         return ProcessState(twist[:3], seen[0], seen[0] - seen[1])
 
     def read(self, since: FloatArray, wrench: FloatArray) -> FloatArray:
