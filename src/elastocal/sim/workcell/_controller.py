@@ -13,8 +13,7 @@ from elastocal.arrays import FloatArray
 from elastocal.cell import ArmState, Fault, Motion
 from elastocal.errors import DeviceError
 from elastocal.sim.workcell._contact import Contact
-from elastocal.sim.workcell._force_control import ForceControl
-from elastocal.sim.workcell._paths import guarded_move, joint_path, retract_path
+from elastocal.sim.workcell._paths import ForceControl, guarded_move, joint_path, retract_path
 from elastocal.sim.workcell._plant import FOREVER, Plant
 from elastocal.sim.workcell._timeline import (
     MICROSECONDS,

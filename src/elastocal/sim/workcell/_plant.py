@@ -13,7 +13,6 @@ from elastocal.robot import inverse_transform
 from elastocal.sim.workcell._contact import Contact, ContactLaw, TrueSurface
 from elastocal.sim.workcell._quasistatics import Quasistatics
 from elastocal.sim.workcell._robot import TrueRobot
-from elastocal.sim.workcell._sampling import generator, posture_key
 from elastocal.sim.workcell._timeline import (
     Ripple,
     RobotPath,
@@ -22,6 +21,8 @@ from elastocal.sim.workcell._timeline import (
     SimClock,
     TimeLaw,
     Uniform,
+    generator,
+    posture_key,
     to_microseconds,
 )
 

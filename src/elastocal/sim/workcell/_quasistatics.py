@@ -20,36 +20,6 @@ from elastocal.sim.workcell._timeline import Knots, RobotPath, RobotState
 
 
 @dataclass(frozen=True, eq=False)
-class ForceReading:
-    """How the controller reads the wrist sensor: with its faults, zeroed before contact."""
-
-    gain: FloatArray
-    """Force that the sensor reads per force at the tool, sensor frame, shape (3, 3)."""
-    R_tcp_sensor: FloatArray
-    """As the controller knows it, shape (3, 3)."""
-    R_base_sensor: FloatArray
-    """Truly, when it was zeroed, shape (3, 3)."""
-    weight: FloatArray
-    """Weight of the tool in base, shape (3,), in N."""
-
-    def true_force(self, wanted_tcp: FloatArray, R_base_sensor: FloatArray) -> FloatArray:
-        """Return the force on the robot in base at which the reading is the wanted one.
-
-        The sensor turns with the arm, so that it sees another part of the weight than before.
-
-        Parameters
-        ----------
-        wanted_tcp : ndarray, shape (3,)
-            Wanted reading in the tcp frame, in N.
-        R_base_sensor : ndarray, shape (3, 3)
-            True orientation of the sensor under load.
-        """
-        felt = np.linalg.solve(self.gain, self.R_tcp_sensor.T @ wanted_tcp)
-        force: FloatArray = R_base_sensor @ (felt + self.R_base_sensor.T @ self.weight)
-        return force - self.weight
-
-
-@dataclass(frozen=True, eq=False)
 class Quasistatics:
     """The robot with its tool, and how well the controller knows it."""
 
@@ -116,11 +86,11 @@ class Quasistatics:
     def loaded(
         self, state: RobotState, q: FloatArray, force: FloatArray, error: FloatArray
     ) -> RobotState:
-        """Return the robot under a force, from a stand whose gears remember.
+        """Return the robot under a force, from a state whose gears remember.
 
         Parameters
         ----------
-        stand : RobotState
+        state : RobotState
             Where it comes from.
         q : ndarray, shape (joint,)
             In rad or m.

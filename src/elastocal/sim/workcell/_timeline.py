@@ -1,10 +1,15 @@
-"""How the simulated cell moves through time: the clock, time laws, and segments.
+"""How the simulated cell moves through time: clock, random numbers, time laws, and segments.
 
 Time is in whole microseconds, so that time differences are exact. A segment is a stretch of time in
 which the cell does one thing: at its knots everything is exact; between them joints, forces and
 small deviations are interpolated along the progress of the movement.
+
+Every generator of random numbers is made from the seed and from words that say what it is for: the
+posture that the arm was sent to, the device, the number of the block. A pose that is done again,
+in the same process or another, meets the same noise.
 """
 
+import hashlib
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -31,6 +36,31 @@ def to_microseconds(seconds: float) -> int:
     40000
     """
     return round(seconds * MICROSECONDS)
+
+
+def generator(seed: int, *words: object) -> np.random.Generator:
+    """Return the generator of some purpose.
+
+    Parameters
+    ----------
+    seed : int
+        Of the simulated cell.
+    *words : object
+        What it is for; objects with distinct `repr`.
+    """
+    digest = hashlib.sha256(repr((seed, *words)).encode()).digest()
+    return np.random.default_rng(np.frombuffer(digest, dtype=np.uint32))
+
+
+def posture_key(q: FloatArray) -> str:
+    """Return what stands for a posture: its joint positions to a nanoradian.
+
+    Parameters
+    ----------
+    q : ndarray, shape (joint,)
+        In rad or m.
+    """
+    return ",".join(f"{value + 0.0:.9f}" for value in np.round(q, 9))
 
 
 class SimClock:
