@@ -10,7 +10,7 @@ ranges of the axes, itself too (gain). The drift counts from the last restart.
 Each tracker station (see `elastocal.cell.devices.Metrology`) stands near where the cell file puts
 it, turned as it happens to be; that turn is what the registration of a run has to find. Noise grows
 with the distance, the same along each axis. A part of it comes from moving air and changes slowly,
-as a first-order process of `AIR_TIME`.
+as a first-order process of `_AIR_TIME`.
 """
 
 import math
@@ -29,7 +29,7 @@ from elastocal.sim.workcell._timeline import MICROSECONDS, Segment, generator
 TRACKER_SOURCE = "simulated laser tracker"
 COVERAGE = 1.96
 """Standard deviations within which 95 % of the samples lie."""
-AIR_TIME = 0.4
+_AIR_TIME = 0.4
 """Time constant of the slow noise, in s. An assumption."""
 SENSOR_SOURCE = "simulated force sensor"
 NEWEST = 500
@@ -365,7 +365,7 @@ def _station(seed: int, name: str, position: FloatArray, placing: float) -> Floa
 
 def _draw(slow: float, rate: float) -> Draw:
     """Return what draws a block of noise of unit size, shape (`BLOCK`, 3)."""
-    keep = math.exp(-1.0 / (rate * AIR_TIME))
+    keep = math.exp(-1.0 / (rate * _AIR_TIME))
 
     def draw(rng: np.random.Generator) -> FloatArray:
         fast, drive = rng.standard_normal((2, BLOCK, 3))
@@ -375,3 +375,15 @@ def _draw(slow: float, rate: float) -> Draw:
         return noise
 
     return draw
+
+
+def averaged_noise(slow: float, time: float, rate: float) -> float:
+    """Return the standard deviation of an average over that of a sample.
+
+    A part of the noise is white, the other a first-order process of `_AIR_TIME`; the variance of
+    its average is that of an Ornstein-Uhlenbeck process (N. G. van Kampen, "Stochastic Processes
+    in Physics and Chemistry", chapter IV).
+    """
+    ratio = _AIR_TIME / time
+    air = 2.0 * ratio * (1.0 - ratio * -math.expm1(-1.0 / ratio))
+    return math.sqrt((1.0 - slow**2) / max(time * rate, 1.0) + slow**2 * air)

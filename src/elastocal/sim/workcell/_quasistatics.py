@@ -106,7 +106,8 @@ class Quasistatics:
     def R_base_sensor(self, q: FloatArray, twist: FloatArray) -> FloatArray:
         """Return the true orientation of the sensor, shape (..., 3, 3)."""
         nominal = self.robot.forward(q)[..., :3, :3] @ self.robot.T_tcp_sensor[:3, :3]
-        return Rotation.from_rotvec(twist[..., 6:]).as_matrix() @ nominal
+        turn = Rotation.from_rotvec(twist[..., 6:].reshape(-1, 3)).as_matrix()
+        return turn.reshape(nominal.shape) @ nominal
 
     def tool_position(self, state: RobotState) -> FloatArray:
         """Return where the tool centre point truly is, in base, shape (..., 3), in m."""

@@ -25,7 +25,7 @@ from elastocal.dataset import Readings
 from elastocal.errors import DeviceError
 from elastocal.results import brief_repr
 from elastocal.sim.workcell._contact import Contact, ContactLaw
-from elastocal.sim.workcell._instruments import AIR_TIME, COVERAGE, sensor_range
+from elastocal.sim.workcell._instruments import COVERAGE, averaged_noise, sensor_range
 from elastocal.sim.workcell._quasistatics import Quasistatics
 from elastocal.sim.workcell._robot import TrueRobot
 from elastocal.sim.workcell._timeline import RobotState
@@ -208,38 +208,36 @@ class CampaignSimulator:
             )
         return found.q
 
-    def _markers(self, state: RobotState) -> tuple[FloatArray, FloatArray]:
-        """Return the marker by the controller and where it truly is, each (place, 3), in m."""
-        T = self.statics.robot.forward(state.q)
-        lever = T[:, :3, :3] @ self.statics.marker_tcp
-        turned = Rotation.from_rotvec(state.twist[:, 3:6]).apply(lever)
-        return T[:, :3, 3] + lever, T[:, :3, 3] + state.twist[:, :3] + turned
+    def _markers(self, q: FloatArray, twist: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return the marker by the controller and where it truly is, each (..., 3), in m."""
+        T = self.statics.robot.forward(q)
+        lever = T[..., :3, :3] @ self.statics.marker_tcp
+        turn = Rotation.from_rotvec(twist[..., 3:6].reshape(-1, 3))
+        turned = turn.apply(lever.reshape(-1, 3)).reshape(lever.shape)
+        return T[..., :3, 3] + lever, T[..., :3, 3] + twist[..., :3] + turned
 
     def _settled(
         self, near: RobotState, touch: RobotState, states: list[RobotState]
     ) -> TrueReadings:
         weight, statics = self.statics.weight, self.statics
-        unloaded, markers = self._markers(near), [self._markers(state) for state in states]
+        q, twist, force = (
+            np.stack([getattr(state, name) for state in states], axis=1)
+            for name in ("q", "twist", "force")
+        )
+        unloaded, loaded = self._markers(near.q, near.twist), self._markers(q, twist)
         tare = weight @ statics.R_base_sensor(near.q, near.twist)
-        R_base_sensor = _stack([statics.R_base_sensor(state.q, state.twist) for state in states])
-        force = _stack([state.force for state in states])
-        felt = np.einsum("plji,plj->pli", R_base_sensor, force + weight) - tare[:, None]
+        carried = np.einsum("plji,plj->pli", statics.R_base_sensor(q, twist), force + weight)
         R = statics.robot.forward(near.q)[:, :3, :3] @ statics.robot.T_tcp_sensor[:3, :3]
         return TrueReadings(
-            q=_stack([state.q for state in states]),
+            q=q,
             force=force,
-            deflection=_stack([state.twist[:, :3] - touch.twist[:, :3] for state in states]),
-            controller_displacement=_stack([each[0] - unloaded[0] for each in markers]),
-            marker_displacement=_stack([each[1] - unloaded[1] for each in markers]),
+            deflection=twist[..., :3] - touch.twist[:, None, :3],
+            controller_displacement=loaded[0] - unloaded[0][:, None],
+            marker_displacement=loaded[1] - unloaded[1][:, None],
             marker=unloaded[1],
-            felt=felt,
+            felt=carried - tare[:, None],
             R_base_sensor=R,
         )
-
-
-def _stack(parts: list[FloatArray]) -> FloatArray:
-    """Return arrays of every place under each load as one, shape (place, load, ...)."""
-    return np.stack(parts, axis=1)
 
 
 class ErrorScales(NamedTuple):
@@ -318,7 +316,7 @@ class CampaignErrors:
         entry, procedure = cell.file.simulation, cell.file.procedure
         tracker, sensor, ranges = entry.tracker, entry.sensor, sensor_range(cell)
         times = (procedure.unloaded_average, procedure.average)
-        averages = [_averaged(tracker.turbulence, time, tracker.rate) for time in times]
+        averages = [averaged_noise(tracker.turbulence, time, tracker.rate) for time in times]
         force = [sensor.force_noise / math.sqrt(max(time * sensor.rate, 1.0)) for time in times]
         return cls(
             noise=tracker.noise / COVERAGE,
@@ -381,18 +379,6 @@ class CampaignErrors:
         shown = settled.felt @ gain.T + scale * noise
         force: FloatArray = np.einsum("pij,plj->pli", settled.R_base_sensor, shown)
         return force
-
-
-def _averaged(slow: float, time: float, rate: float) -> float:
-    """Return the standard deviation of an average over that of a sample.
-
-    A part of the noise is white, the other a first-order process of `AIR_TIME`; the variance of
-    its average is that of an Ornstein-Uhlenbeck process (N. G. van Kampen, "Stochastic Processes
-    in Physics and Chemistry", chapter IV).
-    """
-    ratio = AIR_TIME / time
-    air = 2.0 * ratio * (1.0 - ratio * -math.expm1(-1.0 / ratio))
-    return math.sqrt((1.0 - slow**2) / max(time * rate, 1.0) + slow**2 * air)
 
 
 def _gain(cell: Cell, ranges: FloatArray) -> FloatArray:
