@@ -1,5 +1,16 @@
 from . import style as style
 from ._plan_layers import weakest_margins as weakest_margins
+from .analysis_charts import (
+    INDEX_NAMES as INDEX_NAMES,
+    KIND_TITLES as KIND_TITLES,
+    SpringBoxes as SpringBoxes,
+    check_indices as check_indices,
+    compliance_chart as compliance_chart,
+    index_chart as index_chart,
+    never_told_apart as never_told_apart,
+    spring_boxes as spring_boxes,
+    spring_scale as spring_scale,
+)
 from .calibration_figures import (
     SpringBar as SpringBar,
     StationResiduals as StationResiduals,
@@ -16,19 +27,8 @@ from .codec_chart import (
     headline as headline,
     how_to_read as how_to_read,
     saturation_words as saturation_words,
-)
-from .compliance_chart import (
-    SpringBoxes as SpringBoxes,
-    compliance_chart as compliance_chart,
-    never_told_apart as never_told_apart,
-    scale_top as scale_top,
-    spring_boxes as spring_boxes,
-)
-from .index_chart import (
-    INDEX_NAMES as INDEX_NAMES,
-    KIND_TITLES as KIND_TITLES,
-    check_indices as check_indices,
-    index_chart as index_chart,
+    study_figure as study_figure,
+    write_study_figures as write_study_figures,
 )
 from .interactive_codec import compliance_views as compliance_views, error_views as error_views
 from .plan_figure import (
@@ -37,15 +37,6 @@ from .plan_figure import (
     write_plan_figure as write_plan_figure,
 )
 from .plan_scene import PlanView as PlanView, plan_view as plan_view
-from .printing import (
-    SUFFIXES as SUFFIXES,
-    figure_bytes as figure_bytes,
-    literal as literal,
-    new_figure as new_figure,
-    wrapped as wrapped,
-    write_figure as write_figure,
-    write_kinds as write_kinds,
-)
 from .process_figures import course_figure as course_figure, process_maps as process_maps
 from .recertification_figure import (
     recertification_figure as recertification_figure,
@@ -57,15 +48,16 @@ from .stiffness_figure import (
     stiffness_figure as stiffness_figure,
     write_stiffness_figure as write_stiffness_figure,
 )
-from .study_figure import study_figure as study_figure, write_study_figures as write_study_figures
 from .style import (
     ARM as ARM,
+    BAND as BAND,
     BLUE as BLUE,
     CHOSEN as CHOSEN,
     COLOURS as COLOURS,
     FAINT as FAINT,
     FIXTURE as FIXTURE,
     GREEN as GREEN,
+    GRID as GRID,
     INK as INK,
     MUTED as MUTED,
     ORANGE as ORANGE,
@@ -75,13 +67,22 @@ from .style import (
     SEQUENTIAL as SEQUENTIAL,
     SIGHT as SIGHT,
     SKY as SKY,
+    SUFFIXES as SUFFIXES,
     TOOL as TOOL,
     TOOLING as TOOLING,
     TOUR as TOUR,
     VERMILLION as VERMILLION,
     YELLOW as YELLOW,
+    Page as Page,
     VariantStyle as VariantStyle,
+    figure_bytes as figure_bytes,
+    literal as literal,
+    new_figure as new_figure,
+    open_frame as open_frame,
     print_settings as print_settings,
     tint as tint,
     variant_styles as variant_styles,
+    wrapped as wrapped,
+    write_figure as write_figure,
+    write_kinds as write_kinds,
 )

@@ -14,8 +14,7 @@ from elastocal.arrays import BoolArray, FloatArray, IndexArray
 from elastocal.elastic import Unit
 from elastocal.identification import CalibratedModel
 from elastocal.report.plots import style
-from elastocal.report.plots.printing import literal, new_figure
-from elastocal.report.plots.style import variant_styles
+from elastocal.report.plots.style import literal, new_figure, variant_styles
 from elastocal.results import brief_repr
 
 _WIDTH, _HEIGHT = 9.0, 4.0

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from elastocal.arrays import FloatArray
 from elastocal.compensation.process import CourseDeviation
 from elastocal.report.plots import style
-from elastocal.report.plots.printing import literal, new_figure
+from elastocal.report.plots.style import literal, new_figure
 
 _WIDTH = 9.0
 _MM = 1e3

@@ -17,7 +17,7 @@ from elastocal.identification.recertification import (
     SpringChange,
 )
 from elastocal.report.plots import style
-from elastocal.report.plots.printing import literal, new_figure, wrapped, write_figure
+from elastocal.report.plots.style import literal, new_figure, wrapped, write_figure
 
 _WIDTH, _LEFT, _MIDDLE, _RIGHT = 7.5, 2.75, 0.25, 0.2
 _HEAD, _ROW, _BETWEEN, _ROWS, _FOOT = 1.0, 0.21, 0.7, 2.0, 1.0

@@ -27,8 +27,8 @@ from elastocal.report.plots.calibration_figures import (
     spring_figure,
     station_figure,
 )
-from elastocal.report.plots.printing import literal, new_figure
 from elastocal.report.plots.recertification_figure import recertification_figure
+from elastocal.report.plots.style import literal, new_figure
 
 P = ParamSpec("P")
 _MM = 1e3

@@ -16,7 +16,7 @@ from matplotlib.figure import Figure
 from elastocal.arrays import FloatArray
 from elastocal.compensation.stiffness import PathStations, PostureSurvey
 from elastocal.report.plots import style
-from elastocal.report.plots.printing import new_figure, write_figure
+from elastocal.report.plots.style import new_figure, write_figure
 from elastocal.results import brief_repr
 
 _WIDTH, _MAP, _CURVES = 6.6, 2.3, 2.3
