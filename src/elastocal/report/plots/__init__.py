@@ -7,11 +7,9 @@
 `interactive_codec`       errors and compliances of a codec on the screen
 `plan_figure`             a plan on paper: the surface laid flat, poses of two techniques
 `plan_scene`              a plan in three dimensions: robot, tooling, stations, postures
-`calibration_figures`     readings, residuals, registration and springs of a calibration
-`process_figures`         deviation along a process path before and after correction
-`stiffness_figure`        stiffness over spin and rail along a path
-`recertification_figure`  two calibrations compared
-`results`                 what `plot` of a workflow's result shows
+`spring_figures`          springs of one calibration, and two calibrations compared
+`path_figures`            stiffness along a process path, deviation before and after correction
+`results`                 readings and registration; what `plot` of a workflow's result shows
 ========================  ====================================================================
 """
 

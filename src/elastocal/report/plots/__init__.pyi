@@ -11,15 +11,6 @@ from .analysis_charts import (
     spring_boxes as spring_boxes,
     spring_scale as spring_scale,
 )
-from .calibration_figures import (
-    SpringBar as SpringBar,
-    StationResiduals as StationResiduals,
-    displacement_figure as displacement_figure,
-    pose_grid as pose_grid,
-    spring_bars as spring_bars,
-    spring_figure as spring_figure,
-    station_figure as station_figure,
-)
 from .codec_chart import (
     ERROR_PANELS as ERROR_PANELS,
     codec_chart as codec_chart,
@@ -31,22 +22,33 @@ from .codec_chart import (
     write_study_figures as write_study_figures,
 )
 from .interactive_codec import compliance_views as compliance_views, error_views as error_views
+from .path_figures import (
+    Curve as Curve,
+    course_figure as course_figure,
+    process_maps as process_maps,
+    stiffness_figure as stiffness_figure,
+    write_stiffness_figure as write_stiffness_figure,
+)
 from .plan_figure import (
     plan_figure as plan_figure,
     spread_labels as spread_labels,
     write_plan_figure as write_plan_figure,
 )
 from .plan_scene import PlanView as PlanView, plan_view as plan_view
-from .process_figures import course_figure as course_figure, process_maps as process_maps
-from .recertification_figure import (
-    recertification_figure as recertification_figure,
-    write_recertification_figure as write_recertification_figure,
+from .results import (
+    StationResiduals as StationResiduals,
+    displacement_figure as displacement_figure,
+    drawn as drawn,
+    plot_result as plot_result,
+    pose_grid as pose_grid,
+    station_figure as station_figure,
 )
-from .results import drawn as drawn, plot_result as plot_result
-from .stiffness_figure import (
-    Curve as Curve,
-    stiffness_figure as stiffness_figure,
-    write_stiffness_figure as write_stiffness_figure,
+from .spring_figures import (
+    SpringBar as SpringBar,
+    recertification_figure as recertification_figure,
+    spring_bars as spring_bars,
+    spring_figure as spring_figure,
+    write_recertification_figure as write_recertification_figure,
 )
 from .style import (
     ARM as ARM,
