@@ -1,5 +1,4 @@
 from . import style as style
-from ._plan_layers import weakest_margins as weakest_margins
 from .analysis_charts import (
     INDEX_NAMES as INDEX_NAMES,
     KIND_TITLES as KIND_TITLES,
@@ -34,7 +33,13 @@ from .plan_figure import (
     spread_labels as spread_labels,
     write_plan_figure as write_plan_figure,
 )
-from .plan_scene import PlanView as PlanView, plan_view as plan_view
+from .plan_scene import (
+    Layer as Layer,
+    PlanView as PlanView,
+    WeakestMargins as WeakestMargins,
+    plan_view as plan_view,
+    weakest_margins as weakest_margins,
+)
 from .results import (
     StationResiduals as StationResiduals,
     displacement_figure as displacement_figure,

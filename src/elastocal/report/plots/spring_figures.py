@@ -143,9 +143,10 @@ def recertification_figure(found: CompareSummary) -> Figure:
     """
     table = max(len(found.springs), 1) * _ROW
     along = 0.0 if found.deflection is None else _BETWEEN + _ROWS
-    figure = style.new_figure(_WIDTH, _HEAD + table + along + _FOOT)
+    height = _HEAD + table + along + _FOOT
+    figure = style.new_figure(_WIDTH, height)
     wide = _WIDTH - _LEFT - _MIDDLE - _RIGHT
-    bottom = along + _FOOT
+    bottom = height - _HEAD - table
     _draw_values(figure.add_panel(_LEFT, bottom, _SHARE * wide, table), found.springs)
     left = _LEFT + _SHARE * wide + _MIDDLE
     _draw_tested(figure.add_panel(left, bottom, (1.0 - _SHARE) * wide, table), found.springs)
