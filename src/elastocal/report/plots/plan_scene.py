@@ -4,7 +4,6 @@ It holds what moves (robot, line of sight), the layers that stay, and cameras th
 work, at the tooling and at the whole cell. Traces of one layer go on and off together.
 """
 
-from collections import Counter
 from dataclasses import dataclass
 from html import escape
 from itertools import pairwise
@@ -222,8 +221,9 @@ def _candidates(pool: PoolData, lift: float) -> Layer:
 def _refused(pool: PoolData) -> list[Layer]:
     """Return the points without a posture, a layer a reason, most frequent first."""
     layers = []
-    for number, count in Counter(pool.refused_by.tolist()).most_common():
-        name = pool.refusal_names[number]
+    counts = [int(np.sum(pool.refused_by == k)) for k in range(len(pool.refusal_names))]
+    for number in sorted(np.flatnonzero(counts), key=lambda k: -counts[k]):
+        name, count = pool.refusal_names[number], counts[number]
         trace = scatter(
             pool.sampled[pool.refused_by == number], "markers", f"refused: {escape(name)}", "name",
             marker={"size": 2.6, "symbol": "x", "color": style.REFUSED},
