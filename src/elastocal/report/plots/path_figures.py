@@ -18,8 +18,8 @@ from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 
 from elastocal.arrays import FloatArray
+from elastocal.compensation import PathStations, PostureSurvey
 from elastocal.compensation.process import CourseDeviation
-from elastocal.compensation.stiffness import PathStations, PostureSurvey
 from elastocal.report.plots import style
 from elastocal.results import brief_repr
 
