@@ -27,6 +27,7 @@ from .origins import (
 from .springs import (
     KINDS as KINDS,
     AnySpring as AnySpring,
+    Characteristic as Characteristic,
     Gear as Gear,
     Hinge as Hinge,
     OneAxisSpring as OneAxisSpring,

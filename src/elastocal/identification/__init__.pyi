@@ -44,6 +44,7 @@ from .model_file import (
     SpringSummary as SpringSummary,
     SuspiciousReading as SuspiciousReading,
     read_model as read_model,
+    spring_summaries as spring_summaries,
     summary as summary,
     write_model as write_model,
 )

@@ -19,7 +19,7 @@ from elastocal.identification.ladder import Climbed
 from elastocal.identification.observability import Observability, Term
 from elastocal.identification.options import MINIMUM_DRAWS, FitSettings
 from elastocal.identification.suspicious import Screening
-from elastocal.identification.uncertainty import HeldOut
+from elastocal.identification.uncertainty import HeldOut, interval
 from elastocal.records import read_json, record, write_json
 from elastocal.results import Result, brief_repr
 from elastocal.robot import Robot
@@ -27,12 +27,12 @@ from elastocal.robot import Robot
 
 @record()
 class SpringSummary:
-    """One spring: its compliance, how well it is known, and whether it is known by itself."""
+    """A characteristic of a spring: how well it is known, and whether it is known by itself."""
 
     name: str
     kind: str
     unit: str
-    """SI unit of the compliance."""
+    """SI unit of the compliance, or of another characteristic (`elastic.Characteristic`)."""
     compliance: float
     low: float
     """Lower end of the 95 % interval."""
@@ -40,6 +40,8 @@ class SpringSummary:
     """Upper end of the 95 % interval."""
     observable: bool
     """Whether the data determine it by itself."""
+    group: int | None = None
+    """Number of the first unobservable combination that leaves it open."""
 
 
 @brief_repr
@@ -162,7 +164,7 @@ def summary(calibration: Calibration, settings: FitSettings | None = None) -> Ca
     rms = np.sqrt(np.mean(np.square(calibration.residual[calibration.used]), axis=0))
     return CalibrationSummary(
         robot=calibrated.model.robot.name,
-        springs=_springs(calibration),
+        springs=spring_summaries(calibrated),
         rank=seen.rank,
         rank_attainable=calibration.attainable_rank,
         springs_total=seen.springs,
@@ -187,22 +189,31 @@ def summary(calibration: Calibration, settings: FitSettings | None = None) -> Ca
     )
 
 
-def _springs(calibration: Calibration) -> tuple[SpringSummary, ...]:
-    calibrated = calibration.calibrated
-    low, high = calibrated.interval()
-    named = ((spring, each) for spring in calibrated.model.springs for each in spring.parameters)
-    return tuple(
-        SpringSummary(
-            name=parameter.name,
-            kind=spring.kind,
-            unit=parameter.unit.si,
-            compliance=float(calibrated.compliance[i]),
-            low=float(low[i]),
-            high=float(high[i]),
-            observable=calibrated.observability.observable[i],
-        )
-        for i, (spring, parameter) in enumerate(named)
-    )
+def spring_summaries(calibrated: CalibratedModel) -> tuple[SpringSummary, ...]:
+    """Return what tables show of each spring: its characteristics, with their intervals."""
+    seen = calibrated.observability
+    first, rows = 0, list[SpringSummary]()
+    for spring in calibrated.model.springs:
+        own = slice(first, first + len(spring.parameters))
+        first = own.stop
+        names = [parameter.name for parameter in spring.parameters]
+        for each in spring.characteristics:
+            weights = np.array(each.weights)
+            group = seen.group_of(dict(zip(names, each.weights, strict=True)))
+            low, high = interval(calibrated.draws[:, own] @ weights)
+            rows.append(
+                SpringSummary(
+                    name=each.name,
+                    kind=spring.kind,
+                    unit=each.unit.si,
+                    compliance=float(calibrated.compliance[own] @ weights),
+                    low=float(low),
+                    high=float(high),
+                    observable=group is None,
+                    group=group,
+                )
+            )
+    return tuple(rows)
 
 
 def _suspicious(

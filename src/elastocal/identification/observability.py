@@ -13,7 +13,7 @@ independence is a matroid (Coleman and Pothen, "The null space problem I", SIAM 
 Meth. 7, 1986).
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from itertools import combinations
 from math import comb
 
@@ -122,6 +122,8 @@ def _independent(candidates: Sequence[FloatArray], k: int) -> list[FloatArray]:
     return chosen
 
 
+_CANCELS = 1e-6
+"""Share of its parts that a sum may leave over and still count as none."""
 _PROBES, _PROBE_SEED = 60, 0
 """Number and seed of the configurations that show what could be observed at all."""
 
@@ -148,6 +150,25 @@ class Observability:
     """Combinations of compliances that the data do not see, in a sparse basis: adding any
     multiple of one of them changes no deflection that was measured. Whether it changes others
     is told by `attainable_rank`."""
+
+    def group_of(self, weights: Mapping[str, float]) -> int | None:
+        """Return the number, from 1, of the first combination that leaves a sum of parameters open.
+
+        Parameters
+        ----------
+        weights : mapping
+            Weights of the sum by the names of the parameters.
+
+        Returns
+        -------
+        int or None
+            None: the sum has one value for all that explains the data.
+        """
+        for number, group in enumerate(self.unobservable, start=1):
+            parts = [weights.get(term.spring, 0.0) * term.weight for term in group]
+            if abs(sum(parts)) > _CANCELS * sum(map(abs, parts)):
+                return number
+        return None
 
     @property
     def springs(self) -> int:

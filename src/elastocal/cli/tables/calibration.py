@@ -107,11 +107,6 @@ def _show_ladder(console: Console, ladder: Sequence[RungSummary]) -> None:
 
 def _spring_table(figures: CalibrationSummary) -> Table:
     """Return a row a spring; linear springs, rare, name their own units."""
-    group_of = {
-        term.spring: number
-        for number, group in reversed(list(enumerate(figures.unobservable, start=1)))
-        for term in group
-    }
     table = Table(box=None, pad_edge=False)
     table.add_column("spring", no_wrap=True)
     table.add_column(f"compliance\n{_USUAL_UNIT.shown}", justify="right", no_wrap=True)
@@ -119,17 +114,17 @@ def _spring_table(figures: CalibrationSummary) -> Table:
     table.add_column(f"stiffness\n{_USUAL_UNIT.stiffness}", justify="right", no_wrap=True)
     table.add_column("known?", no_wrap=True)
     for spring in figures.springs:
-        table.add_row(*_spring_row(spring, group_of.get(spring.name)))
+        table.add_row(*_spring_row(spring))
     return table
 
 
-def _spring_row(spring: SpringSummary, group: int | None) -> tuple[str, ...]:
+def _spring_row(spring: SpringSummary) -> tuple[str, ...]:
     shown = unit_of(spring.unit)
     values = (spring.compliance, spring.low, spring.high)
     value, low, high = (shown.factor * each for each in values)
     unit = "" if shown == _USUAL_UNIT else f" {shown.shown}"
     if not spring.observable:
-        note = f"[yellow]not by itself[/yellow], group {group}"
+        note = f"[yellow]not by itself[/yellow], group {spring.group}"
         return escape(spring.name), f"[dim]({value:.4f}{unit})[/dim]", "", "", note
     return (
         escape(spring.name),

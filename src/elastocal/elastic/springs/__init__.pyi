@@ -8,7 +8,7 @@ from .expression import (
     Sum as Sum,
     atan as atan,
 )
-from .gear import Gear as Gear
+from .gear import LOST_MOTION as LOST_MOTION, Gear as Gear
 from .hinge import (
     COMPLIANCE_SCALE as COMPLIANCE_SCALE,
     TORSIONAL as TORSIONAL,
@@ -23,6 +23,7 @@ from .kinds import (
 )
 from .spring import (
     Angles as Angles,
+    Characteristic as Characteristic,
     OneAxisSpring as OneAxisSpring,
     Parameter as Parameter,
     Spring as Spring,

@@ -9,12 +9,17 @@ from elastocal.elastic.springs.expression import Quantity, atan
 from elastocal.elastic.springs.hinge import COMPLIANCE_SCALE, TORSIONAL
 from elastocal.elastic.springs.spring import (
     Angles,
+    Characteristic,
     OneAxisSpring,
     Parameter,
     SpringLoad,
     Tangents,
+    Unit,
 )
 from elastocal.records import record
+
+LOST_MOTION = Unit("rad", "arcmin", 10_800.0 / np.pi)
+"""Unit of the angle between a torque and its opposite that friction leaves."""
 
 
 @record()
@@ -45,7 +50,7 @@ class Gear(OneAxisSpring):
     """``r_j``: torques at which friction elements slide, in N·m; empty: no friction."""
     kind: Literal["gear"] = "gear"
 
-    units = (TORSIONAL,)
+    units = (TORSIONAL, LOST_MOTION)
     bears_weight = True
 
     @property
@@ -57,6 +62,26 @@ class Gear(OneAxisSpring):
             Parameter(f"{self.name}.{name}", self.joint, TORSIONAL, COMPLIANCE_SCALE)
             for name in names
         )
+
+    @property
+    def characteristics(self) -> tuple[Characteristic, ...]:
+        """Compliance without torque (makers' K1) and at the middle knee (K2), and lost motion."""
+        still = (0.0,) * len(self.slips)
+        found = [
+            Characteristic(
+                self.name if torque == 0.0 else f"{self.name} at {torque:.0f} N·m",
+                (1.0, *(1.0 / (1.0 + (torque / T) ** 2) for T in self.knees), *still),
+                TORSIONAL,
+            )
+            for torque in (0.0, self.knees[len(self.knees) // 2])
+        ]
+        if self.slips:
+            elastic = (0.0,) * (1 + len(self.knees))
+            both_ways = tuple(2.0 * r for r in self.slips)
+            found.append(
+                Characteristic(f"{self.name} lost motion", (*elastic, *both_ways), LOST_MOTION)
+            )
+        return tuple(found)
 
     @property
     def friction_limits(self) -> tuple[float, ...]:

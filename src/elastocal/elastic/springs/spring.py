@@ -49,6 +49,17 @@ class Parameter:
 
 
 @dataclass(frozen=True)
+class Characteristic:
+    """A number that people state of a spring, as a data sheet would: a sum of its parameters."""
+
+    name: str
+    """Begins with the spring's name; equal to it for its compliance without load."""
+    weights: tuple[float, ...]
+    """One a parameter of the spring."""
+    unit: Unit
+
+
+@dataclass(frozen=True)
 class SpringAxis:
     """A virtual joint that a spring inserts into the chain."""
 
@@ -158,6 +169,15 @@ class Spring(ABC):
     @abstractmethod
     def parameters(self) -> tuple[Parameter, ...]:
         """The coefficients, in the order of every compliance vector."""
+
+    @property
+    def characteristics(self) -> tuple[Characteristic, ...]:
+        """What tables show of the spring; by default its parameters."""
+        unit_vectors = np.eye(len(self.parameters)).tolist()
+        return tuple(
+            Characteristic(parameter.name, tuple(weights), parameter.unit)
+            for parameter, weights in zip(self.parameters, unit_vectors, strict=True)
+        )
 
     @property
     def friction_limits(self) -> tuple[float, ...]:

@@ -12,8 +12,8 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter, MaxNLocator
 
 from elastocal.arrays import FloatArray
-from elastocal.elastic import Unit
-from elastocal.identification import CalibratedModel
+from elastocal.elastic import Unit, unit_of
+from elastocal.identification import CalibratedModel, spring_summaries
 from elastocal.identification.recertification import (
     CompareSummary,
     DeflectionChange,
@@ -52,16 +52,12 @@ class SpringBar:
 
 
 def spring_bars(model: CalibratedModel) -> list[SpringBar]:
-    """Return the compliances of a model, each with the first group that it is mixed up in."""
-    numbered = list(enumerate(model.observability.unobservable, start=1))
-    groups = {term.spring: number for number, group in reversed(numbered) for term in group}
-    low, high = model.interval()
+    """Return the characteristics of a model, each with the first group that leaves it open."""
     bars = []
-    for k, parameter in enumerate(model.model.parameters):
-        name, unit = parameter.name, parameter.unit
-        value, start, end = (unit.factor * float(c[k]) for c in (model.compliance, low, high))
-        group = None if model.observability.observable[k] else groups.get(name, 0)
-        bars.append(SpringBar(name, unit, value, start, end, group))
+    for row in spring_summaries(model):
+        unit = unit_of(row.unit)
+        value, low, high = (unit.factor * each for each in (row.compliance, row.low, row.high))
+        bars.append(SpringBar(row.name, unit, value, low, high, row.group))
     return bars
 
 
