@@ -12,9 +12,8 @@ import numpy as np
 
 from elastocal.arrays import BoolArray, FloatArray
 from elastocal.codec._overlap import Overlap, corrected_mean, known, micrometres
-from elastocal.codec.data import CodecData
-from elastocal.codec.index_correlation import Correlation
-from elastocal.codec.netcdf import ARRAYS, read_codec
+from elastocal.codec.data import ARRAYS, CodecData, read_codec
+from elastocal.codec.indices import Correlation
 from elastocal.codec.saturation import Saturation, SaturationInterval, Tolerance, find_saturation
 from elastocal.codec.variants import KEYS
 from elastocal.errors import SchemaError
