@@ -18,7 +18,7 @@ from elastocal.cell import CellFile
 from elastocal.cell.description import ProcedureSettings
 from elastocal.cell.description.simulation import FaultKind
 from elastocal.cell.fingerprint import RUN_SECTIONS
-from elastocal.procedure.run.faults import Fault
+from elastocal.procedure.run.steps import Fault
 from elastocal.workflows import chapters
 from support.cli import Result, elastocal
 from support.demos import demo_result, finished_demo
