@@ -29,6 +29,7 @@ from .plan_result import (
     SpreadRecord as SpreadRecord,
     Vector as Vector,
     check_plan as check_plan,
+    check_plan_robot as check_plan_robot,
     read_plan as read_plan,
     write_plan as write_plan,
 )

@@ -6,7 +6,7 @@ import pytest
 from mcap.reader import make_reader
 from mcap.records import Metadata
 
-from elastocal.cell.devices import (
+from elastocal.cell import (
     ArmState,
     BeamState,
     Motion,

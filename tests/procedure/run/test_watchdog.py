@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from elastocal.cell.devices import (
+from elastocal.cell import (
     ArmState,
     BeamState,
     Motion,

@@ -30,7 +30,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from elastocal.arrays import FloatArray
-from elastocal.cell.devices import ArmState, PointBlock, WrenchBlock
+from elastocal.cell import ArmState, PointBlock, WrenchBlock
 from elastocal.errors import FileAccessError, SchemaError
 from elastocal.files import replacing
 

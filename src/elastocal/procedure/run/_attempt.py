@@ -11,7 +11,7 @@ from functools import partial
 import numpy as np
 
 from elastocal.arrays import FloatArray
-from elastocal.cell.devices import ArmState, Motion
+from elastocal.cell import ArmState, Motion
 from elastocal.planning import Joints, PoseRecord
 from elastocal.procedure.record import Action, PoseLog, ReadingStatus, Window
 from elastocal.procedure.run._stability import SlideDetector, SlipReference
