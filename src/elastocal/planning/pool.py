@@ -49,7 +49,7 @@ class Approach:
 @brief_repr
 @dataclass(frozen=True)
 class BasePlacement:
-    """Where the external axes carry the arm, and which branches are asked there, the best first."""
+    """A position of the external axes, and the branches that are asked there, the best first."""
 
     external: tuple[float, ...] = ()
     """Positions of the external axes, in rad or m."""
@@ -163,7 +163,7 @@ def make_pool(
         options = Options(options.postures.at(waiting[options.point]), options.branch)
         order = range(solver.branches) if placement.branches is None else placement.branches
         for branch in order:
-            _ask_branch(options.of(branch, found.is_waiting), branch, checks, found)
+            found.ask(options.of(branch, found.is_waiting), branch)
     return found.pool(len(solver.robot.joint_names))
 
 
@@ -221,6 +221,25 @@ class _PoolSearch:
             bad = self.is_waiting & ~(check.at_points > 0.0)
             self.refused_by[bad] = number
             self.is_waiting[bad] = False
+
+    def ask(self, postures: Postures, branch: int) -> None:
+        """Give every waiting point the best of its postures in a branch that passes all checks."""
+        fast = verdicts(self.checks.quick, postures)
+        before = 1 + len(self.checks.point)
+        self.refuse(postures, fast.margin, before, 1.0)
+        passed = np.flatnonzero(fast.passed)
+        order = np.lexsort((-fast.quality[passed], postures.point[passed]))
+        for index in _rounds(postures.point, passed[order]):
+            asked = index[self.is_waiting[postures.point[index]]]
+            if not len(asked):
+                return
+            late = verdicts(self.checks.slow, postures.take(asked))
+            # One slow check failed is nearer to a posture than one quick check.
+            weight = 0.5 / (1 + len(self.checks.slow))
+            self.refuse(postures.take(asked), late.margin, before + len(self.checks.quick), weight)
+            good = asked[late.passed]
+            margin = np.vstack([fast.margin[:, good], late.margin[:, late.passed]])
+            self.accept(postures.take(good), branch, margin)
 
     def refuse(self, postures: Postures, margin: FloatArray, first: int, weight: float) -> None:
         """Remember, for each point, the check that its least bad posture fails."""
@@ -283,26 +302,6 @@ def options_at(
         parts.append(Postures(contact[point], normals[point], here[reached], there[reached], point))
         branches.append(branch)
     return Options(Postures.joined(parts), np.concatenate(branches))
-
-
-def _ask_branch(postures: Postures, branch: int, checks: Checks, found: _PoolSearch) -> None:
-    """Give every waiting point the best of its postures in a branch that passes all checks."""
-    fast = verdicts(checks.quick, postures)
-    before = 1 + len(checks.point)
-    found.refuse(postures, fast.margin, before, 1.0)
-    passed = np.flatnonzero(fast.passed)
-    order = np.lexsort((-fast.quality[passed], postures.point[passed]))
-    for index in _rounds(postures.point, passed[order]):
-        asked = index[found.is_waiting[postures.point[index]]]
-        if not len(asked):
-            return
-        late = verdicts(checks.slow, postures.take(asked))
-        # One slow check failed is nearer to a posture than one quick check.
-        weight = 0.5 / (1 + len(checks.slow))
-        found.refuse(postures.take(asked), late.margin, before + len(checks.quick), weight)
-        good = asked[late.passed]
-        margin = np.vstack([fast.margin[:, good], late.margin[:, late.passed]])
-        found.accept(postures.take(good), branch, margin)
 
 
 def _rounds(point: IndexArray, ordered: IndexArray) -> list[IndexArray]:
