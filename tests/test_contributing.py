@@ -142,6 +142,4 @@ class TestEveryRow:
         assert re.search(r"^\s*def test_\w+\(", test.read_text(encoding="utf-8"), re.MULTILINE)
 
     def test_few_files_are_touched(self, row):
-        # A command is also a function of two faces.
-        many = row.kind == "command" or "input file" in row.kind
-        assert len(row.touched) <= (4 if many else 3)
+        assert len(row.touched) <= (4 if "input file" in row.kind else 3)

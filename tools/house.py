@@ -146,7 +146,17 @@ def find_faces(modules: dict[str, Module]) -> dict[str, dict[str, str]]:
                 for alias in node.names:
                     full = f"{named}.{alias.name}"
                     names[alias.asname or alias.name] = full if full in modules else named
+    for names in faces.values():
+        # The top face takes with "*" what the list ``__all__`` of another one names.
+        if source := names.pop("*", None):
+            names |= dict.fromkeys(_listed(modules[source].path.with_suffix(".pyi")), source)
     return _followed(faces)
+
+
+def _listed(stub: Path) -> list[str]:
+    """Return the list ``__all__`` of a stub."""
+    statements = ast.parse(stub.read_text("utf-8")).body
+    return ast.literal_eval(next(s.value for s in statements if isinstance(s, ast.Assign)))
 
 
 def _followed(faces: dict[str, dict[str, str]]) -> dict[str, dict[str, str]]:

@@ -13,12 +13,27 @@ The work of every command is a function here; equations and parts are in the sub
 Nothing is imported before it is used.
 """
 
+import ast
 import sys
 import types
 
 import lazy_loader
 
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
+
+def _statements(stub: str) -> list[ast.stmt]:
+    with open(f"{__path__[0]}/{stub}", encoding="utf-8") as file:  # noqa: PTH123 - light import
+        return ast.parse(file.read()).body
+
+
+_exports = {
+    each.module: [alias.name for alias in each.names]
+    for each in _statements("__init__.pyi")
+    if isinstance(each, ast.ImportFrom) and each.module
+}
+# The stub takes all commands at once, "*"; `lazy_loader` has to be given their names.
+_commands = next(s for s in _statements("workflows/__init__.pyi") if isinstance(s, ast.Assign))
+_exports["workflows"] = ast.literal_eval(_commands.value)
+__getattr__, __dir__, __all__ = lazy_loader.attach(__name__, submod_attrs=_exports)
 
 
 class _Face(types.ModuleType):

@@ -5,22 +5,4 @@ from .elastic import ElasticModel as ElasticModel
 from .identification import CalibratedModel as CalibratedModel, read_model as read_model
 from .planning import read_plan as read_plan
 from .robot import Robot as Robot
-from .workflows import (
-    calibrate as calibrate,
-    check as check,
-    codec as codec,
-    compare as compare,
-    compensate as compensate,
-    demo as demo,
-    derive as derive,
-    export as export,
-    init as init,
-    plan as plan,
-    predict as predict,
-    report as report,
-    run as run,
-    simulate_process as simulate_process,
-    stiffness as stiffness,
-    study as study,
-    tool as tool,
-)
+from .workflows import *  # noqa: F403 - the commands, by the list `__all__`

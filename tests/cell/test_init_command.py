@@ -2,15 +2,15 @@
 
 import pytest
 
-from elastocal.cli.commands.init import init
+from elastocal.cli.commands.init import _init
 from elastocal.errors import FileAccessError
 
 
 def test_init_writes_a_cell_and_says_what_comes_next(tmp_path, capsys):
-    init(tmp_path / "new", like="machining")
+    _init(tmp_path / "new", like="machining")
     assert {p.name for p in (tmp_path / "new").iterdir()} == {"cell.yaml", "block.stl"}
     shown = capsys.readouterr()
     assert shown.out == ""
     assert "elastocal check" in shown.err
     with pytest.raises(FileAccessError, match="--force"):
-        init(tmp_path / "new", like="machining")
+        _init(tmp_path / "new", like="machining")

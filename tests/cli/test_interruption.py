@@ -5,7 +5,7 @@ import signal
 
 import pytest
 
-from elastocal.cli.operator import NAMES, interruption
+from elastocal.cli._operator import NAMES, interruption
 
 
 @pytest.mark.parametrize("name", [name for name in NAMES if hasattr(signal, name)])

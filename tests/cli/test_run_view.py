@@ -6,8 +6,8 @@ import threading
 import pytest
 from rich.console import Console
 
-from elastocal.cli import operator as run_view
-from elastocal.cli.operator import watching
+from elastocal.cli import _operator as run_view
+from elastocal.cli._operator import watching
 from elastocal.procedure import Progress
 from elastocal.procedure.run import Step
 

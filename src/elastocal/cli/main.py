@@ -10,21 +10,45 @@ import os
 import pkgutil
 import sys
 from collections.abc import Callable
+from types import ModuleType
+from typing import Any
 
 import typer
+from typer.core import TyperGroup
 
 from elastocal.cli import commands
-from elastocal.cli.termination import ended_cleanly
+from elastocal.cli._termination import ended_cleanly
 from elastocal.errors import ElastocalError, FileAccessError
+
+_UNUSED_BY_HELP = {"rich.markdown": "Markdown", "rich.traceback": "Traceback"}
+"""What typer imports with its help and our help never shows: Markdown, errors of Python."""
+
+
+class _Commands(TyperGroup):
+    """The commands; their help is drawn without importing a parser of Markdown first."""
+
+    def format_help(self, ctx: Any, formatter: Any) -> None:
+        """Draw the help; stand-ins for `_UNUSED_BY_HELP` halve what is imported for it."""
+        absent = {name: kind for name, kind in _UNUSED_BY_HELP.items() if name not in sys.modules}
+        for name, kind in absent.items():
+            sys.modules[name] = ModuleType(name)
+            setattr(sys.modules[name], kind, type(kind, (), {}))
+        try:
+            super().format_help(ctx, formatter)
+        finally:
+            for name in absent:
+                del sys.modules[name]
+
 
 app = typer.Typer(
     name="elastocal",
+    cls=_Commands,
     help="In-situ elastic calibration of industrial robots.",
     no_args_is_help=True,
     add_completion=False,
     pretty_exceptions_enable=False,
 )
-ORDER = (
+_ORDER = (
     "robots",
     "init",
     "check",
@@ -50,10 +74,10 @@ ORDER = (
 def _found_commands() -> dict[str, Callable[..., None]]:
     """Return the function of each file in ``commands``, by the name that people type."""
     names = {module.name for module in pkgutil.iter_modules(commands.__path__)}
-    ordered = [*(name for name in ORDER if name in names), *sorted(names - set(ORDER))]
+    ordered = [*(name for name in _ORDER if name in names), *sorted(names - set(_ORDER))]
     package = commands.__name__
     return {
-        name.replace("_", "-"): getattr(importlib.import_module(f"{package}.{name}"), name)
+        name.replace("_", "-"): getattr(importlib.import_module(f"{package}.{name}"), f"_{name}")
         for name in ordered
     }
 

@@ -1,10 +1,17 @@
-"""Options that several commands share, with their help."""
+"""Options that several commands share, with their help, and small values that people type."""
 
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
+from elastocal.errors import CompensationError, UnitError
+from elastocal.units import parse_quantity
+
+START_HELP = (
+    "Posture before the first row, a quantity a joint from base to tip:"
+    " '0 deg, -90 deg, 90 deg, 0 deg, 45 deg, 0 deg'."
+)
 RobotName = Annotated[
     str | None, typer.Option(help="URDF file or catalogue name; default: the dataset's own.")
 ]
@@ -27,3 +34,61 @@ KeyFigures = Annotated[
     bool, typer.Option("--json", help="Print the key figures as one JSON object.")
 ]
 Written = Annotated[bool, typer.Option("--json", help="Print what was written as one JSON object.")]
+
+
+def parse_point(text: str) -> tuple[float, float, float]:
+    """Return a point in m from three lengths with units.
+
+    >>> parse_point("0 mm, 0 mm, 35 mm")
+    (0.0, 0.0, 0.035)
+
+    Raises
+    ------
+    UnitError
+        If the text is not three lengths.
+    """
+    parts = text.split(",")
+    if len(parts) != 3:
+        raise UnitError(f"{text!r} must be three lengths, e.g. '0 mm, 0 mm, 35 mm'")
+    x, y, z = (parse_quantity(part.strip(), "length") for part in parts)
+    return x, y, z
+
+
+def parse_limit(text: str, option: str = "--limit") -> float:
+    """Return a limit in m from a length with its unit.
+
+    >>> parse_limit("0.1 mm")
+    0.0001
+
+    Raises
+    ------
+    UnitError
+        If the text is not a length above 0.
+    """
+    try:
+        limit = parse_quantity(text, "length")
+    except UnitError as error:
+        raise UnitError(f"{option}: {error}") from error
+    if not limit > 0.0:
+        raise UnitError(f"{option}: {text!r} is not above 0")
+    return limit
+
+
+def parse_direction(text: str) -> tuple[float, float, float]:
+    """Return a direction from ``"x, y, z"``.
+
+    >>> parse_direction("0, 0, -1")
+    (0.0, 0.0, -1.0)
+
+    Raises
+    ------
+    CompensationError
+        If the text is not three numbers.
+    """
+    try:
+        x, y, z = (float(part) for part in text.split(","))
+    except ValueError as error:
+        raise CompensationError(
+            f"direction {text!r} must be three numbers, e.g. '0, 0, -1'"
+        ) from error
+    return x, y, z

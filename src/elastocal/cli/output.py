@@ -1,51 +1,49 @@
-"""Where output goes: people read standard error, programs read standard output."""
+"""Where output goes: people read standard error, programs read standard output.
+
+Rich is imported when something is printed: help does without most of it.
+"""
 
 import json
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
-
-from rich.console import Console
-from rich.progress import (
-    BarColumn,
-    MofNCompleteColumn,
-    Progress as ProgressBars,
-    TextColumn,
-    TimeElapsedColumn,
-)
+from typing import TYPE_CHECKING
 
 from elastocal.progress import Progress
-from elastocal.records import to_data
+
+if TYPE_CHECKING:
+    from rich.console import Console
 
 
-def console() -> Console:
+def console() -> "Console":
     """Return the console that people read; standard output stays free for data."""
+    from rich.console import Console
+
     return Console(stderr=True, highlight=False, soft_wrap=False)
 
 
 def print_json(data: object) -> None:
     """Print a record as one JSON object on standard output, and nothing else there."""
+    from elastocal.records import to_data
+
     sys.stdout.write(json.dumps(to_data(data), allow_nan=False) + "\n")
     # A disk that is full is to be known now, not when Python ends.
     sys.stdout.flush()
 
 
 @contextmanager
-def progress_bars(console: Console) -> Iterator[Progress]:
-    """Yield a function that shows progress; nothing is shown where no person looks.
+def progress_bars() -> Iterator[Progress]:
+    """Yield a function that shows progress; nothing is shown where no person looks."""
+    from rich import progress
 
-    Parameters
-    ----------
-    console : Console
-        Where bars are drawn when it is a terminal.
-    """
-    bars = ProgressBars(
-        TextColumn("{task.description}"),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TimeElapsedColumn(),
-        console=console,
-        disable=not console.is_terminal,
+    screen = console()
+    bars = progress.Progress(
+        progress.TextColumn("{task.description}"),
+        progress.BarColumn(),
+        progress.MofNCompleteColumn(),
+        progress.TimeElapsedColumn(),
+        console=screen,
+        disable=not screen.is_terminal,
     )
     tasks = {}
 

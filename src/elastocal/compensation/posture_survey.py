@@ -91,15 +91,6 @@ def directional_stiffness(
         return DirectionalStiffness(1.0 / (rows @ calibrated.compliance), 1.0 / high, 1.0 / low)
 
 
-def stiffness_along(calibrated: CalibratedModel, q: ArrayLike, direction: ArrayLike) -> FloatArray:
-    """Return the stiffness along a direction without its interval; see `directional_stiffness`."""
-    with np.errstate(divide="ignore"):
-        stiffness: FloatArray = 1.0 / (
-            _squared_torques(calibrated, q, direction) @ calibrated.compliance
-        )
-    return stiffness
-
-
 def _squared_torques(calibrated: CalibratedModel, q: ArrayLike, direction: ArrayLike) -> FloatArray:
     """Return the squares ``(J_i^T u)^2``, shape (row, spring): times ``c`` they are ``u^T C u``."""
     q = calibrated.model.robot.check_positions(q)
@@ -312,7 +303,7 @@ def survey_postures(
     constraints : tuple of PostureConstraint
         What a posture must pass, quick ones first.
     done : callable
-        Told how many stations are done.
+        Hears how many stations are done.
 
     Raises
     ------
@@ -339,7 +330,9 @@ def survey_postures(
             refused[constraint.name] += int(np.sum(allowed & ~passed))
             allowed = passed
         found = np.full(len(rows), np.nan)
-        found[allowed] = stiffness_along(calibrated, rows[allowed], u)
+        squares = _squared_torques(calibrated, rows[allowed], u)
+        with np.errstate(divide="ignore"):
+            found[allowed] = 1.0 / (squares @ calibrated.compliance)
         stiffness[station] = found.reshape(shape[1:])
         done(station + 1)
     return PostureSurvey(grid, q, stiffness, refused)

@@ -29,19 +29,18 @@ from .plan_result import (
     SpreadRecord as SpreadRecord,
     Vector as Vector,
     check_plan as check_plan,
+    check_plan_robot as check_plan_robot,
     read_plan as read_plan,
     write_plan as write_plan,
 )
 from .pool import (
     REACH_ADVICE as REACH_ADVICE,
     UNREACHABLE as UNREACHABLE,
-    Approach as Approach,
     BasePlacement as BasePlacement,
     Options as Options,
     Pool as Pool,
+    PostureSolver as PostureSolver,
     join_pools as join_pools,
-    make_pool as make_pool,
-    options_at as options_at,
 )
 from .pool_file import (
     HAS_POSTURE as HAS_POSTURE,

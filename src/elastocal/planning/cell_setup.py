@@ -230,14 +230,8 @@ def sight_check(cell: Cell, surface: Surface) -> SightCheck | None:
     if marker is None or not trackers:
         return None
     stations = tuple(
-        Station(
-            tracker.name,
-            (float(x), float(y), float(z)),
-            float(tracker.range[0]),
-            float(tracker.range[1]),
-        )
+        Station(tracker.name, tuple(tracker.position_base.tolist()), *map(float, tracker.range))
         for tracker in trackers
-        for x, y, z in [tracker.position_base]
     )
     solids = [surface.rays, *(fixture.triangulated() for fixture in _fixtures(cell))]
     return SightCheck(

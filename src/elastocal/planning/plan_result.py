@@ -14,7 +14,8 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from elastocal.arrays import FloatArray
-from elastocal.errors import SchemaError
+from elastocal.cell import Cell
+from elastocal.errors import PlanningError, SchemaError
 from elastocal.files import sha256, write_json
 from elastocal.records import read_json, record, to_data
 from elastocal.results import Result, brief_repr
@@ -31,7 +32,7 @@ Joints = tuple[float, ...]
 
 @record()
 class CellRecord:
-    """Which cell a plan was made for."""
+    """The cell that a plan was made for."""
 
     name: str
     file: str
@@ -310,6 +311,21 @@ def check_plan(plan: PlanResult, what: str = "plan") -> None:
     """
     for problem in (*_pose_problems(plan), *_move_problems(plan), *_number_problems(plan)):
         raise SchemaError(f"{what}: {problem}")
+
+
+def check_plan_robot(plan: PlanResult, cell: Cell) -> None:
+    """Refuse a cell whose robot has other joints than the plan's.
+
+    Raises
+    ------
+    PlanningError
+        By the names of the joints.
+    """
+    if plan.robot.joints != cell.robot.joint_names:
+        raise PlanningError(
+            f"the plan is for joints {', '.join(plan.robot.joints)}; the robot of cell"
+            f" {cell.name!r} has {', '.join(cell.robot.joint_names)}"
+        )
 
 
 def _pose_problems(plan: PlanResult) -> Iterator[str]:

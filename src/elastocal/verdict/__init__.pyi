@@ -1,7 +1,6 @@
 from .consistency import (
     check_codec as check_codec,
     check_model as check_model,
-    check_plan_robot as check_plan_robot,
     check_process as check_process,
     check_tool as check_tool,
     find_doubts as find_doubts,

@@ -10,14 +10,13 @@ from pathlib import Path
 
 import numpy as np
 
-from elastocal.cell import Cell, fingerprint
+from elastocal.cell import fingerprint
 from elastocal.codec import CodecData
 from elastocal.compensation.conditioning import ToolResult
 from elastocal.compensation.process import SimulatedProcess
 from elastocal.dataset import Dataset
-from elastocal.errors import CodecError, CompensationError, IdentificationError, PlanningError
+from elastocal.errors import CodecError, CompensationError, IdentificationError
 from elastocal.identification import CalibratedModel
-from elastocal.planning import PlanResult
 from elastocal.procedure import commits
 from elastocal.robot import parse_urdf
 from elastocal.verdict.evidence import Evidence
@@ -39,21 +38,6 @@ def check_model(model: CalibratedModel, dataset: Dataset | None, path: Path) -> 
         raise IdentificationError(
             f"{path} is a model of {model.model.robot.name} with joints {', '.join(names)}; the"
             f" dataset has {', '.join(dataset.joint_names)}"
-        )
-
-
-def check_plan_robot(plan: PlanResult, cell: Cell) -> None:
-    """Refuse a cell whose robot has other joints than the plan's.
-
-    Raises
-    ------
-    PlanningError
-        By the names of the joints.
-    """
-    if plan.robot.joints != cell.robot.joint_names:
-        raise PlanningError(
-            f"the plan is for joints {', '.join(plan.robot.joints)}; the robot of cell"
-            f" {cell.name!r} has {', '.join(cell.robot.joint_names)}"
         )
 
 

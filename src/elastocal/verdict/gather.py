@@ -27,6 +27,7 @@ from elastocal.planning import (
     PlanResult,
     PoolData,
     cell_surface,
+    check_plan_robot,
     check_pool_of,
     read_plan,
     read_pool,
@@ -53,7 +54,6 @@ from elastocal.verdict._folders import (
 from elastocal.verdict.consistency import (
     check_codec,
     check_model,
-    check_plan_robot,
     check_process,
     check_tool,
     find_doubts,

@@ -6,10 +6,10 @@ from typing import Annotated
 import typer
 
 from elastocal import workflows
-from elastocal.cli import options
+from elastocal.cli import options, output, tables
 
 
-def calibrate(  # noqa: PLR0913 - one parameter an option
+def _calibrate(  # noqa: PLR0913 - one parameter an option
     data: Annotated[Path, typer.Argument(help="Dataset, .nc or .csv.")],
     out: Annotated[Path, typer.Option(help="Model file to write.")],
     *,
@@ -40,10 +40,6 @@ def calibrate(  # noqa: PLR0913 - one parameter an option
     as_json: options.Figures = False,
 ) -> None:
     """Identify the compliances of a robot from a measured dataset."""
-    from elastocal.cli.output import console, print_json
-    from elastocal.cli.parsing import parse_point
-    from elastocal.cli.tables import show_calibration
-
     result = workflows.calibrate(
         data,
         out=out,
@@ -54,7 +50,7 @@ def calibrate(  # noqa: PLR0913 - one parameter an option
         loss=loss,
         weights=weights,
         bounds=bounds,
-        marker=None if marker is None else parse_point(marker),
+        marker=None if marker is None else options.parse_point(marker),
         exclude=tuple(exclude or ()),
         keep_blunders=keep_blunders,
         trust_conventions=trust_conventions,
@@ -62,6 +58,6 @@ def calibrate(  # noqa: PLR0913 - one parameter an option
         seed=seed,
     )
     if as_json:
-        print_json(result.calibration)
+        output.print_json(result.calibration)
     else:
-        show_calibration(console(), result, out)
+        tables.show_calibration(output.console(), result, out)

@@ -6,9 +6,10 @@ from typing import Annotated
 import typer
 
 from elastocal import workflows
+from elastocal.cli import output
 
 
-def check(
+def _check(
     file: Annotated[
         Path,
         typer.Argument(
@@ -23,12 +24,10 @@ def check(
     """Validate a file and say what it holds."""
     from rich.markup import escape
 
-    from elastocal.cli.output import console, print_json
-
     result = workflows.check(file)
     if as_json:
-        print_json({"file": result.file, "kind": result.kind, **result.holds})
+        output.print_json({"file": result.file, "kind": result.kind, **result.holds})
         return
-    console().print(f"[green]ok[/green] {escape(result.file)} is a {result.kind}")
+    output.console().print(f"[green]ok[/green] {escape(result.file)} is a {result.kind}")
     for name, value in result.holds.items():
-        console().print(f"   {name.replace('_', ' ')}: {value}", markup=False)
+        output.console().print(f"   {name.replace('_', ' ')}: {value}", markup=False)

@@ -6,13 +6,13 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from elastocal import workflows
-from elastocal.cli import options
+from elastocal.cli import options, output, tables
 
 if TYPE_CHECKING:
     from elastocal.codec import Tolerance
 
 
-def codec(  # noqa: PLR0913 - one parameter an option
+def _codec(  # noqa: PLR0913 - one parameter an option
     data: Annotated[Path, typer.Argument(help="Dataset, .nc or .csv.")],
     out: Annotated[Path, typer.Option(metavar="DIR", help="Folder to write the codec into.")],
     *,
@@ -71,14 +71,11 @@ def codec(  # noqa: PLR0913 - one parameter an option
     as_json: options.Figures = False,
 ) -> None:
     """Cross-validate growing training sets: how many poses, which technique."""
-    from elastocal.cli.output import console, print_json, progress_bars
-    from elastocal.cli.parsing import parse_point
-    from elastocal.cli.tables import show_codec
     from elastocal.codec import CodecOptions
     from elastocal.records import to_data
 
     chosen = CodecOptions(splits, _parse_ratio(ratio), seed, not keep_blunders, trust_conventions)
-    with progress_bars(console()) as progress:
+    with output.progress_bars() as progress:
         result = workflows.codec(
             data,
             progress,
@@ -87,7 +84,7 @@ def codec(  # noqa: PLR0913 - one parameter an option
             robot=robot,
             tcp=tcp,
             tool=tool,
-            marker=None if marker is None else parse_point(marker),
+            marker=None if marker is None else options.parse_point(marker),
             exclude=tuple(exclude or ()),
             options=chosen,
             tolerance=_parse_tolerance(tolerance),
@@ -97,9 +94,9 @@ def codec(  # noqa: PLR0913 - one parameter an option
             force=force,
         )
     if as_json:
-        print_json({"folder": str(out), "files": result.files, **to_data(result.summary)})
+        output.print_json({"folder": str(out), "files": result.files, **to_data(result.summary)})
     else:
-        show_codec(console(), result.summary, out, result.files)
+        tables.show_codec(output.console(), result.summary, out, result.files)
 
 
 def _parse_ratio(text: str) -> float:

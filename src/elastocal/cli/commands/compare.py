@@ -6,9 +6,10 @@ from typing import Annotated
 import typer
 
 from elastocal import workflows
+from elastocal.cli import options, output, tables
 
 
-def compare(
+def _compare(
     old: Annotated[Path, typer.Argument(help="Model file of the earlier calibration.")],
     new: Annotated[Path, typer.Argument(help="Model file of the later one.")],
     *,
@@ -34,23 +35,19 @@ def compare(
 
     Exits with 0 whatever the verdict; read it from --json.
     """
-    from elastocal.cli.output import console, print_json
-    from elastocal.cli.parsing import parse_limit
-    from elastocal.cli.tables import show_comparison
-
     found = workflows.compare(
         old,
         new=new,
         rows=rows,
-        limit=None if limit is None else parse_limit(limit),
+        limit=None if limit is None else options.parse_limit(limit),
         out=out,
         figure=figure,
     )
     if as_json:
-        print_json(found.summary)
+        output.print_json(found.summary)
         return
     asked = limit is not None and rows is None
     hint = workflows.measured_rows(found.summary.new_provenance) if asked else None
-    show_comparison(console(), found, hint)
+    tables.show_comparison(output.console(), found, hint)
     for path in (each for each in (out, figure) if each is not None):
-        console().print(f"written to {path}", markup=False, soft_wrap=True)
+        output.console().print(f"written to {path}", markup=False, soft_wrap=True)

@@ -6,11 +6,10 @@ from typing import Annotated
 import typer
 
 from elastocal import workflows
-from elastocal.cli import options
-from elastocal.cli.parsing import START_HELP
+from elastocal.cli import options, output, tables
 
 
-def compensate(
+def _compensate(
     model: Annotated[Path, typer.Argument(help="Model file from calibrate.")],
     path: Annotated[Path, typer.Argument(help="Path, .csv, or KUKA program, .src beside .dat.")],
     out: Annotated[Path, typer.Option(help="CSV, or .src, to write.")],
@@ -23,15 +22,13 @@ def compensate(
         str | None,
         typer.Option(help="A program's $BASE in the model's base: 'x, y, z, a, b, c' with units."),
     ] = None,
-    start: Annotated[str | None, typer.Option(help=START_HELP)] = None,
+    start: Annotated[str | None, typer.Option(help=options.START_HELP)] = None,
     largest: Annotated[
         str, typer.Option("--limit", help="Largest deflection that is taken for one.")
     ] = "20 mm",
     as_json: options.Figures = False,
 ) -> None:
     """Correct a programmed path so that the loaded tool is where it was programmed."""
-    from elastocal.cli.output import console, print_json, progress_bars
-    from elastocal.cli.tables import show_compensation
     from elastocal.errors import UnitError
     from elastocal.units import parse_quantity
 
@@ -41,9 +38,9 @@ def compensate(
     given = workflows.CompensateSettings(
         model, path=path, out=out, forces=forces, base=base, start=start, largest=limit
     )
-    with progress_bars(console()) as progress:
+    with output.progress_bars() as progress:
         result = workflows.compensate(given, progress)
     if as_json:
-        print_json(result)
+        output.print_json(result)
     else:
-        show_compensation(console(), result, out)
+        tables.show_compensation(output.console(), result, out)

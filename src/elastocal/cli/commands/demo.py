@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, TextIO
 import typer
 
 from elastocal import workflows
+from elastocal.cli import output, tables
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -22,7 +23,7 @@ _WIDTH = 100
 """Columns of the log."""
 
 
-def demo(
+def _demo(
     kind: Annotated[
         str,
         typer.Argument(
@@ -39,10 +40,7 @@ def demo(
     ] = False,
 ) -> None:
     """Show the whole story on a simulated cell: from an empty folder to a signed-off report."""
-    from elastocal.cli.output import console
-    from elastocal.cli.tables import show_demo
-
-    screen = console()
+    screen = output.console()
 
     @contextmanager
     def display(log: TextIO, story: "Sequence[Chapter]") -> "Iterator[_Display]":
@@ -53,7 +51,7 @@ def demo(
             yield _Display(log, out, _lines(screen, story))
 
     result = workflows.demo(kind, out=out, seed=seed, force=force, display=display)
-    show_demo(screen, result)
+    tables.show_demo(screen, result)
 
 
 class _Display:
@@ -70,7 +68,7 @@ class _Display:
     """
 
     def __init__(self, log: TextIO, out: Path, show: Callable[..., Any]) -> None:
-        from elastocal.cli.operator import TerminalOperator
+        from elastocal.cli._operator import TerminalOperator
 
         self.operator = TerminalOperator(_log_console(log))
         self.show, self._out = show, out

@@ -6,9 +6,10 @@ from typing import Annotated
 import typer
 
 from elastocal import workflows
+from elastocal.cli import output, tables
 
 
-def derive(
+def _derive(
     run: Annotated[Path, typer.Argument(help="Folder of a run.")],
     *,
     as_json: Annotated[
@@ -16,11 +17,8 @@ def derive(
     ] = False,
 ) -> None:
     """Derive dataset.nc and summary.json of a run again from its raw streams."""
-    from elastocal.cli.output import console, print_json
-    from elastocal.cli.tables import show_derived
-
     result = workflows.derive(run)
     if as_json:
-        print_json(result.summary)
+        output.print_json(result.summary)
         return
-    show_derived(console(), result)
+    tables.show_derived(output.console(), result)

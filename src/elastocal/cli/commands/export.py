@@ -6,10 +6,10 @@ from typing import Annotated
 import typer
 
 from elastocal import workflows
-from elastocal.cli import options
+from elastocal.cli import options, output, tables
 
 
-def export(
+def _export(
     model: Annotated[Path, typer.Argument(help="Model file from calibrate.")],
     c: Annotated[Path, typer.Option("--c", help="Folder to write the C files into.")],
     *,
@@ -21,11 +21,8 @@ def export(
     as_json: options.Written = False,
 ) -> None:
     """Write a model as dependency-free C99 with filters, limits and a self-test."""
-    from elastocal.cli.output import console, print_json
-    from elastocal.cli.tables import show_export
-
     result = workflows.export(model, c=c, settings=settings, tool=tool, force=force)
     if as_json:
-        print_json(result)
+        output.print_json(result)
         return
-    show_export(console(), result, tool is not None)
+    tables.show_export(output.console(), result, tool is not None)

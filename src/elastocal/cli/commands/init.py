@@ -6,9 +6,10 @@ from typing import Annotated
 import typer
 
 from elastocal import workflows
+from elastocal.cli import output, tables
 
 
-def init(
+def _init(
     folder: Annotated[Path, typer.Argument(metavar="DIR", help="Folder to write into.")],
     like: Annotated[
         str, typer.Option(help="Which example: afp (dome on a rail) or machining (block).")
@@ -16,7 +17,4 @@ def init(
     force: Annotated[bool, typer.Option("--force", help="Replace files that are there.")] = False,
 ) -> None:
     """Write a commented example cell with its mesh."""
-    from elastocal.cli.output import console
-    from elastocal.cli.tables import show_example
-
-    show_example(console(), workflows.init(folder, like=like, force=force))
+    tables.show_example(output.console(), workflows.init(folder, like=like, force=force))

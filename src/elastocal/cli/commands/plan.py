@@ -6,10 +6,10 @@ from typing import Annotated
 import typer
 
 from elastocal import workflows
-from elastocal.cli import options
+from elastocal.cli import options, output, tables
 
 
-def plan(
+def _plan(
     cell: Annotated[Path, typer.Argument(help="Cell file, .yaml.")],
     out: Annotated[Path, typer.Option(metavar="DIR", help="Folder to write the plan into.")],
     *,
@@ -30,14 +30,11 @@ def plan(
     as_json: options.KeyFigures = False,
 ) -> None:
     """Choose calibration poses on the tooling, check them, and put them in order."""
-    from elastocal.cli.output import console, print_json, progress_bars
-    from elastocal.cli.tables import show_plan
-
     settings = workflows.PlanSettings(cell, out, compare, program, jobs, force)
-    with progress_bars(console()) as progress:
+    with output.progress_bars() as progress:
         found = workflows.plan(settings, progress)
     figures = workflows.plan_figures(found, out, program)
     if as_json:
-        print_json(figures)
+        output.print_json(figures)
     else:
-        show_plan(console(), found, figures)
+        tables.show_plan(output.console(), found, figures)

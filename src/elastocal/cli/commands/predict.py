@@ -6,9 +6,10 @@ from typing import Annotated
 import typer
 
 from elastocal import workflows
+from elastocal.cli import output, tables
 
 
-def predict(
+def _predict(
     model: Annotated[Path, typer.Argument(help="Model file from calibrate.")],
     rows: Annotated[Path, typer.Argument(help="CSV: joint columns, force_x[N] …, moment_x[N*m] …")],
     out: Annotated[Path, typer.Option(help="CSV to write.")],
@@ -17,11 +18,8 @@ def predict(
     ] = False,
 ) -> None:
     """Predict the deflection of each row, with 95 % intervals of the fit and of a measurement."""
-    from elastocal.cli.output import console, print_json
-    from elastocal.cli.tables import show_predicted
-
     result = workflows.predict(model, rows=rows, out=out)
     if as_json:
-        print_json(result.summary)
+        output.print_json(result.summary)
     else:
-        show_predicted(console(), result, out)
+        tables.show_predicted(output.console(), result, out)

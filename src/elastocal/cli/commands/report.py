@@ -6,9 +6,10 @@ from typing import Annotated
 import typer
 
 from elastocal import workflows
+from elastocal.cli import options, output, tables
 
 
-def report(  # noqa: PLR0913 - one parameter an option
+def _report(  # noqa: PLR0913 - one parameter an option
     run: Annotated[
         Path,
         typer.Argument(
@@ -56,17 +57,13 @@ def report(  # noqa: PLR0913 - one parameter an option
     ] = False,
 ) -> None:
     """Write the report of a calibration: one HTML file that an inspector can sign."""
-    from elastocal.cli.output import console, print_json
-    from elastocal.cli.parsing import parse_limit
-    from elastocal.cli.tables import show_report
-
-    accepted = None if tolerance is None else parse_limit(tolerance, "--tolerance")
-    drift = None if limit is None else parse_limit(limit)
+    accepted = None if tolerance is None else options.parse_limit(tolerance, "--tolerance")
+    drift = None if limit is None else options.parse_limit(limit)
     settings = workflows.ReportSettings(
         run, out, model, tool, codec, process, old, accepted, drift, pdf, force
     )
     result = workflows.report(settings)
     if as_json:
-        print_json(result.figures)
+        output.print_json(result.figures)
         return
-    show_report(console(), result)
+    tables.show_report(output.console(), result)

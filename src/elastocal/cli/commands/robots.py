@@ -4,8 +4,10 @@ from typing import Annotated
 
 import typer
 
+from elastocal.cli import output, tables
 
-def robots(
+
+def _robots(
     name: Annotated[str | None, typer.Argument(help="Show one robot in full.")] = None,
     urdf: Annotated[
         bool, typer.Option("--urdf", help="Print the named robot's URDF on standard output.")
@@ -15,8 +17,6 @@ def robots(
     ] = False,
 ) -> None:
     """List the robots that elastocal knows, with the source of each number."""
-    from elastocal.cli.output import console, print_json
-    from elastocal.cli.tables import robot_facts, show_robot, show_robots
     from elastocal.errors import RobotError
     from elastocal.robot import catalogue
 
@@ -26,10 +26,10 @@ def robots(
         typer.echo(catalogue.urdf(name), nl=False)
         return
     chosen = [catalogue.entry(name).name] if name else list(catalogue.names())
-    rows = [robot_facts(robot) for robot in chosen]
+    rows = [tables.robot_facts(robot) for robot in chosen]
     if as_json:
-        print_json({"robots": rows})
+        output.print_json({"robots": rows})
     elif name:
-        show_robot(console(), rows[0])
+        tables.show_robot(output.console(), rows[0])
     else:
-        show_robots(console(), rows)
+        tables.show_robots(output.console(), rows)

@@ -6,10 +6,10 @@ from typing import Annotated
 import typer
 
 from elastocal import workflows
-from elastocal.cli import options
+from elastocal.cli import options, output, tables
 
 
-def run(
+def _run(
     cell: Annotated[Path, typer.Argument(help="Cell file, .yaml.")],
     plan: Annotated[Path, typer.Option(metavar="DIR", help="Folder with the cell's plan.")],
     out: Annotated[Path, typer.Option(metavar="RUN", help="Folder of the run.")],
@@ -29,26 +29,24 @@ def run(
     as_json: options.Figures = False,
 ) -> None:
     """Press on the tooling at every pose of a plan and record what happens."""
-    from elastocal.cli.operator import TerminalOperator
-    from elastocal.cli.output import console, print_json
-    from elastocal.cli.tables import dry_figures, show_itinerary, show_run
+    from elastocal.cli._operator import TerminalOperator
     from elastocal.procedure import RunEnd
 
     settings = workflows.RunSettings(
-        cell, plan, out, resume, yes, seed, TerminalOperator(console())
+        cell, plan, out, resume, yes, seed, TerminalOperator(output.console())
     )
     if dry_run:
         rehearsed = workflows.dry_run(settings)
         if as_json:
-            print_json(dry_figures(rehearsed))
+            output.print_json(tables.dry_figures(rehearsed))
         else:
-            show_itinerary(console(), rehearsed)
+            tables.show_itinerary(output.console(), rehearsed)
         return
     finished = workflows.run(settings)
     if as_json and finished.end is RunEnd.DONE:
-        print_json(finished.figures)
+        output.print_json(finished.figures)
     else:
-        show_run(console(), finished)
+        tables.show_run(output.console(), finished)
     if finished.problem is not None:
         raise finished.problem
     if finished.end is RunEnd.INTERRUPTED:

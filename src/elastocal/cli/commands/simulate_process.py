@@ -6,10 +6,10 @@ from typing import Annotated
 import typer
 
 from elastocal import workflows
-from elastocal.cli import options
+from elastocal.cli import options, output, tables
 
 
-def simulate_process(  # noqa: PLR0913 (a command has as many options as it has)
+def _simulate_process(  # noqa: PLR0913 (a command has as many options as it has)
     cell: Annotated[Path, typer.Argument(help="Cell file, .yaml.")],
     model: Annotated[
         list[Path],
@@ -38,8 +38,6 @@ def simulate_process(  # noqa: PLR0913 (a command has as many options as it has)
     as_json: options.Figures = False,
 ) -> None:
     """Run a process on the simulated cell without and with correction: how much is left."""
-    from elastocal.cli.output import console, print_json, progress_bars
-    from elastocal.cli.tables import show_process
     from elastocal.records import to_data
 
     given = workflows.SimulateProcessSettings(
@@ -55,10 +53,10 @@ def simulate_process(  # noqa: PLR0913 (a command has as many options as it has)
         jobs=jobs,
         force=force,
     )
-    with progress_bars(console()) as progress:
+    with output.progress_bars() as progress:
         result = workflows.simulate_process(given, progress)
     if as_json:
-        print_json(to_data(result) | {"folder": str(out)})
+        output.print_json(to_data(result) | {"folder": str(out)})
     else:
-        show_process(console(), result)
-        console().print(f"written to {out}")
+        tables.show_process(output.console(), result)
+        output.console().print(f"written to {out}")

@@ -6,11 +6,10 @@ from typing import Annotated
 import typer
 
 from elastocal import workflows
-from elastocal.cli import options
-from elastocal.cli.parsing import START_HELP
+from elastocal.cli import options, output, tables
 
 
-def stiffness(  # noqa: PLR0913 (a command has as many options as it has)
+def _stiffness(  # noqa: PLR0913 (a command has as many options as it has)
     model: Annotated[Path, typer.Argument(help="Model file from calibrate.")],
     path: Annotated[Path, typer.Argument(help="CSV as for compensate; forces are not needed.")],
     out: Annotated[Path, typer.Option(metavar="DIR", help="Folder to write into.")],
@@ -26,13 +25,11 @@ def stiffness(  # noqa: PLR0913 (a command has as many options as it has)
     cell: Annotated[
         Path | None, typer.Option(help="Cell file: its margins, tooling and fixtures.")
     ] = None,
-    start: Annotated[str | None, typer.Option(help=START_HELP)] = None,
+    start: Annotated[str | None, typer.Option(help=options.START_HELP)] = None,
     force: Annotated[bool, typer.Option("--force", help="Replace files that are there.")] = False,
     as_json: options.KeyFigures = False,
 ) -> None:
     """Map the stiffness over spin, rail and path; choose the stiffest posture."""
-    from elastocal.cli.output import console, print_json, progress_bars
-    from elastocal.cli.tables import show_stiffness
     from elastocal.records import to_data
 
     given = workflows.StiffnessSettings(
@@ -47,10 +44,10 @@ def stiffness(  # noqa: PLR0913 (a command has as many options as it has)
         start=start,
         force=force,
     )
-    with progress_bars(console()) as progress:
+    with output.progress_bars() as progress:
         result = workflows.stiffness(given, progress)
     if as_json:
-        print_json(to_data(result.summary) | {"folder": str(out)})
+        output.print_json(to_data(result.summary) | {"folder": str(out)})
     else:
-        show_stiffness(console(), result)
-        console().print(f"written to {out}: {', '.join(result.summary.files)}")
+        tables.show_stiffness(output.console(), result)
+        output.console().print(f"written to {out}: {', '.join(result.summary.files)}")

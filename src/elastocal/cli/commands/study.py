@@ -6,10 +6,10 @@ from typing import Annotated
 import typer
 
 from elastocal import workflows
-from elastocal.cli import options
+from elastocal.cli import options, output, tables
 
 
-def study(  # noqa: PLR0913 - one parameter an option
+def _study(  # noqa: PLR0913 - one parameter an option
     cell: Annotated[Path, typer.Argument(help="Cell file, .yaml.")],
     out: Annotated[
         Path, typer.Option(metavar="DIR", help="Folder of the study; one that is there goes on.")
@@ -40,11 +40,9 @@ def study(  # noqa: PLR0913 - one parameter an option
     as_json: options.Figures = False,
 ) -> None:
     """Simulate many calibrations of a cell: what reaches which accuracy."""
-    from elastocal.cli.output import console, print_json, progress_bars
-    from elastocal.cli.tables import show_study
     from elastocal.records import to_data
 
-    with progress_bars(console()) as progress:
+    with output.progress_bars() as progress:
         result = workflows.study(
             cell,
             progress,
@@ -60,9 +58,9 @@ def study(  # noqa: PLR0913 - one parameter an option
     if as_json:
         figures = to_data(result.summary)
         del figures["schema"]
-        print_json({"folder": str(out), "files": result.files, **figures})
+        output.print_json({"folder": str(out), "files": result.files, **figures})
     else:
-        show_study(console(), result.summary, out, result.files)
+        tables.show_study(output.console(), result.summary, out, result.files)
 
 
 def _parse_target(text: str | None) -> float | None:

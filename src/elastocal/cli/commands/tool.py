@@ -6,10 +6,10 @@ from typing import Annotated
 import typer
 
 from elastocal import workflows
-from elastocal.cli import options
+from elastocal.cli import options, output, tables
 
 
-def tool(
+def _tool(
     data: Annotated[
         Path, typer.Argument(help="CSV of postures with raw wrenches, or the folder of a run.")
     ],
@@ -32,9 +32,6 @@ def tool(
     as_json: options.Written = False,
 ) -> None:
     """Find mass, centre of mass, sensor bias and sensor rotation from static postures."""
-    from elastocal.cli.output import console, print_json
-    from elastocal.cli.parsing import parse_direction
-    from elastocal.cli.tables import show_tool
     from elastocal.records import to_data
 
     result = workflows.tool(
@@ -43,11 +40,11 @@ def tool(
         robot=robot,
         flange=flange,
         sensor=sensor,
-        down=parse_direction(down),
+        down=options.parse_direction(down),
         keep_rotation=keep_rotation,
     )
     if as_json:
         # What this command always printed: the file without its schema.
-        print_json({key: value for key, value in to_data(result).items() if key != "schema"})
+        output.print_json({key: value for key, value in to_data(result).items() if key != "schema"})
     else:
-        show_tool(console(), result, out)
+        tables.show_tool(output.console(), result, out)

@@ -1,10 +1,11 @@
-"""The table that ``calibrate`` prints: a user's first questions, in their order.
+"""What ``calibrate`` and ``compare`` print: a user's first questions, in their order.
 
 How well does it fit; is it better than 6 springs; which springs are really known, and how well;
-which readings look wrong.
+which readings look wrong. Of two calibrations: which springs moved, what it does, the verdict.
 """
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from rich.console import Console
 from rich.markup import escape
@@ -19,6 +20,15 @@ from elastocal.identification import (
     SuspiciousReading,
     describe,
 )
+from elastocal.wording import mm
+
+if TYPE_CHECKING:
+    from elastocal.identification.recertification import (
+        CompareResult,
+        CompareSummary,
+        Estimate,
+        SpringChange,
+    )
 
 _USUAL_UNIT = unit_of("rad/(N*m)")
 """Of most springs: the headings name it, other springs their own."""
@@ -52,20 +62,20 @@ def _show_fit(console: Console, figures: CalibrationSummary) -> None:
     console.print(
         f"[bold]{escape(figures.robot)}[/bold]: {figures.springs_total} springs,"
         f" {figures.readings} readings at {figures.poses} poses,"
-        f" measured deflection {_mm(mean)} mean, {_mm(peak)} max"
+        f" measured deflection {mm(mean)} mean, {mm(peak)} max"
     )
     table = Table(box=None, pad_edge=False)
     for heading in ("error norm", "mean", "of deflection", "95 %", "max"):
         table.add_column(heading, justify="left" if heading == "error norm" else "right")
     table.add_row(
         f"at left-out poses ({held_out.folds} refits)",
-        f"[bold]{_mm(held_out.mean)}[/bold]",
+        f"[bold]{mm(held_out.mean)}[/bold]",
         f"{held_out.mean / mean:.2%}",
         "",
-        _mm(held_out.max),
+        mm(held_out.max),
     )
     table.add_row(
-        "at the poses fitted", _mm(fit.mean), f"{fit.mean / mean:.2%}", _mm(fit.p95), _mm(fit.max)
+        "at the poses fitted", mm(fit.mean), f"{fit.mean / mean:.2%}", mm(fit.p95), mm(fit.max)
     )
     console.print(table)
 
@@ -82,7 +92,7 @@ def _show_comparison(console: Console, comparison: ComparisonSummary | None) -> 
     else:
         verdict = "[yellow]no clear difference[/yellow]: the poses do not decide"
     console.print(
-        f"axial springs alone: {_mm(other)} at left-out poses,"
+        f"axial springs alone: {mm(other)} at left-out poses,"
         f" {1e3 * difference.mean:+.3f} mm ({1e3 * low:+.3f} to {1e3 * high:+.3f}, 95 %);"
         f" {verdict}"
     )
@@ -167,7 +177,7 @@ def _show_suspicious(console: Console, suspicious: tuple[SuspiciousReading, ...]
     console.print(f"\n[yellow]{len(suspicious)} {many} wrong[/yellow] (robust score):")
     for reading in suspicious[:_MOST_SUSPICIOUS]:
         note = " [red]set aside as a blunder[/red]" if reading.set_aside else ""
-        off = _mm(reading.residual)
+        off = mm(reading.residual)
         console.print(
             f"   pose {reading.pose} {escape(reading.load_case)}: {off} off,"
             f" score {reading.score:.1f}{note}"
@@ -178,5 +188,100 @@ def _show_suspicious(console: Console, suspicious: tuple[SuspiciousReading, ...]
     console.print(f"   to leave one out: --exclude {first.pose}:{escape(first.load_case)}")
 
 
-def _mm(metres: float) -> str:
-    return f"{1e3 * metres:.3f} mm"
+_COLOURS = {"pass": "green", "fail": "red", "undecided": "yellow"}
+
+
+def show_comparison(console: Console, compared: "CompareResult", hint: Path | None = None) -> None:
+    """Print a comparison for a person.
+
+    Parameters
+    ----------
+    console : Console
+        Where.
+    compared : CompareResult
+        The comparison.
+    hint : Path, optional
+        A dataset that could serve as rows.
+    """
+    found = compared.summary
+    console.print(f"[bold]{escape(found.robot)}[/bold]: {_moved(found)}")
+    if found.springs:
+        sums = {each.name: f"sum {n}" for n, each in enumerate(_sums(found), start=1)}
+        console.print(_change_table(found, sums))
+        for name, short in sums.items():
+            console.print(f"   {short}: {name}", markup=False, soft_wrap=True)
+        console.print(
+            f"the interval holds for all {len(found.springs)} comparisons at once with 95 %; what"
+            " has 0 outside it moved",
+            soft_wrap=True,
+        )
+    for names, which in ((found.only_old, "old"), (found.only_new, "new")):
+        if names:
+            console.print(
+                f"only in the {which} model: {', '.join(names)}", markup=False, soft_wrap=True
+            )
+    if found.not_compared:
+        console.print(f"not determined by both: {', '.join(found.not_compared)}", markup=False)
+    if compared.rows is not None:
+        console.print(f"\n{compared.rows.sentence()}", soft_wrap=True)
+    _show_verdict(console, found, hint)
+    for note in found.notes:
+        console.print(f"[yellow]note:[/yellow] {escape(note)}", soft_wrap=True)
+
+
+def _moved(found: "CompareSummary") -> str:
+    if found.unmoved_sentence:
+        return found.unmoved_sentence
+    names = ", ".join(each.label for each in found.moved_springs)
+    return f"[bold red]{found.verb}[/bold red]: {escape(names)}"
+
+
+def _sums(found: "CompareSummary") -> "list[SpringChange]":
+    return [each for each in found.springs if len(each.terms) > 1]
+
+
+def _change_table(found: "CompareSummary", sums: dict[str, str]) -> Table:
+    """Return a row a spring; linear springs, rare, name their own unit."""
+    table = Table(box=None, pad_edge=False)
+    table.add_column("spring", no_wrap=True)
+    headings = (
+        *(f"{name}\n{_USUAL_UNIT.shown}" for name in ("old", "new", "change")),
+        "95 %, all\nat once",
+    )
+    for heading in headings:
+        table.add_column(heading, justify="right", no_wrap=True)
+    table.add_column("", no_wrap=True)
+    word = "moved" if found.same_springs else "differs"
+    for change in found.springs:
+        unit = unit_of(change.unit)
+        shown = "" if unit.shown == _USUAL_UNIT.shown else f" {unit.shown}"
+        table.add_row(
+            escape(sums.get(change.name, change.name)),
+            f"{unit.factor * change.old.value:.4f}{shown}",
+            f"{unit.factor * change.new.value:.4f}{shown}",
+            f"{unit.factor * change.difference.value:+.4f}",
+            _between(change.together, unit.factor),
+            f"[red]{word}[/red]" if change.moved else "",
+        )
+    return table
+
+
+def _between(estimate: "Estimate", factor: float) -> str:
+    return f"{factor * estimate.low:+.3f} … {factor * estimate.high:+.3f}"
+
+
+def _show_verdict(console: Console, found: "CompareSummary", hint: Path | None) -> None:
+    if found.limit is None:
+        return
+    if found.verdict is None:
+        asked = "give them with --rows"
+        if hint is not None:
+            asked += f", e.g. {hint}, which the new model states it was calibrated on"
+        console.print(f"[yellow]no verdict:[/yellow] {escape(found.reason)}; {escape(asked)}",
+                      soft_wrap=True)  # fmt: skip
+        return
+    colour = _COLOURS[found.verdict]
+    console.print(
+        f"[bold {colour}]{found.verdict.value}[/bold {colour}]: {escape(found.reason)}",
+        soft_wrap=True,
+    )

@@ -1,22 +1,24 @@
-"""What ``codec`` prints for a person: the verdicts in words, and a small table."""
+"""What ``codec`` and ``study`` print: verdicts in words, a small table, the advice."""
 
 from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
+from rich.box import SIMPLE
 from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
 from elastocal.codec import CodecSummary
+from elastocal.codec.study import Share, StudySummary, micrometres, value_text
 
-_MOST_ROWS = 12
+_MOST_SIZES = 12
 
 
 def show_codec(console: Console, result: CodecSummary, out: Path, names: Sequence[str]) -> None:
     """Print the verdicts of a codec."""
     console.print(f"[bold]{escape(result.robot)}[/bold]: {result.settings.sentence}")
-    console.print(_table(result))
+    console.print(_codec_table(result))
     for sentence in result.sentences:
         console.print(sentence, markup=False)
     for finding in result.findings:
@@ -24,7 +26,7 @@ def show_codec(console: Console, result: CodecSummary, out: Path, names: Sequenc
     console.print(f"\n{', '.join(names)} written to [bold]{escape(str(out))}[/bold]")
 
 
-def _table(result: CodecSummary) -> Table:
+def _codec_table(result: CodecSummary) -> Table:
     """Return the median errors at held-out poses, for some numbers of training poses."""
     table = Table(box=None, pad_edge=False, title="error norm at held-out poses, µm: mean / max")
     table.add_column("training poses", justify="right")
@@ -32,9 +34,51 @@ def _table(result: CodecSummary) -> Table:
         table.add_column(escape(name), justify="right")
     curves = list(result.variants.values())
     sizes = len(curves[0].n_train)
-    for k in np.unique(np.linspace(0, sizes - 1, min(sizes, _MOST_ROWS)).round().astype(int)):
+    for k in np.unique(np.linspace(0, sizes - 1, min(sizes, _MOST_SIZES)).round().astype(int)):
         cells = [
             f"{1e6 * each.error_mean[k]:.1f} / {1e6 * each.error_max[k]:.1f}" for each in curves
         ]
         table.add_row(str(curves[0].n_train[k]), *cells)
     return table
+
+
+_MOST_CONDITIONS = 40
+_CAPTION = (
+    "mean and largest error at unseen poses in µm: median over the arms, and what 95 % of them stay"
+    " below; good: arms within the target, with a 95 % interval"
+)
+
+
+def show_study(console: Console, summary: StudySummary, out: Path, names: Sequence[str]) -> None:
+    """Print what a study says."""
+    console.print(f"[bold]{escape(summary.cell)}[/bold]: {escape(summary.sentence)}")
+    console.print(_study_table(summary))
+    if len(summary.conditions) > _MOST_CONDITIONS:
+        console.print(f"{len(summary.conditions) - _MOST_CONDITIONS} more conditions in study.json")
+    if summary.advice:
+        console.print(summary.advice, markup=False)
+    console.print(f"\n{', '.join(names)} written to [bold]{escape(str(out))}[/bold]")
+
+
+def _study_table(summary: StudySummary) -> Table:
+    factors = summary.varied or ("poses",)
+    table = Table(caption=_CAPTION, box=SIMPLE, pad_edge=False, padding=(0, 1, 0, 0))
+    titles = [escape(name.replace("_", " ")) for name in factors]
+    titles += ["mean", "95 %", "largest", "95 %"]
+    titles += [] if summary.target is None else ["mean good", "largest good"]
+    for number, title in enumerate(titles):
+        longest = max(map(len, title.split()))
+        table.add_column(title, justify="right", no_wrap=number >= len(factors), min_width=longest)
+    for each in summary.conditions[:_MOST_CONDITIONS]:
+        cells = [value_text(each.factors.value(key)) for key in factors]
+        for found in (each.error_mean, each.error_max):
+            cells += [micrometres(found.median), micrometres(found.q95)]
+        if summary.target is not None:
+            cells += [_share(each.mean_reaches), _share(each.max_reaches)]
+        table.add_row(*map(escape, cells))
+    return table
+
+
+def _share(share: Share | None) -> str:
+    assert share is not None
+    return f"{share.share:.0%} [{100 * share.low:.0f}, {100 * share.high:.0f}]"

@@ -11,10 +11,8 @@ from rich.markup import escape
 
 if TYPE_CHECKING:
     from elastocal.workflows import (
-        CompensateResult,
         DemoResult,
         DeriveResult,
-        ExportResult,
         InitResult,
         PredictResult,
         ReportResult,
@@ -53,35 +51,6 @@ def show_predicted(console: Console, result: "PredictResult", out: Path) -> None
             "Note: the model does not know its errors at left-out poses, so that there are no"
             " intervals of what would be measured; calibrate again to have them",
             soft_wrap=True,
-        )
-
-
-def show_compensation(console: Console, result: "CompensateResult", out: Path) -> None:
-    """Print what was corrected, and what the model predicts to be left."""
-    lengths = (
-        ("deviation as programmed", result.deviation),
-        ("left by one first-order step", result.first_order),
-        ("left by this correction", result.residual),
-        ("correction", result.correction),
-    )
-    console.print(f"{result.rows} rows corrected, predicted by the model; written to {out}")
-    for name, length in lengths:
-        console.print(
-            f"  {name + ':':30} {1e3 * length.mean:.3g} mm mean, {1e3 * length.max:.3g} mm max"
-            f" ({length.at})"
-        )
-    for note in result.notes:
-        console.print(f"Note: {note}")
-
-
-def show_export(console: Console, result: "ExportResult", with_tool: bool) -> None:
-    """Print which C files were written, and what their wrenches are."""
-    console.print(f"{', '.join(result.files)} written to {result.folder}")
-    console.print(f"the filters delay a slow wrench by {1e3 * result.filter_delay:.1f} ms")
-    if not with_tool:
-        console.print(
-            "no --tool: wrenches are taken as at the tool centre point, in its axes, bias and tool"
-            " weight removed"
         )
 
 

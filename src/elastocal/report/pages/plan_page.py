@@ -6,11 +6,10 @@ from typing import Any
 
 from elastocal.cell import Cell
 from elastocal.files import write_text
-from elastocal.planning import PlanResult, PoolData, PoseRecord, check_pool_of
+from elastocal.planning import PlanResult, PoolData, PoseRecord, check_plan_robot, check_pool_of
 from elastocal.planning.surface import Surface
 from elastocal.report.pages.templating import render
 from elastocal.report.plots import PlanView, plan_view, weakest_margins
-from elastocal.verdict import check_plan_robot
 from elastocal.wording import duration, millimetres, readable
 
 

@@ -5,7 +5,7 @@ loses such an exception in two places, and a command would go on as if nothing h
 finalisers and callbacks of weak references, where it is dropped, and in libraries that catch
 everything while they are imported. So a signal that arrives during an import waits for its end,
 and one that was dropped is sent once more. `elastocal run`, which has an arm to bring to safety,
-has a way of its own: `elastocal.cli.operator`.
+has a way of its own: `elastocal.cli._operator`.
 """
 
 import contextlib

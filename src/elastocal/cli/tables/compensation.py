@@ -1,0 +1,133 @@
+"""What ``tool``, ``compensate``, ``stiffness``, ``export`` and ``simulate-process`` print.
+
+Results are named for type checkers only: no command imports another one's work.
+"""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from rich.console import Console
+from rich.table import Table
+from scipy.spatial.transform import Rotation
+
+from elastocal.compensation.conditioning import TOOL_UNKNOWNS, ToolResult
+from elastocal.compensation.process import DeviationComparison, SimulateProcessResult
+
+if TYPE_CHECKING:
+    from elastocal.workflows import (
+        ChosenStiffness,
+        CompensateResult,
+        ExportResult,
+        ExternalAxis,
+        StiffnessResult,
+    )
+
+_SHOWN = {"mass": ("kg", 1.0), "sensor": ("deg", 180.0 / np.pi), "force": ("N", 1.0)}
+_SHOWN |= {"centre": ("mm", 1e3), "moment": ("N*m", 1.0)}
+
+
+def show_tool(console: Console, record: ToolResult, out: Path) -> None:
+    """Print the unknowns with their intervals."""
+    rotation = Rotation.from_matrix(record.R_flange_sensor).as_rotvec()
+    values = [record.mass, *rotation, *record.force_bias, *record.centre, *record.moment_bias]
+    table = Table("", "value", "± (95 %)", "", title=f"{record.postures} static postures")
+    for name, value in zip(TOOL_UNKNOWNS, values, strict=True):
+        unit, scale = _SHOWN[name.split()[0]]
+        width = record.half_width[name]
+        if width is None:
+            table.add_row(name, "not determined", "", "")
+        else:
+            table.add_row(name, f"{scale * value:.4g}", f"{scale * width:.2g}", unit)
+    console.print(table)
+    if record.undetermined:
+        console.print(
+            f"not determined: {', '.join(record.undetermined)}. Take more postures that turn the"
+            " sensor about two axes, 30 deg apart and more."
+        )
+    console.print(f"written to {out}")
+
+
+def show_compensation(console: Console, result: "CompensateResult", out: Path) -> None:
+    """Print what was corrected, and what the model predicts to be left."""
+    lengths = (
+        ("deviation as programmed", result.deviation),
+        ("left by one first-order step", result.first_order),
+        ("left by this correction", result.residual),
+        ("correction", result.correction),
+    )
+    console.print(f"{result.rows} rows corrected, predicted by the model; written to {out}")
+    for name, length in lengths:
+        console.print(
+            f"  {name + ':':30} {1e3 * length.mean:.3g} mm mean, {1e3 * length.max:.3g} mm max"
+            f" ({length.at})"
+        )
+    for note in result.notes:
+        console.print(f"Note: {note}")
+
+
+def show_export(console: Console, result: "ExportResult", with_tool: bool) -> None:
+    """Print which C files were written, and what their wrenches are."""
+    console.print(f"{', '.join(result.files)} written to {result.folder}")
+    console.print(f"the filters delay a slow wrench by {1e3 * result.filter_delay:.1f} ms")
+    if not with_tool:
+        console.print(
+            "no --tool: wrenches are taken as at the tool centre point, in its axes, bias and tool"
+            " weight removed"
+        )
+
+
+def show_stiffness(console: Console, result: "StiffnessResult") -> None:
+    """Print the choices as a table, and the notes on them."""
+    summary = result.summary
+    table = Table("posture", title=f"stiffness along {result.along} in N/µm")
+    # Of several external axes the figure shows the first; choice.csv has all.
+    rail = summary.external_axes[:1]
+    for name in ("softest", "mean", "spin", *(axis.name for axis in rail), "stations"):
+        table.add_column(name, justify="right")
+    for choice in summary.choices:
+        table.add_row(choice.name, *_cells(choice, rail), str(choice.stations))
+    console.print(table)
+    postures = summary.postures
+    refused = ", ".join(f"{count} by {what}" for what, count in postures.refused.items() if count)
+    console.print(
+        f"{postures.allowed} of {postures.tried} postures are allowed"
+        + (f"; refused: {refused}" if refused else "")
+    )
+    for note in result.notes:
+        console.print(f"Note: {note}")
+
+
+def _cells(choice: "ChosenStiffness", rail: "tuple[ExternalAxis, ...]") -> list[str]:
+    if not choice.stations:
+        return ["none"] * (3 + len(rail))
+    spin = "various" if choice.spin is None else f"{np.degrees(choice.spin):.0f} deg"
+    numbers = [f"{1e-6 * value:.3g}" for value in (choice.softest, choice.mean)]
+    stands = [
+        "various" if choice.stand is None else f"{choice.stand:.3g} {axis.unit}" for axis in rail
+    ]
+    return [*numbers, spin, *stands]
+
+
+def show_process(console: Console, result: SimulateProcessResult) -> None:
+    """Print the table in mm, and the budget below it."""
+    points = f"{result.lines[-1].points} points"
+    title = f"{result.cell}, {result.process}: absolute deviation in mm at {points}"
+    console.print(_deviation_table(title, result.lines))
+    if result.budget:
+        console.print(
+            _deviation_table(f"error budget of seed {result.runs[0].seed}", result.budget)
+        )
+
+
+def _deviation_table(title: str, lines: Sequence[DeviationComparison]) -> Table:
+    """Return a table with two lines of text a line: before and after, reduction below."""
+    table = Table("before > after, reduction", title=title, show_lines=True)
+    for name in ("mean", "max", "st. dev."):
+        table.add_column(name, justify="right", no_wrap=True)
+    for line in lines:
+        triples = zip(line.before.values, line.after.values, line.reduction.values, strict=True)
+        cells = [f"{1e3 * b:.3f} > {1e3 * a:.3f}\n{100 * r:.1f} %" for b, a, r in triples]
+        table.add_row(line.name, *cells)
+    return table
