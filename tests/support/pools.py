@@ -11,7 +11,7 @@ from support import cells
 
 SPRINGS = 18
 LOAD_CASES = 5
-RANK = 14
+RANK = 15
 """Observable directions of the bearing layout on an arm whose wrist axes meet (trap 1)."""
 
 
