@@ -174,11 +174,6 @@ class SurfaceEntry(MeshFile):
     crease_angle: PositiveAngle = math.radians(30.0)
     """Neighbouring faces that differ by more meet in an edge that the disk must not hang over."""
 
-    @property
-    def T_base_surface(self) -> FloatArray:
-        """Frame of the mesh in base, shape (4, 4)."""
-        return self.pose.T
-
 
 def _in_polygon(points: FloatArray, corners: FloatArray) -> BoolArray:
     """Return whether a ray from each point along x crosses the polygon an odd number of times.
