@@ -1,4 +1,4 @@
-"""What stands in the cell: the robot with its tool, the instruments, the tooling, other solids."""
+"""The hardware of the cell: robot with its tool, instruments, tooling surface, other solids."""
 
 import math
 from typing import Annotated, Any, Literal, Self
