@@ -13,8 +13,7 @@ from elastocal.arrays import FloatArray
 from elastocal.cell import ArmState, Fault, Motion
 from elastocal.errors import DeviceError
 from elastocal.sim.workcell._contact import Contact
-from elastocal.sim.workcell._force_control import ForceControl
-from elastocal.sim.workcell._paths import guarded_move, joint_path, retract_path
+from elastocal.sim.workcell._paths import ForceControl, guarded_move, joint_path, retract_path
 from elastocal.sim.workcell._plant import FOREVER, Plant
 from elastocal.sim.workcell._timeline import (
     MICROSECONDS,
@@ -37,6 +36,7 @@ class SimulatedArm:
     def __init__(self, plant: Plant, control: ForceControl) -> None:
         """Take the arm of a cell; its drives are off."""
         self._plant, self._control = plant, control
+        self.joint_names = plant.cell.robot.joint_names
         self._fault: str | None = None
         self._refused_until = 0
         self._approaches = 0
@@ -44,11 +44,6 @@ class SimulatedArm:
         self._touched = False
         self._leaving: Contact | None = None
         self._pose: tuple[Segment, FloatArray] | None = None
-
-    @property
-    def joint_names(self) -> tuple[str, ...]:
-        """Names of the joints, in the order of every joint array."""
-        return self._plant.cell.robot.joint_names
 
     def state(self) -> ArmState:
         """Return the newest state."""
@@ -59,10 +54,10 @@ class SimulatedArm:
             time = min(time, span.begin) if span.holds(now) else time
         done = now >= segment.end
         if done and self._pose is not None and self._pose[0] is segment:
-            q, T = segment.knots.q[-1], self._pose[1]
+            q, T = segment.path.end.q, self._pose[1]
         else:
             where = np.array([segment.progress(now)])
-            q = segment.knots.at(segment.knots.q, where)[0]
+            q = segment.path.knots.at(segment.path.knots.q, where)[0]
             T = plant.statics.robot.forward(q)
             self._pose = (segment, T) if done else None
         motion = segment.motion_after if done else segment.motion
@@ -83,7 +78,7 @@ class SimulatedArm:
             raise DeviceError(f"{_SOURCE} cannot be enabled: {self._fault}")
         self._fault = None
         if self._motion() in (Motion.DISARMED, Motion.STOPPED):
-            plant.switch(plant.standing(plant.robot_state(), Motion.IDLE))
+            plant.stand(plant.robot_state(), Motion.IDLE)
 
     def disable(self) -> None:
         """Take the release back; the arm stands."""
@@ -96,7 +91,7 @@ class SimulatedArm:
 
     def move_joints(self, q: FloatArray, speed: float) -> None:
         """Start a synchronous joint-space move; see `RobotArm.move_joints`."""
-        plant, linkage = self._plant, self._plant.statics.robot.layout.linkage
+        plant, linkage = self._plant, self._plant.statics.robot.linkage
         target = check_vector("joint target", q, len(self.joint_names))
         for name, value, low, high in zip(
             self.joint_names, target, linkage.lower, linkage.upper, strict=True
@@ -108,32 +103,29 @@ class SimulatedArm:
         plant.begin_journey(target)
         self._visiting = False
         end = plant.statics.free(target, plant.stop_error(), None)
-        plant.note_sag(end)
         motion = plant.cell.file.motion
         # The cell's speeds hold its override already; a caller says its own part of them.
         fastest = plant.cell.axis_speeds / motion.override
         law = joint_move(target - start.q, speed * fastest, motion.acceleration_time)
         path = joint_path(plant.statics, start, end)
-        plant.run(path, law, (Motion.MOVING, Motion.IDLE), start)
+        plant.run(path, law, (Motion.MOVING, Motion.IDLE))
 
     def approach(
         self, direction_base: FloatArray, distance: float, speed: float, contact_force: float
     ) -> None:
         """Start a guarded straight move; see `RobotArm.approach`."""
         plant = self._plant
-        direction = check_vector("approach direction", direction_base, 3, unit=True)
-        check_distance("approach", distance, speed)
+        direction = check_line("approach", direction_base, distance, speed)
         require(contact_force > 0.0, "contact force", contact_force, "above 0 N")
         self._allow("approach", _STANDING, in_contact=False)
         start = plant.robot_state()
         self._begin_approach()
         guarded = guarded_move(plant, start, direction, distance, (speed, contact_force))
         plant.contact, self._touched = guarded.contact, guarded.felt
-        plant.note_sag(guarded.path.end)
         after = Motion.STOPPED if guarded.fault else Motion.IDLE
         self._fault = guarded.fault
         law = Uniform(guarded.length / speed)
-        plant.run(guarded.path, law, (Motion.APPROACHING, after), start, fault=guarded.fault)
+        plant.run(guarded.path, law, (Motion.APPROACHING, after), fault=guarded.fault)
         if self._approaches == 1 and not guarded.felt:
             segment = plant.segment
             plant.later(segment.end, partial(self._reference, segment))
@@ -160,8 +152,7 @@ class SimulatedArm:
     def retract(self, direction_base: FloatArray, distance: float, speed: float) -> None:
         """Start a straight move away from the surface; see `RobotArm.retract`."""
         plant = self._plant
-        direction = check_vector("retract direction", direction_base, 3, unit=True)
-        check_distance("retract", distance, speed)
+        direction = check_line("retract", direction_base, distance, speed)
         self._allow("retract", _FORCED)
         if plant.contact is not None and not float(direction @ plant.contact.normal) > 0.0:
             raise DeviceError(
@@ -172,9 +163,8 @@ class SimulatedArm:
         path, contact = retract_path(plant, start, direction, distance)
         self._leaving, plant.contact = plant.contact, contact
         if contact is None:
-            plant.note_sag(path.end)
             self._touched = self._visiting = False
-        plant.run(path, Uniform(distance / speed), (Motion.RETRACTING, Motion.IDLE), start)
+        plant.run(path, Uniform(distance / speed), (Motion.RETRACTING, Motion.IDLE))
         self._begin("retract")
 
     def _motion(self) -> Motion:
@@ -209,8 +199,8 @@ class SimulatedArm:
         """Stand where the arm is."""
         plant = self._plant
         before = self._motion()
-        plant.switch(plant.standing(plant.robot_state(), motion, fault))
-        pressing = bool(np.any(plant.segment.knots.force[-1]))
+        plant.stand(plant.robot_state(), motion, fault)
+        pressing = bool(np.any(plant.segment.path.end.force))
         if before is Motion.APPROACHING:
             self._touched = False
             plant.contact = plant.contact if pressing else None
@@ -257,7 +247,7 @@ def require(holds: bool, what: str, value: object, allowed: str) -> None:
         raise DeviceError(f"simulated arm: {what} is {value}: must be {allowed}")
 
 
-def check_vector(what: str, values: FloatArray, size: int, *, unit: bool = False) -> FloatArray:
+def check_vector(what: str, values: FloatArray, size: int) -> FloatArray:
     """Return numbers as an array of their own.
 
     Parameters
@@ -268,8 +258,6 @@ def check_vector(what: str, values: FloatArray, size: int, *, unit: bool = False
         Finite.
     size : int
         How many there must be.
-    unit : bool
-        Whether they must be a unit vector; it is then made one exactly.
 
     Raises
     ------
@@ -279,20 +267,20 @@ def check_vector(what: str, values: FloatArray, size: int, *, unit: bool = False
     array = np.array(values, dtype=float)
     fits = array.shape == (size,) and bool(np.all(np.isfinite(array)))
     require(fits, what, array.tolist(), f"{size} finite numbers")
-    if unit:
-        length = float(np.linalg.norm(array))
-        require(abs(length - 1.0) <= _UNIT, f"length of the {what}", length, "1")
-        array /= length
     return array
 
 
-def check_distance(what: str, distance: float, speed: float) -> None:
-    """Refuse a distance or a speed that is not above 0 and finite.
+def check_line(what: str, direction: FloatArray, distance: float, speed: float) -> FloatArray:
+    """Return the direction of a straight move, of length 1 exactly.
 
     Raises
     ------
     DeviceError
-        Naming it.
+        If it is no unit vector, or distance or speed is not above 0 and finite.
     """
+    array = check_vector(f"{what} direction", direction, 3)
+    length = float(np.linalg.norm(array))
+    require(abs(length - 1.0) <= _UNIT, f"length of the {what} direction", length, "1")
     require(0.0 < distance < math.inf, f"{what} distance", distance, "above 0 m and finite")
     require(0.0 < speed < math.inf, f"{what} speed", speed, "above 0 m/s and finite")
+    return array / length
