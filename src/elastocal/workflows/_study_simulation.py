@@ -14,6 +14,7 @@ from elastocal.codec.study import Condition, ConditionResult, Sample, SampleResu
 from elastocal.elastic import ElasticModel, layout
 from elastocal.errors import CodecError, DeviceError, nearest
 from elastocal.files import sha256
+from elastocal.records import to_data
 from elastocal.sim.workcell import (
     CampaignErrors,
     CampaignSimulator,
@@ -177,7 +178,7 @@ def _design(
     seed: int,
 ) -> StudyDesign:
     simulated = cell.file.model_dump(mode="json", include={"simulation", "procedure"})
-    springs = {name: repr(model.springs) for name, model in models.items()}
+    springs = {name: to_data(model.springs) for name, model in models.items()}
     text = json.dumps([simulated, springs], sort_keys=True, allow_nan=False)
     return StudyDesign(
         cell=cell.name,

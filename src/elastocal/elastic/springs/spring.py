@@ -106,6 +106,7 @@ Tangents = tuple[tuple[tuple[FloatArray | float, ...], ...], ...]
 """By axis, by torque, by parameter."""
 
 
+@brief_repr
 @record()
 class Spring(ABC):
     """A place where a robot is soft.
