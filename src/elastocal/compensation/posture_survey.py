@@ -40,7 +40,7 @@ from elastocal.planning import cell_surface, collision_scene
 from elastocal.results import brief_repr
 from elastocal.robot import Robot, characteristic_length, smallest_singular_value
 from elastocal.robot.inverse import InverseKinematics
-from elastocal.tables import TableRows
+from elastocal.tables import TableLayout, TableRows
 
 _BLOCK = 20_000
 """Rows of a path that are read at a time."""
@@ -170,25 +170,20 @@ def read_stations(
         layout = read_layout(path)
         columns = find_columns(layout.header, solver.robot, forces=False)
         count = sum(len(block.lines) for block in row_blocks(path, layout, _BLOCK))
-        wanted = np.unique(np.linspace(0, count - 1, min(most, count)).round().astype(int))
-        block = _rows(path, wanted)
+        wanted = np.linspace(0, count - 1, min(most, count)).round().astype(int)
+        block = _rows(path, layout, set(wanted.tolist()))
         values = read_values(block, columns)
         labels = [f"row {line}" for line in block.lines]
         q, T = programmed_rows(solver, values, start, labels.__getitem__)
     return PathStations(tuple(block.lines), T, q)
 
 
-def _rows(path: Path, wanted: np.ndarray) -> TableRows:
-    """Return some rows of a file by their numbers, in ascending order."""
-    cells: list[list[str]] = []
-    lines: list[int] = []
-    first = 0
-    for block in row_blocks(path, read_layout(path), _BLOCK):
-        for row in wanted[(wanted >= first) & (wanted < first + len(block.lines))]:
-            cells.append(block.cells[row - first])
-            lines.append(block.lines[row - first])
-        first += len(block.lines)
-    return TableRows(cells, lines)
+def _rows(path: Path, layout: TableLayout, wanted: set[int]) -> TableRows:
+    """Return some rows of a file by their numbers, in the order of the file."""
+    blocks = row_blocks(path, layout, _BLOCK)
+    rows = (row for block in blocks for row in zip(block.lines, block.cells, strict=True))
+    found = [row for number, row in enumerate(rows) if number in wanted]
+    return TableRows([cells for _, cells in found], [line for line, _ in found])
 
 
 @brief_repr
