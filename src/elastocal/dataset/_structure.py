@@ -11,9 +11,17 @@ from numpy.typing import ArrayLike
 
 from elastocal.dataset._layout import (
     AXES,
+    CONDITIONED,
     COORDINATES,
+    INTEGERS,
     JOINT_POSITION,
+    JOINT_PREFIXES,
     JOINT_UNITS,
+    JOINT_VARIABLES,
+    MISSING,
+    SCHEMA,
+    SCHEMA_2,
+    SEQUENCE,
     SI_JOINT_UNITS,
     STATUS,
     STATUSES,
@@ -21,6 +29,7 @@ from elastocal.dataset._layout import (
     VARIABLES,
     Arrays,
     FloatArray,
+    IntArray,
     Labels,
     StatusArray,
     Variable,
@@ -45,7 +54,8 @@ def assemble(
     Parameters
     ----------
     labels : mapping
-        Labels of the dimensions ``pose``, ``load_case`` and ``joint``; poses may be None.
+        Labels of the dimensions ``pose``, ``load_case`` and ``joint``, and ``campaign`` of the
+        poses; poses and campaigns may be None.
     arrays : mapping
         Variables by name, in SI units; None for those that are absent.
     joint_units : sequence of str, shape (joint,)
@@ -69,17 +79,20 @@ def assemble(
     }
     sizes = _sizes(coordinates, joint_units)
     variables: dict[str, LabelledArray] = {}
-    for variable in (*VARIABLES, STATUS):
+    for variable in (*VARIABLES, *INTEGERS):
         values = arrays.get(variable.name)
         if values is not None:
             dims, array = _fitted(values, variable, sizes, broadcast=variable.broadcast)
             variables[variable.name] = LabelledArray(dims, array, _notes(variable, joint_units))
     variables |= {name: LabelledArray((name,), each) for name, each in coordinates.items()}
+    if not all(unit == "rad" for unit in joint_units):
+        variables["joint_unit"] = LabelledArray(("joint",), np.array(joint_units))
+    campaign = labels.get("campaign")
+    if campaign is not None:
+        variables["campaign"] = LabelledArray(("pose",), _text_array(campaign))
     present = {name: value for name, value in attributes.items() if value is not None}
-    if all(unit == "rad" for unit in joint_units):
-        return LabelledArrays(variables, present)
-    variables["joint_unit"] = LabelledArray(("joint",), np.array(joint_units))
-    return LabelledArrays(variables, present, ("joint_unit",))
+    auxiliary = tuple(name for name in ("joint_unit", "campaign") if name in variables)
+    return LabelledArrays(variables, present, auxiliary)
 
 
 def check_structure(labels: Labels, arrays: Arrays, joint_units: Sequence[str]) -> None:
@@ -91,23 +104,38 @@ def check_structure(labels: Labels, arrays: Arrays, joint_units: Sequence[str]) 
         Naming the label, or the array and its shape.
     """
     _check_unique("pose", labels["pose"])
-    for label in map(str, labels["load_case"]):
+    _check_printable("load case", labels["load_case"])
+    _check_unique("load case", labels["load_case"])
+    _check_printable("campaign", labels["campaign"])
+    if len(labels["campaign"]) not in (0, len(labels["pose"])):
+        raise DatasetError(
+            f"{len(labels['campaign'])} campaigns given for {len(labels['pose'])} poses"
+        )
+    _check_joint_names([str(label) for label in labels["joint"]])
+    sizes = _sizes(labels, joint_units)
+    for variable in (*VARIABLES, *INTEGERS):
+        if variable.name in arrays:
+            _fitted(arrays[variable.name], variable, sizes, broadcast=False)
+
+
+def _check_printable(kind: str, labels: Sequence[object]) -> None:
+    for label in map(str, labels):
         if not label or label != label.strip() or not label.isprintable():
             raise DatasetError(
-                f"load case {label!r} must be a printable name without spaces around it"
+                f"{kind} {label!r} must be a printable name without spaces around it"
             )
-    _check_unique("load case", labels["load_case"])
-    if not labels["joint"]:
+
+
+def _check_joint_names(joints: Sequence[str]) -> None:
+    if not joints:
         raise DatasetError("coordinate 'joint' is empty: a robot has at least one joint")
-    for label in map(str, labels["joint"]):
+    for label in joints:
         problem = joint_name_problem(label)
         if problem:
             raise DatasetError(f"joint {label!r}: {problem}")
-    _check_unique("joint", labels["joint"])
-    sizes = _sizes(labels, joint_units)
-    for variable in (*VARIABLES, STATUS):
-        if variable.name in arrays:
-            _fitted(arrays[variable.name], variable, sizes, broadcast=False)
+        if any(prefix + other == label for prefix in JOINT_PREFIXES for other in joints):
+            raise DatasetError(f"joint {label!r}: the name stands for a column of another joint")
+    _check_unique("joint", joints)
 
 
 def check_names(data: LabelledArrays) -> None:
@@ -116,7 +144,7 @@ def check_names(data: LabelledArrays) -> None:
     Raises
     ------
     DatasetError
-        Naming the first of them.
+        Naming the first of them, or the first that the stated schema does not have.
     """
     coordinates = data.coordinates
     others = [name for name in data.variables if name not in coordinates]
@@ -130,14 +158,31 @@ def check_names(data: LabelledArrays) -> None:
                     f"{kind} {name!r} is not known{nearest(name, known)}"
                     f" (allowed: {', '.join(known)})"
                 )
+    _check_schema(data)
+    schema = data.attributes.get("schema")
     for variable in VARIABLES:
-        if variable.required and variable.name not in data:
+        required = variable.required and variable.optional_in != schema
+        if required and variable.name not in data:
             raise DatasetError(
                 f"variable {variable.name!r} ({', '.join(variable.dims)}) is missing"
             )
     for name in ("pose", "load_case", "axis", "joint"):
         if name not in data or data[name].dims != (name,):
             raise DatasetError(f"coordinate {name!r} (one label each) is missing")
+
+
+def _check_schema(data: LabelledArrays) -> None:
+    """Refuse a dataset of the first schema that has something of the second."""
+    if data.attributes.get("schema") != SCHEMA:
+        return
+    late = [each.name for each in (*VARIABLES, *INTEGERS) if each.schema != SCHEMA]
+    news = [f"variable {name!r}" for name in late if name in data]
+    news += ["coordinate 'campaign'"] if "campaign" in data else []
+    news += ["attribute 'gravity'"] if "gravity" in data.attributes else []
+    if data.attributes.get("history") == CONDITIONED:
+        news += [f"attribute 'history' {CONDITIONED!r}"]
+    if news:
+        raise DatasetError(f"{news[0]} needs schema {SCHEMA_2!r}: the dataset says {SCHEMA!r}")
 
 
 def pose_labels(data: LabelledArrays) -> tuple[int, ...]:
@@ -153,6 +198,15 @@ def _axis_order(data: LabelledArrays) -> list[int]:
     if sorted(labels) != list(AXES):
         raise DatasetError(f"coordinate 'axis' is {labels}: it must be {list(AXES)}")
     return [labels.index(axis) for axis in AXES]
+
+
+def campaign_labels(data: LabelledArrays) -> list[str]:
+    """Return the campaign of each pose; none where the dataset has no campaigns."""
+    if "campaign" not in data:
+        return []
+    if data["campaign"].dims != ("pose",):
+        raise DatasetError("coordinate 'campaign' must have one label for each pose")
+    return text_labels(data, "campaign")
 
 
 def text_labels(data: LabelledArrays, name: str) -> list[str]:
@@ -219,17 +273,54 @@ def read_status(data: LabelledArrays) -> StatusArray:
     return values.astype(np.int8)
 
 
+def read_sequence(data: LabelledArrays, status: StatusArray) -> IntArray | None:
+    """Return the order in time, shape (pose, load_case); None where the dataset has none.
+
+    Where nothing was measured it may be NaN, which becomes -1.
+    """
+    if SEQUENCE.name not in data:
+        return None
+    values = _aligned(data, SEQUENCE, ())
+    values = np.where(np.isnan(values) & (status == MISSING), -1.0, values)
+    for pose, case in np.argwhere(values != np.round(values)):
+        raise DatasetError(
+            f"sequence of pose {data['pose'].values[pose]}, load case"
+            f" {str(data['load_case'].values[case])!r} is {values[pose, case]:g}: it must be a"
+            " whole number"
+        )
+    return values.astype(np.int64)
+
+
 def read_variables(data: LabelledArrays, joint_factors: FloatArray) -> dict[str, FloatArray]:
     """Return every variable that is present but the status, in SI units, axes in order."""
     axes = _axis_order(data)
     values: dict[str, FloatArray] = {}
     for variable in VARIABLES:
         if variable.name in data:
-            is_joints = variable is JOINT_POSITION
-            scale = joint_factors if is_joints else _unit_factor(data, variable)
+            scale: FloatArray | float
+            if variable in JOINT_VARIABLES:
+                scale = _joint_factors(data, variable, joint_factors)
+            else:
+                scale = _unit_factor(data, variable)
             # x * 1.0 is x, bit for bit: data in SI units pass unchanged.
             values[variable.name] = _aligned(data, variable, axes) * scale
     return values
+
+
+def _joint_factors(data: LabelledArrays, variable: Variable, factors: FloatArray) -> FloatArray:
+    """Return the factors to SI units of a variable of joints, shape (joint,).
+
+    They are those of the joint positions, ``factors``, unless it states a unit of its own.
+    """
+    stated, wanted = _units_attribute(data, variable), _units_attribute(data, JOINT_POSITION)
+    if stated == wanted:
+        return factors
+    if "joint_unit" in data or JOINT_UNITS.get(stated, "") != JOINT_UNITS[wanted]:
+        raise DatasetError(
+            f"variable {variable.name!r} has units {stated!r}: they must be those of"
+            f" {JOINT_POSITION.name!r}, {wanted!r}"
+        )
+    return np.full(len(factors), factor(stated, JOINT_UNITS[stated]))
 
 
 def _unit_factor(data: LabelledArrays, variable: Variable) -> float:
@@ -308,12 +399,14 @@ def _fitted(
 
 def _notes(variable: Variable, joint_units: Sequence[str]) -> dict[str, object]:
     """Return the attributes of a variable: its unit or its flags, and what it means."""
+    notes: dict[str, object] = {}
     if variable is STATUS:
         flags = np.arange(len(STATUSES), dtype=np.int8)
         notes = {"flag_values": flags, "flag_meanings": " ".join(STATUSES)}
-    else:
-        is_joints = variable is JOINT_POSITION
-        notes = {"units": _joined_units(joint_units) if is_joints else variable.unit}
+    elif variable in JOINT_VARIABLES:
+        notes = {"units": _joined_units(joint_units)}
+    elif variable.unit:
+        notes = {"units": variable.unit}
     return notes | {"long_name": variable.meaning}
 
 

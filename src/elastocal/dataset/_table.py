@@ -4,6 +4,7 @@ The header says which column holds what, in which unit; attributes stand above i
 their texts in JSON so that each fits on one line.
 """
 
+import difflib
 import io
 import json
 import math
@@ -13,24 +14,30 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from elastocal.dataset._layout import (
     ATTRIBUTES,
-    AXES,
     CF_ATTRIBUTES,
     COLUMN_NAMES,
+    JOINT_POSITION,
+    JOINT_PREFIXES,
     JOINT_UNITS,
     MISSING,
     OK,
-    SCHEMA,
+    SCHEMA_2,
+    SEQUENCE,
     SI_JOINT_UNITS,
+    SIMILAR,
     STATUSES,
     TEXT_COLUMNS,
+    VARIABLES,
     VECTORS,
     BoolArray,
     FloatArray,
+    IntArray,
     StatusArray,
+    Variable,
     joint_name_problem,
 )
 from elastocal.dataset._structure import assemble
@@ -64,16 +71,26 @@ class Header:
     """The columns of a file, by what they hold."""
 
     text: dict[str, int]
-    """Position of ``pose``, ``load_case`` and, where present, ``status``."""
+    """Position of ``pose``, ``load_case`` and, where present, ``status``, ``sequence`` and
+    ``campaign``."""
     joints: tuple[Column, ...]
     """Joint positions, in the order of the file."""
     vectors: dict[str, tuple[Column, ...]]
     """The x, y and z columns of each vector that is present."""
+    other_joints: dict[str, tuple[Column, ...]]
+    """The columns of each further variable of joints that is present, in the joints' order."""
 
     @property
     def joint_units(self) -> tuple[str, ...]:
         """SI unit of each joint."""
         return tuple(SI_JOINT_UNITS[JOINT_UNITS[column.unit]] for column in self.joints)
+
+    def components(self, variable: Variable) -> tuple[str, ...]:
+        """Return each component of a variable as an SI column is headed."""
+        if variable.name in self.vectors:
+            return tuple(f"{name}[{variable.column_unit}]" for name in variable.columns)
+        columns = zip(self.other_joints[variable.name], self.joint_units, strict=True)
+        return tuple(f"{column.name}[{unit}]" for column, unit in columns)
 
 
 @dataclass(frozen=True)
@@ -109,23 +126,35 @@ def read_table(path: Path) -> LabelledArrays:
     """
     table = cut(read_text(path))
     header = parse_header(table.header)
+    for variable in VECTORS:
+        needed = variable.required and variable.optional_in != table.attributes.get("schema")
+        if needed and variable.name not in header.vectors:
+            raise _missing(variable.columns[0], variable)
     grid = _grid(table, header.text)
     joints = _numbers(table, header.joints)
     vectors = {name: _numbers(table, columns) for name, columns in header.vectors.items()}
     measured = [joints, *(vectors[name] for name in _MEASURED if name in vectors)]
     empty = np.asarray(np.isnan(np.hstack(measured)).all(axis=1))
-    arrays = {name: grid.spread(values) for name, values in vectors.items()}
-    if "tcp_position" in vectors:
-        arrays["tcp_position"] = _per_pose(table, grid, vectors["tcp_position"])
-    arrays["joint_position"] = grid.spread(joints)
-    arrays["status"] = grid.spread(_statuses(table, header.text, empty), MISSING)
-    joint_names = [column.name for column in header.joints]
-    return assemble(
-        {"pose": grid.poses, "load_case": grid.load_cases, "joint": joint_names},
-        arrays,
-        header.joint_units,
-        {"schema": SCHEMA, **table.attributes},
-    )
+    vectors |= {name: _numbers(table, columns) for name, columns in header.other_joints.items()}
+    arrays: dict[str, np.ndarray] = {"joint_position": grid.spread(joints)}
+    for variable in VARIABLES:
+        values = vectors.get(variable.name)
+        if values is not None:
+            by_pose = "load_case" not in variable.dims
+            names = header.components(variable)
+            spread = _per_pose(table, grid, names, values) if by_pose else grid.spread(values)
+            arrays[variable.name] = spread
+    statuses = _statuses(table, header.text, empty)
+    arrays["status"] = grid.spread(statuses, MISSING)
+    if SEQUENCE.name in header.text:
+        arrays[SEQUENCE.name] = grid.spread(_sequence(table, header.text, statuses), -1)
+    labels: dict[str, ArrayLike | None] = {
+        "pose": grid.poses,
+        "load_case": grid.load_cases,
+        "joint": [column.name for column in header.joints],
+        "campaign": _campaigns(table, grid, header.text) if "campaign" in header.text else None,
+    }
+    return assemble(labels, arrays, header.joint_units, {"schema": SCHEMA_2, **table.attributes})
 
 
 def write_table(data: Dataset, path: Path) -> None:
@@ -145,16 +174,23 @@ def write_table(data: Dataset, path: Path) -> None:
     }
     if np.any(data.status != OK):
         columns["status"] = [STATUSES[value] for value in data.status.ravel()]
-    joints = zip(data.joint_names, data.joint_units, strict=True)
-    for index, (name, unit) in enumerate(joints):
-        columns[f"{name}[{unit}]"] = _cells(data.joint_position[..., index])
-    for variable in VECTORS:
+    if data.sequence is not None:
+        columns["sequence"] = list(data.sequence.ravel().tolist())
+    if data.campaigns:
+        columns["campaign"] = [name for name in data.campaigns for _ in data.load_cases]
+    prefixes = {variable: prefix for prefix, variable in JOINT_PREFIXES.items()}
+    for variable in (JOINT_POSITION, *prefixes, *VECTORS):
         values = data.arrays.get(variable.name)
-        if values is not None:
-            if "load_case" not in variable.dims:
-                values = np.broadcast_to(values[:, np.newaxis], (*data.status.shape, len(AXES)))
-            for index, name in enumerate(variable.columns):
-                columns[f"{name}[{variable.column_unit}]"] = _cells(values[..., index])
+        if values is None:
+            continue
+        if "load_case" not in variable.dims:
+            values = np.broadcast_to(values[:, None], (*data.status.shape, values.shape[-1]))
+        heads = [f"{name}[{variable.column_unit}]" for name in variable.columns]
+        if "joint" in variable.dims:
+            joints = zip(data.joint_names, data.joint_units, strict=True)
+            heads = [f"{prefixes.get(variable, '')}{name}[{unit}]" for name, unit in joints]
+        for index, head in enumerate(heads):
+            columns[head] = _cells(values[..., index])
     stated = {name: text for name, text in data.attributes.items() if text}
     rows = zip(*columns.values(), strict=True)
     write_rows(path, tuple(columns), rows, tuple(attribute_lines(stated)))
@@ -250,10 +286,52 @@ def parse_header(cells: Sequence[str]) -> Header:
     for name in ("pose", "load_case"):
         if name not in text:
             raise DatasetError(f"column {name!r} is missing")
-    joints = tuple(column for name, column in numbers.items() if name not in _VARIABLE_OF)
+    joints, others = _joints([each for name, each in numbers.items() if name not in _VARIABLE_OF])
     if not joints:
         raise DatasetError(f"no joint column: {_JOINT_HINT}")
-    return Header(text, joints, _vectors(numbers))
+    return Header(text, joints, _vectors(numbers), others)
+
+
+def _joints(
+    columns: Sequence[Column],
+) -> tuple[tuple[Column, ...], dict[str, tuple[Column, ...]]]:
+    """Return the columns of the joint positions, and those of each further variable of joints."""
+    known = {column.name: column for column in columns}
+    others = {prefix + name for prefix in JOINT_PREFIXES for name in known} & set(known)
+    joints = tuple(column for column in columns if column.name not in others)
+    for column in joints:
+        rest = next((each.name for each in joints if column.name.endswith(f"_{each.name}")), None)
+        prefixed = [] if rest is None else [prefix + rest for prefix in JOINT_PREFIXES]
+        similar = difflib.get_close_matches(column.name, prefixed, n=1, cutoff=SIMILAR)
+        if similar:
+            raise DatasetError(
+                f"column {column.header!r} is not known; did you mean {similar[0]!r}?"
+            )
+    found: dict[str, tuple[Column, ...]] = {}
+    for prefix, variable in JOINT_PREFIXES.items():
+        named = [known.get(prefix + joint.name) for joint in joints]
+        present = tuple(column for column in named if column is not None)
+        if present:
+            _check_columns(prefix, joints, named)
+            found[variable.name] = present
+    return joints, found
+
+
+def _check_columns(prefix: str, joints: Sequence[Column], columns: Sequence[Column | None]) -> None:
+    """Refuse a variable of joints that lacks a joint, or has another kind of unit than it."""
+    for joint, column in zip(joints, columns, strict=True):
+        units = [unit for unit, kind in JOINT_UNITS.items() if kind == JOINT_UNITS[joint.unit]]
+        if column is None:
+            raise DatasetError(f"column '{prefix}{joint.name}[{units[0]}]' is missing")
+        if column.unit not in units:
+            raise DatasetError(
+                f"column {column.header!r}: the unit must be {' or '.join(units)}, as that of"
+                f" {joint.header!r}"
+            )
+
+
+def _missing(column: str, variable: Variable) -> DatasetError:
+    return DatasetError(f"column '{column}[{variable.column_unit}]' is missing")
 
 
 def _split(cell: str, index: int) -> tuple[str, str | None]:
@@ -296,8 +374,9 @@ def _vectors(numbers: dict[str, Column]) -> dict[str, tuple[Column, ...]]:
     vectors: dict[str, tuple[Column, ...]] = {}
     for variable in VECTORS:
         missing = [name for name in variable.columns if name not in numbers]
-        if missing and (variable.required or len(missing) < len(variable.columns)):
-            raise DatasetError(f"column '{missing[0]}[{variable.column_unit}]' is missing")
+        needed = variable.required and not variable.optional_in
+        if missing and (needed or len(missing) < len(variable.columns)):
+            raise _missing(missing[0], variable)
         if not missing:
             vectors[variable.name] = tuple(numbers[name] for name in variable.columns)
     return vectors
@@ -309,7 +388,7 @@ def _grid(table: TableText, text: Mapping[str, int]) -> _Grid:
     cases: dict[str, int] = {}
     line_of: dict[tuple[int, int], int] = {}
     for line, row in zip(table.rows.lines, table.rows.cells, strict=True):
-        pose = _pose(row[text["pose"]], line)
+        pose = _integer("pose", row[text["pose"]], line)
         case = row[text["load_case"]].strip()
         if not case:
             raise DatasetError(f"row {line}: load_case is empty: it must be a name")
@@ -324,12 +403,12 @@ def _grid(table: TableText, text: Mapping[str, int]) -> _Grid:
     return _Grid(list(poses), list(cases), places[:, 0], places[:, 1])
 
 
-def _pose(cell: str, line: int) -> int:
+def _integer(name: str, cell: str, line: int) -> int:
     try:
         _refuse_underscore(cell)
         return int(cell)
     except ValueError as error:
-        raise DatasetError(f"row {line}: pose is {cell!r}: it must be an integer") from error
+        raise DatasetError(f"row {line}: {name} is {cell!r}: it must be an integer") from error
 
 
 def _numbers(table: TableText, columns: Sequence[Column]) -> FloatArray:
@@ -374,20 +453,50 @@ def _statuses(table: TableText, text: Mapping[str, int], empty: BoolArray) -> St
     return statuses
 
 
-def _per_pose(table: TableText, grid: _Grid, values: FloatArray) -> FloatArray:
-    """Return TCP positions, shape (pose, 3), from rows of which those of a pose must agree."""
-    positions, lines = np.full((len(grid.poses), len(AXES)), math.nan), table.rows.lines
-    row, axis = np.nonzero(~np.isnan(values))
-    positions[grid.pose[row], axis] = values[row, axis]
-    for index in np.flatnonzero(positions[grid.pose[row], axis] != values[row, axis]):
-        pose, component = grid.pose[row[index]], axis[index]
-        other = row[(grid.pose[row] == pose) & (axis == component)][-1]
+def _sequence(table: TableText, text: Mapping[str, int], statuses: StatusArray) -> IntArray:
+    """Return the place of each row in time, shape (row,); a missing reading may have none: -1."""
+    places = np.full(len(table.rows), -1, dtype=np.int64)
+    for index, row in enumerate(table.rows.cells):
+        cell = row[text[SEQUENCE.name]]
+        if cell.strip() or statuses[index] != MISSING:
+            places[index] = _integer(SEQUENCE.name, cell, table.rows.lines[index])
+    return places
+
+
+def _campaigns(table: TableText, grid: _Grid, text: Mapping[str, int]) -> list[str]:
+    """Return the campaign of each pose, shape (pose,), on which its rows must agree."""
+    campaigns = [""] * len(grid.poses)
+    for index, row in enumerate(table.rows.cells):
+        name, pose = row[text["campaign"]].strip(), int(grid.pose[index])
+        if campaigns[pose] not in ("", name):
+            raise DatasetError(
+                f"row {table.rows.lines[index]}: campaign of pose {grid.poses[pose]} is {name!r},"
+                f" but {campaigns[pose]!r} above: a pose belongs to one campaign"
+            )
+        campaigns[pose] = name
+    return campaigns
+
+
+def _per_pose(
+    table: TableText, grid: _Grid, columns: Sequence[str], values: FloatArray
+) -> FloatArray:
+    """Return what a pose has one of, shape (pose, column), from rows that must agree on it.
+
+    ``columns`` are the headers of the values in SI units.
+    """
+    ones, lines = np.full((len(grid.poses), values.shape[1]), math.nan), table.rows.lines
+    row, column = np.nonzero(~np.isnan(values))
+    ones[grid.pose[row], column] = values[row, column]
+    for index in np.flatnonzero(ones[grid.pose[row], column] != values[row, column]):
+        pose, component = grid.pose[row[index]], column[index]
+        other = row[(grid.pose[row] == pose) & (column == component)][-1]
+        name, unit = split_column(columns[component])
         raise DatasetError(
-            f"tcp_position_{AXES[component]} of pose {grid.poses[pose]} is"
-            f" {values[row[index], component]} m in row {lines[row[index]]} but"
-            f" {values[other, component]} m in row {lines[other]}: a pose has one unloaded position"
+            f"{name} of pose {grid.poses[pose]} is {values[row[index], component]} {unit} in row"
+            f" {lines[row[index]]} but {values[other, component]} {unit} in row {lines[other]}:"
+            f" a pose has one {'unloaded position' if name.startswith('tcp_') else 'reference'}"
         )
-    return positions
+    return ones
 
 
 def _cells(values: np.ndarray) -> list[object]:

@@ -9,31 +9,39 @@ from numpy.typing import ArrayLike
 
 from elastocal.dataset._layout import (
     AXES,
+    CONDITIONED,
+    INTEGERS,
+    LINK_JOINT_POSITION,
     OK,
     SCHEMA,
-    VARIABLE_NAMES,
+    SCHEMA_2,
+    SEQUENCE,
+    VARIABLES,
     BoolArray,
     FloatArray,
+    IntArray,
     Labels,
-    Point,
     StatusArray,
+    Vector,
     canonical_attributes,
     freeze,
-    read_point,
-    write_point,
+    read_vector,
+    write_vector,
 )
 from elastocal.dataset._structure import (
     assemble,
+    campaign_labels,
     check_names,
     check_structure,
     pose_labels,
     read_joint_units,
+    read_sequence,
     read_status,
     read_variables,
     text_labels,
 )
 from elastocal.dataset._validation import check_numbers, check_plausible
-from elastocal.dataset.readings import Readings
+from elastocal.dataset.readings import Presses, Readings
 from elastocal.errors import DatasetError, nearest
 from elastocal.records import LabelledArray, LabelledArrays
 
@@ -71,10 +79,11 @@ class Dataset:
     """Force on the robot at the TCP in base (F^m), shape (pose, load_case, 3), in N."""
     controller_displacement: FloatArray
     """Displacement by the controller (P^c), in base, shape (pose, load_case, 3), in m."""
-    marker_displacement: FloatArray
-    """Displacement by the tracker (P^m), in base, shape (pose, load_case, 3), in m."""
     status: StatusArray
     """Index into ``STATUSES`` of each reading, shape (pose, load_case)."""
+    marker_displacement: FloatArray | None = None
+    """Displacement by the tracker (P^m), in base, shape (pose, load_case, 3), in m; None: there
+    was no metrology."""
     moment: FloatArray | None = None
     """Moment on the robot at the TCP in base, shape (pose, load_case, 3), in N·m."""
     force_sigma: FloatArray | None = None
@@ -83,18 +92,32 @@ class Dataset:
     """Standard deviation of the marker displacement, shape (pose, load_case, 3), in m."""
     tcp_position: FloatArray | None = None
     """Unloaded TCP position in base, shape (pose, 3), in m."""
+    sequence: IntArray | None = None
+    """Place of each reading in time among those of its pose, shape (pose, load_case); None: the
+    order of the load cases."""
+    reference_joint_position: FloatArray | None = None
+    """Joint positions when the zero of both displacements was read, shape (pose, joint)."""
+    reference_force: FloatArray | None = None
+    """Force on the robot at the TCP in base then, shape (pose, 3), in N; None: none."""
+    link_joint_position: FloatArray | None = None
+    """Positions of the links by secondary encoders, shape (pose, load_case, joint)."""
+    campaigns: tuple[str, ...] = ()
+    """Campaign of each pose; empty where there are none."""
     attributes: Mapping[str, str] = field(default_factory=lambda: {"schema": SCHEMA})
-    """Attributes of the file: schema, robot, marker, provenance, and CF's remarks."""
+    """Attributes of the file: schema, robot, marker, gravity, provenance, and CF's remarks. The
+    schema becomes the first one that has all that the dataset has."""
 
     def __post_init__(self) -> None:
-        for name in ("poses", "load_cases", "joint_names", "joint_units"):
+        for name in ("poses", "load_cases", "joint_names", "joint_units", "campaigns"):
             object.__setattr__(self, name, tuple(getattr(self, name)))
-        for name in VARIABLE_NAMES:
-            if getattr(self, name) is not None:
-                values = np.array(getattr(self, name), np.int8 if name == "status" else np.float64)
+        for variable in (*VARIABLES, *INTEGERS):
+            values = getattr(self, variable.name)
+            if values is not None:
+                values = np.array(values, INTEGERS.get(variable, np.float64))
                 freeze(values)
-                object.__setattr__(self, name, values)
-        object.__setattr__(self, "attributes", canonical_attributes(self.attributes))
+                object.__setattr__(self, variable.name, values)
+        attributes = canonical_attributes(self.attributes)
+        object.__setattr__(self, "attributes", attributes | {"schema": self._schema(attributes)})
         check_structure(self._labels, self._variables, self.joint_units)
         check_numbers(self._labels, self._variables)
 
@@ -112,7 +135,7 @@ class Dataset:
         joint_position: ArrayLike,
         force: ArrayLike,
         controller_displacement: ArrayLike,
-        marker_displacement: ArrayLike,
+        marker_displacement: ArrayLike | None = None,
         joint_names: Sequence[str],
         load_cases: Sequence[str],
         poses: Sequence[int] | None = None,
@@ -121,11 +144,18 @@ class Dataset:
         force_sigma: ArrayLike | None = None,
         marker_sigma: ArrayLike | None = None,
         tcp_position: ArrayLike | None = None,
+        sequence: ArrayLike | None = None,
+        reference_joint_position: ArrayLike | None = None,
+        reference_force: ArrayLike | None = None,
+        link_joint_position: ArrayLike | None = None,
+        campaigns: Sequence[str] | None = None,
         joint_units: Sequence[str] | None = None,
         robot_name: str = "",
         robot_urdf: str | None = None,
         tcp_frame: str | None = None,
-        marker: Point | None = None,
+        marker: Vector | None = None,
+        gravity: Vector | None = None,
+        conditioned: bool = False,
         provenance: str = "",
     ) -> "Dataset":
         """Return the dataset of plain arrays in SI units, if it is plausible.
@@ -138,7 +168,8 @@ class Dataset:
             Force on the robot at the TCP in base (F^m), in N.
         controller_displacement, marker_displacement : array_like, shape (pose, load_case, 3)
             Displacements under load by controller (P^c) and tracker (P^m), in base, in m: of the
-            TCP, or both of the marker where ``marker`` is given.
+            TCP, or both of the marker where ``marker`` is given. The tracker's is left out where
+            there was no metrology.
         joint_names, load_cases : sequence of str
             Labels of the joints and the load cases.
         poses : sequence of int, optional
@@ -151,12 +182,28 @@ class Dataset:
             Standard deviations in N and m.
         tcp_position : array_like, shape (pose, 3), optional
             Unloaded TCP position in base, in m.
+        sequence : array_like of int, shape (pose, load_case), optional
+            Place of each reading in time among those of its pose; by default the order of the
+            load cases.
+        reference_joint_position : array_like, shape (pose, joint), optional
+            Joint positions when the zero of both displacements was read, in rad (m).
+        reference_force : array_like, shape (pose, 3), optional
+            Force on the robot at the TCP in base then, in N; none by default.
+        link_joint_position : array_like, shape (pose, load_case, joint), optional
+            Positions of the links by secondary encoders, in rad (m).
+        campaigns : sequence of str, optional
+            Campaign of each pose.
         joint_units : sequence of str, optional
             ``"rad"`` or ``"m"`` for each joint; ``"rad"`` by default.
         robot_name, robot_urdf, tcp_frame, provenance : str, optional
             Attributes of the file: the robot, its URDF text, a link of it, and where from.
         marker : tuple of float, optional
             Metrology marker in the frame ``tcp_frame``, in m.
+        gravity : tuple of float, optional
+            Acceleration of gravity in base, in m/s², of a base that is not upright.
+        conditioned : bool
+            Whether the first load case of each pose is a full press made before the reference was
+            read; else the arm came to it by free moves.
 
         Raises
         ------
@@ -173,16 +220,27 @@ class Dataset:
             "force_sigma": force_sigma,
             "marker_sigma": marker_sigma,
             "tcp_position": tcp_position,
+            "sequence": sequence,
+            "reference_joint_position": reference_joint_position,
+            "reference_force": reference_force,
+            "link_joint_position": link_joint_position,
         }
         attributes = {
-            "schema": SCHEMA,
+            "schema": SCHEMA_2,
             "robot_name": robot_name,
             "robot_urdf": robot_urdf,
             "tcp_frame": tcp_frame,
-            "marker": None if marker is None else write_point(marker),
+            "marker": None if marker is None else write_vector(marker),
+            "gravity": None if gravity is None else write_vector(gravity, "m/s2"),
+            "history": CONDITIONED if conditioned else None,
             "provenance": provenance,
         }
-        labels = {"pose": poses, "load_case": load_cases, "joint": joint_names}
+        labels = {
+            "pose": poses,
+            "load_case": load_cases,
+            "joint": joint_names,
+            "campaign": campaigns,
+        }
         units = joint_units or ("rad",) * len(joint_names)
         dataset = cls.from_labelled(assemble(labels, arrays, units, attributes))
         dataset.require_plausible()
@@ -207,13 +265,16 @@ class Dataset:
         poses, load_cases = pose_labels(arrays), text_labels(arrays, "load_case")
         joint_names = text_labels(arrays, "joint")
         joint_units, factors = read_joint_units(arrays, len(joint_names))
+        status = read_status(arrays)
         return cls(
             poses=poses,
             load_cases=tuple(load_cases),
             joint_names=tuple(joint_names),
             joint_units=tuple(joint_units),
             **read_variables(arrays, factors),
-            status=read_status(arrays),
+            status=status,
+            sequence=read_sequence(arrays, status),
+            campaigns=tuple(campaign_labels(arrays)),
             attributes=attributes,
         )
 
@@ -234,6 +295,7 @@ class Dataset:
             "pose": np.array(self.poses, dtype=np.int64),
             "load_case": np.array(self.load_cases, dtype=np.str_),
             "joint": np.array(self.joint_names, dtype=np.str_),
+            "campaign": np.array(self.campaigns, dtype=np.str_) if self.campaigns else None,
         }
         arrays = assemble(labels, self._variables, self.joint_units, self.attributes)
         for each in arrays.variables.values():
@@ -264,13 +326,21 @@ class Dataset:
 
     @property
     def arrays(self) -> dict[str, FloatArray]:
-        """The variables that are present, by name; all but the status."""
-        return {name: each for name, each in self._variables.items() if name != "status"}
+        """The quantities that are present, by name: all variables but status and sequence."""
+        found = {variable.name: getattr(self, variable.name) for variable in VARIABLES}
+        return {name: values for name, values in found.items() if values is not None}
 
     @property
     def _variables(self) -> dict[str, np.ndarray]:
-        found = {name: getattr(self, name) for name in VARIABLE_NAMES}
-        return {name: values for name, values in found.items() if values is not None}
+        whole = {variable.name: getattr(self, variable.name) for variable in INTEGERS}
+        return self.arrays | {name: each for name, each in whole.items() if each is not None}
+
+    def _schema(self, attributes: Mapping[str, str]) -> str:
+        """Return the first schema that has all that the dataset has."""
+        present = [each for each in (*VARIABLES, *INTEGERS) if getattr(self, each.name) is not None]
+        later = any(each.schema == SCHEMA_2 for each in present) or "gravity" in attributes
+        later |= bool(self.campaigns) or attributes.get("history") == CONDITIONED
+        return SCHEMA_2 if later or self.marker_displacement is None else SCHEMA
 
     @property
     def _labels(self) -> Labels:
@@ -279,6 +349,7 @@ class Dataset:
             "load_case": self.load_cases,
             "axis": AXES,
             "joint": self.joint_names,
+            "campaign": self.campaigns,
         }
 
     @property
@@ -303,10 +374,32 @@ class Dataset:
         return self.attributes.get("tcp_frame")
 
     @property
-    def marker(self) -> Point | None:
+    def marker(self) -> Vector | None:
         """Metrology marker in the tcp frame, in m; None: at the tcp, or the file does not say."""
         text = self.attributes.get("marker")
-        return None if text is None else read_point("marker", text)
+        return None if text is None else read_vector("marker", text)
+
+    @property
+    def gravity(self) -> Vector | None:
+        """Acceleration of gravity in base, in m/s²; None: the base stands upright."""
+        text = self.attributes.get("gravity")
+        return None if text is None else read_vector("gravity", text)
+
+    @property
+    def conditioned(self) -> bool:
+        """Whether each pose's first reading is a full press made before the reference was read.
+
+        Else the arm came to the reference by free moves, and its friction is not known.
+        """
+        return self.attributes.get("history") == CONDITIONED
+
+    @property
+    def order(self) -> IntArray:
+        """Place of each reading in time among those of its pose, shape (pose, load_case)."""
+        if self.sequence is not None:
+            return self.sequence
+        order = np.broadcast_to(np.arange(len(self.load_cases)), self.status.shape)
+        return np.asarray(order, dtype=np.int64)
 
     @property
     def provenance(self) -> str:
@@ -319,7 +412,8 @@ class Dataset:
         """Return some poses and load cases, in the order asked for.
 
         Load cases that are not asked for by name and have no usable reading at the chosen poses
-        are left out.
+        are left out. What was first in time remains so: where the load cases are not asked for in
+        that order, the dataset gets a ``sequence``.
 
         Parameters
         ----------
@@ -354,8 +448,13 @@ class Dataset:
         Raises
         ------
         DatasetError
-            If the dataset's joints are not these.
+            If the dataset's joints are not these, or there was no metrology.
         """
+        if self.marker_displacement is None:
+            raise DatasetError(
+                "dataset has no marker_displacement: to identify springs, metrology is needed"
+                " (a tracker that measures the marker)"
+            )
         wanted = list(joint_names)
         if sorted(wanted) != sorted(self.joint_names):
             raise DatasetError(
@@ -364,25 +463,58 @@ class Dataset:
             )
         order = [self.joint_names.index(name) for name in wanted]
         pose, case = np.nonzero(self.usable)
-        flat: dict[str, Any] = {
-            name: values[pose] if name == "tcp_position" else values[pose, case]
-            for name, values in self.arrays.items()
-        }
-        flat["joint_position"] = flat["joint_position"][:, order]
-        return Readings(np.array(self.poses)[pose], np.array(self.load_cases)[case], **flat)
+        flat: dict[str, Any] = {}
+        for variable in VARIABLES:
+            values = self.arrays.get(variable.name)
+            if values is not None and variable != LINK_JOINT_POSITION:
+                rows = values[pose, case] if "load_case" in variable.dims else values[pose]
+                flat[variable.name] = rows[:, order] if "joint" in variable.dims else rows
+        presses = self._unusable_presses(order)
+        if self.sequence is not None or presses is not None:
+            flat["sequence"] = self.order[pose, case]
+        if self.campaigns:
+            flat["campaign"] = np.array(self.campaigns)[pose]
+        return Readings(
+            np.array(self.poses)[pose],
+            np.array(self.load_cases)[case],
+            conditioned=self.conditioned,
+            also_pressed=presses,
+            **flat,
+        )
+
+    def _unusable_presses(self, order: Sequence[int]) -> Presses | None:
+        """Return what pressed on the arm without a usable reading, as far as it is known."""
+        known = np.isfinite(self.joint_position).all(axis=2) & np.isfinite(self.force).all(axis=2)
+        if self.moment is not None:
+            known &= np.isfinite(self.moment).all(axis=2)
+        pose, case = np.nonzero(known & ~self.usable)
+        if not len(pose):
+            return None
+        return Presses(
+            np.array(self.poses)[pose],
+            self.order[pose, case],
+            self.joint_position[pose, case][:, order],
+            self.force[pose, case],
+            None if self.moment is None else self.moment[pose, case],
+        )
 
     def _taken(self, rows: Sequence[int], columns: Sequence[int]) -> "Dataset":
         """Return the poses and load cases at some positions."""
         index = np.ix_(rows, columns)
+        dims = {variable.name: variable.dims for variable in (*VARIABLES, *INTEGERS)}
+        variables = self._variables
+        if sorted(columns) != list(columns):
+            variables[SEQUENCE.name] = self.order
         return Dataset(
             poses=tuple(self.poses[row] for row in rows),
             load_cases=tuple(self.load_cases[column] for column in columns),
             joint_names=self.joint_names,
             joint_units=self.joint_units,
+            campaigns=tuple(self.campaigns[row] for row in rows) if self.campaigns else (),
             attributes=self.attributes,
             **{
-                name: values[list(rows)] if name == "tcp_position" else values[index]
-                for name, values in self._variables.items()
+                name: values[index] if "load_case" in dims[name] else values[list(rows)]
+                for name, values in variables.items()
             },
         )
 

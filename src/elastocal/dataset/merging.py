@@ -5,24 +5,30 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from elastocal.dataset._layout import MISSING, FloatArray
+from elastocal.dataset._layout import MISSING, VARIABLES, FloatArray, IntArray
 from elastocal.dataset.dataset import Dataset
 from elastocal.errors import DatasetError
 
-_SAME_ATTRIBUTES = ("robot_name", "robot_urdf", "tcp_frame")
+_SAME_ATTRIBUTES = ("robot_name", "robot_urdf", "tcp_frame", "gravity")
 
 _SAME_MARKER = 1e-3
 """Markers that are estimated closer to one another are the same, in m: the displacements of a
 tool that turns by 1 mrad under load then differ by 1 µm."""
 
 
-def merge(datasets: Sequence[Dataset], *, relabel: bool = False) -> Dataset:
+def merge(
+    datasets: Sequence[Dataset],
+    *,
+    relabel: bool = False,
+    campaigns: Sequence[str] | None = None,
+) -> Dataset:
     """Return all poses of several datasets of the same robot.
 
     Poses keep their labels, and one that stands in two datasets is refused: whether it is the
     same pose measured again or another one is for the user to say. Load cases are the union, in
     order of first appearance; a pose that lacks one has NaN and the status missing there. Joints
     are matched by name. Provenances are joined with ``"; "``; the marker is the first one's.
+    Readings keep their order in time, and a reference without a recorded force was unloaded.
 
     Parameters
     ----------
@@ -30,11 +36,14 @@ def merge(datasets: Sequence[Dataset], *, relabel: bool = False) -> Dataset:
         At least one.
     relabel : bool
         Number the poses 0, 1, 2 … instead, for campaigns that each count from zero.
+    campaigns : sequence of str, optional
+        Name of the campaign that each dataset is. By default those that the datasets name; one
+        that names none, beside others that do, is called by its number.
 
     Raises
     ------
     DatasetError
-        If robots, joints or optional variables differ, or a pose label repeats.
+        If robots, joints, optional variables or histories differ, or a pose label repeats.
     """
     if not datasets:
         raise DatasetError("nothing to merge: give at least one dataset")
@@ -44,6 +53,7 @@ def merge(datasets: Sequence[Dataset], *, relabel: bool = False) -> Dataset:
         _check_poses_differ(datasets)
     cases = tuple(dict.fromkeys(case for dataset in datasets for case in dataset.load_cases))
     poses = tuple(pose for dataset in datasets for pose in dataset.poses)
+    names = dict.fromkeys(name for dataset in datasets for name in dataset.arrays)
     sources = [dataset.provenance for dataset in datasets if dataset.provenance]
     provenance = "; ".join(dict.fromkeys(sources))
     return Dataset(
@@ -52,20 +62,54 @@ def merge(datasets: Sequence[Dataset], *, relabel: bool = False) -> Dataset:
         joint_names=datasets[0].joint_names,
         joint_units=datasets[0].joint_units,
         status=np.concatenate([_spread(each, each.status, cases, MISSING) for each in datasets]),
+        sequence=_sequence(datasets, cases),
+        campaigns=_campaigns(datasets, campaigns),
         attributes={**datasets[0].attributes, "provenance": provenance},
-        **{name: _joined(datasets, name, cases) for name in datasets[0].arrays},
+        **{name: _joined(datasets, name, cases) for name in names},
     )
+
+
+def _sequence(datasets: Sequence[Dataset], cases: Sequence[str]) -> IntArray | None:
+    """Return the order in time; None where it is that of the load cases at all poses."""
+    places = [[cases.index(case) for case in dataset.load_cases] for dataset in datasets]
+    ordered = all(place == sorted(place) for place in places)
+    if ordered and all(dataset.sequence is None for dataset in datasets):
+        return None
+    return np.concatenate([_spread(each, each.order, cases, -1) for each in datasets])
+
+
+def _campaigns(datasets: Sequence[Dataset], named: Sequence[str] | None) -> tuple[str, ...]:
+    if named is None and not any(dataset.campaigns for dataset in datasets):
+        return ()
+    if named is not None and len(named) != len(datasets):
+        raise DatasetError(f"{len(named)} campaigns are named for {len(datasets)} datasets")
+    labels: list[str] = []
+    for index, dataset in enumerate(datasets):
+        own = dataset.campaigns
+        if named is None:
+            labels += own or [str(index)] * len(dataset.poses)
+        else:
+            # Two datasets may each count their campaigns from one.
+            labels += [f"{named[index]} {label}" for label in own] or [named[index]] * len(
+                dataset.poses
+            )
+    return tuple(labels)
+
+
+_DIMS = {variable.name: variable.dims for variable in VARIABLES}
+_ZERO_BY_DEFAULT = "reference_force"
 
 
 def _joined(datasets: Sequence[Dataset], name: str, cases: Sequence[str]) -> FloatArray:
     """Return the values of a variable at the poses of all datasets, joints in the first's order."""
     parts = []
     for dataset in datasets:
-        values = dataset.arrays[name]
-        if name == "joint_position":
+        values = dataset.arrays.get(name, np.zeros((len(dataset.poses), 3)))
+        if "joint" in _DIMS[name]:
             order = [dataset.joint_names.index(joint) for joint in datasets[0].joint_names]
             values = values[..., order]
-        parts.append(values if name == "tcp_position" else _spread(dataset, values, cases, np.nan))
+        by_case = "load_case" in _DIMS[name]
+        parts.append(_spread(dataset, values, cases, np.nan) if by_case else values)
     return np.concatenate(parts)
 
 
@@ -92,12 +136,21 @@ def _check_compatible(first: Dataset, other: Dataset, index: int) -> None:
         raise DatasetError(
             f"datasets 0 and {index} have different joints: {joints[0]} and {joints[1]}"
         )
-    for variable in sorted(set(first.arrays) ^ set(other.arrays)):
+    if first.conditioned != other.conditioned:
+        raise DatasetError(
+            f"datasets 0 and {index} have different histories: {_history(first)} and"
+            f" {_history(other)}"
+        )
+    for variable in sorted((set(first.arrays) ^ set(other.arrays)) - {_ZERO_BY_DEFAULT}):
         lacking = index if variable in first.arrays else 0
         raise DatasetError(
             f"dataset {lacking} has no variable {variable!r}, dataset {index - lacking} has:"
             " what was not measured cannot be filled in"
         )
+
+
+def _history(dataset: Dataset) -> str:
+    return "conditioned" if dataset.conditioned else "free"
 
 
 def _check_marker(first: Dataset, other: Dataset, index: int) -> None:

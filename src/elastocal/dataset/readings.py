@@ -12,8 +12,25 @@ from elastocal.results import brief_repr
 
 _LARGEST = 1e9
 """No SI number of a robot's reading comes near; what does is a damaged file."""
-_NO_NUMBERS = ("pose", "load_case", "sequence", "conditioned")
+_NO_NUMBERS = ("pose", "load_case", "sequence", "campaign", "conditioned", "also_pressed")
 """Fields that are labels or say how all readings were taken."""
+
+
+@brief_repr
+@dataclass(frozen=True, eq=False)
+class Presses:
+    """Presses that gave no usable reading but belong to the way that the torques took."""
+
+    pose: IntArray
+    """Label of the pose of each, shape (press,)."""
+    sequence: IntArray
+    """Place of each in time among presses and readings of its pose, shape (press,)."""
+    joint_position: FloatArray
+    """Shape (press, joint), in rad or m."""
+    force: FloatArray
+    """Force on the robot at the TCP in base, shape (press, 3), in N."""
+    moment: FloatArray | None = None
+    """Moment on the robot at the TCP in base, shape (press, 3), in N·m; None: not measured."""
 
 
 @brief_repr
@@ -58,12 +75,21 @@ class Readings:
     conditioned: bool = False
     """Whether each pose's first reading is a press made before the zero was read; else the arm
     came to the zero by free moves."""
+    campaign: StringArray | None = None
+    """Campaign of each reading, shape (reading,); None: there are none."""
+    also_pressed: Presses | None = None
+    """Presses that gave no usable reading, such as one that slipped; None: none is known. Those of
+    any pose: `take` keeps all of them, so friction still remembers."""
 
     def __post_init__(self) -> None:
         self._own("pose", np.array(self.pose, dtype=np.int64), (len(self.pose),))
         self._own("load_case", np.array(self.load_case, dtype=np.str_), (len(self.pose),))
         if self.sequence is not None:
             self._own("sequence", np.array(self.sequence, dtype=np.int64), (len(self.pose),))
+        elif self.also_pressed is not None:
+            raise DatasetError("readings with other presses between them need their sequence")
+        if self.campaign is not None:
+            self._own("campaign", np.array(self.campaign, dtype=np.str_), (len(self.pose),))
         for name, value in self._numbers():
             array = np.array(value, dtype=np.float64)
             width = array.shape[-1] if name.endswith("joint_position") and array.ndim else 3
@@ -107,9 +133,13 @@ class Readings:
         chosen = np.asarray(index)
         rows = np.arange(len(self))[chosen.astype(np.intp) if chosen.size == 0 else chosen]
         numbers = {name: value[rows] for name, value in self._numbers()}
-        sequence = None if self.sequence is None else self.sequence[rows]
         return replace(
-            self, pose=self.pose[rows], load_case=self.load_case[rows], sequence=sequence, **numbers
+            self,
+            pose=self.pose[rows],
+            load_case=self.load_case[rows],
+            sequence=None if self.sequence is None else self.sequence[rows],
+            campaign=None if self.campaign is None else self.campaign[rows],
+            **numbers,
         )
 
     def _numbers(self) -> Iterator[tuple[str, FloatArray]]:
