@@ -3,7 +3,6 @@
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from elastocal import __version__
 from elastocal.files import write_text
@@ -63,22 +62,14 @@ def _page(evidence: Evidence, verdict: Verdict) -> str:
         evidence=evidence,
         sections=sections,
         version=__version__,
-        **_verdict_values(evidence, verdict),
+        verdict=verdict,
+        blocks=tuple(_accuracy(evidence, verdict)),
     )
 
 
 def verdict_html(evidence: Evidence, verdict: Verdict) -> str:
     """Return the verdict as HTML."""
-    return render("verdict.html", **_verdict_values(evidence, verdict))
-
-
-def _verdict_values(evidence: Evidence, verdict: Verdict) -> dict[str, Any]:
-    """Return the values of the template of the verdict."""
-    return {
-        "light": verdict.light.value if verdict.light else "",
-        "verdict": verdict,
-        "blocks": tuple(_accuracy(evidence, verdict)),
-    }
+    return render("verdict.html", verdict=verdict, blocks=tuple(_accuracy(evidence, verdict)))
 
 
 def _accuracy(evidence: Evidence, verdict: Verdict) -> Iterator[Block]:

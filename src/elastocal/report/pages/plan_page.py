@@ -2,7 +2,6 @@
 
 import json
 from pathlib import Path
-from typing import Any
 
 from elastocal.cell import Cell
 from elastocal.files import write_text
@@ -84,7 +83,7 @@ def _cells(plan: PlanResult, pose: PoseRecord, worst: str) -> list[str]:
     ]
 
 
-def view_data(view: PlanView, plan: PlanResult, pool: PoolData) -> dict[str, Any]:
+def view_data(view: PlanView, plan: PlanResult, pool: PoolData) -> dict[str, object]:
     """Return the data from which the script of a page shows a view.
 
     Parameters

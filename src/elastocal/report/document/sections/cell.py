@@ -5,27 +5,24 @@ from collections.abc import Iterator
 import numpy as np
 
 from elastocal.cell import Cell
-from elastocal.report.document.blocks import Block, Content, Paragraph, Section, Table
+from elastocal.report.document import blocks
 from elastocal.verdict import Evidence
 from elastocal.wording import mm, point
 
 
-def _body(evidence: Evidence) -> Content:
-    """Return the section."""
-    if evidence.cell is None:
+def _body(evidence: Evidence) -> Iterator[blocks.Block]:
+    cell = evidence.cell
+    if cell is None:
         robot = f" The robot of the model is {evidence.robot}." if evidence.robot else ""
-        text = f"The cell is not known: no cell file could be read.{robot}"
-        return Content((Paragraph(text),))
-    text = "The devices are simulated: no real robot, sensor or tracker took part."
-    banner = (Paragraph(text, "banner"),) if evidence.simulated else ()
-    return Content((*banner, *_tables(evidence.cell)))
-
-
-def _tables(cell: Cell) -> Iterator[Block]:
+        yield blocks.Paragraph(f"The cell is not known: no cell file could be read.{robot}")
+        return
+    if evidence.simulated:
+        text = "The devices are simulated: no real robot, sensor or tracker took part."
+        yield blocks.Paragraph(text, "banner")
     heads = ("What", "Value")
-    yield Table("Robot, tool and instruments", heads, tuple(_instruments(cell)), texts=2)
+    yield blocks.Table("Robot, tool and instruments", heads, tuple(_instruments(cell)), texts=2)
     cases = cell.file.load_cases
-    yield Table(
+    yield blocks.Table(
         "Load cases: force on the robot in the tcp frame, in N",
         ("Load case", "x", "y", "z"),
         tuple(
@@ -33,7 +30,7 @@ def _tables(cell: Cell) -> Iterator[Block]:
             for name, force in zip(cases.cases, cases.force_tcp, strict=True)
         ),
     )
-    yield Table("Limits of the poses", heads, tuple(_limits(cell)), texts=2)
+    yield blocks.Table("Limits of the poses", heads, tuple(_limits(cell)), texts=2)
 
 
 def _instruments(cell: Cell) -> Iterator[tuple[str, str]]:
@@ -82,4 +79,4 @@ def _limits(cell: Cell) -> Iterator[tuple[str, str]]:
     yield "Torques that may be used, in N·m", torques or "not known"
 
 
-CELL = Section("cell", "The cell", 10, _body)
+CELL = blocks.Section("cell", "The cell", 10, _body)

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 
-from elastocal.report.document.blocks import Block, Bullets, Content, Heading, Paragraph, Section
+from elastocal.report.document import blocks
 from elastocal.verdict import Evidence
 from elastocal.wording import mm
 
@@ -19,25 +19,20 @@ _ALWAYS = (
 )
 
 
-def _body(evidence: Evidence) -> Content:
-    """Return the section."""
-    return Content(tuple(_blocks(evidence)))
-
-
-def _blocks(evidence: Evidence) -> Iterator[Block]:
-    yield Paragraph("Whatever the light says, this was not verified:")
-    yield Bullets(tuple(_always(evidence)))
-    yield Heading("Missing in this report")
+def _body(evidence: Evidence) -> Iterator[blocks.Block]:
+    yield blocks.Paragraph("Whatever the light says, this was not verified:")
+    yield blocks.Bullets(tuple(_always(evidence)))
+    yield blocks.Heading("Missing in this report")
     missing = tuple(
         f"{each.name[0].upper()}{each.name[1:]}{' (cannot be used)' if each.damaged else ''}:"
         f" {each.reason}"
         for each in evidence.missing
     )
-    none = Paragraph("No part of the report is missing.")
-    yield Bullets(missing, code=True) if missing else none
+    none = blocks.Paragraph("No part of the report is missing.")
+    yield blocks.Bullets(missing, code=True) if missing else none
     if evidence.doubts:
-        yield Heading("What does not fit together")
-        yield Bullets(evidence.doubts)
+        yield blocks.Heading("What does not fit together")
+        yield blocks.Bullets(evidence.doubts)
 
 
 def _always(evidence: Evidence) -> Iterator[str]:
@@ -58,4 +53,4 @@ def _always(evidence: Evidence) -> Iterator[str]:
         )
 
 
-NOT_VERIFIED = Section("not-verified", "What was not verified", 100, _body)
+NOT_VERIFIED = blocks.Section("not-verified", "What was not verified", 100, _body)

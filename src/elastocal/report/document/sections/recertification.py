@@ -10,16 +10,7 @@ from elastocal.identification.recertification import (
     Estimate,
     Verdict,
 )
-from elastocal.report.document.blocks import (
-    Block,
-    Bullets,
-    Content,
-    Facts,
-    Paragraph,
-    Section,
-    Table,
-    picture,
-)
+from elastocal.report.document import blocks
 from elastocal.report.plots import recertification_figure
 from elastocal.verdict import Evidence
 from elastocal.wording import mm
@@ -32,23 +23,19 @@ _WORDS = {
 }
 
 
-def _body(evidence: Evidence) -> Content:
-    """Return the section."""
-    if evidence.recertification is None:
-        text = (
+def _body(evidence: Evidence) -> Iterator[blocks.Block]:
+    found = evidence.recertification
+    if found is None:
+        yield blocks.Paragraph(
             "This calibration was not compared with an earlier one, so nothing is said of how"
             " the cell changed."
         )
-        return Content((Paragraph(text),))
-    return Content(tuple(_blocks(evidence.recertification)))
-
-
-def _blocks(found: CompareSummary) -> Iterator[Block]:
-    yield Paragraph(f"{_WORDS[found.verdict]} {found.reason}. {_moved(found)}", "sentence")
+        return
+    yield blocks.Paragraph(f"{_WORDS[found.verdict]} {found.reason}. {_moved(found)}", "sentence")
     if found.deflection is not None:
         yield _deflections(found.deflection, found.limit)
     yield _springs(found)
-    yield picture(
+    yield blocks.picture(
         partial(recertification_figure, found),
         f"Springs of both calibrations with their intervals, and the change of deflection."
         f" {_moved(found)} {found.reason}",
@@ -57,7 +44,7 @@ def _blocks(found: CompareSummary) -> Iterator[Block]:
     )
     # The origin of the readings is a path; where a folder lies is no part of a report.
     origin = f" ({found.old_provenance})"
-    yield Bullets(tuple(note.replace(origin, "") for note in found.notes))
+    yield blocks.Bullets(tuple(note.replace(origin, "") for note in found.notes))
 
 
 def _moved(found: CompareSummary) -> str:
@@ -67,8 +54,8 @@ def _moved(found: CompareSummary) -> str:
     return f"Moved beyond their intervals: {names}."
 
 
-def _deflections(change: DeflectionChange, limit: float | None) -> Block:
-    return Facts(
+def _deflections(change: DeflectionChange, limit: float | None) -> blocks.Block:
+    return blocks.Facts(
         (
             ("Poses and forces compared", change.rows),
             ("Change, mean", _span(change.mean)),
@@ -78,7 +65,7 @@ def _deflections(change: DeflectionChange, limit: float | None) -> Block:
     )
 
 
-def _springs(found: CompareSummary) -> Block:
+def _springs(found: CompareSummary) -> blocks.Block:
     rows = tuple(
         (
             each.name,
@@ -92,11 +79,11 @@ def _springs(found: CompareSummary) -> Block:
         for each, unit in ((each, unit_of(each.unit)) for each in found.springs)
     )
     heads = ("Spring or sum", "", "Old", "New", "Change", "95 %, all at once", "Unit")
-    return Table("Springs and sums that both calibrations determine", heads, rows, texts=2)
+    return blocks.Table("Springs and sums that both calibrations determine", heads, rows, texts=2)
 
 
 def _span(found: Estimate) -> str:
     return f"{mm(found.value)} ({mm(found.low)} to {mm(found.high)})"
 
 
-RECERTIFICATION = Section("recertification", "Change since the last calibration", 80, _body)
+RECERTIFICATION = blocks.Section("recertification", "Change since the last calibration", 80, _body)
