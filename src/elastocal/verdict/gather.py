@@ -41,7 +41,7 @@ from elastocal.procedure import (
     read_summary,
 )
 from elastocal.records import read_json
-from elastocal.verdict._folders import (
+from elastocal.verdict._files import (
     CODEC,
     MODEL,
     PROCESS,
@@ -51,19 +51,17 @@ from elastocal.verdict._folders import (
     find_folders,
     run_files,
 )
-from elastocal.verdict.consistency import (
-    check_codec,
-    check_model,
-    check_process,
-    check_tool,
-    find_doubts,
-)
 from elastocal.verdict.evidence import (
     AcceptanceLimits,
     CodecEvidence,
     Evidence,
     MissingPart,
     ModelEvidence,
+    check_codec,
+    check_model,
+    check_process,
+    check_tool,
+    find_doubts,
 )
 
 

@@ -1,4 +1,4 @@
-"""Provenance: versions, hashes, seeds, every setting."""
+"""Where the figures come from, and what the report does not show; neither list is ever empty."""
 
 import platform
 from collections.abc import Iterator
@@ -9,11 +9,12 @@ from elastocal import __version__
 from elastocal.records import to_data
 from elastocal.report.document import blocks
 from elastocal.verdict import BYTES, Evidence
+from elastocal.wording import mm
 
 _PACKAGES = ("numpy", "scipy", "pin", "xarray", "matplotlib", "plotly")
 
 
-def _body(evidence: Evidence) -> Iterator[blocks.Block]:
+def _provenance(evidence: Evidence) -> Iterator[blocks.Block]:
     yield blocks.Table("Times", ("What", "When"), tuple(_times(evidence)), texts=2)
     yield blocks.Table("Versions", ("What", "Version"), tuple(_versions(evidence)), texts=2)
     yield blocks.Table(
@@ -108,4 +109,54 @@ def _setting(key: str, value: str) -> str:
     return "that of the dataset" if key == "marker" and value == "none" else value
 
 
-PROVENANCE = blocks.Section("provenance", "Provenance", 90, _body)
+PROVENANCE = blocks.Section("provenance", "Provenance", 90, _provenance)
+
+
+_ALWAYS = (
+    "Geometric calibration and the sag under the arm's own weight: only deflection under a force"
+    " is modelled, and both must be corrected before it.",
+    "Absolute accuracy: deflections are differences to the unloaded reading at the same pose.",
+    "Temperature: nothing corrects for a warm arm.",
+    "Payloads and tools other than the one of this run.",
+    "Poses outside the region of the pool, and forces beyond those that were applied.",
+    "Dynamic effects: readings were taken while the arm stood still.",
+    "The controller that will apply the correction, and its delay.",
+    "Safety: a calibrated model is not a safety function.",
+)
+
+
+def _not_verified(evidence: Evidence) -> Iterator[blocks.Block]:
+    yield blocks.Paragraph("Whatever the light says, this was not verified:")
+    yield blocks.Bullets(tuple(_always(evidence)))
+    yield blocks.Heading("Missing in this report")
+    missing = tuple(
+        f"{each.name[0].upper()}{each.name[1:]}{' (cannot be used)' if each.damaged else ''}:"
+        f" {each.reason}"
+        for each in evidence.missing
+    )
+    none = blocks.Paragraph("No part of the report is missing.")
+    yield blocks.Bullets(missing, code=True) if missing else none
+    if evidence.doubts:
+        yield blocks.Heading("What does not fit together")
+        yield blocks.Bullets(evidence.doubts)
+
+
+def _always(evidence: Evidence) -> Iterator[str]:
+    if evidence.simulated:
+        yield "A real robot: all devices of this run are simulated."
+    yield from _ALWAYS
+    calibrated = evidence.calibrated
+    if calibrated is not None and calibrated.model.observability.unobservable:
+        yield (
+            "Single springs that no reading tells apart (see Compliances): their numbers are not"
+            " findings."
+        )
+    if evidence.plan is not None:
+        yield (
+            "Places on the surface farther than"
+            f" {mm(evidence.plan.search.covering_radius, 1)} from every pose; that is how far the"
+            " worst covered candidate is from one."
+        )
+
+
+NOT_VERIFIED = blocks.Section("not-verified", "What was not verified", 100, _not_verified)
