@@ -42,6 +42,7 @@ bench: $(VENV)/installed-dev
 	$(BIN)/python benchmarks/pool.py
 	$(BIN)/python benchmarks/compensation.py
 	$(BIN)/python benchmarks/codec.py
+	$(BIN)/python benchmarks/record.py
 
 house:
 	$(PYTHON) tools/house.py

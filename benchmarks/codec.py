@@ -6,7 +6,6 @@ of a ``pip install --target`` on PYTHONPATH. Run with ``python benchmarks/codec.
 """
 
 import importlib.util
-import os
 import time
 import warnings
 
@@ -17,6 +16,7 @@ from elastocal.codec import CodecData, Variant, cross_validate
 from elastocal.dataset import Readings
 from elastocal.elastic import ElasticModel, layout
 from elastocal.identification import build
+from elastocal.parallel import core_count
 from elastocal.robot import Robot, catalogue, with_tool
 from elastocal.sim.arm import (
     SHOP_FLOOR,
@@ -87,7 +87,7 @@ def main() -> None:
     else:
         print(f"  scikit-learn's learning_curve: {usual:.3f} s; ratio {usual / taken:.1f}")
     ioops = [Variant(search="ioops")]
-    for jobs in (1, os.cpu_count() or 1):
+    for jobs in (1, core_count()):
         start = time.perf_counter()
         cross_validate(robot, readings, ioops, jobs=jobs)
         print(f"  with IOOPS, {jobs} processes: {time.perf_counter() - start:.1f} s")

@@ -5,7 +5,6 @@ Run with ``python benchmarks/pool.py``; ``--large`` goes on to 100 000 candidate
 """
 
 import argparse
-import os
 import tempfile
 import time
 from pathlib import Path
@@ -14,8 +13,8 @@ import numpy as np
 
 from elastocal.cell import load_cell
 from elastocal.cell.examples import write_example
-from elastocal.planning import cell_surface, sample_pool
-from elastocal.planning.pool_sampling import SampledPool
+from elastocal.parallel import core_count
+from elastocal.planning import SampledPool, cell_surface, sample_pool
 
 SIZES = (1000, 3000, 10_000)
 LARGE = (*SIZES, 30_000, 100_000)
@@ -50,7 +49,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--large", action="store_true", help="go on to 100 000 candidates")
     sizes = LARGE if parser.parse_args().large else SIZES
-    cores = os.cpu_count() or 1
+    cores = core_count()
     for like in ("afp", "machining"):
         report(like, sizes, cores)
 

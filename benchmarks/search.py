@@ -19,13 +19,13 @@ from elastocal.planning.search import (
     ExchangeSearch,
     ExchangeSelection,
     Information,
+    PlainField,
     build_information,
     covering_radius,
     nearest_neighbour,
     o1,
     technique,
 )
-from elastocal.planning.search.cover import PlainField
 from elastocal.robot import Robot, catalogue, with_tool
 from elastocal.sim.arm import (
     Linkage,

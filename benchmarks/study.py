@@ -16,10 +16,11 @@ from pathlib import Path
 from typing import NamedTuple
 
 from elastocal.cell.examples import write_example
+from elastocal.parallel import core_count
 
 COMMAND = "from elastocal.cli.main import run; run()"
 SAMPLES = (50, 100, 200)
-CORES = len(os.sched_getaffinity(0))
+CORES = core_count()
 
 
 class Use(NamedTuple):

@@ -59,7 +59,7 @@ rows = np.hstack([q, force])
 path, out = folder / "path.csv", folder / "corrected.csv"
 np.savetxt(path, rows, delimiter=",", header=header, comments="", fmt="%.17g")
 tally = compensate_path(calibrated, path, out)
-print(f"{tally.rows} points corrected, by at most {1e3 * tally.correction.largest:.2f} mm")
+print(f"{tally.rows} points corrected, by at most {1e3 * tally.figures().correction.max:.2f} mm")
 
 # Now run both paths on the true arm and see how far the loaded tool is from the course.
 corrected = np.loadtxt(out, delimiter=",", skiprows=1)[:, : len(joints)]

@@ -14,10 +14,8 @@ import pytest
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
-from elastocal.cell import CellFile
-from elastocal.cell.description import ProcedureSettings
-from elastocal.cell.description.simulation import FaultKind
-from elastocal.cell.fingerprint import RUN_SECTIONS
+from elastocal.cell import RUN_SECTIONS, CellFile, ProcedureSettings
+from elastocal.cell.simulation import FaultKind
 from elastocal.procedure.run.faults import Fault
 from elastocal.workflows import chapters
 from support.cli import Result, elastocal

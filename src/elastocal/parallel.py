@@ -12,9 +12,13 @@ import signal
 import warnings
 from collections.abc import Callable, Generator, Iterable, Iterator
 from contextlib import contextmanager
-from typing import Any, TypeVar
+from functools import cache
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from elastocal.errors import ElastocalError
+
+if TYPE_CHECKING:
+    from threadpoolctl import ThreadpoolController
 
 _Task = TypeVar("_Task")
 _Result = TypeVar("_Result")
@@ -215,12 +219,18 @@ def one_blas_thread() -> Iterator[None]:
     >>> with one_blas_thread():
     ...     x = np.linalg.solve(np.eye(18), np.ones(18))
     """
-    from threadpoolctl import threadpool_limits
-
-    # Only libraries that are loaded can be limited.
-    importlib.import_module("scipy.linalg")
-    with threadpool_limits(1, user_api="blas"):
+    with _blas().limit(limits=1, user_api="blas"):
         yield
+
+
+@cache
+def _blas() -> "ThreadpoolController":
+    """Return the thread pools of linear algebra, sought once: it takes 2 ms."""
+    from threadpoolctl import ThreadpoolController
+
+    # Only libraries that are loaded are found.
+    importlib.import_module("scipy.linalg")
+    return ThreadpoolController()
 
 
 def _call(task: Callable[[], object]) -> object:

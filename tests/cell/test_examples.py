@@ -8,7 +8,7 @@ from elastocal.cell.examples import EXAMPLES, write_example
 from elastocal.errors import FileAccessError, SchemaError
 from elastocal.planning.surface import (
     ReachableFrom,
-    contact_poses,
+    contact_frames,
     distance_to_boundary,
     fit_disk,
     load_surface,
@@ -67,7 +67,7 @@ def test_nearly_all_of_the_surface_is_reached_and_takes_the_disk(cell):
     fit = fit_disk(surface, points, wanted.disk_radius)
     assert fit.supported.all()
     assert fit.angle.max() < wanted.normal_tolerance
-    poses = contact_poses(points, np.arange(8) * np.pi / 4)
+    poses = contact_frames(points.position, points.normal, np.arange(8) * np.pi / 4)
     away = poses.copy()
     away[..., :3, 3] += wanted.approach_distance * points.normal[:, None]
     reachable = ReachableFrom(inverse_for(cell.robot), cell.external_positions[::3])

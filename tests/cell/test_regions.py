@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from elastocal.cell.description.surface import RegionEntry
+from elastocal.cell.hardware import RegionEntry
 
 
 def test_a_polygon_may_be_concave_and_bounded_in_height():

@@ -6,7 +6,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from elastocal.errors import RobotError
 from elastocal.identification import write_model
+from elastocal.robot import Robot
+from elastocal.workflows._inputs import require_same_robot
+from support.cells import robot
 from support.cli import elastocal
 from support.paths import (
     calibrated,
@@ -18,6 +22,7 @@ from support.paths import (
     write_csv,
 )
 from support.simulated import example_cell, places
+from support.urdfs import KR_LIKE, opw_arm_urdf
 
 FILES = {"postures.csv", "choice.csv", "stiffness.svg", "stiffness.png", "stiffness.json"}
 
@@ -142,3 +147,13 @@ def test_a_cell_brings_its_rail_its_margins_and_its_tooling(folder):
         cell.path,
     )  # fmt: skip
     assert "they must be the same" in refused.reason
+
+
+def test_a_cell_of_another_robot_is_refused():
+    cell, names = example_cell("afp"), ("model.json", "afp")
+    require_same_robot(cell.robot, cell.robot, names)
+    with pytest.raises(RobotError, match="they must be the same"):
+        require_same_robot(robot(), cell.robot, names)
+    other = Robot.from_urdf(opw_arm_urdf(**KR_LIKE), "tcp")
+    with pytest.raises(RobotError, match="mm apart"):
+        require_same_robot(robot(), other, names)

@@ -3,11 +3,7 @@
 import numpy as np
 import pytest
 
-from elastocal.compensation.offline import (
-    PathError,
-    joints_along_path,
-)
-from elastocal.compensation.stiffness import (
+from elastocal.compensation import (
     PostureConstraint,
     PostureGrid,
     cell_constraints,
@@ -16,10 +12,12 @@ from elastocal.compensation.stiffness import (
     joint_limit_constraint,
     principal_stiffness,
     read_stations,
-    require_same_robot,
     survey_postures,
 )
-from elastocal.errors import RobotError
+from elastocal.compensation.offline import (
+    PathError,
+    joints_along_path,
+)
 from elastocal.identification import CalibratedModel
 from elastocal.robot import Robot
 from elastocal.robot.inverse import NumericalInverse, inverse_for
@@ -215,12 +213,3 @@ class TestCell:
         assert np.isfinite(found.best_by_spin).any()
         inside = found.q[~np.isnan(found.stiffness)]
         assert constraints["collision"].allows(inside).all()
-
-    def test_a_cell_of_another_robot_is_refused(self):
-        cell = example_cell("afp")
-        require_same_robot(cell.robot, cell.robot)
-        with pytest.raises(RobotError, match="they must be the same"):
-            require_same_robot(robot(), cell.robot)
-        other = Robot.from_urdf(opw_arm_urdf(**KR_LIKE), "tcp")
-        with pytest.raises(RobotError, match="mm apart"):
-            require_same_robot(robot(), other)

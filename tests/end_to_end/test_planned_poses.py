@@ -15,8 +15,7 @@ import pinocchio as pin
 import pytest
 import trimesh
 
-from elastocal.cell import load_cell
-from elastocal.cell.description import TOOLING
+from elastocal.cell import TOOLING, load_cell
 from elastocal.cell.examples import write_example
 from elastocal.planning import cell_surface, collision_scene, read_plan, read_pool
 from support.cli import elastocal

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from elastocal.identification import interval, solve
-from elastocal.identification.refits import PoseGrams
+from elastocal.identification.solve import PoseGrams
 from elastocal.identification.uncertainty import bootstrap
 from support.problems import made_up, planted
 

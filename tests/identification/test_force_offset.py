@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from elastocal.identification import build, calibrate, solve
-from elastocal.identification._force_offset import ForceOffset, force_offset
+from elastocal.identification.suspicious import ForceOffset, force_offset
 from support.cells import Cell, linear_truth, rich_truth
 from support.problems import campaign, elastic, linear_readings
 

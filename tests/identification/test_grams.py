@@ -5,7 +5,7 @@ import pytest
 
 from elastocal.errors import IdentificationError
 from elastocal.identification import FitOptions, Prior, build, solve
-from elastocal.identification.refits import PoseGrams
+from elastocal.identification.solve import PoseGrams
 from support.problems import elastic, linear_readings, made_up, planted
 
 CHOICES = np.array([[1.0] * 31, [2.0, 0.0, 3.0] + [1.0] * 28, [0.0] * 20 + [1.0] * 11])

@@ -81,7 +81,7 @@ def test_scale_is_the_norm_of_the_weighted_columns():
     problem, _ = made_up(np.random.default_rng(0))
     problem = replace(problem, weight=np.random.default_rng(1).uniform(0.1, 2.0, (32, 3)))
     rows = (problem.O * problem.weight[..., None]).reshape(-1, 5)
-    np.testing.assert_allclose(problem.scale, np.linalg.norm(rows, axis=0))
+    np.testing.assert_allclose(problem.scaled().scale, np.linalg.norm(rows, axis=0))
 
 
 def test_a_factor_multiplies_squared_residuals():

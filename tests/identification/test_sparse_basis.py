@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from elastocal.identification._sparse_basis import sparse_basis
+from elastocal.identification.observability import sparse_basis
 
 
 def orthonormal(vectors, seed=0):

@@ -5,7 +5,7 @@ import pytest
 from scipy.stats import norm, t
 
 from elastocal.identification import leave_poses_out, solve
-from elastocal.identification.refits import PoseGrams
+from elastocal.identification.solve import PoseGrams
 from elastocal.identification.uncertainty import bootstrap, widen_draws, widening_factor
 from support.problems import made_up
 

@@ -5,8 +5,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from elastocal.cell import load_cell
-from elastocal.cell.description import TOOLING
+from elastocal.cell import TOOLING, load_cell
 from elastocal.cell.examples import write_example
 from elastocal.planning import cell_surface, collision_scene
 from elastocal.planning.pool_sampling import PoolBuilder

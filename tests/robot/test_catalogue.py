@@ -13,10 +13,10 @@ import yaml
 from elastocal.errors import RobotError, SchemaError
 from elastocal.robot import catalogue
 from elastocal.robot.catalogue import (
+    LINKS,
     CatalogueEntry,
     catalogue as table,
 )
-from elastocal.robot.catalogue.record import LINKS
 
 NAMES = catalogue.names()
 TRANSPORT = np.radians([0.0, -90.0, 90.0, 0.0, 45.0, 0.0])

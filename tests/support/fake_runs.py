@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from elastocal.cell.description import ProcedureSettings
+from elastocal.cell import ProcedureSettings
 from elastocal.planning import PlanResult, PoseRecord, SpreadRecord
 from elastocal.planning.motion import AxisMotion
 from elastocal.planning.plan_result import (

@@ -1,4 +1,15 @@
-"""The cell: its description; the procedure and the devices that carry it out."""
+"""The cell: the file that describes it, and the devices that carry a procedure out in it.
+
+============  =================================================================================
+`cell`        the whole file, and `Cell`: robot made, files found; its fingerprint
+`hardware`    robot, tool, sensor, marker, trackers; tooling surface and other solids
+`procedure`   load cases, limits, search for poses, Procedure 1, what its result is held against
+`motion`      HOME, axis speeds, positions of the external axes
+`simulation`  the hidden truth of the simulated cell, and the faults that it injects
+`devices`     protocols of arm, force sensor, tracker and clock
+`examples`    the cells that ``elastocal init`` writes
+============  =================================================================================
+"""
 
 import lazy_loader
 

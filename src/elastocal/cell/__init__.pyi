@@ -1,6 +1,96 @@
-from .description import Cell as Cell, CellFile as CellFile, load_cell as load_cell
-from .fingerprint import (
+from ._quantities import (
+    Angle as Angle,
+    Distance as Distance,
+    PositiveForce as PositiveForce,
+    PositiveLength as PositiveLength,
+    PositiveMoment as PositiveMoment,
+)
+from .cell import (
     RUN_SECTIONS as RUN_SECTIONS,
+    SCHEMA as SCHEMA,
+    TOOLING as TOOLING,
+    Cell as Cell,
+    CellFile as CellFile,
+    ProcessFile as ProcessFile,
     fingerprint as fingerprint,
+    load_cell as load_cell,
     named_files as named_files,
+)
+from .devices import (
+    ArmState as ArmState,
+    BeamState as BeamState,
+    Clock as Clock,
+    Devices as Devices,
+    ForceSensor as ForceSensor,
+    Metrology as Metrology,
+    Motion as Motion,
+    PointBlock as PointBlock,
+    RobotArm as RobotArm,
+    SensorStatus as SensorStatus,
+    WrenchBlock as WrenchBlock,
+)
+from .examples import (
+    BLOCK_SIZE as BLOCK_SIZE,
+    EXAMPLES as EXAMPLES,
+    Example as Example,
+    binary_stl as binary_stl,
+    block as block,
+    dome_section as dome_section,
+    require_example as require_example,
+    write_example as write_example,
+)
+from .hardware import (
+    Box as Box,
+    Cylinder as Cylinder,
+    Marker as Marker,
+    MeshFile as MeshFile,
+    RailEntry as RailEntry,
+    RegionBox as RegionBox,
+    RegionEntry as RegionEntry,
+    RegionPolygon as RegionPolygon,
+    RobotEntry as RobotEntry,
+    SensorEntry as SensorEntry,
+    Shape as Shape,
+    Sphere as Sphere,
+    SurfaceEntry as SurfaceEntry,
+    Tool as Tool,
+    Tracker as Tracker,
+)
+from .motion import (
+    MotionEntry as MotionEntry,
+    axis_speeds as axis_speeds,
+    external_positions as external_positions,
+    home_position as home_position,
+    joint_margins as joint_margins,
+    torque_limits as torque_limits,
+)
+from .procedure import (
+    DEFAULT_POSES as DEFAULT_POSES,
+    DIRECTIONS as DIRECTIONS,
+    SIMULATED as SIMULATED,
+    Acceptance as Acceptance,
+    DeviceNames as DeviceNames,
+    Engagement as Engagement,
+    Limits as Limits,
+    LoadCases as LoadCases,
+    ProcedureSettings as ProcedureSettings,
+    Search as Search,
+    TorqueLimits as TorqueLimits,
+)
+from .simulation import (
+    Balancer as Balancer,
+    Bearings as Bearings,
+    ContactTruth as ContactTruth,
+    ControllerTruth as ControllerTruth,
+    EndEffector as EndEffector,
+    ExternalAxes as ExternalAxes,
+    Fault as Fault,
+    FaultKind as FaultKind,
+    Floor as Floor,
+    Gears as Gears,
+    Links as Links,
+    SensorTruth as SensorTruth,
+    Simulation as Simulation,
+    TrackerTruth as TrackerTruth,
+    TruthScale as TruthScale,
 )

@@ -24,7 +24,7 @@ import numpy as np
 from pydantic import Discriminator, Field, Tag, model_validator
 
 from elastocal.arrays import FloatArray
-from elastocal.cell.description import (
+from elastocal.cell import (
     Angle,
     Distance,
     PositiveForce,

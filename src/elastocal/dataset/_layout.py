@@ -6,9 +6,8 @@ variables are those of the paper's Procedure 1: ``P^c``, ``P^m``, ``F^m`` and ``
 
 import difflib
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +21,10 @@ StringArray = NDArray[np.str_]
 BoolArray = NDArray[np.bool_]
 StatusArray = NDArray[np.int8]
 Point = tuple[float, float, float]
+Labels = Mapping[str, Sequence[object]]
+"""Labels of each dimension, by its name."""
+Arrays = Mapping[str, np.ndarray]
+"""Values of each variable that is present, by its name."""
 
 SCHEMA = "elastocal.dataset/1"
 """The schema that this version reads and writes."""
@@ -169,7 +172,7 @@ def freeze(array: NDArray[np.generic]) -> None:
     array.setflags(write=False)
 
 
-def canonical_attributes(attributes: Mapping[str, Any]) -> dict[str, str]:
+def canonical_attributes(attributes: Mapping[str, object]) -> dict[str, str]:
     """Return the global attributes in order, with empty texts where a text is optional.
 
     Raises

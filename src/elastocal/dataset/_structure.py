@@ -5,7 +5,6 @@ stated unit that is not SI is converted, since nothing is guessed; a missing one
 """
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -20,28 +19,28 @@ from elastocal.dataset._layout import (
     STATUSES,
     VARIABLE_NAMES,
     VARIABLES,
+    Arrays,
     FloatArray,
+    Labels,
     StatusArray,
     Variable,
-    canonical_attributes,
-    freeze,
     joint_name_problem,
 )
 from elastocal.errors import DatasetError, UnitError, nearest
 from elastocal.records import LabelledArray, LabelledArrays
 from elastocal.units import factor
 
-if TYPE_CHECKING:
-    from elastocal.dataset.dataset import Dataset
+_Sizes = Mapping[str, int]
+"""Length of each dimension, by its name."""
 
 
 def assemble(
-    labels: Mapping[str, Sequence[Any] | None],
+    labels: Mapping[str, ArrayLike | None],
     arrays: Mapping[str, ArrayLike | None],
     joint_units: Sequence[str],
     attributes: Mapping[str, object],
 ) -> LabelledArrays:
-    """Return the labelled arrays of plain ones, not yet validated.
+    """Return plain arrays with their labels, units and meanings, not yet validated.
 
     Parameters
     ----------
@@ -62,170 +61,63 @@ def assemble(
     poses = labels["pose"]
     if poses is None:
         poses = range(len(np.atleast_1d(_as_array("force", arrays["force"]))))
-    coordinates: dict[str, np.ndarray] = {
+    coordinates = {
         "pose": np.asarray(poses),
-        "load_case": np.array(labels["load_case"], dtype=object),
+        "load_case": _text_array(labels["load_case"]),
         "axis": np.array(AXES),
-        "joint": np.array(labels["joint"], dtype=object),
+        "joint": _text_array(labels["joint"]),
     }
-    sizes = {name: len(values) for name, values in coordinates.items()}
-    if len(joint_units) != sizes["joint"]:
-        raise DatasetError(f"{len(joint_units)} joint units given for {sizes['joint']} joints")
+    sizes = _sizes(coordinates, joint_units)
     variables: dict[str, LabelledArray] = {}
     for variable in (*VARIABLES, STATUS):
         values = arrays.get(variable.name)
         if values is not None:
-            unit = _joined_units(joint_units) if variable is JOINT_POSITION else variable.unit
-            notes = {"units": unit} if unit else {}
-            variables[variable.name] = LabelledArray(*_fitted(values, variable, sizes), notes)
+            dims, array = _fitted(values, variable, sizes, broadcast=variable.broadcast)
+            variables[variable.name] = LabelledArray(dims, array, _notes(variable, joint_units))
     variables |= {name: LabelledArray((name,), each) for name, each in coordinates.items()}
-    if len(set(joint_units)) > 1:
-        variables["joint_unit"] = LabelledArray(("joint",), np.array(joint_units))
     present = {name: value for name, value in attributes.items() if value is not None}
-    return LabelledArrays(variables, present, ("joint_unit",) if "joint_unit" in variables else ())
+    if all(unit == "rad" for unit in joint_units):
+        return LabelledArrays(variables, present)
+    variables["joint_unit"] = LabelledArray(("joint",), np.array(joint_units))
+    return LabelledArrays(variables, present, ("joint_unit",))
 
 
-def canonical(data: LabelledArrays) -> dict[str, Any]:
-    """Return the fields of a `Dataset` that labelled arrays hold, in SI units.
-
-    Raises
-    ------
-    DatasetError
-        If a variable, coordinate, attribute or unit is missing, unknown or of the wrong form.
-    SchemaError
-        If the schema is not known.
-    """
-    attributes = canonical_attributes(data.attributes)
-    _check_names(data)
-    fields: dict[str, Any] = {
-        "attributes": attributes,
-        "poses": _poses(data),
-        "load_cases": _texts(data, "load_case"),
-        "joint_names": _texts(data, "joint"),
-    }
-    axes = _axis_order(data)
-    units, factors = _joint_units(data, len(fields["joint_names"]))
-    fields["joint_units"] = units
-    for variable in VARIABLES:
-        if variable.name in data:
-            scale = factors if variable is JOINT_POSITION else _unit_factor(data, variable)
-            # x * 1.0 is x, bit for bit: data in SI units pass unchanged.
-            fields[variable.name] = _aligned(data, variable, axes) * scale
-    fields["status"] = _status(data)
-    return fields
-
-
-def labelled(data: "Dataset") -> LabelledArrays:
-    """Return the arrays of a dataset with their labels, units and meanings."""
-    variables: dict[str, LabelledArray] = {}
-    for variable in VARIABLES:
-        values = getattr(data, variable.name)
-        if values is not None:
-            is_joints = variable is JOINT_POSITION
-            unit = _joined_units(data.joint_units) if is_joints else variable.unit
-            notes = {"units": unit, "long_name": variable.meaning}
-            variables[variable.name] = LabelledArray(variable.dims, values, notes)
-    flags = {
-        "flag_values": np.arange(len(STATUSES), dtype=np.int8),
-        "flag_meanings": " ".join(STATUSES),
-        "long_name": STATUS.meaning,
-    }
-    variables["status"] = LabelledArray(STATUS.dims, data.status, flags)
-    for dim, labels in (
-        ("pose", np.array(data.poses, dtype=np.int64)),
-        ("load_case", np.array(data.load_cases, dtype=np.str_)),
-        ("axis", np.array(AXES)),
-        ("joint", np.array(data.joint_names, dtype=np.str_)),
-    ):
-        freeze(labels)
-        variables[dim] = LabelledArray((dim,), labels)
-    if "m" not in data.joint_units:
-        return LabelledArrays(variables, dict(data.attributes))
-    units = np.array(data.joint_units)
-    freeze(units)
-    variables["joint_unit"] = LabelledArray(("joint",), units)
-    return LabelledArrays(variables, dict(data.attributes), ("joint_unit",))
-
-
-def check_labels(data: "Dataset") -> None:
-    """Refuse labels of poses, load cases and joints that repeat or that a file cannot hold.
+def check_structure(labels: Labels, arrays: Arrays, joint_units: Sequence[str]) -> None:
+    """Refuse labels that repeat or that a file cannot hold, and arrays that do not fit them.
 
     Raises
     ------
     DatasetError
-        Naming the label.
+        Naming the label, or the array and its shape.
     """
-    _check_unique("pose", data.poses)
-    for label in data.load_cases:
+    _check_unique("pose", labels["pose"])
+    for label in map(str, labels["load_case"]):
         if not label or label != label.strip() or not label.isprintable():
             raise DatasetError(
                 f"load case {label!r} must be a printable name without spaces around it"
             )
-    _check_unique("load case", data.load_cases)
-    if not data.joint_names:
+    _check_unique("load case", labels["load_case"])
+    if not labels["joint"]:
         raise DatasetError("coordinate 'joint' is empty: a robot has at least one joint")
-    for label in data.joint_names:
+    for label in map(str, labels["joint"]):
         problem = joint_name_problem(label)
         if problem:
             raise DatasetError(f"joint {label!r}: {problem}")
-    _check_unique("joint", data.joint_names)
+    _check_unique("joint", labels["joint"])
+    sizes = _sizes(labels, joint_units)
+    for variable in (*VARIABLES, STATUS):
+        if variable.name in arrays:
+            _fitted(arrays[variable.name], variable, sizes, broadcast=False)
 
 
-def check_shapes(data: "Dataset") -> None:
-    """Refuse arrays that do not fit the labels, and a status that means nothing.
+def check_names(data: LabelledArrays) -> None:
+    """Refuse variables and coordinates that are not known, and required ones that are missing.
 
     Raises
     ------
     DatasetError
-        Naming the array and its shape, or the place of the status.
+        Naming the first of them.
     """
-    sizes = {
-        "pose": len(data.poses),
-        "load_case": len(data.load_cases),
-        "axis": len(AXES),
-        "joint": len(data.joint_names),
-    }
-    if len(data.joint_units) != sizes["joint"]:
-        raise DatasetError(f"{len(data.joint_units)} joint units given for {sizes['joint']} joints")
-    for variable in (*VARIABLES, STATUS):
-        values = getattr(data, variable.name)
-        wanted = tuple(sizes[dim] for dim in variable.dims)
-        if values is not None and values.shape != wanted:
-            raise DatasetError(
-                f"{variable.name} has shape {values.shape}: it must be"
-                f" ({', '.join(variable.dims)}) = {wanted}"
-            )
-
-
-def _as_array(name: str, values: ArrayLike | None) -> np.ndarray:
-    try:
-        return np.asarray(values)
-    except ValueError as error:
-        raise DatasetError(f"{name} is ragged: its rows differ in length") from error
-
-
-def _fitted(
-    values: ArrayLike, variable: Variable, sizes: Mapping[str, int]
-) -> tuple[tuple[str, ...], np.ndarray]:
-    """Return the dimensions that an array has, and the array."""
-    array = _as_array(variable.name, values)
-    shapes = {variable.dims: tuple(sizes[dim] for dim in variable.dims)}
-    if variable.broadcast:
-        shapes[variable.dims[:2]] = shapes[variable.dims][:2]
-        shapes[()] = ()
-    for dims, shape in shapes.items():
-        if array.shape == shape:
-            return dims, array
-    allowed = " or ".join(f"({', '.join(dims)}) = {shape}" for dims, shape in shapes.items())
-    raise DatasetError(f"{variable.name} has shape {array.shape}: it must be {allowed}")
-
-
-def _joined_units(units: Sequence[str]) -> str:
-    """Return the ``units`` attribute of the joint positions: one unit, or ``rad or m``."""
-    return " or ".join(sorted(set(units), reverse=True))
-
-
-def _check_names(data: LabelledArrays) -> None:
     coordinates = data.coordinates
     others = [name for name in data.variables if name not in coordinates]
     for names, known, kind in (
@@ -248,22 +140,23 @@ def _check_names(data: LabelledArrays) -> None:
             raise DatasetError(f"coordinate {name!r} (one label each) is missing")
 
 
-def _poses(data: LabelledArrays) -> list[int]:
+def pose_labels(data: LabelledArrays) -> tuple[int, ...]:
+    """Return the labels of the poses, which must be integers."""
     labels = data["pose"].values
     if labels.dtype.kind not in "iu":
         raise DatasetError(f"coordinate 'pose' has {labels.dtype} labels: they must be integers")
-    poses: list[int] = labels.tolist()
-    return poses
+    return tuple(labels.tolist())
 
 
 def _axis_order(data: LabelledArrays) -> list[int]:
-    labels = _texts(data, "axis")
+    labels = text_labels(data, "axis")
     if sorted(labels) != list(AXES):
         raise DatasetError(f"coordinate 'axis' is {labels}: it must be {list(AXES)}")
     return [labels.index(axis) for axis in AXES]
 
 
-def _texts(data: LabelledArrays, name: str) -> list[str]:
+def text_labels(data: LabelledArrays, name: str) -> list[str]:
+    """Return the labels of a dimension, which must be texts."""
     labels: list[object] = data[name].values.tolist()
     texts = [label for label in labels if isinstance(label, str)]
     if len(texts) != len(labels):
@@ -306,7 +199,7 @@ def _aligned(data: LabelledArrays, variable: Variable, axes: Sequence[int]) -> F
     return np.array(np.broadcast_to(values, shape), dtype=np.float64)
 
 
-def _status(data: LabelledArrays) -> StatusArray:
+def read_status(data: LabelledArrays) -> StatusArray:
     """Return the status of each reading, shape (pose, load_case); absent means ok."""
     poses, cases = data["pose"].values, data["load_case"].values
     if "status" not in data:
@@ -324,6 +217,19 @@ def _status(data: LabelledArrays) -> StatusArray:
             f" {values[pose, case]:g}: allowed are {allowed}"
         )
     return values.astype(np.int8)
+
+
+def read_variables(data: LabelledArrays, joint_factors: FloatArray) -> dict[str, FloatArray]:
+    """Return every variable that is present but the status, in SI units, axes in order."""
+    axes = _axis_order(data)
+    values: dict[str, FloatArray] = {}
+    for variable in VARIABLES:
+        if variable.name in data:
+            is_joints = variable is JOINT_POSITION
+            scale = joint_factors if is_joints else _unit_factor(data, variable)
+            # x * 1.0 is x, bit for bit: data in SI units pass unchanged.
+            values[variable.name] = _aligned(data, variable, axes) * scale
+    return values
 
 
 def _unit_factor(data: LabelledArrays, variable: Variable) -> float:
@@ -345,10 +251,10 @@ def _units_attribute(data: LabelledArrays, variable: Variable) -> str:
     return unit
 
 
-def _joint_units(data: LabelledArrays, joints: int) -> tuple[list[str], FloatArray]:
+def read_joint_units(data: LabelledArrays, joints: int) -> tuple[list[str], FloatArray]:
     """Return the SI unit of every joint and the factors that lead to it, shape (joint,)."""
     stated = _units_attribute(data, JOINT_POSITION)
-    units = _texts(data, "joint_unit") if "joint_unit" in data else [stated] * joints
+    units = text_labels(data, "joint_unit") if "joint_unit" in data else [stated] * joints
     for unit in units:
         if unit not in JOINT_UNITS:
             raise DatasetError(
@@ -362,3 +268,55 @@ def _joint_units(data: LabelledArrays, joints: int) -> tuple[list[str], FloatArr
         )
     factors = np.array([factor(unit, JOINT_UNITS[unit]) for unit in units])
     return [SI_JOINT_UNITS[JOINT_UNITS[unit]] for unit in units], factors
+
+
+def _text_array(labels: ArrayLike | None) -> np.ndarray:
+    """Return labels as objects, so that a number among them does not become a text."""
+    return labels if isinstance(labels, np.ndarray) else np.array(labels, dtype=object)
+
+
+def _as_array(name: str, values: ArrayLike | None) -> np.ndarray:
+    try:
+        return np.asarray(values)
+    except ValueError as error:
+        raise DatasetError(f"{name} is ragged: its rows differ in length") from error
+
+
+def _sizes(labels: Mapping[str, Sequence[object] | np.ndarray], units: Sequence[str]) -> _Sizes:
+    """Return the length of each dimension; every joint must have a unit."""
+    sizes = {name: len(values) for name, values in labels.items()}
+    if len(units) != sizes["joint"]:
+        raise DatasetError(f"{len(units)} joint units given for {sizes['joint']} joints")
+    return sizes
+
+
+def _fitted(
+    values: ArrayLike, variable: Variable, sizes: _Sizes, *, broadcast: bool
+) -> tuple[tuple[str, ...], np.ndarray]:
+    """Return the dimensions that an array has, and the array."""
+    array = _as_array(variable.name, values)
+    shapes = {variable.dims: tuple(sizes[dim] for dim in variable.dims)}
+    if broadcast:
+        shapes[variable.dims[:2]] = shapes[variable.dims][:2]
+        shapes[()] = ()
+    for dims, shape in shapes.items():
+        if array.shape == shape:
+            return dims, array
+    allowed = " or ".join(f"({', '.join(dims)}) = {shape}" for dims, shape in shapes.items())
+    raise DatasetError(f"{variable.name} has shape {array.shape}: it must be {allowed}")
+
+
+def _notes(variable: Variable, joint_units: Sequence[str]) -> dict[str, object]:
+    """Return the attributes of a variable: its unit or its flags, and what it means."""
+    if variable is STATUS:
+        flags = np.arange(len(STATUSES), dtype=np.int8)
+        notes = {"flag_values": flags, "flag_meanings": " ".join(STATUSES)}
+    else:
+        is_joints = variable is JOINT_POSITION
+        notes = {"units": _joined_units(joint_units) if is_joints else variable.unit}
+    return notes | {"long_name": variable.meaning}
+
+
+def _joined_units(units: Sequence[str]) -> str:
+    """Return the ``units`` attribute of the joint positions: one unit, or ``rad or m``."""
+    return " or ".join(sorted(set(units), reverse=True))

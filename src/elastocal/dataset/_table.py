@@ -11,7 +11,6 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,23 +19,30 @@ from elastocal.dataset._layout import (
     ATTRIBUTES,
     AXES,
     CF_ATTRIBUTES,
+    COLUMN_NAMES,
+    JOINT_UNITS,
     MISSING,
     OK,
     SCHEMA,
+    SI_JOINT_UNITS,
     STATUSES,
+    TEXT_COLUMNS,
     VECTORS,
     BoolArray,
     FloatArray,
     StatusArray,
+    joint_name_problem,
 )
 from elastocal.dataset._structure import assemble
-from elastocal.dataset._table_header import parse_header
 from elastocal.dataset.dataset import Dataset
-from elastocal.errors import DatasetError, nearest
+from elastocal.errors import DatasetError, UnitError, nearest
 from elastocal.files import read_text
 from elastocal.records import LabelledArrays
 from elastocal.tables import Column, TableError, TableReader, TableRows, write_table as write_rows
+from elastocal.units import factor, split_column
 
+_JOINT_HINT = "a joint column is written name[rad], name[deg], name[m] or name[mm]"
+_VARIABLE_OF = {column: variable for variable in VECTORS for column in variable.columns}
 _MEASURED = ("force", "moment", "controller_displacement", "marker_displacement")
 """Vectors that, with the joint positions, make a reading; a row with none of them is missing."""
 _ATTRIBUTE = re.compile(r"#\s*(\w+)\s*:\s*(.*)")
@@ -51,6 +57,23 @@ class TableText:
     header: tuple[str, ...]
     rows: TableRows
     """Rows that are not blank, each as long as the header."""
+
+
+@dataclass(frozen=True)
+class Header:
+    """The columns of a file, by what they hold."""
+
+    text: dict[str, int]
+    """Position of ``pose``, ``load_case`` and, where present, ``status``."""
+    joints: tuple[Column, ...]
+    """Joint positions, in the order of the file."""
+    vectors: dict[str, tuple[Column, ...]]
+    """The x, y and z columns of each vector that is present."""
+
+    @property
+    def joint_units(self) -> tuple[str, ...]:
+        """SI unit of each joint."""
+        return tuple(SI_JOINT_UNITS[JOINT_UNITS[column.unit]] for column in self.joints)
 
 
 @dataclass(frozen=True)
@@ -91,18 +114,18 @@ def read_table(path: Path) -> LabelledArrays:
     vectors = {name: _numbers(table, columns) for name, columns in header.vectors.items()}
     measured = [joints, *(vectors[name] for name in _MEASURED if name in vectors)]
     empty = np.asarray(np.isnan(np.hstack(measured)).all(axis=1))
-    arrays: dict[str, Any] = {name: grid.spread(values) for name, values in vectors.items()}
+    arrays = {name: grid.spread(values) for name, values in vectors.items()}
     if "tcp_position" in vectors:
         arrays["tcp_position"] = _per_pose(table, grid, vectors["tcp_position"])
     arrays["joint_position"] = grid.spread(joints)
     arrays["status"] = grid.spread(_statuses(table, header.text, empty), MISSING)
-    labels: dict[str, Sequence[Any]] = {
-        "pose": grid.poses,
-        "load_case": grid.load_cases,
-        "joint": [column.name for column in header.joints],
-    }
-    attributes = {"schema": SCHEMA, **table.attributes}
-    return assemble(labels, arrays, header.joint_units, attributes)
+    joint_names = [column.name for column in header.joints]
+    return assemble(
+        {"pose": grid.poses, "load_case": grid.load_cases, "joint": joint_names},
+        arrays,
+        header.joint_units,
+        {"schema": SCHEMA, **table.attributes},
+    )
 
 
 def write_table(data: Dataset, path: Path) -> None:
@@ -116,7 +139,22 @@ def write_table(data: Dataset, path: Path) -> None:
     FileAccessError
         If the file cannot be written.
     """
-    columns = _label_columns(data) | _joint_columns(data) | _vector_columns(data)
+    columns: dict[str, list[object]] = {
+        "pose": [pose for pose in data.poses for _ in data.load_cases],
+        "load_case": [case for _ in data.poses for case in data.load_cases],
+    }
+    if np.any(data.status != OK):
+        columns["status"] = [STATUSES[value] for value in data.status.ravel()]
+    joints = zip(data.joint_names, data.joint_units, strict=True)
+    for index, (name, unit) in enumerate(joints):
+        columns[f"{name}[{unit}]"] = _cells(data.joint_position[..., index])
+    for variable in VECTORS:
+        values = data.arrays.get(variable.name)
+        if values is not None:
+            if "load_case" not in variable.dims:
+                values = np.broadcast_to(values[:, np.newaxis], (*data.status.shape, len(AXES)))
+            for index, name in enumerate(variable.columns):
+                columns[f"{name}[{variable.column_unit}]"] = _cells(values[..., index])
     stated = {name: text for name, text in data.attributes.items() if text}
     rows = zip(*columns.values(), strict=True)
     write_rows(path, tuple(columns), rows, tuple(attribute_lines(stated)))
@@ -141,7 +179,12 @@ def cut(text: str) -> TableText:
         raise DatasetError(str(error)) from error
     uneven = rows.uneven(len(header))
     if uneven:
-        _require_width(*uneven, len(header))
+        line, cells = uneven
+        hint = " (with a decimal comma the delimiter must be another, and the comma a point)"
+        raise DatasetError(
+            f"row {line} has {cells} cells, the header has {len(header)}"
+            f"{hint if cells > len(header) else ''}"
+        )
     if not len(rows):
         raise DatasetError("file has a header but no row")
     return TableText(attributes, header, rows)
@@ -184,11 +227,80 @@ def _attribute(line: str, number: int) -> dict[str, object]:
     return {name: value} if name in known else {}
 
 
-def _require_width(number: int, cells: int, width: int) -> None:
-    hint = ""
-    if cells > width:
-        hint = " (with a decimal comma the delimiter must be another, and the comma a point)"
-    raise DatasetError(f"row {number} has {cells} cells, the header has {width}{hint}")
+def parse_header(cells: Sequence[str]) -> Header:
+    """Return the columns that a header line names, in any order.
+
+    Raises
+    ------
+    DatasetError
+        If a column is unknown, missing, named twice, or has no unit or a wrong one.
+    """
+    text: dict[str, int] = {}
+    numbers: dict[str, Column] = {}
+    for index, cell in enumerate(cells):
+        name, unit = _split(cell, index)
+        if name in text or name in numbers:
+            raise DatasetError(f"column {name!r} stands twice in the header")
+        if name in TEXT_COLUMNS:
+            if unit is not None:
+                raise DatasetError(f"column {cell!r} has a unit: it must be written {name!r}")
+            text[name] = index
+        else:
+            numbers[name] = _number_column(index, name, unit)
+    for name in ("pose", "load_case"):
+        if name not in text:
+            raise DatasetError(f"column {name!r} is missing")
+    joints = tuple(column for name, column in numbers.items() if name not in _VARIABLE_OF)
+    if not joints:
+        raise DatasetError(f"no joint column: {_JOINT_HINT}")
+    return Header(text, joints, _vectors(numbers))
+
+
+def _split(cell: str, index: int) -> tuple[str, str | None]:
+    if not cell.strip():
+        raise DatasetError(f"column {index + 1} has no name in the header")
+    try:
+        return split_column(cell)
+    except UnitError as error:
+        raise DatasetError(str(error)) from error
+
+
+def _number_column(index: int, name: str, unit: str | None) -> Column:
+    variable = _VARIABLE_OF.get(name)
+    if variable is None:
+        return _joint_column(index, name, unit)
+    if not unit:
+        raise DatasetError(
+            f"column {name!r} has no unit: it is written {name}[{variable.column_unit}]"
+        )
+    try:
+        return Column(index, name, unit, factor(unit, variable.dimension))
+    except UnitError as error:
+        raise DatasetError(f"column '{name}[{unit}]': {error}") from error
+
+
+def _joint_column(index: int, name: str, unit: str | None) -> Column:
+    """Return a joint's column: every column that is not known otherwise and has a joint's unit."""
+    if unit not in JOINT_UNITS:
+        shown = name if unit is None else f"{name}[{unit}]"
+        hint = nearest(name, COLUMN_NAMES)
+        raise DatasetError(f"column {shown!r} is not known{hint} ({_JOINT_HINT})")
+    problem = joint_name_problem(name)
+    if problem:
+        raise DatasetError(f"column '{name}[{unit}]': {problem}")
+    return Column(index, name, unit, factor(unit, JOINT_UNITS[unit]))
+
+
+def _vectors(numbers: dict[str, Column]) -> dict[str, tuple[Column, ...]]:
+    """Return the columns of each vector; one that is there must be there whole."""
+    vectors: dict[str, tuple[Column, ...]] = {}
+    for variable in VECTORS:
+        missing = [name for name in variable.columns if name not in numbers]
+        if missing and (variable.required or len(missing) < len(variable.columns)):
+            raise DatasetError(f"column '{missing[0]}[{variable.column_unit}]' is missing")
+        if not missing:
+            vectors[variable.name] = tuple(numbers[name] for name in variable.columns)
+    return vectors
 
 
 def _grid(table: TableText, text: Mapping[str, int]) -> _Grid:
@@ -276,37 +388,6 @@ def _per_pose(table: TableText, grid: _Grid, values: FloatArray) -> FloatArray:
             f" {values[other, component]} m in row {lines[other]}: a pose has one unloaded position"
         )
     return positions
-
-
-def _label_columns(data: Dataset) -> dict[str, list[Any]]:
-    columns: dict[str, list[Any]] = {
-        "pose": [pose for pose in data.poses for _ in data.load_cases],
-        "load_case": list(data.load_cases) * len(data.poses),
-    }
-    if np.any(data.status != OK):
-        columns["status"] = [STATUSES[value] for value in data.status.ravel()]
-    return columns
-
-
-def _joint_columns(data: Dataset) -> dict[str, list[object]]:
-    pairs = zip(data.joint_names, data.joint_units, strict=True)
-    return {
-        f"{name}[{unit}]": _cells(data.joint_position[..., index])
-        for index, (name, unit) in enumerate(pairs)
-    }
-
-
-def _vector_columns(data: Dataset) -> dict[str, list[object]]:
-    columns: dict[str, list[object]] = {}
-    for variable in VECTORS:
-        values = data.arrays.get(variable.name)
-        if values is not None:
-            for index, name in enumerate(variable.columns):
-                component = values[..., index]
-                if "load_case" not in variable.dims:
-                    component = np.broadcast_to(component[:, np.newaxis], data.status.shape)
-                columns[f"{name}[{variable.column_unit}]"] = _cells(component)
-    return columns
 
 
 def _cells(values: np.ndarray) -> list[object]:

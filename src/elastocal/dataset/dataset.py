@@ -1,18 +1,20 @@
 """The dataset: the labelled arrays of the paper's Procedure 1."""
 
 from collections.abc import Hashable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from elastocal.dataset._layout import (
+    AXES,
     OK,
     SCHEMA,
     VARIABLE_NAMES,
     BoolArray,
     FloatArray,
+    Labels,
     Point,
     StatusArray,
     canonical_attributes,
@@ -20,7 +22,16 @@ from elastocal.dataset._layout import (
     read_point,
     write_point,
 )
-from elastocal.dataset._structure import assemble, canonical, check_labels, check_shapes, labelled
+from elastocal.dataset._structure import (
+    assemble,
+    check_names,
+    check_structure,
+    pose_labels,
+    read_joint_units,
+    read_status,
+    read_variables,
+    text_labels,
+)
 from elastocal.dataset._validation import check_numbers, check_plausible
 from elastocal.dataset.readings import Readings
 from elastocal.errors import DatasetError, nearest
@@ -84,9 +95,8 @@ class Dataset:
                 freeze(values)
                 object.__setattr__(self, name, values)
         object.__setattr__(self, "attributes", canonical_attributes(self.attributes))
-        check_labels(self)
-        check_shapes(self)
-        check_numbers(self)
+        check_structure(self._labels, self._variables, self.joint_units)
+        check_numbers(self._labels, self._variables)
 
     def __repr__(self) -> str:
         """Return the size of the dataset and where it comes from, in one line."""
@@ -175,7 +185,7 @@ class Dataset:
         labels = {"pose": poses, "load_case": load_cases, "joint": joint_names}
         units = joint_units or ("rad",) * len(joint_names)
         dataset = cls.from_labelled(assemble(labels, arrays, units, attributes))
-        check_plausible(dataset)
+        dataset.require_plausible()
         return dataset
 
     @classmethod
@@ -192,7 +202,20 @@ class Dataset:
         SchemaError
             If the schema is not known.
         """
-        return cls(**canonical(arrays))
+        attributes = canonical_attributes(arrays.attributes)
+        check_names(arrays)
+        poses, load_cases = pose_labels(arrays), text_labels(arrays, "load_case")
+        joint_names = text_labels(arrays, "joint")
+        joint_units, factors = read_joint_units(arrays, len(joint_names))
+        return cls(
+            poses=poses,
+            load_cases=tuple(load_cases),
+            joint_names=tuple(joint_names),
+            joint_units=tuple(joint_units),
+            **read_variables(arrays, factors),
+            status=read_status(arrays),
+            attributes=attributes,
+        )
 
     @classmethod
     def from_xarray(cls, data: "xr.Dataset") -> "Dataset":
@@ -207,25 +230,56 @@ class Dataset:
 
     def to_labelled(self) -> LabelledArrays:
         """Return the arrays with their labels, units and meanings, as the NetCDF file has them."""
-        return labelled(self)
+        labels = {
+            "pose": np.array(self.poses, dtype=np.int64),
+            "load_case": np.array(self.load_cases, dtype=np.str_),
+            "joint": np.array(self.joint_names, dtype=np.str_),
+        }
+        arrays = assemble(labels, self._variables, self.joint_units, self.attributes)
+        for each in arrays.variables.values():
+            freeze(each.values)
+        return arrays
 
     def to_xarray(self) -> "xr.Dataset":
         """Return the dataset as an `xarray.Dataset`, which shares the read-only arrays."""
         import xarray as xr
 
         arrays = self.to_labelled()
-        variables: dict[str, Any] = {
-            name: (each.dims, each.values, dict(each.attributes))
+        variables = {
+            name: xr.Variable(each.dims, each.values, each.attributes)
             for name, each in arrays.variables.items()
         }
         coordinates = {name: variables.pop(name) for name in arrays.coordinates}
         return xr.Dataset(variables, coordinates, arrays.attributes)
 
+    def require_plausible(self) -> None:
+        """Refuse numbers that look like a unit mistake.
+
+        Raises
+        ------
+        DatasetError
+            Naming the quantity, its value, the limit and the mistake that it looks like.
+        """
+        check_plausible(self._labels, self._variables, self.joint_units)
+
     @property
     def arrays(self) -> dict[str, FloatArray]:
         """The variables that are present, by name; all but the status."""
-        found = {name: getattr(self, name) for name in VARIABLE_NAMES if name != "status"}
+        return {name: each for name, each in self._variables.items() if name != "status"}
+
+    @property
+    def _variables(self) -> dict[str, np.ndarray]:
+        found = {name: getattr(self, name) for name in VARIABLE_NAMES}
         return {name: values for name, values in found.items() if values is not None}
+
+    @property
+    def _labels(self) -> Labels:
+        return {
+            "pose": self.poses,
+            "load_case": self.load_cases,
+            "axis": AXES,
+            "joint": self.joint_names,
+        }
 
     @property
     def usable(self) -> BoolArray:
@@ -319,21 +373,21 @@ class Dataset:
 
     def _taken(self, rows: Sequence[int], columns: Sequence[int]) -> "Dataset":
         """Return the poses and load cases at some positions."""
-        index = np.ix_(np.array(rows, dtype=np.intp), np.array(columns, dtype=np.intp))
-        arrays: dict[str, Any] = {
-            name: values[index[0][:, 0]] if name == "tcp_position" else values[index]
-            for name, values in self.arrays.items()
-        }
-        return replace(
-            self,
+        index = np.ix_(rows, columns)
+        return Dataset(
             poses=tuple(self.poses[row] for row in rows),
             load_cases=tuple(self.load_cases[column] for column in columns),
-            status=self.status[index],
-            **arrays,
+            joint_names=self.joint_names,
+            joint_units=self.joint_units,
+            attributes=self.attributes,
+            **{
+                name: values[list(rows)] if name == "tcp_position" else values[index]
+                for name, values in self._variables.items()
+            },
         )
 
 
-def _positions(kind: str, labels: Sequence[Any], known: Sequence[Hashable]) -> list[int]:
+def _positions(kind: str, labels: Sequence[object], known: Sequence[Hashable]) -> list[int]:
     for label in labels:
         if label not in known:
             listed = ", ".join(map(str, known[:20])) + (", …" if len(known) > 20 else "")

@@ -2,8 +2,6 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
@@ -48,14 +46,14 @@ def merge(datasets: Sequence[Dataset], *, relabel: bool = False) -> Dataset:
     poses = tuple(pose for dataset in datasets for pose in dataset.poses)
     sources = [dataset.provenance for dataset in datasets if dataset.provenance]
     provenance = "; ".join(dict.fromkeys(sources))
-    arrays: dict[str, Any] = {name: _joined(datasets, name, cases) for name in datasets[0].arrays}
-    return replace(
-        datasets[0],
+    return Dataset(
         poses=tuple(range(len(poses))) if relabel else poses,
         load_cases=cases,
+        joint_names=datasets[0].joint_names,
+        joint_units=datasets[0].joint_units,
         status=np.concatenate([_spread(each, each.status, cases, MISSING) for each in datasets]),
         attributes={**datasets[0].attributes, "provenance": provenance},
-        **arrays,
+        **{name: _joined(datasets, name, cases) for name in datasets[0].arrays},
     )
 
 

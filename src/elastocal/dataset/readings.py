@@ -2,7 +2,6 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, fields
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -92,9 +91,8 @@ class Readings:
         """
         chosen = np.asarray(index)
         rows = np.arange(len(self))[chosen.astype(np.intp) if chosen.size == 0 else chosen]
-        taken: dict[str, Any] = {"pose": self.pose[rows], "load_case": self.load_case[rows]}
-        taken |= {name: value[rows] for name, value in self._numbers()}
-        return Readings(**taken)
+        numbers = {name: value[rows] for name, value in self._numbers()}
+        return Readings(self.pose[rows], self.load_case[rows], **numbers)
 
     def _numbers(self) -> Iterator[tuple[str, FloatArray]]:
         for field in fields(self)[2:]:

@@ -1,16 +1,13 @@
 """Dataset files: NetCDF or CSV, as the suffix of the path says."""
 
-from collections.abc import Callable
 from pathlib import Path
 
 from elastocal.dataset._table import read_table, write_table
-from elastocal.dataset._validation import check_plausible
 from elastocal.dataset.dataset import Dataset
 from elastocal.errors import DatasetError, SchemaError
 from elastocal.records import LabelledArrays, read_arrays, write_arrays
 
-_Read = Callable[[Path], LabelledArrays]
-_Write = Callable[[Dataset, Path], None]
+_SUFFIXES = (".nc", ".csv")
 
 
 def read(path: Path | str) -> Dataset:
@@ -31,11 +28,10 @@ def read(path: Path | str) -> Dataset:
         If the file cannot be read.
     """
     path = Path(path)
-    reader, _ = _format_of(path)
-    arrays = reader(path)
+    arrays = _read_netcdf(path) if _suffix(path) == ".nc" else None
     try:
-        dataset = Dataset.from_labelled(arrays)
-        check_plausible(dataset)
+        dataset = Dataset.from_labelled(arrays or read_table(path))
+        dataset.require_plausible()
     except (DatasetError, SchemaError) as error:
         raise type(error)(f"{path}: {error}") from error
     return dataset
@@ -59,25 +55,20 @@ def write(dataset: Dataset, path: Path | str) -> None:
         If the file cannot be written.
     """
     path = Path(path)
-    _, writer = _format_of(path)
-    writer(dataset, path)
+    if _suffix(path) == ".nc":
+        write_arrays(path, dataset.to_labelled())
+    else:
+        write_table(dataset, path)
 
 
-def _format_of(path: Path) -> tuple[_Read, _Write]:
-    found = _FORMATS.get(path.suffix.lower())
-    if found is None:
+def _suffix(path: Path) -> str:
+    suffix = path.suffix.lower()
+    if suffix not in _SUFFIXES:
         raise DatasetError(
             f"{path}: suffix {path.suffix!r} is not that of a dataset: allowed are"
-            f" {', '.join(_FORMATS)}"
+            f" {', '.join(_SUFFIXES)}"
         )
-    return found
-
-
-def _read_csv(path: Path) -> LabelledArrays:
-    try:
-        return read_table(path)
-    except DatasetError as error:
-        raise DatasetError(f"{path}: {error}") from error
+    return suffix
 
 
 def _read_netcdf(path: Path) -> LabelledArrays:
@@ -85,16 +76,6 @@ def _read_netcdf(path: Path) -> LabelledArrays:
         return read_arrays(path)
     except SchemaError as error:
         raise DatasetError(str(error)) from error
-
-
-def _write_netcdf(dataset: Dataset, path: Path) -> None:
-    write_arrays(path, dataset.to_labelled())
-
-
-_FORMATS: dict[str, tuple[_Read, _Write]] = {
-    ".nc": (_read_netcdf, _write_netcdf),
-    ".csv": (_read_csv, write_table),
-}
 
 
 read_dataset = read

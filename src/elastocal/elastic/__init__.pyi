@@ -1,5 +1,5 @@
-from .directions import AXES as AXES, as_axis as as_axis, orthogonal_axes as orthogonal_axes
 from .layouts import (
+    AXES as AXES,
     LAYOUTS as LAYOUTS,
     SpringEntry as SpringEntry,
     SpringFile as SpringFile,
@@ -7,6 +7,7 @@ from .layouts import (
     bearing as bearing,
     custom as custom,
     layout as layout,
+    orthogonal_axes as orthogonal_axes,
     read_springs as read_springs,
 )
 from .model import (
@@ -25,6 +26,7 @@ from .springs import (
     SpringAxis as SpringAxis,
     SpringLoad as SpringLoad,
     Unit as Unit,
+    as_axis as as_axis,
     axial as axial,
     check_springs as check_springs,
     unit_of as unit_of,

@@ -15,16 +15,21 @@ from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
+import numpy as np
+from numpy.typing import ArrayLike
 from pydantic import BeforeValidator, Field
 
-from elastocal.elastic.directions import AXES, as_axis, orthogonal_axes
-from elastocal.elastic.springs import KINDS, Hinge, Spring, SpringAxis, axial
+from elastocal.elastic.springs import KINDS, Hinge, Spring, SpringAxis, as_axis, axial
 from elastocal.errors import SpringError, nearest
 from elastocal.records import StrictModel, read_yaml
 from elastocal.robot import ChainJoint, Robot
 from elastocal.units import parse_quantity
 
 _SCHEMA = "elastocal.springs/1"
+AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
+"""Axes of a joint's frame by the words that spring files have for them."""
+_ALIGNED = 1.0 - 1e-9
+"""Cosine above which a joint axis counts as a coordinate axis."""
 _HINGE = "hinge"
 _MOTIONS = ("revolute", "prismatic")
 """What a hinge may do; other kinds of springs are asked for by their word."""
@@ -54,6 +59,34 @@ def bearing(robot: Robot, distal: bool = False) -> tuple[Spring, ...]:
         for name, axis in orthogonal_axes(joint.axis).items()
     )
     return (*actuated(robot), *virtual)
+
+
+def orthogonal_axes(axis: ArrayLike) -> dict[str, tuple[float, float, float]]:
+    """Return the two named axes of the virtual springs of a joint with this axis.
+
+    They are the coordinate axes orthogonal to the joint axis. For an axis that is not a
+    coordinate axis: the two coordinate axes least aligned with it, made orthonormal to it
+    (Gram-Schmidt, the least aligned first) and still named after them.
+
+    >>> orthogonal_axes([0, 1, 0])
+    {'x': (1.0, 0.0, 0.0), 'z': (0.0, 0.0, 1.0)}
+    """
+    unit = np.asarray(as_axis(axis))
+    alignment = np.abs(unit)
+    if alignment.max() >= _ALIGNED:
+        along = int(alignment.argmax())
+        return {name: AXES[name] for index, name in enumerate(AXES) if index != along}
+    first, second = np.argsort(alignment, kind="stable")[:2]
+    names = list(AXES)
+    made: dict[str, tuple[float, float, float]] = {}
+    basis = [unit]
+    for index in (first, second):
+        vector = np.asarray(AXES[names[index]])
+        for other in basis:
+            vector = vector - (vector @ other) * other
+        basis.append(vector / np.linalg.norm(vector))
+        made[names[index]] = as_axis(basis[-1])
+    return dict(sorted(made.items()))
 
 
 LAYOUTS: dict[str, Callable[[Robot], tuple[Spring, ...]]] = {

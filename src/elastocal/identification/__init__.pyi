@@ -1,26 +1,33 @@
 from ._least_squares import (
+    OPTIMALITY as OPTIMALITY,
     RANK_TOLERANCE as RANK_TOLERANCE,
     rank as rank,
 )
-from .calibrated import (
-    CalibratedModel as CalibratedModel,
-    Prediction as Prediction,
-)
 from .calibration import (
+    CalibratedModel as CalibratedModel,
     Calibration as Calibration,
+    Prediction as Prediction,
     calibrate as calibrate,
+    check_rows as check_rows,
 )
 from .conventions import (
     POOR as POOR,
     check_conventions as check_conventions,
-)
-from .joint_check import (
     check_joints as check_joints,
 )
 from .model_file import (
     CalibrateResult as CalibrateResult,
+    CalibrationSummary as CalibrationSummary,
+    ComparisonSummary as ComparisonSummary,
+    DeflectionSummary as DeflectionSummary,
+    DifferenceSummary as DifferenceSummary,
+    HeldOutSummary as HeldOutSummary,
+    ResidualSummary as ResidualSummary,
     RobotRecord as RobotRecord,
+    SpringSummary as SpringSummary,
+    SuspiciousReading as SuspiciousReading,
     read_model as read_model,
+    summary as summary,
     write_model as write_model,
 )
 from .observability import (
@@ -29,6 +36,7 @@ from .observability import (
     attainable_rank as attainable_rank,
     describe as describe,
     observability as observability,
+    sparse_basis as sparse_basis,
 )
 from .options import (
     LOSSES as LOSSES,
@@ -50,14 +58,11 @@ from .problem import (
     Problem as Problem,
     ScaledRows as ScaledRows,
     build as build,
+    column_scaling as column_scaling,
     pose_blocks as pose_blocks,
     relative_sizes as relative_sizes,
     same_configuration as same_configuration,
     unit_columns as unit_columns,
-)
-from .refits import (
-    PoseGrams as PoseGrams,
-    PoseTriangles as PoseTriangles,
 )
 from .reproduction import (
     Reproduction as Reproduction,
@@ -66,27 +71,19 @@ from .reproduction import (
     unseen_errors as unseen_errors,
 )
 from .solve import (
-    OPTIMALITY as OPTIMALITY,
     Factored as Factored,
+    PoseGrams as PoseGrams,
+    PoseTriangles as PoseTriangles,
     Solution as Solution,
     factor as factor,
     normalised_residuals as normalised_residuals,
     solve as solve,
 )
-from .summary import (
-    CalibrationSummary as CalibrationSummary,
-    ComparisonSummary as ComparisonSummary,
-    DeflectionSummary as DeflectionSummary,
-    DifferenceSummary as DifferenceSummary,
-    HeldOutSummary as HeldOutSummary,
-    ResidualSummary as ResidualSummary,
-    SpringSummary as SpringSummary,
-    SuspiciousReading as SuspiciousReading,
-    summary as summary,
-)
 from .suspicious import (
     BLUNDER_SCORE as BLUNDER_SCORE,
+    ForceOffset as ForceOffset,
     Screening as Screening,
+    force_offset as force_offset,
     leverage as leverage,
     screen as screen,
 )

@@ -16,6 +16,9 @@ RANK_TOLERANCE = 1e-6
 a direction a millionth as visible as the best one is below one nanometre in a deflection of a
 millimetre, which no tracker sees."""
 
+OPTIMALITY = 1e-7
+"""Largest accepted violation of the optimality conditions, relative to the start."""
+
 _FLOOR = 1e-6
 """Weight, relative to the largest singular value, that holds undetermined directions small."""
 
@@ -65,6 +68,25 @@ def minimise(
     if np.all(np.isfinite(lower)) and np.all(np.isposinf(upper)):
         return lower + _nonnegative(A, y - A @ lower)
     return _boxed(A, y, lower, upper)
+
+
+def minimise_certified(
+    s: FloatArray, Vt: FloatArray, y: FloatArray, lower: FloatArray, upper: FloatArray
+) -> tuple[FloatArray, float]:
+    """Return the minimum of `minimise` and how far it violates the optimality conditions.
+
+    Raises
+    ------
+    IdentificationError
+        If the data determine nothing, or the solver did not reach the optimum.
+    """
+    x = minimise(s, Vt, y, lower, upper)
+    violation = kkt_violation(s, Vt, y, x, lower, upper)
+    if not violation <= OPTIMALITY:
+        raise IdentificationError(
+            f"the solver stopped short of the optimum (violation {violation:.1e})"
+        )
+    return x, violation
 
 
 def kkt_violation(

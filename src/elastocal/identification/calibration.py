@@ -1,4 +1,7 @@
-"""From a dataset to a calibrated model: build, solve, certify (paper Eq. 15-19)."""
+"""From a dataset to a calibrated model: build, solve, certify (paper Eq. 15-19).
+
+The calibrated model is what the compensation and every prediction work with.
+"""
 
 from dataclasses import dataclass
 
@@ -8,29 +11,140 @@ from numpy.typing import ArrayLike
 
 from elastocal.arrays import BoolArray, FloatArray
 from elastocal.dataset import Readings
-from elastocal.elastic import LAYOUTS, ElasticModel
-from elastocal.errors import ConventionError, IdentificationError
-from elastocal.identification._force_offset import force_offset
-from elastocal.identification.calibrated import CalibratedModel
-from elastocal.identification.conventions import POOR, check_conventions
-from elastocal.identification.joint_check import check_joints
-from elastocal.identification.observability import attainable_rank, observability
+from elastocal.elastic import LAYOUTS, ElasticModel, check_vectors
+from elastocal.errors import ConventionError, IdentificationError, SpringError
+from elastocal.identification.conventions import POOR, check_conventions, check_joints
+from elastocal.identification.observability import Observability, attainable_rank, observability
 from elastocal.identification.options import FitOptions
 from elastocal.identification.problem import Problem, build, same_configuration
-from elastocal.identification.refits import PoseGrams
-from elastocal.identification.solve import Solution, factor, solve
-from elastocal.identification.suspicious import Screening, screen
+from elastocal.identification.solve import PoseGrams, Solution, factor, solve
+from elastocal.identification.suspicious import Screening, force_offset, screen
 from elastocal.identification.uncertainty import (
     Comparison,
     HeldOut,
     bootstrap,
     compare_layouts,
+    interval,
     leave_poses_out,
     widen_draws,
     widening_factor,
 )
 from elastocal.parallel import one_blas_thread
 from elastocal.results import brief_repr
+from elastocal.robot import Robot
+
+_CHUNK = 2000
+"""Configurations predicted at a time, so that the draws of a long path fit into memory."""
+
+
+@brief_repr
+@dataclass(frozen=True)
+class Prediction:
+    """Predicted deflections with 95 % intervals: of the fit, and of what would be measured."""
+
+    deflection: FloatArray
+    """Real minus commanded tcp position in base, shape (row, 3), in m."""
+    low: FloatArray
+    """Lower ends of what another campaign would predict (bootstrap draws), shape (row, 3), in m."""
+    high: FloatArray
+    """Upper ends of that, shape (row, 3), in m."""
+    measured_low: FloatArray
+    """Lower ends of what would be measured, shape (row, 3), in m: with what the springs cannot
+    express, and the noise of a measurement. NaN where the model does not know its misfit."""
+    measured_high: FloatArray
+    """Upper ends of that, shape (row, 3), in m."""
+
+
+@brief_repr
+@dataclass(frozen=True, eq=False)
+class CalibratedModel:
+    """An elastic model with identified compliances and their bootstrap draws."""
+
+    model: ElasticModel
+    compliance: FloatArray
+    """Shape (spring,), in rad/(N·m) or m/N."""
+    draws: FloatArray
+    """Bootstrap draws, shape (draw, spring)."""
+    observability: Observability
+    provenance: str = ""
+    """Where the data came from."""
+    misfit: float = float("nan")
+    """Share of a predicted deflection that 95 % of the errors along an axis stayed below at
+    left-out poses; NaN: not known. See `HeldOut.misfit`."""
+
+    def __post_init__(self) -> None:
+        for name in ("compliance", "draws"):
+            array = np.array(getattr(self, name), dtype=float)
+            array.flags.writeable = False
+            object.__setattr__(self, name, array)
+
+    @property
+    def stiffness(self) -> FloatArray:
+        """Stiffness of each spring, ``1 / c``, infinite where the compliance is zero."""
+        return np.divide(
+            1.0,
+            self.compliance,
+            out=np.full_like(self.compliance, np.inf),
+            where=self.compliance != 0,
+        )
+
+    def interval(self) -> tuple[FloatArray, FloatArray]:
+        """Return the 95 % intervals of the compliances, two arrays of shape (spring,)."""
+        return interval(self.draws)
+
+    def predict(
+        self, q: ArrayLike, force: ArrayLike, moment: ArrayLike | None = None
+    ) -> Prediction:
+        """Return the deflections at configurations under loads.
+
+        Parameters
+        ----------
+        q : array_like, shape (row, joint)
+            Joint positions in rad or m.
+        force : array_like, shape (row, 3)
+            Force on the robot at the tcp in base, in N.
+        moment : array_like, shape (row, 3), optional
+            Moment on the robot about the tcp in base, in N·m.
+        """
+        q, force, moment = check_rows(self.model.robot, q, force, moment)
+        result = np.empty((3, len(q), 3))
+        for start in range(0, len(q), _CHUNK):
+            rows = slice(start, start + _CHUNK)
+            m = None if moment is None else moment[rows]
+            blocks = self.model.observation_blocks(q[rows], force[rows], m)
+            result[0, rows] = blocks @ self.compliance
+            result[1:, rows] = interval(np.moveaxis(blocks @ self.draws.T, -1, 0))
+        deflection, low, high = result
+        return Prediction(deflection, low, high, *self._measured(deflection, low, high))
+
+    def _measured(
+        self, deflection: FloatArray, low: FloatArray, high: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """Widen the intervals of the fit by the misfit, as independent errors add up."""
+        error = self.misfit * np.linalg.norm(deflection, axis=1, keepdims=True)
+        # The point estimate may lie outside the draws when a spring is at its bound.
+        below, above = np.maximum(deflection - low, 0.0), np.maximum(high - deflection, 0.0)
+        return deflection - np.hypot(below, error), deflection + np.hypot(above, error)
+
+
+def check_rows(
+    robot: Robot, q: ArrayLike, force: ArrayLike, moment: ArrayLike | None
+) -> tuple[FloatArray, FloatArray, FloatArray | None]:
+    """Return rows of joint positions, forces and moments as arrays; see `CalibratedModel.predict`.
+
+    Raises
+    ------
+    RobotError, SpringError
+        If they are not finite or have other shapes.
+    """
+    joints, forces = robot.check_positions(q), check_vectors("force", force)
+    moments = None if moment is None else check_vectors("moment", moment)
+    for name, array in (("force", forces), ("moment", moments)):
+        if array is not None and (joints.ndim != 2 or array.shape != (len(joints), 3)):
+            raise SpringError(
+                f"{name} {array.shape} does not have a row for each of q {joints.shape}"
+            )
+    return joints, forces, moments
 
 
 @brief_repr

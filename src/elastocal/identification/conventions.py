@@ -1,4 +1,4 @@
-"""The verdict on signs and frames.
+"""The verdict on signs, frames and joints: whether the data are of this robot, as they say.
 
 A force with the wrong sign, in the wrong frame, or joints counted the other way round still make
 a solvable system; only the fit is worse. So the usual mistakes are undone one by one, and if the
@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike
 from elastocal.arrays import FloatArray
 from elastocal.dataset import Readings
 from elastocal.elastic import ElasticModel
-from elastocal.errors import ConventionError, IdentificationError
+from elastocal.errors import ConventionError, DatasetError, IdentificationError
 from elastocal.identification.options import FitOptions
 from elastocal.identification.problem import Problem, build
 from elastocal.identification.solve import solve
@@ -38,6 +38,14 @@ _EXACT = 1e-8
 _NOTHING = 0.5
 """Unexplained part above which a mistake is named even when there are fewer than four equations a
 spring; with so few, another reading may fit better by chance."""
+
+_OUTSIDE = np.radians(5.0)
+"""Distance outside a joint limit that cannot be calibration or rounding, in rad (or m)."""
+_TCP_WRONG = 0.05
+"""Median distance between recorded and computed tcp position that geometry errors and
+deflection cannot explain, in m."""
+_TCP_OFF = 0.005
+"""The same distance above which it is worth a warning, in m."""
 
 
 def check_conventions(
@@ -112,7 +120,8 @@ def _mistakes_of(robot: Robot) -> tuple[_Mistake, ...]:
 
 
 def _turn_force(_: Robot, readings: Readings) -> Readings:
-    return _with_wrench(readings, -readings.force, _negative(readings.moment))
+    moment = readings.moment
+    return replace(readings, force=-readings.force, moment=None if moment is None else -moment)
 
 
 def _from_tcp_frame(robot: Robot, readings: Readings) -> Readings:
@@ -122,6 +131,13 @@ def _from_tcp_frame(robot: Robot, readings: Readings) -> Readings:
 def _from_last_link_frame(robot: Robot, readings: Readings) -> Readings:
     R_base_tcp = robot.forward(readings.joint_position)[:, :3, :3]
     return _rotated(readings, R_base_tcp @ robot.chain.T_last_tip[:3, :3].T)
+
+
+def _rotated(readings: Readings, R: FloatArray) -> Readings:
+    moment = readings.moment
+    turned = None if moment is None else np.einsum("rij,rj->ri", R, moment)
+    force = np.einsum("rij,rj->ri", R, readings.force)
+    return replace(readings, force=force, moment=turned)
 
 
 def _turn_roll_joints(robot: Robot, readings: Readings) -> Readings:
@@ -184,15 +200,52 @@ _MISTAKES = (
 """Every mistake that is tried, the likeliest first."""
 
 
-def _rotated(readings: Readings, R: FloatArray) -> Readings:
-    moment = readings.moment
-    turned = None if moment is None else np.einsum("rij,rj->ri", R, moment)
-    return _with_wrench(readings, np.einsum("rij,rj->ri", R, readings.force), turned)
+def check_joints(robot: Robot, readings: Readings) -> tuple[str, ...]:
+    """Return warnings about recorded joints, or refuse them.
+
+    Raises
+    ------
+    DatasetError
+        If a joint lies clearly outside its limits (degrees in a radian column, another joint
+        order), or the recorded tcp positions are elsewhere.
+    """
+    return (*_limits(robot, readings), *_positions(robot, readings))
 
 
-def _with_wrench(readings: Readings, force: FloatArray, moment: FloatArray | None) -> Readings:
-    return replace(readings, force=force, moment=moment)
+def _limits(robot: Robot, readings: Readings) -> list[str]:
+    margin = robot.limits.margin(readings.joint_position)
+    reading, joint = np.unravel_index(int(margin.argmin()), margin.shape)
+    worst, limits = float(margin[reading, joint]), robot.limits
+    if worst >= 0.0:
+        return []
+    value = readings.joint_position[reading, joint]
+    unit = "rad" if robot.revolute[joint] else "m"
+    message = (
+        f"{robot.joint_names[joint]} at pose {readings.pose[reading]} is {value:.4g} {unit},"
+        f" outside the robot's {limits.lower[joint]:.4g} to {limits.upper[joint]:.4g} {unit}"
+    )
+    if limits.lower[joint] >= limits.upper[joint]:
+        raise DatasetError(
+            f"URDF of {robot.name} leaves {robot.joint_names[joint]} no range: its limits are"
+            f" {limits.lower[joint]:g} to {limits.upper[joint]:g} {unit}"
+        )
+    assumed = any(assumption.field == "position" for assumption in robot.assumptions)
+    if worst < -_OUTSIDE and not assumed:
+        raise DatasetError(f"{message}: degrees, another joint order, or another robot?")
+    return [message + (" (limits assumed, no source)" if assumed else "")]
 
 
-def _negative(array: FloatArray | None) -> FloatArray | None:
-    return None if array is None else -array
+def _positions(robot: Robot, readings: Readings) -> list[str]:
+    if readings.tcp_position is None:
+        return []
+    computed = robot.forward(readings.joint_position)[:, :3, 3]
+    recorded = readings.tcp_position + readings.controller_displacement
+    distance = np.linalg.norm(computed - recorded, axis=1)
+    median = float(np.median(distance))
+    message = (
+        f"recorded tcp_position is {1e3 * median:.1f} mm (median) from that of the joints of"
+        f" {robot.name} at {robot.tip!r}"
+    )
+    if median > _TCP_WRONG:
+        raise DatasetError(f"{message}: another tcp, joint signs, joint order or base frame?")
+    return [message] if median > _TCP_OFF else []

@@ -77,11 +77,6 @@ class Problem:
         """Number of columns: of the parameters of all springs."""
         return int(self.O.shape[2])
 
-    @property
-    def scale(self) -> FloatArray:
-        """Norm of each weighted column; see `scaled`. Shape (parameter,)."""
-        return self.scaled().scale
-
     def scaled(self) -> "ScaledRows":
         """Return the weighted observation blocks with columns of unit norm.
 
@@ -135,13 +130,28 @@ def unit_columns(rows: FloatArray, size: FloatArray | float = 1.0) -> ScaledRows
     size : ndarray, shape (parameter,), optional
         Sensible relative size of each parameter; see `relative_sizes`.
     """
-    norms = np.sqrt(np.einsum("rin,rin->n", rows, rows))
+    gain, scale = column_scaling(np.sqrt(np.einsum("rin,rin->n", rows, rows)), size)
+    return ScaledRows(rows * gain, scale)
+
+
+def column_scaling(
+    norms: FloatArray, size: FloatArray | float = 1.0
+) -> tuple[FloatArray, FloatArray]:
+    """Return what columns are multiplied by, zero for an unloaded spring, and `ScaledRows.scale`.
+
+    Parameters
+    ----------
+    norms : ndarray, shape (..., parameter)
+        Norm of each column, in m per unit of each parameter.
+    size : ndarray, shape (parameter,), optional
+        See `unit_columns`.
+    """
     # The deflections that sensible values make have one unit, the norms may have several.
     visible = norms * size
-    largest = visible.max() or 1.0
+    largest = visible.max(axis=-1, keepdims=True)
     loaded = visible > RANK_TOLERANCE * largest
     gain = np.where(loaded, 1.0 / np.where(loaded, norms, 1.0), 0.0)
-    return ScaledRows(rows * gain, np.where(loaded, norms, largest / size))
+    return gain, np.where(loaded, norms, np.where(largest > 0.0, largest, 1.0) / size)
 
 
 def relative_sizes(parameters: Sequence[Parameter]) -> FloatArray:

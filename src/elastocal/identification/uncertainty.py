@@ -23,7 +23,7 @@ from scipy.special import ndtri, stdtrit
 
 from elastocal.arrays import FloatArray, IndexArray
 from elastocal.identification.problem import Problem
-from elastocal.identification.refits import PoseGrams
+from elastocal.identification.solve import PoseGrams
 from elastocal.results import brief_repr
 
 CONFIDENCE = 0.95

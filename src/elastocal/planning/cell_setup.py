@@ -7,8 +7,14 @@ import trimesh
 from numpy.random import Generator
 
 from elastocal.arrays import FloatArray
-from elastocal.cell import Cell, description
-from elastocal.cell.description import TOOLING, Shape
+from elastocal.cell import (
+    TOOLING,
+    Box as BoxEntry,
+    Cell,
+    Cylinder as CylinderEntry,
+    Shape,
+    Sphere as SphereEntry,
+)
 from elastocal.errors import PlanningError
 from elastocal.planning.checks import (
     Check,
@@ -128,11 +134,11 @@ def _body(cell: Cell, shape: Shape, name: str, T_frame: FloatArray) -> Body:
 def _solid(cell: Cell, shape: Shape) -> Solid:
     """Return a shape of a cell file as a solid."""
     given = shape.solid
-    if isinstance(given, description.Box):
+    if isinstance(given, BoxEntry):
         return Box(*given.size)
-    if isinstance(given, description.Cylinder):
+    if isinstance(given, CylinderEntry):
         return Cylinder(given.radius, given.length)
-    if isinstance(given, description.Sphere):
+    if isinstance(given, SphereEntry):
         return Sphere(given.radius)
     mesh = read_mesh(cell.find(given.file), given.metres)
     return Mesh.of(mesh.vertices, mesh.faces)
@@ -224,14 +230,8 @@ def sight_check(cell: Cell, surface: Surface) -> SightCheck | None:
     if marker is None or not trackers:
         return None
     stations = tuple(
-        Station(
-            tracker.name,
-            (float(x), float(y), float(z)),
-            float(tracker.range[0]),
-            float(tracker.range[1]),
-        )
+        Station(tracker.name, tuple(tracker.position_base.tolist()), *map(float, tracker.range))
         for tracker in trackers
-        for x, y, z in [tracker.position_base]
     )
     solids = [surface.rays, *(fixture.triangulated() for fixture in _fixtures(cell))]
     return SightCheck(

@@ -4,11 +4,12 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.random import Generator
+from scipy.spatial.transform import Rotation
 
-from elastocal.arrays import IndexArray
-from elastocal.cell import Cell
+from elastocal import __version__
+from elastocal.arrays import FloatArray, IndexArray
+from elastocal.cell import Cell, fingerprint
 from elastocal.errors import PlanningError
-from elastocal.planning._plan_record import Decisions, plan_record, pool_data
 from elastocal.planning.cell_setup import (
     cell_surface,
     collision_scene,
@@ -20,15 +21,29 @@ from elastocal.planning.motion import (
     Mover,
     Route,
     clear_retreats,
+    contact_time,
     mover_for,
     plan_route,
     require_free_home,
 )
-from elastocal.planning.plan_result import PlanResult, SpreadRecord
-from elastocal.planning.pool_file import PoolData
+from elastocal.planning.plan_result import (
+    POOL,
+    CellRecord,
+    CheckRecord,
+    ComparisonRecord,
+    ContactRecord,
+    MoveRecord,
+    PlanResult,
+    PoolRecord,
+    PoseRecord,
+    RobotRecord,
+    SearchRecord,
+    Vector,
+)
+from elastocal.planning.pool import REACH_ADVICE, Pool
+from elastocal.planning.pool_file import NOT_CHOSEN, PoolData
 from elastocal.planning.pool_sampling import SampledPool, sample_pool
-from elastocal.planning.postures import Postures
-from elastocal.planning.search import Cover, Selection, technique
+from elastocal.planning.search import Cover, CoverSelection, Selection, technique
 from elastocal.planning.search_pool import SearchPool
 from elastocal.planning.surface import Finding, Surface
 from elastocal.progress import Progress, silent
@@ -46,6 +61,25 @@ class PlanAndPool:
     plan: PlanResult
     pool: PoolData
     surface: Surface
+
+
+@dataclass(frozen=True, eq=False)
+class _Choice:
+    """The poses of a plan, with all that it was decided by."""
+
+    cell: Cell
+    surface: Surface
+    pool: Pool
+    search_pool: SearchPool
+    selection: Selection
+    """Numbers in the pool, in search order."""
+    route: Route
+    """Numbers in the selection, in visiting order."""
+
+    @property
+    def place(self) -> IndexArray:
+        """Place of each chosen pose in the visiting order, shape (pose,), in search order."""
+        return np.argsort(self.route.order)
 
 
 def make_plan(
@@ -89,25 +123,30 @@ def make_plan(
     progress(_SEARCH, 0, 1)
     search_pool = SearchPool.of(cell, surface, sampled)
     selection, route = _choose(cell, search_pool, sampled, mover, for_search, progress)
-    spread = search_pool.spread(selection.order)
+    chosen = _Choice(cell, surface, sampled.pool, search_pool, selection, route)
+    search = _search(chosen)
     progress(_SEARCH, 1, 1)
-    everyone = np.arange(len(search_pool.candidates))
-    comparison = (
-        None if other is None else search_pool.take(other, everyone, len(selection), for_search)
+    compared = None
+    if other is not None:
+        everyone = np.arange(len(search_pool.candidates))
+        taken = search_pool.take(other, everyone, len(selection), for_search).order
+        spread = search_pool.spread(taken)
+        compared = ComparisonRecord(
+            name=other.name, candidates=tuple(taken.tolist()), spread=spread
+        )
+    plan = PlanResult(
+        elastocal=__version__,
+        cell=CellRecord(name=cell.name, file=str(cell.path), fingerprint=fingerprint(cell)),
+        robot=_robot(cell),
+        contact=_contact(cell),
+        poses=_poses(chosen),
+        moves=_moves(route),
+        search=search,
+        comparison=compared,
+        pool=_pool(sampled.pool),
+        findings=(*(each.message for each in findings), *_notes(cell, sampled.pool, search)),
     )
-    chosen = sampled.pool.postures.take(selection.order)
-    decisions = Decisions(
-        cell,
-        sampled,
-        search_pool,
-        selection,
-        spread,
-        comparison,
-        route,
-        _stations(cell, surface, chosen),
-        (*(finding.message for finding in findings), *_notes(cell, sampled, selection, spread)),
-    )
-    return PlanAndPool(plan_record(decisions), pool_data(decisions), surface)
+    return PlanAndPool(plan, _pool_data(chosen, sampled.points.position), surface)
 
 
 def require_possible_search(cell: Cell, compare: str | None = None) -> None:
@@ -177,34 +216,23 @@ def _choose(
     )
 
 
-def _stations(cell: Cell, surface: Surface, chosen: Postures) -> tuple[str | None, ...]:
-    """Return the tracker station of each pose."""
-    check = sight_check(cell, surface)
-    return (None,) * len(chosen) if check is None else tuple(check.seen_by(chosen))
-
-
-def _notes(
-    cell: Cell, sampled: SampledPool, selection: Selection, spread: SpreadRecord
-) -> tuple[str, ...]:
+def _notes(cell: Cell, pool: Pool, search: SearchRecord) -> tuple[str, ...]:
     """Return what a user should know of how the poses were found, a line each."""
-    search, pool = cell.file.search, sampled.pool
     notes: list[str] = []
-    if len(pool.postures) < search.pool:
+    wanted = cell.file.search.pool
+    if len(pool.postures) < wanted:
         notes.append(
-            f"only {len(pool.postures)} of {search.pool} candidates were found among"
+            f"only {len(pool.postures)} of {wanted} candidates were found among"
             f" {pool.sampled} points; most of the others were refused by {pool.bottleneck}:"
             f" {pool.advice}"
         )
-    radius = spread.covering_radius
-    if search.d_max is not None and not radius <= search.d_max:
+    if search.d_max is not None and not search.covered:
         notes.append(
             f"d_max of {1e3 * search.d_max:.4g} mm was not reached: the worst-covered candidate is"
-            f" {1e3 * radius:.4g} mm from the nearest of {len(selection)} poses"
+            f" {1e3 * search.covering_radius:.4g} mm from the nearest of {len(search.order)} poses"
         )
-    if search.d_max is not None and not isinstance(technique(search.technique), Cover):
-        notes.append(
-            f"{selection.name} knows no d_max: it chose as many poses as cover needs for it"
-        )
+    if search.d_max is not None and not isinstance(technique(search.name), Cover):
+        notes.append(f"{search.name} knows no d_max: it chose as many poses as cover needs for it")
     notes.extend(f"assumed, {text}" for text in _assumptions(cell))
     judged = torque_check(cell).judged
     unknown = [name for name in cell.robot.joint_names if name not in judged]
@@ -221,3 +249,136 @@ def _assumptions(cell: Cell) -> list[str]:
     if cell.file.motion.speed:
         given.add("velocity")
     return [f"{a.field}: {a.reason}" for a in cell.robot.assumptions if a.field not in given]
+
+
+def _robot(cell: Cell) -> RobotRecord:
+    robot = cell.robot
+    return RobotRecord(
+        name=robot.name,
+        urdf=robot.urdf,
+        base=robot.base,
+        tcp=robot.tip,
+        joints=robot.joint_names,
+        home=tuple(cell.home.tolist()),
+    )
+
+
+def _contact(cell: Cell) -> ContactRecord:
+    engagement, loads = cell.file.engagement, cell.file.load_cases
+    return ContactRecord(
+        approach_distance=engagement.approach_distance,
+        near_contact=engagement.near_contact,
+        axis_override=cell.file.motion.override,
+        contact_speed=cell.file.motion.contact_speed,
+        load_cases={
+            name: _vector(force) for name, force in zip(loads.cases, loads.force_tcp, strict=True)
+        },
+    )
+
+
+def _poses(choice: _Choice) -> tuple[PoseRecord, ...]:
+    pool, robot = choice.pool, choice.cell.robot
+    order = choice.selection.order[choice.route.order]
+    check = sight_check(choice.cell, choice.surface)
+    seen_by = check.seen_by(pool.postures.take(order)) if check else [None] * len(order)
+    poses = []
+    for number, candidate in enumerate(order.tolist()):
+        posture = pool.postures.take([candidate])
+        # From the joints and not from the frame wanted: what the robot will do.
+        T = robot.forward(posture.q[0])
+        margins = dict(zip(pool.verdicts.names, pool.verdicts.margin[:, candidate], strict=True))
+        x, y, z, w = Rotation.from_matrix(T[:3, :3]).as_quat()
+        poses.append(
+            PoseRecord(
+                id=number,
+                candidate=candidate,
+                joints=tuple(posture.q[0].tolist()),
+                approach_joints=tuple(posture.q_approach[0].tolist()),
+                tcp_position=_vector(T[:3, 3]),
+                tcp_quaternion=(float(x), float(y), float(z), float(w)),
+                normal=_vector(posture.normal[0]),
+                seen_by=seen_by[number],
+                contact_time=contact_time(choice.cell),
+                # JSON has no infinity: a check that cannot refuse is left out.
+                margins={name: float(m) for name, m in margins.items() if np.isfinite(m)},
+            )
+        )
+    return tuple(poses)
+
+
+def _moves(route: Route) -> tuple[MoveRecord, ...]:
+    place = {int(chosen): number for number, chosen in enumerate(route.order)}
+    return tuple(
+        MoveRecord(
+            start=None if move.start is None else place[move.start],
+            end=None if move.end is None else place[move.end],
+            via=tuple(tuple(joints.tolist()) for joints in move.via),
+            duration=move.duration,
+        )
+        for move in route.moves
+    )
+
+
+def _search(choice: _Choice) -> SearchRecord:
+    search, selection, pool = choice.cell.file.search, choice.selection, choice.search_pool
+    spread = pool.spread(selection.order)
+    has_process = pool.candidates.process is not None
+    return SearchRecord(
+        name=selection.name,
+        metric=search.metric,
+        seed=search.seed,
+        wanted=search.most,
+        d_max=search.d_max,
+        covering_radius=spread.covering_radius,
+        lower_bound=selection.lower_bound if isinstance(selection, CoverSelection) else None,
+        covered=None if search.d_max is None else spread.covering_radius <= search.d_max,
+        order=tuple(choice.place.tolist()),
+        spread=spread,
+        process_unseen=pool.information.process_unseen if has_process else None,
+    )
+
+
+def _pool(pool: Pool) -> PoolRecord:
+    refused = pool.refused
+    units = (None, *pool.verdicts.units)
+    advice = (REACH_ADVICE, *pool.verdicts.advice)
+    return PoolRecord(
+        file=POOL,
+        sampled=pool.sampled,
+        valid=len(pool.postures),
+        checks=tuple(
+            CheckRecord(name=name, unit=unit, refused=refused[name], advice=text)
+            for name, unit, text in zip(pool.refusals, units, advice, strict=True)
+        ),
+        bottleneck=pool.bottleneck,
+    )
+
+
+def _pool_data(choice: _Choice, sampled: FloatArray) -> PoolData:
+    """Return the pool that goes beside the plan; ``sampled`` are all points that were tried."""
+    pool, postures = choice.pool, choice.pool.postures
+    pose_id = np.full(len(postures), NOT_CHOSEN, dtype=np.intp)
+    pose_id[choice.selection.order] = choice.place
+    return PoolData(
+        contact=postures.contact,
+        normal=postures.normal,
+        T_base_tcp=postures.T_base_tcp,
+        q=postures.q,
+        q_approach=postures.q_approach,
+        joint_names=choice.cell.robot.joint_names,
+        branch=pool.branch,
+        margin=pool.verdicts.margin,
+        check_names=pool.verdicts.names,
+        check_units=pool.verdicts.units,
+        boundary_distance=choice.search_pool.boundary_distance,
+        pose_id=pose_id,
+        point=postures.point,
+        sampled=sampled,
+        refused_by=pool.refused_by,
+        refusal_names=pool.refusals,
+    )
+
+
+def _vector(values: FloatArray) -> Vector:
+    x, y, z = (float(value) for value in values)
+    return x, y, z

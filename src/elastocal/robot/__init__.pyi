@@ -5,17 +5,13 @@ from .chain import (
     SerialChain as SerialChain,
     build_model as build_model,
 )
-from .mesh_files import (
-    collision_model as collision_model,
-    find_meshes as find_meshes,
-    is_relative as is_relative,
-)
 from .mounting import Rail as Rail, on_rail as on_rail, with_tool as with_tool
 from .robot import (
     GRAVITY as GRAVITY,
     Jacobian as Jacobian,
     JointLimits as JointLimits,
     Robot as Robot,
+    collision_model as collision_model,
     evaluate_jacobian as evaluate_jacobian,
 )
 from .singularity import (
@@ -33,6 +29,8 @@ from .transforms import (
 from .urdf import (
     Assumption as Assumption,
     assumptions as assumptions,
+    find_meshes as find_meshes,
+    is_relative as is_relative,
     leaf_links as leaf_links,
     parse_urdf as parse_urdf,
     read_chain as read_chain,

@@ -1,5 +1,6 @@
 """The rigid robot: kinematics, limits and gravity torques of a serial chain."""
 
+import xml.etree.ElementTree as ElementTree
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -80,7 +81,7 @@ class Robot:
     """Numbers of the description that have no source."""
     meshes: tuple[tuple[str, Path], ...] = ()
     """Files of its collision shapes by their names in the URDF, where they were looked for
-    (`elastocal.robot.mesh_files`)."""
+    (`find_meshes`)."""
     _rigid: ChainModel = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
@@ -111,7 +112,7 @@ class Robot:
         base : str, optional
             Link that positions and forces are expressed in; the root link by default.
         meshes : tuple of (str, Path)
-            Files of the collision shapes; see `elastocal.robot.mesh_files.find_meshes`.
+            Files of the collision shapes; see `elastocal.robot.find_meshes`.
 
         Raises
         ------
@@ -285,3 +286,34 @@ def evaluate_jacobian(chain: ChainModel, q: FloatArray, columns: IndexArray) -> 
         target[:] = jacobian(model, data, configuration, frame, axes)
     picked = np.take(rows, columns, axis=2).reshape(*q.shape[:-1], 6, len(columns))
     return Jacobian(picked[..., :3, :], picked[..., 3:, :])
+
+
+def collision_model(robot: Robot) -> tuple[pin.Model, pin.GeometryModel]:
+    """Return the tree of a robot's URDF and the collision shapes of its links.
+
+    Parameters
+    ----------
+    robot : Robot
+        With its `Robot.meshes` found.
+
+    Raises
+    ------
+    RobotError
+        If a mesh cannot be read.
+    """
+    text = robot.urdf
+    if robot.meshes:
+        places = dict(robot.meshes)
+        root = parse_urdf(text)
+        for mesh in root.iterfind("link/collision/geometry/mesh"):
+            name = mesh.get("filename", "")
+            mesh.set("filename", str(places.get(name, name)))
+        text = ElementTree.tostring(root, encoding="unicode")
+    model = pin.buildModelFromXML(text)
+    try:
+        return model, pin.buildGeomFromUrdfString(model, text, pin.GeometryType.COLLISION)
+    except ValueError as error:
+        reason = " ".join(str(error).partition("message:")[2].split()) or str(error)
+        raise RobotError(
+            f"collision shapes of {robot_name(parse_urdf(text))} cannot be read: {reason}"
+        ) from error

@@ -2,18 +2,25 @@
 
 The checks come before Pinocchio because its parser reports problems on the C++ error stream;
 a user of elastocal gets one line that names the link, the joint and the allowed ones.
+
+A URDF keeps the names that its author gave to the mesh files of collision shapes, also in the files
+that elastocal writes: kinematics reads no mesh, so that a plan or a model needs none.
 """
 
 import math
 import xml.etree.ElementTree as ElementTree
+from collections.abc import Iterator
 from dataclasses import dataclass
+from pathlib import Path
+from urllib.parse import unquote
 
 import numpy as np
 import pinocchio as pin
 
-from elastocal.errors import RobotError, nearest
+from elastocal.errors import FileAccessError, RobotError, nearest
 from elastocal.robot.chain import ChainJoint, SerialChain
 
+_PACKAGE, _FILE = "package://", "file://"
 _NUMBERS = {
     "origin": {"xyz": 3, "rpy": 3},
     "axis": {"xyz": 3},
@@ -254,3 +261,68 @@ def _joint_of(model: pin.Model, joint_id: int, placement: pin.SE3) -> ChainJoint
         centre_of_mass=inertia.lever,
         inertia=inertia.inertia,
     )
+
+
+def find_meshes(urdf: str, folder: Path) -> tuple[tuple[str, Path], ...]:
+    """Return the meshes of a URDF's collision shapes.
+
+    Parameters
+    ----------
+    urdf : str
+        The URDF.
+    folder : Path
+        Its folder. Relative names are relative to it; ``package://NAME/REST`` is ``NAME/REST``
+        in it or in the nearest folder above, else ``REST`` in it or in the one above;
+        ``file://`` and absolute names are taken as they are.
+
+    Returns
+    -------
+    tuple of (str, Path)
+        Each name as the URDF has it, once, and its file.
+
+    Raises
+    ------
+    FileAccessError
+        If there is no such file; with the link and the name.
+    RobotError
+        If the URDF is not valid XML.
+    """
+    found: dict[str, Path] = {}
+    for link in parse_urdf(urdf).findall("link"):
+        for mesh in link.iterfind("collision/geometry/mesh"):
+            name = mesh.get("filename", "")
+            if name not in found:
+                found[name] = _find(name, link.get("name", ""), folder.absolute())
+    return tuple(found.items())
+
+
+def is_relative(name: str) -> bool:
+    """Return whether a mesh name of a URDF moves with the URDF's folder."""
+    return not (name.startswith(_FILE) or Path(name).is_absolute())
+
+
+def _find(name: str, link: str, folder: Path) -> Path:
+    places = list(_places(name, folder))
+    for place in places:
+        if place.is_file():
+            return place
+    where = f"there is no file {places[0]}"
+    if name.startswith(_PACKAGE):
+        where += ", nor one of that name in the folders above"
+    raise FileAccessError(f"link {link!r}: mesh {name!r}: {where}")
+
+
+def _places(name: str, folder: Path) -> Iterator[Path]:
+    """Yield where the file of a mesh name may be, the likeliest place first."""
+    if name.startswith(_PACKAGE):
+        package, _, rest = name.removeprefix(_PACKAGE).partition("/")
+        for parent in (folder, *folder.parents):
+            yield parent / package / rest
+        # The folder of a package may have been renamed, or copied without its name; farther up
+        # there may be a file of that name that has nothing to do with it.
+        yield folder / rest
+        yield folder.parent / rest
+    elif name.startswith(_FILE):
+        yield Path(unquote(name.removeprefix(_FILE)))
+    else:
+        yield folder / name

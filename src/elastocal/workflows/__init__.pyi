@@ -20,15 +20,14 @@ __all__ = [
 
 from ._demo_folder import LOG as LOG, README as README, begin as begin, finish as finish
 from ._device_sources import KINDS as KINDS, SOURCES as SOURCES, DeviceSource as DeviceSource
-from ._kinds_of_measurement import FileDescription as FileDescription
+from ._file_kinds import FileDescription as FileDescription
+from ._inputs import find_robot as find_robot, refuse_overwriting as refuse_overwriting
 from ._operator import Operator as Operator, Supervision as Supervision, Unattended as Unattended
-from ._outputs import refuse_overwriting as refuse_overwriting
 from ._process_trial import (
     ProcessTrial as ProcessTrial,
     TrialRuns as TrialRuns,
     run_trial as run_trial,
 )
-from ._robot_source import find_robot as find_robot
 from .calibrate import (
     CalibrateResult as CalibrateResult,
     CalibrateSettings as CalibrateSettings,

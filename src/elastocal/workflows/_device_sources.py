@@ -3,9 +3,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from elastocal.cell import Cell
-from elastocal.cell.description import SIMULATED, DeviceNames
-from elastocal.cell.devices import Devices
+from elastocal.cell import SIMULATED, Cell, DeviceNames, Devices
 from elastocal.errors import DeviceError, nearest
 
 KINDS = tuple(DeviceNames.model_fields)

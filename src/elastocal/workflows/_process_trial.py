@@ -26,7 +26,6 @@ from elastocal.compensation.process import (
     compare_deviations,
     run_course,
 )
-from elastocal.errors import CompensationError
 from elastocal.identification import CalibratedModel
 from elastocal.parallel import map_in_processes, process_count
 from elastocal.progress import Progress
@@ -145,28 +144,6 @@ def run_effect(
         )
         courses = tuple(replace(course, ripple=()) for course in courses)
     return _run_courses(changed, courses, late if effect.exact else None, progress, effect.name)
-
-
-def require_same_robot(cell: Cell, model: CalibratedModel, name: str) -> None:
-    """Refuse a model of another robot; ``name`` is its file.
-
-    Raises
-    ------
-    CompensationError
-        If joints differ, or the tool centre point at HOME does.
-    """
-    robot, known = cell.robot, model.model.robot
-    if known.joint_names != robot.joint_names:
-        raise CompensationError(
-            f"{name}: the model's robot has the joints {', '.join(known.joint_names)}, that of"
-            f" cell {cell.name} {', '.join(robot.joint_names)}"
-        )
-    apart = np.abs(known.forward(cell.home) - robot.forward(cell.home)).max()
-    if not apart <= 1e-6:
-        raise CompensationError(
-            f"{name}: the model's tool centre point lies {1e3 * apart:.3g} mm from that of cell"
-            f" {cell.name} at HOME: it is a model of another cell or tool"
-        )
 
 
 def _run_courses(

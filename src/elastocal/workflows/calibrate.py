@@ -13,8 +13,7 @@ from elastocal.identification import CalibrateResult, FitSettings, summary
 from elastocal.progress import Progress
 from elastocal.records import write_json
 from elastocal.results import brief_repr
-from elastocal.workflows._outputs import refuse_overwriting
-from elastocal.workflows._robot_source import find_robot
+from elastocal.workflows._inputs import find_robot, refuse_overwriting
 from elastocal.workflows._workflow import workflow
 
 __all__ = ["CalibrateResult", "CalibrateSettings", "calibrate"]

@@ -1,7 +1,7 @@
 """``check``: validate any of our files, and say what it holds.
 
-The kind of a file is found by its suffix and the schema that it states; a new kind
-is a function that reads (and so validates) the file, and its entry in a table here.
+The kind of a file is found by its suffix and the schema that it states; a new kind is a function
+of `elastocal.workflows._file_kinds`, and its entry in a table here.
 """
 
 import re
@@ -10,6 +10,8 @@ from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
 
+from elastocal.codec import ARRAYS, VERDICTS
+from elastocal.codec.study import DESIGN, PARTS
 from elastocal.compensation.process import TABLE
 from elastocal.errors import DatasetError, SchemaError
 from elastocal.files import read_text
@@ -18,34 +20,43 @@ from elastocal.procedure import JOURNAL
 from elastocal.progress import Progress
 from elastocal.records import read_arrays
 from elastocal.results import Result, brief
-from elastocal.workflows import _kinds_of_measurement as measurement, _kinds_of_results as results
-from elastocal.workflows._kinds_of_measurement import FileDescription
+from elastocal.workflows import _file_kinds as kinds
+from elastocal.workflows._file_kinds import FileDescription
 from elastocal.workflows._workflow import workflow
 
 _Describe = Callable[[Path], FileDescription]
 
 _JSON_KINDS: dict[str, _Describe] = {
-    "elastocal.plan": measurement.plan_file,
-    "elastocal.run-summary": measurement.summary_file,
-    "elastocal.tool": results.tool_file,
-    "elastocal.codec_verdicts": results.verdicts,
-    "elastocal.study": results.study_record,
-    "elastocal.study_settings": results.study_settings,
-    "elastocal.study_samples": results.study_samples,
-    "elastocal.process": results.process_table,
-    "elastocal.comparison": results.comparison_file,
+    "elastocal.plan": kinds.plan_file,
+    "elastocal.run-summary": kinds.summary_file,
+    "elastocal.tool": kinds.tool_file,
+    "elastocal.codec_verdicts": kinds.codec_verdicts,
+    "elastocal.study": kinds.study_record,
+    "elastocal.study_settings": kinds.study_settings,
+    "elastocal.study_samples": kinds.study_samples,
+    "elastocal.process": kinds.process_table,
+    "elastocal.comparison": kinds.comparison_file,
 }
 """JSON files by the schema that they state, without its version; others are read as a model."""
 _NETCDF_KINDS: dict[str, _Describe] = {
-    "elastocal.codec": results.arrays,
-    "elastocal.pool": measurement.pool_file,
+    "elastocal.codec": kinds.codec_arrays,
+    "elastocal.pool": kinds.pool_file,
 }
 """NetCDF files likewise; others are read as a dataset."""
 _YAML_KINDS: dict[str, _Describe] = {
-    "elastocal.cell": measurement.cell_file,
-    "elastocal.compensator": results.compensator_file,
+    "elastocal.cell": kinds.cell_file,
+    "elastocal.compensator": kinds.compensator_file,
 }
 """YAML files likewise; others are read as springs."""
+
+_FOLDERS: tuple[tuple[tuple[str, ...], _Describe], ...] = (
+    ((PLAN,), lambda folder: kinds.plan_file(folder / PLAN)),
+    ((JOURNAL,), kinds.run_folder),
+    ((TABLE,), kinds.process_folder),
+    ((DESIGN, PARTS), kinds.study_folder),
+    ((ARRAYS, VERDICTS), kinds.codec_folder),
+)
+"""Folders by what lies in them."""
 
 _IN_JSON = re.compile(r'"schema":\s*"(elastocal\.[\w-]+)/')
 _IN_YAML = re.compile(r"^schema:\s*[\"']?(elastocal\.[\w-]+)/", re.MULTILINE)
@@ -115,17 +126,10 @@ def describe_file(path: Path) -> FileDescription:
 
 
 def _folder(path: Path) -> FileDescription:
-    """Describe the folder of a plan, a run, a simulated process, a codec or a study."""
-    if (path / PLAN).is_file():
-        return measurement.plan_file(path / PLAN)
-    if (path / JOURNAL).is_file():
-        return measurement.run_folder(path)
-    if (path / TABLE).is_file():
-        return results.process_folder(path)
-    if results.is_study(path):
-        return results.study_folder(path)
-    if results.is_codec(path):
-        return results.codec_folder(path)
+    """Describe the folder of a plan, a run, a simulated process, a study or a codec."""
+    for names, describe in _FOLDERS:
+        if all((path / name).exists() for name in names):
+            return describe(path)
     raise SchemaError(
         f"{path} is a folder with none of {PLAN}, {JOURNAL}, {TABLE} in it, nor the files of a"
         " codec or a study"
@@ -138,16 +142,16 @@ def _netcdf(path: Path) -> FileDescription:
         stated = read_arrays(path).attributes.get("schema")
     except SchemaError as error:
         raise DatasetError(str(error)) from error
-    return _NETCDF_KINDS.get(str(stated).partition("/")[0], measurement.dataset_file)(path)
+    return _NETCDF_KINDS.get(str(stated).partition("/")[0], kinds.dataset_file)(path)
 
 
 def _json(path: Path) -> FileDescription:
     """Describe a JSON file by the schema that it states; what states none is read as a model."""
-    return _JSON_KINDS.get(_stated(_IN_JSON, read_text(path)[:200]), results.model_file)(path)
+    return _JSON_KINDS.get(_stated(_IN_JSON, read_text(path)[:200]), kinds.model_file)(path)
 
 
 def _table(path: Path) -> FileDescription:
-    return results.table(path) if results.is_table(path) else measurement.dataset_file(path)
+    return kinds.table(path) if kinds.is_table(path) else kinds.dataset_file(path)
 
 
 def _stated(pattern: re.Pattern[str], text: str) -> str:
@@ -158,16 +162,16 @@ def _stated(pattern: re.Pattern[str], text: str) -> str:
 
 def _settings(path: Path) -> FileDescription:
     """Describe a YAML file by the schema that it states."""
-    return _YAML_KINDS.get(_stated(_IN_YAML, read_text(path)), results.springs_file)(path)
+    return _YAML_KINDS.get(_stated(_IN_YAML, read_text(path)), kinds.springs_file)(path)
 
 
 _BY_SUFFIX: dict[str, _Describe] = {
     ".nc": _netcdf,
     ".csv": _table,
     ".json": _json,
-    ".urdf": measurement.robot_file,
-    ".jsonl": measurement.journal_file,
-    ".mcap": measurement.streams_file,
+    ".urdf": kinds.robot_file,
+    ".jsonl": kinds.journal_file,
+    ".mcap": kinds.streams_file,
     ".yaml": _settings,
     ".yml": _settings,
 }

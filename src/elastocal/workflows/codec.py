@@ -27,7 +27,7 @@ from elastocal.dataset import read, without
 from elastocal.files import filling
 from elastocal.progress import Progress
 from elastocal.results import Result, brief_repr
-from elastocal.workflows._robot_source import find_robot
+from elastocal.workflows._inputs import find_robot
 from elastocal.workflows._workflow import workflow
 
 

@@ -17,7 +17,7 @@ from elastocal.identification.recertification import (
 from elastocal.progress import Progress
 from elastocal.records import write_json
 from elastocal.robot import Robot
-from elastocal.workflows._outputs import refuse_overwriting
+from elastocal.workflows._inputs import refuse_overwriting
 from elastocal.workflows._workflow import workflow
 
 __all__ = ["CompareResult", "CompareSettings", "compare", "measured_rows"]

@@ -18,9 +18,13 @@ from elastocal.progress import Progress
 from elastocal.records import record
 from elastocal.results import Result
 from elastocal.robot import Robot
-from elastocal.workflows._coverage import coverage_notes
-from elastocal.workflows._outputs import refuse_overwriting
-from elastocal.workflows._postures import parse_frame, parse_posture, write_posture
+from elastocal.workflows._inputs import (
+    coverage_notes,
+    parse_frame,
+    parse_posture,
+    refuse_overwriting,
+    write_posture,
+)
 from elastocal.workflows._workflow import workflow
 
 

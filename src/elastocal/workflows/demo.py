@@ -8,7 +8,7 @@ from os import PathLike
 from pathlib import Path
 from typing import Protocol, TextIO
 
-from elastocal.cell.examples import check_like
+from elastocal.cell import require_example
 from elastocal.compensation.process import SimulateProcessResult
 from elastocal.errors import FileAccessError
 from elastocal.procedure import RunEnd
@@ -190,7 +190,7 @@ def chapters(kind: str, out: Path, seed: int) -> tuple[Chapter, ...]:
     SchemaError
         If there is no such example cell.
     """
-    check_like(kind)
+    require_example(kind)
     return (
         *_measuring(kind, out, str(seed)),
         _compared(out, "were there enough poses", "springs", "actuated,bearing"),

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
 
-from elastocal.cell.examples import write_example
+from elastocal.cell import write_example
 from elastocal.progress import Progress
 from elastocal.results import Result
 from elastocal.workflows._workflow import workflow

@@ -12,7 +12,7 @@ from elastocal.identification import DeflectionSummary, Prediction, read_model
 from elastocal.progress import Progress
 from elastocal.records import record
 from elastocal.results import Result
-from elastocal.workflows._outputs import refuse_overwriting
+from elastocal.workflows._inputs import refuse_overwriting
 from elastocal.workflows._workflow import workflow
 
 

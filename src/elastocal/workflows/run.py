@@ -11,8 +11,7 @@ from datetime import UTC, datetime
 from os import PathLike
 from pathlib import Path
 
-from elastocal.cell import Cell, load_cell
-from elastocal.cell.devices import Devices
+from elastocal.cell import Cell, Devices, load_cell
 from elastocal.errors import ElastocalError, ProcedureError
 from elastocal.files import read_text
 from elastocal.planning import PLAN, PlanResult, read_plan

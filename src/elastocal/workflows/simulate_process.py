@@ -30,10 +30,10 @@ from elastocal.files import filling, read_text, sha256
 from elastocal.identification import read_model
 from elastocal.progress import Progress
 from elastocal.results import brief_repr
+from elastocal.workflows._inputs import require_same_robot
 from elastocal.workflows._process_trial import (
     BUDGET,
     ProcessTrial,
-    require_same_robot,
     run_effect,
     run_trial,
 )
@@ -97,7 +97,9 @@ def simulate_process(
     Raises
     ------
     CompensationError
-        If the process is not known, the robot cannot follow, or a model is of another cell.
+        If the process is not known, or the robot cannot follow.
+    RobotError
+        If a model is of another robot or tool than the cell's.
     DeviceError, EquilibriumError
         If the cell cannot be simulated, or not under these forces.
     SchemaError, FileAccessError
@@ -186,7 +188,7 @@ def _trial(
     cell: Cell, compensator: CompensatorSettings, run: _Run, jobs: int | None
 ) -> ProcessTrial:
     calibrated = read_model(run.model)
-    require_same_robot(cell, calibrated, str(run.model))
+    require_same_robot(calibrated.model.robot, cell.robot, (str(run.model), cell.name))
     load = read_sensor_load(run.tool, calibrated.model.robot)
     return ProcessTrial(cell, calibrated, load, compensator, run.seed, jobs=jobs)
 

@@ -11,8 +11,7 @@ import numpy as np
 
 from elastocal.arrays import FloatArray
 from elastocal.cell import load_cell
-from elastocal.compensation.offline import PathError, posture_jumps
-from elastocal.compensation.stiffness import (
+from elastocal.compensation import (
     PathPostures,
     PathStations,
     PostureChoice,
@@ -23,11 +22,11 @@ from elastocal.compensation.stiffness import (
     choose_postures,
     directional_stiffness,
     read_stations,
-    require_same_robot,
     survey_postures,
     write_choice,
     write_survey,
 )
+from elastocal.compensation.offline import PathError, posture_jumps
 from elastocal.files import filling
 from elastocal.identification import CalibratedModel, read_model
 from elastocal.progress import Progress
@@ -36,8 +35,7 @@ from elastocal.report import Curve, drawn, stiffness_figure, write_stiffness_fig
 from elastocal.results import Result, brief_repr
 from elastocal.robot import Robot
 from elastocal.robot.inverse import InverseKinematics, inverse_for
-from elastocal.workflows._coverage import coverage_notes
-from elastocal.workflows._postures import parse_posture
+from elastocal.workflows._inputs import coverage_notes, parse_posture, require_same_robot
 from elastocal.workflows._workflow import workflow
 
 _SUMMARY = "stiffness.json"
@@ -250,7 +248,7 @@ def _grid(
     if settings.cell is None:
         return PostureGrid(spins, external), ()
     cell = load_cell(settings.cell)
-    require_same_robot(robot, cell.robot)
+    require_same_robot(robot, cell.robot, (str(settings.model), cell.name))
     return PostureGrid(spins, cell.external_positions), cell_constraints(cell)
 
 

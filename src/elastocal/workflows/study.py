@@ -7,8 +7,7 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
-from elastocal.cell import Cell, load_cell
-from elastocal.cell.description import DEFAULT_POSES
+from elastocal.cell import DEFAULT_POSES, Cell, load_cell
 from elastocal.codec.study import (
     Condition,
     SampleResult,

@@ -31,9 +31,7 @@ from elastocal.procedure import (
 )
 from elastocal.progress import Progress
 from elastocal.robot import GRAVITY, Robot
-from elastocal.workflows._outputs import refuse_overwriting
-from elastocal.workflows._postures import parse_frame
-from elastocal.workflows._robot_source import find_robot
+from elastocal.workflows._inputs import find_robot, parse_frame, refuse_overwriting
 from elastocal.workflows._workflow import workflow
 
 __all__ = ["ToolResult", "ToolSettings", "tool"]

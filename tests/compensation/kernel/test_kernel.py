@@ -13,8 +13,7 @@ from elastocal.compensation.kernel import (
     sum_text,
     value_text,
 )
-from elastocal.compensation.kernel.compiled import python_text
-from elastocal.compensation.kernel.program import ONE, ZERO, Program, needed
+from elastocal.compensation.kernel.program import ONE, ZERO, Program, needed, python_text
 from elastocal.elastic import ElasticModel
 from elastocal.robot import Robot
 from support.virtual_chain import ARMS

@@ -2,7 +2,7 @@ from dataclasses import replace
 
 import pytest
 
-from elastocal.identification.recertification._judgement import load_note, notes_on
+from elastocal.identification.recertification.comparison import load_note, notes_on
 from support.recertified import made_up
 
 PLAN = "run.nc; elastocal run, started {}, plan 906f4cfadf15, cell 0587b5d5dbf5"

@@ -1,8 +1,7 @@
 import numpy as np
 import pytest
 
-from elastocal.identification.recertification._rows import compare_rows
-from elastocal.identification.recertification._spread import Spread
+from elastocal.identification.recertification._changes import Spread, compare_rows
 from support.problems import campaign
 from support.recertified import made_up
 

@@ -1,8 +1,7 @@
 import numpy as np
 import pytest
 
-from elastocal.identification.recertification._spread import Spread
-from elastocal.identification.recertification._springs import compare_springs, critical
+from elastocal.identification.recertification._changes import Spread, compare_springs, critical
 from support.recertified import made_up
 
 

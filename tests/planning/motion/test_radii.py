@@ -8,7 +8,7 @@ import pytest
 
 from elastocal.errors import PlanningError
 from elastocal.planning import CollisionScene
-from elastocal.planning.motion.sweep import joint_radii
+from elastocal.planning.motion.mover import joint_radii
 from elastocal.robot import Rail, Robot, catalogue, on_rail, with_tool
 from elastocal.shapes import Body, Box
 from support.moving import BALL, scene

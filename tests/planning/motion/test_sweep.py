@@ -7,7 +7,7 @@ import pytest
 
 from elastocal.planning import CollisionScene
 from elastocal.planning.motion import Sweep
-from elastocal.planning.motion.sweep import _FINEST
+from elastocal.planning.motion.mover import _FINEST
 from elastocal.shapes import Body, Sphere
 from support.moving import BALL, CLEARANCE, box, dense, scene
 from support.postures import arm

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings, strategies as st
 from hypothesis.extra.numpy import arrays
 
-from elastocal.planning.search.cover import CellField, PlainField, _z_order
+from elastocal.planning.search.cover import CellField, PlainField
 from support.pools import scattered
 
 
@@ -66,18 +66,3 @@ def test_the_picks_are_the_same_on_any_lattice(contact, size):
 def test_the_picks_are_the_same_on_any_points(contact):
     cells, plain = CellField(contact, 4), PlainField(contact)
     assert picks(cells, len(contact)) == picks(plain, len(contact))
-
-
-def test_z_order_is_a_permutation():
-    order = _z_order(scattered(777).contact.T)
-    assert sorted(order.tolist()) == list(range(777))
-
-
-def test_z_order_visits_the_octants_one_after_the_other():
-    corners = np.array([[x, y, z] for z in (0, 1) for y in (0, 1) for x in (0, 1)], dtype=float)
-    shuffled = np.random.default_rng(0).permutation(8)
-    assert shuffled[_z_order(corners[shuffled].T)].tolist() == list(range(8))
-
-
-def test_points_in_the_same_place_keep_their_order():
-    assert _z_order(np.ones((3, 50))).tolist() == list(range(50))

@@ -3,7 +3,7 @@
 import numpy as np
 import trimesh
 
-from elastocal.cell.examples.example import BLOCK_SIZE, block
+from elastocal.cell.examples import BLOCK_SIZE, block
 from elastocal.planning.surface import build_surface, distance_to_boundary, sample_uniform, weld
 from support.tooling import plane, soup
 

@@ -4,13 +4,12 @@ import numpy as np
 import pytest
 
 from elastocal.cell import load_cell
-from elastocal.cell.examples import EXAMPLES, write_example
-from elastocal.cell.examples.example import block, dome_section
+from elastocal.cell.examples import EXAMPLES, block, dome_section, write_example
 from elastocal.planning.surface import (
     ReachableFrom,
     arm_reach,
     build_surface,
-    contact_poses,
+    contact_frames,
     first_joint_positions,
     flipped,
     inverted_finding,
@@ -116,7 +115,7 @@ def test_a_surface_that_is_reached_nowhere_is_not_called_inverted():
 def test_contact_poses_press_into_the_surface_and_turn_about_their_z():
     points = sample_uniform(soup(block()), 40, np.random.default_rng(0))
     spin = np.linspace(0, np.pi, 5)
-    T = contact_poses(points, spin)
+    T = contact_frames(points.position, points.normal, spin)
     R = T[..., :3, :3]
     np.testing.assert_allclose(
         R @ R.swapaxes(-1, -2), np.broadcast_to(np.eye(3), R.shape), atol=1e-12

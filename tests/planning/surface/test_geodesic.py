@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from elastocal.cell.examples.example import block
+from elastocal.cell.examples import block
 from elastocal.planning.surface import SurfaceError, geodesic_distance, sample_uniform
 from support.tooling import cap, plane, soup
 

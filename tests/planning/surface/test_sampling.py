@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
-from elastocal.cell.description.surface import RegionEntry
-from elastocal.cell.examples.example import block
+from elastocal.cell.examples import block
+from elastocal.cell.hardware import RegionEntry
 from elastocal.planning.surface import (
     SurfaceError,
     build_surface,

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from elastocal.cell.examples.example import block
+from elastocal.cell.examples import block
 from elastocal.planning.surface import (
     SurfaceError,
     build_surface,

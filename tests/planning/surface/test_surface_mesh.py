@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from elastocal.cell.examples.example import binary_stl, block
+from elastocal.cell.examples import binary_stl, block
 from elastocal.errors import FileAccessError
 from elastocal.planning.surface import SurfaceError, load_surface, read_mesh, weld
 

@@ -1,6 +1,7 @@
 import io
 import json
 import shutil
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -10,13 +11,10 @@ from mcap.stream_reader import StreamReader
 from mcap.writer import CompressionType, Writer
 
 from elastocal.errors import FileAccessError, SchemaError
-from elastocal.procedure.record._mcap import (
-    CHUNK,
-    Topic,
-    read_mcap,
-    write_mcap,
-)
+from elastocal.procedure.record._mcap import Topic, read_mcap, write_mcap
 
+COUNT = 12_000
+"""Of the messages of /a: with those of /b they need two chunks, and the first holds all of /b."""
 SCHEMA = json.dumps({"type": "object", "properties": {"x": {"type": "number"}}})
 
 
@@ -28,7 +26,7 @@ def topic(name: str, time: np.ndarray) -> Topic:
 @pytest.fixture
 def path(tmp_path):
     """Two topics whose messages interleave, in more than one chunk."""
-    topics = [topic("/a", np.arange(0, 2 * CHUNK, 2)), topic("/b", np.arange(1, CHUNK, 3))]
+    topics = [topic("/a", np.arange(0, 2 * COUNT, 2)), topic("/b", np.arange(1, COUNT, 3))]
     path = tmp_path / "a.mcap"
     write_mcap(path, topics, "test", Metadata(name="note", metadata={"key": "value"}))
     return path
@@ -37,7 +35,7 @@ def path(tmp_path):
 def test_what_is_written_is_read_again(path):
     contents = read_mcap(path)
     assert contents.metadata == {"note": {"key": "value"}}
-    assert contents.topics["/a"].time == list(range(0, 2 * CHUNK, 2))
+    assert contents.topics["/a"].time == list(range(0, 2 * COUNT, 2))
     assert contents.topics["/b"].data[1] == b'{"x": 4}'
 
 
@@ -50,7 +48,7 @@ def test_the_librarys_own_reader_finds_every_message_by_the_index(path):
         counts = summary.statistics.channel_message_counts
         found = [(c.topic, m.log_time, m.data) for _, c, m in reader.iter_messages()]
         metadata = list(reader.iter_metadata())
-    assert counts == {1: CHUNK, 2: len(range(1, CHUNK, 3))}
+    assert counts == {1: COUNT, 2: len(range(1, COUNT, 3))}
     assert len(found) == sum(counts.values())
     assert [time for _, time, _ in found] == sorted(time for _, time, _ in found)
     assert all(json.loads(data)["x"] == time for _, time, data in found)
@@ -128,3 +126,20 @@ def test_a_file_that_cannot_be_written_leaves_nothing_behind(tmp_path):
         write_mcap(folder / "a.mcap", [], "test", Metadata(name="n", metadata={}))
     shutil.rmtree(folder, ignore_errors=True)
     assert list(tmp_path.iterdir()) == []
+
+
+PACKED_BY_HAND = Path(__file__).parent / "packed_by_hand.mcap"
+"""Written before the mcap package wrote the messages: the streams of ``test_streams``."""
+
+
+def test_a_flipped_byte_does_no_harm_or_is_refused(tmp_path):
+    data, path = PACKED_BY_HAND.read_bytes(), tmp_path / "a.mcap"
+    wanted = read_mcap(PACKED_BY_HAND).topics
+    for place in range(0, len(data), 11):
+        path.write_bytes(data[:place] + bytes([data[place] ^ 0x80]) + data[place + 1 :])
+        try:
+            found = read_mcap(path).topics
+        except SchemaError:
+            continue
+        # In the summary, which is for those who jump in the file.
+        assert {name: found[name] for name in wanted} == wanted

@@ -1,4 +1,5 @@
 import json
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -16,10 +17,7 @@ from elastocal.cell.devices import (
 from elastocal.errors import ProcedureError, SchemaError
 from elastocal.procedure import STREAMS_SCHEMA, PoseRecorder, read_streams
 from elastocal.procedure.record import Mark
-from elastocal.procedure.record._mcap import (
-    Topic,
-    write_mcap,
-)
+from elastocal.procedure.record._mcap import Topic, write_mcap
 from elastocal.procedure.record._messages import schemas
 from support.stations import station
 
@@ -73,6 +71,15 @@ def test_streams_come_back_to_twelve_digits(path):
     np.testing.assert_allclose(found.arm.T_base_tcp[3], station(1), atol=1e-11)
     assert found.points.station.tolist() == ["A"] * 20
     assert np.all(found.wrench.ok)
+
+
+def test_a_file_from_before_the_mcap_package_wrote_it_is_read(path):
+    found, now = read_streams(Path(__file__).parent / "packed_by_hand.mcap"), read_streams(path)
+    assert (found.joint_names, found.marks) == (now.joint_names, now.marks)
+    np.testing.assert_array_equal(found.arm.T_base_tcp, now.arm.T_base_tcp)
+    np.testing.assert_array_equal(found.wrench.force, now.wrench.force)
+    np.testing.assert_array_equal(found.points.time, now.points.time)
+    np.testing.assert_array_equal(found.points.position, now.points.position)
 
 
 def test_only_the_spans_that_are_asked_for_are_read(path):

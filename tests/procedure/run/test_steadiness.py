@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from elastocal.cell.description import ProcedureSettings
+from elastocal.cell import ProcedureSettings
 from elastocal.procedure.run._stability import RecentSamples, steadiness, why_shaking, why_unsteady
 
 LIMITS = ProcedureSettings()

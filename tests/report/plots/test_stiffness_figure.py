@@ -3,7 +3,11 @@
 import numpy as np
 import pytest
 
-from elastocal.compensation.stiffness import PathStations, PostureGrid, PostureSurvey
+from elastocal.compensation import (
+    PathStations,
+    PostureGrid,
+    PostureSurvey,
+)
 from elastocal.report import (
     Curve,
 )

@@ -12,7 +12,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from elastocal.arrays import FloatArray
-from elastocal.compensation.offline import beyond_a_turn
+from elastocal.compensation.offline import require_within_a_turn
 from elastocal.dataset import LoadRows, joint_dimensions, read_load_rows
 from elastocal.errors import CompensationError
 from elastocal.results import brief_repr
@@ -141,14 +141,9 @@ def read_postures(
         R = _from_quaternions(path, rows, header)
     elif set(_ANGLES) <= set(header):
         rows = read_load_rows(path, dict.fromkeys(_ANGLES, "angle"))
-        found = beyond_a_turn(rows.joint_position)
-        if found is not None:
-            row, k = found
-            raise CompensationError(
-                f"{path}: posture {row + 1}: {_ANGLES[k]} of"
-                f" {np.degrees(rows.joint_position[row, k]):.4g} deg is more than a turn: is it in"
-                " degrees?"
-            )
+        require_within_a_turn(
+            rows.joint_position, lambda row, k: f"{path}: posture {row + 1}: {_ANGLES[k]}"
+        )
         zero = np.zeros(len(rows.force))
         R = T_from_xyzabc(zero, zero, zero, *rows.joint_position.T)[:, :3, :3]
     elif robot is not None:

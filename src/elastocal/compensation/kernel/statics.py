@@ -1,21 +1,19 @@
-"""Springs as statements: deflection and observation block at given joints and load."""
+"""Chain and springs as statements: joint frames, deflection and observation block at a load."""
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from itertools import count
 
-from elastocal.compensation.kernel._chain import (
-    FORCE,
-    MOMENT,
-    NOTHING,
-    Chain,
-    Frame,
-    constant_vector,
-    write_chain,
-)
+import numpy as np
+from numpy.typing import ArrayLike
+
+from elastocal.arrays import FloatArray
 from elastocal.compensation.kernel.program import (
+    ONE,
+    ZERO,
+    Matrix,
     Program,
-    Statement,
+    Routine,
     Value,
     Vector,
     needed,
@@ -23,7 +21,121 @@ from elastocal.compensation.kernel.program import (
 )
 from elastocal.elastic import ElasticModel, SpringAxis, SpringLoad
 from elastocal.elastic.springs import Expression, Function, Input, Number, Product, Sum
-from elastocal.results import brief_repr
+from elastocal.robot import ChainJoint, SerialChain
+
+_NOTHING: Vector = (ZERO, ZERO, ZERO)
+_IDENTITY: Matrix = ((ONE, ZERO, ZERO), (ZERO, ONE, ZERO), (ZERO, ZERO, ONE))
+_FORCE: Vector = (Value(1, "fx"), Value(1, "fy"), Value(1, "fz"))
+"""Force on the robot at the tool centre point, in base."""
+_MOMENT: Vector = (Value(1, "mx"), Value(1, "my"), Value(1, "mz"))
+"""Moment on the robot about the tool centre point, in base."""
+
+
+@dataclass(frozen=True)
+class _Frame:
+    """A frame in base."""
+
+    rotation: Matrix
+    origin: Vector
+
+
+@dataclass(frozen=True)
+class _JointFrames:
+    """A joint's frame before and behind its motion."""
+
+    proximal: _Frame
+    distal: _Frame
+
+
+@dataclass(frozen=True)
+class _Chain:
+    """Every frame of the chain."""
+
+    joints: tuple[_JointFrames, ...]
+    tcp: _Frame
+
+
+def _write_chain(program: Program, chain: SerialChain) -> _Chain:
+    """Add the statements of the forward chain (paper Eq. 1-3) and return its frames.
+
+    Joint ``k`` counts from 1. Its names are ``p<k>`` (rotation before the motion), ``r<k>``
+    (behind it), ``o<k>`` (origin before), ``d<k>`` (origin behind a linear motion).
+    """
+    here = _Frame(_IDENTITY, _NOTHING)
+    joints = []
+    for k, joint in enumerate(chain.joints, start=1):
+        program.remark(f"joint {k}, {joint.name}")
+        place = _constant_frame(program, f"place{k}", joint.placement)
+        proximal = _behind(program, here, place, (f"p{k}", f"o{k}"))
+        distal = _moved(program, proximal, joint, k)
+        joints.append(_JointFrames(proximal, distal))
+        here = distal
+    program.remark(f"tool centre point, {chain.tip}")
+    tip = _constant_frame(program, "tip", chain.T_last_tip)
+    return _Chain(tuple(joints), _behind(program, here, tip, ("t", "tcp")))
+
+
+def _constant_frame(program: Program, name: str, T: FloatArray) -> _Frame:
+    x, y, z = (
+        _constant_vector(program, f"{name}_{a}", row)
+        for a, row in zip("xyz", T[:3, :3], strict=True)
+    )
+    return _Frame((x, y, z), _constant_vector(program, name, T[:3, 3]))
+
+
+def _behind(program: Program, here: _Frame, place: _Frame, names: tuple[str, str]) -> _Frame:
+    """Return ``here @ place``."""
+    rotation, origin = names
+    return _Frame(
+        program.product(rotation, here.rotation, place.rotation),
+        program.transformed(origin, here.rotation, place.origin, here.origin),
+    )
+
+
+def _moved(program: Program, proximal: _Frame, joint: ChainJoint, k: int) -> _Frame:
+    """Return the frame behind the joint's motion."""
+    axis = _constant_vector(program, f"axis{k}", joint.axis)
+    if joint.revolute:
+        sine, cosine = program.turn(k, f"q{k}")
+        turn = _rotation(program, f"turn{k}", axis, sine, cosine)
+        return _Frame(program.product(f"r{k}", proximal.rotation, turn), proximal.origin)
+    travel = Value(1, f"q{k}")
+    slid = [program.total(f"slide{k}_{a}", [(x, travel)]) for a, x in zip("xyz", axis, strict=True)]
+    along = (slid[0], slid[1], slid[2])
+    origin = program.transformed(f"d{k}", proximal.rotation, along, proximal.origin)
+    return _Frame(proximal.rotation, origin)
+
+
+def _constant_vector(program: Program, name: str, numbers: ArrayLike) -> Vector:
+    """Return three constants."""
+    x, y, z = np.asarray(numbers, dtype=float).tolist()
+    return (
+        program.constant(f"{name}_x", x),
+        program.constant(f"{name}_y", y),
+        program.constant(f"{name}_z", z),
+    )
+
+
+def _rotation(program: Program, name: str, axis: Vector, sine: Value, cosine: Value) -> Matrix:
+    """Return the rotation about an axis (Rodrigues): ``c I + (1 - c) a a^T + s [a]x``."""
+    rest = program.total(f"{name}_rest", [(ONE,), (-cosine,)])
+    rows = []
+    for i, a in enumerate("xyz"):
+        row = []
+        for j, b in enumerate("xyz"):
+            # Row i of [a]x holds -a_k where (i, j, k) is an even permutation, a_k where odd.
+            k = 3 - i - j
+            if i == j:
+                # On a coordinate axis the sum is 1 or the cosine itself.
+                plain = axis[i].sign and not axis[i].name
+                terms = [(ONE,)] if plain else [(cosine,), (rest, axis[i], axis[i])]
+            else:
+                skew = -axis[k] if (j - i) % 3 == 1 else axis[k]
+                terms = [(rest, axis[i], axis[j]), (sine, skew)]
+            row.append(program.total(f"{name}_{a}{b}", terms))
+        rows.append((row[0], row[1], row[2]))
+    return rows[0], rows[1], rows[2]
+
 
 _Point = tuple[int, bool, tuple[float, float, float]]
 """Joint, whether behind its motion, offset: where the axis of a spring passes."""
@@ -31,21 +143,10 @@ _Point = tuple[int, bool, tuple[float, float, float]]
 _Weighted = tuple[Value, Vector]
 
 
-@brief_repr
-@dataclass(frozen=True)
-class Routine:
-    """A finished program."""
-
-    statements: tuple[Statement, ...]
-    outputs: tuple[Value, ...]
-    constants: dict[str, float]
-    """The numbers that it reads, by name."""
-
-
 def orientation(model: ElasticModel) -> Routine:
     """Return the program of the rotation of the tool centre point in base, row by row."""
     program = Program()
-    tcp = write_chain(program, model.robot.chain).tcp
+    tcp = _write_chain(program, model.robot.chain).tcp
     return _routine(program, [value for row in tcp.rotation for value in row])
 
 
@@ -65,7 +166,7 @@ def deflection(model: ElasticModel, compliance: Sequence[float]) -> Routine:
     """
     program = Program()
     laws = _Laws(program, model)
-    total = NOTHING
+    total = _NOTHING
     # A spring between two places of the chain moves neither before both its torques are known.
     waiting: list[_Place] = []
     moved: dict[int, Value] = {}
@@ -134,7 +235,7 @@ class _Place:
     """From it to the tool centre point."""
     moment: Vector
     """Of the load, about the point."""
-    axes: dict[int, tuple[SpringAxis, Frame]]
+    axes: dict[int, tuple[SpringAxis, _Frame]]
     """By number, with the frame that each is fixed in."""
     directions: dict[int, Vector] = field(default_factory=dict)
 
@@ -147,10 +248,10 @@ class _Place:
         """Write and yield one axis after the other."""
         program = self.program
         for number, (axis, frame) in self.axes.items():
-            fixed = constant_vector(program, f"spring{number + 1}", axis.axis)
-            a = program.transformed(f"a{number + 1}", frame.rotation, fixed, NOTHING)
+            fixed = _constant_vector(program, f"spring{number + 1}", axis.axis)
+            a = program.transformed(f"a{number + 1}", frame.rotation, fixed, _NOTHING)
             self.directions[number] = a
-            torque = program.dot(f"tau{number + 1}", a, self.moment if axis.revolute else FORCE)
+            torque = program.dot(f"tau{number + 1}", a, self.moment if axis.revolute else _FORCE)
             yield _LoadedAxis(number, axis.revolute, a, torque)
 
 
@@ -227,7 +328,7 @@ def _displaced(program: Program, start: Vector, place: _Place, moved: dict[int, 
 
 def _places(program: Program, model: ElasticModel) -> Iterator[_Place]:
     """Write the chain and yield where springs sit, from base to tip."""
-    chain = write_chain(program, model.robot.chain)
+    chain = _write_chain(program, model.robot.chain)
     axes = [axis for spring in model.springs for axis in spring.axes]
     before: dict[int, int] = {}
     for (joint, behind, offset), numbers in _points(model, axes):
@@ -235,11 +336,11 @@ def _places(program: Program, model: ElasticModel) -> Iterator[_Place]:
         label = f"{joint + 1}" + (f"_{before[joint]}" if before[joint] > 1 else "")
         program.remark(f"springs {', '.join(axes[i].name for i in numbers)}")
         frame = _frame(chain, joint, behind)
-        shift = constant_vector(program, f"offset{label}", offset)
+        shift = _constant_vector(program, f"offset{label}", offset)
         at = program.transformed(f"at{label}", frame.rotation, shift, frame.origin)
         x, y, z = (-value for value in at)
         lever = program.add(f"lever{label}", chain.tcp.origin, (x, y, z))
-        moment = program.cross(f"moment{label}", lever, FORCE, MOMENT)
+        moment = program.cross(f"moment{label}", lever, _FORCE, _MOMENT)
         here = {i: (axes[i], _frame(chain, joint, axes[i].distal)) for i in numbers}
         yield _Place(program, label, lever, moment, here)
 
@@ -259,7 +360,7 @@ def _points(model: ElasticModel, axes: Sequence[SpringAxis]) -> list[tuple[_Poin
     return sorted(groups.items(), key=lambda item: (item[0][:2], item[1]))
 
 
-def _frame(chain: Chain, joint: int, behind: bool) -> Frame:
+def _frame(chain: _Chain, joint: int, behind: bool) -> _Frame:
     return chain.joints[joint].distal if behind else chain.joints[joint].proximal
 
 

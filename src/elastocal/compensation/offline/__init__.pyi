@@ -1,15 +1,10 @@
 from .correct import (
     LARGEST_DEFLECTION as LARGEST_DEFLECTION,
+    CorrectionFigures as CorrectionFigures,
+    CorrectionSummary as CorrectionSummary,
+    LengthStatistics as LengthStatistics,
     PathCorrection as PathCorrection,
     correct_rows as correct_rows,
-)
-from .path_columns import (
-    PathColumns as PathColumns,
-    PathError as PathError,
-    WrenchColumns as WrenchColumns,
-    find_columns as find_columns,
-    find_wrench_columns as find_wrench_columns,
-    in_file as in_file,
 )
 from .path_file import (
     CorrectionSettings as CorrectionSettings,
@@ -24,18 +19,18 @@ from .path_joints import (
     posture_jumps as posture_jumps,
     turned_inside as turned_inside,
 )
-from .path_rows import (
+from .path_table import (
+    PathColumns as PathColumns,
+    PathError as PathError,
     PathValues as PathValues,
-    beyond_a_turn as beyond_a_turn,
-    count_lines as count_lines,
+    WrenchColumns as WrenchColumns,
+    find_columns as find_columns,
+    find_wrench_columns as find_wrench_columns,
+    in_file as in_file,
     read_layout as read_layout,
     read_values as read_values,
+    require_within_a_turn as require_within_a_turn,
     row_blocks as row_blocks,
     turned_to_base as turned_to_base,
-)
-from .summary import (
-    CorrectionFigures as CorrectionFigures,
-    CorrectionSummary as CorrectionSummary,
-    LengthStatistics as LengthStatistics,
-    LengthSummary as LengthSummary,
+    wrench_in_base as wrench_in_base,
 )

@@ -1,6 +1,6 @@
 """``PATH.csv`` to ``OUT.csv``: rows corrected block by block, everything else as it stood."""
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -11,15 +11,19 @@ from elastocal.compensation.offline import (
     PathColumns,
     PathError,
     PathValues,
-    count_lines,
     find_columns,
     in_file,
     read_layout,
     read_values,
     row_blocks,
-    turned_to_base,
+    wrench_in_base,
 )
-from elastocal.compensation.offline.correct import LARGEST_DEFLECTION, PathCorrection, correct_rows
+from elastocal.compensation.offline.correct import (
+    LARGEST_DEFLECTION,
+    CorrectionSummary,
+    PathCorrection,
+    correct_rows,
+)
 from elastocal.compensation.offline.path_joints import (
     RowName,
     check_limits,
@@ -27,7 +31,7 @@ from elastocal.compensation.offline.path_joints import (
     nearest_zero_posture,
     posture_jumps,
 )
-from elastocal.compensation.offline.summary import CorrectionSummary
+from elastocal.errors import FileAccessError
 from elastocal.identification import CalibratedModel
 from elastocal.progress import Progress, silent
 from elastocal.results import brief_repr
@@ -36,6 +40,8 @@ from elastocal.tables import TableRows, new_table
 
 _ROWS_AT_A_TIME = 2000
 """Rows corrected at a time; bounds memory."""
+_BYTES_AT_A_TIME = 1 << 20
+"""Bytes that are read at a time when lines are counted."""
 _ADDED = tuple(f"deflection_{axis}{end}[m]" for end in ("", "_low", "_high") for axis in "xyz")
 
 
@@ -81,51 +87,39 @@ def compensate_path(
     with in_file(path):
         layout = read_layout(path)
         columns = find_columns(layout.header, calibrated.model.robot)
-        solver = inverse_for(calibrated.model.robot)
-        job = _Job(calibrated, solver, columns, settings)
-        total = count_lines(path) - len(layout.preamble) - 1
+        robot, solver = calibrated.model.robot, inverse_for(calibrated.model.robot)
+        total = _count_lines(path) - len(layout.preamble) - 1
         kept = [i for i, name in enumerate(layout.header) if name.strip() not in _ADDED]
         header = (*(layout.header[i] for i in kept), *_ADDED)
+        summary, previous = CorrectionSummary(), settings.start
         with new_table(out, replace(layout, header=header)) as write:
-            return _correct_blocks(
-                job,
-                row_blocks(path, layout, _ROWS_AT_A_TIME),
-                lambda block, found: write(_new_cells(job, block, kept, found)),
-                lambda done: progress("rows", done, total),
-            )
-
-
-@dataclass(frozen=True, eq=False)
-class _Job:
-    calibrated: CalibratedModel
-    solver: InverseKinematics
-    columns: PathColumns
-    settings: CorrectionSettings
-
-
-def _correct_blocks(
-    job: _Job,
-    blocks: Iterable[TableRows],
-    write: Callable[[TableRows, PathCorrection], None],
-    done: Callable[[int], None],
-) -> CorrectionSummary:
-    summary, previous = CorrectionSummary(), job.settings.start
-    for block in blocks:
-        values = read_values(block, job.columns)
-        labels = [f"row {line}" for line in block.lines]
-        q, T = programmed_rows(job.solver, values, previous, labels.__getitem__)
-        found = _corrected(job, values, q, T, labels.__getitem__)
-        shift = found.T_base_tcp[:, :3, 3] - T[:, :3, 3]
-        turned: list[int] = []
-        if job.columns.by_pose:
-            # How the first row is reached is not the path's.
-            before = previous if summary.rows and previous is not None else q[0]
-            turned = posture_jumps(job.solver.robot, q, before).tolist()
-            summary = summary if summary.rows else replace(summary, start=tuple(q[0].tolist()))
-        summary = summary.plus(found, shift, labels, turned)
-        previous = q[-1]
-        write(block, found)
-        done(summary.rows)
+            for block in row_blocks(path, layout, _ROWS_AT_A_TIME):
+                values = read_values(block, columns)
+                labels = [f"row {line}" for line in block.lines]
+                q, T = programmed_rows(solver, values, previous, labels.__getitem__)
+                found = correct_rows(
+                    solver,
+                    calibrated,
+                    q,
+                    T,
+                    wrench_in_base(values, columns, T),
+                    labels.__getitem__,
+                    may_turn=columns.by_pose,
+                    largest=settings.largest,
+                )
+                turned: list[int] = []
+                if columns.by_pose:
+                    # How the first row is reached is not the path's.
+                    before = previous if summary.rows and previous is not None else q[0]
+                    turned = posture_jumps(robot, q, before).tolist()
+                    if not summary.rows:
+                        summary = replace(summary, start=tuple(q[0].tolist()))
+                summary = summary.plus(
+                    found, found.T_base_tcp[:, :3, 3] - T[:, :3, 3], labels, turned
+                )
+                previous = q[-1]
+                write(_new_cells(columns, robot.external_axes, block, kept, found))
+                progress("rows", summary.rows, total)
     return summary
 
 
@@ -168,38 +162,21 @@ def programmed_rows(
     return joints_along_path(solver, values.T_base_tcp, external, before, where), values.T_base_tcp
 
 
-def _corrected(
-    job: _Job, values: PathValues, q: FloatArray, T: FloatArray, where: RowName
-) -> PathCorrection:
-    force = turned_to_base(values.force, job.columns.force, T)
-    moment = turned_to_base(values.moment, job.columns.moment, T)
-    if force is None:
-        raise PathError("path has no forces")
-    wrench, largest = (force, moment), job.settings.largest
-    return correct_rows(
-        job.solver,
-        job.calibrated,
-        q,
-        T,
-        wrench,
-        where,
-        may_turn=job.columns.by_pose,
-        largest=largest,
-    )
-
-
 def _new_cells(
-    job: _Job, block: TableRows, kept: list[int], found: PathCorrection
+    columns: PathColumns,
+    external_axes: int,
+    block: TableRows,
+    kept: list[int],
+    found: PathCorrection,
 ) -> Iterator[list[str]]:
     """Yield the cells of corrected rows; only those that were corrected are new text."""
-    columns, robot = job.columns, job.solver.robot
     new: list[tuple[int, list[str]]] = []
     if columns.by_pose:
         # The orientation is kept, and so is its text.
         position = found.T_base_tcp[:, :3, 3]
         pairs = list(zip(columns.position, position.T, strict=True))
     else:
-        pairs = list(zip(columns.joints, found.q.T, strict=True))[robot.external_axes :]
+        pairs = list(zip(columns.joints, found.q.T, strict=True))[external_axes:]
     for column, numbers in pairs:
         new.append((column.index, list(map(repr, (numbers / column.scale).tolist()))))
     deflection = np.hstack([found.deflection, found.low, found.high])
@@ -208,3 +185,13 @@ def _new_cells(
         for index, text in new:
             cells[index] = text[row]
         yield [*(cells[i] for i in kept), *end]
+
+
+def _count_lines(path: Path) -> int:
+    """Return the number of lines of a file, for a progress bar."""
+    try:
+        with Path(path).open("rb") as file:
+            blocks = iter(lambda: file.read(_BYTES_AT_A_TIME), b"")
+            return sum(block.count(b"\n") for block in blocks)
+    except OSError as error:
+        raise FileAccessError(f"cannot read {path}: {error.strerror or error}") from error

@@ -1,5 +1,4 @@
-from .compensator import Compensator as Compensator
-from .conditioner import Conditioner as Conditioner
+from .compensator import Compensator as Compensator, Conditioner as Conditioner
 from .design import (
     JOINT_RANGE as JOINT_RANGE,
     LONG_AGO as LONG_AGO,

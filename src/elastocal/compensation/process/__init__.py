@@ -5,10 +5,8 @@
 `placement`    fibre placement courses on a dome (paper 4.2)
 `roughing`     rings of a dome roughed from a block (paper 4.3)
 `postures`     the processes by name; one spin and rail position for their courses
-`correctors`   the online compensator, or a perfect one with delay
-`loop`         cycle by cycle: readings, correction, delay, deviation
-`result`       mean, max and standard deviation; reduction: Table 1
-`folder`       the result's folder, written and read
+`loop`         cycle by cycle: readings, corrector, delay, deviation
+`result`       mean, max and standard deviation; reduction: Table 1, and its folder
 =============  ====================================================================
 
 Nothing here knows what the cell truly does: it comes in as a `loop.TrueCell`.

@@ -1,8 +1,3 @@
-from .correctors import (
-    Corrector as Corrector,
-    ModelCorrector as ModelCorrector,
-    PerfectCorrector as PerfectCorrector,
-)
 from .course import (
     Course as Course,
     Process as Process,
@@ -14,20 +9,14 @@ from .course import (
     tool_frames as tool_frames,
     unit_tangents as unit_tangents,
 )
-from .folder import (
-    DEVIATIONS as DEVIATIONS,
-    PROGRAMMED_PATH as PROGRAMMED_PATH,
-    TABLE as TABLE,
-    read_process as read_process,
-    read_table as read_table,
-    write_process as write_process,
-    write_programmed_path as write_programmed_path,
-)
 from .loop import (
     Controller as Controller,
+    Corrector as Corrector,
     CourseDeviation as CourseDeviation,
     CourseRun as CourseRun,
     LoadedRobot as LoadedRobot,
+    ModelCorrector as ModelCorrector,
+    PerfectCorrector as PerfectCorrector,
     TrueCell as TrueCell,
     air_shifts as air_shifts,
     run_course as run_course,
@@ -39,6 +28,9 @@ from .postures import (
     with_postures as with_postures,
 )
 from .result import (
+    DEVIATIONS as DEVIATIONS,
+    PROGRAMMED_PATH as PROGRAMMED_PATH,
+    TABLE as TABLE,
     DeviationComparison as DeviationComparison,
     DeviationStatistics as DeviationStatistics,
     ProcessRun as ProcessRun,
@@ -46,5 +38,9 @@ from .result import (
     SimulateProcessResult as SimulateProcessResult,
     compare_deviations as compare_deviations,
     pooled as pooled,
+    read_process as read_process,
+    read_table as read_table,
+    write_process as write_process,
+    write_programmed_path as write_programmed_path,
 )
 from .roughing import Roughing as Roughing

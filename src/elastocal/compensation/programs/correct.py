@@ -1,7 +1,8 @@
 """A controller's program corrected: new numbers at its points, all else as it stood."""
 
+import sys
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -13,8 +14,8 @@ from elastocal.compensation.offline import (
     PathColumns,
     PathCorrection,
     PathError,
+    PathValues,
     RowName,
-    WrenchColumns,
     check_limits,
     correct_rows,
     find_wrench_columns,
@@ -23,7 +24,7 @@ from elastocal.compensation.offline import (
     read_layout,
     read_values,
     row_blocks,
-    turned_to_base,
+    wrench_in_base,
 )
 from elastocal.compensation.programs.krl import read_krl
 from elastocal.compensation.programs.program import (
@@ -42,8 +43,6 @@ PROGRAM_READERS: Mapping[str, Callable[[Path], ControllerProgram]] = {".src": re
 """Readers of programs by the suffix of their main file."""
 _POINT = "point"
 """The column that names the points in a table of forces."""
-_BLOCK = 10_000
-"""Rows of that table that are read at a time."""
 _SAME = 1e-3
 """Postures nearer than this in every joint (rad or m) are one."""
 
@@ -98,7 +97,9 @@ def compensate_program(
         If a file cannot be read or written.
     """
     settings = CorrectionSettings() if settings is None else settings
-    program, table = PROGRAM_READERS[path.suffix.lower()](path), read_forces(forces)
+    program = PROGRAM_READERS[path.suffix.lower()](path)
+    with in_file(forces):
+        table = _read_forces(forces)
     placed = np.eye(4) if T_base_frame is None else T_base_frame
     follower = _PostureFollower(inverse_for(calibrated.model.robot), program, placed)
     text, data = program.files
@@ -118,62 +119,36 @@ def compensate_program(
     return ProgramCorrection(program, summary, files, assumed, notes)
 
 
-@brief_repr
 @dataclass(frozen=True, eq=False)
-class PointForces:
+class _PointForces:
     """Forces and moments by point."""
 
     rows: dict[str, int]
     """Row of each point, by its name in capitals."""
-    force: FloatArray
-    """As the table has it, shape (row, 3), in N."""
-    moment: FloatArray | None
-    """The same in N·m."""
-    force_columns: WrenchColumns
-    moment_columns: WrenchColumns | None
+    values: PathValues
+    columns: PathColumns
 
 
-def read_forces(path: Path) -> PointForces:
-    """Return the forces of a table.
-
-    Raises
-    ------
-    PathError
-        If a column is missing, a cell is not a number, or a point stands twice.
-    FileAccessError
-        If the file cannot be read.
-    """
-    with in_file(path):
-        return _read_forces(path)
-
-
-def _read_forces(path: Path) -> PointForces:
+def _read_forces(path: Path) -> _PointForces:
     layout = read_layout(path)
-    force, moment = find_wrench_columns(layout.header)
+    columns = find_wrench_columns(layout.header)
     header = [name.strip() for name in layout.header]
     if header.count(_POINT) != 1:
         raise PathError(
             f"one column {_POINT!r} must name the points; the columns are {', '.join(header)}"
         )
-    place, columns = header.index(_POINT), PathColumns((), (), (), force, moment)
+    place = header.index(_POINT)
+    (table,) = row_blocks(path, layout, sys.maxsize)
     rows: dict[str, int] = {}
-    forces: list[FloatArray] = []
-    moments: list[FloatArray] = []
-    for block in row_blocks(path, layout, _BLOCK):
-        for line, cells in zip(block.lines, block.cells, strict=True):
-            name = cells[place].strip().upper()
-            if not name or name in rows:
-                raise PathError(f"row {line}: point {name!r} stands twice or has no name")
-            rows[name] = len(rows)
-        values = read_values(block, columns)
-        forces += [] if values.force is None else [values.force]
-        moments += [] if values.moment is None else [values.moment]
-    return PointForces(
-        rows, np.vstack(forces), np.vstack(moments) if moments else None, force, moment
-    )
+    for line, cells in zip(table.lines, table.cells, strict=True):
+        name = cells[place].strip().upper()
+        if not name or name in rows:
+            raise PathError(f"row {line}: point {name!r} stands twice or has no name")
+        rows[name] = len(rows)
+    return _PointForces(rows, read_values(table, columns), columns)
 
 
-def _targets(program: ControllerProgram, table: PointForces, forces: Path) -> frozenset[str]:
+def _targets(program: ControllerProgram, table: _PointForces, forces: Path) -> frozenset[str]:
     """Return the points that are corrected: straight ones, and those that have a force."""
     targets: set[str] = set()
     for move in program.moves:
@@ -206,7 +181,7 @@ def _targets(program: ControllerProgram, table: PointForces, forces: Path) -> fr
 def _corrected(
     calibrated: CalibratedModel,
     follower: "_PostureFollower",
-    table: PointForces,
+    table: _PointForces,
     postures: dict[str, FloatArray],
     largest: float,
 ) -> tuple[PathCorrection, CorrectionSummary]:
@@ -215,9 +190,10 @@ def _corrected(
     labels = [f"point {point.name}" for point in points]
     T = np.array([follower.pose(point, q[row]) for row, point in enumerate(points)])
     rows = [table.rows[name] for name in postures]
-    force = np.asarray(turned_to_base(table.force[rows], table.force_columns, T))
-    moment = None if table.moment is None else table.moment[rows]
-    moment = turned_to_base(moment, table.moment_columns, T)
+    force, moment = (
+        None if each is None else each[rows] for each in (table.values.force, table.values.moment)
+    )
+    values = replace(table.values, force=force, moment=moment)
     # A point by axes means its joints as they stand; the turn of a frame is the controller's.
     frames = not any(point.by_axes for point in points)
     found = correct_rows(
@@ -225,7 +201,7 @@ def _corrected(
         calibrated,
         q,
         T,
-        (force, moment),
+        wrench_in_base(values, table.columns, T),
         labels.__getitem__,
         may_turn=frames,
         largest=largest,

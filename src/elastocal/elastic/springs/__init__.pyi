@@ -24,4 +24,5 @@ from .spring import (
     SpringLoad as SpringLoad,
     Tangents as Tangents,
     Unit as Unit,
+    as_axis as as_axis,
 )

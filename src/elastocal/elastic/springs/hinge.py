@@ -1,7 +1,6 @@
 """Hinge: a linear spring about an axis, or along one."""
 
 from elastocal.arrays import FloatArray
-from elastocal.elastic.directions import as_axis
 from elastocal.elastic.springs.expression import Quantity
 from elastocal.elastic.springs.spring import (
     Angles,
@@ -10,6 +9,7 @@ from elastocal.elastic.springs.spring import (
     SpringLoad,
     Tangents,
     Unit,
+    as_axis,
 )
 from elastocal.records import record
 from elastocal.robot import ChainJoint

@@ -6,6 +6,7 @@ from dataclasses import dataclass, fields
 from typing import ClassVar, Generic
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from elastocal.arrays import FloatArray
 from elastocal.elastic.springs.expression import Quantity
@@ -221,3 +222,19 @@ class OneAxisSpring(Spring):
         """The axis of the spring."""
         place = (self.axis, self.revolute, self.distal, self.offset)
         return (SpringAxis(self.name, self.joint, *place),)
+
+
+def as_axis(vector: ArrayLike) -> tuple[float, float, float]:
+    """Return a vector as a unit axis.
+
+    Raises
+    ------
+    SpringError
+        If it is not three finite numbers, or zero.
+    """
+    array = np.asarray(vector, dtype=float)
+    length = float(np.linalg.norm(array)) if array.shape == (3,) else 0.0
+    if not 0.0 < length < np.inf:
+        raise SpringError(f"axis {vector!r} must be three finite numbers that are not all zero")
+    unit: FloatArray = array / length
+    return float(unit[0]), float(unit[1]), float(unit[2])

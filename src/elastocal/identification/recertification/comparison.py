@@ -1,5 +1,10 @@
-"""Compare two calibrations of one cell: what changed, and whether it matters (recertification)."""
+"""Compare two calibrations of one cell: what changed, and whether it matters (recertification).
 
+The verdict is given in words: pass, fail or undecided, what would decide, and caveats.
+"""
+
+import math
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -7,17 +12,149 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from elastocal.arrays import FloatArray
-from elastocal.elastic import check_vectors
 from elastocal.errors import IdentificationError, RobotError, SpringError
-from elastocal.identification.calibrated import CalibratedModel
-from elastocal.identification.model_file import CalibrateResult, read_model
-from elastocal.identification.recertification._judgement import judge, load_note, notes_on
-from elastocal.identification.recertification._rows import compare_rows
-from elastocal.identification.recertification._spread import Spread
-from elastocal.identification.recertification._springs import common_springs, compare_springs
-from elastocal.identification.recertification.result import CompareResult, CompareSummary
+from elastocal.identification.calibration import CalibratedModel, check_rows
+from elastocal.identification.model_file import CalibrateResult
+from elastocal.identification.recertification._changes import (
+    Spread,
+    common_springs,
+    compare_rows,
+    compare_springs,
+)
+from elastocal.identification.recertification.result import (
+    CompareResult,
+    CompareSummary,
+    RowComparison,
+    Verdict,
+)
 from elastocal.records import read_json
 from elastocal.robot import Robot
+
+_MOST = 20
+"""Beyond this many times the poses nobody measures."""
+_PLAN = re.compile(r"\bplan ([0-9a-f]{12,})\b")
+_LIKE = 1.25
+"""Mean measured deflections further apart than by this factor come from other loads."""
+
+
+def judge(deflection: RowComparison | None, limit: float | None) -> tuple[Verdict | None, str]:
+    """Return the verdict on the largest change against a limit in m, and why.
+
+    Parameters
+    ----------
+    deflection : RowComparison, optional
+        Over the rows that matter; None: there are none.
+    limit : float, optional
+        Largest accepted change, in m.
+    """
+    if limit is None:
+        return None, "no limit was given, so nothing was judged"
+    if deflection is None:
+        return None, (
+            "not judged: a limit is held against the poses and forces that matter, and no rows were"
+            " given"
+        )
+    largest, allowed = deflection.largest, f"the limit of {1e3 * limit:g} mm"
+    found = (
+        f"the largest change is {_mm(largest.value)}"
+        f" ({1e3 * largest.low:.3f} to {_mm(largest.high)}, 95 %)"
+    )
+    if largest.high <= limit:
+        return Verdict.PASS, f"{found}, all of it within {allowed}"
+    if largest.low > limit:
+        return Verdict.FAIL, f"{found}, all of it beyond {allowed}"
+    decides = _what_decides(deflection, limit)
+    return Verdict.UNDECIDED, f"{found}, and {allowed} lies in between; {decides}"
+
+
+def _what_decides(deflection: RowComparison, limit: float) -> str:
+    """Return what would decide a verdict that is open, if the estimate stays.
+
+    The old calibration cannot be repeated: that arm is gone. Only the new one's part of the
+    variance shrinks, as one over its poses.
+    """
+    largest = deflection.largest
+    passing = largest.value < limit
+    half = largest.high - largest.value if passing else largest.value - largest.low
+    row = int(deflection.high.argmax()) if passing else deflection.where
+    share = float(deflection.old_share[row])
+    spare = (abs(limit - largest.value) / half) ** 2 - share
+    times = math.inf if not spare > 0.0 else (1.0 - share) / spare
+    limits = f"limits of {_mm(largest.high)} and more would pass"
+    if largest.low > 0.0:
+        limits += f", limits below {_mm(largest.low)} fail"
+    if not times <= _MOST:
+        return f"more poses in the new calibration alone will hardly decide it; {limits}"
+    return (
+        f"about {max(math.ceil(10.0 * times) / 10.0, 1.1):.1f} times as many poses in the new"
+        f" calibration would decide it, if the estimate stays; {limits}"
+    )
+
+
+def _mm(length: float) -> str:
+    return f"{1e3 * length:.3f} mm"
+
+
+def notes_on(
+    old: CalibratedModel, new: CalibratedModel, same_springs: bool, outside: int
+) -> tuple[str, ...]:
+    """Return what a reader has to know beside the figures, a sentence each.
+
+    Parameters
+    ----------
+    old, new : CalibratedModel
+        What is compared.
+    same_springs : bool
+        Whether the models have the same springs.
+    outside : int
+        Number of rows outside the joint limits.
+    """
+    notes = []
+    if not same_springs:
+        notes.append(
+            "the models have different springs: a spring's value depends on which others are in the"
+            " model, so the springs do not tell whether the robot changed; predictions do, as far"
+            " as both models can express the arm"
+        )
+    if old.provenance and old.provenance == new.provenance:
+        notes.append(
+            f"both models state the same origin ({old.provenance}): calibrations of one set of"
+            " readings are not independent, and the intervals do not hold for them"
+        )
+    elif not _same_plan(old, new):
+        notes.append(
+            "the models do not state one and the same plan: the intervals hold if both calibrations"
+            " spread their poses over the same region under the same forces; elsewhere the arm does"
+            " what springs cannot express, and this looks like a change"
+        )
+    if outside:
+        notes.append(f"{outside} rows lie outside the joint limits of the robot")
+    return tuple(notes)
+
+
+def load_note(old: float | None, new: float | None) -> str | None:
+    """Return what other loads do to a comparison, or None where they were alike.
+
+    Parameters
+    ----------
+    old, new : float, optional
+        Mean measured deflection of each calibration, in m; None: not known.
+    """
+    if old is None or new is None or not (old > 0.0 and new > 0.0):
+        return None
+    if not abs(np.log(new / old)) > np.log(_LIKE):
+        return None
+    return (
+        f"the arm was deflected by {1e3 * old:.3f} mm on average in the old calibration and by"
+        f" {1e3 * new:.3f} mm in the new one: with other forces gears that stiffen under load look"
+        " like a change"
+    )
+
+
+def _same_plan(old: CalibratedModel, new: CalibratedModel) -> bool:
+    plans = [_PLAN.search(each.provenance) for each in (old, new)]
+    return plans[0] is not None and plans[1] is not None and plans[0][1] == plans[1][1]
+
 
 _PROBES, _SEED = 8, 0
 _LENGTH, _ANGLE = 1e-4, 1e-4
@@ -52,16 +189,10 @@ def recertify_files(
     """
     if Path(old).resolve() == Path(new).resolve():
         raise IdentificationError(f"{old} and {new} are one and the same file: nothing to compare")
-    found = recertify(
-        _read_named(old),
-        _read_named(new),
-        q,
-        force,
-        moment,
-        limit=limit,
-        names=(str(old), str(new)),
-    )
-    note = load_note(*(_measured_deflection(path) for path in (old, new)))
+    (old_model, old_deflection), (new_model, new_deflection) = _read(old), _read(new)
+    names = (str(old), str(new))
+    found = recertify(old_model, new_model, q, force, moment, limit=limit, names=names)
+    note = load_note(old_deflection, new_deflection)
     if note is None:
         return found
     return replace(found, summary=replace(found.summary, notes=(*found.summary.notes, note)))
@@ -111,7 +242,7 @@ def recertify(
             f"{names[0]} and {names[1]} are one and the same calibration: nothing to compare"
         )
     spread = Spread.of(old, new)
-    loads = None if q is None else _checked_rows(new, q, force, moment)
+    loads = None if q is None else _checked_rows(new.model.robot, q, force, moment)
     rows = None if loads is None else compare_rows(old, new, spread, *loads)
     verdict, reason = judge(rows, limit)
     springs = compare_springs(old, new, spread)
@@ -181,20 +312,15 @@ def check_same_robot(old: Robot, new: Robot, names: tuple[str, str]) -> None:
 
 
 def _checked_rows(
-    model: CalibratedModel, q: ArrayLike, force: ArrayLike | None, moment: ArrayLike | None
+    robot: Robot, q: ArrayLike, force: ArrayLike | None, moment: ArrayLike | None
 ) -> tuple[FloatArray, FloatArray, FloatArray | None]:
     """Return rows as arrays, or refuse them by shape or value."""
-    joints = model.model.robot.check_positions(q)
     if force is None:
         raise SpringError("rows have joint positions q but no force")
-    loads = {"force": force} | ({} if moment is None else {"moment": moment})
-    vectors = {name: check_vectors(name, each) for name, each in loads.items()}
-    for name, array in vectors.items():
-        if joints.ndim != 2 or not len(joints) or array.shape != (len(joints), 3):
-            raise SpringError(
-                f"{name} {array.shape} does not have a row for each of q {joints.shape}"
-            )
-    return joints, vectors["force"], vectors.get("moment")
+    joints, forces, moments = check_rows(robot, q, force, moment)
+    if not len(joints):
+        raise SpringError(f"force {forces.shape} does not have a row for each of q {joints.shape}")
+    return joints, forces, moments
 
 
 def _count_outside_limits(robot: Robot, q: FloatArray) -> int:
@@ -218,15 +344,12 @@ def _apart(a: FloatArray, b: FloatArray) -> tuple[float, float]:
     return float(distance.max()), float(2.0 * np.arcsin(np.minimum(chord.max(), 1.0)))
 
 
-def _read_named(path: Path) -> CalibratedModel:
-    """Return the model of a file; of two files, a refusal has to say which."""
+def _read(path: Path) -> tuple[CalibratedModel, float | None]:
+    """Return the model of a file, and the mean measured deflection that it states, in m."""
+    found = read_json(path, CalibrateResult)
+    figures = found.calibration
     try:
-        return read_model(path)
+        return found.calibrated, None if figures is None else figures.deflection.mean
     except (SpringError, RobotError) as error:
+        # Of two files, a refusal has to say which.
         raise type(error)(f"{path}: {error}") from error
-
-
-def _measured_deflection(path: Path) -> float | None:
-    """Return the mean measured deflection that a model file states, in m; None: none."""
-    figures = read_json(path, CalibrateResult).calibration
-    return None if figures is None else figures.deflection.mean

@@ -5,6 +5,7 @@ margins have different units.
 """
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
@@ -21,36 +22,25 @@ class JointLimitsCheck:
 
     robot: Robot
     keep: FloatArray | float
-    """Margin to keep, a number in rad, or shape (joint,), in rad (m for prismatic joints)."""
+    """Margin to keep, a number in `unit`, or shape (joint,), in rad or m."""
     name: str = "joint_limits"
     unit: str = "rad"
     advice: str = "move the tooling towards the middle of the robot's reach, or mount the tool anew"
+    _turning: ClassVar[bool] = True
 
     def margin(self, postures: Postures) -> FloatArray:
-        """Return the margin of each posture, shape (pose,), in rad."""
-        return _left(self.robot, postures, self.keep, np.array(self.robot.revolute))
+        """Return the margin of each posture, shape (pose,), in `unit`."""
+        limits, judged = self.robot.limits, np.array(self.robot.revolute) == self._turning
+        both = np.minimum(limits.margin(postures.q), limits.margin(postures.q_approach))
+        return np.asarray((both - self.keep)[:, judged].min(axis=1, initial=np.inf))
 
 
 @brief_repr
 @dataclass(frozen=True, eq=False)
-class TravelLimitsCheck:
+class TravelLimitsCheck(JointLimitsCheck):
     """Smallest distance of any prismatic joint to its nearer limit, less the margin asked for."""
 
-    robot: Robot
-    keep: FloatArray | float
-    """Margin to keep, a number in m, or shape (joint,), in m (rad for revolute joints)."""
     name: str = "travel_limits"
     unit: str = "m"
     advice: str = "choose positions of the rail farther from its ends, or a smaller rail_margin"
-
-    def margin(self, postures: Postures) -> FloatArray:
-        """Return the margin of each posture, shape (pose,), in m."""
-        return _left(self.robot, postures, self.keep, ~np.array(self.robot.revolute))
-
-
-def _left(
-    robot: Robot, postures: Postures, keep: FloatArray | float, judged: np.ndarray
-) -> FloatArray:
-    limits = robot.limits
-    both = np.minimum(limits.margin(postures.q), limits.margin(postures.q_approach))
-    return np.asarray((both - keep)[:, judged].min(axis=1, initial=np.inf))
+    _turning: ClassVar[bool] = False

@@ -1,10 +1,10 @@
 from .mover import (
     AxisMotion as AxisMotion,
     Mover as Mover,
+    Sweep as Sweep,
     clear_retreats as clear_retreats,
     contact_time as contact_time,
-    detour_vias as detour_vias,
-    lifted_vias as lifted_vias,
+    joint_radii as joint_radii,
     mover_for as mover_for,
 )
 from .route import (
@@ -14,5 +14,4 @@ from .route import (
     plan_route as plan_route,
     require_free_home as require_free_home,
 )
-from .sweep import Sweep as Sweep, joint_radii as joint_radii
 from .tour import Tour as Tour, shortest_tour as shortest_tour

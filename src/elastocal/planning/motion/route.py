@@ -97,9 +97,8 @@ class _Roadmap:
     def __post_init__(self) -> None:
         home = np.broadcast_to(self.q[_HOME_NODE], self.q[1:].shape)
         straight = 1 + np.flatnonzero(self.mover.sweep.free(self.q[1:], home))
-        self.stems.update(
-            (int(pose), self._transfer(int(pose), _HOME_NODE, self._none())) for pose in straight
-        )
+        for pose in straight.tolist():
+            self.stems[pose] = self._transfer(pose, _HOME_NODE, self._none())
         for pose in sorted(set(range(1, len(self.q))) - set(self.stems)):
             stem = self._first_free(pose, _HOME_NODE, self._single_vias(pose, _HOME_NODE))
             stem = stem or self._first_free(pose, _HOME_NODE, [self.q[[gate]] for gate in straight])

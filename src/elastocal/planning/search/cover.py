@@ -10,6 +10,7 @@ from typing import ClassVar, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.spatial import cKDTree
 
 from elastocal.arrays import FloatArray, IndexArray
 from elastocal.errors import PlanningError
@@ -155,9 +156,8 @@ class Cover:
 def _field(candidates: Candidates, count: int) -> DistanceField:
     if candidates.distance is not None:
         return MetricField(candidates.distance, candidates)
-    if len(candidates) >= _LARGE_POOL and count >= _MANY_PICKS:
-        return CellField(candidates.contact)
-    return PlainField(candidates.contact)
+    large = len(candidates) >= _LARGE_POOL and count >= _MANY_PICKS
+    return CellField(candidates.contact) if large else PlainField(candidates.contact)
 
 
 class PlainField:
@@ -165,11 +165,21 @@ class PlainField:
 
     def __init__(self, contact: FloatArray) -> None:
         self._axes = [np.ascontiguousarray(axis) for axis in contact.T]
-        self._squared = np.full(len(contact), np.inf)
+        self._nearest = np.full(len(contact), np.inf)
         self._work = np.empty((2, len(contact)))
 
     def add(self, index: int) -> None:
         """Choose a candidate."""
+        np.minimum(self._nearest, self._from(index), out=self._nearest)
+        self._nearest[index] = _CHOSEN
+
+    def farthest(self) -> Farthest:
+        """Return the candidate that is farthest from the chosen ones."""
+        index = int(self._nearest.argmax())
+        return Farthest(index, self._in_metres(max(float(self._nearest[index]), 0.0)))
+
+    def _from(self, index: int) -> FloatArray:
+        """Return the squared distance of every candidate from one, shape (pose,)."""
         total, term = self._work
         for number, axis in enumerate(self._axes):
             into = term if number else total
@@ -177,24 +187,21 @@ class PlainField:
             np.multiply(into, into, out=into)
             if number:
                 np.add(total, term, out=total)
-        np.minimum(self._squared, total, out=self._squared)
-        self._squared[index] = _CHOSEN
+        return total
 
-    def farthest(self) -> Farthest:
-        """Return the candidate that is farthest from the chosen ones."""
-        index = int(self._squared.argmax())
-        return Farthest(index, float(np.sqrt(max(self._squared[index], 0.0))))
+    def _in_metres(self, value: float) -> float:
+        return float(np.sqrt(value))
 
 
-class MetricField:
-    """Distances by a metric of the pool's own."""
+class MetricField(PlainField):
+    """Distances by a metric of the pool's own, as it gives them."""
 
     def __init__(self, metric: Metric, candidates: Candidates) -> None:
+        super().__init__(candidates.contact)
         self._metric = metric
-        self._distance = np.full(len(candidates), np.inf)
 
-    def add(self, index: int) -> None:
-        """Choose a candidate.
+    def _from(self, index: int) -> FloatArray:
+        """Return the distance of every candidate from one, shape (pose,).
 
         Raises
         ------
@@ -202,27 +209,23 @@ class MetricField:
             If the metric does not give one distance, 0 or more, for each candidate.
         """
         distance = np.asarray(self._metric.from_point(index), dtype=float)
-        expected = self._distance.shape
+        expected = self._nearest.shape
         if distance.shape != expected or not np.all(distance >= 0.0):
             raise PlanningError(
                 f"the metric's distances from candidate {index}: must be {expected[0]} numbers"
                 f" not below 0, got shape {distance.shape}, least {distance.min(initial=np.inf)}"
             )
-        np.minimum(self._distance, distance, out=self._distance)
-        self._distance[index] = _CHOSEN
+        return distance
 
-    def farthest(self) -> Farthest:
-        """Return the candidate that is farthest from the chosen ones."""
-        index = int(self._distance.argmax())
-        return Farthest(index, max(float(self._distance[index]), 0.0))
+    def _in_metres(self, value: float) -> float:
+        return value
 
 
 class CellField:
     """Euclidean distances in cells; picks equal those of `PlainField` bit for bit.
 
-    The bounding cube is halved along x, y, z in turn, as in a k-d tree with middle splits; the
-    candidates in the order of its leaves (Morton's Z-order) are cut into cells of equal size, so
-    that every step is a whole-array operation. Only cells that a new centre can improve are
+    The candidates in the order of a k-d tree's leaves are cut into cells of equal size, so that
+    every step is a whole-array operation. Only cells that a new centre can improve are
     visited: one whose box is no nearer to the centre than its own worst-covered candidate is to
     the old ones cannot change.
 
@@ -231,8 +234,8 @@ class CellField:
     """
 
     def __init__(self, contact: FloatArray, size: int = _CELL) -> None:
-        columns = np.ascontiguousarray(contact.T)
-        order = _z_order(columns)
+        # Middle splits: medians would take longer to find than the cells save.
+        order = cKDTree(contact, size, balanced_tree=False, compact_nodes=False).indices
         cells = -(-len(order) // size)
         # The last cell is filled up with copies of its last candidate, which change nothing.
         filled = np.concatenate([order, np.full(cells * size - len(order), order[-1])])
@@ -241,7 +244,7 @@ class CellField:
         self._cell = np.empty(len(contact), dtype=np.intp)
         self._cell[self._number] = np.arange(cells)[:, None]
         self._contact = contact
-        self._axes = [column[self._number] for column in columns]
+        self._axes = [column[self._number] for column in contact.T]
         self._low = np.array([axis.min(axis=1) for axis in self._axes])
         self._high = np.array([axis.max(axis=1) for axis in self._axes])
         self._squared = np.full((cells, size), np.inf)
@@ -280,42 +283,6 @@ class CellField:
         self._best[cells] = self._number[cells, column]
 
 
-def _z_order(columns: FloatArray) -> IndexArray:
-    """Return the numbers of points in the order of a k-d tree's leaves (Morton, 1966).
-
-    G. M. Morton, "A computer oriented geodetic data base and a new technique in file
-    sequencing", IBM, 1966. Points in the same finest leaf come by rising number.
-
-    Parameters
-    ----------
-    columns : ndarray, shape (3, point)
-        Coordinates of at least one point, finite.
-    """
-    count = columns.shape[1]
-    number_bits = max(count - 1, 1).bit_length()
-    bits = min((63 - number_bits) // 3, 16)
-    low = columns.min(axis=1)
-    # Points all in one place have no width; they share one leaf.
-    width = float((columns.max(axis=1) - low).max()) or 1.0
-    spaced = _spaced(bits)
-    key = np.zeros(count, dtype=np.int64)
-    for axis, (column, least) in enumerate(zip(columns, low, strict=True)):
-        leaf = ((column - least) / width * (2**bits - 1)).astype(np.intp)
-        key |= spaced[leaf] << axis
-    # Sorting plain numbers is faster than sorting an index by them.
-    key = np.sort(key << number_bits | np.arange(count))
-    return np.asarray(key & ((1 << number_bits) - 1), dtype=np.intp)
-
-
-def _spaced(bits: int) -> IndexArray:
-    """Return the numbers below ``2**bits`` with two zeros put between their binary digits."""
-    value = np.arange(2**bits, dtype=np.int64)
-    spaced = np.zeros_like(value)
-    for bit in range(bits):
-        spaced |= (value >> bit & 1) << 3 * bit
-    return spaced.astype(np.intp)
-
-
 def covering_radius(candidates: Candidates, chosen: ArrayLike) -> float:
     """Return the distance of the worst-covered candidate from its nearest chosen pose, in m.
 
@@ -334,8 +301,7 @@ def covering_radius(candidates: Candidates, chosen: ArrayLike) -> float:
     index = np.asarray(chosen, dtype=np.intp)
     if not len(index):
         raise PlanningError("the covering radius of no poses is not defined: choose at least 1")
-    metric = candidates.distance
-    field = PlainField(candidates.contact) if metric is None else MetricField(metric, candidates)
+    field = _field(candidates, len(index))
     for one in index:
         field.add(int(one))
     return field.farthest().distance

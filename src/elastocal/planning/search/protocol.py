@@ -46,15 +46,25 @@ class Candidates:
     unit of compliance: what I-optimality wants to predict well."""
 
     def __post_init__(self) -> None:
-        contact = _frozen(self.contact, "contact points")
+        contact = self._freeze("contact", "contact points")
         if contact.ndim != 2 or contact.shape[1] != 3:
             raise PlanningError(f"contact points of shape {contact.shape}: must be (pose, 3)")
         _check_each(contact, "contact point")
-        object.__setattr__(self, "contact", contact)
+        springs = "spring"
         if self.observation is not None:
-            self._set_observation(_frozen(self.observation, "observation rows"))
+            rows = self._freeze("observation", "observation rows")
+            if rows.ndim != 3 or len(rows) != len(self):
+                raise PlanningError(
+                    f"observation rows of shape {rows.shape}: must be (pose, row, spring)"
+                    f" for {len(self)} candidates"
+                )
+            _check_each(rows, "observation rows")
+            springs = str(rows.shape[2])
         if self.process is not None:
-            self._set_process(_frozen(self.process, "process rows"))
+            rows = self._freeze("process", "process rows")
+            if rows.ndim != 2 or not len(rows) or springs not in ("spring", str(rows.shape[1])):
+                raise PlanningError(f"process rows of shape {rows.shape}: must be (row, {springs})")
+            _check_each(rows, "process row", "process row")
 
     def __len__(self) -> int:
         """Return the number of candidates."""
@@ -73,21 +83,15 @@ class Candidates:
         distance = None if self.distance is None else _Part(self.distance, chosen)
         return Candidates(self.contact[chosen], observation, distance, self.process)
 
-    def _set_observation(self, rows: FloatArray) -> None:
-        if rows.ndim != 3 or len(rows) != len(self):
-            raise PlanningError(
-                f"observation rows of shape {rows.shape}: must be (pose, row, spring)"
-                f" for {len(self)} candidates"
-            )
-        _check_each(rows, "observation rows")
-        object.__setattr__(self, "observation", rows)
-
-    def _set_process(self, rows: FloatArray) -> None:
-        springs = "spring" if self.observation is None else str(self.observation.shape[2])
-        if rows.ndim != 2 or not len(rows) or springs not in ("spring", str(rows.shape[1])):
-            raise PlanningError(f"process rows of shape {rows.shape}: must be (row, {springs})")
-        _check_each(rows, "process row", "process row")
-        object.__setattr__(self, "process", rows)
+    def _freeze(self, name: str, what: str) -> FloatArray:
+        """Replace a field by a read-only copy and return it."""
+        try:
+            copy: NDArray[np.float64] = np.array(getattr(self, name), dtype=float)
+        except (TypeError, ValueError) as error:
+            raise PlanningError(f"{what} must be an array of numbers: {error}") from error
+        copy.setflags(write=False)
+        object.__setattr__(self, name, copy)
+        return copy
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,15 +103,6 @@ class _Part:
 
     def from_point(self, index: int) -> FloatArray:
         return self.metric.from_point(int(self.index[index]))[self.index]
-
-
-def _frozen(values: ArrayLike, what: str) -> FloatArray:
-    try:
-        copy: NDArray[np.float64] = np.array(values, dtype=float)
-    except (TypeError, ValueError) as error:
-        raise PlanningError(f"{what} must be an array of numbers: {error}") from error
-    copy.setflags(write=False)
-    return copy
 
 
 def _check_each(values: FloatArray, what: str, item: str = "candidate") -> None:

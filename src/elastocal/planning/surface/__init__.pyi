@@ -1,7 +1,6 @@
 from .contact import (
     DiskFit as DiskFit,
     contact_frames as contact_frames,
-    contact_poses as contact_poses,
     fit_disk as fit_disk,
 )
 from .distances import (
@@ -32,6 +31,7 @@ from .sampling import (
 )
 from .surface import (
     CREASE_ANGLE as CREASE_ANGLE,
+    Edges as Edges,
     Region as Region,
     Surface as Surface,
     SurfacePoints as SurfacePoints,

@@ -18,11 +18,6 @@ _NUDGE = 1e-5
 """Part of the radius by which a ray that slipped between two triangles is moved and cast again."""
 
 
-def contact_poses(points: SurfacePoints, spin: FloatArray) -> FloatArray:
-    """Return T_base_tcp at sampled points; see `contact_frames`."""
-    return contact_frames(points.position, points.normal, spin)
-
-
 def contact_frames(position: FloatArray, normal: FloatArray, spin: FloatArray) -> FloatArray:
     """Return T_base_tcp at points, z into the surface, turned about z by each spin.
 

@@ -46,18 +46,13 @@ def distance_to_boundary(surface: Surface, points: SurfacePoints) -> FloatArray:
     pieces, patch_of_piece = _border_pieces(surface)
     distance = np.full(len(points), np.inf)
     patch_of_point = surface.patch[points.face]
-    by_point, by_piece = np.argsort(patch_of_point), np.argsort(patch_of_piece)
-    patches = np.unique(patch_of_point)
-    point_ends = _ranges(patch_of_point[by_point], patches)
-    piece_ends = _ranges(patch_of_piece[by_piece], patches)
-    for (p0, p1), (s0, s1) in zip(point_ends, piece_ends, strict=True):
-        if s1 > s0:
-            chosen = by_point[p0:p1]
-            distance[chosen] = _nearest(points.position[chosen], pieces[by_piece[s0:s1]])
+    for patch in np.intersect1d(patch_of_point, patch_of_piece):
+        chosen = patch_of_point == patch
+        distance[chosen] = _nearest(points.position[chosen], pieces[patch_of_piece == patch])
     return distance
 
 
-def _border_pieces(surface: Surface) -> tuple[FloatArray, np.ndarray]:
+def _border_pieces(surface: Surface) -> tuple[FloatArray, IndexArray]:
     """Return segments, shape (piece, 2, 3), and the patch of each."""
     half = surface.border_half_edges
     face, corner = half // 3, half % 3
@@ -68,19 +63,9 @@ def _border_pieces(surface: Surface) -> tuple[FloatArray, np.ndarray]:
     cuts = np.ceil(length * (_PIECES / length.sum() if len(half) else 0.0)).astype(np.intp)
     which = np.repeat(np.arange(len(half)), cuts)
     step = np.arange(len(which)) - np.repeat(np.cumsum(cuts) - cuts, cuts)
-    low, high = step / cuts[which], (step + 1) / cuts[which]
-    along = (end - start)[which]
-    pieces = np.stack(
-        [start[which] + low[:, None] * along, start[which] + high[:, None] * along], axis=1
-    )
+    ends = np.stack([step, step + 1], axis=1) / cuts[which][:, None]
+    pieces = start[which][:, None] + ends[:, :, None] * (end - start)[which][:, None]
     return pieces, surface.patch[face][which]
-
-
-def _ranges(ordered: np.ndarray, values: np.ndarray) -> np.ndarray:
-    """Return begin and end of each value in an ascending array, shape (value, 2)."""
-    return np.stack(
-        [np.searchsorted(ordered, values), np.searchsorted(ordered, values, side="right")], axis=1
-    )
 
 
 def _nearest(position: FloatArray, pieces: FloatArray) -> FloatArray:
@@ -181,9 +166,8 @@ def _nodes(surface: Surface, spacing: float) -> tuple[FloatArray, list[IndexArra
     inner = np.maximum(_LEAST, np.ceil(length / spacing).astype(np.intp) - 1)
     first = len(mesh.vertices) + np.cumsum(inner) - inner
     which = np.repeat(np.arange(len(inner)), inner)
-    share = (np.arange(len(which)) - np.repeat(first - len(mesh.vertices), inner) + 1.0) / (
-        inner[which] + 1.0
-    )
+    place = np.arange(len(which)) - np.repeat(first - len(mesh.vertices), inner)
+    share = (place + 1.0) / (inner[which] + 1.0)
     steiner = ends[which, 0] + share[:, None] * (ends[which, 1] - ends[which, 0])
     of_face = edges.of_half_edge.reshape(-1, 3)
     outline = [

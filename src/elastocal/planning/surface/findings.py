@@ -7,7 +7,7 @@ import numpy as np
 from numpy.random import Generator
 
 from elastocal.arrays import BoolArray, FloatArray
-from elastocal.planning.surface.contact import contact_poses
+from elastocal.planning.surface.contact import contact_frames
 from elastocal.planning.surface.sampling import sample_uniform
 from elastocal.planning.surface.surface import Surface, SurfacePoints
 from elastocal.results import brief_repr
@@ -49,29 +49,27 @@ def mesh_findings(surface: Surface) -> tuple[Finding, ...]:
     surface : Surface
         The surface.
     """
-    name, found = surface.name, []
-    if surface.mesh.degenerate:
-        text = f"{name}: {surface.mesh.degenerate} faces without area were left out"
-        found.append(Finding("degenerate", text))
-    if surface.mesh.duplicate:
-        text = f"{name}: {surface.mesh.duplicate} faces stood twice and were left out once"
-        found.append(Finding("duplicate", text))
-    if surface.turned:
-        text = f"{name}: {surface.turned} faces were wound against their neighbours and were turned"
-        found.append(Finding("winding", text))
-    if surface.non_manifold_edges:
-        text = (
-            f"{name} is not a manifold: {surface.non_manifold_edges} edges have three faces or"
-            " more, or none that agree; the contact disk keeps away from them"
-        )
-        found.append(Finding("non-manifold", text))
-    if surface.open_edges:
-        text = (
-            f"{name} is an open mesh with {surface.open_edges} edges at its border; the contact"
-            " disk keeps away from them"
-        )
-        found.append(Finding("open", text))
-    return tuple(found)
+    odd = (
+        ("degenerate", surface.mesh.degenerate, ": {} faces without area were left out"),
+        ("duplicate", surface.mesh.duplicate, ": {} faces stood twice and were left out once"),
+        (
+            "winding",
+            surface.turned,
+            ": {} faces were wound against their neighbours and were turned",
+        ),
+        (
+            "non-manifold",
+            surface.non_manifold_edges,
+            " is not a manifold: {} edges have three faces or more, or none that agree; the contact"
+            " disk keeps away from them",
+        ),
+        (
+            "open",
+            surface.open_edges,
+            " is an open mesh with {} edges at its border; the contact disk keeps away from them",
+        ),
+    )
+    return tuple(Finding(kind, surface.name + text.format(n)) for kind, n, text in odd if n)
 
 
 def placement_findings(
@@ -154,8 +152,8 @@ def inverted_finding(surface: Surface, reachable: Reachable, rng: Generator) -> 
 
 def _reached(points: SurfacePoints, sign: float, reachable: Reachable) -> float:
     """Return the share of the points that are reached at any of a few spins."""
-    turned = SurfacePoints(points.position, sign * points.normal, points.face, points.barycentric)
-    poses = contact_poses(turned, np.linspace(0.0, 2.0 * np.pi, _SPINS, endpoint=False))
+    spins = np.linspace(0.0, 2.0 * np.pi, _SPINS, endpoint=False)
+    poses = contact_frames(points.position, sign * points.normal, spins)
     return float(reachable(poses.reshape(-1, 4, 4)).reshape(len(points), -1).any(axis=1).mean())
 
 

@@ -1,4 +1,8 @@
-"""The tooling surface S of the paper (2.2): triangles in base, their normals and their borders."""
+"""The tooling surface S of the paper (2.2): triangles in base, their normals and their borders.
+
+Faces hang together over edges; where an edge is open, shared by more than two faces or a crease,
+a smooth patch of the surface ends.
+"""
 
 import math
 from dataclasses import dataclass, replace
@@ -9,11 +13,11 @@ from typing import Protocol
 import numpy as np
 import trimesh
 from numpy.typing import ArrayLike
+from scipy.sparse import coo_array, csr_array
+from scipy.sparse.csgraph import breadth_first_order, connected_components
 
 from elastocal.arrays import BoolArray, FloatArray, IndexArray
 from elastocal.planning.postures import Rows
-from elastocal.planning.surface import _topology as topology
-from elastocal.planning.surface._topology import corner_normals, face_normals_and_areas
 from elastocal.planning.surface.mesh import SurfaceError, TriangleMesh, read_mesh
 from elastocal.results import brief_repr
 
@@ -61,6 +65,23 @@ class SurfacePoints(Rows):
 
 @brief_repr
 @dataclass(frozen=True, eq=False)
+class Edges:
+    """The edges of a mesh. Half-edge ``3 f + k`` runs from corner k of face f to the next one."""
+
+    of_half_edge: IndexArray
+    """Edge number of each half-edge, shape (3 face,)."""
+    vertices: IndexArray
+    """The two ends of each edge, lower number first, shape (edge, 2)."""
+    count: IndexArray
+    """Number of faces at each edge, shape (edge,)."""
+    pairs: IndexArray
+    """Half-edges of the edges that exactly two faces share, shape (pair, 2)."""
+    opposed: BoolArray
+    """Whether the two half-edges of a pair run against each other, as they should."""
+
+
+@brief_repr
+@dataclass(frozen=True, eq=False)
 class Surface:
     """A tooling surface in base. Make one with `load_surface` or `build_surface`."""
 
@@ -77,18 +98,21 @@ class Surface:
     """Faces that were wound against their neighbours and have been turned."""
 
     @cached_property
-    def _normals_and_areas(self) -> tuple[FloatArray, FloatArray]:
-        return face_normals_and_areas(self.mesh.vertices, self.mesh.faces)
+    def _doubled_areas(self) -> FloatArray:
+        """Normals of the faces, as long as twice their areas, shape (face, 3), in m²."""
+        a, b, c = np.moveaxis(self.mesh.vertices[self.mesh.faces], 1, 0)
+        return np.asarray(np.cross(b - a, c - a))
 
-    @property
+    @cached_property
     def face_normals(self) -> FloatArray:
         """Unit outward normals of the faces, shape (face, 3)."""
-        return self._normals_and_areas[0]
+        normal = self._doubled_areas
+        return np.asarray(normal / np.linalg.norm(normal, axis=1)[:, None])
 
-    @property
+    @cached_property
     def face_areas(self) -> FloatArray:
         """Shape (face,), in m²."""
-        return self._normals_and_areas[1]
+        return np.asarray(0.5 * np.linalg.norm(self._doubled_areas, axis=1))
 
     @property
     def area(self) -> float:
@@ -96,25 +120,49 @@ class Surface:
         return float(self.face_areas.sum())
 
     @cached_property
-    def edges(self) -> topology.Edges:
+    def edges(self) -> Edges:
         """The edges of the mesh."""
-        return topology.edges_of(self.mesh.faces)
+        return _edges_of(self.mesh.faces)
 
     @cached_property
     def _smooth(self) -> IndexArray:
-        return topology.smooth_pairs(self.edges, self.face_normals, self.crease_angle)
+        """The half-edge pairs over which the surface is smooth, shape (pair, 2)."""
+        normal = self.face_normals[self.edges.pairs // 3]
+        # An arc cosine would lose the small angles; the chord of two unit vectors does not.
+        chord = np.linalg.norm(normal[:, 0] - normal[:, 1], axis=1)
+        angle = 2.0 * np.arcsin(np.minimum(1.0, 0.5 * chord))
+        return np.asarray(self.edges.pairs[self.edges.opposed & (angle <= self.crease_angle)])
 
     @cached_property
     def patch(self) -> IndexArray:
         """Smooth patch of each face: parts of the surface between open edges and creases."""
-        return topology.patches(self._smooth, len(self.mesh.faces))
+        _, patch = _parts(self._smooth // 3, len(self.mesh.faces))
+        return patch
 
     @cached_property
     def corner_normals(self) -> FloatArray:
-        """Smooth normals at the corners of the faces, shape (face, 3, 3); not over creases."""
-        groups = topology.smoothing_groups(self._smooth, len(self.mesh.faces))
-        mesh = self.mesh
-        return corner_normals(mesh.vertices, mesh.faces, self.face_normals, groups)
+        """Smooth normals at the corners of the faces, shape (face, 3, 3); not over creases.
+
+        The angle-weighted mean ``n = Σ α_i n_i / |Σ α_i n_i|`` over the faces i at the corner that
+        smooth edges join, α_i their angles at the vertex; independent of how a flat part is cut
+        into triangles.
+
+        Source: G. Thürmer, C. A. Wüthrich, "Computing vertex normals from polygonal facets",
+        Journal of Graphics Tools 3(1), 1998.
+        """
+        corners, smooth = self.mesh.vertices[self.mesh.faces], self._smooth
+        # Corners at one vertex are of one group when their faces are joined by smooth edges there.
+        following = smooth + np.where(smooth % 3 == 2, -2, 1)
+        links = np.stack([smooth.T, following[:, ::-1].T], axis=2).reshape(-1, 2)
+        count, groups = _parts(links, 3 * len(corners))
+        along = np.roll(corners, -1, axis=1) - corners
+        back = np.roll(corners, 1, axis=1) - corners
+        sine = np.linalg.norm(np.cross(along, back), axis=2)
+        angle = np.arctan2(sine, np.einsum("fki,fki->fk", along, back)).reshape(-1)
+        weighted = angle[:, None] * np.repeat(self.face_normals, 3, axis=0)
+        total = np.stack([np.bincount(groups, weighted[:, i], count) for i in range(3)], axis=1)
+        normal = total[groups].reshape(-1, 3, 3)
+        return np.asarray(normal / np.linalg.norm(normal, axis=2, keepdims=True))
 
     @cached_property
     def border_half_edges(self) -> IndexArray:
@@ -230,7 +278,7 @@ def build_surface(
     if not 0.0 < crease_angle < math.pi:
         raise SurfaceError(f"crease angle {crease_angle!r} rad: must be above 0 and below π")
     T = np.array(T_base_surface, dtype=float)
-    faces, turned = topology.wound_alike(mesh.faces)
+    faces, turned = _wound_alike(mesh.faces)
     vertices = mesh.vertices @ T[:3, :3].T + T[:3, 3]
     for array in (T, vertices, faces):
         array.setflags(write=False)
@@ -242,3 +290,65 @@ def flipped(surface: Surface) -> Surface:
     """Return the surface with its outside in: every normal turned round."""
     mesh = replace(surface.mesh, faces=surface.mesh.faces[:, ::-1])
     return replace(surface, mesh=mesh)
+
+
+def _edges_of(faces: IndexArray) -> Edges:
+    """Return the edges of a mesh.
+
+    Parameters
+    ----------
+    faces : ndarray of int, shape (face, 3)
+        Vertex numbers.
+    """
+    directed = np.stack([faces, np.roll(faces, -1, axis=1)], axis=2).reshape(-1, 2)
+    vertices, of_half_edge, count = np.unique(
+        np.sort(directed, axis=1), axis=0, return_inverse=True, return_counts=True
+    )
+    of_half_edge = of_half_edge.reshape(-1)
+    order = np.argsort(of_half_edge, kind="stable")
+    first = np.cumsum(count) - count
+    shared = first[count == 2]
+    pairs = np.stack([order[shared], order[shared + 1]], axis=1)
+    opposed = directed[pairs[:, 0], 0] != directed[pairs[:, 1], 0]
+    return Edges(of_half_edge, vertices, count, pairs, opposed)
+
+
+def _wound_alike(faces: IndexArray) -> tuple[IndexArray, int]:
+    """Return the faces with one sense of winding a connected part, and how many were turned.
+
+    The sense that most faces of a part have is kept. A part that has no consistent winding (a
+    Möbius strip) keeps some edges where it changes.
+
+    Parameters
+    ----------
+    faces : ndarray of int, shape (face, 3)
+        Vertex numbers.
+    """
+    edges = _edges_of(faces)
+    if edges.opposed.all():
+        return faces, 0
+    neighbours = np.sort(edges.pairs // 3, axis=1)
+    clashing = {(int(a), int(b)) for a, b in neighbours[~edges.opposed]}
+    graph = _graph(neighbours, len(faces))
+    parts, part = connected_components(graph, directed=False)
+    turned = np.zeros(len(faces), dtype=bool)
+    for mixed in np.unique(part[neighbours[~edges.opposed, 0]]):
+        order, before = breadth_first_order(graph, int(np.argmax(part == mixed)), directed=False)
+        for face in order[1:].tolist():
+            parent = int(before[face])
+            turned[face] = turned[parent] ^ ((min(face, parent), max(face, parent)) in clashing)
+    most = np.bincount(part, turned, parts) > 0.5 * np.bincount(part, minlength=parts)
+    turned ^= most[part]
+    faces = np.where(turned[:, None], faces[:, ::-1], faces)
+    return faces, int(turned.sum())
+
+
+def _parts(links: IndexArray, nodes: int) -> tuple[int, IndexArray]:
+    """Return the number of connected parts of a graph, and the part of each node."""
+    count, part = connected_components(_graph(links, nodes), directed=False)
+    return int(count), np.array(part, dtype=np.intp)
+
+
+def _graph(links: IndexArray, nodes: int) -> csr_array[np.float64]:
+    there = np.ones(len(links))
+    return coo_array((there, (links[:, 0], links[:, 1])), shape=(nodes, nodes)).tocsr()

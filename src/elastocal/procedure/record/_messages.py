@@ -17,7 +17,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from elastocal.arrays import FloatArray
-from elastocal.cell.devices import ArmState, PointBlock, WrenchBlock
+from elastocal.cell import ArmState, PointBlock, WrenchBlock
 
 ARM, WRENCH, MARKER, MARKS = "/arm", "/wrench", "/marker", "/marks"
 """Topics, in the order of their channels."""

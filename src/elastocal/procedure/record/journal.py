@@ -15,7 +15,7 @@ from typing import Any
 
 from pydantic import SerializerFunctionWrapHandler, ValidationError, model_serializer
 
-from elastocal.cell.devices import Clock
+from elastocal.cell import Clock
 from elastocal.errors import FileAccessError, SchemaError
 from elastocal.records import StrictModel
 

@@ -18,7 +18,7 @@ from scipy.spatial.transform import Rotation
 
 from elastocal import __version__
 from elastocal.arrays import BoolArray, FloatArray
-from elastocal.cell.devices import ArmState, PointBlock, SensorStatus, WrenchBlock
+from elastocal.cell import ArmState, PointBlock, SensorStatus, WrenchBlock
 from elastocal.errors import ProcedureError, SchemaError
 from elastocal.procedure.record._mcap import Messages, TimeArray, Topic, read_mcap, write_mcap
 from elastocal.procedure.record._messages import (

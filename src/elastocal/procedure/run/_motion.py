@@ -9,7 +9,7 @@ from functools import partial
 import numpy as np
 
 from elastocal.arrays import FloatArray
-from elastocal.cell.devices import ArmState, Motion
+from elastocal.cell import ArmState, Motion
 from elastocal.planning import Joints
 from elastocal.procedure.record import Action
 from elastocal.procedure.run._attempt import Attempt

@@ -11,7 +11,7 @@ before the tool leaves the surface: an arm in force control in free air would ac
 import numpy as np
 
 from elastocal.arrays import FloatArray
-from elastocal.cell.devices import Motion
+from elastocal.cell import Motion
 from elastocal.procedure.record import Action, ReadingStatus
 from elastocal.procedure.run._attempt import Attempt
 from elastocal.procedure.run._motion import (

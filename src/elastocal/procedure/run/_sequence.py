@@ -10,7 +10,7 @@ command that an arm takes in every state.
 import contextlib
 from collections.abc import Callable
 
-from elastocal.cell.devices import ArmState, Motion
+from elastocal.cell import ArmState, Motion
 from elastocal.procedure.record import Action
 from elastocal.procedure.run import _press
 from elastocal.procedure.run._attempt import Attempt

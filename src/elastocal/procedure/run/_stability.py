@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from elastocal.arrays import FloatArray
-from elastocal.cell.description import ProcedureSettings
+from elastocal.cell import ProcedureSettings
 
 _SPREAD = 4.0
 """Standard deviations that make up the width which holds 95 % of the samples."""

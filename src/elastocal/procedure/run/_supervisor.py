@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from elastocal.arrays import FloatArray
-from elastocal.cell.devices import ArmState, Devices, PointBlock, WrenchBlock
+from elastocal.cell import ArmState, Devices, PointBlock, WrenchBlock
 from elastocal.errors import DeviceError
 from elastocal.procedure.record import Action, Logbook, StreamRecorder
 from elastocal.procedure.run._watchdog import (

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from elastocal.cell.devices import Devices, Motion
+from elastocal.cell import Devices, Motion
 from elastocal.errors import ProcedureError
 from elastocal.planning import Joints, PoseRecord
 from elastocal.procedure.record import (

@@ -10,8 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from elastocal.arrays import FloatArray
-from elastocal.cell import Cell
-from elastocal.cell.description import ProcedureSettings
+from elastocal.cell import Cell, ProcedureSettings
 from elastocal.errors import ProcedureError
 from elastocal.planning import PlanResult
 from elastocal.planning.motion import AxisMotion

@@ -18,8 +18,7 @@ import plotly.graph_objects as go
 
 from elastocal import shapes
 from elastocal.arrays import BoolArray, FloatArray, IndexArray
-from elastocal.cell import Cell
-from elastocal.cell.description import TOOLING
+from elastocal.cell import TOOLING, Cell
 from elastocal.planning import CollisionScene, collision_scene
 from elastocal.planning.surface import Surface
 

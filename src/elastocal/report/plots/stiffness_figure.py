@@ -14,7 +14,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from elastocal.arrays import FloatArray
-from elastocal.compensation.stiffness import PathStations, PostureSurvey
+from elastocal.compensation import (
+    PathStations,
+    PostureSurvey,
+)
 from elastocal.report.plots import style
 from elastocal.report.plots.printing import new_figure, write_figure
 from elastocal.results import brief_repr

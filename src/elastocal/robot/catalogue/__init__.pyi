@@ -16,5 +16,5 @@ from .record import (
     Maxima as Maxima,
     PositionLimits as PositionLimits,
     inertias_like as inertias_like,
+    urdf_of as urdf_of,
 )
-from .writer import urdf_of as urdf_of

@@ -7,14 +7,19 @@ on demand. What has no source says so in `Robot.assumptions`.
 import functools
 import importlib.resources
 import re
+from collections.abc import Mapping
 from typing import Any
 
 import yaml
 
 from elastocal.errors import RobotError, SchemaError, nearest
 from elastocal.records import check_schema, validate
-from elastocal.robot.catalogue.record import CatalogueEntry, Dimensions, inertias_like
-from elastocal.robot.catalogue.writer import urdf_of
+from elastocal.robot.catalogue.record import (
+    CatalogueEntry,
+    Dimensions,
+    inertias_like,
+    urdf_of,
+)
 from elastocal.robot.robot import Robot
 
 _FILE = "kuka.yaml"
@@ -37,14 +42,22 @@ def entry(name: str) -> CatalogueEntry:
     Raises
     ------
     RobotError
-        If no robot has that name.
+        If no robot has that name, with the nearest name and the list of all.
     """
-    return _find(name)
+    table = _entries()
+    by_key = {_key(known): known for known in table}
+    known = by_key.get(_key(name))
+    if known is None:
+        raise RobotError(
+            f"no robot {name!r} in the catalogue{_suggestion(name, by_key)}"
+            f" (robots: {', '.join(table)})"
+        )
+    return table[known]
 
 
 def urdf(name: str) -> str:
-    """Return the URDF of a robot; see `elastocal.robot.catalogue.writer`."""
-    return urdf_of(_find(name))
+    """Return the URDF of a robot; see `elastocal.robot.catalogue.record`."""
+    return urdf_of(entry(name))
 
 
 def load(name: str, tip: str = "flange") -> Robot:
@@ -99,26 +112,7 @@ def _entries() -> dict[str, CatalogueEntry]:
     return read_table(text, _FILE)
 
 
-def _find(name: str) -> CatalogueEntry:
-    """Return the robot of a name; case, spaces, hyphens and underscores do not matter.
-
-    Raises
-    ------
-    RobotError
-        If there is none, with the nearest name and the list of all.
-    """
-    table = _entries()
-    by_key = {_key(known): known for known in table}
-    known = by_key.get(_key(name))
-    if known is None:
-        raise RobotError(
-            f"no robot {name!r} in the catalogue{_suggestion(name, by_key)}"
-            f" (robots: {', '.join(table)})"
-        )
-    return table[known]
-
-
-def _entry(name: str, by_name: dict[str, Any], what: str) -> CatalogueEntry:
+def _entry(name: str, by_name: Mapping[str, Mapping[str, Any]], what: str) -> CatalogueEntry:
     """Return one robot; masses that are ``like`` a sister's are estimated from hers."""
     robot = by_name[name]
     sister_name = robot.get("inertia", {}).get("like")
@@ -128,7 +122,7 @@ def _entry(name: str, by_name: dict[str, Any], what: str) -> CatalogueEntry:
                 f"{what}: inertia of {name} is like {sister_name!r}, which has none of its own"
             )
         arm = validate(robot["dimensions"], Dimensions, f"{what}: {name}")
-        robot = robot | {"inertia": inertias_like(_entry(sister_name, by_name, what), arm)}
+        robot = {**robot, "inertia": inertias_like(_entry(sister_name, by_name, what), arm)}
     return validate(robot, CatalogueEntry, f"{what}: {name}")
 
 

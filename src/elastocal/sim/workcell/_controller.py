@@ -10,8 +10,7 @@ from functools import partial
 import numpy as np
 
 from elastocal.arrays import FloatArray
-from elastocal.cell.description import Fault
-from elastocal.cell.devices import ArmState, Motion
+from elastocal.cell import ArmState, Fault, Motion
 from elastocal.errors import DeviceError
 from elastocal.sim.workcell._contact import Contact
 from elastocal.sim.workcell._force_control import ForceControl

@@ -8,8 +8,7 @@ it. A lateral force beyond the friction limit is not reached: the contact slides
 import numpy as np
 
 from elastocal.arrays import FloatArray
-from elastocal.cell.description import Fault
-from elastocal.cell.devices import Motion
+from elastocal.cell import Fault, Motion
 from elastocal.errors import DeviceError
 from elastocal.sim.workcell._contact import Contact
 from elastocal.sim.workcell._paths import force_path, pressed_state

@@ -21,8 +21,7 @@ from scipy.signal import lfilter
 from scipy.spatial.transform import Rotation
 
 from elastocal.arrays import FloatArray, IndexArray
-from elastocal.cell import Cell
-from elastocal.cell.devices import BeamState, PointBlock, SensorStatus, WrenchBlock
+from elastocal.cell import BeamState, Cell, PointBlock, SensorStatus, WrenchBlock
 from elastocal.errors import DeviceError, nearest
 from elastocal.sim.workcell._plant import Plant
 from elastocal.sim.workcell._sampling import BLOCK, NoiseStream, SampleGrid, Samples, generator

@@ -7,9 +7,7 @@ from typing import Protocol
 import numpy as np
 
 from elastocal.arrays import FloatArray, IndexArray
-from elastocal.cell import Cell
-from elastocal.cell.description import Fault
-from elastocal.cell.devices import Motion
+from elastocal.cell import Cell, Fault, Motion
 from elastocal.errors import DeviceError, nearest
 from elastocal.robot import inverse_transform
 from elastocal.sim.workcell._contact import Contact, ContactLaw, TrueSurface
@@ -81,7 +79,7 @@ class FaultSchedule:
         Parameters
         ----------
         step : str
-            See `elastocal.cell.description.simulation.Fault.step`.
+            See `elastocal.cell.simulation.Fault.step`.
         visit : int
             Number of the visit.
         load : int

@@ -25,7 +25,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from elastocal.arrays import FloatArray, IndexArray
-from elastocal.cell.description import Gears
+from elastocal.cell import Gears
 from elastocal.sim.arm import gear_softening
 
 _STOPS = 4

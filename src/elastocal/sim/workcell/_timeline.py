@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from elastocal.arrays import FloatArray, IndexArray
-from elastocal.cell.devices import Motion
+from elastocal.cell import Motion
 from elastocal.errors import DeviceError
 from elastocal.sim.workcell._springs import RobotSprings
 

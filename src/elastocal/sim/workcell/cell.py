@@ -17,8 +17,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from elastocal.arrays import FloatArray
-from elastocal.cell import Cell
-from elastocal.cell.devices import Devices
+from elastocal.cell import Cell, Devices
 from elastocal.results import brief_repr
 from elastocal.sim.workcell._controller import SimulatedArm
 from elastocal.sim.workcell._force_control import ForceControl

@@ -6,7 +6,6 @@ from .criterion import (
     singular_values as singular_values,
 )
 from .d_optimal import DOptimal as DOptimal, o1 as o1
-from .e_optimal import EOptimal as EOptimal
 from .i_optimal import IOptimal as IOptimal
 from .named import CRITERIA as CRITERIA, criterion_class as criterion_class
-from .observability import O2 as O2, O3 as O3, O4 as O4, O5 as O5
+from .observability import O2 as O2, O3 as O3, O4 as O4, O5 as O5, EOptimal as EOptimal

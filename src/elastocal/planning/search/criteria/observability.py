@@ -1,4 +1,4 @@
-"""The observability indices O2 to O5; O1 is `DOptimal`."""
+"""The observability indices O2 to O5, and E-optimality, which ranks as O3; O1 is `DOptimal`."""
 
 from typing import ClassVar
 
@@ -65,3 +65,17 @@ class O5(Criterion):
         """Return one over the summed inverses."""
         s = singular_values(matrix)
         return np.asarray(1.0 / np.sum(1.0 / s, axis=-1))
+
+
+class EOptimal(Criterion):
+    """``sr^2``: the smallest eigenvalue, one over the largest variance of any direction.
+
+    It ranks choices as O3 does. Y. Sun, J. M. Hollerbach, "Observability index selection for
+    robot calibration", ICRA 2008 (the paper's [56]).
+    """
+
+    name: ClassVar[str] = "e"
+
+    def value(self, matrix: FloatArray) -> FloatArray:
+        """Return the smallest eigenvalue."""
+        return np.asarray(np.square(singular_values(matrix)[..., 0]))

@@ -1,0 +1,387 @@
+"""The cell file, validated, and the cell ready to compute with: robot made, files found."""
+
+import hashlib
+import json
+import os
+from collections import Counter
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, TypeVar
+
+import numpy as np
+from pydantic import Field, field_validator
+
+from elastocal.arrays import FloatArray
+from elastocal.cell._quantities import IDENTITY, Pose
+from elastocal.cell.hardware import (
+    Marker,
+    MeshFile,
+    RobotEntry,
+    SensorEntry,
+    Shape,
+    SurfaceEntry,
+    Tool,
+    Tracker,
+)
+from elastocal.cell.motion import (
+    MotionEntry,
+    axis_speeds,
+    external_positions,
+    home_position,
+    joint_margins,
+    torque_limits,
+)
+from elastocal.cell.procedure import (
+    Acceptance,
+    DeviceNames,
+    Engagement,
+    Limits,
+    LoadCases,
+    ProcedureSettings,
+    Search,
+)
+from elastocal.cell.simulation import Fault, Simulation
+from elastocal.dataset import LoadRows, joint_dimensions, read_load_rows
+from elastocal.errors import ElastocalError, FileAccessError, SchemaError
+from elastocal.files import read_text
+from elastocal.records import StrictModel, read_yaml
+from elastocal.robot import (
+    GRAVITY,
+    Rail,
+    Robot,
+    catalogue,
+    find_meshes,
+    inverse_transform,
+    is_relative,
+    on_rail,
+    parse_urdf,
+    with_tool,
+)
+
+SCHEMA = "elastocal.cell/1"
+TOOLING = "tooling"
+"""Name of the surface among the solids of the cell; no fixture may have it."""
+
+
+class ProcessFile(StrictModel):
+    """Poses and forces of the production process."""
+
+    file: str
+    """CSV with joint and force columns (the ROWS.csv of `elastocal predict`), relative to the
+    cell file."""
+
+
+class CellFile(StrictModel):
+    """All keys of a cell file but ``schema``."""
+
+    name: str = ""
+    robot: RobotEntry
+    tcp: Pose = IDENTITY
+    """Tool centre point in the flange frame, z out of the tool."""
+    tool: Tool
+    sensor: SensorEntry | None = None
+    marker: Marker | None = None
+    trackers: tuple[Tracker, ...] = ()
+    surface: SurfaceEntry
+    fixtures: tuple[Shape, ...] = ()
+    """Solids in base."""
+    load_cases: LoadCases
+    engagement: Engagement
+    limits: Limits = Field(default_factory=Limits)
+    motion: MotionEntry
+    """Required: where HOME is safe is not guessed."""
+    search: Search = Field(default_factory=Search)
+    process: ProcessFile | None = None
+    acceptance: Acceptance = Field(default_factory=Acceptance)
+    """Tolerances that the result is judged by; neither plan nor run depends on it."""
+    procedure: ProcedureSettings = Field(default_factory=ProcedureSettings)
+    devices: DeviceNames = Field(default_factory=DeviceNames)
+    simulation: Simulation = Field(default_factory=Simulation)
+    """Truth of the simulated devices; the calibration never reads it."""
+    faults: tuple[Fault, ...] = ()
+    """Faults of the simulated devices, and when."""
+
+    def __repr__(self) -> str:
+        return "\n  ".join([f"CellFile {self.name!r}", *self.summary()])
+
+    __str__ = __repr__
+
+    def summary(self) -> list[str]:
+        """Return what stands in the cell, one line a subject."""
+        robot, loads, sensor = self.robot, self.load_cases, self.sensor
+        rail = " on a rail" if robot.rail else ""
+        lines = [
+            f"robot: {robot.model or robot.urdf}{rail}",
+            f"tool: {self.tool.mass:g} kg, sensor: {'none' if sensor is None else sensor.name}",
+            f"trackers: {', '.join(tracker.name for tracker in self.trackers) or 'none'}",
+            f"surface: {self.surface.file}, {len(self.fixtures)} fixtures",
+            f"load cases: {', '.join(loads.cases)};"
+            f" fx {loads.fx:g} N, fy {loads.fy:g} N, fz {loads.fz:g} N",
+            f"search: {self.search.technique}, {self.search.most or 'any number of'} poses",
+        ]
+        return lines + ([f"faults: {len(self.faults)}"] if self.faults else [])
+
+    @field_validator("trackers")
+    @classmethod
+    def _named_once(cls, trackers: tuple[Tracker, ...]) -> tuple[Tracker, ...]:
+        for name, times in Counter(tracker.name for tracker in trackers).items():
+            if times > 1:
+                raise ValueError(f"{times} stations are named {name!r}")
+        return trackers
+
+    @field_validator("trackers")
+    @classmethod
+    def _something_to_look_at(cls, trackers: tuple[Tracker, ...], info: Any) -> Any:
+        if trackers and info.data.get("marker") is None:
+            raise ValueError("trackers need a marker to look at (key 'marker')")
+        return trackers
+
+    @field_validator("fixtures")
+    @classmethod
+    def _none_is_the_tooling(cls, fixtures: tuple[Shape, ...]) -> tuple[Shape, ...]:
+        # Under this name the plan knows the surface, which the tool may touch.
+        if any(fixture.name == TOOLING for fixture in fixtures):
+            raise ValueError(f"the name {TOOLING!r} is the surface's: name the fixture otherwise")
+        return fixtures
+
+    @field_validator("limits")
+    @classmethod
+    def _carries_the_tool(cls, limits: Limits, info: Any) -> Limits:
+        mass, payload = getattr(info.data.get("tool"), "mass", 0.0), limits.payload
+        if payload is not None and not mass <= payload:
+            raise ValueError(f"payload {payload:g} kg is below the tool's mass, {mass:g} kg")
+        return limits
+
+
+_TCP = "tcp"
+"""Name of the link at the tool centre point."""
+
+_Result = TypeVar("_Result")
+
+
+@dataclass(frozen=True, eq=False)
+class Cell:
+    """A robot before its tooling. Make one with `load_cell`.
+
+    What has no property here is in `file`, in SI units: ``cell.file.engagement.disk_radius``.
+    """
+
+    path: Path
+    """The cell file."""
+    file: CellFile
+    """Its contents."""
+    robot: Robot
+    """From base (the rail's frame, if there is one) to the tool centre point."""
+    external_positions: FloatArray
+    """Positions of the external axes to choose from, shape (combination, external axis)."""
+    torque_limits: FloatArray
+    """Torques that may be used, shape (joint,), in N·m (N); NaN where not known."""
+    home: FloatArray
+    """Joint positions where the robot starts and ends, shape (joint,), in rad or m."""
+    axis_speeds: FloatArray
+    """Speeds that are used between poses, override included, shape (joint,), in rad/s or m/s."""
+    process: LoadRows | None = None
+    """Poses and forces of the production process."""
+
+    def __repr__(self) -> str:
+        return "\n  ".join([f"Cell {self.name!r} of {self.path}", *self.file.summary()])
+
+    @property
+    def name(self) -> str:
+        """Name that the file gives the cell, else the name of its folder."""
+        return self.file.name or self.path.resolve().parent.name
+
+    @property
+    def T_flange_tcp(self) -> FloatArray:
+        """Tool centre point in the flange frame, shape (4, 4)."""
+        return self.file.tcp.T
+
+    @property
+    def T_tcp_flange(self) -> FloatArray:
+        """Flange in the tcp frame, shape (4, 4)."""
+        return inverse_transform(self.T_flange_tcp)
+
+    @property
+    def T_world_base(self) -> FloatArray:
+        """Base in the world, shape (4, 4); the world's z axis points up."""
+        return self.file.robot.mounting.T
+
+    @property
+    def gravity_base(self) -> FloatArray:
+        """Acceleration of gravity in base, shape (3,), in m/s²."""
+        gravity: FloatArray = self.T_world_base[:3, :3].T @ np.array(GRAVITY)
+        return gravity
+
+    @property
+    def T_base_surface(self) -> FloatArray:
+        """Frame of the surface's mesh in base, shape (4, 4)."""
+        return self.file.surface.T_base_surface
+
+    @property
+    def surface_path(self) -> Path:
+        """The surface's mesh file."""
+        return self.find(self.file.surface.file)
+
+    @property
+    def tool_centre_tcp(self) -> FloatArray:
+        """Centre of mass of the tool in the tcp frame, shape (3,), in m."""
+        T = self.T_tcp_flange
+        return T[:3, :3] @ self.file.tool.centre + T[:3, 3]
+
+    @property
+    def T_sensor_tcp(self) -> FloatArray | None:
+        """Tool centre point in the force sensor's frame, shape (4, 4); None without sensor."""
+        if self.file.sensor is None:
+            return None
+        return inverse_transform(self.file.sensor.T_flange_sensor) @ self.T_flange_tcp
+
+    @property
+    def joint_margin(self) -> FloatArray:
+        """Least distance of each joint to its limits, shape (joint,), in rad or m."""
+        return joint_margins(self.robot, self.file.limits)
+
+    def find(self, file: str) -> Path:
+        """Return the path of a file that the cell file names."""
+        return self.path.parent / file
+
+
+def load_cell(path: Path) -> Cell:
+    """Return the cell that a file describes.
+
+    Parameters
+    ----------
+    path : Path
+        YAML with the schema ``elastocal.cell/1``; the files that it names are relative to it.
+
+    Raises
+    ------
+    SchemaError
+        If the file does not fit: unknown key, missing unit, contradiction; by its path in the
+        file.
+    FileAccessError
+        If the file, or one that it names, cannot be read.
+    """
+    path = Path(path)
+    file = read_yaml(path, CellFile, SCHEMA)
+    robot = _at(f"{path}: robot", lambda: _robot(path, file))
+    margins = _at(str(path), lambda: joint_margins(robot, file.limits))
+    positions = _at(f"{path}: robot", lambda: external_positions(robot, file.robot, margins))
+    torques = _at(f"{path}: limits.torque.values", lambda: torque_limits(robot, file.limits.torque))
+    home = _at(f"{path}: motion", lambda: home_position(robot, file.motion))
+    speeds = _at(f"{path}: motion", lambda: axis_speeds(robot, file.motion))
+    for key, mesh in _meshes(file):
+        if not (path.parent / mesh.file).is_file():
+            raise FileAccessError(f"{path}: {key}.file: there is no file {path.parent / mesh.file}")
+    process = _at(f"{path}: process.file", lambda: _process(path, file, robot))
+    for array in (positions, torques, home, speeds):
+        array.setflags(write=False)
+    return Cell(path, file, robot, positions, torques, home, speeds, process)
+
+
+def _at(place: str, make: Callable[[], _Result]) -> _Result:
+    """Return what ``make`` makes; its refusal names the place in the cell file."""
+    try:
+        return make()
+    except FileAccessError as error:
+        raise FileAccessError(f"{place}: {error}") from error
+    except ElastocalError as error:
+        raise SchemaError(f"{place}: {error}") from error
+
+
+def _robot(path: Path, file: CellFile) -> Robot:
+    entry = file.robot
+    meshes: tuple[tuple[str, Path], ...] = ()
+    if entry.urdf is None:
+        urdf = catalogue.urdf(entry.model or "")
+    else:
+        place = path.parent / entry.urdf
+        urdf = read_text(place)
+        meshes = find_meshes(urdf, place.parent)
+    links = {link.get("name") for link in parse_urdf(urdf).findall("link")}
+    tip = f"cell_{_TCP}" if _TCP in links else _TCP
+    urdf = with_tool(urdf, entry.flange, tip, file.tcp.T)
+    if entry.rail is not None:
+        rail = entry.rail
+        urdf = on_rail(urdf, Rail(rail.name, rail.axis, *rail.travel, T_rail_base=rail.pose.T))
+    return Robot.from_urdf(urdf, tip, meshes=meshes)
+
+
+def _meshes(file: CellFile) -> list[tuple[str, MeshFile]]:
+    def of(key: str, shapes: tuple[Shape, ...]) -> list[tuple[str, MeshFile]]:
+        return [(f"{key}.{i}.mesh", s.mesh) for i, s in enumerate(shapes) if s.mesh is not None]
+
+    tool, fixtures = of("tool.shapes", file.tool.shapes), of("fixtures", file.fixtures)
+    return [("surface", file.surface), *tool, *fixtures]
+
+
+def _process(path: Path, file: CellFile, robot: Robot) -> LoadRows | None:
+    if file.process is None:
+        return None
+    joints = joint_dimensions(robot.joint_names, robot.revolute)
+    return read_load_rows(path.parent / file.process.file, joints)
+
+
+RUN_SECTIONS = ("acceptance", "procedure", "devices", "simulation", "faults")
+"""Sections of the cell file that say how a plan is carried out and its result is judged; a plan
+does not depend on them."""
+
+
+def fingerprint(cell: Cell) -> str:
+    """Return a SHA-256 over what a cell file says and the files that it names.
+
+    It changes with every value of the cell file, defaults included, and with every byte of the
+    surface, the mesh shapes, the robot's URDF with the meshes of its collision shapes, and the
+    process file. It does not change with
+    comments, the order of keys, the way a number is written, the place of the folder, or the
+    sections that say how a plan is carried out (`RUN_SECTIONS`).
+
+    Parameters
+    ----------
+    cell : Cell
+        The cell.
+
+    Returns
+    -------
+    str
+        64 hexadecimal digits.
+
+    Raises
+    ------
+    FileAccessError
+        If a file that the cell names cannot be read.
+    """
+    contents = cell.file.model_dump(mode="json", exclude=set(RUN_SECTIONS))
+    content = json.dumps(contents, sort_keys=True, allow_nan=False)
+    digest = hashlib.sha256(content.encode("utf-8"))
+    for name in named_files(cell):
+        # Digests have one length, so that no byte can move from one file to the next unseen.
+        digest.update(hashlib.sha256(_bytes_of(cell, name)).digest())
+    return digest.hexdigest()
+
+
+def named_files(cell: Cell) -> Iterator[str]:
+    """Yield the files that a cell file or its URDF names, relative to the cell file.
+
+    A file that is named by an absolute path comes with that path.
+    """
+    file = cell.file
+    yield file.surface.file
+    for shape in (*file.tool.shapes, *file.fixtures):
+        if shape.mesh is not None:
+            yield shape.mesh.file
+    if file.robot.urdf is not None:
+        yield file.robot.urdf
+    folder = cell.path.absolute().parent
+    for name, place in cell.robot.meshes:
+        yield os.path.relpath(place, folder) if is_relative(name) else str(place)
+    if file.process is not None:
+        yield file.process.file
+
+
+def _bytes_of(cell: Cell, name: str) -> bytes:
+    path = cell.find(name)
+    try:
+        return path.read_bytes()
+    except OSError as error:
+        raise FileAccessError(f"cannot read {path}: {error.strerror or error}") from error

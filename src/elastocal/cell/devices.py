@@ -1,0 +1,254 @@
+"""Protocols of arm, force sensor, tracker and clock, and the samples that they hand out.
+
+An arm does the steps of paper Procedure 1 (4-25). Every command returns at once; the arm is asked
+how far it is by `RobotArm.state`. A caller looks again each supervision cycle, so that a watchdog
+can stop the arm at any step. Forces are those on the robot at the tool centre point (conventions
+of spec section 1).
+
+No call may take longer than a supervision cycle (``procedure.cycle``, 40 ms): the watchdog that
+calls is the same that stops the arm. A driver whose line may be slow talks to it in a thread of
+its own and answers from what came last. A call may raise `DeviceError`, or an `OSError` of its
+line; the arm is then brought off the surface with what still works.
+
+A new driver is one package under ``elastocal.drivers`` and an entry in the contract tests of
+``tests/contracts/``.
+"""
+
+from dataclasses import dataclass
+from enum import Enum
+from typing import Protocol
+
+from elastocal.arrays import FloatArray
+from elastocal.results import brief_repr
+
+
+class Motion(Enum):
+    """States of motion of an arm."""
+
+    DISARMED = "disarmed"
+    """Drives off, or not released for motion by `RobotArm.enable`."""
+    IDLE = "idle"
+    """Standing in position control; the last command is done."""
+    MOVING = "moving"
+    """On a joint-space move."""
+    APPROACHING = "approaching"
+    """On a guarded linear move."""
+    HOLDING = "holding"
+    """In force control, building up or holding a load case."""
+    RELEASING = "releasing"
+    """In force control, ramping the force to zero."""
+    RETRACTING = "retracting"
+    """On a linear move away from the surface."""
+    STOPPED = "stopped"
+    """Stopped by a fault, a limit or `RobotArm.stop`; needs `RobotArm.enable` again."""
+
+
+@brief_repr
+@dataclass(frozen=True, eq=False)
+class ArmState:
+    """State of an arm, as its controller states it."""
+
+    time: float
+    """When, in s of the clock."""
+    q: FloatArray
+    """Joint positions of the controller, shape (joint,), in rad or m."""
+    T_base_tcp: FloatArray
+    """Tool frame that the controller computes from them, shape (4, 4), in m."""
+    motion: Motion
+    in_contact: bool
+    """Whether a guarded move ended because the contact force was reached, until a retract."""
+    fault: str | None
+    """Why it stopped; None when nothing is wrong."""
+    source: str
+    """Device that says so."""
+
+
+class RobotArm(Protocol):
+    """An arm with a guarded approach and force control at the tool.
+
+    Contract: no command moves anything before `enable`; a command that is not allowed in the
+    present state raises `DeviceError`; `stop` is allowed in every state and any number of times.
+    """
+
+    @property
+    def joint_names(self) -> tuple[str, ...]:
+        """Names of the joints, in the order of every joint array."""
+
+    def state(self) -> ArmState:
+        """Return the newest state, within a supervision cycle; it does not wait for a newer one."""
+
+    def enable(self) -> None:
+        """Release the arm for motion; it then is idle. Refused while a fault stands."""
+
+    def disable(self) -> None:
+        """Take the release back; the arm stands."""
+
+    def move_joints(self, q: FloatArray, speed: float) -> None:
+        """Start a synchronous joint-space move.
+
+        Parameters
+        ----------
+        q : ndarray, shape (joint,)
+            Target in rad or m.
+        speed : float
+            Fraction of the axis speeds, in (0, 1].
+        """
+
+    def approach(
+        self, direction_base: FloatArray, distance: float, speed: float, contact_force: float
+    ) -> None:
+        """Start a straight move that ends at a distance or when a force is felt.
+
+        Parameters
+        ----------
+        direction_base : ndarray, shape (3,)
+            Unit vector in base.
+        distance : float
+            Longest way, in m.
+        speed : float
+            In m/s.
+        contact_force : float
+            Force against the motion at which the arm stops, in N; infinite: never.
+        """
+
+    def hold(self, force_tcp: FloatArray, rate: float) -> None:
+        """Start to build up a force and hold it, orientation kept.
+
+        Parameters
+        ----------
+        force_tcp : ndarray, shape (3,)
+            Force on the robot in the tcp frame, in N.
+        rate : float
+            Fastest change of the force, in N/s.
+        """
+
+    def release(self, rate: float) -> None:
+        """Start to ramp the force to zero; the arm then is idle, without force, at the surface."""
+
+    def retract(self, direction_base: FloatArray, distance: float, speed: float) -> None:
+        """Start a straight move away from the surface; see `approach`."""
+
+    def stop(self) -> None:
+        """Stop at once, in position control. Always allowed."""
+
+
+class Clock(Protocol):
+    """Seconds that only go forward. Nothing in the procedure asks any other clock."""
+
+    def now(self) -> float:
+        """Return the time in s since an origin of the clock's own."""
+
+    def sleep(self, seconds: float) -> None:
+        """Let time pass, and no more than that; devices go on meanwhile."""
+
+
+class SensorStatus(Enum):
+    """State of the sensor over a block of samples; the worst of them."""
+
+    OK = "ok"
+    SATURATED = "saturated"
+    """A gauge or the range of an axis is exceeded: the values are not to be used."""
+    FAULT = "fault"
+    """The device says that it cannot measure."""
+
+
+@brief_repr
+@dataclass(frozen=True, eq=False)
+class WrenchBlock:
+    """Samples since the last look, as the sensor measures them.
+
+    Raw: in the sensor's own frame, bias and tool weight still in. An empty block means that
+    nothing has come.
+    """
+
+    time: FloatArray
+    """Shape (sample,), in s of the clock, ascending."""
+    force: FloatArray
+    """Force on the tool side, shape (sample, 3), sensor frame, in N."""
+    moment: FloatArray
+    """Moment about the sensor's origin, shape (sample, 3), in N·m."""
+    force_sigma: float
+    """Standard deviation of one sample and axis, in N; NaN when the maker does not say."""
+    moment_sigma: float
+    """The same of the moment, in N·m."""
+    status: SensorStatus
+    source: str
+
+    def __len__(self) -> int:
+        """Return the number of samples."""
+        return len(self.time)
+
+
+class ForceSensor(Protocol):
+    """A six-axis sensor between flange and tool."""
+
+    @property
+    def rate(self) -> float:
+        """Nominal number of samples a second."""
+
+    def read(self) -> WrenchBlock:
+        """Return the samples since the last call; the newest few hundred when there are more.
+
+        Returns at once, empty when nothing has come.
+        """
+
+
+class BeamState(Enum):
+    """Whether the instrument sees the marker."""
+
+    LOCKED = "locked"
+    BROKEN = "broken"
+
+
+@brief_repr
+@dataclass(frozen=True, eq=False)
+class PointBlock:
+    """Marker positions since the last look, in the station's own frame."""
+
+    time: FloatArray
+    """Shape (sample,), in s of the clock, ascending."""
+    position: FloatArray
+    """Shape (sample, 3), in m, tracker frame."""
+    sigma: FloatArray
+    """Standard deviation of one sample along each axis of the tracker frame, shape (sample, 3),
+    in m; NaN when the maker does not say."""
+    beam: BeamState
+    """At the end of the block."""
+    station: str
+    """Which station measures."""
+    source: str
+
+    def __len__(self) -> int:
+        """Return the number of samples."""
+        return len(self.time)
+
+
+class Metrology(Protocol):
+    """One or several stations; at any time one of them measures."""
+
+    @property
+    def stations(self) -> tuple[str, ...]:
+        """Names of the stations."""
+
+    @property
+    def rate(self) -> float:
+        """Nominal number of samples a second."""
+
+    def look(self, station: str) -> None:
+        """Measure with this station from now on, and find the marker again if it was lost.
+
+        Returns at once; `read` says whether it was found.
+        """
+
+    def read(self) -> PointBlock:
+        """Return the positions since the last call, at once; none while the beam is broken."""
+
+
+@dataclass(frozen=True, eq=False)
+class Devices:
+    """The devices of a run, with the clock that they share."""
+
+    arm: RobotArm
+    sensor: ForceSensor
+    metrology: Metrology
+    clock: Clock

@@ -1,0 +1,314 @@
+"""How the robot presses, how poses are searched for, and how Procedure 1 is carried out and judged.
+
+The load cases are those of the paper's section 4.1, as force on the robot in the tcp frame. The
+bounds are there so that a slip of the pen in the cell file is refused and not carried out. They
+are wide: what is within them may still be wrong for a machine.
+"""
+
+import math
+from collections.abc import Iterator
+from typing import Annotated, Any, Literal, get_args
+
+import numpy as np
+from pydantic import Field, FiniteFloat, ValidationError, field_validator, model_validator
+from pydantic_core import InitErrorDetails, PydanticCustomError
+
+from elastocal.arrays import FloatArray
+from elastocal.cell._quantities import (
+    Distance,
+    Force,
+    PositiveAngle,
+    PositiveForce,
+    PositiveForceRate,
+    PositiveLength,
+    PositiveMass,
+    PositiveSpeed,
+    PositiveTime,
+    SpanAngle,
+    TranslationalCompliance,
+)
+from elastocal.errors import UnitError
+from elastocal.records import StrictModel
+from elastocal.units import parse_quantity
+
+DEFAULT_POSES = 31
+"""Number of poses of the paper's first case study."""
+_MOST_CANDIDATES = 10_000_000
+"""Largest pool; with more, no memory would hold the candidates."""
+SIMULATED = "simulated"
+"""Name of the device of each kind that needs no hardware."""
+DIRECTIONS = {
+    "normal": (0.0, 0.0, -1.0),
+    "north": (1.0, 0.0, -1.0),
+    "south": (-1.0, 0.0, -1.0),
+    "east": (0.0, -1.0, -1.0),
+    "west": (0.0, 1.0, -1.0),
+}
+"""Signs of (fx, fy, fz) in the force on the robot (spec section 2, load cases)."""
+_CaseName = Literal["normal", "north", "south", "east", "west"]
+
+
+class LoadCases(StrictModel):
+    """Amplitudes, and which cases are applied at each pose."""
+
+    fz: PositiveForce
+    """Pressing force in N."""
+    fx: Force = 0.0
+    """Lateral force of north and south in N."""
+    fy: Force = 0.0
+    """Lateral force of east and west in N."""
+    friction: Annotated[FiniteFloat, Field(gt=0.0, le=10.0)]
+    """Coefficient of static friction between disk and surface."""
+    safety: Annotated[FiniteFloat, Field(ge=1.0, le=100.0)] = 1.5
+    """Factor by which the friction must exceed the lateral force."""
+    cases: Annotated[tuple[_CaseName, ...], Field(validate_default=True)] = get_args(_CaseName)
+
+    @field_validator("cases")
+    @classmethod
+    def _distinct(cls, cases: tuple[str, ...]) -> tuple[str, ...]:
+        if not cases:
+            raise ValueError("at least one load case is needed")
+        if len(set(cases)) != len(cases):
+            raise ValueError("a load case is named twice")
+        return cases
+
+    @field_validator("cases")
+    @classmethod
+    def _lateral_force_is_given(cls, cases: tuple[str, ...], info: Any) -> tuple[str, ...]:
+        for axis, names in (("fx", {"north", "south"}), ("fy", {"east", "west"})):
+            pushed = sorted(names & set(cases))
+            if pushed and not info.data.get(axis, 1.0) > 0.0:
+                raise ValueError(f"{' and '.join(pushed)} need {axis} above 0")
+        return cases
+
+    @property
+    def force_tcp(self) -> FloatArray:
+        """Force on the robot in each case, tcp frame, shape (load_case, 3), in N."""
+        signs = np.array([DIRECTIONS[name] for name in self.cases])
+        return signs * (self.fx, self.fy, self.fz)
+
+
+class Engagement(StrictModel):
+    """Contact disk, and the way to it."""
+
+    disk_radius: PositiveLength
+    """In m."""
+    normal_tolerance: PositiveAngle = math.radians(3.0)
+    """Largest angle between the disk's axis and the surface's normal under it, in rad."""
+    edge_margin: Distance = 5e-3
+    """Least distance from the rim of the disk to an edge of the surface, in m."""
+    near_contact: PositiveLength = 3e-3
+    """Distance from the surface at which the unloaded readings are taken, in m."""
+    approach_distance: PositiveLength = 0.1
+    """Distance of the approach pose A_i from the surface, along the normal, in m."""
+
+    @field_validator("approach_distance")
+    @classmethod
+    def _behind_near_contact(cls, value: float, info: Any) -> float:
+        near = info.data.get("near_contact", 0.0)
+        if not value > near:
+            raise ValueError(f"must be above near_contact ({near:g} m)")
+        return value
+
+
+class TorqueLimits(StrictModel):
+    """Continuous torques of the actuators (paper 4.1).
+
+    Catalogues give one figure, mostly without saying whether it is peak or continuous.
+    """
+
+    factor: Annotated[FiniteFloat, Field(gt=0.0, le=1.0)] = 1.0
+    """Part of the figure that may be used for seconds on end."""
+    values: dict[str, str] = Field(default_factory=dict)
+    """Figure of each joint, by name; those of the robot's description by default."""
+    provenance: Annotated[str | None, Field(validate_default=True)] = None
+    """Where the figures are from; needed when there are any."""
+
+    @field_validator("values")
+    @classmethod
+    def _positive(cls, values: dict[str, str]) -> dict[str, str]:
+        for joint, text in values.items():
+            if not _either(text) > 0.0:
+                raise ValueError(f"{joint} must be above 0")
+        return values
+
+    def figure(self, joint: str, revolute: bool) -> float:
+        """Return the figure of a joint that has one.
+
+        Parameters
+        ----------
+        joint : str
+            One of `values`.
+        revolute : bool
+            Whether it turns (a moment in N·m) or slides (a force in N).
+
+        Raises
+        ------
+        UnitError
+            If the figure is of the other kind.
+        """
+        text = self.values[joint]
+        try:
+            return parse_quantity(text, "moment" if revolute else "force")
+        except UnitError as error:
+            kind = "turns and has a moment" if revolute else "slides and has a force"
+            raise UnitError(f"{joint} {kind}: {error}") from error
+
+    @field_validator("provenance")
+    @classmethod
+    def _known_origin(cls, text: str | None, info: Any) -> str | None:
+        if info.data.get("values") and not (text or "").strip():
+            raise ValueError("say where the torque values are from")
+        return text
+
+
+class Limits(StrictModel):
+    """Margins that every pose keeps."""
+
+    joint_margin: SpanAngle = 0.0873
+    """Least distance of a revolute joint to its limits, in rad."""
+    rail_margin: Distance = 0.0
+    """Least distance of a prismatic joint to its limits, in m."""
+    singular_value: Annotated[FiniteFloat, Field(ge=0.0, le=1.0)] = 0.05
+    """Least singular value of the length-scaled Jacobian, without dimension."""
+    wrist_angle: SpanAngle = 0.1745
+    """Least |A5|, in rad."""
+    clearance: Distance = 0.0
+    """Least distance between solids that must not touch, in m."""
+    payload: PositiveMass | None = None
+    """Largest mass that the flange may carry, in kg."""
+    torque: TorqueLimits = TorqueLimits()
+
+
+def _either(text: str) -> float:
+    """Return a moment in N·m or a force in N: which one a joint has, only the robot knows."""
+    return parse_quantity(text, "force" if text.rstrip().endswith("N") else "moment")
+
+
+class Search(StrictModel):
+    """Pool and technique; ends at ``poses`` or at ``d_max``, whichever comes first."""
+
+    technique: str = "cover"
+    """Name of a search technique (`elastocal.planning.search`)."""
+    metric: Literal["euclidean", "geodesic"] = "euclidean"
+    """How COVER measures the distance between contact points."""
+    poses: Annotated[int, Field(ge=1, le=_MOST_CANDIDATES)] | None = None
+    """Largest number of poses N."""
+    d_max: PositiveLength | None = None
+    """Cover distance at which COVER may stop, in m."""
+    pool: Annotated[int, Field(ge=1, le=_MOST_CANDIDATES)] = 3000
+    """Number of candidates."""
+    sampling: Literal["blue_noise", "uniform"] = "blue_noise"
+    """How candidate points are spread: keeping their distance, or each by itself."""
+    seed: Annotated[int, Field(ge=0, lt=2**63)] = 0
+    """Seed of everything random."""
+
+    @field_validator("pool")
+    @classmethod
+    def _holds_the_poses(cls, pool: int, info: Any) -> int:
+        poses = info.data.get("poses")
+        if poses is not None and not poses <= pool:
+            raise ValueError(f"must be at least the {poses} poses that are to be chosen")
+        return pool
+
+    @property
+    def most(self) -> int | None:
+        """Largest number of poses; None when only ``d_max`` ends the search."""
+        if self.poses is None and self.d_max is None:
+            return DEFAULT_POSES
+        return self.poses
+
+
+class ProcedureSettings(StrictModel):
+    """Settings of `elastocal run`. Joint moves go at the speeds of the section ``motion``."""
+
+    cycle: Annotated[PositiveTime, Field(ge=1e-3, le=0.1)] = 0.04
+    """Time between two looks at the devices, in s."""
+    approach_speed: Annotated[PositiveSpeed, Field(ge=1e-4, le=0.25)] = 0.02
+    """Between approach pose and near contact, and back, in m/s."""
+    contact_speed: Annotated[PositiveSpeed, Field(ge=1e-4, le=0.02)] = 0.005
+    """From near contact to the surface, in m/s."""
+    contact_force: PositiveForce = 60.0
+    """Force at which the guarded approach stops, in N."""
+    ramp: Annotated[PositiveForceRate, Field(ge=1.0, le=2e3)] = 400.0
+    """Fastest change of the force, in N/s."""
+    force_limit: PositiveForce | None = None
+    """Largest force that is let happen, in N; by default 1.3 times the largest load case, and
+    never more than the sensor's range allows."""
+    travel_limit: Annotated[PositiveLength, Field(le=50e-3)] = 15e-3
+    """How far the tool may go beyond the expected contact, or aside, in m."""
+    contact_compliance: Annotated[TranslationalCompliance, Field(le=10e-6)] = 0.5e-6
+    """Lateral movement of the marker under load that is expected without slip (disk, tooling,
+    tilt of the tool), in m/N of the load case."""
+    force_tolerance: Annotated[PositiveForce, Field(le=50.0)] = 5.0
+    """Largest distance of the mean force from the load case, in N."""
+    force_drift: Annotated[PositiveForceRate, Field(le=50.0)] = 5.0
+    """Largest drift of the force over the dwell, in N/s."""
+    force_spread: Annotated[PositiveForce, Field(le=50.0)] = 8.0
+    """Largest width of the force about its drift that holds 95 % of the samples, each axis, in N;
+    counted as four standard deviations."""
+    dwell: Annotated[PositiveTime, Field(le=60.0)] = 0.5
+    """How long the force must be like that before it is averaged, in s."""
+    average: Annotated[PositiveTime, Field(le=60.0)] = 1.0
+    """Time over which a loaded reading is averaged, in s."""
+    unloaded_average: Annotated[PositiveTime, Field(le=60.0)] = 1.0
+    """Time over which the unloaded reference is averaged, in s."""
+    marker_sigma: Annotated[PositiveLength, Field(le=1e-3)] = 50e-6
+    """Largest standard deviation of the marker during the unloaded reference, each axis, in m."""
+    slip_limit: Annotated[PositiveLength, Field(le=5e-3)] = 0.2e-3
+    """Largest lateral movement of the marker that is not expected, in m."""
+    timeout: Annotated[PositiveTime, Field(le=600.0)] = 20.0
+    """How long a load case may take to become stable after its ramp, in s; also what every other
+    step may take beyond its expected time."""
+    beam_timeout: Annotated[PositiveTime, Field(le=600.0)] = 5.0
+    """How long a tracker may look for the marker, in s."""
+    stale: Annotated[PositiveTime, Field(le=1.0)] = 0.3
+    """Oldest data that are trusted, in s."""
+    retries: Annotated[int, Field(ge=0, le=5)] = 1
+    """Further attempts at a pose after one that failed."""
+
+    @model_validator(mode="after")
+    def _no_contradiction(self) -> "ProcedureSettings":
+        # Not a validator of a field: that is not asked where the field keeps its default.
+        for key, reason in self._contradictions():
+            error = PydanticCustomError("contradiction", "{reason}", {"reason": reason})
+            detail = InitErrorDetails(type=error, loc=(key,), input=getattr(self, key))
+            raise ValidationError.from_exception_data(type(self).__name__, [detail])
+        return self
+
+    def _contradictions(self) -> Iterator[tuple[str, str]]:
+        """Yield keys whose values do not go with others."""
+        if not self.stale > 2.0 * self.cycle:
+            yield "stale", f"must be above two cycles ({2.0 * self.cycle:g} s)"
+        for key in ("dwell", "average", "unloaded_average"):
+            if not getattr(self, key) >= 4.0 * self.cycle:
+                yield key, f"must be at least four cycles ({4.0 * self.cycle:g} s)"
+        if not self.contact_speed <= self.approach_speed:
+            yield "contact_speed", f"must be at most approach_speed ({self.approach_speed:g} m/s)"
+        if not self.contact_force > self.force_spread:
+            least_felt = f"must be above force_spread ({self.force_spread:g} N)"
+            yield "contact_force", f"{least_felt}: less is felt without contact"
+        least = self.dwell + self.average
+        if not self.timeout >= least:
+            yield "timeout", f"must be at least dwell and average together ({least:g} s)"
+        if not self.beam_timeout >= self.stale:
+            yield "beam_timeout", f"must be at least stale ({self.stale:g} s)"
+
+
+class DeviceNames(StrictModel):
+    """Name of each device; which names there are is known to `elastocal run`."""
+
+    arm: str = SIMULATED
+    sensor: str = SIMULATED
+    """Force/torque sensor."""
+    metrology: str = SIMULATED
+    """Laser trackers."""
+
+
+class Acceptance(StrictModel):
+    """Limits that the report and the comparison of two calibrations hold their figures against."""
+
+    tolerance: PositiveLength | None = None
+    """Largest error of a predicted deflection at a pose that the fit has not seen, in m."""
+    drift: PositiveLength | None = None
+    """Largest change of a predicted deflection between two calibrations of the cell, in m."""

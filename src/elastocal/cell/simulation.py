@@ -1,0 +1,297 @@
+"""The hidden truth of the simulated cell, the figures of its devices, and the faults it injects.
+
+Only the simulation reads this; nothing here is known to planning, procedure or calibration. All
+defaults are assumptions of a plausible size, none is taken from a data sheet.
+"""
+
+import math
+from typing import Annotated, Any, Literal
+
+from pydantic import Field, FiniteFloat, field_validator, model_validator
+
+from elastocal.cell._quantities import (
+    Distance,
+    Force,
+    Mass,
+    Moment,
+    Point,
+    PositiveForce,
+    PositiveLength,
+    PositiveSpeed,
+    PositiveTime,
+    RotationalStiffness,
+    SampleRate,
+    Scale,
+    Share,
+    ShareBelowHalf,
+    SpanAngle,
+    Time,
+    TranslationalStiffness,
+)
+from elastocal.records import StrictModel
+
+_SIX = Field(min_length=6, max_length=6)
+
+
+class TruthScale(StrictModel):
+    """Factors on the stiffness of parts; 2 makes them twice as stiff."""
+
+    gears: Scale = 1.0
+    bearings: Scale = 1.0
+    links: Scale = 1.0
+    balancer: Scale = 1.0
+    floor: Scale = 1.0
+    external: Scale = 1.0
+    end_effector: Scale = 1.0
+
+
+class Gears(StrictModel):
+    """Gears of the six arm joints (`elastocal.sim.workcell`)."""
+
+    stiffness: Annotated[tuple[RotationalStiffness, ...], _SIX] | None = None
+    """At high torque, in N·m/rad; by default those of a 1.1 t arm, scaled with the moved mass."""
+    growth: ShareBelowHalf = 0.2
+    """How much softer a gear is at rest, over its stiffness at high torque."""
+    growth_angle: Annotated[SpanAngle, Field(gt=0.0)] = 3e-4
+    """Twist at which it is half way between the two, in rad."""
+    backlash: SpanAngle = 3e-5
+    """Twist that is lost between a torque and its opposite, in rad; there the gear is soft, not
+    free."""
+    hysteresis: Annotated[FiniteFloat, Field(ge=0.0, lt=0.3)] = 0.03
+    """Friction in the gear over its torque at `reference_angle`: half the height of its loop."""
+    reference_angle: Annotated[SpanAngle, Field(gt=0.0)] = 5e-4
+    """In rad."""
+    presliding: Annotated[SpanAngle, Field(gt=0.0)] = 6e-5
+    """Twist from rest after which the friction is at its full height, in rad."""
+
+
+class Bearings(StrictModel):
+    """Tilt of the bearings."""
+
+    ratio: tuple[Scale, Scale] = (4.0, 6.0)
+    """Stiffness of the two tilts over that of the joint's gear."""
+
+
+class Links(StrictModel):
+    """Bending of the two long links."""
+
+    bending: RotationalStiffness | None = None
+    """Stiffness of a hinge in the middle of the link, in N·m/rad; by default that of a 1.1 t arm,
+    scaled with the moved mass."""
+
+
+class Balancer(StrictModel):
+    """Spring between carousel and arm, beside the gear of axis 2."""
+
+    rate: TranslationalStiffness | None = None
+    """Rate of the spring, in N/m; by default one that carries about 3 kN·m of a 1.1 t arm stretched
+    out, scaled with the moved mass."""
+    free_length: PositiveLength = 0.3
+    """In m."""
+    anchor: PositiveLength = 0.6
+    """Distance of its end on the carousel from axis 2, in m."""
+    lever: PositiveLength = 0.18
+    """Distance of its end on the arm from axis 2, in m; below ``anchor``."""
+    fitted: bool = True
+    """Whether the robot has one."""
+
+    @field_validator("lever")
+    @classmethod
+    def _below_anchor(cls, value: float, info: Any) -> float:
+        anchor = info.data.get("anchor", math.inf)
+        if not value < anchor:
+            raise ValueError(f"must be below anchor ({anchor:g} m)")
+        return value
+
+
+class Floor(StrictModel):
+    """Foot of the robot: foundation, rail carriage, base frame."""
+
+    tilt: RotationalStiffness = 4e7
+    """About each of three axes through the foot, in N·m/rad."""
+
+
+class ExternalAxes(StrictModel):
+    """Drives of the axes before the arm."""
+
+    linear: TranslationalStiffness = 4e7
+    """Stiffness of a rail's drive, in N/m."""
+    turning: RotationalStiffness = 8e6
+    """Stiffness of a turntable's drive, in N·m/rad."""
+
+
+class EndEffector(StrictModel):
+    """Tool between sensor and tool centre point."""
+
+    turn: RotationalStiffness = 2.5e6
+    """About each axis of the sensor's frame, in N·m/rad."""
+    shift: TranslationalStiffness = 8e7
+    """Along each axis, in N/m."""
+
+
+class ContactTruth(StrictModel):
+    """Contact disk and tooling."""
+
+    normal_stiffness: TranslationalStiffness = 4e6
+    """Normal stiffness of the urethane disk, in N/m: 0.3 mm at 1.1 kN."""
+    shear_stiffness: TranslationalStiffness = 1.5e6
+    """Shear stiffness of the disk before it slips at all, in N/m: 0.2 mm at 280 N."""
+    friction: Annotated[FiniteFloat, Field(gt=0.0)] | None = None
+    """True coefficient of friction; by default that of the load cases."""
+    micro_slip: Distance = 8e-6
+    """Standard deviation of the slip of a load case at half the friction limit, in m; it grows
+    towards the limit."""
+    slide_speed: PositiveSpeed = 5e-3
+    """Speed at which a contact beyond its friction limit slides, in m/s."""
+    tooling_stiffness: TranslationalStiffness = 2.5e7
+    """Stiffness of the tooling along its normal, in N/m."""
+    surface_offset: Point = (0.0, 0.0, 0.0)
+    """How far the tooling stands from where the cell file puts it, in base, in m."""
+
+
+class ControllerTruth(StrictModel):
+    """Robot controller with force control."""
+
+    settling: PositiveTime = 0.12
+    """Time constant with which a force follows its ramp, in s."""
+    ripple: Force = 0.7
+    """Amplitude of the unrest of a held force, in N."""
+    reaction: PositiveTime = 0.004
+    """From the contact force to the standstill of a guarded approach, in s."""
+    repeatability: Distance = 10e-6
+    """Standard deviation of a stop along each axis of base, in m; the controller knows nothing
+    of it."""
+    gravity_compensation: Annotated[FiniteFloat, Field(ge=0.0, le=1.0)] = 0.9
+    """Part of the sag under its own weight that the controller takes out."""
+    collision_force: PositiveForce = 5000.0
+    """Force at which the drives give up a straight move, in N."""
+    travel_limit: PositiveLength = 0.03
+    """Way along the surface after which force control gives up, in m."""
+
+
+class SensorTruth(StrictModel):
+    """Force/torque sensor; ranges and place stand in the section ``sensor``."""
+
+    rate: SampleRate = 100.0
+    force_noise: Force = 0.8
+    """Standard deviation of a sample along each axis, in N."""
+    moment_noise: Moment = 0.08
+    """The same about each axis, in N·m."""
+    bias: Share = 0.01
+    """Standard deviation of the zero of each axis, over its range."""
+    drift: Force = 0.3
+    """Standard deviation of the drift of a force axis within a minute, in N; a moment axis drifts
+    as much in proportion to its range."""
+    cross_talk: Share = 0.001
+    """Standard deviation of what an axis reads of each axis, itself too, over the ranges."""
+
+
+class TrackerTruth(StrictModel):
+    """Laser trackers; stations stand in the section ``trackers``."""
+
+    rate: SampleRate = 100.0
+    noise: Distance = 15e-6
+    """Error that 95 % of the samples stay within along each axis, at no distance, in m."""
+    noise_per_metre: Distance = 6e-6
+    """Error that each metre of distance adds, in m."""
+    turbulence: Share = 0.3
+    """Part of the noise that changes slowly, as moving air makes it, so that it averages badly."""
+    placing: Distance = 0.02
+    """Standard deviation of the station's true place about that of the cell file, in m."""
+
+
+class Simulation(StrictModel):
+    """Section ``simulation`` of the cell file."""
+
+    seed: Annotated[int, Field(ge=0)] = 0
+    """Seed of everything random in the simulated devices."""
+    truth: TruthScale = TruthScale()
+    """Factors on the stiffness of parts, without dimension."""
+    gears: Gears = Gears()
+    bearings: Bearings = Bearings()
+    links: Links = Links()
+    balancer: Balancer = Balancer()
+    floor: Floor = Floor()
+    external: ExternalAxes = ExternalAxes()
+    end_effector: EndEffector = EndEffector()
+    contact: ContactTruth = ContactTruth()
+    controller: ControllerTruth = ControllerTruth()
+    sensor: SensorTruth = SensorTruth()
+    tracker: TrackerTruth = TrackerTruth()
+
+
+FaultKind = Literal[
+    "beam_break",
+    "ft_dropout",
+    "ft_frozen",
+    "ft_saturation",
+    "slip",
+    "never_stable",
+    "contact_missed",
+    "robot_stop",
+    "stale_clock",
+    "station_bumped",
+    "tool_weight",
+]
+_Step = Literal["approach", "reference", "engage", "hold", "release", "retract"]
+
+_ALWAYS = {"kind", "pose", "visits"}
+_WHEN = {"step", "load", "after"}
+_KEYS: dict[str, set[str]] = {
+    "beam_break": {*_WHEN, "duration", "station"},
+    "ft_dropout": {*_WHEN, "duration"},
+    "ft_frozen": {*_WHEN, "duration"},
+    "ft_saturation": {*_WHEN, "duration"},
+    "slip": {"load", "after", "distance"},
+    "never_stable": {"load", "amplitude"},
+    "contact_missed": set(),
+    "robot_stop": {*_WHEN, "duration"},
+    "stale_clock": {*_WHEN, "duration"},
+    "station_bumped": {"station", "offset"},
+    "tool_weight": {"mass"},
+}
+
+
+class Fault(StrictModel):
+    """One fault: what goes wrong, and when."""
+
+    kind: FaultKind
+    pose: Annotated[int, Field(ge=0)]
+    """Visit at which it happens, from 0. A visit begins with the first straight approach after a
+    joint move or a retract; a pose that is tried again is another visit."""
+    visits: Annotated[int, Field(ge=1)] = 1
+    """How many visits in a row it happens at. Not counted by `station_bumped` and `tool_weight`,
+    which stay."""
+    step: _Step = "hold"
+    """Step of the visit from whose beginning `after` counts: `approach` the first approach,
+    `reference` when it has ended, `engage` the second approach, `hold` a load case."""
+    load: Annotated[int, Field(ge=0)] = 0
+    """Which load case of the visit, from 0, where the step is `hold`."""
+    after: Time = 0.0
+    """In s."""
+    duration: PositiveTime | None = None
+    """How long it lasts, in s; for good by default."""
+    station: str | None = None
+    """Tracker station; all by default."""
+    distance: PositiveLength = 1e-3
+    """How far the contact slips, in m."""
+    amplitude: Force = 40.0
+    """Amplitude of the force that never comes to rest, in N."""
+    offset: Point = (0.5e-3, 0.0, 0.0)
+    """How far the station is moved, in base, in m."""
+    mass: Annotated[Mass, Field(le=1e3)] = 2.0
+    """Mass that is put on the tool, in kg."""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _only_its_keys(cls, data: Any) -> Any:
+        """Refuse a key that has no meaning for this kind of fault."""
+        if isinstance(data, dict) and data.get("kind") in _KEYS:
+            allowed = _KEYS[data["kind"]]
+            for key in data:
+                if key in cls.model_fields and key not in _ALWAYS | allowed:
+                    raise ValueError(
+                        f"{key!r} means nothing for {data['kind']}"
+                        f" (its keys: {', '.join(sorted(allowed)) or 'none'})"
+                    )
+        return data

@@ -1,1 +1,0 @@
-from .program import KrlProgram as KrlProgram, read_krl as read_krl

@@ -1,0 +1,361 @@
+"""What each kind of file holds, as ``check`` says: a function a kind, which reads and so validates.
+
+A new kind is a function here and its entry in a table of `elastocal.workflows.check`.
+"""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from elastocal import dataset, planning, procedure
+from elastocal.cell import load_cell
+from elastocal.codec import (
+    ARRAYS_SCHEMA,
+    VERDICTS_SCHEMA,
+    CodecData,
+    read_codec,
+    read_codec_folder,
+    read_codec_summary,
+)
+from elastocal.codec.study import (
+    DESIGN,
+    DESIGN_SCHEMA,
+    PART_SCHEMA,
+    STUDY_SCHEMA,
+    StudyDesign,
+    StudyStore,
+    read_design,
+    read_part,
+    read_study,
+)
+from elastocal.compensation import read_settings
+from elastocal.compensation.conditioning import read_tool
+from elastocal.compensation.process import TABLE, read_process, read_table
+from elastocal.elastic import read_springs
+from elastocal.errors import RobotError, SchemaError
+from elastocal.files import read_text
+from elastocal.identification import read_model
+from elastocal.identification.recertification import CompareSummary
+from elastocal.planning.motion import mover_for, require_free_home
+from elastocal.records import read_json, schema_of
+from elastocal.robot import Robot, leaf_links, parse_urdf
+from elastocal.tables import opened_table
+
+FileDescription = tuple[str, dict[str, object]]
+"""The kind of a file, and what it holds: figures by name, JSON-ready."""
+
+_TABLES: dict[tuple[str, ...], str] = {
+    ("variant", "seed_pose", "n_train"): "table of the indices of a codec",
+    ("sample", "poses", "search"): "table of a study",
+}
+"""What a table is, by its first columns."""
+
+
+def cell_file(path: Path) -> FileDescription:
+    """Describe a cell file.
+
+    Every mesh is read, the surface is held against the robot's reach, and HOME against the
+    solids; no candidate is made.
+
+    Raises
+    ------
+    ElastocalError
+        If the cell cannot be planned for whatever the candidates: its file, a file that it names,
+        the search technique, the place of the surface, or a collision at HOME.
+    """
+    cell = load_cell(path)
+    search = cell.file.search
+    planning.require_possible_search(cell)
+    surface = planning.cell_surface(cell)
+    findings = planning.surface_findings(cell, surface, np.random.default_rng(search.seed))
+    require_free_home(cell.home, mover_for(cell, planning.collision_scene(cell, surface)))
+    return "cell file", {
+        "schema": "elastocal.cell/1",
+        "cell": cell.name,
+        "robot": cell.robot.name,
+        "load_cases": list(cell.file.load_cases.cases),
+        "trackers": [tracker.name for tracker in cell.file.trackers],
+        "technique": search.technique,
+        "faces": len(surface.mesh.faces),
+        "findings": [finding.message for finding in findings],
+    }
+
+
+def plan_file(path: Path) -> FileDescription:
+    """Describe a plan."""
+    plan = planning.read_plan(path)
+    return "plan", {
+        "schema": "elastocal.plan/1",
+        "cell": plan.cell.name,
+        "robot": plan.robot.name,
+        "poses": len(plan.poses),
+        "load_cases": list(plan.contact.load_cases),
+        "technique": plan.search.name,
+        "covering_radius": plan.search.covering_radius,
+    }
+
+
+def pool_file(path: Path) -> FileDescription:
+    """Describe a pool of candidates."""
+    pool = planning.read_pool(path)
+    return "pool of candidates", {
+        "schema": "elastocal.pool/1",
+        "candidates": len(pool),
+        "sampled": len(pool.sampled),
+        "checks": list(pool.check_names),
+    }
+
+
+def run_folder(path: Path) -> FileDescription:
+    """Describe a run; its cell, plan and dataset are validated, its raw streams are not."""
+    run = procedure.RunFolder(path)
+    entries, start = _journal(run.journal)
+    cell, plan = load_cell(run.cell / start.cell_file), planning.read_plan(run.plan)
+    return "run", {
+        "schema": start.schema_name,
+        "cell": cell.name,
+        "robot": cell.robot.name,
+        "started": start.started,
+        "poses": len(plan.poses),
+        "committed": [log.pose for log in procedure.commits(entries)],
+        "readings": dataset_file(run.dataset)[1]["readings"] if run.dataset.exists() else None,
+    }
+
+
+def journal_file(path: Path) -> FileDescription:
+    """Describe a journal."""
+    entries, start = _journal(path)
+    return "journal of a run", {
+        "schema": start.schema_name,
+        "started": start.started,
+        "entries": len(entries),
+        "committed": [log.pose for log in procedure.commits(entries)],
+        "last_entry": f"{entries[-1].event.value} at {entries[-1].time:.1f} s",
+    }
+
+
+def streams_file(path: Path) -> FileDescription:
+    """Describe a recording of raw streams."""
+    streams = procedure.read_streams(path)
+    return "recording of raw streams", {
+        "schema": procedure.STREAMS_SCHEMA,
+        "joints": list(streams.joint_names),
+        "arm_states": len(streams.arm.time),
+        "wrenches": len(streams.wrench.time),
+        "marker_points": len(streams.points.time),
+    }
+
+
+def summary_file(path: Path) -> FileDescription:
+    """Describe a summary of a run."""
+    summary = procedure.read_summary(path)
+    counts, warnings = summary.readings.counts, len(summary.warnings)
+    schema = schema_of(procedure.RunSummary)
+    return "summary of a run", {"schema": schema, "readings": counts, "warnings": warnings}
+
+
+def dataset_file(path: Path) -> FileDescription:
+    """Describe a dataset."""
+    data = dataset.read(path)
+    return "dataset", {
+        "readings": len(data.readings(data.joint_names)),
+        "poses": len(data.poses),
+        "load_cases": list(data.load_cases),
+        "joints": list(data.joint_names),
+        "robot": data.robot_name or None,
+        "tcp": data.tcp_frame,
+    }
+
+
+def robot_file(path: Path) -> FileDescription:
+    """Describe a robot description."""
+    text = read_text(path)
+    leaves = leaf_links(parse_urdf(text))
+    if not leaves:
+        raise RobotError(f"{path}: URDF has no link at the end of a chain")
+    robots = [Robot.from_urdf(text, leaf) for leaf in leaves]
+    return "robot description", {
+        "robot": robots[0].name,
+        "tips": leaves,
+        "joints": list(max(robots, key=lambda robot: len(robot.joint_names)).joint_names),
+        "assumptions": [f"{a.field}: {a.reason}" for a in robots[0].assumptions],
+    }
+
+
+def springs_file(path: Path) -> FileDescription:
+    """Describe a file of springs."""
+    file = read_springs(path)
+    facts = {"include": file.include, "springs": len(file.springs)}
+    return "spring file", {"schema": "elastocal.springs/1", **facts}
+
+
+def model_file(path: Path) -> FileDescription:
+    """Describe a calibrated model."""
+    calibrated = read_model(path)
+    return "calibrated model", {
+        "robot": calibrated.model.robot.name,
+        "tcp": calibrated.model.robot.tip,
+        **_picked(calibrated.observability, "springs", "rank"),
+        "draws": len(calibrated.draws),
+        "provenance": calibrated.provenance,
+    }
+
+
+def tool_file(path: Path) -> FileDescription:
+    """Describe a tool file."""
+    facts = _picked(read_tool(path), "flange", "mass", "postures", "undetermined")
+    return "tool file", {"schema": "elastocal.tool/1", **facts}
+
+
+def compensator_file(path: Path) -> FileDescription:
+    """Describe settings of a compensator."""
+    settings = read_settings(path)
+    return "settings of a compensator", {
+        "schema": "elastocal.compensator/1",
+        "cycle": settings.cycle,
+        "filter_delay": float(settings.chain.delay()),
+        **_picked(settings.limits, "correction", "rate"),
+    }
+
+
+def process_table(path: Path) -> FileDescription:
+    """Describe a table of a simulated process."""
+    table = read_table(path)
+    last = table.lines[-1]
+    return "simulated process", {
+        "schema": "elastocal.process/1",
+        "cell": table.cell,
+        "process": table.process,
+        "seeds": [run.seed for run in table.runs],
+        "points": last.points,
+        "mean_after": last.after.mean,
+        "max_after": last.after.max,
+    }
+
+
+def process_folder(path: Path) -> FileDescription:
+    """Describe the folder of a simulated process; its deviations are validated, too."""
+    courses = len(read_process(path).courses)
+    kind, facts = process_table(path / TABLE)
+    return kind, {**facts, "courses": courses}
+
+
+def comparison_file(path: Path) -> FileDescription:
+    """Describe a comparison of two calibrations."""
+    found = read_json(path, CompareSummary)
+    return "comparison of two calibrations", {
+        "schema": "elastocal.comparison/1",
+        "robot": found.robot,
+        "compared": len(found.springs),
+        "moved": list(found.moved),
+        "rows": 0 if found.deflection is None else found.deflection.rows,
+        **_picked(found, "limit", "verdict"),
+    }
+
+
+def codec_folder(path: Path) -> FileDescription:
+    """Describe the folder of a codec; arrays and verdicts are validated and belong together."""
+    data, found = read_codec_folder(path)
+    return "folder of a codec", {**_codec_facts(data), "saturation": found.saturation}
+
+
+def codec_arrays(path: Path) -> FileDescription:
+    """Describe the arrays of a codec."""
+    return "codec", _codec_facts(read_codec(path))
+
+
+def codec_verdicts(path: Path) -> FileDescription:
+    """Describe the verdicts of a codec."""
+    facts = _picked(read_codec_summary(path), "robot", "variants", "saturation")
+    return "verdict file of a codec", {"schema": VERDICTS_SCHEMA, **facts}
+
+
+def study_folder(path: Path) -> FileDescription:
+    """Describe the folder of a study; every finished sample is validated."""
+    design = read_design(path / DESIGN)
+    return "study", {**_design_facts(design), "samples": len(StudyStore(path).finished(design))}
+
+
+def study_settings(path: Path) -> FileDescription:
+    """Describe what a study is a study of."""
+    return "settings file of a study", _design_facts(read_design(path))
+
+
+def study_samples(path: Path) -> FileDescription:
+    """Describe some finished samples, by the settings in the folder above theirs."""
+    results = read_part(path, read_design(path.resolve().parent.parent / DESIGN))
+    return "part of a study", {
+        "schema": PART_SCHEMA,
+        "samples": [result.number for result in results],
+        "conditions": len(results[0].outcomes) if results else 0,
+    }
+
+
+def study_record(path: Path) -> FileDescription:
+    """Describe the results of a study."""
+    found = read_study(path)
+    return "record of a study", {
+        "schema": STUDY_SCHEMA,
+        **_picked(found, "cell", "samples", "verification"),
+        "median_error_m": {each.name: each.error_mean.median for each in found.conditions},
+        "advice": found.advice or None,
+    }
+
+
+def is_table(path: Path) -> bool:
+    """Return whether a CSV file begins as a table that a codec or a study writes."""
+    return _first_columns(read_text(path).partition("\n")[0].strip().split(",")) in _TABLES
+
+
+def table(path: Path) -> FileDescription:
+    """Describe a table of results.
+
+    Raises
+    ------
+    SchemaError
+        If a row has more or fewer cells than the header.
+    """
+    with opened_table(path) as table:
+        header, rows = list(table.layout.header), table.rows()
+    uneven = rows.uneven(len(header))
+    if uneven:
+        line, cells = uneven
+        raise SchemaError(f"{path}, line {line}: {cells} cells, not {len(header)}")
+    return _TABLES[_first_columns(header)], {"rows": len(rows), "columns": header}
+
+
+def _first_columns(header: Sequence[str]) -> tuple[str, ...]:
+    return tuple(header[:3])
+
+
+def _picked(found: object, *names: str) -> dict[str, object]:
+    """Return some attributes of a record as they are called; tuples as lists."""
+    values = {name: getattr(found, name) for name in names}
+    return {name: list(v) if isinstance(v, tuple) else v for name, v in values.items()}
+
+
+def _journal(path: Path) -> tuple[tuple[procedure.Entry, ...], procedure.RunRecord]:
+    """Return the entries of a journal, and what the first says of the run."""
+    entries = procedure.read_journal(path)
+    start = entries[0].run if entries else None
+    if start is None:
+        raise SchemaError(f"{path} has no entry: nothing has moved in this run")
+    return entries, start
+
+
+def _codec_facts(data: CodecData) -> dict[str, object]:
+    return {
+        "schema": ARRAYS_SCHEMA,
+        "robot": data.robot,
+        "variants": [each.name for each in data.variants],
+        "poses": len(data.contact),
+        "splits": len(data.seed_pose),
+        "training": len(data.n_train),
+    }
+
+
+def _design_facts(design: StudyDesign) -> dict[str, object]:
+    facts = _picked(design, "cell", "seed")
+    facts |= {"conditions": list(design.names), "verification": design.verification}
+    return {"schema": DESIGN_SCHEMA, **facts}

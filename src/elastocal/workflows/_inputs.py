@@ -1,0 +1,199 @@
+"""What several workflows ask of their inputs: robot, postures and frames as people write them.
+
+Also that a model fits the cell, how far it carries, and that no output takes an input's place.
+"""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from elastocal.arrays import FloatArray
+from elastocal.dataset import Dataset
+from elastocal.errors import ElastocalError, FileAccessError, RobotError, UnitError
+from elastocal.files import read_text
+from elastocal.identification import CalibratedModel, attainable_rank
+from elastocal.robot import Robot, T_from_xyzabc, catalogue, leaf_links, parse_urdf, with_tool
+from elastocal.units import parse_quantity
+
+_TOOL_LINK = "tcp"
+"""Name of the link that a tool given by numbers gets."""
+_NOT_COVERED = (
+    "the calibration saw fewer combinations of springs than a force can load: predictions away from"
+    " its poses are not covered by the intervals"
+)
+_SAMPLES = 5
+"""Joint positions at which two robots are compared."""
+_SAME = 1e-6
+"""Difference of their poses by rounding, in m or as a number of a rotation."""
+
+
+def find_robot(
+    robot: str | None, tcp: str | None, tool: str | None, dataset: Dataset | None = None
+) -> Robot:
+    """Return the robot that a user means.
+
+    Parameters
+    ----------
+    robot : str or None
+        A URDF file, a catalogue name, or None for the dataset's own.
+    tcp : str or None
+        Link at the tool centre point; by default the dataset's, or the robot's only leaf link.
+    tool : str or None
+        Pose of the tcp behind that link, ``"x, y, z, a, b, c"`` with units (KUKA Z-Y'-X'').
+    dataset : Dataset, optional
+        A dataset that may name both.
+
+    Raises
+    ------
+    RobotError
+        If there is no robot, or no way to tell its tool centre point.
+    """
+    urdf = _find_urdf(robot, dataset)
+    if robot is None and dataset is not None:
+        tcp = tcp or dataset.tcp_frame
+    if not tcp:
+        leaves = leaf_links(parse_urdf(urdf))
+        if len(leaves) != 1:
+            raise RobotError(f"name the tool centre point with --tcp: {', '.join(leaves)}")
+        tcp = leaves[0]
+    if tool is not None:
+        urdf = with_tool(urdf, tcp, _TOOL_LINK, parse_frame(tool, "tool", error=RobotError))
+        tcp = _TOOL_LINK
+    return Robot.from_urdf(urdf, tcp)
+
+
+def require_same_robot(model: Robot, cell: Robot, names: tuple[str, str]) -> None:
+    """Refuse a model whose robot, or whose tool centre point, is not that of the cell.
+
+    Parameters
+    ----------
+    model, cell : Robot
+        The robots of a calibrated model and of a cell.
+    names : tuple of str
+        File of the model and name of the cell, for the message.
+
+    Raises
+    ------
+    RobotError
+        If joints have other names, or the same joints lead elsewhere.
+    """
+    file, name = names
+    if model.joint_names != cell.joint_names:
+        raise RobotError(
+            f"{file}: the model's robot has the joints {', '.join(model.joint_names)}, that of"
+            f" cell {name} {', '.join(cell.joint_names)}: they must be the same"
+        )
+    low, high = (np.clip(end, -np.pi, np.pi) for end in (cell.limits.lower, cell.limits.upper))
+    q = np.linspace(low, high, _SAMPLES)
+    gap = float(np.abs(model.forward(q) - cell.forward(q)).max())
+    if not gap <= _SAME:
+        raise RobotError(
+            f"{file}: the same joints lead {1e3 * gap:.3g} mm apart in the model and in cell"
+            f" {name}: another tool centre point, base or robot"
+        )
+
+
+def coverage_notes(calibrated: CalibratedModel) -> tuple[str, ...]:
+    """Return a warning unless every combination that forces can load was determined."""
+    covered = calibrated.observability.rank >= attainable_rank(calibrated.model)
+    return () if covered else (_NOT_COVERED,)
+
+
+def parse_posture(robot: Robot, text: str | None) -> FloatArray | None:
+    """Return joint positions, shape (joint,), in rad or m; None for no text.
+
+    Raises
+    ------
+    RobotError
+        If there is not one quantity a joint, or one is outside its limits.
+    UnitError
+        If a unit is missing or wrong.
+    """
+    if text is None:
+        return None
+    parts, names = [part.strip() for part in text.split(",")], robot.joint_names
+    if len(parts) != len(names):
+        raise RobotError(
+            f"posture {text!r} has {len(parts)} values: it must have one a joint of {robot.name}"
+            f" ({', '.join(names)})"
+        )
+    kinds = ["angle" if turns else "length" for turns in robot.revolute]
+    q = np.array([parse_quantity(part, kind) for part, kind in zip(parts, kinds, strict=True)])
+    outside = ~(robot.limits.margin(q) >= 0.0)
+    if outside.any():
+        joint = int(np.argmax(outside))
+        raise RobotError(
+            f"posture {text!r}: {names[joint]} at {parts[joint]} is outside its limits"
+        )
+    return q
+
+
+def write_posture(robot: Robot, q: Sequence[float]) -> str:
+    """Return a posture as `parse_posture` reads it, to 0.1 deg and 0.1 mm."""
+    return ", ".join(
+        f"{np.degrees(value):.1f} deg" if turns else f"{1e3 * value:.1f} mm"
+        for value, turns in zip(q, robot.revolute, strict=True)
+    )
+
+
+def parse_frame(
+    text: str,
+    name: str = "frame",
+    rule: str = "must be six quantities, e.g. '0 mm, 0 mm, 565 mm, 0 deg, 0 deg, 0 deg'",
+    error: type[ElastocalError] = UnitError,
+) -> FloatArray:
+    """Return a frame, shape (4, 4), from ``"x, y, z, a, b, c"`` (KUKA Z-Y'-X'').
+
+    Parameters
+    ----------
+    text : str
+        Three lengths and three angles.
+    name, rule : str
+        For the refusal of another number of quantities.
+    error : type
+        What that refusal is raised as.
+
+    Raises
+    ------
+    UnitError
+        If a unit is missing or wrong.
+    """
+    parts = [part.strip() for part in text.split(",")]
+    if len(parts) != 6:
+        raise error(f"{name} {text!r} {rule}")
+    kinds = ("length",) * 3 + ("angle",) * 3
+    return T_from_xyzabc(*(parse_quantity(p, kind) for p, kind in zip(parts, kinds, strict=True)))
+
+
+def refuse_overwriting(out: Path | None, *inputs: Path) -> None:
+    """Refuse an output path that is also an input: measurements are not to be replaced.
+
+    Raises
+    ------
+    FileAccessError
+        If the paths are the same file.
+    """
+    if out is not None and any(out.resolve() == path.resolve() for path in inputs):
+        raise FileAccessError(f"--out {out} is an input of this command: name another file")
+
+
+def _find_urdf(robot: str | None, dataset: Dataset | None) -> str:
+    if robot is None:
+        if dataset is None or not dataset.robot_urdf:
+            raise RobotError(
+                "the dataset names no robot: give --robot with a URDF file or a catalogue name"
+                " (see `elastocal robots`)"
+            )
+        return dataset.robot_urdf
+    path = Path(robot)
+    if path.suffix.lower() in (".urdf", ".xml") or _is_file(path):
+        return read_text(path)
+    return catalogue.urdf(robot)
+
+
+def _is_file(path: Path) -> bool:
+    try:
+        return path.is_file()
+    except OSError:  # a name that is too long for a file
+        return False
