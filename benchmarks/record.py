@@ -17,7 +17,7 @@ from pathlib import Path
 import numpy as np
 import zstandard
 
-from elastocal.cell.devices import (
+from elastocal.cell import (
     ArmState,
     BeamState,
     Motion,

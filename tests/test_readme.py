@@ -16,7 +16,7 @@ from pydantic.fields import FieldInfo
 
 from elastocal.cell import RUN_SECTIONS, CellFile, ProcedureSettings
 from elastocal.cell.simulation import FaultKind
-from elastocal.procedure.run.faults import Fault
+from elastocal.procedure.run.steps import Fault
 from elastocal.workflows import chapters
 from support.cli import Result, elastocal
 from support.demos import demo_result, finished_demo

@@ -245,7 +245,7 @@ def _one_thread_each(processes: int) -> Any:
 
 
 def _to_the_end(results: Generator[_Result]) -> Iterator[_Result]:
-    """Yield results; whoever does not want the rest of them is told nothing about it."""
+    """Yield results; whoever does not want the rest of them hears nothing about it."""
     try:
         for result in results:  # noqa: UP028 - `yield from` would close them with complaints
             yield result

@@ -1,6 +1,5 @@
 """``elastocal run`` on the simulated cell: refusals, the dry run, a whole run, kill and resume."""
 
-import importlib
 import json
 import shutil
 import signal
@@ -14,6 +13,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
+from elastocal import procedure
 from elastocal.cell import fingerprint, load_cell
 from elastocal.errors import DatasetError, FileAccessError
 from elastocal.planning import read_plan, write_plan
@@ -221,8 +221,7 @@ def test_a_run_whose_readings_cannot_be_derived_still_says_how_it_ended(
     def fails(_):
         raise DatasetError("no usable reading among 8")
 
-    module = importlib.import_module("elastocal.workflows.run")  # its face has the function
-    monkeypatch.setattr(module, "derive_run", fails)
+    monkeypatch.setattr(procedure, "derive_run", fails)
     result = run(planned, tmp_path / "run", "--json")
     assert result.code == 1
     figures = json.loads(result.out)

@@ -15,15 +15,15 @@ from elastocal.codec import (
     cross_validate,
     write_index_table,
 )
-from elastocal.codec._training import prepared_variants
-from elastocal.codec.index_correlation import (
+from elastocal.codec.cross_validation import prepared_variants
+from elastocal.codec.indices import (
     KINDS,
     _at_equal_size,
     _at_equal_size_and_split,
     _growth,
     correlate,
+    index_values,
 )
-from elastocal.codec.indices import index_values
 from elastocal.elastic import layout
 from elastocal.errors import CodecError
 from elastocal.identification import factor, observability

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from elastocal.planning.checks import Checks, JointLimitsCheck
-from elastocal.planning.pool import Approach
+from elastocal.planning.pool import PostureSolver
 from elastocal.planning.pool_sampling import rank_base_placements
 from elastocal.robot import Rail, Robot, catalogue, on_rail, with_tool
 from elastocal.robot.inverse import inverse_for
@@ -12,8 +12,6 @@ from elastocal.sim.arm import (
     SphericalCap,
 )
 from support.postures import T_FLANGE_TCP
-
-APPROACH = Approach(0.1, spins=4)
 
 
 @pytest.fixture(scope="module")
@@ -26,9 +24,8 @@ def ranked(robot, apexes, external, slow=(), margin=0.05):
     caps = [SphericalCap(apex=apex).spread(24, 0.0) for apex in apexes]
     points, normals = (np.concatenate(parts) for parts in zip(*caps, strict=True))
     checks = Checks((), (JointLimitsCheck(robot, margin),), tuple(slow))
-    return rank_base_placements(
-        inverse_for(robot), points, normals, APPROACH, checks, np.array(external)[:, None]
-    )
+    solver = PostureSolver(inverse_for(robot), checks, 0.1, spins=4)
+    return rank_base_placements(solver, points, normals, np.array(external)[:, None])
 
 
 def test_the_position_that_reaches_the_surface_comes_alone(robot):

@@ -5,7 +5,7 @@ import pytest
 
 from elastocal.errors import PlanningError
 from elastocal.planning.checks import Checks, EdgeCheck, FrictionCheck, JointLimitsCheck, WristCheck
-from elastocal.planning.pool import UNREACHABLE, Approach, BasePlacement, join_pools, make_pool
+from elastocal.planning.pool import UNREACHABLE, BasePlacement, PostureSolver, join_pools
 from elastocal.planning.surface import contact_frames
 from elastocal.robot.inverse import inverse_for
 from elastocal.sim.arm import (
@@ -19,7 +19,7 @@ QUICK = [JointLimitsCheck(arm(), 0.05), WristCheck(arm(), 0.1)]
 
 def made(points, normals, quick=QUICK, slow=(), point=(), stands=STANDS):
     checks = Checks(tuple(point), tuple(quick), tuple(slow))
-    return make_pool(inverse_for(arm()), points, normals, Approach(0.1), checks, stands)
+    return PostureSolver(inverse_for(arm()), checks, 0.1).pool(points, normals, stands)
 
 
 def test_contact_frames_press_into_the_surface():

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from elastocal.planning.checks import Checks
-from elastocal.planning.pool import Approach, make_pool
+from elastocal.planning.pool import PostureSolver
 from elastocal.planning.postures import _STRAIGHT, retreat_joints
 from elastocal.robot.inverse import inverse_for
 from elastocal.sim.arm import (
@@ -15,7 +15,7 @@ from support.postures import arm
 
 def postures(distance):
     points, normals = SphericalCap().spread(30, 0.0)
-    return make_pool(inverse_for(arm()), points, normals, Approach(distance), Checks()).postures
+    return PostureSolver(inverse_for(arm()), Checks(), distance).pool(points, normals).postures
 
 
 @pytest.mark.parametrize("distance", [0.1, 0.3])

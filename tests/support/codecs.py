@@ -14,7 +14,7 @@ from elastocal.codec import (
     judge,
     make_variants,
 )
-from elastocal.codec._training import PreparedVariant, prepared_variants
+from elastocal.codec.cross_validation import PreparedVariant, prepared_variants
 from elastocal.dataset import Readings
 from support.cells import Cell, rich_truth, robot
 

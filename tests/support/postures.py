@@ -5,7 +5,7 @@ from functools import cache
 import numpy as np
 
 from elastocal.planning.checks import Checks
-from elastocal.planning.pool import Approach, Pool, make_pool
+from elastocal.planning.pool import Pool, PostureSolver
 from elastocal.planning.postures import Postures
 from elastocal.robot import Robot, catalogue, with_tool
 from elastocal.robot.inverse import inverse_for
@@ -31,7 +31,7 @@ def arm() -> Robot:
 @cache
 def pool(count: int = 60) -> Pool:
     points, normals = SphericalCap().spread(count, 0.0)
-    return make_pool(inverse_for(arm()), points, normals, Approach(0.1), Checks())
+    return PostureSolver(inverse_for(arm()), Checks(), 0.1).pool(points, normals)
 
 
 def postures() -> Postures:

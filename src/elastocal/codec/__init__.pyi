@@ -3,36 +3,30 @@ from .analysis import (
     SpringObservability as SpringObservability,
     analyse as analyse,
 )
-from .cross_validation import cross_validate as cross_validate
+from .cross_validation import (
+    PreparedVariant as PreparedVariant,
+    cross_validate as cross_validate,
+    prepared_variants as prepared_variants,
+)
 from .data import (
+    ARRAYS as ARRAYS,
+    ARRAYS_SCHEMA as ARRAYS_SCHEMA,
     AXES as AXES,
     NO_POSE as NO_POSE,
     CodecData as CodecData,
     SpringLabels as SpringLabels,
-)
-from .index_correlation import (
-    KINDS as KINDS,
-    Correlation as Correlation,
-    correlate as correlate,
+    read_codec as read_codec,
+    write_codec as write_codec,
 )
 from .indices import (
     COVERING_RADIUS as COVERING_RADIUS,
     INDICES as INDICES,
+    KINDS as KINDS,
+    Correlation as Correlation,
     IndexValues as IndexValues,
+    correlate as correlate,
     index_values as index_values,
     write_index_table as write_index_table,
-)
-from .netcdf import (
-    ARRAYS as ARRAYS,
-    ARRAYS_SCHEMA as ARRAYS_SCHEMA,
-    read_codec as read_codec,
-    write_codec as write_codec,
-)
-from .paired_differences import (
-    DifferenceAtSize as DifferenceAtSize,
-    PairedDifference as PairedDifference,
-    PairVerdict as PairVerdict,
-    paired_difference as paired_difference,
 )
 from .saturation import (
     Saturation as Saturation,
@@ -65,9 +59,13 @@ from .verdicts import (
     CodecSetup as CodecSetup,
     CodecSummary as CodecSummary,
     Curve as Curve,
+    DifferenceAtSize as DifferenceAtSize,
+    PairedDifference as PairedDifference,
+    PairVerdict as PairVerdict,
     Verdicts as Verdicts,
     codec_summary as codec_summary,
     judge as judge,
+    paired_difference as paired_difference,
     read_codec_folder as read_codec_folder,
     read_codec_summary as read_codec_summary,
     write_codec_summary as write_codec_summary,

@@ -10,10 +10,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from elastocal.arrays import BoolArray, FloatArray
-from elastocal.codec._training import PreparedVariant, prepared_variants
+from elastocal.codec.cross_validation import PreparedVariant, prepared_variants
 from elastocal.codec.data import NO_POSE, CodecData
-from elastocal.codec.index_correlation import Correlation, correlate
-from elastocal.codec.indices import IndexValues, index_values
+from elastocal.codec.indices import Correlation, IndexValues, correlate, index_values
 from elastocal.dataset import Readings
 from elastocal.elastic import layout
 from elastocal.identification import Term, factor, observability, rank, unit_columns

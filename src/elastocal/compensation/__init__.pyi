@@ -17,7 +17,6 @@ from .posture_survey import (
     joint_limit_constraint as joint_limit_constraint,
     principal_stiffness as principal_stiffness,
     read_stations as read_stations,
-    stiffness_along as stiffness_along,
     survey_postures as survey_postures,
 )
 from .settings import (

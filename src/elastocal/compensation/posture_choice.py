@@ -92,25 +92,19 @@ def write_survey(path: Path, robot: Robot, stations: PathStations, survey: Postu
     FileAccessError
         If the file cannot be written.
     """
-    spins, externals = survey.grid.spins, survey.grid.external
-    external = robot.joint_names[: robot.external_axes]
-    names = [_header(robot, name) for name in external]
-    header = ["line", "spin[deg]", *names, "stiffness[N/m]", *_arm_headers(robot)]
+    names, count = _headers(robot), robot.external_axes
+    header = ["line", "spin[deg]", *names[:count], "stiffness[N/m]", *names[count:]]
     filled = np.where(np.isnan(survey.stiffness), -np.inf, survey.stiffness)
     rows: list[list[str]] = []
     for index in np.ndindex(*survey.stiffness.shape[:3]):
         station, spin, place = index
         branch = int(filled[index].argmax())
         k = float(survey.stiffness[(*index, branch)])
-        q = (
-            survey.q[(*index, branch)]
-            if not np.isnan(k)
-            else np.full(len(robot.joint_names), np.nan)
-        )
-        held = _shown(robot, externals[place])
-        arm = _shown(robot, q)[robot.external_axes :]
+        q = np.where(np.isnan(k), np.nan, survey.q[(*index, branch)])
+        held = _shown(robot, survey.grid.external[place])
+        turned = _cell(float(np.degrees(survey.grid.spins[spin])))
         line = str(stations.lines[station])
-        rows.append([line, _cell(float(np.degrees(spins[spin]))), *held, _cell(k), *arm])
+        rows.append([line, turned, *held, _cell(k), *_shown(robot, q)[count:]])
     write_table(path, header, rows)
     return path
 
@@ -135,7 +129,7 @@ def write_choice(
     robot = calibrated.model.robot
     header = [
         *("choice", "line", "spin[deg]"),
-        *(_header(robot, name) for name in robot.joint_names),
+        *_headers(robot),
         *(f"stiffness{end}[N/m]" for end in ("", "_low", "_high")),
         *(f"principal_{number}[N/m]" for number in (1, 2, 3)),
         *(f"axis_{number}_{axis}" for number in (1, 2, 3) for axis in "xyz"),
@@ -160,12 +154,9 @@ def write_choice(
     return path
 
 
-def _arm_headers(robot: Robot) -> list[str]:
-    return [_header(robot, name) for name in robot.joint_names[robot.external_axes :]]
-
-
-def _header(robot: Robot, name: str) -> str:
-    return f"{name}[{'deg' if robot.revolute[robot.joint_names.index(name)] else 'mm'}]"
+def _headers(robot: Robot) -> list[str]:
+    joints = zip(robot.joint_names, robot.revolute, strict=True)
+    return [f"{name}[{'deg' if turns else 'mm'}]" for name, turns in joints]
 
 
 def _shown(robot: Robot, q: FloatArray) -> list[str]:

@@ -40,7 +40,7 @@ from elastocal.planning import cell_surface, collision_scene
 from elastocal.results import brief_repr
 from elastocal.robot import Robot, characteristic_length, smallest_singular_value
 from elastocal.robot.inverse import InverseKinematics
-from elastocal.tables import TableRows
+from elastocal.tables import TableLayout, TableRows
 
 _BLOCK = 20_000
 """Rows of a path that are read at a time."""
@@ -89,15 +89,6 @@ def directional_stiffness(
         low, high = interval((rows @ calibrated.draws.T).T)
         # What is most compliant is least stiff.
         return DirectionalStiffness(1.0 / (rows @ calibrated.compliance), 1.0 / high, 1.0 / low)
-
-
-def stiffness_along(calibrated: CalibratedModel, q: ArrayLike, direction: ArrayLike) -> FloatArray:
-    """Return the stiffness along a direction without its interval; see `directional_stiffness`."""
-    with np.errstate(divide="ignore"):
-        stiffness: FloatArray = 1.0 / (
-            _squared_torques(calibrated, q, direction) @ calibrated.compliance
-        )
-    return stiffness
 
 
 def _squared_torques(calibrated: CalibratedModel, q: ArrayLike, direction: ArrayLike) -> FloatArray:
@@ -179,25 +170,20 @@ def read_stations(
         layout = read_layout(path)
         columns = find_columns(layout.header, solver.robot, forces=False)
         count = sum(len(block.lines) for block in row_blocks(path, layout, _BLOCK))
-        wanted = np.unique(np.linspace(0, count - 1, min(most, count)).round().astype(int))
-        block = _rows(path, wanted)
+        wanted = np.linspace(0, count - 1, min(most, count)).round().astype(int)
+        block = _rows(path, layout, set(wanted.tolist()))
         values = read_values(block, columns)
         labels = [f"row {line}" for line in block.lines]
         q, T = programmed_rows(solver, values, start, labels.__getitem__)
     return PathStations(tuple(block.lines), T, q)
 
 
-def _rows(path: Path, wanted: np.ndarray) -> TableRows:
-    """Return some rows of a file by their numbers, in ascending order."""
-    cells: list[list[str]] = []
-    lines: list[int] = []
-    first = 0
-    for block in row_blocks(path, read_layout(path), _BLOCK):
-        for row in wanted[(wanted >= first) & (wanted < first + len(block.lines))]:
-            cells.append(block.cells[row - first])
-            lines.append(block.lines[row - first])
-        first += len(block.lines)
-    return TableRows(cells, lines)
+def _rows(path: Path, layout: TableLayout, wanted: set[int]) -> TableRows:
+    """Return some rows of a file by their numbers, in the order of the file."""
+    blocks = row_blocks(path, layout, _BLOCK)
+    rows = (row for block in blocks for row in zip(block.lines, block.cells, strict=True))
+    found = [row for number, row in enumerate(rows) if number in wanted]
+    return TableRows([cells for _, cells in found], [line for line, _ in found])
 
 
 @brief_repr
@@ -312,7 +298,7 @@ def survey_postures(
     constraints : tuple of PostureConstraint
         What a posture must pass, quick ones first.
     done : callable
-        Told how many stations are done.
+        Hears how many stations are done.
 
     Raises
     ------
@@ -339,7 +325,9 @@ def survey_postures(
             refused[constraint.name] += int(np.sum(allowed & ~passed))
             allowed = passed
         found = np.full(len(rows), np.nan)
-        found[allowed] = stiffness_along(calibrated, rows[allowed], u)
+        squares = _squared_torques(calibrated, rows[allowed], u)
+        with np.errstate(divide="ignore"):
+            found[allowed] = 1.0 / (squares @ calibrated.compliance)
         stiffness[station] = found.reshape(shape[1:])
         done(station + 1)
     return PostureSurvey(grid, q, stiffness, refused)

@@ -32,6 +32,8 @@ _ZERO = 1e-6
 """Components below this part of the largest count as zero."""
 _MOST_SETS = 20_000
 """Largest number of coordinate sets to try; beyond it elimination gives a sparse enough basis."""
+_PROBES, _PROBE_SEED = 60, 0
+"""Number and seed of the configurations that show what could be observed at all."""
 
 
 def sparse_basis(null_space: FloatArray, joints: Sequence[int]) -> FloatArray:
@@ -120,10 +122,6 @@ def _independent(candidates: Sequence[FloatArray], k: int) -> list[FloatArray]:
         if len(chosen) == k:
             break
     return chosen
-
-
-_PROBES, _PROBE_SEED = 60, 0
-"""Number and seed of the configurations that show what could be observed at all."""
 
 
 @record()

@@ -42,6 +42,19 @@ _MOST_BLUNDERS = 0.1
 _REDUNDANCY = 1.5
 """Fewest equations for each determined direction; with fewer, residuals say nothing."""
 _MOST_LEVERAGE = 0.99
+_SIGNIFICANT = 6.0
+"""Number of standard errors from which an offset is named."""
+_SMALLEST = 0.03
+"""Part of the median force below which an offset is not worth naming."""
+_REDUCTION = 0.3
+"""Part of the sum of squared residuals that the offset must explain to be named."""
+_FEWEST_POSES = 10
+"""With fewer poses, what the springs miss at one of them may pass for an offset."""
+_SPARE = 2.0
+"""Fewest equations for each unknown, offset included."""
+_ROUNDS = 20
+_SETTLED = 1e-3
+"""Step at which the offset stands still, relative to its size."""
 
 
 @brief_repr
@@ -96,21 +109,6 @@ def leverage(problem: Problem, solution: Solution) -> FloatArray:
     basis = system.Vt[:seen] / system.s[:seen, None]
     rows = problem.scaled().rows @ basis.T
     return np.asarray(np.minimum(np.square(rows).sum(axis=2).mean(axis=1), _MOST_LEVERAGE))
-
-
-_SIGNIFICANT = 6.0
-"""Number of standard errors from which an offset is named."""
-_SMALLEST = 0.03
-"""Part of the median force below which an offset is not worth naming."""
-_REDUCTION = 0.3
-"""Part of the sum of squared residuals that the offset must explain to be named."""
-_FEWEST_POSES = 10
-"""With fewer poses, what the springs miss at one of them may pass for an offset."""
-_SPARE = 2.0
-"""Fewest equations for each unknown, offset included."""
-_ROUNDS = 20
-_SETTLED = 1e-3
-"""Step at which the offset stands still, relative to its size."""
 
 
 @brief_repr

@@ -36,13 +36,11 @@ from .plan_result import (
 from .pool import (
     REACH_ADVICE as REACH_ADVICE,
     UNREACHABLE as UNREACHABLE,
-    Approach as Approach,
     BasePlacement as BasePlacement,
     Options as Options,
     Pool as Pool,
+    PostureSolver as PostureSolver,
     join_pools as join_pools,
-    make_pool as make_pool,
-    options_at as options_at,
 )
 from .pool_file import (
     HAS_POSTURE as HAS_POSTURE,

@@ -32,7 +32,7 @@ Joints = tuple[float, ...]
 
 @record()
 class CellRecord:
-    """Which cell a plan was made for."""
+    """The cell that a plan was made for."""
 
     name: str
     file: str

@@ -36,20 +36,10 @@ _ROUNDS = 6
 """Postures of a point and branch that the slow checks are asked about, at most."""
 
 
-@dataclass(frozen=True)
-class Approach:
-    """How the tool comes to the surface."""
-
-    distance: float
-    """Distance of the approach pose from the surface along the normal, in m."""
-    spins: int = 8
-    """Number of turns of the tool about its axis that are tried."""
-
-
 @brief_repr
 @dataclass(frozen=True)
 class BasePlacement:
-    """Where the external axes carry the arm, and which branches are asked there, the best first."""
+    """A position of the external axes, and the branches that are asked there, the best first."""
 
     external: tuple[float, ...] = ()
     """Positions of the external axes, in rad or m."""
@@ -122,66 +112,6 @@ class Pool:
         )
 
 
-def make_pool(
-    solver: InverseKinematics,
-    points: FloatArray,
-    normals: FloatArray,
-    approach: Approach,
-    checks: Checks,
-    placements: Sequence[BasePlacement] = (BasePlacement(),),
-) -> Pool:
-    """Return a posture for every point that has one which passes every check.
-
-    Parameters
-    ----------
-    solver : InverseKinematics
-        Of the robot with its tool.
-    points, normals : ndarray, shape (point, 3)
-        Contact points in base, in m, and outward unit normals.
-    approach : Approach
-        How the tool comes to the surface.
-    checks : Checks
-        What a posture has to pass; those of points refer to these points.
-    placements : sequence of BasePlacement
-        Where the external axes may carry the arm, in the order in which they are tried.
-
-    Raises
-    ------
-    PlanningError
-        If there is no point.
-    """
-    if not len(points):
-        raise PlanningError("the surface has no candidate points: is its region empty?")
-    found = _PoolSearch(checks, len(points))
-    found.refuse_points()
-    for placement in placements:
-        waiting = found.waiting
-        if not len(waiting):
-            break
-        where = points[waiting], normals[waiting]
-        options = options_at(solver, *where, approach, placement.external)
-        options = Options(options.postures.at(waiting[options.point]), options.branch)
-        order = range(solver.branches) if placement.branches is None else placement.branches
-        for branch in order:
-            _ask_branch(options.of(branch, found.is_waiting), branch, checks, found)
-    return found.pool(len(solver.robot.joint_names))
-
-
-def join_pools(pools: Sequence[Pool]) -> Pool:
-    """Return one pool of several that were made of consecutive parts of the points."""
-    starts = np.cumsum([0, *(pool.sampled for pool in pools)])
-    postures = [
-        pool.postures.at(pool.postures.point + start)
-        for pool, start in zip(pools, starts[:-1], strict=True)
-    ]
-    return Pool(
-        Postures.joined(postures),
-        np.concatenate([pool.branch for pool in pools]),
-        Verdicts.joined([pool.verdicts for pool in pools]),
-        np.concatenate([pool.refused_by for pool in pools]),
-    )
-
-
 @brief_repr
 @dataclass(frozen=True, eq=False)
 class Options:
@@ -202,7 +132,7 @@ class Options:
 
 
 class _PoolSearch:
-    """The postures found so far, and the points that wait for one; lives in `make_pool` only."""
+    """The postures found so far, and the points that wait for one, while a pool is made."""
 
     def __init__(self, checks: Checks, points: int) -> None:
         self.checks = checks
@@ -221,6 +151,25 @@ class _PoolSearch:
             bad = self.is_waiting & ~(check.at_points > 0.0)
             self.refused_by[bad] = number
             self.is_waiting[bad] = False
+
+    def ask(self, postures: Postures, branch: int) -> None:
+        """Give every waiting point the best of its postures in a branch that passes all checks."""
+        fast = verdicts(self.checks.quick, postures)
+        before = 1 + len(self.checks.point)
+        self.refuse(postures, fast.margin, before, 1.0)
+        passed = np.flatnonzero(fast.passed)
+        order = np.lexsort((-fast.quality[passed], postures.point[passed]))
+        for index in _rounds(postures.point, passed[order]):
+            asked = index[self.is_waiting[postures.point[index]]]
+            if not len(asked):
+                return
+            late = verdicts(self.checks.slow, postures.take(asked))
+            # One slow check failed is nearer to a posture than one quick check.
+            weight = 0.5 / (1 + len(self.checks.slow))
+            self.refuse(postures.take(asked), late.margin, before + len(self.checks.quick), weight)
+            good = asked[late.passed]
+            margin = np.vstack([fast.margin[:, good], late.margin[:, late.passed]])
+            self.accept(postures.take(good), branch, margin)
 
     def refuse(self, postures: Postures, margin: FloatArray, first: int, weight: float) -> None:
         """Remember, for each point, the check that its least bad posture fails."""
@@ -254,55 +203,96 @@ class _PoolSearch:
         return Pool(postures.take(order), branch[order], found, self.refused_by)
 
 
-def options_at(
-    solver: InverseKinematics,
-    points: FloatArray,
-    normals: FloatArray,
-    approach: Approach,
-    external: tuple[float, ...],
-) -> Options:
-    """Return all configurations that reach contact and approach pose in one branch.
+@dataclass(frozen=True, eq=False)
+class PostureSolver:
+    """Finds the postures that press on points of the surface and pass every check."""
 
-    Parameters
-    ----------
-    solver, points, normals, approach
-        As for `make_pool`.
-    external : tuple of float
-        Positions of the external axes, in rad or m.
-    """
-    parts: list[Postures] = []
-    branches: list[IndexArray] = []
-    spins = 2.0 * np.pi * np.arange(approach.spins) / approach.spins
-    for contact in np.moveaxis(contact_frames(points, normals, spins), 1, 0):
-        off = contact.copy()
-        off[:, :3, 3] += approach.distance * normals
-        here, there = (solver.solve_many(frames, external).q for frames in (contact, off))
-        # NaN where there is no solution. Half a turn: axes 4 and 6 may be given a turn apart.
-        reached = np.abs(there - here).max(axis=2) < np.pi
-        point, branch = np.nonzero(reached)
-        parts.append(Postures(contact[point], normals[point], here[reached], there[reached], point))
-        branches.append(branch)
-    return Options(Postures.joined(parts), np.concatenate(branches))
+    inverse: InverseKinematics
+    """Of the robot with its tool."""
+    checks: Checks
+    """What a posture has to pass."""
+    approach: float
+    """Distance of the approach pose from the surface along the normal, in m."""
+    spins: int = 8
+    """Number of turns of the tool about its axis that are tried."""
+
+    def pool(
+        self,
+        points: FloatArray,
+        normals: FloatArray,
+        placements: Sequence[BasePlacement] = (BasePlacement(),),
+    ) -> Pool:
+        """Return a posture for every point that has one which passes every check.
+
+        Parameters
+        ----------
+        points, normals : ndarray, shape (point, 3)
+            Contact points in base, in m, and outward unit normals. The checks of points refer to
+            these.
+        placements : sequence of BasePlacement
+            Where the external axes may carry the arm, in the order in which they are tried.
+
+        Raises
+        ------
+        PlanningError
+            If there is no point.
+        """
+        if not len(points):
+            raise PlanningError("the surface has no candidate points: is its region empty?")
+        found = _PoolSearch(self.checks, len(points))
+        found.refuse_points()
+        for placement in placements:
+            waiting = found.waiting
+            if not len(waiting):
+                break
+            options = self.options(points[waiting], normals[waiting], placement.external)
+            options = Options(options.postures.at(waiting[options.point]), options.branch)
+            order = placement.branches
+            for branch in range(self.inverse.branches) if order is None else order:
+                found.ask(options.of(branch, found.is_waiting), branch)
+        return found.pool(len(self.inverse.robot.joint_names))
+
+    def options(
+        self, points: FloatArray, normals: FloatArray, external: tuple[float, ...]
+    ) -> Options:
+        """Return all configurations that reach contact and approach pose in one branch.
+
+        Parameters
+        ----------
+        points, normals : ndarray, shape (point, 3)
+            As for `pool`.
+        external : tuple of float
+            Positions of the external axes, in rad or m.
+        """
+        parts: list[Postures] = []
+        branches: list[IndexArray] = []
+        spins = 2.0 * np.pi * np.arange(self.spins) / self.spins
+        for contact in np.moveaxis(contact_frames(points, normals, spins), 1, 0):
+            off = contact.copy()
+            off[:, :3, 3] += self.approach * normals
+            here, there = (self.inverse.solve_many(T, external).q for T in (contact, off))
+            # NaN where there is no solution. Half a turn: axes 4 and 6 may be given a turn apart.
+            reached = np.abs(there - here).max(axis=2) < np.pi
+            point, branch = np.nonzero(reached)
+            q, q_approach = here[reached], there[reached]
+            parts.append(Postures(contact[point], normals[point], q, q_approach, point))
+            branches.append(branch)
+        return Options(Postures.joined(parts), np.concatenate(branches))
 
 
-def _ask_branch(postures: Postures, branch: int, checks: Checks, found: _PoolSearch) -> None:
-    """Give every waiting point the best of its postures in a branch that passes all checks."""
-    fast = verdicts(checks.quick, postures)
-    before = 1 + len(checks.point)
-    found.refuse(postures, fast.margin, before, 1.0)
-    passed = np.flatnonzero(fast.passed)
-    order = np.lexsort((-fast.quality[passed], postures.point[passed]))
-    for index in _rounds(postures.point, passed[order]):
-        asked = index[found.is_waiting[postures.point[index]]]
-        if not len(asked):
-            return
-        late = verdicts(checks.slow, postures.take(asked))
-        # One slow check failed is nearer to a posture than one quick check.
-        weight = 0.5 / (1 + len(checks.slow))
-        found.refuse(postures.take(asked), late.margin, before + len(checks.quick), weight)
-        good = asked[late.passed]
-        margin = np.vstack([fast.margin[:, good], late.margin[:, late.passed]])
-        found.accept(postures.take(good), branch, margin)
+def join_pools(pools: Sequence[Pool]) -> Pool:
+    """Return one pool of several that were made of consecutive parts of the points."""
+    starts = np.cumsum([0, *(pool.sampled for pool in pools)])
+    postures = [
+        pool.postures.at(pool.postures.point + start)
+        for pool, start in zip(pools, starts[:-1], strict=True)
+    ]
+    return Pool(
+        Postures.joined(postures),
+        np.concatenate([pool.branch for pool in pools]),
+        Verdicts.joined([pool.verdicts for pool in pools]),
+        np.concatenate([pool.refused_by for pool in pools]),
+    )
 
 
 def _rounds(point: IndexArray, ordered: IndexArray) -> list[IndexArray]:

@@ -19,12 +19,12 @@ from elastocal.cell import Cell
 from elastocal.errors import PlanningError
 from elastocal.parallel import process_count, process_pool
 from elastocal.planning.cell_setup import point_checks, robot_checks
-from elastocal.planning.checks import Checks, verdicts
-from elastocal.planning.pool import Approach, BasePlacement, Pool, join_pools, make_pool, options_at
+from elastocal.planning.checks import verdicts
+from elastocal.planning.pool import BasePlacement, Pool, PostureSolver, join_pools
 from elastocal.planning.surface import Surface, SurfacePoints, sample_blue_noise, sample_uniform
 from elastocal.progress import Progress, silent
 from elastocal.results import brief_repr
-from elastocal.robot.inverse import InverseKinematics, inverse_for
+from elastocal.robot.inverse import inverse_for
 
 CANDIDATES = "candidates"
 """Stage under which progress is reported."""
@@ -140,32 +140,26 @@ class PoolBuilder:
 
     cell: Cell
     surface: Surface
-    solver: InverseKinematics
-    checks: Checks
-    """Those of the robot; those of points are made with the points."""
-    approach: Approach
+    solver: PostureSolver
+    """With the checks of the robot; those of points are made with the points."""
 
     @staticmethod
     def of(cell: Cell, surface: Surface) -> "PoolBuilder":
         """Return the builder of a cell's pool."""
-        checks = robot_checks(cell, surface)
-        approach = Approach(cell.file.engagement.approach_distance)
-        return PoolBuilder(cell, surface, inverse_for(cell.robot), checks, approach)
+        checks, approach = robot_checks(cell, surface), cell.file.engagement.approach_distance
+        return PoolBuilder(cell, surface, PostureSolver(inverse_for(cell.robot), checks, approach))
 
     def rank(self, probes: SurfacePoints) -> tuple[BasePlacement, ...]:
         """Return where the external axes should carry the arm, judged by some tens of points."""
+        coarse = replace(self.solver, spins=self.solver.spins // 2)
         external = self.cell.external_positions
-        coarse = replace(self.approach, spins=self.approach.spins // 2)
-        return rank_base_placements(
-            self.solver, probes.position, probes.normal, coarse, self.checks, external
-        )
+        return rank_base_placements(coarse, probes.position, probes.normal, external)
 
     def pool(self, placements: tuple[BasePlacement, ...], points: SurfacePoints) -> Pool:
         """Return the pool of some points."""
         of_points = point_checks(self.cell, self.surface, points)
-        checks = Checks(of_points, self.checks.quick, self.checks.slow)
-        where = points.position, points.normal
-        return make_pool(self.solver, *where, self.approach, checks, placements)
+        solver = replace(self.solver, checks=replace(self.solver.checks, point=of_points))
+        return solver.pool(points.position, points.normal, placements)
 
     def pools(
         self, placements: tuple[BasePlacement, ...], parts: Sequence[SurfacePoints]
@@ -232,12 +226,7 @@ class _Survey:
 
 
 def rank_base_placements(
-    solver: InverseKinematics,
-    points: FloatArray,
-    normals: FloatArray,
-    approach: Approach,
-    checks: Checks,
-    external: FloatArray,
+    solver: PostureSolver, points: FloatArray, normals: FloatArray, external: FloatArray
 ) -> tuple[BasePlacement, ...]:
     """Return as few positions of the external axes as serve the surface, the best first.
 
@@ -247,14 +236,10 @@ def rank_base_placements(
 
     Parameters
     ----------
-    solver : InverseKinematics
-        Of the robot with its tool.
+    solver : PostureSolver
+        Its checks of points are not asked.
     points, normals : ndarray, shape (point, 3)
         Some tens of contact points in base, in m, and outward unit normals.
-    approach : Approach
-        How the tool comes to the surface.
-    checks : Checks
-        What a posture has to pass; those of points are not asked.
     external : ndarray, shape (combination, external axis)
         Positions to choose from, in rad or m.
 
@@ -263,11 +248,9 @@ def rank_base_placements(
     tuple of BasePlacement
         At least one, even when none serves any point.
     """
-    of_robot = replace(checks, point=())
-    surveys = [
-        _survey(solver, points, normals, approach, of_robot, tuple(map(float, position)))
-        for position in external
-    ]
+    solver = replace(solver, checks=replace(solver.checks, point=()))
+    places = [tuple(map(float, position)) for position in external]
+    surveys = [_survey(solver, points, normals, place) for place in places]
     chosen: list[BasePlacement] = []
     left = np.ones(len(points), dtype=bool)
     while surveys:
@@ -276,7 +259,7 @@ def rank_base_placements(
             break
         surveys.remove(best)
         if not best.asked:
-            pool = make_pool(solver, points, normals, approach, of_robot, (best.placement,))
+            pool = solver.pool(points, normals, (best.placement,))
             surveys.append(replace(best, served=pool.refused_by < 0, asked=True))
             continue
         chosen.append(best.placement)
@@ -285,16 +268,11 @@ def rank_base_placements(
 
 
 def _survey(
-    solver: InverseKinematics,
-    points: FloatArray,
-    normals: FloatArray,
-    approach: Approach,
-    checks: Checks,
-    external: tuple[float, ...],
+    solver: PostureSolver, points: FloatArray, normals: FloatArray, external: tuple[float, ...]
 ) -> _Survey:
-    options = options_at(solver, points, normals, approach, external)
-    found = verdicts(checks.quick, options.postures)
-    served = np.zeros((solver.branches, len(points)), dtype=bool)
+    options = solver.options(points, normals, external)
+    found = verdicts(solver.checks.quick, options.postures)
+    served = np.zeros((solver.inverse.branches, len(points)), dtype=bool)
     served[options.branch[found.passed], options.point[found.passed]] = True
     best, nearest = np.zeros(len(points)), np.full(len(points), -1.0)
     np.maximum.at(nearest, options.point, (found.margin > 0.0).sum(axis=0))

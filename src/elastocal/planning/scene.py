@@ -20,7 +20,7 @@ _NEIGHBOURS = 1
 @brief_repr
 @dataclass(frozen=True, eq=False)
 class CollisionScene:
-    """Which bodies must stay apart: links and tool from obstacles and from one another.
+    """The bodies that must stay apart: links and tool from obstacles and from one another.
 
     Obstacles named in ``touched`` are those that the tool presses on: the tool is checked
     against them only where it is not in contact.

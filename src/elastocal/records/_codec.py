@@ -95,9 +95,9 @@ def from_data(cls: type[T], data: Any, what: str, schema: str = "") -> T:
     SchemaError
         With the path of the first problem, its value and what is allowed.
     """
-    from elastocal.records._validation import validate_record
+    from elastocal.records._validation import validate
 
-    return validate_record(_unstated(cls, data, what, schema), cls, what)
+    return validate(_unstated(cls, data, what, schema), cls, what)
 
 
 def write_json(path: Path, value: Any) -> None:

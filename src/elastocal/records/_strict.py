@@ -30,10 +30,6 @@ class StrictModel(BaseModel):
             raise ValueError("must be a number")
         return value
 
-    def stated(self, schema: str) -> dict[str, Any]:
-        """Return JSON-ready data that state their schema first, as every file of ours does."""
-        return {"schema": schema, **self.model_dump(mode="json")}
-
 
 Model = TypeVar("Model", bound=StrictModel)
 

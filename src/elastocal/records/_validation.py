@@ -12,7 +12,6 @@ from pydantic import BaseModel, TypeAdapter, ValidationError
 from elastocal.errors import SchemaError, nearest
 
 T = TypeVar("T")
-Model = TypeVar("Model", bound=BaseModel)
 
 _LONGEST_SHOWN = 60
 """Longer values are left out of messages."""
@@ -30,34 +29,24 @@ def check_schema(found: object, known: str, what: str) -> None:
         raise SchemaError(f"{what} has schema {found!r}; this version reads {known!r}")
 
 
-def validate(data: Any, model: type[Model], what: str) -> Model:
-    """Return ``data`` as a model, or refuse it in one line.
+def validate(data: Any, cls: type[T], what: str) -> T:
+    """Return ``data`` as a record or a model, or refuse it in one line.
+
+    Records are read strictly: no text for a number, no yes for a 1.
 
     Raises
     ------
     SchemaError
         With the path of the first problem, its value and what is allowed.
     """
+    adapter: TypeAdapter[T] = _adapter(typing.cast("Any", cls))
     try:
-        return model.model_validate(data)
-    except ValidationError as error:
-        raise SchemaError(f"{what}: {_first_problem(error, model)}") from error
-
-
-def validate_record(data: Any, cls: type[T], what: str) -> T:
-    """Return ``data`` as a record or a model, or refuse it in one line; see `validate`.
-
-    Records are read strictly: no text for a number, no yes for a 1.
-    """
-    if issubclass(cls, BaseModel):
-        return validate(data, cls, what)
-    try:
+        if issubclass(cls, BaseModel):
+            return adapter.validate_python(data)
         # Strict checks know JSON's lists for tuples only where they read JSON itself.
-        adapter = _adapter(typing.cast("Any", cls))
-        checked: T = adapter.validate_json(json.dumps(data), strict=True)
+        return adapter.validate_json(json.dumps(data), strict=True)
     except ValidationError as error:
         raise SchemaError(f"{what}: {_first_problem(error, cls)}") from error
-    return checked
 
 
 @cache

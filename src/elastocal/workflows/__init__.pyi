@@ -18,15 +18,15 @@ __all__ = [
     "tool",
 ]  # the commands: what the package itself exports of these
 
-from ._demo_folder import LOG as LOG, README as README, begin as begin, finish as finish
-from ._device_sources import KINDS as KINDS, SOURCES as SOURCES, DeviceSource as DeviceSource
 from ._file_kinds import FileDescription as FileDescription
 from ._inputs import find_robot as find_robot, refuse_overwriting as refuse_overwriting
-from ._operator import Operator as Operator, Supervision as Supervision, Unattended as Unattended
-from ._process_trial import (
-    ProcessTrial as ProcessTrial,
-    TrialRuns as TrialRuns,
-    run_trial as run_trial,
+from ._operator_and_devices import (
+    KINDS as KINDS,
+    SOURCES as SOURCES,
+    DeviceSource as DeviceSource,
+    Operator as Operator,
+    Supervision as Supervision,
+    Unattended as Unattended,
 )
 from .calibrate import (
     CalibrateResult as CalibrateResult,
@@ -52,13 +52,17 @@ from .compensate import (
     compensate as compensate,
 )
 from .demo import (
+    LOG as LOG,
+    README as README,
     Chapter as Chapter,
     DemoDisplay as DemoDisplay,
     DemoResult as DemoResult,
     DemoSettings as DemoSettings,
     MakeDisplay as MakeDisplay,
+    begin as begin,
     chapters as chapters,
     demo as demo,
+    finish as finish,
 )
 from .derive import DeriveResult as DeriveResult, DeriveSettings as DeriveSettings, derive as derive
 from .export import ExportResult as ExportResult, ExportSettings as ExportSettings, export as export
@@ -94,8 +98,11 @@ from .run import (
     run as run,
 )
 from .simulate_process import (
+    ProcessTrial as ProcessTrial,
     SimulateProcessResult as SimulateProcessResult,
     SimulateProcessSettings as SimulateProcessSettings,
+    TrialRuns as TrialRuns,
+    run_trial as run_trial,
     simulate_process as simulate_process,
 )
 from .stiffness import (

@@ -1,4 +1,4 @@
-"""What each kind of file holds, as ``check`` says: a function a kind, which reads and so validates.
+"""Describe what files hold, as ``check`` says: a function a kind, which reads and so validates.
 
 A new kind is a function here and its entry in a table of `elastocal.workflows.check`.
 """
@@ -17,17 +17,7 @@ from elastocal.codec import (
     read_codec,
     read_codec_folder,
     read_codec_summary,
-)
-from elastocal.codec.study import (
-    DESIGN,
-    DESIGN_SCHEMA,
-    PART_SCHEMA,
-    STUDY_SCHEMA,
-    StudyDesign,
-    StudyStore,
-    read_design,
-    read_part,
-    read_study,
+    study as studies,
 )
 from elastocal.compensation import read_settings
 from elastocal.compensation.conditioning import read_tool
@@ -273,20 +263,25 @@ def codec_verdicts(path: Path) -> FileDescription:
 
 def study_folder(path: Path) -> FileDescription:
     """Describe the folder of a study; every finished sample is validated."""
-    design = read_design(path / DESIGN)
-    return "study", {**_design_facts(design), "samples": len(StudyStore(path).finished(design))}
+    design = studies.read_design(path / studies.DESIGN)
+    return "study", {
+        **_design_facts(design),
+        "samples": len(studies.StudyStore(path).finished(design)),
+    }
 
 
 def study_settings(path: Path) -> FileDescription:
     """Describe what a study is a study of."""
-    return "settings file of a study", _design_facts(read_design(path))
+    return "settings file of a study", _design_facts(studies.read_design(path))
 
 
 def study_samples(path: Path) -> FileDescription:
     """Describe some finished samples, by the settings in the folder above theirs."""
-    results = read_part(path, read_design(path.resolve().parent.parent / DESIGN))
+    results = studies.read_part(
+        path, studies.read_design(path.resolve().parent.parent / studies.DESIGN)
+    )
     return "part of a study", {
-        "schema": PART_SCHEMA,
+        "schema": studies.PART_SCHEMA,
         "samples": [result.number for result in results],
         "conditions": len(results[0].outcomes) if results else 0,
     }
@@ -294,9 +289,9 @@ def study_samples(path: Path) -> FileDescription:
 
 def study_record(path: Path) -> FileDescription:
     """Describe the results of a study."""
-    found = read_study(path)
+    found = studies.read_study(path)
     return "record of a study", {
-        "schema": STUDY_SCHEMA,
+        "schema": studies.STUDY_SCHEMA,
         **_picked(found, "cell", "samples", "verification"),
         "median_error_m": {each.name: each.error_mean.median for each in found.conditions},
         "advice": found.advice or None,
@@ -355,7 +350,7 @@ def _codec_facts(data: CodecData) -> dict[str, object]:
     }
 
 
-def _design_facts(design: StudyDesign) -> dict[str, object]:
+def _design_facts(design: studies.StudyDesign) -> dict[str, object]:
     facts = _picked(design, "cell", "seed")
     facts |= {"conditions": list(design.names), "verification": design.verification}
-    return {"schema": DESIGN_SCHEMA, **facts}
+    return {"schema": studies.DESIGN_SCHEMA, **facts}

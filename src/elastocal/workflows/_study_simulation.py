@@ -9,25 +9,12 @@ import numpy as np
 
 from elastocal.arrays import FloatArray, IndexArray
 from elastocal.cell import Cell, fingerprint
-from elastocal.codec import ALL_LOADS, training_cases
-from elastocal.codec.study import (
-    Condition,
-    ConditionResult,
-    PoseChoice,
-    Purpose,
-    Sample,
-    SampleResult,
-    SpringLabel,
-    StudyDesign,
-    StudyPool,
-    Verification,
-    calibrated,
-    choose_poses,
-    study_poses,
-)
+from elastocal.codec import ALL_LOADS, study as studies, training_cases
+from elastocal.codec.study import Condition, ConditionResult, Sample, SampleResult, StudyDesign
 from elastocal.elastic import ElasticModel, layout
 from elastocal.errors import CodecError, DeviceError, nearest
 from elastocal.files import sha256
+from elastocal.records import to_data
 from elastocal.sim.workcell import (
     CampaignErrors,
     CampaignSimulator,
@@ -44,13 +31,13 @@ class StudySimulation:
     """Simulates samples of one study; made by `prepare_study`, sent to other processes as it is."""
 
     conditions: tuple[Condition, ...]
-    chosen: tuple[PoseChoice, ...]
+    chosen: tuple[studies.PoseChoice, ...]
     """Calibration poses of each condition."""
     models: dict[str, ElasticModel]
     """By spring layout."""
     truth: CampaignSimulator
     errors: CampaignErrors
-    pool: StudyPool
+    pool: studies.StudyPool
     load_cases: tuple[str, ...]
     force_tcp: FloatArray
     """Force of each load case in the tcp frame, shape (load_case, 3), in N."""
@@ -59,10 +46,10 @@ class StudySimulation:
 
     def __call__(self, sample: Sample) -> SampleResult:
         """Return the sample's arm, calibrated under every condition."""
-        rng = sample.generator(Purpose.TRUTH)
+        rng = sample.generator(studies.Purpose.TRUTH)
         stiffness, balancer = rng.standard_normal(self.truth.springs), rng.standard_normal()
         draws = ErrorDraws.of(
-            len(self.pool), len(self.load_cases), sample.generator(Purpose.ERRORS)
+            len(self.pool), len(self.load_cases), sample.generator(studies.Purpose.ERRORS)
         )
         found: dict[int, ConditionResult] = {}
         for spread in dict.fromkeys(each.truth for each in self.conditions):
@@ -87,10 +74,10 @@ class StudySimulation:
         arm: CampaignSimulator,
         draws: ErrorDraws,
         numbers: Sequence[int],
-        verification: Verification,
+        verification: studies.Verification,
     ) -> dict[int, ConditionResult]:
         """Calibrate one arm under conditions with the same load cases, measuring each pose once."""
-        chosen = [self.chosen[i].of(sample.generator(Purpose.CHOICE)) for i in numbers]
+        chosen = [self.chosen[i].of(sample.generator(studies.Purpose.CHOICE)) for i in numbers]
         poses = np.unique(np.concatenate(chosen))
         cases = training_cases(self.conditions[numbers[0]].load_cases, self.load_cases)
         loads = np.array([self.load_cases.index(case) for case in cases])
@@ -104,13 +91,15 @@ class StudySimulation:
             readings = self.errors.readings(settled, own, scales, station, cases)
             mine = np.isin(readings.pose, np.searchsorted(poses, order))
             model = self.models[condition.springs]
-            found[number] = calibrated(model, readings.take(mine), self.marker, verification)
+            found[number] = studies.calibrated(
+                model, readings.take(mine), self.marker, verification
+            )
         return found
 
-    def _verification(self, arm: CampaignSimulator) -> Verification:
+    def _verification(self, arm: CampaignSimulator) -> studies.Verification:
         settled = arm.settle(self.places(self.pool.verification), self.force_tcp)
         flat = (settled.q, settled.force, settled.deflection)
-        return Verification(*(array.reshape(-1, array.shape[-1]) for array in flat))
+        return studies.Verification(*(array.reshape(-1, array.shape[-1]) for array in flat))
 
 
 @dataclass(frozen=True, eq=False)
@@ -154,8 +143,8 @@ def prepare_study(
     if cell.file.marker is None or not cell.file.trackers:
         raise DeviceError(f"cell {cell.name} has no tracker to simulate (key 'trackers')")
     truth, errors = CampaignSimulator.of(cell), CampaignErrors.of(cell)
-    poses = study_poses(cell, verification, jobs)
-    chosen = choose_poses(cell, poses, conditions)
+    poses = studies.study_poses(cell, verification, jobs)
+    chosen = studies.choose_poses(cell, poses, conditions)
     design = _design(cell, conditions, models, poses.pool, seed)
     simulate = StudySimulation(
         conditions=tuple(conditions),
@@ -185,11 +174,11 @@ def _design(
     cell: Cell,
     conditions: Sequence[Condition],
     models: dict[str, ElasticModel],
-    pool: StudyPool,
+    pool: studies.StudyPool,
     seed: int,
 ) -> StudyDesign:
     simulated = cell.file.model_dump(mode="json", include={"simulation", "procedure"})
-    springs = {name: repr(model.springs) for name, model in models.items()}
+    springs = {name: to_data(model.springs) for name, model in models.items()}
     text = json.dumps([simulated, springs], sort_keys=True, allow_nan=False)
     return StudyDesign(
         cell=cell.name,
@@ -201,7 +190,7 @@ def _design(
         load_cases=cell.file.load_cases.cases,
         conditions=tuple(conditions),
         springs={
-            name: tuple(SpringLabel(name=p.name, unit=p.unit.si) for p in model.parameters)
+            name: tuple(studies.SpringLabel(name=p.name, unit=p.unit.si) for p in model.parameters)
             for name, model in models.items()
         },
         versions={name: version(name) for name in _PACKAGES},

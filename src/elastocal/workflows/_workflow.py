@@ -14,6 +14,8 @@ R = TypeVar("R", covariant=True)
 class Workflow(Protocol[S, R]):
     """A function from settings to a result."""
 
+    __name__: str
+
     @overload
     def __call__(self, settings: S, /, progress: Progress = ...) -> R: ...
     @overload

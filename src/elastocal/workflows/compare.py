@@ -6,7 +6,7 @@ from pathlib import Path
 
 from elastocal import dataset
 from elastocal.arrays import FloatArray
-from elastocal.dataset import joint_dimensions, read_load_rows
+from elastocal.dataset import LoadRows, Readings, joint_dimensions, read_load_rows
 from elastocal.errors import DatasetError
 from elastocal.identification import read_model
 from elastocal.identification.recertification import (
@@ -91,25 +91,22 @@ def _read_rows(path: Path, model: Path) -> _Loads:
     suffix = path.suffix.lower()
     if suffix not in (".csv", ".nc"):
         raise DatasetError(f"{path}: suffix {path.suffix!r} is not one of .csv, .nc")
-    loads = _of_dataset(path, robot, model) if suffix == ".nc" else _of_table(path, robot)
-    if not len(loads[0]):
+    if suffix == ".nc":
+        rows: LoadRows | Readings = _readings(path, robot, model)
+    else:
+        rows = read_load_rows(path, joint_dimensions(robot.joint_names, robot.revolute))
+    if not len(rows.joint_position):
         raise DatasetError(f"{path} holds no row")
-    return loads
-
-
-def _of_table(path: Path, robot: Robot) -> _Loads:
-    rows = read_load_rows(path, joint_dimensions(robot.joint_names, robot.revolute))
     return rows.joint_position, rows.force, rows.moment
 
 
-def _of_dataset(path: Path, robot: Robot, model: Path) -> _Loads:
+def _readings(path: Path, robot: Robot, model: Path) -> Readings:
     data = dataset.read(path)
     if data.robot_urdf is not None and data.tcp_frame is not None:
         base = robot.base if data.robot_urdf == robot.urdf else None
         measured = Robot.from_urdf(data.robot_urdf, data.tcp_frame, base)
         check_same_robot(measured, robot, (str(path), str(model)))
     try:
-        readings = data.readings(robot.joint_names)
+        return data.readings(robot.joint_names)
     except DatasetError as error:
         raise DatasetError(f"{path}: {error}") from error
-    return readings.joint_position, readings.force, readings.moment

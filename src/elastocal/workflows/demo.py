@@ -1,22 +1,24 @@
 """``demo``: the whole story on a simulated cell, one public command after the other."""
 
 import shlex
+import shutil
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import AbstractContextManager, contextmanager
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
-from typing import Protocol, TextIO
+from typing import Any, Protocol, TextIO
 
+from elastocal import __version__
 from elastocal.cell import require_example
 from elastocal.compensation.process import SimulateProcessResult
 from elastocal.errors import FileAccessError
+from elastocal.files import write_text
 from elastocal.procedure import RunEnd
 from elastocal.progress import Progress
 from elastocal.results import Result, brief_repr
-from elastocal.workflows._demo_folder import LOG, README, begin, finish
-from elastocal.workflows._operator import Operator, Unattended
-from elastocal.workflows._workflow import workflow
+from elastocal.workflows._operator_and_devices import Operator, Unattended
+from elastocal.workflows._workflow import Workflow, workflow
 from elastocal.workflows.calibrate import calibrate
 from elastocal.workflows.codec import codec
 from elastocal.workflows.compensate import compensate
@@ -27,6 +29,28 @@ from elastocal.workflows.report import report
 from elastocal.workflows.run import RunResult, run
 from elastocal.workflows.simulate_process import simulate_process
 from elastocal.workflows.tool import tool
+
+LOG = "log.txt"
+README = "README.md"
+_FIRST = "# A demo of elastocal:"
+"""How a README begins that tells an earlier demo from somebody's own folder."""
+
+_FILES = (
+    ("report.html", "the report: open it in a browser; it needs no network"),
+    ("cell.yaml", "the cell: robot, tool, sensor, trackers, tooling, load cases, limits"),
+    ("plan/plan.html", "the chosen poses in three dimensions; plan.json holds them for programs"),
+    ("run/", "cell and plan as used, journal, raw streams (.mcap), dataset.nc, summary.json"),
+    ("model.json", "the calibrated model: compliances, their bootstrap draws, what is observable"),
+    ("tool.json", "mass, centre of mass, sensor bias and rotation, from the unloaded poses"),
+    ("codec/", "were there enough poses: one folder a comparison, with codec.html"),
+    ("process/", "the process without and with correction in real time: the paper's Table 1"),
+    ("process/path.csv", "the programmed path with the forces that are expected"),
+    ("corrected.csv", "the same path, corrected offline"),
+    ("c/", "C99 of the model and its compensator, for the real-time target"),
+    (LOG, "every command as it was given, and what it printed"),
+)
+_FLAGS = {"models": "--model", "tools": "--tool", "seeds": "--seed", "path": ""}
+"""How a command names a field that its workflow calls otherwise; empty: by its place."""
 
 
 @brief_repr
@@ -91,7 +115,7 @@ class DemoSettings:
     out: str | PathLike[str] = "demo"
     """Folder for the results."""
     seed: int = 0
-    """Of the simulated cell."""
+    """Seed of the simulated cell."""
     force: bool = False
     """Remove an earlier demo from the folder first."""
     display: MakeDisplay | None = None
@@ -156,7 +180,7 @@ def demo(settings: DemoSettings, progress: Progress) -> DemoResult:
     out = Path(settings.out)
     story = chapters(settings.kind, out, settings.seed)
     begin(out, settings.kind, settings.force)
-    make = settings.display or (lambda _log, _story: _plain(progress))
+    make = settings.display or (lambda _log, _story: nullcontext(_Plain(progress)))
     results: dict[str, Result] = {}
     with _opened(out / LOG) as log, make(log, story) as display:
         for chapter in story:
@@ -191,100 +215,129 @@ def chapters(kind: str, out: Path, seed: int) -> tuple[Chapter, ...]:
         If there is no such example cell.
     """
     require_example(kind)
-    return (
-        *_measuring(kind, out, str(seed)),
-        _compared(out, "were there enough poses", "springs", "actuated,bearing"),
-        _compared(out, "did the load cases help", "load_cases", "normal,all"),
-        _compared(out, "did the search help", "search", "cover,ioops"),
-        *_using(kind, out, str(seed)),
+    cell, run_folder, planned, process = (
+        out / name for name in ("cell.yaml", "run", "plan", "process")
     )
-
-
-def _measuring(kind: str, out: Path, seed: str) -> tuple[Chapter, ...]:
-    """Return the story from the cell to model and tool."""
-    cell, data, planned = out / "cell.yaml", out / "run/dataset.nc", out / "plan"
-    model, weights, done = out / "model.json", out / "tool.json", out / "run"
-    return (
-        Chapter(
-            "describe the cell",
-            ("init", str(out), "--like", kind, "--force"),
-            lambda show, _: init(out, show, like=kind, force=True),
-        ),
-        Chapter(
-            "plan the poses",
-            ("plan", str(cell), "--out", str(planned)),
-            lambda show, _: plan(cell, show, out=planned),
-        ),
-        Chapter(
-            "measure",
-            ("run", str(cell), "--plan", str(planned), "--out", str(done), "--seed", seed),
-            lambda show, operator: run(
-                cell, show, plan=planned, out=done, seed=int(seed), operator=operator
-            ),
-        ),
-        Chapter(
-            "identify the springs",
-            ("calibrate", str(data), "--out", str(model)),
-            lambda show, _: calibrate(data, show, out=model),
-        ),
-        Chapter(
-            "weigh the tool",
-            ("tool", str(done), "--out", str(weights)),
-            lambda show, _: tool(done, show, out=weights),
-        ),
+    data, model, weights = run_folder / "dataset.nc", out / "model.json", out / "tool.json"
+    comparisons = (
+        ("were there enough poses", "springs", "actuated,bearing"),
+        ("did the load cases help", "load_cases", "normal,all"),
+        ("did the search help", "search", "cover,ioops"),
     )
-
-
-def _compared(out: Path, title: str, key: str, values: str) -> Chapter:
-    data, choice, folder = out / "run/dataset.nc", f"{key}={values}", out / "codec" / key
-    return Chapter(
-        title,
-        ("codec", str(data), "--compare", choice, "--out", str(folder)),
-        lambda show, _: codec(data, show, compare=(choice,), out=folder),
-    )
-
-
-def _using(kind: str, out: Path, seed: str) -> tuple[Chapter, ...]:
-    """Return the story from the model to the report."""
-    cell, model, weights = out / "cell.yaml", out / "model.json", out / "tool.json"
-    process, corrected, page = out / "process", out / "corrected.csv", out / "report.html"
-    path, known = process / "path.csv", ("--model", str(model), "--tool", str(weights))
-    rest = ("--process", kind, "--seed", seed, "--out", str(process))
     return (
-        Chapter(
+        _chapter("describe the cell", init, out, like=kind, force=True),
+        _chapter("plan the poses", plan, cell, out=planned),
+        _chapter("measure", run, cell, plan=planned, out=run_folder, seed=seed),
+        _chapter("identify the springs", calibrate, data, out=model),
+        _chapter("weigh the tool", tool, run_folder, out=weights),
+        *(
+            _chapter(title, codec, data, compare=(f"{key}={values}",), out=out / "codec" / key)
+            for title, key, values in comparisons
+        ),
+        _chapter(
             "correct in real time",
-            ("simulate-process", str(cell), *known, *rest),
-            lambda show, _: simulate_process(
-                cell,
-                show,
-                models=(model,),
-                tools=(weights,),
-                process=kind,
-                seeds=(int(seed),),
-                out=process,
-            ),
+            simulate_process,
+            cell,
+            models=(model,),
+            tools=(weights,),
+            process=kind,
+            seeds=(seed,),
+            out=process,
         ),
-        Chapter(
+        _chapter(
             "correct offline",
-            ("compensate", str(model), str(path), "--out", str(corrected)),
-            lambda show, _: compensate(model, show, path=path, out=corrected),
+            compensate,
+            model,
+            path=process / "path.csv",
+            out=out / "corrected.csv",
         ),
-        Chapter(
-            "write C for the robot",
-            ("export", str(model), "--tool", str(weights), "--c", str(out / "c")),
-            lambda show, _: export(model, show, tool=weights, c=out / "c"),
-        ),
-        Chapter(
-            "report",
-            ("report", str(out), "--out", str(page)),
-            lambda show, _: report(out, show, out=page),
-        ),
+        _chapter("write C for the robot", export, model, tool=weights, c=out / "c"),
+        _chapter("report", report, out, out=out / "report.html"),
     )
 
 
-@contextmanager
-def _plain(progress: Progress) -> Iterator[DemoDisplay]:
-    yield _Plain(progress)
+def _chapter(
+    title: str, workflow: Workflow[Any, Result], source: Path, **options: object
+) -> Chapter:
+    """Return a workflow with its options, and the command that does the same."""
+    words = [workflow.__name__.replace("_", "-"), str(source)]
+    for name, value in options.items():
+        flag = _FLAGS.get(name, f"--{name}")
+        for each in value if isinstance(value, tuple) else (value,):
+            words += [word for word in (flag, "" if each is True else str(each)) if word]
+
+    def work(progress: Progress, operator: Operator) -> Result:
+        watched = {"operator": operator} if workflow is run else {}
+        return workflow(source, progress, **options, **watched)
+
+    return Chapter(title, tuple(words), work)
+
+
+def begin(out: Path, kind: str, force: bool) -> None:
+    """Make the folder, without an earlier demo.
+
+    Raises
+    ------
+    FileAccessError
+        If it holds files, unless all are those of a demo and ``force`` is given.
+    """
+    try:
+        holds = sorted(entry.name for entry in out.iterdir()) if out.exists() else []
+        if holds:
+            _refuse_foreign(out, holds, force)
+            _empty(out)
+        out.mkdir(parents=True, exist_ok=True)
+        # Written first: a demo that is interrupted can be removed like a finished one.
+        write_text(out / README, f"{_FIRST} {kind}\n\nNot finished.\n")
+    except OSError as error:
+        if isinstance(error, FileAccessError):
+            raise
+        raise FileAccessError(f"cannot use folder {out}: {error.strerror or error}") from error
+
+
+def finish(out: Path, kind: str, seed: int, commands: Sequence[str]) -> None:
+    """Write what each file is, and how to make all of them again.
+
+    Raises
+    ------
+    FileAccessError
+        If it cannot be written.
+    """
+    rows = "".join(f"| [{name}]({name}) | {text} |\n" for name, text in _FILES)
+    lines = "".join(f"{command}\n" for command in commands)
+    write_text(
+        out / README,
+        f"{_FIRST} {kind}\n\n"
+        f"Made by elastocal {__version__} on a simulated cell, seed {seed}. Every measurement in"
+        " it was simulated, with a truth that the model cannot express; nothing was measured on a"
+        " robot.\n\n"
+        f"| file | what it is |\n|---|---|\n{rows}\n"
+        f"## How it was made\n\n```sh\n{lines}```\n",
+    )
+
+
+def _refuse_foreign(out: Path, holds: list[str], force: bool) -> None:
+    readme = out / README
+    ours = readme.is_file() and readme.read_text("utf-8", "replace").startswith(_FIRST)
+    known = {name.partition("/")[0] for name, _ in _FILES} | {README}
+    foreign = [name for name in holds if name not in known and not name.endswith(".stl")]
+    if foreign or not ours:
+        first = (foreign or holds)[0]
+        raise FileAccessError(f"{out} holds files that are no demo's ({first}): name another")
+    if not force:
+        raise FileAccessError(f"{out} holds a demo already: name another, or give --force")
+
+
+def _empty(out: Path) -> None:
+    """Remove what a folder holds, the README last: what is left then is known as a demo's.
+
+    The folder itself stays: it may be a link, or the one that somebody stands in.
+    """
+    for entry in sorted(out.iterdir(), key=lambda each: each.name == README):
+        if entry.is_dir() and not entry.is_symlink():
+            shutil.rmtree(entry)
+        else:
+            entry.unlink()
 
 
 @contextmanager

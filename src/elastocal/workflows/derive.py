@@ -21,7 +21,7 @@ class DeriveSettings:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class DeriveResult(Result):
-    """What the raw streams of a run say."""
+    """The dataset and summary that the raw streams of a run give."""
 
     folder: RunFolder
     dataset: Dataset

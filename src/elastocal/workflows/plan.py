@@ -4,18 +4,10 @@ from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
 
+from elastocal import planning
 from elastocal.cell import Cell, load_cell
 from elastocal.files import filling
-from elastocal.planning import (
-    PLAN,
-    POOL,
-    PlanAndPool,
-    PlanResult,
-    SpreadRecord,
-    make_plan,
-    write_plan,
-    write_pool,
-)
+from elastocal.planning import PLAN, PlanResult, SpreadRecord
 from elastocal.planning.export import PLAN_TABLE, check_name, takes_krl, write_krl, write_table
 from elastocal.progress import Progress
 from elastocal.records import record
@@ -113,7 +105,9 @@ def plan(settings: PlanSettings, progress: Progress) -> PlanResult:
     if compare is None:
         compare = "cover" if cell.file.search.technique != "cover" else "ioops"
     with filling(Path(settings.out), PLAN, settings.force) as folder:
-        planned = make_plan(cell, None if compare == "none" else compare, settings.jobs, progress)
+        planned = planning.make_plan(
+            cell, None if compare == "none" else compare, settings.jobs, progress
+        )
         _write_folder(folder, cell, planned, settings.program)
     return planned.plan
 
@@ -121,7 +115,7 @@ def plan(settings: PlanSettings, progress: Progress) -> PlanResult:
 def plan_figures(found: PlanResult, folder: Path, program: str) -> PlanFigures:
     """Return the key figures of a plan that was written into a folder."""
     search, other = found.search, found.comparison
-    names = (PLAN, POOL, PLAN_TABLE, f"{program}.src", f"{program}.dat", _PAGE, _FIGURE)
+    names = (PLAN, planning.POOL, PLAN_TABLE, f"{program}.src", f"{program}.dat", _PAGE, _FIGURE)
     return PlanFigures(
         folder=str(folder),
         files=tuple(name for name in names if (folder / name).is_file()),
@@ -147,11 +141,11 @@ def _stations(found: PlanResult) -> dict[str, int]:
     return {name: names.count(name) for name in sorted(set(names))}
 
 
-def _write_folder(folder: Path, cell: Cell, planned: PlanAndPool, program: str) -> None:
+def _write_folder(folder: Path, cell: Cell, planned: planning.PlanAndPool, program: str) -> None:
     """Write every file of a plan; no KRL program for an arm whose axes KRL cannot name."""
     found, pool, surface = planned.plan, planned.pool, planned.surface
-    write_plan(folder, found)
-    write_pool(folder, pool)
+    planning.write_plan(folder, found)
+    planning.write_pool(folder, pool)
     write_table(folder, found)
     if takes_krl(cell.robot):
         write_krl(folder, found, program)

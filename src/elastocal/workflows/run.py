@@ -5,58 +5,27 @@ that a person must look at first moves before the operator has agreed.
 """
 
 from collections import Counter
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from os import PathLike
 from pathlib import Path
 
+from elastocal import procedure
 from elastocal.cell import Cell, Devices, load_cell
 from elastocal.errors import ElastocalError, ProcedureError
 from elastocal.files import read_text
 from elastocal.planning import PLAN, PlanResult, read_plan
-from elastocal.procedure import (
-    Entry,
-    Event,
-    Journal,
-    LastKnown,
-    PoseLog,
-    PoseRecorder,
-    Progress as RunProgress,
-    RunEnd,
-    RunFolder,
-    Runner,
-    RunRecord,
-    RunSettings as SessionSettings,
-    RunSummary,
-    Session,
-    SessionHooks,
-    SessionResult,
-    cell_path_in_run,
-    check_compatible,
-    check_same_run,
-    check_same_settings,
-    commits,
-    derive_run,
-    fill_folder,
-    home_route,
-    itinerary,
-    last_known,
-    make_folder,
-    read_copies,
-    read_journal,
-    refuse_foreign_files,
-    registration_warnings,
-    run_record,
-    run_settings,
-    write_derived,
-)
+from elastocal.procedure import Event, Journal, LastKnown, RunEnd, RunFolder, RunSummary, Session
 from elastocal.procedure.run import PlannedStep
 from elastocal.progress import Progress
 from elastocal.records import record
 from elastocal.results import Result, brief_repr
-from elastocal.workflows._device_sources import DeviceSource, device_source
-from elastocal.workflows._operator import Operator, Unattended
+from elastocal.workflows._operator_and_devices import (
+    DeviceSource,
+    Operator,
+    Unattended,
+    device_source,
+)
 from elastocal.workflows._workflow import workflow
 
 POSES_MEASURED = "poses measured"
@@ -119,7 +88,7 @@ class RunResult(Result):
     figures: RunFigures
     end: RunEnd
     summary: RunSummary | None
-    """Of the derived run; None where nothing was derived."""
+    """Summary of the derived run; None where nothing was derived."""
     problem: ElastocalError | None
     """Why nothing was derived of a run that is done."""
 
@@ -175,9 +144,9 @@ class _Job:
     cell: Cell
     plan: PlanResult
     plan_folder: Path
-    settings: SessionSettings
+    settings: procedure.RunSettings
     source: DeviceSource
-    record: RunRecord
+    record: procedure.RunRecord
     folder: RunFolder
     warnings: tuple[str, ...]
 
@@ -202,16 +171,17 @@ def run(settings: RunSettings, progress: Progress) -> RunResult:
         If cell, plan, a file or a device cannot be used.
     """
     job = _prepare(settings)
-    entries = _entries(job.folder)
+    journal_file = job.folder.journal
+    entries = procedure.read_journal(journal_file) if journal_file.is_file() else ()
     _check_folder(job, entries, settings.resume)
-    make_folder(job.folder.path)
-    with Journal(job.folder.journal) as journal:
+    procedure.make_folder(job.folder.path)
+    with Journal(journal_file) as journal:
         # Read again: between the look above and the lock another process may have been here.
-        if read_journal(job.folder.journal) != entries:
+        if procedure.read_journal(journal_file) != entries:
             raise ProcedureError(f"{job.folder.path}: another process has just run here")
         if not entries:
-            fill_folder(job.folder, job.cell, job.plan_folder)
-        known = last_known(entries) if entries else None
+            procedure.fill_folder(job.folder, job.cell, job.plan_folder)
+        known = procedure.last_known(entries) if entries else None
         devices = job.source.make(job.cell, job.record.seed, known.entry.time if known else 0.0)
         _confirm(job, known, devices, settings)
         session = _session(job, known, devices)
@@ -236,7 +206,7 @@ def dry_run(settings: RunSettings, progress: Progress) -> DryRunResult:  # noqa:
     """
     job = _prepare(settings)
     return DryRunResult(
-        steps=itinerary(job.plan, job.settings),
+        steps=procedure.itinerary(job.plan, job.settings),
         poses=len(job.plan.poses),
         load_cases=tuple(name for name, _ in job.settings.loads),
         force_limit=job.settings.force_limit,
@@ -252,44 +222,44 @@ def _prepare(settings: RunSettings) -> _Job:
     now = datetime.now(UTC).isoformat(timespec="seconds")
     text = read_text(folder / PLAN)
     seed = loaded.file.simulation.seed if settings.seed is None else settings.seed
-    stated = run_record(loaded, read, text, cell_path_in_run(loaded), seed, now)
-    check_compatible(read, loaded)
+    stated = procedure.run_record(loaded, read, text, procedure.cell_path_in_run(loaded), seed, now)
+    procedure.check_compatible(read, loaded)
     return _Job(
         loaded,
         read,
         folder,
-        run_settings(loaded, read),
+        procedure.run_settings(loaded, read),
         device_source(loaded),
         stated,
         RunFolder(Path(settings.out)),
-        registration_warnings(read),
+        procedure.registration_warnings(read),
     )
 
 
 def _carry_out(
     session: Session, devices: Devices, journal: Journal, operator: Operator, progress: Progress
-) -> SessionResult:
+) -> procedure.SessionResult:
     count = len(session.plan.poses)
     with operator.supervise(count) as supervision:
 
-        def show(step: RunProgress) -> None:
+        def show(step: procedure.Progress) -> None:
             supervision.show(step)
             progress(POSES_MEASURED, step.number - 1, count)
 
-        hooks = SessionHooks(
-            lambda: PoseRecorder(session.plan.robot.joints), show, supervision.interrupted
+        hooks = procedure.SessionHooks(
+            lambda: procedure.PoseRecorder(session.plan.robot.joints), show, supervision.interrupted
         )
-        return Runner(session, devices, journal, hooks).run()
+        return procedure.Runner(session, devices, journal, hooks).run()
 
 
-def _derived(job: _Job, result: SessionResult) -> RunResult:
+def _derived(job: _Job, result: procedure.SessionResult) -> RunResult:
     """Derive the dataset of a run that is done; what keeps it from that is no end of the run."""
     summary: RunSummary | None = None
     problem: ElastocalError | None = None
     if result.end is RunEnd.DONE:
         try:
-            derived = derive_run(job.folder.path)
-            write_derived(job.folder.path, derived)
+            derived = procedure.derive_run(job.folder.path)
+            procedure.write_derived(job.folder.path, derived)
             summary = derived.summary
         except ElastocalError as error:
             problem = error
@@ -297,32 +267,31 @@ def _derived(job: _Job, result: SessionResult) -> RunResult:
 
 
 def _figures(
-    job: _Job, result: SessionResult, summary: RunSummary | None, problem: ElastocalError | None
+    job: _Job,
+    result: procedure.SessionResult,
+    summary: RunSummary | None,
+    problem: ElastocalError | None,
 ) -> RunFigures:
-    entries = read_journal(job.folder.journal)
+    entries = procedure.read_journal(job.folder.journal)
+    logs = procedure.commits(entries)
+    # As derived; else as the journal has them.
+    windows = [w.status.value for log in logs for w in log.windows if w.load_case is not None]
+    counts = Counter(windows) if summary is None else summary.readings.counts
     return RunFigures(
         run=str(job.folder.path),
         state=result.end.value,
         arm=result.location.value,
         message=result.message,
         poses=len(job.plan.poses),
-        committed=len(commits(entries)),
+        committed=len(logs),
         given_up=tuple(result.given_up),
-        readings=_readings(summary, commits(entries)),
+        readings={status: number for status, number in counts.items() if number},
         failed_attempts=sum(entry.event is Event.FAULT for entry in entries),
         seconds=entries[-1].time - entries[0].time,
         dataset=str(job.folder.dataset) if summary is not None else None,
         warnings=tuple(job.warnings if summary is None else summary.warnings),
         problem=str(problem) if problem is not None else None,
     )
-
-
-def _readings(summary: RunSummary | None, logs: Sequence[PoseLog]) -> dict[str, int]:
-    """Return the number of readings by status, as derived; else as the journal has them."""
-    if summary is not None:
-        return {status: n for status, n in summary.readings.counts.items() if n}
-    windows = [window for log in logs for window in log.windows if window.load_case is not None]
-    return dict(Counter(window.status.value for window in windows))
 
 
 def _session(job: _Job, known: LastKnown | None, devices: Devices) -> Session:
@@ -335,33 +304,29 @@ def _session(job: _Job, known: LastKnown | None, devices: Devices) -> Session:
         job.folder,
         committed=frozenset(known.committed) if known else frozenset(),
         attempts=known.attempts if known else {},
-        home=home_route(job.plan, state.q, state.T_base_tcp, limit, likely),
+        home=procedure.home_route(job.plan, state.q, state.T_base_tcp, limit, likely),
     )
 
 
-def _entries(folder: RunFolder) -> tuple[Entry, ...]:
-    return read_journal(folder.journal) if folder.journal.is_file() else ()
-
-
-def _check_folder(job: _Job, entries: tuple[Entry, ...], resume: bool) -> None:
+def _check_folder(job: _Job, entries: tuple[procedure.Entry, ...], resume: bool) -> None:
     """Refuse a folder that holds something else than what was asked for."""
     out = job.folder.path
     if not entries:
         if resume:
             raise ProcedureError(f"{out} holds no run to go on with: leave --resume out")
-        refuse_foreign_files(job.folder)
+        procedure.refuse_foreign_files(job.folder)
         return
     started = entries[0].run
     assert started is not None
-    check_same_run(started, job.record, str(out))
+    procedure.check_same_run(started, job.record, str(out))
     if not resume:
-        done, count = len(last_known(entries).committed), len(job.plan.poses)
+        done, count = len(procedure.last_known(entries).committed), len(job.plan.poses)
         raise ProcedureError(
             f"{out} holds this run already ({done} of {count} poses committed):"
             " go on with --resume, or name another folder"
         )
-    used, _ = read_copies(job.folder, started)
-    check_same_settings(used, job.cell)
+    used, _ = procedure.read_copies(job.folder, started)
+    procedure.check_same_settings(used, job.cell)
 
 
 def _confirm(job: _Job, known: LastKnown | None, devices: Devices, settings: RunSettings) -> None:

@@ -3,29 +3,17 @@
 import itertools
 from contextlib import nullcontext
 from dataclasses import dataclass
+from functools import partial
 from os import PathLike
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from elastocal import compensation
 from elastocal.arrays import FloatArray
 from elastocal.cell import load_cell
-from elastocal.compensation import (
-    PathPostures,
-    PathStations,
-    PostureChoice,
-    PostureConstraint,
-    PostureGrid,
-    PostureSurvey,
-    cell_constraints,
-    choose_postures,
-    directional_stiffness,
-    read_stations,
-    survey_postures,
-    write_choice,
-    write_survey,
-)
+from elastocal.compensation import PathPostures, PathStations, PostureChoice, PostureSurvey
 from elastocal.compensation.offline import PathError, posture_jumps
 from elastocal.files import filling
 from elastocal.identification import CalibratedModel, read_model
@@ -34,12 +22,13 @@ from elastocal.records import record, write_json
 from elastocal.report import Curve, drawn, stiffness_figure, write_stiffness_figure
 from elastocal.results import Result, brief_repr
 from elastocal.robot import Robot
-from elastocal.robot.inverse import InverseKinematics, inverse_for
+from elastocal.robot.inverse import inverse_for
 from elastocal.workflows._inputs import coverage_notes, parse_posture, require_same_robot
 from elastocal.workflows._workflow import workflow
 
 _SUMMARY = "stiffness.json"
 """Name of the file by which the folder is known."""
+_FILES = ("postures.csv", "choice.csv", "stiffness.svg", "stiffness.png", _SUMMARY)
 
 
 @dataclass(frozen=True)
@@ -200,40 +189,43 @@ def _surveyed(
     robot = calibrated.model.robot
     solver = inverse_for(robot)
     grid, constraints = _grid(robot, settings)
-    stations = read_stations(settings.path, solver, settings.stations, start)
+    stations = compensation.read_stations(settings.path, solver, settings.stations, start)
+    count = len(stations)
     direction = _parse_direction(settings.direction, stations)
-    survey, choice = _survey(calibrated, solver, stations, direction, grid, constraints, progress)
-    choices = _choices(stations, choice)
+    survey = compensation.survey_postures(
+        calibrated,
+        solver,
+        stations.T_base_tcp,
+        direction,
+        grid,
+        constraints,
+        lambda done: progress("stations", done, count),
+    )
+    choice = compensation.choose_postures(survey, solver)
+    programmed = PathPostures("as programmed", stations.q, np.zeros(count))
+    choices = [each for each in (programmed, choice.one, choice.each) if each is not None]
     curves = tuple(_curve(calibrated, direction, postures) for postures in choices)
-    files: tuple[str, ...] = ()
-    if folder is not None:
-        tables = (
-            write_survey(folder / "postures.csv", robot, stations, survey),
-            write_choice(folder / "choice.csv", calibrated, stations, direction, choices),
-        )
-        files = (*(path.name for path in tables), "stiffness.svg", "stiffness.png", _SUMMARY)
+    axes = zip(robot.joint_names, robot.revolute, strict=True)
     summary = StiffnessSummary(
         direction=settings.direction,
-        stations=len(stations),
-        external_axes=tuple(
-            ExternalAxis(name, "rad" if turns else "m")
-            for name, turns in zip(robot.joint_names, robot.revolute, strict=True)
-        )[: robot.external_axes],
+        stations=count,
+        external_axes=tuple(ExternalAxis(name, "rad" if turns else "m") for name, turns in axes)[
+            : robot.external_axes
+        ],
         postures=PostureCounts(
             survey.stiffness.size, int(np.sum(~np.isnan(survey.stiffness))), survey.refused
         ),
-        choices=tuple(
-            _chosen(curve, _count_jumps(robot, postures))
-            for curve, postures in zip(curves, choices, strict=True)
-        ),
-        files=files,
+        choices=tuple(map(partial(_chosen, robot), curves, choices)),
+        files=_FILES if folder is not None else (),
     )
     notes = (*_notes(summary, choice), *coverage_notes(calibrated))
     result = StiffnessResult(
         summary, stations, direction, survey, choice, notes, robot.name, curves
     )
     if folder is not None:
-        for name in ("stiffness.svg", "stiffness.png"):
+        compensation.write_survey(folder / _FILES[0], robot, stations, survey)
+        compensation.write_choice(folder / _FILES[1], calibrated, stations, direction, choices)
+        for name in _FILES[2:4]:
             write_stiffness_figure(folder / name, result.title, stations, survey, curves)
         write_json(folder / _SUMMARY, summary)
     return result
@@ -241,24 +233,24 @@ def _surveyed(
 
 def _grid(
     robot: Robot, settings: StiffnessSettings
-) -> tuple[PostureGrid, tuple[PostureConstraint, ...]]:
+) -> tuple[compensation.PostureGrid, tuple[compensation.PostureConstraint, ...]]:
     """Return what may be chosen at every station, and what a posture must pass."""
     spins = np.linspace(0.0, 2.0 * np.pi, settings.spins, endpoint=False)
     external = _external_grid(robot, settings.stands)
     if settings.cell is None:
-        return PostureGrid(spins, external), ()
+        return compensation.PostureGrid(spins, external), ()
     cell = load_cell(settings.cell)
     require_same_robot(robot, cell.robot, (str(settings.model), cell.name))
-    return PostureGrid(spins, cell.external_positions), cell_constraints(cell)
+    return compensation.PostureGrid(spins, cell.external_positions), compensation.cell_constraints(
+        cell
+    )
 
 
 def _external_grid(robot: Robot, count: int) -> FloatArray:
     """Return evenly spread positions of the external axes, shape (position, external axis)."""
-    ends = zip(robot.limits.lower, robot.limits.upper, strict=True)
     axes = []
-    for name, (low, high) in itertools.islice(
-        zip(robot.joint_names, ends, strict=True), robot.external_axes
-    ):
+    ends = zip(robot.joint_names, robot.limits.lower, robot.limits.upper, strict=True)
+    for name, low, high in itertools.islice(ends, robot.external_axes):
         if not (np.isfinite(low) and np.isfinite(high)):
             raise PathError(f"external axis {name} has no limits: give a --cell with its positions")
         axes.append(np.linspace(low, high, count))
@@ -282,38 +274,9 @@ def _parse_direction(text: str, stations: PathStations) -> FloatArray:
     return np.tile(vector / length, (len(stations), 1))
 
 
-def _survey(
-    calibrated: CalibratedModel,
-    solver: InverseKinematics,
-    stations: PathStations,
-    direction: FloatArray,
-    grid: PostureGrid,
-    constraints: tuple[PostureConstraint, ...],
-    progress: Progress,
-) -> tuple[PostureSurvey, PostureChoice]:
-    count = len(stations)
-    survey = survey_postures(
-        calibrated,
-        solver,
-        stations.T_base_tcp,
-        direction,
-        grid,
-        constraints,
-        lambda done: progress("stations", done, count),
-    )
-    return survey, choose_postures(survey, solver)
-
-
-def _choices(stations: PathStations, choice: PostureChoice) -> list[PathPostures]:
-    """Return the postures as programmed, and those chosen."""
-    programmed = PathPostures("as programmed", stations.q, np.zeros(len(stations)))
-    one = [] if choice.one is None else [choice.one]
-    return [programmed, *one, choice.each]
-
-
 def _curve(calibrated: CalibratedModel, direction: FloatArray, postures: PathPostures) -> Curve:
     there = np.flatnonzero(np.isfinite(postures.q).all(axis=1))
-    k = directional_stiffness(calibrated, postures.q[there], direction[there])
+    k = compensation.directional_stiffness(calibrated, postures.q[there], direction[there])
     stiffness, low, high = (np.full(len(postures.q), np.nan) for _ in range(3))
     stiffness[there], low[there], high[there] = k.stiffness, k.low, k.high
     railed = calibrated.model.robot.external_axes > 0
@@ -321,14 +284,9 @@ def _curve(calibrated: CalibratedModel, direction: FloatArray, postures: PathPos
     return Curve(postures.name, stiffness, low, high, postures.spin, rail)
 
 
-def _count_jumps(robot: Robot, postures: PathPostures) -> int:
-    """Return at how many stations a joint turns by more than 90 deg from the one before."""
-    q = postures.q[np.isfinite(postures.q).all(axis=1)]
-    return len(posture_jumps(robot, q, q[0])) if len(q) else 0
-
-
-def _chosen(curve: Curve, jumps: int) -> ChosenStiffness:
+def _chosen(robot: Robot, curve: Curve, postures: PathPostures) -> ChosenStiffness:
     k = curve.stiffness[np.isfinite(curve.stiffness)]
+    q = postures.q[np.isfinite(postures.q).all(axis=1)]
 
     def only(values: FloatArray) -> float | None:
         found = np.unique(values[np.isfinite(values)])
@@ -341,7 +299,7 @@ def _chosen(curve: Curve, jumps: int) -> ChosenStiffness:
         mean=float(k.mean()) if len(k) else 0.0,
         spin=only(curve.spin),
         stand=only(curve.rail),
-        posture_jumps=jumps,
+        posture_jumps=len(posture_jumps(robot, q, q[0])) if len(q) else 0,
     )
 
 

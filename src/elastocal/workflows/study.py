@@ -8,20 +8,8 @@ from pathlib import Path
 from typing import Any
 
 from elastocal.cell import DEFAULT_POSES, Cell, load_cell
-from elastocal.codec.study import (
-    Condition,
-    SampleResult,
-    StudyDesign,
-    StudyStore,
-    StudySummary,
-    check_samples,
-    make_conditions,
-    read_variations,
-    run_study,
-    spread_over,
-    study_summary,
-    write_study,
-)
+from elastocal.codec import study as studies
+from elastocal.codec.study import Condition, SampleResult, StudyDesign, StudySummary
 from elastocal.progress import Progress
 from elastocal.report import drawn, study_figure, write_study_figures
 from elastocal.results import Result, brief_repr
@@ -103,21 +91,23 @@ def study(settings: StudySettings, progress: Progress) -> StudyResult:
     ElastocalError
         If the cell cannot be read or simulated, or a file not be written.
     """
-    check_samples(settings.samples)
+    studies.check_samples(settings.samples)
     cell = load_cell(Path(settings.cell))
     conditions = study_conditions(cell, settings.vary)
     # Processes import the simulation while this one makes the pool.
     prepare = partial(importlib.import_module, _SIMULATION)
-    with spread_over(settings.jobs, settings.dask, prepare) as spread:
+    with studies.spread_over(settings.jobs, settings.dask, prepare) as spread:
         from elastocal.workflows._study_simulation import prepare_study
 
         prepared = prepare_study(
             cell, conditions, settings.seed, settings.verification, settings.jobs
         )
-        store, design = StudyStore(settings.out), prepared.design
-        results = run_study(store, design, settings.samples, prepared.simulate, spread, progress)
-    summary = study_summary(design, results, settings.target)
-    names = write_study(settings.out, design, results, summary)
+        store, design = studies.StudyStore(settings.out), prepared.design
+        results = studies.run_study(
+            store, design, settings.samples, prepared.simulate, spread, progress
+        )
+    summary = studies.study_summary(design, results, settings.target)
+    names = studies.write_study(settings.out, design, results, summary)
     names += write_study_figures(settings.out, design, results, summary)
     return StudyResult(summary, design, results, tuple(names))
 
@@ -132,4 +122,4 @@ def study_conditions(cell: Cell, vary: tuple[str, ...]) -> tuple[Condition, ...]
     """
     search = cell.file.search
     base = Condition(poses=search.most or DEFAULT_POSES, search=search.technique)
-    return make_conditions(read_variations(vary or (DEFAULT_VARIATION,)), base)
+    return studies.make_conditions(studies.read_variations(vary or (DEFAULT_VARIATION,)), base)

@@ -6,29 +6,13 @@ from pathlib import Path
 
 import numpy as np
 
+from elastocal import procedure
 from elastocal.arrays import FloatArray
 from elastocal.cell import Cell, load_cell
-from elastocal.compensation.conditioning import (
-    SensorMount,
-    StaticPostures,
-    ToolResult,
-    fit_tool,
-    read_postures,
-    refuse_mistakes,
-    static_postures,
-    tool_result,
-    write_tool,
-)
+from elastocal.compensation import conditioning
+from elastocal.compensation.conditioning import SensorMount, StaticPostures, ToolResult
 from elastocal.errors import CompensationError, ProcedureError
 from elastocal.identification import read_model
-from elastocal.procedure import (
-    PoseReadings,
-    RunFolder,
-    commits,
-    read_journal,
-    read_streams,
-    reduce_pose,
-)
 from elastocal.progress import Progress
 from elastocal.robot import GRAVITY, Robot
 from elastocal.workflows._inputs import find_robot, parse_frame, refuse_overwriting
@@ -97,11 +81,13 @@ def tool(settings: ToolSettings, progress: Progress) -> ToolResult:  # noqa: ARG
     data = Path(settings.data)
     refuse_overwriting(settings.out, data)
     source = _from_run(data) if data.is_dir() else _from_table(data, settings)
-    fit = fit_tool(source.postures, source.R_nominal, settings.keep_rotation)
-    refuse_mistakes(source.postures, fit, source.R_nominal, source.expected_centre, source.points)
-    result = tool_result(fit, source.mount, str(data))
+    fit = conditioning.fit_tool(source.postures, source.R_nominal, settings.keep_rotation)
+    conditioning.refuse_mistakes(
+        source.postures, fit, source.R_nominal, source.expected_centre, source.points
+    )
+    result = conditioning.tool_result(fit, source.mount, str(data))
     if settings.out is not None:
-        write_tool(settings.out, result)
+        conditioning.write_tool(settings.out, result)
     return result
 
 
@@ -119,7 +105,7 @@ def _from_table(path: Path, settings: ToolSettings) -> _PostureSource:
     R, origin = T_flange_sensor[:3, :3], T_flange_sensor[:3, 3]
     points = {} if not np.any(origin) else {"flange": -origin @ R}
     mount = SensorMount(settings.flange, origin, gravity)
-    return _PostureSource(read_postures(path, arm, gravity), mount, R, points=points)
+    return _PostureSource(conditioning.read_postures(path, arm, gravity), mount, R, points=points)
 
 
 def _posture_robot(robot: str | None, flange: str) -> Robot | None:
@@ -133,9 +119,9 @@ def _posture_robot(robot: str | None, flange: str) -> Robot | None:
 
 def _from_run(run: Path) -> _PostureSource:
     """Return the unloaded references of a run as postures, the cell's sensor as mounted."""
-    folder = RunFolder(run)
-    entries = read_journal(folder.journal)
-    latest = {log.pose: log for log in commits(entries)}
+    folder = procedure.RunFolder(run)
+    entries = procedure.read_journal(folder.journal)
+    latest = {log.pose: log for log in procedure.commits(entries)}
     if not entries or entries[0].run is None or not latest:
         raise ProcedureError(f"{folder.journal}: no pose is committed")
     cell = load_cell(folder.cell / entries[0].run.cell_file)
@@ -143,8 +129,11 @@ def _from_run(run: Path) -> _PostureSource:
     if sensor is None or T_sensor_tcp is None:
         raise ProcedureError(f"cell {cell.name!r} has no force sensor (key 'sensor')")
     poses = [
-        reduce_pose(
-            log, read_streams(folder.streams / log.streams, [(w.start, w.end) for w in log.windows])
+        procedure.reduce_pose(
+            log,
+            procedure.read_streams(
+                folder.streams / log.streams, [(w.start, w.end) for w in log.windows]
+            ),
         )
         for log in latest.values()
     ]
@@ -155,10 +144,10 @@ def _from_run(run: Path) -> _PostureSource:
     return _PostureSource(_unloaded(poses, cell), mount, T[:3, :3], centre, points)
 
 
-def _unloaded(poses: list[PoseReadings], cell: Cell) -> StaticPostures:
+def _unloaded(poses: list[procedure.PoseReadings], cell: Cell) -> StaticPostures:
     states = [r.tool for pose in poses if (r := pose.reference) and r.tool]
     R_base_tcp = np.array([state.T_base_tcp[:3, :3] for state in states]).reshape(-1, 3, 3)
-    return static_postures(
+    return conditioning.static_postures(
         R_base_tcp @ cell.T_flange_tcp[:3, :3].T,
         np.array([state.force.value for state in states]).reshape(-1, 3),
         np.array([state.moment.value for state in states]).reshape(-1, 3),

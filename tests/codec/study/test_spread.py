@@ -7,7 +7,7 @@ from functools import partial
 
 import pytest
 
-from elastocal.codec.study import _cluster
+from elastocal.codec.study import sampling
 from elastocal.codec.study.sampling import spread_over
 from elastocal.errors import CodecError
 from support.cli import elastocal
@@ -51,9 +51,9 @@ def test_processes_that_find_nothing_to_do_end_without_a_word(recwarn):
 @pytest.mark.parametrize("answer", [b"", b"SSH-2.0-OpenSSH_9.6\r\n"])
 def test_a_port_that_speaks_no_dask_is_refused_and_not_waited_for(monkeypatch, answer):
     pytest.importorskip("distributed")
-    monkeypatch.setattr(_cluster, "PATIENCE", 0.5)
+    monkeypatch.setattr(sampling, "_PATIENCE", 0.5)
     with listening(answer) as address, pytest.raises(CodecError, match="no Dask scheduler answers"):
-        _cluster.check_scheduler(address)
+        sampling._check_scheduler(address)
 
 
 @pytest.mark.parametrize("address", ["tcp://127.0.0.1:9", "nonsense://x", "foo", ""])
@@ -61,7 +61,7 @@ def test_an_address_without_a_scheduler_is_refused_before_anything_is_written(
     tmp_path, monkeypatch, address
 ):
     pytest.importorskip("distributed")
-    monkeypatch.setattr(_cluster, "PATIENCE", 0.3)
+    monkeypatch.setattr(sampling, "_PATIENCE", 0.3)
     cell = example_cell("afp").path
     found = elastocal("study", cell, "--out", tmp_path / "study", "--dask", address)
     assert f"--dask {address}: no Dask scheduler answers there" in found.reason
@@ -74,12 +74,12 @@ def test_a_worker_is_not_taken_for_a_scheduler(monkeypatch):
     async def worker(_):
         return "Worker"
 
-    monkeypatch.setattr(_cluster, "_identity", worker)
+    monkeypatch.setattr(sampling, "_identity", worker)
     with pytest.raises(CodecError, match="a Dask worker answers there, not a scheduler"):
-        _cluster.check_scheduler("tcp://127.0.0.1:1")
+        sampling._check_scheduler("tcp://127.0.0.1:1")
 
 
 def test_a_missing_extra_says_how_to_install_it(monkeypatch):
     monkeypatch.setitem(__import__("sys").modules, "distributed", None)
     with pytest.raises(CodecError, match=r"pip install 'elastocal\[dask\]'"):
-        _cluster.check_scheduler("tcp://127.0.0.1:9")
+        sampling._check_scheduler("tcp://127.0.0.1:9")

@@ -52,15 +52,15 @@ class Spring:
 
 
 class Listener(PerfectCorrector):
-    """Corrects nothing, and keeps what it was told."""
+    """Corrects nothing, and keeps the readings."""
 
     def __init__(self) -> None:
         super().__init__(0)
         self.time, self.raw = [], []
 
-    def correct(self, time, q, raw, deflection):  # noqa: ARG002
-        self.time.append(time)
-        self.raw.append(raw)
+    def correct(self, cycle):
+        self.time.append(cycle.time)
+        self.raw.append(cycle.raw)
         return np.zeros(3)
 
 

@@ -3,8 +3,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from elastocal.procedure.derive.displacement import LoadRow
 from elastocal.procedure.derive.findings import run_warnings
+from elastocal.procedure.derive.readings import LoadRow
 from elastocal.procedure.derive.tool import Interval, ToolChange, ToolEstimate, ToolLoad
 from elastocal.procedure.record import ReadingStatus
 from elastocal.procedure.registration import Blunder, Registration, StationFit, StationMove

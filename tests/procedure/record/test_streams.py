@@ -6,7 +6,7 @@ import pytest
 from mcap.reader import make_reader
 from mcap.records import Metadata
 
-from elastocal.cell.devices import (
+from elastocal.cell import (
     ArmState,
     BeamState,
     Motion,
@@ -17,8 +17,7 @@ from elastocal.cell.devices import (
 from elastocal.errors import ProcedureError, SchemaError
 from elastocal.procedure import STREAMS_SCHEMA, PoseRecorder, read_streams
 from elastocal.procedure.record import Mark
-from elastocal.procedure.record._mcap import Topic, write_mcap
-from elastocal.procedure.record._messages import schemas
+from elastocal.procedure.record._mcap import Topic, schemas, write_mcap
 from support.stations import station
 
 JOINTS = ("rail", "joint 100%s")

@@ -6,7 +6,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from elastocal.cell.devices import Motion
+from elastocal.cell import Motion
 from elastocal.procedure import Event, RunEnd, read_journal
 from elastocal.procedure.record import read_commits
 from support.fake_devices import FakeCell

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from hypothesis import given, settings, strategies as st
 
-from elastocal.cell.devices import Motion
+from elastocal.cell import Motion
 from elastocal.procedure import Event, RunEnd, read_journal
 from elastocal.procedure.record import Action, read_commits
 from support import fake_faults as fault

@@ -5,8 +5,15 @@ import itertools
 import pytest
 
 from elastocal.procedure.run._sequence import ACTIONS
-from elastocal.procedure.run.faults import Fault, FaultScope
-from elastocal.procedure.run.steps import MAY_TOUCH, ON_APPROACH_LINE, Step, StepResult, next_step
+from elastocal.procedure.run.steps import (
+    MAY_TOUCH,
+    ON_APPROACH_LINE,
+    Fault,
+    FaultScope,
+    Step,
+    StepResult,
+    next_step,
+)
 
 READING = [Step.LOAD, Step.SETTLE, Step.AVERAGE]
 AFTER = [Step.RELEASE, Step.LIFT, Step.RELEASED, Step.RETRACT, Step.COMMIT]

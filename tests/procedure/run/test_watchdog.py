@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from elastocal.cell.devices import (
+from elastocal.cell import (
     ArmState,
     BeamState,
     Motion,
@@ -14,7 +14,7 @@ from elastocal.cell.devices import (
     WrenchBlock,
 )
 from elastocal.procedure.run._watchdog import Guard, Snapshot, Watchdog
-from elastocal.procedure.run.faults import Fault, FaultError
+from elastocal.procedure.run.steps import Fault, FaultError
 
 STALE, BEAM = 0.3, 2.0
 

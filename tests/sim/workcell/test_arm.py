@@ -52,7 +52,7 @@ class TestLoadedReading:
             state = session.hold(wanted)
             force, memory = (
                 session.sim.plant.robot_state().force,
-                session.sim.plant.segment.springs[0],
+                session.sim.plant.segment.path.start.springs,
             )
             _, loaded = session.average()
             controller = marker_by_controller(state, cell) - marker_by_controller(near, cell)

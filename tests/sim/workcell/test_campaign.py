@@ -14,7 +14,7 @@ from elastocal.sim.workcell import (
     ErrorScales,
 )
 from elastocal.sim.workcell._instruments import _draw, force_gain
-from elastocal.sim.workcell._sampling import generator
+from elastocal.sim.workcell._timeline import generator
 from elastocal.sim.workcell.campaign import TrueReadings
 from support.simulated import QUIET, Session, example_cell, marker_by_controller, places
 

@@ -98,7 +98,7 @@ class TestForceSensor:
         found = []
         for _ in range(3):
             session.near(places()[0])
-            found.append(np.linalg.norm(session.average()[0][:3] - session.sim.sensor._zero[:3]))
+            found.append(np.linalg.norm(session.average()[0][:3] - session.sim.sensor.zero[:3]))
         assert found[1] - found[0] == pytest.approx(3 * 9.80665, rel=1e-3)
         assert found[2] == pytest.approx(found[1])
 

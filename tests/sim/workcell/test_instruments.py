@@ -4,8 +4,7 @@ import pytest
 from elastocal.cell.devices import SensorStatus
 from elastocal.errors import DeviceError
 from elastocal.sim.workcell import SimulatedCell, simulated_devices
-from elastocal.sim.workcell._instruments import sensor_matrix, sensor_range
-from elastocal.sim.workcell._sampling import BLOCK, NoiseStream
+from elastocal.sim.workcell._instruments import BLOCK, NoiseStream, sensor_matrix, sensor_range
 from support.simulated import QUIET, Session, example_cell, marker_by_controller, places
 
 

@@ -7,7 +7,7 @@ import pytest
 from elastocal.errors import DeviceError
 from elastocal.planning import make_plan
 from elastocal.robot import catalogue
-from elastocal.sim.workcell._robot import TrueRobot, lay_out_robot
+from elastocal.sim.workcell._robot import TrueRobot
 from support.simulated import example_cell, places
 
 STEP = 1e-6
@@ -81,7 +81,7 @@ def test_the_robot_gives_way_along_the_force():
 def test_it_hangs_down_under_its_weight_and_the_balancer_holds_it_up():
     q = np.array([0.0, 0.0, -0.35, 0.6, 0.0, 0.5, 0.0])
     arm = robot()
-    hanging = replace(arm, layout=replace(arm.layout, springs=replace(arm.springs, balancer=None)))
+    hanging = replace(arm, springs=replace(arm.springs, balancer=None))
 
     def sag(one):
         return one.rest(q, np.zeros(3), one.springs).T_base_tcp[2, 3] - one.forward(q)[2, 3]
@@ -105,7 +105,7 @@ def test_force_on_deflection_is_the_slope_of_the_stored_energy():
     arm, q = robot(), places()[0].q
     force = 500.0 * arm.forward(q)[:3, :3] @ (0.0, 0.0, -1.0)
     one, two = (arm.rest(q, s * force, arm.springs) for s in (1.0, 1.001))
-    springs = arm.springs.at_joint(float(q[arm.layout.external + 1]))
+    springs = arm.springs.at_joint(float(q[arm.external + 1]))
     stored = springs.evaluate(two.theta[None])[0] - springs.evaluate(one.theta[None])[0]
     way = two.T_base_tcp[:3, 3] - one.T_base_tcp[:3, 3]
     weight = _work_of_weight(arm, q, one, two)
@@ -149,7 +149,7 @@ def test_every_part_can_be_made_stiffer(part):
 
 def test_stiffnesses_of_the_file_are_taken():
     values = [f"{k} N*m/rad" for k in (1e6, 2e6, 3e6, 4e5, 5e5, 6e5)]
-    layout = lay_out_robot(example_cell(simulation={"gears": {"stiffness": values}}))
+    layout = TrueRobot.of(example_cell(simulation={"gears": {"stiffness": values}}))
     which = layout.springs.gears.which
     np.testing.assert_allclose(layout.springs.stiffness[which], (1e6, 2e6, 3e6, 4e5, 5e5, 6e5))
     assert [layout.chain.springs[i].joint for i in which] == list(
@@ -158,10 +158,10 @@ def test_stiffnesses_of_the_file_are_taken():
 
 
 def test_upright_is_where_the_upper_arm_points_up():
-    layout = lay_out_robot(example_cell())
+    layout = TrueRobot.of(example_cell())
     assert layout.springs.balancer.upright == pytest.approx(-np.pi / 2)
     assert (
-        lay_out_robot(example_cell(simulation={"balancer": {"fitted": False}})).springs.balancer
+        TrueRobot.of(example_cell(simulation={"balancer": {"fitted": False}})).springs.balancer
         is None
     )
 
@@ -188,7 +188,7 @@ def test_a_robot_of_five_joints_is_refused_by_name():
     cell = example_cell("machining")
     lame = replace(cell, robot=_five_joints(cell))
     with pytest.raises(DeviceError, match="needs six joints"):
-        lay_out_robot(lame)
+        TrueRobot.of(lame)
 
 
 def _five_joints(cell):

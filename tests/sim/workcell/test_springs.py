@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from elastocal.cell import Gears
-from elastocal.sim.workcell._springs import BalancerSpring, GearLaws, RobotSprings
+from elastocal.sim.arm import BalancerSpring, GearLaws, RobotSprings
 
 K = np.array([2e6, 1e6, 5e5])
 ENTRY = Gears()

@@ -6,8 +6,8 @@ spreads batches. `elastocal.workflows.study` brings the simulation.
 ============  ===================================================================================
 `conditions`  what may be varied; conditions
 `poses`       one pool of valid poses: verification poses set aside, the choice of each condition
-`samples`     sample, its generators, its fit, accuracy at unseen poses
-`store`       folder with design and finished samples; a killed study goes on
+`samples`     sample, its generators, its fit, accuracy at unseen poses; the folder with design
+              and finished samples, from which a killed study goes on
 `sampling`    batches, on processes or a Dask cluster
 `summary`     medians, quantiles, shares with intervals; tidy tables and ``study.json``
 ============  ===================================================================================

@@ -17,13 +17,22 @@ from .poses import (
     study_poses as study_poses,
 )
 from .samples import (
+    DESIGN as DESIGN,
+    DESIGN_SCHEMA as DESIGN_SCHEMA,
+    PART_SCHEMA as PART_SCHEMA,
+    PARTS as PARTS,
     ConditionResult as ConditionResult,
     Purpose as Purpose,
     Sample as Sample,
     SampleResult as SampleResult,
     Simulate as Simulate,
+    SpringLabel as SpringLabel,
+    StudyDesign as StudyDesign,
+    StudyStore as StudyStore,
     Verification as Verification,
     calibrated as calibrated,
+    read_design as read_design,
+    read_part as read_part,
 )
 from .sampling import (
     Spread as Spread,
@@ -32,17 +41,6 @@ from .sampling import (
     one_after_the_other as one_after_the_other,
     run_study as run_study,
     spread_over as spread_over,
-)
-from .store import (
-    DESIGN as DESIGN,
-    DESIGN_SCHEMA as DESIGN_SCHEMA,
-    PART_SCHEMA as PART_SCHEMA,
-    PARTS as PARTS,
-    SpringLabel as SpringLabel,
-    StudyDesign as StudyDesign,
-    StudyStore as StudyStore,
-    read_design as read_design,
-    read_part as read_part,
 )
 from .summary import (
     STUDY_SCHEMA as STUDY_SCHEMA,

@@ -3,17 +3,21 @@
 Every worker keeps its linear algebra to one thread: the systems are small, the processes already
 use all cores, and sums split over threads would be rounded otherwise. For the same reason nothing
 is simulated in the process of the command itself, whose linear algebra may use all cores.
+
+Dask's own client goes on trying and closing long after its timeout, and prints what it tries.
+So the scheduler is asked who it is first, by one message with one deadline.
 """
 
+import asyncio
+import logging
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import CancelledError
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import closing, contextmanager
 from functools import partial
+from typing import Any
 
-from elastocal.codec.study import _cluster
-from elastocal.codec.study.samples import Sample, SampleResult, Simulate
-from elastocal.codec.study.store import StudyDesign, StudyStore
+from elastocal.codec.study.samples import Sample, SampleResult, Simulate, StudyDesign, StudyStore
 from elastocal.errors import CodecError
 from elastocal.parallel import ProcessPool, map_on_cluster, process_count, process_pool
 from elastocal.progress import Progress, silent
@@ -26,6 +30,11 @@ Work = Callable[[], list[SampleResult]]
 """One batch."""
 Spread = Callable[[Iterable[Work]], Iterator[list[SampleResult]]]
 """Has the batches done, somewhere and in any order, and yields each result when it is there."""
+_PATIENCE = 10.0
+"""Longest time that a scheduler or its first worker may take to answer, in s."""
+_SCHEDULER = "Scheduler"
+_LOGGERS = ("distributed", "distributed.client")
+"""They print tracebacks of what is refused here in one line."""
 
 
 def run_study(
@@ -115,7 +124,7 @@ def spread_over(
         If Dask is not installed, the scheduler does not answer or is lost, or a process dies.
     """
     if address is not None:
-        _cluster.check_scheduler(address)  # refused before the long work
+        _check_scheduler(address)  # refused before the long work
         yield partial(_over_cluster, address=address)
         return
     with _dead_process_named(), process_pool(process_count(jobs), prepare) as pool:
@@ -127,13 +136,13 @@ def _over_cores(batches: Iterable[Work], pool: ProcessPool) -> Iterator[list[Sam
 
 
 def _over_cluster(batches: Iterable[Work], address: str) -> Iterator[list[SampleResult]]:
-    client = _cluster.connected(address)
+    client = _connected(address)
     with closing(client):
         from distributed import KilledWorker
         from distributed.comm.core import CommClosedError
 
         try:
-            yield from map_on_cluster(_do, batches, client, _cluster.PATIENCE)
+            yield from map_on_cluster(_do, batches, client, _PATIENCE)
         except (CancelledError, CommClosedError, KilledWorker, TimeoutError) as error:
             raise CodecError(
                 f"--dask {address}: the cluster was lost or has no worker"
@@ -158,3 +167,73 @@ def _simulate_batch(simulate: Simulate, seed: int, numbers: Sequence[int]) -> li
 
 def _do(work: Work) -> list[SampleResult]:
     return work()
+
+
+def _check_scheduler(address: str) -> None:
+    """Refuse an address where no Dask scheduler answers in time.
+
+    Parameters
+    ----------
+    address : str
+        E.g. ``tcp://10.0.0.5:8786``.
+
+    Raises
+    ------
+    CodecError
+        If Dask is not installed, nothing answers, or what answers is no scheduler.
+    """
+    try:
+        import distributed  # noqa: F401 - sets the levels of its loggers
+    except ImportError as error:
+        raise CodecError(
+            "--dask needs Dask, which is not installed: pip install 'elastocal[dask]'"
+        ) from error
+    from tornado.websocket import WebSocketError
+
+    for name in _LOGGERS:
+        logging.getLogger(name).setLevel(logging.CRITICAL)
+    try:
+        found = asyncio.run(asyncio.wait_for(_identity(address), _PATIENCE))
+    except (OSError, ValueError, TypeError, EOFError, MemoryError, WebSocketError) as error:
+        # Memory: other services' first letters are read as the length of a message.
+        raise CodecError(
+            f"--dask {address}: no Dask scheduler answers there within {_PATIENCE:g} s (an address"
+            " looks like tcp://10.0.0.5:8786)"
+        ) from error
+    if found != _SCHEDULER:
+        raise CodecError(
+            f"--dask {address}: a Dask {found.lower()} answers there, not a scheduler: give the"
+            " address that `dask scheduler` printed"
+        )
+
+
+def _connected(address: str) -> Any:
+    """Return a client of a Dask scheduler.
+
+    Raises
+    ------
+    CodecError
+        As `_check_scheduler`.
+    """
+    _check_scheduler(address)
+    from distributed import Client
+
+    make: Callable[..., Any] = Client
+    try:
+        return make(address, timeout=_PATIENCE, set_as_default=False)
+    except (OSError, ValueError, TypeError) as error:
+        raise CodecError(f"--dask {address}: the Dask scheduler has stopped answering") from error
+
+
+async def _identity(address: str) -> str:
+    """Return what kind of Dask process answers."""
+    from distributed.comm.core import connect
+
+    reach: Callable[..., Any] = connect
+    comm = await reach(address, timeout=_PATIENCE)
+    try:
+        await comm.write({"op": "identity"})
+        answer = await comm.read()
+    finally:
+        comm.abort()
+    return str(answer.get("type", "process") if isinstance(answer, dict) else "process")

@@ -8,8 +8,7 @@ from scipy.special import bdtr, ndtri
 
 from elastocal.arrays import FloatArray
 from elastocal.codec.study.conditions import FACTORS, Condition, value_text
-from elastocal.codec.study.samples import SampleResult
-from elastocal.codec.study.store import StudyDesign
+from elastocal.codec.study.samples import SampleResult, StudyDesign
 from elastocal.errors import CodecError
 from elastocal.identification import CONFIDENCE
 from elastocal.records import read_json, record, write_json

@@ -16,6 +16,7 @@ from elastocal.errors import CompensationError
 
 _HEAVIEST = 5000.0
 """In kg; robots carry up to 2300 kg."""
+_UNITS = ("N", "N*m")
 _POOR = 0.1
 """Part of what turns with the posture that may be left: noise, cross-talk leave a few percent."""
 _NOISE = np.array([5.0, 0.5])
@@ -78,22 +79,7 @@ def refuse_mistakes(
 
 
 def _refuse_misfit(postures: StaticPostures, fit: ToolFit, R_nominal: FloatArray | None) -> None:
-    """Refuse postures that do not fit one tool, saying why where that can be found.
-
-    Parameters
-    ----------
-    postures : StaticPostures
-        As stated.
-    fit : ToolFit
-        Of these.
-    R_nominal : ndarray, shape (3, 3), optional
-        Rotation of the sensor in the flange as it was mounted.
-
-    Raises
-    ------
-    CompensationError
-        Naming the posture, the angle or the unit.
-    """
+    """Refuse postures that do not fit one tool, saying why where that can be found."""
     if fit.mass > _HEAVIEST:
         raise CompensationError(
             f"mass comes out as {fit.mass:.4g} kg, more than a robot carries ({_HEAVIEST:g} kg):"
@@ -106,10 +92,9 @@ def _refuse_misfit(postures: StaticPostures, fit: ToolFit, R_nominal: FloatArray
     if fit.rotation_known:
         _refuse_rotation(postures, fit, left)
     # Without weight, or turned too little, noise is all that changes: undetermined, no misfit.
-    weight = abs(fit.mass) * float(np.linalg.norm(postures.gravity))
-    if postures.spread > _TURNED and weight > left[0]:
+    if postures.spread > _TURNED and _weight(postures, fit) > left[0]:
         which = int(np.argmax(left / _allowed(postures)))
-        unit = ("N", "N*m")[which]
+        unit = _UNITS[which]
         raise CompensationError(
             f"the postures do not fit one tool: {left[which]:.3g} {unit} are left of a component of"
             f" the {('force', 'moment')[which]}, of {turning[which]:.3g} {unit} that change with"
@@ -128,7 +113,7 @@ def _refuse_one_posture(
         without = _left(others, refit)
         worst = int(np.argmax(left / np.maximum(without, np.finfo(float).tiny)))
         if np.all(without <= _allowed(others)) and without[worst] < _MUCH_BETTER * left[worst]:
-            unit = ("N", "N*m")[worst]
+            unit = _UNITS[worst]
             raise CompensationError(
                 f"posture {row + 1} does not fit the others: {left[worst]:.3g} {unit} are left of a"
                 f" component, without it {without[worst]:.3g} {unit}: measure it again or leave it"
@@ -149,8 +134,7 @@ def _refuse_rotation(postures: StaticPostures, fit: ToolFit, left: FloatArray) -
     free = fit_tool(postures, fit.R_flange_sensor)
     found = _left(postures, free)
     if np.any(found < _MUCH_BETTER * left):
-        cosine = 0.5 * (np.trace(fit.R_flange_sensor.T @ free.R_flange_sensor) - 1.0)
-        angle = np.degrees(np.arccos(np.clip(cosine, -1.0, 1.0)))
+        angle = np.degrees(_angle(fit.R_flange_sensor, free.R_flange_sensor))
         raise CompensationError(
             f"the sensor is not turned as --sensor says: with {left[0]:.3g} N left of a force"
             f" component, {found[0]:.3g} N if it sits {angle:.1f} deg from there; leave out"
@@ -174,19 +158,19 @@ def _turning(postures: StaticPostures) -> FloatArray:
 
 
 def _refuse_base(postures: StaticPostures, fit: ToolFit) -> None:
-    """In base, the weight does not turn with the sensor: it looks like a bias."""
+    """Refuse wrenches in base: the weight does not turn with the sensor, it looks like a bias."""
     g = postures.gravity
     R = postures.R_base_flange
     # F = mass g + R b in base, if b is the bias in the flange's axes.
-    A = np.concatenate([np.broadcast_to(g[None, :, None], (len(R), 3, 1)), R], axis=2)
-    A = A.reshape(-1, 4)
+    A = np.dstack([np.broadcast_to(g[:, None], (len(R), 3, 1)), R]).reshape(-1, 4)
     solution, *_ = np.linalg.lstsq(A, postures.force.ravel(), rcond=None)
     left = _rms(postures.force.ravel() - A @ solution)
     stated = _rms(tool_residual(postures, fit)[0])
-    weight = abs(fit.mass) * float(np.linalg.norm(g))
     constant = float(np.linalg.norm(fit.force_bias))
     upright = float(fit.force_bias @ g) > 0.9 * constant * float(np.linalg.norm(g))
-    seems_constant = weight < _LIGHT * constant and upright and postures.spread > _TURNED
+    seems_constant = (
+        _weight(postures, fit) < _LIGHT * constant and upright and postures.spread > _TURNED
+    )
     noticeable = stated > _NOTICEABLE * _rms(postures.force)
     if solution[0] > 0.0 and (seems_constant or (noticeable and left < _BETTER * stated)):
         raise CompensationError(
@@ -220,8 +204,7 @@ def _refuse_other_forces(
     as_mounted = np.eye(3) if R_nominal is None else R_nominal
     # With gravity turning in one plane both signs fit; where the sensor sits tells them apart.
     fits_both = left[turned] <= 1.5 * stated + _NOTICEABLE * _rms(postures.force)
-    weight = abs(fit.mass) * float(np.linalg.norm(postures.gravity))
-    weighs = weight > _NOTICEABLE * _rms(postures.force)
+    weighs = _weight(postures, fit) > _NOTICEABLE * _rms(postures.force)
     if (fit.mass < 0.0 and weighs and "mass" not in fit.undetermined) or (
         fits_both
         and _angle(fit.R_flange_sensor, as_mounted) > 0.5 * np.pi
@@ -250,8 +233,7 @@ def _refuse_other_moments(postures: StaticPostures, fit: ToolFit) -> None:
 def _refuse_far_centre(postures: StaticPostures, fit: ToolFit) -> None:
     """Refuse a centre of mass far away, where a moment in N·mm that is called N·m puts it."""
     distance = float(np.linalg.norm(fit.centre))
-    turning = _rms(postures.moment - postures.moment.mean(axis=0))
-    seen = turning > _CLEAR * fit.moment_scatter and "mass" not in fit.undetermined
+    seen = _turning(postures)[1] > _CLEAR * fit.moment_scatter and "mass" not in fit.undetermined
     if seen and distance > _FARTHEST:
         raise CompensationError(
             f"centre of mass comes out {distance:.3g} m from the sensor: moments in another unit"
@@ -280,6 +262,10 @@ def _refuse_other_point(
                 f"moments seem to be about the {name}, not the sensor's origin: the centre of mass"
                 f" comes out {1e3 * off:.0f} mm from where it should be, which is that lever"
             )
+
+
+def _weight(postures: StaticPostures, fit: ToolFit) -> float:
+    return abs(fit.mass) * float(np.linalg.norm(postures.gravity))
 
 
 def _angle(a: FloatArray, b: FloatArray) -> float:

@@ -172,12 +172,11 @@ def _descend(
     """Return values (rotation 0, about the R returned) of the least squares."""
     values = np.zeros(len(TOOL_UNKNOWNS))
     measured = np.hstack([postures.force, postures.moment])
-    w = np.repeat(weights, 3)
     for _ in range(_STEPS):
-        left = (measured - tool_wrenches(postures, values, R)) * w
-        J = (tool_derivatives(postures, values, R) * w[:, None]).reshape(left.size, -1)[:, free]
+        left = (measured - tool_wrenches(postures, values, R)) * np.repeat(weights, 3)
+        u, s, vt, scale, kept = _decomposed(tool_derivatives(postures, values, R), free, weights)
         step = np.zeros(len(TOOL_UNKNOWNS))
-        step[free] = _least_squares(J, left.ravel())
+        step[free] = (vt[kept].T @ ((u[:, kept].T @ left.ravel()) / s[kept])) / scale
         values = values + step
         R = R @ Rotation.from_rotvec(step[_ROTATION]).as_matrix()
         values[_ROTATION] = 0.0
@@ -186,12 +185,15 @@ def _descend(
     return values, R
 
 
-def _least_squares(J: FloatArray, b: FloatArray) -> FloatArray:
-    u, s, vt, scale, kept = _decomposed(J)
-    return (vt[kept].T @ ((u[:, kept].T @ b) / s[kept])) / scale
+def _decomposed(
+    derivatives: FloatArray, free: BoolArray, weights: FloatArray
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, BoolArray]:
+    """Return the singular value decomposition ``u s vt`` of the weighed derivatives.
 
-
-def _decomposed(J: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, BoolArray]:
+    Before it the columns of the free unknowns are divided by their ``scale``; the last array tells
+    the directions that the postures determine.
+    """
+    J = (derivatives * np.repeat(weights, 3)[:, None]).reshape(-1, len(TOOL_UNKNOWNS))[:, free]
     scale = np.linalg.norm(J, axis=0)
     scale[scale <= _DEPENDENT * scale.max()] = scale.max()
     u, s, vt = np.linalg.svd(J / scale, full_matrices=False)
@@ -217,9 +219,7 @@ def _result(
     weights: FloatArray,
     scatter: FloatArray,
 ) -> ToolFit:
-    w = np.repeat(weights, 3)
-    J = (tool_derivatives(postures, values, R) * w[:, None]).reshape(6 * len(postures), -1)[:, free]
-    _, s, vt, scale, kept = _decomposed(J)
+    _, s, vt, scale, kept = _decomposed(tool_derivatives(postures, values, R), free, weights)
     mass = float(values[0])
     centre = values[7:10] / (mass if abs(mass) > 0.0 else np.inf)
     # Rows: how each unknown moves with the independent directions, each by its deviation.
@@ -255,12 +255,5 @@ def _result(
 def _widest(mass: float, postures: StaticPostures) -> FloatArray:
     """Return the half widths beyond which an unknown counts as not determined."""
     weight = abs(mass) * float(np.linalg.norm(postures.gravity))
-    return np.array(
-        [
-            _WIDE_MASS * abs(mass),
-            *[_WIDE_ROTATION] * 3,
-            *[_WIDE_BIAS * weight] * 3,
-            *[_WIDE_CENTRE] * 3,
-            *[_WIDE_BIAS * weight * 0.1] * 3,
-        ]
-    )
+    widest = [_WIDE_ROTATION, _WIDE_BIAS * weight, _WIDE_CENTRE, _WIDE_BIAS * weight * 0.1]
+    return np.array([_WIDE_MASS * abs(mass), *np.repeat(widest, 3)])

@@ -13,6 +13,7 @@ from elastocal.compensation.online import JOINT_RANGE, LONG_AGO, Design
 
 _FNV_START, _FNV_PRIME = 14695981039346656037, 1099511628211
 """FNV-1a, 64 bits (Fowler, Noll and Vo)."""
+_INDENT = " " * 4
 _COUNTS = ("JOINTS", "SPRINGS", "SECTIONS", "MEDIAN")
 
 
@@ -47,18 +48,15 @@ class Constant:
     def mixing(self) -> list[str]:
         """Return the C statements that add it to the sum of constants."""
         cast = "(double)" if self.whole else ""
-        if self.numbers.ndim == 0:
-            return [f"    sum = mixed(sum, {cast}{self.name});"]
-        if self.numbers.ndim == 1:
-            loop = f"    for (i = 0; i < {len(self.numbers)}; i++) {{"
-            return [loop, f"        sum = mixed(sum, {cast}{self.name}[i]);", "    }"]
-        n, m = self.numbers.shape
+        loops = list(zip("ik", self.numbers.shape, strict=False))
+        place = "".join(f"[{index}]" for index, _ in loops)
         return [
-            f"    for (i = 0; i < {n}; i++) {{",
-            f"        for (k = 0; k < {m}; k++) {{",
-            f"            sum = mixed(sum, {self.name}[i][k]);",
-            "        }",
-            "    }",
+            *(
+                f"{_INDENT * depth}for ({index} = 0; {index} < {extent}; {index}++) {{"
+                for depth, (index, extent) in enumerate(loops, start=1)
+            ),
+            f"{_INDENT * (len(loops) + 1)}sum = mixed(sum, {cast}{self.name}{place});",
+            *(f"{_INDENT * depth}}}" for depth in range(len(loops), 0, -1)),
         ]
 
     def _literal(self, number: np.floating | FloatArray) -> str:

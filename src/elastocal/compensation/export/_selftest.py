@@ -6,7 +6,9 @@ itself. A compiler is not on every machine, so before anything is written the st
 evaluated in Python and must agree with the model, too.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.random import Generator
@@ -38,21 +40,12 @@ def selftest_tables(numbers: Design) -> dict[str, str]:
     for load in loads:
         _check_statements(exported, model, load)
     course = _episodes(numbers, model)
-    load_rows = [
-        _struct(_array(x.q), _array(x.force), _array(x.moment), _array(x.deflection), x.half_width)
-        for x in loads
-    ]
+    load_rows = [_struct(*load) for load in loads]
     episode_rows = [
         _struct(
             str(x.times),
-            _struct(
-                x.reading.time,
-                _array(x.reading.q),
-                _array(x.reading.force),
-                _array(x.reading.moment),
-                "1" if x.reading.ok else "0",
-            ),
-            _array(x.correction),
+            _struct(*x.reading[:4], str(int(x.reading.ok))),
+            x.correction,
             f"{x.status}U",
         )
         for x in course
@@ -65,9 +58,8 @@ def selftest_tables(numbers: Design) -> dict[str, str]:
     }
 
 
-@dataclass(frozen=True)
-class _LoadCase:
-    """A load with its deflection."""
+class _LoadCase(NamedTuple):
+    """A load with its deflection, in the order of the C struct."""
 
     q: list[float]
     force: list[float]
@@ -207,10 +199,14 @@ def _configurations(numbers: Design, rng: Generator, count: int) -> FloatArray:
     return rng.uniform(lower, upper, (count, numbers.joints))
 
 
-def _struct(*parts: str | float) -> str:
-    texts = (part if isinstance(part, str) else repr(float(part)) for part in parts)
-    return "{" + ",\n     ".join(texts) + "}"
+def _struct(*parts: str | float | Sequence[float]) -> str:
+    """Return a C initializer; text goes in as it is."""
+    return "{" + ",\n     ".join(map(_literal, parts)) + "}"
 
 
-def _array(numbers: object) -> str:
-    return "{" + ", ".join(repr(x) for x in np.asarray(numbers, dtype=float).tolist()) + "}"
+def _literal(part: str | float | Sequence[float]) -> str:
+    if isinstance(part, str):
+        return part
+    if isinstance(part, Sequence):
+        return "{" + ", ".join(repr(float(x)) for x in part) + "}"
+    return repr(float(part))

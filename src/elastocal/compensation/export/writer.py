@@ -1,6 +1,6 @@
 """A compensator as a folder of C: model, header, self-test, CMake file and page for integrators."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from importlib import resources
 from pathlib import Path
 
@@ -25,75 +25,8 @@ from elastocal.compensation.online import Design
 from elastocal.files import filling
 
 _VECTORS = {"f": "force", "m": "moment"}
-
-
-def c_routines(numbers: Design) -> str:
-    """Return the functions for orientation, deflection and observation block."""
-    springs = len(numbers.calibrated.model.parameters)
-    load = "const double q[], const double force[3], const double moment[3]"
-    inputs = ("q", "force", "moment")
-    rotation = [f"rotation[{i}]" for i in range(9)]
-    deflection = [f"deflection[{i}]" for i in range(3)]
-    block = [f"block[{row}][{spring}]" for row in range(3) for spring in range(springs)]
-    head = "static void orientation(const double q[], double rotation[9])"
-    columns = f"void elastocal_block({load},\n    double block[3][ELASTOCAL_SPRINGS])"
-    total = f"void elastocal_deflection({load},\n    double deflection[3])"
-    return "\n".join(
-        (
-            "/* ---- The model ------------------------------------------------------------------",
-            " * s and c are sine and cosine, p and r rotations before and behind a joint, o and d",
-            " * origins; tau torques, w turns of a spring, theta turns of a joint's springs. */",
-            "",
-            "/* Rotation of the tool centre point in base, by rows. */",
-            _function(head, numbers.orientation, rotation, inputs[:1], numbers.joints),
-            _function(total, numbers.deflection, deflection, inputs, numbers.joints),
-            _function(columns, numbers.block, block, inputs, numbers.joints),
-        )
-    )
-
-
-def _function(
-    head: str, routine: Routine, outputs: Sequence[str], inputs: Sequence[str], joints: int
-) -> str:
-    names = {f"q{k + 1}": f"q[{k}]" for k in range(joints)}
-    for letter, vector in _VECTORS.items():
-        names |= {f"{letter}{axis}": f"{vector}[{i}]" for i, axis in enumerate("xyz")}
-    naming = _naming(names, routine.constants)
-    lines = [line for statement in routine.statements for line in _lines(statement, naming)]
-    results = [
-        f"    {output} = {value_text(value, naming)};"
-        for output, value in zip(outputs, routine.outputs, strict=True)
-    ]
-    used = used_names(routine.statements, routine.outputs)
-    idle = [
-        f"    (void){name};"
-        for name in inputs
-        if not any(names.get(value, "").startswith(f"{name}[") for value in used)
-    ]
-    return "\n".join([head, "{", *lines, *idle, *results, "}", ""])
-
-
-def _naming(names: Mapping[str, str], constants: Mapping[str, float]) -> Naming:
-    return lambda name: name.upper() if name in constants else names.get(name, name)
-
-
-def _lines(statement: Statement, naming: Naming) -> list[str]:
-    match statement:
-        case Remark(text):
-            return [f"    /* {remark(text)} */"]
-        case Turn(sine, cosine, angle):
-            return [
-                f"    double {sine};",
-                f"    double {cosine};",
-                f"    sin_cos({naming(angle)}, &{sine}, &{cosine});",
-            ]
-        case Assignment():
-            return [f"    const double {statement.name} = {sum_text(statement, naming)};"]
-        case Call(name, function, argument):
-            return [f"    const double {name} = {function}({value_text(argument, naming)});"]
-
-
 _PARTS = ("head.c", "sin_cos.c", "condition.c", "correct.c", "selftest.c")
+_BESIDE = ("elastocal_model.h", "selftest_main.c", "CMakeLists.txt", "README.md")
 _RAW = "N, N m; raw, as the sensor gives them | sensor"
 _AT_TCP = (
     "N, N m; **on** the robot, bias and tool weight removed, about the tool centre point | tcp"
@@ -151,14 +84,9 @@ def c_files(numbers: Design) -> dict[str, str]:
     values |= data | {"MIXING": mixing, "CHECKSUM": str(checksum(constants))}
     head, sin_cos, condition, correct, selftest = (_filled(part, values) for part in _PARTS)
     definitions = "".join(f"{each.definition()}\n" for each in constants if not each.in_header)
-    model = "".join([head, definitions, sin_cos, c_routines(numbers), condition, correct, selftest])
-    return {
-        "elastocal_model.c": model,
-        "elastocal_model.h": _filled("elastocal_model.h", values),
-        "selftest_main.c": _filled("selftest_main.c", values),
-        "CMakeLists.txt": _filled("CMakeLists.txt", values),
-        "README.md": _filled("README.md", values | _readme_values(numbers)),
-    }
+    model = "".join([head, definitions, sin_cos, _routines(numbers), condition, correct, selftest])
+    values |= _readme_values(numbers)
+    return {"elastocal_model.c": model} | {name: _filled(name, values) for name in _BESIDE}
 
 
 def _values(numbers: Design) -> dict[str, str]:
@@ -226,3 +154,69 @@ def _filled(name: str, values: dict[str, str]) -> str:
     for key, value in values.items():
         text = text.replace(f"@{key}@", value)
     return text
+
+
+def _routines(numbers: Design) -> str:
+    """Return the functions for orientation, deflection and observation block."""
+    springs = len(numbers.calibrated.model.parameters)
+    load = "const double q[], const double force[3], const double moment[3]"
+    inputs = ("q", "force", "moment")
+    rotation = [f"rotation[{i}]" for i in range(9)]
+    deflection = [f"deflection[{i}]" for i in range(3)]
+    block = [f"block[{row}][{spring}]" for row in range(3) for spring in range(springs)]
+    head = "static void orientation(const double q[], double rotation[9])"
+    columns = f"void elastocal_block({load},\n    double block[3][ELASTOCAL_SPRINGS])"
+    total = f"void elastocal_deflection({load},\n    double deflection[3])"
+    return "\n".join(
+        (
+            "/* ---- The model ------------------------------------------------------------------",
+            " * s and c are sine and cosine, p and r rotations before and behind a joint, o and d",
+            " * origins; tau torques, w turns of a spring, theta turns of a joint's springs. */",
+            "",
+            "/* Rotation of the tool centre point in base, by rows. */",
+            _function(head, numbers.orientation, rotation, inputs[:1], numbers.joints),
+            _function(total, numbers.deflection, deflection, inputs, numbers.joints),
+            _function(columns, numbers.block, block, inputs, numbers.joints),
+        )
+    )
+
+
+def _function(
+    head: str, routine: Routine, outputs: Sequence[str], inputs: Sequence[str], joints: int
+) -> str:
+    names = {f"q{k + 1}": f"q[{k}]" for k in range(joints)}
+    for letter, vector in _VECTORS.items():
+        names |= {f"{letter}{axis}": f"{vector}[{i}]" for i, axis in enumerate("xyz")}
+
+    def naming(name: str) -> str:
+        return name.upper() if name in routine.constants else names.get(name, name)
+
+    lines = [line for statement in routine.statements for line in _lines(statement, naming)]
+    results = [
+        f"    {output} = {value_text(value, naming)};"
+        for output, value in zip(outputs, routine.outputs, strict=True)
+    ]
+    used = used_names(routine.statements, routine.outputs)
+    # An argument that a model without such joints or loads never reads would be a warning in C.
+    idle = [
+        f"    (void){name};"
+        for name in inputs
+        if not any(names.get(value, "").startswith(f"{name}[") for value in used)
+    ]
+    return "\n".join([head, "{", *lines, *idle, *results, "}", ""])
+
+
+def _lines(statement: Statement, naming: Naming) -> list[str]:
+    match statement:
+        case Remark(text):
+            return [f"    /* {remark(text)} */"]
+        case Turn(sine, cosine, angle):
+            return [
+                f"    double {sine};",
+                f"    double {cosine};",
+                f"    sin_cos({naming(angle)}, &{sine}, &{cosine});",
+            ]
+        case Assignment():
+            return [f"    const double {statement.name} = {sum_text(statement, naming)};"]
+        case Call(name, function, argument):
+            return [f"    const double {name} = {function}({value_text(argument, naming)});"]

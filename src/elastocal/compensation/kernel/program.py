@@ -11,6 +11,9 @@ import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 
+import numpy as np
+from numpy.typing import ArrayLike
+
 from elastocal.results import brief_repr
 
 _SNAP = 4e-16
@@ -155,10 +158,16 @@ class Program:
 
     # -- vectors ----------------------------------------------------------------------------
 
-    def add(self, name: str, *vectors: Vector) -> Vector:
-        """Return the sum of vectors."""
+    def constant_vector(self, name: str, numbers: ArrayLike) -> Vector:
+        """Return three constants as a vector."""
+        plain = np.asarray(numbers, dtype=float).tolist()
+        pairs = zip("xyz", plain, strict=True)
+        return _vector(self.constant(f"{name}_{axis}", x) for axis, x in pairs)
+
+    def weighted_sum(self, name: str, parts: Sequence[tuple[Value, Vector]]) -> Vector:
+        """Return the sum of ``weight * vector``."""
         return _vector(
-            self.total(f"{name}_{axis}", [(vector[i],) for vector in vectors])
+            self.total(f"{name}_{axis}", [(weight, vector[i]) for weight, vector in parts])
             for i, axis in enumerate("xyz")
         )
 
@@ -280,7 +289,7 @@ Function = Callable[..., tuple[float, ...]]
 @brief_repr
 @dataclass(frozen=True)
 class ModelFunctions:
-    """What a compensator asks of a model; arguments and results are sequences of floats."""
+    """Functions of a model that a compensator needs; they take and return sequences of floats."""
 
     orientation: Function
     """``(q)``: rotation of the tool centre point in base, by rows."""
@@ -315,6 +324,7 @@ def compiled(routine: Routine, joints: int, loaded: bool = True) -> Function:
     functions = {"sin", "cos"}
     functions |= {each.function for each in routine.statements if isinstance(each, Call)}
     namespace: dict[str, Function] = {name: getattr(math, name) for name in functions}
+    # Compiled once, run every cycle: an interpreter of the statements would be slower than arrays.
     exec(compile(source, "<elastic model>", "exec"), namespace)
     return namespace["routine"]
 

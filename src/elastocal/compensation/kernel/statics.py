@@ -4,9 +4,6 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from itertools import count
 
-import numpy as np
-from numpy.typing import ArrayLike
-
 from elastocal.arrays import FloatArray
 from elastocal.compensation.kernel.program import (
     ONE,
@@ -61,6 +58,7 @@ def _write_chain(program: Program, chain: SerialChain) -> _Chain:
     Joint ``k`` counts from 1. Its names are ``p<k>`` (rotation before the motion), ``r<k>``
     (behind it), ``o<k>`` (origin before), ``d<k>`` (origin behind a linear motion).
     """
+    # From the base out: what is 0 or 1 in the first frames leaves no statement in those behind.
     here = _Frame(_IDENTITY, _NOTHING)
     joints = []
     for k, joint in enumerate(chain.joints, start=1):
@@ -77,10 +75,9 @@ def _write_chain(program: Program, chain: SerialChain) -> _Chain:
 
 def _constant_frame(program: Program, name: str, T: FloatArray) -> _Frame:
     x, y, z = (
-        _constant_vector(program, f"{name}_{a}", row)
-        for a, row in zip("xyz", T[:3, :3], strict=True)
+        program.constant_vector(f"{name}_{a}", row) for a, row in zip("xyz", T[:3, :3], strict=True)
     )
-    return _Frame((x, y, z), _constant_vector(program, name, T[:3, 3]))
+    return _Frame((x, y, z), program.constant_vector(name, T[:3, 3]))
 
 
 def _behind(program: Program, here: _Frame, place: _Frame, names: tuple[str, str]) -> _Frame:
@@ -94,7 +91,7 @@ def _behind(program: Program, here: _Frame, place: _Frame, names: tuple[str, str
 
 def _moved(program: Program, proximal: _Frame, joint: ChainJoint, k: int) -> _Frame:
     """Return the frame behind the joint's motion."""
-    axis = _constant_vector(program, f"axis{k}", joint.axis)
+    axis = program.constant_vector(f"axis{k}", joint.axis)
     if joint.revolute:
         sine, cosine = program.turn(k, f"q{k}")
         turn = _rotation(program, f"turn{k}", axis, sine, cosine)
@@ -104,16 +101,6 @@ def _moved(program: Program, proximal: _Frame, joint: ChainJoint, k: int) -> _Fr
     along = (slid[0], slid[1], slid[2])
     origin = program.transformed(f"d{k}", proximal.rotation, along, proximal.origin)
     return _Frame(proximal.rotation, origin)
-
-
-def _constant_vector(program: Program, name: str, numbers: ArrayLike) -> Vector:
-    """Return three constants."""
-    x, y, z = np.asarray(numbers, dtype=float).tolist()
-    return (
-        program.constant(f"{name}_x", x),
-        program.constant(f"{name}_y", y),
-        program.constant(f"{name}_z", z),
-    )
 
 
 def _rotation(program: Program, name: str, axis: Vector, sine: Value, cosine: Value) -> Matrix:
@@ -207,7 +194,7 @@ def observation_block(model: ElasticModel) -> Routine:
                 for p, angle in angles:
                     terms[p].append((angle, jacobian[number]))
             for p in dict.fromkeys(p for _, angles in complete for p, _ in angles):
-                columns[p] = _sum(program, f"b{p + 1}", terms[p])
+                columns[p] = program.weighted_sum(f"b{p + 1}", terms[p])
     parameters = range(len(model.parameters))
     return _routine(program, [columns[p][row] for row in range(3) for p in parameters])
 
@@ -234,21 +221,21 @@ class _Place:
     lever: Vector
     """From it to the tool centre point."""
     moment: Vector
-    """Of the load, about the point."""
+    """Moment of the load about the point."""
     axes: dict[int, tuple[SpringAxis, _Frame]]
     """By number, with the frame that each is fixed in."""
     directions: dict[int, Vector] = field(default_factory=dict)
 
     @property
     def numbers(self) -> tuple[int, ...]:
-        """Of its axes."""
+        """Numbers of its axes."""
         return tuple(self.axes)
 
     def loaded(self) -> Iterator[_LoadedAxis]:
         """Write and yield one axis after the other."""
         program = self.program
         for number, (axis, frame) in self.axes.items():
-            fixed = _constant_vector(program, f"spring{number + 1}", axis.axis)
+            fixed = program.constant_vector(f"spring{number + 1}", axis.axis)
             a = program.transformed(f"a{number + 1}", frame.rotation, fixed, _NOTHING)
             self.directions[number] = a
             torque = program.dot(f"tau{number + 1}", a, self.moment if axis.revolute else _FORCE)
@@ -256,7 +243,7 @@ class _Place:
 
 
 class _Laws:
-    """What the springs make of the torques about their axes, as statements."""
+    """The laws of the springs as statements: from torques about their axes to angles."""
 
     def __init__(self, program: Program, model: ElasticModel) -> None:
         self._program = program
@@ -320,9 +307,9 @@ def _displaced(program: Program, start: Vector, place: _Place, moved: dict[int, 
     turns = {number: axis.revolute for number, (axis, _) in place.axes.items()}
     turned = [(moved[n], a) for n, a in place.directions.items() if turns[n]]
     shifted = [(moved[n], a) for n, a in place.directions.items() if not turns[n]]
-    theta = _sum(program, f"theta{place.label}", turned)
-    shift = _sum(program, f"shift{place.label}", shifted)
-    base = program.add(f"base{place.label}", start, shift)
+    theta = program.weighted_sum(f"theta{place.label}", turned)
+    shift = program.weighted_sum(f"shift{place.label}", shifted)
+    base = program.weighted_sum(f"base{place.label}", [(ONE, start), (ONE, shift)])
     return program.cross(f"sum{place.label}", theta, place.lever, base)
 
 
@@ -336,10 +323,9 @@ def _places(program: Program, model: ElasticModel) -> Iterator[_Place]:
         label = f"{joint + 1}" + (f"_{before[joint]}" if before[joint] > 1 else "")
         program.remark(f"springs {', '.join(axes[i].name for i in numbers)}")
         frame = _frame(chain, joint, behind)
-        shift = _constant_vector(program, f"offset{label}", offset)
+        shift = program.constant_vector(f"offset{label}", offset)
         at = program.transformed(f"at{label}", frame.rotation, shift, frame.origin)
-        x, y, z = (-value for value in at)
-        lever = program.add(f"lever{label}", chain.tcp.origin, (x, y, z))
+        lever = program.weighted_sum(f"lever{label}", [(ONE, chain.tcp.origin), (-ONE, at)])
         moment = program.cross(f"moment{label}", lever, _FORCE, _MOMENT)
         here = {i: (axes[i], _frame(chain, joint, axes[i].distal)) for i in numbers}
         yield _Place(program, label, lever, moment, here)
@@ -362,15 +348,6 @@ def _points(model: ElasticModel, axes: Sequence[SpringAxis]) -> list[tuple[_Poin
 
 def _frame(chain: _Chain, joint: int, behind: bool) -> _Frame:
     return chain.joints[joint].distal if behind else chain.joints[joint].proximal
-
-
-def _sum(program: Program, name: str, parts: Sequence[_Weighted]) -> Vector:
-    """Return the sum of ``weight * axis``."""
-    x, y, z = (
-        program.total(f"{name}_{a}", [(weight, axis[i]) for weight, axis in parts])
-        for i, a in enumerate("xyz")
-    )
-    return x, y, z
 
 
 def _routine(program: Program, outputs: Iterable[Value]) -> Routine:

@@ -16,12 +16,17 @@ import numpy as np
 
 from elastocal.arrays import BoolArray, FloatArray, IndexArray
 from elastocal.compensation.offline import PathError
-from elastocal.compensation.offline.path_joints import RowName, check_limits, turned_inside
+from elastocal.compensation.offline.path_joints import (
+    RowName,
+    check_limits,
+    largest_move,
+    turned_inside,
+)
 from elastocal.identification import CalibratedModel
 from elastocal.records import record
 from elastocal.results import brief_repr
 from elastocal.robot import Robot
-from elastocal.robot.inverse import TURN, InverseKinematics, pose_error
+from elastocal.robot.inverse import InverseKinematics, pose_error
 
 LARGEST_DEFLECTION = 0.02
 """Largest deflection that is taken for one, in m."""
@@ -128,6 +133,7 @@ def correct_rows(
     commanded[:, :3, 3] = reached[:, :3, 3]
     residual = reached[:, :3, 3] + deflection - T_base_tcp[:, :3, 3]
     predicted = calibrated.predict(q, *wrench)
+    along = np.einsum("ri,ri->r", T_base_tcp[:, :3, 2], wrench[0])
     return PathCorrection(
         q,
         commanded,
@@ -137,7 +143,7 @@ def correct_rows(
         uncorrected,
         np.linalg.norm(first - uncorrected, axis=1),
         np.linalg.norm(residual, axis=1),
-        _pulled(T_base_tcp, wrench[0]),
+        np.asarray(along > 0.5 * np.linalg.norm(wrench[0], axis=1)),
     )
 
 
@@ -153,11 +159,6 @@ class _Load:
         # What overflows is refused by its size.
         with np.errstate(over="ignore", invalid="ignore"):
             return model.deflection(c, q, self.force[rows], moment)
-
-
-def _pulled(T_base_tcp: FloatArray, force: FloatArray) -> BoolArray:
-    along = np.einsum("ri,ri->r", T_base_tcp[:, :3, 2], force)
-    return np.asarray(along > 0.5 * np.linalg.norm(force, axis=1))
 
 
 def _check_size(deflection: FloatArray, largest: float, where: RowName) -> None:
@@ -212,9 +213,7 @@ def _by_solver(
         options = solver.solve(wanted, q_start[: robot.external_axes])
         if not len(options):
             break
-        gap = options - q
-        gap = np.where(robot.revolute, gap - TURN * np.round(gap / TURN), gap)
-        q = options[np.abs(gap).max(axis=1).argmin()]
+        q = options[largest_move(robot, options - q).argmin()]
         deflection = load.deflection(q[None], np.array([row]))[0]
         before, wanted = wanted, T.copy()
         wanted[:3, 3] -= deflection

@@ -15,7 +15,6 @@ _ON_LIMIT = 1e-9
 """Outside by less than this, in rad or m, is on the limit."""
 _JUMP = 0.5 * np.pi
 """A joint that turns farther than this from one row to the next has changed its posture, in rad."""
-_OUTSIDE = 1e-9
 
 
 def check_limits(robot: Robot, q: FloatArray, where: RowName, what: str) -> None:
@@ -135,10 +134,10 @@ def posture_jumps(robot: Robot, q: FloatArray, previous: FloatArray) -> IndexArr
 def _branches(robot: Robot, branches: FloatArray, previous: FloatArray) -> IndexArray:
     """Return the branch slot of each row."""
     slots = np.empty(len(branches), dtype=np.intp)
-    slots[0] = _cost(robot, branches[0] - previous).argmin()
+    slots[0] = largest_move(robot, branches[0] - previous).argmin()
     # For each slot of a row, the nearest slot of the next; then the chain of them is walked.
     gaps = branches[1:, None, :, :] - branches[:-1, :, None, :]
-    following = _cost(robot, gaps).argmin(axis=-1)
+    following = largest_move(robot, gaps).argmin(axis=-1)
     slot = int(slots[0])
     for row, choices in enumerate(following.tolist(), start=1):
         slot = choices[slot]
@@ -146,8 +145,16 @@ def _branches(robot: Robot, branches: FloatArray, previous: FloatArray) -> Index
     return slots
 
 
-def _cost(robot: Robot, gap: FloatArray) -> FloatArray:
-    """Return the largest move of any joint, infinite where there is no branch."""
+def largest_move(robot: Robot, gap: FloatArray) -> FloatArray:
+    """Return the largest move of any joint, whole turns aside; infinite where there is no branch.
+
+    Parameters
+    ----------
+    robot : Robot
+        Whose joints move.
+    gap : ndarray, shape (…, joint)
+        Joints less those before, in rad or m; NaN where there is no branch.
+    """
     gap = np.where(robot.revolute, gap - TURN * np.round(gap / TURN), gap)
     largest = np.abs(gap).max(axis=-1)
     return np.where(np.isfinite(largest), largest, np.inf)
@@ -162,7 +169,7 @@ def _unwound(robot: Robot, q: FloatArray, previous: FloatArray) -> FloatArray:
     unwound = np.where(revolute, np.unwrap(together, axis=0), together)[1:]
     first = 0
     while first < len(q):
-        outside = (robot.limits.margin(unwound[first:]) < -_OUTSIDE) & revolute
+        outside = (robot.limits.margin(unwound[first:]) < -_ON_LIMIT) & revolute
         rows = np.flatnonzero(outside.any(axis=1))
         if not len(rows):
             break

@@ -173,6 +173,7 @@ class Compensator:
 
     def start(self) -> State:
         """Return the state before the first reading: no correction, filters at rest."""
+        # Before the first reading it has missed more than it holds: no correction is to be held.
         still = (0.0,) * 6
         filters = self.design.filters
         return State(
@@ -244,6 +245,8 @@ class Compensator:
             rzx * nx + rzy * ny + rzz * nz,
         )
         dx, dy, dz = self._deflection(q, force, moment)
+        # O L has the interval's half widths as lengths of its rows: products of a fixed number, in
+        # every cycle the same time, where percentiles of the draws would need a sort.
         rows = np.array(self._block(q, force, moment)).reshape(self._shape) @ self._spread
         variance = max(np.einsum("ij,ij->i", rows, rows).tolist())
         return (dx, dy, dz), math.sqrt(variance)

@@ -14,6 +14,7 @@ from .loop import (
     Corrector as Corrector,
     CourseDeviation as CourseDeviation,
     CourseRun as CourseRun,
+    CycleInput as CycleInput,
     LoadedRobot as LoadedRobot,
     ModelCorrector as ModelCorrector,
     PerfectCorrector as PerfectCorrector,

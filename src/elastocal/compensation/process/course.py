@@ -6,7 +6,7 @@ that change slowly. A further process is a file with a subclass of `Process`, an
 """
 
 from abc import ABC, abstractmethod
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import ClassVar
 
 import numpy as np
@@ -48,10 +48,6 @@ class Course:
     ripple: tuple[Ripple, ...] = ()
     q: FloatArray = field(default_factory=lambda: np.zeros((0, 0)))
     """Programmed joints, shape (row, joint), in rad or m; none before a posture is chosen."""
-
-    def with_joints(self, q: FloatArray) -> "Course":
-        """Return the course with joints, shape (row, joint)."""
-        return replace(self, q=q)
 
 
 @dataclass(frozen=True)

@@ -21,30 +21,29 @@ from elastocal.results import brief_repr
 from elastocal.robot import Robot
 
 
+@brief_repr
+@dataclass(frozen=True, eq=False)
+class CycleInput:
+    """Measurements of a cycle that a correction is made from."""
+
+    time: FloatArray
+    """Time of each reading, shape (reading,), in s."""
+    q: FloatArray
+    """Measured joints, shape (joint,), in rad or m."""
+    raw: FloatArray
+    """Readings of the sensor, shape (reading, 6), in N and N·m."""
+    deflection: FloatArray
+    """True deflection, shape (3,), in m, for a corrector that may know it."""
+
+
 class Corrector(Protocol):
     """Corrects the commanded position every cycle."""
 
     def start(self) -> None:
         """Forget what was."""
-        ...
 
-    def correct(
-        self, time: FloatArray, q: FloatArray, raw: FloatArray, deflection: FloatArray
-    ) -> FloatArray:
-        """Return the correction in base, shape (3,), in m.
-
-        Parameters
-        ----------
-        time : ndarray, shape (reading,)
-            Of the readings of the cycle, in s.
-        q : ndarray, shape (joint,)
-            Measured joints, in rad or m.
-        raw : ndarray, shape (reading, 6)
-            What the sensor says.
-        deflection : ndarray, shape (3,)
-            The truth, for a corrector that may know it.
-        """
-        ...
+    def correct(self, cycle: CycleInput) -> FloatArray:
+        """Return the correction in base, shape (3,), in m."""
 
 
 class ModelCorrector:
@@ -62,22 +61,16 @@ class ModelCorrector:
         if frame != "base":
             raise CompensationError(f"frame of the compensator is {frame!r}: here it must be base")
         self._compensator = compensator
-        self._state = compensator.start()
+        self.start()
 
     def start(self) -> None:
         """Forget what was."""
         self._state = self._compensator.start()
 
-    def correct(
-        self,
-        time: FloatArray,
-        q: FloatArray,
-        raw: FloatArray,
-        deflection: FloatArray,  # noqa: ARG002 (it measures, it does not know)
-    ) -> FloatArray:
-        """Return the correction; see `Corrector.correct`."""
-        state, joints = self._state, q.tolist()
-        for t, values in zip(time.tolist(), raw.tolist(), strict=True):
+    def correct(self, cycle: CycleInput) -> FloatArray:
+        """Return the correction from the readings; the deflection is not looked at."""
+        state, joints = self._state, cycle.q.tolist()
+        for t, values in zip(cycle.time.tolist(), cycle.raw.tolist(), strict=True):
             state = self._compensator.condition(state, Reading(t, joints, values[:3], values[3:]))
         self._state, answer = self._compensator.correct(state, joints)
         return np.array(answer.correction)
@@ -89,22 +82,15 @@ class PerfectCorrector:
     def __init__(self, cycles: int) -> None:
         """Be late by so many cycles."""
         self._cycles = cycles
-        self._line: deque[FloatArray] = deque()
         self.start()
 
     def start(self) -> None:
         """Forget what was."""
         self._line = deque(np.zeros(3) for _ in range(self._cycles))
 
-    def correct(
-        self,
-        time: FloatArray,  # noqa: ARG002
-        q: FloatArray,  # noqa: ARG002
-        raw: FloatArray,  # noqa: ARG002 (it knows, it does not measure)
-        deflection: FloatArray,
-    ) -> FloatArray:
-        """Return the correction; see `Corrector.correct`."""
-        self._line.append(-deflection)
+    def correct(self, cycle: CycleInput) -> FloatArray:
+        """Return the correction from the deflection; the readings are not looked at."""
+        self._line.append(-cycle.deflection)
         return self._line.popleft()
 
 
@@ -114,17 +100,14 @@ class LoadedRobot(Protocol):
     @property
     def shift(self) -> FloatArray:
         """Shift of the tool from where the undeformed robot has it, in base, shape (3,), in m."""
-        ...
 
     @property
     def wrench(self) -> FloatArray:
         """True, in the sensor's frame, shape (6,), in N and N·m."""
-        ...
 
     @property
     def felt(self) -> FloatArray:
         """The part of it that the process makes, shape (6,)."""
-        ...
 
 
 class TrueCell(Protocol):
@@ -132,19 +115,15 @@ class TrueCell(Protocol):
 
     def lift(self, course: str, q: FloatArray) -> None:
         """Begin a course in the air."""
-        ...
 
     def free_shift(self, q: FloatArray) -> FloatArray:
         """Return the shift of the tool in the air, shape (3,), in m."""
-        ...
 
     def press(self, q: FloatArray, force_base: FloatArray) -> LoadedRobot:
         """Go on to joints and a force on the robot."""
-        ...
 
     def read(self, since: FloatArray, wrench: FloatArray) -> FloatArray:
         """Return what the sensor says of true wrenches, shape (sample, 6)."""
-        ...
 
 
 @dataclass(frozen=True)
@@ -208,16 +187,6 @@ class _Drives:
         self.done = self.done + self._gain * (self._line.popleft() - self.done)
 
 
-class _Interpolated:
-    """A row and the next, with what lies between them."""
-
-    def __init__(self, here: FloatArray, there: FloatArray) -> None:
-        self._here, self._way = here, there - here
-
-    def at(self, part: float) -> FloatArray:
-        return self._here + part * self._way
-
-
 def air_shifts(cell: TrueCell, course: Course) -> FloatArray:
     """Return where the tool is on the programmed path in the air, shape (row, 3), in m."""
     cell.lift(course.name, course.q[0])
@@ -253,37 +222,24 @@ def run_course(
     if corrector is not None:
         corrector.start()
     cycles = _cycles(course, controller)
+    parts = np.arange(1, cycles + 1)[:, None] / cycles
     drives = _Drives(controller)
     into_joints = _into_joints(robot, course.q)
     before = cell.press(course.q[0], course.force[0])
     shifts = []
     for row in range(1, len(course.q)):
-        offset = into_joints[row] @ drives.done
-        now = cell.press(course.q[row] + offset, course.force[row])
-        raw = _readings(cell, course, controller, (row, cycles), before, now)
-        shift = _Interpolated(before.shift - air[row - 1], now.shift - air[row])
-        joints = _Interpolated(course.q[row - 1], course.q[row])
+        now = cell.press(course.q[row] + into_joints[row] @ drives.done, course.force[row])
+        time, raw = _readings(cell, course, (row, cycles), controller.readings, before, now)
+        deflection = _between(before.shift - air[row - 1], now.shift - air[row], parts)
+        joints = _between(course.q[row - 1], course.q[row], parts)
         for n in range(cycles):
-            part = (n + 1) / cycles
-            deflection = shift.at(part)
+            # The correction of this cycle acts from the next on, later by the dead cycles.
             if corrector is not None:
-                q = joints.at(part) + into_joints[row] @ drives.done
-                drives.command(corrector.correct(*raw.of(n, q), deflection))
-            shifts.append(deflection + drives.done)
+                q = joints[n] + into_joints[row] @ drives.done
+                drives.command(corrector.correct(CycleInput(time[n], q, raw[n], deflection[n])))
+            shifts.append(deflection[n] + drives.done)
         before = now
     return _course_run(course, controller, cycles, np.array(shifts))
-
-
-@dataclass(frozen=True, eq=False)
-class _Raw:
-    time: FloatArray
-    values: FloatArray
-    a_cycle: int
-
-    def of(self, cycle: int, q: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Return times, joints and readings of a cycle."""
-        rows = slice(cycle * self.a_cycle, (cycle + 1) * self.a_cycle)
-        return self.time[rows], q, self.values[rows]
 
 
 def _cycles(course: Course, controller: Controller) -> int:
@@ -309,21 +265,29 @@ def _into_joints(robot: Robot, q: FloatArray) -> FloatArray:
 def _readings(
     cell: TrueCell,
     course: Course,
-    controller: Controller,
     where: tuple[int, int],
+    a_cycle: int,
     before: LoadedRobot,
     now: LoadedRobot,
-) -> _Raw:
-    """Return what the sensor says between two rows; the ripple swings in all its axes alike."""
+) -> tuple[FloatArray, FloatArray]:
+    """Return times and readings between two rows, shapes (cycle, reading) and (cycle, reading, 6).
+
+    The ripple swings in all the sensor's axes alike.
+    """
     row, cycles = where
-    count = cycles * controller.readings
+    count = cycles * a_cycle
     part = np.arange(1, count + 1)[:, None] / count
     time = course.step * (row - 1 + part[:, 0])
     swing = sum(r.share * np.sin(2.0 * np.pi * r.frequency * time) for r in course.ripple)
-    true = before.wrench + part * (now.wrench - before.wrench)
+    true = _between(before.wrench, now.wrench, part)
     if course.ripple:
-        true = true + np.asarray(swing)[:, None] * (before.felt + part * (now.felt - before.felt))
-    return _Raw(time, cell.read(time, true), controller.readings)
+        true = true + np.asarray(swing)[:, None] * _between(before.felt, now.felt, part)
+    return time.reshape(cycles, -1), cell.read(time, true).reshape(cycles, a_cycle, -1)
+
+
+def _between(here: FloatArray, there: FloatArray, part: FloatArray) -> FloatArray:
+    """Return what lies between a row and the next, shape (part, …)."""
+    return here + part * (there - here)
 
 
 def _course_run(

@@ -59,34 +59,29 @@ class FibrePlacement(Process):
         low, high = own.min(axis=0), own.max(axis=0)
         inside = np.linspace(low[0] + self.border, high[0] - self.border, self.count)
         return tuple(
-            _course(f"course {n + 1}", surface, (x, low[1], high[1], high[2]), self, rng)
+            self._course(f"course {n + 1}", surface, (x, low[1], high[1], high[2]), rng)
             for n, x in enumerate(inside)
         )
 
-
-def _course(
-    name: str,
-    surface: Surface,
-    where: tuple[float, float, float, float],
-    settings: FibrePlacement,
-    rng: Generator,
-) -> Course:
-    hits = _within(_hits(surface, where), settings.border)
-    if len(hits) < 10:
-        raise CompensationError(f"{surface.name} is too small for {name} within its border")
-    rows = evenly_spaced(hits, settings.speed, settings.step)
-    kept, normal = rows[:, :3], rows[:, 3:]
-    normal = normal / np.linalg.norm(normal, axis=1, keepdims=True)
-    forward = unit_tangents(kept)
-    T = tool_frames(kept, forward, -normal)
-    time = np.arange(float(len(kept))) * settings.step
-    share = engaged(time, settings.rise)
-    press = settings.compaction * (1.0 + settings.compaction_swing * swing(time, rng))
-    mean = rng.choice([-1.0, 1.0]) * rng.uniform(*settings.lateral)
-    aside = mean + settings.lateral_swing * swing(time, rng)
-    tcp = np.stack([np.full(len(kept), -settings.drag), aside, -press], axis=1) * share[:, None]
-    force = np.einsum("rij,rj->ri", T[:, :3, :3], tcp)
-    return Course(name, settings.step, T, force, T[:, :3, 1])
+    def _course(
+        self, name: str, surface: Surface, where: tuple[float, float, float, float], rng: Generator
+    ) -> Course:
+        hits = _within(_hits(surface, where), self.border)
+        if len(hits) < 10:
+            raise CompensationError(f"{surface.name} is too small for {name} within its border")
+        rows = evenly_spaced(hits, self.speed, self.step)
+        kept, normal = rows[:, :3], rows[:, 3:]
+        normal = normal / np.linalg.norm(normal, axis=1, keepdims=True)
+        forward = unit_tangents(kept)
+        T = tool_frames(kept, forward, -normal)
+        time = np.arange(float(len(kept))) * self.step
+        share = engaged(time, self.rise)
+        press = self.compaction * (1.0 + self.compaction_swing * swing(time, rng))
+        mean = rng.choice([-1.0, 1.0]) * rng.uniform(*self.lateral)
+        aside = mean + self.lateral_swing * swing(time, rng)
+        tcp = np.stack([np.full(len(kept), -self.drag), aside, -press], axis=1) * share[:, None]
+        force = np.einsum("rij,rj->ri", T[:, :3, :3], tcp)
+        return Course(name, self.step, T, force, T[:, :3, 1])
 
 
 def _hits(surface: Surface, where: tuple[float, float, float, float]) -> FloatArray:

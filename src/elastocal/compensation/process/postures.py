@@ -4,14 +4,14 @@ The tool is turned by one angle for all courses; the rail stands still along eac
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from elastocal.arrays import FloatArray
 from elastocal.cell import Cell
 from elastocal.compensation.offline import PathError, joints_along_path, posture_jumps
-from elastocal.compensation.process.course import Course
+from elastocal.compensation.process.course import Course, Process
 from elastocal.compensation.process.placement import FibrePlacement
 from elastocal.compensation.process.roughing import Roughing
 from elastocal.errors import CompensationError
@@ -57,10 +57,7 @@ class _Trial:
         )
 
 
-PROCESSES: Mapping[str, type[FibrePlacement] | type[Roughing]] = {
-    "afp": FibrePlacement,
-    "machining": Roughing,
-}
+PROCESSES: Mapping[str, type[Process]] = {"afp": FibrePlacement, "machining": Roughing}
 """The processes that can be simulated, by the name that a command gives them."""
 
 
@@ -120,7 +117,7 @@ def with_postures(cell: Cell, courses: tuple[Course, ...]) -> tuple[Course, ...]
             " the tool is turned about its axis"
         )
     return tuple(
-        course.with_joints(trial.joints(course, float(_SPINS[chosen]), external, slice(None)))
+        replace(course, q=trial.joints(course, float(_SPINS[chosen]), external, slice(None)))
         for course, (_, external) in zip(courses, found[chosen], strict=True)
     )
 

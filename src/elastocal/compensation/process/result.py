@@ -28,6 +28,16 @@ from elastocal.records import read_json, record, write_json
 from elastocal.results import Result, brief_repr
 from elastocal.tables import TableError, TableRows, opened_table, write_table
 
+TABLE = "table.json"
+"""Name of the file by which the folder is known."""
+DEVIATIONS = "deviations.csv"
+PROGRAMMED_PATH = "path.csv"
+_HEADER = ("seed", "course", "time[s]", "x[mm]", "y[mm]", "z[mm]", "before[mm]", "after[mm]")
+"""Columns of ``deviations.csv``; the place is the programmed tool centre point in base."""
+_ALIKE = 1e-8
+"""Deviations are written to the nanometre; figures that differ by more, in m, are of others."""
+_UNITS = {"angle": "rad", "length": "m"}
+
 
 @record()
 class DeviationStatistics:
@@ -164,17 +174,6 @@ def _pooled_statistics(
     squares = share @ (np.array([part.standard_deviation for part in parts]) ** 2 + means**2)
     spread = float(np.sqrt(max(squares - mean**2, 0.0)))
     return DeviationStatistics(mean, max(part.max for part in parts), spread)
-
-
-TABLE = "table.json"
-"""Name of the file by which the folder is known."""
-DEVIATIONS = "deviations.csv"
-PROGRAMMED_PATH = "path.csv"
-_HEADER = ("seed", "course", "time[s]", "x[mm]", "y[mm]", "z[mm]", "before[mm]", "after[mm]")
-"""Columns of ``deviations.csv``; the place is the programmed tool centre point in base."""
-_ALIKE = 1e-8
-"""Deviations are written to the nanometre; figures that differ by more, in m, are of others."""
-_UNITS = {"angle": "rad", "length": "m"}
 
 
 def write_process(folder: Path, process: SimulatedProcess) -> None:
@@ -330,10 +329,13 @@ def _read_deviations(path: Path) -> tuple[CourseDeviation, ...]:
         )
     numbers = _numbers(path, rows)
     courses = groupby(range(len(rows)), key=lambda n: (numbers[n, 0], rows.cells[n][1]))
-    return tuple(
-        _course_deviation(int(seed), name, numbers[list(lines), 1:])
-        for (seed, name), lines in courses
-    )
+    found = []
+    for (seed, name), lines in courses:
+        own = numbers[list(lines)]
+        time, lengths = own[:, 1], 1e-3 * own[:, 2:]
+        before, after = lengths[:, 3], lengths[:, 4]
+        found.append(CourseDeviation(int(seed), name, time, lengths[:, :3], before, after))
+    return tuple(found)
 
 
 def _numbers(path: Path, rows: TableRows) -> FloatArray:
@@ -352,8 +354,3 @@ def _numbers(path: Path, rows: TableRows) -> FloatArray:
                 raise CompensationError(f"{path}: line {line}: {name} {value!r} is not a number")
             found[row, column] = number
     return found
-
-
-def _course_deviation(seed: int, course: str, numbers: FloatArray) -> CourseDeviation:
-    time, lengths = numbers[:, 0], 1e-3 * numbers[:, 1:]
-    return CourseDeviation(seed, course, time, lengths[:, :3], lengths[:, 3], lengths[:, 4])

@@ -84,36 +84,35 @@ class Roughing(Process):
         apex = np.array([middle[0], middle[1], top])
         radii = np.linspace(self.disk, self.radius, self.count + 1)[1:]
         return tuple(
-            _ring(f"ring {n + 1}", T, apex, float(radius), self, rng)
+            self._ring(f"ring {n + 1}", T, apex, float(radius), rng)
             for n, radius in enumerate(radii)
         )
 
-
-def _ring(
-    name: str,
-    T_base_surface: FloatArray,
-    apex: FloatArray,
-    radius: float,
-    settings: Roughing,
-    rng: Generator,
-) -> Course:
-    R = T_base_surface[:3, :3]
-    sphere = (settings.radius**2 + settings.height**2) / (2.0 * settings.height)
-    angle = np.linspace(0.0, 2.0 * np.pi, 721)
-    flat = np.stack([np.cos(angle), np.sin(angle), np.zeros(len(angle))], axis=1)
-    depth = np.sqrt(sphere**2 - radius**2) - sphere
-    own = apex + radius * flat + (0.0, 0.0, depth)
-    path = evenly_spaced(own @ R.T + T_base_surface[:3, 3], settings.speed, settings.step)
-    centre = R @ (apex - (0.0, 0.0, sphere)) + T_base_surface[:3, 3]
-    normal = (path - centre) / sphere
-    forward = unit_tangents(path)
-    across = np.cross(normal, forward)
-    time = np.arange(float(len(path))) * settings.step
-    cut = rng.uniform(*settings.engagement) * (1.0 + settings.swing * swing(time, rng))
-    cut *= engaged(time, settings.roll_in / settings.speed)
-    force = cut[:, None] * (
-        settings.normal * normal - settings.tangential * forward + settings.across * across
-    )
-    still = np.ones((len(path), 1))
-    T = tool_frames(path, still * R[:, 0], -still * R[:, 2])
-    return Course(name, settings.step, T, force, normal, settings.ripple)
+    def _ring(
+        self,
+        name: str,
+        T_base_surface: FloatArray,
+        apex: FloatArray,
+        radius: float,
+        rng: Generator,
+    ) -> Course:
+        R = T_base_surface[:3, :3]
+        sphere = (self.radius**2 + self.height**2) / (2.0 * self.height)
+        angle = np.linspace(0.0, 2.0 * np.pi, 721)
+        flat = np.stack([np.cos(angle), np.sin(angle), np.zeros(len(angle))], axis=1)
+        depth = np.sqrt(sphere**2 - radius**2) - sphere
+        own = apex + radius * flat + (0.0, 0.0, depth)
+        path = evenly_spaced(own @ R.T + T_base_surface[:3, 3], self.speed, self.step)
+        centre = R @ (apex - (0.0, 0.0, sphere)) + T_base_surface[:3, 3]
+        normal = (path - centre) / sphere
+        forward = unit_tangents(path)
+        across = np.cross(normal, forward)
+        time = np.arange(float(len(path))) * self.step
+        cut = rng.uniform(*self.engagement) * (1.0 + self.swing * swing(time, rng))
+        cut *= engaged(time, self.roll_in / self.speed)
+        force = cut[:, None] * (
+            self.normal * normal - self.tangential * forward + self.across * across
+        )
+        still = np.ones((len(path), 1))
+        T = tool_frames(path, still * R[:, 0], -still * R[:, 2])
+        return Course(name, self.step, T, force, normal, self.ripple)

@@ -19,17 +19,14 @@ class ProgramPoint(Protocol):
     @property
     def name(self) -> str:
         """As declared."""
-        ...
 
     @property
     def kind(self) -> str:
         """Type of the position in the controller's words."""
-        ...
 
     @property
     def by_axes(self) -> bool:
         """Whether it holds axis positions, else a frame."""
-        ...
 
     def T_frame_tcp(self) -> FloatArray:
         """Return its pose in the program's frame, shape (4, 4), in m.
@@ -39,7 +36,6 @@ class ProgramPoint(Protocol):
         PathError
             If a number is missing.
         """
-        ...
 
     def arm_joints(self) -> FloatArray:
         """Return its positions of the arm's axes, shape (axis,), in rad.
@@ -49,7 +45,6 @@ class ProgramPoint(Protocol):
         PathError
             If a number is missing.
         """
-        ...
 
     def external_joints(self, revolute: Sequence[bool]) -> FloatArray | None:
         """Return its positions of the external axes, shape (axis,), in rad or m; None: not given.
@@ -59,7 +54,6 @@ class ProgramPoint(Protocol):
         PathError
             If it gives some of them only.
         """
-        ...
 
 
 @dataclass(frozen=True)
@@ -112,22 +106,18 @@ class ControllerProgram(Protocol):
     @property
     def moves(self) -> tuple[Move, ...]:
         """Motions in the order of the text."""
-        ...
 
     @property
     def points(self) -> Mapping[str, ProgramPoint]:
         """Declared positions that have a value, by name in capitals."""
-        ...
 
     @property
     def files(self) -> tuple[Path, Path]:
         """The file that holds the motions, and the one that holds the points."""
-        ...
 
     @property
     def words(self) -> Words:
         """Words for refusals."""
-        ...
 
     def write(self, out: Path, corrected: Mapping[str, CorrectedPoint]) -> tuple[Path, ...]:
         """Write the program with some points corrected, all else as it stood; return the files.
@@ -144,7 +134,6 @@ class ControllerProgram(Protocol):
         FileAccessError
             If a file cannot be written.
         """
-        ...
 
     def notes(self, assumed: Sequence[str], out: Path, frame_given: bool) -> tuple[str, ...]:
         """Return what a person must know of a corrected program.
@@ -158,4 +147,3 @@ class ControllerProgram(Protocol):
         frame_given : bool
             Whether the program's frame was placed in the model's base by hand.
         """
-        ...

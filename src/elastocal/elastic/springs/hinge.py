@@ -47,13 +47,6 @@ class Hinge(OneAxisSpring):
         del load
         return (((1.0,),),)
 
-    def __repr__(self) -> str:
-        # Word for word as before springs had kinds: a study hashes it, and old ones go on.
-        return (
-            f"Spring(name={self.name!r}, joint={self.joint!r}, axis={self.axis!r},"
-            f" revolute={self.revolute!r}, distal={self.distal!r}, offset={self.offset!r})"
-        )
-
 
 def axial(joint: ChainJoint) -> Hinge:
     """Return the spring about (or along) a joint's own axis: gear, servo, belt."""

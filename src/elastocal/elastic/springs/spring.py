@@ -1,4 +1,4 @@
-"""What a spring is: its place in the chain, its parameters, its law and the law's tangent."""
+"""A spring: its place in the chain, its parameters, its law and the law's tangent."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Hashable, Sequence
@@ -106,6 +106,7 @@ Tangents = tuple[tuple[tuple[FloatArray | float, ...], ...], ...]
 """By axis, by torque, by parameter."""
 
 
+@brief_repr
 @record()
 class Spring(ABC):
     """A place where a robot is soft.
@@ -139,7 +140,7 @@ class Spring(ABC):
     @property
     @abstractmethod
     def kind(self) -> str:
-        """What files call the spring; a field of every kind but the hinge, which is understood."""
+        """The word of files for the spring; a field of every kind but the hinge, understood."""
 
     @property
     @abstractmethod
@@ -193,7 +194,7 @@ class Spring(ABC):
 
     @property
     def law(self) -> Hashable:
-        """What springs have in common that can be evaluated together: all but their place."""
+        """The settings that springs evaluated together have in common: all but their place."""
         settings = (getattr(self, f.name) for f in fields(self) if f.name not in self.places)
         return (type(self), *settings)
 

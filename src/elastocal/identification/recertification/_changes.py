@@ -42,6 +42,15 @@ from elastocal.identification.uncertainty import CONFIDENCE, interval
 
 _SHIFTS = 10
 """Number of draws of the new model that each draw of the old one is paired with."""
+_CHUNK = 100
+"""Rows at a time, so that the pairs of a long path fit into memory."""
+_ONE_SIDE = 50.0 * (1.0 + CONFIDENCE)
+"""Percentile that leaves out half of what a 95 % interval leaves out."""
+_NORMAL = 1.959964
+"""Normal quantile at that percentile; the draws are stretched for few poses already."""
+_SAME = 1e-4
+"""Singular value, over the largest, below which unobservable combinations of the two models
+count as the same."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,14 +107,6 @@ class Spread:
 def over(numbers: FloatArray, scale: FloatArray) -> FloatArray:
     """Return numbers over their scale; 0 where the scale is 0."""
     return np.divide(numbers, scale, out=np.zeros_like(numbers), where=scale > 0.0)
-
-
-_CHUNK = 100
-"""Rows at a time, so that the pairs of a long path fit into memory."""
-_ONE_SIDE = 50.0 * (1.0 + CONFIDENCE)
-"""Percentile that leaves out half of what a 95 % interval leaves out."""
-_NORMAL = 1.959964
-"""Normal quantile at that percentile; the draws are stretched for few poses already."""
 
 
 def compare_rows(
@@ -183,11 +184,6 @@ def _widest(blocks: list[FloatArray], spread: Spread) -> tuple[FloatArray, Float
     old = np.einsum("ri,rij,rj->r", axis, parts[0], axis)
     share = over(old, widest)
     return np.sqrt(widest), np.clip(share, 0.0, 1.0)
-
-
-_SAME = 1e-4
-"""Singular value, over the largest, below which unobservable combinations of the two models
-count as the same."""
 
 
 def compare_springs(

@@ -35,6 +35,10 @@ _MOST = 20
 _PLAN = re.compile(r"\bplan ([0-9a-f]{12,})\b")
 _LIKE = 1.25
 """Mean measured deflections further apart than by this factor come from other loads."""
+_PROBES, _SEED = 8, 0
+_LENGTH, _ANGLE = 1e-4, 1e-4
+"""Largest difference of two descriptions of one robot, in m and rad: on a lever of 2 m it changes
+a deflection by less than a part in ten thousand."""
 
 
 def judge(deflection: RowComparison | None, limit: float | None) -> tuple[Verdict | None, str]:
@@ -154,12 +158,6 @@ def load_note(old: float | None, new: float | None) -> str | None:
 def _same_plan(old: CalibratedModel, new: CalibratedModel) -> bool:
     plans = [_PLAN.search(each.provenance) for each in (old, new)]
     return plans[0] is not None and plans[1] is not None and plans[0][1] == plans[1][1]
-
-
-_PROBES, _SEED = 8, 0
-_LENGTH, _ANGLE = 1e-4, 1e-4
-"""Largest difference of two descriptions of one robot, in m and rad: on a lever of 2 m it changes
-a deflection by less than a part in ten thousand."""
 
 
 def recertify_files(

@@ -43,6 +43,10 @@ class PointCheck(Check, Protocol):
     def at_points(self) -> FloatArray:
         """Margin of every sampled point, shape (point,)."""
 
+    def margin(self, postures: Postures) -> FloatArray:
+        """Return the margin of the point that each posture touches, shape (pose,)."""
+        return self.at_points[postures.point]
+
 
 @brief_repr
 @dataclass(frozen=True, eq=False)

@@ -5,14 +5,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from elastocal.arrays import FloatArray
-from elastocal.planning.postures import Postures
+from elastocal.planning.checks.check import PointCheck
 from elastocal.planning.surface import DiskFit
 from elastocal.results import brief_repr
 
 
 @brief_repr
 @dataclass(frozen=True, eq=False)
-class EdgeCheck:
+class EdgeCheck(PointCheck):
     """Distance from the contact point to the nearest edge, less disk radius and margin."""
 
     edge_distance: FloatArray
@@ -30,13 +30,9 @@ class EdgeCheck:
         """Margin of each sampled point, shape (point,), in m."""
         return np.asarray(self.edge_distance - self.radius - self.keep)
 
-    def margin(self, postures: Postures) -> FloatArray:
-        """Return the margin of each posture, shape (pose,), in m."""
-        return self.at_points[postures.point]
-
 
 @dataclass(frozen=True, eq=False)
-class FlatnessCheck:
+class FlatnessCheck(PointCheck):
     """Tolerance of the normals under the disk, less the largest angle between them."""
 
     fit: DiskFit
@@ -51,7 +47,3 @@ class FlatnessCheck:
     def at_points(self) -> FloatArray:
         """Margin of each sampled point, shape (point,), in rad."""
         return np.asarray(self.tolerance - np.where(self.fit.supported, self.fit.angle, np.pi))
-
-    def margin(self, postures: Postures) -> FloatArray:
-        """Return the margin of each posture, shape (pose,), in rad."""
-        return self.at_points[postures.point]

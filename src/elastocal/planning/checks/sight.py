@@ -32,7 +32,7 @@ _OFF_THE_MARKER = 1e-3
 
 @dataclass(frozen=True)
 class Station:
-    """Where a laser tracker stands."""
+    """A laser tracker in its place."""
 
     name: str
     position: tuple[float, float, float]

@@ -1,4 +1,4 @@
-"""Where the program moves: axis positions for ``PTP``, frames for ``LIN``.
+"""Targets and speeds of the program: axis positions for ``PTP``, frames for ``LIN``.
 
 A frame carries no status and turn (S and T): ``LIN`` needs none, and which posture a number means
 depends on the robot (hardware facts, section 2.2). The axis positions of the approach pose choose

@@ -2,7 +2,6 @@ from .cover import (
     CellField as CellField,
     Cover as Cover,
     CoverSelection as CoverSelection,
-    DistanceField as DistanceField,
     Farthest as Farthest,
     MetricField as MetricField,
     PlainField as PlainField,

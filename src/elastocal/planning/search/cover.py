@@ -6,7 +6,7 @@ field. `PlainField` and `CellField` give the same picks bit for bit, because bot
 """
 
 from dataclasses import dataclass
-from typing import ClassVar, NamedTuple, Protocol
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -34,16 +34,6 @@ class Farthest(NamedTuple):
     """Its number; the lowest where several are equally far."""
     distance: float
     """From the nearest chosen candidate, in m; 0 when all are chosen."""
-
-
-class DistanceField(Protocol):
-    """Distances of all candidates from the chosen ones."""
-
-    def add(self, index: int) -> None:
-        """Choose a candidate."""
-
-    def farthest(self) -> Farthest:
-        """Return the candidate that is farthest from the chosen ones, at least one of which is."""
 
 
 @brief_repr
@@ -153,7 +143,7 @@ class Cover:
         return int(np.einsum("pi,pi->p", away, away).argmin())
 
 
-def _field(candidates: Candidates, count: int) -> DistanceField:
+def _field(candidates: Candidates, count: int) -> "PlainField | CellField":
     if candidates.distance is not None:
         return MetricField(candidates.distance, candidates)
     large = len(candidates) >= _LARGE_POOL and count >= _MANY_PICKS

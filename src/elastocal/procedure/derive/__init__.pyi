@@ -4,12 +4,6 @@ from .derivation import (
     derive_run as derive_run,
     write_derived as write_derived,
 )
-from .displacement import (
-    LoadRow as LoadRow,
-    LoadValues as LoadValues,
-    load_rows as load_rows,
-    make_dataset as make_dataset,
-)
 from .findings import (
     RunFindings as RunFindings,
     run_warnings as run_warnings,
@@ -19,6 +13,8 @@ from .readings import (
     JOINT_ERROR as JOINT_ERROR,
     LEAST_SAMPLES as LEAST_SAMPLES,
     SAG as SAG,
+    LoadRow as LoadRow,
+    LoadValues as LoadValues,
     Mean as Mean,
     PoseReadings as PoseReadings,
     Reading as Reading,

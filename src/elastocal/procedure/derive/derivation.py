@@ -1,4 +1,16 @@
-"""From a run folder's journal and raw streams to its dataset and summary."""
+"""From a run folder's journal and raw streams to its dataset and summary.
+
+The dataset holds displacements and force of every load against the unloaded reference of its pose.
+Both displacements are those of the marker: the tracker's, turned into base, and the controller's,
+of the point at the lever arm ``r`` that moves rigidly with its tool frame,
+
+    marker_displacement     = R_base_tracker (p - p_0),
+    controller_displacement = (p_tcp + R_tcp r) - (p_tcp,0 + R_tcp,0 r).
+
+Their difference is the elastic deflection of the marker, which the marker's own Jacobian explains
+(spec section 2). An error of ``R_base_tracker`` by an angle turns the marker's displacement by
+it: 1 mrad makes 1 µm of each millimetre; the tracker's place does not enter at all.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -8,19 +20,23 @@ import numpy as np
 
 from elastocal.arrays import FloatArray
 from elastocal.cell import Cell
-from elastocal.dataset import Dataset, write
+from elastocal.dataset import STATUSES, Dataset, write
 from elastocal.errors import DatasetError, FileAccessError, ProcedureError, SchemaError
 from elastocal.planning import PlanResult
-from elastocal.procedure.derive.displacement import LoadRow, load_rows, make_dataset
 from elastocal.procedure.derive.findings import RunFindings, summarise
 from elastocal.procedure.derive.readings import (
+    LoadRow,
+    LoadValues,
+    Mean,
     PoseReadings,
+    Reading,
+    ToolState,
     marker_readings,
     reduce_pose,
     tool_readings,
 )
 from elastocal.procedure.derive.summary import RunSummary
-from elastocal.procedure.derive.tool import ToolLoad, estimate_tool
+from elastocal.procedure.derive.tool import ToolLoad, estimate_tool, turned_sigma, wrench_on_robot
 from elastocal.procedure.record import (
     Entry,
     PoseLog,
@@ -130,23 +146,15 @@ def derive_poses(
     tool, lever = _tool_load(cell), _lever_arm(cell)
     seen = marker_readings(poses, cell.robot, cell.gravity_base, lever)
     registration = register(seen, lever)
-    rows = [row for pose in poses for row in load_rows(pose, registration, tool)]
+    rows = [_row(pose, load, registration, tool) for pose in poses for load in pose.loads]
     had = {row.load_case for row in rows if row.status is ReadingStatus.OK}
     if not had:
         raise DatasetError(f"no usable reading among {len(rows)}: {_reasons(rows, registration)}")
-    dataset = make_dataset(
-        rows,
-        [case for case in plan.contact.load_cases if case in had],
-        cell.robot,
-        _tcp_positions(poses),
-        {"marker": tuple(registration.lever_arm.tolist()), "provenance": provenance},
-    )
+    cases = [case for case in plan.contact.load_cases if case in had]
+    dataset = _dataset(poses, rows, cases, cell, registration.lever_arm, provenance)
     estimate = estimate_tool(tool_readings(poses, tool), tool.mass)
-    findings = RunFindings(poses, rows, seen, registration, tool, estimate, dataset)
-    cases = tuple(plan.contact.load_cases)
-    return DerivedRun(
-        dataset, summarise(findings, [pose.id for pose in plan.poses], cases, entries)
-    )
+    found = RunFindings(poses, rows, registration, tool, estimate, dataset, plan, entries)
+    return DerivedRun(dataset, summarise(found))
 
 
 def _latest(logs: Sequence[PoseLog]) -> list[PoseLog]:
@@ -185,11 +193,6 @@ def _lever_arm(cell: Cell) -> FloatArray:
     return cell.file.marker.position_tcp
 
 
-def _tcp_positions(poses: Sequence[PoseReadings]) -> dict[int, FloatArray]:
-    states = {p.pose: p.reference.tool for p in poses if p.reference is not None}
-    return {pose: np.array(tool.T_base_tcp[:3, 3]) for pose, tool in states.items() if tool}
-
-
 def _reasons(rows: Sequence[LoadRow], registration: Registration) -> str:
     if registration.unregistered:
         name, reason = next(iter(registration.unregistered.items()))
@@ -199,3 +202,121 @@ def _reasons(rows: Sequence[LoadRow], registration: Registration) -> str:
 
 def _provenance(folder: RunFolder, record: RunRecord) -> str:
     return f"elastocal run {folder.path.resolve().name}, {record.origin}"
+
+
+@dataclass(frozen=True, eq=False)
+class _LoadAndReference:
+    """A load and its reference, with nothing missing."""
+
+    load: ToolState
+    load_marker: Mean
+    reference: ToolState
+    reference_marker: Mean
+    R_base_tracker: FloatArray
+
+
+def _row(pose: PoseReadings, load: Reading, registration: Registration, tool: ToolLoad) -> LoadRow:
+    """Return a load as the dataset holds it; without reference, station or stream it is missing."""
+    window, case = load.window, str(load.window.load_case)
+    pair = _pair(pose, load, registration)
+    if isinstance(pair, _LoadAndReference):
+        numbers = _numbers(pair, registration.lever_arm, tool)
+        return LoadRow(pose.pose, case, window.status, window.note, numbers)
+    if window.status is not ReadingStatus.OK:
+        return LoadRow(pose.pose, case, window.status, window.note or pair, None)
+    return LoadRow(pose.pose, case, ReadingStatus.MISSING, pair, None)
+
+
+def _pair(pose: PoseReadings, load: Reading, registration: Registration) -> _LoadAndReference | str:
+    """Return load and reference, or why a reading has no numbers."""
+    reference, station = pose.reference, load.window.station
+    if reference is None:
+        return "there is no unloaded reference"
+    if reference.window.status is not ReadingStatus.OK:
+        return f"the unloaded reference is {reference.window.status.value}: {reference.window.note}"
+    if not station:
+        return "no tracker station measured"
+    if station != reference.window.station:
+        return f"station {station} measured it, {reference.window.station} its unloaded reference"
+    fit = registration.station_of(station, pose.pose)
+    if fit is None:
+        return f"station {station} is not registered: {registration.unregistered.get(station, '')}"
+    means = (load.tool, load.marker, reference.tool, reference.marker)
+    if means[0] is None or means[1] is None or means[2] is None or means[3] is None:
+        return load.window.note or "a stream says too little"
+    return _LoadAndReference(means[0], means[1], means[2], means[3], fit.T_base_tracker[:3, :3])
+
+
+def _numbers(pair: _LoadAndReference, lever: FloatArray, tool: ToolLoad) -> LoadValues:
+    load, reference, R = pair.load, pair.reference, pair.R_base_tracker
+    T, T_0 = load.T_base_tcp, reference.T_base_tcp
+    wrench = wrench_on_robot(load.wrench, reference.wrench, tool)
+    return LoadValues(
+        q=load.q,
+        controller_displacement=T[:3, 3] - T_0[:3, 3] + (T[:3, :3] - T_0[:3, :3]) @ lever,
+        marker_displacement=R @ (pair.load_marker.value - pair.reference_marker.value),
+        marker_sigma=turned_sigma(R, pair.load_marker.sigma, pair.reference_marker.sigma),
+        force=wrench.force,
+        moment=wrench.moment,
+        force_sigma=turned_sigma(tool.R_base_sensor(T), load.force.sigma, reference.force.sigma),
+    )
+
+
+def _dataset(
+    poses: Sequence[PoseReadings],
+    rows: Sequence[LoadRow],
+    load_cases: Sequence[str],
+    cell: Cell,
+    lever: FloatArray,
+    provenance: str,
+) -> Dataset:
+    """Return the dataset of all rows, with the load cases to keep.
+
+    The moment is left out: the paper's row takes the force alone, and a moment that is moved from
+    the sensor to the tcp carries the sensor's place and cross-talk with the arm of the tool.
+    """
+    robot, labels = cell.robot, tuple(dict.fromkeys(row.pose for row in rows))
+    placed = {
+        (labels.index(r.pose), load_cases.index(r.load_case)): r
+        for r in rows
+        if r.load_case in load_cases
+    }
+    shape = (len(labels), len(load_cases))
+    status = np.full(shape, STATUSES.index(ReadingStatus.MISSING.value))
+    for place, row in placed.items():
+        status[place] = STATUSES.index(row.status.value)
+    ok = status == STATUSES.index(ReadingStatus.OK.value)
+
+    def array(name: str, width: int = 3) -> FloatArray:
+        values = np.full((*shape, width), np.nan)
+        for place, row in placed.items():
+            if row.numbers is not None:
+                values[place] = getattr(row.numbers, name)
+        return values
+
+    def sigma(name: str) -> FloatArray | None:
+        values = array(name)
+        return values if np.all(values[ok] > 0) else None
+
+    tools = {pose.pose: pose.reference.tool for pose in poses if pose.reference is not None}
+    unknown = np.full(3, np.nan)
+    tcp = [tool.T_base_tcp[:3, 3] if (tool := tools.get(pose)) else unknown for pose in labels]
+    return Dataset.from_arrays(
+        joint_position=array("q", len(robot.joint_names)),
+        force=array("force"),
+        controller_displacement=array("controller_displacement"),
+        marker_displacement=array("marker_displacement"),
+        force_sigma=sigma("force_sigma"),
+        marker_sigma=sigma("marker_sigma"),
+        joint_names=robot.joint_names,
+        joint_units=["rad" if revolute else "m" for revolute in robot.revolute],
+        load_cases=load_cases,
+        poses=labels,
+        status=status,
+        tcp_position=np.array(tcp),
+        robot_name=robot.name,
+        robot_urdf=robot.urdf,
+        tcp_frame=robot.tip,
+        marker=tuple(lever.tolist()),
+        provenance=provenance,
+    )

@@ -9,33 +9,12 @@ import numpy as np
 from elastocal import __version__
 from elastocal.arrays import FloatArray
 from elastocal.dataset import Dataset
-from elastocal.procedure.derive.displacement import LoadRow, LoadValues
-from elastocal.procedure.derive.readings import PoseReadings, weighed_poses
-from elastocal.procedure.derive.summary import (
-    AttemptSummary,
-    DriftSummary,
-    FaultSummary,
-    LostReading,
-    MomentSummary,
-    MoveSummary,
-    NoiseSummary,
-    Number,
-    PoseCounts,
-    ReadingCounts,
-    RegistrationSummary,
-    RunSummary,
-    ScalarEstimate,
-    StationSummary,
-    TimeSummary,
-    ToolStep,
-    ToolSummary,
-    Vector,
-    VectorEstimate,
-    VectorInterval,
-)
+from elastocal.planning import PlanResult
+from elastocal.procedure.derive import summary
+from elastocal.procedure.derive.readings import LoadRow, LoadValues, PoseReadings, weighed_poses
 from elastocal.procedure.derive.tool import Interval, ToolEstimate, ToolLoad
 from elastocal.procedure.record import Entry, Event, ReadingStatus
-from elastocal.procedure.registration import Registration, StationFit, UnloadedReadings
+from elastocal.procedure.registration import Registration, StationFit
 from elastocal.results import brief_repr
 
 _SIGMAS = ("force_sigma", "marker_sigma")
@@ -59,58 +38,49 @@ class RunFindings:
 
     poses: Sequence[PoseReadings]
     rows: Sequence[LoadRow]
-    seen: UnloadedReadings
     registration: Registration
     tool: ToolLoad
     estimate: ToolEstimate
     dataset: Dataset
+    plan: PlanResult
+    entries: Sequence[Entry]
+    """The journal, for times, retries and faults."""
 
 
-def summarise(
-    found: RunFindings, planned: Sequence[int], load_cases: Sequence[str], entries: Sequence[Entry]
-) -> RunSummary:
-    """Return the summary of a run.
-
-    Parameters
-    ----------
-    found : RunFindings
-        Everything that the streams say.
-    planned : sequence of int
-        Poses of the plan.
-    load_cases : sequence of str
-        Load cases of the plan.
-    entries : sequence of Entry
-        The journal.
-    """
+def summarise(found: RunFindings) -> summary.RunSummary:
+    """Return the summary of a run."""
     committed, weighed = [pose.pose for pose in found.poses], weighed_poses(found.poses)
+    planned, cases = [pose.id for pose in found.plan.poses], tuple(found.plan.contact.load_cases)
     registration, tool, estimate = found.registration, found.tool, found.estimate
     missing = tuple(pose for pose in planned if pose not in committed)
-    warnings = run_warnings(found.rows, registration, tool, estimate, load_cases, weighed)
-    return RunSummary(
+    warnings = run_warnings(found.rows, registration, tool, estimate, cases, weighed)
+    return summary.RunSummary(
         elastocal=__version__,
-        poses=PoseCounts(len(planned), len(committed), missing),
+        poses=summary.PoseCounts(len(planned), len(committed), missing),
         readings=_readings(found.rows),
         registration=_registration(registration, found.dataset),
         tool=_tool(tool, estimate, weighed),
         drift=_drift(found.poses),
         contact_moment=_moments(found.rows),
         noise=_noise(found.rows),
-        attempts=_attempts(found.poses, entries),
-        times=_times(found.poses, entries),
+        attempts=_attempts(found.poses, found.entries),
+        times=_times(found.poses, found.entries),
         warnings=tuple(warnings),
     )
 
 
-def _readings(rows: Sequence[LoadRow]) -> ReadingCounts:
+def _readings(rows: Sequence[LoadRow]) -> summary.ReadingCounts:
     counts = Counter(row.status.value for row in rows)
-    lost = (LostReading(row.pose, row.load_case, row.status, row.note) for row in _not_ok(rows))
-    return ReadingCounts({s.value: counts[s.value] for s in ReadingStatus}, tuple(lost))
+    lost = (
+        summary.LostReading(row.pose, row.load_case, row.status, row.note) for row in _not_ok(rows)
+    )
+    return summary.ReadingCounts({s.value: counts[s.value] for s in ReadingStatus}, tuple(lost))
 
 
-def _registration(found: Registration, dataset: Dataset) -> RegistrationSummary:
+def _registration(found: Registration, dataset: Dataset) -> summary.RegistrationSummary:
     typical = np.linalg.norm(dataset.marker_displacement, axis=-1)
     displacement = float(np.nanmedian(typical))
-    return RegistrationSummary(
+    return summary.RegistrationSummary(
         stations=tuple(_station(fit, displacement) for fit in found.stations),
         unregistered=found.unregistered,
         lever_arm=_vector(found.lever_arm),
@@ -119,16 +89,18 @@ def _registration(found: Registration, dataset: Dataset) -> RegistrationSummary:
         lever_arm_from_cell_along=found.undetermined_lever,
         scatter=_number(found.scatter),
         moves=tuple(
-            MoveSummary(move.station, move.pose, move.distance, move.angle, move.improbability)
+            summary.MoveSummary(
+                move.station, move.pose, move.distance, move.angle, move.improbability
+            )
             for move in found.moves
         ),
         blunders=found.blunders,
     )
 
 
-def _station(fit: StationFit, displacement: float) -> StationSummary:
+def _station(fit: StationFit, displacement: float) -> summary.StationSummary:
     norms = np.linalg.norm(fit.residual, axis=1)
-    return StationSummary(
+    return summary.StationSummary(
         station=fit.station,
         poses=fit.poses,
         T_base_tracker=tuple(map(tuple, fit.T_base_tracker.tolist())),
@@ -142,14 +114,16 @@ def _station(fit: StationFit, displacement: float) -> StationSummary:
     )
 
 
-def _tool(tool: ToolLoad, found: ToolEstimate, weighed: Sequence[int]) -> ToolSummary:
+def _tool(tool: ToolLoad, found: ToolEstimate, weighed: Sequence[int]) -> summary.ToolSummary:
     step = found.change
     mass, half = (_number(float(part)) for part in (found.mass.value, found.mass.half_width))
     centre = _interval(found.centre)
-    return ToolSummary(
+    return summary.ToolSummary(
         unloaded_references=found.count,
-        mass_kg=ScalarEstimate(mass, half, tool.mass),
-        centre_of_mass=VectorEstimate(centre.value, centre.half_width_95, _vector(tool.centre)),
+        mass_kg=summary.ScalarEstimate(mass, half, tool.mass),
+        centre_of_mass=summary.VectorEstimate(
+            centre.value, centre.half_width_95, _vector(tool.centre)
+        ),
         force_bias_N=_interval(found.force_bias),
         moment_bias_Nm=_interval(found.moment_bias),
         force_drift_N_per_s=_interval(found.force_drift),
@@ -157,11 +131,11 @@ def _tool(tool: ToolLoad, found: ToolEstimate, weighed: Sequence[int]) -> ToolSu
         force_scatter_N=_number(found.force_scatter),
         moment_scatter_Nm=_number(found.moment_scatter),
         not_determined=found.undetermined,
-        changed=ToolStep(weighed[step.reading], step.mass) if step else None,
+        changed=summary.ToolStep(weighed[step.reading], step.mass) if step else None,
     )
 
 
-def _drift(poses: Sequence[PoseReadings]) -> DriftSummary:
+def _drift(poses: Sequence[PoseReadings]) -> summary.DriftSummary:
     """Return how far the sensor is from its tare when the tool is free again, pose by pose."""
     found = []
     for pose in poses:
@@ -171,36 +145,36 @@ def _drift(poses: Sequence[PoseReadings]) -> DriftSummary:
             change = float(np.linalg.norm(after.force.value - before.force.value))
             found.append((change, pose.pose, after.force.time - before.force.time))
     if not found:
-        return DriftSummary(0, None, None, None)
-    return DriftSummary(len(found), *max(found, key=lambda each: each[0]))
+        return summary.DriftSummary(0, None, None, None)
+    return summary.DriftSummary(len(found), *max(found, key=lambda each: each[0]))
 
 
-def _moments(rows: Sequence[LoadRow]) -> MomentSummary:
-    sizes = [float(np.linalg.norm(row.numbers.wrench.moment)) for row in rows if row.numbers]
-    return MomentSummary(len(sizes), _median(sizes), max(sizes, default=None))
+def _moments(rows: Sequence[LoadRow]) -> summary.MomentSummary:
+    sizes = [float(np.linalg.norm(row.numbers.moment)) for row in rows if row.numbers]
+    return summary.MomentSummary(len(sizes), _median(sizes), max(sizes, default=None))
 
 
-def _noise(rows: Sequence[LoadRow]) -> NoiseSummary:
+def _noise(rows: Sequence[LoadRow]) -> summary.NoiseSummary:
     good = _good(rows)
     forces, markers = ([getattr(each, name) for each in good] for name in _SIGMAS)
-    return NoiseSummary(len(good), _median(forces), _median(markers))
+    return summary.NoiseSummary(len(good), _median(forces), _median(markers))
 
 
-def _attempts(poses: Sequence[PoseReadings], entries: Sequence[Entry]) -> AttemptSummary:
+def _attempts(poses: Sequence[PoseReadings], entries: Sequence[Entry]) -> summary.AttemptSummary:
     faults = (e for e in entries if e.event is Event.FAULT)
-    return AttemptSummary(
+    return summary.AttemptSummary(
         retried={str(p.pose): p.log.attempt for p in poses if p.log.attempt > 1},
         given_up=tuple(entry.pose for entry in entries if entry.event is Event.GIVEN_UP),
         resumed=sum(entry.event is Event.RESUME for entry in entries),
-        faults=tuple(FaultSummary(e.pose, e.attempt, e.step, e.text) for e in faults),
+        faults=tuple(summary.FaultSummary(e.pose, e.attempt, e.step, e.text) for e in faults),
     )
 
 
-def _times(poses: Sequence[PoseReadings], entries: Sequence[Entry]) -> TimeSummary:
+def _times(poses: Sequence[PoseReadings], entries: Sequence[Entry]) -> summary.TimeSummary:
     windows = [pose.log.windows for pose in poses if pose.log.windows]
     spans = [max(w.end for w in each) - min(w.start for w in each) for each in windows]
     record = entries[0].run if entries else None
-    return TimeSummary(
+    return summary.TimeSummary(
         started=record.started if record else None,
         measuring_per_pose_median=_median(spans),
         total=entries[-1].time - entries[0].time if entries else None,
@@ -216,19 +190,19 @@ def _not_ok(rows: Sequence[LoadRow]) -> list[LoadRow]:
     return [row for row in rows if row.status is not ReadingStatus.OK]
 
 
-def _interval(interval: Interval) -> VectorInterval:
-    return VectorInterval(_vector(interval.value), _vector(interval.half_width))
+def _interval(interval: Interval) -> summary.VectorInterval:
+    return summary.VectorInterval(_vector(interval.value), _vector(interval.half_width))
 
 
-def _median(values: Sequence[float] | Sequence[FloatArray]) -> Number:
+def _median(values: Sequence[float] | Sequence[FloatArray]) -> summary.Number:
     return float(np.median(np.array(values))) if len(values) else None
 
 
-def _vector(values: FloatArray) -> Vector:
+def _vector(values: FloatArray) -> summary.Vector:
     return tuple(_number(float(value)) for value in values)
 
 
-def _number(value: float) -> Number:
+def _number(value: float) -> summary.Number:
     """Return a number, or None where there is none: JSON has no NaN."""
     return value if np.isfinite(value) else None
 

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from elastocal.arrays import BoolArray, FloatArray
-from elastocal.procedure.derive.tool import ToolLoad, UnloadedWrenches
+from elastocal.procedure.derive.tool import RawWrench, ToolLoad, UnloadedWrenches
 from elastocal.procedure.record import SAME_TIME, PoseLog, ReadingStatus, Streams, Window
 from elastocal.procedure.registration import UnloadedReadings
 from elastocal.results import brief_repr
@@ -57,6 +57,11 @@ class ToolState:
     """Raw, sensor frame, in N."""
     moment: Mean
     """Raw, sensor frame, in N·m."""
+
+    @property
+    def wrench(self) -> RawWrench:
+        """Mean raw wrench."""
+        return RawWrench(self.force.value, self.moment.value, self.T_base_tcp)
 
 
 @dataclass(frozen=True, eq=False)
@@ -291,3 +296,37 @@ def tool_readings(poses: Sequence[PoseReadings], tool: ToolLoad) -> UnloadedWren
         R_base_sensor=tool.R_base_sensor(T),
         gravity=tool.gravity,
     )
+
+
+@brief_repr
+@dataclass(frozen=True, eq=False)
+class LoadValues:
+    """The numbers of a reading, in base and SI units."""
+
+    q: FloatArray
+    """Shape (joint,)."""
+    controller_displacement: FloatArray
+    """Displacement of the marker by the controller, shape (3,), in m."""
+    marker_displacement: FloatArray
+    """Shape (3,), in m."""
+    marker_sigma: FloatArray
+    """Shape (3,), in m."""
+    force: FloatArray
+    """Force on the robot, shape (3,), in N."""
+    moment: FloatArray
+    """Moment on the robot about the tcp, shape (3,), in N·m."""
+    force_sigma: FloatArray
+    """Shape (3,), in N."""
+
+
+@dataclass(frozen=True, eq=False)
+class LoadRow:
+    """One load case at one pose, as the dataset holds it."""
+
+    pose: int
+    load_case: str
+    status: ReadingStatus
+    note: str
+    """Why it is not ok."""
+    numbers: LoadValues | None
+    """None where something that they need is missing."""

@@ -1,12 +1,21 @@
-"""MCAP files: topics written in compressed chunks with the index that viewers jump by, read whole.
+"""The form of stream files: MCAP containers, and samples as JSON messages in them.
 
-The `mcap` package does both; what it takes beside messages packed by hand is measured in
-``benchmarks/record.py``.
+The `mcap` package writes and reads the containers; what it takes beside messages packed by hand is
+measured in ``benchmarks/record.py``.
+
+One message a sample, because that is what both viewers draw: Foxglove plots ``/wrench.force.z``
+and PlotJuggler lists ``/wrench/force/z``. A block of samples as arrays would be three times as
+quick to write, but PlotJuggler makes a series of each array place, a hundred a block.
+Numbers have 12 digits: finer than any instrument, and nearly three times as quick to write as all
+17. What is not a finite number is null, whatever the schema says.
 """
 
+import json
+import math
 import struct
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import lru_cache
 from io import BytesIO
 from operator import itemgetter
 from pathlib import Path
@@ -18,7 +27,10 @@ from mcap.records import Channel, Chunk, DataEnd, McapRecord, Message, Metadata
 from mcap.stream_reader import CRCValidationError, StreamReader, breakup_chunk
 from mcap.writer import Writer
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
+from elastocal.arrays import FloatArray
+from elastocal.cell import ArmState, PointBlock, WrenchBlock
 from elastocal.errors import FileAccessError, SchemaError
 from elastocal.files import replacing
 
@@ -175,3 +187,149 @@ def _in_order(messages: Messages) -> Messages:
     order = sorted(range(len(messages.time)), key=messages.time.__getitem__)
     time, data = messages.time, messages.data
     return Messages([time[row] for row in order], [data[row] for row in order])
+
+
+ARM, WRENCH, MARKER, MARKS = "/arm", "/wrench", "/marker", "/marks"
+"""Topics, in the order of their channels."""
+
+_NUMBER = {"type": "number"}
+"""Not ``["number", "null"]``: one type a field is what every viewer's schema reader knows."""
+_HERE = "\0"
+"""Place of a number; no JSON text holds this letter."""
+_XYZ = f'{{"x":{_HERE},"y":{_HERE},"z":{_HERE}}}'
+_XYZW = f'{_XYZ[:-1]},"w":{_HERE}}}'
+
+
+def schemas(joint_names: Sequence[str]) -> dict[str, tuple[str, str]]:
+    """Return name and text of the JSON schema of each topic.
+
+    Parameters
+    ----------
+    joint_names : sequence of str
+        Joints, which are the keys of ``q``.
+    """
+    fields: dict[str, tuple[str, dict[str, object]]] = {
+        ARM: (
+            "elastocal.ArmState",
+            {
+                "q": _object(
+                    "joint positions of the controller, in rad (m if prismatic)", joint_names
+                ),
+                "position": _object("tcp of the controller in base, in m", "xyz"),
+                "orientation": _object("tcp of the controller in base, quaternion", "xyzw"),
+                "motion": _text("what the arm is doing"),
+                "in_contact": {"type": "boolean", "description": "touched, not yet retracted"},
+                "fault": _text("why it stopped; empty when nothing is wrong"),
+                "source": _text("device"),
+            },
+        ),
+        WRENCH: (
+            "elastocal.RawWrench",
+            {
+                "force": _object("on the tool side, sensor frame, raw, in N", "xyz"),
+                "moment": _object("about the sensor's origin, raw, in N m", "xyz"),
+                "force_sigma": {**_NUMBER, "description": "of one sample and axis, in N"},
+                "moment_sigma": {**_NUMBER, "description": "of one sample and axis, in N m"},
+                "status": _text("state of the sensor"),
+                "source": _text("device"),
+            },
+        ),
+        MARKER: (
+            "elastocal.MarkerPoint",
+            {
+                "position": _object("of the marker, tracker frame, in m", "xyz"),
+                "sigma": _object("standard deviation, tracker frame, in m", "xyz"),
+                "station": _text("tracker station"),
+                "beam": _text("state of the beam"),
+                "source": _text("device"),
+            },
+        ),
+        MARKS: ("elastocal.Mark", {"text": _text("what happened")}),
+    }
+    return {topic: (name, json.dumps(_schema(keys))) for topic, (name, keys) in fields.items()}
+
+
+def arm_messages(states: Sequence[ArmState], joint_names: Sequence[str]) -> list[bytes]:
+    """Return a message for each state of the arm."""
+    if not states:
+        return []
+    poses = np.array([state.T_base_tcp for state in states])
+    quaternions = Rotation.from_matrix(poses[:, :3, :3]).as_quat()
+    numbers = np.hstack([np.array([state.q for state in states]), poses[:, :3, 3], quaternions])
+    keys = ",".join(json.dumps(name) + ":" + _HERE for name in joint_names)
+    head = f'{{"q":{{{keys}}},"position":{_XYZ},"orientation":{_XYZW}'
+    tails = [
+        _tail(
+            motion=state.motion.value,
+            in_contact=bool(state.in_contact),
+            fault=state.fault or "",
+            source=state.source,
+        )
+        for state in states
+    ]
+    return _joined(head, numbers, tails)
+
+
+def wrench_messages(blocks: Sequence[WrenchBlock]) -> list[bytes]:
+    """Return a message for each wrench of some blocks."""
+    rows, tails = [np.empty((0, 6))], []
+    for block in blocks:
+        rows.append(np.hstack([block.force, block.moment]))
+        force, moment = _finite(block.force_sigma), _finite(block.moment_sigma)
+        status, source = block.status.value, block.source
+        tail = _tail(force_sigma=force, moment_sigma=moment, status=status, source=source)
+        tails += [tail] * len(block)
+    return _joined(f'{{"force":{_XYZ},"moment":{_XYZ}', np.vstack(rows), tails)
+
+
+def point_messages(blocks: Sequence[PointBlock]) -> list[bytes]:
+    """Return a message for each point of some blocks."""
+    rows, tails = [np.empty((0, 6))], []
+    for block in blocks:
+        rows.append(np.hstack([block.position, block.sigma]))
+        tail = _tail(station=block.station, beam=block.beam.value, source=block.source)
+        tails += [tail] * len(block)
+    return _joined(f'{{"position":{_XYZ},"sigma":{_XYZ}', np.vstack(rows), tails)
+
+
+def mark_message(text: str) -> bytes:
+    """Return the message of a mark."""
+    return json.dumps({"text": text}).encode()
+
+
+# These texts hardly ever change from one look at a device to the next.
+@lru_cache(maxsize=64)
+def _tail(**keys: object) -> str:
+    """Return the end of a JSON object, from the comma on."""
+    return "," + json.dumps(keys)[1:]
+
+
+def _joined(head: str, numbers: FloatArray, tails: Sequence[str]) -> list[bytes]:
+    """Return JSON objects: the numbers of a row in their places of ``head``, then the tail."""
+    head, rows = head.replace("%", "%%"), numbers.tolist()
+    if np.all(np.isfinite(numbers)):
+        template = head.replace(_HERE, "%.12g")
+    else:
+        template = head.replace(_HERE, "%s")
+        rows = [[_number(value) for value in row] for row in rows]
+    return [(template % tuple(row) + tail).encode() for row, tail in zip(rows, tails, strict=True)]
+
+
+def _number(value: float) -> str:
+    return f"{value:.12g}" if math.isfinite(value) else "null"
+
+
+def _finite(value: float) -> float | None:
+    return value if math.isfinite(value) else None
+
+
+def _schema(keys: Mapping[str, object]) -> dict[str, object]:
+    return {"type": "object", "properties": keys, "required": list(keys)}
+
+
+def _object(description: str, names: Iterable[str]) -> dict[str, object]:
+    return {"description": description, **_schema(dict.fromkeys(names, _NUMBER))}
+
+
+def _text(description: str) -> dict[str, object]:
+    return {"type": "string", "description": description}

@@ -20,17 +20,21 @@ from elastocal import __version__
 from elastocal.arrays import BoolArray, FloatArray
 from elastocal.cell import ArmState, PointBlock, SensorStatus, WrenchBlock
 from elastocal.errors import ProcedureError, SchemaError
-from elastocal.procedure.record._mcap import Messages, TimeArray, Topic, read_mcap, write_mcap
-from elastocal.procedure.record._messages import (
+from elastocal.procedure.record._mcap import (
     ARM,
     MARKER,
     MARKS,
     WRENCH,
+    Messages,
+    TimeArray,
+    Topic,
     arm_messages,
     mark_message,
     point_messages,
+    read_mcap,
     schemas,
     wrench_messages,
+    write_mcap,
 )
 from elastocal.procedure.record.folder import file_sha256
 from elastocal.records import check_schema

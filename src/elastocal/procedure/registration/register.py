@@ -1,9 +1,19 @@
-"""Register the stations of a run: fit, look for what moved, part it there, fit again."""
+"""Register the stations of a run: fit, look for what moved, part it there, fit again.
 
+A station that moved, or a reading that is a blunder, is one hypothesis more at a time. Each adds
+columns to the linear equations of a fit: six for a station that stood elsewhere from a pose on,
+three for a reading of its own. How much of the sum of squares they take away is judged by the F
+distribution, against the scatter that is really there, and by Bonferroni's factor for the number of
+hypotheses that were tried (Cook and Weisberg 1982, section 2.2.2, the mean-shift outlier model).
+"""
+
+import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 from scipy.spatial.transform import Rotation
+from scipy.special import fdtrc
 
 from elastocal.arrays import BoolArray, FloatArray, IndexArray
 from elastocal.procedure.registration._fit import (
@@ -12,10 +22,11 @@ from elastocal.procedure.registration._fit import (
     Fit,
     UnloadedReadings,
     align,
+    centred_points,
     determined,
     fit,
+    motion_columns,
 )
-from elastocal.procedure.registration._moves import Finding, find
 from elastocal.records import record
 from elastocal.results import brief_repr
 
@@ -100,6 +111,10 @@ class Registration:
         return next(stood, None)
 
 
+_CHANCE = 1e-4
+"""Largest probability that a run without any move or blunder is said to have one."""
+_LEAST_MOVE = 50e-6
+"""Smallest shift of the marker that is called a move or a blunder, in m: less does no harm."""
 _MOST_FINDINGS = 0.2
 """Largest share of the readings that may be called moves or blunders."""
 _UNDETERMINED = 0.5
@@ -130,11 +145,13 @@ def register(readings: UnloadedReadings, lever_prior: FloatArray) -> Registratio
     if not np.any(group >= 0):
         return _nothing(lever_prior, bad)
     kept = group >= 0
-    findings: list[tuple[int, Finding]] = []
+    findings: list[tuple[int, _Finding]] = []
     while True:
         rows = np.flatnonzero(kept)
-        result = fit(readings.take(rows), _dense(group[rows]), lever_prior)
-        finding = find(readings.take(rows), result)
+        # Numbered from 0 without gaps, in the order of their labels.
+        dense = np.unique(group[rows], return_inverse=True)[1]
+        result = fit(readings.take(rows), dense, lever_prior)
+        finding = _find(readings.take(rows), result)
         if finding is None or len(findings) >= _MOST_FINDINGS * len(readings):
             break
         row = int(rows[finding.row])
@@ -158,6 +175,76 @@ def register(readings: UnloadedReadings, lever_prior: FloatArray) -> Registratio
     )
 
 
+@dataclass(frozen=True)
+class _Finding:
+    """A hypothesis that the readings bear out."""
+
+    row: int
+    """Reading of the blunder, or the first one after the move."""
+    move: bool
+    """Whether the station moved (else a blunder)."""
+    improbability: float
+    """Decimal logarithm of the probability of chance, Bonferroni's factor included."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Hypothesis:
+    row: int
+    move: bool
+    rows: BoolArray
+    """Readings that it concerns, shape (reading,)."""
+    columns: FloatArray
+    """Effect of its unknowns on them, shape (reading concerned, 3, unknown)."""
+
+
+def _find(readings: UnloadedReadings, fit: Fit) -> _Finding | None:
+    """Return the most convincing move or blunder of fitted readings, if there is one."""
+    q, _ = np.linalg.qr(fit.A)
+    tried = list(_hypotheses(readings, fit))
+    found = [finding for each in tried if (finding := _judge(each, fit, q, len(tried)))]
+    return min(found, key=lambda finding: finding.improbability, default=None)
+
+
+def _judge(hypothesis: _Hypothesis, fit: Fit, q: FloatArray, tried: int) -> _Finding | None:
+    count = hypothesis.columns.shape[2]
+    free = fit.A.shape[0] - fit.A.shape[1]
+    if not free - count >= 1:
+        return None
+    Z = np.zeros((len(fit.e), count))
+    rows = np.flatnonzero(np.repeat(hypothesis.rows, 3))
+    Z[rows] = (hypothesis.columns * fit.weight[hypothesis.rows, None, None]).reshape(-1, count)
+    beside = Z - q @ (q.T @ Z)
+    shift, _, found, _ = np.linalg.lstsq(beside, fit.e, rcond=1e-9)
+    rank = int(found)
+    explained = float(((beside @ shift) ** 2).sum())
+    left = max(float(fit.e @ fit.e) - explained, np.finfo(float).tiny)
+    f = explained / rank / (left / (free - rank)) if rank else 0.0
+    with np.errstate(divide="ignore"):  # a chance of nothing is the smallest of all
+        log10 = float(np.log10(fdtrc(max(rank, 1), free - rank, f))) + math.log10(tried)
+    size = np.sqrt((np.square(hypothesis.columns @ shift)).sum(axis=1).mean())
+    if not (log10 < math.log10(_CHANCE) and size >= _LEAST_MOVE):
+        return None
+    return _Finding(hypothesis.row, hypothesis.move, log10)
+
+
+def _hypotheses(readings: UnloadedReadings, fit: Fit) -> Iterator[_Hypothesis]:
+    base, row_of = centred_points(fit.R, readings.position, fit.group), np.arange(len(readings))
+
+    def enough(rows: BoolArray) -> bool:
+        return determined(readings.position[rows], DEFAULT_SCATTER)
+
+    for row, number in enumerate(fit.group):
+        if enough((fit.group == number) & (row_of != row)):
+            yield _Hypothesis(row, False, row_of == row, np.eye(3)[None])
+    for number in range(len(fit.R)):
+        members = fit.group == number
+        for row in np.flatnonzero(members)[1:].tolist():
+            late = members & (row_of >= row)
+            if enough(members & ~late) and enough(late):
+                columns = motion_columns(base[late] - base[late].mean(axis=0))
+                yield _Hypothesis(row, True, late, columns)
+
+
 def _unusable(readings: UnloadedReadings, station: str) -> str | None:
     """Return why a station cannot be registered; None when it can."""
     position = readings.position[np.array(readings.station) == station]
@@ -173,11 +260,6 @@ def _nothing(lever_prior: FloatArray, unregistered: dict[str, str]) -> Registrat
     return Registration(
         (), lever_prior, sigma, lever_prior, _undetermined(sigma), np.nan, (), (), unregistered
     )
-
-
-def _dense(group: IndexArray) -> IndexArray:
-    """Return the groups numbered from 0 without gaps, in the order of their numbers."""
-    return np.unique(group, return_inverse=True)[1].astype(np.intp)
 
 
 def _undetermined(sigma: FloatArray) -> tuple[str, ...]:
@@ -222,7 +304,7 @@ def _accuracy(readings: UnloadedReadings, lever: FloatArray) -> float:
 
 
 def _move(
-    readings: UnloadedReadings, stations: tuple[StationFit, ...], row: int, finding: Finding
+    readings: UnloadedReadings, stations: tuple[StationFit, ...], row: int, finding: _Finding
 ) -> StationMove:
     """Describe a move by what old and new transform make of the same marker readings."""
     station = readings.station[row]

@@ -1,10 +1,3 @@
-from .faults import (
-    EXPECTED_ERRORS as EXPECTED_ERRORS,
-    Fault as Fault,
-    FaultError as FaultError,
-    FaultScope as FaultScope,
-    as_fault as as_fault,
-)
 from .routes import (
     HOME_AT_START as HOME_AT_START,
     ApproachLine as ApproachLine,
@@ -35,12 +28,17 @@ from .settings import (
     run_settings as run_settings,
 )
 from .steps import (
+    EXPECTED_ERRORS as EXPECTED_ERRORS,
     MAY_TOUCH as MAY_TOUCH,
     ON_APPROACH_LINE as ON_APPROACH_LINE,
     ArmLocation as ArmLocation,
     BackOffResult as BackOffResult,
+    Fault as Fault,
+    FaultError as FaultError,
+    FaultScope as FaultScope,
     Progress as Progress,
     Step as Step,
     StepResult as StepResult,
+    as_fault as as_fault,
     next_step as next_step,
 )

@@ -1,18 +1,32 @@
-"""State of one attempt at a pose: what its steps have found, and what they must keep to."""
+"""State of one attempt at a pose, and the motions that it is made of.
+
+A motion (joint move, straight move, force release) begins with one cycle that looks at the arm,
+journals what it tells the arm before it does, and waits under the watchdog until the arm says that
+it has got there, never longer than a limit.
+"""
 
 from dataclasses import dataclass, field
+from functools import partial
 
 import numpy as np
 
 from elastocal.arrays import FloatArray
+from elastocal.cell import ArmState, Motion
 from elastocal.planning import Joints, PoseRecord
-from elastocal.procedure.record import PoseLog, ReadingStatus, Window
+from elastocal.procedure.record import Action, PoseLog, ReadingStatus, Window
 from elastocal.procedure.run._stability import SlideDetector, SlipReference
 from elastocal.procedure.run._supervisor import Supervisor
-from elastocal.procedure.run._watchdog import Guard
+from elastocal.procedure.run._watchdog import Guard, Snapshot
 from elastocal.procedure.run.routes import ApproachLine
 from elastocal.procedure.run.settings import RunSettings
-from elastocal.procedure.run.steps import MAY_TOUCH, ON_APPROACH_LINE, ArmLocation, Step
+from elastocal.procedure.run.steps import (
+    MAY_TOUCH,
+    ON_APPROACH_LINE,
+    ArmLocation,
+    Fault,
+    FaultError,
+    Step,
+)
 
 _STIFFEST = 1e6
 """Arm and tooling against each other are not stiffer than this, in N/m: so much the force grows
@@ -131,3 +145,165 @@ class Attempt:
             streams=self.streams,
             windows=tuple(self.windows),
         )
+
+
+_JOINT_TOLERANCE = 5e-3
+"""A joint that is closer to its target than this has arrived, in rad or m."""
+_STRAIGHT_TOLERANCE = 1e-3
+"""The same of a straight motion, in m."""
+_BIAS = 0.1
+"""Bias of a sensor that is let pass, as a part of the force limit."""
+
+
+def drive(supervisor: Supervisor, legs: tuple[Joints, ...], guard: Guard) -> None:
+    """Pass joint positions one after the other, each leg straight in joint space.
+
+    Raises
+    ------
+    FaultError
+        See `Supervisor.wait`.
+    """
+    settings = supervisor.settings
+    for leg, target in enumerate(legs):
+        seen = supervisor.cycle(Guard())
+        # A joint move sweeps the tool sideways: in contact it would drag it over the surface.
+        if seen.arm.in_contact:
+            raise FaultError(Fault.IN_CONTACT, f"{seen.arm.source} says that it is")
+        # Once: a tare at each leg would hide a force that grows from leg to leg.
+        if leg == 0 and len(seen.wrenches):
+            force = seen.wrenches.force.mean(axis=0)
+            require_tool_weight(force, settings)
+            supervisor.tare(force)
+        goal = np.array(target)
+        limit = 2.0 * float(settings.axes.duration(seen.arm.q, goal)) + settings.procedure.timeout
+        with supervisor.actuation(Action.MOVE, target):
+            supervisor.devices.arm.move_joints(goal, settings.override)
+            supervisor.wait(guard, partial(_at_joints, goal), limit, "a move")
+
+
+def approach_by(a: Attempt, distance: float, speed: float, most: float = np.inf) -> Snapshot:
+    """Make a guarded linear move along the inward normal; return what is seen at its end.
+
+    It also ends, with the arm still moving, when a force above ``most`` N is felt.
+    """
+    s, procedure = a.supervisor, a.settings.procedure
+    start = s.cycle(a.guard()).arm.T_base_tcp[:3, 3]
+
+    def done(seen: Snapshot) -> bool:
+        touched = is_idle(seen.arm) and seen.arm.in_contact
+        return touched or has_gone(seen.arm, start, distance) or largest_force(seen) > most
+
+    limit = 2.0 * distance / speed + procedure.timeout
+    with s.actuation(Action.APPROACH, (distance,)):
+        s.devices.arm.approach(-a.line.normal, distance, speed, procedure.contact_force)
+        return s.wait(a.guard(), done, limit, "an approach")
+
+
+def retract_to(supervisor: Supervisor, line: ApproachLine, guard: Guard, height: float) -> None:
+    """Go along a line's normal until a height above the expected contact, in m.
+
+    Raises
+    ------
+    FaultError
+        See `Supervisor.wait`.
+    """
+    start = supervisor.cycle(guard).arm.T_base_tcp
+    distance = height - line.height(start)
+    if distance <= 0.0:
+        return
+    limit = retract_limit(supervisor.settings, distance)
+    with supervisor.actuation(Action.RETRACT, (distance,)):
+        speed = supervisor.settings.procedure.approach_speed
+        supervisor.devices.arm.retract(line.normal, distance, speed)
+        supervisor.wait(
+            guard, lambda seen: has_gone(seen.arm, start[:3, 3], distance), limit, "the retract"
+        )
+
+
+def release_force(supervisor: Supervisor, guard: Guard) -> None:
+    """Ramp the force to zero; the arm then is in position control.
+
+    Raises
+    ------
+    FaultError
+        See `Supervisor.wait`.
+    """
+    with supervisor.actuation(Action.RELEASE):
+        supervisor.devices.arm.release(supervisor.settings.procedure.ramp)
+        _wait_released(supervisor, guard)
+
+
+def leave_force_control(supervisor: Supervisor) -> None:
+    """Take the arm out of force control, in which a program that died may have left it.
+
+    Raises
+    ------
+    FaultError
+        If that takes too long.
+    """
+    arm = supervisor.devices.arm
+    if arm.state().motion not in (Motion.HOLDING, Motion.RELEASING):
+        return
+    with supervisor.actuation(Action.RELEASE):
+        if arm.state().motion is Motion.HOLDING:
+            arm.release(supervisor.settings.procedure.ramp)
+        _wait_released(supervisor, Guard())
+
+
+def require_tool_weight(force: FloatArray, settings: RunSettings) -> None:
+    """Refuse a force in free air, shape (3,), in N, that is not about the tool's weight.
+
+    Half the weight is left for a mass that is only roughly known, and a tenth of the force limit
+    for a sensor that has not been set to zero. Without a mass in the cell nothing is refused.
+
+    Raises
+    ------
+    FaultError
+        With both.
+    """
+    weight = settings.tool_weight
+    if not weight > 0.0:
+        return
+    size, tolerance = float(np.linalg.norm(force)), 0.5 * weight + _BIAS * settings.force_limit
+    if not abs(size - weight) <= tolerance:
+        text = f"{size:.0f} N in free air, it weighs {weight:.0f} N, tolerance {tolerance:.0f} N"
+        raise FaultError(Fault.WEIGHT, text)
+
+
+def largest_force(seen: Snapshot) -> float:
+    """Return the largest force of a cycle, tared, in N; 0 when nothing has come."""
+    return float(np.linalg.norm(seen.force_tcp, axis=1).max(initial=0.0))
+
+
+def is_idle(arm: ArmState) -> bool:
+    """Return whether the arm stands in position control."""
+    return arm.motion is Motion.IDLE
+
+
+def has_gone(arm: ArmState, start: FloatArray, distance: float) -> bool:
+    """Return whether a straight motion of a distance in m from a start, shape (3,), is over.
+
+    Idle alone is not enough: an arm may still be idle in the first cycle after a command.
+    """
+    gone = float(np.linalg.norm(arm.T_base_tcp[:3, 3] - start))
+    return is_idle(arm) and gone > distance - _STRAIGHT_TOLERANCE
+
+
+def release_limit(settings: RunSettings) -> float:
+    """Return the longest time that a release may take, in s."""
+    return 2.0 * settings.force_limit / settings.procedure.ramp + settings.procedure.timeout
+
+
+def retract_limit(settings: RunSettings, distance: float) -> float:
+    """Return the longest time that a retract by a distance in m may take, in s."""
+    return 2.0 * distance / settings.procedure.approach_speed + settings.procedure.timeout
+
+
+def _at_joints(goal: FloatArray, seen: Snapshot) -> bool:
+    away = float(np.abs(seen.arm.q - goal).max())
+    return is_idle(seen.arm) and away <= _JOINT_TOLERANCE
+
+
+def _wait_released(supervisor: Supervisor, guard: Guard) -> None:
+    limit = release_limit(supervisor.settings)
+    supervisor.wait(guard, lambda seen: is_idle(seen.arm), limit, "the release")

@@ -13,8 +13,8 @@ import numpy as np
 from elastocal.arrays import FloatArray
 from elastocal.cell import Motion
 from elastocal.procedure.record import Action, ReadingStatus
-from elastocal.procedure.run._attempt import Attempt
-from elastocal.procedure.run._motion import (
+from elastocal.procedure.run._attempt import (
+    Attempt,
     approach_by,
     drive,
     largest_force,
@@ -33,8 +33,7 @@ from elastocal.procedure.run._stability import (
 )
 from elastocal.procedure.run._supervisor import TIME_SLACK
 from elastocal.procedure.run._watchdog import Snapshot
-from elastocal.procedure.run.faults import Fault, FaultError
-from elastocal.procedure.run.steps import StepResult
+from elastocal.procedure.run.steps import Fault, FaultError, StepResult
 
 _AGREES = 0.5
 """Smallest part of a force of the arm that its sensor must feel."""

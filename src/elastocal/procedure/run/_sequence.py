@@ -13,17 +13,26 @@ from collections.abc import Callable
 from elastocal.cell import ArmState, Motion
 from elastocal.procedure.record import Action
 from elastocal.procedure.run import _press
-from elastocal.procedure.run._attempt import Attempt
-from elastocal.procedure.run._motion import has_gone, is_idle, release_limit, retract_limit
+from elastocal.procedure.run._attempt import (
+    Attempt,
+    has_gone,
+    is_idle,
+    release_limit,
+    retract_limit,
+)
 from elastocal.procedure.run._supervisor import DEVICE_ERRORS, Supervisor
-from elastocal.procedure.run.faults import EXPECTED_ERRORS, Fault, FaultError, FaultScope, as_fault
 from elastocal.procedure.run.steps import (
+    EXPECTED_ERRORS,
     MAY_TOUCH,
     ON_APPROACH_LINE,
     ArmLocation,
     BackOffResult,
+    Fault,
+    FaultError,
+    FaultScope,
     Step,
     StepResult,
+    as_fault,
     next_step,
 )
 

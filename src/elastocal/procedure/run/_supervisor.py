@@ -24,8 +24,8 @@ from elastocal.procedure.run._watchdog import (
     check_points,
     check_wrenches,
 )
-from elastocal.procedure.run.faults import Fault, FaultError
 from elastocal.procedure.run.settings import RunSettings
+from elastocal.procedure.run.steps import Fault, FaultError
 
 TIME_SLACK = 1e-6
 """Times that differ by less are equal, in s: sums of cycles are not exact."""

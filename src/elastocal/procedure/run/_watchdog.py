@@ -19,8 +19,8 @@ from elastocal.cell import (
     SensorStatus,
     WrenchBlock,
 )
-from elastocal.procedure.run.faults import Fault, FaultError
 from elastocal.procedure.run.routes import ApproachLine
+from elastocal.procedure.run.steps import Fault, FaultError
 
 _LOOK_AGAIN = 1.0
 """Time after which a tracker that has not found the marker is told again to look, in s."""

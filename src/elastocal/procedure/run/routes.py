@@ -13,9 +13,8 @@ import numpy as np
 from elastocal.arrays import FloatArray
 from elastocal.errors import ProcedureError
 from elastocal.planning import Joints, PlanResult, PoseRecord
-from elastocal.procedure.run.faults import Fault, FaultError
 from elastocal.procedure.run.settings import RunSettings
-from elastocal.procedure.run.steps import Step
+from elastocal.procedure.run.steps import Fault, FaultError, Step
 from elastocal.results import brief_repr
 
 HOME_AT_START = -1

@@ -16,15 +16,23 @@ from elastocal.procedure.record import (
     ReadingStatus,
     StreamRecorder,
 )
-from elastocal.procedure.run._attempt import Attempt
-from elastocal.procedure.run._motion import drive, leave_force_control, retract_to
+from elastocal.procedure.run._attempt import Attempt, drive, leave_force_control, retract_to
 from elastocal.procedure.run._sequence import AttemptFailedError, disarm, halt, run_attempt
 from elastocal.procedure.run._supervisor import Observers, Supervisor
 from elastocal.procedure.run._watchdog import Guard, Snapshot
-from elastocal.procedure.run.faults import EXPECTED_ERRORS, Fault, FaultError, FaultScope, as_fault
 from elastocal.procedure.run.routes import HOME_AT_START, ApproachLine, remaining_times, route
 from elastocal.procedure.run.session import RunEnd, Session, SessionHooks, SessionResult
-from elastocal.procedure.run.steps import ArmLocation, Progress, Step, StepResult
+from elastocal.procedure.run.steps import (
+    EXPECTED_ERRORS,
+    ArmLocation,
+    Fault,
+    FaultError,
+    FaultScope,
+    Progress,
+    Step,
+    StepResult,
+    as_fault,
+)
 
 _REPORT_EVERY = 5
 """Cycles between two reports of progress."""

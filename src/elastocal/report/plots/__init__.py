@@ -1,15 +1,15 @@
 """Figures: matplotlib for paper, Plotly for the screen.
 
 ========================  ====================================================================
-`style`, `printing`       palette, styles of variants, files of figures
-`codec_chart` ...         codecs on paper: errors, compliances, indices; `study_figure`
-`interactive_codec`       the same on the screen
+`style`                   palette, styles of variants, pages in inches, files of figures
+`codec_chart`             errors on paper: of a codec, of a study
+`analysis_charts`         compliances and indices of a codec on paper
+`interactive_codec`       errors and compliances of a codec on the screen
 `plan_figure`             a plan on paper: the surface laid flat, poses of two techniques
 `plan_scene`              a plan in three dimensions: robot, tooling, stations, postures
-`calibration_figures`     readings, residuals, registration and springs of a calibration
-`process_figures`         deviation along a process path before and after correction
-`stiffness_figure`        stiffness over spin and rail along a path
-`recertification_figure`  two calibrations compared
+`spring_figures`          springs of one calibration, and two calibrations compared
+`path_figures`            stiffness along a process path, deviation before and after correction
+`results`                 readings and registration; what `plot` of a workflow's result shows
 ========================  ====================================================================
 """
 

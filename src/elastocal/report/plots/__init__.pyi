@@ -1,13 +1,14 @@
 from . import style as style
-from ._plan_layers import weakest_margins as weakest_margins
-from .calibration_figures import (
-    SpringBar as SpringBar,
-    StationResiduals as StationResiduals,
-    displacement_figure as displacement_figure,
-    pose_grid as pose_grid,
-    spring_bars as spring_bars,
-    spring_figure as spring_figure,
-    station_figure as station_figure,
+from .analysis_charts import (
+    INDEX_NAMES as INDEX_NAMES,
+    KIND_TITLES as KIND_TITLES,
+    SpringBoxes as SpringBoxes,
+    check_indices as check_indices,
+    compliance_chart as compliance_chart,
+    index_chart as index_chart,
+    never_told_apart as never_told_apart,
+    spring_boxes as spring_boxes,
+    spring_scale as spring_scale,
 )
 from .codec_chart import (
     ERROR_PANELS as ERROR_PANELS,
@@ -16,56 +17,54 @@ from .codec_chart import (
     headline as headline,
     how_to_read as how_to_read,
     saturation_words as saturation_words,
-)
-from .compliance_chart import (
-    SpringBoxes as SpringBoxes,
-    compliance_chart as compliance_chart,
-    never_told_apart as never_told_apart,
-    scale_top as scale_top,
-    spring_boxes as spring_boxes,
-)
-from .index_chart import (
-    INDEX_NAMES as INDEX_NAMES,
-    KIND_TITLES as KIND_TITLES,
-    check_indices as check_indices,
-    index_chart as index_chart,
+    study_figure as study_figure,
+    write_study_figures as write_study_figures,
 )
 from .interactive_codec import compliance_views as compliance_views, error_views as error_views
+from .path_figures import (
+    Curve as Curve,
+    course_figure as course_figure,
+    process_maps as process_maps,
+    stiffness_figure as stiffness_figure,
+    write_stiffness_figure as write_stiffness_figure,
+)
 from .plan_figure import (
     plan_figure as plan_figure,
     spread_labels as spread_labels,
     write_plan_figure as write_plan_figure,
 )
-from .plan_scene import PlanView as PlanView, plan_view as plan_view
-from .printing import (
-    SUFFIXES as SUFFIXES,
-    figure_bytes as figure_bytes,
-    literal as literal,
-    new_figure as new_figure,
-    wrapped as wrapped,
-    write_figure as write_figure,
-    write_kinds as write_kinds,
+from .plan_scene import (
+    Layer as Layer,
+    PlanView as PlanView,
+    WeakestMargins as WeakestMargins,
+    plan_view as plan_view,
+    weakest_margins as weakest_margins,
 )
-from .process_figures import course_figure as course_figure, process_maps as process_maps
-from .recertification_figure import (
+from .results import (
+    StationResiduals as StationResiduals,
+    displacement_figure as displacement_figure,
+    drawn as drawn,
+    plot_result as plot_result,
+    pose_grid as pose_grid,
+    station_figure as station_figure,
+)
+from .spring_figures import (
+    SpringBar as SpringBar,
     recertification_figure as recertification_figure,
+    spring_bars as spring_bars,
+    spring_figure as spring_figure,
     write_recertification_figure as write_recertification_figure,
 )
-from .results import drawn as drawn, plot_result as plot_result
-from .stiffness_figure import (
-    Curve as Curve,
-    stiffness_figure as stiffness_figure,
-    write_stiffness_figure as write_stiffness_figure,
-)
-from .study_figure import study_figure as study_figure, write_study_figures as write_study_figures
 from .style import (
     ARM as ARM,
+    BAND as BAND,
     BLUE as BLUE,
     CHOSEN as CHOSEN,
     COLOURS as COLOURS,
     FAINT as FAINT,
     FIXTURE as FIXTURE,
     GREEN as GREEN,
+    GRID as GRID,
     INK as INK,
     MUTED as MUTED,
     ORANGE as ORANGE,
@@ -75,13 +74,22 @@ from .style import (
     SEQUENTIAL as SEQUENTIAL,
     SIGHT as SIGHT,
     SKY as SKY,
+    SUFFIXES as SUFFIXES,
     TOOL as TOOL,
     TOOLING as TOOLING,
     TOUR as TOUR,
     VERMILLION as VERMILLION,
     YELLOW as YELLOW,
+    Page as Page,
     VariantStyle as VariantStyle,
+    figure_bytes as figure_bytes,
+    literal as literal,
+    new_figure as new_figure,
+    open_frame as open_frame,
     print_settings as print_settings,
     tint as tint,
     variant_styles as variant_styles,
+    wrapped as wrapped,
+    write_figure as write_figure,
+    write_kinds as write_kinds,
 )

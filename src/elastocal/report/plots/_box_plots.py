@@ -1,28 +1,24 @@
 """Box plots of codecs: their numbers, the same for print and screen, and their printed panels."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection, PolyCollection
-from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 from matplotlib.ticker import FixedLocator, FuncFormatter, MultipleLocator, NullFormatter
 
 from elastocal.arrays import BoolArray, FloatArray, IndexArray
 from elastocal.errors import CodecError
 from elastocal.report.plots import style
-from elastocal.report.plots.printing import literal
-from elastocal.report.plots.style import VariantStyle, tint
+from elastocal.report.plots.style import Page, VariantStyle, literal, tint
 
 REACH = 1.5
 """Longest reach of a whisker, in heights of the box."""
-BAND = "#f4f4f1"
-"""Behind every second number of training poses: shows which boxes belong together."""
 _LABEL = 0.26
 """Room that the label of a number of training poses takes, in inches."""
-_PALE = 0.55
+PALE = 0.55
 """Part of the colour in the outline of a hollow box."""
 _DECADES = 12.0
 """Largest over smallest value from which on a logarithmic scale reads better."""
@@ -56,14 +52,24 @@ class Boxes:
     """Number of the box, from 0, of each value beyond the whiskers, shape (outlier,)."""
     outlier: FloatArray
     """Those values."""
+    hollow: BoolArray
+    """Which boxes are drawn as pale outlines, since their values are no finding, shape (box,)."""
 
-    def extent(self) -> tuple[float, float]:
-        """Return the smallest and largest value that is drawn."""
-        values = np.concatenate([self.low, self.high, self.outlier])
-        return float(values.min()), float(values.max())
+    def ends(self) -> tuple[FloatArray, FloatArray]:
+        """Return the smallest and the largest value of each box, each of shape (box,)."""
+        lowest, highest = self.low.copy(), self.high.copy()
+        np.minimum.at(lowest, self.outlier_box, self.outlier)
+        np.maximum.at(highest, self.outlier_box, self.outlier)
+        return lowest, highest
 
 
-def make_boxes(values: FloatArray, what: str) -> Boxes:
+def extent(drawn: Iterable[Boxes]) -> tuple[float, float]:
+    """Return the smallest and largest value that is drawn."""
+    ends = np.hstack([each.ends() for each in drawn])
+    return float(ends.min()), float(ends.max())
+
+
+def make_boxes(values: FloatArray, what: str, finding: BoolArray | None = None) -> Boxes:
     """Return the boxes of values; NaN is a value that is missing.
 
     Parameters
@@ -72,6 +78,8 @@ def make_boxes(values: FloatArray, what: str) -> Boxes:
         A figure of each verification set for 1, 2, … training poses.
     what : str
         What it is, for the message of a refusal.
+    finding : ndarray of bool, shape (n_train,), optional
+        For which numbers of training poses the values are a finding; by default all.
 
     Raises
     ------
@@ -102,12 +110,11 @@ def make_boxes(values: FloatArray, what: str) -> Boxes:
         count=finite.sum(axis=0),
         outlier_box=box,
         outlier=values[verification_set, box],
+        hollow=np.zeros(len(drawn), dtype=bool) if finding is None else ~finding[drawn],
     )
 
 
-def draw_boxes(
-    axes: Axes, boxes: Boxes, variant: VariantStyle, hollow: BoolArray | None = None
-) -> None:
+def draw_boxes(axes: Axes, boxes: Boxes, variant: VariantStyle) -> None:
     """Draw the boxes of a variant; limits are left to `finish_axes`.
 
     Parameters
@@ -118,29 +125,24 @@ def draw_boxes(
         In the unit of the panel.
     variant : VariantStyle
         Of the variant.
-    hollow : ndarray, shape (box,), optional
-        Which boxes are drawn as pale outlines.
     """
     x, half = variant.at(boxes.n), 0.5 * variant.width
-    empty = np.zeros(len(x), dtype=bool) if hollow is None else hollow
     left, right = x - half, x + half
-    corners = np.stack(
-        [_points(left, boxes.q1), _points(right, boxes.q1), _points(right, boxes.q3),
-         _points(left, boxes.q3)], axis=1,
-    )  # fmt: skip
-    faces = [style.PAPER if each else variant.fill for each in empty]
-    edges = [tint(variant.colour, _PALE) if each else variant.colour for each in empty]
-    ends = ((boxes.q1, boxes.low), (boxes.q3, boxes.high))
-    for near, far in ends:
-        whiskers = np.stack([_points(x, near), _points(x, far)], axis=1)
+    corners = np.array(
+        [[left, right, right, left], [boxes.q1, boxes.q1, boxes.q3, boxes.q3]]
+    ).T  # fmt: skip
+    faces = [style.PAPER if hollow else variant.fill for hollow in boxes.hollow]
+    edges = [tint(variant.colour, PALE) if hollow else variant.colour for hollow in boxes.hollow]
+    for near, far in ((boxes.q1, boxes.low), (boxes.q3, boxes.high)):
+        whiskers = np.array([[x, x], [near, far]]).T
         axes.add_collection(LineCollection(list(whiskers), colors=edges, lw=0.8, zorder=2))
     axes.add_collection(
         PolyCollection(list(corners), facecolors=faces, edgecolors=edges, lw=0.8, zorder=3)
     )
-    line = np.stack([_points(left, boxes.median), _points(right, boxes.median)], axis=1)
+    line = np.array([[left, right], [boxes.median, boxes.median]]).T
     # A box without height shows nothing but its median, which then has to tell the variant.
     full = np.where(boxes.q3 > boxes.q1, style.INK, variant.colour)
-    inks = np.where(empty, style.REFUSED, full).tolist()
+    inks = np.where(boxes.hollow, style.REFUSED, full).tolist()
     axes.add_collection(LineCollection(list(line), colors=inks, lw=1.3, zorder=4))
     axes.scatter(
         x[boxes.outlier_box], boxes.outlier, s=4.0, linewidths=0, zorder=3, clip_on=True,
@@ -163,7 +165,7 @@ def finish_axes(axes: Axes, last: int, low: float, high: float, log: bool) -> No
         Whether the scale of the values is logarithmic.
     """
     for n in range(2, last + 1, 2):
-        axes.axvspan(n - 0.5, n + 0.5, color=BAND, lw=0, zorder=0)
+        axes.axvspan(n - 0.5, n + 0.5, color=style.BAND, lw=0, zorder=0)
     axes.set_xlim(0.5, last + 0.5)
     if log:
         axes.set_yscale("log")
@@ -175,11 +177,35 @@ def finish_axes(axes: Axes, last: int, low: float, high: float, log: bool) -> No
         margin = 0.05 * (high - min(low, 0.0)) or 1.0
         # A box at zero, where bounded fits put many springs, would hide under the axis.
         axes.set_ylim(min(0.0, low - margin * (low <= 0.0)), high + margin)
-    axes.grid(axis="y", color="#dcdcd8", lw=0.5, zorder=0.5)
-    axes.set_axisbelow(True)
-    axes.spines[["top", "right"]].set_visible(False)
+    style.open_frame(axes, grid="y")
     axes.tick_params(axis="x", length=0)
     axes.tick_params(axis="y", which="both", length=2)
+
+
+def draw_error_panel(
+    axes: Axes, boxes: Sequence[Boxes], styles: Sequence[VariantStyle], last: int, label: str
+) -> None:
+    """Draw boxes beside one another, their values in decades where that reads better.
+
+    Parameters
+    ----------
+    axes : Axes
+        Panel.
+    boxes : sequence of Boxes
+        Of each variant.
+    styles : sequence of VariantStyle
+        Of the variants.
+    last : int
+        Number of groups.
+    label : str
+        Of the values.
+    """
+    low, high = extent(boxes)
+    log = reads_better_in_decades(low, high)
+    for each, variant in zip(boxes, styles, strict=True):
+        draw_boxes(axes, each, variant)
+    finish_axes(axes, last, low, high, log)
+    axes.set_ylabel(f"{label} (log scale)" if log else label)
 
 
 def label_sizes(axes: Axes, last: int, width: float, shown: bool = True) -> None:
@@ -237,23 +263,19 @@ def round_values(low: float, high: float) -> list[float]:
     return [value for value in values if low <= value <= high]
 
 
-def _points(x: FloatArray, y: FloatArray) -> FloatArray:
-    return np.column_stack([x, y])
-
-
 def legend_height(styles: Sequence[VariantStyle], across: float) -> float:
     """Return the height of a legend of some width, both in inches."""
     return ROW * -(-len(styles) // _columns(styles, across))
 
 
 def draw_legend(
-    figure: Figure, styles: Sequence[VariantStyle], left: float, top: float, across: float
+    figure: Page, styles: Sequence[VariantStyle], left: float, top: float, across: float
 ) -> None:
     """Draw the legend.
 
     Parameters
     ----------
-    figure : Figure
+    figure : Page
         Where to.
     styles : sequence of VariantStyle
         Of the variants.
@@ -265,9 +287,8 @@ def draw_legend(
     width, height = figure.get_size_inches()
     figure.legend(
         handles=legend_handles(styles), loc="upper left", ncols=_columns(styles, across),
-        frameon=False,
-        bbox_to_anchor=(left / width, 1.0 - top / height), borderpad=0.0, borderaxespad=0.0,
-        handlelength=1.4, columnspacing=1.6, fontsize=9.0,
+        frameon=False, bbox_to_anchor=(left / width, 1.0 - top / height), borderpad=0.0,
+        borderaxespad=0.0, handlelength=1.4, columnspacing=1.6, fontsize=9.0,
     )  # fmt: skip
 
 

@@ -9,19 +9,22 @@ approximations for rendering complex scenes", in Modeling in Computer Graphics, 
 Vertices in one cell of a grid become their mean; faces and edges that lose a corner go.
 """
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 import plotly.graph_objects as go
 
 from elastocal import shapes
-from elastocal.arrays import BoolArray, FloatArray, IndexArray
+from elastocal.arrays import FloatArray, IndexArray
 from elastocal.cell import TOOLING, Cell
-from elastocal.planning import CollisionScene, collision_scene
+from elastocal.planning import CollisionScene, PlanResult, collision_scene
 from elastocal.planning.surface import Surface
+from elastocal.report.plots import style
+from elastocal.report.plots.style import tint
 
+MOVING_COLOURS = (style.ARM, style.TOOL)
 _SECTIONS = 24
 """Sides of a drawn cylinder."""
 MOST_OF_TOOLING = 60_000
@@ -74,11 +77,11 @@ class RobotSolids:
     """Links, then tool, each in its own frame, as `CollisionScene.moving` orders them."""
 
     @property
-    def on_tool(self) -> BoolArray:
-        """Whether each face of the joined mesh is the tool's, shape (face,)."""
+    def on_tool(self) -> IndexArray:
+        """Whether each face of the joined mesh is the tool's: 1 or else 0, shape (face,)."""
         links = len(self.parts) - len(self.scene.tool)
         sizes = [len(part.faces) for part in self.parts]
-        return np.repeat(np.arange(len(self.parts)) >= links, sizes)
+        return np.repeat((np.arange(len(self.parts)) >= links).astype(np.intp), sizes)
 
     def at(self, q: FloatArray) -> list[Solid]:
         """Return links and tool as one mesh in base, one a configuration.
@@ -177,7 +180,7 @@ def coarsened(solid: Solid, most: int) -> CoarseSolid:
     while True:
         cell = min(cell, coarsest)
         cluster, vertices = _clusters(solid.vertices, cell)
-        faces = _left(cluster[solid.faces])
+        faces = _proper(cluster[solid.faces])
         if len(faces) <= most or cell == coarsest:
             return CoarseSolid(Solid(vertices, faces), cluster, count)
         cell *= _COARSER
@@ -192,12 +195,12 @@ def _clusters(vertices: FloatArray, cell: float) -> tuple[IndexArray, FloatArray
     return cluster, np.stack(sums, axis=1) / count[:, None]
 
 
-def _left(faces: IndexArray) -> IndexArray:
+def _proper(faces: IndexArray) -> IndexArray:
     """Return the faces with three different corners, each once."""
-    a, b, c = faces.T
-    faces = faces[(a != b) & (b != c) & (c != a)]
-    _, first = np.unique(np.sort(faces, axis=1), axis=0, return_index=True)
-    return faces[np.sort(first)]
+    corners = np.sort(faces, axis=1)
+    kept = np.flatnonzero((np.diff(corners, axis=1) != 0).all(axis=1))
+    _, first = np.unique(corners[kept], axis=0, return_index=True)
+    return faces[kept[np.sort(first)]]
 
 
 def solid_trace(
@@ -242,13 +245,79 @@ def single_precision(points: FloatArray) -> Any:
 
 
 def _scale(colours: Sequence[str]) -> list[tuple[float, str]]:
-    stops = []
-    for number, colour in enumerate(colours):
-        stops.append((number / len(colours), _darker(colour)))
-        stops.append(((number + 1) / len(colours), colour))
-    return stops
+    count = len(colours)
+    return [
+        stop
+        for k, colour in enumerate(colours)
+        for stop in ((k / count, tint(colour, _DARK, ground=0)), ((k + 1) / count, colour))
+    ]
 
 
-def _darker(colour: str) -> str:
-    parts = (int(colour[start : start + 2], 16) for start in (1, 3, 5))
-    return "#" + "".join(f"{round(_DARK * part):02x}" for part in parts)
+@dataclass(frozen=True, eq=False)
+class MovingParts:
+    """The robot at HOME and at every pose, with the lines of sight."""
+
+    robot: tuple[Solid, ...]
+    """HOME first."""
+    on_tool: IndexArray
+    """Which part each face of the robot belongs to, shape (face,): 0 the arm, 1 the tool."""
+    light: FloatArray
+    """Unit vector towards the light, shape (3,)."""
+    sight: tuple[FloatArray, ...]
+    """From marker to station and a gap, each of shape (3, 3); NaN where no station sees. Empty in
+    a cell without stations."""
+    note: str = ""
+    """A remark for readers on how the robot is drawn."""
+
+    def frames(self) -> list[Any]:
+        """Return a Plotly frame for every posture: what changes of the first traces."""
+        frames = []
+        for number, robot in enumerate(self.robot):
+            shade = tones(robot, self.light, self.on_tool, len(MOVING_COLOURS))
+            data = [{"type": "mesh3d", **_xyz(robot.vertices), "intensity": shade}]
+            if self.sight:
+                data.append({"type": "scatter3d", **_xyz(self.sight[number])})
+            frames.append(go.Frame(name=str(number), data=data, traces=list(range(len(data)))))
+        return frames
+
+
+def moving_parts(cell: Cell, surface: Surface, plan: PlanResult, light: FloatArray) -> MovingParts:
+    """Return the robot at HOME and in contact at every pose of a plan."""
+    q = np.array([plan.robot.home, *(pose.joints for pose in plan.poses)])
+    whole = robot_solids(cell, surface)
+    drawn = [coarsened(part, MOST_OF_LINK) for part in whole.parts]
+    solids = replace(whole, parts=tuple(part.solid for part in drawn))
+    finer = any(part.note("A part") for part in drawn)
+    note = "Parts of the robot with fine meshes are drawn coarser." if finer else ""
+    seen = [None, *(pose.seen_by for pose in plan.poses)]
+    sight: tuple[FloatArray, ...] = ()
+    if any(seen):
+        tcp = cell.robot.forward(q)
+        sight = tuple(_sight(cell, T, name) for T, name in zip(tcp, seen, strict=True))
+    return MovingParts(tuple(solids.at(q)), solids.on_tool, light, sight, note)
+
+
+def _sight(cell: Cell, T_base_tcp: FloatArray, name: str | None) -> FloatArray:
+    marker = cell.file.marker
+    stations = {station.name: station.position_base for station in cell.file.trackers}
+    if marker is None or name is None or name not in stations:
+        return np.full((3, 3), np.nan)
+    start = T_base_tcp[:3, :3] @ marker.position_tcp + T_base_tcp[:3, 3]
+    return segments([(start, stations[name])])
+
+
+def scatter(
+    points: FloatArray, mode: str, name: str, hoverinfo: str = "skip", **options: object
+) -> Any:
+    """Return a Plotly trace of points or lines, shape (point, 3), in base in m."""
+    return go.Scatter3d(**_xyz(points), mode=mode, name=name, hoverinfo=hoverinfo, **options)
+
+
+def _xyz(points: FloatArray) -> dict[str, Any]:
+    return dict(zip("xyz", single_precision(points), strict=True))
+
+
+def segments(lines: Iterable[Sequence[FloatArray]]) -> FloatArray:
+    """Return separate lines as one array with NaN between them, shape (3 line, 3)."""
+    gap = np.full(3, np.nan)
+    return np.array([row for ends in lines for row in (*ends, gap)]).reshape(-1, 3)

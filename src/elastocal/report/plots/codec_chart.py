@@ -1,38 +1,52 @@
-"""Accuracy competency development chart on paper (paper Fig. 7, 9, 10).
+"""Errors on paper over the number of poses: of a codec (paper Fig. 7, 9, 10) and of a study.
 
-Mean errors above, largest errors below, over the number of training poses; a strip on top tells
-from where on each variant has saturated.
+Mean errors above, largest errors below. Over those of a codec, its accuracy competency development
+chart, a strip tells from where on each variant has saturated.
 """
 
 from collections.abc import Sequence
+from pathlib import Path
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from elastocal.codec import CodecData, Saturation, Verdicts
+from elastocal.codec.study import (
+    SampleResult,
+    StudyDesign,
+    StudySummary,
+    condition_name,
+    value_text,
+)
 from elastocal.report.plots import style
 from elastocal.report.plots._box_plots import (
     Boxes,
-    draw_boxes,
+    draw_error_panel,
     draw_legend,
-    finish_axes,
     label_sizes,
+    legend_handles,
     legend_height,
     make_boxes,
-    reads_better_in_decades,
 )
-from elastocal.report.plots.printing import literal, new_figure
 from elastocal.report.plots.style import VariantStyle, variant_styles
 from elastocal.wording import counted
 
+ERROR_PANELS = {"mean": "Mean error", "max": "Maximum error"}
 _MM = 1e3
 _LEFT, _RIGHT, _BOTTOM, _GAP = 0.75, 0.2, 0.95, 0.2
 """Room about and between the panels, in inches."""
 _PANEL, _ROW = 2.9, 0.34
 """Heights of a panel and of a row of the saturation strip, in inches."""
 _HEADLINE, _STRIP_TITLE = 0.42, 0.22
-ERROR_PANELS = {"mean": "Mean error", "max": "Maximum error"}
+_STUDY_FIGURES = ("study.svg", "study.png")
+"""Names of the files in a study's folder."""
+_STUDY_WIDTH, _STUDY_PANEL, _STUDY_BOTTOM, _STUDY_HEAD = 7.5, 2.6, 0.9, 0.5
+"""In inches."""
+_HOW_TO_READ = (
+    "Line: median; box: quartiles; whiskers: farthest value within 1.5 box heights; dots:"
+    " single {} beyond."
+)
 
 
 def codec_chart(data: CodecData, verdicts: Verdicts, axis: str = "norm") -> Figure:
@@ -59,12 +73,13 @@ def codec_chart(data: CodecData, verdicts: Verdicts, axis: str = "norm") -> Figu
     strip = _ROW * len(styles) if axis == "norm" else 0.0
     over_strip = _STRIP_TITLE + strip + _GAP if strip else 0.0
     head = _HEADLINE + legend_height(styles, across) + (0.02 if strip else 0.12)
-    width, height = _LEFT + across + _RIGHT, head + over_strip + 2 * _PANEL + _GAP + _BOTTOM
-    figure = new_figure(width, height)
+    height = head + over_strip + 2 * _PANEL + _GAP + _BOTTOM
+    figure = style.new_figure(_LEFT + across + _RIGHT, height)
     bottom = _BOTTOM
     for which in reversed(ERROR_PANELS):
-        axes = figure.add_axes((_LEFT / width, bottom / height, across / width, _PANEL / height))
-        _draw_panel(axes, panels[which], styles, last, f"{ERROR_PANELS[which]}{_of(axis)} in mm")
+        axes = figure.add_panel(_LEFT, bottom, across, _PANEL)
+        label = f"{ERROR_PANELS[which]}{_of(axis)} in mm"
+        draw_error_panel(axes, panels[which], styles, last, label)
         label_sizes(axes, last, across, shown=which == "max")
         bottom += _PANEL + _GAP
         if which == "max":
@@ -72,9 +87,10 @@ def codec_chart(data: CodecData, verdicts: Verdicts, axis: str = "norm") -> Figu
         elif strip:
             _mark_saturation(axes, verdicts.saturation, styles)
     if strip:
-        box = (_LEFT / width, bottom / height, across / width, strip / height)
-        _draw_strip(figure.add_axes(box), verdicts, styles, last)
-    _draw_frame(figure, data, styles)
+        _draw_strip(figure.add_panel(_LEFT, bottom, across, strip), verdicts, styles, last)
+    figure.add_title(headline(data), _LEFT)
+    draw_legend(figure, styles, _LEFT, _HEADLINE - 0.02, across)
+    figure.add_caption(how_to_read(data), _LEFT)
     return figure
 
 
@@ -102,18 +118,6 @@ def _panel_width(last: int, variants: int) -> float:
 
 def _of(axis: str) -> str:
     return "" if axis == "norm" else f" along {axis} of base"
-
-
-def _draw_panel(
-    axes: Axes, boxes: Sequence[Boxes], styles: Sequence[VariantStyle], last: int, label: str
-) -> None:
-    extents = np.array([each.extent() for each in boxes])
-    low, high = float(extents.min()), float(extents.max())
-    log = reads_better_in_decades(low, high)
-    for each, variant in zip(boxes, styles, strict=True):
-        draw_boxes(axes, each, variant)
-    finish_axes(axes, last, low, high, log)
-    axes.set_ylabel(f"{label} (log scale)" if log else label)
 
 
 def _mark_saturation(
@@ -146,7 +150,8 @@ def _draw_strip(axes: Axes, verdicts: Verdicts, styles: Sequence[VariantStyle], 
             [x], [y], color=variant.colour, marker=variant.marker, ms=6.5, zorder=3, clip_on=False,
             mfc=variant.colour if found.n_train < last else style.PAPER,
         )  # fmt: skip
-        axes.text(0.5, row + 0.52, literal(saturation_words(found)), fontsize=8.0, va="bottom")
+        words = style.literal(saturation_words(found))
+        axes.text(0.5, row + 0.52, words, fontsize=8.0, va="bottom")
 
 
 def saturation_words(found: Saturation) -> str:
@@ -160,20 +165,6 @@ def saturation_words(found: Saturation) -> str:
     return f"{found.variant}: from {found.n_train} training poses on{steadily} ({between})"
 
 
-def _draw_frame(figure: Figure, data: CodecData, styles: Sequence[VariantStyle]) -> None:
-    """Draw what belongs to all panels: title, legend, how to read it."""
-    width, height = figure.get_size_inches()
-    figure.text(
-        _LEFT / width, 1.0 - 0.1 / height, literal(headline(data)), va="top", fontsize=11.5,
-        weight="bold",
-    )  # fmt: skip
-    draw_legend(figure, styles, _LEFT, _HEADLINE - 0.02, width - _LEFT - _RIGHT)
-    figure.text(
-        _LEFT / width, 0.1 / height, how_to_read(data), va="bottom", fontsize=7.8,
-        color=style.MUTED, linespacing=1.35,
-    )  # fmt: skip
-
-
 def headline(data: CodecData) -> str:
     """Return the title of a codec's charts."""
     poses, splits = counted(len(data.contact), "pose"), counted(len(data.seed_pose), "split")
@@ -185,7 +176,109 @@ def how_to_read(data: CodecData) -> str:
     sets, size = data.verification.shape
     return (
         f"Each box: {counted(sets, 'verification set')} of {counted(size, 'held-out pose')} under"
-        f" load cases {', '.join(data.load_cases)}.\n"
-        "Line: median; box: quartiles; whiskers: farthest value within 1.5 box heights; dots:"
-        " single sets beyond."
+        f" load cases {', '.join(data.load_cases)}.\n{_HOW_TO_READ.format('sets')}"
+    )
+
+
+def write_study_figures(
+    folder: Path, settings: StudyDesign, results: Sequence[SampleResult], record: StudySummary
+) -> list[str]:
+    """Write the chart of a study for print; return the names of the files.
+
+    Raises
+    ------
+    FileAccessError
+        If a file cannot be written.
+    """
+    title = f"{record.cell}: error at unseen poses of {record.samples} simulated arms"
+    description = "; ".join(
+        f"{each.name}: median mean error {_MM * each.error_mean.median:.4f} mm"
+        for each in record.conditions
+    )
+    places = [Path(folder) / name for name in _STUDY_FIGURES]
+    style.write_kinds(places, lambda: study_figure(settings, results, record), title, description)
+    return list(_STUDY_FIGURES)
+
+
+def study_figure(
+    settings: StudyDesign, results: Sequence[SampleResult], record: StudySummary
+) -> Figure:
+    """Return the chart: mean errors above, largest errors below, a group of boxes a pose count.
+
+    Where only one other factor varies and the poses do not, the groups are its values.
+    """
+    along, groups, columns = _study_columns(settings)
+    styles = variant_styles(list(columns))
+    rows = len(styles) if len(styles) > 1 else 0
+    across = _STUDY_WIDTH - _LEFT - 0.2
+    height = _STUDY_HEAD + 0.2 * rows + 2 * _STUDY_PANEL + _GAP + _STUDY_BOTTOM
+    figure = style.new_figure(_STUDY_WIDTH, height)
+    bottom = _STUDY_BOTTOM
+    for which in reversed(ERROR_PANELS):
+        axes = figure.add_panel(_LEFT, bottom, across, _STUDY_PANEL)
+        label = f"{ERROR_PANELS[which]} in mm"
+        boxes = [
+            _study_boxes(results, pairs, len(groups), which, name)
+            for name, pairs in columns.items()
+        ]
+        draw_error_panel(axes, boxes, styles, len(groups), label)
+        lowest = bottom == _STUDY_BOTTOM
+        axes.set_xticks(range(1, len(groups) + 1), groups if lowest else [""] * len(groups))
+        if lowest:
+            poses = along == "poses"
+            axes.set_xlabel("Number of calibration poses" if poses else along.replace("_", " "))
+        if record.target is not None:
+            axes.axhline(_MM * record.target, color=style.INK, lw=0.9, ls=(0, (5, 4)), zorder=1)
+        bottom += _STUDY_PANEL + _GAP
+    _draw_study_frame(figure, record)
+    if rows:
+        figure.legend(
+            handles=legend_handles(styles), loc="upper left", frameon=False, fontsize=9.0,
+            bbox_to_anchor=(_LEFT / _STUDY_WIDTH, 1.0 - 0.35 / height), borderaxespad=0.0,
+        )  # fmt: skip
+    return figure
+
+
+def _study_columns(
+    settings: StudyDesign,
+) -> tuple[str, list[str], dict[str, list[tuple[int, int]]]]:
+    """Return the factor along the axis, its values, and the columns of each name beside another.
+
+    A column is the number of a condition and that of its group.
+    """
+    varied = settings.varied or ("poses",)
+    along = "poses" if "poses" in varied else varied[0]
+    others = [key for key in varied if key != along]
+    groups = list(dict.fromkeys(each.value(along) for each in settings.conditions))
+    if along == "poses":
+        groups.sort()
+    columns: dict[str, list[tuple[int, int]]] = {}
+    for number, condition in enumerate(settings.conditions):
+        name = condition_name(others, condition) if others else "all"
+        columns.setdefault(name, []).append((number, groups.index(condition.value(along))))
+    return along, [value_text(each) for each in groups], columns
+
+
+def _study_boxes(
+    results: Sequence[SampleResult],
+    columns: Sequence[tuple[int, int]],
+    count: int,
+    which: str,
+    name: str,
+) -> Boxes:
+    values = np.full((len(results), count), np.nan)
+    for number, group in columns:
+        errors = [getattr(each.outcomes[number], f"error_{which}") for each in results]
+        values[:, group] = errors
+    return make_boxes(_MM * values, f"{ERROR_PANELS[which]} in mm of {name}")
+
+
+def _draw_study_frame(figure: style.Page, record: StudySummary) -> None:
+    title = f"{record.cell}: error at unseen poses, {record.samples} simulated arms"
+    figure.add_title(title, _LEFT)
+    target = "" if record.target is None else f" Dashed: target, {_MM * record.target:g} mm."
+    figure.add_caption(
+        f"Each box: {record.samples} arms, {record.verification} poses under"
+        f" {', '.join(record.load_cases)}.{target}\n{_HOW_TO_READ.format('arms')}",
+        _LEFT,
     )

@@ -19,8 +19,8 @@ from elastocal.arrays import FloatArray
 from elastocal.planning import PlanResult, PoolData, SpreadRecord, check_pool_of
 from elastocal.planning.surface import Surface
 from elastocal.report.plots import style
-from elastocal.report.plots._flat_map import FlatMap, flat_map
-from elastocal.report.plots.printing import new_figure, write_figure
+from elastocal.report.plots._views import FlatMap, flat_map
+from elastocal.report.plots.style import new_figure, write_figure
 from elastocal.wording import readable
 
 _HEAD, _FOOT, _SIDE = 0.7, 1.95, 0.25

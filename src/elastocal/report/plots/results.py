@@ -1,6 +1,7 @@
-"""Pictures of results: what `plot` of a workflow's result shows."""
+"""Pictures of readings and registration, and what `plot` of a workflow's result shows."""
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from functools import singledispatch
 from typing import ParamSpec
 
@@ -10,7 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from elastocal.arrays import FloatArray
+from elastocal.arrays import BoolArray, FloatArray, IndexArray
 from elastocal.compensation.offline import CorrectionFigures
 from elastocal.compensation.process import SimulateProcessResult
 from elastocal.dataset import Dataset
@@ -20,21 +21,155 @@ from elastocal.identification.recertification import CompareResult
 from elastocal.planning import PlanResult
 from elastocal.procedure import RunSummary
 from elastocal.report.plots import style
-from elastocal.report.plots.calibration_figures import (
-    StationResiduals,
-    pose_grid,
+from elastocal.report.plots.spring_figures import (
+    recertification_figure,
     spring_bars,
     spring_figure,
-    station_figure,
 )
-from elastocal.report.plots.printing import literal, new_figure
-from elastocal.report.plots.recertification_figure import recertification_figure
+from elastocal.report.plots.style import literal, new_figure, open_frame, variant_styles
+from elastocal.results import brief_repr
 
 P = ParamSpec("P")
 _MM = 1e3
 _WIDTH = 7.5
-"""Width of a figure in inches."""
+"""Width of a figure of a result, in inches."""
 _BEFORE, _AFTER = style.VERMILLION, style.BLUE
+_READINGS_WIDTH = 9.0
+_CELL, _HEAD, _AXIS, _LEFT = 0.3, 0.55, 0.5, 0.9
+"""Of a grid of readings, in inches."""
+_MANY = 45
+"""Poses beyond which numbers no longer fit."""
+
+
+@brief_repr
+@dataclass(frozen=True, eq=False)
+class StationResiduals:
+    """Residuals of the registration of one tracker station."""
+
+    station: str
+    poses: tuple[int, ...]
+    residual: FloatArray
+    """Shape (pose, 3), in m."""
+
+
+def displacement_figure(
+    pose: IndexArray, commanded: FloatArray, residual: FloatArray, used: BoolArray
+) -> Figure:
+    """Return the figure.
+
+    Parameters
+    ----------
+    pose : ndarray, shape (reading,)
+        Label of the pose of each reading, in order.
+    commanded, residual : ndarray, shape (reading,)
+        Norms, in m.
+    used : ndarray, shape (reading,), bool
+        Whether a reading entered the fit.
+    """
+    figure = new_figure(_READINGS_WIDTH, 4.0)
+    main, side = figure.subplots(1, 2, width_ratios=(6, 1), sharey=True)
+    x = np.arange(len(pose))
+    for number in np.unique(pose)[1::2]:
+        of = np.flatnonzero(pose == number)
+        main.axvspan(of[0] - 0.5, of[-1] + 0.5, color=style.BAND, lw=0, zorder=0)
+    series = (
+        ("commanded displacement of the tcp", commanded, style.VERMILLION, "^"),
+        ("residual of the fit", residual, style.BLUE, "o"),
+    )
+    edges = np.linspace(0.0, _MM * float(max(commanded.max(), residual.max())), 40)
+    for name, values, colour, marker in series:
+        main.scatter(x, _MM * values, s=13, c=colour, marker=marker, lw=0, label=name, zorder=2)
+        side.hist(
+            _MM * values, bins=edges, orientation="horizontal", color=colour, alpha=0.75, lw=0
+        )
+    if not np.all(used):
+        main.scatter(
+            x[~used], _MM * residual[~used], s=60, facecolors="none", edgecolors=style.INK,
+            marker="s", label="set aside as a blunder", zorder=3,
+        )  # fmt: skip
+    main.set_ylim(bottom=0.0)
+    main.set_xlim(-1, len(pose))
+    main.set(xlabel="reading, pose by pose", ylabel="norm in mm")
+    main.legend(loc="upper center", bbox_to_anchor=(0.5, 1.13), ncols=3, frameon=False)
+    side.set_xlabel("readings")
+    side.xaxis.set_major_locator(MaxNLocator(integer=True, nbins=3))
+    for axes in (main, side):
+        open_frame(axes, grid="y")
+    figure.subplots_adjust(left=0.07, right=0.99, bottom=0.13, top=0.9, wspace=0.05)
+    return figure
+
+
+def pose_grid(
+    panels: Sequence[tuple[str, FloatArray]], poses: Sequence[int], cases: Sequence[str]
+) -> Figure:
+    """Return the figure: a panel below the other, load cases downwards, poses across.
+
+    Parameters
+    ----------
+    panels : sequence of (str, ndarray)
+        Title, and values of shape (pose, load_case) in mm; NaN where there is none.
+    poses : sequence of int
+        Their labels.
+    cases : sequence of str
+        Names of the load cases.
+    """
+    each = _HEAD + _CELL * len(cases)
+    height = each * len(panels) + _AXIS
+    figure = new_figure(_READINGS_WIDTH, height)
+    for number, (title, values) in enumerate(panels):
+        bottom = height - each * (number + 1) + 0.05
+        across = _READINGS_WIDTH - _LEFT - 0.1
+        axes = figure.add_panel(_LEFT, bottom, across, _CELL * len(cases))
+        _draw_shades(axes, title, values, poses, cases)
+        if number == len(panels) - 1:
+            axes.set_xlabel("pose; a cross: no usable reading")
+    return figure
+
+
+def _draw_shades(
+    axes: Axes, title: str, values: FloatArray, poses: Sequence[int], cases: Sequence[str]
+) -> None:
+    top = float(np.nanmax(values)) if np.any(np.isfinite(values)) else 1.0
+    axes.imshow(values.T, cmap=style.SEQUENTIAL, vmin=0.0, vmax=top or 1.0, aspect="auto")
+    axes.set_title(literal(title), loc="left", fontsize=9.0, weight="bold")
+    axes.set_yticks(range(len(cases)), [literal(case) for case in cases])
+    step = max(1, len(poses) // 40 + (len(poses) > 40))
+    axes.set_xticks(range(0, len(poses), step), [str(label) for label in poses[::step]])
+    axes.tick_params(length=0, labelsize=7.5)
+    axes.spines[:].set_visible(False)
+    for (pose, case), value in np.ndenumerate(values):
+        if not np.isfinite(value):
+            axes.text(pose, case, "×", ha="center", va="center", color=style.VERMILLION)
+        elif len(poses) <= _MANY:
+            ink = style.INK if value > 0.55 * top else style.PAPER
+            # In little room: 1.23, .041.
+            text = f"{value:.2f}" if value >= 1.0 else f"{value:.3f}".lstrip("0")
+            axes.text(pose, case, text, ha="center", va="center", color=ink, fontsize=6.0)
+
+
+def station_figure(stations: Sequence[StationResiduals]) -> Figure:
+    """Return the figure: length of the residual vector at each pose, a style a station.
+
+    Parameters
+    ----------
+    stations : sequence of StationResiduals
+        At least one.
+    """
+    figure = new_figure(_READINGS_WIDTH, 2.6)
+    axes = figure.subplots()
+    names = [f"{each.station}, {len(each.poses)} poses" for each in stations]
+    for each, drawn in zip(stations, variant_styles(names), strict=True):
+        size = 1e6 * np.linalg.norm(each.residual, axis=1)
+        axes.vlines(each.poses, 0.0, size, color=drawn.colour, lw=1.0)
+        axes.scatter(
+            each.poses, size, s=18, c=drawn.colour, marker=drawn.marker, label=literal(drawn.name)
+        )
+    axes.set(xlabel="pose", ylabel="residual in µm")
+    axes.set_ylim(bottom=0.0)
+    axes.legend(loc="upper center", bbox_to_anchor=(0.5, 1.22), ncols=4, frameon=False)
+    open_frame(axes, grid="y")
+    figure.subplots_adjust(left=0.07, right=0.99, bottom=0.19, top=0.86)
+    return figure
 
 
 def plot_result(result: object) -> Figure:
@@ -104,15 +239,11 @@ def _plan(plan: PlanResult) -> Figure:
     spans = 1.15 * np.maximum(np.ptp(position, axis=0), 0.05 * np.ptp(position) + 1.0)
     middle = 0.5 * (position.max(axis=0) + position.min(axis=0))
     # One scale for both views, at most as tall as a page.
-    scale = min((_WIDTH - 1.0) / spans[0], 7.5 / (spans[1] + spans[2]))
-    height = float(scale * (spans[1] + spans[2])) + 1.55
-    figure = new_figure(_WIDTH, height)
-    bottom = height - 0.45
-    for axis in (1, 2):
-        tall = float(scale * spans[axis])
-        bottom -= tall + (0.5 if axis == 2 else 0.0)
-        box = (0.8 / _WIDTH, bottom / height, float(scale * spans[0]) / _WIDTH, tall / height)
-        axes = figure.add_axes(box)
+    scale = float(min((_WIDTH - 1.0) / spans[0], 7.5 / (spans[1] + spans[2])))
+    across, *heights = scale * spans
+    figure = new_figure(_WIDTH, sum(heights) + 1.55)
+    for axis, bottom in ((1, heights[1] + 1.1), (2, 0.6)):
+        axes = figure.add_panel(0.8, bottom, across, heights[axis - 1])
         _draw_tour(axes, position[:, [0, axis]], [pose.id for pose in plan.poses])
         for set_limits, k in ((axes.set_xlim, 0), (axes.set_ylim, axis)):
             set_limits(middle[k] - 0.5 * spans[k], middle[k] + 0.5 * spans[k])
@@ -122,9 +253,7 @@ def _plan(plan: PlanResult) -> Figure:
         f"{plan.cell.name}: {len(plan.poses)} poses by {search.name} in visiting order,"
         f" covering radius {_MM * search.covering_radius:.0f} mm"
     )
-    figure.text(
-        0.8 / _WIDTH, 1.0 - 0.12 / height, literal(title), va="top", fontsize=9.5, weight="bold"
-    )
+    figure.add_title(title, 0.8, 9.5, 0.12)
     return figure
 
 
@@ -137,7 +266,7 @@ def _draw_tour(axes: Axes, place: FloatArray, numbers: Sequence[int]) -> None:
             str(number), at, ha="center", va="center", color=style.PAPER, fontsize=0.85 * size,
             bbox={"boxstyle": "circle,pad=0.25", "fc": style.BLUE, "ec": style.PAPER, "lw": 0.5},
         )  # fmt: skip
-    axes.spines[["top", "right"]].set_visible(False)
+    open_frame(axes)
     axes.tick_params(labelsize=7.5)
 
 
@@ -158,7 +287,7 @@ def _prediction(prediction: Prediction) -> Figure:
         axes.axhline(0.0, color=style.FAINT, lw=0.7, zorder=0)
         axes.set_ylabel(f"along {axis} in mm")
         axes.margins(x=0.01)
-        axes.spines[["top", "right"]].set_visible(False)
+        open_frame(axes)
     axes.set_xlabel("row; band: 95 % interval of the fit")
     axes.xaxis.set_major_locator(MaxNLocator(integer=True))
     figure.suptitle(
@@ -233,8 +362,6 @@ def _mean_to_largest(bars: list[_Bar], title: str, decades: bool) -> Figure:
         axes.set_xlim(left=0.0)
     axes.set_xlabel("mm; dot: mean, diamond: largest")
     axes.tick_params(axis="y", length=0)
-    axes.grid(axis="x", color="#e6e6e2", lw=0.5)
-    axes.set_axisbelow(True)
-    axes.spines[["top", "right", "left"]].set_visible(False)
-    figure.text(0.02, 1.0 - 0.12 / height, literal(title), va="top", fontsize=9.5, weight="bold")
+    open_frame(axes, grid="x", colour="#e6e6e2", also="left")
+    figure.add_title(title, 0.02 * _WIDTH, 9.5, 0.12)
     return figure

@@ -1,21 +1,35 @@
-"""One palette and one type for all pictures: told apart by colour-blind readers, and on paper.
+"""One palette, one type and one way to file for all pictures.
 
-Colours are those of M. Okabe and K. Ito, "Color Universal Design", 2008. Shapes or words always
-say the same again, so that no figure needs colour to be read.
+Colours are those of M. Okabe and K. Ito, "Color Universal Design", 2008: told apart by
+colour-blind readers, and on paper. Shapes or words always say the same again, so that no figure
+needs colour to be read. The same figure has the same bytes, and says in words what it shows.
 """
 
-from collections.abc import Sequence
+import io
+import textwrap
+from collections.abc import Callable, Sequence
+from contextlib import ExitStack
 from dataclasses import dataclass
-from typing import Any
+from pathlib import Path
+from typing import Any, Literal
 
+import matplotlib
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
 
 from elastocal.arrays import FloatArray, IndexArray
+from elastocal.errors import FileAccessError
+from elastocal.files import replacing
 
 INK = "#1b1b1b"
 MUTED = "#595959"
 FAINT = "#b5b5b5"
 PAPER = "#ffffff"
+GRID = "#dcdcd8"
+BAND = "#f4f4f1"
+"""Behind every second group of a panel: shows what belongs together."""
 BLUE = "#0072b2"
 SKY = "#56b4e9"
 GREEN = "#009e73"
@@ -34,14 +48,20 @@ TOUR = PURPLE
 REFUSED = "#8c8c8c"
 SEQUENTIAL = "cividis"
 """Colour map of quantities; its order survives colour blindness and grey printing."""
-_FONTS = ("DejaVu Sans",)
-"""Of printed figures; comes with matplotlib."""
 COLOURS = (BLUE, VERMILLION, GREEN, PURPLE, ORANGE, SKY)
+SUFFIXES = (".pdf", ".png", ".svg")
 _MARKERS = "os^Dv"
 """Of medians in print; one less than colours, so that both together repeat late."""
 _SCREEN = {"o": "circle", "s": "square", "^": "triangle-up", "D": "diamond", "v": "triangle-down"}
 _FILL = 0.35
 """Part of the colour in a box; the rest is paper."""
+_DPI = 200
+_UNDATED: dict[str, dict[str, str | None]] = {
+    ".svg": {"Date": None, "Creator": "elastocal"},
+    ".pdf": {"CreationDate": None, "Creator": "elastocal"},
+    ".png": {"Software": "elastocal"},
+}
+"""No date, or the bytes of a figure would change."""
 
 
 @dataclass(frozen=True)
@@ -68,23 +88,6 @@ class VariantStyle:
         return np.asarray(n + self.place, dtype=float)
 
 
-def print_settings() -> dict[Any, Any]:
-    """Return matplotlib's settings of a printed figure; the same figure has the same bytes."""
-    return {
-        "font.family": list(_FONTS),
-        "font.size": 9.0,
-        "text.color": INK,
-        "axes.edgecolor": MUTED,
-        "axes.labelcolor": INK,
-        "xtick.color": INK,
-        "ytick.color": INK,
-        "figure.facecolor": PAPER,
-        "savefig.facecolor": PAPER,
-        "svg.hashsalt": "elastocal",
-        "pdf.fonttype": 42,
-    }
-
-
 def variant_styles(names: Sequence[str]) -> tuple[VariantStyle, ...]:
     """Return the styles of variants, in their order from left to right."""
     step = 0.82 / len(names)
@@ -101,11 +104,11 @@ def variant_styles(names: Sequence[str]) -> tuple[VariantStyle, ...]:
     )
 
 
-def tint(colour: str, part: float = _FILL) -> str:
-    """Return a colour on paper.
+def tint(colour: str, part: float = _FILL, ground: int = 255) -> str:
+    """Return a colour on paper, or on another grey.
 
-    >>> tint("#0072b2", 0.5)
-    '#80b8d8'
+    >>> tint("#0072b2", 0.5), tint("#0072b2", 0.5, ground=0)
+    ('#80b8d8', '#003959')
 
     Parameters
     ----------
@@ -113,6 +116,163 @@ def tint(colour: str, part: float = _FILL) -> str:
         ``#rrggbb``.
     part : float
         How much of it is left, from 0 to 1.
+    ground : int
+        Of each channel: 255 for paper, 0 for black.
     """
     channels = (int(colour[k : k + 2], 16) for k in (1, 3, 5))
-    return "#" + "".join(f"{round(255 + part * (channel - 255)):02x}" for channel in channels)
+    return "#" + "".join(f"{round(ground + part * (each - ground)):02x}" for each in channels)
+
+
+class Page(Figure):
+    """A figure whose parts are placed in inches, from its left and lower edge."""
+
+    def add_panel(self, left: float, bottom: float, width: float, height: float) -> Axes:
+        """Return new axes."""
+        across, tall = self.get_size_inches()
+        return self.add_axes((left / across, bottom / tall, width / across, height / tall))
+
+    def add_title(self, text: str, left: float, size: float = 11.5, top: float = 0.1) -> None:
+        """Write the title, ``top`` below the upper edge."""
+        across, tall = self.get_size_inches()
+        self.text(
+            left / across, 1.0 - top / tall, literal(text), va="top", fontsize=size, weight="bold"
+        )
+
+    def add_caption(self, text: str, left: float, size: float = 7.8, spacing: float = 1.35) -> None:
+        """Write how to read the figure at its foot."""
+        across, tall = self.get_size_inches()
+        self.text(
+            left / across, 0.1 / tall, literal(text), va="bottom", fontsize=size, color=MUTED,
+            linespacing=spacing,
+        )  # fmt: skip
+
+
+def new_figure(width: float, height: float) -> Page:
+    """Return an empty figure of a size in inches, without a window."""
+    figure = Page((width, height))
+    FigureCanvasAgg(figure)
+    return figure
+
+
+def open_frame(
+    axes: Axes, grid: Literal["", "x", "y", "both"] = "", colour: str = GRID, also: str = ""
+) -> None:
+    """Take the upper and right edge off axes, and lay a faint grid under what they show.
+
+    Parameters
+    ----------
+    axes : Axes
+        To change.
+    grid : str
+        Of which axis; empty for no grid.
+    colour : str
+        Of the grid.
+    also : str
+        A further edge to take off, for example ``left``.
+    """
+    axes.spines[["top", "right", *filter(None, [also])]].set_visible(False)
+    if grid:
+        axes.grid(axis=grid, color=colour, lw=0.5)
+        axes.set_axisbelow(True)
+
+
+def literal(text: str) -> str:
+    r"""Return a text whose dollar signs begin no formula.
+
+    >>> literal("a$b")
+    'a\\$b'
+    """
+    return text.replace("$", r"\$")
+
+
+def wrapped(text: str, width: int) -> list[str]:
+    """Return a text in lines of at most ``width`` characters.
+
+    >>> wrapped("one two three", 8)
+    ['one two', 'three']
+    """
+    return textwrap.wrap(text, width, break_long_words=True, break_on_hyphens=False)
+
+
+def print_settings() -> dict[Any, Any]:
+    """Return matplotlib's settings of a printed figure; the same figure has the same bytes."""
+    return {
+        # Comes with matplotlib.
+        "font.family": ["DejaVu Sans"],
+        "font.size": 9.0,
+        "text.color": INK,
+        "axes.edgecolor": MUTED,
+        "axes.labelcolor": INK,
+        "xtick.color": INK,
+        "ytick.color": INK,
+        "figure.facecolor": PAPER,
+        "savefig.facecolor": PAPER,
+        "svg.hashsalt": "elastocal",
+        "pdf.fonttype": 42,
+    }
+
+
+def write_figure(
+    path: Path, draw: Callable[[], Figure], title: str = "", description: str = ""
+) -> Path:
+    """Write a figure, atomically; return its path. See `write_kinds`."""
+    return write_kinds([path], draw, title, description)[0]
+
+
+def write_kinds(
+    paths: Sequence[Path], draw: Callable[[], Figure], title: str = "", description: str = ""
+) -> list[Path]:
+    """Write one figure in several kinds, each atomically; return their paths.
+
+    Parameters
+    ----------
+    paths : sequence of Path
+        The suffix decides the kind: SVG, PNG or PDF.
+    draw : callable
+        Returns the figure; called once, with the settings of print.
+    title, description : str, optional
+        What it is and shows, for readers that cannot see it; kept in the file.
+
+    Raises
+    ------
+    FileAccessError
+        If a suffix is another or a file cannot be written.
+    """
+    paths = [Path(path) for path in paths]
+    for path in paths:
+        if path.suffix.lower() not in SUFFIXES:
+            raise FileAccessError(
+                f"figure {path}: suffix {path.suffix!r} is not one of {', '.join(SUFFIXES)}"
+            )
+    with matplotlib.rc_context(print_settings()), ExitStack() as files:
+        temporary = [files.enter_context(replacing(path)) for path in paths]
+        figure = draw()
+        for path, place in zip(paths, temporary, strict=True):
+            suffix = path.suffix.lower()
+            notes = _metadata(suffix, title, description)
+            figure.savefig(place, format=suffix[1:], dpi=_DPI, metadata=notes)
+    return paths
+
+
+def figure_bytes(draw: Callable[[], Figure], suffix: str, dpi: int) -> bytes:
+    """Return a figure as the bytes of a file; the same figure has the same bytes.
+
+    Parameters
+    ----------
+    draw : callable
+        Returns the figure; called with the settings of print.
+    suffix : str
+        ``.svg``, ``.png`` or ``.pdf``.
+    dpi : int
+        Resolution of what is stored as an image.
+    """
+    buffer = io.BytesIO()
+    with matplotlib.rc_context(print_settings()):
+        draw().savefig(buffer, format=suffix[1:], dpi=dpi, metadata=_metadata(suffix))
+    return buffer.getvalue()
+
+
+def _metadata(suffix: str, title: str = "", description: str = "") -> dict[str, str | None]:
+    """Return what the file says about itself; what is empty is left out."""
+    found = {"Title": title, "Subject" if suffix == ".pdf" else "Description": description}
+    return _UNDATED[suffix] | {key: text for key, text in found.items() if text}

@@ -133,7 +133,7 @@ class CatalogueEntry(StrictModel):
 
     @property
     def sources(self) -> dict[str, str]:
-        """Where each group of numbers was read; groups without a source are left out."""
+        """The source of each group of numbers; groups without a source are left out."""
         return {field: group.source for field, group in self.groups.items() if group.source}
 
     @property

@@ -4,7 +4,6 @@ from .arm import (
     arm_axes as arm_axes,
     arm_base as arm_base,
     arm_joints as arm_joints,
-    arm_tip_at_zero as arm_tip_at_zero,
     nearest_zero as nearest_zero,
     turns as turns,
 )

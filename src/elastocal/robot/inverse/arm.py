@@ -25,6 +25,8 @@ class AxisLines:
     """A point of each line, shape (joint, 3), in m."""
     direction: FloatArray
     """Unit vector of each line, positive rotation about it, shape (joint, 3)."""
+    T_arm_tcp: FloatArray
+    """Tool centre point at q = 0, shape (4, 4), in m."""
 
 
 def arm_joints(robot: Robot) -> tuple[ChainJoint, ...]:
@@ -56,21 +58,13 @@ def arm_base(robot: Robot, external: FloatArray) -> FloatArray:
 
 
 def arm_axes(robot: Robot) -> AxisLines:
-    """Return the axis lines of the arm's joints at q = 0 in the arm frame."""
+    """Return the axis lines of the arm's joints, and its tool, at q = 0 in the arm frame."""
     T, points, directions = np.eye(4), [], []
     for joint in arm_joints(robot):
         T = T @ joint.placement
         points.append(T[:3, 3])
         directions.append(T[:3, :3] @ joint.axis)
-    return AxisLines(np.array(points), np.array(directions))
-
-
-def arm_tip_at_zero(robot: Robot) -> FloatArray:
-    """Return T_arm_tcp at q = 0, shape (4, 4)."""
-    T = np.eye(4)
-    for joint in arm_joints(robot):
-        T = T @ joint.placement
-    return T @ robot.chain.T_last_tip
+    return AxisLines(np.array(points), np.array(directions), T @ robot.chain.T_last_tip)
 
 
 def _motion(joint: ChainJoint, position: FloatArray) -> FloatArray:

@@ -13,7 +13,7 @@ import numpy as np
 from elastocal.arrays import FloatArray
 from elastocal.errors import RobotError
 from elastocal.results import brief_repr
-from elastocal.robot.inverse.arm import AxisLines, arm_axes, arm_base, arm_joints, arm_tip_at_zero
+from elastocal.robot.inverse.arm import AxisLines, arm_axes, arm_base, arm_joints
 from elastocal.robot.inverse.solver import InverseKinematics
 from elastocal.robot.robot import Robot
 from elastocal.robot.transforms import inverse_transform
@@ -257,10 +257,9 @@ def derive_opw(robot: Robot) -> OpwGeometry:
     axes = arm_axes(robot)
     centre = _wrist_centre(robot, axes)
     T_arm_opw = _opw_base(axes)
-    T_arm_tcp = arm_tip_at_zero(robot)
-    parameters = _parameters(axes, centre, T_arm_opw, T_arm_tcp[:3, 3])
+    parameters = _parameters(axes, centre, T_arm_opw)
     T_arm_flange = T_arm_opw @ parameters.forward(np.array(parameters.offsets))
-    T_flange_tcp = inverse_transform(T_arm_flange) @ T_arm_tcp
+    T_flange_tcp = inverse_transform(T_arm_flange) @ axes.T_arm_tcp
     deviation = _deviation(robot, parameters, T_arm_opw, T_flange_tcp)
     if not deviation <= _EXACT:
         raise NotOrthoParallelError(
@@ -312,13 +311,11 @@ def _opw_base(axes: AxisLines) -> FloatArray:
     return T
 
 
-def _parameters(
-    axes: AxisLines, centre: FloatArray, T_arm_opw: FloatArray, tip: FloatArray
-) -> OpwParameters:
+def _parameters(axes: AxisLines, centre: FloatArray, T_arm_opw: FloatArray) -> OpwParameters:
     """Read lengths, senses and zero angles off the axes in the OPW base frame."""
     R, origin = T_arm_opw[:3, :3], T_arm_opw[:3, 3]
     p, d = (axes.point - origin) @ R, axes.direction @ R
-    centre, tip = (centre - origin) @ R, (tip - origin) @ R
+    centre, tip = (centre - origin) @ R, (axes.T_arm_tcp[:3, 3] - origin) @ R
     y = np.array([0.0, 1.0, 0.0])
     upper_arm = p[2] - p[1]
     theta2 = np.arctan2(upper_arm[0], upper_arm[2])

@@ -1,9 +1,9 @@
 """Elastic arms that share no equation with the estimator.
 
 ===============  ==============================================================================
-`linkage`        the rigid arm, read from a URDF with `xml.etree`; products of exponentials
-`inverse`        its inverse kinematics
-`springs`        torque laws of springs and gears, and where the springs sit
+`linkage`        the rigid arm, read from a URDF with `xml.etree`; products of exponentials, inverse
+`springs`        torque laws of single springs, and where the springs sit
+`gears`          a bank of springs whose gears stiffen, lose way and remember; a balancer
 `statics`        potential energy under dead loads, with exact derivatives, and its minimum
 `elastic_arm`    `ElasticArm`: deflection of the true arm; ready-made arms
 `measurement`    calibration poses, load cases, and what Procedure 1 records

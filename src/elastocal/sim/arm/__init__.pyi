@@ -6,24 +6,24 @@ from .elastic_arm import (
     TRANSVERSE_RATIO as TRANSVERSE_RATIO,
     ElasticArm as ElasticArm,
     Equilibrium as Equilibrium,
-    as_triple as as_triple,
     bearing_truth as bearing_truth,
-    link_vector as link_vector,
-    transverse_axes as transverse_axes,
     with_link_bending as with_link_bending,
     with_stiffening_gears as with_stiffening_gears,
 )
-from .inverse import (
-    InverseResult as InverseResult,
-    pose_error as pose_error,
-    solve_inverse as solve_inverse,
+from .gears import (
+    BalancerSpring as BalancerSpring,
+    GearLaws as GearLaws,
+    RobotSprings as RobotSprings,
 )
 from .linkage import (
+    InverseResult as InverseResult,
     Linkage as Linkage,
     PointMass as PointMass,
     Screws as Screws,
     motions as motions,
     moved_axes as moved_axes,
+    pose_error as pose_error,
+    solve_inverse as solve_inverse,
 )
 from .measurement import (
     LOAD_CASES as LOAD_CASES,
@@ -42,11 +42,15 @@ from .springs import (
     CubicGear as CubicGear,
     Linear as Linear,
     SpringChain as SpringChain,
+    SpringResponse as SpringResponse,
     TorqueLaw as TorqueLaw,
     TruthSpring as TruthSpring,
-    TwoSlopeGear as TwoSlopeGear,
+    as_triple as as_triple,
+    axial_spring as axial_spring,
     build_spring_chain as build_spring_chain,
-    gear_softening as gear_softening,
+    joint_index as joint_index,
+    link_hinges as link_hinges,
+    tilt_springs as tilt_springs,
 )
 from .statics import (
     DeadLoads as DeadLoads,
@@ -54,5 +58,4 @@ from .statics import (
     EquilibriumError as EquilibriumError,
     LoadedMechanism as LoadedMechanism,
     SpringBank as SpringBank,
-    minimise as minimise,
 )

@@ -6,6 +6,7 @@ laws that need not be linear, springs that need not sit at joints, and gravity. 
 go from what the estimator can express to what it cannot.
 """
 
+import itertools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
@@ -13,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from elastocal.arrays import FloatArray
-from elastocal.errors import RobotError, SpringError, nearest
+from elastocal.errors import RobotError, SpringError
 from elastocal.sim.arm.linkage import Linkage
 from elastocal.sim.arm.springs import (
     CubicGear,
@@ -21,9 +22,13 @@ from elastocal.sim.arm.springs import (
     SpringChain,
     TorqueLaw,
     TruthSpring,
+    axial_spring,
     build_spring_chain,
+    joint_index,
+    link_hinges,
+    tilt_springs,
 )
-from elastocal.sim.arm.statics import DeadLoads, LoadedMechanism, minimise
+from elastocal.sim.arm.statics import DeadLoads, LoadedMechanism
 
 GRAVITY = (0.0, 0.0, -9.80665)
 """Standard gravity (CGPM 1901) in the base of an upright robot, in m/s²."""
@@ -87,9 +92,7 @@ class ElasticArm:
         object.__setattr__(self, "_chain", chain)
         object.__setattr__(self, "springs", chain.springs)
 
-    def equilibrium(
-        self, q: ArrayLike, force: ArrayLike, moment: ArrayLike = (0.0, 0.0, 0.0)
-    ) -> Equilibrium:
+    def equilibrium(self, q: ArrayLike, force: ArrayLike) -> Equilibrium:
         """Return the stable rest position under a load that keeps its direction in base.
 
         Parameters
@@ -98,9 +101,6 @@ class ElasticArm:
             Commanded joint positions in rad or m.
         force : array_like, shape (..., 3)
             Force on the robot at the TCP, in base, in N.
-        moment : array_like, shape (..., 3)
-            Moment on the robot in base, in N·m. It is made of dead forces on a unit cross fixed
-            in the tool (Ziegler's semi-tangential moment), so that it has a potential.
 
         Raises
         ------
@@ -109,15 +109,14 @@ class ElasticArm:
         RobotError
             If shapes do not fit or a value is not finite.
         """
-        q, force, moment = self._checked(q, force, moment)
+        q, force = self._checked(q, force)
         batch = q.shape[:-1]
-        flat_q, flat_force, flat_moment = (a.reshape(-1, a.shape[-1]) for a in (q, force, moment))
-        nothing = np.zeros_like(flat_force)
+        flat_q, flat_force = q.reshape(-1, q.shape[-1]), force.reshape(-1, 3)
         theta = np.zeros((len(flat_q), len(self.springs)))
         if any(self.gravity):
-            theta, _ = _rest(self._mechanism(flat_q, nothing, nothing), theta)
+            theta, _ = self._rest(flat_q, np.zeros_like(flat_force), theta)
         unloaded = self._tip(flat_q, theta)
-        theta, imbalance = _rest(self._mechanism(flat_q, flat_force, flat_moment), theta)
+        theta, imbalance = self._rest(flat_q, flat_force, theta)
         loaded = self._tip(flat_q, theta)
         return Equilibrium(
             theta=theta.reshape(*batch, -1),
@@ -133,58 +132,38 @@ class ElasticArm:
         return flat.reshape(*q.shape[:-1], 3)
 
     def _tip(self, q: FloatArray, theta: FloatArray) -> FloatArray:
-        nothing = np.zeros((len(q), 3))
-        total = self._mechanism(q, nothing, nothing).motions(theta)
+        total = self._mechanism(q, np.zeros((len(q), 3))).motions(theta)
         tip: FloatArray = (total[-1] @ self.linkage.T_base_tip)[:, :3, 3]
         return tip
 
-    def _mechanism(self, q: FloatArray, force: FloatArray, moment: FloatArray) -> LoadedMechanism:
-        chain = self._chain
-        held = np.zeros((len(q), chain.ends[-1]))
-        held[:, chain.motor_elements] = q
+    def _rest(
+        self, q: FloatArray, force: FloatArray, start: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return spring positions of least energy, and the torque left over, for a batch."""
+        mechanism = self._mechanism(q, force)
+        undeformed = mechanism.load_points(mechanism.motions(np.zeros_like(start)))
+        theta, state = mechanism.rest(start, undeformed, _BALANCE)
+        return theta, np.abs(state.gradient).max(axis=1)
+
+    def _mechanism(self, q: FloatArray, force: FloatArray) -> LoadedMechanism:
+        """Return the arm under a force at its tip and the weight of its links."""
+        chain, weighty = self._chain, self.linkage.masses if any(self.gravity) else ()
+        points = [self.linkage.T_base_tip[:3, 3], *(body.centre for body in weighty)]
+        after = [chain.ends[-1], *(chain.ends[body.joint - 1] for body in weighty)]
+        weights = [np.broadcast_to(b.mass * np.array(self.gravity), force.shape) for b in weighty]
+        loads = DeadLoads(np.array(points), np.array(after), np.stack([force, *weights], axis=1))
         laws = [spring.law for spring in self.springs]
-        loads = self._loads(q, force, moment)
-        return LoadedMechanism(chain.screws, chain.spring_elements, laws, held, loads)
+        return LoadedMechanism(chain.screws, chain.spring_elements, laws, chain.held(q), loads)
 
-    def _loads(self, q: FloatArray, force: FloatArray, moment: FloatArray) -> DeadLoads:
-        """Return the tip force, the moment's cross of forces, and the links' weights."""
-        T_base_tip = self.linkage.T_base_tip
-        tip = T_base_tip[:3, 3]
-        points, after = [tip], [self._chain.ends[-1]]
-        forces = [force]
-        if np.any(moment):
-            tool = self.linkage.forward(q)[:, :3, :3]
-            for k in range(3):
-                arm_force = 0.5 * np.cross(moment, tool[:, :, k])
-                points += [tip + T_base_tip[:3, k], tip]
-                after += 2 * [self._chain.ends[-1]]
-                forces += [arm_force, -arm_force]
-        for body in self.linkage.masses if any(self.gravity) else ():
-            points.append(body.centre)
-            after.append(self._chain.ends[body.joint - 1])
-            forces.append(np.broadcast_to(body.mass * np.array(self.gravity), force.shape))
-        return DeadLoads(np.array(points), np.array(after), np.stack(forces, axis=1))
-
-    def _checked(self, q: ArrayLike, *loads: ArrayLike) -> tuple[FloatArray, ...]:
-        arrays = [np.asarray(q, dtype=float), *(np.asarray(a, dtype=float) for a in loads)]
-        for array, width in zip(arrays, (len(self.linkage.joint_names), 3, 3), strict=True):
+    def _checked(self, q: ArrayLike, force: ArrayLike) -> tuple[FloatArray, FloatArray]:
+        q, force = np.asarray(q, dtype=float), np.asarray(force, dtype=float)
+        for array, width in ((q, len(self.linkage.joint_names)), (force, 3)):
             if array.ndim == 0 or array.shape[-1] != width:
                 raise RobotError(f"array of shape {array.shape}: the last axis must be {width}")
             if not np.all(np.isfinite(array)):
-                raise RobotError("joints, forces and moments of the truth must be finite")
-        batch = np.broadcast_shapes(*(array.shape[:-1] for array in arrays))
-        return tuple(np.broadcast_to(a, (*batch, a.shape[-1])) for a in arrays)
-
-
-def _rest(mechanism: LoadedMechanism, start: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return spring positions of least energy, and the torque left over, for a batch."""
-    undeformed = mechanism.load_points(mechanism.motions(np.zeros_like(start)))
-    reach = np.linalg.norm(undeformed, axis=-1).T
-    scale = np.sum(np.linalg.norm(mechanism.loads.force, axis=-1) * (1.0 + reach), axis=1)
-    theta, state = minimise(
-        lambda positions: mechanism.evaluate(positions, undeformed), start, _BALANCE * scale
-    )
-    return theta, np.abs(state.gradient).max(axis=1)
+                raise RobotError("joints and forces of the truth must be finite")
+        batch = np.broadcast_shapes(q.shape[:-1], force.shape[:-1])
+        return np.broadcast_to(q, (*batch, q.shape[-1])), np.broadcast_to(force, (*batch, 3))
 
 
 def bearing_truth(
@@ -223,13 +202,10 @@ def bearing_truth(
     for label, array, shape in (("axial", axial, (count,)), ("transverse", transverse, (count, 2))):
         if array.shape != shape:
             raise SpringError(f"{label} stiffness has shape {array.shape}, must be {shape}")
-    springs = []
-    for joint, name in enumerate(linkage.joint_names):
-        axis = linkage.axis[joint]
-        law = Linear(float(axial[joint]))
-        springs.append(TruthSpring(name, as_triple(axis), law, linkage.revolute[joint]))
-        for direction, stiffness in zip(transverse_axes(axis), transverse[joint], strict=True):
-            springs.append(TruthSpring(name, as_triple(direction), Linear(float(stiffness))))
+    springs: list[TruthSpring] = []
+    for joint, (stiffness, tilts) in enumerate(zip(axial, transverse, strict=True)):
+        springs.append(axial_spring(linkage, joint, float(stiffness)))
+        springs += tilt_springs(linkage, joint, tilts)
     return ElasticArm(linkage, tuple(springs), gravity)
 
 
@@ -255,13 +231,8 @@ def with_link_bending(
     SpringError
         If a joint is unknown, last, or has the next one at its own origin.
     """
-    hinges = []
-    for joint, k in stiffness.items():
-        link = link_vector(arm.linkage, joint)
-        at = as_triple(fraction * link)
-        for direction in transverse_axes(link / np.linalg.norm(link)):
-            hinges.append(TruthSpring(joint, as_triple(direction), Linear(k), distal=True, at=at))
-    return replace(arm, springs=(*arm.springs, *hinges))
+    hinges = [link_hinges(arm.linkage, joint, k, fraction) for joint, k in stiffness.items()]
+    return replace(arm, springs=(*arm.springs, *itertools.chain(*hinges)))
 
 
 def with_stiffening_gears(
@@ -285,7 +256,7 @@ def with_stiffening_gears(
     """
     joints = arm.linkage.joint_names if joints is None else joints
     for joint in joints:
-        _joint_index(arm.linkage, joint)
+        joint_index(arm.linkage, joint)
 
     def stiffened(spring: TruthSpring) -> TorqueLaw:
         gear = spring.joint in joints and _is_axial(arm.linkage, spring)
@@ -298,40 +269,6 @@ def with_stiffening_gears(
 
 
 def _is_axial(linkage: Linkage, spring: TruthSpring) -> bool:
-    axis = linkage.axis[_joint_index(linkage, spring.joint)]
+    axis = linkage.axis[joint_index(linkage, spring.joint)]
     aligned = np.allclose(np.cross(axis, spring.axis), 0.0, atol=1e-9)
     return spring.revolute and not any(spring.at) and bool(aligned)
-
-
-def link_vector(linkage: Linkage, joint: str) -> FloatArray:
-    """Return the next joint's origin in this joint's moving frame, shape (3,), in m."""
-    index = _joint_index(linkage, joint)
-    if index + 1 < len(linkage.joint_names):
-        here, following = linkage.T_base_joint[index : index + 2]
-        link: FloatArray = here[:3, :3].T @ (following[:3, 3] - here[:3, 3])
-        if np.linalg.norm(link) > 1e-6:
-            return link
-    raise SpringError(f"the link behind joint {joint!r} has no length: it cannot bend")
-
-
-def _joint_index(linkage: Linkage, joint: str) -> int:
-    names = linkage.joint_names
-    if joint not in names:
-        raise SpringError(f"no joint {joint!r}{nearest(joint, names)} (joints: {', '.join(names)})")
-    return names.index(joint)
-
-
-def transverse_axes(axis: FloatArray) -> list[FloatArray]:
-    """Return the coordinate axes least aligned with a unit vector, made orthonormal to it."""
-    least = sorted(range(3), key=lambda k: (round(abs(float(axis[k])), 9), k))[:2]
-    first, second = (np.eye(3)[k] for k in sorted(least))
-    first = first - axis * (axis @ first)
-    first /= np.linalg.norm(first)
-    second = second - axis * (axis @ second) - first * (first @ second)
-    return [first, second / np.linalg.norm(second)]
-
-
-def as_triple(vector: FloatArray) -> tuple[float, float, float]:
-    """Return a vector of three as plain numbers."""
-    x, y, z = (float(value) for value in vector)
-    return x, y, z

@@ -1,4 +1,4 @@
-"""The rigid linkage of the simulated arm, read from a URDF without any robotics library.
+"""The rigid linkage of the simulated arm: its URDF, forward and inverse kinematics.
 
 Only `xml.etree` and numpy: a mistake in the estimator's URDF reader must show up as a difference,
 not be repeated here. Every movement, of a joint or of a spring, is a screw written down once, in
@@ -9,6 +9,7 @@ base, with the arm at zero (Brockett's product of exponentials; Lynch and Park, 
 import xml.etree.ElementTree as ElementTree
 from dataclasses import dataclass
 from functools import cached_property
+from xml.etree.ElementTree import Element
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -18,6 +19,11 @@ from elastocal.errors import RobotError
 from elastocal.results import brief_repr
 
 _MOVABLE = ("revolute", "continuous", "prismatic")
+_DAMPING = 1e-3
+"""Largest damping; it falls with the square of the error, so that the last steps are Newton's."""
+_MAX_STEP = 0.5
+"""Largest change of a joint in one iteration, in rad or m."""
+_MAX_ITERATIONS = 60
 
 
 @brief_repr
@@ -162,9 +168,9 @@ class Linkage:
         parents = {_link(joint, "child"): joint for joint in root.findall("joint")}
         path = _path(parents, tip, base)
         movable = [joint for joint in path if joint.get("type") != "fixed"]
-        frames = _frames_at_zero(parents, path)
+        links = _links_at_zero(parents, _link(path[0], "parent"), movable)
         limits = np.array([_limits(joint) for joint in movable]).reshape(-1, 2)
-        T_base_joint = [frames[_link(joint, "child")] for joint in movable]
+        T_base_joint = [links[_link(joint, "child")][0] for joint in movable]
         return cls(
             joint_names=tuple(joint.get("name", "") for joint in movable),
             T_base_joint=np.array(T_base_joint).reshape(-1, 4, 4),
@@ -172,8 +178,8 @@ class Linkage:
             revolute=tuple(joint.get("type") != "prismatic" for joint in movable),
             lower=limits[:, 0],
             upper=limits[:, 1],
-            T_base_tip=frames[tip],
-            masses=_masses(root, parents, movable, frames),
+            T_base_tip=links[tip][0],
+            masses=_masses(root, links),
             name=root.get("name", "unnamed"),
             urdf=text,
             tip=tip,
@@ -222,11 +228,88 @@ class Linkage:
         return np.concatenate([linear, np.where(turns, axis, 0.0)], axis=-1).transpose(1, 2, 0)
 
 
-def _path(
-    parents: dict[str, ElementTree.Element], tip: str, base: str | None
-) -> list[ElementTree.Element]:
+@brief_repr
+@dataclass(frozen=True)
+class InverseResult:
+    """Joint positions for a batch of poses."""
+
+    q: FloatArray
+    """Shape (batch, joint), in rad or m."""
+    ok: BoolArray
+    """Whether each pose is reached within the tolerance, shape (batch,)."""
+
+
+def solve_inverse(
+    linkage: Linkage,
+    T_base_tip: FloatArray,
+    start: FloatArray,
+    tolerance: float = 1e-11,
+    locked: int = 0,
+) -> InverseResult:
+    """Return joint positions that bring the tip of the rigid arm to the poses.
+
+    Levenberg's step ``J^T (J J^T + d² I)^{-1} e`` with ``d²`` proportional to ``|e|²`` (Sugihara,
+    "Solvability-unconcerned inverse kinematics by the Levenberg-Marquardt method", IEEE Trans.
+    Robotics 27, 2011). Limits are not looked at.
+
+    Parameters
+    ----------
+    linkage : Linkage
+        The arm.
+    T_base_tip : ndarray, shape (batch, 4, 4)
+        Poses to reach.
+    start : ndarray, shape (batch, joint)
+        Where to start; decides the posture that is found.
+    tolerance : float
+        Largest error that counts as reached, in m and rad.
+    locked : int
+        Number of joints, from the base on, that stand still.
+    """
+    q = np.array(start, dtype=float)
+    error = pose_error(linkage.forward(q), T_base_tip)
+    for _ in range(_MAX_ITERATIONS):
+        if np.all(np.abs(error) <= tolerance):
+            break
+        J = linkage.jacobian(q)[:, :, locked:]
+        damping = _DAMPING * np.minimum(1.0, np.sum(error**2, axis=1))
+        normal = J @ J.transpose(0, 2, 1) + (damping + 1e-14)[:, None, None] * np.eye(6)
+        step = (J.transpose(0, 2, 1) @ np.linalg.solve(normal, error[..., None]))[..., 0]
+        largest = np.abs(step).max(axis=1, keepdims=True)
+        q[:, locked:] += step * np.minimum(1.0, _MAX_STEP / np.maximum(largest, 1e-300))
+        error = pose_error(linkage.forward(q), T_base_tip)
+    return InverseResult(q, np.all(np.abs(error) <= tolerance, axis=1))
+
+
+def pose_error(T_base_now: FloatArray, T_base_goal: FloatArray) -> FloatArray:
+    """Return translation in m over rotation vector in rad from one pose to another, in base.
+
+    Parameters
+    ----------
+    T_base_now, T_base_goal : ndarray, shape (batch, 4, 4)
+
+    Returns
+    -------
+    ndarray, shape (batch, 6)
+    """
+    turn = T_base_goal[:, :3, :3] @ T_base_now[:, :3, :3].transpose(0, 2, 1)
+    skew = 0.5 * np.stack(
+        [
+            turn[:, 2, 1] - turn[:, 1, 2],
+            turn[:, 0, 2] - turn[:, 2, 0],
+            turn[:, 1, 0] - turn[:, 0, 1],
+        ],
+        axis=1,
+    )
+    sine = np.linalg.norm(skew, axis=1)
+    angle = np.arctan2(sine, 0.5 * (np.trace(turn, axis1=1, axis2=2) - 1.0))
+    factor = np.where(sine > 1e-9, angle / np.maximum(sine, 1e-9), 1.0)
+    shift = T_base_goal[:, :3, 3] - T_base_now[:, :3, 3]
+    return np.concatenate([shift, factor[:, None] * skew], axis=1)
+
+
+def _path(parents: dict[str, Element], tip: str, base: str | None) -> list[Element]:
     """Return the joints from base to tip, in that order."""
-    path: list[ElementTree.Element] = []
+    path: list[Element] = []
     link = tip
     while link != base and link in parents and parents[link] not in path:
         path.append(parents[link])
@@ -242,65 +325,53 @@ def _path(
     return path[::-1]
 
 
-def _frames_at_zero(
-    parents: dict[str, ElementTree.Element], path: list[ElementTree.Element]
-) -> dict[str, FloatArray]:
-    """Return T_base_link of every link that hangs on the path, all joints at zero."""
-    frames = {_link(path[0], "parent"): np.eye(4)}
-    waiting = list(frames)
+def _links_at_zero(
+    parents: dict[str, Element], base: str, movable: list[Element]
+) -> dict[str, tuple[FloatArray, int]]:
+    """Return T_base_link and the number of joints in front of every link that hangs on the base.
+
+    All joints are at zero; those beside the chain stay there.
+    """
+    links = {base: (np.eye(4), 0)}
+    waiting = [base]
     while waiting:
         parent = waiting.pop()
+        T_base_parent, in_front = links[parent]
         for child, joint in parents.items():
-            if _link(joint, "parent") == parent and child not in frames:
-                frames[child] = frames[parent] @ _origin(joint)
+            if _link(joint, "parent") == parent and child not in links:
+                number = movable.index(joint) + 1 if joint in movable else in_front
+                links[child] = (T_base_parent @ _origin(joint), number)
                 waiting.append(child)
-    return frames
+    return links
 
 
-def _masses(
-    root: ElementTree.Element,
-    parents: dict[str, ElementTree.Element],
-    movable: list[ElementTree.Element],
-    frames: dict[str, FloatArray],
-) -> tuple[PointMass, ...]:
-    """Return the links that move with the chain; joints beside it stay locked at zero."""
+def _masses(root: Element, links: dict[str, tuple[FloatArray, int]]) -> tuple[PointMass, ...]:
+    """Return the links that move with the chain and have a mass."""
     masses = []
     for link in root.findall("link"):
-        name, inertial = link.get("name", ""), link.find("inertial")
-        joint = _joints_in_front(name, parents, movable)
-        element = None if inertial is None else inertial.find("mass")
-        if inertial is None or element is None or joint == 0 or name not in frames:
-            continue
-        centre = (frames[name] @ _origin(inertial))[:3, 3]
-        masses.append(PointMass(joint, float(element.get("value", "0")), centre))
+        inertial, element = link.find("inertial"), link.find("inertial/mass")
+        T_base_link, joint = links.get(link.get("name", ""), (np.eye(4), 0))
+        if inertial is not None and element is not None and joint > 0:
+            centre = (T_base_link @ _origin(inertial))[:3, 3]
+            masses.append(PointMass(joint, float(element.get("value", "0")), centre))
     return tuple(mass for mass in masses if mass.mass > 0.0)
 
 
-def _joints_in_front(
-    link: str, parents: dict[str, ElementTree.Element], movable: list[ElementTree.Element]
-) -> int:
-    while link in parents:
-        if parents[link] in movable:
-            return movable.index(parents[link]) + 1
-        link = _link(parents[link], "parent")
-    return 0
-
-
-def _link(joint: ElementTree.Element, role: str) -> str:
+def _link(joint: Element, role: str) -> str:
     element = joint.find(role)
     if element is None or not element.get("link"):
         raise RobotError(f"URDF joint {joint.get('name')!r} has no {role} link")
     return element.get("link", "")
 
 
-def _limits(joint: ElementTree.Element) -> tuple[float, float]:
+def _limits(joint: Element) -> tuple[float, float]:
     limit = joint.find("limit")
     if limit is None or joint.get("type") == "continuous":
         return -np.inf, np.inf
     return float(limit.get("lower", "0")), float(limit.get("upper", "0"))
 
 
-def _axis(joint: ElementTree.Element) -> FloatArray:
+def _axis(joint: Element) -> FloatArray:
     element = joint.find("axis")
     axis = _numbers(element, "xyz", "1 0 0")
     length = float(np.linalg.norm(axis))
@@ -309,7 +380,7 @@ def _axis(joint: ElementTree.Element) -> FloatArray:
     return axis / length
 
 
-def _origin(owner: ElementTree.Element) -> FloatArray:
+def _origin(owner: Element) -> FloatArray:
     """Return the transform of an ``<origin>``: roll, pitch, yaw about the fixed x, y, z."""
     element = owner.find("origin")
     (sr, sp, sy), (cr, cp, cy) = (f(_numbers(element, "rpy", "0 0 0")) for f in (np.sin, np.cos))
@@ -322,6 +393,6 @@ def _origin(owner: ElementTree.Element) -> FloatArray:
     return transform
 
 
-def _numbers(element: ElementTree.Element | None, key: str, default: str) -> FloatArray:
+def _numbers(element: Element | None, key: str, default: str) -> FloatArray:
     text = default if element is None else element.get(key, default)
     return np.array([float(word) for word in text.split()])

@@ -19,8 +19,7 @@ from elastocal.arrays import FloatArray
 from elastocal.dataset import Dataset
 from elastocal.errors import DatasetError, UnreachableError
 from elastocal.sim.arm.elastic_arm import ElasticArm
-from elastocal.sim.arm.inverse import solve_inverse
-from elastocal.sim.arm.linkage import Linkage
+from elastocal.sim.arm.linkage import Linkage, solve_inverse
 
 LOAD_CASES = ("normal", "north", "south", "east", "west")
 """The load cases of paper section 4.1."""
@@ -313,7 +312,7 @@ def press_poses(
     for _ in range(_ATTEMPTS):
         open_poses = np.flatnonzero(np.isnan(joints[:, 0]))
         if not len(open_poses):
-            return PressPoses(joints, goals)
+            break
         turn = _about_z(rng.uniform(-spin, spin, len(open_poses)))
         goals[open_poses, :3, :3] = frames[open_poses] @ turn
         found = solve_inverse(linkage, goals[open_poses], start[open_poses])
@@ -321,13 +320,13 @@ def press_poses(
         usable = found.ok & inside
         joints[open_poses[usable]] = found.q[usable]
     missing = np.flatnonzero(np.isnan(joints[:, 0]))
-    if not len(missing):
-        return PressPoses(joints, goals)
-    where = ", ".join(f"{value:.3f}" for value in points[missing[0]])
-    raise UnreachableError(
-        f"{linkage.name} cannot press at ({where}) m within its joint limits: none of {_ATTEMPTS}"
-        f" spins is reached, and so for {len(missing)} of {count} points"
-    )
+    if len(missing):
+        where = ", ".join(f"{value:.3f}" for value in points[missing[0]])
+        raise UnreachableError(
+            f"{linkage.name} cannot press at ({where}) m within its joint limits: none of"
+            f" {_ATTEMPTS} spins is reached, and so for {len(missing)} of {count} points"
+        )
+    return PressPoses(joints, goals)
 
 
 def press_forces(

@@ -1,6 +1,6 @@
 """The springs of the simulated arm: how hard each resists being turned, and where it sits.
 
-A torque law is three verbs, each vectorised over angles: the energy stored, the torque (its
+A torque law is one verb, vectorised over angles: it returns the energy stored, the torque (its
 derivative) and the stiffness (the derivative of that). For a prismatic spring read m, N, N/m.
 Motors and springs together are one row of screws from base to tip, the spring chain.
 """
@@ -16,26 +16,21 @@ from elastocal.errors import SpringError, nearest
 from elastocal.results import brief_repr
 from elastocal.sim.arm.linkage import Linkage, Screws
 
+SpringResponse = tuple[FloatArray, FloatArray, FloatArray]
+"""Energy in J, torque in N·m, stiffness in N·m/rad: each the derivative of the one before."""
+
 
 class TorqueLaw(Protocol):
     """An elastic law: symmetric, stiffness positive everywhere, torque 0 at angle 0."""
 
-    def energy(self, angle: FloatArray) -> FloatArray:
-        """Return the energy stored, in J, for angles of any shape in rad."""
-        ...
-
-    def torque(self, angle: FloatArray) -> FloatArray:
-        """Return the torque that holds the spring there, in N·m: d energy / d angle."""
-        ...
-
-    def stiffness(self, angle: FloatArray) -> FloatArray:
-        """Return the tangent stiffness in N·m/rad: d torque / d angle."""
+    def evaluate(self, angle: FloatArray) -> SpringResponse:
+        """Return energy, torque and tangent stiffness at angles of any shape in rad."""
         ...
 
 
 @dataclass(frozen=True)
 class Linear:
-    """Hooke's spring: ``torque = k angle``."""
+    """Hooke's spring: ``torque = k angle``, so that its energy is ``k angle² / 2``."""
 
     k: float
     """Stiffness in N·m/rad, or N/m."""
@@ -43,22 +38,17 @@ class Linear:
     def __post_init__(self) -> None:
         _require_positive(self)
 
-    def energy(self, angle: FloatArray) -> FloatArray:
-        """Return ``k angle² / 2``."""
-        return 0.5 * self.k * angle**2
-
-    def torque(self, angle: FloatArray) -> FloatArray:
-        """Return ``k angle``."""
-        return self.k * angle
-
-    def stiffness(self, angle: FloatArray) -> FloatArray:
-        """Return ``k``, in the shape of ``angle``."""
-        return np.full_like(angle, self.k)
+    def evaluate(self, angle: FloatArray) -> SpringResponse:
+        """Return energy, torque and stiffness."""
+        return 0.5 * self.k * angle**2, self.k * angle, np.full_like(angle, self.k)
 
 
 @dataclass(frozen=True)
 class CubicGear:
     """A gear that stiffens without end: ``torque = k angle (1 + (angle / scale)²)``.
+
+    Its energy is ``k angle² (1 + (angle / scale)² / 2) / 2``, its stiffness
+    ``k (1 + 3 (angle / scale)²)``.
 
     A linear plus a cubic term is the stiffness curve with which Tuttle and Seering, "A nonlinear
     dynamic model of a harmonic drive gear transmission", IEEE Trans. Robotics and Automation 12
@@ -73,86 +63,14 @@ class CubicGear:
     def __post_init__(self) -> None:
         _require_positive(self)
 
-    def energy(self, angle: FloatArray) -> FloatArray:
-        """Return ``k angle² (1 + (angle / scale)² / 2) / 2``."""
-        return 0.5 * self.k * angle**2 * (1.0 + 0.5 * (angle / self.scale) ** 2)
-
-    def torque(self, angle: FloatArray) -> FloatArray:
-        """Return ``k angle (1 + (angle / scale)²)``."""
-        return self.k * angle * (1.0 + (angle / self.scale) ** 2)
-
-    def stiffness(self, angle: FloatArray) -> FloatArray:
-        """Return ``k (1 + 3 (angle / scale)²)``."""
-        return self.k * (1.0 + 3.0 * (angle / self.scale) ** 2)
+    def evaluate(self, angle: FloatArray) -> SpringResponse:
+        """Return energy, torque and stiffness."""
+        square = (angle / self.scale) ** 2
+        energy = 0.5 * self.k * angle**2 * (1.0 + 0.5 * square)
+        return energy, self.k * angle * (1.0 + square), self.k * (1.0 + 3.0 * square)
 
 
-@dataclass(frozen=True)
-class TwoSlopeGear:
-    """A gear that is soft around zero and stiff beyond a knee, without a corner.
-
-    Gear makers tabulate stiffness as two or three straight pieces, K1 < K2 (< K3), soft at low
-    torque where not all teeth touch yet. Here the tangent stiffness passes smoothly from the one
-    to the other, ``soft + (stiff - soft) angle² / (angle² + knee²)``, whose integrals are closed.
-    """
-
-    soft: float
-    """Stiffness at rest in N·m/rad."""
-    stiff: float
-    """Stiffness far beyond the knee in N·m/rad; larger than ``soft``."""
-    knee: float
-    """Angle in rad at which the stiffness is half way."""
-
-    def __post_init__(self) -> None:
-        _require_positive(self)
-        if not self.stiff > self.soft:
-            raise SpringError(f"TwoSlopeGear stiff {self.stiff:g} must exceed soft {self.soft:g}")
-
-    def energy(self, angle: FloatArray) -> FloatArray:
-        """Return the integral of `torque`."""
-        lost, _, _ = self._lost(angle)
-        return 0.5 * self.stiff * angle**2 - lost
-
-    def torque(self, angle: FloatArray) -> FloatArray:
-        """Return ``stiff angle - (stiff - soft) knee atan(angle / knee)``."""
-        _, lost, _ = self._lost(angle)
-        return self.stiff * angle - lost
-
-    def stiffness(self, angle: FloatArray) -> FloatArray:
-        """Return ``stiff - (stiff - soft) / (1 + (angle / knee)²)``."""
-        _, _, lost = self._lost(angle)
-        return self.stiff - lost
-
-    def _lost(self, angle: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-        return gear_softening(angle, self.stiff - self.soft, self.knee)
-
-
-def gear_softening(
-    twist: FloatArray, loss: FloatArray | float, scale: FloatArray | float
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return the energy, torque and stiffness that a gear lacks near rest.
-
-    With the stiffness ``L`` that is missing at rest and the twist ``a`` at which half of it is
-    back: ``L a² (r atan(r) - log(1 + r²) / 2)``, ``L a atan(r)`` and ``L / (1 + r²)`` at
-    ``r = twist / a``, each the derivative of the one before.
-
-    Parameters
-    ----------
-    twist : ndarray
-        In rad.
-    loss : ndarray or float
-        L in N·m/rad, of a shape that broadcasts with ``twist``.
-    scale : ndarray or float
-        a in rad, likewise.
-    """
-    ratio = twist / scale
-    bend, square = np.arctan(ratio), ratio**2
-    energy: FloatArray = loss * scale**2 * (ratio * bend - 0.5 * np.log1p(square))
-    torque: FloatArray = loss * scale * bend
-    stiffness: FloatArray = loss / (1.0 + square)
-    return energy, torque, stiffness
-
-
-def _require_positive(law: Linear | CubicGear | TwoSlopeGear) -> None:
+def _require_positive(law: Linear | CubicGear) -> None:
     for parameter in fields(law):
         value = getattr(law, parameter.name)
         if not 0.0 < value < np.inf:
@@ -194,6 +112,18 @@ class SpringChain:
     """Which screws are motors, ascending, shape (joint,)."""
     ends: tuple[int, ...]
     """Number of screws up to and with those of each joint."""
+
+    def held(self, q: FloatArray) -> FloatArray:
+        """Return positions of all screws, shape (batch, element), the springs at rest.
+
+        Parameters
+        ----------
+        q : ndarray, shape (batch, joint)
+            Positions that the motors hold, in rad or m.
+        """
+        positions = np.zeros((len(q), self.ends[-1]))
+        positions[:, self.motor_elements] = q
+        return positions
 
 
 def build_spring_chain(linkage: Linkage, springs: Sequence[TruthSpring]) -> SpringChain:
@@ -246,3 +176,68 @@ def _require_known(linkage: Linkage, springs: Sequence[TruthSpring]) -> None:
             )
         if not 0.0 < float(np.linalg.norm(spring.axis)) < np.inf:
             raise SpringError(f"spring at {spring.joint!r} has axis {spring.axis}: no direction")
+
+
+def axial_spring(linkage: Linkage, joint: int, stiffness: float) -> TruthSpring:
+    """Return the spring of a gear or drive: about the joint's axis, along it if prismatic."""
+    name, axis = linkage.joint_names[joint], as_triple(linkage.axis[joint])
+    return TruthSpring(name, axis, Linear(stiffness), linkage.revolute[joint])
+
+
+def tilt_springs(linkage: Linkage, joint: int, stiffness: FloatArray) -> list[TruthSpring]:
+    """Return the two tilts of a joint's bearing, of stiffness (2,) in N·m/rad.
+
+    They turn about the coordinate axes orthogonal to the joint's (for a skew axis: the two least
+    aligned with it, made orthonormal to it).
+    """
+    name = linkage.joint_names[joint]
+    return [
+        TruthSpring(name, as_triple(direction), Linear(float(k)))
+        for direction, k in zip(_transverse_axes(linkage.axis[joint]), stiffness, strict=True)
+    ]
+
+
+def link_hinges(
+    linkage: Linkage, joint: str, stiffness: float, fraction: float = 0.5
+) -> list[TruthSpring]:
+    """Return two hinges across the link behind a joint, at a part of the way to the next joint.
+
+    Raises
+    ------
+    SpringError
+        If the joint is unknown, last, or has the next one at its own origin.
+    """
+    here, *following = linkage.T_base_joint[joint_index(linkage, joint) :][:2]
+    link = here[:3, :3].T @ (following[0][:3, 3] - here[:3, 3]) if following else np.zeros(3)
+    length = np.linalg.norm(link)
+    if not length > 1e-6:
+        raise SpringError(f"the link behind joint {joint!r} has no length: it cannot bend")
+    at = as_triple(fraction * link)
+    return [
+        TruthSpring(joint, as_triple(direction), Linear(stiffness), distal=True, at=at)
+        for direction in _transverse_axes(link / length)
+    ]
+
+
+def joint_index(linkage: Linkage, joint: str) -> int:
+    """Return the place of a joint; a name that there is not is refused with `SpringError`."""
+    names = linkage.joint_names
+    if joint not in names:
+        raise SpringError(f"no joint {joint!r}{nearest(joint, names)} (joints: {', '.join(names)})")
+    return names.index(joint)
+
+
+def _transverse_axes(axis: FloatArray) -> list[FloatArray]:
+    """Return the coordinate axes least aligned with a unit vector, made orthonormal to it."""
+    least = sorted(range(3), key=lambda k: (round(abs(float(axis[k])), 9), k))[:2]
+    first, second = (np.eye(3)[k] for k in sorted(least))
+    first = first - axis * (axis @ first)
+    first /= np.linalg.norm(first)
+    second = second - axis * (axis @ second) - first * (first @ second)
+    return [first, second / np.linalg.norm(second)]
+
+
+def as_triple(vector: FloatArray) -> tuple[float, float, float]:
+    """Return a vector of three as plain numbers."""
+    x, y, z = (float(value) for value in vector)
+    return x, y, z

@@ -29,7 +29,7 @@ from elastocal.arrays import BoolArray, FloatArray
 from elastocal.errors import ElastocalError
 from elastocal.results import brief_repr
 from elastocal.sim.arm.linkage import Screws, motions, moved_axes
-from elastocal.sim.arm.springs import TorqueLaw
+from elastocal.sim.arm.springs import SpringResponse, TorqueLaw
 
 _MAX_ITERATIONS = 60
 _MAX_HALVINGS = 40
@@ -72,7 +72,7 @@ class EnergyState:
 class SpringBank(Protocol):
     """Laws of all springs, evaluated together."""
 
-    def evaluate(self, theta: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    def evaluate(self, theta: FloatArray) -> SpringResponse:
         """Return the stored energy (batch,), the torques and the stiffnesses (batch, spring).
 
         Parameters
@@ -141,6 +141,29 @@ class LoadedMechanism:
         hessian[:, diagonal, diagonal] += stiffness
         return EnergyState(phi - work, torque - load_torque, hessian, stiffness)
 
+    def rest(
+        self, start: FloatArray, rest_points: FloatArray, balance: float
+    ) -> tuple[FloatArray, EnergyState]:
+        """Return spring positions of least energy, shape (batch, spring), and the state there.
+
+        Parameters
+        ----------
+        start : ndarray, shape (batch, spring)
+            Where to start, in rad or m.
+        rest_points : ndarray, shape (load, batch, 3)
+            See `evaluate`.
+        balance : float
+            Torque imbalance that counts as none, over the largest that the loads can exert.
+
+        Raises
+        ------
+        EquilibriumError
+            If the mechanism cannot carry the loads.
+        """
+        reach = np.linalg.norm(rest_points, axis=-1).T
+        scale = np.sum(np.linalg.norm(self.loads.force, axis=-1) * (1.0 + reach), axis=1)
+        return _minimise(lambda theta: self.evaluate(theta, rest_points), start, balance * scale)
+
     def _carried(self, points: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return sum p F^T and sum F over the loads behind each spring, spring axis first."""
         force = self.loads.force.transpose(1, 0, 2)
@@ -149,19 +172,14 @@ class LoadedMechanism:
         return np.tensordot(behind, moments, 1), np.tensordot(behind, force, 1)
 
 
-def _evaluate_laws(
-    laws: Sequence[TorqueLaw] | SpringBank, theta: FloatArray
-) -> tuple[FloatArray, FloatArray, FloatArray]:
+def _evaluate_laws(laws: Sequence[TorqueLaw] | SpringBank, theta: FloatArray) -> SpringResponse:
     """Return the springs' energy (batch,), torques and stiffnesses (batch, spring)."""
     if not isinstance(laws, Sequence):
         return laws.evaluate(theta)
-    columns = list(zip(laws, theta.T, strict=True))
-    energy = np.zeros(len(theta))
-    for law, angle in columns:
-        energy += law.energy(angle)
-    torque = np.stack([law.torque(angle) for law, angle in columns], axis=1)
-    stiffness = np.stack([law.stiffness(angle) for law, angle in columns], axis=1)
-    return energy, torque, stiffness
+    each = zip(*(law.evaluate(x) for law, x in zip(laws, theta.T, strict=True)), strict=True)
+    energies, torques, stiffnesses = each
+    energy = sum(energies, np.zeros(len(theta)))
+    return energy, np.stack(torques, axis=1), np.stack(stiffnesses, axis=1)
 
 
 def _load_torque(
@@ -202,7 +220,7 @@ def _load_stiffness(
     return mirrored
 
 
-def minimise(
+def _minimise(
     evaluate: Callable[[FloatArray], EnergyState], start: FloatArray, tolerance: FloatArray
 ) -> tuple[FloatArray, EnergyState]:
     """Return the minima of a batch of energies, and the certified state there.

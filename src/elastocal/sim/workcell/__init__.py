@@ -2,19 +2,15 @@
 
 ===================  ==========================================================================
 `cell`               `simulated_devices`: the devices of a cell file; the cell under a process
-`campaign`           readings of a whole plan at once, without stepping through time
-`campaign_errors`    what the instruments add to them
+`campaign`           readings of a whole plan at once, and what the instruments add
 `_controller`        the robot controller: what it allows, what it says
-`_force_control`     builds up a load case and holds it
-`_paths`             the paths of the robot: joint moves, guarded approach, retract, change of force
+`_paths`             joint moves, guarded approach, retract; force control: a load case is held
 `_instruments`       force sensor and trackers: cross-talk, zero, drift, noise, stations
 `_plant`             what is shared: time, robot, tooling, faults, what is going on
 `_quasistatics`      where tool, marker and sensor truly are
 `_robot`              where the robot gives way; its nonlinear equilibrium with a memory
-`_springs`           gears that stiffen, lose way and remember; the balancer of axis 2
 `_contact`           disk, friction, tooling; ray against its mesh
-`_timeline`          the clock in µs, time laws, and segments: the cell doing one thing
-`_sampling`          samples on a grid of time, noise without history
+`_timeline`          clock in µs, random numbers, time laws, segments: the cell doing one thing
 ===================  ==========================================================================
 """
 

@@ -13,8 +13,7 @@ from elastocal.arrays import FloatArray
 from elastocal.cell import ArmState, Fault, Motion
 from elastocal.errors import DeviceError
 from elastocal.sim.workcell._contact import Contact
-from elastocal.sim.workcell._force_control import ForceControl
-from elastocal.sim.workcell._paths import guarded_move, joint_path, retract_path
+from elastocal.sim.workcell._paths import ForceControl, guarded_move, joint_path, retract_path
 from elastocal.sim.workcell._plant import FOREVER, Plant
 from elastocal.sim.workcell._timeline import (
     MICROSECONDS,
@@ -59,10 +58,10 @@ class SimulatedArm:
             time = min(time, span.begin) if span.holds(now) else time
         done = now >= segment.end
         if done and self._pose is not None and self._pose[0] is segment:
-            q, T = segment.knots.q[-1], self._pose[1]
+            q, T = segment.path.end.q, self._pose[1]
         else:
             where = np.array([segment.progress(now)])
-            q = segment.knots.at(segment.knots.q, where)[0]
+            q = segment.path.knots.at(segment.path.knots.q, where)[0]
             T = plant.statics.robot.forward(q)
             self._pose = (segment, T) if done else None
         motion = segment.motion_after if done else segment.motion
@@ -83,7 +82,7 @@ class SimulatedArm:
             raise DeviceError(f"{_SOURCE} cannot be enabled: {self._fault}")
         self._fault = None
         if self._motion() in (Motion.DISARMED, Motion.STOPPED):
-            plant.switch(plant.standing(plant.robot_state(), Motion.IDLE))
+            plant.stand(plant.robot_state(), Motion.IDLE)
 
     def disable(self) -> None:
         """Take the release back; the arm stands."""
@@ -96,7 +95,7 @@ class SimulatedArm:
 
     def move_joints(self, q: FloatArray, speed: float) -> None:
         """Start a synchronous joint-space move; see `RobotArm.move_joints`."""
-        plant, linkage = self._plant, self._plant.statics.robot.layout.linkage
+        plant, linkage = self._plant, self._plant.statics.robot.linkage
         target = check_vector("joint target", q, len(self.joint_names))
         for name, value, low, high in zip(
             self.joint_names, target, linkage.lower, linkage.upper, strict=True
@@ -108,13 +107,12 @@ class SimulatedArm:
         plant.begin_journey(target)
         self._visiting = False
         end = plant.statics.free(target, plant.stop_error(), None)
-        plant.note_sag(end)
         motion = plant.cell.file.motion
         # The cell's speeds hold its override already; a caller says its own part of them.
         fastest = plant.cell.axis_speeds / motion.override
         law = joint_move(target - start.q, speed * fastest, motion.acceleration_time)
         path = joint_path(plant.statics, start, end)
-        plant.run(path, law, (Motion.MOVING, Motion.IDLE), start)
+        plant.run(path, law, (Motion.MOVING, Motion.IDLE))
 
     def approach(
         self, direction_base: FloatArray, distance: float, speed: float, contact_force: float
@@ -129,11 +127,10 @@ class SimulatedArm:
         self._begin_approach()
         guarded = guarded_move(plant, start, direction, distance, (speed, contact_force))
         plant.contact, self._touched = guarded.contact, guarded.felt
-        plant.note_sag(guarded.path.end)
         after = Motion.STOPPED if guarded.fault else Motion.IDLE
         self._fault = guarded.fault
         law = Uniform(guarded.length / speed)
-        plant.run(guarded.path, law, (Motion.APPROACHING, after), start, fault=guarded.fault)
+        plant.run(guarded.path, law, (Motion.APPROACHING, after), fault=guarded.fault)
         if self._approaches == 1 and not guarded.felt:
             segment = plant.segment
             plant.later(segment.end, partial(self._reference, segment))
@@ -172,9 +169,8 @@ class SimulatedArm:
         path, contact = retract_path(plant, start, direction, distance)
         self._leaving, plant.contact = plant.contact, contact
         if contact is None:
-            plant.note_sag(path.end)
             self._touched = self._visiting = False
-        plant.run(path, Uniform(distance / speed), (Motion.RETRACTING, Motion.IDLE), start)
+        plant.run(path, Uniform(distance / speed), (Motion.RETRACTING, Motion.IDLE))
         self._begin("retract")
 
     def _motion(self) -> Motion:
@@ -209,8 +205,8 @@ class SimulatedArm:
         """Stand where the arm is."""
         plant = self._plant
         before = self._motion()
-        plant.switch(plant.standing(plant.robot_state(), motion, fault))
-        pressing = bool(np.any(plant.segment.knots.force[-1]))
+        plant.stand(plant.robot_state(), motion, fault)
+        pressing = bool(np.any(plant.segment.path.end.force))
         if before is Motion.APPROACHING:
             self._touched = False
             plant.contact = plant.contact if pressing else None

@@ -10,7 +10,7 @@ ranges of the axes, itself too (gain). The drift counts from the last restart.
 Each tracker station (see `elastocal.cell.devices.Metrology`) stands near where the cell file puts
 it, turned as it happens to be; that turn is what the registration of a run has to find. Noise grows
 with the distance, the same along each axis. A part of it comes from moving air and changes slowly,
-as a first-order process of `AIR_TIME`.
+as a first-order process of `_AIR_TIME`.
 """
 
 import math
@@ -24,45 +24,146 @@ from elastocal.arrays import FloatArray, IndexArray
 from elastocal.cell import BeamState, Cell, PointBlock, SensorStatus, WrenchBlock
 from elastocal.errors import DeviceError, nearest
 from elastocal.sim.workcell._plant import Plant
-from elastocal.sim.workcell._sampling import BLOCK, NoiseStream, SampleGrid, Samples, generator
-from elastocal.sim.workcell._timeline import MICROSECONDS, Segment
+from elastocal.sim.workcell._timeline import MICROSECONDS, Segment, generator
 
 TRACKER_SOURCE = "simulated laser tracker"
 COVERAGE = 1.96
 """Standard deviations within which 95 % of the samples lie."""
-AIR_TIME = 0.4
+_AIR_TIME = 0.4
 """Time constant of the slow noise, in s. An assumption."""
 SENSOR_SOURCE = "simulated force sensor"
+NEWEST = 500
+"""Samples that are kept for a caller that does not look; older ones are lost."""
+BLOCK = 512
+"""Samples that are drawn at once."""
+Draw = Callable[[np.random.Generator], FloatArray]
+"""Draws a block of noise, shape (`BLOCK`, axis)."""
 
 
-class SimulatedForceSensor:
+class SampleBuffer:
+    """Samples that nobody has asked for yet, every so many µs from the last restart on."""
+
+    def __init__(self, rate: float, now: int) -> None:
+        """Sample so often, in Hz, from now on, in µs."""
+        self._period = round(MICROSECONDS / rate)
+        self._times: list[IndexArray] = []
+        self._values: list[FloatArray] = []
+        self.restart(now)
+
+    def restart(self, now: int) -> None:
+        """Count from now on, in µs."""
+        self.begin, self._next = now, 1
+
+    def due(self, now: int) -> tuple[int, int]:
+        """Return the numbers of the samples that are due, from the first to before the last."""
+        first = self._next
+        self._next = last = max(first, (now - self.begin) // self._period + 1)
+        return max(first, last - NEWEST), last
+
+    def times(self, first: int, last: int) -> IndexArray:
+        """Return the times of samples in µs, shape (sample,)."""
+        return self.begin + self._period * np.arange(first, last)
+
+    def add(self, times: IndexArray, values: FloatArray) -> None:
+        """Keep some more; forget blocks that are too old to be among the newest."""
+        self._times.append(times)
+        self._values.append(values)
+        while len(self._times) > 1 and sum(map(len, self._times[1:])) >= NEWEST:
+            del self._times[0], self._values[0]
+
+    def drain(self) -> tuple[FloatArray, FloatArray]:
+        """Return times in s and six columns of the newest samples, and forget them all."""
+        if not self._times:
+            return np.empty(0), np.empty((0, 6))
+        times, values = np.concatenate(self._times), np.concatenate(self._values)
+        self._times, self._values = [], []
+        return times[-NEWEST:] / MICROSECONDS, values[-NEWEST:]
+
+
+class NoiseStream:
+    """Noise by the number of the sample, whichever samples are asked for."""
+
+    def __init__(self, draw: Draw, seed: int) -> None:
+        """Draw blocks of shape (`BLOCK`, axis) by ``draw``."""
+        self._draw, self._seed = draw, seed
+        self._words: tuple[object, ...] = ()
+        self._number, self._block = -1, np.empty((0, 0))
+
+    def restart(self, *words: object) -> None:
+        """Begin anew with sample 0, for the purpose that the words say."""
+        self._words, self._number = words, -1
+
+    def take(self, first: int, last: int) -> FloatArray:
+        """Return samples ``first`` to before ``last``, shape (sample, axis)."""
+        number = first // BLOCK
+        if number == (last - 1) // BLOCK:
+            block = self._load(number)
+            return block[first - number * BLOCK : last - number * BLOCK]
+        border = (number + 1) * BLOCK
+        return np.concatenate([self.take(first, border), self.take(border, last)])
+
+    def _load(self, number: int) -> FloatArray:
+        if number != self._number:
+            self._block = self._draw(generator(self._seed, *self._words, number))
+            self._number = number
+        return self._block
+
+
+class _SimulatedInstrument:
+    """A device that samples what goes on, with noise that belongs to what the arm was sent to."""
+
+    def __init__(self, plant: Plant, rate: float, name: str, draw: Draw) -> None:
+        self._plant, self.rate, self._name = plant, rate, name
+        self._noise = NoiseStream(draw, plant.seed)
+        self._buffer = SampleBuffer(rate, plant.now)
+        self.restart(plant.now, "HOME")
+
+    def restart(self, now: int, key: str) -> None:
+        """Begin to count samples, with the noise that belongs to a key."""
+        self._buffer.restart(now)
+        self._noise.restart(self._name, key)
+
+    def catch_up(self, now: int) -> None:
+        """Take the samples that are due."""
+        first, last = self._buffer.due(now)
+        if first < last:
+            times = self._buffer.times(first, last)
+            times, values = self._measure(times, self._noise.take(first, last))
+            if len(times):
+                self._buffer.add(times, values)
+
+    def _measure(self, times: IndexArray, noise: FloatArray) -> tuple[IndexArray, FloatArray]:
+        """Return which samples come, by their times in µs, and their six columns."""
+        raise NotImplementedError
+
+
+class SimulatedForceSensor(_SimulatedInstrument):
     """A sensor with faults of its own."""
 
     def __init__(self, plant: Plant) -> None:
         """Put the cell's sensor between flange and tool."""
         cell, entry = plant.cell, plant.cell.file.simulation.sensor
-        self._plant, self._entry = plant, entry
-        self._range = sensor_range(cell)
-        self._matrix = sensor_matrix(cell, plant.seed)
-        self._zero = sensor_zero(cell, plant.seed)
-        sigma = np.repeat([entry.force_noise, entry.moment_noise], 3)
-        self._noise = NoiseStream(lambda rng: sigma * rng.standard_normal((BLOCK, 6)), plant.seed)
-        self._grid, self._samples = SampleGrid(entry.rate, plant.now), Samples(6)
+        self._entry, self.range = entry, sensor_range(cell)
+        self.matrix, self.zero = sensor_matrix(cell, plant.seed), sensor_zero(cell, plant.seed)
+        self.sigma = np.repeat([entry.force_noise, entry.moment_noise], 3)
         self._still: tuple[Segment, FloatArray] | None = None
         self._last = np.zeros(6)
         self._saturated = False
-        self._slope = np.zeros(6)
-        self.restart(plant.now, "HOME")
+        super().__init__(plant, entry.rate, "sensor", self._draw)
 
-    @property
-    def rate(self) -> float:
-        """Nominal number of samples a second."""
-        return self._entry.rate
+    def _draw(self, rng: np.random.Generator) -> FloatArray:
+        return self.sigma * rng.standard_normal((BLOCK, 6))
+
+    def slope(self, rng: np.random.Generator) -> FloatArray:
+        """Return a drift drawn at random, shape (6,), in N/s and N·m/s."""
+        share = self._entry.drift / 60.0 / self.range[0]
+        slope: FloatArray = share * self.range * rng.standard_normal(6)
+        return slope
 
     def read(self) -> WrenchBlock:
         """Return the samples since the last call; the newest few hundred when there are more."""
         self.catch_up(self._plant.now)
-        times, values = self._samples.drain()
+        times, values = self._buffer.drain()
         status = SensorStatus.SATURATED if self._saturated else SensorStatus.OK
         self._saturated = False
         return WrenchBlock(
@@ -77,27 +178,19 @@ class SimulatedForceSensor:
 
     def restart(self, now: int, key: str) -> None:
         """Begin to count samples, with the noise and drift that belong to a key."""
-        self._grid.restart(now)
-        self._noise.restart("sensor", key)
-        share = self._entry.drift / 60.0 / self._range[0]
-        draw = generator(self._plant.seed, "drift", key).standard_normal(6)
-        self._slope = share * self._range * draw
+        super().restart(now, key)
+        self._slope = self.slope(generator(self._plant.seed, "drift", key))
 
-    def catch_up(self, now: int) -> None:
-        """Take the samples that are due."""
-        first, last = self._grid.due(now)
-        if first >= last:
-            return
-        times = self._grid.times(first, last)
-        since = (times - self._grid.begin) / MICROSECONDS
+    def _measure(self, times: IndexArray, noise: FloatArray) -> tuple[IndexArray, FloatArray]:
+        since = (times - self._buffer.begin) / MICROSECONDS
         values = self._true(times) + since[:, None] * self._slope
-        values += self._noise.take(first, last)
+        values += noise
         values = self._clipped(times, values)
         if self._plant.schedule.any_span:
             times, values = self._with_faults(times, values)
         if len(times):
             self._last = values[-1]
-            self._samples.add(times, values)
+        return times, values
 
     def _true(self, times: IndexArray) -> FloatArray:
         """Return readings without noise and drift, shape (sample or 1, 6)."""
@@ -105,21 +198,21 @@ class SimulatedForceSensor:
         if self._still is not None and self._still[0] is segment:
             reading = self._still[1]
         else:
-            reading = segment.seen(times)[:, 3:] @ self._matrix.T + self._zero
+            reading = segment.seen(times)[:, 3:] @ self.matrix.T + self.zero
             if times[0] >= segment.end:
                 self._still = (segment, reading)
         unrest = segment.unrest(times)
         if unrest is None:
             return reading
-        return reading + unrest * (self._matrix @ segment.ripple_wrench)
+        return reading + unrest * (self.matrix @ segment.ripple_wrench)
 
     def _clipped(self, times: IndexArray, values: FloatArray) -> FloatArray:
         """Keep the readings within the ranges, and notice when they were not."""
         if self._plant.schedule.any_span:
-            values[self._plant.schedule.struck("ft_saturation", times), 2] = 2.0 * self._range[2]
-        if np.any(np.abs(values) > self._range):
+            values[self._plant.schedule.struck("ft_saturation", times), 2] = 2.0 * self.range[2]
+        if np.any(np.abs(values) > self.range):
             self._saturated = True
-            return np.clip(values, -self._range, self._range)
+            return np.clip(values, -self.range, self.range)
         return values
 
     def _with_faults(self, times: IndexArray, values: FloatArray) -> tuple[IndexArray, FloatArray]:
@@ -130,7 +223,7 @@ class SimulatedForceSensor:
         return np.delete(times, lost), np.delete(values, lost, axis=0)
 
 
-class SimulatedTracker:
+class SimulatedTracker(_SimulatedInstrument):
     """One or several stations, of which one measures."""
 
     def __init__(self, plant: Plant) -> None:
@@ -144,27 +237,16 @@ class SimulatedTracker:
         cell, entry = plant.cell, plant.cell.file.simulation.tracker
         if not cell.file.trackers:
             raise DeviceError(f"cell {cell.name} has no tracker to simulate (key 'trackers')")
-        self._plant, self._entry = plant, entry
-        self._names = tuple(tracker.name for tracker in cell.file.trackers)
+        self._entry = entry
+        self.stations = tuple(tracker.name for tracker in cell.file.trackers)
         self._T_base_station = {
             tracker.name: _station(plant.seed, tracker.name, tracker.position_base, entry.placing)
             for tracker in cell.file.trackers
         }
-        self._station = self._names[0]
-        self._noise = NoiseStream(_draw(entry.turbulence, entry.rate), plant.seed)
-        self._grid, self._samples = SampleGrid(entry.rate, plant.now), Samples(6)
+        self._station = self.stations[0]
         self._still: tuple[Segment, str, FloatArray, FloatArray] | None = None
-        self.restart(plant.now, "HOME")
-
-    @property
-    def stations(self) -> tuple[str, ...]:
-        """Names of the stations."""
-        return self._names
-
-    @property
-    def rate(self) -> float:
-        """Nominal number of samples a second."""
-        return self._entry.rate
+        draw = _draw(entry.turbulence, entry.rate)
+        super().__init__(plant, entry.rate, "tracker", draw)
 
     def look(self, station: str) -> None:
         """Measure with this station from now on, and find the marker again if it was lost.
@@ -174,21 +256,21 @@ class SimulatedTracker:
         DeviceError
             If there is no such station.
         """
-        if station not in self._names:
+        if station not in self.stations:
             raise DeviceError(
-                f"{TRACKER_SOURCE} has no station {station!r}{nearest(station, self._names)}"
-                f" (stations: {', '.join(self._names)})"
+                f"{TRACKER_SOURCE} has no station {station!r}{nearest(station, self.stations)}"
+                f" (stations: {', '.join(self.stations)})"
             )
         self.catch_up(self._plant.now)
         if station != self._station:
-            self._samples.drain()
+            self._buffer.drain()
         self._station = station
 
     def read(self) -> PointBlock:
         """Return the positions since the last call; none while the beam is broken."""
         now = self._plant.now
         self.catch_up(now)
-        times, values = self._samples.drain()
+        times, values = self._buffer.drain()
         spans = self._plant.schedule.spans("beam_break")
         broken = any(s.holds(now) and s.station in (None, self._station) for s in spans)
         return PointBlock(
@@ -223,25 +305,18 @@ class SimulatedTracker:
 
     def restart(self, now: int, key: str) -> None:
         """Begin to count samples, with the noise that belongs to a key."""
-        self._grid.restart(now)
-        self._noise.restart("tracker", key)
+        super().restart(now, key)
         self._still = None
 
-    def catch_up(self, now: int) -> None:
-        """Take the samples that are due."""
-        first, last = self._grid.due(now)
-        if first >= last:
-            return
-        times = self._grid.times(first, last)
+    def _measure(self, times: IndexArray, noise: FloatArray) -> tuple[IndexArray, FloatArray]:
         marker, sigma = self._true(times)
         values = np.empty((len(times), 6))
-        values[:, :3] = marker + sigma * self._noise.take(first, last)
+        values[:, :3] = marker + sigma * noise
         values[:, 3:] = sigma
         if self._plant.schedule.any_span:
             lost = self._plant.schedule.struck("beam_break", times, self._station)
             times, values = np.delete(times, lost), np.delete(values, lost, axis=0)
-        if len(times):
-            self._samples.add(times, values)
+        return times, values
 
 
 def sensor_range(cell: Cell) -> FloatArray:
@@ -288,9 +363,9 @@ def _station(seed: int, name: str, position: FloatArray, placing: float) -> Floa
     return T
 
 
-def _draw(slow: float, rate: float) -> Callable[[np.random.Generator], FloatArray]:
+def _draw(slow: float, rate: float) -> Draw:
     """Return what draws a block of noise of unit size, shape (`BLOCK`, 3)."""
-    keep = math.exp(-1.0 / (rate * AIR_TIME))
+    keep = math.exp(-1.0 / (rate * _AIR_TIME))
 
     def draw(rng: np.random.Generator) -> FloatArray:
         fast, drive = rng.standard_normal((2, BLOCK, 3))
@@ -300,3 +375,15 @@ def _draw(slow: float, rate: float) -> Callable[[np.random.Generator], FloatArra
         return noise
 
     return draw
+
+
+def averaged_noise(slow: float, time: float, rate: float) -> float:
+    """Return the standard deviation of an average over that of a sample.
+
+    A part of the noise is white, the other a first-order process of `_AIR_TIME`; the variance of
+    its average is that of an Ornstein-Uhlenbeck process (N. G. van Kampen, "Stochastic Processes
+    in Physics and Chemistry", chapter IV).
+    """
+    ratio = _AIR_TIME / time
+    air = 2.0 * ratio * (1.0 - ratio * -math.expm1(-1.0 / ratio))
+    return math.sqrt((1.0 - slow**2) / max(time * rate, 1.0) + slow**2 * air)

@@ -1,6 +1,10 @@
-"""The paths of the robot from where it stands to where a command leads it.
+"""The paths of the robot to where a command leads it, and force control at the surface.
 
 Straight moves to the surface are guarded by the force; on one away from it the force fades.
+
+In force control the force that the wrist sensor shows follows the wanted one along a straight ramp
+with a first-order lag; what is commanded moves so that robot, disk and tooling are in equilibrium
+under it. A lateral force beyond the friction limit is not reached: the contact slides.
 """
 
 from collections.abc import Callable
@@ -9,9 +13,21 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from elastocal.arrays import FloatArray
+from elastocal.cell import Fault, Motion
+from elastocal.errors import DeviceError
 from elastocal.sim.workcell._contact import Contact
 from elastocal.sim.workcell._plant import Plant
-from elastocal.sim.workcell._quasistatics import Quasistatics, RobotPath, RobotState
+from elastocal.sim.workcell._quasistatics import Quasistatics
+from elastocal.sim.workcell._timeline import (
+    Ripple,
+    RobotPath,
+    RobotState,
+    Segment,
+    SettlingRamp,
+    TimeLaw,
+    Uniform,
+    generator,
+)
 
 CLOSED = 1e-8
 """How far the tool may end from where the contact holds it, in m: 0.03 N of the disk."""
@@ -29,7 +45,7 @@ def joint_path(statics: Quasistatics, start: RobotState, end: RobotState) -> Rob
     progress = np.linspace(0.0, 1.0, _STEPS + 1)
     q = _between(start.q, end.q, progress)
     twist = _between(start.twist, end.twist, progress)
-    return RobotPath(statics.knots(progress, q, twist, np.zeros((len(q), 3))), end)
+    return RobotPath(statics.knots(progress, q, twist, np.zeros((len(q), 3))), start, end)
 
 
 def straight_path(statics: Quasistatics, states: list[RobotState]) -> RobotPath:
@@ -39,7 +55,7 @@ def straight_path(statics: Quasistatics, states: list[RobotState]) -> RobotPath:
     ----------
     statics : Quasistatics
         The robot.
-    stands : list of RobotState
+    states : list of RobotState
         All with the same commanded orientation, on one line; those where nothing moves are left
         out, but for the last.
     """
@@ -54,14 +70,7 @@ def straight_path(statics: Quasistatics, states: list[RobotState]) -> RobotPath:
     points = _interpolated(at, T[:, :3, 3], fine)
     q = statics.along(states[0].q, T[0, :3, :3], points[1:-1])
     q = np.concatenate([coarse[:1], q, coarse[-1:]])
-    return RobotPath(statics.knots(fine, q, twist, force), states[-1])
-
-
-def force_path(statics: Quasistatics, start: RobotState, end: RobotState) -> RobotPath:
-    """Return the path on which the force goes straight from one to the other."""
-    both = (start, end)
-    q, twist, force = (np.stack([getattr(s, n) for s in both]) for n in ("q", "twist", "force"))
-    return RobotPath(statics.knots(np.array([0.0, 1.0]), q, twist, force), end)
+    return RobotPath(statics.knots(fine, q, twist, force), states[0], states[-1])
 
 
 @dataclass(frozen=True, eq=False)
@@ -269,3 +278,119 @@ def _between(start: FloatArray, end: FloatArray, progress: FloatArray) -> FloatA
 
 def _interpolated(at: FloatArray, values: FloatArray, fine: FloatArray) -> FloatArray:
     return np.stack([np.interp(fine, at, column) for column in values.T], axis=1)
+
+
+SLIP_TIME = 0.1
+"""Time that an injected slip takes, in s."""
+_UNREST = (7.3, 11.9)
+"""Frequencies of the unrest of a held force, in Hz. An assumption."""
+_NEVER_AT_REST = (0.9, 1.7)
+"""Frequencies of a force that never comes to rest, in Hz."""
+
+
+class ForceControl:
+    """The controller in force control."""
+
+    def __init__(self, plant: Plant, gain: FloatArray) -> None:
+        """Control with a sensor that reads ``gain`` per force at the tool, its frame, (3, 3)."""
+        self._plant, self._gain = plant, gain
+        self.load = -1
+        self._wanted: FloatArray = np.zeros(3)
+        self._rate = 1.0
+        self.begin_visit()
+
+    def begin_visit(self) -> None:
+        """Zero the sensor and count load cases from 0."""
+        state = self._plant.robot_state()
+        self.load = -1
+        self._R_zeroed = self._plant.statics.R_base_sensor(state.q, state.twist)
+
+    def hold(self, wanted_tcp: FloatArray, rate: float) -> None:
+        """Build up and hold a reading of the sensor, tcp frame, in N, at a rate in N/s."""
+        plant, contact = self._plant, self._plant.contact
+        if contact is None:
+            raise DeviceError("simulated arm: no contact to hold a force in")
+        self.load += 1
+        self._wanted, self._rate = contact.law.held(wanted_tcp), rate
+        slides = contact.law.effort(wanted_tcp) > 1.0
+        slip = plant.slip(self.load) * contact.law.slip_sigma(wanted_tcp)
+        segment = self._press(slip)
+        if slides:
+            ramp = segment.law
+            assert isinstance(ramp, SettlingRamp)
+            after = segment.begin + round(1e6 * (ramp.ramp + 5.0 * ramp.tau))
+            plant.later(after, lambda: self._slide(segment))
+
+    def release(self, rate: float) -> None:
+        """Ramp the force to zero."""
+        plant, contact = self._plant, self._plant.contact
+        if contact is None:
+            raise DeviceError("simulated arm: no contact to release")
+        start = plant.robot_state()
+        end = pressed_state(
+            plant.statics, start, contact, lambda _: np.zeros(3), plant.stop_error()
+        )
+        law = Uniform(float(np.linalg.norm(start.force)) / rate)
+        plant.run(plant.statics.path(start, end), law, (Motion.RELEASING, Motion.IDLE))
+
+    def let_slip(self, fault: Fault, held: Segment) -> None:
+        """Let the contact slip against the lateral force, unless the load case is over."""
+        if self._plant.segment is held:
+            self._press(fault.distance * self._away(), SLIP_TIME)
+
+    def _press(self, slip: FloatArray, least: float = 0.0) -> Segment:
+        """Go for the wanted force, the contact slipping meanwhile; tcp frame, shape (2,), in m."""
+        plant, contact = self._plant, self._plant.contact
+        assert contact is not None
+        start = plant.robot_state()
+        contact = contact.slipped(slip)
+        end = self._equilibrium(start, contact)
+        plant.contact = contact
+        ramp = max(float(np.linalg.norm(end.force - start.force)) / self._rate, least)
+        law: TimeLaw = SettlingRamp(ramp, plant.cell.file.simulation.controller.settling)
+        path, holding = plant.statics.path(start, end), (Motion.HOLDING, Motion.HOLDING)
+        return plant.run(path, law, holding, ripple=self._ripple())
+
+    def _slide(self, held: Segment) -> None:
+        """Slide at a steady speed until the controller has had enough."""
+        plant, entry = self._plant, self._plant.cell.file.simulation
+        contact = plant.contact
+        if plant.segment is not held or contact is None:
+            return
+        start, slide = plant.robot_state(), entry.controller.travel_limit
+        plant.contact = contact = contact.slipped(slide * self._away())
+        end = self._equilibrium(start, contact)
+        plant.run(
+            plant.statics.path(start, end),
+            Uniform(slide / entry.contact.slide_speed),
+            (Motion.HOLDING, Motion.STOPPED),
+            fault=f"force control gave up: the contact slid by {1e3 * slide:g} mm",
+        )
+
+    def _equilibrium(self, start: RobotState, contact: Contact) -> RobotState:
+        """Return the robot where the sensor reads the wanted force."""
+        plant, statics = self._plant, self._plant.statics
+        wanted_sensor = statics.robot.T_tcp_sensor[:3, :3].T @ self._wanted
+        # The sensor turns with the arm, so that it sees another part of the weight than before.
+        felt = np.linalg.solve(self._gain, wanted_sensor) + self._R_zeroed.T @ statics.weight
+
+        def force(R_base_sensor: FloatArray) -> FloatArray:
+            true_force: FloatArray = R_base_sensor @ felt - statics.weight
+            return true_force
+
+        return pressed_state(statics, start, contact, force, plant.stop_error())
+
+    def _away(self) -> FloatArray:
+        """Return the direction in which the contact gives way, tcp frame, shape (2,)."""
+        lateral = self._wanted[:2]
+        length = float(np.linalg.norm(lateral))
+        return -lateral / length if length else np.array([1.0, 0.0])
+
+    def _ripple(self) -> Ripple:
+        plant = self._plant
+        amplitude, frequency = plant.cell.file.simulation.controller.ripple, _UNREST
+        for fault in plant.schedule.at(plant.visit):
+            if fault.kind == "never_stable" and fault.load == self.load:
+                amplitude, frequency = fault.amplitude, _NEVER_AT_REST
+        phase = generator(plant.seed, "ripple", plant.key, self.load).uniform(0.0, 2 * np.pi, 2)
+        return Ripple(amplitude, frequency, (float(phase[0]), float(phase[1])))

@@ -11,15 +11,18 @@ from elastocal.cell import Cell, Fault, Motion
 from elastocal.errors import DeviceError, nearest
 from elastocal.robot import inverse_transform
 from elastocal.sim.workcell._contact import Contact, ContactLaw, TrueSurface
-from elastocal.sim.workcell._quasistatics import Quasistatics, RobotPath, RobotState
+from elastocal.sim.workcell._quasistatics import Quasistatics
 from elastocal.sim.workcell._robot import TrueRobot
-from elastocal.sim.workcell._sampling import generator, posture_key
 from elastocal.sim.workcell._timeline import (
     Ripple,
+    RobotPath,
+    RobotState,
     Segment,
     SimClock,
     TimeLaw,
     Uniform,
+    generator,
+    posture_key,
     to_microseconds,
 )
 
@@ -170,8 +173,7 @@ class Plant:
         self._draw()
         self._events: list[tuple[int, Callable[[], None]]] = []
         state = self.statics.free(cell.home, self.stop_error(), None)
-        self.segment = self.standing(state, Motion.DISARMED)
-        self._sag = state.sag
+        self.stand(state, Motion.DISARMED)
         clock.on_wake(self.wake)
 
     @property
@@ -230,18 +232,11 @@ class Plant:
         slip: FloatArray = self._slips[load % _DRAWS]
         return slip
 
-    def switch(self, segment: Segment) -> None:
-        """Go over to another segment now."""
-        for instrument in self.instruments:
-            instrument.catch_up(self.now)
-        self.segment = segment
-
     def run(
         self,
         path: RobotPath,
         law: TimeLaw,
         motions: tuple[Motion, Motion],
-        start: RobotState,
         *,
         fault: str | None = None,
         ripple: Ripple | None = None,
@@ -251,67 +246,37 @@ class Plant:
         Parameters
         ----------
         path : RobotPath
-            From ``start`` on.
+            From where it is.
         law : TimeLaw
             How the time goes.
         motions : tuple of Motion
             Motion of the arm on the path, and at its end.
-        start : RobotState
-            Where it is.
         fault : str, optional
             What the controller says at the end.
         ripple : Ripple, optional
             Unrest of the force.
         """
-        theta = path.end.theta
-        assert theta is not None
-        segment = Segment(
-            begin=self.now,
-            law=law,
-            knots=path.knots,
-            motion=motions[0],
-            motion_after=motions[1],
-            springs=(start.springs, path.end.springs),
-            theta=theta,
-            fault_after=fault,
-            ripple=ripple,
-            ripple_wrench=self._pressing,
-        )
-        self.switch(segment)
-        return segment
+        for instrument in self.instruments:
+            instrument.catch_up(self.now)
+        self.segment = Segment(self.now, law, path, *motions, fault, ripple, self._pressing)
+        return self.segment
+
+    def stand(self, state: RobotState, motion: Motion, fault: str | None = None) -> None:
+        """Stand still in a state."""
+        self.run(self.statics.path(state, state), Uniform(0.0), (motion, motion), fault=fault)
 
     def robot_state(self) -> RobotState:
         """Return where the robot is now, with the memory that it has gathered so far."""
-        segment, progress = self.segment, self.segment.progress(self.now)
-        knots, where = segment.knots, np.array([progress])
+        path, progress = self.segment.path, self.segment.progress(self.now)
+        knots, where = path.knots, np.array([progress])
         columns = (knots.q, knots.twist, knots.force)
         q, twist, force = (knots.at(column, where)[0] for column in columns)
         done = progress >= _DONE
-        springs, theta = segment.springs[int(done)], segment.theta
+        springs, theta = (path.end if done else path.start).springs, path.end.theta
         if not done and self.contact is not None:
             rest = self.statics.robot.rest(q, force, springs, theta)
             springs, theta = rest.springs, rest.theta
-        return RobotState(q, twist, force, springs, theta, self._sag)
-
-    def note_sag(self, state: RobotState) -> None:
-        """Remember the sag of the last free state, which the controller partly takes out."""
-        self._sag = state.sag
-
-    def standing(self, state: RobotState, motion: Motion, fault: str | None = None) -> Segment:
-        """Return a segment in which nothing moves."""
-        both = np.array([0.0, 1.0])
-        columns = (np.stack([c, c]) for c in (state.q, state.twist, state.force))
-        theta = state.theta
-        return Segment(
-            begin=self.now,
-            law=Uniform(0.0),
-            knots=self.statics.knots(both, *columns),
-            motion=motion,
-            motion_after=motion,
-            springs=(state.springs, state.springs),
-            theta=np.zeros(len(state.springs.stiffness)) if theta is None else theta,
-            fault_after=fault,
-        )
+        return RobotState(q, twist, force, springs, theta, path.end.sag)
 
 
 def _unit_wrench(robot: TrueRobot) -> FloatArray:

@@ -15,66 +15,8 @@ from elastocal.arrays import FloatArray
 from elastocal.cell import Cell
 from elastocal.errors import DeviceError
 from elastocal.robot import inverse_transform
-from elastocal.sim.arm import solve_inverse
 from elastocal.sim.workcell._robot import RobotEquilibrium, TrueRobot
-from elastocal.sim.workcell._springs import RobotSprings
-from elastocal.sim.workcell._timeline import Knots
-
-
-@dataclass(frozen=True, eq=False)
-class RobotState:
-    """State of the robot between two commands; in many postures at once with a leading axis."""
-
-    q: FloatArray
-    """Joints of the controller, shape (..., joint), in rad or m."""
-    twist: FloatArray
-    """See `Knots.twist`, shape (..., 9)."""
-    force: FloatArray
-    """Force on the robot in base, shape (..., 3), in N."""
-    springs: RobotSprings
-    """With the memory of the gears."""
-    theta: FloatArray | None
-    """Spring positions to start from; None: from none."""
-    sag: FloatArray
-    """Twist under weight alone that the controller has taken out a part of, shape (..., 9)."""
-
-
-@dataclass(frozen=True, eq=False)
-class RobotPath:
-    """A path that the robot takes, and where it leads."""
-
-    knots: Knots
-    end: RobotState
-
-
-@dataclass(frozen=True, eq=False)
-class ForceReading:
-    """How the controller reads the wrist sensor: with its faults, zeroed before contact."""
-
-    gain: FloatArray
-    """Force that the sensor reads per force at the tool, sensor frame, shape (3, 3)."""
-    R_tcp_sensor: FloatArray
-    """As the controller knows it, shape (3, 3)."""
-    R_base_sensor: FloatArray
-    """Truly, when it was zeroed, shape (3, 3)."""
-    weight: FloatArray
-    """Weight of the tool in base, shape (3,), in N."""
-
-    def true_force(self, wanted_tcp: FloatArray, R_base_sensor: FloatArray) -> FloatArray:
-        """Return the force on the robot in base at which the reading is the wanted one.
-
-        The sensor turns with the arm, so that it sees another part of the weight than before.
-
-        Parameters
-        ----------
-        wanted_tcp : ndarray, shape (3,)
-            Wanted reading in the tcp frame, in N.
-        R_base_sensor : ndarray, shape (3, 3)
-            True orientation of the sensor under load.
-        """
-        felt = np.linalg.solve(self.gain, self.R_tcp_sensor.T @ wanted_tcp)
-        force: FloatArray = R_base_sensor @ (felt + self.R_base_sensor.T @ self.weight)
-        return force - self.weight
+from elastocal.sim.workcell._timeline import Knots, RobotPath, RobotState
 
 
 @dataclass(frozen=True, eq=False)
@@ -144,11 +86,11 @@ class Quasistatics:
     def loaded(
         self, state: RobotState, q: FloatArray, force: FloatArray, error: FloatArray
     ) -> RobotState:
-        """Return the robot under a force, from a stand whose gears remember.
+        """Return the robot under a force, from a state whose gears remember.
 
         Parameters
         ----------
-        stand : RobotState
+        state : RobotState
             Where it comes from.
         q : ndarray, shape (joint,)
             In rad or m.
@@ -164,7 +106,8 @@ class Quasistatics:
     def R_base_sensor(self, q: FloatArray, twist: FloatArray) -> FloatArray:
         """Return the true orientation of the sensor, shape (..., 3, 3)."""
         nominal = self.robot.forward(q)[..., :3, :3] @ self.robot.T_tcp_sensor[:3, :3]
-        return Rotation.from_rotvec(twist[..., 6:]).as_matrix() @ nominal
+        turn = Rotation.from_rotvec(twist[..., 6:].reshape(-1, 3)).as_matrix()
+        return turn.reshape(nominal.shape) @ nominal
 
     def tool_position(self, state: RobotState) -> FloatArray:
         """Return where the tool centre point truly is, in base, shape (..., 3), in m."""
@@ -193,15 +136,19 @@ class Quasistatics:
         """
         goals = np.zeros((len(points), 4, 4))
         goals[:, :3, :3], goals[:, :3, 3], goals[:, 3, 3] = R_base_tcp, points, 1.0
-        layout = self.robot.layout
-        start = np.repeat(q[None], len(points), axis=0)
-        found = solve_inverse(layout.linkage, goals, start, tolerance=1e-10, locked=layout.external)
+        found = self.robot.solve(goals, np.repeat(q[None], len(points), axis=0))
         if not found.ok.all():
             raise DeviceError(
                 f"the arm cannot follow a straight line to {np.round(points[-1], 4).tolist()} m:"
                 " a singularity or the end of its reach"
             )
         return found.q
+
+    def path(self, start: RobotState, end: RobotState) -> RobotPath:
+        """Return the path on which joints, force and deviation change evenly together."""
+        both = (start, end)
+        columns = (np.stack([getattr(s, name) for s in both]) for name in ("q", "twist", "force"))
+        return RobotPath(self.knots(np.array([0.0, 1.0]), *columns), start, end)
 
     def knots(
         self, progress: FloatArray, q: FloatArray, twist: FloatArray, force: FloatArray

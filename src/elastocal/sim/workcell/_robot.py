@@ -9,10 +9,11 @@ of 1.1 t, in proportion to the mass that the arm moves: an assumption that bring
 the right order of magnitude.
 
 At rest the potential energy of the deformed robot under its own weight, the tool's and the contact
-force is least (`elastocal.sim.arm.statics`, with the laws of `elastocal.sim.workcell._springs`): a
+force is least (`elastocal.sim.arm.statics`, with the laws of `elastocal.sim.arm.gears`): a
 nonlinear equilibrium with a memory, of one posture or many.
 """
 
+import itertools
 import math
 from dataclasses import dataclass, field
 
@@ -25,20 +26,23 @@ from elastocal.robot import inverse_transform
 from elastocal.sim.arm import (
     AXIAL_STIFFNESS,
     LINK_BENDING,
+    BalancerSpring,
     DeadLoads,
-    EnergyState,
+    GearLaws,
+    InverseResult,
     Linear,
     Linkage,
     LoadedMechanism,
+    RobotSprings,
     SpringChain,
     TruthSpring,
     as_triple,
+    axial_spring,
     build_spring_chain,
-    link_vector,
-    minimise,
-    transverse_axes,
+    link_hinges,
+    solve_inverse,
+    tilt_springs,
 )
-from elastocal.sim.workcell._springs import BalancerSpring, GearLaws, RobotSprings
 
 ARM_JOINTS = 6
 MOVED_MASS = 850.0
@@ -50,21 +54,10 @@ HIGH_TORQUE = 1.65
 which play, bending links and floor add. An assumption."""
 _SHORT_LINK = 0.2
 """A link shorter than this does not bend, in m."""
+_END_EFFECTOR = 6
+"""Number of springs of the end-effector, behind the sensor and last of all."""
 BALANCE = 1e-11
 """Torque imbalance that counts as none, over the largest torque that the loads can exert."""
-
-
-@dataclass(frozen=True, eq=False)
-class RobotLayout:
-    """Spring chain of the simulated robot with the laws of its springs."""
-
-    linkage: Linkage
-    chain: SpringChain
-    springs: RobotSprings
-    sensor_after: int
-    """Number of elements in front of the body that carries the sensor."""
-    external: int
-    """Number of joints before the arm."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,7 +80,12 @@ class RobotEquilibrium:
 class TrueRobot:
     """A robot on its floor with its tool; make one with `of`."""
 
-    layout: RobotLayout
+    linkage: Linkage
+    chain: SpringChain
+    springs: RobotSprings
+    """Without friction and memory."""
+    external: int
+    """Number of joints before the arm."""
     gravity: FloatArray
     """Acceleration in base, shape (3,), in m/s²."""
     tool_mass: float
@@ -101,7 +99,7 @@ class TrueRobot:
     _weights: FloatArray = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
-        linkage, ends = self.layout.linkage, self.layout.chain.ends
+        linkage, ends = self.linkage, self.chain.ends
         T = linkage.T_base_tip
         tool = T[:3, :3] @ self.tool_centre_tcp + T[:3, 3]
         bodies = [(b.centre, ends[b.joint - 1], b.mass) for b in linkage.masses]
@@ -120,20 +118,24 @@ class TrueRobot:
         DeviceError, RobotError
             If the simulator has no arm for it.
         """
-        sensor = cell.T_sensor_tcp
-        T_tcp_sensor = cell.T_tcp_flange if sensor is None else inverse_transform(sensor)
+        linkage = Linkage.from_urdf(cell.robot.urdf, cell.robot.tip, cell.robot.base)
+        external = len(linkage.joint_names) - ARM_JOINTS
+        if external < 0:
+            raise DeviceError(
+                f"the simulated arm needs six joints; {linkage.name} has"
+                f" {len(linkage.joint_names)} ({', '.join(linkage.joint_names)})"
+            )
+        chain, springs = _springs(cell, linkage, external)
         return cls(
-            lay_out_robot(cell),
+            linkage,
+            chain,
+            springs,
+            external,
             cell.gravity_base,
             cell.file.tool.mass,
             cell.tool_centre_tcp,
-            T_tcp_sensor,
+            _sensor_frame(cell),
         )
-
-    @property
-    def springs(self) -> RobotSprings:
-        """The springs, without friction and memory."""
-        return self.layout.springs
 
     def forward(self, q: FloatArray) -> FloatArray:
         """Return T_base_tcp of the undeformed robot: what its controller believes.
@@ -143,7 +145,18 @@ class TrueRobot:
         q : ndarray, shape (..., joint)
             In rad or m.
         """
-        return self.layout.linkage.forward(q)
+        return self.linkage.forward(q)
+
+    def solve(self, T_base_tcp: FloatArray, start: FloatArray) -> InverseResult:
+        """Return joints that bring the undeformed tool to poses, external axes where they start.
+
+        Parameters
+        ----------
+        T_base_tcp : ndarray, shape (pose, 4, 4)
+        start : ndarray, shape (pose, joint)
+            In rad or m.
+        """
+        return solve_inverse(self.linkage, T_base_tcp, start, tolerance=1e-10, locked=self.external)
 
     def rest(
         self,
@@ -172,15 +185,17 @@ class TrueRobot:
         EquilibriumError
             If the robot cannot carry the load.
         """
-        springs = springs.at_joint(q[..., self.layout.external + 1])
+        springs = springs.at_joint(q[..., self.external + 1])
         batch = q.shape[:-1]
         mechanism = self._mechanism(np.atleast_2d(q), np.atleast_2d(force_base), springs)
         theta = np.zeros((*batch, len(springs.stiffness))) if start is None else start
-        theta, state = _minimum(mechanism, np.atleast_2d(theta))
+        theta = np.atleast_2d(theta)
+        points = mechanism.load_points(mechanism.motions(theta))
+        theta, state = mechanism.rest(theta, points, BALANCE)
         total = mechanism.motions(theta)
-        T_base_tip = self.layout.linkage.T_base_tip
+        T_base_tip = self.linkage.T_base_tip
         tool = total[-1] @ T_base_tip
-        sensor = total[self.layout.sensor_after] @ T_base_tip @ self.T_tcp_sensor
+        sensor = total[-1 - _END_EFFECTOR] @ T_base_tip @ self.T_tcp_sensor
         theta = theta.reshape(*batch, -1)
         return RobotEquilibrium(
             theta=theta,
@@ -194,77 +209,38 @@ class TrueRobot:
         self, q: FloatArray, force_base: FloatArray, springs: RobotSprings
     ) -> LoadedMechanism:
         """Return the robot with its loads in postures of shape (posture, joint)."""
-        chain = self.layout.chain
-        held = np.zeros((len(q), chain.ends[-1]))
-        held[:, chain.motor_elements] = q
+        chain = self.chain
         weights = np.repeat(self._weights[None], len(q), axis=0)
         forces = np.concatenate([force_base[:, None], weights], axis=1)
         loads = DeadLoads(self._points, self._after, forces)
-        return LoadedMechanism(chain.screws, chain.spring_elements, springs, held, loads)
+        return LoadedMechanism(chain.screws, chain.spring_elements, springs, chain.held(q), loads)
 
 
-def _minimum(mechanism: LoadedMechanism, start: FloatArray) -> tuple[FloatArray, EnergyState]:
-    """Return spring positions of least energy, shape (posture, spring), and the state there."""
-    points = mechanism.load_points(mechanism.motions(start))
-    reach = np.linalg.norm(points, axis=-1).T
-    scale = np.sum(np.linalg.norm(mechanism.loads.force, axis=-1) * (1.0 + reach), axis=1)
-    return minimise(lambda theta: mechanism.evaluate(theta, points), start, BALANCE * scale)
-
-
-def lay_out_robot(cell: Cell) -> RobotLayout:
-    """Return the simulated robot of a cell.
-
-    Raises
-    ------
-    DeviceError
-        If the robot has fewer than six joints.
-    RobotError
-        If the simulator cannot read its URDF.
-    """
-    linkage = Linkage.from_urdf(cell.robot.urdf, cell.robot.tip, cell.robot.base)
-    names, external = linkage.joint_names, len(linkage.joint_names) - ARM_JOINTS
-    if external < 0:
-        raise DeviceError(
-            f"the simulated arm needs six joints; {linkage.name} has {len(names)}"
-            f" ({', '.join(names)})"
-        )
+def _springs(cell: Cell, linkage: Linkage, external: int) -> tuple[SpringChain, RobotSprings]:
+    """Return where the springs of a cell's robot sit, and their laws."""
     truth, scale = cell.file.simulation, cell.file.simulation.truth
     size = _size(linkage, external)
     usual = size * HIGH_TORQUE * np.array(AXIAL_STIFFNESS)
     stiffness = scale.gears * np.array(truth.gears.stiffness or usual)
-    gears = [
-        _spring(linkage, external + i, linkage.axis[external + i], float(k))
-        for i, k in enumerate(stiffness)
-    ]
     bearings = scale.bearings / scale.gears * np.array(truth.bearings.ratio)
     bending = scale.links * (truth.links.bending or size * LINK_BENDING)
+    gears = [axial_spring(linkage, joint, float(k)) for joint, k in enumerate(stiffness, external)]
+    tilts = [tilt_springs(linkage, j, k * bearings) for j, k in enumerate(stiffness, external)]
     springs = [
         *_drives(cell, linkage, external),
         *_floor(linkage, external, scale.floor * truth.floor.tilt),
         *gears,
-        *(s for i, k in enumerate(stiffness) for s in _tilts(linkage, external + i, k * bearings)),
-        *(s for i in (1, 2) for s in _bending(linkage, names[external + i], bending)),
+        *itertools.chain(*tilts),
+        *(s for i in (1, 2) for s in _bending(linkage, external + i, bending)),
         *_end_effector(cell, linkage),
     ]
     chain = build_spring_chain(linkage, springs)
-    return RobotLayout(
-        linkage,
-        chain,
-        _robot_springs(cell, linkage, chain, gears, size),
-        chain.ends[-1] - 6,
-        external,
-    )
-
-
-def _robot_springs(
-    cell: Cell, linkage: Linkage, chain: SpringChain, gears: list[TruthSpring], size: float
-) -> RobotSprings:
-    stiffness = np.array([_stiffness(spring) for spring in chain.springs])
+    ks = np.array([spring.law.k for spring in chain.springs if isinstance(spring.law, Linear)])
     order = [id(spring) for spring in chain.springs]
     which = np.array([order.index(id(gear)) for gear in gears])
-    laws = GearLaws.of(cell.file.simulation.gears, which, stiffness[which])
+    laws = GearLaws.of(truth.gears, which, ks[which])
     balancer = _balancer(cell, linkage, size)
-    return RobotSprings(stiffness, laws, None, balancer, int(which[1]), np.zeros(()))
+    return chain, RobotSprings(ks, laws, None, balancer, int(which[1]), np.zeros(()))
 
 
 def _size(linkage: Linkage, external: int) -> float:
@@ -273,22 +249,11 @@ def _size(linkage: Linkage, external: int) -> float:
     return moved / MOVED_MASS if moved > 0.0 else 1.0
 
 
-def _stiffness(spring: TruthSpring) -> float:
-    law = spring.law
-    assert isinstance(law, Linear)
-    return law.k
-
-
-def _spring(linkage: Linkage, joint: int, axis: FloatArray, stiffness: float) -> TruthSpring:
-    name, revolute = linkage.joint_names[joint], linkage.revolute[joint]
-    return TruthSpring(name, as_triple(axis), Linear(stiffness), revolute)
-
-
 def _drives(cell: Cell, linkage: Linkage, external: int) -> list[TruthSpring]:
     entry, scale = cell.file.simulation.external, cell.file.simulation.truth.external
     stiffness = {True: scale * entry.turning, False: scale * entry.linear}
     return [
-        _spring(linkage, joint, linkage.axis[joint], stiffness[linkage.revolute[joint]])
+        axial_spring(linkage, joint, stiffness[linkage.revolute[joint]])
         for joint in range(external)
     ]
 
@@ -305,35 +270,18 @@ def _floor(linkage: Linkage, external: int, tilt: float) -> list[TruthSpring]:
     ]
 
 
-def _tilts(linkage: Linkage, joint: int, stiffness: FloatArray) -> list[TruthSpring]:
-    name = linkage.joint_names[joint]
-    return [
-        TruthSpring(name, as_triple(direction), Linear(float(k)))
-        for direction, k in zip(transverse_axes(linkage.axis[joint]), stiffness, strict=True)
-    ]
-
-
-def _bending(linkage: Linkage, joint: str, stiffness: float) -> list[TruthSpring]:
-    """Return two hinges in the middle of a link across it; none for a short one."""
-    index = linkage.joint_names.index(joint)
-    ends = linkage.T_base_joint[index : index + 2, :3, 3]
+def _bending(linkage: Linkage, joint: int, stiffness: float) -> list[TruthSpring]:
+    """Return two hinges in the middle of the link behind a joint; none for a short one."""
+    ends = linkage.T_base_joint[joint : joint + 2, :3, 3]
     if not np.linalg.norm(ends[1] - ends[0]) > _SHORT_LINK:
         return []
-    link = link_vector(linkage, joint)
-    at = as_triple(0.5 * link)
-    return [
-        TruthSpring(joint, as_triple(direction), Linear(stiffness), distal=True, at=at)
-        for direction in transverse_axes(link / np.linalg.norm(link))
-    ]
+    return link_hinges(linkage, linkage.joint_names[joint], stiffness)
 
 
 def _end_effector(cell: Cell, linkage: Linkage) -> list[TruthSpring]:
     """Return three turns and three shifts at the sensor, last of all springs."""
     entry, scale = cell.file.simulation.end_effector, cell.file.simulation.truth.end_effector
-    T_tcp_sensor = cell.T_tcp_flange
-    if cell.file.sensor is not None:
-        T_tcp_sensor = cell.T_tcp_flange @ cell.file.sensor.T_flange_sensor
-    T = inverse_transform(linkage.T_base_joint[-1]) @ linkage.T_base_tip @ T_tcp_sensor
+    T = inverse_transform(linkage.T_base_joint[-1]) @ linkage.T_base_tip @ _sensor_frame(cell)
     at, name = as_triple(T[:3, 3]), linkage.joint_names[-1]
     kinds = ((True, scale * entry.turn), (False, scale * entry.shift))
     return [
@@ -341,6 +289,12 @@ def _end_effector(cell: Cell, linkage: Linkage) -> list[TruthSpring]:
         for turns, stiffness in kinds
         for k in range(3)
     ]
+
+
+def _sensor_frame(cell: Cell) -> FloatArray:
+    """Return T_tcp_sensor of the undeformed robot; the flange where there is no sensor."""
+    sensor = cell.T_sensor_tcp
+    return cell.T_tcp_flange if sensor is None else inverse_transform(sensor)
 
 
 def _balancer(cell: Cell, linkage: Linkage, size: float) -> BalancerSpring | None:

@@ -1,13 +1,18 @@
-"""How the simulated cell moves through time: the clock, time laws, and segments.
+"""How the simulated cell moves through time: clock, random numbers, time laws, and segments.
 
 Time is in whole microseconds, so that time differences are exact. A segment is a stretch of time in
 which the cell does one thing: at its knots everything is exact; between them joints, forces and
 small deviations are interpolated along the progress of the movement.
+
+Every generator of random numbers is made from the seed and from words that say what it is for: the
+posture that the arm was sent to, the device, the number of the block. A pose that is done again,
+in the same process or another, meets the same noise.
 """
 
+import hashlib
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Protocol
 
@@ -17,7 +22,7 @@ from numpy.typing import ArrayLike
 from elastocal.arrays import FloatArray, IndexArray
 from elastocal.cell import Motion
 from elastocal.errors import DeviceError
-from elastocal.sim.workcell._springs import RobotSprings
+from elastocal.sim.arm import RobotSprings
 
 SETTLED = 1e-5
 """Rest of a settling force that counts as none, over its change."""
@@ -31,6 +36,31 @@ def to_microseconds(seconds: float) -> int:
     40000
     """
     return round(seconds * MICROSECONDS)
+
+
+def generator(seed: int, *words: object) -> np.random.Generator:
+    """Return the generator of some purpose.
+
+    Parameters
+    ----------
+    seed : int
+        Of the simulated cell.
+    *words : object
+        What it is for; objects with distinct `repr`.
+    """
+    digest = hashlib.sha256(repr((seed, *words)).encode()).digest()
+    return np.random.default_rng(np.frombuffer(digest, dtype=np.uint32))
+
+
+def posture_key(q: FloatArray) -> str:
+    """Return what stands for a posture: its joint positions to a nanoradian.
+
+    Parameters
+    ----------
+    q : ndarray, shape (joint,)
+        In rad or m.
+    """
+    return ",".join(f"{value + 0.0:.9f}" for value in np.round(q, 9))
 
 
 class SimClock:
@@ -196,6 +226,33 @@ class Knots:
         return (1.0 - part) * array[after - 1] + part * array[after]
 
 
+@dataclass(frozen=True, eq=False)
+class RobotState:
+    """State of the robot between two commands; in many postures at once with a leading axis."""
+
+    q: FloatArray
+    """Joints of the controller, shape (..., joint), in rad or m."""
+    twist: FloatArray
+    """See `Knots.twist`, shape (..., 9)."""
+    force: FloatArray
+    """Force on the robot in base, shape (..., 3), in N."""
+    springs: RobotSprings
+    """With the memory of the gears."""
+    theta: FloatArray
+    """Spring positions, shape (..., spring), in rad or m."""
+    sag: FloatArray
+    """Twist under weight alone that the controller has taken out a part of, shape (..., 9)."""
+
+
+@dataclass(frozen=True, eq=False)
+class RobotPath:
+    """A path that the robot takes."""
+
+    knots: Knots
+    start: RobotState
+    end: RobotState
+
+
 @dataclass(frozen=True)
 class Ripple:
     """Unrest of a held force: two sines, never in step."""
@@ -223,19 +280,15 @@ class Segment:
     begin: int
     """In µs of the clock."""
     law: TimeLaw
-    knots: Knots
+    path: RobotPath
     motion: Motion
     """Motion on the path."""
     motion_after: Motion
     """When it is done."""
-    springs: tuple[RobotSprings, RobotSprings]
-    """Memory of the gears at the beginning and at the end."""
-    theta: FloatArray
-    """Spring positions at the end, shape (spring,), to start from."""
-    fault_after: str | None = None
+    fault_after: str | None
     """Fault that the controller reports when it is done."""
-    ripple: Ripple | None = None
-    ripple_wrench: FloatArray = field(default_factory=lambda: np.zeros(6))
+    ripple: Ripple | None
+    ripple_wrench: FloatArray
     """Wrench at the sensor per N of the ripple, sensor frame, shape (6,)."""
 
     @cached_property
@@ -255,8 +308,9 @@ class Segment:
         Shape (time, 9), or (1, 9) where nothing changes any more; see `Knots.seen`.
         """
         if times[0] >= self.end:
-            return self.knots.seen[-1:]
-        return self.knots.at(self.knots.seen, self.law.at((times - self.begin) / MICROSECONDS))
+            return self.path.knots.seen[-1:]
+        progress = self.law.at((times - self.begin) / MICROSECONDS)
+        return self.path.knots.at(self.path.knots.seen, progress)
 
     def unrest(self, times: IndexArray) -> FloatArray | None:
         """Return the unrest of the force at times in µs, shape (time, 1), in N; None: none."""

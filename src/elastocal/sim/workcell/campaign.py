@@ -5,21 +5,30 @@ so that the gears remember. Robot, contact and controller are those of `simulate
 is left out moves a deflection by well under a micrometre: the force of the guarded touch (a larger
 one wipes it from the gears' memory), the curvature of the tooling within the few millimetres
 beside a touch, and what stop errors do to the place that is touched. No fault is injected.
+
+Then `CampaignErrors` adds what the instruments do. The devices sample, the procedure averages; here
+the averages are drawn at once, with the standard deviations that follow from the same figures of
+the cell file. Assumed perfect: weight of the tool and zero of the sensor (identified at every
+pose), registration of the tracker (0.01 mrad turns 5 mm by 50 nm).
 """
 
-from dataclasses import dataclass, replace
+import math
+from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from elastocal.arrays import FloatArray
+from elastocal.arrays import FloatArray, IndexArray
 from elastocal.cell import Cell
+from elastocal.dataset import Readings
 from elastocal.errors import DeviceError
-from elastocal.sim.arm import solve_inverse
+from elastocal.results import brief_repr
 from elastocal.sim.workcell._contact import Contact, ContactLaw
-from elastocal.sim.workcell._quasistatics import Quasistatics, RobotState
+from elastocal.sim.workcell._instruments import COVERAGE, averaged_noise, sensor_range
+from elastocal.sim.workcell._quasistatics import Quasistatics
 from elastocal.sim.workcell._robot import TrueRobot
+from elastocal.sim.workcell._timeline import RobotState
 
 _CLOSED = 1e-6
 """How far a tool may end from where the contact holds it, in m: nanometres of deflection."""
@@ -73,9 +82,7 @@ class CampaignSimulator:
     """How far the tooling stands from where the cell file puts it, shape (3,), in m."""
 
     def __repr__(self) -> str:
-        return (
-            f"CampaignSimulator({self.statics.robot.layout.linkage.name!r}, {self.springs} springs)"
-        )
+        return f"CampaignSimulator({self.statics.robot.linkage.name!r}, {self.springs} springs)"
 
     @classmethod
     def of(cls, cell: Cell) -> "CampaignSimulator":
@@ -117,8 +124,7 @@ class CampaignSimulator:
             gears=replace(gears, loss=gears.loss * own, stop_stiffness=gears.stop_stiffness * own),
             balancer=None if pull is None else replace(pull, rate=balancer * pull.rate),
         )
-        layout = replace(robot.layout, springs=scaled)
-        return replace(self, statics=replace(self.statics, robot=replace(robot, layout=layout)))
+        return replace(self, statics=replace(self.statics, robot=replace(robot, springs=scaled)))
 
     def settle(self, places: ContactPoses, force_tcp: FloatArray) -> TrueReadings:
         """Return what is true at every place under every load case, in this order.
@@ -157,7 +163,8 @@ class CampaignSimulator:
         statics, weight = self.statics, self.statics.weight
         q, reached = start.q, start
         for _ in range(_ROUNDS):
-            force = _turn(statics.R_base_sensor(reached.q, reached.twist), reading) - weight
+            R_base_sensor = statics.R_base_sensor(reached.q, reached.twist)
+            force = np.einsum("pij,pj->pi", R_base_sensor, reading) - weight
             reached = statics.loaded(replace(start, theta=reached.theta), q, force, np.zeros(3))
             goal = [c.tool_position(f) for c, f in zip(contacts, force, strict=True)]
             missed = np.array(goal) - statics.tool_position(reached)
@@ -190,9 +197,9 @@ class CampaignSimulator:
 
     def _along(self, q: FloatArray, T: FloatArray, shift: FloatArray) -> FloatArray:
         """Return joints that move the undeformed tool from T by a shift, orientation kept."""
-        layout, goal = self.statics.robot.layout, T.copy()
+        goal = T.copy()
         goal[:, :3, 3] += shift
-        found = solve_inverse(layout.linkage, goal, q, tolerance=1e-10, locked=layout.external)
+        found = self.statics.robot.solve(goal, q)
         if not found.ok.all():
             place = int(np.flatnonzero(~found.ok)[0])
             raise DeviceError(
@@ -201,47 +208,184 @@ class CampaignSimulator:
             )
         return found.q
 
-    def _markers(self, state: RobotState) -> tuple[FloatArray, FloatArray]:
-        """Return the marker by the controller and where it truly is, each (place, 3), in m."""
-        T = self.statics.robot.forward(state.q)
-        lever = T[:, :3, :3] @ self.statics.marker_tcp
-        turned = Rotation.from_rotvec(state.twist[:, 3:6]).apply(lever)
-        return T[:, :3, 3] + lever, T[:, :3, 3] + state.twist[:, :3] + turned
+    def _markers(self, q: FloatArray, twist: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return the marker by the controller and where it truly is, each (..., 3), in m."""
+        T = self.statics.robot.forward(q)
+        lever = T[..., :3, :3] @ self.statics.marker_tcp
+        turn = Rotation.from_rotvec(twist[..., 3:6].reshape(-1, 3))
+        turned = turn.apply(lever.reshape(-1, 3)).reshape(lever.shape)
+        return T[..., :3, 3] + lever, T[..., :3, 3] + twist[..., :3] + turned
 
     def _settled(
         self, near: RobotState, touch: RobotState, states: list[RobotState]
     ) -> TrueReadings:
         weight, statics = self.statics.weight, self.statics
-        unloaded, markers = self._markers(near), [self._markers(state) for state in states]
+        q, twist, force = (
+            np.stack([getattr(state, name) for state in states], axis=1)
+            for name in ("q", "twist", "force")
+        )
+        unloaded, loaded = self._markers(near.q, near.twist), self._markers(q, twist)
         tare = weight @ statics.R_base_sensor(near.q, near.twist)
-        felt = [
-            _turn_back(statics.R_base_sensor(state.q, state.twist), state.force + weight) - tare
-            for state in states
-        ]
+        carried = np.einsum("plji,plj->pli", statics.R_base_sensor(q, twist), force + weight)
         R = statics.robot.forward(near.q)[:, :3, :3] @ statics.robot.T_tcp_sensor[:3, :3]
         return TrueReadings(
-            q=_stack([state.q for state in states]),
-            force=_stack([state.force for state in states]),
-            deflection=_stack([state.twist[:, :3] - touch.twist[:, :3] for state in states]),
-            controller_displacement=_stack([each[0] - unloaded[0] for each in markers]),
-            marker_displacement=_stack([each[1] - unloaded[1] for each in markers]),
+            q=q,
+            force=force,
+            deflection=twist[..., :3] - touch.twist[:, None, :3],
+            controller_displacement=loaded[0] - unloaded[0][:, None],
+            marker_displacement=loaded[1] - unloaded[1][:, None],
             marker=unloaded[1],
-            felt=_stack(felt),
+            felt=carried - tare[:, None],
             R_base_sensor=R,
         )
 
 
-def _stack(parts: list[FloatArray]) -> FloatArray:
-    return np.stack(parts, axis=1)
+class ErrorScales(NamedTuple):
+    """Factors on the errors of the instruments; 1 is the cell file's."""
+
+    tracker: float = 1.0
+    force: float = 1.0
 
 
-def _turn(R: FloatArray, vectors: FloatArray) -> FloatArray:
-    """Return ``R v`` of each place."""
-    turned: FloatArray = np.einsum("pij,pj->pi", R, vectors)
-    return turned
+@dataclass(frozen=True, eq=False)
+class ErrorDraws:
+    """Unit normals behind all errors of one campaign, whatever part of it is measured."""
+
+    marker: FloatArray
+    """Shape (place, 1 + load, 3); the first is the unloaded reading."""
+    sensor: FloatArray
+    """Likewise."""
+    stop: FloatArray
+    """Likewise."""
+    drift: FloatArray
+    """Shape (place, 3)."""
+    cross_talk: FloatArray
+    """Shape (6, 6)."""
+
+    def __repr__(self) -> str:
+        places, readings, _ = self.marker.shape
+        return f"ErrorDraws({places} places, {readings - 1} loads)"
+
+    @classmethod
+    def of(cls, places: int, loads: int, rng: np.random.Generator) -> "ErrorDraws":
+        """Draw for some places under some load cases."""
+        marker, sensor, stop = rng.standard_normal((3, places, 1 + loads, 3))
+        return cls(
+            marker, sensor, stop, rng.standard_normal((places, 3)), rng.standard_normal((6, 6))
+        )
+
+    def take(self, places: IndexArray, loads: IndexArray) -> "ErrorDraws":
+        """Return the draws of some places and load cases."""
+        rows = np.ix_(places, np.concatenate([[0], 1 + loads]))
+        return ErrorDraws(
+            self.marker[rows], self.sensor[rows], self.stop[rows], self.drift[places],
+            self.cross_talk,
+        )  # fmt: skip
 
 
-def _turn_back(R: FloatArray, vectors: FloatArray) -> FloatArray:
-    """Return ``R^T v`` of each place."""
-    turned: FloatArray = np.einsum("pji,pj->pi", R, vectors)
-    return turned
+@brief_repr
+@dataclass(frozen=True, eq=False)
+class CampaignErrors:
+    """Standard deviations of averaged readings; make one with `of`."""
+
+    noise: float
+    """Noise of a sample of the tracker at no distance, in m."""
+    noise_per_metre: float
+    average: float
+    """Standard deviation of a loaded average of the tracker over that of a sample."""
+    unloaded_average: float
+    """The same of an unloaded one."""
+    force: tuple[float, float]
+    """Noise of an unloaded and of a loaded average of the sensor, in N."""
+    drift: FloatArray
+    """Drift of each force axis per load case, in N, shape (3,)."""
+    gain: FloatArray = field(repr=False)
+    """Change of the gain per unit of cross-talk, shape (3, 3, 6, 6)."""
+    repeatability: float
+    """Error of a stop, in m."""
+
+    @classmethod
+    def of(cls, cell: Cell) -> "CampaignErrors":
+        """Return the errors of a cell's instruments.
+
+        Raises
+        ------
+        DeviceError
+            If the cell has no force sensor.
+        """
+        entry, procedure = cell.file.simulation, cell.file.procedure
+        tracker, sensor, ranges = entry.tracker, entry.sensor, sensor_range(cell)
+        times = (procedure.unloaded_average, procedure.average)
+        averages = [averaged_noise(tracker.turbulence, time, tracker.rate) for time in times]
+        force = [sensor.force_noise / math.sqrt(max(time * sensor.rate, 1.0)) for time in times]
+        return cls(
+            noise=tracker.noise / COVERAGE,
+            noise_per_metre=tracker.noise_per_metre / COVERAGE,
+            average=averages[1],
+            unloaded_average=averages[0],
+            force=(force[0], force[1]),
+            drift=sensor.drift / 60.0 * cell.file.motion.load_time * ranges[:3] / ranges[0],
+            gain=sensor.cross_talk * _gain(cell, ranges),
+            repeatability=entry.controller.repeatability,
+        )
+
+    def readings(
+        self,
+        settled: TrueReadings,
+        draws: ErrorDraws,
+        scales: ErrorScales,
+        station: FloatArray,
+        load_cases: tuple[str, ...],
+    ) -> Readings:
+        """Return the truth as the instruments show it, places numbered from 0.
+
+        Parameters
+        ----------
+        settled : TrueReadings
+            The truth.
+        draws : ErrorDraws
+            Of these places and load cases.
+        scales : ErrorScales
+            How large the errors are.
+        station : ndarray, shape (place, 3)
+            Tracker station that looks at each place, in base, in m.
+        load_cases : tuple of str
+            Names of the loads.
+        """
+        places, loads = settled.force.shape[:2]
+        distance = np.linalg.norm(settled.marker - station, axis=1)[:, None, None]
+        sigma = scales.tracker * (self.noise + self.noise_per_metre * distance)
+        marker = sigma * (
+            self.average * draws.marker[:, 1:] - self.unloaded_average * draws.marker[:, :1]
+        )
+        # The encoders do not see where the arm truly stops; the tracker does.
+        marker += self.repeatability * (draws.stop[:, 1:] - draws.stop[:, :1])
+        rows = (places * loads, -1)
+        return Readings(
+            pose=np.repeat(np.arange(places), loads),
+            load_case=np.tile(load_cases, places),
+            joint_position=settled.q.reshape(rows),
+            force=self._force(settled, draws, scales.force).reshape(rows),
+            controller_displacement=settled.controller_displacement.reshape(rows),
+            marker_displacement=(settled.marker_displacement + marker).reshape(rows),
+        )
+
+    def _force(self, settled: TrueReadings, draws: ErrorDraws, scale: float) -> FloatArray:
+        """Return the force in base as the sensor shows it, shape (place, load, 3), in N."""
+        gain = np.eye(3) + scale * np.einsum("ijkl,kl->ij", self.gain, draws.cross_talk)
+        noise = self.force[1] * draws.sensor[:, 1:] - self.force[0] * draws.sensor[:, :1]
+        since = np.arange(1, settled.force.shape[1] + 1)[:, None]
+        noise = noise + since * self.drift * draws.drift[:, None]
+        shown = settled.felt @ gain.T + scale * noise
+        force: FloatArray = np.einsum("pij,plj->pli", settled.R_base_sensor, shown)
+        return force
+
+
+def _gain(cell: Cell, ranges: FloatArray) -> FloatArray:
+    """Return d gain / d cross-talk; see `force_gain`. Shape (3, 3, 6, 6)."""
+    T_sensor_tcp = cell.T_sensor_tcp
+    assert T_sensor_tcp is not None
+    wrench = np.vstack([np.eye(3), np.cross(T_sensor_tcp[:3, 3], np.eye(3)).T])
+    ratio = np.divide.outer(ranges, ranges)
+    gain: FloatArray = np.einsum("ik,kl,lj->ijkl", np.eye(3, 6), ratio, wrench)
+    return gain

@@ -20,19 +20,15 @@ from elastocal.arrays import FloatArray
 from elastocal.cell import Cell, Devices
 from elastocal.results import brief_repr
 from elastocal.sim.workcell._controller import SimulatedArm
-from elastocal.sim.workcell._force_control import ForceControl
 from elastocal.sim.workcell._instruments import (
     SimulatedForceSensor,
     SimulatedTracker,
     force_gain,
-    sensor_matrix,
     sensor_range,
-    sensor_zero,
 )
+from elastocal.sim.workcell._paths import ForceControl
 from elastocal.sim.workcell._plant import Plant
-from elastocal.sim.workcell._quasistatics import RobotState
-from elastocal.sim.workcell._sampling import generator
-from elastocal.sim.workcell._timeline import SimClock
+from elastocal.sim.workcell._timeline import RobotState, SimClock, generator
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,7 +103,6 @@ class _SpringTrail:
 
     def went(self, state: RobotState) -> None:
         """Take the positions that were found."""
-        assert state.theta is not None, "they were sought"
         self._before, self._theta = self._theta, state.theta
 
 
@@ -122,12 +117,9 @@ class ProcessCell:
         DeviceError
             If the cell has no sensor or no tracker, or its robot fewer than six joints.
         """
-        self._statics = SimulatedCell.of(cell, seed).plant.statics
-        self._entry = cell.file.simulation.sensor
+        run = SimulatedCell.of(cell, seed)
+        self._statics, self._sensor, self._seed = run.plant.statics, run.sensor, seed
         self._repeatability = cell.file.simulation.controller.repeatability
-        self._range, self._matrix = sensor_range(cell), sensor_matrix(cell, seed)
-        self._zero = sensor_zero(cell, seed)
-        self._seed = seed
         self._state: RobotState | None = None
         self._pressed = self._free = _SpringTrail()
         self._stop = np.zeros(3)
@@ -146,8 +138,7 @@ class ProcessCell:
         """
         self._rng = generator(self._seed, "process", course)
         self._stop = self._repeatability * self._rng.standard_normal(3)
-        share = self._entry.drift / 60.0 / self._range[0]
-        self._slope = share * self._range * self._rng.standard_normal(6)
+        self._slope = self._sensor.slope(self._rng)
         self._state = self._statics.free(q, np.zeros(3), None)
         self._pressed, self._free = _SpringTrail(self._state), _SpringTrail(self._state)
 
@@ -182,9 +173,7 @@ class ProcessCell:
         state = statics.loaded(state, q, force_base, self._stop)
         self._pressed.went(state)
         self._state, twist = state, state.twist
-        joints, twists = (np.stack([a, a]) for a in (q, twist))
-        forces = np.stack([force_base, np.zeros(3)])
-        seen = statics.knots(np.array([0.0, 1.0]), joints, twists, forces).seen[:, 3:]
+        seen = statics.path(state, replace(state, force=np.zeros(3))).knots.seen[:, 3:]
         return ProcessState(twist[:3], seen[0], seen[0] - seen[1])
 
     def read(self, since: FloatArray, wrench: FloatArray) -> FloatArray:
@@ -197,7 +186,7 @@ class ProcessCell:
         wrench : ndarray, shape (sample, 6)
             True, in the sensor's frame.
         """
-        sigma = np.repeat([self._entry.force_noise, self._entry.moment_noise], 3)
-        noise = sigma * self._rng.standard_normal(wrench.shape)
-        values = wrench @ self._matrix.T + self._zero + np.outer(since, self._slope) + noise
-        return np.clip(values, -self._range, self._range)
+        sensor, drift = self._sensor, np.outer(since, self._slope)
+        noise = sensor.sigma * self._rng.standard_normal(wrench.shape)
+        values = wrench @ sensor.matrix.T + sensor.zero + drift + noise
+        return np.clip(values, -sensor.range, sensor.range)

@@ -1,6 +1,8 @@
-"""Printable page of a recertification: springs old and new, and the change along the rows."""
+"""Springs of a calibration, and the change between two calibrations (paper Fig. 12b)."""
 
+from collections import Counter
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +12,8 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter, MaxNLocator
 
 from elastocal.arrays import FloatArray
+from elastocal.elastic import Unit
+from elastocal.identification import CalibratedModel
 from elastocal.identification.recertification import (
     CompareSummary,
     DeflectionChange,
@@ -17,8 +21,10 @@ from elastocal.identification.recertification import (
     SpringChange,
 )
 from elastocal.report.plots import style
-from elastocal.report.plots.printing import literal, new_figure, wrapped, write_figure
+from elastocal.report.plots.style import literal, wrapped
 
+_BAR, _BAR_FOOT = 0.23, 0.75
+"""Heights of a spring and of what stands below its panel, in inches."""
 _WIDTH, _LEFT, _MIDDLE, _RIGHT = 7.5, 2.75, 0.25, 0.2
 _HEAD, _ROW, _BETWEEN, _ROWS, _FOOT = 1.0, 0.21, 0.7, 2.0, 1.0
 """In inches; `_ROW` is a spring, `_ROWS` the height of the change along the rows."""
@@ -30,6 +36,81 @@ _MOST_POINTS = 1500
 """More rows than this are drawn in groups, by the extremes of each."""
 _EDGE = 3.0
 """Changes beyond this many times what chance allows are drawn at the edge, with the number."""
+
+
+@dataclass(frozen=True)
+class SpringBar:
+    """One spring in the unit that people read."""
+
+    name: str
+    unit: Unit
+    value: float
+    low: float
+    high: float
+    group: int | None
+    """Number of the group of springs that it cannot be told apart from."""
+
+
+def spring_bars(model: CalibratedModel) -> list[SpringBar]:
+    """Return the compliances of a model, each with the first group that it is mixed up in."""
+    numbered = list(enumerate(model.observability.unobservable, start=1))
+    groups = {term.spring: number for number, group in reversed(numbered) for term in group}
+    low, high = model.interval()
+    bars = []
+    for k, parameter in enumerate(model.model.parameters):
+        name, unit = parameter.name, parameter.unit
+        value, start, end = (unit.factor * float(c[k]) for c in (model.compliance, low, high))
+        group = None if model.observability.observable[k] else groups.get(name, 0)
+        bars.append(SpringBar(name, unit, value, start, end, group))
+    return bars
+
+
+def spring_figure(springs: Sequence[SpringBar]) -> Figure:
+    """Return the figure: a panel for each unit, springs downwards.
+
+    Parameters
+    ----------
+    springs : sequence of SpringBar
+        From `spring_bars`; not empty.
+    """
+    # The unit of most springs comes first, so that a rail does not stand above the joints.
+    counts = Counter(bar.unit for bar in springs).most_common()
+    height = _BAR * len(springs) + _BAR_FOOT * len(counts)
+    figure = style.new_figure(9.0, height)
+    bottom = height
+    for unit, count in counts:
+        bottom -= _BAR * count + _BAR_FOOT
+        axes = figure.add_panel(0.14 * 9.0, bottom + _BAR_FOOT - 0.1, 0.84 * 9.0, _BAR * count)
+        _draw_bars(axes, unit.shown, [bar for bar in springs if bar.unit == unit])
+    return figure
+
+
+def _draw_bars(axes: Axes, unit: str, bars: Sequence[SpringBar]) -> None:
+    # A value that is not by itself has no interval that means anything.
+    ends = [bar.high if bar.group is None else bar.value for bar in bars]
+    top = max(0.0, *ends) or 1.0
+    own = [(k, bar) for k, bar in enumerate(bars) if bar.group is None]
+    rows = [k for k, _ in own]
+    low, value, high = ([getattr(bar, key) for _, bar in own] for key in ("low", "value", "high"))
+    axes.hlines(rows, low, high, color=style.BLUE, lw=3.5, alpha=0.45)
+    axes.scatter(value, rows, s=26, c=style.BLUE, zorder=3)
+    for k, bar in enumerate(bars):
+        if bar.group is not None:
+            axes.scatter(
+                bar.value, k, s=26, facecolors="none", edgecolors=style.REFUSED, marker="D"
+            )
+            left = bar.value > 0.75 * top
+            axes.text(
+                bar.value + (-0.015 if left else 0.015) * top, k,
+                f"not by itself, group {bar.group}", ha="right" if left else "left",
+                va="center", fontsize=7.5, color=style.MUTED, style="italic",
+            )  # fmt: skip
+    axes.set_yticks(range(len(bars)), [literal(bar.name) for bar in bars], fontsize=8)
+    axes.set_ylim(len(bars) - 0.4, -0.6)
+    axes.set_xlim(-0.02 * top, 1.05 * top)
+    axes.set_xlabel(f"compliance in {unit}; band: 95 % interval")
+    style.open_frame(axes, grid="both", colour="#e6e6e2")
+    axes.tick_params(length=0)
 
 
 def write_recertification_figure(path: Path, found: CompareSummary) -> Path:
@@ -49,7 +130,9 @@ def write_recertification_figure(path: Path, found: CompareSummary) -> Path:
     """
     moved = ", ".join(found.moved) or "none"
     description = f"Springs that moved: {moved}. {found.reason}."
-    return write_figure(path, lambda: recertification_figure(found), _title(found), description)
+    return style.write_figure(
+        path, lambda: recertification_figure(found), _title(found), description
+    )
 
 
 def recertification_figure(found: CompareSummary) -> Figure:
@@ -61,18 +144,16 @@ def recertification_figure(found: CompareSummary) -> Figure:
     table = max(len(found.springs), 1) * _ROW
     along = 0.0 if found.deflection is None else _BETWEEN + _ROWS
     height = _HEAD + table + along + _FOOT
-    figure = new_figure(_WIDTH, height)
+    figure = style.new_figure(_WIDTH, height)
     wide = _WIDTH - _LEFT - _MIDDLE - _RIGHT
-    bottom = (height - _HEAD - table) / height
-    values = figure.add_axes((_LEFT / _WIDTH, bottom, _SHARE * wide / _WIDTH, table / height))
-    left = (_LEFT + _SHARE * wide + _MIDDLE) / _WIDTH
-    tested = figure.add_axes((left, bottom, (1.0 - _SHARE) * wide / _WIDTH, table / height))
-    _draw_values(values, found.springs)
-    _draw_tested(tested, found.springs)
+    bottom = height - _HEAD - table
+    _draw_values(figure.add_panel(_LEFT, bottom, _SHARE * wide, table), found.springs)
+    left = _LEFT + _SHARE * wide + _MIDDLE
+    _draw_tested(figure.add_panel(left, bottom, (1.0 - _SHARE) * wide, table), found.springs)
     if found.deflection is not None:
-        box = (0.85 / _WIDTH, _FOOT / height, (_WIDTH - 1.05) / _WIDTH, _ROWS / height)
-        _draw_rows(figure.add_axes(box), found.deflection, found.limit)
-    _draw_frame(figure, found, height)
+        axes = figure.add_panel(0.85, _FOOT, _WIDTH - 1.05, _ROWS)
+        _draw_rows(axes, found.deflection, found.limit)
+    _draw_frame(figure, found)
     return figure
 
 
@@ -125,7 +206,7 @@ def _finish(axes: Axes, count: int) -> None:
         axes.axhline(number - 0.5, color=style.FAINT, lw=0.35, zorder=0)
     axes.tick_params(axis="x", labelsize=7.5)
     axes.tick_params(axis="y", length=0)
-    axes.spines[["top", "right", "left"]].set_visible(False)
+    style.open_frame(axes, also="left")
 
 
 def _draw_rows(axes: Axes, change: DeflectionChange, limit: float | None) -> None:
@@ -149,7 +230,7 @@ def _draw_rows(axes: Axes, change: DeflectionChange, limit: float | None) -> Non
     axes.set_xlabel("Row", fontsize=8.0)
     axes.set_ylabel("Change of predicted\ndeflection in mm", fontsize=8.0)
     axes.tick_params(labelsize=8.0)
-    axes.spines[["top", "right"]].set_visible(False)
+    style.open_frame(axes)
 
 
 def _grouped(change: DeflectionChange) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
@@ -170,11 +251,9 @@ def _over_chance(together: Estimate) -> float:
     return float(np.sign(together.value) * np.inf) if together.value != 0.0 else 0.0
 
 
-def _draw_frame(figure: Figure, found: CompareSummary, height: float) -> None:
-    figure.text(
-        0.15 / _WIDTH, 1.0 - 0.1 / height, literal(_title(found)), va="top", fontsize=11.5,
-        weight="bold",
-    )  # fmt: skip
+def _draw_frame(figure: style.Page, found: CompareSummary) -> None:
+    height = figure.get_size_inches()[1]
+    figure.add_title(_title(found), 0.15)
     figure.text(
         0.15 / _WIDTH, 1.0 - 0.36 / height, literal("\n".join(wrapped(_found(found), 115))),
         va="top", fontsize=8.5, linespacing=1.3,
@@ -194,10 +273,7 @@ def _draw_frame(figure: Figure, found: CompareSummary, height: float) -> None:
     )
     if found.deflection is not None:
         description += " Below: norm of the change at each row; the black mark is the largest."
-    figure.text(
-        0.15 / _WIDTH, 0.1 / height, "\n".join(wrapped(description, 125)), va="bottom",
-        fontsize=7.5, color=style.MUTED, linespacing=1.3,
-    )  # fmt: skip
+    figure.add_caption("\n".join(wrapped(description, 125)), 0.15, 7.5, 1.3)
 
 
 def _title(found: CompareSummary) -> str:

@@ -5,7 +5,7 @@ The torque of a gear over its twist is
     tau(x) = k x - sum_m L_m a_m atan(x / a_m) + sum_i kappa_i clip(x - s_i, -d_i, d_i)
 
 *Growth and backlash* (the sum over m): near rest the stiffness is smaller by ``L_m``, and half of
-that is back at the twist ``a_m``; see `elastocal.sim.arm.springs.gear_softening`. A small ``a_m``
+that is back at the twist ``a_m``; see `_softening`. A small ``a_m``
 with nearly all of ``k`` is a smoothed play: beyond it the twist is larger by ``b / 2`` with
 ``b = pi a_m L_m / k``, so that a torque and its opposite are ``b`` further apart.
 
@@ -26,7 +26,7 @@ import numpy as np
 
 from elastocal.arrays import FloatArray, IndexArray
 from elastocal.cell import Gears
-from elastocal.sim.arm import gear_softening
+from elastocal.sim.arm.springs import SpringResponse
 
 _STOPS = 4
 """Number of sliders of a gear's friction."""
@@ -63,7 +63,7 @@ class BalancerSpring:
     upright: float
     """Joint angle at which the arm is upright, in rad."""
 
-    def evaluate(self, angle: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    def evaluate(self, angle: FloatArray) -> SpringResponse:
         """Return energy in J, torque dE/dalpha in N·m and stiffness d²E/dalpha² in N·m/rad.
 
         Parameters
@@ -149,7 +149,7 @@ class RobotSprings:
     joint_angle: FloatArray
     """Angle that the motor of the balanced joint holds, shape () or (posture,), in rad."""
 
-    def evaluate(self, theta: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    def evaluate(self, theta: FloatArray) -> SpringResponse:
         """Return energy (batch,), torques and stiffnesses (batch, spring); see the module.
 
         Parameters
@@ -163,7 +163,7 @@ class RobotSprings:
         stiffness[:] = self.stiffness
         which, law = self.gears.which, self.gears
         twist = theta[:, which, None]
-        lost = gear_softening(twist, law.loss, law.angle)
+        lost = _softening(twist, law.loss, law.angle)
         torque[:, which] -= np.sum(lost[1], axis=2)
         stiffness[:, which] -= np.sum(lost[2], axis=2)
         energy -= np.sum(lost[0], axis=(1, 2))
@@ -209,3 +209,27 @@ class RobotSprings:
         travel = self.gears.stop_travel
         twist = theta[..., self.gears.which, None]
         return replace(self, slider=twist - np.clip(twist - self.slider, -travel, travel))
+
+
+def _softening(twist: FloatArray, loss: FloatArray, scale: FloatArray) -> SpringResponse:
+    """Return the energy, torque and stiffness that a gear lacks near rest.
+
+    With the stiffness ``L`` that is missing at rest and the twist ``a`` at which half of it is
+    back: ``L a² (r atan(r) - log(1 + r²) / 2)``, ``L a atan(r)`` and ``L / (1 + r²)`` at
+    ``r = twist / a``, each the derivative of the one before.
+
+    Parameters
+    ----------
+    twist : ndarray
+        In rad.
+    loss : ndarray
+        L in N·m/rad, of a shape that broadcasts with ``twist``.
+    scale : ndarray
+        a in rad, likewise.
+    """
+    ratio = twist / scale
+    bend, square = np.arctan(ratio), ratio**2
+    energy: FloatArray = loss * scale**2 * (ratio * bend - 0.5 * np.log1p(square))
+    torque: FloatArray = loss * scale * bend
+    stiffness: FloatArray = loss / (1.0 + square)
+    return energy, torque, stiffness
