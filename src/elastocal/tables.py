@@ -13,7 +13,6 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from itertools import chain, islice
 from pathlib import Path
-from typing import TextIO
 
 import numpy as np
 
@@ -257,14 +256,10 @@ def new_table(
         If the file cannot be written.
     """
     with replacing(path) as temporary, temporary.open("w", encoding="utf-8", newline="") as file:
-        yield _append_to(file, layout)
-
-
-def _append_to(file: TextIO, layout: TableLayout) -> Callable[[Iterable[Sequence[object]]], None]:
-    file.writelines(layout.preamble)
-    writer = csv.writer(file, delimiter=layout.delimiter, lineterminator=layout.line_end)
-    writer.writerow(layout.header)
-    return writer.writerows
+        file.writelines(layout.preamble)
+        writer = csv.writer(file, delimiter=layout.delimiter, lineterminator=layout.line_end)
+        writer.writerow(layout.header)
+        yield writer.writerows
 
 
 def _parsed(cell: str, line: int, column: Column, parse: Callable[[str], float]) -> float:

@@ -34,7 +34,7 @@ from .examples import (
     EXAMPLES as EXAMPLES,
     Example as Example,
     binary_stl as binary_stl,
-    block as block,
+    block_mesh as block_mesh,
     dome_section as dome_section,
     require_example as require_example,
     write_example as write_example,

@@ -4,7 +4,7 @@ import math
 from typing import Annotated
 
 import numpy as np
-from pydantic import AfterValidator, BeforeValidator, Field, FiniteFloat
+from pydantic import AfterValidator, BeforeValidator, Field, FiniteFloat, ValidationInfo
 
 from elastocal.arrays import FloatArray
 from elastocal.records import StrictModel
@@ -171,6 +171,25 @@ def unit_vector(values: tuple[float, ...]) -> FloatArray:
     """Return a direction as a read-only unit vector."""
     array = np.array(values, dtype=float)
     return vector(tuple(array / np.linalg.norm(array)))
+
+
+def needed_for(key: str, figures: str) -> AfterValidator:
+    """Return what makes a field say where figures are from, as soon as a field before it has any.
+
+    Parameters
+    ----------
+    key : str
+        Field of the figures.
+    figures : str
+        What the message calls them.
+    """
+
+    def check(text: str | None, info: ValidationInfo) -> str | None:
+        if info.data.get(key) and not (text or "").strip():
+            raise ValueError(f"say where the {figures} are from")
+        return text
+
+    return AfterValidator(check)
 
 
 def check_exactly_one(**given: object) -> None:

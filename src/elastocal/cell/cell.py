@@ -124,15 +124,10 @@ class CellFile(StrictModel):
 
     @field_validator("trackers")
     @classmethod
-    def _named_once(cls, trackers: tuple[Tracker, ...]) -> tuple[Tracker, ...]:
+    def _named_once_with_a_marker(cls, trackers: tuple[Tracker, ...], info: Any) -> Any:
         for name, times in Counter(tracker.name for tracker in trackers).items():
             if times > 1:
                 raise ValueError(f"{times} stations are named {name!r}")
-        return trackers
-
-    @field_validator("trackers")
-    @classmethod
-    def _something_to_look_at(cls, trackers: tuple[Tracker, ...], info: Any) -> Any:
         if trackers and info.data.get("marker") is None:
             raise ValueError("trackers need a marker to look at (key 'marker')")
         return trackers
@@ -216,7 +211,7 @@ class Cell:
     @property
     def T_base_surface(self) -> FloatArray:
         """Frame of the surface's mesh in base, shape (4, 4)."""
-        return self.file.surface.T_base_surface
+        return self.file.surface.pose.T
 
     @property
     def surface_path(self) -> Path:

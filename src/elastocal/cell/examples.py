@@ -45,7 +45,7 @@ def dome_section() -> FloatArray:
     return own[_grid_faces(_DOME_CELLS + 1)]
 
 
-def block() -> FloatArray:
+def block_mesh() -> FloatArray:
     """Return the triangles of a block that stands on z = 0, centred on x = y = 0.
 
     Returns
@@ -99,12 +99,12 @@ class Example:
 
     template: str
     meshes: dict[str, Callable[[], FloatArray]]
-    """What makes the triangles of each mesh file, shape (face, 3, 3), in m."""
+    """Function that makes the triangles of each mesh file, shape (face, 3, 3), in m."""
 
 
 EXAMPLES = {
     "afp": Example("afp.yaml", {"dome.stl": dome_section}),
-    "machining": Example("machining.yaml", {"block.stl": block}),
+    "machining": Example("machining.yaml", {"block.stl": block_mesh}),
 }
 """Fibre placement on a dome section, and machining of a block: the paper's two case studies."""
 

@@ -1,4 +1,4 @@
-"""What stands in the cell: the robot with its tool, the instruments, the tooling, other solids."""
+"""The hardware of the cell: robot with its tool, instruments, tooling surface, other solids."""
 
 import math
 from typing import Annotated, Any, Literal, Self
@@ -173,11 +173,6 @@ class SurfaceEntry(MeshFile):
     """Turn the normals round; they must point to the robot's side."""
     crease_angle: PositiveAngle = math.radians(30.0)
     """Neighbouring faces that differ by more meet in an edge that the disk must not hang over."""
-
-    @property
-    def T_base_surface(self) -> FloatArray:
-        """Frame of the mesh in base, shape (4, 4)."""
-        return self.pose.T
 
 
 def _in_polygon(points: FloatArray, corners: FloatArray) -> BoolArray:

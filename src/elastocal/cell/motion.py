@@ -3,13 +3,13 @@
 import itertools
 import math
 from collections.abc import Iterable
-from typing import Annotated, Any
+from typing import Annotated
 
 import numpy as np
-from pydantic import Field, FiniteFloat, field_validator
+from pydantic import Field, FiniteFloat
 
 from elastocal.arrays import FloatArray
-from elastocal.cell._quantities import PositiveSpeed, PositiveTime, vector
+from elastocal.cell._quantities import PositiveSpeed, PositiveTime, needed_for, vector
 from elastocal.cell.hardware import RobotEntry
 from elastocal.cell.procedure import Limits, TorqueLimits
 from elastocal.errors import RobotError, UnitError, nearest
@@ -40,7 +40,9 @@ class MotionEntry(StrictModel):
     """Position of every joint, external axes too, where the robot starts and ends."""
     speed: dict[str, str] = Field(default_factory=dict)
     """Largest speed of each joint, by name; those of the robot's description by default."""
-    provenance: Annotated[str | None, Field(validate_default=True)] = None
+    provenance: Annotated[
+        str | None, needed_for("speed", "speeds"), Field(validate_default=True)
+    ] = None
     """Where the speeds are from; needed when there are any."""
     override: Annotated[FiniteFloat, Field(ge=0.01, le=1.0)] = 0.2
     """Part of the speeds that is used; controllers know no less than a percent."""
@@ -52,13 +54,6 @@ class MotionEntry(StrictModel):
     """Time of the unloaded reference of a pose, in s."""
     load_time: PositiveTime = 8.0
     """Time of one load case, in s: ramp, settle, average."""
-
-    @field_validator("provenance")
-    @classmethod
-    def _known_origin(cls, text: str | None, info: Any) -> str | None:
-        if info.data.get("speed") and not (text or "").strip():
-            raise ValueError("say where the speeds are from")
-        return text
 
 
 def home_position(robot: Robot, entry: MotionEntry) -> FloatArray:

@@ -26,6 +26,7 @@ from elastocal.cell._quantities import (
     PositiveTime,
     SpanAngle,
     TranslationalCompliance,
+    needed_for,
 )
 from elastocal.errors import UnitError
 from elastocal.records import StrictModel
@@ -65,16 +66,11 @@ class LoadCases(StrictModel):
 
     @field_validator("cases")
     @classmethod
-    def _distinct(cls, cases: tuple[str, ...]) -> tuple[str, ...]:
+    def _distinct_with_their_forces(cls, cases: tuple[str, ...], info: Any) -> tuple[str, ...]:
         if not cases:
             raise ValueError("at least one load case is needed")
         if len(set(cases)) != len(cases):
             raise ValueError("a load case is named twice")
-        return cases
-
-    @field_validator("cases")
-    @classmethod
-    def _lateral_force_is_given(cls, cases: tuple[str, ...], info: Any) -> tuple[str, ...]:
         for axis, names in (("fx", {"north", "south"}), ("fy", {"east", "west"})):
             pushed = sorted(names & set(cases))
             if pushed and not info.data.get(axis, 1.0) > 0.0:
@@ -121,7 +117,9 @@ class TorqueLimits(StrictModel):
     """Part of the figure that may be used for seconds on end."""
     values: dict[str, str] = Field(default_factory=dict)
     """Figure of each joint, by name; those of the robot's description by default."""
-    provenance: Annotated[str | None, Field(validate_default=True)] = None
+    provenance: Annotated[
+        str | None, needed_for("values", "torque values"), Field(validate_default=True)
+    ] = None
     """Where the figures are from; needed when there are any."""
 
     @field_validator("values")
@@ -153,13 +151,6 @@ class TorqueLimits(StrictModel):
         except UnitError as error:
             kind = "turns and has a moment" if revolute else "slides and has a force"
             raise UnitError(f"{joint} {kind}: {error}") from error
-
-    @field_validator("provenance")
-    @classmethod
-    def _known_origin(cls, text: str | None, info: Any) -> str | None:
-        if info.data.get("values") and not (text or "").strip():
-            raise ValueError("say where the torque values are from")
-        return text
 
 
 class Limits(StrictModel):

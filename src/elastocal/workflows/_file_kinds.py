@@ -257,8 +257,13 @@ def codec_arrays(path: Path) -> FileDescription:
 
 def codec_verdicts(path: Path) -> FileDescription:
     """Describe the verdicts of a codec."""
-    facts = _picked(read_codec_summary(path), "robot", "variants", "saturation")
-    return "verdict file of a codec", {"schema": VERDICTS_SCHEMA, **facts}
+    found = read_codec_summary(path)
+    return "verdict file of a codec", {
+        "schema": VERDICTS_SCHEMA,
+        "robot": found.robot,
+        "variants": list(found.variants),
+        "saturation": found.saturation,
+    }
 
 
 def study_folder(path: Path) -> FileDescription:

@@ -13,7 +13,7 @@ from elastocal.compensation.offline import (
 )
 from elastocal.compensation.programs import PROGRAM_READERS, compensate_program
 from elastocal.errors import FileAccessError
-from elastocal.identification import CalibratedModel, read_model
+from elastocal.identification import read_model
 from elastocal.progress import Progress
 from elastocal.records import record
 from elastocal.results import Result
@@ -107,7 +107,11 @@ def compensate(settings: CompensateSettings, progress: Progress) -> CompensateRe
     robot = calibrated.model.robot
     how = CorrectionSettings(parse_posture(robot, settings.start), settings.largest)
     if is_program:
-        summary, notes = _correct_program(calibrated, settings, how)
+        if forces is None:
+            raise FileAccessError(f"{path} has no forces: name a table of them with --forces")
+        T_base_frame = None if settings.base is None else parse_frame(settings.base)
+        found = compensate_program(calibrated, path, forces, settings.out, how, T_base_frame)
+        summary, notes = found.summary, found.notes
     else:
         summary = compensate_path(calibrated, path, settings.out, how, progress)
         notes = _path_notes(summary, robot, settings.start)
@@ -116,18 +120,6 @@ def compensate(settings: CompensateSettings, progress: Progress) -> CompensateRe
         **{each.name: getattr(figures, each.name) for each in fields(figures)},
         notes=(*coverage_notes(calibrated), *notes, *_force_notes(summary)),
     )
-
-
-def _correct_program(
-    calibrated: CalibratedModel, settings: CompensateSettings, how: CorrectionSettings
-) -> tuple[CorrectionSummary, tuple[str, ...]]:
-    if settings.forces is None:
-        raise FileAccessError(f"{settings.path} has no forces: name a table of them with --forces")
-    T_base_frame = None if settings.base is None else parse_frame(settings.base)
-    found = compensate_program(
-        calibrated, settings.path, settings.forces, settings.out, how, T_base_frame
-    )
-    return found.summary, found.notes
 
 
 def _path_notes(summary: CorrectionSummary, robot: Robot, start: str | None) -> tuple[str, ...]:

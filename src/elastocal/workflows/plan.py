@@ -1,5 +1,6 @@
 """``plan``: from a cell to an ordered, checked, executable set of poses, with its files."""
 
+from collections import Counter
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
@@ -115,6 +116,7 @@ def plan(settings: PlanSettings, progress: Progress) -> PlanResult:
 def plan_figures(found: PlanResult, folder: Path, program: str) -> PlanFigures:
     """Return the key figures of a plan that was written into a folder."""
     search, other = found.search, found.comparison
+    seeing = Counter(pose.seen_by for pose in found.poses if pose.seen_by is not None)
     names = (PLAN, planning.POOL, PLAN_TABLE, f"{program}.src", f"{program}.dat", _PAGE, _FIGURE)
     return PlanFigures(
         folder=str(folder),
@@ -130,15 +132,10 @@ def plan_figures(found: PlanResult, folder: Path, program: str) -> PlanFigures:
         sampled=found.pool.sampled,
         refused={check.name: check.refused for check in found.pool.checks},
         bottleneck=found.pool.bottleneck,
-        stations=_stations(found),
+        stations=dict(sorted(seeing.items())),
         time=PlanTimes(found.travel_time, found.total_time),
         findings=found.findings,
     )
-
-
-def _stations(found: PlanResult) -> dict[str, int]:
-    names = [pose.seen_by for pose in found.poses if pose.seen_by is not None]
-    return {name: names.count(name) for name in sorted(set(names))}
 
 
 def _write_folder(folder: Path, cell: Cell, planned: planning.PlanAndPool, program: str) -> None:

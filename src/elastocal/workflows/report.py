@@ -6,7 +6,6 @@ from os import PathLike
 from pathlib import Path
 
 from elastocal.errors import FileAccessError
-from elastocal.identification import UnseenErrors
 from elastocal.identification.recertification import Estimate
 from elastocal.progress import Progress
 from elastocal.records import record
@@ -142,7 +141,10 @@ def report(settings: ReportSettings, progress: Progress) -> ReportResult:
     if paper is not None:
         write_pdf(out, paper, browser)
         progress("report", 3, steps)
-    verdict, again = written.verdict, evidence.reproduction
+    verdict, again, unseen = written.verdict, evidence.reproduction, None
+    if again is not None and again.same:
+        left = again.unseen
+        unseen = UnseenFigures(left.mean, left.p95, left.max, left.poses, len(left.error))
     figures = ReportFigures(
         report=str(written.path),
         pdf=str(paper) if paper else None,
@@ -151,14 +153,10 @@ def report(settings: ReportSettings, progress: Progress) -> ReportResult:
         reasons=tuple(verdict.reasons),
         advice=tuple(verdict.advice),
         tolerance=evidence.limits.tolerance,
-        unseen=_unseen(again.unseen) if again is not None and again.same else None,
+        unseen=unseen,
         missing=tuple(each.name for each in evidence.missing),
     )
     return ReportResult(verdict, figures)
-
-
-def _unseen(errors: UnseenErrors) -> UnseenFigures:
-    return UnseenFigures(errors.mean, errors.p95, errors.max, errors.poses, len(errors.error))
 
 
 def _check_places(out: Path, paper: Path | None, force: bool) -> None:

@@ -93,7 +93,13 @@ def tool(settings: ToolSettings, progress: Progress) -> ToolResult:  # noqa: ARG
 
 def _from_table(path: Path, settings: ToolSettings) -> _PostureSource:
     """Return the postures of a CSV file."""
-    robot = _posture_robot(settings.robot, settings.flange)
+    arm = None
+    if settings.robot is not None:
+        if Path(settings.robot).suffix.lower() == ".json":
+            robot = read_model(Path(settings.robot)).model.robot
+        else:
+            robot = find_robot(settings.robot, settings.flange, None)
+        arm = Robot.from_urdf(robot.urdf, settings.flange, robot.base)
     rule = "must be six quantities, e.g. '0 mm, 0 mm, 45 mm, 0 deg, 0 deg, 0 deg'"
     T_flange_sensor = parse_frame(settings.sensor, "sensor", rule, CompensationError)
     down = np.array(settings.down)
@@ -101,20 +107,10 @@ def _from_table(path: Path, settings: ToolSettings) -> _PostureSource:
     if not 0.0 < length < np.inf:
         raise CompensationError(f"direction of gravity {down.tolist()} must be finite and not zero")
     gravity = down * (-GRAVITY[2] / length)
-    arm = None if robot is None else Robot.from_urdf(robot.urdf, settings.flange, robot.base)
     R, origin = T_flange_sensor[:3, :3], T_flange_sensor[:3, 3]
     points = {} if not np.any(origin) else {"flange": -origin @ R}
     mount = SensorMount(settings.flange, origin, gravity)
     return _PostureSource(conditioning.read_postures(path, arm, gravity), mount, R, points=points)
-
-
-def _posture_robot(robot: str | None, flange: str) -> Robot | None:
-    """Return the robot of a model file, a URDF file or the catalogue, up to the flange."""
-    if robot is None:
-        return None
-    if Path(robot).suffix.lower() == ".json":
-        return read_model(Path(robot)).model.robot
-    return find_robot(robot, flange, None)
 
 
 def _from_run(run: Path) -> _PostureSource:

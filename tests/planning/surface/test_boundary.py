@@ -3,7 +3,7 @@
 import numpy as np
 import trimesh
 
-from elastocal.cell.examples import BLOCK_SIZE, block
+from elastocal.cell.examples import BLOCK_SIZE, block_mesh
 from elastocal.planning.surface import build_surface, distance_to_boundary, sample_uniform, weld
 from support.tooling import plane, soup
 
@@ -16,7 +16,7 @@ def test_on_a_square_it_is_the_distance_to_the_nearest_side():
 
 
 def test_the_edges_of_a_block_are_borders_though_its_mesh_is_closed():
-    surface = soup(block())
+    surface = soup(block_mesh())
     points = sample_uniform(surface, 1000, np.random.default_rng(1))
     size = np.array(BLOCK_SIZE)
     from_sides = np.minimum(
@@ -36,7 +36,7 @@ def test_a_whole_sphere_has_no_border():
 
 
 def test_an_edge_on_the_other_side_of_a_sheet_does_not_count():
-    sheet, hole = plane(), soup(0.1 * block())
+    sheet, hole = plane(), soup(0.1 * block_mesh())
     vertices = np.concatenate([sheet.mesh.vertices, hole.mesh.vertices - (0, 0, 0.05)])
     faces = np.concatenate([sheet.mesh.faces, hole.mesh.faces + len(sheet.mesh.vertices)])
     both = build_surface(weld(vertices, faces, "both"))

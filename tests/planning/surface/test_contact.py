@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from elastocal.cell.examples import block
+from elastocal.cell.examples import block_mesh
 from elastocal.planning.surface import (
     SurfaceError,
     distance_to_boundary,
@@ -27,7 +27,7 @@ def test_on_a_sphere_angle_and_gap_are_those_of_the_cap_under_the_disk():
 
 
 def test_a_disk_is_supported_on_a_block_exactly_where_its_rim_is_inside_the_edges():
-    surface = soup(block())
+    surface = soup(block_mesh())
     points = sample_uniform(surface, 1500, np.random.default_rng(1))
     distance = distance_to_boundary(surface, points)
     fit = fit_disk(surface, points, RADIUS)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from elastocal.cell import load_cell
-from elastocal.cell.examples import EXAMPLES, block, dome_section, write_example
+from elastocal.cell.examples import EXAMPLES, block_mesh, dome_section, write_example
 from elastocal.planning.surface import (
     ReachableFrom,
     arm_reach,
@@ -81,11 +81,11 @@ def test_the_reach_is_a_bound_that_a_stretched_arm_nearly_attains(cell):
 def test_an_open_mesh_is_said_and_a_closed_one_is_not():
     assert [f.kind for f in mesh_findings(plane())] == ["open"]
     assert "4 edges" in mesh_findings(plane())[0].message
-    assert mesh_findings(soup(block())) == ()
+    assert mesh_findings(soup(block_mesh())) == ()
 
 
 def test_a_third_face_at_an_edge_a_turned_and_a_flat_face_are_said():
-    triangles = block()
+    triangles = block_mesh()
     fin = np.array(
         [triangles[0][0], triangles[0][1], triangles[0][:2].mean(axis=0) + np.array([-1, 0, 0.3])]
     )
@@ -101,8 +101,8 @@ def test_a_block_inside_out_is_found_without_asking_the_robot():
         raise AssertionError("not asked")
 
     rng = np.random.default_rng(RNG)
-    assert inverted_finding(soup(block()), nowhere, rng) == ()
-    (found,) = inverted_finding(soup(block()[:, ::-1]), nowhere, rng)
+    assert inverted_finding(soup(block_mesh()), nowhere, rng) == ()
+    (found,) = inverted_finding(soup(block_mesh()[:, ::-1]), nowhere, rng)
     assert "inside out" in found.message
 
 
@@ -113,7 +113,7 @@ def test_a_surface_that_is_reached_nowhere_is_not_called_inverted():
 
 
 def test_contact_poses_press_into_the_surface_and_turn_about_their_z():
-    points = sample_uniform(soup(block()), 40, np.random.default_rng(0))
+    points = sample_uniform(soup(block_mesh()), 40, np.random.default_rng(0))
     spin = np.linspace(0, np.pi, 5)
     T = contact_frames(points.position, points.normal, spin)
     R = T[..., :3, :3]
@@ -136,7 +136,7 @@ def _shift(metres):
 
 
 def test_faces_that_stand_twice_are_said_and_do_not_make_the_mesh_non_manifold():
-    triangles = block()
+    triangles = block_mesh()
     surface = soup(np.concatenate([triangles, triangles[:5]]))
     (found,) = mesh_findings(surface)
     assert (found.kind, surface.closed) == ("duplicate", True)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from elastocal.cell.examples import block
+from elastocal.cell.examples import block_mesh
 from elastocal.planning.surface import SurfaceError, geodesic_distance, sample_uniform
 from support.tooling import cap, plane, soup
 
@@ -35,7 +35,7 @@ def test_on_a_sphere_it_is_the_great_circle():
 
 
 def test_over_the_edge_of_a_block_it_is_the_distance_of_the_unfolded_faces():
-    surface = soup(block())
+    surface = soup(block_mesh())
     points = sample_uniform(surface, 600, np.random.default_rng(2))
     top, side = points.normal[:, 2] > 0.5, points.normal[:, 0] > 0.5
     start = np.flatnonzero(top)[
@@ -50,7 +50,7 @@ def test_over_the_edge_of_a_block_it_is_the_distance_of_the_unfolded_faces():
 
 
 def test_parts_that_hang_not_together_are_infinitely_far():
-    one = block()
+    one = block_mesh()
     surface = soup(np.concatenate([one, one + np.array([5.0, 0, 0])]))
     points = sample_uniform(surface, 40, np.random.default_rng(3))
     found = geodesic_distance(surface, points).from_point(0)

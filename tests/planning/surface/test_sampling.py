@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
-from elastocal.cell.examples import block
+from elastocal.cell.examples import block_mesh
 from elastocal.cell.hardware import RegionEntry
 from elastocal.planning.surface import (
     SurfaceError,
@@ -19,7 +19,7 @@ from support.tooling import cap, plane, soup
 
 
 def test_uniform_points_fall_on_faces_in_proportion_to_their_area():
-    surface = soup(block())
+    surface = soup(block_mesh())
     points = sample_uniform(surface, 20_000, np.random.default_rng(3))
     share = np.bincount(points.face, minlength=12) / len(points)
     expected = surface.face_areas / surface.area

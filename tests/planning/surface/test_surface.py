@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from elastocal.cell.examples import block
+from elastocal.cell.examples import block_mesh
 from elastocal.planning.surface import (
     SurfaceError,
     build_surface,
@@ -15,7 +15,7 @@ from support.tooling import cap, plane, soup
 
 
 def test_a_block_keeps_the_normals_of_its_faces():
-    surface = soup(block())
+    surface = soup(block_mesh())
     points = sample_uniform(surface, 2000, np.random.default_rng(0))
     np.testing.assert_allclose(np.abs(points.normal).max(axis=1), 1.0, atol=1e-12)
     assert len(np.unique(surface.patch)) == 6
@@ -33,7 +33,7 @@ def test_normals_of_a_sphere_are_smooth_inside_and_within_a_facet_at_its_border(
 
 
 def test_one_triangle_wound_backwards_is_turned():
-    triangles = block()
+    triangles = block_mesh()
     triangles[5] = triangles[5][::-1]
     surface = soup(triangles)
     assert surface.turned == 1
@@ -75,4 +75,4 @@ def test_the_crease_angle_decides_what_is_smooth():
 @pytest.mark.parametrize("angle", [0.0, -1.0, np.nan, 4.0])
 def test_a_crease_angle_without_meaning_is_refused(angle):
     with pytest.raises(SurfaceError, match="crease angle"):
-        soup(block(), crease_angle=angle)
+        soup(block_mesh(), crease_angle=angle)

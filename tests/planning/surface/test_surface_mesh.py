@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from elastocal.cell.examples import binary_stl, block
+from elastocal.cell.examples import binary_stl, block_mesh
 from elastocal.errors import FileAccessError
 from elastocal.planning.surface import SurfaceError, load_surface, read_mesh, weld
 
@@ -25,7 +25,7 @@ end_header
 
 def test_an_stl_in_mm_is_welded_and_becomes_metres(tmp_path):
     path = tmp_path / "block.stl"
-    path.write_bytes(binary_stl(block()))
+    path.write_bytes(binary_stl(block_mesh()))
     mesh = read_mesh(path, 1e-3)
     assert mesh.vertices.shape == (8, 3)
     assert mesh.faces.shape == (12, 3)
@@ -43,7 +43,7 @@ def test_ply_and_obj_are_read(tmp_path, name, text):
 
 def test_the_pose_puts_the_surface_into_base(tmp_path):
     path = tmp_path / "block.stl"
-    path.write_bytes(binary_stl(block()))
+    path.write_bytes(binary_stl(block_mesh()))
     T = np.array([[0.0, -1, 0, 2], [1, 0, 0, 0], [0, 0, 1, 1], [0, 0, 0, 1]])
     surface = load_surface(path, 1e-3, T)
     np.testing.assert_allclose(surface.mesh.vertices.min(axis=0), (1.8, -0.3, 1.0), atol=1e-6)
@@ -92,7 +92,7 @@ def refusal(path) -> str:
 
 def test_a_binary_stl_that_is_cut_short_is_told_from_a_text_that_is_none(tmp_path):
     path = tmp_path / "t.stl"
-    whole = binary_stl(block())
+    whole = binary_stl(block_mesh())
     path.write_bytes(whole[:-1])
     assert f"is cut short, or no STL: its head promises 12 triangles, which take {len(whole)}" in (
         refusal(path)
@@ -103,7 +103,7 @@ def test_a_binary_stl_that_is_cut_short_is_told_from_a_text_that_is_none(tmp_pat
 
 def test_a_binary_stl_whose_head_says_solid_is_read(tmp_path):
     path = tmp_path / "t.stl"
-    path.write_bytes(b"solid by some program".ljust(80) + binary_stl(block())[80:])
+    path.write_bytes(b"solid by some program".ljust(80) + binary_stl(block_mesh())[80:])
     assert len(read_mesh(path, 1e-3).faces) == 12
 
 

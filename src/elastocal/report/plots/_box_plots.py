@@ -53,7 +53,7 @@ class Boxes:
     outlier: FloatArray
     """Those values."""
     hollow: BoolArray
-    """Which boxes are drawn as pale outlines, since their values are no finding, shape (box,)."""
+    """Boxes drawn as pale outlines, since their values are no finding, shape (box,)."""
 
     def ends(self) -> tuple[FloatArray, FloatArray]:
         """Return the smallest and the largest value of each box, each of shape (box,)."""

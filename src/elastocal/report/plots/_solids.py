@@ -221,10 +221,9 @@ def solid_trace(
     part : int or ndarray of int, shape (face,)
         Which part each face belongs to.
     """
-    x, y, z = single_precision(solid.vertices)
     i, j, k = np.asarray(solid.faces, dtype=np.int32).T
     return go.Mesh3d(
-        x=x, y=y, z=z, i=i, j=j, k=k, name=name, hoverinfo="skip", showscale=False,
+        **_xyz(solid.vertices), i=i, j=j, k=k, name=name, hoverinfo="skip", showscale=False,
         intensity=tones(solid, light, part, len(colours)), intensitymode="cell", cmin=0.0, cmax=1.0,
         colorscale=_scale(colours), lighting=_UNLIT,
     )  # fmt: skip
@@ -237,11 +236,6 @@ def tones(solid: Solid, light: FloatArray, part: Any, parts: int) -> Any:
     """
     within = 0.01 + 0.98 * solid.brightness(light)
     return ((part + within) / parts).astype(np.float32)
-
-
-def single_precision(points: FloatArray) -> Any:
-    """Return x, y, z in single precision, shape (3, point): good to a micrometre within 10 m."""
-    return np.asarray(points, dtype=np.float32).T
 
 
 def _scale(colours: Sequence[str]) -> list[tuple[float, str]]:
@@ -260,12 +254,12 @@ class MovingParts:
     robot: tuple[Solid, ...]
     """HOME first."""
     on_tool: IndexArray
-    """Which part each face of the robot belongs to, shape (face,): 0 the arm, 1 the tool."""
+    """Part that each face of the robot belongs to, shape (face,): 0 the arm, 1 the tool."""
     light: FloatArray
     """Unit vector towards the light, shape (3,)."""
     sight: tuple[FloatArray, ...]
-    """From marker to station and a gap, each of shape (3, 3); NaN where no station sees. Empty in
-    a cell without stations."""
+    """Lines from marker to station and a gap, each of shape (3, 3); NaN where no station sees.
+    Empty in a cell without stations."""
     note: str = ""
     """A remark for readers on how the robot is drawn."""
 
@@ -313,8 +307,9 @@ def scatter(
     return go.Scatter3d(**_xyz(points), mode=mode, name=name, hoverinfo=hoverinfo, **options)
 
 
-def _xyz(points: FloatArray) -> dict[str, Any]:
-    return dict(zip("xyz", single_precision(points), strict=True))
+def _xyz(points: FloatArray) -> dict[str, object]:
+    """Return coordinates in single precision, which is good to a micrometre within 10 m."""
+    return dict(zip("xyz", np.asarray(points, dtype=np.float32).T, strict=True))
 
 
 def segments(lines: Iterable[Sequence[FloatArray]]) -> FloatArray:

@@ -23,7 +23,7 @@ _AWAY = "upward is away from the robot's base"
 _GAP = 0.1
 """Between two views, as part of their width."""
 _HEIGHT = 1e-3
-"""From how far above the surface candidates are looked up on it, in m."""
+"""Height above the surface from which candidates are looked up on it, in m."""
 _TURNED_AWAY = np.cos(np.radians(135.0))
 """A face turned further than this from the middle one cannot hang on it."""
 _NET_GAP = 0.05
@@ -48,9 +48,9 @@ class Sheet:
     b: FloatArray
     """Shape (2,), in m."""
     faces: IndexArray
-    """Which faces are drawn, the farthest from the viewer first."""
+    """Faces that are drawn, the farthest from the viewer first."""
     candidates: IndexArray
-    """Which candidates lie on it."""
+    """Candidates that lie on it."""
 
     def flat(self, points: FloatArray) -> FloatArray:
         """Return points in the figure, shape (..., 2), in m."""
@@ -114,10 +114,9 @@ def _seen_along(
 def _two_sides(surface: Surface, normal: FloatArray) -> tuple[Sheet, Sheet]:
     """Return the views from the robot's side and from behind, side by side."""
     middle = surface.mesh.vertices.mean(axis=0)
-    back = np.array([middle[0], middle[1], 0.0])
-    back = back / (np.linalg.norm(back) or 1.0)
+    back = _unit(middle * (1.0, 1.0, 0.0))
     high = np.array([0.0, 0.0, 0.6])
-    directions = [view / np.linalg.norm(view) for view in (high - back, high + back)]
+    directions = [_unit(high - back), _unit(high + back)]
     seen = np.argmax(normal @ np.transpose(directions), axis=1)
     sheets, left = [], 0.0
     for number, towards in enumerate(directions):
@@ -156,7 +155,7 @@ def unfold(surface: Surface, patch: IndexArray, normal: FloatArray) -> tuple[She
     normal : ndarray, shape (candidate, 3)
         Outward unit normals.
     """
-    facing = {int(p): _mean(normal[patch == p]) for p in np.unique(patch)}
+    facing = {int(p): _unit(normal[patch == p].sum(axis=0)) for p in np.unique(patch)}
     if any(np.any(normal[patch == p] @ towards <= ONE_WAY) for p, towards in facing.items()):
         return None
     total = np.sum(list(facing.values()), axis=0)
@@ -187,7 +186,7 @@ def axes_across(towards: FloatArray, upward: FloatArray) -> FloatArray:
     if not np.linalg.norm(up) > 1e-3 * np.linalg.norm(upward):
         up = np.eye(3)[np.argmin(np.abs(towards))]
         up = up - towards * (towards @ up)
-    up = up / np.linalg.norm(up)
+    up = _unit(up)
     return np.stack([np.cross(up, towards), up])
 
 
@@ -233,11 +232,6 @@ def _corners(surface: Surface, patch: int) -> FloatArray:
     faces = surface.mesh.faces[surface.patch == patch]
     corners: FloatArray = surface.mesh.vertices[np.unique(faces)]
     return corners
-
-
-def _mean(normals: FloatArray) -> FloatArray:
-    total: FloatArray = normals.sum(axis=0)
-    return total / (np.linalg.norm(total) or 1.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -347,7 +341,8 @@ def _up(cell: Cell) -> FloatArray:
 
 
 def _unit(vector: FloatArray) -> FloatArray:
-    return vector / np.linalg.norm(vector)
+    """Return a vector with length 1, or as it is with length 0."""
+    return vector / (np.linalg.norm(vector) or 1.0)
 
 
 def _point(vector: FloatArray) -> dict[str, float]:

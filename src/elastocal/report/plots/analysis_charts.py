@@ -54,7 +54,7 @@ class _IndexName:
     title: str
     unit: str = ""
     factor: float = 1.0
-    """From the value of the criterion to what is shown."""
+    """Factor from the value of the criterion to what is shown."""
     more_is_better: bool = True
     """Whether more of the value shown is better."""
 
@@ -87,7 +87,7 @@ class SpringBoxes:
 
     spring: str
     unit: str
-    """That people read."""
+    """The unit that people read."""
     boxes: dict[str, Boxes]
     """By variant; hollow for numbers of training poses that leave the spring mixed up with others
     in at least half of the splits."""
@@ -218,8 +218,15 @@ def _draw_compliance(
     for variant in drawn:
         draw_boxes(axes, each.boxes[variant.name], variant)
     finish_axes(axes, last, *spring_scale(each, last), log=False)
+    top = axes.get_ylim()[1]
     for variant in drawn:
-        _mark_cut(axes, each.boxes[variant.name], variant)
+        # An arrow at the upper edge over every box that goes beyond it.
+        boxes = each.boxes[variant.name]
+        x = variant.at(boxes.n)[boxes.ends()[1] > top]
+        axes.scatter(
+            x, np.full(len(x), top), marker="^", s=13.0, c=variant.colour, linewidths=0,
+            clip_on=False, zorder=5,
+        )  # fmt: skip
     axes.set_title(literal(each.spring), loc="left", fontsize=8.5, weight="bold", pad=5)
     axes.set_title(
         literal(never_told_apart(each)), loc="right", fontsize=7.5, color=style.MUTED,
@@ -228,17 +235,6 @@ def _draw_compliance(
     axes.set_ylabel(each.unit, fontsize=7.5, labelpad=2)
     axes.tick_params(labelsize=7.5)
     axes.locator_params(axis="y", nbins=4)
-
-
-def _mark_cut(axes: Axes, boxes: Boxes, variant: VariantStyle) -> None:
-    """Put an arrow at the upper edge over every box that goes beyond it."""
-    top = axes.get_ylim()[1]
-    _, highest = boxes.ends()
-    x = variant.at(boxes.n)[highest > top]
-    axes.scatter(
-        x, np.full(len(x), top), marker="^", s=13.0, c=variant.colour, linewidths=0,
-        clip_on=False, zorder=5,
-    )  # fmt: skip
 
 
 def _notes(seen: Sequence[SpringObservability], width: int) -> list[str]:

@@ -42,7 +42,7 @@ _HEADLINE, _STRIP_TITLE = 0.42, 0.22
 _STUDY_FIGURES = ("study.svg", "study.png")
 """Names of the files in a study's folder."""
 _STUDY_WIDTH, _STUDY_PANEL, _STUDY_BOTTOM, _STUDY_HEAD = 7.5, 2.6, 0.9, 0.5
-"""In inches."""
+"""Sizes of a study's figure, in inches."""
 _HOW_TO_READ = (
     "Line: median; box: quartiles; whiskers: farthest value within 1.5 box heights; dots:"
     " single {} beyond."

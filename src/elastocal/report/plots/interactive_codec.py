@@ -25,12 +25,8 @@ from elastocal.report.plots.style import VariantStyle, tint, variant_styles
 
 _Json = dict[str, object]
 """A part of a figure as plotly.js reads it."""
-_AXIS_NAMES = {
-    "norm": "Norm",
-    "x": "Along x of base",
-    "y": "Along y of base",
-    "z": "Along z of base",
-}
+_MARKERS: _Json = {"type": "scatter", "mode": "markers"}
+_AXIS_NAMES = {"norm": "Norm"} | {axis: f"Along {axis} of base" for axis in "xyz"}
 
 
 def error_views(data: CodecData, verdicts: Verdicts) -> list[dict[str, object]]:
@@ -128,11 +124,7 @@ def _compliance_view(each: SpringBoxes, styles: Sequence[VariantStyle], last: in
 
 
 def _view(
-    name: str,
-    words: str,
-    traces: list[_Json],
-    last: int,
-    panels: Sequence[tuple[str, _Json]],
+    name: str, words: str, traces: list[_Json], last: int, panels: Sequence[tuple[str, _Json]]
 ) -> _Json:
     return {
         "name": name,
@@ -171,8 +163,7 @@ def _box_traces(
         if which.any()
     ]
     dots: _Json = {
-        "type": "scatter",
-        "mode": "markers",
+        **_MARKERS,
         "x": _listed(variant.at(boxes.n)[boxes.outlier_box]),
         "y": _listed(boxes.outlier),
         "marker": {
@@ -182,8 +173,7 @@ def _box_traces(
         "hoverinfo": "skip",
     }
     medians: _Json = {
-        "type": "scatter",
-        "mode": "markers",
+        **_MARKERS,
         "x": boxes.n.tolist(),
         "y": _listed(boxes.median),
         "marker": {"color": variant.colour, "symbol": variant.symbol, "opacity": 0.0},

@@ -24,7 +24,7 @@ from elastocal.report.plots import style
 from elastocal.results import brief_repr
 
 _WIDTH, _MAP, _CURVES = 6.6, 2.3, 2.3
-"""Of the figure of stiffness, in inches: its width, height of a map and of the curves."""
+"""Width of the figure of stiffness, heights of a map and of the curves, in inches."""
 _HEAD, _FOOT, _BETWEEN, _LEFT, _RIGHT = 0.75, 0.6, 0.75, 0.75, 1.05
 _PER_MICROMETRE = 1e-6
 _CASING = 2.0
@@ -40,7 +40,7 @@ class _Line:
     dashes: str
     width: float
     size: float
-    """Of the dot, in points."""
+    """Size of the dot, in points."""
 
     def draw(
         self, axes: Axes, along: FloatArray, values: FloatArray, name: str | None = None
@@ -62,7 +62,7 @@ _LINES = (
     _Line(style.BLUE, "--", 1.9, 7.0),
     _Line(style.VERMILLION, ":", 1.3, 4.0),
 )
-"""Of up to three choices; each shows under the next one."""
+"""Styles of up to three choices; each shows under the next one."""
 
 
 @brief_repr

@@ -7,11 +7,10 @@ small distance from the edge and a small distance between neighbours.
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.collections import LineCollection, PolyCollection
+from matplotlib.collections import LineCollection, PathCollection, PolyCollection
 from matplotlib.figure import Figure
 from scipy.spatial import cKDTree
 
@@ -20,7 +19,6 @@ from elastocal.planning import PlanResult, PoolData, SpreadRecord, check_pool_of
 from elastocal.planning.surface import Surface
 from elastocal.report.plots import style
 from elastocal.report.plots._views import FlatMap, flat_map
-from elastocal.report.plots.style import new_figure, write_figure
 from elastocal.wording import readable
 
 _HEAD, _FOOT, _SIDE = 0.7, 1.95, 0.25
@@ -40,8 +38,6 @@ _MANY = 20_000
 """With more candidates than this their dots are stored as an image."""
 _FINE = 5_000
 """With more faces or border lines than this the surface is stored as an image."""
-_NAME: dict[str, Any] = {"color": style.MUTED}
-_VALUE: dict[str, Any] = {"ha": "right", "weight": "bold"}
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,13 +49,11 @@ class _Choice:
     marker: str
     order: list[int]
     """Candidates in search order."""
+    distance: FloatArray
+    """How far each candidate is from the nearest chosen one, straight, in m."""
     spread: SpreadRecord
     metric: str
     """Metric of the covering radius: ``euclidean`` or ``geodesic``."""
-
-    def distance(self, pool: PoolData) -> FloatArray:
-        """Return how far each candidate is from the nearest chosen one, straight, in m."""
-        return np.asarray(cKDTree(pool.contact[self.order]).query(pool.contact)[0])
 
 
 def write_plan_figure(path: Path, surface: Surface, plan: PlanResult, pool: PoolData) -> Path:
@@ -82,41 +76,47 @@ def write_plan_figure(path: Path, surface: Surface, plan: PlanResult, pool: Pool
         If the suffix is another or the file cannot be written.
     """
     check_pool_of(plan, pool)
-    return write_figure(path, lambda: plan_figure(surface, plan, pool))
+    return style.write_figure(path, lambda: plan_figure(surface, plan, pool))
 
 
 def plan_figure(surface: Surface, plan: PlanResult, pool: PoolData) -> Figure:
     """Return the figure; see `write_plan_figure`."""
     flat = flat_map(surface, pool.contact, pool.normal)
-    choices = _choices(plan)
+    place = flat.positions(pool.contact)
+    choices = _choices(plan, pool)
+    farthest = max(float(choice.distance.max()) for choice in choices)
     low, high = _extent(surface, flat)
     height = _WIDTH * float((high - low)[1] / (high - low)[0])
-    size = (len(choices) * (_WIDTH + _SIDE) + _SIDE, _HEAD + height + _FOOT)
-    figure = new_figure(*size)
-    farthest = max(float(choice.distance(pool).max()) for choice in choices)
-    dots = None
+    figure = style.new_figure(
+        len(choices) * (_WIDTH + _SIDE) + _SIDE, _HEAD + height + _FOOT
+    )  # fmt: skip
     for number, choice in enumerate(choices):
-        left = _SIDE + number * (_WIDTH + _SIDE)
-        box = (left / size[0], _FOOT / size[1], _WIDTH / size[0], height / size[1])
-        axes = figure.add_axes(box, xlim=(low[0], high[0]), ylim=(low[1], high[1]))
-        dots = _draw_panel(axes, surface, flat, pool, choice, farthest)
+        axes = figure.add_panel(_SIDE + number * (_WIDTH + _SIDE), _FOOT, _WIDTH, height)
+        axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
+        axes.set_axis_off()
+        axes.set_title(choice.title, fontsize=11, fontweight="bold", color=choice.colour, pad=2)
+        _draw_surface(axes, surface, flat)
+        dots = _draw_candidates(axes, place, choice.distance, farthest)
+        _draw_chosen(axes, place[choice.order], choice)
+        _draw_scale(axes)
+        _draw_numbers(axes, choice)
     _draw_frame(figure, plan, flat, dots)
     return figure
 
 
-def _choices(plan: PlanResult) -> list[_Choice]:
+def _choices(plan: PlanResult, pool: PoolData) -> list[_Choice]:
     """Return what the plan's technique chose, and the one that it is compared with."""
     candidate = {pose.id: pose.candidate for pose in plan.poses}
     search, other = plan.search, plan.comparison
     found = [(search.name, "this plan", [candidate[i] for i in search.order], search.spread)]
     if other is not None:
         found.append((other.name, "for comparison", list(other.candidates), other.spread))
-    return [
-        _Choice(f"{name.upper()} ({role})", colour, marker, order, numbers, search.metric)
-        for (name, role, order, numbers), colour, marker in zip(
-            found, style.CHOSEN, "os", strict=False
-        )
-    ]
+    choices = []
+    for (name, role, order, spread), colour, marker in zip(found, style.CHOSEN, "os", strict=False):
+        distance = np.asarray(cKDTree(pool.contact[order]).query(pool.contact)[0])
+        title = f"{name.upper()} ({role})"
+        choices.append(_Choice(title, colour, marker, order, distance, spread, search.metric))
+    return choices
 
 
 def _extent(surface: Surface, flat: FlatMap) -> tuple[FloatArray, FloatArray]:
@@ -134,14 +134,11 @@ def _extent(surface: Surface, flat: FlatMap) -> tuple[FloatArray, FloatArray]:
     return middle - 0.5 * size, middle + 0.5 * size
 
 
-def _draw_frame(figure: Figure, plan: PlanResult, flat: FlatMap, dots: Any) -> None:
+def _draw_frame(figure: style.Page, plan: PlanResult, flat: FlatMap, dots: PathCollection) -> None:
     """Draw what belongs to all panels: title, colour bar, how to read it."""
     width, height = figure.get_size_inches()
-    sizes = f"{len(plan.poses)} of {plan.pool.valid} candidate poses"
-    figure.text(
-        0.5, 1.0 - 0.12 / height, f"{plan.cell.name}: {sizes}".replace("$", r"\$"),
-        ha="center", va="top", fontsize=12,
-    )  # fmt: skip
+    title = f"{plan.cell.name}: {len(plan.poses)} of {plan.pool.valid} candidate poses"
+    figure.text(0.5, 1.0 - 0.12 / height, style.literal(title), ha="center", va="top", fontsize=12)
     bar = figure.add_axes((0.5 - 1.7 / width, 0.72 / height, 3.4 / width, 0.11 / height))
     figure.colorbar(dots, cax=bar, orientation="horizontal")
     bar.set_title(
@@ -156,32 +153,6 @@ def _draw_frame(figure: Figure, plan: PlanResult, flat: FlatMap, dots: Any) -> N
     )  # fmt: skip
 
 
-def _draw_panel(
-    axes: Axes, surface: Surface, flat: FlatMap, pool: PoolData, choice: _Choice, farthest: float
-) -> Any:
-    """Draw a panel; return the dots, for a colour bar.
-
-    Parameters
-    ----------
-    axes : Axes
-        As wide as `_WIDTH`, its limits set.
-    surface, flat, pool : Surface, FlatMap, PoolData
-        What was chosen from.
-    choice : _Choice
-        What was chosen.
-    farthest : float
-        Distance at the dark end of the colours, in m.
-    """
-    axes.set_axis_off()
-    axes.set_title(choice.title, fontsize=11, fontweight="bold", color=choice.colour, pad=2)
-    _draw_surface(axes, surface, flat)
-    dots = _draw_candidates(axes, flat, pool, choice, farthest)
-    _draw_chosen(axes, flat, pool, choice)
-    _draw_scale(axes)
-    _draw_numbers(axes, choice)
-    return dots
-
-
 def _draw_surface(axes: Axes, surface: Surface, flat: FlatMap) -> None:
     face, corner = np.divmod(surface.border_half_edges, 3)
     for sheet in flat.sheets:
@@ -191,13 +162,10 @@ def _draw_surface(axes: Axes, surface: Surface, flat: FlatMap) -> None:
         colours = np.repeat(grey[:, None], 3, axis=1)
         axes.add_collection(
             PolyCollection(
-                list(sheet.flat(triangles)),
-                facecolors=colours,
-                edgecolors=colours,
-                lw=0.3,
+                list(sheet.flat(triangles)), facecolors=colours, edgecolors=colours, lw=0.3,
                 rasterized=len(triangles) > _FINE,
             )
-        )
+        )  # fmt: skip
         shown = np.isin(face, sheet.faces)
         ends = [surface.mesh.faces[face[shown], (corner[shown] + step) % 3] for step in (0, 1)]
         border = sheet.flat(surface.mesh.vertices[np.stack(ends, axis=1)])
@@ -207,25 +175,21 @@ def _draw_surface(axes: Axes, surface: Surface, flat: FlatMap) -> None:
 
 
 def _draw_candidates(
-    axes: Axes, flat: FlatMap, pool: PoolData, choice: _Choice, farthest: float
-) -> Any:
-    distance = choice.distance(pool)
+    axes: Axes, place: FloatArray, distance: FloatArray, farthest: float
+) -> PathCollection:
+    """Draw a dot a candidate, darkest at the distance ``farthest`` in m."""
     # The farthest come last, so that no gap hides under near ones.
     order = np.argsort(distance)
-    x, y = flat.positions(pool.contact)[order].T
+    size = float(np.clip(12_000.0 / len(place), 0.5, 12.0))
+    x, y = place[order].T
     return axes.scatter(
-        x, y, s=_dot_size(len(pool.contact)), c=1e3 * distance[order], cmap=f"{style.SEQUENTIAL}_r",
-        vmin=0.0, vmax=1e3 * farthest, linewidths=0, rasterized=len(order) > _MANY,
+        x, y, s=size, c=1e3 * distance[order], cmap=f"{style.SEQUENTIAL}_r", vmin=0.0,
+        vmax=1e3 * farthest, linewidths=0, rasterized=len(order) > _MANY,
     )  # fmt: skip
 
 
-def _dot_size(count: int) -> float:
-    return float(np.clip(12_000.0 / count, 0.5, 12.0))
-
-
-def _draw_chosen(axes: Axes, flat: FlatMap, pool: PoolData, choice: _Choice) -> None:
+def _draw_chosen(axes: Axes, anchor: FloatArray, choice: _Choice) -> None:
     """Draw numbered discs; where they crowd, they move aside and point to their place."""
-    anchor = flat.positions(pool.contact)[choice.order]
     left, right = axes.get_xlim()
     points = min(_DISC, _CROWD / np.sqrt(len(anchor)))
     disc = points * (right - left) / (72.0 * _WIDTH)
@@ -307,11 +271,14 @@ def _draw_numbers(axes: Axes, choice: _Choice) -> None:
         ("Observability index O1 (no unit)", f"{numbers.o1:.3g}"),
     ]
     for row, (name, value) in enumerate(lines):
-        for x, text, kind in ((0.08, name, _NAME), (0.92, value, _VALUE)):
-            axes.annotate(
-                text, (x, 0.0), (0, -8 - 14 * row), "axes fraction", "offset points",
-                va="top", **kind,
-            )  # fmt: skip
+        down = (0, -8 - 14 * row)
+        axes.annotate(
+            name, (0.08, 0.0), down, "axes fraction", "offset points", va="top", color=style.MUTED
+        )
+        axes.annotate(
+            value, (0.92, 0.0), down, "axes fraction", "offset points", va="top", ha="right",
+            weight="bold",
+        )  # fmt: skip
 
 
 def _length(value: float | None) -> str:

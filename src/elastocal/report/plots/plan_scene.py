@@ -78,7 +78,7 @@ class PlanView:
     figure: Any
     """Plotly figure; frame 0 is HOME, frame i + 1 is pose i."""
     layers: tuple[Layer, ...]
-    """Which traces of the figure go on and off together, in its order."""
+    """Traces of the figure that go on and off together, in its order."""
     cameras: dict[str, _Json]
     """Plotly cameras by name; the first is the initial one."""
 
@@ -92,7 +92,7 @@ def plan_view(cell: Cell, surface: Surface, plan: PlanResult, pool: PoolData) ->
         Which belong together; the plan has at least one pose.
     """
     moving = moving_parts(cell, surface, plan, light_over(cell, surface))
-    layers = (*_moving_layers(moving, 1), *_still_layers(cell, surface, plan, pool, moving.light))
+    layers = (*_moving_layers(moving), *_still_layers(cell, surface, plan, pool, moving.light))
     traces = [trace.update(visible=layer.shown) for layer in layers for trace in layer.traces]
     reach = [*(robot.vertices for robot in moving.robot), _tool_path(cell, plan)]
     bounds = bounds_of(cell, surface, np.concatenate(reach))
@@ -123,15 +123,13 @@ def _layout(bounds: Bounds, camera: _Json) -> _Json:
     }
 
 
-def _moving_layers(moving: MovingParts, shown: int) -> list[Layer]:
-    """Return the layers at one posture (0: HOME)."""
-    robot = solid_trace(
-        moving.robot[shown], moving.light, "robot", MOVING_COLOURS, moving.on_tool
-    )  # fmt: skip
+def _moving_layers(moving: MovingParts) -> list[Layer]:
+    """Return the layers that differ between postures, as they are at the first pose."""
+    robot = solid_trace(moving.robot[1], moving.light, "robot", MOVING_COLOURS, moving.on_tool)
     layers = [Layer("Robot and tool", style.ARM, (robot,), note=moving.note)]
     if moving.sight:
         line = scatter(
-            moving.sight[shown], "lines+markers", "line of sight",
+            moving.sight[1], "lines+markers", "line of sight",
             line={"color": style.SIGHT, "width": 5}, marker={"color": style.SIGHT, "size": 4},
         )  # fmt: skip
         layers.append(Layer("Line of sight to the marker", style.SIGHT, (line,)))

@@ -21,22 +21,18 @@ from elastocal.identification.recertification import CompareResult
 from elastocal.planning import PlanResult
 from elastocal.procedure import RunSummary
 from elastocal.report.plots import style
-from elastocal.report.plots.spring_figures import (
-    recertification_figure,
-    spring_bars,
-    spring_figure,
-)
+from elastocal.report.plots.spring_figures import recertification_figure, spring_bars, spring_figure
 from elastocal.report.plots.style import literal, new_figure, open_frame, variant_styles
 from elastocal.results import brief_repr
 
-P = ParamSpec("P")
+_P = ParamSpec("_P")
 _MM = 1e3
 _WIDTH = 7.5
 """Width of a figure of a result, in inches."""
 _BEFORE, _AFTER = style.VERMILLION, style.BLUE
 _READINGS_WIDTH = 9.0
 _CELL, _HEAD, _AXIS, _LEFT = 0.3, 0.55, 0.5, 0.9
-"""Of a grid of readings, in inches."""
+"""Sizes of a grid of readings, in inches."""
 _MANY = 45
 """Poses beyond which numbers no longer fit."""
 
@@ -183,7 +179,7 @@ def plot_result(result: object) -> Figure:
     return drawn(_draw, result)
 
 
-def drawn(figure: Callable[P, Figure], *arguments: P.args, **options: P.kwargs) -> Figure:
+def drawn(figure: Callable[_P, Figure], *arguments: _P.args, **options: _P.kwargs) -> Figure:
     """Return what a function draws, with the settings of print."""
     with matplotlib.rc_context(style.print_settings()):
         return figure(*arguments, **options)

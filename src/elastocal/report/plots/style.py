@@ -51,7 +51,7 @@ SEQUENTIAL = "cividis"
 COLOURS = (BLUE, VERMILLION, GREEN, PURPLE, ORANGE, SKY)
 SUFFIXES = (".pdf", ".png", ".svg")
 _MARKERS = "os^Dv"
-"""Of medians in print; one less than colours, so that both together repeat late."""
+"""Markers of medians in print; one less than colours, so that both together repeat late."""
 _SCREEN = {"o": "circle", "s": "square", "^": "triangle-up", "D": "diamond", "v": "triangle-down"}
 _FILL = 0.35
 """Part of the colour in a box; the rest is paper."""
@@ -71,12 +71,12 @@ class VariantStyle:
     name: str
     colour: str
     fill: str
-    """Of its boxes; the second time that a colour is used, paper."""
+    """Colour inside its boxes; the second time that a colour is used, paper."""
     marker: str
     place: float
     """Middle of its boxes from the middle of their group, in numbers of training poses."""
     width: float
-    """Of its boxes, likewise."""
+    """Width of its boxes, likewise."""
 
     @property
     def symbol(self) -> str:

@@ -20,7 +20,6 @@ from elastocal.sim.arm.springs import (
     CubicGear,
     Linear,
     SpringChain,
-    TorqueLaw,
     TruthSpring,
     axial_spring,
     build_spring_chain,
@@ -258,14 +257,13 @@ def with_stiffening_gears(
     for joint in joints:
         joint_index(arm.linkage, joint)
 
-    def stiffened(spring: TruthSpring) -> TorqueLaw:
+    springs = []
+    for spring in arm.springs:
         gear = spring.joint in joints and _is_axial(arm.linkage, spring)
         if gear and isinstance(spring.law, Linear):
-            return CubicGear(spring.law.k, scale)
-        return spring.law
-
-    springs = tuple(replace(spring, law=stiffened(spring)) for spring in arm.springs)
-    return replace(arm, springs=springs)
+            spring = replace(spring, law=CubicGear(spring.law.k, scale))
+        springs.append(spring)
+    return replace(arm, springs=tuple(springs))
 
 
 def _is_axial(linkage: Linkage, spring: TruthSpring) -> bool:

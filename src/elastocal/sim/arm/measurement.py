@@ -56,7 +56,7 @@ class Contact:
     gap: float = 3e-3
     """Free travel before contact, in m."""
     normal_stiffness: float = 4e6
-    """Of the friction disk, in N/m: 0.3 mm at 1.1 kN. An assumption, as is the next."""
+    """Normal stiffness of the disk, in N/m: 0.3 mm at 1.1 kN. An assumption, as is the next."""
     shear_stiffness: float = 1.5e6
     """Shear stiffness of the friction disk, in N/m: 0.2 mm at 280 N."""
     micro_slip: float = 20e-6

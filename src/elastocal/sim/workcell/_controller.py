@@ -36,6 +36,7 @@ class SimulatedArm:
     def __init__(self, plant: Plant, control: ForceControl) -> None:
         """Take the arm of a cell; its drives are off."""
         self._plant, self._control = plant, control
+        self.joint_names = plant.cell.robot.joint_names
         self._fault: str | None = None
         self._refused_until = 0
         self._approaches = 0
@@ -43,11 +44,6 @@ class SimulatedArm:
         self._touched = False
         self._leaving: Contact | None = None
         self._pose: tuple[Segment, FloatArray] | None = None
-
-    @property
-    def joint_names(self) -> tuple[str, ...]:
-        """Names of the joints, in the order of every joint array."""
-        return self._plant.cell.robot.joint_names
 
     def state(self) -> ArmState:
         """Return the newest state."""
@@ -119,8 +115,7 @@ class SimulatedArm:
     ) -> None:
         """Start a guarded straight move; see `RobotArm.approach`."""
         plant = self._plant
-        direction = check_vector("approach direction", direction_base, 3, unit=True)
-        check_distance("approach", distance, speed)
+        direction = check_line("approach", direction_base, distance, speed)
         require(contact_force > 0.0, "contact force", contact_force, "above 0 N")
         self._allow("approach", _STANDING, in_contact=False)
         start = plant.robot_state()
@@ -157,8 +152,7 @@ class SimulatedArm:
     def retract(self, direction_base: FloatArray, distance: float, speed: float) -> None:
         """Start a straight move away from the surface; see `RobotArm.retract`."""
         plant = self._plant
-        direction = check_vector("retract direction", direction_base, 3, unit=True)
-        check_distance("retract", distance, speed)
+        direction = check_line("retract", direction_base, distance, speed)
         self._allow("retract", _FORCED)
         if plant.contact is not None and not float(direction @ plant.contact.normal) > 0.0:
             raise DeviceError(
@@ -253,7 +247,7 @@ def require(holds: bool, what: str, value: object, allowed: str) -> None:
         raise DeviceError(f"simulated arm: {what} is {value}: must be {allowed}")
 
 
-def check_vector(what: str, values: FloatArray, size: int, *, unit: bool = False) -> FloatArray:
+def check_vector(what: str, values: FloatArray, size: int) -> FloatArray:
     """Return numbers as an array of their own.
 
     Parameters
@@ -264,8 +258,6 @@ def check_vector(what: str, values: FloatArray, size: int, *, unit: bool = False
         Finite.
     size : int
         How many there must be.
-    unit : bool
-        Whether they must be a unit vector; it is then made one exactly.
 
     Raises
     ------
@@ -275,20 +267,20 @@ def check_vector(what: str, values: FloatArray, size: int, *, unit: bool = False
     array = np.array(values, dtype=float)
     fits = array.shape == (size,) and bool(np.all(np.isfinite(array)))
     require(fits, what, array.tolist(), f"{size} finite numbers")
-    if unit:
-        length = float(np.linalg.norm(array))
-        require(abs(length - 1.0) <= _UNIT, f"length of the {what}", length, "1")
-        array /= length
     return array
 
 
-def check_distance(what: str, distance: float, speed: float) -> None:
-    """Refuse a distance or a speed that is not above 0 and finite.
+def check_line(what: str, direction: FloatArray, distance: float, speed: float) -> FloatArray:
+    """Return the direction of a straight move, of length 1 exactly.
 
     Raises
     ------
     DeviceError
-        Naming it.
+        If it is no unit vector, or distance or speed is not above 0 and finite.
     """
+    array = check_vector(f"{what} direction", direction, 3)
+    length = float(np.linalg.norm(array))
+    require(abs(length - 1.0) <= _UNIT, f"length of the {what} direction", length, "1")
     require(0.0 < distance < math.inf, f"{what} distance", distance, "above 0 m and finite")
     require(0.0 < speed < math.inf, f"{what} speed", speed, "above 0 m/s and finite")
+    return array / length

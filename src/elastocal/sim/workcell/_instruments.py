@@ -186,7 +186,7 @@ class SimulatedForceSensor(_SimulatedInstrument):
         values = self._true(times) + since[:, None] * self._slope
         values += noise
         values = self._clipped(times, values)
-        if self._plant.schedule.any_span:
+        if self._plant.schedule.active:
             times, values = self._with_faults(times, values)
         if len(times):
             self._last = values[-1]
@@ -208,7 +208,7 @@ class SimulatedForceSensor(_SimulatedInstrument):
 
     def _clipped(self, times: IndexArray, values: FloatArray) -> FloatArray:
         """Keep the readings within the ranges, and notice when they were not."""
-        if self._plant.schedule.any_span:
+        if self._plant.schedule.active:
             values[self._plant.schedule.struck("ft_saturation", times), 2] = 2.0 * self.range[2]
         if np.any(np.abs(values) > self.range):
             self._saturated = True
@@ -313,7 +313,7 @@ class SimulatedTracker(_SimulatedInstrument):
         values = np.empty((len(times), 6))
         values[:, :3] = marker + sigma * noise
         values[:, 3:] = sigma
-        if self._plant.schedule.any_span:
+        if self._plant.schedule.active:
             lost = self._plant.schedule.struck("beam_break", times, self._station)
             times, values = np.delete(times, lost), np.delete(values, lost, axis=0)
         return times, values

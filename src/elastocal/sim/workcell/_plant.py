@@ -72,7 +72,7 @@ class FaultSchedule:
                     f"{nearest(fault.station, names)} (stations: {', '.join(names)})"
                 )
         self._faults = cell.file.faults
-        self._spans: list[FaultSpan] = []
+        self.active: list[FaultSpan] = []
 
     def begin(self, step: str, visit: int, load: int, now: int) -> list[tuple[int, Fault]]:
         """Note the faults that follow from the beginning of a step.
@@ -91,22 +91,17 @@ class FaultSchedule:
             In µs.
         """
         moments = []
-        self._spans = [span for span in self._spans if span.end > now]
+        self.active = [span for span in self.active if span.end > now]
         for fault in self.at(visit):
             if fault.step != step or (step == "hold" and fault.load != load):
                 continue
             start = now + to_microseconds(fault.after)
             if fault.kind in SPANS:
                 last = FOREVER if fault.duration is None else to_microseconds(fault.duration)
-                self._spans.append(FaultSpan(fault.kind, start, start + last, fault.station))
+                self.active.append(FaultSpan(fault.kind, start, start + last, fault.station))
             elif fault.kind in ("slip", "robot_stop"):
                 moments.append((start, fault))
         return moments
-
-    @property
-    def any_span(self) -> bool:
-        """Whether there is any span to look at."""
-        return bool(self._spans)
 
     def at(self, visit: int) -> list[Fault]:
         """Return the faults of a visit."""
@@ -118,9 +113,7 @@ class FaultSchedule:
 
     def spans(self, kind: str) -> list[FaultSpan]:
         """Return the spans of a kind of fault."""
-        if not self._spans:
-            return []
-        return [span for span in self._spans if span.kind == kind]
+        return [span for span in self.active if span.kind == kind]
 
     def struck(self, kind: str, times: IndexArray, station: str | None = None) -> IndexArray:
         """Return which samples a span of some kind of fault covers, as indices.
