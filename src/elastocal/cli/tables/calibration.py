@@ -1,4 +1,4 @@
-"""Print what ``calibrate``, ``compare`` and ``report`` found: a user's first questions, in their order.
+"""Print what ``calibrate``, ``compare`` and ``report`` found: a user's questions, in their order.
 
 How well does it fit; is it better than 6 springs; which springs are really known, and how well;
 which readings look wrong. Of two calibrations: which springs moved, what it does, the verdict.
