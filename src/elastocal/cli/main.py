@@ -27,7 +27,7 @@ _PAUSE = 0.05
 _IMPORTS = "<frozen importlib"
 """How the file names of Python's import machinery begin."""
 _UNUSED_BY_HELP = {"rich.markdown": "Markdown", "rich.traceback": "Traceback"}
-"""What typer imports with its help and our help never shows: Markdown, errors of Python."""
+"""Modules that typer imports with its help and that ours never needs: Markdown, tracebacks."""
 
 
 class _Commands(TyperGroup):
@@ -55,25 +55,9 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
 )
 _ORDER = (
-    "robots",
-    "init",
-    "check",
-    "plan",
-    "run",
-    "derive",
-    "calibrate",
-    "codec",
-    "study",
-    "predict",
-    "tool",
-    "compensate",
-    "stiffness",
-    "export",
-    "simulate_process",
-    "compare",
-    "report",
-    "demo",
-)
+    "robots", "init", "check", "plan", "run", "derive", "calibrate", "codec", "study", "predict",
+    "tool", "compensate", "stiffness", "export", "simulate_process", "compare", "report", "demo",
+)  # fmt: skip
 """The order in which help lists commands: that of the work; others follow by name."""
 
 

@@ -124,14 +124,16 @@ class PartReader:
     files: list[UsedFile] = field(default_factory=list)
     missing: list[MissingPart] = field(default_factory=list)
 
-    def read(self, name: str, path: Path, read: Callable[[], Part], named: bool) -> Part | None:
+    def read(
+        self, name: str, path: Path, read: Callable[[], Part], named: bool = False
+    ) -> Part | None:
         """Return a part, or None and a note of why there is none."""
         try:
             part = read()
         except ElastocalError as error:
             if named:
                 raise
-            self.missing.append(MissingPart(name, self._without_folders(error), damaged=True))
+            self.note_missing(name, self._without_folders(error), damaged=True)
             return None
         self.use(path)
         return part
@@ -142,9 +144,13 @@ class PartReader:
         """Return a part that may be named or lie under a default name."""
         path = given or self.folders.default(default)
         if path is None:
-            self.missing.append(MissingPart(name, f"there is no {default}; {hint}"))
+            self.note_missing(name, f"there is no {default}; {hint}")
             return None
         return self.read(name, path, lambda: read(path), named=given is not None)
+
+    def note_missing(self, name: str, reason: str, damaged: bool = False) -> None:
+        """Note that the report does without a part."""
+        self.missing.append(MissingPart(name, reason, damaged))
 
     def use(self, path: Path) -> None:
         """Note the hash of a file, or of every file in a folder that belongs to a part."""

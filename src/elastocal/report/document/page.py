@@ -44,14 +44,9 @@ def write_report(path: Path, evidence: Evidence) -> WrittenReport:
         If it cannot be written.
     """
     verdict = judge_evidence(evidence)
-    write_text(path, _page(evidence, verdict))
-    return WrittenReport(Path(path), verdict)
-
-
-def _page(evidence: Evidence, verdict: Verdict) -> str:
     sections = [(section, section.body(evidence)) for section in SECTIONS]
     data = {section.identifier: content.data for section, content in sections if content.data}
-    return render(
+    page = render(
         "report.html",
         title=f"Calibration report: {evidence.name}",
         styles=("report.css",),
@@ -65,6 +60,8 @@ def _page(evidence: Evidence, verdict: Verdict) -> str:
         verdict=verdict,
         blocks=tuple(_accuracy(evidence, verdict)),
     )
+    write_text(path, page)
+    return WrittenReport(Path(path), verdict)
 
 
 def verdict_html(evidence: Evidence, verdict: Verdict) -> str:
