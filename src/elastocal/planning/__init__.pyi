@@ -57,6 +57,11 @@ from .pool_sampling import (
     rank_base_placements as rank_base_placements,
     sample_pool as sample_pool,
 )
-from .postures import Postures as Postures, Rows as Rows, retreat_joints as retreat_joints
+from .postures import (
+    Postures as Postures,
+    Rows as Rows,
+    read_only as read_only,
+    retreat_joints as retreat_joints,
+)
 from .scene import CollisionScene as CollisionScene
 from .search_pool import SearchPool as SearchPool

@@ -357,7 +357,13 @@ def _move_problems(plan: PlanResult) -> Iterator[str]:
 def _number_problems(plan: PlanResult) -> Iterator[str]:
     """Yield lists that do not have as many numbers as there are joints or poses."""
     count = len(plan.robot.joints)
-    for key, joints in _joint_lists(plan):
+    lists = {"robot.home": plan.robot.home}
+    for number, pose in enumerate(plan.poses):
+        lists[f"poses.{number}.joints"] = pose.joints
+        lists[f"poses.{number}.approach_joints"] = pose.approach_joints
+    for number, move in enumerate(plan.moves):
+        lists |= {f"moves.{number}.via.{stop}": q for stop, q in enumerate(move.via)}
+    for key, joints in lists.items():
         if len(joints) != count:
             yield f"{key}: needs a position of each of {count} joints, got {len(joints)}"
     if sorted(plan.search.order) != list(range(len(plan.poses))):
@@ -365,13 +371,3 @@ def _number_problems(plan: PlanResult) -> Iterator[str]:
     for number in plan.comparison.candidates if plan.comparison else ():
         if not 0 <= number < plan.pool.valid:
             yield f"comparison.candidates: must be among {plan.pool.valid}, got {number}"
-
-
-def _joint_lists(plan: PlanResult) -> Iterator[tuple[str, Joints]]:
-    yield "robot.home", plan.robot.home
-    for number, pose in enumerate(plan.poses):
-        yield f"poses.{number}.joints", pose.joints
-        yield f"poses.{number}.approach_joints", pose.approach_joints
-    for number, move in enumerate(plan.moves):
-        for stop, joints in enumerate(move.via):
-            yield f"moves.{number}.via.{stop}", joints

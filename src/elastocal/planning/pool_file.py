@@ -12,6 +12,7 @@ import numpy as np
 from elastocal.arrays import FloatArray, IndexArray
 from elastocal.errors import PlanningError, SchemaError
 from elastocal.planning.plan_result import POOL, PlanResult
+from elastocal.planning.postures import read_only
 from elastocal.records import Variable, read_netcdf, record, variables_of, write_netcdf
 from elastocal.results import brief_repr
 
@@ -100,9 +101,8 @@ class PoolData:
     def __post_init__(self) -> None:
         for name in variables_of(PoolData):
             if name not in _NAMES:
-                array = np.array(getattr(self, name), np.intp if name in _INDICES else float)
-                array.flags.writeable = False
-                object.__setattr__(self, name, array)
+                dtype = np.intp if name in _INDICES else float
+                object.__setattr__(self, name, read_only(getattr(self, name), dtype))
         for name in _NAMES:
             object.__setattr__(self, name, tuple(str(text) for text in getattr(self, name)))
         _check_shapes(self)

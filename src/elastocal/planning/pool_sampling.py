@@ -94,8 +94,11 @@ def sample_pool(
         while (missing := wanted - _valid(pools)) > 0 and not _hopeless(pools, wanted):
             tried.append(_sample(cell, surface, missing, pools, rng))
             parts = _parts(tried[-1])
-            make = builder.pools if len(parts) == 1 else make_in_processes or builder.pools
-            for pool in make(placements, parts):
+            if make_in_processes and len(parts) > 1:
+                made = make_in_processes(placements, parts)
+            else:
+                made = (builder.pool(placements, part) for part in parts)
+            for pool in made:
                 pools.append(pool)
                 progress(CANDIDATES, min(_valid(pools), wanted), wanted)
     pool = join_pools(pools).first(wanted)
@@ -161,12 +164,6 @@ class PoolBuilder:
         solver = replace(self.solver, checks=replace(self.solver.checks, point=of_points))
         return solver.pool(points.position, points.normal, placements)
 
-    def pools(
-        self, placements: tuple[BasePlacement, ...], parts: Sequence[SurfacePoints]
-    ) -> Iterator[Pool]:
-        """Yield the pool of each part of the points, in their order."""
-        return (self.pool(placements, part) for part in parts)
-
 
 _PoolsOfParts = Callable[[tuple[BasePlacement, ...], Sequence[SurfacePoints]], Iterator[Pool]]
 
@@ -182,18 +179,14 @@ def _processes(jobs: int | None, wanted: int) -> int:
 
 @contextmanager
 def _workers(cell: Cell, surface: Surface, processes: int) -> Iterator[_PoolsOfParts | None]:
-    """Yield what makes pools in processes, as `PoolBuilder.pools` does; None with but one."""
+    """Yield what makes the pools of parts in processes, in their order; None with but one."""
     if processes == 1:
         yield None
         return
     # Coal's shapes cannot be sent to a process: each unpacks the cell and makes its own of it.
     packed = pickle.dumps((cell, surface))
-    with process_pool(processes, partial(_prepare, packed)) as workers:
+    with process_pool(processes, partial(_builder, packed)) as workers:
         yield lambda placements, parts: workers.map(partial(_make_part, packed, placements), parts)
-
-
-def _prepare(packed: bytes) -> None:
-    _builder(packed)
 
 
 def _make_part(packed: bytes, placements: tuple[BasePlacement, ...], points: SurfacePoints) -> Pool:

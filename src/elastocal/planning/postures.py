@@ -5,7 +5,7 @@ from dataclasses import dataclass, fields, replace
 from typing import Any, Self
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from elastocal.arrays import FloatArray, IndexArray
 from elastocal.results import brief_repr
@@ -39,6 +39,13 @@ class Rows:
         return tuple(getattr(self, each.name) for each in fields(self))  # type: ignore[arg-type]
 
 
+def read_only(values: ArrayLike, dtype: type[Any] = float) -> NDArray[Any]:
+    """Return a copy of an array that cannot be written to."""
+    copy = np.array(values, dtype)
+    copy.setflags(write=False)
+    return copy
+
+
 @brief_repr
 @dataclass(frozen=True, eq=False)
 class Postures(Rows):
@@ -57,12 +64,8 @@ class Postures(Rows):
 
     def __post_init__(self) -> None:
         for name in ("T_base_tcp", "normal", "q", "q_approach"):
-            array = np.array(getattr(self, name), dtype=float)
-            array.flags.writeable = False
-            object.__setattr__(self, name, array)
-        point = np.array(self.point, dtype=np.intp)
-        point.flags.writeable = False
-        object.__setattr__(self, "point", point)
+            object.__setattr__(self, name, read_only(getattr(self, name)))
+        object.__setattr__(self, "point", read_only(self.point, np.intp))
 
     @property
     def contact(self) -> FloatArray:

@@ -15,7 +15,7 @@ from elastocal.arrays import FloatArray, IndexArray
 from elastocal.errors import PlanningError
 from elastocal.planning.motion.mover import Mover
 from elastocal.planning.motion.tour import _Cuts, shortest_tour
-from elastocal.planning.postures import Postures
+from elastocal.planning.postures import Postures, read_only
 from elastocal.progress import Progress, silent
 from elastocal.results import brief_repr
 
@@ -162,8 +162,7 @@ class _Roadmap:
 
     def _transfer(self, start: int, end: int, via: FloatArray) -> _Transfer:
         duration = self.mover.axes.along(self._chain(start, end, via))
-        via.setflags(write=False)
-        return _Transfer(via, duration)
+        return _Transfer(read_only(via), duration)
 
     def _chain(self, start: int, end: int, via: FloatArray) -> FloatArray:
         return np.concatenate([self.q[[start]], via, self.q[[end]]])
@@ -221,10 +220,8 @@ def plan_route(
         for a, b in unknown:
             i, j = np.searchsorted(nodes, (a, b))
             cost[i, j] = cost[j, i] = roadmap.find(a, b).duration
-    unreachable = np.setdiff1d(np.arange(1, len(roadmap.q)), nodes) - 1
-    visited = order[1:] - 1
-    for array in (visited, unreachable):
-        array.setflags(write=False)
+    visited = read_only(order[1:] - 1, np.intp)
+    unreachable = read_only(np.setdiff1d(np.arange(1, len(roadmap.q)), nodes) - 1, np.intp)
     return Route(visited, tuple(_move(roadmap, *leg) for leg in legs), unreachable, tour.shortest)
 
 

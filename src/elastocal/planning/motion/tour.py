@@ -18,6 +18,7 @@ from scipy.sparse.csgraph import connected_components
 
 from elastocal.arrays import BoolArray, FloatArray, IndexArray
 from elastocal.errors import PlanningError
+from elastocal.planning.postures import read_only
 from elastocal.results import brief_repr
 
 _ALL_EDGES = 60
@@ -96,8 +97,7 @@ def _tour(cost: FloatArray, order: IndexArray, shortest: bool) -> Tour:
     order = np.roll(order, -int(np.flatnonzero(order == 0)[0]))
     if len(order) > 2 and order[1] > order[-1]:
         order = np.roll(order[::-1], 1)
-    order.setflags(write=False)
-    return Tour(order, _tour_length(cost, order), shortest)
+    return Tour(read_only(order, np.intp), _tour_length(cost, order), shortest)
 
 
 def _nearest_neighbour(cost: FloatArray) -> IndexArray:

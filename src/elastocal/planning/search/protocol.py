@@ -6,10 +6,11 @@ from types import MappingProxyType
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from elastocal.arrays import FloatArray, IndexArray
 from elastocal.errors import PlanningError
+from elastocal.planning.postures import read_only
 from elastocal.results import brief_repr
 
 
@@ -86,10 +87,9 @@ class Candidates:
     def _freeze(self, name: str, what: str) -> FloatArray:
         """Replace a field by a read-only copy and return it."""
         try:
-            copy: NDArray[np.float64] = np.array(getattr(self, name), dtype=float)
+            copy: FloatArray = read_only(getattr(self, name))
         except (TypeError, ValueError) as error:
             raise PlanningError(f"{what} must be an array of numbers: {error}") from error
-        copy.setflags(write=False)
         object.__setattr__(self, name, copy)
         return copy
 
@@ -129,12 +129,8 @@ class Selection:
     """Figures of the first 1, 2, … n poses, by name, each of shape (n,)."""
 
     def __post_init__(self) -> None:
-        order = np.array(self.order, dtype=np.intp)
-        order.setflags(write=False)
-        object.__setattr__(self, "order", order)
-        trace = {name: np.array(values, dtype=float) for name, values in self.trace.items()}
-        for values in trace.values():
-            values.setflags(write=False)
+        object.__setattr__(self, "order", read_only(self.order, np.intp))
+        trace = {name: read_only(values) for name, values in self.trace.items()}
         object.__setattr__(self, "trace", MappingProxyType(trace))
 
     def __len__(self) -> int:

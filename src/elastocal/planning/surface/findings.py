@@ -90,29 +90,27 @@ def placement_findings(
     rng : Generator
         Seeded source of randomness, for the points that are tried.
     """
-    vertices = surface.mesh.vertices
+    name, vertices = surface.name, surface.mesh.vertices
     gap = np.linalg.norm(vertices[:, None] - first_joints[None], axis=2).min()
+    size = float(np.linalg.norm(np.ptp(vertices, axis=0)))
     if not gap <= _FAR * reach:
         text = (
-            f"{surface.name}: its nearest point is {gap:.3g} m from the robot, whose reach is"
+            f"{name}: its nearest point is {gap:.3g} m from the robot, whose reach is"
             f" {reach:.3g} m: is the mesh in mm and read as m (surface.unit), or its pose wrong?"
         )
         return (Finding("far", text, fatal=True),)
-    size = float(np.linalg.norm(np.ptp(vertices, axis=0)))
     if not size <= _HUGE * reach:
         text = (
-            f"{surface.name} is {size:.3g} m across; the reach of the robot is {reach:.3g} m: is"
+            f"{name} is {size:.3g} m across; the reach of the robot is {reach:.3g} m: is"
             " the mesh in mm and read as m (surface.unit)?"
         )
         return (Finding("huge", text, fatal=True),)
-    found: tuple[Finding, ...] = ()
-    if size < _TINY * reach:
-        text = (
-            f"{surface.name} is only {1e3 * size:.3g} mm across; the reach of the robot is"
-            f" {reach:.3g} m: is the mesh in m and read as mm (surface.unit)?"
-        )
-        found = (Finding("tiny", text),)
-    return found + inverted_finding(surface, reachable, rng)
+    text = (
+        f"{name} is only {1e3 * size:.3g} mm across; the reach of the robot is"
+        f" {reach:.3g} m: is the mesh in m and read as mm (surface.unit)?"
+    )
+    tiny = (Finding("tiny", text),) if size < _TINY * reach else ()
+    return tiny + inverted_finding(surface, reachable, rng)
 
 
 def inverted_finding(surface: Surface, reachable: Reachable, rng: Generator) -> tuple[Finding, ...]:

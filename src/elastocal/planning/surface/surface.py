@@ -17,7 +17,7 @@ from scipy.sparse import coo_array, csr_array
 from scipy.sparse.csgraph import breadth_first_order, connected_components
 
 from elastocal.arrays import BoolArray, FloatArray, IndexArray
-from elastocal.planning.postures import Rows
+from elastocal.planning.postures import Rows, read_only
 from elastocal.planning.surface.mesh import SurfaceError, TriangleMesh, read_mesh
 from elastocal.results import brief_repr
 
@@ -277,12 +277,10 @@ def build_surface(
     """
     if not 0.0 < crease_angle < math.pi:
         raise SurfaceError(f"crease angle {crease_angle!r} rad: must be above 0 and below π")
-    T = np.array(T_base_surface, dtype=float)
+    T = read_only(T_base_surface)
     faces, turned = _wound_alike(mesh.faces)
-    vertices = mesh.vertices @ T[:3, :3].T + T[:3, 3]
-    for array in (T, vertices, faces):
-        array.setflags(write=False)
-    placed = replace(mesh, vertices=vertices, faces=faces)
+    vertices = read_only(mesh.vertices @ T[:3, :3].T + T[:3, 3])
+    placed = replace(mesh, vertices=vertices, faces=read_only(faces, np.intp))
     return Surface(name, placed, crease_angle, T, region, turned)
 
 

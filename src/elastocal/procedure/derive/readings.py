@@ -71,9 +71,9 @@ class Reading:
     window: Window
     """Its status is ``missing``, with a note, where a stream has too few good samples."""
     tool: ToolState | None
-    """None where arm or sensor said too little."""
+    """None where arm or sensor gave too few samples."""
     marker: Mean | None
-    """In the frame of the window's station, in m; None where the station said too little."""
+    """In the frame of the window's station, in m; None where the station gave too few."""
 
 
 def average(streams: Streams, window: Window) -> Reading:

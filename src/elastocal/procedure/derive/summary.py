@@ -208,7 +208,7 @@ class TimeSummary:
 
 @record("elastocal.run-summary/1")
 class RunSummary(Result):
-    """What was found on the way to the dataset of a run."""
+    """Findings on the way to the dataset of a run."""
 
     elastocal: str
     """Version that derived it."""

@@ -121,7 +121,7 @@ class RunRecord(StrictModel):
         )
 
     @model_serializer(mode="wrap")
-    def _schema_first(self, rest: SerializerFunctionWrapHandler) -> dict[str, Any]:
+    def _schema_first(self, rest: SerializerFunctionWrapHandler) -> dict[str, object]:
         # An entry leaves out what is at its default; the schema must be there all the same.
         return {"schema_name": self.schema_name, **rest(self)}
 

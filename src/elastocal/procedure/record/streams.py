@@ -1,6 +1,6 @@
 """Raw streams of one attempt at a pose: recorded to an MCAP file, and read again as arrays.
 
-Raw means as the devices said it: forces in the sensor's frame with bias and tool weight still in,
+Raw means as the devices gave it: forces in the sensor's frame with bias and tool weight still in,
 marker positions in the frame of the station that measured.
 """
 
@@ -233,7 +233,7 @@ class PointStream:
 @brief_repr
 @dataclass(frozen=True, eq=False)
 class Streams:
-    """All that the devices said during one pose attempt; the arrays are read-only."""
+    """All samples of the devices during one pose attempt; the arrays are read-only."""
 
     joint_names: tuple[str, ...]
     arm: ArmStream

@@ -140,7 +140,7 @@ class RecentSamples:
 
 @dataclass(frozen=True, eq=False)
 class SlipReference:
-    """Where the marker was, and how it moved, before contact."""
+    """Place of the marker before contact, and the direction in which it got there."""
 
     unloaded: FloatArray
     """Marker at the unloaded reference, shape (3,), in m, tracker frame."""

@@ -1,4 +1,4 @@
-"""Where the arm goes: the line to each surface, the legs between HOME and the approach poses.
+"""The ways of the arm: the line to each surface, the legs between HOME and the approach poses.
 
 Legs are those of the plan, forwards and backwards, because only those were checked for collisions.
 Stops are numbered by the poses' ids: before the first pose and after the last one is HOME.

@@ -8,7 +8,6 @@ from collections import Counter
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from enum import Enum
-from typing import Any
 
 from elastocal import __version__
 from elastocal.cell import Cell, fingerprint
@@ -232,7 +231,7 @@ def _may_touch(entries: tuple[Entry, ...]) -> bool:
     return False
 
 
-def _dump(section: object) -> dict[str, Any]:
+def _dump(section: object) -> dict[str, object]:
     if isinstance(section, StrictModel):
         return section.model_dump(mode="json")
     return {} if section is None else {"": section}

@@ -85,7 +85,7 @@ def next_step(step: Step, result: StepResult, loads_left: int) -> Step:
 
 
 class ArmLocation(Enum):
-    """Where the arm is when a session or an attempt is over."""
+    """Place of the arm when a session or an attempt is over."""
 
     HOME = "at HOME"
     BETWEEN_POSES = "on its way between poses, off every surface"
@@ -96,7 +96,7 @@ class ArmLocation(Enum):
 
 @dataclass(frozen=True)
 class BackOffResult:
-    """Where the arm was left after a fault."""
+    """Place of the arm after a fault, and why it is still at the surface if it is."""
 
     location: ArmLocation
     reason: str = ""
@@ -105,7 +105,7 @@ class BackOffResult:
 
 @dataclass(frozen=True, slots=True)
 class Progress:
-    """Where a run is; reported several times a second."""
+    """Stage of a run, reported several times a second."""
 
     time: float
     """In s of the devices' clock."""

@@ -43,6 +43,7 @@ _OFF_SURFACE = 0.004
 of each."""
 
 
+@brief_repr
 @dataclass(frozen=True, eq=False)
 class WeakestMargins:
     """The smallest relative margin of each candidate."""
@@ -55,6 +56,7 @@ class WeakestMargins:
     """Name of the check and the margin with its unit, for example ``edge 12.3 mm``."""
 
 
+@brief_repr
 @dataclass(frozen=True, eq=False)
 class Layer:
     """Traces with one switch."""
