@@ -173,20 +173,20 @@ def unit_vector(values: tuple[float, ...]) -> FloatArray:
     return vector(tuple(array / np.linalg.norm(array)))
 
 
-def needed_for(key: str, figures: str) -> AfterValidator:
+def needed_for(key: str, refusal: str) -> AfterValidator:
     """Return what makes a field say where figures are from, as soon as a field before it has any.
 
     Parameters
     ----------
     key : str
         Field of the figures.
-    figures : str
-        What the message calls them.
+    refusal : str
+        Message when the field says nothing.
     """
 
     def check(text: str | None, info: ValidationInfo) -> str | None:
         if info.data.get(key) and not (text or "").strip():
-            raise ValueError(f"say where the {figures} are from")
+            raise ValueError(refusal)
         return text
 
     return AfterValidator(check)

@@ -41,7 +41,9 @@ class MotionEntry(StrictModel):
     speed: dict[str, str] = Field(default_factory=dict)
     """Largest speed of each joint, by name; those of the robot's description by default."""
     provenance: Annotated[
-        str | None, needed_for("speed", "speeds"), Field(validate_default=True)
+        str | None,
+        needed_for("speed", "say where the speeds are from"),
+        Field(validate_default=True),
     ] = None
     """Where the speeds are from; needed when there are any."""
     override: Annotated[FiniteFloat, Field(ge=0.01, le=1.0)] = 0.2

@@ -118,7 +118,9 @@ class TorqueLimits(StrictModel):
     values: dict[str, str] = Field(default_factory=dict)
     """Figure of each joint, by name; those of the robot's description by default."""
     provenance: Annotated[
-        str | None, needed_for("values", "torque values"), Field(validate_default=True)
+        str | None,
+        needed_for("values", "say where the torque values are from"),
+        Field(validate_default=True),
     ] = None
     """Where the figures are from; needed when there are any."""
 
