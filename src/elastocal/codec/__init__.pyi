@@ -52,6 +52,7 @@ from .variants import (
     read_comparison as read_comparison,
     read_comparisons as read_comparisons,
     training_cases as training_cases,
+    values_by_key as values_by_key,
 )
 from .verdicts import (
     VERDICTS as VERDICTS,

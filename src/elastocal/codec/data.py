@@ -9,7 +9,7 @@ import json
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import numpy as np
 
@@ -256,7 +256,7 @@ def _arrays_of(data: CodecData) -> LabelledArrays:
     return LabelledArrays(variables, _attributes(data))
 
 
-def _attributes(data: CodecData) -> dict[str, Any]:
+def _attributes(data: CodecData) -> dict[str, str]:
     options = {name: getattr(data.options, name) for name in _OPTIONS}
     splits = data.options.splits
     return {
@@ -270,7 +270,7 @@ def _attributes(data: CodecData) -> dict[str, Any]:
     }
 
 
-def _texts(dim: str, texts: Any) -> LabelledArray:
+def _texts(dim: str, texts: Sequence[str]) -> LabelledArray:
     return LabelledArray((dim,), np.array(texts, dtype=np.str_))
 
 

@@ -1,8 +1,9 @@
 """Variants: what one codec lays beside another (paper 3.2, the three pillars, and the solver)."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
+from typing import TypeVar
 
 import numpy as np
 
@@ -10,6 +11,7 @@ from elastocal.errors import CodecError, DatasetError, nearest
 from elastocal.identification import FitOptions
 from elastocal.planning.search import technique
 
+_Value = TypeVar("_Value")
 ALL_LOADS = "all"
 """Name of the set of all load cases of a dataset."""
 _DEFAULT = "default"
@@ -99,11 +101,33 @@ def read_comparisons(texts: Sequence[str]) -> dict[str, tuple[str, ...]]:
     CodecError
         If a text does not fit, or a key stands twice.
     """
-    found: dict[str, tuple[str, ...]] = {}
+    return values_by_key("--compare", texts, read_comparison)
+
+
+def values_by_key(
+    option: str, texts: Sequence[str], read: Callable[[str], tuple[str, tuple[_Value, ...]]]
+) -> dict[str, tuple[_Value, ...]]:
+    """Return what was given to an option, one ``"KEY=A,B"`` a time, by key.
+
+    Parameters
+    ----------
+    option : str
+        For messages.
+    texts : sequence of str
+        What was given.
+    read : callable
+        Returns key and values of a text, or refuses it.
+
+    Raises
+    ------
+    CodecError
+        If a key stands twice.
+    """
+    found: dict[str, tuple[_Value, ...]] = {}
     for text in texts:
-        key, values = read_comparison(text)
+        key, values = read(text)
         if key in found:
-            raise CodecError(f"--compare {text!r}: {key} stands twice; name all its values at once")
+            raise CodecError(f"{option} {text!r}: {key} stands twice; name all its values at once")
         found[key] = values
     return found
 

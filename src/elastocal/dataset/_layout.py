@@ -33,7 +33,7 @@ AXES = ("x", "y", "z")
 """Labels of the coordinate axes, in order."""
 
 STATUSES = ("ok", "slipped", "unstable", "aborted", "missing")
-"""What a reading can be; its position is the CF flag value."""
+"""Statuses of a reading; the position of each is its CF flag value."""
 
 OK = STATUSES.index("ok")
 MISSING = STATUSES.index("missing")

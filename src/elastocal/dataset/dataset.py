@@ -84,7 +84,7 @@ class Dataset:
     tcp_position: FloatArray | None = None
     """Unloaded TCP position in base, shape (pose, 3), in m."""
     attributes: Mapping[str, str] = field(default_factory=lambda: {"schema": SCHEMA})
-    """What the file says about itself: schema, robot, marker, provenance, and CF's remarks."""
+    """Attributes of the file: schema, robot, marker, provenance, and CF's remarks."""
 
     def __post_init__(self) -> None:
         for name in ("poses", "load_cases", "joint_names", "joint_units"):

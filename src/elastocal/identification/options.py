@@ -1,4 +1,4 @@
-"""What a user may choose about a fit: bounds, weights, loss, prior.
+"""Choices of a user about a fit: bounds, weights, loss, prior.
 
 A loss is a weight for iterative reweighting (Huber, *Robust Statistics*, 1981). It sees the norm
 ``u`` of a reading's three residual components in units of one component's robust standard
@@ -25,7 +25,7 @@ _WEIGHTS: tuple[Weights, ...] = get_args(Weights)
 @brief_repr
 @dataclass(frozen=True)
 class Prior:
-    """What is known of the compliances before the data, e.g. from last year's calibration.
+    """Knowledge of the compliances before the data, e.g. from last year's calibration.
 
     Adds the rows ``noise / sigma * (c - mean)`` to the least-squares system.
     """
@@ -120,7 +120,7 @@ def bounds(
 @brief_repr
 @record(kw_only=True)
 class FitSettings:
-    """What a user chose about springs, readings and fit; the defaults are the paper's."""
+    """Choices of a user about springs, readings and fit; the defaults are the paper's."""
 
     springs: str = "bearing"
     """Spring layout: a name, or a YAML file."""

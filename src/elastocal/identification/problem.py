@@ -39,7 +39,7 @@ class ScaledRows:
     rows: FloatArray
     """Columns of unit norm, zero for an unloaded spring, shape (reading, 3, parameter)."""
     scale: FloatArray
-    """What each column was divided by, shape (parameter,); the largest for an unloaded spring."""
+    """Divisor of each column, shape (parameter,); the largest for an unloaded spring."""
 
 
 @brief_repr

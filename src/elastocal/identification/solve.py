@@ -189,7 +189,7 @@ class PoseTriangles:
     lower: FloatArray
     upper: FloatArray
     size: FloatArray | float = 1.0
-    """As for `Problem`."""
+    """See `Problem.size`."""
 
     @classmethod
     def of(cls, problem: Problem, blocks: IndexArray) -> "PoseTriangles":

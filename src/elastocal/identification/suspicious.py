@@ -1,4 +1,4 @@
-"""What looks wrong in the data: single readings, and a constant in all forces.
+"""Suspicious data: single readings that look wrong, and a constant in all forces.
 
 Each reading's residual is taken from a fit that gross errors hardly pull (Cauchy loss), divided
 by the robust standard deviation and by ``sqrt(1 - leverage)``, since a reading that pulls the

@@ -2,7 +2,7 @@ from dataclasses import replace
 
 import pytest
 
-from elastocal.identification.recertification.comparison import load_note, notes_on
+from elastocal.identification.recertification.comparison import _load_note, _notes_on
 from support.recertified import made_up
 
 PLAN = "run.nc; elastocal run, started {}, plan 906f4cfadf15, cell 0587b5d5dbf5"
@@ -10,7 +10,7 @@ PLAN = "run.nc; elastocal run, started {}, plan 906f4cfadf15, cell 0587b5d5dbf5"
 
 def notes(old: str, new: str, same_springs: bool = True, outside: int = 0) -> str:
     models = (replace(made_up(0), provenance=old), replace(made_up(1), provenance=new))
-    return "; ".join(notes_on(*models, same_springs, outside))
+    return "; ".join(_notes_on(*models, same_springs, outside))
 
 
 def test_two_runs_of_one_plan_need_no_word():
@@ -34,12 +34,12 @@ def test_other_springs_and_rows_beyond_the_limits_are_told():
 
 @pytest.mark.parametrize(("old", "new"), [(1e-3, 1.2e-3), (1e-3, None), (None, 1.0), (0.0, 1e-3)])
 def test_like_loads_and_unknown_ones_need_no_word(old, new):
-    assert load_note(old, new) is None
+    assert _load_note(old, new) is None
 
 
 @pytest.mark.parametrize(("old", "new"), [(1e-3, 2e-3), (2e-3, 1e-3)])
 def test_other_loads_are_told_with_both_deflections(old, new):
-    told = load_note(old, new)
+    told = _load_note(old, new)
     assert told is not None
     assert "1.000 mm" in told
     assert "2.000 mm" in told

@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
 
-from elastocal.codec.variants import ALL_LOADS
+from elastocal.codec.variants import ALL_LOADS, values_by_key
 from elastocal.errors import CodecError, ElastocalError, nearest
 from elastocal.planning.search import technique
 from elastocal.records import record
@@ -26,7 +26,7 @@ class Factor:
     allowed: str
     """Allowed values, in words."""
     unit: str
-    """As in a column header; empty for names and counts."""
+    """Unit of a column header; empty for names and counts."""
     read: Callable[[str], Value]
     """Returns a value from its text.
 
@@ -135,13 +135,7 @@ def read_variations(texts: Sequence[str]) -> dict[str, tuple[Value, ...]]:
     CodecError
         Also if a factor stands twice.
     """
-    found: dict[str, tuple[Value, ...]] = {}
-    for text in texts:
-        key, values = read_variation(text)
-        if key in found:
-            raise CodecError(f"--vary {text!r}: {key} stands twice; name all its values at once")
-        found[key] = values
-    return found
+    return values_by_key("--vary", texts, read_variation)
 
 
 def make_conditions(

@@ -15,6 +15,7 @@ from concurrent.futures import CancelledError
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import closing, contextmanager
 from functools import partial
+from operator import call
 from typing import Any
 
 from elastocal.codec.study.samples import Sample, SampleResult, Simulate, StudyDesign, StudyStore
@@ -132,7 +133,7 @@ def spread_over(
 
 
 def _over_cores(batches: Iterable[Work], pool: ProcessPool) -> Iterator[list[SampleResult]]:
-    return pool.map(_do, batches, ordered=False)
+    return pool.map(call, batches, ordered=False)
 
 
 def _over_cluster(batches: Iterable[Work], address: str) -> Iterator[list[SampleResult]]:
@@ -142,7 +143,7 @@ def _over_cluster(batches: Iterable[Work], address: str) -> Iterator[list[Sample
         from distributed.comm.core import CommClosedError
 
         try:
-            yield from map_on_cluster(_do, batches, client, _PATIENCE)
+            yield from map_on_cluster(call, batches, client, _PATIENCE)
         except (CancelledError, CommClosedError, KilledWorker, TimeoutError) as error:
             raise CodecError(
                 f"--dask {address}: the cluster was lost or has no worker"
@@ -163,10 +164,6 @@ def _dead_process_named() -> Iterator[None]:
 
 def _simulate_batch(simulate: Simulate, seed: int, numbers: Sequence[int]) -> list[SampleResult]:
     return [simulate(Sample(seed, number)) for number in numbers]
-
-
-def _do(work: Work) -> list[SampleResult]:
-    return work()
 
 
 def _check_scheduler(address: str) -> None:

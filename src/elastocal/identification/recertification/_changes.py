@@ -1,4 +1,4 @@
-"""What changed between two calibrations: springs, and deflections along rows of joints and forces.
+"""Changes between two calibrations: springs, and deflections along rows of joints and forces.
 
 The draws of the two models say how far each estimate may be from its truth; the campaigns are
 independent, so a draw of the one goes with any draw of the other. Draws with the same number are

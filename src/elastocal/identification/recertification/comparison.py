@@ -41,7 +41,7 @@ _LENGTH, _ANGLE = 1e-4, 1e-4
 a deflection by less than a part in ten thousand."""
 
 
-def judge(deflection: RowComparison | None, limit: float | None) -> tuple[Verdict | None, str]:
+def _judge(deflection: RowComparison | None, limit: float | None) -> tuple[Verdict | None, str]:
     """Return the verdict on the largest change against a limit in m, and why.
 
     Parameters
@@ -99,7 +99,7 @@ def _mm(length: float) -> str:
     return f"{1e3 * length:.3f} mm"
 
 
-def notes_on(
+def _notes_on(
     old: CalibratedModel, new: CalibratedModel, same_springs: bool, outside: int
 ) -> tuple[str, ...]:
     """Return what a reader has to know beside the figures, a sentence each.
@@ -136,7 +136,7 @@ def notes_on(
     return tuple(notes)
 
 
-def load_note(old: float | None, new: float | None) -> str | None:
+def _load_note(old: float | None, new: float | None) -> str | None:
     """Return what other loads do to a comparison, or None where they were alike.
 
     Parameters
@@ -190,7 +190,7 @@ def recertify_files(
     (old_model, old_deflection), (new_model, new_deflection) = _read(old), _read(new)
     names = (str(old), str(new))
     found = recertify(old_model, new_model, q, force, moment, limit=limit, names=names)
-    note = load_note(old_deflection, new_deflection)
+    note = _load_note(old_deflection, new_deflection)
     if note is None:
         return found
     return replace(found, summary=replace(found.summary, notes=(*found.summary.notes, note)))
@@ -242,7 +242,7 @@ def recertify(
     spread = Spread.of(old, new)
     loads = None if q is None else _checked_rows(new.model.robot, q, force, moment)
     rows = None if loads is None else compare_rows(old, new, spread, *loads)
-    verdict, reason = judge(rows, limit)
+    verdict, reason = _judge(rows, limit)
     springs = compare_springs(old, new, spread)
     moved = sorted(
         (each for each in springs if each.moved), key=lambda each: each.certainty, reverse=True
@@ -267,7 +267,7 @@ def recertify(
         limit=limit,
         verdict=verdict,
         reason=reason,
-        notes=notes_on(old, new, not only_old and not only_new, outside),
+        notes=_notes_on(old, new, not only_old and not only_new, outside),
     )
     return CompareResult(result, rows)
 
