@@ -86,6 +86,7 @@ from .report import (
     ReportFigures as ReportFigures,
     ReportResult as ReportResult,
     ReportSettings as ReportSettings,
+    UnseenFigures as UnseenFigures,
     report as report,
 )
 from .run import (

@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from elastocal import workflows
-from elastocal.cli import output, tables
+from elastocal.cli import output
 
 
 def _predict(
@@ -21,5 +21,17 @@ def _predict(
     result = workflows.predict(model, rows=rows, out=out)
     if as_json:
         output.print_json(result.summary)
-    else:
-        tables.show_predicted(output.console(), result, out)
+        return
+    figures, size = result.summary, result.summary.deflection
+    output.console().print(
+        f"{figures.rows} rows: predicted deflection {1e3 * size.mean:.3f} mm mean,"
+        f" {1e3 * size.max:.3f} mm max; written to {out}",
+        markup=False,
+        soft_wrap=True,
+    )
+    if figures.misfit is None:
+        output.console().print(
+            "Note: the model does not know its errors at left-out poses, so that there are no"
+            " intervals of what would be measured; calibrate again to have them",
+            soft_wrap=True,
+        )

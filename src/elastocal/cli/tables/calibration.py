@@ -1,4 +1,4 @@
-"""What ``calibrate`` and ``compare`` print: a user's first questions, in their order.
+"""Print what ``calibrate``, ``compare`` and ``report`` found: a user's questions, in their order.
 
 How well does it fit; is it better than simpler models; which springs are really known, and how
 well; which readings look wrong. Of two calibrations: which springs moved, what it does, the
@@ -31,9 +31,10 @@ if TYPE_CHECKING:
         Estimate,
         SpringChange,
     )
+    from elastocal.workflows import ReportResult
 
 _USUAL_UNIT = unit_of("rad/(N*m)")
-"""Of most springs: the headings name it, other springs their own."""
+"""The unit of most springs stands in the headings; other springs name their own."""
 _MOST_SUSPICIOUS = 10
 _MOST_TERMS = 6
 """A combination of more springs than this tells a reader nothing."""
@@ -287,3 +288,12 @@ def _show_verdict(console: Console, found: "CompareSummary", hint: Path | None) 
         f"[bold {colour}]{found.verdict.value}[/bold {colour}]: {escape(found.reason)}",
         soft_wrap=True,
     )
+
+
+def show_report(console: Console, result: "ReportResult") -> None:
+    """Print the verdict of a report."""
+    verdict = result.verdict
+    console.print(f"[bold]{verdict.word}[/bold]{result.light}: {escape(verdict.sentence)}")
+    for reason in verdict.reasons:
+        console.print(f"   {reason}", markup=False)
+    console.print(f"written to {result.files}", markup=False)

@@ -1,4 +1,4 @@
-"""What ``tool``, ``compensate``, ``stiffness``, ``export`` and ``simulate-process`` print.
+"""Print what ``tool``, ``compensate``, ``stiffness``, ``export``, ``simulate-process`` found.
 
 Results are named for type checkers only: no command imports another one's work.
 """
