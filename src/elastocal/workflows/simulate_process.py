@@ -14,9 +14,9 @@ from typing import TypeVar
 import numpy as np
 
 from elastocal.arrays import FloatArray
-from elastocal.cell import Cell, load_cell
+from elastocal.cell import Cell, SensorLoad, load_cell
 from elastocal.compensation import CompensatorSettings, process, read_settings
-from elastocal.compensation.conditioning import SensorLoad, read_sensor_load
+from elastocal.compensation.conditioning import read_sensor_load
 from elastocal.compensation.online import Compensator
 from elastocal.compensation.process import Course, CourseRun, ProcessRun, SimulateProcessResult
 from elastocal.dataset import joint_dimensions
