@@ -11,7 +11,7 @@ from elastocal.dataset import joint_dimensions, read_load_rows, write_load_rows
 from elastocal.identification import DeflectionSummary, Prediction
 from elastocal.progress import Progress
 from elastocal.records import record
-from elastocal.results import Result
+from elastocal.results import Result, brief_repr
 from elastocal.workflows._inputs import NewTool, coverage_notes, refuse_overwriting
 from elastocal.workflows._workflow import workflow
 
@@ -28,6 +28,7 @@ class PredictSettings(NewTool):
     """CSV to write: the rows with their deflections and intervals."""
 
 
+@brief_repr
 @record()
 class PredictSummary:
     """The figures of ``predict --json``."""
