@@ -1,21 +1,30 @@
 """The dataset: the labelled arrays of the paper's Procedure 1."""
 
-from collections.abc import Hashable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from elastocal.dataset._labelled import (
+    campaign_labels,
+    labelled_from_xarray,
+    pose_labels,
+    read_joint_units,
+    read_sequence,
+    read_status,
+    read_variables,
+    text_labels,
+    xarray_from_labelled,
+)
 from elastocal.dataset._layout import (
     AXES,
     CONDITIONED,
     INTEGERS,
-    LINK_JOINT_POSITION,
     OK,
     SCHEMA,
     SCHEMA_2,
-    SEQUENCE,
     VARIABLES,
     BoolArray,
     FloatArray,
@@ -30,20 +39,14 @@ from elastocal.dataset._layout import (
 )
 from elastocal.dataset._structure import (
     assemble,
-    campaign_labels,
     check_names,
     check_structure,
-    pose_labels,
-    read_joint_units,
-    read_sequence,
-    read_status,
-    read_variables,
-    text_labels,
+    needed_schema,
 )
 from elastocal.dataset._validation import check_numbers, check_plausible
-from elastocal.dataset.readings import Presses, Readings
-from elastocal.errors import DatasetError, nearest
-from elastocal.records import LabelledArray, LabelledArrays
+from elastocal.dataset.merging import selected
+from elastocal.dataset.readings import Readings, usable_readings
+from elastocal.records import LabelledArrays
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -117,7 +120,8 @@ class Dataset:
                 freeze(values)
                 object.__setattr__(self, variable.name, values)
         attributes = canonical_attributes(self.attributes)
-        object.__setattr__(self, "attributes", attributes | {"schema": self._schema(attributes)})
+        schema = needed_schema(self._labels, self._variables, attributes)
+        object.__setattr__(self, "attributes", attributes | {"schema": schema})
         check_structure(self._labels, self._variables, self.joint_units)
         check_numbers(self._labels, self._variables)
 
@@ -162,35 +166,20 @@ class Dataset:
 
         Parameters
         ----------
-        joint_position : array_like, shape (pose, load_case, joint)
-            Joint positions after settling (paper: Theta^c), in rad, or m for prismatic joints.
-        force : array_like, shape (pose, load_case, 3)
-            Force on the robot at the TCP in base (F^m), in N.
-        controller_displacement, marker_displacement : array_like, shape (pose, load_case, 3)
-            Displacements under load by controller (P^c) and tracker (P^m), in base, in m: of the
-            TCP, or both of the marker where ``marker`` is given. The tracker's is left out where
-            there was no metrology.
+        joint_position, force, controller_displacement, marker_displacement : array_like
+            As the fields of these names. Displacements are those of the TCP, or both of the marker
+            where ``marker`` is given; the tracker's is left out where there was no metrology.
+        moment, tcp_position, sequence : array_like, optional
+        reference_joint_position, reference_force, link_joint_position : array_like, optional
+            As the fields of these names.
         joint_names, load_cases : sequence of str
             Labels of the joints and the load cases.
         poses : sequence of int, optional
             Labels of the poses; 0, 1, 2 … by default.
-        moment : array_like, shape (pose, load_case, 3), optional
-            Moment on the robot at the TCP in base, in N·m.
         status : array_like of int, shape (pose, load_case), optional
             Index into ``STATUSES`` of each reading; 0 (ok) by default.
         force_sigma, marker_sigma : array_like, shape () or (pose, load_case[, 3]), optional
             Standard deviations in N and m.
-        tcp_position : array_like, shape (pose, 3), optional
-            Unloaded TCP position in base, in m.
-        sequence : array_like of int, shape (pose, load_case), optional
-            Place of each reading in time among those of its pose; by default the order of the
-            load cases.
-        reference_joint_position : array_like, shape (pose, joint), optional
-            Joint positions when the zero of both displacements was read, in rad (m).
-        reference_force : array_like, shape (pose, 3), optional
-            Force on the robot at the TCP in base then, in N; none by default.
-        link_joint_position : array_like, shape (pose, load_case, joint), optional
-            Positions of the links by secondary encoders, in rad (m).
         campaigns : sequence of str, optional
             Campaign of each pose.
         joint_units : sequence of str, optional
@@ -200,7 +189,7 @@ class Dataset:
         marker : tuple of float, optional
             Metrology marker in the frame ``tcp_frame``, in m.
         gravity : tuple of float, optional
-            Acceleration of gravity in base, in m/s², of a base that is not upright.
+            Acceleration of gravity in base, in m/s²; that of an upright base by default.
         conditioned : bool
             Whether the first load case of each pose is a full press made before the reference was
             read; else the arm came to it by free moves.
@@ -235,12 +224,8 @@ class Dataset:
             "history": CONDITIONED if conditioned else None,
             "provenance": provenance,
         }
-        labels = {
-            "pose": poses,
-            "load_case": load_cases,
-            "joint": joint_names,
-            "campaign": campaigns,
-        }
+        labels = {"pose": poses, "load_case": load_cases, "joint": joint_names}
+        labels["campaign"] = campaigns
         units = joint_units or ("rad",) * len(joint_names)
         dataset = cls.from_labelled(assemble(labels, arrays, units, attributes))
         dataset.require_plausible()
@@ -262,13 +247,12 @@ class Dataset:
         """
         attributes = canonical_attributes(arrays.attributes)
         check_names(arrays)
-        poses, load_cases = pose_labels(arrays), text_labels(arrays, "load_case")
         joint_names = text_labels(arrays, "joint")
         joint_units, factors = read_joint_units(arrays, len(joint_names))
         status = read_status(arrays)
         return cls(
-            poses=poses,
-            load_cases=tuple(load_cases),
+            poses=pose_labels(arrays),
+            load_cases=tuple(text_labels(arrays, "load_case")),
             joint_names=tuple(joint_names),
             joint_units=tuple(joint_units),
             **read_variables(arrays, factors),
@@ -281,13 +265,7 @@ class Dataset:
     @classmethod
     def from_xarray(cls, data: "xr.Dataset") -> "Dataset":
         """Return the dataset of an `xarray.Dataset`; see `from_labelled`."""
-        coordinates = [str(name) for name in data.coords if data[name].dims != (name,)]
-        variables = {
-            str(name): LabelledArray(tuple(map(str, each.dims)), each.values, each.attrs)
-            for name, each in data.variables.items()
-        }
-        attributes = {str(name): value for name, value in data.attrs.items()}
-        return cls.from_labelled(LabelledArrays(variables, attributes, tuple(coordinates)))
+        return cls.from_labelled(labelled_from_xarray(data))
 
     def to_labelled(self) -> LabelledArrays:
         """Return the arrays with their labels, units and meanings, as the NetCDF file has them."""
@@ -304,15 +282,7 @@ class Dataset:
 
     def to_xarray(self) -> "xr.Dataset":
         """Return the dataset as an `xarray.Dataset`, which shares the read-only arrays."""
-        import xarray as xr
-
-        arrays = self.to_labelled()
-        variables = {
-            name: xr.Variable(each.dims, each.values, each.attributes)
-            for name, each in arrays.variables.items()
-        }
-        coordinates = {name: variables.pop(name) for name in arrays.coordinates}
-        return xr.Dataset(variables, coordinates, arrays.attributes)
+        return xarray_from_labelled(self.to_labelled())
 
     def require_plausible(self) -> None:
         """Refuse numbers that look like a unit mistake.
@@ -327,20 +297,13 @@ class Dataset:
     @property
     def arrays(self) -> dict[str, FloatArray]:
         """The quantities that are present, by name: all variables but status and sequence."""
-        found = {variable.name: getattr(self, variable.name) for variable in VARIABLES}
-        return {name: values for name, values in found.items() if values is not None}
+        names = [variable.name for variable in VARIABLES]
+        return {name: each for name, each in self._variables.items() if name in names}
 
     @property
     def _variables(self) -> dict[str, np.ndarray]:
-        whole = {variable.name: getattr(self, variable.name) for variable in INTEGERS}
-        return self.arrays | {name: each for name, each in whole.items() if each is not None}
-
-    def _schema(self, attributes: Mapping[str, str]) -> str:
-        """Return the first schema that has all that the dataset has."""
-        present = [each for each in (*VARIABLES, *INTEGERS) if getattr(self, each.name) is not None]
-        later = any(each.schema == SCHEMA_2 for each in present) or "gravity" in attributes
-        later |= bool(self.campaigns) or attributes.get("history") == CONDITIONED
-        return SCHEMA_2 if later or self.marker_displacement is None else SCHEMA
+        found = {each.name: getattr(self, each.name) for each in (*VARIABLES, *INTEGERS)}
+        return {name: values for name, values in found.items() if values is not None}
 
     @property
     def _labels(self) -> Labels:
@@ -376,30 +339,27 @@ class Dataset:
     @property
     def marker(self) -> Vector | None:
         """Metrology marker in the tcp frame, in m; None: at the tcp, or the file does not say."""
-        text = self.attributes.get("marker")
-        return None if text is None else read_vector("marker", text)
+        return self._vector("marker")
+
+    def _vector(self, name: str) -> Vector | None:
+        text = self.attributes.get(name)
+        return None if text is None else read_vector(name, text)
 
     @property
     def gravity(self) -> Vector | None:
         """Acceleration of gravity in base, in m/s²; None: the base stands upright."""
-        text = self.attributes.get("gravity")
-        return None if text is None else read_vector("gravity", text)
+        return self._vector("gravity")
 
     @property
     def conditioned(self) -> bool:
-        """Whether each pose's first reading is a full press made before the reference was read.
-
-        Else the arm came to the reference by free moves, and its friction is not known.
-        """
+        """Whether each pose's first reading is a full press made before the reference was read."""
         return self.attributes.get("history") == CONDITIONED
 
     @property
     def order(self) -> IntArray:
         """Place of each reading in time among those of its pose, shape (pose, load_case)."""
-        if self.sequence is not None:
-            return self.sequence
-        order = np.broadcast_to(np.arange(len(self.load_cases)), self.status.shape)
-        return np.asarray(order, dtype=np.int64)
+        default = np.tile(np.arange(len(self.load_cases)), (len(self.poses), 1))
+        return default if self.sequence is None else self.sequence
 
     @property
     def provenance(self) -> str:
@@ -427,15 +387,7 @@ class Dataset:
         DatasetError
             If a label is unknown or stands twice, or nothing usable is left.
         """
-        rows = list(range(len(self.poses)))
-        if poses is not None:
-            rows = _positions("pose", poses, self.poses)
-        columns = list(range(len(self.load_cases)))
-        if load_cases is not None:
-            columns = _positions("load case", load_cases, self.load_cases)
-        elif self.usable[rows].any():
-            columns = np.flatnonzero(self.usable[rows].any(axis=0)).tolist()
-        return self._taken(rows, columns)
+        return selected(self, poses, load_cases)
 
     def readings(self, joint_names: Sequence[str]) -> Readings:
         """Return the usable readings as flat arrays, the joints in the robot's order.
@@ -450,80 +402,4 @@ class Dataset:
         DatasetError
             If the dataset's joints are not these, or there was no metrology.
         """
-        if self.marker_displacement is None:
-            raise DatasetError(
-                "dataset has no marker_displacement: to identify springs, metrology is needed"
-                " (a tracker that measures the marker)"
-            )
-        wanted = list(joint_names)
-        if sorted(wanted) != sorted(self.joint_names):
-            raise DatasetError(
-                f"joints of the dataset are {list(self.joint_names)}, those of the robot {wanted}:"
-                " they must have the same names"
-            )
-        order = [self.joint_names.index(name) for name in wanted]
-        pose, case = np.nonzero(self.usable)
-        flat: dict[str, Any] = {}
-        for variable in VARIABLES:
-            values = self.arrays.get(variable.name)
-            if values is not None and variable != LINK_JOINT_POSITION:
-                rows = values[pose, case] if "load_case" in variable.dims else values[pose]
-                flat[variable.name] = rows[:, order] if "joint" in variable.dims else rows
-        presses = self._unusable_presses(order)
-        if self.sequence is not None or presses is not None:
-            flat["sequence"] = self.order[pose, case]
-        if self.campaigns:
-            flat["campaign"] = np.array(self.campaigns)[pose]
-        return Readings(
-            np.array(self.poses)[pose],
-            np.array(self.load_cases)[case],
-            conditioned=self.conditioned,
-            also_pressed=presses,
-            **flat,
-        )
-
-    def _unusable_presses(self, order: Sequence[int]) -> Presses | None:
-        """Return what pressed on the arm without a usable reading, as far as it is known."""
-        known = np.isfinite(self.joint_position).all(axis=2) & np.isfinite(self.force).all(axis=2)
-        if self.moment is not None:
-            known &= np.isfinite(self.moment).all(axis=2)
-        pose, case = np.nonzero(known & ~self.usable)
-        if not len(pose):
-            return None
-        return Presses(
-            np.array(self.poses)[pose],
-            self.order[pose, case],
-            self.joint_position[pose, case][:, order],
-            self.force[pose, case],
-            None if self.moment is None else self.moment[pose, case],
-        )
-
-    def _taken(self, rows: Sequence[int], columns: Sequence[int]) -> "Dataset":
-        """Return the poses and load cases at some positions."""
-        index = np.ix_(rows, columns)
-        dims = {variable.name: variable.dims for variable in (*VARIABLES, *INTEGERS)}
-        variables = self._variables
-        if sorted(columns) != list(columns):
-            variables[SEQUENCE.name] = self.order
-        return Dataset(
-            poses=tuple(self.poses[row] for row in rows),
-            load_cases=tuple(self.load_cases[column] for column in columns),
-            joint_names=self.joint_names,
-            joint_units=self.joint_units,
-            campaigns=tuple(self.campaigns[row] for row in rows) if self.campaigns else (),
-            attributes=self.attributes,
-            **{
-                name: values[index] if "load_case" in dims[name] else values[list(rows)]
-                for name, values in variables.items()
-            },
-        )
-
-
-def _positions(kind: str, labels: Sequence[object], known: Sequence[Hashable]) -> list[int]:
-    for label in labels:
-        if label not in known:
-            listed = ", ".join(map(str, known[:20])) + (", …" if len(known) > 20 else "")
-            names = [name for name in known if isinstance(name, str)]
-            hint = nearest(label, names) if isinstance(label, str) else ""
-            raise DatasetError(f"{kind} {label!r} is not in the dataset{hint} (known: {listed})")
-    return [known.index(label) for label in labels]
+        return usable_readings(self, joint_names)

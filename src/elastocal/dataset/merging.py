@@ -1,13 +1,17 @@
-"""Merging: several datasets of one robot become one."""
+"""Parts and wholes: some poses of a dataset, and several datasets of one robot as one."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Hashable, Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from elastocal.dataset._layout import MISSING, VARIABLES, FloatArray, IntArray
-from elastocal.dataset.dataset import Dataset
-from elastocal.errors import DatasetError
+from elastocal.dataset._layout import INTEGERS, MISSING, SEQUENCE, VARIABLES, FloatArray, IntArray
+from elastocal.errors import DatasetError, nearest
+
+if TYPE_CHECKING:
+    from elastocal.dataset.dataset import Dataset
 
 _SAME_ATTRIBUTES = ("robot_name", "robot_urdf", "tcp_frame", "gravity")
 
@@ -17,11 +21,11 @@ tool that turns by 1 mrad under load then differ by 1 µm."""
 
 
 def merge(
-    datasets: Sequence[Dataset],
+    datasets: Sequence["Dataset"],
     *,
     relabel: bool = False,
     campaigns: Sequence[str] | None = None,
-) -> Dataset:
+) -> "Dataset":
     """Return all poses of several datasets of the same robot.
 
     Poses keep their labels, and one that stands in two datasets is refused: whether it is the
@@ -54,22 +58,22 @@ def merge(
     cases = tuple(dict.fromkeys(case for dataset in datasets for case in dataset.load_cases))
     poses = tuple(pose for dataset in datasets for pose in dataset.poses)
     names = dict.fromkeys(name for dataset in datasets for name in dataset.arrays)
+    joined: dict[str, Any] = {name: _joined(datasets, name, cases) for name in names}
     sources = [dataset.provenance for dataset in datasets if dataset.provenance]
     provenance = "; ".join(dict.fromkeys(sources))
-    return Dataset(
+    return replace(
+        datasets[0],
         poses=tuple(range(len(poses))) if relabel else poses,
         load_cases=cases,
-        joint_names=datasets[0].joint_names,
-        joint_units=datasets[0].joint_units,
         status=np.concatenate([_spread(each, each.status, cases, MISSING) for each in datasets]),
         sequence=_sequence(datasets, cases),
         campaigns=_campaigns(datasets, campaigns),
         attributes={**datasets[0].attributes, "provenance": provenance},
-        **{name: _joined(datasets, name, cases) for name in names},
+        **joined,
     )
 
 
-def _sequence(datasets: Sequence[Dataset], cases: Sequence[str]) -> IntArray | None:
+def _sequence(datasets: Sequence["Dataset"], cases: Sequence[str]) -> IntArray | None:
     """Return the order in time; None where it is that of the load cases at all poses."""
     places = [[cases.index(case) for case in dataset.load_cases] for dataset in datasets]
     ordered = all(place == sorted(place) for place in places)
@@ -78,7 +82,7 @@ def _sequence(datasets: Sequence[Dataset], cases: Sequence[str]) -> IntArray | N
     return np.concatenate([_spread(each, each.order, cases, -1) for each in datasets])
 
 
-def _campaigns(datasets: Sequence[Dataset], named: Sequence[str] | None) -> tuple[str, ...]:
+def _campaigns(datasets: Sequence["Dataset"], named: Sequence[str] | None) -> tuple[str, ...]:
     if named is None and not any(dataset.campaigns for dataset in datasets):
         return ()
     if named is not None and len(named) != len(datasets):
@@ -96,11 +100,55 @@ def _campaigns(datasets: Sequence[Dataset], named: Sequence[str] | None) -> tupl
     return tuple(labels)
 
 
-_DIMS = {variable.name: variable.dims for variable in VARIABLES}
+_DIMS = {variable.name: variable.dims for variable in (*VARIABLES, *INTEGERS)}
 _ZERO_BY_DEFAULT = "reference_force"
 
 
-def _joined(datasets: Sequence[Dataset], name: str, cases: Sequence[str]) -> FloatArray:
+def selected(
+    dataset: "Dataset", poses: Sequence[int] | None, load_cases: Sequence[str] | None
+) -> "Dataset":
+    """Return some poses and load cases of a dataset, as `Dataset.select` does."""
+    rows = list(range(len(dataset.poses)))
+    if poses is not None:
+        rows = _positions("pose", poses, dataset.poses)
+    columns = list(range(len(dataset.load_cases)))
+    if load_cases is not None:
+        columns = _positions("load case", load_cases, dataset.load_cases)
+    elif dataset.usable[rows].any():
+        columns = np.flatnonzero(dataset.usable[rows].any(axis=0)).tolist()
+    return _taken(dataset, rows, columns)
+
+
+def _taken(dataset: "Dataset", rows: Sequence[int], columns: Sequence[int]) -> "Dataset":
+    """Return the poses and load cases at some positions."""
+    index = np.ix_(rows, columns)
+    variables: dict[str, Any] = dict(dataset.arrays)
+    if dataset.sequence is not None or sorted(columns) != list(columns):
+        variables[SEQUENCE.name] = dataset.order
+    return replace(
+        dataset,
+        poses=tuple(dataset.poses[row] for row in rows),
+        load_cases=tuple(dataset.load_cases[column] for column in columns),
+        campaigns=tuple(dataset.campaigns[row] for row in rows) if dataset.campaigns else (),
+        status=dataset.status[index],
+        **{
+            name: values[index] if "load_case" in _DIMS[name] else values[list(rows)]
+            for name, values in variables.items()
+        },
+    )
+
+
+def _positions(kind: str, labels: Sequence[object], known: Sequence[Hashable]) -> list[int]:
+    for label in labels:
+        if label not in known:
+            listed = ", ".join(map(str, known[:20])) + (", …" if len(known) > 20 else "")
+            names = [name for name in known if isinstance(name, str)]
+            hint = nearest(label, names) if isinstance(label, str) else ""
+            raise DatasetError(f"{kind} {label!r} is not in the dataset{hint} (known: {listed})")
+    return [known.index(label) for label in labels]
+
+
+def _joined(datasets: Sequence["Dataset"], name: str, cases: Sequence[str]) -> FloatArray:
     """Return the values of a variable at the poses of all datasets, joints in the first's order."""
     parts = []
     for dataset in datasets:
@@ -113,7 +161,9 @@ def _joined(datasets: Sequence[Dataset], name: str, cases: Sequence[str]) -> Flo
     return np.concatenate(parts)
 
 
-def _spread(dataset: Dataset, values: np.ndarray, cases: Sequence[str], fill: float) -> np.ndarray:
+def _spread(
+    dataset: "Dataset", values: np.ndarray, cases: Sequence[str], fill: float
+) -> np.ndarray:
     """Return values of shape (pose, load_case, …) for other load cases; ``fill`` without one."""
     shape = (len(values), len(cases), *values.shape[2:])
     spread = np.full(shape, fill, dtype=values.dtype)
@@ -121,7 +171,7 @@ def _spread(dataset: Dataset, values: np.ndarray, cases: Sequence[str], fill: fl
     return spread
 
 
-def _check_compatible(first: Dataset, other: Dataset, index: int) -> None:
+def _check_compatible(first: "Dataset", other: "Dataset", index: int) -> None:
     """Refuse to merge dataset ``index`` with dataset 0 when they are not of one kind."""
     for name in _SAME_ATTRIBUTES:
         here, there = first.attributes.get(name), other.attributes.get(name)
@@ -149,11 +199,11 @@ def _check_compatible(first: Dataset, other: Dataset, index: int) -> None:
         )
 
 
-def _history(dataset: Dataset) -> str:
+def _history(dataset: "Dataset") -> str:
     return "conditioned" if dataset.conditioned else "free"
 
 
-def _check_marker(first: Dataset, other: Dataset, index: int) -> None:
+def _check_marker(first: "Dataset", other: "Dataset", index: int) -> None:
     here, there = first.marker, other.marker
     if here is None and there is None:
         return
@@ -165,7 +215,7 @@ def _check_marker(first: Dataset, other: Dataset, index: int) -> None:
         )
 
 
-def _check_poses_differ(datasets: Sequence[Dataset]) -> None:
+def _check_poses_differ(datasets: Sequence["Dataset"]) -> None:
     first: dict[int, int] = {}
     for index, dataset in enumerate(datasets):
         for pose in dataset.poses:

@@ -19,6 +19,7 @@ from elastocal.identification.ladder import Climbed
 from elastocal.identification.observability import Observability, Term
 from elastocal.identification.options import MINIMUM_DRAWS, FitSettings
 from elastocal.identification.suspicious import Screening
+from elastocal.identification.tool_change import ToolChange
 from elastocal.identification.uncertainty import HeldOut, interval
 from elastocal.records import read_json, record, write_json
 from elastocal.results import Result, brief_repr
@@ -283,6 +284,8 @@ class CalibrateResult(Result):
     """See `CalibratedModel.misfit`; none where it is not known, as in files of elastocal 0.1.0."""
     calibration: CalibrationSummary | None = None
     """The figures of the calibration; none for a model that was made otherwise."""
+    tool: ToolChange | None = None
+    """The tool that the model is for; none: the one that it was calibrated with."""
 
     def __post_init__(self) -> None:
         """Refuse parts that contradict one another.
@@ -321,6 +324,7 @@ class CalibrateResult(Result):
             provenance=calibrated.provenance,
             misfit=calibrated.misfit if np.isfinite(calibrated.misfit) else None,
             calibration=calibration,
+            tool=calibrated.tool,
         )
 
     @cached_property
@@ -340,6 +344,7 @@ class CalibrateResult(Result):
             self.observability,
             self.provenance,
             float("nan") if self.misfit is None else self.misfit,
+            self.tool,
         )
 
     def facts(self) -> tuple[tuple[str, str], ...]:
@@ -347,6 +352,7 @@ class CalibrateResult(Result):
         seen, figures = self.observability, self.calibration
         facts = [
             ("robot", f"{self.robot.name}, tool centre point {self.robot.tcp}"),
+            *((("tool", self.tool.sentence),) if self.tool is not None else ()),
             ("springs", f"{seen.springs}, rank {seen.rank}, {sum(seen.observable)} known alone"),
         ]
         if figures is not None:
