@@ -15,6 +15,7 @@ from elastocal.dataset import Readings
 from elastocal.elastic import ElasticModel, check_vectors
 from elastocal.errors import ConventionError, IdentificationError, SpringError
 from elastocal.identification.conventions import POOR, check_conventions, check_joints
+from elastocal.identification.domain import CalibrationDomain
 from elastocal.identification.ladder import Climbed
 from elastocal.identification.observability import Observability, attainable_rank, observability
 from elastocal.identification.options import FitOptions
@@ -71,6 +72,8 @@ class CalibratedModel:
     misfit: float = float("nan")
     """Share of a predicted deflection that 95 % of the errors along an axis stayed below at
     left-out poses; NaN: not known. See `HeldOut.misfit`."""
+    domain: CalibrationDomain | None = None
+    """Poses and loads of the calibration; none: not known, as in files of elastocal 0.1.0."""
 
     def __post_init__(self) -> None:
         for name in ("compliance", "draws"):
@@ -242,6 +245,7 @@ def calibrate(
         observability(factor(weighted.without_prior()), model.springs),
         provenance,
         held_out.misfit,
+        CalibrationDomain.of(model.robot, readings.take(used), kept.block),
     )
     offset = force_offset(model, readings.take(used), weighted, solution.compliance, marker_offset)
     reach = max(attainable_rank(model, marker_offset), calibrated.observability.rank)

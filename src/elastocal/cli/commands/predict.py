@@ -29,6 +29,8 @@ def _predict(
         markup=False,
         soft_wrap=True,
     )
+    if figures.warning:
+        output.console().print(f"[yellow]warning:[/yellow] {figures.warning}", soft_wrap=True)
     if figures.misfit is None:
         output.console().print(
             "Note: the model does not know its errors at left-out poses, so that there are no"
