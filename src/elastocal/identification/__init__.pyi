@@ -63,6 +63,7 @@ from .observability import (
     describe as describe,
     observability as observability,
     sparse_basis as sparse_basis,
+    unseen_groups as unseen_groups,
 )
 from .options import (
     LOSSES as LOSSES,
@@ -113,6 +114,7 @@ from .suspicious import (
     leverage as leverage,
     screen as screen,
 )
+from .tool_change import ToolChange as ToolChange, change_tool as change_tool
 from .uncertainty import (
     CONFIDENCE as CONFIDENCE,
     MOST_FOLDS as MOST_FOLDS,

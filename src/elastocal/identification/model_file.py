@@ -14,6 +14,7 @@ from elastocal.identification.domain import CalibrationDomain
 from elastocal.identification.figures import CalibrationSummary
 from elastocal.identification.observability import Observability
 from elastocal.identification.options import MINIMUM_DRAWS
+from elastocal.identification.tool_change import ToolChange
 from elastocal.records import read_json, record, write_json
 from elastocal.results import Result, brief_repr
 from elastocal.robot import Robot
@@ -48,6 +49,8 @@ class CalibrateResult(Result):
     """See `CalibratedModel.misfit`; none where it is not known, as in files of elastocal 0.1.0."""
     calibration: CalibrationSummary | None = None
     """The figures of the calibration; none for a model that was made otherwise."""
+    tool: ToolChange | None = None
+    """The tool that the model is for; none: the one that it was calibrated with."""
     domain: CalibrationDomain | None = None
     """Poses and loads of the calibration; none in files of elastocal 0.1.0."""
 
@@ -88,6 +91,7 @@ class CalibrateResult(Result):
             provenance=calibrated.provenance,
             misfit=calibrated.misfit if np.isfinite(calibrated.misfit) else None,
             calibration=calibration,
+            tool=calibrated.tool,
             domain=calibrated.domain,
         )
 
@@ -113,6 +117,7 @@ class CalibrateResult(Result):
             self.observability,
             self.provenance,
             float("nan") if self.misfit is None else self.misfit,
+            self.tool,
             self.domain,
         )
 
@@ -121,6 +126,7 @@ class CalibrateResult(Result):
         seen, figures = self.observability, self.calibration
         facts = [
             ("robot", f"{self.robot.name}, tool centre point {self.robot.tcp}"),
+            *((("tool", self.tool.sentence),) if self.tool is not None else ()),
             ("springs", f"{seen.springs}, rank {seen.rank}, {sum(seen.observable)} known alone"),
         ]
         if figures is not None:

@@ -8,22 +8,16 @@ import numpy as np
 
 from elastocal.arrays import FloatArray
 from elastocal.dataset import joint_dimensions, read_load_rows, write_load_rows
-from elastocal.identification import (
-    DeflectionSummary,
-    OutsideRows,
-    OutsideSummary,
-    Prediction,
-    read_model,
-)
+from elastocal.identification import DeflectionSummary, OutsideRows, OutsideSummary, Prediction
 from elastocal.progress import Progress
 from elastocal.records import record
-from elastocal.results import Result
-from elastocal.workflows._inputs import refuse_overwriting
+from elastocal.results import Result, brief_repr
+from elastocal.workflows._inputs import NewTool, coverage_notes, refuse_overwriting
 from elastocal.workflows._workflow import workflow
 
 
 @dataclass(frozen=True)
-class PredictSettings:
+class PredictSettings(NewTool):
     """Which model predicts which rows."""
 
     model: str | PathLike[str]
@@ -34,6 +28,7 @@ class PredictSettings:
     """CSV to write: the rows with their deflections and intervals."""
 
 
+@brief_repr
 @record()
 class PredictSummary:
     """The figures of ``predict --json``."""
@@ -43,6 +38,10 @@ class PredictSummary:
     """Predicted deflection norms in m."""
     misfit: float | None
     """See `CalibratedModel.misfit`; none where the model does not know it."""
+    tool: str
+    """The tool that the rows are of, in words."""
+    notes: tuple[str, ...]
+    """Sentences that a person must know."""
     outside: OutsideSummary | None = None
     """Rows beyond what was calibrated; none where the model does not know where that was."""
 
@@ -63,9 +62,11 @@ class PredictResult(Result):
         """Return what a person wants to know first."""
         figures = self.summary
         return (
+            ("tool", figures.tool),
             ("rows", str(figures.rows)),
             ("deflection", f"{1e3 * figures.deflection.mean:.3f} mm mean"),
             ("largest", f"{1e3 * figures.deflection.max:.3f} mm"),
+            *(("note", text) for text in figures.notes),
             *((("warning", text),) if (text := figures.warning) else ()),
         )
 
@@ -94,7 +95,7 @@ def predict(settings: PredictSettings, progress: Progress) -> PredictResult:  # 
     """
     model, rows = Path(settings.model), Path(settings.rows)
     refuse_overwriting(settings.out, model, rows)
-    calibrated = read_model(model)
+    calibrated = settings.read_model(model)
     robot = calibrated.model.robot
     loads = read_load_rows(rows, joint_dimensions(robot.joint_names, robot.revolute))
     prediction = calibrated.predict(loads.joint_position, loads.force, loads.moment)
@@ -106,9 +107,9 @@ def predict(settings: PredictSettings, progress: Progress) -> PredictResult:  # 
         write_load_rows(settings.out, loads, _columns(prediction, outside, misfit is not None))
     norms = np.linalg.norm(prediction.deflection, axis=1)
     size = DeflectionSummary(float(norms.mean()), float(norms.max()))
-    summary = PredictSummary(
-        len(norms), size, misfit, None if outside is None else outside.summary()
-    )
+    notes = coverage_notes(calibrated) if calibrated.tool is not None else ()
+    beyond = None if outside is None else outside.summary()
+    summary = PredictSummary(len(norms), size, misfit, calibrated.tool_name, notes, beyond)
     return PredictResult(prediction, summary)
 
 

@@ -60,6 +60,7 @@ def _head(found: ModelEvidence, observable: int) -> blocks.Block:
     residual = mm(figures.residual.mean) if figures else "not known"
     return blocks.Facts(
         (
+            ("Tool", found.model.tool_name),
             ("Springs", seen.springs),
             ("Known by themselves", observable),
             ("Rank", f"{seen.rank} of {seen.springs}"),
