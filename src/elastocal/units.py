@@ -88,6 +88,24 @@ def parse_quantity(text: object, dimension: str) -> float:
     return value
 
 
+def parse_point(text: str) -> tuple[float, float, float]:
+    """Return a point in m from three lengths with units.
+
+    >>> parse_point("0 mm, 0 mm, 35 mm")
+    (0.0, 0.0, 0.035)
+
+    Raises
+    ------
+    UnitError
+        If the text is not three lengths.
+    """
+    parts = text.split(",")
+    if len(parts) != 3:
+        raise UnitError(f"{text!r} must be three lengths, e.g. '0 mm, 0 mm, 35 mm'")
+    x, y, z = (parse_quantity(part.strip(), "length") for part in parts)
+    return x, y, z
+
+
 def _a(dimension: str) -> str:
     return f"{'an' if dimension[0] in 'aeiou' else 'a'} {dimension}"
 

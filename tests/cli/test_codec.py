@@ -78,7 +78,10 @@ def test_both_files_pass_the_check(data, tmp_path):
     elastocal("codec", data, "--out", tmp_path / "c", "--splits", "2")
     for name, kind in (("codec.nc", "codec"), ("codec.json", "verdict file of a codec")):
         result = elastocal("check", tmp_path / "c" / name, "--json")
-        assert json.loads(result.out)["kind"] == kind
+        found = json.loads(result.out)
+        assert found["kind"] == kind
+        assert [type(name) for name in found["variants"]] == [str]
+        assert isinstance(found["variants"], list)
 
 
 def test_a_folder_with_files_is_kept_unless_forced(data, tmp_path):

@@ -4,14 +4,16 @@ from functools import cache
 
 import numpy as np
 
-from elastocal.cell import load_cell
+from elastocal.cell import SensorLoad, load_cell, weight_response
 from elastocal.cell.examples import write_example
 from elastocal.compensation import CompensatorSettings
-from elastocal.compensation.conditioning import SensorLoad
 from elastocal.elastic import ElasticModel, Spring, layout
 from elastocal.identification import CalibratedModel, Observability
 from elastocal.robot import Robot
 from support.virtual_chain import ARMS
+
+SCALE = np.repeat([1.0, 0.1], 3)
+"""Of forces in N and moments in N·m, as a sensor's ranges are to one another."""
 
 
 def calibrated(robot: Robot, springs: tuple[Spring, ...] | None = None, seed: int = 0):
@@ -35,8 +37,8 @@ def example_robot(like: str, folder) -> Robot:
 
 
 def load() -> SensorLoad:
-    """Return a heavy tool on a sensor that sits turned and behind the tcp."""
-    T = np.eye(4)
+    """Return a heavy tool on a sensor with cross-talk that sits turned and behind the tcp."""
+    T, rng = np.eye(4), np.random.default_rng(4)
     T[:3, :3] = [[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]
     T[:3, 3] = (0.01, -0.02, -0.35)
     return SensorLoad(
@@ -45,6 +47,8 @@ def load() -> SensorLoad:
         force_bias=np.array([12.0, -30.0, 5.0]),
         moment_bias=np.array([0.4, 1.0, -2.0]),
         T_tcp_sensor=T,
+        matrix=np.eye(6) + 0.01 * rng.normal(size=(6, 6)) * np.divide.outer(SCALE, SCALE),
+        response=weight_response(23.0, np.array([0.01, -0.005, 0.12])) + rng.normal(size=(6, 3)),
     )
 
 

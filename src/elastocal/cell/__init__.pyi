@@ -77,6 +77,7 @@ from .procedure import (
     Search as Search,
     TorqueLimits as TorqueLimits,
 )
+from .sensor import SensorLoad as SensorLoad, weight_response as weight_response
 from .simulation import (
     Balancer as Balancer,
     Bearings as Bearings,

@@ -177,7 +177,7 @@ def _duration(seconds: float) -> str:
 
 
 NAMES = ("SIGINT", "SIGTERM", "SIGHUP", "SIGQUIT", "SIGTSTP")
-"""What a person, a terminal or a system sends to end a program, or to halt it, which would leave
+"""Signals by which a person, a terminal or a system ends a program, or halts it, which would leave
 the arm pressing with nobody to watch. Not every system has all of them."""
 
 

@@ -1,4 +1,4 @@
-"""The command line: collects the commands and turns every error into one line.
+"""The command line: collects the commands, ends them cleanly, turns every error into one line.
 
 Exit codes: 0 done; 1 the work could not be done, with a one-line reason; 2 usage;
 130 interrupted; 143 terminated. Commands import what they need when they run: help is quick.
@@ -8,20 +8,26 @@ import contextlib
 import importlib
 import os
 import pkgutil
+import signal
 import sys
-from collections.abc import Callable
-from types import ModuleType
+import threading
+from collections.abc import Callable, Iterator
+from types import FrameType, ModuleType
 from typing import Any
 
 import typer
 from typer.core import TyperGroup
 
 from elastocal.cli import commands
-from elastocal.cli._termination import ended_cleanly
 from elastocal.errors import ElastocalError, FileAccessError
 
+_Handler = Callable[[int, FrameType | None], None]
+_PAUSE = 0.05
+"""Until a signal is sent once more, in s."""
+_IMPORTS = "<frozen importlib"
+"""How the file names of Python's import machinery begin."""
 _UNUSED_BY_HELP = {"rich.markdown": "Markdown", "rich.traceback": "Traceback"}
-"""What typer imports with its help and our help never shows: Markdown, errors of Python."""
+"""Modules that typer imports with its help and that ours never needs: Markdown, tracebacks."""
 
 
 class _Commands(TyperGroup):
@@ -49,25 +55,9 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
 )
 _ORDER = (
-    "robots",
-    "init",
-    "check",
-    "plan",
-    "run",
-    "derive",
-    "calibrate",
-    "codec",
-    "study",
-    "predict",
-    "tool",
-    "compensate",
-    "stiffness",
-    "export",
-    "simulate_process",
-    "compare",
-    "report",
-    "demo",
-)
+    "robots", "init", "check", "plan", "run", "derive", "calibrate", "codec", "study", "predict",
+    "tool", "compensate", "stiffness", "export", "simulate_process", "compare", "report", "demo",
+)  # fmt: skip
 """The order in which help lists commands: that of the work; others follow by name."""
 
 
@@ -108,7 +98,7 @@ def run() -> None:
     """Run the command line and exit with its code."""
     try:
         _check_output()
-        with ended_cleanly():
+        with _ended_cleanly():
             app()
     except ElastocalError as error:
         _complain(str(error))
@@ -137,3 +127,84 @@ def _drop_output() -> None:
 
 def _complain(message: str) -> None:
     typer.echo(f"elastocal: {' '.join(message.split())}", err=True)
+
+
+@contextlib.contextmanager
+def _ended_cleanly() -> Iterator[None]:
+    """Turn signals that end a program into exceptions that arrive.
+
+    SIGINT raises KeyboardInterrupt, SIGTERM and SIGHUP raise SystemExit with 128 and their
+    number, so that whoever writes a folder cleans it up. What ignores a signal already, as
+    ``nohup`` does, goes on ignoring it.
+
+    Python loses such an exception in two places, and a command would go on as if nothing had
+    happened: in finalisers and callbacks of weak references, where it is dropped, and in libraries
+    that catch everything while they are imported. So a signal that arrives during an import waits
+    for its end, and one that was dropped is sent once more. `elastocal run`, which has an arm to
+    bring to safety, has a way of its own: `elastocal.cli._operator`.
+    """
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    handlers: dict[int, _Handler] = {signal.SIGINT: _interrupt, signal.SIGTERM: _leave}
+    if hasattr(signal, "SIGHUP"):
+        handlers[signal.SIGHUP] = _leave
+    heeded = {n: h for n, h in handlers.items() if signal.getsignal(n) is not signal.SIG_IGN}
+    before = {number: signal.signal(number, handler) for number, handler in heeded.items()}
+    reported = sys.unraisablehook
+
+    def again(dropped: "sys.UnraisableHookArgs") -> None:
+        number = _number_of(dropped.exc_value)
+        if number is None:
+            reported(dropped)
+            return
+        signal.signal(number, handlers[number])
+        _send_soon(number)
+
+    sys.unraisablehook = again
+    try:
+        yield
+    finally:
+        sys.unraisablehook = reported
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+def _interrupt(number: int, frame: FrameType | None) -> None:
+    if _importing(frame):
+        _send_soon(number)
+    else:
+        raise KeyboardInterrupt
+
+
+def _leave(number: int, frame: FrameType | None) -> None:
+    if _importing(frame):
+        _send_soon(number)
+        return
+    # A second one must not break into the cleaning up.
+    signal.signal(number, signal.SIG_IGN)
+    sys.exit(128 + number)
+
+
+def _importing(frame: FrameType | None) -> bool:
+    while frame is not None:
+        if frame.f_code.co_filename.startswith(_IMPORTS):
+            return True
+        frame = frame.f_back
+    return False
+
+
+def _number_of(raised: BaseException | None) -> int | None:
+    """Return the signal that raised an exception; None where none did."""
+    if isinstance(raised, KeyboardInterrupt):
+        return signal.SIGINT
+    if isinstance(raised, SystemExit) and isinstance(raised.code, int) and raised.code > 128:
+        return raised.code - 128
+    return None
+
+
+def _send_soon(number: int) -> None:
+    # Sent to the main thread itself, or it would not wake up from what it waits for.
+    timer = threading.Timer(_PAUSE, signal.pthread_kill, (threading.main_thread().ident, number))
+    timer.daemon = True
+    timer.start()

@@ -4,7 +4,7 @@ The calibrated model is what the compensation and every prediction work with.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.random import Generator
@@ -15,12 +15,14 @@ from elastocal.dataset import Readings
 from elastocal.elastic import ElasticModel, check_vectors
 from elastocal.errors import ConventionError, IdentificationError, SpringError
 from elastocal.identification.conventions import POOR, check_conventions, check_joints
+from elastocal.identification.domain import CalibrationDomain
 from elastocal.identification.ladder import Climbed
 from elastocal.identification.observability import Observability, attainable_rank, observability
 from elastocal.identification.options import FitOptions
 from elastocal.identification.problem import Problem, build, same_configuration
 from elastocal.identification.solve import PoseGrams, Solution, factor, solve
 from elastocal.identification.suspicious import Screening, force_offset, screen
+from elastocal.identification.tool_change import ToolChange, change_tool
 from elastocal.identification.uncertainty import (
     HeldOut,
     bootstrap,
@@ -71,6 +73,10 @@ class CalibratedModel:
     misfit: float = float("nan")
     """Share of a predicted deflection that 95 % of the errors along an axis stayed below at
     left-out poses; NaN: not known. See `HeldOut.misfit`."""
+    tool: ToolChange | None = None
+    """The tool that the model is for; none: the one that it was calibrated with."""
+    domain: CalibrationDomain | None = None
+    """Poses and loads of the calibration; none: not known, as in files of elastocal 0.1.0."""
 
     def __post_init__(self) -> None:
         for name in ("compliance", "draws"):
@@ -87,6 +93,41 @@ class CalibratedModel:
             out=np.full_like(self.compliance, np.inf),
             where=self.compliance != 0,
         )
+
+    @property
+    def tool_name(self) -> str:
+        """The tool that the model is for, in words."""
+        if self.tool is None:
+            return f"{self.model.robot.tip}, as calibrated"
+        return self.tool.sentence
+
+    def with_tool(
+        self,
+        T_tcp_tool: ArrayLike,
+        mass: float | None = None,
+        centre: Sequence[float] | None = None,
+    ) -> "CalibratedModel":
+        """Return the model of the same springs at another tool's tcp.
+
+        Compliances, draws and observability are the arm's. Predictions are of the new tcp, under
+        forces and moments at it; a mass changes sag and the preload of gears, nothing else.
+
+        Parameters
+        ----------
+        T_tcp_tool : array_like, shape (4, 4)
+            New tcp in this model's tcp frame.
+        mass : float, optional
+            Mass of the new tool in kg, in place of what the tcp's link has; the same by default.
+        centre : array_like, shape (3,), optional
+            Centre of that mass in the new tcp's frame, in m.
+
+        Raises
+        ------
+        RobotError
+            If the transform is not rigid, or mass and centre do not come together.
+        """
+        model, tool = change_tool(self.model, self.tool, T_tcp_tool, mass, centre)
+        return replace(self, model=model, tool=tool)
 
     def interval(self) -> tuple[FloatArray, FloatArray]:
         """Return the 95 % intervals of the compliances, two arrays of shape (spring,)."""
@@ -242,6 +283,7 @@ def calibrate(
         observability(factor(weighted.without_prior()), model.springs),
         provenance,
         held_out.misfit,
+        domain=CalibrationDomain.of(model.robot, readings.take(used), kept.block),
     )
     offset = force_offset(model, readings.take(used), weighted, solution.compliance, marker_offset)
     reach = max(attainable_rank(model, marker_offset), calibrated.observability.rank)

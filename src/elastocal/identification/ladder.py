@@ -18,7 +18,16 @@ from scipy.special import stdtrit
 
 from elastocal.arrays import BoolArray, FloatArray, IndexArray
 from elastocal.dataset import Readings
-from elastocal.elastic import ElasticModel, Gear, Spring, actuated, bearing, layout, tensor
+from elastocal.elastic import (
+    ElasticModel,
+    Gear,
+    Spring,
+    actuated,
+    bearing,
+    bearing_ends,
+    layout,
+    tensor,
+)
 from elastocal.errors import IdentificationError
 from elastocal.identification.options import FitOptions
 from elastocal.identification.problem import Problem, build
@@ -32,8 +41,8 @@ AUTO = "auto"
 """Asks for the rung that the readings carry."""
 KNEES = (0.3, 1.0, 3.0)
 """Knees of the gears, in typical load torques of the joint: one below, at and above it."""
-SLIPS = (0.03, 0.1, 0.3)
-"""Limits of the friction elements, likewise: from what barely matters to what reverses a press."""
+SLIPS = (0.03, 0.1, 0.3, 1.0)
+"""Limits of the friction elements, likewise: from what barely matters to gears that stick."""
 _LOADED = 0.01
 """Part of the largest typical torque below which a joint counts as never loaded."""
 _LOW_LEVEL = 0.6
@@ -72,7 +81,7 @@ class Climbed:
 
 
 def gears(robot: Robot, readings: Readings, slips: tuple[float, ...] = ()) -> tuple[Spring, ...]:
-    """Return the bearing layout with gears for axial springs.
+    """Return the layout `bearing_ends` with gears for axial springs.
 
     Parameters
     ----------
@@ -84,7 +93,7 @@ def gears(robot: Robot, readings: Readings, slips: tuple[float, ...] = ()) -> tu
     slips : tuple of float
         Limits of friction elements, in that torque; none without.
     """
-    springs = bearing(robot)
+    springs = bearing_ends(robot)
     model = ElasticModel(robot, actuated(robot))
     torque = model.load_torques(readings.joint_position, readings.force, readings.moment)
     typical = dict(zip(robot.joint_names, np.median(np.abs(torque), axis=0), strict=True))
@@ -108,6 +117,7 @@ RUNGS: dict[str, Rung] = {
     for rung in (
         Rung("actuated", lambda robot, _: actuated(robot)),
         Rung("bearing", lambda robot, _: bearing(robot)),
+        Rung("bearing-ends", lambda robot, _: bearing_ends(robot)),
         Rung("tensor", lambda robot, _: tensor(robot)),
         Rung("gears", gears),
         Rung(

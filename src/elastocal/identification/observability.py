@@ -210,15 +210,49 @@ def attainable_rank(model: ElasticModel, marker_offset: ArrayLike | None = None)
     marker_offset : array_like, shape (3,), optional
         Marker in the tcp frame, in m.
     """
+    n = len(model.parameters)
+    blocks = _probe_blocks(model, marker_offset)
+    rows = unit_columns(blocks, relative_sizes(model.parameters)).rows
+    s = np.linalg.svd(rows.reshape(-1, n), compute_uv=False)
+    return rank(np.asarray(s, dtype=float))
+
+
+def _probe_blocks(model: ElasticModel, marker_offset: ArrayLike | None = None) -> FloatArray:
+    """Return observation blocks of forces at many configurations, shape (row, 3, parameter)."""
     limits = model.robot.limits
     lower, upper = np.maximum(limits.lower, -np.pi), np.minimum(limits.upper, np.pi)
     rng = np.random.default_rng(_PROBE_SEED)
     q = rng.uniform(lower, upper, (_PROBES, len(lower)))
     blocks = model.observation_blocks(q[:, None], np.eye(3), marker_offset=marker_offset)
-    n = len(model.parameters)
-    rows = unit_columns(blocks.reshape(-1, 3, n), relative_sizes(model.parameters)).rows
-    s = np.linalg.svd(rows.reshape(-1, n), compute_uv=False)
-    return rank(np.asarray(s, dtype=float))
+    return blocks.reshape(-1, 3, len(model.parameters))
+
+
+def unseen_groups(model: ElasticModel, seen: Observability) -> tuple[tuple[Term, ...], ...]:
+    """Return the unobservable combinations that forces at a model's tcp nevertheless load.
+
+    None at the tcp of a calibration of attainable rank; another tool may load springs that the
+    calibrated one could not, such as the last joint with a tcp beside its axis.
+
+    Parameters
+    ----------
+    model : ElasticModel
+        Robot, perhaps with another tool, and the springs.
+    seen : Observability
+        Of the calibration.
+    """
+    names = list(model.parameter_names)
+    size = relative_sizes(model.parameters)
+    blocks = _probe_blocks(model)
+    largest = float((np.linalg.norm(blocks, axis=(0, 1)) * size).max())
+    found = []
+    for group in seen.unobservable:
+        vector = np.zeros(len(names))
+        for term in group:
+            vector[names.index(term.spring)] = term.weight
+        vector /= np.abs(vector / size).max()
+        if float(np.linalg.norm(blocks @ vector)) > _CANCELS * largest:
+            found.append(group)
+    return tuple(found)
 
 
 def _readable(

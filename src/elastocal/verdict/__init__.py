@@ -1,9 +1,8 @@
 """The verdict on a calibration: evidence gathered, held together, judged; nothing is rendered.
 
 =============  ==================================================================
-`gather`       from the files of a run to its `evidence`, with what is missing
-`consistency`  whether the parts belong together
-`hashes`       hashes of files that equal runs share
+`gather`       from the files of a run to its evidence, with what is missing
+`evidence`     the parts, and whether they belong together
 `findings`     what a reader has to know, part by part
 `judgement`    light, sentence, reasons, advice
 =============  ==================================================================

@@ -1,10 +1,4 @@
-from .consistency import (
-    check_codec as check_codec,
-    check_model as check_model,
-    check_process as check_process,
-    check_tool as check_tool,
-    find_doubts as find_doubts,
-)
+from ._files import BYTES as BYTES, CONTENT as CONTENT, content_hash as content_hash
 from .evidence import (
     AcceptanceLimits as AcceptanceLimits,
     CodecEvidence as CodecEvidence,
@@ -12,6 +6,11 @@ from .evidence import (
     MissingPart as MissingPart,
     ModelEvidence as ModelEvidence,
     UsedFile as UsedFile,
+    check_codec as check_codec,
+    check_model as check_model,
+    check_process as check_process,
+    check_tool as check_tool,
+    find_doubts as find_doubts,
 )
 from .findings import (
     FINDINGS as FINDINGS,
@@ -26,7 +25,6 @@ from .findings import (
     recertification_findings as recertification_findings,
 )
 from .gather import EvidenceOptions as EvidenceOptions, gather_evidence as gather_evidence
-from .hashes import BYTES as BYTES, CONTENT as CONTENT, content_hash as content_hash
 from .judgement import (
     Light as Light,
     Verdict as Verdict,

@@ -33,7 +33,6 @@ from elastocal.planning import (
     read_pool,
 )
 from elastocal.procedure import (
-    Entry,
     RunFolder,
     check_plan,
     file_sha256,
@@ -41,7 +40,7 @@ from elastocal.procedure import (
     read_summary,
 )
 from elastocal.records import read_json
-from elastocal.verdict._folders import (
+from elastocal.verdict._files import (
     CODEC,
     MODEL,
     PROCESS,
@@ -51,19 +50,16 @@ from elastocal.verdict._folders import (
     find_folders,
     run_files,
 )
-from elastocal.verdict.consistency import (
+from elastocal.verdict.evidence import (
+    AcceptanceLimits,
+    CodecEvidence,
+    Evidence,
+    ModelEvidence,
     check_codec,
     check_model,
     check_process,
     check_tool,
     find_doubts,
-)
-from elastocal.verdict.evidence import (
-    AcceptanceLimits,
-    CodecEvidence,
-    Evidence,
-    MissingPart,
-    ModelEvidence,
 )
 
 
@@ -119,15 +115,18 @@ def _with_run(evidence: Evidence, reader: PartReader) -> Evidence:
     run = reader.folders.run
     if run is None:
         reason = "no folder of a run was given: nothing is known of how the readings came about"
-        reader.missing.append(MissingPart("run", reason))
+        reader.note_missing("run", reason)
         return evidence
-    journal = reader.read("journal", run.journal, lambda: read_journal(run.journal), named=False)
-    cell = _cell(reader, run, journal)
-    evidence = replace(evidence, journal=journal, cell=cell)
+    journal = reader.read("journal", run.journal, lambda: read_journal(run.journal))
+    evidence = replace(evidence, journal=journal)
+    record = evidence.run_record
+    path = run.cell / (record.cell_file if record else "cell.yaml")
+    cell = reader.read("cell", path, lambda: load_cell(path))
+    evidence = replace(evidence, cell=cell)
     if cell is not None:
-        surface = reader.read("surface", cell.path, lambda: cell_surface(cell), named=False)
+        surface = reader.read("surface", cell.path, lambda: cell_surface(cell))
         evidence = replace(evidence, surface=surface, cell_text=read_text(cell.path))
-    evidence = _with_plan(evidence, reader, run, journal)
+    evidence = _with_plan(evidence, reader, run)
     summary = _derived(reader, "summary of the run", run.summary, read_summary)
     evidence = replace(evidence, dataset=_derived(reader, "dataset", run.dataset, datasets.read))
     for file in run_files(run):
@@ -135,16 +134,8 @@ def _with_run(evidence: Evidence, reader: PartReader) -> Evidence:
     return replace(evidence, summary=summary)
 
 
-def _cell(reader: PartReader, run: RunFolder, journal: tuple[Entry, ...] | None) -> Cell | None:
-    record = journal[0].run if journal else None
-    path = run.cell / (record.cell_file if record else "cell.yaml")
-    return reader.read("cell", path, lambda: load_cell(path), named=False)
-
-
-def _with_plan(
-    evidence: Evidence, reader: PartReader, run: RunFolder, journal: tuple[Entry, ...] | None
-) -> Evidence:
-    cell, record = evidence.cell, journal[0].run if journal else None
+def _with_plan(evidence: Evidence, reader: PartReader, run: RunFolder) -> Evidence:
+    cell, record = evidence.cell, evidence.run_record
 
     def plan_of_cell() -> PlanResult:
         plan = read_plan(run.plan)
@@ -154,7 +145,7 @@ def _with_plan(
             check_plan_robot(plan, cell)
         return plan
 
-    plan = reader.read("plan", run.plan / PLAN, plan_of_cell, named=False)
+    plan = reader.read("plan", run.plan / PLAN, plan_of_cell)
     if plan is None:
         return evidence
 
@@ -163,7 +154,7 @@ def _with_plan(
         check_pool_of(plan, pool)
         return pool
 
-    pool = reader.read("pool", run.plan / POOL, pool_of_plan, named=False)
+    pool = reader.read("pool", run.plan / POOL, pool_of_plan)
     return replace(evidence, plan=plan, pool=pool)
 
 
@@ -172,9 +163,9 @@ def _derived(
 ) -> Part | None:
     if not path.is_file():
         reason = f"there is no {reader.folders.shown(path)}; `elastocal derive` makes it"
-        reader.missing.append(MissingPart(name, reason))
+        reader.note_missing(name, reason)
         return None
-    return reader.read(name, path, lambda: read(path), named=False)
+    return reader.read(name, path, lambda: read(path))
 
 
 def _with_model(evidence: Evidence, reader: PartReader, options: EvidenceOptions) -> Evidence:
@@ -190,7 +181,7 @@ def _with_model(evidence: Evidence, reader: PartReader, options: EvidenceOptions
         reproduction = reproduce_calibration(calibrated.model, calibrated.figures, evidence.dataset)
     except ElastocalError as error:
         reason = " ".join(str(error).split())
-        reader.missing.append(MissingPart("calibration made again", reason, damaged=True))
+        reader.note_missing("calibration made again", reason, damaged=True)
         return evidence
     return replace(evidence, reproduction=reproduction)
 
@@ -251,11 +242,11 @@ def _with_old(evidence: Evidence, reader: PartReader, options: EvidenceOptions) 
     new = options.model or reader.folders.model or reader.folders.default(MODEL)
     if old is None:
         reason = "no earlier calibration was given (--old), so nothing is known of any change"
-        reader.missing.append(MissingPart("earlier calibration", reason))
+        reader.note_missing("earlier calibration", reason)
         return evidence
     if new is None or evidence.calibrated is None:
         reason = "there is no calibrated model to compare it with"
-        reader.missing.append(MissingPart("comparison with the earlier calibration", reason))
+        reader.note_missing("comparison with the earlier calibration", reason)
         return evidence
     q, force = _rows_that_matter(evidence)
     found = recertify_files(old, new, q, force, limit=evidence.limits.drift)

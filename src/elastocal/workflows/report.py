@@ -43,6 +43,7 @@ class ReportSettings:
     """Replace a report that is there."""
 
 
+@brief_repr
 @record()
 class UnseenFigures:
     """Errors at poses that were left out of the fit, in m."""

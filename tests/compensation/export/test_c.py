@@ -190,7 +190,7 @@ class TestSelfTest:
         ("old", "new", "code"),
         [
             ("s = x + ((x * y) * s)", "s = x - ((x * y) * s)", 2),
-            ("- weight[i]", "+ weight[i]", 3),
+            ("- ((k[0]", "+ ((k[0]", 3),
             ("share = LARGEST_CORRECTION / length", "share = 1.0", 3),
             ("(passed > 0.0) && ", "", 3),
             ("state->correction[i] *= share", "state->correction[i] *= 0.5", 3),

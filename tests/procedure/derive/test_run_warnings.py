@@ -3,13 +3,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from elastocal.cell import SensorLoad
 from elastocal.procedure.derive.findings import run_warnings
 from elastocal.procedure.derive.readings import LoadRow
-from elastocal.procedure.derive.tool import Interval, ToolChange, ToolEstimate, ToolLoad
+from elastocal.procedure.derive.tool import Interval, ToolChange, ToolEstimate
 from elastocal.procedure.record import ReadingStatus
 from elastocal.procedure.registration import Blunder, Registration, StationFit, StationMove
 
-TOOL = ToolLoad(60.0, np.array([0.0, 0.0, 0.15]), np.array([0.0, 0.0, -9.8]), np.eye(4))
+TOOL = SensorLoad(60.0, np.array([0.0, 0.0, 0.15]), gravity=np.array([0.0, 0.0, -9.8]))
 SMALL = Interval(np.zeros(3), np.ones(3))
 ESTIMATE = ToolEstimate(
     count=31,

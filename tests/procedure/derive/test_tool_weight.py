@@ -2,7 +2,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from elastocal.procedure.derive.tool import RawWrench, ToolLoad, turned_sigma, wrench_on_robot
+from elastocal.cell import SensorLoad
+from elastocal.procedure.derive.tool import RawWrench, turned_sigma, wrench_on_robot
 from support.stations import station
 
 GRAVITY = np.array([0.0, 0.0, -9.80665])
@@ -12,11 +13,11 @@ FORCE_BIAS, MOMENT_BIAS = np.array([20.0, -40.0, 10.0]), np.array([1.0, 2.0, -1.
 
 
 @pytest.fixture
-def tool() -> ToolLoad:
-    return ToolLoad(60.0, np.array([0.01, -0.02, 0.15]), GRAVITY, station(3))
+def tool() -> SensorLoad:
+    return SensorLoad(60.0, np.array([0.01, -0.02, 0.15]), gravity=GRAVITY, T_tcp_sensor=station(3))
 
 
-def reading(tool: ToolLoad, T: np.ndarray, force: np.ndarray, moment: np.ndarray) -> RawWrench:
+def reading(tool: SensorLoad, T: np.ndarray, force: np.ndarray, moment: np.ndarray) -> RawWrench:
     """Return what the sensor reads of a wrench on the robot at the tcp, in base."""
     T_sensor = T @ tool.T_tcp_sensor
     R, arm = T_sensor[:3, :3], T[:3, 3] - T_sensor[:3, 3]
@@ -45,10 +46,10 @@ def test_force_and_moment_on_the_robot_come_back(tool, turn):
 def test_a_tare_without_its_turn_leaves_weight_behind(tool):
     """Known answer: 60 kg turned by 10 mrad about a level axis leave 5.9 N in the level."""
     T = np.eye(4)
-    sensor = ToolLoad(60.0, np.zeros(3), GRAVITY, np.eye(4))
+    sensor = SensorLoad(60.0, gravity=GRAVITY)
     tare = reading(sensor, T, np.zeros(3), np.zeros(3))
     loaded = reading(sensor, turned(T, [0.01, 0.0, 0.0]), np.zeros(3), np.zeros(3))
-    weightless = ToolLoad(0.0, np.zeros(3), GRAVITY, np.eye(4))
+    weightless = SensorLoad(0.0, gravity=GRAVITY)
     left = wrench_on_robot(loaded, tare, weightless).force
     assert np.linalg.norm(left) == pytest.approx(60.0 * 9.80665 * 0.01, rel=1e-3)
     np.testing.assert_allclose(wrench_on_robot(loaded, tare, sensor).force, 0.0, atol=1e-9)

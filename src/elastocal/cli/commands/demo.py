@@ -51,7 +51,8 @@ def _demo(
             yield _Display(log, out, _lines(screen, story))
 
     result = workflows.demo(kind, out=out, seed=seed, force=force, display=display)
-    tables.show_demo(screen, result)
+    for line in result.closing():
+        screen.print(line, soft_wrap=True, markup=False)
 
 
 class _Display:
@@ -88,7 +89,6 @@ def _log_console(file: TextIO) -> "Console":
 
 def _print(console: "Console", chapter: "Chapter", result: Any, out: Path) -> None:
     """Print a result as its command does."""
-    from elastocal.cli import tables
 
     def show_plan() -> None:
         figures = workflows.plan_figures(result, out / "plan", "calib")

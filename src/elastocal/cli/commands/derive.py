@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from elastocal import workflows
-from elastocal.cli import output, tables
+from elastocal.cli import output
 
 
 def _derive(
@@ -21,4 +21,8 @@ def _derive(
     if as_json:
         output.print_json(result.summary)
         return
-    tables.show_derived(output.console(), result)
+    console, folder = output.console(), result.folder
+    console.print(f"{len(result.dataset.poses)} poses, readings: {result.counts()}")
+    for warning in result.summary.warnings:
+        console.print(f"warning: {warning}", markup=False, soft_wrap=True)
+    console.print(f"wrote {folder.dataset} and {folder.summary.name}", markup=False, soft_wrap=True)

@@ -1,4 +1,4 @@
-"""What commands print for people: one file a subject, from typed results."""
+"""Print typed results for people: one file a subject."""
 
 import lazy_loader
 

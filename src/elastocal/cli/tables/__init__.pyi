@@ -1,4 +1,8 @@
-from .calibration import show_calibration as show_calibration, show_comparison as show_comparison
+from .calibration import (
+    show_calibration as show_calibration,
+    show_comparison as show_comparison,
+    show_report as show_report,
+)
 from .codec import show_codec as show_codec, show_study as show_study
 from .compensation import (
     show_compensation as show_compensation,
@@ -7,15 +11,9 @@ from .compensation import (
     show_stiffness as show_stiffness,
     show_tool as show_tool,
 )
-from .notices import (
-    show_demo as show_demo,
-    show_derived as show_derived,
-    show_example as show_example,
-    show_predicted as show_predicted,
-    show_report as show_report,
-)
 from .plan import (
     dry_figures as dry_figures,
+    show_example as show_example,
     show_itinerary as show_itinerary,
     show_plan as show_plan,
     show_run as show_run,

@@ -1,4 +1,4 @@
-"""What ``calibrate`` and ``compare`` print: a user's first questions, in their order.
+"""Print what ``calibrate``, ``compare`` and ``report`` found: a user's questions, in their order.
 
 How well does it fit; is it better than simpler models; which springs are really known, and how
 well; which readings look wrong. Of two calibrations: which springs moved, what it does, the
@@ -31,9 +31,10 @@ if TYPE_CHECKING:
         Estimate,
         SpringChange,
     )
+    from elastocal.workflows import ReportResult
 
 _USUAL_UNIT = unit_of("rad/(N*m)")
-"""Of most springs: the headings name it, other springs their own."""
+"""The unit of most springs stands in the headings; other springs name their own."""
 _MOST_SUSPICIOUS = 10
 _MOST_TERMS = 6
 """A combination of more springs than this tells a reader nothing."""
@@ -213,8 +214,8 @@ def show_comparison(console: Console, compared: "CompareResult", hint: Path | No
         for name, short in sums.items():
             console.print(f"   {short}: {name}", markup=False, soft_wrap=True)
         console.print(
-            f"the interval holds for all {len(found.springs)} comparisons at once with 95 %; what"
-            " has 0 outside it moved",
+            f"the interval holds for all {len(found.springs)} comparisons at once with 95 %"
+            + ("; what has 0 outside it moved" if found.springs_judged else ""),
             soft_wrap=True,
         )
     for names, which in ((found.only_old, "old"), (found.only_new, "new")):
@@ -233,7 +234,7 @@ def show_comparison(console: Console, compared: "CompareResult", hint: Path | No
 
 def _moved(found: "CompareSummary") -> str:
     if found.unmoved_sentence:
-        return found.unmoved_sentence
+        return escape(found.unmoved_sentence)
     names = ", ".join(each.label for each in found.moved_springs)
     return f"[bold red]{found.verb}[/bold red]: {escape(names)}"
 
@@ -287,3 +288,12 @@ def _show_verdict(console: Console, found: "CompareSummary", hint: Path | None) 
         f"[bold {colour}]{found.verdict.value}[/bold {colour}]: {escape(found.reason)}",
         soft_wrap=True,
     )
+
+
+def show_report(console: Console, result: "ReportResult") -> None:
+    """Print the verdict of a report."""
+    verdict = result.verdict
+    console.print(f"[bold]{verdict.word}[/bold]{result.light}: {escape(verdict.sentence)}")
+    for reason in verdict.reasons:
+        console.print(f"   {reason}", markup=False)
+    console.print(f"written to {result.files}", markup=False)

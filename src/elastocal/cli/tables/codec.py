@@ -1,4 +1,4 @@
-"""What ``codec`` and ``study`` print: verdicts in words, a small table, the advice."""
+"""Print what ``codec`` and ``study`` found: verdicts in words, a small table, the advice."""
 
 from collections.abc import Sequence
 from pathlib import Path

@@ -1,13 +1,23 @@
-"""What ``plan`` and ``run`` print: the poses and their checks, the steps, how a run ended."""
+"""Print what ``init``, ``plan`` and ``run`` made: the poses, their checks, the steps of a run."""
 
 import math
 
 from rich.console import Console
+from rich.markup import escape
 from rich.table import Table
 
 from elastocal.planning import PlanResult, SpreadRecord
 from elastocal.records import record
-from elastocal.workflows import DryRunResult, PlanFigures, RunResult
+from elastocal.workflows import DryRunResult, InitResult, PlanFigures, RunResult
+
+
+def show_example(console: Console, result: InitResult) -> None:
+    """Print where an example cell was written, and what comes next."""
+    cell, names = escape(str(result.cell)), ", ".join(mesh.name for mesh in result.meshes)
+    console.print(
+        f"wrote [bold]{cell}[/bold] and {names}: edit it, then `elastocal check {cell}`",
+        soft_wrap=True,
+    )
 
 
 def show_plan(console: Console, plan: PlanResult, figures: PlanFigures) -> None:

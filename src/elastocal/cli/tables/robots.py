@@ -1,4 +1,4 @@
-"""What ``elastocal robots`` shows of a robot."""
+"""Print what the catalogue knows of a robot."""
 
 import numpy as np
 from rich.console import Console

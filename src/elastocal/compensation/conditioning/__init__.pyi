@@ -18,7 +18,6 @@ from .postures import (
     static_postures as static_postures,
 )
 from .tool import (
-    SensorLoad as SensorLoad,
     SensorMount as SensorMount,
     ToolResult as ToolResult,
     read_sensor_load as read_sensor_load,

@@ -191,10 +191,10 @@ def _conditioning(numbers: Design) -> list[Constant]:
     return [
         Constant("BIAS", biases, "of the sensor, N and N m"),
         Constant("RANGE", np.array([*settings.sensor.force, *settings.sensor.moment])),
-        Constant("WEIGHT", numbers.weight, "of the tool, base, N"),
-        Constant("SENSOR_ROTATION", numbers.sensor_rotation.ravel(), "in the tcp frame, by rows"),
+        Constant("SENSOR_MATRIX", numbers.sensor_matrix, "of readings without bias, tcp axes"),
+        Constant("WEIGHT", numbers.weight_response, "of the tool by gravity, tcp axes, kg, kg m"),
+        Constant("GRAVITY", numbers.gravity, "base, m/s^2"),
         Constant("ORIGIN", numbers.sensor_origin, "of the sensor, tcp frame, m"),
-        Constant("CENTRE", numbers.centre, "of mass from that origin, tcp axes, m"),
         Constant("SECTION", sections, "b0, b1, b2, a1, a2"),
         _one("LONGEST_GAP", settings.hold, "between readings, s"),
         _one("LONG_AGO", LONG_AGO, "s"),

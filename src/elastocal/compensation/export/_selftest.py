@@ -247,10 +247,8 @@ def _episodes(numbers: Design, model: ModelFunctions) -> list[_Episode]:
     return _played(Compensator(numbers, model), course)
 
 
-def _free_motion(
-    numbers: Design, pressed: tuple[Reading, Reading]
-) -> list[tuple[int, Reading]]:
-    """Return what friction remembers and forgets: presses before and after a way through the air."""
+def _free_motion(numbers: Design, pressed: tuple[Reading, Reading]) -> list[tuple[int, Reading]]:
+    """Return presses before, within and after a way through the air."""
     if not numbers.light_loads:
         return []
     first, large = pressed
@@ -296,12 +294,12 @@ def _reading(numbers: Design, q: list[float], size: float, rng: Generator) -> Re
 
 def _raw(numbers: Design, wrench: FloatArray, R_base_tcp: FloatArray) -> FloatArray:
     """Return what the sensor reads of a wrench in the tcp frame: the conditioner backwards."""
-    f, m, weight = wrench[:3], wrench[3:], numbers.weight @ R_base_tcp
-    at_sensor = m - np.cross(numbers.sensor_origin, f) + np.cross(numbers.centre, weight)
-    S = numbers.sensor_rotation
-    return np.concatenate(
-        [(f + weight) @ S + numbers.load.force_bias, at_sensor @ S + numbers.load.moment_bias]
-    )
+    f, m = wrench[:3], wrench[3:]
+    at_sensor = np.concatenate([f, m - np.cross(numbers.sensor_origin, f)])
+    weight = numbers.weight_response @ (numbers.gravity @ R_base_tcp)
+    bias = np.concatenate([numbers.load.force_bias, numbers.load.moment_bias])
+    raw: FloatArray = np.linalg.solve(numbers.sensor_matrix, at_sensor + weight) + bias
+    return raw
 
 
 def _configurations(numbers: Design, rng: Generator, count: int) -> FloatArray:

@@ -116,6 +116,7 @@ def _values(numbers: Design) -> dict[str, str]:
     robot = calibrated.model.robot
     about = [
         f"Robot {robot.name}, base {robot.base}, tool centre point {robot.tip}.",
+        f"Tool: {calibrated.tool_name}.",
         f"Data: {calibrated.provenance or 'not named'}.",
     ]
     names = [

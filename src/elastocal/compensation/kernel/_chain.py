@@ -1,6 +1,5 @@
 """The chain as statements: joint frames, and the moment of the arm's own weight."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import accumulate
 

@@ -4,7 +4,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import count
 
-from elastocal.compensation.kernel.program import ZERO, Program, Value, Vector
+from elastocal.compensation.kernel.program import Program, Value, Vector
 from elastocal.elastic import ElasticModel, SpringLoad
 from elastocal.elastic.springs import Expression, Function, Input, Number, Product, Sum
 

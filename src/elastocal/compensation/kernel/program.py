@@ -437,5 +437,3 @@ class _Variables:
         for name in sorted(_uses(statement)):
             if self._last.get(name) == id(statement) and name in self._place:
                 self._idle.append(self._place.pop(name))
-
-

@@ -236,8 +236,6 @@ def _frame(chain: ChainFrames, joint: int, behind: bool) -> Frame:
     return chain.joints[joint].distal if behind else chain.joints[joint].proximal
 
 
-def _routine(
-    program: Program, outputs: Iterable[Value], memory: tuple[str, ...] = ()
-) -> Routine:
+def _routine(program: Program, outputs: Iterable[Value], memory: tuple[str, ...] = ()) -> Routine:
     every = tuple(outputs)
     return Routine(tuple(program.statements), every, program.constants, memory).leading(len(every))

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from elastocal.arrays import FloatArray
-from elastocal.compensation.conditioning import SensorLoad
+from elastocal.cell import SensorLoad
 from elastocal.compensation.kernel import Function, ModelFunctions
 from elastocal.compensation.online.design import JOINT_RANGE, LONG_AGO, Design, design
 from elastocal.compensation.online.state import Correction, Reading, State, Status, Triple
@@ -28,10 +28,10 @@ class Conditioner:
         self._orientation = orientation
         self._bias = (*design.load.force_bias.tolist(), *design.load.moment_bias.tolist())
         self._range = (*design.settings.sensor.force, *design.settings.sensor.moment)
-        self._weight = tuple(design.weight.tolist())
-        self._rotation = tuple(design.sensor_rotation.ravel().tolist())
+        self._gravity = tuple(design.gravity.tolist())
+        rows = np.hstack([design.sensor_matrix, design.weight_response])
+        self._rows = tuple(tuple(row) for row in rows.tolist())
         self._origin = tuple(design.sensor_origin.tolist())
-        self._centre = tuple(design.centre.tolist())
         self._sections = design.filters.sections
         self._previous = design.filters.median - 1
         self._longest_gap = design.settings.hold
@@ -97,35 +97,34 @@ class Conditioner:
 
     def _at_tcp(self, reading: Reading) -> tuple[float, ...]:
         """Return the wrench on the robot in the tcp frame, about the tool centre point."""
-        # Unrolled by hand: arrays of three would take longer than the products, and the C reads
-        # line by line the same. First the weight w = R_base_tcp^T (m g), in tcp axes.
+        # Unrolled by hand: arrays of six would take longer than the products, and the C reads
+        # line by line the same. First gravity in tcp axes.
         rxx, rxy, rxz, ryx, ryy, ryz, rzx, rzy, rzz = self._orientation(reading.q)
-        gx, gy, gz = self._weight
-        wx = rxx * gx + ryx * gy + rzx * gz
-        wy = rxy * gx + ryy * gy + rzy * gz
-        wz = rxz * gx + ryz * gy + rzz * gz
-        # The bias is the sensor's own: it goes before the sensor's axes are turned.
-        bx, by, bz, nx, ny, nz = self._bias
-        ax, ay, az = reading.force
-        ax, ay, az = ax - bx, ay - by, az - bz
-        mx, my, mz = reading.moment
-        mx, my, mz = mx - nx, my - ny, mz - nz
-        sxx, sxy, sxz, syx, syy, syz, szx, szy, szz = self._rotation
-        # f = R_tcp_sensor (F - b) - w
-        fx = sxx * ax + sxy * ay + sxz * az - wx
-        fy = syx * ax + syy * ay + syz * az - wy
-        fz = szx * ax + szy * ay + szz * az - wz
-        # m = R_tcp_sensor (M - b_m) - c x w + p x f: the weight's moment is about the sensor's
-        # origin, so it goes before the moment is moved to the tcp, by the force without weight.
-        cx, cy, cz = self._centre
+        ux, uy, uz = self._gravity
+        gx = rxx * ux + ryx * uy + rzx * uz
+        gy = rxy * ux + ryy * uy + rzy * uz
+        gz = rxz * ux + ryz * uy + rzz * uz
+        # The bias is the sensor's own: it goes before the sensor's matrix and axes.
+        b0, b1, b2, b3, b4, b5 = self._bias
+        x0, x1, x2 = reading.force
+        x3, x4, x5 = reading.moment
+        x0, x1, x2, x3, x4, x5 = x0 - b0, x1 - b1, x2 - b2, x3 - b3, x4 - b4, x5 - b5
+        # [f; t] = D (y - b) - K g, both D and K in tcp axes.
+        fx, fy, fz, tx, ty, tz = [
+            (s0 * x0 + s1 * x1 + s2 * x2 + s3 * x3 + s4 * x4 + s5 * x5)
+            - (k0 * gx + k1 * gy + k2 * gz)
+            for s0, s1, s2, s3, s4, s5, k0, k1, k2 in self._rows
+        ]
+        # m = t + p x f: the weight's moment is about the sensor's origin, so it is gone before the
+        # moment is moved to the tcp, by the force without weight.
         px, py, pz = self._origin
         return (
             fx,
             fy,
             fz,
-            sxx * mx + sxy * my + sxz * mz - (cy * wz - cz * wy) + (py * fz - pz * fy),
-            syx * mx + syy * my + syz * mz - (cz * wx - cx * wz) + (pz * fx - px * fz),
-            szx * mx + szy * my + szz * mz - (cx * wy - cy * wx) + (px * fy - py * fx),
+            tx + (py * fz - pz * fy),
+            ty + (pz * fx - px * fz),
+            tz + (px * fy - py * fx),
         )
 
 

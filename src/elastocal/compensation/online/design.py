@@ -6,7 +6,8 @@ import numpy as np
 from scipy.special import ndtri
 
 from elastocal.arrays import FloatArray
-from elastocal.compensation.conditioning import FilterChain, SensorLoad
+from elastocal.cell import SensorLoad
+from elastocal.compensation.conditioning import FilterChain
 from elastocal.compensation.kernel import (
     ModelFunctions,
     Routine,
@@ -47,14 +48,14 @@ class Design:
     filters: FilterChain
     spread: FloatArray
     """``L`` with ``L L^T`` the covariance of the draws times 1.96², shape (spring, direction)."""
-    weight: FloatArray
-    """Weight of the tool in base, shape (3,), in N."""
-    sensor_rotation: FloatArray
-    """R_tcp_sensor, shape (3, 3)."""
+    sensor_matrix: FloatArray
+    """From readings without bias to the wrench about the sensor's origin, in tcp axes, (6, 6)."""
+    weight_response: FloatArray
+    """Wrench of the tool's weight per gravity, in tcp axes, shape (6, 3), in kg and kg·m."""
+    gravity: FloatArray
+    """In base, shape (3,), in m/s²."""
     sensor_origin: FloatArray
     """In the tcp frame, shape (3,), in m."""
-    centre: FloatArray
-    """From the sensor's origin to the tool's centre of mass, in tcp axes, shape (3,), in m."""
     frame: FloatArray
     """R_base_frame of the correction, shape (3, 3); the identity where it is the tcp's."""
 
@@ -90,6 +91,7 @@ class Design:
         """Whether readings are raw: bias and weight are taken away, or the wrench is moved."""
         load = self.load
         moved = not np.array_equal(load.T_tcp_sensor, np.eye(4))
+        moved |= not np.array_equal(load.matrix, np.eye(6))
         return bool(load.mass > 0.0 or load.force_bias.any() or load.moment_bias.any() or moved)
 
     @property
@@ -138,7 +140,7 @@ def design(
     settings, load = settings or CompensatorSettings(), load or SensorLoad()
     _check_compliances(calibrated)
     filters = settings.chain
-    R, frame = load.T_tcp_sensor[:3, :3], settings.R_base_frame
+    frame = settings.R_base_frame
     model = calibrated.model
     return Design(
         calibrated=calibrated,
@@ -150,10 +152,10 @@ def design(
         rest=rest(model),
         filters=filters,
         spread=_Z * draws_factor(calibrated.draws),
-        weight=load.mass * load.gravity,
-        sensor_rotation=R,
+        sensor_matrix=load.matrix_tcp,
+        weight_response=load.response_tcp,
+        gravity=load.gravity,
         sensor_origin=load.T_tcp_sensor[:3, 3],
-        centre=R @ load.centre,
         frame=np.eye(3) if frame is None else frame,
     )
 

@@ -55,7 +55,6 @@ from .tool import (
     RobotWrench as RobotWrench,
     ToolChange as ToolChange,
     ToolEstimate as ToolEstimate,
-    ToolLoad as ToolLoad,
     UnloadedWrenches as UnloadedWrenches,
     estimate_tool as estimate_tool,
     tool_change as tool_change,

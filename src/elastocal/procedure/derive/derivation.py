@@ -19,7 +19,7 @@ from pathlib import Path
 import numpy as np
 
 from elastocal.arrays import FloatArray
-from elastocal.cell import Cell
+from elastocal.cell import Cell, SensorLoad
 from elastocal.dataset import STATUSES, Dataset, write
 from elastocal.errors import DatasetError, FileAccessError, ProcedureError, SchemaError
 from elastocal.planning import PlanResult
@@ -36,7 +36,7 @@ from elastocal.procedure.derive.readings import (
     tool_readings,
 )
 from elastocal.procedure.derive.summary import RunSummary
-from elastocal.procedure.derive.tool import ToolLoad, estimate_tool, turned_sigma, wrench_on_robot
+from elastocal.procedure.derive.tool import estimate_tool, turned_sigma, wrench_on_robot
 from elastocal.procedure.record import (
     Entry,
     PoseLog,
@@ -174,14 +174,15 @@ def _streams(folder: RunFolder, log: PoseLog, cell: Cell) -> Streams:
     return streams
 
 
-def _tool_load(cell: Cell) -> ToolLoad:
+def _tool_load(cell: Cell) -> SensorLoad:
     sensor, T_sensor_tcp = cell.file.sensor, cell.T_sensor_tcp
     if sensor is None or T_sensor_tcp is None:
         raise ProcedureError(f"cell {cell.name!r} has no force sensor (key 'sensor')")
     T_sensor_flange = inverse_transform(sensor.T_flange_sensor)
     centre = T_sensor_flange[:3, :3] @ cell.file.tool.centre + T_sensor_flange[:3, 3]
     mass = cell.file.tool.mass
-    return ToolLoad(mass, centre, cell.gravity_base, inverse_transform(T_sensor_tcp))
+    T = inverse_transform(T_sensor_tcp)
+    return SensorLoad(mass, centre, T_tcp_sensor=T, gravity=cell.gravity_base)
 
 
 def _lever_arm(cell: Cell) -> FloatArray:
@@ -215,7 +216,9 @@ class _LoadAndReference:
     R_base_tracker: FloatArray
 
 
-def _row(pose: PoseReadings, load: Reading, registration: Registration, tool: ToolLoad) -> LoadRow:
+def _row(
+    pose: PoseReadings, load: Reading, registration: Registration, tool: SensorLoad
+) -> LoadRow:
     """Return a load as the dataset holds it; without reference, station or stream it is missing."""
     window, case = load.window, str(load.window.load_case)
     pair = _pair(pose, load, registration)
@@ -247,7 +250,7 @@ def _pair(pose: PoseReadings, load: Reading, registration: Registration) -> _Loa
     return _LoadAndReference(means[0], means[1], means[2], means[3], fit.T_base_tracker[:3, :3])
 
 
-def _numbers(pair: _LoadAndReference, lever: FloatArray, tool: ToolLoad) -> LoadValues:
+def _numbers(pair: _LoadAndReference, lever: FloatArray, tool: SensorLoad) -> LoadValues:
     load, reference, R = pair.load, pair.reference, pair.R_base_tracker
     T, T_0 = load.T_base_tcp, reference.T_base_tcp
     wrench = wrench_on_robot(load.wrench, reference.wrench, tool)

@@ -8,11 +8,12 @@ import numpy as np
 
 from elastocal import __version__
 from elastocal.arrays import FloatArray
+from elastocal.cell import SensorLoad
 from elastocal.dataset import Dataset
 from elastocal.planning import PlanResult
 from elastocal.procedure.derive import summary
 from elastocal.procedure.derive.readings import LoadRow, LoadValues, PoseReadings, weighed_poses
-from elastocal.procedure.derive.tool import Interval, ToolEstimate, ToolLoad
+from elastocal.procedure.derive.tool import Interval, ToolEstimate
 from elastocal.procedure.record import Entry, Event, ReadingStatus
 from elastocal.procedure.registration import Registration, StationFit
 from elastocal.results import brief_repr
@@ -39,7 +40,7 @@ class RunFindings:
     poses: Sequence[PoseReadings]
     rows: Sequence[LoadRow]
     registration: Registration
-    tool: ToolLoad
+    tool: SensorLoad
     estimate: ToolEstimate
     dataset: Dataset
     plan: PlanResult
@@ -114,7 +115,7 @@ def _station(fit: StationFit, displacement: float) -> summary.StationSummary:
     )
 
 
-def _tool(tool: ToolLoad, found: ToolEstimate, weighed: Sequence[int]) -> summary.ToolSummary:
+def _tool(tool: SensorLoad, found: ToolEstimate, weighed: Sequence[int]) -> summary.ToolSummary:
     step = found.change
     mass, half = (_number(float(part)) for part in (found.mass.value, found.mass.half_width))
     centre = _interval(found.centre)
@@ -210,7 +211,7 @@ def _number(value: float) -> summary.Number:
 def run_warnings(
     rows: Sequence[LoadRow],
     registration: Registration,
-    tool: ToolLoad,
+    tool: SensorLoad,
     estimate: ToolEstimate,
     load_cases: Sequence[str],
     weighed: Sequence[int],
@@ -223,7 +224,7 @@ def run_warnings(
         Readings of all poses.
     registration : Registration
         Stations and marker.
-    tool, estimate : ToolLoad, ToolEstimate
+    tool, estimate : SensorLoad, ToolEstimate
         The tool by the cell file and by the unloaded references.
     load_cases : sequence of str
         Load cases of the plan.
@@ -288,7 +289,7 @@ def _about_lever(registration: Registration) -> Iterator[str]:
         )
 
 
-def _about_tool(tool: ToolLoad, estimate: ToolEstimate, weighed: Sequence[int]) -> Iterator[str]:
+def _about_tool(tool: SensorLoad, estimate: ToolEstimate, weighed: Sequence[int]) -> Iterator[str]:
     if estimate.change is not None:
         yield (
             f"the tool weight changed near pose {weighed[estimate.change.reading]}, by about"

@@ -14,7 +14,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from elastocal.arrays import BoolArray, FloatArray
-from elastocal.procedure.derive.tool import RawWrench, ToolLoad, UnloadedWrenches
+from elastocal.cell import SensorLoad
+from elastocal.procedure.derive.tool import RawWrench, UnloadedWrenches
 from elastocal.procedure.record import SAME_TIME, PoseLog, ReadingStatus, Streams, Window
 from elastocal.procedure.registration import UnloadedReadings
 from elastocal.results import brief_repr
@@ -277,14 +278,14 @@ def weighed_poses(poses: Sequence[PoseReadings]) -> list[int]:
     return [pose.pose for pose in poses if pose.reference and pose.reference.tool]
 
 
-def tool_readings(poses: Sequence[PoseReadings], tool: ToolLoad) -> UnloadedWrenches:
+def tool_readings(poses: Sequence[PoseReadings], tool: SensorLoad) -> UnloadedWrenches:
     """Return the raw wrenches of the unloaded references.
 
     Parameters
     ----------
     poses : sequence of PoseReadings
         In the order of time.
-    tool : ToolLoad
+    tool : SensorLoad
         How the sensor sits.
     """
     states = [r.tool for pose in poses if (r := pose.reference) and r.tool]

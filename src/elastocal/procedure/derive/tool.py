@@ -1,13 +1,9 @@
 """The tool's weight: taken off each reading, estimated from a run, and watched for a change.
 
-The sensor reads, in its own frame,
-
-    F = R^T (f + w) + b,        M = R^T m + c x R^T w + b_m,
-
-with ``R`` its rotation in base, ``f`` and ``m`` force and moment on the robot about the sensor's
-origin, ``w`` the tool's weight, ``c`` the tool's centre of mass and the biases ``b``. The unloaded
-reference of the same pose is the tare: with almost the same ``R`` it takes ``b`` and ``w`` away,
-and what the weight turns by between the two is taken away by the cell file's mass (spec section 2).
+How a sensor reads, and how a reading becomes the wrench on the robot, is in
+`elastocal.cell.sensor`, which the compensator takes its numbers from, too. The unloaded reference
+of the same pose is the tare: with almost the same rotation it takes bias and weight away, and what
+the weight turns by between the two is taken away by the cell file's mass (spec section 2).
 
 `estimate_tool` finds mass, centre of mass, bias and drift by the unloaded references of a run. With
 a bias that drifts linearly they are linear in the mass, ``h = mass c``, biases and drifts:
@@ -27,34 +23,8 @@ import numpy as np
 from scipy.special import fdtrc, stdtrit
 
 from elastocal.arrays import FloatArray
+from elastocal.cell import SensorLoad
 from elastocal.results import brief_repr
-
-
-@brief_repr
-@dataclass(frozen=True, eq=False)
-class ToolLoad:
-    """The tool on the sensor, and how the sensor sits."""
-
-    mass: float
-    """In kg."""
-    centre: FloatArray
-    """Centre of mass in the sensor's frame, shape (3,), in m."""
-    gravity: FloatArray
-    """Acceleration of gravity in base, shape (3,), in m/s²."""
-    T_tcp_sensor: FloatArray
-    """Sensor's measuring frame in the tcp frame, shape (4, 4), in m."""
-
-    def R_base_sensor(self, T_base_tcp: FloatArray) -> FloatArray:
-        """Return the rotation of the sensor, shape (..., 3, 3)."""
-        return T_base_tcp[..., :3, :3] @ self.T_tcp_sensor[:3, :3]
-
-    def force(self, R_base_sensor: FloatArray) -> FloatArray:
-        """Return the weight as the sensor feels it, shape (..., 3), in N, sensor frame."""
-        return self.mass * (self.gravity @ R_base_sensor)
-
-    def moment(self, R_base_sensor: FloatArray) -> FloatArray:
-        """Return the weight's moment about the sensor's origin, shape (..., 3), in N·m."""
-        return np.cross(self.centre, self.force(R_base_sensor))
 
 
 @brief_repr
@@ -81,8 +51,11 @@ class RobotWrench:
     """About the tool centre point, shape (3,), in N·m."""
 
 
-def wrench_on_robot(loaded: RawWrench, tare: RawWrench, tool: ToolLoad) -> RobotWrench:
+def wrench_on_robot(loaded: RawWrench, tare: RawWrench, sensor: SensorLoad) -> RobotWrench:
     """Return what presses on the robot, tool weight and bias removed.
+
+    ``[f; t] = D (y - y_tare) - K (g - g_tare)``, with the sensor's matrix ``D`` and its response
+    ``K`` to gravity ``g``; see `elastocal.cell.sensor`.
 
     Parameters
     ----------
@@ -90,13 +63,14 @@ def wrench_on_robot(loaded: RawWrench, tare: RawWrench, tool: ToolLoad) -> Robot
         Under load.
     tare : RawWrench
         UnloadedWrenches, at the same pose.
-    tool : ToolLoad
-        Its weight, and the sensor's place.
+    sensor : SensorLoad
+        Its matrix, the tool's weight on it, and its place.
     """
-    R, R_tare = tool.R_base_sensor(loaded.T_base_tcp), tool.R_base_sensor(tare.T_base_tcp)
-    force = R @ (loaded.force - tare.force - (tool.force(R) - tool.force(R_tare)))
-    moment = R @ (loaded.moment - tare.moment - (tool.moment(R) - tool.moment(R_tare)))
-    arm = loaded.T_base_tcp[:3, :3] @ tool.T_tcp_sensor[:3, 3]
+    R, R_tare = sensor.R_base_sensor(loaded.T_base_tcp), sensor.R_base_sensor(tare.T_base_tcp)
+    change = np.concatenate([loaded.force - tare.force, loaded.moment - tare.moment])
+    wrench = sensor.matrix @ change - (sensor.weight(R) - sensor.weight(R_tare))
+    force, moment = R @ wrench[:3], R @ wrench[3:]
+    arm = loaded.T_base_tcp[:3, :3] @ sensor.T_tcp_sensor[:3, 3]
     return RobotWrench(force, moment + np.cross(arm, force))
 
 

@@ -4,10 +4,9 @@ A section chooses what to show and never writes markup: texts are escaped where 
 """
 
 import base64
-from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 from matplotlib.figure import Figure
 
@@ -113,11 +112,14 @@ class Verbatim:
     text: str
 
 
+@brief_repr
 @dataclass(frozen=True)
 class PlanScene:
-    """The view of a plan in three dimensions; its figure stands in the data of the section."""
+    """The view of a plan in three dimensions."""
 
     poses: int
+    data: Mapping[str, object]
+    """For the script of the page."""
 
 
 @brief_repr
@@ -139,8 +141,11 @@ class Content:
     """Everything that a section shows."""
 
     blocks: tuple[Block, ...]
-    data: Mapping[str, Any] = field(default_factory=dict)
-    """For the script of the page."""
+
+    @property
+    def data(self) -> Mapping[str, object]:
+        """The data of its scene, for the script of the page; empty without a scene."""
+        return next((each.data for each in self.blocks if isinstance(each, PlanScene)), {})
 
     @cached_property
     def html(self) -> str:
@@ -157,7 +162,11 @@ class Section:
     title: str
     place: int
     """Sections stand in the order of these numbers."""
-    body: Callable[[Evidence], Content]
+    blocks: Callable[[Evidence], Iterable[Block]]
+
+    def body(self, evidence: Evidence) -> Content:
+        """Return what the section shows."""
+        return Content(tuple(self.blocks(evidence)))
 
 
 def picture(draw: Callable[[], Figure], alt: str, caption: str, kind: str = ".svg") -> Picture:

@@ -1,4 +1,4 @@
-"""A Chromium that nobody sees, told what to do through a pipe.
+"""Drive a Chromium that nobody sees, through a pipe.
 
 The page says itself when it is ready; nothing here guesses how long that takes. The browser's
 DevTools protocol goes over two pipes (file descriptors 3 and 4 of the child): nothing listens on
@@ -13,7 +13,7 @@ import select
 import shutil
 import subprocess
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -40,7 +40,8 @@ _READY = """new Promise((done) => {
   look();
 })"""
 
-Message = dict[str, Any]
+Message = Mapping[str, Any]
+"""A JSON object of the DevTools protocol."""
 
 
 def find_browser() -> str:
@@ -104,9 +105,8 @@ class Tab:
             If the browser refuses, ends, or does not answer.
         """
         self._count += 1
-        message: Message = {"id": self._count, "method": method, "params": parameters}
-        if self._session:
-            message["sessionId"] = self._session
+        session = {"sessionId": self._session} if self._session else {}
+        message = {"id": self._count, "method": method, "params": parameters, **session}
         self._send(json.dumps(message).encode() + b"\0")
         deadline = time.monotonic() + _SECONDS
         while True:

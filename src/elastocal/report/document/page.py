@@ -3,7 +3,6 @@
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from elastocal import __version__
 from elastocal.files import write_text
@@ -45,14 +44,9 @@ def write_report(path: Path, evidence: Evidence) -> WrittenReport:
         If it cannot be written.
     """
     verdict = judge_evidence(evidence)
-    write_text(path, _page(evidence, verdict))
-    return WrittenReport(Path(path), verdict)
-
-
-def _page(evidence: Evidence, verdict: Verdict) -> str:
     sections = [(section, section.body(evidence)) for section in SECTIONS]
     data = {section.identifier: content.data for section, content in sections if content.data}
-    return render(
+    page = render(
         "report.html",
         title=f"Calibration report: {evidence.name}",
         styles=("report.css",),
@@ -63,22 +57,16 @@ def _page(evidence: Evidence, verdict: Verdict) -> str:
         evidence=evidence,
         sections=sections,
         version=__version__,
-        **_verdict_values(evidence, verdict),
+        verdict=verdict,
+        blocks=tuple(_accuracy(evidence, verdict)),
     )
+    write_text(path, page)
+    return WrittenReport(Path(path), verdict)
 
 
 def verdict_html(evidence: Evidence, verdict: Verdict) -> str:
     """Return the verdict as HTML."""
-    return render("verdict.html", **_verdict_values(evidence, verdict))
-
-
-def _verdict_values(evidence: Evidence, verdict: Verdict) -> dict[str, Any]:
-    """Return the values of the template of the verdict."""
-    return {
-        "light": verdict.light.value if verdict.light else "",
-        "verdict": verdict,
-        "blocks": tuple(_accuracy(evidence, verdict)),
-    }
+    return render("verdict.html", verdict=verdict, blocks=tuple(_accuracy(evidence, verdict)))
 
 
 def _accuracy(evidence: Evidence, verdict: Verdict) -> Iterator[Block]:

@@ -115,16 +115,6 @@ def write_codec_page(
     FileAccessError
         If the page cannot be written.
     """
-    write_text(path, _page(data, verdicts, seen, correlations))
-    return Path(path)
-
-
-def _page(
-    data: CodecData,
-    verdicts: Verdicts,
-    seen: Sequence[SpringObservability],
-    correlations: Sequence[Correlation],
-) -> str:
     names = [each.name for each in data.variants]
     if correlations:
         check_indices(names, [each.variant for each in correlations])
@@ -136,7 +126,7 @@ def _page(
         for variant in variant_styles(names)
     ]
     first = len(verdicts.saturation)
-    return render(
+    page = render(
         "codec.html",
         title=f"Codec: {data.robot or 'robot'}",
         styles=("plan.css", "codec.css"),
@@ -158,6 +148,8 @@ def _page(
         rows=_median_rows(data),
         footer=f"Made by elastocal {data.versions.get('elastocal', '')}".strip() + ".",
     )
+    write_text(path, page)
+    return Path(path)
 
 
 def _key_figures(data: CodecData) -> list[tuple[str, str]]:

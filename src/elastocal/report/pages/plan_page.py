@@ -2,7 +2,6 @@
 
 import json
 from pathlib import Path
-from typing import Any
 
 from elastocal.cell import Cell
 from elastocal.files import write_text
@@ -38,13 +37,9 @@ def write_plan_page(
     """
     check_pool_of(plan, pool)
     check_plan_robot(plan, cell)
-    write_text(path, _page(plan_view(cell, surface, plan, pool), plan, pool))
-    return Path(path)
-
-
-def _page(view: PlanView, plan: PlanResult, pool: PoolData) -> str:
+    view = plan_view(cell, surface, plan, pool)
     worst = weakest_margins(pool).label
-    return render(
+    page = render(
         "plan.html",
         title=f"Calibration plan: {plan.cell.name}",
         styles=("plan.css",),
@@ -56,6 +51,8 @@ def _page(view: PlanView, plan: PlanResult, pool: PoolData) -> str:
         rows=[(pose.id, _cells(plan, pose, worst[pose.candidate])) for pose in plan.poses],
         notes=[layer.note for layer in view.layers if layer.note],
     )
+    write_text(path, page)
+    return Path(path)
 
 
 def key_figures(plan: PlanResult) -> tuple[tuple[str, str], ...]:
@@ -84,7 +81,7 @@ def _cells(plan: PlanResult, pose: PoseRecord, worst: str) -> list[str]:
     ]
 
 
-def view_data(view: PlanView, plan: PlanResult, pool: PoolData) -> dict[str, Any]:
+def view_data(view: PlanView, plan: PlanResult, pool: PoolData) -> dict[str, object]:
     """Return the data from which the script of a page shows a view.
 
     Parameters

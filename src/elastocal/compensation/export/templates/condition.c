@@ -36,31 +36,33 @@ static unsigned int problem_of(const elastocal_state *state, const elastocal_rea
     return problem;
 }
 
-/* Bias and tool weight removed, moved to the tool centre point, in the tcp frame. */
+/* Bias and tool weight removed, calibration matrix applied, moved to the tool centre point, in
+ * the tcp frame. */
 static void at_tcp(const elastocal_reading *reading, double wrench[6])
 {
     double r[9];
-    double weight[3];
-    double n[3];
-    double *const f = wrench;
+    double g[3];
+    double x[6];
+    double y[6];
     int i;
     orientation(reading->q, r);
     for (i = 0; i < 3; i++) {
-        weight[i] = (r[i] * WEIGHT[0]) + (r[i + 3] * WEIGHT[1]) + (r[i + 6] * WEIGHT[2]);
+        g[i] = (r[i] * GRAVITY[0]) + (r[i + 3] * GRAVITY[1]) + (r[i + 6] * GRAVITY[2]);
+        x[i] = reading->force[i] - BIAS[i];
+        x[i + 3] = reading->moment[i] - BIAS[i + 3];
+    }
+    for (i = 0; i < 6; i++) {
+        const double *const s = SENSOR_MATRIX[i];
+        const double *const k = WEIGHT[i];
+        y[i] = ((s[0] * x[0]) + (s[1] * x[1]) + (s[2] * x[2]) + (s[3] * x[3]) + (s[4] * x[4]) +
+                (s[5] * x[5])) - ((k[0] * g[0]) + (k[1] * g[1]) + (k[2] * g[2]));
     }
     for (i = 0; i < 3; i++) {
-        const double *const s = &SENSOR_ROTATION[3 * i];
-        f[i] = (s[0] * (reading->force[0] - BIAS[0])) + (s[1] * (reading->force[1] - BIAS[1])) +
-               (s[2] * (reading->force[2] - BIAS[2])) - weight[i];
-        n[i] = (s[0] * (reading->moment[0] - BIAS[3])) + (s[1] * (reading->moment[1] - BIAS[4])) +
-               (s[2] * (reading->moment[2] - BIAS[5]));
+        wrench[i] = y[i];
     }
-    wrench[3] = n[0] - ((CENTRE[1] * weight[2]) - (CENTRE[2] * weight[1])) +
-                ((ORIGIN[1] * f[2]) - (ORIGIN[2] * f[1]));
-    wrench[4] = n[1] - ((CENTRE[2] * weight[0]) - (CENTRE[0] * weight[2])) +
-                ((ORIGIN[2] * f[0]) - (ORIGIN[0] * f[2]));
-    wrench[5] = n[2] - ((CENTRE[0] * weight[1]) - (CENTRE[1] * weight[0])) +
-                ((ORIGIN[0] * f[1]) - (ORIGIN[1] * f[0]));
+    wrench[3] = y[3] + ((ORIGIN[1] * y[2]) - (ORIGIN[2] * y[1]));
+    wrench[4] = y[4] + ((ORIGIN[2] * y[0]) - (ORIGIN[0] * y[2]));
+    wrench[5] = y[5] + ((ORIGIN[0] * y[1]) - (ORIGIN[1] * y[0]));
 }
 
 /* Second-order sections, transposed direct form II. */

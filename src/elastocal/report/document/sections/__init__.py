@@ -1,4 +1,4 @@
-"""Sections of the report: one file each, and its export here; each knows its place."""
+"""Sections of the report, each with its place: a subject a file, and its export here."""
 
 import lazy_loader
 

@@ -5,17 +5,7 @@ from functools import partial
 
 from elastocal.codec import CodecData
 from elastocal.errors import CodecError
-from elastocal.report.document.blocks import (
-    Block,
-    Bullets,
-    Content,
-    Facts,
-    Heading,
-    Paragraph,
-    Section,
-    Table,
-    picture,
-)
+from elastocal.report.document import blocks
 from elastocal.report.plots import codec_chart, headline, how_to_read
 from elastocal.verdict import CodecEvidence, Evidence
 from elastocal.wording import mm
@@ -28,14 +18,14 @@ _FIGURES = {
 """Comparisons of the paper, in its order: title and figure of each."""
 
 
-def _body(evidence: Evidence) -> Content:
-    """Return the section."""
+def _body(evidence: Evidence) -> Iterator[blocks.Block]:
     if not evidence.codecs:
         text = "There is no codec, so it is not known whether there were enough poses."
-        return Content((Paragraph(text),))
+        yield blocks.Paragraph(text)
+        return
     data = evidence.codecs[0].data
     sets, size = data.verification.shape
-    facts = Facts(
+    yield blocks.Facts(
         (
             ("Poses", len(data.contact)),
             ("Splits", sets),
@@ -43,16 +33,16 @@ def _body(evidence: Evidence) -> Content:
             ("Training poses", f"1 to {data.n_train[-1]}"),
         )
     )
-    codecs = sorted(evidence.codecs, key=_order)
-    return Content((facts, *(block for codec in codecs for block in _codec(codec))))
+    for codec in sorted(evidence.codecs, key=_order):
+        yield from _codec(codec)
 
 
-def _codec(codec: CodecEvidence) -> Iterator[Block]:
+def _codec(codec: CodecEvidence) -> Iterator[blocks.Block]:
     data, verdicts = codec.data, codec.verdicts
-    yield Heading(_title(data))
-    yield Bullets(tuple(map(_micro, verdicts.sentences)))
+    yield blocks.Heading(_title(data))
+    yield blocks.Bullets(tuple(map(_micro, verdicts.sentences)))
     try:
-        yield picture(
+        yield blocks.picture(
             partial(codec_chart, data, verdicts),
             f"{headline(data)}: box plots of mean and maximum error at held-out poses over the"
             f" number of training poses. {_micro(' '.join(verdicts.sentences))}",
@@ -60,7 +50,7 @@ def _codec(codec: CodecEvidence) -> Iterator[Block]:
             ".png",
         )
     except CodecError as error:
-        yield Paragraph(f"No chart: {error}.")
+        yield blocks.Paragraph(f"No chart: {error}.")
     yield _saturation(codec)
 
 
@@ -94,7 +84,7 @@ def _micro(sentence: str) -> str:
     return sentence.replace(" um", " µm")
 
 
-def _saturation(codec: CodecEvidence) -> Block:
+def _saturation(codec: CodecEvidence) -> blocks.Block:
     rows = tuple(
         (
             each.variant,
@@ -108,7 +98,7 @@ def _saturation(codec: CodecEvidence) -> Block:
     )
     heads = ("Variant", "Saturated from", "95 % interval", "Error there", "Error with all",
              "Settled?")  # fmt: skip
-    return Table("Saturation: training poses from which on more do not help", heads, rows)
+    return blocks.Table("Saturation: training poses from which on more do not help", heads, rows)
 
 
-CODECS = Section("codecs", "Number of poses: codecs", 60, _body)
+CODECS = blocks.Section("codecs", "Number of poses: codecs", 60, _body)

@@ -1,41 +1,34 @@
-"""Compliances with intervals, and what the readings tell apart."""
+"""Compliances with intervals, what the readings tell apart, and what changed since last time."""
 
 from collections.abc import Iterator
 from functools import partial
 
+from elastocal.elastic import unit_of
 from elastocal.identification import CalibrationSummary, Term, describe
-from elastocal.report.document.blocks import (
-    Block,
-    Bullets,
-    Content,
-    Facts,
-    Heading,
-    Paragraph,
-    Row,
-    Section,
-    Table,
-    picture,
+from elastocal.identification.recertification import (
+    CompareSummary,
+    DeflectionChange,
+    Estimate,
+    Verdict,
 )
-from elastocal.report.plots import SpringBar, spring_bars, spring_figure
+from elastocal.report.document import blocks
+from elastocal.report.plots import SpringBar, recertification_figure, spring_bars, spring_figure
 from elastocal.verdict import Evidence, ModelEvidence
 from elastocal.wording import mm
 
 _MOST_TERMS = 6
 
 
-def _body(evidence: Evidence) -> Content:
-    """Return the section."""
-    if evidence.calibrated is None:
-        return Content((Paragraph("There is no calibrated model, so no compliance is known."),))
-    return Content(tuple(_blocks(evidence.calibrated)))
-
-
-def _blocks(found: ModelEvidence) -> Iterator[Block]:
+def _compliances(evidence: Evidence) -> Iterator[blocks.Block]:
+    found = evidence.calibrated
+    if found is None:
+        yield blocks.Paragraph("There is no calibrated model, so no compliance is known.")
+        return
     springs = spring_bars(found.model)
     observable = sum(each.group is None for each in springs)
     yield _head(found, observable)
     yield from _ladder(found.figures)
-    yield picture(
+    yield blocks.picture(
         partial(spring_figure, springs),
         f"Compliances of {len(springs)} springs with 95 % intervals; {len(springs) - observable} of"
         " them have no value of their own",
@@ -43,11 +36,11 @@ def _blocks(found: ModelEvidence) -> Iterator[Block]:
         " is the smallest one that explains the readings.",
     )
     heads = ("Spring", "Known?", "Compliance", "95 % interval", "Unit", "Stiffness")
-    yield Table("Compliances", heads, tuple(map(_row, springs)), texts=2)
+    yield blocks.Table("Compliances", heads, tuple(map(_row, springs)), texts=2)
     yield from _not_told_apart(found)
 
 
-def _row(spring: SpringBar) -> Row:
+def _row(spring: SpringBar) -> blocks.Row:
     name, unit, value = spring.name, spring.unit, spring.value
     if spring.group is not None:
         known = f"not by itself, group {spring.group}"
@@ -62,11 +55,12 @@ def _row(spring: SpringBar) -> Row:
     return name, known, f"{value:.4f}", span, unit.shown, stiff
 
 
-def _head(found: ModelEvidence, observable: int) -> Block:
+def _head(found: ModelEvidence, observable: int) -> blocks.Block:
     seen, figures = found.model.observability, found.figures
     residual = mm(figures.residual.mean) if figures else "not known"
-    return Facts(
+    return blocks.Facts(
         (
+            ("Tool", found.model.tool_name),
             ("Springs", seen.springs),
             ("Known by themselves", observable),
             ("Rank", f"{seen.rank} of {seen.springs}"),
@@ -77,12 +71,12 @@ def _head(found: ModelEvidence, observable: int) -> Block:
     )
 
 
-def _ladder(figures: CalibrationSummary | None) -> Iterator[Block]:
+def _ladder(figures: CalibrationSummary | None) -> Iterator[blocks.Block]:
     """Yield the models that were tried on the same left-out poses."""
     if figures is None or len(figures.ladder) < 2:
         return
-    yield Heading("Which model the readings carry")
-    yield Table(
+    yield blocks.Heading("Which model the readings carry")
+    yield blocks.Table(
         "Models at the same left-out poses",
         ("Springs", "Numbers", "Error at left-out poses", "Worse than the best by (95 %)", ""),
         tuple(
@@ -99,15 +93,15 @@ def _ladder(figures: CalibrationSummary | None) -> Iterator[Block]:
     )
 
 
-def _not_told_apart(found: ModelEvidence) -> Iterator[Block]:
+def _not_told_apart(found: ModelEvidence) -> Iterator[blocks.Block]:
     seen = found.model.observability
     if not seen.unobservable:
-        yield Paragraph("Every spring is observable by itself.")
+        yield blocks.Paragraph("Every spring is observable by itself.")
         return
     attainable = found.figures.rank_attainable if found.figures else seen.rank
     missing = attainable - seen.rank
-    yield Heading("What cannot be told apart")
-    yield Paragraph(
+    yield blocks.Heading("What cannot be told apart")
+    yield blocks.Paragraph(
         "These combinations change no deflection under a force, so their springs have no value of"
         " their own. Predictions do not need one."
         if missing <= 0
@@ -115,11 +109,91 @@ def _not_told_apart(found: ModelEvidence) -> Iterator[Block]:
         " all of these combinations are harmless."
     )
     groups = enumerate(seen.unobservable, start=1)
-    yield Bullets(tuple(f"Group {number}: {_described(group)}" for number, group in groups))
+    yield blocks.Bullets(tuple(f"Group {number}: {_described(group)}" for number, group in groups))
 
 
 def _described(group: tuple[Term, ...]) -> str:
     return describe(group) if len(group) <= _MOST_TERMS else f"{len(group)} springs mixed"
 
 
-COMPLIANCES = Section("compliances", "Compliances", 50, _body)
+COMPLIANCES = blocks.Section("compliances", "Compliances", 50, _compliances)
+
+
+_WORDS = {
+    Verdict.PASS: "Passed:",
+    Verdict.FAIL: "Failed:",
+    Verdict.UNDECIDED: "Not decided:",
+    None: "Not judged:",
+}
+
+
+def _recertification(evidence: Evidence) -> Iterator[blocks.Block]:
+    found = evidence.recertification
+    if found is None:
+        yield blocks.Paragraph(
+            "This calibration was not compared with an earlier one, so nothing is said of how"
+            " the cell changed."
+        )
+        return
+    yield blocks.Paragraph(
+        f"{_WORDS[found.verdict]} {found.reason}. {_moved_springs(found)}", "sentence"
+    )
+    if found.deflection is not None:
+        yield _deflections(found.deflection, found.limit)
+    yield _change_table(found)
+    yield blocks.picture(
+        partial(recertification_figure, found),
+        f"Springs of both calibrations with their intervals, and the change of deflection."
+        f" {_moved_springs(found)} {found.reason}",
+        "Round: the earlier calibration; diamonds: this one. What lies outside the grey band moved"
+        " beyond what both calibrations leave open.",
+    )
+    # The origin of the readings is a path; where a folder lies is no part of a report.
+    origin = f" ({found.old_provenance})"
+    yield blocks.Bullets(tuple(note.replace(origin, "") for note in found.notes))
+
+
+def _moved_springs(found: CompareSummary) -> str:
+    names = ", ".join(found.moved)
+    if not found.springs_judged and found.ground is not None:
+        return f"{found.ground.sentence.capitalize()}."
+    if not names:
+        return "No compared spring moved beyond its interval."
+    return f"Moved beyond their intervals: {names}."
+
+
+def _deflections(change: DeflectionChange, limit: float | None) -> blocks.Block:
+    return blocks.Facts(
+        (
+            ("Poses and forces compared", change.rows),
+            ("Change, mean", _span(change.mean)),
+            ("Change, largest", _span(change.largest)),
+            ("Limit", "none given" if limit is None else mm(limit)),
+        )
+    )
+
+
+def _change_table(found: CompareSummary) -> blocks.Block:
+    rows = tuple(
+        (
+            each.name,
+            "moved" if each.moved else "",
+            f"{unit.factor * each.old.value:.4f}",
+            f"{unit.factor * each.new.value:.4f}",
+            f"{unit.factor * each.difference.value:+.4f}",
+            f"{unit.factor * each.together.low:+.3f} to {unit.factor * each.together.high:+.3f}",
+            unit.shown,
+        )
+        for each, unit in ((each, unit_of(each.unit)) for each in found.springs)
+    )
+    heads = ("Spring or sum", "", "Old", "New", "Change", "95 %, all at once", "Unit")
+    return blocks.Table("Springs and sums that both calibrations determine", heads, rows, texts=2)
+
+
+def _span(found: Estimate) -> str:
+    return f"{mm(found.value)} ({mm(found.low)} to {mm(found.high)})"
+
+
+RECERTIFICATION = blocks.Section(
+    "recertification", "Change since the last calibration", 80, _recertification
+)

@@ -1,55 +1,50 @@
 """Surface, pool and chosen poses (paper Fig. 2 and 3)."""
 
+from collections.abc import Iterator
 from functools import partial
 
 from elastocal.planning import PlanResult
-from elastocal.report.document.blocks import (
-    Block,
-    Bullets,
-    Content,
-    Details,
-    Facts,
-    Paragraph,
-    PlanScene,
-    PoseButton,
-    Section,
-    Table,
-    picture,
-)
+from elastocal.report.document import blocks
 from elastocal.report.pages import key_figures, view_data
 from elastocal.report.plots import plan_figure, plan_view
 from elastocal.verdict import Evidence
 from elastocal.wording import counted, mm
 
 
-def _body(evidence: Evidence) -> Content:
-    """Return the section."""
-    plan, pool = evidence.plan, evidence.pool
+def _body(evidence: Evidence) -> Iterator[blocks.Block]:
+    plan = evidence.plan
     if plan is None:
         text = "The plan is not known, so nothing is said of how the poses were chosen."
-        return Content((Paragraph(text),))
-    head = (Facts(key_figures(plan)), _spreads(plan))
-    if pool is None or evidence.surface is None or evidence.cell is None:
-        text = "Without cell, mesh and pool there is no picture."
-        return Content((*head, Paragraph(text), *_notes(plan), _poses(plan, buttons=False)))
-    view = plan_view(evidence.cell, evidence.surface, plan, pool)
-    flat_map = picture(
-        partial(plan_figure, evidence.surface, plan, pool),
+        yield blocks.Paragraph(text)
+        return
+    yield blocks.Facts(key_figures(plan))
+    yield _spreads(plan)
+    pictures = tuple(_pictures(evidence, plan))
+    yield from pictures or (blocks.Paragraph("Without cell, mesh and pool there is no picture."),)
+    yield from _notes(plan)
+    yield _poses(plan, buttons=bool(pictures))
+
+
+def _pictures(evidence: Evidence, plan: PlanResult) -> Iterator[blocks.Block]:
+    cell, surface, pool = evidence.cell, evidence.surface, evidence.pool
+    if pool is None or surface is None or cell is None:
+        return
+    data = view_data(plan_view(cell, surface, plan, pool), plan, pool)
+    yield blocks.PlanScene(len(plan.poses), data)
+    yield blocks.picture(
+        partial(plan_figure, surface, plan, pool),
         _alt(plan),
         "After the paper's Fig. 3: the surface unrolled; colour is the distance of each candidate"
         " from its nearest chosen pose.",
         ".png",
     )
-    scene = PlanScene(len(plan.poses))
-    blocks = (*head, scene, flat_map, *_notes(plan), _poses(plan, buttons=True))
-    return Content(blocks, view_data(view, plan, pool))
 
 
-def _poses(plan: PlanResult, buttons: bool) -> Block:
+def _poses(plan: PlanResult, buttons: bool) -> blocks.Block:
     """Return the table of the poses, with buttons where there is a scene that shows them."""
     rows = tuple(
         (
-            PoseButton(pose.id) if buttons else str(pose.id),
+            blocks.PoseButton(pose.id) if buttons else str(pose.id),
             str(plan.search.order.index(pose.id) + 1),
             *(f"{1e3 * value + 0.0:.1f}" for value in pose.tcp_position),
             pose.seen_by or "no station",
@@ -58,14 +53,14 @@ def _poses(plan: PlanResult, buttons: bool) -> Block:
     )
     heads = ("Pose", "Chosen as no.", "x in mm", "y in mm", "z in mm", "Seen by")
     caption = "Poses in visiting order, contact point in base"
-    table = Table(caption, heads, rows, name="pose-table")
-    return Details(f"The {counted(len(plan.poses), 'pose')} in visiting order", (table,))
+    table = blocks.Table(caption, heads, rows, name="pose-table")
+    return blocks.Details(f"The {counted(len(plan.poses), 'pose')} in visiting order", (table,))
 
 
-def _spreads(plan: PlanResult) -> Block:
+def _spreads(plan: PlanResult) -> blocks.Block:
     search, other = plan.search, plan.comparison
     rows = [(search.name, search.spread)] + ([(other.name, other.spread)] if other else [])
-    return Table(
+    return blocks.Table(
         "How the poses lie in the pool",
         ("Technique", "Covering radius", "To the edge, mean", "To the next pose, mean", "O1"),
         tuple(
@@ -89,13 +84,13 @@ def _alt(plan: PlanResult) -> str:
     )
 
 
-def _notes(plan: PlanResult) -> tuple[Block, ...]:
+def _notes(plan: PlanResult) -> Iterator[blocks.Block]:
     if not plan.findings:
-        return ()
+        return
     # Where the folder lies is no part of a report.
     folder = plan.cell.file.rpartition("/")[0]
     notes = tuple(text.replace(f"{folder}/", "") if folder else text for text in plan.findings)
-    return (Details("Notes of the planner", (Bullets(notes),)),)
+    yield blocks.Details("Notes of the planner", (blocks.Bullets(notes),))
 
 
-POSES = Section("poses", "Surface, pool and poses", 20, _body)
+POSES = blocks.Section("poses", "Surface, pool and poses", 20, _body)

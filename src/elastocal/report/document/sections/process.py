@@ -12,17 +12,7 @@ from elastocal.compensation.process import (
     DeviationStatistics,
     SimulatedProcess,
 )
-from elastocal.report.document.blocks import (
-    Block,
-    Content,
-    Details,
-    Paragraph,
-    Row,
-    Section,
-    Table,
-    flattened,
-    picture,
-)
+from elastocal.report.document import blocks
 from elastocal.report.plots import course_figure, process_maps
 from elastocal.verdict import Evidence
 from elastocal.wording import counted, mm
@@ -56,32 +46,31 @@ _DEVIATIONS = {
 _HEADS = ("", "Mean", "Max", "St. dev.")
 
 
-def _body(evidence: Evidence) -> Content:
-    """Return the section."""
-    if evidence.process is None:
+def _body(evidence: Evidence) -> Iterator[blocks.Block]:
+    record = evidence.process
+    if record is None:
         text = "No process path was run, so the effect of the correction was not verified."
-        return Content((Paragraph(text),))
-    return Content(tuple(_blocks(evidence.process, evidence.limits.tolerance)))
-
-
-def _blocks(record: SimulatedProcess, tolerance: float | None) -> Iterator[Block]:
-    yield Paragraph(
+        yield blocks.Paragraph(text)
+        return
+    yield blocks.Paragraph(
         "Simulated: the simulated robot followed the path under process forces, once as programmed"
         " and once with the online compensator of a calibrated model.", "banner",
     )  # fmt: skip
     yield from _table_1(record)
     seed = record.courses[0].seed
-    yield from _pictures([trace for trace in record.courses if trace.seed == seed], tolerance)
+    yield from _pictures(
+        [trace for trace in record.courses if trace.seed == seed], evidence.limits.tolerance
+    )
     if record.table.budget:
-        yield Details("Error budget", (_budget(record.table.budget),))
-    settings = Table("Settings, SI units", ("Key", "Value"),
-                     tuple(flattened(record.table.settings)), 2)  # fmt: skip
-    yield Details("Settings of the compensator", (settings,))
+        yield blocks.Details("Error budget", (_budget(record.table.budget),))
+    settings = blocks.Table("Settings, SI units", ("Key", "Value"),
+                     tuple(blocks.flattened(record.table.settings)), 2)  # fmt: skip
+    yield blocks.Details("Settings of the compensator", (settings,))
 
 
-def _table_1(record: SimulatedProcess) -> Iterator[Block]:
+def _table_1(record: SimulatedProcess) -> Iterator[blocks.Block]:
     deviation = _DEVIATIONS.get(record.table.process, "Absolute deviation")
-    rows: list[Row] = []
+    rows: list[blocks.Row] = []
     for line in record.table.lines:
         head = f"{deviation}, {line.name} ({line.points} points)"
         rows += [
@@ -96,15 +85,15 @@ def _table_1(record: SimulatedProcess) -> Iterator[Block]:
             ("Paper, with correction in mm", *(f"{value:.3f}" for value in paper.after)),
             ("Paper, reduction", *(f"{share:.2%}" for share in paper.reduction)),
         ]
-    yield Table("In the form of the paper's Table 1", _HEADS, tuple(rows))
+    yield blocks.Table("In the form of the paper's Table 1", _HEADS, tuple(rows))
     if paper is not None:
-        yield Paragraph(
+        yield blocks.Paragraph(
             "The paper's figures are of its real cell; those above them of the simulated one. They"
             " are set side by side for their size, not as a repetition.", "sub",
         )  # fmt: skip
 
 
-def _budget(lines: tuple[DeviationComparison, ...]) -> Block:
+def _budget(lines: tuple[DeviationComparison, ...]) -> blocks.Block:
     rows = tuple(
         (
             line.name,
@@ -118,10 +107,10 @@ def _budget(lines: tuple[DeviationComparison, ...]) -> Block:
         for line in lines
     )
     caption = "Error budget of the first seed, before to after in mm (reduction)"
-    return Table(caption, _HEADS, rows)
+    return blocks.Table(caption, _HEADS, rows)
 
 
-def _pictures(traces: list[CourseDeviation], tolerance: float | None) -> Iterator[Block]:
+def _pictures(traces: list[CourseDeviation], tolerance: float | None) -> Iterator[blocks.Block]:
     worst = max(traces, key=lambda trace: float(np.abs(trace.before).max()))
     before, after = (
         np.concatenate([getattr(t, key) for t in traces]) for key in ("before", "after")
@@ -130,13 +119,13 @@ def _pictures(traces: list[CourseDeviation], tolerance: float | None) -> Iterato
         f"mean {mm(float(np.abs(before).mean()))} without and {mm(float(np.abs(after).mean()))}"
         f" with correction, over {counted(len(traces), 'course')}"
     )
-    yield picture(
+    yield blocks.picture(
         partial(process_maps, traces),
         f"Two maps of the path, coloured by absolute deviation: {text}",
         f"After the paper's Fig. 11e, 11f and 13b, 13c, in the plane that fits the path best:"
         f" {text}.", ".png",
     )  # fmt: skip
-    yield picture(
+    yield blocks.picture(
         partial(course_figure, worst, tolerance),
         f"Deviation over time of course {worst.course}, without and with correction",
         f"After the paper's Fig. 11g: the course with the largest deviation, {worst.course}.",
@@ -151,4 +140,4 @@ def _mm(values: DeviationStatistics) -> tuple[str, ...]:
     return tuple(f"{1e3 * value:.3f}" for value in _three(values))
 
 
-PROCESS = Section("process", "The process path, before and after", 70, _body)
+PROCESS = blocks.Section("process", "The process path, before and after", 70, _body)

@@ -1,4 +1,4 @@
-"""Provenance: versions, hashes, seeds, every setting."""
+"""Where the figures come from, and what the report does not show; neither list is ever empty."""
 
 import platform
 from collections.abc import Iterator
@@ -7,59 +7,44 @@ from pathlib import PurePath
 
 from elastocal import __version__
 from elastocal.records import to_data
-from elastocal.report.document.blocks import (
-    Block,
-    Code,
-    Content,
-    Details,
-    Heading,
-    Paragraph,
-    Row,
-    Section,
-    Stamp,
-    Table,
-    Verbatim,
-    flattened,
-)
+from elastocal.report.document import blocks
 from elastocal.verdict import BYTES, Evidence
+from elastocal.wording import mm
 
 _PACKAGES = ("numpy", "scipy", "pin", "xarray", "matplotlib", "plotly")
 
 
-def _body(evidence: Evidence) -> Content:
-    """Return the section."""
-    return Content(tuple(_blocks(evidence)))
-
-
-def _blocks(evidence: Evidence) -> Iterator[Block]:
-    yield Table("Times", ("What", "When"), tuple(_times(evidence)), texts=2)
-    yield Table("Versions", ("What", "Version"), tuple(_versions(evidence)), texts=2)
-    yield Table("Seeds and fingerprints", ("What", "Value"), tuple(_seeds(evidence)), texts=2)
+def _provenance(evidence: Evidence) -> Iterator[blocks.Block]:
+    yield blocks.Table("Times", ("What", "When"), tuple(_times(evidence)), texts=2)
+    yield blocks.Table("Versions", ("What", "Version"), tuple(_versions(evidence)), texts=2)
+    yield blocks.Table(
+        "Seeds and fingerprints", ("What", "Value"), tuple(_seeds(evidence)), texts=2
+    )
     yield from _files(evidence)
     yield from _settings(evidence)
     if evidence.cell_text is not None:
-        yield Details("The cell file as it stands", (Verbatim(evidence.cell_text),))
+        yield blocks.Details("The cell file as it stands", (blocks.Verbatim(evidence.cell_text),))
     if evidence.cell is not None:
-        values = tuple(sorted(flattened(evidence.cell.file.model_dump(mode="json"))))
-        yield Details(
+        values = tuple(sorted(blocks.flattened(evidence.cell.file.model_dump(mode="json"))))
+        yield blocks.Details(
             "Every setting of the cell, defaults included, in SI units",
-            (Table("Settings of the cell", ("Key", "Value"), values, texts=2),),
+            (blocks.Table("Settings of the cell", ("Key", "Value"), values, texts=2),),
             "long",
         )
 
 
-def _times(evidence: Evidence) -> Iterator[Row]:
+def _times(evidence: Evidence) -> Iterator[blocks.Row]:
     record, times = evidence.run_record, evidence.summary.times if evidence.summary else None
     started = times.started if times else None
     if started is None and record is not None:
         started = record.started
-    yield "Run began", Stamp(started) if started else "not known"
+    yield "Run began", blocks.Stamp(started) if started else "not known"
     if times is not None and times.total is not None:
         yield "Run took", f"{times.total / 60:.1f} min of the cell's clock"
-    yield "Report made", Stamp(evidence.made)
+    yield "Report made", blocks.Stamp(evidence.made)
 
 
-def _versions(evidence: Evidence) -> Iterator[Row]:
+def _versions(evidence: Evidence) -> Iterator[blocks.Row]:
     yield "elastocal, this report", __version__
     if evidence.run_record is not None:
         yield "elastocal, run", evidence.run_record.elastocal
@@ -77,7 +62,7 @@ def _versions(evidence: Evidence) -> Iterator[Row]:
             yield name, "not known"
 
 
-def _seeds(evidence: Evidence) -> Iterator[Row]:
+def _seeds(evidence: Evidence) -> Iterator[blocks.Row]:
     if evidence.run_record is not None:
         yield "Seed of the simulated devices", str(evidence.run_record.seed)
         yield "Fingerprint of the cell", evidence.run_record.cell
@@ -94,27 +79,27 @@ def _seeds(evidence: Evidence) -> Iterator[Row]:
         yield "SHA-256 of the robot's URDF", evidence.calibrated.urdf_sha256
 
 
-def _files(evidence: Evidence) -> Iterator[Block]:
-    rows = tuple((each.name, Code(each.sha256), each.of) for each in evidence.files)
-    yield Heading("Files")
-    yield Table("Files", ("File", "SHA-256", "Of"), rows, texts=3)
-    yield Paragraph(
+def _files(evidence: Evidence) -> Iterator[blocks.Block]:
+    rows = tuple((each.name, blocks.Code(each.sha256), each.of) for each in evidence.files)
+    yield blocks.Heading("Files")
+    yield blocks.Table("Files", ("File", "SHA-256", "Of"), rows, texts=3)
+    yield blocks.Paragraph(
         f"Hashes of {BYTES} are what sha256sum gives. Files that carry the time of the run, or"
         " the folder it was started in, are hashed without those, so that equal runs have equal"
         " hashes. The raw streams are hashed in the journal.", "sub",
     )  # fmt: skip
 
 
-def _settings(evidence: Evidence) -> Iterator[Block]:
+def _settings(evidence: Evidence) -> Iterator[blocks.Block]:
     if evidence.calibrated is None:
         return
     settings = evidence.figures.settings if evidence.figures else None
     if settings is None:
-        yield Paragraph("The model file does not tell the settings of its calibration.")
+        yield blocks.Paragraph("The model file does not tell the settings of its calibration.")
         return
-    rows = tuple((key, _setting(key, value)) for key, value in flattened(to_data(settings)))
-    yield Heading("Settings")
-    yield Table("Settings of the calibration", ("Key", "Value"), rows, texts=2)
+    rows = tuple((key, _setting(key, value)) for key, value in blocks.flattened(to_data(settings)))
+    yield blocks.Heading("Settings")
+    yield blocks.Table("Settings of the calibration", ("Key", "Value"), rows, texts=2)
 
 
 def _setting(key: str, value: str) -> str:
@@ -124,4 +109,54 @@ def _setting(key: str, value: str) -> str:
     return "that of the dataset" if key == "marker" and value == "none" else value
 
 
-PROVENANCE = Section("provenance", "Provenance", 90, _body)
+PROVENANCE = blocks.Section("provenance", "Provenance", 90, _provenance)
+
+
+_ALWAYS = (
+    "Geometric calibration and the sag under the arm's own weight: only deflection under a force"
+    " is modelled, and both must be corrected before it.",
+    "Absolute accuracy: deflections are differences to the unloaded reading at the same pose.",
+    "Temperature: nothing corrects for a warm arm.",
+    "Payloads and tools other than the one of this run.",
+    "Poses outside the region of the pool, and forces beyond those that were applied.",
+    "Dynamic effects: readings were taken while the arm stood still.",
+    "The controller that will apply the correction, and its delay.",
+    "Safety: a calibrated model is not a safety function.",
+)
+
+
+def _not_verified(evidence: Evidence) -> Iterator[blocks.Block]:
+    yield blocks.Paragraph("Whatever the light says, this was not verified:")
+    yield blocks.Bullets(tuple(_always(evidence)))
+    yield blocks.Heading("Missing in this report")
+    missing = tuple(
+        f"{each.name[0].upper()}{each.name[1:]}{' (cannot be used)' if each.damaged else ''}:"
+        f" {each.reason}"
+        for each in evidence.missing
+    )
+    none = blocks.Paragraph("No part of the report is missing.")
+    yield blocks.Bullets(missing, code=True) if missing else none
+    if evidence.doubts:
+        yield blocks.Heading("What does not fit together")
+        yield blocks.Bullets(evidence.doubts)
+
+
+def _always(evidence: Evidence) -> Iterator[str]:
+    if evidence.simulated:
+        yield "A real robot: all devices of this run are simulated."
+    yield from _ALWAYS
+    calibrated = evidence.calibrated
+    if calibrated is not None and calibrated.model.observability.unobservable:
+        yield (
+            "Single springs that no reading tells apart (see Compliances): their numbers are not"
+            " findings."
+        )
+    if evidence.plan is not None:
+        yield (
+            "Places on the surface farther than"
+            f" {mm(evidence.plan.search.covering_radius, 1)} from every pose; that is how far the"
+            " worst covered candidate is from one."
+        )
+
+
+NOT_VERIFIED = blocks.Section("not-verified", "What was not verified", 100, _not_verified)

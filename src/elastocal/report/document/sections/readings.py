@@ -9,18 +9,7 @@ from elastocal.arrays import FloatArray
 from elastocal.dataset import Dataset
 from elastocal.identification import Calibration, CalibrationSummary, Reproduction, UnseenErrors
 from elastocal.procedure.derive import RunSummary
-from elastocal.report.document.blocks import (
-    Block,
-    Bullets,
-    Content,
-    Details,
-    Facts,
-    Heading,
-    Paragraph,
-    Section,
-    Table,
-    picture,
-)
+from elastocal.report.document import blocks
 from elastocal.report.plots import displacement_figure, pose_grid
 from elastocal.verdict import Evidence
 from elastocal.wording import counted, mm
@@ -29,15 +18,10 @@ _PoseValues = dict[tuple[int, str], float]
 """Values in m by pose and load case."""
 
 
-def _body(evidence: Evidence) -> Content:
-    """Return the section."""
-    return Content(tuple(_blocks(evidence)))
-
-
-def _blocks(evidence: Evidence) -> Iterator[Block]:
+def _body(evidence: Evidence) -> Iterator[blocks.Block]:
     dataset, reproduction = evidence.dataset, evidence.reproduction
     if dataset is None:
-        yield Paragraph("The dataset is not known, so no reading is shown.")
+        yield blocks.Paragraph("The dataset is not known, so no reading is shown.")
         yield from _suspicious(evidence)
         return
     yield from _counts(dataset, evidence.summary)
@@ -49,10 +33,10 @@ def _blocks(evidence: Evidence) -> Iterator[Block]:
         yield _worst(reproduction.unseen)
 
 
-def _counts(dataset: Dataset, summary: RunSummary | None) -> Iterator[Block]:
+def _counts(dataset: Dataset, summary: RunSummary | None) -> Iterator[blocks.Block]:
     readings = dataset.readings(dataset.joint_names)
     size = np.linalg.norm(readings.deflection, axis=1)
-    yield Facts(
+    yield blocks.Facts(
         (
             ("Poses", len(dataset.poses)),
             ("Load cases", ", ".join(dataset.load_cases)),
@@ -64,18 +48,18 @@ def _counts(dataset: Dataset, summary: RunSummary | None) -> Iterator[Block]:
     if summary is None:
         return
     counts = tuple(summary.readings.counts.items())
-    yield Table("Readings by status", ("Status", "Readings"), counts)
+    yield blocks.Table("Readings by status", ("Status", "Readings"), counts)
     lost = tuple(
         f"pose {each.pose} {each.load_case}: {each.status}"
         + (f" ({each.note})" if each.note else "")
         for each in summary.readings.not_ok
     )
     if lost:
-        yield Heading("Readings that are not ok")
-        yield Bullets(lost)
+        yield blocks.Heading("Readings that are not ok")
+        yield blocks.Bullets(lost)
 
 
-def _residuals(calibration: Calibration) -> Block:
+def _residuals(calibration: Calibration) -> blocks.Block:
     readings, used = calibration.readings, calibration.used
     commanded = np.linalg.norm(readings.controller_displacement, axis=1)
     residual = np.linalg.norm(calibration.residual, axis=1)
@@ -85,33 +69,33 @@ def _residuals(calibration: Calibration) -> Block:
         f" {mm(float(residual[used].mean()))} on average, {mm(float(residual[used].max()))} at most"
         f" ({counted(int(used.sum()), 'reading')} that were fitted, so not held out)"
     )
-    return picture(
+    return blocks.picture(
         partial(displacement_figure, readings.pose, commanded, residual, used),
         f"Norms of commanded displacements and of residuals of each reading. {text}",
         f"After the paper's Fig. 8g and 12b. {text}.",
     )
 
 
-def _grids(dataset: Dataset, reproduction: Reproduction | None) -> Iterator[Block]:
+def _grids(dataset: Dataset, reproduction: Reproduction | None) -> Iterator[blocks.Block]:
     panels = [("Measured deflection, norm in mm", _grid(dataset, _deflection(dataset)))]
     if reproduction is not None:
         error = _grid(dataset, _errors(reproduction.unseen))
         panels.append(("Error where the pose was left out of the fit, norm in mm", error))
-    yield picture(
+    yield blocks.picture(
         partial(pose_grid, panels, dataset.poses, dataset.load_cases),
         "Shaded table of poses and load cases: " + "; ".join(title for title, _ in panels),
         "Each pose under each load case. Bright is large; the two scales differ.",
     )
     tables = tuple(_number_table(dataset, title, values) for title, values in panels)
-    yield Details("The same numbers as a table", tables)
+    yield blocks.Details("The same numbers as a table", tables)
 
 
-def _number_table(dataset: Dataset, title: str, values: FloatArray) -> Table:
+def _number_table(dataset: Dataset, title: str, values: FloatArray) -> blocks.Table:
     rows = tuple(
         (str(label), *("none" if np.isnan(v) else f"{v:.3f}" for v in row))
         for label, row in zip(dataset.poses, values, strict=True)
     )
-    return Table(title, ("Pose", *dataset.load_cases), rows)
+    return blocks.Table(title, ("Pose", *dataset.load_cases), rows)
 
 
 def _deflection(dataset: Dataset) -> _PoseValues:
@@ -140,13 +124,13 @@ def _grid(dataset: Dataset, values: _PoseValues) -> FloatArray:
     )
 
 
-def _suspicious(evidence: Evidence) -> Iterator[Block]:
+def _suspicious(evidence: Evidence) -> Iterator[blocks.Block]:
     if evidence.calibrated is None:
         return
     figures: CalibrationSummary | None = evidence.figures
     if figures is None or not figures.suspicious:
-        yield Heading("Suspicious readings")
-        yield Paragraph("No reading looks wrong.")
+        yield blocks.Heading("Suspicious readings")
+        yield blocks.Paragraph("No reading looks wrong.")
         return
     rows = tuple(
         (
@@ -159,16 +143,16 @@ def _suspicious(evidence: Evidence) -> Iterator[Block]:
         for each in figures.suspicious
     )
     heads = ("Reading", "Off by", "Robust score", "Leverage", "What was done")
-    yield Table("Readings that look wrong", heads, rows)
+    yield blocks.Table("Readings that look wrong", heads, rows)
 
 
-def _worst(unseen: UnseenErrors) -> Block:
+def _worst(unseen: UnseenErrors) -> blocks.Block:
     """Return where the model errs most."""
     order = np.argsort(-unseen.error, kind="stable")[:5]
     rows = tuple(
         (f"pose {unseen.pose[k]} {unseen.load_case[k]}", mm(float(unseen.error[k]))) for k in order
     )
-    return Table("Largest errors, each at a left-out pose", ("Reading", "Error"), rows)
+    return blocks.Table("Largest errors, each at a left-out pose", ("Reading", "Error"), rows)
 
 
-READINGS = Section("readings", "What was measured", 30, _body)
+READINGS = blocks.Section("readings", "What was measured", 30, _body)

@@ -1,16 +1,89 @@
-"""Folders of a run, and a reader that notes which of their files were used and which could not."""
+"""Folders of a run, the hashes of their files, and a reader that notes which of them were used.
 
+A file that holds no time of day is hashed as it is: ``sha256sum`` gives the same. The others
+carry the time at which the run began, the folder it was started from, or hashes of files that
+do. Of those, the hash is taken of what they say beside that, so that equal runs have equal
+hashes: of their JSON, keys sorted, or of their arrays, without the fields of `_LEFT_OUT`.
+"""
+
+import hashlib
+import json
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
+
+import numpy as np
 
 from elastocal.codec import ARRAYS, VERDICTS
 from elastocal.compensation.process import DEVIATIONS, TABLE
 from elastocal.errors import ElastocalError, FileAccessError
-from elastocal.procedure import JOURNAL, RunFolder
+from elastocal.files import read_text
+from elastocal.procedure import JOURNAL, RunFolder, file_sha256
+from elastocal.records import read_arrays
 from elastocal.verdict.evidence import MissingPart, UsedFile
-from elastocal.verdict.hashes import content_hash
+
+BYTES, CONTENT = "bytes", "content without times and folders"
+_LEFT_OUT = (
+    "provenance", "started", "source", "sha256", "file", "findings", "model", "model_sha256",
+    "tool", "tool_sha256", "plan", "streams_sha256",
+)  # fmt: skip
+"""Keys and attributes that tell when and where, or are hashes of what does."""
+_STAMPED = (".json", ".jsonl", ".nc")
+
+
+def content_hash(path: Path) -> tuple[str, str]:
+    """Return the hash of a file and what it was taken of, `BYTES` or `CONTENT`.
+
+    Raises
+    ------
+    FileAccessError
+        If it cannot be read.
+    """
+    if path.suffix in _STAMPED:
+        try:
+            return _content(path), CONTENT
+        except (ElastocalError, ValueError):
+            # What is damaged has no content to speak of.
+            return file_sha256(path), BYTES
+    return file_sha256(path), BYTES
+
+
+def _content(path: Path) -> str:
+    if path.suffix == ".nc":
+        return _arrays(path)
+    text = read_text(path)
+    documents = text.splitlines() if path.suffix == ".jsonl" else [text]
+    digest = hashlib.sha256()
+    for document in documents:
+        kept = json.dumps(_kept(json.loads(document)), sort_keys=True, separators=(",", ":"))
+        digest.update(kept.encode("utf-8") + b"\n")
+    return digest.hexdigest()
+
+
+def _kept(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {key: _kept(each) for key, each in value.items() if not _left_out(key, each)}
+    return [_kept(each) for each in value] if isinstance(value, list) else value
+
+
+def _left_out(key: str, value: Any) -> bool:
+    # A section of that name, such as the tool in the summary of a run, says more than where.
+    return key in _LEFT_OUT and not isinstance(value, dict)
+
+
+def _arrays(path: Path) -> str:
+    data = read_arrays(path)
+    digest = hashlib.sha256()
+    for name in sorted(data.variables):
+        values = np.ascontiguousarray(data[name].values)
+        shape = f"{name} {data[name].dims} {values.shape}"
+        listed = json.dumps(values.tolist()) if values.dtype.kind in "OU" else ""
+        digest.update(shape.encode() + (listed.encode() if listed else values.tobytes()))
+    attributes = {k: str(v) for k, v in data.attributes.items() if k not in _LEFT_OUT}
+    digest.update(json.dumps(attributes, sort_keys=True).encode())
+    return digest.hexdigest()
+
 
 MODEL, TOOL, CODEC, PROCESS = "model.json", "tool.json", "codec", "process"
 """Default names of what is not part of the run's own folder."""
@@ -51,14 +124,16 @@ class PartReader:
     files: list[UsedFile] = field(default_factory=list)
     missing: list[MissingPart] = field(default_factory=list)
 
-    def read(self, name: str, path: Path, read: Callable[[], Part], named: bool) -> Part | None:
+    def read(
+        self, name: str, path: Path, read: Callable[[], Part], named: bool = False
+    ) -> Part | None:
         """Return a part, or None and a note of why there is none."""
         try:
             part = read()
         except ElastocalError as error:
             if named:
                 raise
-            self.missing.append(MissingPart(name, self._without_folders(error), damaged=True))
+            self.note_missing(name, self._without_folders(error), damaged=True)
             return None
         self.use(path)
         return part
@@ -69,9 +144,13 @@ class PartReader:
         """Return a part that may be named or lie under a default name."""
         path = given or self.folders.default(default)
         if path is None:
-            self.missing.append(MissingPart(name, f"there is no {default}; {hint}"))
+            self.note_missing(name, f"there is no {default}; {hint}")
             return None
         return self.read(name, path, lambda: read(path), named=given is not None)
+
+    def note_missing(self, name: str, reason: str, damaged: bool = False) -> None:
+        """Note that the report does without a part."""
+        self.missing.append(MissingPart(name, reason, damaged))
 
     def use(self, path: Path) -> None:
         """Note the hash of a file, or of every file in a folder that belongs to a part."""
