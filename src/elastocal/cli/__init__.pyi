@@ -6,12 +6,16 @@ from .options import (
     Figures as Figures,
     KeyFigures as KeyFigures,
     Marker as Marker,
+    NewTool as NewTool,
+    NewToolOrFile as NewToolOrFile,
     RobotName as RobotName,
     TcpLink as TcpLink,
+    ToolCentre as ToolCentre,
     ToolFrame as ToolFrame,
+    ToolMass as ToolMass,
     Written as Written,
     parse_direction as parse_direction,
     parse_limit as parse_limit,
-    parse_point as parse_point,
+    split_tools as split_tools,
 )
 from .output import console as console, print_json as print_json, progress_bars as progress_bars

@@ -21,6 +21,27 @@ TcpLink = Annotated[
 ToolFrame = Annotated[
     str | None, typer.Option(help="Tcp behind that link: 'x, y, z, a, b, c' with units (Z-Y'-X'').")
 ]
+NewTool = Annotated[
+    str | None,
+    typer.Option(
+        "--tool",
+        help="Another tool: its tcp in the calibrated tcp's frame, 'x, y, z, a, b, c' with units.",
+    ),
+]
+NewToolOrFile = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--tool",
+        help="Tool file from `elastocal tool` (weight, bias, sensor); and, given again, another"
+        " tool: its tcp in the calibrated tcp's frame, 'x, y, z, a, b, c' with units.",
+    ),
+]
+ToolMass = Annotated[
+    str | None, typer.Option(help="Mass of that tool, '12 kg'; needs --tool-centre.")
+]
+ToolCentre = Annotated[
+    str | None, typer.Option(help="Its centre in the new tcp's frame: 'x, y, z' with units.")
+]
 Marker = Annotated[
     str | None,
     typer.Option(help="Marker in the tcp frame: 'x, y, z' with units; default: the dataset's."),
@@ -34,24 +55,6 @@ KeyFigures = Annotated[
     bool, typer.Option("--json", help="Print the key figures as one JSON object.")
 ]
 Written = Annotated[bool, typer.Option("--json", help="Print what was written as one JSON object.")]
-
-
-def parse_point(text: str) -> tuple[float, float, float]:
-    """Return a point in m from three lengths with units.
-
-    >>> parse_point("0 mm, 0 mm, 35 mm")
-    (0.0, 0.0, 0.035)
-
-    Raises
-    ------
-    UnitError
-        If the text is not three lengths.
-    """
-    parts = text.split(",")
-    if len(parts) != 3:
-        raise UnitError(f"{text!r} must be three lengths, e.g. '0 mm, 0 mm, 35 mm'")
-    x, y, z = (parse_quantity(part.strip(), "length") for part in parts)
-    return x, y, z
 
 
 def parse_limit(text: str, option: str = "--limit") -> float:
@@ -92,3 +95,21 @@ def parse_direction(text: str) -> tuple[float, float, float]:
             f"direction {text!r} must be three numbers, e.g. '0, 0, -1'"
         ) from error
     return x, y, z
+
+
+def split_tools(given: list[str] | None) -> tuple[tuple[Path, ...], str | None]:
+    """Return the tool files, and the frame of another tool, among the values of ``--tool``.
+
+    >>> split_tools(["tool.json", "0 mm, 0 mm, 100 mm, 0 deg, 0 deg, 0 deg"])[1]
+    '0 mm, 0 mm, 100 mm, 0 deg, 0 deg, 0 deg'
+
+    Raises
+    ------
+    CompensationError
+        If there are several frames.
+    """
+    frames = [text for text in given or () if "," in text and not Path(text).exists()]
+    if len(frames) > 1:
+        raise CompensationError(f"--tool names {len(frames)} tcps: a model is for one tool")
+    files = tuple(Path(text) for text in given or () if text not in frames)
+    return files, frames[0] if frames else None

@@ -6,6 +6,7 @@ from .layouts import (
     SpringFile as SpringFile,
     actuated as actuated,
     bearing as bearing,
+    bearing_ends as bearing_ends,
     bearing_joint as bearing_joint,
     custom as custom,
     layout as layout,

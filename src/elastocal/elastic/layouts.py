@@ -31,6 +31,8 @@ AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 """Axes of a joint's frame by the words that spring files have for them."""
 _ALIGNED = 1.0 - 1e-9
 """Cosine above which a joint axis counts as a coordinate axis."""
+_APART = 1e-3
+"""Distance in m from which two places on an axis are two."""
 _HINGE = "hinge"
 _MOTIONS = ("revolute", "prismatic")
 """What a hinge may do; other kinds of springs are asked for by their word."""
@@ -53,6 +55,27 @@ def bearing(robot: Robot) -> tuple[Spring, ...]:
         for joint, origin in zip(robot.chain.joints, joint_origins(robot.chain), strict=True)
         for name, axis in origin.directions.items()
     )
+    return (*actuated(robot), *virtual)
+
+
+def bearing_ends(robot: Robot) -> tuple[Spring, ...]:
+    """Return the bearing layout with springs at both ends of each joint's own axis.
+
+    A joint tilts in bearings that sit somewhere along its axis, and links bend between joints. A
+    tilt at the Hartenberg-Denavit origin, where the common normal with the axis before meets it,
+    and one at the end where that with the axis behind does, share out what lies between. Where
+    both ends are one place there is one pair of springs.
+    """
+    virtual: list[Spring] = []
+    for joint, origin in zip(robot.chain.joints, joint_origins(robot.chain), strict=True):
+        places = {"": origin.offset}
+        if np.linalg.norm(np.subtract(origin.far, origin.offset)) > _APART:
+            places["far-"] = origin.far
+        virtual += [
+            Hinge(f"{joint.name}.{end}{name}", joint.name, axis, offset=place)
+            for end, place in places.items()
+            for name, axis in origin.directions.items()
+        ]
     return (*actuated(robot), *virtual)
 
 
@@ -120,6 +143,7 @@ LAYOUTS: dict[str, Callable[[Robot], tuple[Spring, ...]]] = {
     "actuated": actuated,
     "bearing": bearing,
     "bearing-joint": bearing_joint,
+    "bearing-ends": bearing_ends,
     "tensor": tensor,
 }
 """Layouts by name."""

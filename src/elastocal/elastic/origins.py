@@ -15,6 +15,7 @@ turning it about it, moves nothing. Special cases:
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import accumulate
 
 import numpy as np
 
@@ -40,6 +41,9 @@ class JointOrigin:
 
     offset: Triple
     """The origin in the joint's proximal frame, in m."""
+    far: Triple
+    """Where the common normal with the next axis, or for the last joint the one through the tip,
+    meets the axis, likewise; the origin again where axes are parallel."""
     directions: dict[str, Triple]
     """Unit vectors orthogonal to the joint axis by name: the common normal, and the direction
     orthogonal to it. Named after the frame's coordinate axes where they are those, else
@@ -52,15 +56,21 @@ def joint_origins(chain: SerialChain) -> tuple[JointOrigin, ...]:
 
 
 def _origins(chain: SerialChain) -> Iterator[JointOrigin]:
-    T_base_joint = np.eye(4)
+    frames = list(accumulate((joint.placement for joint in chain.joints), np.matmul))
+    axes = [T[:3, :3] @ joint.axis for T, joint in zip(frames, chain.joints, strict=True)]
+    tip = (frames[-1] @ chain.T_last_tip)[:3, 3]
     before: tuple[FloatArray, FloatArray] | None = None
-    for joint in chain.joints:
-        T_base_joint = T_base_joint @ joint.placement
+    for k, (joint, T_base_joint, axis) in enumerate(zip(chain.joints, frames, axes, strict=True)):
         R, drawn = T_base_joint[:3, :3], T_base_joint[:3, 3]
-        axis = R @ joint.axis
         origin, normal = _meeting(axis, drawn, before)
+        far = _foot(tip, axis, drawn)
+        if k + 1 < len(axes):
+            crossing = float(np.linalg.norm(np.cross(axis, axes[k + 1]))) > PARALLEL
+            following = axes[k + 1], frames[k + 1][:3, 3]
+            far = _meeting(axis, drawn, following)[0] if crossing else origin
         yield JointOrigin(
             _triple(R.T @ (origin - drawn)),
+            _triple(R.T @ (far - drawn)),
             _named(R.T @ normal, R.T @ np.cross(axis, normal)),
         )
         if joint.revolute:

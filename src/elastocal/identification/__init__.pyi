@@ -20,6 +20,25 @@ from .displacement import (
     friction_states as friction_states,
     reference_joints as reference_joints,
 )
+from .domain import (
+    REACH as REACH,
+    CalibrationDomain as CalibrationDomain,
+    OutsideRows as OutsideRows,
+    OutsideSummary as OutsideSummary,
+)
+from .figures import (
+    CalibrationSummary as CalibrationSummary,
+    ComparisonSummary as ComparisonSummary,
+    DeflectionSummary as DeflectionSummary,
+    DifferenceSummary as DifferenceSummary,
+    HeldOutSummary as HeldOutSummary,
+    ResidualSummary as ResidualSummary,
+    RungSummary as RungSummary,
+    SpringSummary as SpringSummary,
+    SuspiciousReading as SuspiciousReading,
+    spring_summaries as spring_summaries,
+    summary as summary,
+)
 from .ladder import (
     AUTO as AUTO,
     RUNGS as RUNGS,
@@ -33,28 +52,20 @@ from .ladder import (
 )
 from .model_file import (
     CalibrateResult as CalibrateResult,
-    CalibrationSummary as CalibrationSummary,
-    ComparisonSummary as ComparisonSummary,
-    DeflectionSummary as DeflectionSummary,
-    DifferenceSummary as DifferenceSummary,
-    HeldOutSummary as HeldOutSummary,
-    ResidualSummary as ResidualSummary,
     RobotRecord as RobotRecord,
-    RungSummary as RungSummary,
-    SpringSummary as SpringSummary,
-    SuspiciousReading as SuspiciousReading,
     read_model as read_model,
-    spring_summaries as spring_summaries,
-    summary as summary,
     write_model as write_model,
 )
 from .observability import (
+    FaintParameter as FaintParameter,
     Observability as Observability,
     Term as Term,
     attainable_rank as attainable_rank,
     describe as describe,
+    find_faint as find_faint,
     observability as observability,
     sparse_basis as sparse_basis,
+    unseen_groups as unseen_groups,
 )
 from .options import (
     LOSSES as LOSSES,
@@ -105,13 +116,19 @@ from .suspicious import (
     leverage as leverage,
     screen as screen,
 )
+from .tool_change import ToolChange as ToolChange, change_tool as change_tool
 from .uncertainty import (
     CONFIDENCE as CONFIDENCE,
     MOST_FOLDS as MOST_FOLDS,
+    MOST_UNEXPLAINED as MOST_UNEXPLAINED,
+    Coverage as Coverage,
     HeldOut as HeldOut,
+    IntervalCoverage as IntervalCoverage,
     bootstrap as bootstrap,
+    distrust_factor as distrust_factor,
     interval as interval,
     leave_poses_out as leave_poses_out,
+    measured_coverage as measured_coverage,
     widen_draws as widen_draws,
     widening_factor as widening_factor,
 )

@@ -4,7 +4,7 @@ The calibrated model is what the compensation and every prediction work with.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.random import Generator
@@ -15,17 +15,28 @@ from elastocal.dataset import Readings
 from elastocal.elastic import ElasticModel, check_vectors
 from elastocal.errors import ConventionError, IdentificationError, SpringError
 from elastocal.identification.conventions import POOR, check_conventions, check_joints
+from elastocal.identification.domain import CalibrationDomain
 from elastocal.identification.ladder import Climbed
-from elastocal.identification.observability import Observability, attainable_rank, observability
+from elastocal.identification.observability import (
+    Observability,
+    attainable_rank,
+    find_faint,
+    observability,
+)
 from elastocal.identification.options import FitOptions
 from elastocal.identification.problem import Problem, build, same_configuration
 from elastocal.identification.solve import PoseGrams, Solution, factor, solve
 from elastocal.identification.suspicious import Screening, force_offset, screen
+from elastocal.identification.tool_change import ToolChange, change_tool
 from elastocal.identification.uncertainty import (
+    MOST_UNEXPLAINED,
+    Coverage,
     HeldOut,
     bootstrap,
+    distrust_factor,
     interval,
     leave_poses_out,
+    measured_coverage,
     widen_draws,
     widening_factor,
 )
@@ -71,6 +82,12 @@ class CalibratedModel:
     misfit: float = float("nan")
     """Share of a predicted deflection that 95 % of the errors along an axis stayed below at
     left-out poses; NaN: not known. See `HeldOut.misfit`."""
+    tool: ToolChange | None = None
+    """The tool that the model is for; none: the one that it was calibrated with."""
+    domain: CalibrationDomain | None = None
+    """Poses and loads of the calibration; none: not known, as in files of elastocal 0.1.0."""
+    unexplained: float = float("nan")
+    """Mean error at left-out poses over the mean deflection; NaN: not known."""
 
     def __post_init__(self) -> None:
         for name in ("compliance", "draws"):
@@ -87,6 +104,41 @@ class CalibratedModel:
             out=np.full_like(self.compliance, np.inf),
             where=self.compliance != 0,
         )
+
+    @property
+    def tool_name(self) -> str:
+        """The tool that the model is for, in words."""
+        if self.tool is None:
+            return f"{self.model.robot.tip}, as calibrated"
+        return self.tool.sentence
+
+    def with_tool(
+        self,
+        T_tcp_tool: ArrayLike,
+        mass: float | None = None,
+        centre: Sequence[float] | None = None,
+    ) -> "CalibratedModel":
+        """Return the model of the same springs at another tool's tcp.
+
+        Compliances, draws and observability are the arm's. Predictions are of the new tcp, under
+        forces and moments at it; a mass changes sag and the preload of gears, nothing else.
+
+        Parameters
+        ----------
+        T_tcp_tool : array_like, shape (4, 4)
+            New tcp in this model's tcp frame.
+        mass : float, optional
+            Mass of the new tool in kg, in place of what the tcp's link has; the same by default.
+        centre : array_like, shape (3,), optional
+            Centre of that mass in the new tcp's frame, in m.
+
+        Raises
+        ------
+        RobotError
+            If the transform is not rigid, or mass and centre do not come together.
+        """
+        model, tool = change_tool(self.model, self.tool, T_tcp_tool, mass, centre)
+        return replace(self, model=model, tool=tool)
 
     def interval(self) -> tuple[FloatArray, FloatArray]:
         """Return the 95 % intervals of the compliances, two arrays of shape (spring,)."""
@@ -167,6 +219,8 @@ class Calibration:
     """Errors at left-out poses of the readings that entered the fit."""
     ladder: tuple[Climbed, ...]
     """Simpler and richer models at the same left-out poses; empty where none were tried."""
+    coverage: Coverage
+    """Measured coverage of the intervals of a prediction."""
     widening: float
     """Factor by which the bootstrap draws were stretched; see `widening_factor`."""
     screening: Screening
@@ -234,19 +288,26 @@ def calibrate(
     held_out = leave_poses_out(weighted)
     draws = bootstrap(PoseGrams.of(weighted), options.draws, rng)
     by = widening_factor(weighted, solution.compliance, draws, held_out.compliance)
+    unexplained = held_out.mean / float(np.linalg.norm(kept.d, axis=1).mean())
+    if unexplained > MOST_UNEXPLAINED:
+        by = max(by, distrust_factor(weighted, solution.compliance, draws, held_out))
+    widened = widen_draws(weighted, solution.compliance, draws, by)
+    # A prior makes nothing observable: what was believed before is not measured.
+    seen = observability(factor(weighted.without_prior()), model.springs)
     calibrated = CalibratedModel(
         model,
         solution.compliance,
-        widen_draws(weighted, solution.compliance, draws, by),
-        # A prior makes nothing observable: what was believed before is not measured.
-        observability(factor(weighted.without_prior()), model.springs),
+        widened,
+        find_faint(seen, weighted, solution.compliance, model.parameters),
         provenance,
         held_out.misfit,
+        unexplained=unexplained,
+        domain=CalibrationDomain.of(model.robot, readings.take(used), kept.block),
     )
     offset = force_offset(model, readings.take(used), weighted, solution.compliance, marker_offset)
     reach = max(attainable_rank(model, marker_offset), calibrated.observability.rank)
     doubts += [offset.message()] if offset else []
-    doubts += _worth(calibrated, reach, held_out, weighted)
+    doubts += _worth(calibrated, reach, weighted)
     return Calibration(
         calibrated=calibrated,
         readings=readings,
@@ -256,6 +317,7 @@ def calibrate(
         attainable_rank=reach,
         held_out=held_out,
         ladder=tuple(ladder),
+        coverage=measured_coverage(weighted, held_out, widened - solution.compliance),
         widening=by,
         screening=screening,
         solution=solution,
@@ -286,9 +348,7 @@ def _doubts(
     return doubts
 
 
-def _worth(
-    calibrated: CalibratedModel, reach: int, held_out: HeldOut, problem: Problem
-) -> list[str]:
+def _worth(calibrated: CalibratedModel, reach: int, problem: Problem) -> list[str]:
     """Return what limits the use of a fit, or refuse one that the data had no part in."""
     c = calibrated.compliance
     if np.all((c == problem.lower) | (c == problem.upper)):
@@ -302,7 +362,11 @@ def _worth(
             f"poses and load cases determine {calibrated.observability.rank} of the {reach}"
             " directions that more of them would: predictions elsewhere are not covered"
         )
-    deflection = float(np.linalg.norm(problem.d, axis=1).mean())
-    if held_out.mean >= deflection:
-        doubts.append("at left-out poses the model predicts no better than none at all")
+    left = calibrated.unexplained
+    if left > MOST_UNEXPLAINED:
+        none = "; it predicts no better than none at all" if left >= 1.0 else ""
+        doubts.append(
+            f"at left-out poses the model leaves {left:.0%} of the deflection unexplained, more"
+            f" than half: it is not fit for use, and is not exported{none}"
+        )
     return doubts

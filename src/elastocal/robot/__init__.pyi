@@ -5,7 +5,12 @@ from .chain import (
     SerialChain as SerialChain,
     build_model as build_model,
 )
-from .mounting import Rail as Rail, on_rail as on_rail, with_tool as with_tool
+from .mounting import (
+    Rail as Rail,
+    on_rail as on_rail,
+    with_tool as with_tool,
+    without_tool_mass as without_tool_mass,
+)
 from .robot import (
     GRAVITY as GRAVITY,
     Jacobian as Jacobian,

@@ -56,10 +56,17 @@ class Rail:
             object.__setattr__(self, name, value)
 
 
-def with_tool(urdf: str, parent: str, tool: str, T_parent_tool: ArrayLike) -> str:
+def with_tool(
+    urdf: str,
+    parent: str,
+    tool: str,
+    T_parent_tool: ArrayLike,
+    mass: float = 0.0,
+    centre: ArrayLike = (0.0, 0.0, 0.0),
+) -> str:
     """Return a URDF with a link ``tool`` fixed behind ``parent``.
 
-    The tool has no mass and no shape; comments and everything else of the URDF stay.
+    The tool has no shape; comments and everything else of the URDF stay.
 
     Parameters
     ----------
@@ -71,12 +78,16 @@ def with_tool(urdf: str, parent: str, tool: str, T_parent_tool: ArrayLike) -> st
         Name of the new link, e.g. ``"tcp"``; its joint is ``<tool>_joint``.
     T_parent_tool : array_like, shape (4, 4)
         Tool frame in the parent's, its z axis out of the tool; translation in m.
+    mass : float
+        Mass of the tool in kg.
+    centre : array_like, shape (3,)
+        Centre of that mass in the tool frame, in m.
 
     Raises
     ------
     RobotError
-        If the URDF cannot be read, the parent is missing, a name is taken, or the transform is
-        not rigid.
+        If the URDF cannot be read, the parent is missing, a name is taken, the transform is not
+        rigid, or the mass is none.
     """
     root = _parse(urdf)
     links = _names(root, "link")
@@ -88,8 +99,40 @@ def with_tool(urdf: str, parent: str, tool: str, T_parent_tool: ArrayLike) -> st
     _refuse_taken(root, "link", tool)
     _refuse_taken(root, "joint", f"{tool}_joint")
     T = _transform(T_parent_tool, f"tool {tool!r}")
-    ElementTree.SubElement(root, "link", name=tool)
+    link = ElementTree.SubElement(root, "link", name=tool)
+    if mass != 0.0:
+        link.append(_point_mass(f"tool {tool!r}", mass, centre))
     root.append(_joint(f"{tool}_joint", "fixed", (parent, tool), T))
+    return _write(root)
+
+
+def without_tool_mass(urdf: str, tool: str) -> str:
+    """Return a URDF whose link ``tool`` has no mass, if it is fixed to the link before it.
+
+    A link behind a joint that moves is part of the arm, and keeps what it has.
+
+    Parameters
+    ----------
+    urdf : str
+        The robot.
+    tool : str
+        The link.
+
+    Raises
+    ------
+    RobotError
+        If the URDF cannot be read.
+    """
+    root = _parse(urdf)
+    fixed = {
+        child.get("link")
+        for joint in root.iterfind("joint[@type='fixed']")
+        if (child := joint.find("child")) is not None
+    }
+    for link in root.iterfind("link"):
+        inertial = link.find("inertial")
+        if inertial is not None and link.get("name") == tool and tool in fixed:
+            link.remove(inertial)
     return _write(root)
 
 
@@ -169,6 +212,22 @@ def _transform(T: ArrayLike, what: str) -> FloatArray:
             f" (allowed: {_RIGID:g})"
         )
     return T
+
+
+def _point_mass(what: str, mass: float, centre: ArrayLike) -> ElementTree.Element:
+    """Return the element of a mass without inertia, of which statics needs none."""
+    point = np.asarray(centre, dtype=float)
+    if not 0.0 < mass < math.inf or point.shape != (3,) or not np.all(np.isfinite(point)):
+        raise RobotError(
+            f"mass of {what} is {mass} kg at {centre!r} m: it must be above 0, at three finite"
+            " coordinates"
+        )
+    inertial = ElementTree.Element("inertial")
+    ElementTree.SubElement(inertial, "origin", xyz=_text(point), rpy="0 0 0")
+    ElementTree.SubElement(inertial, "mass", value=repr(float(mass)))
+    moments = dict.fromkeys(("ixx", "ixy", "ixz", "iyy", "iyz", "izz"), "0")
+    ElementTree.SubElement(inertial, "inertia", moments)
+    return inertial
 
 
 def _joint(

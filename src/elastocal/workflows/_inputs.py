@@ -4,6 +4,7 @@ Also that a model fits the cell, how far it carries, and that no output takes an
 """
 
 from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -12,15 +13,25 @@ from elastocal.arrays import FloatArray
 from elastocal.dataset import Dataset
 from elastocal.errors import ElastocalError, FileAccessError, RobotError, UnitError
 from elastocal.files import read_text
-from elastocal.identification import CalibratedModel, attainable_rank
+from elastocal.identification import (
+    CalibratedModel,
+    attainable_rank,
+    describe,
+    read_model,
+    unseen_groups,
+)
 from elastocal.robot import Robot, T_from_xyzabc, catalogue, leaf_links, parse_urdf, with_tool
-from elastocal.units import parse_quantity
+from elastocal.units import parse_point, parse_quantity
 
 _TOOL_LINK = "tcp"
 """Name of the link that a tool given by numbers gets."""
 _NOT_COVERED = (
     "the calibration saw fewer combinations of springs than a force can load: predictions away from"
     " its poses are not covered by the intervals"
+)
+_TOOL_LOADS = (
+    "forces at this tool load what the calibration did not see: {names}; its share is missing from"
+    " predictions and their intervals"
 )
 _SAMPLES = 5
 """Joint positions at which two robots are compared."""
@@ -42,7 +53,7 @@ def find_robot(
     tool : str or None
         Pose of the tcp behind that link, ``"x, y, z, a, b, c"`` with units (KUKA Z-Y'-X'').
     dataset : Dataset, optional
-        A dataset that may name both.
+        A dataset that may name both, and say where gravity points if the base is not upright.
 
     Raises
     ------
@@ -60,7 +71,10 @@ def find_robot(
     if tool is not None:
         urdf = with_tool(urdf, tcp, _TOOL_LINK, parse_frame(tool, "tool", error=RobotError))
         tcp = _TOOL_LINK
-    return Robot.from_urdf(urdf, tcp)
+    arm = Robot.from_urdf(urdf, tcp)
+    if dataset is None or dataset.gravity is None:
+        return arm
+    return replace(arm, gravity=dataset.gravity)
 
 
 def require_same_robot(model: Robot, cell: Robot, names: tuple[str, str]) -> None:
@@ -94,8 +108,46 @@ def require_same_robot(model: Robot, cell: Robot, names: tuple[str, str]) -> Non
         )
 
 
+@dataclass(frozen=True, kw_only=True)
+class NewTool:
+    """Settings of every command that may work at another tool than the one calibrated with."""
+
+    tool_frame: str | None = None
+    """New tcp in the calibrated tcp's frame, ``"x, y, z, a, b, c"`` with units (Z-Y'-X''); none:
+    the calibrated tool."""
+    tool_mass: str | None = None
+    """Mass of the new tool with its unit; none: that of the calibrated one. It changes sag and
+    the preload of gears."""
+    tool_centre: str | None = None
+    """Centre of that mass in the new tcp's frame, ``"x, y, z"`` with units."""
+
+    def read_model(self, path: Path) -> CalibratedModel:
+        """Return the calibrated model of a file, at the tool that is meant.
+
+        Raises
+        ------
+        RobotError, UnitError
+            If the new tool is not understood.
+        SchemaError, FileAccessError
+            If the file is not a model, or cannot be read.
+        """
+        calibrated = read_model(path)
+        if self.tool_frame is None:
+            if self.tool_mass is not None or self.tool_centre is not None:
+                raise RobotError("a tool's mass needs its tcp: give --tool 'x, y, z, a, b, c'")
+            return calibrated
+        T_tcp_tool = parse_frame(self.tool_frame, "tool", error=RobotError)
+        mass = None if self.tool_mass is None else parse_quantity(self.tool_mass, "mass")
+        centre = None if self.tool_centre is None else parse_point(self.tool_centre)
+        return calibrated.with_tool(T_tcp_tool, mass, centre)
+
+
 def coverage_notes(calibrated: CalibratedModel) -> tuple[str, ...]:
     """Return a warning unless every combination that forces can load was determined."""
+    if calibrated.tool is not None:
+        unseen = unseen_groups(calibrated.model, calibrated.observability)
+        names = ", ".join(map(describe, unseen))
+        return (_TOOL_LOADS.format(names=names),) if unseen else ()
     covered = calibrated.observability.rank >= attainable_rank(calibrated.model)
     return () if covered else (_NOT_COVERED,)
 

@@ -13,12 +13,13 @@ from elastocal.compensation.offline import (
 )
 from elastocal.compensation.programs import PROGRAM_READERS, compensate_program
 from elastocal.errors import FileAccessError
-from elastocal.identification import read_model
+from elastocal.identification import OutsideSummary
 from elastocal.progress import Progress
 from elastocal.records import record
 from elastocal.results import Result
 from elastocal.robot import Robot
 from elastocal.workflows._inputs import (
+    NewTool,
     coverage_notes,
     parse_frame,
     parse_posture,
@@ -29,7 +30,7 @@ from elastocal.workflows._workflow import workflow
 
 
 @dataclass(frozen=True)
-class CompensateSettings:
+class CompensateSettings(NewTool):
     """Which model corrects which path."""
 
     model: str | PathLike[str]
@@ -52,8 +53,12 @@ class CompensateSettings:
 class CompensateResult(Result, CorrectionFigures):
     """The figures of a correction, predicted by the model."""
 
+    tool: str
+    """The tool that the correction is for, in words."""
     notes: tuple[str, ...]
     """Sentences that a person must know."""
+    outside: OutsideSummary | None = None
+    """Rows beyond what was calibrated; none where the model does not know where that was."""
 
     def facts(self) -> tuple[tuple[str, str], ...]:
         """Return what a person wants to know first."""
@@ -65,6 +70,7 @@ class CompensateResult(Result, CorrectionFigures):
         }
         first = f", first at {self.first_jump}" if self.posture_jumps else ""
         return (
+            ("tool", self.tool),
             ("rows", str(self.rows)),
             *(
                 (label, f"{1e3 * each.mean:.3g} mm mean, {1e3 * each.max:.3g} mm max at {each.at}")
@@ -103,7 +109,7 @@ def compensate(settings: CompensateSettings, progress: Progress) -> CompensateRe
         raise FileAccessError(f"--out {settings.out} must end in {path.suffix} like {path}")
     if not is_program and (forces or settings.base):
         raise FileAccessError(f"--forces and --base are for KUKA programs (.src), not for {path}")
-    calibrated = read_model(Path(settings.model))
+    calibrated = settings.read_model(Path(settings.model))
     robot = calibrated.model.robot
     how = CorrectionSettings(parse_posture(robot, settings.start), settings.largest)
     if is_program:
@@ -118,7 +124,9 @@ def compensate(settings: CompensateSettings, progress: Progress) -> CompensateRe
     figures = summary.figures()
     return CompensateResult(
         **{each.name: getattr(figures, each.name) for each in fields(figures)},
-        notes=(*coverage_notes(calibrated), *notes, *_force_notes(summary)),
+        tool=calibrated.tool_name,
+        notes=(*coverage_notes(calibrated), *notes, *_force_notes(summary), *_outside(summary)),
+        outside=summary.outside,
     )
 
 
@@ -137,6 +145,11 @@ def _path_notes(summary: CorrectionSummary, robot: Robot, start: str | None) -> 
             " posture deflects otherwise, give --start if it is another"
         )
     return tuple(notes)
+
+
+def _outside(summary: CorrectionSummary) -> tuple[str, ...]:
+    text = "" if summary.outside is None else summary.outside.sentence()
+    return (text,) if text else ()
 
 
 def _force_notes(summary: CorrectionSummary) -> tuple[str, ...]:

@@ -11,15 +11,16 @@ from elastocal.compensation.conditioning import read_sensor_load
 from elastocal.compensation.export import write_c
 from elastocal.compensation.online import design
 from elastocal.errors import CompensationError
-from elastocal.identification import read_model
+from elastocal.identification import MOST_UNEXPLAINED
 from elastocal.progress import Progress
 from elastocal.records import record
 from elastocal.results import Result
+from elastocal.workflows._inputs import NewTool, coverage_notes
 from elastocal.workflows._workflow import workflow
 
 
 @dataclass(frozen=True)
-class ExportSettings:
+class ExportSettings(NewTool):
     """Which model is written, and how it corrects."""
 
     model: str | PathLike[str]
@@ -48,12 +49,17 @@ class ExportResult(Result):
     filter_delay: float
     """Delay of a slow wrench, in s."""
     limits: CorrectionLimits
+    tool: str
+    """The tool that the model is for, in words."""
+    notes: tuple[str, ...]
+    """Sentences that a person must know."""
 
     def facts(self) -> tuple[tuple[str, str], ...]:
         """Return what a person wants to know first."""
         limits = self.limits
         return (
             ("robot", f"{self.robot}: {self.joints} joints, {self.springs} springs"),
+            ("tool", self.tool),
             ("folder", self.folder),
             ("files", ", ".join(self.files)),
             ("cycle", f"{1e3 * self.cycle:g} ms"),
@@ -81,7 +87,12 @@ def export(settings: ExportSettings, progress: Progress) -> ExportResult:  # noq
         If a file cannot be read or written, or the folder holds files and ``force`` is not given.
     """
     model = Path(settings.model)
-    calibrated = read_model(model)
+    calibrated = settings.read_model(model)
+    if calibrated.unexplained > MOST_UNEXPLAINED:
+        raise CompensationError(
+            f"{model} leaves {calibrated.unexplained:.0%} of the deflection unexplained at left-out"
+            f" poses, at most {MOST_UNEXPLAINED:.0%} is allowed: it is no model of this arm"
+        )
     chosen = None if settings.settings is None else read_settings(settings.settings)
     load = read_sensor_load(settings.tool, calibrated.model.robot)
     try:
@@ -98,4 +109,6 @@ def export(settings: ExportSettings, progress: Progress) -> ExportResult:  # noq
         cycle=numbers.settings.cycle,
         filter_delay=float(np.asarray(numbers.filters.delay())),
         limits=numbers.settings.limits,
+        tool=calibrated.tool_name,
+        notes=coverage_notes(calibrated) if calibrated.tool is not None else (),
     )

@@ -8,16 +8,16 @@ import numpy as np
 
 from elastocal.arrays import FloatArray
 from elastocal.dataset import joint_dimensions, read_load_rows, write_load_rows
-from elastocal.identification import DeflectionSummary, Prediction, read_model
+from elastocal.identification import DeflectionSummary, OutsideRows, OutsideSummary, Prediction
 from elastocal.progress import Progress
 from elastocal.records import record
-from elastocal.results import Result
-from elastocal.workflows._inputs import refuse_overwriting
+from elastocal.results import Result, brief_repr
+from elastocal.workflows._inputs import NewTool, coverage_notes, refuse_overwriting
 from elastocal.workflows._workflow import workflow
 
 
 @dataclass(frozen=True)
-class PredictSettings:
+class PredictSettings(NewTool):
     """Which model predicts which rows."""
 
     model: str | PathLike[str]
@@ -28,6 +28,7 @@ class PredictSettings:
     """CSV to write: the rows with their deflections and intervals."""
 
 
+@brief_repr
 @record()
 class PredictSummary:
     """The figures of ``predict --json``."""
@@ -37,6 +38,17 @@ class PredictSummary:
     """Predicted deflection norms in m."""
     misfit: float | None
     """See `CalibratedModel.misfit`; none where the model does not know it."""
+    tool: str
+    """The tool that the rows are of, in words."""
+    notes: tuple[str, ...]
+    """Sentences that a person must know."""
+    outside: OutsideSummary | None = None
+    """Rows beyond what was calibrated; none where the model does not know where that was."""
+
+    @property
+    def warning(self) -> str:
+        """The line on rows beyond what was calibrated; empty without any."""
+        return "" if self.outside is None else self.outside.sentence()
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -50,9 +62,12 @@ class PredictResult(Result):
         """Return what a person wants to know first."""
         figures = self.summary
         return (
+            ("tool", figures.tool),
             ("rows", str(figures.rows)),
             ("deflection", f"{1e3 * figures.deflection.mean:.3f} mm mean"),
             ("largest", f"{1e3 * figures.deflection.max:.3f} mm"),
+            *(("note", text) for text in figures.notes),
+            *((("warning", text),) if (text := figures.warning) else ()),
         )
 
     def pictured(self) -> object:
@@ -80,26 +95,38 @@ def predict(settings: PredictSettings, progress: Progress) -> PredictResult:  # 
     """
     model, rows = Path(settings.model), Path(settings.rows)
     refuse_overwriting(settings.out, model, rows)
-    calibrated = read_model(model)
+    calibrated = settings.read_model(model)
     robot = calibrated.model.robot
     loads = read_load_rows(rows, joint_dimensions(robot.joint_names, robot.revolute))
     prediction = calibrated.predict(loads.joint_position, loads.force, loads.moment)
     misfit = float(calibrated.misfit) if np.isfinite(calibrated.misfit) else None
+    outside = None
+    if calibrated.domain is not None:
+        outside = calibrated.domain.outside(robot, loads.joint_position, loads.force, loads.moment)
     if settings.out is not None:
-        write_load_rows(settings.out, loads, _columns(prediction, misfit is not None))
+        write_load_rows(settings.out, loads, _columns(prediction, outside, misfit is not None))
     norms = np.linalg.norm(prediction.deflection, axis=1)
     size = DeflectionSummary(float(norms.mean()), float(norms.max()))
-    return PredictResult(prediction, PredictSummary(len(norms), size, misfit))
+    notes = coverage_notes(calibrated) if calibrated.tool is not None else ()
+    beyond = None if outside is None else outside.summary()
+    summary = PredictSummary(len(norms), size, misfit, calibrated.tool_name, notes, beyond)
+    return PredictResult(prediction, summary)
 
 
-def _columns(prediction: Prediction, with_measured: bool) -> dict[str, FloatArray]:
+def _columns(
+    prediction: Prediction, outside: OutsideRows | None, with_measured: bool
+) -> dict[str, FloatArray]:
     """Return the columns to add, by their headings."""
     parts = {"": prediction.deflection, "_low": prediction.low, "_high": prediction.high}
     if with_measured:
         parts["_measured_low"] = prediction.measured_low
         parts["_measured_high"] = prediction.measured_high
-    return {
+    columns = {
         f"deflection_{axis}{suffix}[m]": values[:, index]
         for suffix, values in parts.items()
         for index, axis in enumerate("xyz")
     }
+    if outside is not None:
+        flags = {"outside_pose": outside.pose, "outside_load": outside.load}
+        columns |= {name: flag.astype(float) for name, flag in flags.items()}
+    return columns

@@ -22,13 +22,13 @@ from elastocal.compensation.process import Course, CourseRun, ProcessRun, Simula
 from elastocal.dataset import joint_dimensions
 from elastocal.errors import CompensationError
 from elastocal.files import filling, read_text, sha256
-from elastocal.identification import CalibratedModel, read_model
+from elastocal.identification import CalibratedModel
 from elastocal.parallel import map_in_processes, process_count
 from elastocal.progress import Progress
 from elastocal.results import brief_repr
 from elastocal.robot import inverse_transform
 from elastocal.sim.workcell import ProcessCell
-from elastocal.workflows._inputs import require_same_robot
+from elastocal.workflows._inputs import NewTool, require_same_robot
 from elastocal.workflows._workflow import workflow
 
 __all__ = [
@@ -47,7 +47,7 @@ _ZEROING = 250
 
 @brief_repr
 @dataclass(frozen=True)
-class SimulateProcessSettings:
+class SimulateProcessSettings(NewTool):
     """Which process on which cell, corrected by which models."""
 
     cell: str | PathLike[str]
@@ -231,7 +231,7 @@ def _simulate(
 ) -> tuple[process.SimulatedProcess, tuple[Course, ...]]:
     """Run the process for every seed; return also the path with the forces of the first."""
     compensator = _compensator_settings(settings)
-    trials = [_trial(cell, compensator, run, settings.jobs) for run in runs]
+    trials = [_trial(cell, compensator, run, settings) for run in runs]
     lines: list[process.DeviationComparison] = []
     deviations: list[process.CourseDeviation] = []
     budget: tuple[process.DeviationComparison, ...] = ()
@@ -257,6 +257,7 @@ def _simulate(
         versions={name: version(name) for name in _PACKAGES},
         lines=tuple(lines),
         budget=budget,
+        tool=trials[0].model.tool_name,
     )
     return process.SimulatedProcess(table, tuple(deviations)), programmed
 
@@ -276,13 +277,13 @@ def _compensator_settings(settings: SimulateProcessSettings) -> CompensatorSetti
 
 
 def _trial(
-    cell: Cell, compensator: CompensatorSettings, run: ProcessRun, jobs: int | None
+    cell: Cell, compensator: CompensatorSettings, run: ProcessRun, settings: SimulateProcessSettings
 ) -> ProcessTrial:
-    calibrated = read_model(Path(run.model))
+    calibrated = settings.read_model(Path(run.model))
     robot = calibrated.model.robot
     require_same_robot(robot, cell.robot, (run.model, cell.name))
     load = read_sensor_load(Path(run.tool) if run.tool else None, robot)
-    return ProcessTrial(cell, calibrated, load, compensator, run.seed, jobs=jobs)
+    return ProcessTrial(cell, calibrated, load, compensator, run.seed, jobs=settings.jobs)
 
 
 def _run_effect(

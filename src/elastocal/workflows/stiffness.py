@@ -16,14 +16,14 @@ from elastocal.cell import load_cell
 from elastocal.compensation import PathPostures, PathStations, PostureChoice, PostureSurvey
 from elastocal.compensation.offline import PathError, posture_jumps
 from elastocal.files import filling
-from elastocal.identification import CalibratedModel, read_model
+from elastocal.identification import CalibratedModel
 from elastocal.progress import Progress
 from elastocal.records import record, write_json
 from elastocal.report import Curve, drawn, stiffness_figure, write_stiffness_figure
 from elastocal.results import Result, brief_repr
 from elastocal.robot import Robot
 from elastocal.robot.inverse import inverse_for
-from elastocal.workflows._inputs import coverage_notes, parse_posture, require_same_robot
+from elastocal.workflows._inputs import NewTool, coverage_notes, parse_posture, require_same_robot
 from elastocal.workflows._workflow import workflow
 
 _SUMMARY = "stiffness.json"
@@ -32,7 +32,7 @@ _FILES = ("postures.csv", "choice.csv", "stiffness.svg", "stiffness.png", _SUMMA
 
 
 @dataclass(frozen=True)
-class StiffnessSettings:
+class StiffnessSettings(NewTool):
     """Which model, along which path, and what may be chosen."""
 
     model: str | PathLike[str]
@@ -106,6 +106,8 @@ class StiffnessSummary:
     postures: PostureCounts
     choices: tuple[ChosenStiffness, ...]
     files: tuple[str, ...]
+    tool: str = ""
+    """The tool that the model is for, in words; empty in files before it was written."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -128,6 +130,7 @@ class StiffnessResult(Result):
         """Return what a person wants to know first."""
         counts = self.summary.postures
         return (
+            ("tool", self.summary.tool),
             ("stiffness along", self.along),
             ("postures", f"{counts.allowed} of {counts.tried} are allowed"),
             *(
@@ -172,7 +175,7 @@ def stiffness(settings: StiffnessSettings, progress: Progress) -> StiffnessResul
     FileAccessError
         If a file cannot be read or written, or the folder holds files and ``force`` is not given.
     """
-    calibrated = read_model(Path(settings.model))
+    calibrated = settings.read_model(Path(settings.model))
     start = parse_posture(calibrated.model.robot, settings.start)
     out = settings.out
     with nullcontext() if out is None else filling(out, _SUMMARY, settings.force) as folder:
@@ -217,6 +220,7 @@ def _surveyed(
         ),
         choices=tuple(map(partial(_chosen, robot), curves, choices)),
         files=_FILES if folder is not None else (),
+        tool=calibrated.tool_name,
     )
     notes = (*_notes(summary, choice), *coverage_notes(calibrated))
     result = StiffnessResult(

@@ -7,6 +7,7 @@ import typer
 
 from elastocal import workflows
 from elastocal.cli import options, output, tables
+from elastocal.units import parse_point
 
 
 def _calibrate(  # noqa: PLR0913 - one parameter an option
@@ -53,7 +54,7 @@ def _calibrate(  # noqa: PLR0913 - one parameter an option
         loss=loss,
         weights=weights,
         bounds=bounds,
-        marker=None if marker is None else options.parse_point(marker),
+        marker=None if marker is None else parse_point(marker),
         exclude=tuple(exclude or ()),
         keep_blunders=keep_blunders,
         trust_conventions=trust_conventions,

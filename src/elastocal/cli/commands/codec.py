@@ -7,6 +7,7 @@ import typer
 
 from elastocal import workflows
 from elastocal.cli import options, output, tables
+from elastocal.units import parse_point
 
 if TYPE_CHECKING:
     from elastocal.codec import Tolerance
@@ -84,7 +85,7 @@ def _codec(  # noqa: PLR0913 - one parameter an option
             robot=robot,
             tcp=tcp,
             tool=tool,
-            marker=None if marker is None else options.parse_point(marker),
+            marker=None if marker is None else parse_point(marker),
             exclude=tuple(exclude or ()),
             options=chosen,
             tolerance=_parse_tolerance(tolerance),

@@ -9,7 +9,7 @@ from elastocal import workflows
 from elastocal.cli import options, output, tables
 
 
-def _compensate(
+def _compensate(  # noqa: PLR0913 (a command has as many options as it has)
     model: Annotated[Path, typer.Argument(help="Model file from calibrate.")],
     path: Annotated[Path, typer.Argument(help="Path, .csv, or KUKA program, .src beside .dat.")],
     out: Annotated[Path, typer.Option(help="CSV, or .src, to write.")],
@@ -26,6 +26,9 @@ def _compensate(
     largest: Annotated[
         str, typer.Option("--limit", help="Largest deflection that is taken for one.")
     ] = "20 mm",
+    tool: options.NewTool = None,
+    tool_mass: options.ToolMass = None,
+    tool_centre: options.ToolCentre = None,
     as_json: options.Figures = False,
 ) -> None:
     """Correct a programmed path so that the loaded tool is where it was programmed."""
@@ -36,7 +39,16 @@ def _compensate(
     if not limit > 0.0:
         raise UnitError(f"--limit {largest!r} must be above 0")
     given = workflows.CompensateSettings(
-        model, path=path, out=out, forces=forces, base=base, start=start, largest=limit
+        model,
+        path=path,
+        out=out,
+        forces=forces,
+        base=base,
+        start=start,
+        largest=limit,
+        tool_frame=tool,
+        tool_mass=tool_mass,
+        tool_centre=tool_centre,
     )
     with output.progress_bars() as progress:
         result = workflows.compensate(given, progress)

@@ -14,15 +14,29 @@ def _export(
     c: Annotated[Path, typer.Option("--c", help="Folder to write the C files into.")],
     *,
     settings: options.CompensatorFile = None,
-    tool: Annotated[
-        Path | None, typer.Option(help="Tool file from `elastocal tool`: weight, bias, sensor.")
-    ] = None,
+    tool: options.NewToolOrFile = None,
+    tool_mass: options.ToolMass = None,
+    tool_centre: options.ToolCentre = None,
     force: Annotated[bool, typer.Option("--force", help="Replace files that are there.")] = False,
     as_json: options.Written = False,
 ) -> None:
     """Write a model as dependency-free C99 with filters, limits and a self-test."""
-    result = workflows.export(model, c=c, settings=settings, tool=tool, force=force)
+    from elastocal.errors import CompensationError
+
+    files, frame = options.split_tools(tool)
+    if len(files) > 1:
+        raise CompensationError(f"--tool names {len(files)} tool files: a compensator has one")
+    result = workflows.export(
+        model,
+        c=c,
+        settings=settings,
+        tool=files[0] if files else None,
+        force=force,
+        tool_frame=frame,
+        tool_mass=tool_mass,
+        tool_centre=tool_centre,
+    )
     if as_json:
         output.print_json(result)
         return
-    tables.show_export(output.console(), result, tool is not None)
+    tables.show_export(output.console(), result, bool(files))

@@ -6,19 +6,30 @@ from typing import Annotated
 import typer
 
 from elastocal import workflows
-from elastocal.cli import output
+from elastocal.cli import options, output
 
 
 def _predict(
     model: Annotated[Path, typer.Argument(help="Model file from calibrate.")],
     rows: Annotated[Path, typer.Argument(help="CSV: joint columns, force_x[N] …, moment_x[N*m] …")],
     out: Annotated[Path, typer.Option(help="CSV to write.")],
+    *,
+    tool: options.NewTool = None,
+    tool_mass: options.ToolMass = None,
+    tool_centre: options.ToolCentre = None,
     as_json: Annotated[
         bool, typer.Option("--json", help="Print a summary as one JSON object.")
     ] = False,
 ) -> None:
     """Predict the deflection of each row, with 95 % intervals of the fit and of a measurement."""
-    result = workflows.predict(model, rows=rows, out=out)
+    result = workflows.predict(
+        model,
+        rows=rows,
+        out=out,
+        tool_frame=tool,
+        tool_mass=tool_mass,
+        tool_centre=tool_centre,
+    )
     if as_json:
         output.print_json(result.summary)
         return
@@ -29,6 +40,11 @@ def _predict(
         markup=False,
         soft_wrap=True,
     )
+    output.console().print(f"tool: {figures.tool}", markup=False, soft_wrap=True)
+    for note in figures.notes:
+        output.console().print(f"Note: {note}", markup=False, soft_wrap=True)
+    if figures.warning:
+        output.console().print(f"[yellow]warning:[/yellow] {figures.warning}", soft_wrap=True)
     if figures.misfit is None:
         output.console().print(
             "Note: the model does not know its errors at left-out poses, so that there are no"

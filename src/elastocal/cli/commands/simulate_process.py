@@ -18,10 +18,9 @@ def _simulate_process(  # noqa: PLR0913 (a command has as many options as it has
     process: Annotated[str, typer.Option(help="afp (courses) or machining (rings of a dome).")],
     out: Annotated[Path, typer.Option(metavar="DIR", help="Folder to write into.")],
     *,
-    tool: Annotated[
-        list[Path] | None,
-        typer.Option(help="Tool file from `elastocal tool`; as --model. Default: the cell's."),
-    ] = None,
+    tool: options.NewToolOrFile = None,
+    tool_mass: options.ToolMass = None,
+    tool_centre: options.ToolCentre = None,
     seed: Annotated[
         list[int] | None,
         typer.Option(min=0, help="Of forces and devices; as for run. Repeat it for more."),
@@ -40,18 +39,22 @@ def _simulate_process(  # noqa: PLR0913 (a command has as many options as it has
     """Run a process on the simulated cell without and with correction: how much is left."""
     from elastocal.records import to_data
 
+    tools, frame = options.split_tools(tool)
     given = workflows.SimulateProcessSettings(
         cell,
         models=tuple(model),
         process=process,
         out=out,
-        tools=tuple(tool or ()),
+        tools=tools,
         seeds=tuple(seed or (0,)),
         compensator=settings,
         courses=courses,
         budget=budget,
         jobs=jobs,
         force=force,
+        tool_frame=frame,
+        tool_mass=tool_mass,
+        tool_centre=tool_centre,
     )
     with output.progress_bars() as progress:
         result = workflows.simulate_process(given, progress)

@@ -26,6 +26,9 @@ def _stiffness(  # noqa: PLR0913 (a command has as many options as it has)
         Path | None, typer.Option(help="Cell file: its margins, tooling and fixtures.")
     ] = None,
     start: Annotated[str | None, typer.Option(help=options.START_HELP)] = None,
+    tool: options.NewTool = None,
+    tool_mass: options.ToolMass = None,
+    tool_centre: options.ToolCentre = None,
     force: Annotated[bool, typer.Option("--force", help="Replace files that are there.")] = False,
     as_json: options.KeyFigures = False,
 ) -> None:
@@ -43,6 +46,9 @@ def _stiffness(  # noqa: PLR0913 (a command has as many options as it has)
         cell=cell,
         start=start,
         force=force,
+        tool_frame=tool,
+        tool_mass=tool_mass,
+        tool_centre=tool_centre,
     )
     with output.progress_bars() as progress:
         result = workflows.stiffness(given, progress)

@@ -98,6 +98,7 @@ def show_compensation(console: Console, result: "CompensateResult", out: Path) -
         ("correction", result.correction),
     )
     console.print(f"{result.rows} rows corrected, predicted by the model; written to {out}")
+    console.print(f"  {'tool:':30} {result.tool}", soft_wrap=True)
     for name, length in lengths:
         console.print(
             f"  {name + ':':30} {1e3 * length.mean:.3g} mm mean, {1e3 * length.max:.3g} mm max"
@@ -110,6 +111,9 @@ def show_compensation(console: Console, result: "CompensateResult", out: Path) -
 def show_export(console: Console, result: "ExportResult", with_tool: bool) -> None:
     """Print which C files were written, and what their wrenches are."""
     console.print(f"{', '.join(result.files)} written to {result.folder}")
+    console.print(f"tool: {result.tool}", soft_wrap=True)
+    for note in result.notes:
+        console.print(f"Note: {note}", soft_wrap=True)
     console.print(f"the filters delay a slow wrench by {1e3 * result.filter_delay:.1f} ms")
     if not with_tool:
         console.print(
@@ -135,6 +139,7 @@ def show_stiffness(console: Console, result: "StiffnessResult") -> None:
         f"{postures.allowed} of {postures.tried} postures are allowed"
         + (f"; refused: {refused}" if refused else "")
     )
+    console.print(f"tool: {summary.tool}", soft_wrap=True)
     for note in result.notes:
         console.print(f"Note: {note}")
 
@@ -155,6 +160,7 @@ def show_process(console: Console, result: SimulateProcessResult) -> None:
     points = f"{result.lines[-1].points} points"
     title = f"{result.cell}, {result.process}: absolute deviation in mm at {points}"
     console.print(_deviation_table(title, result.lines))
+    console.print(f"tool: {result.tool}", soft_wrap=True)
     if result.budget:
         console.print(
             _deviation_table(f"error budget of seed {result.runs[0].seed}", result.budget)

@@ -117,11 +117,14 @@ class SimulateProcessResult(Result):
     lines: tuple[DeviationComparison, ...]
     """One a seed, in the order of ``runs``; with several seeds a last one over all."""
     budget: tuple[DeviationComparison, ...] = ()
+    tool: str = ""
+    """The tool that the models are for, in words; empty in files before it was written."""
 
     def facts(self) -> tuple[tuple[str, str], ...]:
         """Return what a person wants to know first."""
         return (
             ("process", f"{self.process} in cell {self.cell}"),
+            *((("tool", self.tool),) if self.tool else ()),
             *((line.name, line.sentence) for line in (*self.lines, *self.budget)),
         )
 

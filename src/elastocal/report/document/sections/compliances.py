@@ -60,6 +60,7 @@ def _head(found: ModelEvidence, observable: int) -> blocks.Block:
     residual = mm(figures.residual.mean) if figures else "not known"
     return blocks.Facts(
         (
+            ("Tool", found.model.tool_name),
             ("Springs", seen.springs),
             ("Known by themselves", observable),
             ("Rank", f"{seen.rank} of {seen.springs}"),
@@ -154,6 +155,8 @@ def _recertification(evidence: Evidence) -> Iterator[blocks.Block]:
 
 def _moved_springs(found: CompareSummary) -> str:
     names = ", ".join(found.moved)
+    if not found.springs_judged and found.ground is not None:
+        return f"{found.ground.sentence.capitalize()}."
     if not names:
         return "No compared spring moved beyond its interval."
     return f"Moved beyond their intervals: {names}."
