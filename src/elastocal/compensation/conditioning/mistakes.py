@@ -20,6 +20,7 @@ from elastocal.compensation.conditioning.tool_fit import (
     tool_residual,
 )
 from elastocal.errors import CompensationError
+from elastocal.parallel import one_blas_thread
 
 _HEAVIEST = 5000.0
 """In kg; robots carry up to 2300 kg."""
@@ -53,6 +54,7 @@ _CLOSE = 0.3
 """Largest distance of the centre of mass from where another point puts it, as a share."""
 
 
+@one_blas_thread()
 def refuse_mistakes(
     postures: StaticPostures,
     fit: ToolFit,

@@ -28,6 +28,7 @@ from elastocal.compensation.conditioning.tool_fit import (
     fit_tool,
     tool_residual,
 )
+from elastocal.parallel import one_blas_thread
 from elastocal.records import record
 from elastocal.results import brief_repr
 
@@ -101,6 +102,7 @@ class ToolChoice:
     notes: tuple[str, ...]
 
 
+@one_blas_thread()
 def choose_tool(
     postures: StaticPostures,
     R_nominal: FloatArray | None = None,
