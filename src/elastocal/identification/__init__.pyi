@@ -20,6 +20,13 @@ from .displacement import (
     friction_states as friction_states,
     reference_joints as reference_joints,
 )
+from .frames import (
+    NUMBERS as NUMBERS,
+    FrameColumns as FrameColumns,
+    FrameSummary as FrameSummary,
+    frame_columns as frame_columns,
+    frame_summaries as frame_summaries,
+)
 from .ladder import (
     AUTO as AUTO,
     RUNGS as RUNGS,
@@ -62,6 +69,7 @@ from .options import (
     MEDIAN_NORM as MEDIAN_NORM,
     MINIMUM_DRAWS as MINIMUM_DRAWS,
     FitOptions as FitOptions,
+    FreeFrame as FreeFrame,
     FitSettings as FitSettings,
     Prior as Prior,
     Weights as Weights,

@@ -15,6 +15,7 @@ from elastocal.dataset import Readings
 from elastocal.elastic import ElasticModel, check_vectors
 from elastocal.errors import ConventionError, IdentificationError, SpringError
 from elastocal.identification.conventions import POOR, check_conventions, check_joints
+from elastocal.identification.frames import FrameSummary, frame_summaries
 from elastocal.identification.ladder import Climbed
 from elastocal.identification.observability import Observability, attainable_rank, observability
 from elastocal.identification.options import FitOptions
@@ -210,6 +211,8 @@ class Calibration:
     screening: Screening
     solution: Solution
     warnings: tuple[str, ...]
+    frames: tuple[FrameSummary, ...] = ()
+    """Frames that were estimated with the springs."""
 
     @property
     def residual_norm(self) -> FloatArray:
@@ -272,16 +275,20 @@ def calibrate(
     held_out = leave_poses_out(weighted)
     draws = bootstrap(PoseGrams.of(weighted), options.draws, rng)
     by = widening_factor(weighted, solution.compliance, draws, held_out.compliance)
+    draws = widen_draws(weighted, solution.compliance, draws, by)
+    springs, frames = weighted.springs, slice(weighted.springs.stop, None)
     calibrated = CalibratedModel(
         model,
-        solution.compliance,
-        widen_draws(weighted, solution.compliance, draws, by),
+        solution.compliance[springs],
+        draws[:, springs],
         # A prior makes nothing observable: what was believed before is not measured.
-        observability(factor(weighted.without_prior()), model.springs),
+        observability(factor(weighted.without_prior().without_frames()), model.springs),
         provenance,
         held_out.misfit,
     )
-    offset = force_offset(model, readings.take(used), weighted, solution.compliance, marker_offset)
+    offset = force_offset(
+        model, readings.take(used), weighted, calibrated.compliance, marker_offset
+    )
     reach = max(attainable_rank(model, marker_offset), calibrated.observability.rank)
     doubts += [offset.message()] if offset else []
     doubts += _worth(calibrated, reach, held_out, weighted)
@@ -298,6 +305,7 @@ def calibrate(
         screening=screening,
         solution=solution,
         warnings=tuple(doubts),
+        frames=frame_summaries(weighted.frames, solution.compliance[frames], draws[:, frames]),
     )
 
 
@@ -314,7 +322,7 @@ def _doubts(
         for group in same_configuration(readings, problem.block)
     ]
     try:
-        left = check_conventions(model, readings, marker_offset)
+        left = check_conventions(model, readings, marker_offset, options.free_frame)
     except ConventionError as error:
         if not options.trust_conventions:
             raise
@@ -329,7 +337,8 @@ def _worth(
 ) -> list[str]:
     """Return what limits the use of a fit, or refuse one that the data had no part in."""
     c = calibrated.compliance
-    if np.all((c == problem.lower) | (c == problem.upper)):
+    n = problem.springs
+    if np.all((c == problem.lower[n]) | (c == problem.upper[n])):
         raise IdentificationError(
             "every spring ends at a bound: the bounds, not the data, would make the model"
         )

@@ -82,7 +82,8 @@ class HeldOut:
 def leave_poses_out(problem: Problem) -> HeldOut:
     """Refit without each pose block in turn and predict its readings.
 
-    With more than `MOST_FOLDS` blocks, blocks are left out together in as many folds.
+    With more than `MOST_FOLDS` blocks, blocks are left out together in as many folds. Free frames
+    are estimated from the poses that are left, as the springs are.
     """
     blocks, index = np.unique(problem.block, return_inverse=True)
     folds = min(len(blocks), MOST_FOLDS)
@@ -91,9 +92,11 @@ def leave_poses_out(problem: Problem) -> HeldOut:
     compliance = PoseGrams.of(problem).refit(kept.astype(float))
     fold = fold_of_block[index]
     predicted = np.einsum("rin,rn->ri", problem.O, compliance[fold])
-    error, norm = predicted - problem.d, np.linalg.norm(predicted, axis=1, keepdims=True)
+    error, n = predicted - problem.d, problem.springs
+    deflection = np.einsum("rin,rn->ri", problem.O[:, :, n], compliance[fold][:, n])
+    norm = np.linalg.norm(deflection, axis=1, keepdims=True)
     share = np.divide(np.abs(error), norm, out=np.full_like(error, np.inf), where=norm > 0.0)
-    return HeldOut(np.linalg.norm(error, axis=1), fold, compliance, share)
+    return HeldOut(np.linalg.norm(error, axis=1), fold, compliance[:, n], share)
 
 
 def bootstrap(grams: PoseGrams, draws: int, rng: Generator) -> FloatArray:
@@ -143,7 +146,7 @@ def widening_factor(
     """
     folds = len(left_out)
     bootstrap = _variance(problem, draws - compliance) / len(draws)
-    jackknife = _variance(problem, left_out - compliance) * (folds - 1) / folds
+    jackknife = _variance(problem, left_out - compliance[problem.springs]) * (folds - 1) / folds
     if not bootstrap > 0.0:
         return 1.0
     tail = 0.5 * (1.0 + CONFIDENCE)
@@ -160,6 +163,8 @@ def widen_draws(
 
 def _variance(problem: Problem, deviations: FloatArray) -> float:
     """Return the sum over deviations of the mean squared change of predicted deflection."""
-    rows = problem.O.reshape(-1, problem.columns)
+    n = problem.springs
+    rows = problem.O[:, :, n].reshape(-1, n.stop)
     gram = rows.T @ rows / len(problem)
+    deviations = deviations[:, n]
     return float(np.einsum("dn,nm,dm->", deviations, gram, deviations))
