@@ -48,7 +48,7 @@ def test_a_softened_gear_is_named_to_people(folder):
     assert result.out == ""
     said = " ".join(result.err.split())
     assert "moved: joint_3.axial (+" in said
-    assert "fail: the largest change is" in said
+    assert "fail: the largest change over the " in said
     assert "holds for all 14 comparisons at once" in said
     assert "sum 1: joint_4.axial + " in said
     assert "at row" in said
@@ -89,7 +89,9 @@ def test_file_and_figure_are_written_and_checked(folder, tmp_path):
     assert "joint_3.axial" in figure.read_text()
     checked = json.loads(elastocal("check", out, "--json").out)
     assert checked["kind"] == "comparison of two calibrations"
-    assert (checked["compared"], checked["rows"]) == (14, 200)
+    # Fewer than the 200 that were given: both campaigns have to cover a row.
+    assert checked["compared"] == 14
+    assert 150 < checked["rows"] < 200
 
 
 def test_models_with_other_springs_are_compared_with_a_word_of_warning(folder):

@@ -66,13 +66,17 @@ def bearing_ends(robot: Robot) -> tuple[Spring, ...]:
     and one at the end where that with the axis behind does, share out what lies between. Where
     both ends are one place there is one pair of springs.
     """
-    far = (
-        Hinge(f"{joint.name}.far-{name}", joint.name, axis, offset=origin.far)
-        for joint, origin in zip(robot.chain.joints, joint_origins(robot.chain), strict=True)
-        if np.linalg.norm(np.subtract(origin.far, origin.offset)) > _APART
-        for name, axis in origin.directions.items()
-    )
-    return (*bearing(robot), *far)
+    virtual: list[Spring] = []
+    for joint, origin in zip(robot.chain.joints, joint_origins(robot.chain), strict=True):
+        places = {"": origin.offset}
+        if np.linalg.norm(np.subtract(origin.far, origin.offset)) > _APART:
+            places["far-"] = origin.far
+        virtual += [
+            Hinge(f"{joint.name}.{end}{name}", joint.name, axis, offset=place)
+            for end, place in places.items()
+            for name, axis in origin.directions.items()
+        ]
+    return (*actuated(robot), *virtual)
 
 
 def bearing_joint(robot: Robot, distal: bool = False) -> tuple[Spring, ...]:

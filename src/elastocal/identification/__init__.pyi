@@ -20,6 +20,25 @@ from .displacement import (
     friction_states as friction_states,
     reference_joints as reference_joints,
 )
+from .domain import (
+    REACH as REACH,
+    CalibrationDomain as CalibrationDomain,
+    OutsideRows as OutsideRows,
+    OutsideSummary as OutsideSummary,
+)
+from .figures import (
+    CalibrationSummary as CalibrationSummary,
+    ComparisonSummary as ComparisonSummary,
+    DeflectionSummary as DeflectionSummary,
+    DifferenceSummary as DifferenceSummary,
+    HeldOutSummary as HeldOutSummary,
+    ResidualSummary as ResidualSummary,
+    RungSummary as RungSummary,
+    SpringSummary as SpringSummary,
+    SuspiciousReading as SuspiciousReading,
+    spring_summaries as spring_summaries,
+    summary as summary,
+)
 from .frames import (
     NUMBERS as NUMBERS,
     FrameColumns as FrameColumns,
@@ -40,19 +59,8 @@ from .ladder import (
 )
 from .model_file import (
     CalibrateResult as CalibrateResult,
-    CalibrationSummary as CalibrationSummary,
-    ComparisonSummary as ComparisonSummary,
-    DeflectionSummary as DeflectionSummary,
-    DifferenceSummary as DifferenceSummary,
-    HeldOutSummary as HeldOutSummary,
-    ResidualSummary as ResidualSummary,
     RobotRecord as RobotRecord,
-    RungSummary as RungSummary,
-    SpringSummary as SpringSummary,
-    SuspiciousReading as SuspiciousReading,
     read_model as read_model,
-    spring_summaries as spring_summaries,
-    summary as summary,
     write_model as write_model,
 )
 from .observability import (
@@ -69,8 +77,8 @@ from .options import (
     MEDIAN_NORM as MEDIAN_NORM,
     MINIMUM_DRAWS as MINIMUM_DRAWS,
     FitOptions as FitOptions,
-    FreeFrame as FreeFrame,
     FitSettings as FitSettings,
+    FreeFrame as FreeFrame,
     Prior as Prior,
     Weights as Weights,
     bounds as bounds,

@@ -15,6 +15,7 @@ from elastocal.dataset import Readings
 from elastocal.elastic import ElasticModel, check_vectors
 from elastocal.errors import ConventionError, IdentificationError, SpringError
 from elastocal.identification.conventions import POOR, check_conventions, check_joints
+from elastocal.identification.domain import CalibrationDomain
 from elastocal.identification.frames import FrameSummary, frame_summaries
 from elastocal.identification.ladder import Climbed
 from elastocal.identification.observability import Observability, attainable_rank, observability
@@ -75,6 +76,8 @@ class CalibratedModel:
     left-out poses; NaN: not known. See `HeldOut.misfit`."""
     tool: ToolChange | None = None
     """The tool that the model is for; none: the one that it was calibrated with."""
+    domain: CalibrationDomain | None = None
+    """Poses and loads of the calibration; none: not known, as in files of elastocal 0.1.0."""
 
     def __post_init__(self) -> None:
         for name in ("compliance", "draws"):
@@ -285,6 +288,7 @@ def calibrate(
         observability(factor(weighted.without_prior().without_frames()), model.springs),
         provenance,
         held_out.misfit,
+        domain=CalibrationDomain.of(model.robot, readings.take(used), kept.block),
     )
     offset = force_offset(
         model, readings.take(used), weighted, calibrated.compliance, marker_offset

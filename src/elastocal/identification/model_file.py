@@ -1,258 +1,23 @@
-"""Model file ``*.json``: a calibrated model with its draws, observability, provenance and figures.
-
-The figures are what ``calibrate --json`` prints and the model file keeps: one record, so that no
-two places can disagree. All numbers are SI.
-"""
+"""Model file ``*.json``: a calibrated model with draws, observability, provenance and figures."""
 
 from functools import cached_property
 from pathlib import Path
 
 import numpy as np
 
-from elastocal.arrays import BoolArray, FloatArray
-from elastocal.dataset import Readings
+from elastocal.arrays import FloatArray
 from elastocal.elastic import AnySpring, ElasticModel
 from elastocal.errors import SchemaError
 from elastocal.files import sha256
-from elastocal.identification.calibration import CalibratedModel, Calibration
-from elastocal.identification.ladder import Climbed
-from elastocal.identification.observability import Observability, Term
-from elastocal.identification.options import MINIMUM_DRAWS, FitSettings
-from elastocal.identification.suspicious import Screening
+from elastocal.identification.calibration import CalibratedModel
+from elastocal.identification.domain import CalibrationDomain
+from elastocal.identification.figures import CalibrationSummary
+from elastocal.identification.observability import Observability
+from elastocal.identification.options import MINIMUM_DRAWS
 from elastocal.identification.tool_change import ToolChange
-from elastocal.identification.uncertainty import HeldOut, interval
 from elastocal.records import read_json, record, write_json
 from elastocal.results import Result, brief_repr
 from elastocal.robot import Robot
-
-
-@record()
-class SpringSummary:
-    """A characteristic of a spring: how well it is known, and whether it is known by itself."""
-
-    name: str
-    kind: str
-    unit: str
-    """SI unit of the compliance, or of another characteristic (`elastic.Characteristic`)."""
-    compliance: float
-    low: float
-    """Lower end of the 95 % interval."""
-    high: float
-    """Upper end of the 95 % interval."""
-    observable: bool
-    """Whether the data determine it by itself."""
-    group: int | None = None
-    """Number of the first unobservable combination that leaves it open."""
-
-
-@brief_repr
-@record()
-class ResidualSummary:
-    """Residual norms of the readings that entered the fit, in m."""
-
-    mean: float
-    max: float
-    p95: float
-    rms_axis: tuple[float, ...]
-    """Root mean square along each axis of base."""
-
-
-@record()
-class DeflectionSummary:
-    """Measured deflection norms of the readings that entered the fit, in m."""
-
-    mean: float
-    max: float
-
-
-@record()
-class HeldOutSummary:
-    """Errors at left-out poses, in m."""
-
-    mean: float
-    max: float
-    readings: int
-    folds: int
-    """Number of refits."""
-    misfit: float | None = None
-    """See `HeldOut.misfit`; none where there are too few errors for it."""
-    split: str = "leave-poses-out"
-
-
-@record()
-class DifferenceSummary:
-    """Difference of two mean errors, with its 95 % interval, in m."""
-
-    mean: float
-    low: float
-    high: float
-
-
-@record()
-class RungSummary:
-    """A model of the ladder, at left-out poses."""
-
-    springs: str
-    """Name of the rung."""
-    held_out: float
-    """Mean error at left-out poses, in m."""
-    difference: DifferenceSummary
-    """What it is judged by: its error at left-out poses and left-out low load, against the best."""
-    parameters: int
-    chosen: bool
-
-
-@record()
-class ComparisonSummary:
-    """Another spring layout on the same left-out poses; calibrations before the ladder have it."""
-
-    springs: str
-    """Name of the other layout."""
-    held_out: HeldOutSummary
-    difference: DifferenceSummary
-
-
-@record()
-class SuspiciousReading:
-    """A reading that looks wrong to a robust fit."""
-
-    pose: int
-    load_case: str
-    score: float
-    """Leverage-corrected residual in robust standard deviations."""
-    residual: float
-    """Residual norm of the robust fit, in m."""
-    leverage: float
-    set_aside: bool
-    """Whether it was left out of the fit as a blunder."""
-
-
-@brief_repr
-@record("elastocal.calibration/1")
-class CalibrationSummary:
-    """The figures of a calibration (spec section 4)."""
-
-    robot: str
-    springs: tuple[SpringSummary, ...]
-    rank: int
-    rank_attainable: int
-    """Rank that any number of poses and forces would reach."""
-    springs_total: int
-    condition: float
-    unobservable: tuple[tuple[Term, ...], ...]
-    residual: ResidualSummary
-    deflection: DeflectionSummary
-    readings: int
-    poses: int
-    suspicious: tuple[SuspiciousReading, ...]
-    """The worst first."""
-    held_out: HeldOutSummary
-    draws: int
-    interval_widening: float
-    warnings: tuple[str, ...]
-    settings: FitSettings | None = None
-    """With these a report makes the calibration again."""
-    comparison: ComparisonSummary | None = None
-    ladder: tuple[RungSummary, ...] = ()
-    """The simplest model first; empty in calibrations before the ladder."""
-
-
-def summary(calibration: Calibration, settings: FitSettings | None = None) -> CalibrationSummary:
-    """Return the figures of a calibration that was made with these settings."""
-    calibrated = calibration.calibrated
-    seen = calibrated.observability
-    residual, deflection = calibration.residual_norm, calibration.deflection_norm
-    rms = np.sqrt(np.mean(np.square(calibration.residual[calibration.used]), axis=0))
-    return CalibrationSummary(
-        robot=calibrated.model.robot.name,
-        springs=spring_summaries(calibrated),
-        rank=seen.rank,
-        rank_attainable=calibration.attainable_rank,
-        springs_total=seen.springs,
-        condition=seen.condition,
-        unobservable=seen.unobservable,
-        residual=ResidualSummary(
-            mean=float(residual.mean()),
-            max=float(residual.max()),
-            p95=float(np.percentile(residual, 95)),
-            rms_axis=tuple(map(float, rms)),
-        ),
-        deflection=DeflectionSummary(float(deflection.mean()), float(deflection.max())),
-        readings=len(residual),
-        poses=calibration.poses,
-        suspicious=_suspicious(calibration.readings, calibration.screening, calibration.used),
-        held_out=_held_out(calibration.held_out),
-        draws=len(calibrated.draws),
-        interval_widening=calibration.widening,
-        warnings=calibration.warnings,
-        settings=settings,
-        ladder=tuple(map(_rung, calibration.ladder)),
-    )
-
-
-def spring_summaries(calibrated: CalibratedModel) -> tuple[SpringSummary, ...]:
-    """Return what tables show of each spring: its characteristics, with their intervals."""
-    seen = calibrated.observability
-    first, rows = 0, list[SpringSummary]()
-    for spring in calibrated.model.springs:
-        own = slice(first, first + len(spring.parameters))
-        first = own.stop
-        names = [parameter.name for parameter in spring.parameters]
-        for each in spring.characteristics:
-            weights = np.array(each.weights)
-            group = seen.group_of(dict(zip(names, each.weights, strict=True)))
-            low, high = interval(calibrated.draws[:, own] @ weights)
-            rows.append(
-                SpringSummary(
-                    name=each.name,
-                    kind=spring.kind,
-                    unit=each.unit.si,
-                    compliance=float(calibrated.compliance[own] @ weights),
-                    low=float(low),
-                    high=float(high),
-                    observable=group is None,
-                    group=group,
-                )
-            )
-    return tuple(rows)
-
-
-def _suspicious(
-    readings: Readings, screening: Screening, used: BoolArray
-) -> tuple[SuspiciousReading, ...]:
-    order = np.argsort(-screening.score, kind="stable")
-    return tuple(
-        SuspiciousReading(
-            pose=int(readings.pose[i]),
-            load_case=str(readings.load_case[i]),
-            score=float(screening.score[i]),
-            residual=float(screening.residual[i]),
-            leverage=float(screening.leverage[i]),
-            set_aside=not bool(used[i]),
-        )
-        for i in order
-        if screening.suspicious[i]
-    )
-
-
-def _held_out(held_out: HeldOut) -> HeldOutSummary:
-    return HeldOutSummary(
-        mean=held_out.mean,
-        max=held_out.max,
-        readings=len(held_out.error),
-        folds=held_out.folds,
-        misfit=held_out.misfit if np.isfinite(held_out.misfit) else None,
-    )
-
-
-def _rung(rung: Climbed) -> RungSummary:
-    return RungSummary(
-        springs=rung.name,
-        held_out=rung.held_out.mean,
-        difference=DifferenceSummary(rung.difference, rung.low, rung.high),
-        parameters=len(rung.model.parameters),
-        chosen=rung.chosen,
-    )
 
 
 @brief_repr
@@ -286,6 +51,8 @@ class CalibrateResult(Result):
     """The figures of the calibration; none for a model that was made otherwise."""
     tool: ToolChange | None = None
     """The tool that the model is for; none: the one that it was calibrated with."""
+    domain: CalibrationDomain | None = None
+    """Poses and loads of the calibration; none in files of elastocal 0.1.0."""
 
     def __post_init__(self) -> None:
         """Refuse parts that contradict one another.
@@ -325,6 +92,7 @@ class CalibrateResult(Result):
             misfit=calibrated.misfit if np.isfinite(calibrated.misfit) else None,
             calibration=calibration,
             tool=calibrated.tool,
+            domain=calibrated.domain,
         )
 
     @cached_property
@@ -335,8 +103,13 @@ class CalibrateResult(Result):
         ------
         RobotError, SpringError
             If springs or frames do not fit the robot.
+        SchemaError
+            If the domain has poses of another number of joints.
         """
         robot = Robot.from_urdf(self.robot.urdf, self.robot.tcp, self.robot.base)
+        joints = len(robot.joint_names)
+        if self.domain is not None and self.domain.joint_position.shape[1] != joints:
+            raise SchemaError(f"domain.joint_position must have {joints} joints a pose")
         return CalibratedModel(
             ElasticModel(robot, self.springs),
             self.compliance,
@@ -345,6 +118,7 @@ class CalibrateResult(Result):
             self.provenance,
             float("nan") if self.misfit is None else self.misfit,
             self.tool,
+            self.domain,
         )
 
     def facts(self) -> tuple[tuple[str, str], ...]:

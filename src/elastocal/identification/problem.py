@@ -250,7 +250,10 @@ def _with_frames(problem: Problem, frames: FrameColumns, scale: float) -> Proble
     count, free = len(frames), np.full(len(frames), np.inf)
     before = problem.prior_rows
     prior = np.zeros((len(before) + count, problem.columns + count + 1))
-    prior[: len(before), : problem.columns], prior[: len(before), -1] = before[:, :-1], before[:, -1]
+    prior[: len(before), : problem.columns], prior[: len(before), -1] = (
+        before[:, :-1],
+        before[:, -1],
+    )
     prior[len(before) :, problem.columns : -1] = frames.prior
     return replace(
         problem,

@@ -13,7 +13,7 @@ from numpy.random import Generator
 from elastocal.arrays import FloatArray, IndexArray
 from elastocal.dataset import Dataset, without
 from elastocal.identification.calibration import CalibratedModel, Calibration, calibrate
-from elastocal.identification.model_file import CalibrationSummary
+from elastocal.identification.figures import CalibrationSummary
 from elastocal.identification.options import MINIMUM_DRAWS, FitSettings
 from elastocal.identification.recertification import Estimate
 from elastocal.identification.uncertainty import interval

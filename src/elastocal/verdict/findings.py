@@ -47,6 +47,22 @@ def reading_findings(evidence: Evidence) -> Iterator[Finding]:
         )
     for warning in figures.warnings:
         yield Finding(f"calibration: {warning}")
+    yield from _outside(evidence)
+
+
+def _outside(evidence: Evidence) -> Iterator[Finding]:
+    process = None if evidence.cell is None else evidence.cell.process
+    domain = None if evidence.calibrated is None else evidence.calibrated.model.domain
+    if process is None or domain is None or evidence.calibrated is None:
+        return
+    robot = evidence.calibrated.model.model.robot
+    load = (process.force, process.moment)
+    found = domain.outside(robot, process.joint_position, *load).summary()
+    if found.rows:
+        yield Finding(
+            f"process path: {found.sentence()}",
+            advice="Plan the calibration where the process works, and under its forces.",
+        )
 
 
 def _missing_poses(evidence: Evidence) -> Iterator[Finding]:

@@ -13,6 +13,7 @@ from elastocal.compensation.offline import (
 )
 from elastocal.compensation.programs import PROGRAM_READERS, compensate_program
 from elastocal.errors import FileAccessError
+from elastocal.identification import OutsideSummary
 from elastocal.progress import Progress
 from elastocal.records import record
 from elastocal.results import Result
@@ -56,6 +57,8 @@ class CompensateResult(Result, CorrectionFigures):
     """The tool that the correction is for, in words."""
     notes: tuple[str, ...]
     """Sentences that a person must know."""
+    outside: OutsideSummary | None = None
+    """Rows beyond what was calibrated; none where the model does not know where that was."""
 
     def facts(self) -> tuple[tuple[str, str], ...]:
         """Return what a person wants to know first."""
@@ -122,7 +125,8 @@ def compensate(settings: CompensateSettings, progress: Progress) -> CompensateRe
     return CompensateResult(
         **{each.name: getattr(figures, each.name) for each in fields(figures)},
         tool=calibrated.tool_name,
-        notes=(*coverage_notes(calibrated), *notes, *_force_notes(summary)),
+        notes=(*coverage_notes(calibrated), *notes, *_force_notes(summary), *_outside(summary)),
+        outside=summary.outside,
     )
 
 
@@ -141,6 +145,11 @@ def _path_notes(summary: CorrectionSummary, robot: Robot, start: str | None) -> 
             " posture deflects otherwise, give --start if it is another"
         )
     return tuple(notes)
+
+
+def _outside(summary: CorrectionSummary) -> tuple[str, ...]:
+    text = "" if summary.outside is None else summary.outside.sentence()
+    return (text,) if text else ()
 
 
 def _force_notes(summary: CorrectionSummary) -> tuple[str, ...]:

@@ -8,7 +8,7 @@ import numpy as np
 
 from elastocal.arrays import FloatArray
 from elastocal.dataset import joint_dimensions, read_load_rows, write_load_rows
-from elastocal.identification import DeflectionSummary, Prediction
+from elastocal.identification import DeflectionSummary, OutsideRows, OutsideSummary, Prediction
 from elastocal.progress import Progress
 from elastocal.records import record
 from elastocal.results import Result, brief_repr
@@ -42,6 +42,13 @@ class PredictSummary:
     """The tool that the rows are of, in words."""
     notes: tuple[str, ...]
     """Sentences that a person must know."""
+    outside: OutsideSummary | None = None
+    """Rows beyond what was calibrated; none where the model does not know where that was."""
+
+    @property
+    def warning(self) -> str:
+        """The line on rows beyond what was calibrated; empty without any."""
+        return "" if self.outside is None else self.outside.sentence()
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -60,6 +67,7 @@ class PredictResult(Result):
             ("deflection", f"{1e3 * figures.deflection.mean:.3f} mm mean"),
             ("largest", f"{1e3 * figures.deflection.max:.3f} mm"),
             *(("note", text) for text in figures.notes),
+            *((("warning", text),) if (text := figures.warning) else ()),
         )
 
     def pictured(self) -> object:
@@ -92,23 +100,33 @@ def predict(settings: PredictSettings, progress: Progress) -> PredictResult:  # 
     loads = read_load_rows(rows, joint_dimensions(robot.joint_names, robot.revolute))
     prediction = calibrated.predict(loads.joint_position, loads.force, loads.moment)
     misfit = float(calibrated.misfit) if np.isfinite(calibrated.misfit) else None
+    outside = None
+    if calibrated.domain is not None:
+        outside = calibrated.domain.outside(robot, loads.joint_position, loads.force, loads.moment)
     if settings.out is not None:
-        write_load_rows(settings.out, loads, _columns(prediction, misfit is not None))
+        write_load_rows(settings.out, loads, _columns(prediction, outside, misfit is not None))
     norms = np.linalg.norm(prediction.deflection, axis=1)
     size = DeflectionSummary(float(norms.mean()), float(norms.max()))
     notes = coverage_notes(calibrated) if calibrated.tool is not None else ()
-    summary = PredictSummary(len(norms), size, misfit, calibrated.tool_name, notes)
+    beyond = None if outside is None else outside.summary()
+    summary = PredictSummary(len(norms), size, misfit, calibrated.tool_name, notes, beyond)
     return PredictResult(prediction, summary)
 
 
-def _columns(prediction: Prediction, with_measured: bool) -> dict[str, FloatArray]:
+def _columns(
+    prediction: Prediction, outside: OutsideRows | None, with_measured: bool
+) -> dict[str, FloatArray]:
     """Return the columns to add, by their headings."""
     parts = {"": prediction.deflection, "_low": prediction.low, "_high": prediction.high}
     if with_measured:
         parts["_measured_low"] = prediction.measured_low
         parts["_measured_high"] = prediction.measured_high
-    return {
+    columns = {
         f"deflection_{axis}{suffix}[m]": values[:, index]
         for suffix, values in parts.items()
         for index, axis in enumerate("xyz")
     }
+    if outside is not None:
+        flags = {"outside_pose": outside.pose, "outside_load": outside.load}
+        columns |= {name: flag.astype(float) for name, flag in flags.items()}
+    return columns

@@ -43,6 +43,8 @@ def _predict(
     output.console().print(f"tool: {figures.tool}", markup=False, soft_wrap=True)
     for note in figures.notes:
         output.console().print(f"Note: {note}", markup=False, soft_wrap=True)
+    if figures.warning:
+        output.console().print(f"[yellow]warning:[/yellow] {figures.warning}", soft_wrap=True)
     if figures.misfit is None:
         output.console().print(
             "Note: the model does not know its errors at left-out poses, so that there are no"

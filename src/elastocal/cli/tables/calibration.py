@@ -214,8 +214,8 @@ def show_comparison(console: Console, compared: "CompareResult", hint: Path | No
         for name, short in sums.items():
             console.print(f"   {short}: {name}", markup=False, soft_wrap=True)
         console.print(
-            f"the interval holds for all {len(found.springs)} comparisons at once with 95 %; what"
-            " has 0 outside it moved",
+            f"the interval holds for all {len(found.springs)} comparisons at once with 95 %"
+            + ("; what has 0 outside it moved" if found.springs_judged else ""),
             soft_wrap=True,
         )
     for names, which in ((found.only_old, "old"), (found.only_new, "new")):
@@ -234,7 +234,7 @@ def show_comparison(console: Console, compared: "CompareResult", hint: Path | No
 
 def _moved(found: "CompareSummary") -> str:
     if found.unmoved_sentence:
-        return found.unmoved_sentence
+        return escape(found.unmoved_sentence)
     names = ", ".join(each.label for each in found.moved_springs)
     return f"[bold red]{found.verb}[/bold red]: {escape(names)}"
 

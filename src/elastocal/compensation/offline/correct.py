@@ -22,7 +22,7 @@ from elastocal.compensation.offline.path_joints import (
     largest_move,
     turned_inside,
 )
-from elastocal.identification import CalibratedModel
+from elastocal.identification import CalibratedModel, OutsideRows, OutsideSummary
 from elastocal.records import record
 from elastocal.results import brief_repr
 from elastocal.robot import Robot
@@ -63,6 +63,8 @@ class PathCorrection:
     pulled: BoolArray
     """Whether the force draws the tool out, along +z of the tcp, rather than aside or against it;
     a surface cannot: shape (row,)."""
+    outside: OutsideRows | None = None
+    """Rows beyond what was calibrated; none where the model does not know where that was."""
 
 
 def correct_rows(
@@ -144,6 +146,7 @@ def correct_rows(
         np.linalg.norm(first - uncorrected, axis=1),
         np.linalg.norm(residual, axis=1),
         np.asarray(along > 0.5 * np.linalg.norm(wrench[0], axis=1)),
+        None if calibrated.domain is None else calibrated.domain.outside(robot, q, *wrench),
     )
 
 
@@ -291,6 +294,8 @@ class CorrectionSummary:
     """Rows at which the force draws the tool out, which a surface cannot."""
     start: tuple[float, ...] = ()
     """Joints that were found for the first row of a path of poses, in rad or m."""
+    outside: OutsideSummary | None = None
+    """Rows beyond what was calibrated; none where the model does not know where that was."""
 
     def plus(
         self, correction: PathCorrection, shift: FloatArray, labels: list[str], jumps: list[int]
@@ -314,6 +319,9 @@ class CorrectionSummary:
             correction.residual,
             np.linalg.norm(shift, axis=1),
         )
+        outside = None if correction.outside is None else correction.outside.summary()
+        if outside is not None and self.outside is not None:
+            outside = self.outside.plus(outside)
         return replace(
             self,
             rows=self.rows + len(labels),
@@ -323,6 +331,7 @@ class CorrectionSummary:
             jumps=self.jumps + len(jumps),
             first_jump=self.first_jump or (labels[jumps[0]] if jumps else ""),
             pulled=self.pulled + int(correction.pulled.sum()),
+            outside=outside,
         )
 
     def figures(self) -> CorrectionFigures:

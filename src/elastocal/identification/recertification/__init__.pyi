@@ -5,6 +5,7 @@ from .comparison import (
 )
 from .result import (
     SCHEMA as SCHEMA,
+    CommonGround as CommonGround,
     CompareResult as CompareResult,
     CompareSummary as CompareSummary,
     DeflectionChange as DeflectionChange,

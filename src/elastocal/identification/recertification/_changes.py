@@ -32,12 +32,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from elastocal.arrays import FloatArray
+from elastocal.arrays import FloatArray, IndexArray
 from elastocal.elastic import Parameter, Spring
 from elastocal.errors import IdentificationError
 from elastocal.identification.calibration import CalibratedModel
 from elastocal.identification.observability import Term, describe, sparse_basis
-from elastocal.identification.recertification.result import Estimate, RowComparison, SpringChange
+from elastocal.identification.recertification.result import (
+    CommonGround,
+    Estimate,
+    RowComparison,
+    SpringChange,
+)
 from elastocal.identification.uncertainty import CONFIDENCE, interval
 
 _SHIFTS = 10
@@ -48,9 +53,15 @@ _ONE_SIDE = 50.0 * (1.0 + CONFIDENCE)
 """Percentile that leaves out half of what a 95 % interval leaves out."""
 _NORMAL = 1.959964
 """Normal quantile at that percentile; the draws are stretched for few poses already."""
+_ENOUGH = 0.75
+"""Share of each campaign's readings that the other must cover for springs to be compared."""
 _SAME = 1e-4
 """Singular value, over the largest, below which unobservable combinations of the two models
 count as the same."""
+
+
+Loads = tuple[FloatArray, FloatArray, FloatArray | None]
+"""Joint positions, forces, and moments if there are any, a row each."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,6 +115,31 @@ class Spread:
         return old, new
 
 
+def common_ground(
+    old: CalibratedModel, new: CalibratedModel, loads: Loads | None
+) -> tuple[CommonGround | None, IndexArray]:
+    """Return what both campaigns cover, and the numbers of the rows that are compared."""
+    count = 0 if loads is None else len(loads[0])
+    robot, number = new.model.robot, np.arange(count)
+    if old.domain is None or new.domain is None:
+        return None, number
+    if loads is not None:
+        outside = [each.outside(robot, *loads).any for each in (old.domain, new.domain)]
+        number = np.flatnonzero(~(outside[0] | outside[1]))
+    shares = (
+        old.domain.share_inside(new.domain, robot),
+        new.domain.share_inside(old.domain, robot),
+    )
+    rows = (None, None) if loads is None else (count, len(number))
+    return CommonGround(*shares, min(shares) >= _ENOUGH, *rows), number
+
+
+def taken(loads: Loads, number: IndexArray) -> Loads:
+    """Return some of the rows."""
+    q, force, moment = loads
+    return q[number], force[number], None if moment is None else moment[number]
+
+
 def over(numbers: FloatArray, scale: FloatArray) -> FloatArray:
     """Return numbers over their scale; 0 where the scale is 0."""
     return np.divide(numbers, scale, out=np.zeros_like(numbers), where=scale > 0.0)
@@ -116,6 +152,7 @@ def compare_rows(
     q: FloatArray,
     force: FloatArray,
     moment: FloatArray | None,
+    number: IndexArray | None = None,
 ) -> RowComparison:
     """Return how the deflection changed at every row, on average and at most.
 
@@ -131,6 +168,8 @@ def compare_rows(
         Force on the robot at the tcp in base, in N.
     moment : ndarray, shape (row, 3), optional
         Moment on the robot about the tcp in base, in N·m.
+    number : ndarray of int, shape (row,), optional
+        Numbers of the rows, where they are some of many.
     """
     count = len(q)
     deflection = np.empty((2, count, 3))
@@ -154,6 +193,7 @@ def compare_rows(
     off = float(np.percentile(total / count, 100.0 * CONFIDENCE))
     mean = float(size.mean())
     return RowComparison(
+        number=np.arange(count) if number is None else number,
         q=q,
         force=force,
         moment=moment,

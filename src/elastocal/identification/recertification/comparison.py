@@ -16,12 +16,16 @@ from elastocal.errors import IdentificationError, RobotError, SpringError
 from elastocal.identification.calibration import CalibratedModel, check_rows
 from elastocal.identification.model_file import CalibrateResult
 from elastocal.identification.recertification._changes import (
+    Loads,
     Spread,
+    common_ground,
     common_springs,
     compare_rows,
     compare_springs,
+    taken,
 )
 from elastocal.identification.recertification.result import (
+    CommonGround,
     CompareResult,
     CompareSummary,
     RowComparison,
@@ -29,6 +33,7 @@ from elastocal.identification.recertification.result import (
 )
 from elastocal.records import read_json
 from elastocal.robot import Robot
+from elastocal.wording import counted
 
 _MOST = 20
 """Beyond this many times the poses nobody measures."""
@@ -41,7 +46,9 @@ _LENGTH, _ANGLE = 1e-4, 1e-4
 a deflection by less than a part in ten thousand."""
 
 
-def _judge(deflection: RowComparison | None, limit: float | None) -> tuple[Verdict | None, str]:
+def _judge(
+    deflection: RowComparison | None, limit: float | None, ground: CommonGround | None = None
+) -> tuple[Verdict | None, str]:
     """Return the verdict on the largest change against a limit in m, and why.
 
     Parameters
@@ -50,17 +57,26 @@ def _judge(deflection: RowComparison | None, limit: float | None) -> tuple[Verdi
         Over the rows that matter; None: there are none.
     limit : float, optional
         Largest accepted change, in m.
+    ground : CommonGround, optional
+        Rows that both campaigns cover, where that is known.
     """
     if limit is None:
         return None, "no limit was given, so nothing was judged"
+    if deflection is None and ground is not None and ground.rows:
+        return None, (
+            f"not judged: none of {counted(ground.rows, 'row')} lies where both campaigns measured"
+        )
     if deflection is None:
         return None, (
             "not judged: a limit is held against the poses and forces that matter, and no rows were"
             " given"
         )
     largest, allowed = deflection.largest, f"the limit of {1e3 * limit:g} mm"
+    where = ""
+    if ground is not None and ground.left_out:
+        where = f" over the {ground.rows_covered} of {ground.rows} rows that both campaigns cover"
     found = (
-        f"the largest change is {_mm(largest.value)}"
+        f"the largest change{where} is {_mm(largest.value)}"
         f" ({1e3 * largest.low:.3f} to {_mm(largest.high)}, 95 %)"
     )
     if largest.high <= limit:
@@ -100,7 +116,11 @@ def _mm(length: float) -> str:
 
 
 def _notes_on(
-    old: CalibratedModel, new: CalibratedModel, same_springs: bool, outside: int
+    old: CalibratedModel,
+    new: CalibratedModel,
+    same_springs: bool,
+    outside: int,
+    ground: CommonGround | None = None,
 ) -> tuple[str, ...]:
     """Return what a reader has to know beside the figures, a sentence each.
 
@@ -112,6 +132,8 @@ def _notes_on(
         Whether the models have the same springs.
     outside : int
         Number of rows outside the joint limits.
+    ground : CommonGround, optional
+        What both campaigns cover, where it is known.
     """
     notes = []
     if not same_springs:
@@ -125,11 +147,16 @@ def _notes_on(
             f"both models state the same origin ({old.provenance}): calibrations of one set of"
             " readings are not independent, and the intervals do not hold for them"
         )
-    elif not _same_plan(old, new):
+    elif ground is None and not _same_plan(old, new):
         notes.append(
             "the models do not state one and the same plan: the intervals hold if both calibrations"
             " spread their poses over the same region under the same forces; elsewhere the arm does"
             " what springs cannot express, and this looks like a change"
+        )
+    if ground is not None and ground.left_out:
+        notes.append(
+            f"{ground.left_out} of {counted(ground.rows or 0, 'row')} lie outside of what both"
+            " campaigns cover, by pose or by load, and were left out: nothing is known of them"
         )
     if outside:
         notes.append(f"{outside} rows lie outside the joint limits of the robot")
@@ -241,9 +268,14 @@ def recertify(
         )
     spread = Spread.of(old, new)
     loads = None if q is None else _checked_rows(new.model.robot, q, force, moment)
-    rows = None if loads is None else compare_rows(old, new, spread, *loads)
-    verdict, reason = _judge(rows, limit)
+    ground, number = common_ground(old, new, loads)
+    rows = None
+    if loads is not None and len(number):
+        rows = compare_rows(old, new, spread, *taken(loads, number), number)
+    verdict, reason = _judge(rows, limit, ground)
     springs = compare_springs(old, new, spread)
+    if ground is not None and not ground.springs_judged:
+        springs = tuple(replace(each, moved=False) for each in springs)
     moved = sorted(
         (each for each in springs if each.moved), key=lambda each: each.certainty, reverse=True
     )
@@ -267,7 +299,8 @@ def recertify(
         limit=limit,
         verdict=verdict,
         reason=reason,
-        notes=_notes_on(old, new, not only_old and not only_new, outside),
+        notes=_notes_on(old, new, not only_old and not only_new, outside, ground),
+        ground=ground,
     )
     return CompareResult(result, rows)
 
@@ -311,7 +344,7 @@ def check_same_robot(old: Robot, new: Robot, names: tuple[str, str]) -> None:
 
 def _checked_rows(
     robot: Robot, q: ArrayLike, force: ArrayLike | None, moment: ArrayLike | None
-) -> tuple[FloatArray, FloatArray, FloatArray | None]:
+) -> Loads:
     """Return rows as arrays, or refuse them by shape or value."""
     if force is None:
         raise SpringError("rows have joint positions q but no force")

@@ -5,7 +5,7 @@ from enum import StrEnum
 
 import numpy as np
 
-from elastocal.arrays import FloatArray
+from elastocal.arrays import FloatArray, IndexArray
 from elastocal.identification.observability import Term
 from elastocal.records import record
 from elastocal.results import Result, brief_repr
@@ -84,11 +84,43 @@ _Triple = tuple[float, float, float]
 
 @brief_repr
 @record()
+class CommonGround:
+    """How far two campaigns cover the same poses and loads; see `CalibrationDomain`."""
+
+    old_covered: float
+    """Share of the old campaign's readings that the new one covers."""
+    new_covered: float
+    """Share of the new campaign's readings that the old one covers."""
+    springs_judged: bool
+    """Whether that is enough to hold springs against one another."""
+    rows: int | None = None
+    """Number of rows that were given; none without rows."""
+    rows_covered: int | None = None
+    """Number of those that both campaigns cover: only these are compared."""
+
+    @property
+    def left_out(self) -> int:
+        """Number of rows that were given and not compared."""
+        return (self.rows or 0) - (self.rows_covered or 0)
+
+    @property
+    def sentence(self) -> str:
+        """Why springs are not judged."""
+        return (
+            "springs are not held against one another: the campaigns were made at other poses or"
+            f" loads ({self.old_covered:.0%} of the old readings lie where the new campaign"
+            f" measured, {self.new_covered:.0%} of the new ones where the old one did), and what"
+            " springs cannot express would look like a change"
+        )
+
+
+@brief_repr
+@record()
 class LargestChange:
     """The row whose deflection changed most."""
 
     row: int
-    """Its number, from 0."""
+    """Its number among the rows that were given, from 0."""
     joints: tuple[float, ...]
     """In rad or m."""
     force: _Triple
@@ -109,13 +141,14 @@ class DeflectionChange:
     """The change of the predicted deflection over given poses and loads (rows)."""
 
     rows: int
+    """Number of rows that are compared."""
     mean: Estimate
     """Mean norm of the change, in m."""
     largest: Estimate
     """Largest norm of all rows, in m; its interval allows for the search over the rows."""
     where: LargestChange
     size: tuple[float, ...]
-    """Norm of the change of each row, in m."""
+    """Norm of the change of each row that is compared, in m."""
     low: tuple[float, ...]
     """Lower end of the 95 % interval of each `size`, in m; not below 0."""
     high: tuple[float, ...]
@@ -153,6 +186,13 @@ class CompareSummary:
     """One sentence: why this verdict, or why none; if undecided, what would decide."""
     notes: tuple[str, ...]
     """Caveats that belong to the figures, a sentence each."""
+    ground: CommonGround | None = None
+    """None where a model does not know where it was calibrated."""
+
+    @property
+    def springs_judged(self) -> bool:
+        """Whether springs were held against one another; see `CommonGround`."""
+        return self.ground is None or self.ground.springs_judged
 
     @property
     def same_springs(self) -> bool:
@@ -174,6 +214,8 @@ class CompareSummary:
         count = len(self.springs)
         if not count:
             return "no spring is determined by both calibrations"
+        if self.ground is not None and not self.springs_judged:
+            return self.ground.sentence
         if self.moved:
             return ""
         return (
@@ -192,6 +234,8 @@ class CompareSummary:
 class RowComparison:
     """Predicted deflections of both models over given poses and loads (rows)."""
 
+    number: IndexArray
+    """Number of each row among those that were given, from 0, shape (row,)."""
     q: FloatArray
     """Joint positions, shape (row, joint), in rad or m."""
     force: FloatArray
@@ -234,7 +278,7 @@ class RowComparison:
         """Return how the deflection changed, as files hold it."""
         row = self.where
         where = LargestChange(
-            row=row,
+            row=int(self.number[row]),
             joints=tuple(self.q[row].tolist()),
             force=_triple(self.force[row]),
             moment=None if self.moment is None else _triple(self.moment[row]),
@@ -253,7 +297,7 @@ class RowComparison:
             f"predicted deflection over {len(self.q)} rows: {before.mean():.3f} mm mean,"
             f" {before.max():.3f} mm max by the old model\n"
             f"   change: {_in_mm(self.mean)} mean, {_in_mm(self.largest)} max\n"
-            f"   largest at row {self.where + 1}, tcp at ({place}) mm in base"
+            f"   largest at row {self.number[self.where] + 1}, tcp at ({place}) mm in base"
         )
 
 
@@ -271,7 +315,7 @@ class CompareResult(Result):
         found = self.summary
         return (
             ("robot", found.robot),
-            ("moved", ", ".join(found.moved) or "none"),
+            ("moved", ", ".join(found.moved) or found.unmoved_sentence or "none"),
             ("verdict", "none" if found.verdict is None else found.verdict.value),
             ("reason", found.reason),
         )

@@ -124,7 +124,7 @@ def write_recertification_figure(path: Path, found: CompareSummary) -> Path:
     FileAccessError
         If the suffix is another or the file cannot be written.
     """
-    moved = ", ".join(found.moved) or "none"
+    moved = ", ".join(found.moved) or ("none" if found.springs_judged else "not judged")
     description = f"Springs that moved: {moved}. {found.reason}."
     return style.write_figure(
         path, lambda: recertification_figure(found), _title(found), description
@@ -281,6 +281,8 @@ def _found(found: CompareSummary) -> str:
     names = ", ".join(found.moved)
     verb = "moved" if found.same_springs else "differ"
     springs = f"{verb.capitalize()}: {names}." if names else f"No compared spring {verb}."
+    if not found.springs_judged:
+        springs = "Springs are not judged: the campaigns were made at other poses or loads."
     verdict = "" if found.verdict is None else f" {found.verdict.value.capitalize()}:"
     judged = "" if found.limit is None else f" {found.reason.partition(';')[0]}."
     return f"{springs}{verdict}{judged}"

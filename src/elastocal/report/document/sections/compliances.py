@@ -155,6 +155,8 @@ def _recertification(evidence: Evidence) -> Iterator[blocks.Block]:
 
 def _moved_springs(found: CompareSummary) -> str:
     names = ", ".join(found.moved)
+    if not found.springs_judged and found.ground is not None:
+        return f"{found.ground.sentence.capitalize()}."
     if not names:
         return "No compared spring moved beyond its interval."
     return f"Moved beyond their intervals: {names}."
