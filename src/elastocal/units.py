@@ -24,6 +24,7 @@ _FACTORS: dict[str, dict[str, float]] = {
     "rotational stiffness": {"N*m/rad": 1.0, "Nm/rad": 1.0, "N·m/rad": 1.0},
     "translational stiffness": {"N/m": 1.0, "N/mm": 1e3, "N/um": 1e6},
     "frequency": {"Hz": 1.0},
+    "acceleration": {"m/s2": 1.0, "m/s^2": 1.0, "m/s²": 1.0},
 }
 
 _LARGEST: dict[str, tuple[float, str]] = {
@@ -36,6 +37,7 @@ _LARGEST: dict[str, tuple[float, str]] = {
     "angular speed": (1e3, "1000 rad/s"),
     "force rate": (1e9, "1 GN/s"),
     "time": (1e6, "1e6 s"),
+    "acceleration": (1e3, "1000 m/s2"),
 }
 """Largest magnitude of what belongs to a robot cell, in SI: more is a slip of the keyboard."""
 _SMALLEST = 1e-12

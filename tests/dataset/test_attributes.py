@@ -20,10 +20,15 @@ def test_attributes_of_the_cf_conventions_are_carried_through():
 @pytest.mark.parametrize(
     ("attributes", "message"),
     [
-        ({}, "dataset has no attribute 'schema'; this version reads 'elastocal.dataset/1'"),
         (
-            {"schema": "elastocal.dataset/2"},
-            "dataset has schema 'elastocal.dataset/2'; this version reads 'elastocal.dataset/1'",
+            {},
+            "dataset has no attribute 'schema'; this version reads 'elastocal.dataset/1' and"
+            " 'elastocal.dataset/2'",
+        ),
+        (
+            {"schema": "elastocal.dataset/3"},
+            "dataset has schema 'elastocal.dataset/3'; this version reads 'elastocal.dataset/1'"
+            " and 'elastocal.dataset/2'",
         ),
     ],
 )
@@ -40,6 +45,11 @@ def test_an_unknown_schema_is_refused_by_name(attributes, message):
         ({"provenance": 3}, "attribute 'provenance' is 3: it must be a text"),
         ({"provenance": "a\0b"}, r"attribute 'provenance' is 'a\x00b': it must be a text"),
         ({"provenance": "\ud800"}, r"attribute 'provenance' is '\ud800': it must be a text"),
+        (
+            {"gravity": "0 m/s2, 0 m/s2, -9.81"},
+            "attribute 'gravity' is '0 m/s2, 0 m/s2, -9.81': it must be three accelerations, such"
+            " as '0 m/s2, 0 m/s2, -9.81 m/s2'",
+        ),
         ({"tcp_frame": ""}, "attribute 'tcp_frame' is empty: leave it out when it is not known"),
     ],
 )

@@ -73,7 +73,7 @@ def test_an_unknown_schema_is_refused_with_the_file(tmp_path):
         read(path)
     assert str(caught.value) == (
         f"{path}: dataset has schema 'elastocal.dataset/7'; this version reads"
-        " 'elastocal.dataset/1'"
+        " 'elastocal.dataset/1' and 'elastocal.dataset/2'"
     )
 
 

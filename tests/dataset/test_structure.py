@@ -118,7 +118,8 @@ def relabel(**labels):
         ),
         (
             lambda data: data.assign_coords(station=1),
-            "coordinate 'station' is not known (allowed: pose, load_case, axis, joint, joint_unit)",
+            "coordinate 'station' is not known (allowed: pose, load_case, axis, joint, joint_unit,"
+            " campaign)",
         ),
         (lambda data: data.drop_vars("joint"), "coordinate 'joint' (one label each) is missing"),
         (lambda data: data.drop_vars("axis"), "coordinate 'axis' (one label each) is missing"),

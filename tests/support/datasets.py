@@ -60,6 +60,22 @@ def full_keywords(**changes: Any) -> dict[str, Any]:
     return arguments | changes
 
 
+def second_keywords(**changes: Any) -> dict[str, Any]:
+    """Return arguments with everything that is new in ``elastocal.dataset/2``."""
+    arguments = full_keywords()
+    joints = arguments["joint_position"]
+    return arguments | {
+        "sequence": [[0, 1], [-1, 4], [7, 2]],
+        "reference_joint_position": joints[:, 1] + 1e-3,
+        "reference_force": [[0.0, 0.0, -5.0], [1.0, 0.0, -6.0], [0.0, 0.0, 0.0]],
+        "link_joint_position": joints + 1e-4,
+        "campaigns": ("monday", "monday", "in the winter"),
+        "gravity": (0.0, 9.8, -0.5),
+        "conditioned": True,
+        **changes,
+    }
+
+
 def dataset(**changes: Any) -> Dataset:
     """Return a small dataset, some keywords replaced."""
     return Dataset.from_arrays(**keywords(**changes))
@@ -83,6 +99,23 @@ _CASES = st.text(string.printable[:95] + "é漢", min_size=1, max_size=8).map(la
 _TEXTS = st.text(st.characters(exclude_categories=["Cs"], exclude_characters="\0"), max_size=30)
 
 
+def _drawn_of_the_second_schema(
+    draw: st.DrawFn, joints: np.ndarray, status: np.ndarray
+) -> dict[str, Any]:
+    poses, cases = status.shape
+    order = draw(st.permutations(range(-5, cases - 5)))
+    drawn = {
+        "sequence": np.tile(order, (poses, 1)),
+        "reference_joint_position": np.nan_to_num(joints[:, 0]),
+        "reference_force": draw(hnp.arrays(float, (poses, 3), elements=st.floats(-9.0, 9.0))),
+        "link_joint_position": joints + 1e-6,
+        "campaigns": draw(st.lists(_CASES, min_size=poses, max_size=poses)),
+        "gravity": draw(st.tuples(*[st.floats(-9.0, 9.0)] * 3)),
+        "conditioned": True,
+    }
+    return {name: value for name, value in drawn.items() if draw(st.booleans())}
+
+
 @st.composite
 def datasets(draw: st.DrawFn) -> Dataset:
     """Draw a plausible dataset with any labels, missing readings, units, optional variables."""
@@ -101,7 +134,8 @@ def datasets(draw: st.DrawFn) -> Dataset:
     force = numbers(100.0, 3) + 500.0
     controller = numbers(1e-4, 3)
     arguments: dict[str, Any] = {
-        "joint_position": numbers(6.0, len(joints)),
+        # Those of a pose differ by what the arm moves while it is pressed.
+        "joint_position": numbers(6.0, len(joints))[:, :1] + numbers(1e-3, len(joints)),
         "force": force,
         "controller_displacement": controller,
         "marker_displacement": controller + 2e-6 * force,
@@ -117,6 +151,7 @@ def datasets(draw: st.DrawFn) -> Dataset:
         arguments["marker_sigma"] = draw(st.floats(1e-9, 1e-3))
     if draw(st.booleans()):
         arguments["tcp_position"] = numbers(2.0, 3)[:, 0]
+    arguments |= _drawn_of_the_second_schema(draw, arguments["joint_position"], status)
     return Dataset.from_arrays(
         joint_names=joints,
         load_cases=cases,

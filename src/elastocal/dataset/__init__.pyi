@@ -1,4 +1,4 @@
-from ._layout import SCHEMA as SCHEMA, STATUSES as STATUSES
+from ._layout import SCHEMA as SCHEMA, SCHEMAS as SCHEMAS, STATUSES as STATUSES
 from .dataset import Dataset as Dataset
 from .load_rows import (
     LoadRows as LoadRows,
@@ -7,5 +7,5 @@ from .load_rows import (
     write_load_rows as write_load_rows,
 )
 from .merging import merge as merge
-from .readings import Readings as Readings, without as without
+from .readings import Presses as Presses, Readings as Readings, without as without
 from .store import read as read, read_dataset as read_dataset, write as write

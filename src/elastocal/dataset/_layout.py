@@ -1,4 +1,4 @@
-"""The contents of a dataset: variables, dimensions, units, statuses, attributes (spec section 3).
+"""The contents of a dataset: variables, dimensions, units, attributes (spec sections 3 and 8).
 
 This is the one list; the NetCDF file, its CSV twin and every check are made from it. The
 variables are those of the paper's Procedure 1: ``P^c``, ``P^m``, ``F^m`` and ``Theta^c``.
@@ -10,7 +10,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import DTypeLike, NDArray
 
 from elastocal.errors import DatasetError, SchemaError, UnitError, nearest
 from elastocal.units import parse_quantity
@@ -20,14 +20,21 @@ IntArray = NDArray[np.int64]
 StringArray = NDArray[np.str_]
 BoolArray = NDArray[np.bool_]
 StatusArray = NDArray[np.int8]
-Point = tuple[float, float, float]
+Vector = tuple[float, float, float]
 Labels = Mapping[str, Sequence[object]]
 """Labels of each dimension, by its name."""
 Arrays = Mapping[str, np.ndarray]
 """Values of each variable that is present, by its name."""
 
 SCHEMA = "elastocal.dataset/1"
-"""The schema that this version reads and writes."""
+"""The schema of a dataset that has nothing of the next one."""
+
+SCHEMA_2 = "elastocal.dataset/2"
+"""The schema with the order in time, the reference's joints and force, secondary encoders,
+campaigns, gravity; and without metrology."""
+
+SCHEMAS = (SCHEMA, SCHEMA_2)
+"""The schemas that this version reads."""
 
 AXES = ("x", "y", "z")
 """Labels of the coordinate axes, in order."""
@@ -43,7 +50,15 @@ JOINT_UNITS = {"rad": "angle", "deg": "angle", "m": "length", "mm": "length"}
 
 SI_JOINT_UNITS = {"angle": "rad", "length": "m"}
 
-ATTRIBUTES = ("schema", "robot_name", "robot_urdf", "tcp_frame", "marker", "provenance")
+ATTRIBUTES = (
+    "schema",
+    "robot_name",
+    "robot_urdf",
+    "tcp_frame",
+    "marker",
+    "gravity",
+    "provenance",
+)
 """Global attributes with a meaning here, in the order in which they are written."""
 
 CF_ATTRIBUTES = (
@@ -56,6 +71,10 @@ CF_ATTRIBUTES = (
     "comment",
 )
 """Global attributes that the CF conventions (section 2.6) give every file; carried through."""
+
+CONDITIONED = "conditioned"
+"""The attribute ``history`` of a dataset whose every pose began with a full press, made before the
+reference was read. Any other text there is a remark, and means that the arm came by free moves."""
 
 
 @dataclass(frozen=True)
@@ -70,6 +89,10 @@ class Variable:
     """SI unit in memory and in NetCDF files."""
     meaning: str
     required: bool = False
+    schema: str = SCHEMA
+    """The first schema that has it."""
+    optional_in: str = ""
+    """The schema in which it may be absent although it is required."""
     broadcast: bool = False
     """Whether it may come with fewer dimensions, which then are filled with equal values."""
 
@@ -95,6 +118,30 @@ JOINT_POSITION = Variable(
     required=True,
 )
 
+REFERENCE_JOINT_POSITION = Variable(
+    "reference_joint_position",
+    ("pose", "joint"),
+    "angle",
+    "rad",
+    "joint positions when the zero of both displacements was read",
+    schema=SCHEMA_2,
+)
+
+LINK_JOINT_POSITION = Variable(
+    "link_joint_position",
+    ("pose", "load_case", "joint"),
+    "angle",
+    "rad",
+    "positions of the links by secondary encoders; NaN throughout at a joint that has none",
+    schema=SCHEMA_2,
+)
+
+JOINT_VARIABLES = (JOINT_POSITION, REFERENCE_JOINT_POSITION, LINK_JOINT_POSITION)
+"""The variables that have a value for each joint."""
+
+JOINT_PREFIXES = {"reference_": REFERENCE_JOINT_POSITION, "link_": LINK_JOINT_POSITION}
+"""What stands before a joint's name in the CSV column of a variable."""
+
 VECTORS = (
     Variable("force", _READING, "force", "N", "force on the robot at the TCP, in base", True),
     Variable("moment", _READING, "moment", "N m", "moment on the robot at the TCP, in base"),
@@ -113,6 +160,7 @@ VECTORS = (
         "m",
         "marker displacement that the tracker measures, in base",
         required=True,
+        optional_in=SCHEMA_2,
     ),
     Variable(
         "force_sigma", _READING, "force", "N", "standard deviation of the force", broadcast=True
@@ -126,25 +174,43 @@ VECTORS = (
         broadcast=True,
     ),
     Variable("tcp_position", ("pose", "axis"), "length", "m", "unloaded TCP position in base"),
+    Variable(
+        "reference_force",
+        ("pose", "axis"),
+        "force",
+        "N",
+        "force on the robot at the TCP, in base, when the zero of both displacements was read",
+        schema=SCHEMA_2,
+    ),
 )
 """The variables that have an x, a y and a z."""
 
-VARIABLES = (JOINT_POSITION, *VECTORS)
-"""Every variable but the status."""
+VARIABLES = (*JOINT_VARIABLES, *VECTORS)
+"""Every variable that holds quantities."""
 
 STATUS = Variable("status", ("pose", "load_case"), "", "", "how the reading went")
+SEQUENCE = Variable(
+    "sequence",
+    ("pose", "load_case"),
+    "",
+    "",
+    "place of the reading in time among those of its pose",
+    schema=SCHEMA_2,
+)
+INTEGERS: dict[Variable, DTypeLike] = {STATUS: np.int8, SEQUENCE: np.int64}
+"""The variables that hold whole numbers, with their types."""
 
-VARIABLE_NAMES = (*(variable.name for variable in VARIABLES), "status")
-COORDINATES = ("pose", "load_case", "axis", "joint", "joint_unit")
+VARIABLE_NAMES = tuple(variable.name for variable in (*VARIABLES, *INTEGERS))
+COORDINATES = ("pose", "load_case", "axis", "joint", "joint_unit", "campaign")
 
-TEXT_COLUMNS = ("pose", "load_case", "status")
+TEXT_COLUMNS = ("pose", "load_case", "status", "sequence", "campaign")
 """CSV columns without a unit."""
 
 COLUMN_NAMES = (*TEXT_COLUMNS, *(name for variable in VECTORS for name in variable.columns))
 """Every CSV column but those of the joints."""
 
 _JOINT_NAME = re.compile(r"[^\[\],;\"#\s](?:[^\[\],;\"#]*[^\[\],;\"#\s])?")
-_SIMILAR = 0.85
+SIMILAR = 0.85
 """Similarity (difflib ratio) from which a joint name is taken for a misspelt column."""
 
 
@@ -163,7 +229,7 @@ def joint_name_problem(name: str) -> str | None:
         return "the name stands for something else in a dataset"
     if not name.isprintable() or _JOINT_NAME.fullmatch(name) is None:
         return "a joint name is not empty and has no brackets, delimiters, quotes or line breaks"
-    similar = difflib.get_close_matches(name, COLUMN_NAMES, n=1, cutoff=_SIMILAR)
+    similar = difflib.get_close_matches(name, COLUMN_NAMES, n=1, cutoff=SIMILAR)
     return f"it is not a joint; did you mean {similar[0]!r}?" if similar else None
 
 
@@ -184,9 +250,10 @@ def canonical_attributes(attributes: Mapping[str, object]) -> dict[str, str]:
     """
     known = (*ATTRIBUTES, *CF_ATTRIBUTES)
     schema = attributes.get("schema")
-    if not isinstance(schema, str) or schema != SCHEMA:
+    if not isinstance(schema, str) or schema not in SCHEMAS:
         found = "no attribute 'schema'" if schema is None else f"schema {schema!r}"
-        raise SchemaError(f"dataset has {found}; this version reads {SCHEMA!r}")
+        known_schemas = " and ".join(map(repr, SCHEMAS))
+        raise SchemaError(f"dataset has {found}; this version reads {known_schemas}")
     for name, value in attributes.items():
         if name not in known:
             raise DatasetError(
@@ -197,41 +264,48 @@ def canonical_attributes(attributes: Mapping[str, object]) -> dict[str, str]:
             raise DatasetError(f"attribute {name!r} is {value!r:.60}: it must be a text")
         if name in ("robot_urdf", "tcp_frame") and not value:
             raise DatasetError(f"attribute {name!r} is empty: leave it out when it is not known")
-        if name == "marker":
-            read_point(name, value)
+        if name in _VECTOR_ATTRIBUTES:
+            read_vector(name, value)
     texts = {"robot_name": "", "provenance": "", **attributes}
     return {name: str(texts[name]) for name in known if name in texts}
 
 
 _NOTHING = 1e-12
-"""Length in m below which `parse_quantity` reads none."""
+"""Number in SI units below which `parse_quantity` reads none."""
+
+_VECTOR_ATTRIBUTES = {
+    "marker": ("length", "0 m, 0.04 m, -0.06 m"),
+    "gravity": ("acceleration", "0 m/s2, 0 m/s2, -9.81 m/s2"),
+}
+"""Attributes of three numbers: their dimension, and an example."""
 
 
-def write_point(point: Point) -> str:
-    """Return the text of a point, as the command line takes it; a picometre is nothing.
+def write_vector(vector: Vector, unit: str = "m") -> str:
+    """Return the text of a vector, as the command line takes it; a picometre is nothing.
 
-    >>> write_point((0.0, 0.04, -0.06))
+    >>> write_vector((0.0, 0.04, -0.06))
     '0.0 m, 0.04 m, -0.06 m'
     """
     return ", ".join(
-        f"{value if abs(value) >= _NOTHING else 0.0!r} m" for value in map(float, point)
+        f"{value if abs(value) >= _NOTHING else 0.0!r} {unit}" for value in map(float, vector)
     )
 
 
-def read_point(name: str, text: str) -> Point:
-    """Return the point that an attribute states, in m.
+def read_vector(name: str, text: str) -> Vector:
+    """Return the point or the acceleration that an attribute states, in m or m/s².
 
     Raises
     ------
     DatasetError
-        If it is not three lengths with their units.
+        If it is not three quantities with their units.
     """
+    dimension, example = _VECTOR_ATTRIBUTES[name]
     try:
-        x, y, z = (parse_quantity(part.strip(), "length") for part in text.split(","))
+        x, y, z = (parse_quantity(part.strip(), dimension) for part in text.split(","))
     except (UnitError, ValueError) as error:
         raise DatasetError(
-            f"attribute {name!r} is {text!r:.60}: it must be three lengths, such as"
-            " '0 m, 0.04 m, -0.06 m'"
+            f"attribute {name!r} is {text!r:.60}: it must be three {dimension}s, such as"
+            f" {example!r}"
         ) from error
     return x, y, z
 

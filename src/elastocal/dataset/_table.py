@@ -1,79 +1,39 @@
-"""A dataset's CSV file, the lossless twin of the NetCDF file: a row a reading (spec section 3).
+"""A dataset's CSV file, the lossless twin of the NetCDF file: a row a reading (spec section 3)."""
 
-The header says which column holds what, in which unit; attributes stand above it as comment lines,
-their texts in JSON so that each fits on one line.
-"""
-
-import io
-import json
 import math
-import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
+from elastocal.dataset._header import TableText, attribute_lines, cut, missing_column, parse_header
 from elastocal.dataset._layout import (
-    ATTRIBUTES,
-    AXES,
-    CF_ATTRIBUTES,
-    COLUMN_NAMES,
-    JOINT_UNITS,
+    JOINT_POSITION,
+    JOINT_PREFIXES,
     MISSING,
     OK,
-    SCHEMA,
-    SI_JOINT_UNITS,
+    SCHEMA_2,
+    SEQUENCE,
     STATUSES,
-    TEXT_COLUMNS,
+    VARIABLES,
     VECTORS,
     BoolArray,
     FloatArray,
+    IntArray,
     StatusArray,
-    joint_name_problem,
 )
 from elastocal.dataset._structure import assemble
 from elastocal.dataset.dataset import Dataset
-from elastocal.errors import DatasetError, UnitError, nearest
+from elastocal.errors import DatasetError, nearest
 from elastocal.files import read_text
 from elastocal.records import LabelledArrays
-from elastocal.tables import Column, TableError, TableReader, TableRows, write_table as write_rows
-from elastocal.units import factor, split_column
+from elastocal.tables import Column, TableError, write_table as write_rows
+from elastocal.units import split_column
 
-_JOINT_HINT = "a joint column is written name[rad], name[deg], name[m] or name[mm]"
-_VARIABLE_OF = {column: variable for variable in VECTORS for column in variable.columns}
 _MEASURED = ("force", "moment", "controller_displacement", "marker_displacement")
 """Vectors that, with the joint positions, make a reading; a row with none of them is missing."""
-_ATTRIBUTE = re.compile(r"#\s*(\w+)\s*:\s*(.*)")
-
-
-@dataclass(frozen=True)
-class TableText:
-    """A CSV file, cut into cells."""
-
-    attributes: dict[str, object]
-    """Attributes of the leading comment lines."""
-    header: tuple[str, ...]
-    rows: TableRows
-    """Rows that are not blank, each as long as the header."""
-
-
-@dataclass(frozen=True)
-class Header:
-    """The columns of a file, by what they hold."""
-
-    text: dict[str, int]
-    """Position of ``pose``, ``load_case`` and, where present, ``status``."""
-    joints: tuple[Column, ...]
-    """Joint positions, in the order of the file."""
-    vectors: dict[str, tuple[Column, ...]]
-    """The x, y and z columns of each vector that is present."""
-
-    @property
-    def joint_units(self) -> tuple[str, ...]:
-        """SI unit of each joint."""
-        return tuple(SI_JOINT_UNITS[JOINT_UNITS[column.unit]] for column in self.joints)
 
 
 @dataclass(frozen=True)
@@ -109,23 +69,35 @@ def read_table(path: Path) -> LabelledArrays:
     """
     table = cut(read_text(path))
     header = parse_header(table.header)
+    for variable in VECTORS:
+        needed = variable.required and variable.optional_in != table.attributes.get("schema")
+        if needed and variable.name not in header.vectors:
+            raise missing_column(variable.columns[0], variable)
     grid = _grid(table, header.text)
     joints = _numbers(table, header.joints)
     vectors = {name: _numbers(table, columns) for name, columns in header.vectors.items()}
     measured = [joints, *(vectors[name] for name in _MEASURED if name in vectors)]
     empty = np.asarray(np.isnan(np.hstack(measured)).all(axis=1))
-    arrays = {name: grid.spread(values) for name, values in vectors.items()}
-    if "tcp_position" in vectors:
-        arrays["tcp_position"] = _per_pose(table, grid, vectors["tcp_position"])
-    arrays["joint_position"] = grid.spread(joints)
-    arrays["status"] = grid.spread(_statuses(table, header.text, empty), MISSING)
-    joint_names = [column.name for column in header.joints]
-    return assemble(
-        {"pose": grid.poses, "load_case": grid.load_cases, "joint": joint_names},
-        arrays,
-        header.joint_units,
-        {"schema": SCHEMA, **table.attributes},
-    )
+    vectors |= {name: _numbers(table, columns) for name, columns in header.other_joints.items()}
+    arrays: dict[str, np.ndarray] = {"joint_position": grid.spread(joints)}
+    for variable in VARIABLES:
+        values = vectors.get(variable.name)
+        if values is not None:
+            by_pose = "load_case" not in variable.dims
+            names = header.components(variable)
+            spread = _per_pose(table, grid, names, values) if by_pose else grid.spread(values)
+            arrays[variable.name] = spread
+    statuses = _statuses(table, header.text, empty)
+    arrays["status"] = grid.spread(statuses, MISSING)
+    if SEQUENCE.name in header.text:
+        arrays[SEQUENCE.name] = grid.spread(_sequence(table, header.text, statuses), -1)
+    labels: dict[str, ArrayLike | None] = {
+        "pose": grid.poses,
+        "load_case": grid.load_cases,
+        "joint": [column.name for column in header.joints],
+        "campaign": _campaigns(table, grid, header.text) if "campaign" in header.text else None,
+    }
+    return assemble(labels, arrays, header.joint_units, {"schema": SCHEMA_2, **table.attributes})
 
 
 def write_table(data: Dataset, path: Path) -> None:
@@ -145,162 +117,26 @@ def write_table(data: Dataset, path: Path) -> None:
     }
     if np.any(data.status != OK):
         columns["status"] = [STATUSES[value] for value in data.status.ravel()]
-    joints = zip(data.joint_names, data.joint_units, strict=True)
-    for index, (name, unit) in enumerate(joints):
-        columns[f"{name}[{unit}]"] = _cells(data.joint_position[..., index])
-    for variable in VECTORS:
+    if data.sequence is not None:
+        columns["sequence"] = list(data.sequence.ravel().tolist())
+    if data.campaigns:
+        columns["campaign"] = [name for name in data.campaigns for _ in data.load_cases]
+    prefixes = {variable: prefix for prefix, variable in JOINT_PREFIXES.items()}
+    for variable in (JOINT_POSITION, *prefixes, *VECTORS):
         values = data.arrays.get(variable.name)
-        if values is not None:
-            if "load_case" not in variable.dims:
-                values = np.broadcast_to(values[:, np.newaxis], (*data.status.shape, len(AXES)))
-            for index, name in enumerate(variable.columns):
-                columns[f"{name}[{variable.column_unit}]"] = _cells(values[..., index])
+        if values is None:
+            continue
+        if "load_case" not in variable.dims:
+            values = np.broadcast_to(values[:, None], (*data.status.shape, values.shape[-1]))
+        heads = [f"{name}[{variable.column_unit}]" for name in variable.columns]
+        if "joint" in variable.dims:
+            joints = zip(data.joint_names, data.joint_units, strict=True)
+            heads = [f"{prefixes.get(variable, '')}{name}[{unit}]" for name, unit in joints]
+        for index, head in enumerate(heads):
+            columns[head] = _cells(values[..., index])
     stated = {name: text for name, text in data.attributes.items() if text}
     rows = zip(*columns.values(), strict=True)
     write_rows(path, tuple(columns), rows, tuple(attribute_lines(stated)))
-
-
-def cut(text: str) -> TableText:
-    """Cut the text of a CSV file into attributes, header and rows.
-
-    Raises
-    ------
-    DatasetError
-        If a comment holds a bad attribute, a row is not as long as the header, or there is none.
-    """
-    try:
-        reader = TableReader(io.StringIO(text))
-        attributes = _preamble(reader.layout.preamble)
-        header = reader.layout.header
-        if not header:
-            raise DatasetError("file has no header line, only comments")
-        rows = reader.rows()
-    except TableError as error:
-        raise DatasetError(str(error)) from error
-    uneven = rows.uneven(len(header))
-    if uneven:
-        line, cells = uneven
-        hint = " (with a decimal comma the delimiter must be another, and the comma a point)"
-        raise DatasetError(
-            f"row {line} has {cells} cells, the header has {len(header)}"
-            f"{hint if cells > len(header) else ''}"
-        )
-    if not len(rows):
-        raise DatasetError("file has a header but no row")
-    return TableText(attributes, header, rows)
-
-
-def attribute_lines(attributes: Mapping[str, str]) -> Iterator[str]:
-    """Yield a comment line for each attribute, its text as JSON so that it fits on one line."""
-    for name, value in attributes.items():
-        yield f"# {name}: {json.dumps(value)}\n"
-
-
-def _preamble(lines: Sequence[str]) -> dict[str, object]:
-    """Return the attributes that the lines above the header state."""
-    attributes: dict[str, object] = {}
-    for number, line in enumerate(lines, start=1):
-        for name, value in _attribute(line.strip(), number).items():
-            if name in attributes:
-                raise DatasetError(f"row {number}: attribute {name!r} stands twice")
-            attributes[name] = value
-    return attributes
-
-
-def _attribute(line: str, number: int) -> dict[str, object]:
-    """Return the attribute that a comment line states; none when it is a person's remark."""
-    match = _ATTRIBUTE.fullmatch(line)
-    if match is None:
-        return {}
-    known, name = (*ATTRIBUTES, *CF_ATTRIBUTES), match[1]
-    try:
-        value = json.loads(match[2])
-    except ValueError as error:
-        if name in ATTRIBUTES:
-            raise DatasetError(
-                f"row {number}: attribute {name!r} is {match[2]!r:.60}: it must be a text in double"
-                " quotes (JSON)"
-            ) from error
-        return {}
-    if name not in known and nearest(name, known):
-        raise DatasetError(f"row {number}: attribute {name!r} is not known{nearest(name, known)}")
-    return {name: value} if name in known else {}
-
-
-def parse_header(cells: Sequence[str]) -> Header:
-    """Return the columns that a header line names, in any order.
-
-    Raises
-    ------
-    DatasetError
-        If a column is unknown, missing, named twice, or has no unit or a wrong one.
-    """
-    text: dict[str, int] = {}
-    numbers: dict[str, Column] = {}
-    for index, cell in enumerate(cells):
-        name, unit = _split(cell, index)
-        if name in text or name in numbers:
-            raise DatasetError(f"column {name!r} stands twice in the header")
-        if name in TEXT_COLUMNS:
-            if unit is not None:
-                raise DatasetError(f"column {cell!r} has a unit: it must be written {name!r}")
-            text[name] = index
-        else:
-            numbers[name] = _number_column(index, name, unit)
-    for name in ("pose", "load_case"):
-        if name not in text:
-            raise DatasetError(f"column {name!r} is missing")
-    joints = tuple(column for name, column in numbers.items() if name not in _VARIABLE_OF)
-    if not joints:
-        raise DatasetError(f"no joint column: {_JOINT_HINT}")
-    return Header(text, joints, _vectors(numbers))
-
-
-def _split(cell: str, index: int) -> tuple[str, str | None]:
-    if not cell.strip():
-        raise DatasetError(f"column {index + 1} has no name in the header")
-    try:
-        return split_column(cell)
-    except UnitError as error:
-        raise DatasetError(str(error)) from error
-
-
-def _number_column(index: int, name: str, unit: str | None) -> Column:
-    variable = _VARIABLE_OF.get(name)
-    if variable is None:
-        return _joint_column(index, name, unit)
-    if not unit:
-        raise DatasetError(
-            f"column {name!r} has no unit: it is written {name}[{variable.column_unit}]"
-        )
-    try:
-        return Column(index, name, unit, factor(unit, variable.dimension))
-    except UnitError as error:
-        raise DatasetError(f"column '{name}[{unit}]': {error}") from error
-
-
-def _joint_column(index: int, name: str, unit: str | None) -> Column:
-    """Return a joint's column: every column that is not known otherwise and has a joint's unit."""
-    if unit not in JOINT_UNITS:
-        shown = name if unit is None else f"{name}[{unit}]"
-        hint = nearest(name, COLUMN_NAMES)
-        raise DatasetError(f"column {shown!r} is not known{hint} ({_JOINT_HINT})")
-    problem = joint_name_problem(name)
-    if problem:
-        raise DatasetError(f"column '{name}[{unit}]': {problem}")
-    return Column(index, name, unit, factor(unit, JOINT_UNITS[unit]))
-
-
-def _vectors(numbers: dict[str, Column]) -> dict[str, tuple[Column, ...]]:
-    """Return the columns of each vector; one that is there must be there whole."""
-    vectors: dict[str, tuple[Column, ...]] = {}
-    for variable in VECTORS:
-        missing = [name for name in variable.columns if name not in numbers]
-        if missing and (variable.required or len(missing) < len(variable.columns)):
-            raise DatasetError(f"column '{missing[0]}[{variable.column_unit}]' is missing")
-        if not missing:
-            vectors[variable.name] = tuple(numbers[name] for name in variable.columns)
-    return vectors
 
 
 def _grid(table: TableText, text: Mapping[str, int]) -> _Grid:
@@ -309,7 +145,7 @@ def _grid(table: TableText, text: Mapping[str, int]) -> _Grid:
     cases: dict[str, int] = {}
     line_of: dict[tuple[int, int], int] = {}
     for line, row in zip(table.rows.lines, table.rows.cells, strict=True):
-        pose = _pose(row[text["pose"]], line)
+        pose = _integer("pose", row[text["pose"]], line)
         case = row[text["load_case"]].strip()
         if not case:
             raise DatasetError(f"row {line}: load_case is empty: it must be a name")
@@ -324,12 +160,12 @@ def _grid(table: TableText, text: Mapping[str, int]) -> _Grid:
     return _Grid(list(poses), list(cases), places[:, 0], places[:, 1])
 
 
-def _pose(cell: str, line: int) -> int:
+def _integer(name: str, cell: str, line: int) -> int:
     try:
         _refuse_underscore(cell)
         return int(cell)
     except ValueError as error:
-        raise DatasetError(f"row {line}: pose is {cell!r}: it must be an integer") from error
+        raise DatasetError(f"row {line}: {name} is {cell!r}: it must be an integer") from error
 
 
 def _numbers(table: TableText, columns: Sequence[Column]) -> FloatArray:
@@ -374,20 +210,50 @@ def _statuses(table: TableText, text: Mapping[str, int], empty: BoolArray) -> St
     return statuses
 
 
-def _per_pose(table: TableText, grid: _Grid, values: FloatArray) -> FloatArray:
-    """Return TCP positions, shape (pose, 3), from rows of which those of a pose must agree."""
-    positions, lines = np.full((len(grid.poses), len(AXES)), math.nan), table.rows.lines
-    row, axis = np.nonzero(~np.isnan(values))
-    positions[grid.pose[row], axis] = values[row, axis]
-    for index in np.flatnonzero(positions[grid.pose[row], axis] != values[row, axis]):
-        pose, component = grid.pose[row[index]], axis[index]
-        other = row[(grid.pose[row] == pose) & (axis == component)][-1]
+def _sequence(table: TableText, text: Mapping[str, int], statuses: StatusArray) -> IntArray:
+    """Return the place of each row in time, shape (row,); a missing reading may have none: -1."""
+    places = np.full(len(table.rows), -1, dtype=np.int64)
+    for index, row in enumerate(table.rows.cells):
+        cell = row[text[SEQUENCE.name]]
+        if cell.strip() or statuses[index] != MISSING:
+            places[index] = _integer(SEQUENCE.name, cell, table.rows.lines[index])
+    return places
+
+
+def _campaigns(table: TableText, grid: _Grid, text: Mapping[str, int]) -> list[str]:
+    """Return the campaign of each pose, shape (pose,), on which its rows must agree."""
+    campaigns = [""] * len(grid.poses)
+    for index, row in enumerate(table.rows.cells):
+        name, pose = row[text["campaign"]].strip(), int(grid.pose[index])
+        if campaigns[pose] not in ("", name):
+            raise DatasetError(
+                f"row {table.rows.lines[index]}: campaign of pose {grid.poses[pose]} is {name!r},"
+                f" but {campaigns[pose]!r} above: a pose belongs to one campaign"
+            )
+        campaigns[pose] = name
+    return campaigns
+
+
+def _per_pose(
+    table: TableText, grid: _Grid, columns: Sequence[str], values: FloatArray
+) -> FloatArray:
+    """Return what a pose has one of, shape (pose, column), from rows that must agree on it.
+
+    ``columns`` are the headers of the values in SI units.
+    """
+    ones, lines = np.full((len(grid.poses), values.shape[1]), math.nan), table.rows.lines
+    row, column = np.nonzero(~np.isnan(values))
+    ones[grid.pose[row], column] = values[row, column]
+    for index in np.flatnonzero(ones[grid.pose[row], column] != values[row, column]):
+        pose, component = grid.pose[row[index]], column[index]
+        other = row[(grid.pose[row] == pose) & (column == component)][-1]
+        name, unit = split_column(columns[component])
         raise DatasetError(
-            f"tcp_position_{AXES[component]} of pose {grid.poses[pose]} is"
-            f" {values[row[index], component]} m in row {lines[row[index]]} but"
-            f" {values[other, component]} m in row {lines[other]}: a pose has one unloaded position"
+            f"{name} of pose {grid.poses[pose]} is {values[row[index], component]} {unit} in row"
+            f" {lines[row[index]]} but {values[other, component]} {unit} in row {lines[other]}:"
+            f" a pose has one {'unloaded position' if name.startswith('tcp_') else 'reference'}"
         )
-    return positions
+    return ones
 
 
 def _cells(values: np.ndarray) -> list[object]:

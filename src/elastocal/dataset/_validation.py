@@ -15,7 +15,12 @@ from numpy.typing import NDArray
 
 from elastocal.dataset._layout import (
     JOINT_POSITION,
+    JOINT_VARIABLES,
+    LINK_JOINT_POSITION,
+    MISSING,
     OK,
+    REFERENCE_JOINT_POSITION,
+    SEQUENCE,
     STATUSES,
     VARIABLES,
     Arrays,
@@ -30,6 +35,10 @@ from elastocal.errors import DatasetError
 _MAX_JOINT_ANGLE = math.radians(2 * 350)
 """Largest plausible position of a revolute joint, in rad: twice the ±350° of a wrist's last
 joint, the widest range in common use. Beyond it the column is in degrees."""
+
+_MAX_APART = {"rad": math.radians(5.0), "m": 0.1}
+"""Largest plausible median of what a joint has moved since the reference, or of what its link is
+away from its motor: both are some millimetres at the tool, which is less than a degree."""
 
 _MAX_TRAVEL = 100.0
 """Largest plausible position of a prismatic joint or of the TCP, in m: no rail is longer.
@@ -63,6 +72,8 @@ def check_numbers(labels: Labels, arrays: Arrays) -> None:
         if variable.name in arrays:
             values = arrays[variable.name]
             needed = ok if "load_case" in variable.dims else ok.any(axis=1)
+            if variable == LINK_JOINT_POSITION:
+                values = _without_absent_encoders(values)
             for place, value in _offences(labels, variable, values, ~np.isfinite(values), needed):
                 raise DatasetError(
                     f"{place} is {value} although the status is ok: give a finite number, or the"
@@ -73,6 +84,8 @@ def check_numbers(labels: Labels, arrays: Arrays) -> None:
                     raise DatasetError(
                         f"{place} is {value}: a standard deviation must be greater than 0"
                     )
+    if SEQUENCE.name in arrays:
+        _check_sequence(labels, arrays[SEQUENCE.name], arrays["status"])
 
 
 def check_plausible(labels: Labels, arrays: Arrays, joint_units: Sequence[str]) -> None:
@@ -85,17 +98,28 @@ def check_plausible(labels: Labels, arrays: Arrays, joint_units: Sequence[str]) 
     """
     ok = arrays["status"] == OK
     force = _norms(arrays["force"][ok])
-    marker, controller = (arrays[f"{name}_displacement"][ok] for name in ("marker", "controller"))
-    _check_joints(labels, arrays["joint_position"], joint_units, ok)
+    controller = arrays["controller_displacement"][ok]
+    for variable in JOINT_VARIABLES:
+        if variable.name in arrays:
+            needed = ok if "load_case" in variable.dims else ok.any(axis=1)
+            _check_joints(labels, variable, arrays[variable.name], joint_units, needed)
+    for variable in (REFERENCE_JOINT_POSITION, LINK_JOINT_POSITION):
+        if variable.name in arrays:
+            _check_near(variable, arrays, joint_units, ok)
     if "tcp_position" in arrays:
         distances = _norms(arrays["tcp_position"][ok.any(axis=1)])
         _check_median("tcp_position", distances, _MAX_TRAVEL, "m", "mm")
     _check_median(
         "controller_displacement", _norms(controller), _MAX_MEDIAN_DISPLACEMENT, "m", "mm"
     )
-    _check_median("marker_displacement", _norms(marker), _MAX_MEDIAN_DISPLACEMENT, "m", "mm")
+    if "marker_displacement" in arrays:
+        marker = arrays["marker_displacement"][ok]
+        _check_median("marker_displacement", _norms(marker), _MAX_MEDIAN_DISPLACEMENT, "m", "mm")
     _check_median("force", force, _MAX_MEDIAN_FORCE, "N", "mN")
-    _check_compliance(_norms(marker - controller), force)
+    if not force.any():
+        raise DatasetError(f"force is zero in all {len(force)} usable readings: nothing to fit")
+    if "marker_displacement" in arrays:
+        _check_compliance(_norms(marker - controller), force)
 
 
 def _offences(
@@ -131,16 +155,65 @@ def _norms(vectors: FloatArray) -> FloatArray:
     return np.asarray(np.linalg.norm(vectors, axis=-1))
 
 
+def _without_absent_encoders(values: FloatArray) -> FloatArray:
+    """Return link positions with zeros at the joints that have no secondary encoder."""
+    absent = np.isnan(values).all(axis=(0, 1))
+    if absent.all():
+        raise DatasetError(
+            f"{LINK_JOINT_POSITION.name} has no number: leave it out without secondary encoders"
+        )
+    return np.where(absent, 0.0, values)
+
+
+def _check_sequence(labels: Labels, sequence: NDArray[np.int64], status: StatusArray) -> None:
+    """Refuse two readings at one place in time; what was not measured has no place."""
+    for pose, row in enumerate(sequence):
+        first: dict[int, int] = {}
+        for case in np.flatnonzero(status[pose] != MISSING).tolist():
+            other = first.setdefault(int(row[case]), case)
+            if other != case:
+                raise DatasetError(
+                    f"sequence of pose {labels['pose'][pose]} is {row[case]} for load cases"
+                    f" {labels['load_case'][other]!r} and {labels['load_case'][case]!r}: each"
+                    " reading of a pose needs its own place in time"
+                )
+
+
+def _check_near(
+    variable: Variable, arrays: Arrays, joint_units: Sequence[str], ok: BoolArray
+) -> None:
+    """Refuse joints that are nowhere near those of the readings: the mark of a wrong unit."""
+    values = arrays[variable.name]
+    if "load_case" not in variable.dims:
+        values = values[:, np.newaxis]
+    apart = np.abs(values - arrays[JOINT_POSITION.name])[ok]
+    known = ~np.isnan(apart).any(axis=0)
+    for unit, mistake in (("rad", "degrees"), ("m", "mm")):
+        columns = known & (np.array(joint_units) == unit)
+        median = float(np.median(apart[:, columns].max(axis=1))) if columns.any() else 0.0
+        if not median <= _MAX_APART[unit]:
+            raise DatasetError(
+                f"{variable.name} is a median of {median:g} {unit} away from joint_position over"
+                f" {len(apart)} readings, more than {_MAX_APART[unit]:.3g} {unit}: looks like"
+                f" {mistake} in a column of {unit}"
+            )
+
+
 def _check_joints(
-    labels: Labels, positions: FloatArray, joint_units: Sequence[str], ok: BoolArray
+    labels: Labels,
+    variable: Variable,
+    positions: FloatArray,
+    joint_units: Sequence[str],
+    needed: BoolArray,
 ) -> None:
     prismatic = np.array(joint_units) == "m"
     limits = np.where(prismatic, _MAX_TRAVEL, _MAX_JOINT_ANGLE)
-    beyond = ~(np.abs(positions) <= limits) & ok[..., np.newaxis]
+    # A joint without a secondary encoder has NaN throughout, which is not beyond.
+    beyond = (np.abs(positions) > limits) & needed[..., np.newaxis]
     for index in np.argwhere(beyond):
         unit, mistake = ("m", "mm") if prismatic[index[-1]] else ("rad", "degrees")
         raise DatasetError(
-            f"{_place(labels, JOINT_POSITION, index)} is {positions[tuple(index)]:g} {unit}, beyond"
+            f"{_place(labels, variable, index)} is {positions[tuple(index)]:g} {unit}, beyond"
             f" ±{limits[index[-1]]:.4g} {unit}: looks like {mistake} in a column of {unit}"
         )
 
@@ -155,8 +228,6 @@ def _check_median(name: str, norms: FloatArray, limit: float, unit: str, mistake
 
 
 def _check_compliance(deflection: FloatArray, force: FloatArray) -> None:
-    if not force.any():
-        raise DatasetError(f"force is zero in all {len(force)} usable readings: nothing to fit")
     if not deflection.any():
         raise DatasetError(
             f"marker_displacement equals controller_displacement in all {len(force)} usable"

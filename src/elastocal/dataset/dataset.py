@@ -1,41 +1,52 @@
 """The dataset: the labelled arrays of the paper's Procedure 1."""
 
-from collections.abc import Hashable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from elastocal.dataset._labelled import (
+    campaign_labels,
+    labelled_from_xarray,
+    pose_labels,
+    read_joint_units,
+    read_sequence,
+    read_status,
+    read_variables,
+    text_labels,
+    xarray_from_labelled,
+)
 from elastocal.dataset._layout import (
     AXES,
+    CONDITIONED,
+    INTEGERS,
     OK,
     SCHEMA,
-    VARIABLE_NAMES,
+    SCHEMA_2,
+    VARIABLES,
     BoolArray,
     FloatArray,
+    IntArray,
     Labels,
-    Point,
     StatusArray,
+    Vector,
     canonical_attributes,
     freeze,
-    read_point,
-    write_point,
+    read_vector,
+    write_vector,
 )
 from elastocal.dataset._structure import (
     assemble,
     check_names,
     check_structure,
-    pose_labels,
-    read_joint_units,
-    read_status,
-    read_variables,
-    text_labels,
+    needed_schema,
 )
 from elastocal.dataset._validation import check_numbers, check_plausible
-from elastocal.dataset.readings import Readings
-from elastocal.errors import DatasetError, nearest
-from elastocal.records import LabelledArray, LabelledArrays
+from elastocal.dataset.merging import selected
+from elastocal.dataset.readings import Readings, usable_readings
+from elastocal.records import LabelledArrays
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -71,10 +82,11 @@ class Dataset:
     """Force on the robot at the TCP in base (F^m), shape (pose, load_case, 3), in N."""
     controller_displacement: FloatArray
     """Displacement by the controller (P^c), in base, shape (pose, load_case, 3), in m."""
-    marker_displacement: FloatArray
-    """Displacement by the tracker (P^m), in base, shape (pose, load_case, 3), in m."""
     status: StatusArray
     """Index into ``STATUSES`` of each reading, shape (pose, load_case)."""
+    marker_displacement: FloatArray | None = None
+    """Displacement by the tracker (P^m), in base, shape (pose, load_case, 3), in m; None: there
+    was no metrology."""
     moment: FloatArray | None = None
     """Moment on the robot at the TCP in base, shape (pose, load_case, 3), in N·m."""
     force_sigma: FloatArray | None = None
@@ -83,18 +95,33 @@ class Dataset:
     """Standard deviation of the marker displacement, shape (pose, load_case, 3), in m."""
     tcp_position: FloatArray | None = None
     """Unloaded TCP position in base, shape (pose, 3), in m."""
+    sequence: IntArray | None = None
+    """Place of each reading in time among those of its pose, shape (pose, load_case); None: the
+    order of the load cases."""
+    reference_joint_position: FloatArray | None = None
+    """Joint positions when the zero of both displacements was read, shape (pose, joint)."""
+    reference_force: FloatArray | None = None
+    """Force on the robot at the TCP in base then, shape (pose, 3), in N; None: none."""
+    link_joint_position: FloatArray | None = None
+    """Positions of the links by secondary encoders, shape (pose, load_case, joint)."""
+    campaigns: tuple[str, ...] = ()
+    """Campaign of each pose; empty where there are none."""
     attributes: Mapping[str, str] = field(default_factory=lambda: {"schema": SCHEMA})
-    """Attributes of the file: schema, robot, marker, provenance, and CF's remarks."""
+    """Attributes of the file: schema, robot, marker, gravity, provenance, and CF's remarks. The
+    schema becomes the first one that has all that the dataset has."""
 
     def __post_init__(self) -> None:
-        for name in ("poses", "load_cases", "joint_names", "joint_units"):
+        for name in ("poses", "load_cases", "joint_names", "joint_units", "campaigns"):
             object.__setattr__(self, name, tuple(getattr(self, name)))
-        for name in VARIABLE_NAMES:
-            if getattr(self, name) is not None:
-                values = np.array(getattr(self, name), np.int8 if name == "status" else np.float64)
+        for variable in (*VARIABLES, *INTEGERS):
+            values = getattr(self, variable.name)
+            if values is not None:
+                values = np.array(values, INTEGERS.get(variable, np.float64))
                 freeze(values)
-                object.__setattr__(self, name, values)
-        object.__setattr__(self, "attributes", canonical_attributes(self.attributes))
+                object.__setattr__(self, variable.name, values)
+        attributes = canonical_attributes(self.attributes)
+        schema = needed_schema(self._labels, self._variables, attributes)
+        object.__setattr__(self, "attributes", attributes | {"schema": schema})
         check_structure(self._labels, self._variables, self.joint_units)
         check_numbers(self._labels, self._variables)
 
@@ -112,7 +139,7 @@ class Dataset:
         joint_position: ArrayLike,
         force: ArrayLike,
         controller_displacement: ArrayLike,
-        marker_displacement: ArrayLike,
+        marker_displacement: ArrayLike | None = None,
         joint_names: Sequence[str],
         load_cases: Sequence[str],
         poses: Sequence[int] | None = None,
@@ -121,42 +148,51 @@ class Dataset:
         force_sigma: ArrayLike | None = None,
         marker_sigma: ArrayLike | None = None,
         tcp_position: ArrayLike | None = None,
+        sequence: ArrayLike | None = None,
+        reference_joint_position: ArrayLike | None = None,
+        reference_force: ArrayLike | None = None,
+        link_joint_position: ArrayLike | None = None,
+        campaigns: Sequence[str] | None = None,
         joint_units: Sequence[str] | None = None,
         robot_name: str = "",
         robot_urdf: str | None = None,
         tcp_frame: str | None = None,
-        marker: Point | None = None,
+        marker: Vector | None = None,
+        gravity: Vector | None = None,
+        conditioned: bool = False,
         provenance: str = "",
     ) -> "Dataset":
         """Return the dataset of plain arrays in SI units, if it is plausible.
 
         Parameters
         ----------
-        joint_position : array_like, shape (pose, load_case, joint)
-            Joint positions after settling (paper: Theta^c), in rad, or m for prismatic joints.
-        force : array_like, shape (pose, load_case, 3)
-            Force on the robot at the TCP in base (F^m), in N.
-        controller_displacement, marker_displacement : array_like, shape (pose, load_case, 3)
-            Displacements under load by controller (P^c) and tracker (P^m), in base, in m: of the
-            TCP, or both of the marker where ``marker`` is given.
+        joint_position, force, controller_displacement, marker_displacement : array_like
+            As the fields of these names. Displacements are those of the TCP, or both of the marker
+            where ``marker`` is given; the tracker's is left out where there was no metrology.
+        moment, tcp_position, sequence : array_like, optional
+        reference_joint_position, reference_force, link_joint_position : array_like, optional
+            As the fields of these names.
         joint_names, load_cases : sequence of str
             Labels of the joints and the load cases.
         poses : sequence of int, optional
             Labels of the poses; 0, 1, 2 … by default.
-        moment : array_like, shape (pose, load_case, 3), optional
-            Moment on the robot at the TCP in base, in N·m.
         status : array_like of int, shape (pose, load_case), optional
             Index into ``STATUSES`` of each reading; 0 (ok) by default.
         force_sigma, marker_sigma : array_like, shape () or (pose, load_case[, 3]), optional
             Standard deviations in N and m.
-        tcp_position : array_like, shape (pose, 3), optional
-            Unloaded TCP position in base, in m.
+        campaigns : sequence of str, optional
+            Campaign of each pose.
         joint_units : sequence of str, optional
             ``"rad"`` or ``"m"`` for each joint; ``"rad"`` by default.
         robot_name, robot_urdf, tcp_frame, provenance : str, optional
             Attributes of the file: the robot, its URDF text, a link of it, and where from.
         marker : tuple of float, optional
             Metrology marker in the frame ``tcp_frame``, in m.
+        gravity : tuple of float, optional
+            Acceleration of gravity in base, in m/s²; that of an upright base by default.
+        conditioned : bool
+            Whether the first load case of each pose is a full press made before the reference was
+            read; else the arm came to it by free moves.
 
         Raises
         ------
@@ -173,16 +209,23 @@ class Dataset:
             "force_sigma": force_sigma,
             "marker_sigma": marker_sigma,
             "tcp_position": tcp_position,
+            "sequence": sequence,
+            "reference_joint_position": reference_joint_position,
+            "reference_force": reference_force,
+            "link_joint_position": link_joint_position,
         }
         attributes = {
-            "schema": SCHEMA,
+            "schema": SCHEMA_2,
             "robot_name": robot_name,
             "robot_urdf": robot_urdf,
             "tcp_frame": tcp_frame,
-            "marker": None if marker is None else write_point(marker),
+            "marker": None if marker is None else write_vector(marker),
+            "gravity": None if gravity is None else write_vector(gravity, "m/s2"),
+            "history": CONDITIONED if conditioned else None,
             "provenance": provenance,
         }
         labels = {"pose": poses, "load_case": load_cases, "joint": joint_names}
+        labels["campaign"] = campaigns
         units = joint_units or ("rad",) * len(joint_names)
         dataset = cls.from_labelled(assemble(labels, arrays, units, attributes))
         dataset.require_plausible()
@@ -204,29 +247,25 @@ class Dataset:
         """
         attributes = canonical_attributes(arrays.attributes)
         check_names(arrays)
-        poses, load_cases = pose_labels(arrays), text_labels(arrays, "load_case")
         joint_names = text_labels(arrays, "joint")
         joint_units, factors = read_joint_units(arrays, len(joint_names))
+        status = read_status(arrays)
         return cls(
-            poses=poses,
-            load_cases=tuple(load_cases),
+            poses=pose_labels(arrays),
+            load_cases=tuple(text_labels(arrays, "load_case")),
             joint_names=tuple(joint_names),
             joint_units=tuple(joint_units),
             **read_variables(arrays, factors),
-            status=read_status(arrays),
+            status=status,
+            sequence=read_sequence(arrays, status),
+            campaigns=tuple(campaign_labels(arrays)),
             attributes=attributes,
         )
 
     @classmethod
     def from_xarray(cls, data: "xr.Dataset") -> "Dataset":
         """Return the dataset of an `xarray.Dataset`; see `from_labelled`."""
-        coordinates = [str(name) for name in data.coords if data[name].dims != (name,)]
-        variables = {
-            str(name): LabelledArray(tuple(map(str, each.dims)), each.values, each.attrs)
-            for name, each in data.variables.items()
-        }
-        attributes = {str(name): value for name, value in data.attrs.items()}
-        return cls.from_labelled(LabelledArrays(variables, attributes, tuple(coordinates)))
+        return cls.from_labelled(labelled_from_xarray(data))
 
     def to_labelled(self) -> LabelledArrays:
         """Return the arrays with their labels, units and meanings, as the NetCDF file has them."""
@@ -234,6 +273,7 @@ class Dataset:
             "pose": np.array(self.poses, dtype=np.int64),
             "load_case": np.array(self.load_cases, dtype=np.str_),
             "joint": np.array(self.joint_names, dtype=np.str_),
+            "campaign": np.array(self.campaigns, dtype=np.str_) if self.campaigns else None,
         }
         arrays = assemble(labels, self._variables, self.joint_units, self.attributes)
         for each in arrays.variables.values():
@@ -242,15 +282,7 @@ class Dataset:
 
     def to_xarray(self) -> "xr.Dataset":
         """Return the dataset as an `xarray.Dataset`, which shares the read-only arrays."""
-        import xarray as xr
-
-        arrays = self.to_labelled()
-        variables = {
-            name: xr.Variable(each.dims, each.values, each.attributes)
-            for name, each in arrays.variables.items()
-        }
-        coordinates = {name: variables.pop(name) for name in arrays.coordinates}
-        return xr.Dataset(variables, coordinates, arrays.attributes)
+        return xarray_from_labelled(self.to_labelled())
 
     def require_plausible(self) -> None:
         """Refuse numbers that look like a unit mistake.
@@ -264,12 +296,13 @@ class Dataset:
 
     @property
     def arrays(self) -> dict[str, FloatArray]:
-        """The variables that are present, by name; all but the status."""
-        return {name: each for name, each in self._variables.items() if name != "status"}
+        """The quantities that are present, by name: all variables but status and sequence."""
+        names = [variable.name for variable in VARIABLES]
+        return {name: each for name, each in self._variables.items() if name in names}
 
     @property
     def _variables(self) -> dict[str, np.ndarray]:
-        found = {name: getattr(self, name) for name in VARIABLE_NAMES}
+        found = {each.name: getattr(self, each.name) for each in (*VARIABLES, *INTEGERS)}
         return {name: values for name, values in found.items() if values is not None}
 
     @property
@@ -279,6 +312,7 @@ class Dataset:
             "load_case": self.load_cases,
             "axis": AXES,
             "joint": self.joint_names,
+            "campaign": self.campaigns,
         }
 
     @property
@@ -303,10 +337,29 @@ class Dataset:
         return self.attributes.get("tcp_frame")
 
     @property
-    def marker(self) -> Point | None:
+    def marker(self) -> Vector | None:
         """Metrology marker in the tcp frame, in m; None: at the tcp, or the file does not say."""
-        text = self.attributes.get("marker")
-        return None if text is None else read_point("marker", text)
+        return self._vector("marker")
+
+    def _vector(self, name: str) -> Vector | None:
+        text = self.attributes.get(name)
+        return None if text is None else read_vector(name, text)
+
+    @property
+    def gravity(self) -> Vector | None:
+        """Acceleration of gravity in base, in m/s²; None: the base stands upright."""
+        return self._vector("gravity")
+
+    @property
+    def conditioned(self) -> bool:
+        """Whether each pose's first reading is a full press made before the reference was read."""
+        return self.attributes.get("history") == CONDITIONED
+
+    @property
+    def order(self) -> IntArray:
+        """Place of each reading in time among those of its pose, shape (pose, load_case)."""
+        default = np.tile(np.arange(len(self.load_cases)), (len(self.poses), 1))
+        return default if self.sequence is None else self.sequence
 
     @property
     def provenance(self) -> str:
@@ -319,7 +372,8 @@ class Dataset:
         """Return some poses and load cases, in the order asked for.
 
         Load cases that are not asked for by name and have no usable reading at the chosen poses
-        are left out.
+        are left out. What was first in time remains so: where the load cases are not asked for in
+        that order, the dataset gets a ``sequence``.
 
         Parameters
         ----------
@@ -333,15 +387,7 @@ class Dataset:
         DatasetError
             If a label is unknown or stands twice, or nothing usable is left.
         """
-        rows = list(range(len(self.poses)))
-        if poses is not None:
-            rows = _positions("pose", poses, self.poses)
-        columns = list(range(len(self.load_cases)))
-        if load_cases is not None:
-            columns = _positions("load case", load_cases, self.load_cases)
-        elif self.usable[rows].any():
-            columns = np.flatnonzero(self.usable[rows].any(axis=0)).tolist()
-        return self._taken(rows, columns)
+        return selected(self, poses, load_cases)
 
     def readings(self, joint_names: Sequence[str]) -> Readings:
         """Return the usable readings as flat arrays, the joints in the robot's order.
@@ -354,44 +400,6 @@ class Dataset:
         Raises
         ------
         DatasetError
-            If the dataset's joints are not these.
+            If the dataset's joints are not these, or there was no metrology.
         """
-        wanted = list(joint_names)
-        if sorted(wanted) != sorted(self.joint_names):
-            raise DatasetError(
-                f"joints of the dataset are {list(self.joint_names)}, those of the robot {wanted}:"
-                " they must have the same names"
-            )
-        order = [self.joint_names.index(name) for name in wanted]
-        pose, case = np.nonzero(self.usable)
-        flat: dict[str, Any] = {
-            name: values[pose] if name == "tcp_position" else values[pose, case]
-            for name, values in self.arrays.items()
-        }
-        flat["joint_position"] = flat["joint_position"][:, order]
-        return Readings(np.array(self.poses)[pose], np.array(self.load_cases)[case], **flat)
-
-    def _taken(self, rows: Sequence[int], columns: Sequence[int]) -> "Dataset":
-        """Return the poses and load cases at some positions."""
-        index = np.ix_(rows, columns)
-        return Dataset(
-            poses=tuple(self.poses[row] for row in rows),
-            load_cases=tuple(self.load_cases[column] for column in columns),
-            joint_names=self.joint_names,
-            joint_units=self.joint_units,
-            attributes=self.attributes,
-            **{
-                name: values[list(rows)] if name == "tcp_position" else values[index]
-                for name, values in self._variables.items()
-            },
-        )
-
-
-def _positions(kind: str, labels: Sequence[object], known: Sequence[Hashable]) -> list[int]:
-    for label in labels:
-        if label not in known:
-            listed = ", ".join(map(str, known[:20])) + (", …" if len(known) > 20 else "")
-            names = [name for name in known if isinstance(name, str)]
-            hint = nearest(label, names) if isinstance(label, str) else ""
-            raise DatasetError(f"{kind} {label!r} is not in the dataset{hint} (known: {listed})")
-    return [known.index(label) for label in labels]
+        return usable_readings(self, joint_names)

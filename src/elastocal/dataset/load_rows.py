@@ -9,8 +9,8 @@ from pathlib import Path
 
 import numpy as np
 
+from elastocal.dataset._header import cut
 from elastocal.dataset._layout import AXES, FloatArray
-from elastocal.dataset._table import cut
 from elastocal.errors import DatasetError, UnitError, nearest
 from elastocal.files import read_text
 from elastocal.results import brief_repr

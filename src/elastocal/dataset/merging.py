@@ -1,28 +1,38 @@
-"""Merging: several datasets of one robot become one."""
+"""Parts and wholes: some poses of a dataset, and several datasets of one robot as one."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Hashable, Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from elastocal.dataset._layout import MISSING, FloatArray
-from elastocal.dataset.dataset import Dataset
-from elastocal.errors import DatasetError
+from elastocal.dataset._layout import INTEGERS, MISSING, SEQUENCE, VARIABLES, FloatArray, IntArray
+from elastocal.errors import DatasetError, nearest
 
-_SAME_ATTRIBUTES = ("robot_name", "robot_urdf", "tcp_frame")
+if TYPE_CHECKING:
+    from elastocal.dataset.dataset import Dataset
+
+_SAME_ATTRIBUTES = ("robot_name", "robot_urdf", "tcp_frame", "gravity")
 
 _SAME_MARKER = 1e-3
 """Markers that are estimated closer to one another are the same, in m: the displacements of a
 tool that turns by 1 mrad under load then differ by 1 µm."""
 
 
-def merge(datasets: Sequence[Dataset], *, relabel: bool = False) -> Dataset:
+def merge(
+    datasets: Sequence["Dataset"],
+    *,
+    relabel: bool = False,
+    campaigns: Sequence[str] | None = None,
+) -> "Dataset":
     """Return all poses of several datasets of the same robot.
 
     Poses keep their labels, and one that stands in two datasets is refused: whether it is the
     same pose measured again or another one is for the user to say. Load cases are the union, in
     order of first appearance; a pose that lacks one has NaN and the status missing there. Joints
     are matched by name. Provenances are joined with ``"; "``; the marker is the first one's.
+    Readings keep their order in time, and a reference without a recorded force was unloaded.
 
     Parameters
     ----------
@@ -30,11 +40,14 @@ def merge(datasets: Sequence[Dataset], *, relabel: bool = False) -> Dataset:
         At least one.
     relabel : bool
         Number the poses 0, 1, 2 … instead, for campaigns that each count from zero.
+    campaigns : sequence of str, optional
+        Name of the campaign that each dataset is. By default those that the datasets name; one
+        that names none, beside others that do, is called by its number.
 
     Raises
     ------
     DatasetError
-        If robots, joints or optional variables differ, or a pose label repeats.
+        If robots, joints, optional variables or histories differ, or a pose label repeats.
     """
     if not datasets:
         raise DatasetError("nothing to merge: give at least one dataset")
@@ -44,32 +57,113 @@ def merge(datasets: Sequence[Dataset], *, relabel: bool = False) -> Dataset:
         _check_poses_differ(datasets)
     cases = tuple(dict.fromkeys(case for dataset in datasets for case in dataset.load_cases))
     poses = tuple(pose for dataset in datasets for pose in dataset.poses)
+    names = dict.fromkeys(name for dataset in datasets for name in dataset.arrays)
+    joined: dict[str, Any] = {name: _joined(datasets, name, cases) for name in names}
     sources = [dataset.provenance for dataset in datasets if dataset.provenance]
     provenance = "; ".join(dict.fromkeys(sources))
-    return Dataset(
+    return replace(
+        datasets[0],
         poses=tuple(range(len(poses))) if relabel else poses,
         load_cases=cases,
-        joint_names=datasets[0].joint_names,
-        joint_units=datasets[0].joint_units,
         status=np.concatenate([_spread(each, each.status, cases, MISSING) for each in datasets]),
+        sequence=_sequence(datasets, cases),
+        campaigns=_campaigns(datasets, campaigns),
         attributes={**datasets[0].attributes, "provenance": provenance},
-        **{name: _joined(datasets, name, cases) for name in datasets[0].arrays},
+        **joined,
     )
 
 
-def _joined(datasets: Sequence[Dataset], name: str, cases: Sequence[str]) -> FloatArray:
+def _sequence(datasets: Sequence["Dataset"], cases: Sequence[str]) -> IntArray | None:
+    """Return the order in time; None where it is that of the load cases at all poses."""
+    places = [[cases.index(case) for case in dataset.load_cases] for dataset in datasets]
+    ordered = all(place == sorted(place) for place in places)
+    if ordered and all(dataset.sequence is None for dataset in datasets):
+        return None
+    return np.concatenate([_spread(each, each.order, cases, -1) for each in datasets])
+
+
+def _campaigns(datasets: Sequence["Dataset"], named: Sequence[str] | None) -> tuple[str, ...]:
+    if named is None and not any(dataset.campaigns for dataset in datasets):
+        return ()
+    if named is not None and len(named) != len(datasets):
+        raise DatasetError(f"{len(named)} campaigns are named for {len(datasets)} datasets")
+    labels: list[str] = []
+    for index, dataset in enumerate(datasets):
+        own = dataset.campaigns
+        if named is None:
+            labels += own or [str(index)] * len(dataset.poses)
+        else:
+            # Two datasets may each count their campaigns from one.
+            labels += [f"{named[index]} {label}" for label in own] or [named[index]] * len(
+                dataset.poses
+            )
+    return tuple(labels)
+
+
+_DIMS = {variable.name: variable.dims for variable in (*VARIABLES, *INTEGERS)}
+_ZERO_BY_DEFAULT = "reference_force"
+
+
+def selected(
+    dataset: "Dataset", poses: Sequence[int] | None, load_cases: Sequence[str] | None
+) -> "Dataset":
+    """Return some poses and load cases of a dataset, as `Dataset.select` does."""
+    rows = list(range(len(dataset.poses)))
+    if poses is not None:
+        rows = _positions("pose", poses, dataset.poses)
+    columns = list(range(len(dataset.load_cases)))
+    if load_cases is not None:
+        columns = _positions("load case", load_cases, dataset.load_cases)
+    elif dataset.usable[rows].any():
+        columns = np.flatnonzero(dataset.usable[rows].any(axis=0)).tolist()
+    return _taken(dataset, rows, columns)
+
+
+def _taken(dataset: "Dataset", rows: Sequence[int], columns: Sequence[int]) -> "Dataset":
+    """Return the poses and load cases at some positions."""
+    index = np.ix_(rows, columns)
+    variables: dict[str, Any] = dict(dataset.arrays)
+    if dataset.sequence is not None or sorted(columns) != list(columns):
+        variables[SEQUENCE.name] = dataset.order
+    return replace(
+        dataset,
+        poses=tuple(dataset.poses[row] for row in rows),
+        load_cases=tuple(dataset.load_cases[column] for column in columns),
+        campaigns=tuple(dataset.campaigns[row] for row in rows) if dataset.campaigns else (),
+        status=dataset.status[index],
+        **{
+            name: values[index] if "load_case" in _DIMS[name] else values[list(rows)]
+            for name, values in variables.items()
+        },
+    )
+
+
+def _positions(kind: str, labels: Sequence[object], known: Sequence[Hashable]) -> list[int]:
+    for label in labels:
+        if label not in known:
+            listed = ", ".join(map(str, known[:20])) + (", …" if len(known) > 20 else "")
+            names = [name for name in known if isinstance(name, str)]
+            hint = nearest(label, names) if isinstance(label, str) else ""
+            raise DatasetError(f"{kind} {label!r} is not in the dataset{hint} (known: {listed})")
+    return [known.index(label) for label in labels]
+
+
+def _joined(datasets: Sequence["Dataset"], name: str, cases: Sequence[str]) -> FloatArray:
     """Return the values of a variable at the poses of all datasets, joints in the first's order."""
     parts = []
     for dataset in datasets:
-        values = dataset.arrays[name]
-        if name == "joint_position":
+        values = dataset.arrays.get(name, np.zeros((len(dataset.poses), 3)))
+        if "joint" in _DIMS[name]:
             order = [dataset.joint_names.index(joint) for joint in datasets[0].joint_names]
             values = values[..., order]
-        parts.append(values if name == "tcp_position" else _spread(dataset, values, cases, np.nan))
+        by_case = "load_case" in _DIMS[name]
+        parts.append(_spread(dataset, values, cases, np.nan) if by_case else values)
     return np.concatenate(parts)
 
 
-def _spread(dataset: Dataset, values: np.ndarray, cases: Sequence[str], fill: float) -> np.ndarray:
+def _spread(
+    dataset: "Dataset", values: np.ndarray, cases: Sequence[str], fill: float
+) -> np.ndarray:
     """Return values of shape (pose, load_case, …) for other load cases; ``fill`` without one."""
     shape = (len(values), len(cases), *values.shape[2:])
     spread = np.full(shape, fill, dtype=values.dtype)
@@ -77,7 +171,7 @@ def _spread(dataset: Dataset, values: np.ndarray, cases: Sequence[str], fill: fl
     return spread
 
 
-def _check_compatible(first: Dataset, other: Dataset, index: int) -> None:
+def _check_compatible(first: "Dataset", other: "Dataset", index: int) -> None:
     """Refuse to merge dataset ``index`` with dataset 0 when they are not of one kind."""
     for name in _SAME_ATTRIBUTES:
         here, there = first.attributes.get(name), other.attributes.get(name)
@@ -92,7 +186,12 @@ def _check_compatible(first: Dataset, other: Dataset, index: int) -> None:
         raise DatasetError(
             f"datasets 0 and {index} have different joints: {joints[0]} and {joints[1]}"
         )
-    for variable in sorted(set(first.arrays) ^ set(other.arrays)):
+    if first.conditioned != other.conditioned:
+        raise DatasetError(
+            f"datasets 0 and {index} have different histories: {_history(first)} and"
+            f" {_history(other)}"
+        )
+    for variable in sorted((set(first.arrays) ^ set(other.arrays)) - {_ZERO_BY_DEFAULT}):
         lacking = index if variable in first.arrays else 0
         raise DatasetError(
             f"dataset {lacking} has no variable {variable!r}, dataset {index - lacking} has:"
@@ -100,7 +199,11 @@ def _check_compatible(first: Dataset, other: Dataset, index: int) -> None:
         )
 
 
-def _check_marker(first: Dataset, other: Dataset, index: int) -> None:
+def _history(dataset: "Dataset") -> str:
+    return "conditioned" if dataset.conditioned else "free"
+
+
+def _check_marker(first: "Dataset", other: "Dataset", index: int) -> None:
     here, there = first.marker, other.marker
     if here is None and there is None:
         return
@@ -112,7 +215,7 @@ def _check_marker(first: Dataset, other: Dataset, index: int) -> None:
         )
 
 
-def _check_poses_differ(datasets: Sequence[Dataset]) -> None:
+def _check_poses_differ(datasets: Sequence["Dataset"]) -> None:
     first: dict[int, int] = {}
     for index, dataset in enumerate(datasets):
         for pose in dataset.poses:

@@ -2,18 +2,46 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, fields, replace
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from elastocal.dataset._layout import FloatArray, IntArray, StringArray, freeze
+from elastocal.dataset._layout import (
+    LINK_JOINT_POSITION,
+    VARIABLES,
+    FloatArray,
+    IntArray,
+    StringArray,
+    freeze,
+)
 from elastocal.errors import DatasetError, nearest
 from elastocal.results import brief_repr
 
+if TYPE_CHECKING:
+    from elastocal.dataset.dataset import Dataset
+
 _LARGEST = 1e9
 """No SI number of a robot's reading comes near; what does is a damaged file."""
-_NO_NUMBERS = ("pose", "load_case", "sequence", "conditioned")
+_NO_NUMBERS = ("pose", "load_case", "sequence", "campaign", "conditioned", "also_pressed")
 """Fields that are labels or say how all readings were taken."""
+
+
+@brief_repr
+@dataclass(frozen=True, eq=False)
+class Presses:
+    """Presses that gave no usable reading but belong to the way that the torques took."""
+
+    pose: IntArray
+    """Label of the pose of each, shape (press,)."""
+    sequence: IntArray
+    """Place of each in time among presses and readings of its pose, shape (press,)."""
+    joint_position: FloatArray
+    """Shape (press, joint), in rad or m."""
+    force: FloatArray
+    """Force on the robot at the TCP in base, shape (press, 3), in N."""
+    moment: FloatArray | None = None
+    """Moment on the robot at the TCP in base, shape (press, 3), in N·m; None: not measured."""
 
 
 @brief_repr
@@ -58,12 +86,21 @@ class Readings:
     conditioned: bool = False
     """Whether each pose's first reading is a press made before the zero was read; else the arm
     came to the zero by free moves."""
+    campaign: StringArray | None = None
+    """Campaign of each reading, shape (reading,); None: there are none."""
+    also_pressed: Presses | None = None
+    """Presses that gave no usable reading, such as one that slipped; None: none is known. Those of
+    any pose: `take` keeps all of them, so friction still remembers."""
 
     def __post_init__(self) -> None:
         self._own("pose", np.array(self.pose, dtype=np.int64), (len(self.pose),))
         self._own("load_case", np.array(self.load_case, dtype=np.str_), (len(self.pose),))
         if self.sequence is not None:
             self._own("sequence", np.array(self.sequence, dtype=np.int64), (len(self.pose),))
+        elif self.also_pressed is not None:
+            raise DatasetError("readings with other presses between them need their sequence")
+        if self.campaign is not None:
+            self._own("campaign", np.array(self.campaign, dtype=np.str_), (len(self.pose),))
         for name, value in self._numbers():
             array = np.array(value, dtype=np.float64)
             width = array.shape[-1] if name.endswith("joint_position") and array.ndim else 3
@@ -107,9 +144,13 @@ class Readings:
         chosen = np.asarray(index)
         rows = np.arange(len(self))[chosen.astype(np.intp) if chosen.size == 0 else chosen]
         numbers = {name: value[rows] for name, value in self._numbers()}
-        sequence = None if self.sequence is None else self.sequence[rows]
         return replace(
-            self, pose=self.pose[rows], load_case=self.load_case[rows], sequence=sequence, **numbers
+            self,
+            pose=self.pose[rows],
+            load_case=self.load_case[rows],
+            sequence=None if self.sequence is None else self.sequence[rows],
+            campaign=None if self.campaign is None else self.campaign[rows],
+            **numbers,
         )
 
     def _numbers(self) -> Iterator[tuple[str, FloatArray]]:
@@ -123,6 +164,58 @@ class Readings:
             raise DatasetError(f"{name} of the readings has shape {array.shape}, not {shape}")
         freeze(array)
         object.__setattr__(self, name, array)
+
+
+def usable_readings(dataset: "Dataset", joint_names: Sequence[str]) -> Readings:
+    """Return the usable readings of a dataset as flat arrays; see `Dataset.readings`."""
+    if dataset.marker_displacement is None:
+        raise DatasetError(
+            "dataset has no marker_displacement: to identify springs, metrology is needed"
+            " (a tracker that measures the marker)"
+        )
+    wanted = list(joint_names)
+    if sorted(wanted) != sorted(dataset.joint_names):
+        raise DatasetError(
+            f"joints of the dataset are {list(dataset.joint_names)}, those of the robot {wanted}:"
+            " they must have the same names"
+        )
+    order = [dataset.joint_names.index(name) for name in wanted]
+    pose, case = np.nonzero(dataset.usable)
+    flat: dict[str, Any] = {}
+    for variable in VARIABLES:
+        values = dataset.arrays.get(variable.name)
+        if values is not None and variable != LINK_JOINT_POSITION:
+            rows = values[pose, case] if "load_case" in variable.dims else values[pose]
+            flat[variable.name] = rows[:, order] if "joint" in variable.dims else rows
+    presses = _unusable_presses(dataset, order)
+    if dataset.sequence is not None or presses is not None:
+        flat["sequence"] = dataset.order[pose, case]
+    if dataset.campaigns:
+        flat["campaign"] = np.array(dataset.campaigns)[pose]
+    return Readings(
+        np.array(dataset.poses)[pose],
+        np.array(dataset.load_cases)[case],
+        conditioned=dataset.conditioned,
+        also_pressed=presses,
+        **flat,
+    )
+
+
+def _unusable_presses(dataset: "Dataset", order: Sequence[int]) -> Presses | None:
+    """Return what pressed on the arm without a usable reading, as far as it is known."""
+    known = np.isfinite(dataset.joint_position).all(axis=2) & np.isfinite(dataset.force).all(axis=2)
+    if dataset.moment is not None:
+        known &= np.isfinite(dataset.moment).all(axis=2)
+    pose, case = np.nonzero(known & ~dataset.usable)
+    if not len(pose):
+        return None
+    return Presses(
+        np.array(dataset.poses)[pose],
+        dataset.order[pose, case],
+        dataset.joint_position[pose, case][:, order],
+        dataset.force[pose, case],
+        None if dataset.moment is None else dataset.moment[pose, case],
+    )
 
 
 def without(readings: Readings, excluded: Sequence[str]) -> Readings:

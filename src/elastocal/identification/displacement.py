@@ -92,7 +92,9 @@ def friction_states(
     model : ElasticModel
         Robot and springs.
     readings : Readings
-        Those of a pose are taken to be all that the arm felt there.
+        Those of a pose, with what else pressed there (`Readings.also_pressed`), are taken to be
+        all that the arm felt. A press of which no force is known (aborted, missing) is not among
+        them: friction remembers the readings after it wrongly, until a larger one.
     q_0 : ndarray, shape (reading, joint)
         From `reference_joints`.
 
@@ -104,26 +106,38 @@ def friction_states(
     q, rest = readings.joint_position, np.zeros((len(readings), 3))
     lightly = rest if readings.reference_force is None else readings.reference_force
     total = model.load_torques(q, readings.force, readings.moment) + model.weight_torques(q)
+    others = readings.also_pressed
+    if others is not None:
+        q = others.joint_position
+        torque = model.load_torques(q, others.force, others.moment) + model.weight_torques(q)
+        total = np.concatenate([total, torque])
     zero = model.load_torques(q_0, lightly) + model.weight_torques(q_0)
     free = model.weight_torques(q_0)
     loaded = np.zeros((len(readings), len(model.friction)))
     reference = np.zeros_like(loaded)
-    for rows in _visits(readings):
+    for steps in _visits(readings):
+        is_reading = steps < len(readings)
+        rows = steps[is_reading]
         first = rows[:1]
         if readings.conditioned:
             # Free, pressed, then lightly loaded: there the zero was read.
-            way = np.concatenate([free[first], total[first], zero[first], total[rows[1:]]])
-            states = model.friction.path(way)
-            loaded[rows], reference[rows] = np.delete(states[1:], 1, axis=0), states[2]
+            way = [free[first], total[steps[:1]], zero[first], total[steps[1:]]]
+            states = model.friction.path(np.concatenate(way))
+            pressed, reference[rows] = np.delete(states[1:], 1, axis=0), states[2]
         else:
-            states = model.friction.path(np.concatenate([free[first], zero[first], total[rows]]))
-            loaded[rows], reference[rows] = states[2:], states[1]
+            states = model.friction.path(np.concatenate([free[first], zero[first], total[steps]]))
+            pressed, reference[rows] = states[2:], states[1]
+        loaded[rows] = pressed[is_reading]
     return loaded, reference
 
 
 def _visits(readings: Readings) -> Iterator[IndexArray]:
-    """Yield the readings of each pose, in order in time."""
+    """Yield what was pressed at each pose, in order in time: readings, and behind them others."""
+    pose = readings.pose
     order = np.arange(len(readings)) if readings.sequence is None else readings.sequence
-    for pose in np.unique(readings.pose):
-        rows = np.flatnonzero(readings.pose == pose)
+    if readings.also_pressed is not None:
+        pose = np.concatenate([pose, readings.also_pressed.pose])
+        order = np.concatenate([order, readings.also_pressed.sequence])
+    for each in np.unique(readings.pose):
+        rows = np.flatnonzero(pose == each)
         yield rows[np.argsort(order[rows], kind="stable")]

@@ -4,7 +4,7 @@ Also that a model fits the cell, how far it carries, and that no output takes an
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -53,7 +53,7 @@ def find_robot(
     tool : str or None
         Pose of the tcp behind that link, ``"x, y, z, a, b, c"`` with units (KUKA Z-Y'-X'').
     dataset : Dataset, optional
-        A dataset that may name both.
+        A dataset that may name both, and say where gravity points if the base is not upright.
 
     Raises
     ------
@@ -71,7 +71,10 @@ def find_robot(
     if tool is not None:
         urdf = with_tool(urdf, tcp, _TOOL_LINK, parse_frame(tool, "tool", error=RobotError))
         tcp = _TOOL_LINK
-    return Robot.from_urdf(urdf, tcp)
+    arm = Robot.from_urdf(urdf, tcp)
+    if dataset is None or dataset.gravity is None:
+        return arm
+    return replace(arm, gravity=dataset.gravity)
 
 
 def require_same_robot(model: Robot, cell: Robot, names: tuple[str, str]) -> None:

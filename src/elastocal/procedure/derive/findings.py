@@ -79,7 +79,7 @@ def _readings(rows: Sequence[LoadRow]) -> summary.ReadingCounts:
 
 
 def _registration(found: Registration, dataset: Dataset) -> summary.RegistrationSummary:
-    typical = np.linalg.norm(dataset.marker_displacement, axis=-1)
+    typical = np.linalg.norm(dataset.arrays["marker_displacement"], axis=-1)
     displacement = float(np.nanmedian(typical))
     return summary.RegistrationSummary(
         stations=tuple(_station(fit, displacement) for fit in found.stations),
