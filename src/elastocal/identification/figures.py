@@ -8,6 +8,7 @@ import numpy as np
 from elastocal.arrays import BoolArray
 from elastocal.dataset import Readings
 from elastocal.identification.calibration import CalibratedModel, Calibration
+from elastocal.identification.frames import FrameSummary
 from elastocal.identification.ladder import Climbed
 from elastocal.identification.observability import Term
 from elastocal.identification.options import FitSettings
@@ -146,6 +147,8 @@ class CalibrationSummary:
     comparison: ComparisonSummary | None = None
     ladder: tuple[RungSummary, ...] = ()
     """The simplest model first; empty in calibrations before the ladder."""
+    frames: tuple[FrameSummary, ...] = ()
+    """Frames that were estimated with the springs."""
 
 
 def summary(calibration: Calibration, settings: FitSettings | None = None) -> CalibrationSummary:
@@ -178,6 +181,7 @@ def summary(calibration: Calibration, settings: FitSettings | None = None) -> Ca
         warnings=calibration.warnings,
         settings=settings,
         ladder=tuple(map(_rung, calibration.ladder)),
+        frames=calibration.frames,
     )
 
 
