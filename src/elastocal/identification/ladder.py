@@ -29,11 +29,13 @@ from elastocal.elastic import (
     tensor,
 )
 from elastocal.errors import IdentificationError
+from elastocal.identification.displacement import reference_joints
 from elastocal.identification.options import FitOptions
 from elastocal.identification.problem import Problem, build
 from elastocal.identification.solve import PoseGrams
 from elastocal.identification.suspicious import screen
 from elastocal.identification.uncertainty import CONFIDENCE, HeldOut, leave_poses_out
+from elastocal.parallel import one_blas_thread
 from elastocal.results import brief_repr
 from elastocal.robot import Robot
 
@@ -140,6 +142,7 @@ class Choice:
     """Every rung that the readings allow, the simplest first."""
 
 
+@one_blas_thread()
 def choose_model(
     robot: Robot,
     readings: Readings,
@@ -177,6 +180,9 @@ def choose_model(
         asked = layout(robot, springs)
         rungs[springs] = Rung(springs, lambda *_: asked)
     options = replace(options, prior=None)
+    # Sought once, not for every rung.
+    sought = reference_joints(robot, readings)
+    readings = replace(readings, reference_joint_position=sought)
     if options.set_blunders_aside:
         # Judged by springs that every reading can be judged by; they would decide otherwise.
         plain = build(ElasticModel(robot, bearing(robot)), readings, options, marker_offset)
