@@ -118,7 +118,7 @@ class CellFile(StrictModel):
             f"surface: {self.surface.file}, {len(self.fixtures)} fixtures",
             f"load cases: {', '.join(loads.cases)};"
             f" fx {loads.fx:g} N, fy {loads.fy:g} N, fz {loads.fz:g} N",
-            f"search: {self.search.technique}, {self.search.most or 'any number of'} poses",
+            f"search: {self.search.technique}, {self.search.pose_limit or 'any number of'} poses",
         ]
         return lines + ([f"faults: {len(self.faults)}"] if self.faults else [])
 
@@ -322,14 +322,28 @@ RUN_SECTIONS = ("acceptance", "procedure", "devices", "simulation", "faults")
 does not depend on them."""
 
 
+_WRITTEN_AS_NULL = frozenset(
+    {
+        *("sensor", "marker", "process", "limits.payload", "limits.torque.provenance"),
+        *("motion.provenance", "robot.model", "robot.rail", "robot.urdf", "search.poses"),
+        *("search.d_max", "surface.region", "surface.region.box", "surface.region.polygon"),
+        *("surface.region.polygon.height", "fixtures.box", "fixtures.cylinder", "fixtures.mesh"),
+        *("fixtures.sphere", "tool.shapes.box", "tool.shapes.cylinder", "tool.shapes.mesh"),
+        "tool.shapes.sphere",
+    }
+)
+"""Optional keys that count in a fingerprint as null when they are not given: those there were when
+keys that are not given began to be left out. Never add one: plans made before would be refused."""
+
+
 def fingerprint(cell: Cell) -> str:
     """Return a SHA-256 over what a cell file says and the files that it names.
 
     It changes with every value of the cell file, defaults included, and with every byte of the
     surface, the mesh shapes, the robot's URDF with the meshes of its collision shapes, and the
-    process file. It does not change with
-    comments, the order of keys, the way a number is written, the place of the folder, or the
-    sections that say how a plan is carried out (`RUN_SECTIONS`).
+    process file. It does not change with comments, the order of keys, the way a number is written,
+    the place of the folder, optional keys that are not given, or the sections that say how a plan
+    is carried out (`RUN_SECTIONS`).
 
     Parameters
     ----------
@@ -346,13 +360,27 @@ def fingerprint(cell: Cell) -> str:
     FileAccessError
         If a file that the cell names cannot be read.
     """
-    contents = cell.file.model_dump(mode="json", exclude=set(RUN_SECTIONS))
+    contents = _given(cell.file.model_dump(mode="json", exclude=set(RUN_SECTIONS)))
     content = json.dumps(contents, sort_keys=True, allow_nan=False)
     digest = hashlib.sha256(content.encode("utf-8"))
     for name in named_files(cell):
         # Digests have one length, so that no byte can move from one file to the next unseen.
         digest.update(hashlib.sha256(_bytes_of(cell, name)).digest())
     return digest.hexdigest()
+
+
+def _given(value: Any, path: str = "") -> Any:
+    """Return contents of a cell file without the optional keys that are not given."""
+    if isinstance(value, list):
+        return [_given(each, path) for each in value]
+    if not isinstance(value, dict):
+        return value
+    places = {key: f"{path}.{key}".removeprefix(".") for key in value}
+    return {
+        key: _given(each, places[key])
+        for key, each in value.items()
+        if each is not None or places[key] in _WRITTEN_AS_NULL
+    }
 
 
 def named_files(cell: Cell) -> Iterator[str]:
