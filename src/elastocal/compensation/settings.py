@@ -15,6 +15,7 @@ Example::
       low_pass: {cutoff: "15 Hz", order: 2}
     sensor: {force: ["2500 N", "2500 N", "6250 N"], moment: ["400 N*m", "400 N*m", "400 N*m"]}
     uncertain_above: "0.15 mm"
+    friction: {free_below: 0.5, free_after: "200 ms"}
 """
 
 from pathlib import Path
@@ -32,14 +33,13 @@ from elastocal.cell import (
     PositiveMoment,
 )
 from elastocal.compensation.conditioning import Duration, FilterChain, FilterSettings, Speed
+from elastocal.dataset import LARGEST_FORCE, LARGEST_MOMENT
 from elastocal.errors import CompensationError
 from elastocal.records import StrictModel, read_yaml
 from elastocal.robot import T_from_xyzabc
 
 _SCHEMA = "elastocal.compensator/1"
 
-_LARGEST_FORCE, _LARGEST_MOMENT = 1e5, 1e5
-"""In N and N·m: what no sensor on a robot reads. Beyond, a number is no reading."""
 _LARGEST_CORRECTION = 0.05
 """In m: no arm that is worth calibrating yields so far."""
 _LARGEST_RATE = 1.0
@@ -48,8 +48,8 @@ _LONGEST_HOLD = 1.0
 """In s: what was measured before is not what acts now."""
 
 
-_RangeForce = Annotated[PositiveForce, Field(le=_LARGEST_FORCE)]
-_RangeMoment = Annotated[PositiveMoment, Field(le=_LARGEST_MOMENT)]
+_RangeForce = Annotated[PositiveForce, Field(le=LARGEST_FORCE)]
+_RangeMoment = Annotated[PositiveMoment, Field(le=LARGEST_MOMENT)]
 
 
 class CorrectionLimits(StrictModel):
@@ -72,10 +72,20 @@ class CorrectionLimits(StrictModel):
 class SensorRange(StrictModel):
     """The range of the sensor; beyond it, a reading is saturated."""
 
-    force: tuple[_RangeForce, _RangeForce, _RangeForce] = (_LARGEST_FORCE,) * 3
+    force: tuple[_RangeForce, _RangeForce, _RangeForce] = (LARGEST_FORCE,) * 3
     """In N."""
-    moment: tuple[_RangeMoment, _RangeMoment, _RangeMoment] = (_LARGEST_MOMENT,) * 3
+    moment: tuple[_RangeMoment, _RangeMoment, _RangeMoment] = (LARGEST_MOMENT,) * 3
     """In N·m."""
+
+
+class FrictionReset(StrictModel):
+    """When the arm counts as moving freely, which wears the memory of friction off."""
+
+    free_below: Annotated[float, Field(gt=0.0, le=1.0)] = 0.5
+    """Share of an axis' smallest friction limit that the load stays below about every axis with
+    friction; its torque is then within the sensor's noise, as in the air."""
+    free_after: Annotated[Duration, Field(le=_LONGEST_HOLD)] = 0.2
+    """Time for which it must, in s: a load that passes through zero is no free motion."""
 
 
 class FixedFrame(StrictModel):
@@ -107,6 +117,7 @@ class CompensatorSettings(StrictModel):
     sensor: SensorRange = SensorRange()
     uncertain_above: PositiveLength = 2e-4
     """Half the 95 % interval of the predicted deflection beyond which it warns, in m."""
+    friction: FrictionReset = FrictionReset()
 
     @model_validator(mode="after")
     def _can_correct(self) -> "CompensatorSettings":
@@ -132,6 +143,11 @@ class CompensatorSettings(StrictModel):
     def hold_cycles(self) -> int:
         """Corrections that are held."""
         return max(1, round(self.hold / self.cycle))
+
+    @property
+    def free_cycles(self) -> int:
+        """Corrections without load after which friction is taken to bear nothing."""
+        return max(1, round(self.friction.free_after / self.cycle))
 
     @property
     def R_base_frame(self) -> FloatArray | None:

@@ -9,6 +9,7 @@ from .mounting import (
     Rail as Rail,
     on_rail as on_rail,
     with_tool as with_tool,
+    with_tool_mass as with_tool_mass,
     without_tool_mass as without_tool_mass,
 )
 from .robot import (
@@ -40,6 +41,7 @@ from .urdf import (
     leaf_links as leaf_links,
     parse_urdf as parse_urdf,
     read_chain as read_chain,
+    refusals_naming as refusals_naming,
     robot_name as robot_name,
     root_link as root_link,
 )
