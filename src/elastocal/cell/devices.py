@@ -2,7 +2,8 @@
 
 An arm does the steps of paper Procedure 1 (4-25). Every command returns at once; the arm is asked
 how far it is by `RobotArm.state`. A caller looks again each supervision cycle, so that a watchdog
-can stop the arm at any step. Forces are those on the robot at the tool centre point (docs/conventions.md).
+can stop the arm at any step. Forces are those on the robot at the tool centre point, as in
+docs/conventions.md.
 
 No call may take longer than a supervision cycle (``procedure.cycle``, 40 ms): the watchdog that
 calls is the same that stops the arm. A driver whose line may be slow talks to it in a thread of
