@@ -39,6 +39,7 @@ from .figures import (
     spring_summaries as spring_summaries,
     summary as summary,
 )
+from .knowledge import with_knowledge as with_knowledge
 from .ladder import (
     AUTO as AUTO,
     RUNGS as RUNGS,

@@ -8,7 +8,14 @@ import numpy as np
 
 from elastocal import identification
 from elastocal.dataset import read, without
-from elastocal.identification import CalibrateResult, FitSettings, choose_model, summary
+from elastocal.elastic import known_springs
+from elastocal.identification import (
+    CalibrateResult,
+    FitSettings,
+    choose_model,
+    summary,
+    with_knowledge,
+)
 from elastocal.progress import Progress
 from elastocal.records import write_json
 from elastocal.results import brief_repr
@@ -65,6 +72,8 @@ def calibrate(settings: CalibrateSettings, progress: Progress) -> CalibrateResul
     readings = without(measured.readings(arm.joint_names), settings.exclude)
     marker = measured.marker if settings.marker is None else settings.marker
     choice = choose_model(arm, readings, settings.springs, options, marker)
+    known = known_springs(arm, settings.springs)
+    options = with_knowledge(options, known, choice.model, readings, marker)
     calibration = identification.calibrate(
         choice.model,
         readings,
@@ -74,7 +83,7 @@ def calibrate(settings: CalibrateSettings, progress: Progress) -> CalibrateResul
         ladder=choice.ladder,
         provenance=f"{data}; {measured.provenance}" if measured.provenance else str(data),
     )
-    result = CalibrateResult.of(calibration.calibrated, summary(calibration, settings.fit))
+    result = CalibrateResult.of(calibration.calibrated, summary(calibration, settings.fit, known))
     if settings.out is not None:
         write_json(settings.out, result)
     return result
