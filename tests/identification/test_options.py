@@ -3,7 +3,7 @@ import pytest
 
 from elastocal.errors import IdentificationError
 from elastocal.identification import MINIMUM_DRAWS, FitOptions
-from elastocal.identification.options import bounds
+from elastocal.identification.options import bounds, parse_bounds
 
 
 def test_the_default_is_the_papers_bounded_least_squares():
@@ -60,3 +60,9 @@ def test_impossible_bounds_are_refused_by_the_spring(lower, upper, message):
 def test_an_unknown_choice_is_refused_with_those_allowed(choice, message):
     with pytest.raises(IdentificationError, match=message):
         FitOptions(**choice)
+
+
+@pytest.mark.parametrize("text", ["nan,1", "0, NaN"])
+def test_bounds_that_are_no_number_are_refused_as_that(text):
+    with pytest.raises(IdentificationError, match=r"'(nan|NaN)' is not a number"):
+        parse_bounds(text)

@@ -6,6 +6,7 @@ deviation, so that for normal noise ``u`` follows a chi distribution with three 
 the constants are quantiles of that. A new one is a function and an entry in `LOSSES`.
 """
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal, get_args
@@ -149,7 +150,7 @@ class FitSettings:
         Raises
         ------
         IdentificationError
-            If they are not two numbers.
+            If they are not two numbers, or one is NaN.
         """
         parse_bounds(self.bounds)
 
@@ -187,12 +188,15 @@ def parse_bounds(text: str) -> tuple[float, float]:
     Raises
     ------
     IdentificationError
-        If the text is not two numbers.
+        If the text is not two numbers, or one is NaN.
     """
     try:
         low, high = (float(part) for part in text.split(","))
     except ValueError as error:
         raise IdentificationError(f"bounds {text!r} must be two numbers, e.g. '0,inf'") from error
+    for part, value in zip(text.split(","), (low, high), strict=True):
+        if math.isnan(value):
+            raise IdentificationError(f"bounds {text!r}: {part.strip()!r} is not a number")
     return low, high
 
 
