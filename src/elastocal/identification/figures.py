@@ -12,6 +12,7 @@ from elastocal.arrays import BoolArray, FloatArray
 from elastocal.dataset import Readings
 from elastocal.elastic import KnownSpring, Spring
 from elastocal.identification.calibration import CalibratedModel, Calibration
+from elastocal.identification.frames import FrameSummary
 from elastocal.identification.ladder import Climbed
 from elastocal.identification.observability import Term
 from elastocal.identification.options import FitSettings
@@ -154,6 +155,8 @@ class CalibrationSummary:
     comparison: ComparisonSummary | None = None
     ladder: tuple[RungSummary, ...] = ()
     """The simplest model first; empty in calibrations before the ladder."""
+    frames: tuple[FrameSummary, ...] = ()
+    """Frames that were estimated with the springs."""
     coverage: Coverage | None = None
     """Measured coverage of the intervals of a prediction; none in calibrations of before."""
     known: tuple[KnownSpring, ...] = ()
@@ -202,6 +205,7 @@ def summary(
         warnings=calibration.warnings,
         settings=settings,
         ladder=tuple(map(_rung, calibration.ladder)),
+        frames=calibration.frames,
         coverage=calibration.coverage,
         known=tuple(known),
     )
