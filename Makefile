@@ -5,7 +5,7 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 
-.PHONY: demo test lint units end-to-end browser docs-strict nightly docs bench house clean
+.PHONY: demo test lint units end-to-end browser docs-strict nightly slow coverage mutation docs bench house clean
 
 demo: $(VENV)/installed
 	$(BIN)/elastocal demo afp --out demo --force
@@ -30,8 +30,18 @@ browser: $(VENV)/installed-dev
 docs-strict: $(VENV)/installed-dev
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet
 
-nightly: $(VENV)/installed-dev
+nightly: slow coverage mutation
+
+slow: $(VENV)/installed-dev
 	$(BIN)/pytest -n auto -m slow -rA
+
+# Tests that count imported modules would count those of coverage.
+coverage: $(VENV)/installed-nightly
+	$(BIN)/pytest -n auto --cov --cov-report=term:skip-covered --deselect tests/test_startup.py
+
+mutation: $(VENV)/installed-nightly
+	$(BIN)/mutmut run
+	$(BIN)/mutmut results
 
 docs: $(VENV)/installed-dev
 	$(BIN)/mkdocs serve
@@ -48,7 +58,7 @@ house:
 	$(PYTHON) tools/house.py
 
 clean:
-	rm -rf $(VENV) demo site
+	rm -rf $(VENV) demo site mutants
 
 $(VENV)/bin/python:
 	$(PYTHON) -m venv $(VENV)
@@ -60,3 +70,7 @@ $(VENV)/installed: pyproject.toml | $(VENV)/bin/python
 $(VENV)/installed-dev: pyproject.toml | $(VENV)/bin/python
 	$(BIN)/pip install --quiet --disable-pip-version-check -e '.[dev,docs]'
 	touch $@ $(VENV)/installed
+
+$(VENV)/installed-nightly: $(VENV)/installed-dev
+	$(BIN)/pip install --quiet --disable-pip-version-check -e '.[nightly]'
+	touch $@

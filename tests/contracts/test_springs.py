@@ -31,7 +31,8 @@ from elastocal.identification import (
     write_model,
 )
 from elastocal.records import from_data, to_data
-from support.cells import linkage, robot
+from elastocal.robot import Robot
+from support.cells import linkage, robot, urdf
 from support.exported import build as compiled_c, needs_gcc, written
 from support.problems import campaign
 from support.virtual_chain import configurations, numerical_column
@@ -47,6 +48,9 @@ CASES: dict[str, Spring] = {
     "gear with friction": Gear(
         "joint_3.gear", "joint_3", (0.0, 1.0, 0.0), knees=(400.0, 1300.0), slips=(50.0, 150.0)
     ),
+    "gear on a heavy arm": Gear(
+        "joint_3.gear", "joint_3", (0.0, 1.0, 0.0), knees=(400.0, 1300.0), slips=(50.0, 150.0)
+    ),
     "tensor": Tensor("joint_3.tensor", "joint_3"),
     "tensor off the origin": Tensor("joint_3.tensor", "joint_3", (0.1, -0.2, 0.3)),
 }
@@ -56,10 +60,26 @@ FORCE, MOMENT = RNG.normal(0.0, 800.0, (4, 3)), RNG.normal(0.0, 100.0, (4, 3))
 
 
 @cache
+def heavy_robot() -> Robot:
+    """Return the same arm with masses, each beside its joint's axis."""
+    text = urdf()
+    for k, mass in enumerate((280.0, 190.0, 150.0, 60.0, 25.0, 40.0), start=1):
+        bare = f'<link name="link_{k}"/>'
+        assert text.count(bare) == 1
+        inertial = (
+            f'<inertial><origin xyz="0.1 -0.05 {0.3 if k < 4 else 0.1}"/><mass value="{mass}"/>'
+            '<inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial>'
+        )
+        text = text.replace(bare, f'<link name="link_{k}">{inertial}</link>')
+    return Robot.from_urdf(text, "tcp")
+
+
+@cache
 def model(case: str) -> ElasticModel:
     """Return the arm with the spring between axial springs of the other joints."""
-    others = [axial(joint) for joint in robot().chain.joints if joint.name != "joint_3"]
-    return ElasticModel(robot(), (*others[:2], CASES[case], *others[2:]))
+    arm = heavy_robot() if "heavy" in case else robot()
+    others = [axial(joint) for joint in arm.chain.joints if joint.name != "joint_3"]
+    return ElasticModel(arm, (*others[:2], CASES[case], *others[2:]))
 
 
 def planted(case: str) -> np.ndarray:
@@ -116,7 +136,10 @@ class TestEverySpring:
             torque = tuple(np.array(j @ f + w @ m) for j, w in zip(J, W, strict=True))
             # Pressed from rest: friction follows the torque until it slides.
             borne = tuple(np.clip(torque[0], -limit, limit) for limit in spring.friction_limits)
-            angles = np.array(spring.angles(SpringLoad(torque, friction=borne)))
+            weight = (
+                tuple(arm.weight_torques(q)[2 : 2 + len(spring.axes)]) if arm.bears_weight else ()
+            )
+            angles = np.array(spring.angles(SpringLoad(torque, weight, borne)))
             expected.append(np.transpose(J) @ angles)
             columns = slice(first, first + len(spring.parameters))
             found.append(arm.observation_blocks(q, f, m)[:, columns])
@@ -194,14 +217,16 @@ class TestEverySpring:
         assert from_data(type(spring), to_data(spring), "a file") == spring
 
     def test_names_make_statements_that_equal_the_model(self, case):
-        """Load cases and a whole step of the online compensator."""
+        """Load cases, each pressed from rest, and a whole step of the online compensator."""
         numbers = design(calibrated(case))
         functions, arm = numbers.functions(), model(case)
+        size = 3 * len(arm.parameters)
         for q, f, m in zip(configurations(linkage(), 4), FORCE, MOMENT, strict=True):
-            row = q.tolist(), f.tolist(), m.tolist()
+            free = [functions.rest(q.tolist())] if len(arm.friction) else []
+            row = q.tolist(), f.tolist(), m.tolist(), *free
             expected = arm.deflection(planted(case), q, f, m)
-            np.testing.assert_allclose(functions.deflection(*row), expected, rtol=1e-10)
-            block = np.reshape(functions.block(*row), (3, -1))
+            np.testing.assert_allclose(functions.deflection(*row)[:3], expected, rtol=1e-10)
+            block = np.reshape(functions.block(*row)[:size], (3, -1))
             expected = arm.observation_blocks(q, f, m)
             np.testing.assert_allclose(block, expected, atol=1e-12 * np.abs(expected).max())
         compensator = Compensator(numbers)
@@ -221,9 +246,13 @@ class TestEverySpring:
     def test_exported_c_equals_python(self, case, tmp_path):
         executable = compiled_c(written(tmp_path, design(calibrated(case))), "-O1")
         assert executable.selftest() == 0
-        q = configurations(linkage(), 4)
+        # One row after the other at one pose, as friction remembers them.
+        arm, q = model(case), np.repeat(configurations(linkage(), 1), 4, axis=0)
         found = executable.numbers("loads", np.hstack([q, FORCE, MOMENT]))[:, :3]
-        expected = model(case).deflection(planted(case), q, FORCE, MOMENT)
+        weight = arm.weight_torques(q)
+        total = weight + arm.load_torques(q, FORCE, MOMENT)
+        friction = arm.friction.path(np.concatenate([weight[:1], total]))[1:]
+        expected = arm.deflection(planted(case), q, FORCE, MOMENT, friction)
         np.testing.assert_allclose(found, expected, atol=1e-12 * np.abs(expected).max())
 
 

@@ -2,13 +2,13 @@ import numpy as np
 import pytest
 
 from elastocal.compensation.kernel import Call, Program, Value, written
-from elastocal.elastic.springs import Expression, Function, Input, Number, Product, Sum, atan
+from elastocal.elastic.springs import Expression, Function, Input, Number, Product, Sum, atan2
 
 X, Y = Input("x"), Input("y")
 
 
 def law(x, y):
-    return (2.0 * x - y / 4.0 + 1.0) * -x + (3.0 - atan(x * y)) + (0.5 + y)
+    return (2.0 * x - y / 4.0 + 1.0) * -x + (3.0 - atan2(x * y, x)) + (0.5 + y)
 
 
 def evaluated(formula: Expression, values: dict[str, float]) -> float:
@@ -21,8 +21,8 @@ def evaluated(formula: Expression, values: dict[str, float]) -> float:
             return sum(evaluated(term, values) for term in terms)
         case Product(factors):
             return float(np.prod([evaluated(factor, values) for factor in factors]))
-        case Function("atan", argument):
-            return float(np.arctan(evaluated(argument, values)))
+        case Function("atan2", (y, x)):
+            return float(np.arctan2(evaluated(y, values), evaluated(x, values)))
     raise AssertionError(formula)
 
 
@@ -35,9 +35,9 @@ def test_a_law_of_names_is_the_law_of_numbers(x, y):
 def test_statements_of_a_formula_are_sums_of_products_and_calls():
     program = Program()
     names = iter(["a", "b", "c", "d"])
-    found = written(program, atan(X * Y), {"x": Value(1, "q1"), "y": Value(-1, "q2")}, names)
+    found = written(program, atan2(X * Y, X), {"x": Value(1, "q1"), "y": Value(-1, "q2")}, names)
     assert found == Value(1, "a")
-    assert program.statements[-1] == Call("a", "atan", Value(1, "b"))
+    assert program.statements[-1] == Call("a", "atan2", (Value(1, "b"), Value(1, "q1")))
 
 
 def test_a_small_number_of_a_law_is_not_taken_for_zero():

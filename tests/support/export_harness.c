@@ -9,14 +9,32 @@
 #endif
 
 #define N ELASTOCAL_JOINTS
+/* A model with friction remembers: its functions take the memory, too. */
+#ifdef ELASTOCAL_MEMORY
+#define REMEMBERED memory,
+#define THEN_REMEMBERED , memory
+#else
+#define REMEMBERED
+#define THEN_REMEMBERED
+#endif
 
 static int loads(void)
 {
     double row[N + 6];
     double out[4];
+#ifdef ELASTOCAL_MEMORY
+    double memory[ELASTOCAL_MEMORY];
+    int begun = 0;
+#endif
     while (fread(row, sizeof(double), N + 6, stdin) == N + 6) {
-        elastocal_deflection(row, &row[N], &row[N + 3], out);
-        out[3] = elastocal_half_width(row, &row[N], &row[N + 3]);
+#ifdef ELASTOCAL_MEMORY
+        if (begun == 0) {
+            elastocal_rest(row, memory);
+            begun = 1;
+        }
+#endif
+        elastocal_deflection(row, &row[N], &row[N + 3], REMEMBERED out);
+        out[3] = elastocal_half_width(row, &row[N], &row[N + 3] THEN_REMEMBERED);
         (void)fwrite(out, sizeof(double), 4, stdout);
     }
     return 0;
@@ -62,9 +80,13 @@ static int timing(void)
     double start = now();
     long i;
     const long calls = 1000000;
+#ifdef ELASTOCAL_MEMORY
+    double memory[ELASTOCAL_MEMORY];
+    elastocal_rest(rows[0], memory);
+#endif
     for (i = 0; i < calls; i++) {
         const double *const row = rows[(size_t)i % read];
-        elastocal_deflection(row, &row[N], &row[N + 3], out);
+        elastocal_deflection(row, &row[N], &row[N + 3], REMEMBERED out);
         sum += out[0];
     }
     printf("%.6g ", (now() - start) / (double)calls);
@@ -94,12 +116,15 @@ static int count(void)
     double time = 0.0;
     double out[3];
     elastocal_state state;
+#ifdef ELASTOCAL_MEMORY
+    double memory[ELASTOCAL_MEMORY] = {0.0};
+#endif
     elastocal_start(&state);
     while (fread(row, sizeof(double), N + 6, stdin) == N + 6) {
         elastocal_reading reading;
         elastocal_correction told;
         CALLGRIND_ZERO_STATS;
-        elastocal_deflection(row, &row[N], &row[N + 3], out);
+        elastocal_deflection(row, &row[N], &row[N + 3], REMEMBERED out);
         CALLGRIND_DUMP_STATS_AT("deflection");
         time += ELASTOCAL_SAMPLE;
         reading.time = time;

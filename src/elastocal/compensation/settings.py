@@ -15,6 +15,7 @@ Example::
       low_pass: {cutoff: "15 Hz", order: 2}
     sensor: {force: ["2500 N", "2500 N", "6250 N"], moment: ["400 N*m", "400 N*m", "400 N*m"]}
     uncertain_above: "0.15 mm"
+    friction: {free_below: 0.5, free_after: "200 ms"}
 """
 
 from pathlib import Path
@@ -78,6 +79,16 @@ class SensorRange(StrictModel):
     """In N·m."""
 
 
+class FrictionReset(StrictModel):
+    """When the arm counts as moving freely, which wears the memory of friction off."""
+
+    free_below: Annotated[float, Field(gt=0.0, le=1.0)] = 0.5
+    """Share of an axis' smallest friction limit that the load stays below about every axis with
+    friction; its torque is then within the sensor's noise, as in the air."""
+    free_after: Annotated[Duration, Field(le=_LONGEST_HOLD)] = 0.2
+    """Time for which it must, in s: a load that passes through zero is no free motion."""
+
+
 class FixedFrame(StrictModel):
     """A frame of fixed rotation in base, such as a controller's ``$BASE``."""
 
@@ -107,6 +118,7 @@ class CompensatorSettings(StrictModel):
     sensor: SensorRange = SensorRange()
     uncertain_above: PositiveLength = 2e-4
     """Half the 95 % interval of the predicted deflection beyond which it warns, in m."""
+    friction: FrictionReset = FrictionReset()
 
     @model_validator(mode="after")
     def _can_correct(self) -> "CompensatorSettings":
@@ -132,6 +144,11 @@ class CompensatorSettings(StrictModel):
     def hold_cycles(self) -> int:
         """Corrections that are held."""
         return max(1, round(self.hold / self.cycle))
+
+    @property
+    def free_cycles(self) -> int:
+        """Corrections without load after which friction is taken to bear nothing."""
+        return max(1, round(self.friction.free_after / self.cycle))
 
     @property
     def R_base_frame(self) -> FloatArray | None:

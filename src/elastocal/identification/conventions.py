@@ -19,6 +19,7 @@ from elastocal.arrays import FloatArray
 from elastocal.dataset import Readings
 from elastocal.elastic import ElasticModel
 from elastocal.errors import ConventionError, DatasetError, IdentificationError
+from elastocal.identification.displacement import displacement_blocks
 from elastocal.identification.options import FitOptions
 from elastocal.identification.problem import Problem, build
 from elastocal.identification.solve import solve
@@ -76,9 +77,9 @@ def check_conventions(
     stated = _unexplained(problem.reweighted(robust.reading_weight))
     found = []
     for mistake in _mistakes_of(model.robot):
-        undone = mistake.undo(model.robot, readings)
-        q, force, moment = undone.joint_position, undone.force, undone.moment
-        blocks = model.observation_blocks(q, force, moment, marker_offset)
+        # A mistake in the joints is one in those of the reference, which are sought anew.
+        undone = mistake.undo(model.robot, replace(readings, reference_joint_position=None))
+        blocks = displacement_blocks(model, undone, marker_offset)
         # The weights of the stated reading keep a blunder out of every other one, too.
         other = replace(problem, O=blocks, d=undone.deflection).reweighted(robust.reading_weight)
         found.append((_unexplained(other), mistake.message))

@@ -23,8 +23,8 @@ from elastocal.robot import Robot
 
 _ROUNDS = 3
 """Newton steps to the reference; each squares the error of some millimetres."""
-_DAMPING = 1e-6
-"""Part of the largest singular value below which a direction is not followed: a wrist in line."""
+_DAMPING = 1e-9
+"""Levenberg's damping over the mean square of the Jacobian's entries: a wrist in line stays."""
 _ARM_JOINTS = 6
 
 
@@ -78,7 +78,10 @@ def reference_joints(robot: Robot, readings: Readings) -> FloatArray:
         turn = np.cross(now[:, :3, :3], here[:, :3, :3], axis=1).sum(axis=2) / 2.0
         error = np.concatenate([goal - now[:, :3, 3], turn], axis=1)
         jacobian = np.concatenate([J.translation, J.rotation], axis=1)[:, :, moving]
-        q[:, moving] += (np.linalg.pinv(jacobian, rcond=_DAMPING) @ error[..., None])[..., 0]
+        transposed = jacobian.swapaxes(1, 2)
+        damping = _DAMPING * float(np.mean(np.square(jacobian))) * np.eye(6)
+        pull = np.linalg.solve(jacobian @ transposed + damping, error[..., None])
+        q[:, moving] += (transposed @ pull)[..., 0]
     return q
 
 

@@ -3,10 +3,13 @@
 More springs always fit better; whether they predict better is seen at poses that a refit has not
 seen, and at a low load that it has not seen, where there is one. (A refit without the full load
 would have to extrapolate, which no rung is asked to.) The rung taken is the simplest that is not
-worse than the best by a paired 95 % interval. Refits without one pose each share nearly all their
-poses, so that their errors are not independent; the interval counts that by the corrected
-resampled t-test (C. Nadeau, Y. Bengio, "Inference for the generalization error", Machine Learning
-52, 2003): the variance of a mean over ``J`` test sets is ``s^2 (1 / J + n_test / n_train)``.
+worse than the best by more than one standard error of their paired difference (the rule of L.
+Breiman, J. Friedman, R. Olshen, C. Stone, *Classification and Regression Trees*, 1984, section
+3.4.3). Refits without one pose each share nearly all their poses, so that their errors are not
+independent; the standard error counts that by the corrected resampled t-test (C. Nadeau, Y.
+Bengio, "Inference for the generalization error", Machine Learning 52, 2003): the variance of a
+mean over ``J`` test sets is ``s^2 (1 / J + n_test / n_train)``. Why not a 95 % interval: see
+docs/decisions/0066-ladder.md.
 """
 
 from collections.abc import Callable, Sequence
@@ -29,11 +32,13 @@ from elastocal.elastic import (
     tensor,
 )
 from elastocal.errors import IdentificationError
+from elastocal.identification.displacement import reference_joints
 from elastocal.identification.options import FitOptions
 from elastocal.identification.problem import Problem, build
 from elastocal.identification.solve import PoseGrams
 from elastocal.identification.suspicious import screen
 from elastocal.identification.uncertainty import CONFIDENCE, HeldOut, leave_poses_out
+from elastocal.parallel import one_blas_thread
 from elastocal.results import brief_repr
 from elastocal.robot import Robot
 
@@ -77,6 +82,8 @@ class Climbed:
     """Lower end of its 95 % interval, in m."""
     high: float
     """Upper end, in m."""
+    standard_error: float = 0.0
+    """Of the difference, in m."""
     chosen: bool = False
 
 
@@ -140,6 +147,7 @@ class Choice:
     """Every rung that the readings allow, the simplest first."""
 
 
+@one_blas_thread()
 def choose_model(
     robot: Robot,
     readings: Readings,
@@ -177,6 +185,9 @@ def choose_model(
         asked = layout(robot, springs)
         rungs[springs] = Rung(springs, lambda *_: asked)
     options = replace(options, prior=None)
+    # Sought once, not for every rung.
+    sought = reference_joints(robot, readings)
+    readings = replace(readings, reference_joint_position=sought)
     if options.set_blunders_aside:
         # Judged by springs that every reading can be judged by; they would decide otherwise.
         plain = build(ElasticModel(robot, bearing(robot)), readings, options, marker_offset)
@@ -228,7 +239,7 @@ def climb(
         raise IdentificationError(reason)
     best = min(candidates, key=lambda each: float(each.score.mean()))
     compared = [_against(each, best) for each in tried]
-    chosen = next(e for e in compared if e.name in allowed and e.low <= 0.0)
+    chosen = next(e for e in compared if e.name in allowed and e.difference <= e.standard_error)
     ladder = tuple(replace(each, chosen=each is chosen) for each in compared)
     return Choice(chosen.model, ladder)
 
@@ -281,7 +292,9 @@ def _against(rung: Climbed, best: Climbed) -> Climbed:
     spread = float(difference.std(ddof=1)) * np.sqrt(1.0 / count + 1.0 / (count - 1))
     reach = float(stdtrit(count - 1, 0.5 * (1.0 + CONFIDENCE))) * spread
     mean = float(difference.mean())
-    return replace(rung, difference=mean, low=mean - reach, high=mean + reach)
+    return replace(
+        rung, difference=mean, low=mean - reach, high=mean + reach, standard_error=spread
+    )
 
 
 def _rounded(torque: float) -> float:

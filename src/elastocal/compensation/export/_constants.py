@@ -9,12 +9,27 @@ from textwrap import wrap
 import numpy as np
 
 from elastocal.arrays import FloatArray
+from elastocal.compensation.kernel import Call
 from elastocal.compensation.online import JOINT_RANGE, LONG_AGO, Design
 
 _FNV_START, _FNV_PRIME = 14695981039346656037, 1099511628211
 """FNV-1a, 64 bits (Fowler, Noll and Vo)."""
 _INDENT = " " * 4
-_COUNTS = ("JOINTS", "SPRINGS", "SECTIONS", "MEDIAN")
+_COUNTS = ("JOINTS", "SPRINGS", "SECTIONS", "MEDIAN", "MEMORY")
+_ARC = (
+    -0.3333333333333325,
+    0.19999999999898407,
+    -0.1428571426609662,
+    0.11111109636534361,
+    -0.09090852557176049,
+    0.0769105515839315,
+    -0.06649613695291669,
+    0.05736332165907643,
+    -0.04483334622272886,
+    0.02275052699336167,
+)
+"""``(atan(t) / t - 1) / t^2`` in powers of ``t^2``, interpolated at the ten Chebyshev nodes of
+``t <= tan(pi / 8)``: wrong by 1.3e-16 at most."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,9 +93,11 @@ def constants_of(numbers: Design) -> list[Constant]:
     return [
         *_header(numbers),
         *_trigonometry(),
+        *(_arcs() if turns_arcs(numbers) else ()),
         *_model(numbers),
         *_conditioning(numbers),
         *_compensation(numbers),
+        *(_friction(numbers) if numbers.deflection.memory else ()),
     ]
 
 
@@ -96,6 +113,8 @@ def _header(numbers: Design) -> list[Constant]:
         "SAMPLE": filters.sample,
         "DELAY": float(filters.delay()),
     }
+    if numbers.deflection.memory:
+        values["MEMORY"] = len(numbers.deflection.memory)
     return [
         Constant(f"ELASTOCAL_{name}", np.array(float(value)), whole=name in _COUNTS, in_header=True)
         for name, value in values.items()
@@ -122,6 +141,30 @@ def _trigonometry() -> list[Constant]:
     ]
 
 
+def turns_arcs(numbers: Design) -> bool:
+    """Return whether a law of the model needs the angle of a point."""
+    calls = [s for s in numbers.deflection.statements if isinstance(s, Call)]
+    return any(call.function == "atan2" for call in calls)
+
+
+def _arcs() -> list[Constant]:
+    return [
+        Constant("ARC", np.array(_ARC), "of the arc tangent"),
+        _one("TAN_EIGHTH", np.sqrt(2.0) - 1.0, "of pi / 8"),
+        _one("QUARTER_TURN", np.pi / 4.0),
+        _one("SMALLEST", 1e-300, "keeps 0 / 0 away"),
+    ]
+
+
+def _friction(numbers: Design) -> list[Constant]:
+    light = np.array(numbers.light_loads)
+    return [
+        _one("RUBBING", len(light), "gears with friction", whole=True),
+        Constant("LIGHT", light, "loads below which the arm moves freely, N m"),
+        _one("FREE_CYCLES", numbers.settings.free_cycles, whole=True),
+    ]
+
+
 def _model(numbers: Design) -> list[Constant]:
     """Return the numbers of the chain and the springs, by the names that the routines use."""
     comments = {
@@ -132,6 +175,7 @@ def _model(numbers: Design) -> list[Constant]:
         **numbers.orientation.constants,
         **numbers.deflection.constants,
         **numbers.block.constants,
+        **numbers.rest.constants,
     }
     return [
         *(_one(name.upper(), number, comments.get(name, "")) for name, number in named.items()),

@@ -16,6 +16,7 @@ from numpy.random import Generator
 from elastocal.arrays import FloatArray
 from elastocal.compensation.kernel import ModelFunctions
 from elastocal.compensation.online import Compensator, Design, Reading
+from elastocal.elastic import ElasticModel
 from elastocal.errors import CompensationError
 from elastocal.identification import CalibratedModel
 
@@ -37,8 +38,9 @@ def selftest_tables(numbers: Design) -> dict[str, str]:
     """
     exported, model = numbers.functions(), _from_model(numbers.calibrated)
     loads = _load_cases(numbers, model)
+    memory = model.rest(loads[0].q)
     for load in loads:
-        _check_statements(exported, model, load)
+        memory = _check_statements(exported, model, load, memory)
     course = _episodes(numbers, model)
     load_rows = [_struct(*load) for load in loads]
     episode_rows = [
@@ -82,42 +84,136 @@ class _Episode:
 def _from_model(calibrated: CalibratedModel) -> ModelFunctions:
     """Return what a compensator asks of a model, answered by the model itself."""
     model, c = calibrated.model, calibrated.compliance
+    if len(model.friction):
+        remembering = _Remembering(model, c)
+        return ModelFunctions(
+            orientation=lambda q: _floats(model.robot.forward(q)[:3, :3]),
+            rest=remembering.rest,
+            deflection=remembering.deflection,
+            block=remembering.block,
+        )
     return ModelFunctions(
         orientation=lambda q: _floats(model.robot.forward(q)[:3, :3]),
+        rest=lambda _: (),
         deflection=lambda q, force, moment: _floats(model.deflection(c, q, force, moment)),
         block=lambda q, force, moment: _floats(model.observation_blocks(q, force, moment)),
     )
+
+
+@dataclass(frozen=True, eq=False)
+class _Remembering:
+    """A model with friction, its memory moved on by `FrictionElements.path`."""
+
+    model: ElasticModel
+    compliance: FloatArray
+
+    @property
+    def _axes(self) -> list[int]:
+        """The axes with friction, in the order of the memory."""
+        return list(dict.fromkeys(self.model.friction.axis.tolist()))
+
+    def rest(self, q: Sequence[float]) -> tuple[float, ...]:
+        weight = self.model.weight_torques(q)
+        still, here = -weight[self.model.friction.axis], weight[self._axes]
+        return _floats(np.concatenate([still, here, here, np.zeros(len(here))]))
+
+    def deflection(self, q: Sequence[float], *given: Sequence[float]) -> tuple[float, ...]:
+        force, moment, _ = given
+        borne, after = self._loaded(q, *given)
+        found = self.model.deflection(self.compliance, q, force, moment, friction=borne)
+        return (*_floats(found), *after)
+
+    def block(self, q: Sequence[float], *given: Sequence[float]) -> tuple[float, ...]:
+        force, moment, _ = given
+        borne, after = self._loaded(q, *given)
+
+        def blocks(friction: FloatArray) -> FloatArray:
+            return self.model.observation_blocks(q, force, moment, friction=friction)
+
+        # Each element by itself moves the deflection by what it may bear besides.
+        limit, axes = self.model.friction.limit, self._axes
+        low, high = np.reshape(after[len(limit) : len(limit) + 2 * len(axes)], (2, -1))
+        spanned = dict(zip(axes, high - low, strict=True))
+        ranges = np.array([spanned[axis] for axis in self.model.friction.axis.tolist()])
+        still = blocks(np.zeros(len(limit)))
+        unknown = sum(
+            np.abs((blocks(one) - still) @ self.compliance)
+            for one in np.diag(np.maximum(limit - 0.5 * ranges, 0.0))
+        )
+        return (*_floats(blocks(borne)), *_floats(np.asarray(unknown)), *after)
+
+    def _loaded(
+        self,
+        q: Sequence[float],
+        force: Sequence[float],
+        moment: Sequence[float],
+        memory: Sequence[float],
+    ) -> tuple[FloatArray, tuple[float, ...]]:
+        """Return what the elements bear under a load, and the memory after it."""
+        model, n, axes = self.model, len(self.model.friction), self._axes
+        load = model.load_torques(q, force, moment)
+        total = load + model.weight_torques(q)
+        way = np.stack([np.zeros_like(total), total])
+        borne = model.friction.path(way, np.array(memory[:n]))[1]
+        low, high = np.reshape(memory[n : n + 2 * len(axes)], (2, -1))
+        seen = total[axes]
+        kept = (
+            borne - total[model.friction.axis],
+            np.minimum(low, seen),
+            np.maximum(high, seen),
+            load[axes],
+        )
+        return borne, _floats(np.concatenate(kept))
 
 
 def _floats(array: FloatArray) -> tuple[float, ...]:
     return tuple(array.ravel().tolist())
 
 
-def _check_statements(exported: ModelFunctions, model: ModelFunctions, load: _LoadCase) -> None:
-    """Refuse statements that give something else than the model."""
-    wrench = (load.force, load.moment)
-    for what, found, expected in (
+def _check_statements(
+    exported: ModelFunctions, model: ModelFunctions, load: _LoadCase, memory: tuple[float, ...]
+) -> tuple[float, ...]:
+    """Refuse statements that give something else than the model; return the memory after a load."""
+    given = (load.q, load.force, load.moment, *([memory] if memory else []))
+    found, block = exported.deflection(*given), exported.block(*given)
+    expected, expected_block = model.deflection(*given), model.block(*given)
+    size = len(expected_block) - (3 + len(memory) if memory else 0)
+    compared = [
         ("orientation", exported.orientation(load.q), model.orientation(load.q)),
-        ("deflection", exported.deflection(load.q, *wrench), load.deflection),
-        ("observation block", exported.block(load.q, *wrench), model.block(load.q, *wrench)),
-    ):
-        off = np.abs(np.subtract(found, expected)).max() / max(np.abs(expected).max(), 1e-300)
+        ("deflection", found[:3], expected[:3]),
+        ("observation block", block[:size], expected_block[:size]),
+    ]
+    if memory:
+        compared += [
+            ("unknown friction", block[size : size + 3], expected_block[size : size + 3]),
+            ("memory of friction", found[3:], expected[3:]),
+            ("memory of friction", block[size + 3 :], expected[3:]),
+            ("free memory of friction", exported.rest(load.q), model.rest(load.q)),
+        ]
+    for what, got, wanted in compared:
+        off = np.abs(np.subtract(got, wanted)).max() / max(np.abs(wanted).max(), 1e-300)
         if not off <= _AGREEMENT:
             raise CompensationError(
                 f"the {what} that would be exported differs from the model's by {off:.1e} of its"
                 f" size, more than {_AGREEMENT:g}: nothing is written"
             )
+    return expected[3:]
 
 
 def _load_cases(numbers: Design, model: ModelFunctions) -> list[_LoadCase]:
-    """Return random loads with their deflections."""
+    """Return random loads, one after the other as friction remembers them, and deflections."""
     rng = np.random.default_rng(_SEED)
     cases = []
-    for q in _configurations(numbers, rng, _LOADS).tolist():
+    configurations = _configurations(numbers, rng, _LOADS).tolist()
+    memory, size = model.rest(configurations[0]), 3 * len(numbers.spread)
+    for q in configurations:
         force, moment = rng.normal(0.0, 800.0, 3).tolist(), rng.normal(0.0, 80.0, 3).tolist()
-        rows = np.reshape(model.block(q, force, moment), (3, -1)) @ numbers.spread
-        half_width = float(np.sqrt((rows**2).sum(axis=1).max()))
-        cases.append(_LoadCase(q, force, moment, model.deflection(q, force, moment), half_width))
+        given = (q, force, moment, *([memory] if memory else []))
+        block, deflection = model.block(*given), model.deflection(*given)
+        rows = np.reshape(block[:size], (3, -1)) @ numbers.spread
+        widths = np.sqrt((rows**2).sum(axis=1)) + (block[size : size + 3] if memory else 0.0)
+        memory = deflection[3:]
+        cases.append(_LoadCase(q, force, moment, deflection[:3], float(widths.max())))
     return cases
 
 
@@ -146,8 +242,21 @@ def _episodes(numbers: Design, model: ModelFunctions) -> list[_Episode]:
         (1, middle._replace(time=-1e3)),
         (2, middle),
         (4, middle),
+        *_free_motion(numbers, (first, large)),
     ]
     return _played(Compensator(numbers, model), course)
+
+
+def _free_motion(numbers: Design, pressed: tuple[Reading, Reading]) -> list[tuple[int, Reading]]:
+    """Return presses before, within and after a way through the air."""
+    if not numbers.light_loads:
+        return []
+    first, large = pressed
+    R = numbers.calibrated.model.robot.forward(first.q)[:3, :3]
+    raw = _raw(numbers, np.zeros(6), R)
+    air = first._replace(force=raw[:3].tolist(), moment=raw[3:].tolist())
+    free = min(_MOST_TIMES, numbers.settings.free_cycles + 60)
+    return [(3, first), (5, large), (5, first), (5, air), (5, first), (free, air), (5, first)]
 
 
 def _played(compensator: Compensator, course: list[tuple[int, Reading]]) -> list[_Episode]:

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from elastocal import __version__
-from elastocal.compensation.export._constants import checksum, constants_of, remark
+from elastocal.compensation.export._constants import checksum, constants_of, remark, turns_arcs
 from elastocal.compensation.export._selftest import selftest_tables
 from elastocal.compensation.kernel import (
     Assignment,
@@ -25,8 +25,15 @@ from elastocal.compensation.online import Design
 from elastocal.files import filling
 
 _VECTORS = {"f": "force", "m": "moment"}
-_PARTS = ("head.c", "sin_cos.c", "condition.c", "correct.c", "selftest.c")
+_PARTS = ("head.c", "sin_cos.c", "arc.c", "condition.c", "correct.c", "selftest.c")
 _BESIDE = ("elastocal_model.h", "selftest_main.c", "CMakeLists.txt", "README.md")
+_FUNCTIONS = {
+    "atan2": "arc({}, {})",
+    "fabs": "fabs({})",
+    "min": "({0} < {1}) ? {0} : {1}",
+    "max": "({0} < {1}) ? {1} : {0}",
+}
+"""As C for what statements call: comparisons compile to one instruction, without a branch."""
 _RAW = "N, N m; raw, as the sensor gives them | sensor"
 _AT_TCP = (
     "N, N m; **on** the robot, bias and tool weight removed, about the tool centre point | tcp"
@@ -78,15 +85,30 @@ def c_files(numbers: Design) -> dict[str, str]:
         If what would be exported does not agree with the model.
     """
     values = _values(numbers)
+    remembers = bool(numbers.deflection.memory)
     constants = constants_of(numbers)
     data = selftest_tables(numbers)
     mixing = "\n".join(line for constant in constants for line in constant.mixing())
     values |= data | {"MIXING": mixing, "CHECKSUM": str(checksum(constants))}
-    head, sin_cos, condition, correct, selftest = (_filled(part, values) for part in _PARTS)
+    head, sin_cos, arc, condition, correct, selftest = (
+        _filled(part, values, remembers) for part in _PARTS
+    )
     definitions = "".join(f"{each.definition()}\n" for each in constants if not each.in_header)
-    model = "".join([head, definitions, sin_cos, _routines(numbers), condition, correct, selftest])
+    model = "".join(
+        [
+            head,
+            definitions,
+            sin_cos,
+            arc if turns_arcs(numbers) else "",
+            _routines(numbers),
+            condition,
+            correct,
+            selftest,
+        ]
+    )
     values |= _readme_values(numbers)
-    return {"elastocal_model.c": model} | {name: _filled(name, values) for name in _BESIDE}
+    beside = {name: _filled(name, values, remembers) for name in _BESIDE}
+    return {"elastocal_model.c": model} | beside
 
 
 def _values(numbers: Design) -> dict[str, str]:
@@ -111,6 +133,7 @@ def _values(numbers: Design) -> dict[str, str]:
         "SPRINGS": str(len(calibrated.model.parameters)),
         "SECTIONS": str(len(numbers.filters.sections)),
         "MEDIAN": str(median),
+        "MEMORY": str(len(numbers.deflection.memory)),
         "MEDIAN_CODE": _template(f"median_{median}.c").rstrip("\n"),
         "CYCLE": repr(numbers.settings.cycle),
         "SAMPLE": repr(numbers.filters.sample),
@@ -143,6 +166,8 @@ def _readme_values(numbers: Design) -> dict[str, str]:
         "SENSOR": _REMOVED_HERE.format(mass=numbers.load.mass) if numbers.weighs else _REMOVED,
         "RAW": _RAW if numbers.weighs else _AT_TCP,
         "DELAYS": "\n".join(rows),
+        "LIBRARY": "`fabs`, `copysign`, " if turns_arcs(numbers) else "",
+        "FREE_MS": f"{1e3 * settings.friction.free_after:g}",
     }
 
 
@@ -150,16 +175,23 @@ def _template(name: str) -> str:
     return (resources.files(__package__) / "templates" / name).read_text(encoding="utf-8")
 
 
-def _filled(name: str, values: dict[str, str]) -> str:
-    text = _template(name)
+def _filled(name: str, values: dict[str, str], remembers: bool) -> str:
+    """Return a template with its places filled.
+
+    Lines that begin with ``@FRICTION@`` are for models that remember friction only, those with
+    ``@PLAIN@`` for the others.
+    """
+    kept, dropped = ("@FRICTION@", "@PLAIN@") if remembers else ("@PLAIN@", "@FRICTION@")
+    lines = _template(name).splitlines(keepends=True)
+    text = "".join(line.removeprefix(kept) for line in lines if not line.startswith(dropped))
     for key, value in values.items():
         text = text.replace(f"@{key}@", value)
     return text
 
 
 def _routines(numbers: Design) -> str:
-    """Return the functions for orientation, deflection and observation block."""
-    springs = len(numbers.calibrated.model.parameters)
+    """Return the functions for orientation, rest, deflection and observation block."""
+    springs, joints = len(numbers.calibrated.model.parameters), numbers.joints
     load = "const double q[], const double force[3], const double moment[3]"
     inputs = ("q", "force", "moment")
     rotation = [f"rotation[{i}]" for i in range(9)]
@@ -168,6 +200,21 @@ def _routines(numbers: Design) -> str:
     head = "static void orientation(const double q[], double rotation[9])"
     columns = f"void elastocal_block({load},\n    double block[3][ELASTOCAL_SPRINGS])"
     total = f"void elastocal_deflection({load},\n    double deflection[3])"
+    of_block, begins = numbers.block, []
+    if numbers.deflection.memory:
+        kept = "double memory[ELASTOCAL_MEMORY]"
+        columns = (
+            f"void elastocal_block({load},\n    const {kept}, double block[3][ELASTOCAL_SPRINGS],"
+            " double unknown[3])"
+        )
+        total = f"void elastocal_deflection({load},\n    {kept}, double deflection[3])"
+        memory = [f"memory[{i}]" for i in range(len(numbers.deflection.memory))]
+        deflection += memory
+        block += [f"unknown[{i}]" for i in range(3)]
+        # The deflection has moved the memory on already; the block leaves it as it is.
+        of_block = numbers.block.leading(len(block))
+        rest = f"void elastocal_rest(const double q[], {kept})"
+        begins = [_function(rest, numbers.rest, memory, inputs[:1], joints)]
     return "\n".join(
         (
             "/* ---- The model ------------------------------------------------------------------",
@@ -175,9 +222,10 @@ def _routines(numbers: Design) -> str:
             " * origins; tau torques, w turns of a spring, theta turns of a joint's springs. */",
             "",
             "/* Rotation of the tool centre point in base, by rows. */",
-            _function(head, numbers.orientation, rotation, inputs[:1], numbers.joints),
-            _function(total, numbers.deflection, deflection, inputs, numbers.joints),
-            _function(columns, numbers.block, block, inputs, numbers.joints),
+            _function(head, numbers.orientation, rotation, inputs[:1], joints),
+            *begins,
+            _function(total, numbers.deflection, deflection, inputs, joints),
+            _function(columns, of_block, block, inputs, joints),
         )
     )
 
@@ -188,6 +236,7 @@ def _function(
     names = {f"q{k + 1}": f"q[{k}]" for k in range(joints)}
     for letter, vector in _VECTORS.items():
         names |= {f"{letter}{axis}": f"{vector}[{i}]" for i, axis in enumerate("xyz")}
+    names |= {name: f"memory[{i}]" for i, name in enumerate(routine.memory)}
 
     def naming(name: str) -> str:
         return name.upper() if name in routine.constants else names.get(name, name)
@@ -219,5 +268,6 @@ def _lines(statement: Statement, naming: Naming) -> list[str]:
             ]
         case Assignment():
             return [f"    const double {statement.name} = {sum_text(statement, naming)};"]
-        case Call(name, function, argument):
-            return [f"    const double {name} = {function}({value_text(argument, naming)});"]
+        case Call(name, function, arguments):
+            texts = [value_text(argument, naming) for argument in arguments]
+            return [f"    const double {name} = {_FUNCTIONS[function].format(*texts)};"]

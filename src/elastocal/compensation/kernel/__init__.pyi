@@ -1,3 +1,4 @@
+from ._laws import written as written
 from .program import (
     ONE as ONE,
     ZERO as ZERO,
@@ -26,5 +27,5 @@ from .statics import (
     deflection as deflection,
     observation_block as observation_block,
     orientation as orientation,
-    written as written,
+    rest as rest,
 )

@@ -75,12 +75,12 @@ class Remark:
 
 @dataclass(frozen=True)
 class Call:
-    """``name = function(argument)``."""
+    """``name = function(arguments)``."""
 
     name: str
     function: str
-    """As C's ``math.h`` and Python's `math` both call it."""
-    argument: Value
+    """``atan2``, ``fabs``, ``min`` or ``max``."""
+    arguments: tuple[Value, ...]
 
 
 Statement = Assignment | Turn | Call | Remark
@@ -125,10 +125,26 @@ class Program:
         self.statements.append(Turn(sine, cosine, angle))
         return Value(1, sine), Value(1, cosine)
 
-    def call(self, name: str, function: str, argument: Value) -> Value:
-        """Return a function of a value."""
-        self.statements.append(Call(name, function, argument))
+    def call(self, name: str, function: str, *arguments: Value) -> Value:
+        """Return a function of values."""
+        self.statements.append(Call(name, function, arguments))
         return Value(1, name)
+
+    def clipped(self, name: str, value: Value, limit: Value) -> Value:
+        """Return a value no farther from zero than a limit: ``(|x + r| - |x - r|) / 2``.
+
+        Comparisons with constants would become jumps in C, and the time would depend on the data.
+        """
+        half = self.quantity("half", 0.5)
+        ahead = self.total(f"{name}_ahead", [(value,), (limit,)])
+        behind = self.total(f"{name}_behind", [(value,), (-limit,)])
+        sizes = self.call(f"{name}_up", "fabs", ahead), self.call(f"{name}_down", "fabs", behind)
+        return self.total(name, [(half, sizes[0]), (-half, sizes[1])])
+
+    def positive(self, name: str, value: Value) -> Value:
+        """Return a value where it is positive, else zero: ``(x + |x|) / 2``."""
+        half = self.quantity("half", 0.5)
+        return self.total(name, [(half, value), (half, self.call(f"{name}_size", "fabs", value))])
 
     def total(self, name: str, products: Iterable[Product]) -> Value:
         """Return a sum of products, left to right; a plain one needs no statement.
@@ -214,20 +230,33 @@ class Routine:
     outputs: tuple[Value, ...]
     constants: dict[str, float]
     """The numbers that it reads, by name."""
+    memory: tuple[str, ...] = ()
+    """Names of the numbers that it remembers from one call to the next."""
+
+    def leading(self, count: int) -> "Routine":
+        """Return the program of its first outputs alone."""
+        outputs = self.outputs[:count]
+        statements = needed(self.statements, outputs)
+        used = used_names(statements, outputs)
+        constants = {name: x for name, x in self.constants.items() if name in used}
+        return Routine(statements, outputs, constants, self.memory)
+
+
+def _uses(statement: Statement) -> set[str]:
+    """Return the names that a statement reads."""
+    match statement:
+        case Assignment():
+            return statement.uses()
+        case Turn():
+            return {statement.angle}
+        case Call():
+            return {value.name for value in statement.arguments}
+    return set()
 
 
 def used_names(statements: Iterable[Statement], outputs: Iterable[Value]) -> set[str]:
     """Return the names that statements and outputs read."""
-    used = {value.name for value in outputs}
-    for statement in statements:
-        match statement:
-            case Assignment():
-                used |= statement.uses()
-            case Turn():
-                used.add(statement.angle)
-            case Call():
-                used.add(statement.argument.name)
-    return used
+    return {value.name for value in outputs}.union(*map(_uses, statements))
 
 
 def needed(statements: Sequence[Statement], outputs: Iterable[Value]) -> tuple[Statement, ...]:
@@ -241,11 +270,8 @@ def needed(statements: Sequence[Statement], outputs: Iterable[Value]) -> tuple[S
                 kept.append(statement)
             case Turn() if {statement.sine, statement.cosine} & wanted:
                 kept.append(statement)
-            case Assignment() if statement.name in wanted:
-                wanted |= statement.uses()
-                kept.append(statement)
-            case Call() if statement.name in wanted:
-                wanted.add(statement.argument.name)
+            case Assignment() | Call() if statement.name in wanted:
+                wanted |= _uses(statement)
                 kept.append(statement)
     return tuple(_without_idle_remarks(kept[::-1]))
 
@@ -283,20 +309,32 @@ def _vector(values: Iterable[Value]) -> Vector:
     return x, y, z
 
 
+_ORDERED = {"min": "{0} if {0} < {1} else {1}", "max": "{1} if {0} < {1} else {0}"}
+"""Python's own functions take thrice the time."""
+
+_MATH = ("sin", "cos", "atan2", "fabs")
+
 Function = Callable[..., tuple[float, ...]]
 
 
 @brief_repr
 @dataclass(frozen=True)
 class ModelFunctions:
-    """Functions of a model that a compensator needs; they take and return sequences of floats."""
+    """Functions of a model that a compensator needs; they take and return sequences of floats.
+
+    A model without friction remembers nothing: its functions take no ``memory``.
+    """
 
     orientation: Function
     """``(q)``: rotation of the tool centre point in base, by rows."""
+    rest: Function
+    """``(q)``: memory of the unloaded arm after a free motion."""
     deflection: Function
-    """``(q, force, moment)``: deflection in base, in m."""
+    """``(q, force, moment, memory)``: deflection in base, in m, and the memory after it."""
     block: Function
-    """``(q, force, moment)``: observation block by rows, in m per unit of each parameter."""
+    """``(q, force, moment, memory)``: observation block by rows, in m per unit of each parameter;
+    with friction also how far an unknown start may move each component, in m, and the memory after
+    the load."""
 
 
 def compiled(routine: Routine, joints: int, loaded: bool = True) -> Function:
@@ -317,41 +355,85 @@ def compiled(routine: Routine, joints: int, loaded: bool = True) -> Function:
     Returns
     -------
     callable
-        ``(q, force, moment) -> outputs`` or ``(q) -> outputs``; every argument a sequence of
-        floats: rad or m, N, N·m.
+        ``(q, force, moment) -> outputs``, with ``memory`` behind them where the routine has one,
+        or ``(q) -> outputs``; every argument a sequence of floats: rad or m, N, N·m.
     """
-    source = python_text(routine, joints, loaded)
-    functions = {"sin", "cos"}
-    functions |= {each.function for each in routine.statements if isinstance(each, Call)}
-    namespace: dict[str, Function] = {name: getattr(math, name) for name in functions}
+    namespace: dict[str, Function] = {name: getattr(math, name) for name in _MATH}
     # Compiled once, run every cycle: an interpreter of the statements would be slower than arrays.
-    exec(compile(source, "<elastic model>", "exec"), namespace)
+    exec(compile(python_text(routine, joints, loaded), "<elastic model>", "exec"), namespace)
     return namespace["routine"]
 
 
 def python_text(routine: Routine, joints: int, loaded: bool) -> str:
     """Return the source of that function."""
+    variables = _Variables(routine)
 
     def naming(name: str) -> str:
         number = routine.constants.get(name)
+        if number is None:
+            return variables.read(name)
         # In parentheses, since "a - -1.0" is no C and its twin here reads the same.
-        return name if number is None else repr(number) if number >= 0 else f"({number!r})"
+        return repr(number) if number >= 0 else f"({number!r})"
 
-    lines = [f"def routine(q{', force, moment' if loaded else ''}):"]
-    lines.append(_unpacked([f"q{k + 1}" for k in range(joints)], "q"))
+    inputs = {"q": [f"q{k + 1}" for k in range(joints)]}
     if loaded:
-        lines += [_unpacked(["fx", "fy", "fz"], "force"), _unpacked(["mx", "my", "mz"], "moment")]
+        inputs |= {"force": ["fx", "fy", "fz"], "moment": ["mx", "my", "mz"]}
+    if routine.memory:
+        inputs["memory"] = list(routine.memory)
+    lines = [f"def routine({', '.join(inputs)}):"]
+    for source, names in inputs.items():
+        targets = "".join(f"{variables.write(name)}, " for name in names)
+        lines.append(f"    {targets}= {source}")
     for statement in routine.statements:
         match statement:
             case Turn(sine, cosine, angle):
-                lines += [f"    {sine} = sin({angle})", f"    {cosine} = cos({angle})"]
+                read = naming(angle)
+                # The angle is read twice: its variable is not free for the sine.
+                pair = variables.write(sine), variables.write(cosine)
+                lines += [f"    {pair[0]} = sin({read})", f"    {pair[1]} = cos({read})"]
             case Assignment():
-                lines.append(f"    {statement.name} = {sum_text(statement, naming)}")
-            case Call(name, function, argument):
-                lines.append(f"    {name} = {function}({value_text(argument, naming)})")
+                text = sum_text(statement, naming)
+                variables.free(statement)
+                lines.append(f"    {variables.write(statement.name)} = {text}")
+            case Call(name, function, arguments):
+                texts = [value_text(argument, naming) for argument in arguments]
+                ordered = _ORDERED.get(function)
+                text = ordered.format(*texts) if ordered else f"{function}({', '.join(texts)})"
+                variables.free(statement)
+                lines.append(f"    {variables.write(name)} = {text}")
     lines.append(f"    return ({' '.join(value_text(v, naming) + ',' for v in routine.outputs)})")
     return "\n".join(lines) + "\n"
 
 
-def _unpacked(names: Sequence[str], source: str) -> str:
-    return f"    {' '.join(name + ',' for name in names)} = {source}"
+class _Variables:
+    """Local variables of a routine in Python, used again once nothing reads what they hold.
+
+    A frame of some hundred variables takes twice the time: the interpreter asks the system for
+    its memory at every call.
+    """
+
+    def __init__(self, routine: Routine) -> None:
+        last = {name: statement for statement in routine.statements for name in _uses(statement)}
+        kept = {value.name for value in routine.outputs}
+        self._last = {name: id(each) for name, each in last.items() if name not in kept}
+        self._place: dict[str, str] = {}
+        self._idle: list[str] = []
+        self._count = 0
+
+    def write(self, name: str) -> str:
+        """Return the variable that a name gets."""
+        if not self._idle:
+            self._count += 1
+            self._idle.append(f"v{self._count}")
+        self._place[name] = self._idle.pop()
+        return self._place[name]
+
+    def read(self, name: str) -> str:
+        """Return the variable that holds a name."""
+        return self._place[name]
+
+    def free(self, statement: Statement) -> None:
+        """Note that a statement has been read: what no later one reads may go."""
+        for name in sorted(_uses(statement)):
+            if self._last.get(name) == id(statement) and name in self._place:
+                self._idle.append(self._place.pop(name))

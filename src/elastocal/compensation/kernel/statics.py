@@ -1,127 +1,30 @@
-"""Chain and springs as statements: joint frames, deflection and observation block at a load."""
+"""Deflection and observation block at a load as statements: chain, weight, springs together."""
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
-from itertools import count
 
-from elastocal.arrays import FloatArray
+from elastocal.compensation.kernel._chain import (
+    NOTHING,
+    ChainFrames,
+    Frame,
+    write_chain,
+    write_weights,
+)
+from elastocal.compensation.kernel._laws import Laws, LoadedAxis
 from elastocal.compensation.kernel.program import (
     ONE,
     ZERO,
-    Matrix,
     Program,
     Routine,
     Value,
     Vector,
-    needed,
-    used_names,
 )
-from elastocal.elastic import ElasticModel, SpringAxis, SpringLoad
-from elastocal.elastic.springs import Expression, Function, Input, Number, Product, Sum
-from elastocal.robot import ChainJoint, SerialChain
+from elastocal.elastic import ElasticModel, SpringAxis
 
-_NOTHING: Vector = (ZERO, ZERO, ZERO)
-_IDENTITY: Matrix = ((ONE, ZERO, ZERO), (ZERO, ONE, ZERO), (ZERO, ZERO, ONE))
 _FORCE: Vector = (Value(1, "fx"), Value(1, "fy"), Value(1, "fz"))
 """Force on the robot at the tool centre point, in base."""
 _MOMENT: Vector = (Value(1, "mx"), Value(1, "my"), Value(1, "mz"))
 """Moment on the robot about the tool centre point, in base."""
-
-
-@dataclass(frozen=True)
-class _Frame:
-    """A frame in base."""
-
-    rotation: Matrix
-    origin: Vector
-
-
-@dataclass(frozen=True)
-class _JointFrames:
-    """A joint's frame before and behind its motion."""
-
-    proximal: _Frame
-    distal: _Frame
-
-
-@dataclass(frozen=True)
-class _Chain:
-    """Every frame of the chain."""
-
-    joints: tuple[_JointFrames, ...]
-    tcp: _Frame
-
-
-def _write_chain(program: Program, chain: SerialChain) -> _Chain:
-    """Add the statements of the forward chain (paper Eq. 1-3) and return its frames.
-
-    Joint ``k`` counts from 1. Its names are ``p<k>`` (rotation before the motion), ``r<k>``
-    (behind it), ``o<k>`` (origin before), ``d<k>`` (origin behind a linear motion).
-    """
-    # From the base out: what is 0 or 1 in the first frames leaves no statement in those behind.
-    here = _Frame(_IDENTITY, _NOTHING)
-    joints = []
-    for k, joint in enumerate(chain.joints, start=1):
-        program.remark(f"joint {k}, {joint.name}")
-        place = _constant_frame(program, f"place{k}", joint.placement)
-        proximal = _behind(program, here, place, (f"p{k}", f"o{k}"))
-        distal = _moved(program, proximal, joint, k)
-        joints.append(_JointFrames(proximal, distal))
-        here = distal
-    program.remark(f"tool centre point, {chain.tip}")
-    tip = _constant_frame(program, "tip", chain.T_last_tip)
-    return _Chain(tuple(joints), _behind(program, here, tip, ("t", "tcp")))
-
-
-def _constant_frame(program: Program, name: str, T: FloatArray) -> _Frame:
-    x, y, z = (
-        program.constant_vector(f"{name}_{a}", row) for a, row in zip("xyz", T[:3, :3], strict=True)
-    )
-    return _Frame((x, y, z), program.constant_vector(name, T[:3, 3]))
-
-
-def _behind(program: Program, here: _Frame, place: _Frame, names: tuple[str, str]) -> _Frame:
-    """Return ``here @ place``."""
-    rotation, origin = names
-    return _Frame(
-        program.product(rotation, here.rotation, place.rotation),
-        program.transformed(origin, here.rotation, place.origin, here.origin),
-    )
-
-
-def _moved(program: Program, proximal: _Frame, joint: ChainJoint, k: int) -> _Frame:
-    """Return the frame behind the joint's motion."""
-    axis = program.constant_vector(f"axis{k}", joint.axis)
-    if joint.revolute:
-        sine, cosine = program.turn(k, f"q{k}")
-        turn = _rotation(program, f"turn{k}", axis, sine, cosine)
-        return _Frame(program.product(f"r{k}", proximal.rotation, turn), proximal.origin)
-    travel = Value(1, f"q{k}")
-    slid = [program.total(f"slide{k}_{a}", [(x, travel)]) for a, x in zip("xyz", axis, strict=True)]
-    along = (slid[0], slid[1], slid[2])
-    origin = program.transformed(f"d{k}", proximal.rotation, along, proximal.origin)
-    return _Frame(proximal.rotation, origin)
-
-
-def _rotation(program: Program, name: str, axis: Vector, sine: Value, cosine: Value) -> Matrix:
-    """Return the rotation about an axis (Rodrigues): ``c I + (1 - c) a a^T + s [a]x``."""
-    rest = program.total(f"{name}_rest", [(ONE,), (-cosine,)])
-    rows = []
-    for i, a in enumerate("xyz"):
-        row = []
-        for j, b in enumerate("xyz"):
-            # Row i of [a]x holds -a_k where (i, j, k) is an even permutation, a_k where odd.
-            k = 3 - i - j
-            if i == j:
-                # On a coordinate axis the sum is 1 or the cosine itself.
-                plain = axis[i].sign and not axis[i].name
-                terms = [(ONE,)] if plain else [(cosine,), (rest, axis[i], axis[i])]
-            else:
-                skew = -axis[k] if (j - i) % 3 == 1 else axis[k]
-                terms = [(rest, axis[i], axis[j]), (sine, skew)]
-            row.append(program.total(f"{name}_{a}{b}", terms))
-        rows.append((row[0], row[1], row[2]))
-    return rows[0], rows[1], rows[2]
 
 
 _Point = tuple[int, bool, tuple[float, float, float]]
@@ -133,7 +36,7 @@ _Weighted = tuple[Value, Vector]
 def orientation(model: ElasticModel) -> Routine:
     """Return the program of the rotation of the tool centre point in base, row by row."""
     program = Program()
-    tcp = _write_chain(program, model.robot.chain).tcp
+    tcp = write_chain(program, model.robot.chain).tcp
     return _routine(program, [value for row in tcp.rotation for value in row])
 
 
@@ -150,14 +53,17 @@ def deflection(model: ElasticModel, compliance: Sequence[float]) -> Routine:
     where the spring makes ``w_i`` of the torques ``a_i . n`` about, or forces ``a_i . f`` along,
     its axes: ``c_i`` times them for a hinge. That is ``sum c_i tau_i J_i`` (paper Eq. 10, 14)
     with ``J_i = a_i x l`` or ``a_i`` and ``tau_i = J_i . f + W_i . m``.
+
+    With friction the outputs go on with what it remembers after the load (`rest` says how it
+    begins).
     """
     program = Program()
-    laws = _Laws(program, model)
-    total = _NOTHING
+    laws = Laws(program, model)
+    total = NOTHING
     # A spring between two places of the chain moves neither before both its torques are known.
     waiting: list[_Place] = []
     moved: dict[int, Value] = {}
-    for place in _places(program, model):
+    for place in _places(program, model, laws):
         for axis in place.loaded():
             for number, angles in laws.angles(axis):
                 terms = [
@@ -169,20 +75,23 @@ def deflection(model: ElasticModel, compliance: Sequence[float]) -> Routine:
         for ready in [each for each in waiting if moved.keys() >= set(each.numbers)]:
             waiting.remove(ready)
             total = _displaced(program, total, ready, moved)
-    return _routine(program, total)
+    return _routine(program, [*total, *laws.remembered()], laws.memory.names)
 
 
-def observation_block(model: ElasticModel) -> Routine:
+def observation_block(model: ElasticModel, compliance: Sequence[float] = ()) -> Routine:
     """Return the program of the block ``O`` with ``O c = deflection`` (paper Eq. 11, 14).
 
-    The outputs are the x components of all parameters, then the y, then the z components.
+    The outputs are the x components of all parameters, then the y, then the z components. With
+    friction, and with compliances, three follow: how far friction from before the memory began
+    may move x, y and z of the deflection, ``sum |J_i| f_j (r_j - R / 2)`` over the elements; then
+    the memory after the load, as of `deflection`.
     """
     program = Program()
-    laws = _Laws(program, model)
+    laws = Laws(program, model)
     jacobian: dict[int, Vector] = {}
     terms: dict[int, list[_Weighted]] = {p: [] for p in range(len(model.parameters))}
     columns: dict[int, Vector] = {}
-    for place in _places(program, model):
+    for place in _places(program, model, laws):
         for axis in place.loaded():
             jacobian[axis.number] = (
                 program.cross(f"j{axis.number + 1}", axis.direction, place.lever)
@@ -195,20 +104,49 @@ def observation_block(model: ElasticModel) -> Routine:
                     terms[p].append((angle, jacobian[number]))
             for p in dict.fromkeys(p for _, angles in complete for p, _ in angles):
                 columns[p] = program.weighted_sum(f"b{p + 1}", terms[p])
-    parameters = range(len(model.parameters))
-    return _routine(program, [columns[p][row] for row in range(3) for p in parameters])
+    outputs = [columns[p][row] for row in range(3) for p in range(len(model.parameters))]
+    if len(model.friction) and len(compliance):
+        outputs += [*_unknown(program, laws, jacobian, compliance), *laws.remembered()]
+    return _routine(program, outputs, laws.memory.names)
 
 
-@dataclass(frozen=True)
-class _LoadedAxis:
-    """An axis of a spring at given joints, with its load."""
+def rest(model: ElasticModel) -> Routine:
+    """Return the program of what friction remembers of a free motion to joints ``q``.
 
-    number: int
-    """Counts the axes of all springs."""
-    revolute: bool
-    direction: Vector
-    torque: Value
-    """About the axis, or force along it."""
+    No element bears anything while only the arm's own weight acts.
+    """
+    if not len(model.friction):
+        return Routine((), (), {})
+    program = Program()
+    laws = Laws(program, model)
+    weights: dict[int, Value] = {}
+    for place in _places(program, model, laws):
+        weights |= {axis.number: axis.weight for axis in place.loaded()}
+    free = [-weights[axis] for axis in model.friction.axis.tolist()]
+    ranges = {axis: (weights[axis], weights[axis], ZERO) for axis in laws.memory.axes}
+    return _routine(program, laws.memory.values(free, ranges))
+
+
+def _unknown(
+    program: Program, laws: Laws, jacobian: dict[int, Vector], compliance: Sequence[float]
+) -> Vector:
+    """Return how far friction from before may move each component at most."""
+    bounds: list[list[Value]] = [[], [], []]
+    for number, J in jacobian.items():
+        terms = [
+            (program.quantity(f"compliance{p + 1}", float(compliance[p])), angle)
+            for p, angle in laws.unknown_angles(number)
+        ]
+        turn = program.total(f"unknown{number + 1}", terms)
+        for bound, axis, component in zip(bounds, "xyz", J, strict=True):
+            moved = program.total(f"unknown{number + 1}_{axis}", [(component, turn)])
+            if moved != ZERO:
+                bound.append(program.call(f"bound{number + 1}_{axis}", "fabs", moved))
+    x, y, z = (
+        program.total(f"bound_{axis}", [(each,) for each in bound])
+        for axis, bound in zip("xyz", bounds, strict=True)
+    )
+    return x, y, z
 
 
 @dataclass(frozen=True)
@@ -222,7 +160,9 @@ class _Place:
     """From it to the tool centre point."""
     moment: Vector
     """Moment of the load about the point."""
-    axes: dict[int, tuple[SpringAxis, _Frame]]
+    weight: tuple[Vector, Vector]
+    """Force and moment about it of the arm's own weight; zero where no law asks for them."""
+    axes: dict[int, tuple[SpringAxis, Frame]]
     """By number, with the frame that each is fixed in."""
     directions: dict[int, Vector] = field(default_factory=dict)
 
@@ -231,75 +171,16 @@ class _Place:
         """Numbers of its axes."""
         return tuple(self.axes)
 
-    def loaded(self) -> Iterator[_LoadedAxis]:
+    def loaded(self) -> Iterator[LoadedAxis]:
         """Write and yield one axis after the other."""
         program = self.program
         for number, (axis, frame) in self.axes.items():
             fixed = program.constant_vector(f"spring{number + 1}", axis.axis)
-            a = program.transformed(f"a{number + 1}", frame.rotation, fixed, _NOTHING)
+            a = program.transformed(f"a{number + 1}", frame.rotation, fixed, NOTHING)
             self.directions[number] = a
             torque = program.dot(f"tau{number + 1}", a, self.moment if axis.revolute else _FORCE)
-            yield _LoadedAxis(number, axis.revolute, a, torque)
-
-
-class _Laws:
-    """The laws of the springs as statements: from torques about their axes to angles."""
-
-    def __init__(self, program: Program, model: ElasticModel) -> None:
-        self._program = program
-        self._torques: dict[int, Value] = {}
-        self._spring_of = [s for s, each in enumerate(model.springs) for _ in each.axes]
-        self._springs = model.springs
-        self._axes = _numbered([len(spring.axes) for spring in model.springs])
-        self._parameters = _numbered([len(spring.parameters) for spring in model.springs])
-
-    def angles(self, axis: _LoadedAxis) -> Iterator[tuple[int, list[tuple[int, Value]]]]:
-        """Yield, once all torques of a spring are known, the angles of each of its axes.
-
-        Each axis by its number, with the angle that one unit of each parameter makes, by the
-        number of the parameter.
-        """
-        self._torques[axis.number] = axis.torque
-        s = self._spring_of[axis.number]
-        axes, parameters = self._axes[s], self._parameters[s]
-        if not self._torques.keys() >= set(axes):
-            return
-        inputs = {f"t{k}": self._torques[number] for k, number in enumerate(axes)}
-        names = (f"x{s + 1}_{k}" for k in count(1))
-        load = SpringLoad[Expression](tuple(Input(name) for name in inputs))
-        for number, row in zip(axes, self._springs[s].angles(load), strict=True):
-            values = [written(self._program, x, inputs, names) for x in row]
-            yield number, list(zip(parameters, values, strict=True))
-
-
-def written(
-    program: Program, x: Expression, inputs: dict[str, Value], names: Iterator[str]
-) -> Value:
-    """Write the statements of a formula and return its value."""
-
-    def value(part: Expression) -> Value:
-        return written(program, part, inputs, names)
-
-    match x:
-        case Input(name):
-            return inputs[name]
-        case Number(number):
-            # Unlike lengths of a URDF, numbers of a law may be tiny and still count.
-            plain = number in (0.0, 1.0, -1.0)
-            return Value(int(number)) if plain else program.quantity(next(names), number)
-        case Product(factors):
-            return program.total(next(names), [tuple(map(value, factors))])
-        case Sum(terms):
-            return program.total(next(names), [(value(term),) for term in terms])
-        case Function(name, argument):
-            return program.call(next(names), name, value(argument))
-    raise TypeError(f"no formula: {x!r}")
-
-
-def _numbered(lengths: Sequence[int]) -> list[range]:
-    """Return the numbers of each one's parts, counted through."""
-    ends = [sum(lengths[: k + 1]) for k in range(len(lengths))]
-    return [range(end - length, end) for end, length in zip(ends, lengths, strict=True)]
+            weight = program.dot(f"own{number + 1}", a, self.weight[axis.revolute])
+            yield LoadedAxis(number, axis.revolute, a, torque, weight)
 
 
 def _displaced(program: Program, start: Vector, place: _Place, moved: dict[int, Value]) -> Vector:
@@ -313,10 +194,12 @@ def _displaced(program: Program, start: Vector, place: _Place, moved: dict[int, 
     return program.cross(f"sum{place.label}", theta, place.lever, base)
 
 
-def _places(program: Program, model: ElasticModel) -> Iterator[_Place]:
+def _places(program: Program, model: ElasticModel, laws: Laws) -> Iterator[_Place]:
     """Write the chain and yield where springs sit, from base to tip."""
-    chain = _write_chain(program, model.robot.chain)
+    chain = write_chain(program, model.robot.chain)
     axes = [axis for spring in model.springs for axis in spring.axes]
+    heavy = any(map(laws.weighs, range(len(axes))))
+    weights = write_weights(program, model.robot, chain) if heavy else None
     before: dict[int, int] = {}
     for (joint, behind, offset), numbers in _points(model, axes):
         before[joint] = before.get(joint, 0) + 1
@@ -327,8 +210,11 @@ def _places(program: Program, model: ElasticModel) -> Iterator[_Place]:
         at = program.transformed(f"at{label}", frame.rotation, shift, frame.origin)
         lever = program.weighted_sum(f"lever{label}", [(ONE, chain.tcp.origin), (-ONE, at)])
         moment = program.cross(f"moment{label}", lever, _FORCE, _MOMENT)
+        weight = NOTHING, NOTHING
+        if weights and any(map(laws.weighs, numbers)):
+            weight = weights.force(label, joint), weights.moment(label, joint, at)
         here = {i: (axes[i], _frame(chain, joint, axes[i].distal)) for i in numbers}
-        yield _Place(program, label, lever, moment, here)
+        yield _Place(program, label, lever, moment, weight, here)
 
 
 def _points(model: ElasticModel, axes: Sequence[SpringAxis]) -> list[tuple[_Point, list[int]]]:
@@ -346,13 +232,10 @@ def _points(model: ElasticModel, axes: Sequence[SpringAxis]) -> list[tuple[_Poin
     return sorted(groups.items(), key=lambda item: (item[0][:2], item[1]))
 
 
-def _frame(chain: _Chain, joint: int, behind: bool) -> _Frame:
+def _frame(chain: ChainFrames, joint: int, behind: bool) -> Frame:
     return chain.joints[joint].distal if behind else chain.joints[joint].proximal
 
 
-def _routine(program: Program, outputs: Iterable[Value]) -> Routine:
-    outputs = tuple(outputs)
-    statements = needed(program.statements, outputs)
-    used = used_names(statements, outputs)
-    constants = {name: x for name, x in program.constants.items() if name in used}
-    return Routine(statements, outputs, constants)
+def _routine(program: Program, outputs: Iterable[Value], memory: tuple[str, ...] = ()) -> Routine:
+    every = tuple(outputs)
+    return Routine(tuple(program.statements), every, program.constants, memory).leading(len(every))

@@ -9,6 +9,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from elastocal.arrays import FloatArray
 from elastocal.cell import SensorLoad
 from elastocal.compensation.kernel import Function, ModelFunctions
 from elastocal.compensation.online.design import JOINT_RANGE, LONG_AGO, Design, design
@@ -128,6 +129,8 @@ class Conditioner:
 
 
 _ORIGIN: Triple = (0.0, 0.0, 0.0)
+_Load = tuple[Triple, Triple]
+"""Force and moment on the robot at the tool centre point, in base."""
 
 
 class Compensator:
@@ -150,8 +153,10 @@ class Compensator:
         limits, functions = numbers.settings.limits, functions or numbers.functions()
         self._conditioner = Conditioner(numbers, functions.orientation)
         self._deflection, self._block = functions.deflection, functions.block
-        self._orientation = functions.orientation
+        self._orientation, self._rest = functions.orientation, functions.rest
         self._spread = np.ascontiguousarray(numbers.spread)
+        compliance = numbers.calibrated.compliance
+        self._weighted = np.ascontiguousarray(np.column_stack([compliance, numbers.spread]))
         self._shape = (3, len(numbers.spread))
         self._frame = tuple(numbers.frame.ravel().tolist())
         self._in_tcp = numbers.in_tcp
@@ -159,6 +164,7 @@ class Compensator:
         self._fade, self._hold = numbers.fade_step, numbers.settings.hold_cycles
         self._deadband, self._slope = numbers.settings.deadband, numbers.deadband_slope
         self._gain, self._uncertain = numbers.settings.gain, numbers.settings.uncertain_above
+        self._light, self._free = numbers.light_loads, numbers.settings.free_cycles
 
     @classmethod
     def of(
@@ -186,6 +192,8 @@ class Compensator:
             correction=_ORIGIN,
             deflection=_ORIGIN,
             half_width=0.0,
+            # Without friction nothing is remembered, and nothing asks whether the arm is free.
+            unloaded=self._free,
         )
 
     def step(self, state: State, reading: Reading) -> tuple[State, Correction]:
@@ -213,7 +221,11 @@ class Compensator:
         if not state.fresh:
             return self._without_reading(state, state.problem)
         rotation = self._orientation(q)
-        deflection, half_width = self._predicted(q, rotation, state.wrench)
+        load = _in_base(rotation, state.wrench)
+        if self._light:
+            deflection, half_width, friction, unloaded = self._remembering(q, load, state)
+        else:
+            (deflection, half_width), friction, unloaded = self._predicted(q, load), (), self._free
         target, status = self._target(deflection, rotation)
         if half_width > self._uncertain:
             status |= Status.UNCERTAIN.value
@@ -223,32 +235,48 @@ class Compensator:
         status |= late | state.problem
         answer = Correction(correction, deflection, half_width, status)
         return State(
-            state.time, False, state.problem, 0, *state[4:7], correction, deflection, half_width
+            state.time,
+            False,
+            state.problem,
+            0,
+            *state[4:7],
+            correction,
+            deflection,
+            half_width,
+            friction,
+            unloaded,
         ), answer
 
-    def _predicted(
-        self, q: Sequence[float], rotation: tuple[float, ...], wrench: tuple[float, ...]
-    ) -> tuple[Triple, float]:
+    def _predicted(self, q: Sequence[float], load: _Load) -> tuple[Triple, float]:
         """Return the deflection in base, and half its 95 % interval where that is widest."""
-        # The wrench is filtered in tcp axes, which turn with it, and turned to base only here.
-        rxx, rxy, rxz, ryx, ryy, ryz, rzx, rzy, rzz = rotation
-        ax, ay, az, nx, ny, nz = wrench
-        force = (
-            rxx * ax + rxy * ay + rxz * az,
-            ryx * ax + ryy * ay + ryz * az,
-            rzx * ax + rzy * ay + rzz * az,
-        )
-        moment = (
-            rxx * nx + rxy * ny + rxz * nz,
-            ryx * nx + ryy * ny + ryz * nz,
-            rzx * nx + rzy * ny + rzz * nz,
-        )
-        dx, dy, dz = self._deflection(q, force, moment)
+        dx, dy, dz = self._deflection(q, *load)
         # O L has the interval's half widths as lengths of its rows: products of a fixed number, in
         # every cycle the same time, where percentiles of the draws would need a sort.
-        rows = np.array(self._block(q, force, moment)).reshape(self._shape) @ self._spread
-        variance = max(np.einsum("ij,ij->i", rows, rows).tolist())
-        return (dx, dy, dz), math.sqrt(variance)
+        rows = np.array(self._block(q, *load)).reshape(self._shape) @ self._spread
+        return (dx, dy, dz), math.sqrt(max(_squares(rows)))
+
+    def _remembering(
+        self, q: Sequence[float], load: _Load, state: State
+    ) -> tuple[Triple, float, tuple[float, ...], int]:
+        """Return the same of a model with friction, its memory, and how long nothing has loaded it.
+
+        The half width holds what friction may still bear from before the arm was free: nothing is
+        known of it but its limits, so it is added in full.
+        """
+        free = state.unloaded >= self._free
+        block = self._block(q, *load, self._rest(q) if free else state.friction)
+        # The deflection is the block times the compliances: the model need not be asked twice.
+        size = self._shape[0] * self._shape[1]
+        rows = np.array(block[:size]).reshape(self._shape) @ self._weighted
+        dx, dy, dz = rows[:, 0].tolist()
+        pairs = zip(_squares(rows[:, 1:]), block[size : size + 3], strict=True)
+        half_width = max([math.sqrt(variance) + unknown for variance, unknown in pairs])
+        friction = block[size + 3 :]
+        unloaded = 0
+        if _below(friction[-len(self._light) :], self._light):
+            # Counted no farther than needed, as the readings missed are.
+            unloaded = min(state.unloaded + 1, self._free)
+        return (dx, dy, dz), half_width, friction, unloaded
 
     def _target(self, deflection: Triple, rotation: tuple[float, ...]) -> tuple[Triple, int]:
         """Return minus the deflection in the correction's frame, within deadband and limit."""
@@ -292,8 +320,53 @@ class Compensator:
             )
         status = (Status.FADED if faded else Status.HELD).value | problem
         answer = Correction(correction, state.deflection, state.half_width, status)
-        after = State(state.time, False, state.problem, missed, *remembered, correction, *state[8:])
-        return after, answer
+        # What acted while nobody measured is not known: friction is as unknown as at the start.
+        unloaded = self._free if faded else state.unloaded
+        return State(
+            state.time,
+            False,
+            state.problem,
+            missed,
+            *remembered,
+            correction,
+            *state[8:11],
+            unloaded,
+        ), answer
+
+
+def _in_base(rotation: tuple[float, ...], wrench: tuple[float, ...]) -> _Load:
+    """Return force and moment of a wrench in tcp axes, in base.
+
+    The wrench is filtered in tcp axes, which turn with it, and turned to base only here.
+    """
+    rxx, rxy, rxz, ryx, ryy, ryz, rzx, rzy, rzz = rotation
+    ax, ay, az, nx, ny, nz = wrench
+    return (
+        (
+            rxx * ax + rxy * ay + rxz * az,
+            ryx * ax + ryy * ay + ryz * az,
+            rzx * ax + rzy * ay + rzz * az,
+        ),
+        (
+            rxx * nx + rxy * ny + rxz * nz,
+            ryx * nx + ryy * ny + ryz * nz,
+            rzx * nx + rzy * ny + rzz * nz,
+        ),
+    )
+
+
+def _squares(rows: FloatArray) -> list[float]:
+    """Return the squared length of each row."""
+    lengths: list[float] = np.einsum("ij,ij->i", rows, rows).tolist()
+    return lengths
+
+
+def _below(loads: Sequence[float], limits: Sequence[float]) -> bool:
+    """Return whether every load is smaller than its limit."""
+    for load, limit in zip(loads, limits, strict=True):  # noqa: SIM110, as above
+        if not -limit < load < limit:
+            return False
+    return True
 
 
 def _are_joints(q: Sequence[float]) -> bool:

@@ -15,6 +15,7 @@ from elastocal.compensation.kernel import (
     deflection,
     observation_block,
     orientation,
+    rest,
 )
 from elastocal.compensation.settings import CompensatorSettings
 from elastocal.errors import CompensationError
@@ -43,6 +44,7 @@ class Design:
     deflection: Routine
     block: Routine
     orientation: Routine
+    rest: Routine
     filters: FilterChain
     spread: FloatArray
     """``L`` with ``L L^T`` the covariance of the draws times 1.96², shape (spring, direction)."""
@@ -66,8 +68,22 @@ class Design:
         """Return the model as compiled Python, for the online step."""
         return ModelFunctions(
             orientation=compiled(self.orientation, self.joints, loaded=False),
+            rest=compiled(self.rest, self.joints, loaded=False),
             deflection=compiled(self.deflection, self.joints),
             block=compiled(self.block, self.joints),
+        )
+
+    @property
+    def light_loads(self) -> tuple[float, ...]:
+        """Torque of the load about each axis with friction below which the arm moves freely.
+
+        In the order of the axes in the memory, in N·m or N.
+        """
+        friction = self.calibrated.model.friction
+        share = self.settings.friction.free_below
+        return tuple(
+            share * float(friction.limit[friction.axis == axis].min())
+            for axis in dict.fromkeys(friction.axis.tolist())
         )
 
     @property
@@ -131,8 +147,9 @@ def design(
         settings=settings,
         load=load,
         deflection=deflection(model, calibrated.compliance.tolist()),
-        block=observation_block(model),
+        block=observation_block(model, calibrated.compliance.tolist()),
         orientation=orientation(model),
+        rest=rest(model),
         filters=filters,
         spread=_Z * draws_factor(calibrated.draws),
         sensor_matrix=load.matrix_tcp,

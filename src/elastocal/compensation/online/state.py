@@ -74,6 +74,10 @@ class State(NamedTuple):
     """Last predicted deflection, in base, in m."""
     half_width: float
     """Half its 95 % interval, in m."""
+    friction: tuple[float, ...] = ()
+    """What friction remembers, in the order of the kernel's memory; empty: nothing."""
+    unloaded: int = 0
+    """Corrections in a row without a load, at most as many as wear the memory off."""
 
 
 class Correction(NamedTuple):

@@ -6,7 +6,7 @@ from .expression import (
     Product as Product,
     Quantity as Quantity,
     Sum as Sum,
-    atan as atan,
+    atan2 as atan2,
 )
 from .gear import LOST_MOTION as LOST_MOTION, Gear as Gear
 from .hinge import (

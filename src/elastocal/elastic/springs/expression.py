@@ -73,12 +73,13 @@ class Product(Expression):
     factors: tuple[Expression, ...]
 
 
+@brief_repr
 @dataclass(frozen=True)
 class Function(Expression):
-    """A function of one argument, by the name that it has in C and in Python's `math`."""
+    """A function, by the name that it has in Python's `math`."""
 
     name: str
-    argument: Expression
+    arguments: tuple[Expression, ...]
 
 
 Quantity = TypeVar("Quantity", FloatArray, Expression)
@@ -86,13 +87,15 @@ Quantity = TypeVar("Quantity", FloatArray, Expression)
 
 
 @overload
-def atan(x: FloatArray) -> FloatArray: ...
+def atan2(y: FloatArray, x: FloatArray) -> FloatArray: ...
 @overload
-def atan(x: Expression) -> Expression: ...
-def atan(x: FloatArray | Expression) -> FloatArray | Expression:
-    """Return the arc tangent, in rad."""
-    return Function("atan", x) if isinstance(x, Expression) else np.arctan(x)
+def atan2(y: Expression, x: Expression) -> Expression: ...
+def atan2(y: FloatArray | Expression, x: FloatArray | Expression) -> FloatArray | Expression:
+    """Return the angle of the point ``(x, y)``, in rad within ``+-pi``."""
+    if isinstance(y, Expression) or isinstance(x, Expression):
+        return Function("atan2", (_as_expression(y), _as_expression(x)))
+    return np.arctan2(y, x)
 
 
-def _as_expression(x: Expression | float) -> Expression:
+def _as_expression(x: Expression | FloatArray | float) -> Expression:
     return x if isinstance(x, Expression) else Number(float(x))

@@ -5,7 +5,7 @@ from typing import Literal
 import numpy as np
 
 from elastocal.arrays import FloatArray
-from elastocal.elastic.springs.expression import Quantity, atan
+from elastocal.elastic.springs.expression import Quantity, atan2
 from elastocal.elastic.springs.hinge import COMPLIANCE_SCALE, TORSIONAL
 from elastocal.elastic.springs.spring import (
     Angles,
@@ -98,12 +98,14 @@ class Gear(OneAxisSpring):
 
     @staticmethod
     def _softness(load: SpringLoad[Quantity], T: float) -> Quantity:
-        """Return ``T atan((w + t) / T) - T atan(w / T)``."""
+        """Return ``T atan((w + t) / T) - T atan(w / T)``, as one angle.
+
+        The tangent of a difference makes it that of ``(T^2 + (w + t) w, T t)``: nothing is lost
+        where a small load meets a heavy arm, and half the arc tangents are left to compute.
+        """
         (t,) = load.torque
-        if not load.weight:
-            return T * atan(t / T)
-        (w,) = load.weight
-        return T * (atan((w + t) / T) - atan(w / T))
+        w = load.weight[0] if load.weight else 0.0 * t
+        return T * atan2(T * t, T * T + (w + t) * w)
 
     def tangents(self, load: SpringLoad[FloatArray]) -> Tangents:
         """Return 1, ``1 / (1 + ((w + t) / T_k)^2)``, and 0: friction that slides adds none."""

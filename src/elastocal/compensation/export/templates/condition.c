@@ -89,6 +89,10 @@ void elastocal_start(elastocal_state *state)
     state->problem = ELASTOCAL_STALE;
     state->missed = HOLD_CYCLES + 1;
     state->half_width = 0.0;
+@FRICTION@    state->unloaded = FREE_CYCLES;
+@FRICTION@    for (i = 0; i < ELASTOCAL_MEMORY; i++) {
+@FRICTION@        state->memory[i] = 0.0;
+@FRICTION@    }
     for (i = 0; i < 6; i++) {
         state->wrench[i] = 0.0;
         for (s = 0; s < 5; s++) {

@@ -1,14 +1,18 @@
 
 /* ---- From the wrench to the correction ------------------------------------------------ */
 
-double elastocal_half_width(const double q[], const double force[3], const double moment[3])
+@PLAIN@double elastocal_half_width(const double q[], const double force[3], const double moment[3])
+@FRICTION@double elastocal_half_width(const double q[], const double force[3], const double moment[3],
+@FRICTION@                            const double memory[ELASTOCAL_MEMORY])
 {
     double block[3][ELASTOCAL_SPRINGS];
+@FRICTION@    double unknown[3];
     double largest = 0.0;
     int row;
     int direction;
     int spring;
-    elastocal_block(q, force, moment, block);
+@PLAIN@    elastocal_block(q, force, moment, block);
+@FRICTION@    elastocal_block(q, force, moment, memory, block, unknown);
     for (row = 0; row < 3; row++) {
         double variance = 0.0;
         for (direction = 0; direction < DIRECTIONS; direction++) {
@@ -18,9 +22,12 @@ double elastocal_half_width(const double q[], const double force[3], const doubl
             }
             variance += part * part;
         }
-        largest = (variance > largest) ? variance : largest;
+@PLAIN@        largest = (variance > largest) ? variance : largest;
+@FRICTION@        variance = sqrt(variance) + unknown[row];
+@FRICTION@        largest = (variance > largest) ? variance : largest;
     }
-    return sqrt(largest);
+@PLAIN@    return sqrt(largest);
+@FRICTION@    return largest;
 }
 
 /* Move the correction towards a target by no more than a step; whether it came late. */
@@ -68,6 +75,24 @@ static unsigned int aim(const double d[3], const double rotation[9], double targ
     return status;
 }
 
+@FRICTION@/* Count the corrections in a row that load no gear: in the air friction wears off. */
+@FRICTION@static void watch(elastocal_state *state)
+@FRICTION@{
+@FRICTION@    const double *const load = &state->memory[ELASTOCAL_MEMORY - RUBBING];
+@FRICTION@    int loaded = 0;
+@FRICTION@    int i;
+@FRICTION@    for (i = 0; i < RUBBING; i++) {
+@FRICTION@        loaded |= ((load[i] > -LIGHT[i]) && (load[i] < LIGHT[i])) ? 0 : 1;
+@FRICTION@    }
+@FRICTION@    if (loaded != 0) {
+@FRICTION@        state->unloaded = 0;
+@FRICTION@    } else if (state->unloaded < FREE_CYCLES) {
+@FRICTION@        state->unloaded += 1;
+@FRICTION@    } else {
+@FRICTION@        state->unloaded = FREE_CYCLES;
+@FRICTION@    }
+@FRICTION@}
+@FRICTION@
 static unsigned int follow(elastocal_state *state, const double q[])
 {
     double r[9];
@@ -83,8 +108,14 @@ static unsigned int follow(elastocal_state *state, const double q[])
         force[i] = (row[0] * w[0]) + (row[1] * w[1]) + (row[2] * w[2]);
         moment[i] = (row[0] * w[3]) + (row[1] * w[4]) + (row[2] * w[5]);
     }
-    elastocal_deflection(q, force, moment, state->deflection);
-    state->half_width = elastocal_half_width(q, force, moment);
+@PLAIN@    elastocal_deflection(q, force, moment, state->deflection);
+@PLAIN@    state->half_width = elastocal_half_width(q, force, moment);
+@FRICTION@    if (state->unloaded >= FREE_CYCLES) {
+@FRICTION@        elastocal_rest(q, state->memory);
+@FRICTION@    }
+@FRICTION@    elastocal_deflection(q, force, moment, state->memory, state->deflection);
+@FRICTION@    state->half_width = elastocal_half_width(q, force, moment, state->memory);
+@FRICTION@    watch(state);
     status = aim(state->deflection, r, target);
     if (state->half_width > UNCERTAIN_ABOVE) {
         status |= ELASTOCAL_UNCERTAIN;
@@ -127,6 +158,8 @@ static unsigned int go_without(elastocal_state *state)
     }
     if (state->missed > HOLD_CYCLES) {
         fade(state);
+@FRICTION@        /* What acted meanwhile is not known: friction is as unknown as at the start. */
+@FRICTION@        state->unloaded = FREE_CYCLES;
         status = ELASTOCAL_FADED;
     }
     return status;

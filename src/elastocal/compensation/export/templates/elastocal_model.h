@@ -20,6 +20,7 @@ extern "C" {
 #define ELASTOCAL_SPRINGS @SPRINGS@
 #define ELASTOCAL_SECTIONS @SECTIONS@ /* second-order filter sections */
 #define ELASTOCAL_MEDIAN @MEDIAN@ /* readings that the median takes */
+@FRICTION@#define ELASTOCAL_MEMORY @MEMORY@ /* numbers that friction remembers */
 
 #define ELASTOCAL_CYCLE @CYCLE@ /* s between two calls of elastocal_correct */
 #define ELASTOCAL_SAMPLE @SAMPLE@ /* s between two calls of elastocal_condition */
@@ -64,6 +65,8 @@ typedef struct {
     double correction[3];
     double deflection[3];
     double half_width;
+@FRICTION@    double memory[ELASTOCAL_MEMORY]; /* of friction */
+@FRICTION@    int unloaded; /* corrections in a row without load */
 } elastocal_state;
 
 /* What the controller is told. */
@@ -74,17 +77,29 @@ typedef struct {
     unsigned int status;
 } elastocal_correction;
 
+@FRICTION@/* What friction remembers when a free motion has brought the unloaded arm to joints q: of each
+@FRICTION@ * element the torque that it bears less the whole torque; of each gear with friction the lowest
+@FRICTION@ * and the highest torque since then and that of the load, N m. */
+@FRICTION@void elastocal_rest(const double q[], double memory[ELASTOCAL_MEMORY]);
+@FRICTION@
 /* Deflection at joints q under force and moment on the robot at the tcp, all in base. Checks nothing:
- * a NaN that goes in comes out. */
+@PLAIN@ * a NaN that goes in comes out. */
+@FRICTION@ * a NaN that goes in comes out, and stays in the memory. The memory is that of the load before, and
+@FRICTION@ * becomes that of this one: calls follow one another as the loads do. */
 void elastocal_deflection(const double q[], const double force[3], const double moment[3],
-                          double deflection[3]);
+@PLAIN@                          double deflection[3]);
+@FRICTION@                          double memory[ELASTOCAL_MEMORY], double deflection[3]);
 
 /* Block O of the same load: deflection[i] is the sum over s of O[i][s] * compliance[s]. */
 void elastocal_block(const double q[], const double force[3], const double moment[3],
-                     double block[3][ELASTOCAL_SPRINGS]);
+@PLAIN@                     double block[3][ELASTOCAL_SPRINGS]);
+@FRICTION@                     const double memory[ELASTOCAL_MEMORY],
+@FRICTION@                     double block[3][ELASTOCAL_SPRINGS], double unknown[3]);
 
 /* Half the 95 % interval of the deflection's most uncertain component, m. */
-double elastocal_half_width(const double q[], const double force[3], const double moment[3]);
+@PLAIN@double elastocal_half_width(const double q[], const double force[3], const double moment[3]);
+@FRICTION@double elastocal_half_width(const double q[], const double force[3], const double moment[3],
+@FRICTION@                            const double memory[ELASTOCAL_MEMORY]);
 
 /* Before the first reading: no correction, filters at rest. The correction is zero at once: call it
  * only while corrections are switched off, never to recover in motion. */

@@ -54,19 +54,24 @@ static int loads_agree(void)
     int all = 1;
     int k;
     int i;
+@FRICTION@    double memory[ELASTOCAL_MEMORY];
+@FRICTION@    elastocal_rest(LOADS[0].q, memory);
     for (k = 0; k < @LOADS@; k++) {
         const load_case *const load = &LOADS[k];
         double found[3];
         double size = 0.0;
-        elastocal_deflection(load->q, load->force, load->moment, found);
+@PLAIN@        elastocal_deflection(load->q, load->force, load->moment, found);
+@FRICTION@        elastocal_deflection(load->q, load->force, load->moment, memory, found);
         for (i = 0; i < 3; i++) {
             size += fabs(load->deflection[i]);
         }
         for (i = 0; i < 3; i++) {
             all &= agree(found[i], load->deflection[i], TOLERANCE * size);
         }
-        all &= agree(elastocal_half_width(load->q, load->force, load->moment), load->half_width,
-                     TOLERANCE * (load->half_width + size));
+@PLAIN@        all &= agree(elastocal_half_width(load->q, load->force, load->moment), load->half_width,
+@PLAIN@                     TOLERANCE * (load->half_width + size));
+@FRICTION@        all &= agree(elastocal_half_width(load->q, load->force, load->moment, memory),
+@FRICTION@                     load->half_width, TOLERANCE * (load->half_width + size));
     }
     return all;
 }
