@@ -166,3 +166,15 @@ def test_what_is_wrong_with_another_file_is_told_of_that_file(tmp_path):
     with pytest.raises(FileAccessError, match=r"^cannot read .*gone\.txt: "):
         copied()
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="needs named pipes")
+def test_a_pipe_is_refused_instead_of_waited_for(tmp_path):
+    os.mkfifo(tmp_path / "a.json")
+    with pytest.raises(FileAccessError, match=r"a\.json: it is a pipe or a device, not a file"):
+        read_text(tmp_path / "a.json")
+
+
+def test_a_folder_is_still_called_one(tmp_path):
+    with pytest.raises(FileAccessError, match="Is a directory"):
+        read_text(tmp_path)

@@ -9,12 +9,17 @@ import contextlib
 import hashlib
 import json
 import os
+import stat
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 from elastocal.errors import FileAccessError
+
+_STANDARD_INPUT = Path("/dev/stdin")
+_DESCRIPTORS = (Path("/dev/fd"), Path("/proc/self/fd"))
+"""Where a shell puts what it pipes into a command by name (``<(...)``)."""
 
 
 @contextlib.contextmanager
@@ -122,6 +127,7 @@ def read_text(path: Path) -> str:
     FileAccessError
         If the file is missing, unreadable, empty, or not text.
     """
+    require_file(path)
     try:
         text = Path(path).read_text(encoding="utf-8-sig")
     except OSError as error:
@@ -131,6 +137,27 @@ def read_text(path: Path) -> str:
     if not text.strip():
         raise FileAccessError(f"cannot read {path}: the file is empty")
     return text
+
+
+def require_file(path: Path) -> None:
+    """Refuse a pipe, a socket or a device: reading it may wait for ever, or never end.
+
+    What is not there, and a folder, are left to whoever opens it; standard input may be read.
+
+    Raises
+    ------
+    FileAccessError
+        If the path leads to one.
+    """
+    path = Path(path)
+    if path == _STANDARD_INPUT or path.parent in _DESCRIPTORS:
+        return
+    try:
+        mode = path.stat().st_mode
+    except (OSError, ValueError):
+        return
+    if not (stat.S_ISREG(mode) or stat.S_ISDIR(mode)):
+        raise FileAccessError(f"cannot read {path}: it is a pipe or a device, not a file")
 
 
 def sha256(text: str) -> str:

@@ -18,7 +18,7 @@ import numpy as np
 
 from elastocal.arrays import FloatArray
 from elastocal.errors import ElastocalError, FileAccessError
-from elastocal.files import replacing
+from elastocal.files import replacing, require_file
 
 DELIMITERS = ",;\t"
 """Delimiters that are recognised; the first is the one that is written."""
@@ -186,6 +186,7 @@ def opened_table(path: Path) -> Iterator[TableReader]:
     FileAccessError
         If the file cannot be read, or is no text; also while rows are taken.
     """
+    require_file(path)
     try:
         with Path(path).open(encoding="utf-8-sig", newline="") as file:
             yield TableReader(file)

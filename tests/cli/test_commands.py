@@ -159,6 +159,9 @@ def test_predict_reads_degrees_and_kilonewtons_by_their_header(folder):
         ("force_y[N]", "force_x[N]", "twice"),
         ("row 7,", "row 7,x", "row 9, column 'joint_1[rad]'"),
         ("row 7,", "row 7,nan", "row 9"),
+        ("row 7,", "row 7,57", "bad.csv: row 9: joint_1 of 57 rad is outside its limits -3.1"),
+        ("row 7,", "row 7,57", " rad: is it in degrees?"),
+        ("row 7,", "row 7,1e300", "joint_1 of 1e+300 rad is outside its limits"),
     ],
 )
 def test_predict_refuses_a_bad_row_by_name(folder, find, replace, message):
@@ -175,6 +178,30 @@ def test_predict_refuses_a_bad_row_by_name(folder, find, replace, message):
     reason = elastocal("predict", folder / "model.json", folder / "bad.csv", "--out", out).reason
     assert message in reason
     assert not out.exists()
+
+
+@pytest.mark.parametrize("force", ["1e7", "-1e300", "1e309"])
+def test_predict_and_compare_refuse_a_force_that_no_robot_feels(folder, force, recwarn):
+    header, row, *_ = (folder / "rows.csv").read_text().splitlines()
+    (folder / "bad.csv").write_text(f"{header}\n{row.rpartition(',')[0]},{force}\n")
+    out = folder / "refused.csv"
+    predicted = elastocal("predict", folder / "model.json", folder / "bad.csv", "--out", out)
+    model = folder / "model.json"
+    compared = elastocal("compare", model, model, "--rows", folder / "bad.csv")
+    for reason in (predicted.reason, compared.reason):
+        assert "bad.csv: row 2" in reason
+        assert "force_z" in reason
+    assert not out.exists()
+    assert not recwarn.list
+
+
+def test_rows_a_little_beyond_the_limits_of_a_drawing_are_predicted(folder):
+    header, row, *_ = (folder / "rows.csv").read_text().splitlines()
+    high = float(robot().limits.upper[0]) + 0.05
+    note, _, rest = row.split(",", 2)
+    (folder / "edge.csv").write_text(f"{header}\n{note},{high!r},{rest}\n")
+    out = folder / "edge_out.csv"
+    assert elastocal("predict", folder / "model.json", folder / "edge.csv", "--out", out).code == 0
 
 
 @pytest.mark.parametrize("name", ["data.nc", "model.json", "arm.urdf", "springs.yaml"])
@@ -194,6 +221,20 @@ def test_check_says_what_a_good_file_is(folder, name):
         ("a.json", "{", "not valid JSON"),
         ("a.json", '{"schema": "elastocal.model/7"}', "elastocal.model/7"),
         ("a.json", '{"schema": "elastocal.model/1"}', "robot"),
+        (
+            "a.json",
+            '{"a": "' + 300 * "b" + '", "schema": "elastocal.plan/9"}',
+            "'elastocal.plan/1'",
+        ),
+        ("a.json", '{"schema": "elastocal.modle/1"}', "did you mean 'elastocal.model'? (known: "),
+        ("a.json", "{}", "states no schema (known: elastocal.codec_verdicts, "),
+        ("a.json", "[" * 100_000, "not valid JSON: its brackets are nested too deeply"),
+        ("a.json", '{"a": ' + 5000 * "9" + "}", "JSON: it holds a number of thousands of digits"),
+        ("a.yaml", "schema: elastocal.spring/1\n", "did you mean 'elastocal.springs'? (known: "),
+        ("a.yaml", "robot: x\n", "states no schema (known: elastocal.cell, elastocal.comp"),
+        ("a.yaml", "a: [1\nb: 2", "while parsing a flow sequence line 1, column 4"),
+        ("a.urdf", "<robot><link/></robot>", "a.urdf: URDF: link 1 of the file has no name"),
+        ("a.jsonl", "no json\n", "a.jsonl: line 1: Invalid JSON"),
         ("a.urdf", "<robot>", "not valid XML"),
         ("a.yaml", "schema: elastocal.springs/1\nspings: []\n", "did you mean 'springs'"),
         ("a.yaml", "schema: elastocal.springs/1\nsprings: [{joint: j, axis: w}]\n", "springs.0"),

@@ -31,6 +31,11 @@ def test_a_folder_that_is_no_run_is_refused(tmp_path):
         _derive(tmp_path)
 
 
+def test_a_folder_that_is_not_there_is_called_missing(tmp_path):
+    with pytest.raises(FileAccessError, match="run: there is no such folder"):
+        _derive(tmp_path / "run")
+
+
 def test_it_is_a_command():
     app = typer.Typer()
     app.command()(_derive)

@@ -5,11 +5,13 @@ import pytest
 
 from elastocal.compensation.conditioning import SensorMount, fit_tool, tool_result, write_tool
 from elastocal.identification import write_model
+from elastocal.records import to_data
 from elastocal.robot import Robot, catalogue, with_tool
 from support.cli import elastocal
 from support.compensated import calibrated
 from support.exported import build, needs_gcc
 from support.static_postures import GRAVITY, PlantedTool, turned
+from support.summaries import made_up_summary
 
 FILES = {"elastocal_model.c", "elastocal_model.h", "selftest_main.c", "CMakeLists.txt", "README.md"}
 
@@ -114,3 +116,15 @@ def test_check_knows_tool_files_and_settings(tmp_path, tool):
     settings.write_text("schema: elastocal.compensator/1\n")
     assert "settings of a compensator" in elastocal("check", settings).err
     assert "tool file" in elastocal("check", tool).err
+
+
+def test_a_model_that_leaves_more_than_half_unexplained_is_refused(tmp_path, model):
+    data = json.loads(model.read_text())
+    data["calibration"] = to_data(made_up_summary(1e-3))
+    data["calibration"]["held_out"]["mean"] = 0.7e-3
+    bad = tmp_path / "bad.json"
+    bad.write_text(json.dumps(data))
+    result = elastocal("export", bad, "--c", tmp_path / "c")
+    assert result.code == 1
+    assert "leaves 70% of the deflection unexplained" in result.reason
+    assert not (tmp_path / "c").exists()

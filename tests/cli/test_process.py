@@ -8,6 +8,7 @@ import time
 import pytest
 
 from elastocal.cell.examples import write_example
+from elastocal.cli import main
 from support.cli import elastocal
 
 COMMAND = (sys.executable, "-c", "from elastocal.cli.main import run; run()")
@@ -141,3 +142,13 @@ def test_a_folder_may_be_named_like_markup(tmp_path):
     assert result.code == 0
     assert "x[/red]a[bold]/cell.yaml" in result.err
     assert (tmp_path / "x[/red]a[bold]" / "cell.yaml").is_file()
+
+
+def test_a_stray_error_names_the_file_that_it_is_about(monkeypatch, capsys):
+    def broken():
+        raise PermissionError(13, "Permission denied", "/data/arm.json")
+
+    monkeypatch.setattr(main, "app", broken)
+    with pytest.raises(SystemExit, match="1"):
+        main.run()
+    assert capsys.readouterr().err == ("elastocal: cannot use /data/arm.json: Permission denied\n")

@@ -73,3 +73,18 @@ def test_one_set_has_no_interval():
 def test_a_tolerance_that_is_none_is_refused(relative, floor):
     with pytest.raises(CodecError, match="tolerance"):
         Tolerance(relative, floor)
+
+
+def test_springs_that_leave_more_than_half_of_the_zero_model_are_not_saturated():
+    overlap, errors = Overlap(31, 0.3), np.tile(CURVE, (31, 1))
+    rng = np.random.default_rng(0)
+    found = find_saturation("x", errors, Tolerance(), overlap, rng, np.full(31, 160e-6))
+    assert found.unexplained == pytest.approx(100 / 160)
+    assert not found.explains
+    assert not found.settled
+    said = found.sentence(Tolerance(), errors, "here")
+    assert "not saturated" in said
+    assert "62 % of what no model at all leaves" in said
+    good = find_saturation("x", errors, Tolerance(), overlap, rng, np.full(31, 1000e-6))
+    assert good.explains
+    assert good.settled

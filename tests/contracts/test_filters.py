@@ -5,23 +5,28 @@ import pytest
 
 from elastocal.compensation.conditioning import FilterChain, FilterSettings, LowPass, Notch
 from elastocal.errors import CompensationError
+from support.filters import EXAMPLES, filter_settings
 
 SAMPLE = 0.004
-EXAMPLES = {
-    "low_pass": LowPass(cutoff="15 Hz"),
-    "notches": Notch(frequency="50 Hz", width="5 Hz"),
-}
 TOO_QUICK = {
     "low_pass": LowPass(cutoff="125 Hz"),
     "notches": Notch(frequency="130 Hz", width="5 Hz"),
 }
 """At and above half the rate of readings."""
+NAMES = {"low_pass": "low-pass", "notches": "notch"}
+"""How a refusal calls each."""
 
 
 def test_every_filter_of_the_settings_has_an_example():
     assert (
         set(FilterSettings.model_fields) - {"sample", "median"} == set(EXAMPLES) == set(TOO_QUICK)
     )
+
+
+def test_off_leaves_no_filter_and_the_rate_of_readings():
+    every = filter_settings(*EXAMPLES, median=5).model_copy(update={"sample": SAMPLE})
+    assert len(every.chain(0.012).sections) >= len(EXAMPLES)
+    assert every.off().chain(0.012) == FilterChain(SAMPLE)
 
 
 @pytest.mark.parametrize("name", EXAMPLES)
@@ -44,5 +49,5 @@ class TestEveryFilter:
         assert 0.0 < self.chain(name).delay() < 0.5
 
     def test_what_readings_cannot_show_is_refused(self, name):
-        with pytest.raises(CompensationError, match="half the rate"):
+        with pytest.raises(CompensationError, match=NAMES[name]):
             TOO_QUICK[name].sections(SAMPLE)

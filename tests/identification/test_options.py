@@ -3,7 +3,7 @@ import pytest
 
 from elastocal.errors import IdentificationError
 from elastocal.identification import MINIMUM_DRAWS, FitOptions, FitSettings
-from elastocal.identification.options import bounds
+from elastocal.identification.options import bounds, parse_bounds
 
 
 def test_the_default_is_the_papers_bounded_least_squares():
@@ -73,3 +73,9 @@ def test_bounds_may_be_two_numbers_and_are_kept_as_a_text():
 def test_bounds_that_are_not_two_numbers_are_refused(wrong):
     with pytest.raises(IdentificationError, match="must be two numbers"):
         FitSettings(bounds=wrong)
+
+
+@pytest.mark.parametrize("text", ["nan,1", "0, NaN"])
+def test_bounds_that_are_no_number_are_refused_as_that(text):
+    with pytest.raises(IdentificationError, match=r"'(nan|NaN)' is not a number"):
+        parse_bounds(text)

@@ -161,3 +161,23 @@ def test_a_file_that_is_no_netcdf_is_named(tmp_path):
     path.write_text("spot,x\n")
     with pytest.raises(SchemaError, match=r"a\.nc: not a NetCDF4 file: it does not begin"):
         read_netcdf(path, Spots)
+
+
+@pytest.mark.parametrize("packed", [False, True])
+def test_a_byte_that_a_disk_has_changed_is_no_other_number(tmp_path, packed):
+    path, number = tmp_path / "a.nc", np.array([1.2345678901234567])
+    dice = np.random.default_rng(0).normal(size=64) if packed else np.repeat(number, 64)
+    write_arrays(path, LabelledArrays({"a": LabelledArray(("x",), dice, packed=packed)}))
+    with h5py.File(path) as file:
+        chunk = file["a"].id.get_chunk_info(0)
+    data = bytearray(path.read_bytes())
+    data[chunk.byte_offset + chunk.size // 2] ^= 1
+    path.write_bytes(data)
+    with pytest.raises(SchemaError, match="not a readable NetCDF4 file"):
+        read_arrays(path)
+
+
+def test_files_without_checksums_are_read(tmp_path):
+    with h5py.File(tmp_path / "a.nc", "w") as file:
+        file["a"] = np.arange(3.0)
+    assert read_arrays(tmp_path / "a.nc")["a"].values.tolist() == [0.0, 1.0, 2.0]

@@ -178,6 +178,34 @@ class TestRefusals:
             read_chain(text, tip, base)
         assert "\n" not in str(refusal.value)
 
+    def test_a_link_that_a_joint_names_in_vain_is_refused_with_the_links(self):
+        text = TWO_JOINTS.replace('child link="tcp"', 'child link="tpc"')
+        message = r"no link 'tpc' \(child\); did you mean 'tcp'\? \(links: base, a, b, tcp\)"
+        with pytest.raises(RobotError, match=message):
+            read_chain(text, "b", "base")
+
+    @pytest.mark.parametrize(
+        ("text", "message"),
+        [
+            (
+                TWO_JOINTS.replace('name="j2"', ""),
+                "URDF: joint 2 of the file, from 'a' to 'b', has no name",
+            ),
+            (TWO_JOINTS.replace('name="j3"', 'name=" "'), "joint 3 of the file, from 'b' to 'tcp'"),
+            (TWO_JOINTS.replace("</robot>", "<link/></robot>"), "link 5 of the file has no name"),
+        ],
+    )
+    def test_a_nameless_part_is_refused_before_pinocchio_prints(self, text, message, capfd):
+        with pytest.raises(RobotError, match=message):
+            read_chain(text, "tcp", "base")
+        assert capfd.readouterr() == ("", "")
+
+    def test_a_refusal_names_the_file(self, tmp_path):
+        path = tmp_path / "bad.urdf"
+        path.write_text(TWO_JOINTS.replace('name="j2"', ""))
+        with pytest.raises(RobotError, match=r"bad\.urdf: URDF: joint 2"):
+            Robot.from_file(path, "tcp", "base")
+
     def test_mimicking_joint_is_refused(self):
         mimic = '<limit lower="-1" upper="1" velocity="1" effort="1"/><mimic joint="j1"/>'
         text = robot(

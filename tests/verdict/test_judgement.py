@@ -142,3 +142,16 @@ def test_advice_stands_behind_that_of_the_findings_and_holds_nothing_back(parts)
     verdict = judge(replace(parts, reproduction=again), findings, ("Two.", "One."))
     assert verdict.light is Light.GREEN
     assert verdict.advice == ("One.", "Two.")
+
+
+@pytest.mark.parametrize("tolerance", [10e-3, None])
+def test_red_whatever_the_tolerance_when_the_model_leaves_more_than_half(parts, tolerance):
+    figures = parts.figures
+    held_out = replace(figures.held_out, mean=0.6 * figures.deflection.mean)
+    bad = replace(parts.calibrated, figures=replace(figures, held_out=held_out))
+    verdict = judged(
+        replace(parts, calibrated=bad), worst=0.29, low=0.1, high=0.2, tolerance=tolerance
+    )
+    assert (verdict.light, verdict.word) == (Light.RED, "Not fit for use")
+    assert "60% of the deflection unexplained" in verdict.reasons[0]
+    assert "less than half" in verdict.sentence

@@ -104,8 +104,9 @@ def run() -> None:
         _complain(str(error))
         sys.exit(1)
     except OSError as error:
-        # Standard output that is full or gone; every file of ours has its own refusal.
-        _complain(f"cannot write output: {error.strerror or error}")
+        # Standard output that is full or gone; nearly every file of ours has its own refusal.
+        place = "cannot write output" if error.filename is None else f"cannot use {error.filename}"
+        _complain(f"{place}: {error.strerror or error}")
         _drop_output()
         sys.exit(1)
 

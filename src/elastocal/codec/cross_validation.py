@@ -191,7 +191,14 @@ def cross_validate(
         provenance=provenance,
         findings=tuple(findings),
         versions={name: version(name) for name in _PACKAGES},
+        zero_error=np.array([_zero_error(prepared[0].problem, split) for split in splits]),
     )
+
+
+def _zero_error(problem: Problem, split: Split) -> float:
+    """Return the mean deflection at the verification poses: what no model at all leaves."""
+    verified = np.isin(problem.block, split.verification)
+    return float(np.linalg.norm(problem.d[verified], axis=1).mean())
 
 
 def _largest_training_set(prepared: PreparedVariant, splits: Sequence[Split]) -> int:

@@ -121,12 +121,17 @@ class CodecData:
     """Notes on the data for the user."""
     versions: dict[str, str] = field(default_factory=dict)
     """Version of each package that the numbers come from."""
+    zero_error: FloatArray | None = None
+    """Mean error norm of no model at all, which is the mean deflection, at the verification poses,
+    shape (cv,), in m; none in files of elastocal 0.1.0."""
 
     def __post_init__(self) -> None:
         for name in ("contact", "error_mean", "error_max"):
             self._own(name, np.array(getattr(self, name), dtype=float))
         for name in ("seed_pose", "verification", "chosen"):
             self._own(name, np.array(getattr(self, name), dtype=np.intp))
+        if self.zero_error is not None:
+            self._own("zero_error", np.array(self.zero_error, dtype=float))
         compliance = tuple(np.array(each, dtype=float) for each in self.compliance)
         for each in compliance:
             each.flags.writeable = False
@@ -186,6 +191,8 @@ class CodecData:
             "error_max": (v, cv, n, len(AXES)),
             "verification": (cv, self.verification.shape[-1]),
         }
+        if self.zero_error is not None:
+            expected["zero_error"] = (cv,)
         found = {name: getattr(self, name).shape for name in expected}
         for k, (array, springs) in enumerate(zip(self.compliance, self.springs, strict=True)):
             expected[f"compliance of variant {k}"] = (cv, n, len(springs.names))
@@ -236,6 +243,9 @@ def read_codec(folder: Path) -> CodecData:
 
 def _arrays_of(data: CodecData) -> LabelledArrays:
     variables = arrays_of(data)
+    if data.zero_error is not None:
+        notes = {"long_name": "mean deflection at the verification poses", "units": "m"}
+        variables["zero_error"] = LabelledArray(("cv",), data.zero_error, notes, packed=True)
     for k, (compliance, springs) in enumerate(zip(data.compliance, data.springs, strict=True)):
         dims = ("cv", "n_train", f"spring_{k}")
         notes = {"long_name": f"compliances of variant {data.variants[k].name}"}
@@ -299,6 +309,7 @@ def _data_of(found: LabelledArrays) -> CodecData:
         provenance=str(found.attributes["provenance"]),
         findings=tuple(json.loads(found.attributes["findings"])),
         versions=json.loads(found.attributes["versions"]),
+        zero_error=found["zero_error"].values if "zero_error" in found else None,
         **arrays,
     )
 

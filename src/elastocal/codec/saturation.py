@@ -8,7 +8,7 @@ from numpy.random import Generator
 from elastocal.arrays import BoolArray, FloatArray, IndexArray
 from elastocal.codec._overlap import Overlap, median_draws, micrometres
 from elastocal.errors import CodecError
-from elastocal.identification import CONFIDENCE
+from elastocal.identification import CONFIDENCE, MOST_UNEXPLAINED
 from elastocal.records import record
 
 
@@ -79,9 +79,17 @@ class SaturationInterval:
     """Median over the verification sets there, in m."""
     rises: bool
     """Whether that is below the last error by more than the tolerance: more poses did harm."""
+    unexplained: float | None = None
+    """Last error as a share of what no model at all leaves, median over the verification sets; none
+    where that is not known."""
+
+    @property
+    def explains(self) -> bool:
+        """Whether the springs explain enough for their error to saturate."""
+        return self.unexplained is None or self.unexplained <= MOST_UNEXPLAINED
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Saturation(SaturationInterval):
     """The verdict on one variant."""
 
@@ -94,6 +102,7 @@ class Saturation(SaturationInterval):
 
     def __post_init__(self) -> None:
         settled = self.high is not None and self.high < self.last and not self.rises
+        settled = settled and self.explains
         object.__setattr__(self, "settled", settled)
 
     def sentence(self, tolerance: Tolerance, largest: FloatArray, where: str) -> str:
@@ -112,6 +121,12 @@ class Saturation(SaturationInterval):
             return (
                 f"{self.variant}: training sets of one pose only ({micrometres(self.error)}):"
                 f" nothing can be said of saturation ({where})"
+            )
+        if self.unexplained is not None and not self.explains:
+            return (
+                f"{self.variant}: not saturated: with {self.last} training poses the error is"
+                f" {micrometres(self.last_error)}, {100.0 * self.unexplained:.0f} % of what no"
+                f" model at all leaves: these springs do not describe the arm ({where})"
             )
         worst = largest[:, self.n_train - 1]
         extent = (
@@ -156,7 +171,12 @@ class Saturation(SaturationInterval):
 
 
 def find_saturation(
-    variant: str, errors: FloatArray, tolerance: Tolerance, overlap: Overlap, rng: Generator
+    variant: str,
+    errors: FloatArray,
+    tolerance: Tolerance,
+    overlap: Overlap,
+    rng: Generator,
+    zero: FloatArray | None = None,
 ) -> Saturation:
     """Return from how many training poses on the median error is that of the last.
 
@@ -172,6 +192,8 @@ def find_saturation(
         Of the verification sets.
     rng : Generator
         Draws the verification sets of the interval.
+    zero : ndarray, shape (cv,), optional
+        Error of no model at all, in m; see `CodecData.zero_error`.
     """
     curve = np.median(errors, axis=0)
     n = _first_reached(tolerance.reached(curve))
@@ -197,6 +219,7 @@ def find_saturation(
         stays=int(_steady_from(tolerance.reached(curve))),
         least=least + 1,
         least_error=float(curve[least]),
+        unexplained=None if zero is None else float(np.median(errors[:, -1] / zero)),
         rises=bool(curve[-1] - curve[least] > tolerance.of(curve[-1])),
     )
 

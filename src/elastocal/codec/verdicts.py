@@ -242,8 +242,9 @@ class CodecSummary:
     provenance: str
     settings: CodecSetup
     variants: dict[str, Curve]
-    saturation: dict[str, int]
-    """By variant: smallest number of training poses whose error is that of the last."""
+    saturation: dict[str, int | None]
+    """By variant: smallest number of training poses whose error is that of the last; none for
+    springs that leave more than half of what no model at all leaves."""
     saturation_interval: dict[str, SaturationInterval]
     paired: tuple[DifferenceAtSize, ...]
     crossings: tuple[PairVerdict, ...]
@@ -273,7 +274,14 @@ def judge(data: CodecData, tolerance: Tolerance | None = None) -> Verdicts:
     overlap = Overlap.of(data.verification, len(data.contact))
     errors = {each.name: data.errors(each.name) for each in data.variants}
     found = tuple(
-        find_saturation(name, values, tolerance, overlap, np.random.default_rng(data.options.seed))
+        find_saturation(
+            name,
+            values,
+            tolerance,
+            overlap,
+            np.random.default_rng(data.options.seed),
+            data.zero_error,
+        )
         for name, values in errors.items()
     )
     sizes = {each.variant: each.n_train for each in found}
@@ -299,7 +307,9 @@ def codec_summary(
         provenance=data.provenance,
         settings=_setup(data, verdicts.tolerance),
         variants={each.name: _curve(data, each.name) for each in data.variants},
-        saturation={each.variant: each.n_train for each in verdicts.saturation},
+        saturation={
+            each.variant: each.n_train if each.explains else None for each in verdicts.saturation
+        },
         saturation_interval={
             each.variant: SaturationInterval(**{name: getattr(each, name) for name in interval})
             for each in verdicts.saturation

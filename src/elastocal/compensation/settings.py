@@ -33,14 +33,13 @@ from elastocal.cell import (
     PositiveMoment,
 )
 from elastocal.compensation.conditioning import Duration, FilterChain, FilterSettings, Speed
+from elastocal.dataset import LARGEST_FORCE, LARGEST_MOMENT
 from elastocal.errors import CompensationError
 from elastocal.records import StrictModel, read_yaml
 from elastocal.robot import T_from_xyzabc
 
 _SCHEMA = "elastocal.compensator/1"
 
-_LARGEST_FORCE, _LARGEST_MOMENT = 1e5, 1e5
-"""In N and N·m: what no sensor on a robot reads. Beyond, a number is no reading."""
 _LARGEST_CORRECTION = 0.05
 """In m: no arm that is worth calibrating yields so far."""
 _LARGEST_RATE = 1.0
@@ -49,8 +48,8 @@ _LONGEST_HOLD = 1.0
 """In s: what was measured before is not what acts now."""
 
 
-_RangeForce = Annotated[PositiveForce, Field(le=_LARGEST_FORCE)]
-_RangeMoment = Annotated[PositiveMoment, Field(le=_LARGEST_MOMENT)]
+_RangeForce = Annotated[PositiveForce, Field(le=LARGEST_FORCE)]
+_RangeMoment = Annotated[PositiveMoment, Field(le=LARGEST_MOMENT)]
 
 
 class CorrectionLimits(StrictModel):
@@ -73,9 +72,9 @@ class CorrectionLimits(StrictModel):
 class SensorRange(StrictModel):
     """The range of the sensor; beyond it, a reading is saturated."""
 
-    force: tuple[_RangeForce, _RangeForce, _RangeForce] = (_LARGEST_FORCE,) * 3
+    force: tuple[_RangeForce, _RangeForce, _RangeForce] = (LARGEST_FORCE,) * 3
     """In N."""
-    moment: tuple[_RangeMoment, _RangeMoment, _RangeMoment] = (_LARGEST_MOMENT,) * 3
+    moment: tuple[_RangeMoment, _RangeMoment, _RangeMoment] = (LARGEST_MOMENT,) * 3
     """In N·m."""
 
 

@@ -1,9 +1,12 @@
 from ._layout import SCHEMA as SCHEMA, SCHEMAS as SCHEMAS, STATUSES as STATUSES
 from .dataset import Dataset as Dataset
 from .load_rows import (
+    LARGEST_FORCE as LARGEST_FORCE,
+    LARGEST_MOMENT as LARGEST_MOMENT,
     LoadRows as LoadRows,
     joint_dimensions as joint_dimensions,
     read_load_rows as read_load_rows,
+    read_robot_rows as read_robot_rows,
     write_load_rows as write_load_rows,
 )
 from .merging import merge as merge, selected as selected

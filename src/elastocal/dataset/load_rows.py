@@ -14,9 +14,17 @@ from elastocal.dataset._layout import AXES, FloatArray
 from elastocal.errors import DatasetError, UnitError, nearest
 from elastocal.files import read_text
 from elastocal.results import brief_repr
+from elastocal.robot import Robot
 from elastocal.tables import Column, TableError, write_table
 from elastocal.units import factor, split_column
 
+LARGEST_FORCE, LARGEST_MOMENT = 1e5, 1e5
+"""In N and N·m: what no sensor on a robot reads. Beyond, a number is no reading."""
+_BEYOND = 0.1
+"""Distance from a joint's limit, in rad or m, that the limits of a drawing may be wrong by; degrees
+that were called radians lie farther off."""
+_LARGEST_POSITION = 200.0 * np.pi
+"""Of a joint without limits, in rad or m: 100 turns."""
 _EXAMPLES = {"angle": "rad", "length": "m", "force": "N", "moment": "N*m"}
 
 
@@ -33,6 +41,54 @@ class LoadRows:
     """Moment on the robot about the tcp in base, shape (row, 3), in N·m; None: no columns."""
     header: tuple[str, ...]
     cells: tuple[tuple[str, ...], ...]
+    lines: tuple[int, ...]
+    """Line of the file that each row ends on."""
+
+
+def read_robot_rows(path: Path, robot: Robot) -> LoadRows:
+    """Return the rows of a CSV file for a robot, if it can stand and be loaded like that.
+
+    Parameters
+    ----------
+    path : Path
+        The file; its header names a unit for each quantity.
+    robot : Robot
+        The robot; its joints are columns of the file.
+
+    Raises
+    ------
+    DatasetError
+        If the file cannot be used (see `read_load_rows`), a joint is far outside its limits, or a
+        force or moment is larger than any at a robot; by row, name, value and what is allowed.
+    FileAccessError
+        If the file cannot be read.
+    """
+    with np.errstate(over="ignore"):
+        rows = read_load_rows(path, joint_dimensions(robot.joint_names, robot.revolute))
+    limits, largest = robot.limits, np.full(len(robot.joint_names), _LARGEST_POSITION)
+    low, high = np.maximum(limits.lower, -largest), np.minimum(limits.upper, largest)
+    near = (rows.joint_position >= low - _BEYOND) & (rows.joint_position <= high + _BEYOND)
+    for row, joint in np.argwhere(~near)[:1].tolist():
+        value, unit = rows.joint_position[row, joint], "rad" if robot.revolute[joint] else "m"
+        in_degrees = robot.revolute[joint] and low[joint] <= np.radians(value) <= high[joint]
+        raise DatasetError(
+            f"{path}: row {rows.lines[row]}: {robot.joint_names[joint]} of {value:.4g} {unit} is"
+            f" outside its limits {low[joint]:.4g} to {high[joint]:.4g} {unit}"
+            f"{': is it in degrees?' if in_degrees else ''}"
+        )
+    for name, values, most, unit in (
+        ("force", rows.force, LARGEST_FORCE, "N"),
+        ("moment", rows.moment, LARGEST_MOMENT, "N·m"),
+    ):
+        if values is None:
+            continue
+        for row, axis in np.argwhere(~(np.abs(values) <= most))[:1].tolist():
+            raise DatasetError(
+                f"{path}: row {rows.lines[row]}: {name}_{AXES[axis]} of {values[row, axis]:.4g}"
+                f" {unit} is beyond {most:.0e} {unit}, more than any at a robot: is it in another"
+                " unit?"
+            )
+    return rows
 
 
 def read_load_rows(path: Path, joint_units: Mapping[str, str]) -> LoadRows:
@@ -72,6 +128,7 @@ def read_load_rows(path: Path, joint_units: Mapping[str, str]) -> LoadRows:
         values[:, n + 3 :] if has_moment else None,
         table.header,
         tuple(tuple(row) for row in table.rows.cells),
+        tuple(table.rows.lines),
     )
 
 

@@ -57,10 +57,12 @@ from .model_file import (
     write_model as write_model,
 )
 from .observability import (
+    FaintParameter as FaintParameter,
     Observability as Observability,
     Term as Term,
     attainable_rank as attainable_rank,
     describe as describe,
+    find_faint as find_faint,
     observability as observability,
     sparse_basis as sparse_basis,
     unseen_groups as unseen_groups,
@@ -118,10 +120,15 @@ from .tool_change import ToolChange as ToolChange, change_tool as change_tool
 from .uncertainty import (
     CONFIDENCE as CONFIDENCE,
     MOST_FOLDS as MOST_FOLDS,
+    MOST_UNEXPLAINED as MOST_UNEXPLAINED,
+    Coverage as Coverage,
     HeldOut as HeldOut,
+    IntervalCoverage as IntervalCoverage,
     bootstrap as bootstrap,
+    distrust_factor as distrust_factor,
     interval as interval,
     leave_poses_out as leave_poses_out,
+    measured_coverage as measured_coverage,
     widen_draws as widen_draws,
     widening_factor as widening_factor,
 )

@@ -99,8 +99,11 @@ def kkt_violation(
     """Return how far a solution is from satisfying the optimality conditions.
 
     The largest gradient component that a bound does not excuse, relative to the gradient at
-    zero (Lawson and Hanson, *Solving Least Squares Problems*, 1974, chapter 23).
+    zero (Lawson and Hanson, *Solving Least Squares Problems*, 1974, chapter 23). Directions that
+    the data do not determine are left out: there `minimise` asks for the least norm.
     """
+    determined = rank(s)
+    s, Vt, y = s[:determined], Vt[:determined], y[:determined]
     gradient = Vt.T @ (s * (s * (Vt @ x) - y))
     # A solution on a bound may only want to move outwards.
     excess = np.where(x <= lower, np.minimum(gradient, 0.0), gradient)

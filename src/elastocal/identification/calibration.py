@@ -17,17 +17,26 @@ from elastocal.errors import ConventionError, IdentificationError, SpringError
 from elastocal.identification.conventions import POOR_FIT, check_conventions, check_joints
 from elastocal.identification.domain import CalibrationDomain
 from elastocal.identification.ladder import Climbed
-from elastocal.identification.observability import Observability, attainable_rank, observability
+from elastocal.identification.observability import (
+    Observability,
+    attainable_rank,
+    find_faint,
+    observability,
+)
 from elastocal.identification.options import FitOptions
 from elastocal.identification.problem import Problem, build, same_configuration
 from elastocal.identification.solve import PoseGrams, Solution, factor, solve
 from elastocal.identification.suspicious import Screening, force_offset, screen
 from elastocal.identification.tool_change import ToolChange, change_tool
 from elastocal.identification.uncertainty import (
+    MOST_UNEXPLAINED,
+    Coverage,
     HeldOut,
     bootstrap,
+    distrust_factor,
     interval,
     leave_poses_out,
+    measured_coverage,
     widen_draws,
     widening_factor,
 )
@@ -77,6 +86,8 @@ class CalibratedModel:
     """The tool that the model is for; none: the one that it was calibrated with."""
     domain: CalibrationDomain | None = None
     """Poses and loads of the calibration; none: not known, as in files of elastocal 0.1.0."""
+    unexplained: float = float("nan")
+    """Mean error at left-out poses over the mean deflection; NaN: not known."""
 
     def __post_init__(self) -> None:
         for name in ("compliance", "draws"):
@@ -208,6 +219,8 @@ class Calibration:
     """Errors at left-out poses of the readings that entered the fit."""
     ladder: tuple[Climbed, ...]
     """Simpler and richer models at the same left-out poses; empty where none were tried."""
+    coverage: Coverage
+    """Measured coverage of the intervals of a prediction."""
     widening: float
     """Factor by which the bootstrap draws were stretched; see `widening_factor`."""
     screening: Screening
@@ -275,20 +288,26 @@ def calibrate(
     held_out = leave_poses_out(weighted)
     draws = bootstrap(PoseGrams.of(weighted), options.draws, rng)
     by = widening_factor(weighted, solution.compliance, draws, held_out.compliance)
+    unexplained = held_out.mean / float(np.linalg.norm(kept.d, axis=1).mean())
+    if unexplained > MOST_UNEXPLAINED:
+        by = max(by, distrust_factor(weighted, solution.compliance, draws, held_out))
+    widened = widen_draws(weighted, solution.compliance, draws, by)
+    # A prior makes nothing observable: what was believed before is not measured.
+    seen = observability(factor(weighted.without_prior()), model.springs)
     calibrated = CalibratedModel(
         model,
         solution.compliance,
-        widen_draws(weighted, solution.compliance, draws, by),
-        # A prior makes nothing observable: what was believed before is not measured.
-        observability(factor(weighted.without_prior()), model.springs),
+        widened,
+        find_faint(seen, weighted, solution.compliance, model.parameters),
         provenance,
         held_out.misfit,
+        unexplained=unexplained,
         domain=CalibrationDomain.of(model.robot, readings.take(used), kept.block),
     )
     offset = force_offset(model, readings.take(used), weighted, solution.compliance, marker_offset)
     reach = max(attainable_rank(model, marker_offset), calibrated.observability.rank)
     warnings += [offset.message()] if offset else []
-    warnings += _fit_warnings(calibrated, reach, held_out, weighted)
+    warnings += _fit_warnings(calibrated, reach, weighted)
     warnings += [] if solution.settled else [_unsettled(options.loss)]
     return Calibration(
         calibrated=calibrated,
@@ -299,6 +318,7 @@ def calibrate(
         attainable_rank=reach,
         held_out=held_out,
         ladder=tuple(ladder),
+        coverage=measured_coverage(weighted, held_out, widened - solution.compliance),
         widening=by,
         screening=screening,
         solution=solution,
@@ -329,9 +349,7 @@ def _data_warnings(
     return warnings
 
 
-def _fit_warnings(
-    calibrated: CalibratedModel, reach: int, held_out: HeldOut, problem: Problem
-) -> list[str]:
+def _fit_warnings(calibrated: CalibratedModel, reach: int, problem: Problem) -> list[str]:
     """Return what limits the use of a fit, or refuse one that the data had no part in."""
     c = calibrated.compliance
     if np.all((c == problem.lower) | (c == problem.upper)):
@@ -345,9 +363,13 @@ def _fit_warnings(
             f"poses and load cases determine {calibrated.observability.rank} of the {reach}"
             " directions that more of them would: predictions elsewhere are not covered"
         )
-    deflection = float(np.linalg.norm(problem.d, axis=1).mean())
-    if held_out.mean >= deflection:
-        warnings.append("at left-out poses the model predicts no better than none at all")
+    left = calibrated.unexplained
+    if left > MOST_UNEXPLAINED:
+        none = "; it predicts no better than none at all" if left >= 1.0 else ""
+        warnings.append(
+            f"at left-out poses the model leaves {left:.0%} of the deflection unexplained, more"
+            f" than half: it is not fit for use, and is not exported{none}"
+        )
     return warnings
 
 

@@ -5,14 +5,15 @@ One record, so that no two places can disagree. All numbers are SI.
 
 import numpy as np
 
-from elastocal.arrays import BoolArray
+from elastocal.arrays import BoolArray, FloatArray
 from elastocal.dataset import Readings
+from elastocal.elastic import Spring
 from elastocal.identification.calibration import CalibratedModel, Calibration
 from elastocal.identification.ladder import Climbed
 from elastocal.identification.observability import Term
 from elastocal.identification.options import FitSettings
 from elastocal.identification.suspicious import Screening
-from elastocal.identification.uncertainty import HeldOut, interval
+from elastocal.identification.uncertainty import Coverage, HeldOut, interval
 from elastocal.records import record
 from elastocal.results import brief_repr
 
@@ -34,6 +35,8 @@ class SpringSummary:
     """Whether the data determine it by itself."""
     group: int | None = None
     """Number of the first unobservable combination that leaves it open."""
+    too_weak: bool = False
+    """Whether the deflection that a sensible value of it makes stays below the noise."""
 
 
 @brief_repr
@@ -146,6 +149,13 @@ class CalibrationSummary:
     comparison: ComparisonSummary | None = None
     ladder: tuple[RungSummary, ...] = ()
     """The simplest model first; empty in calibrations before the ladder."""
+    coverage: Coverage | None = None
+    """Measured coverage of the intervals of a prediction; none in calibrations of before."""
+
+    @property
+    def unexplained(self) -> float:
+        """Mean error at left-out poses over the mean deflection."""
+        return self.held_out.mean / self.deflection.mean
 
 
 def summary(calibration: Calibration, settings: FitSettings | None = None) -> CalibrationSummary:
@@ -178,6 +188,7 @@ def summary(calibration: Calibration, settings: FitSettings | None = None) -> Ca
         warnings=calibration.warnings,
         settings=settings,
         ladder=tuple(map(_rung, calibration.ladder)),
+        coverage=calibration.coverage,
     )
 
 
@@ -191,21 +202,35 @@ def spring_summaries(calibrated: CalibratedModel) -> tuple[SpringSummary, ...]:
         names = [parameter.name for parameter in spring.parameters]
         for each in spring.characteristics:
             weights = np.array(each.weights)
-            group = seen.group_of(dict(zip(names, each.weights, strict=True)))
-            low, high = interval(calibrated.draws[:, own] @ weights)
+            parts = dict(zip(names, each.weights, strict=True))
+            group, reach = seen.group_of(parts), seen.faint_reach(parts)
+            value = float(calibrated.compliance[own] @ weights)
+            low, high = map(float, interval(calibrated.draws[:, own] @ weights))
+            if reach is not None:
+                # Draws at a bound agree with one another; the noise tells how little that means.
+                low = min(low, max(value - reach, _least(spring, weights)))
+                high = max(high, value + reach)
             rows.append(
                 SpringSummary(
                     name=each.name,
                     kind=spring.kind,
                     unit=each.unit.si,
-                    compliance=float(calibrated.compliance[own] @ weights),
-                    low=float(low),
-                    high=float(high),
-                    observable=group is None,
+                    compliance=value,
+                    low=low,
+                    high=high,
+                    observable=group is None and reach is None,
                     group=group,
+                    too_weak=group is None and reach is not None,
                 )
             )
     return tuple(rows)
+
+
+def _least(spring: Spring, weights: FloatArray) -> float:
+    """Return the smallest value that a characteristic may have."""
+    lower = np.array([parameter.lower for parameter in spring.parameters])
+    used = weights != 0.0
+    return float(lower[used] @ weights[used])
 
 
 def _suspicious(

@@ -54,6 +54,7 @@ _LOW_LEVEL = 0.6
 """A load case is of low load below this part of the largest force at its pose."""
 
 
+@brief_repr
 @dataclass(frozen=True)
 class Rung:
     """A model of the ladder."""

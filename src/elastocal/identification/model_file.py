@@ -18,6 +18,7 @@ from elastocal.identification.tool_change import ToolChange
 from elastocal.records import read_json, record, write_json
 from elastocal.results import Result, brief_repr
 from elastocal.robot import Robot
+from elastocal.wording import capped
 
 
 @brief_repr
@@ -119,6 +120,7 @@ class CalibrateResult(Result):
             float("nan") if self.misfit is None else self.misfit,
             self.tool,
             self.domain,
+            float("nan") if self.calibration is None else self.calibration.unexplained,
         )
 
     def facts(self) -> tuple[tuple[str, str], ...]:
@@ -140,7 +142,7 @@ class CalibrateResult(Result):
                     f" {1e3 * held.max:.3f} mm max, {held.folds} refits",
                 ),
             ]
-            facts += [("warning", text) for text in figures.warnings]
+            facts += [("warning", text) for text in capped(figures.warnings)]
         return (*facts, ("provenance", self.provenance))
 
 

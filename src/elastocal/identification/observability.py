@@ -14,6 +14,7 @@ Meth. 7, 1986).
 """
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from itertools import combinations
 from math import comb
 
@@ -23,7 +24,8 @@ from numpy.typing import ArrayLike
 from elastocal.arrays import FloatArray, IndexArray
 from elastocal.elastic import ElasticModel, Parameter, Spring
 from elastocal.identification._least_squares import rank
-from elastocal.identification.problem import relative_sizes, unit_columns
+from elastocal.identification.options import MEDIAN_NORM
+from elastocal.identification.problem import Problem, relative_sizes, unit_columns
 from elastocal.identification.solve import Factored
 from elastocal.records import record
 from elastocal.results import brief_repr
@@ -32,6 +34,8 @@ _ZERO = 1e-6
 """Components below this part of the largest count as zero."""
 _MOST_SETS = 20_000
 """Largest number of coordinate sets to try; beyond it elimination gives a sparse enough basis."""
+_TWICE = 2.0
+"""Standard deviations to either side of a 95 % interval, about."""
 _PROBES, _PROBE_SEED = 60, 0
 """Number and seed of the configurations that show what could be observed at all."""
 
@@ -138,6 +142,20 @@ class Term:
 
 @brief_repr
 @record()
+class FaintParameter:
+    """A parameter whose column is below the noise: too weak to see."""
+
+    name: str
+    deflection: float
+    """Deflection that a sensible value of it makes, root mean square over the readings, in m."""
+    noise: float
+    """Deflection that the noise of the readings hides, averaged over all poses, in m."""
+    reach: float
+    """Half-width of the 95 % interval that it would have if all others were known, in its unit."""
+
+
+@brief_repr
+@record()
 class Observability:
     """Rank, conditioning, and the springs that cannot be told apart."""
 
@@ -150,6 +168,8 @@ class Observability:
     """Combinations of compliances that the data do not see, in a sparse basis: adding any
     multiple of one of them changes no deflection that was measured. Whether it changes others
     is told by `attainable_rank`."""
+    faint: tuple[FaintParameter, ...] = ()
+    """Parameters that are too weak to see; not in a group, since only noise hides them."""
 
     def group_of(self, weights: Mapping[str, float]) -> int | None:
         """Return the number, from 1, of the first combination that leaves a sum of parameters open.
@@ -169,6 +189,25 @@ class Observability:
             if abs(sum(parts)) > _CANCELS * sum(map(abs, parts)):
                 return number
         return None
+
+    def faint_reach(self, weights: Mapping[str, float]) -> float | None:
+        """Return how far noise leaves a sum of parameters open, where all of them are too weak.
+
+        Parameters
+        ----------
+        weights : mapping
+            Weights of the sum by the names of the parameters.
+
+        Returns
+        -------
+        float or None
+            Half-width of its interval; None: at least one of them is seen.
+        """
+        reach = {each.name: each.reach for each in self.faint}
+        used = [name for name, weight in weights.items() if weight != 0.0]
+        if not all(name in reach for name in used):
+            return None
+        return float(np.linalg.norm([weights[name] * reach[name] for name in used]))
 
     @property
     def springs(self) -> int:
@@ -195,6 +234,57 @@ def observability(system: Factored, springs: Sequence[Spring]) -> Observability:
     mixed = {term.spring for group in groups for term in group}
     observable = tuple(parameter.name not in mixed for parameter in parameters)
     return Observability(determined, float(condition), observable, groups)
+
+
+def find_faint(
+    seen: Observability,
+    problem: Problem,
+    compliance: FloatArray,
+    parameters: Sequence[Parameter],
+) -> Observability:
+    """Return the observability with the parameters that are too weak to see.
+
+    A column is below the noise when a sensible value would make a deflection that twice the noise
+    hides, averaged over the poses: even with all others known, the interval would be wider than
+    that value to either side. A sensible value is the largest of `Parameter.scale`, the median size
+    of the fitted ones of its unit, and what was fitted for itself. Readings at one pose share their
+    errors, so poses count.
+
+    Parameters
+    ----------
+    seen : Observability
+        Of the data.
+    problem : Problem
+        What was fitted.
+    compliance : ndarray, shape (parameter,)
+        The estimate.
+    parameters : sequence of Parameter
+        In column order.
+    """
+    poses = len(np.unique(problem.block))
+    residual = np.linalg.norm(problem.residuals(compliance), axis=1)
+    noise = _TWICE * float(np.median(residual)) / MEDIAN_NORM / np.sqrt(poses)
+    columns = np.sqrt(np.mean(np.square(problem.O).sum(axis=1), axis=0))
+    mixed = {term.spring for group in seen.unobservable for term in group}
+    faint = []
+    for index, parameter in enumerate(parameters):
+        alike = [
+            abs(c)
+            for c, other in zip(compliance.tolist(), parameters, strict=True)
+            if other.unit == parameter.unit and c != 0.0
+        ]
+        usual = float(np.median(alike)) if alike else 0.0
+        size = max(parameter.scale, usual, abs(float(compliance[index])))
+        deflection = size * float(columns[index])
+        if parameter.name not in mixed and 0.0 < deflection < noise:
+            reach = noise / float(columns[index])
+            faint.append(FaintParameter(parameter.name, deflection, noise, reach))
+    names = {each.name for each in faint}
+    observable = tuple(
+        known and parameter.name not in names
+        for known, parameter in zip(seen.observable, parameters, strict=True)
+    )
+    return replace(seen, observable=observable, faint=tuple(faint))
 
 
 def attainable_rank(model: ElasticModel, marker_offset: ArrayLike | None = None) -> int:

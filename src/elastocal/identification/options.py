@@ -6,6 +6,7 @@ deviation, so that for normal noise ``u`` follows a chi distribution with three 
 the constants are quantiles of that. A new one is a function and an entry in `LOSSES`.
 """
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Literal, get_args
@@ -150,7 +151,7 @@ class FitSettings:
         Raises
         ------
         IdentificationError
-            If they are not two numbers.
+            If they are not two numbers, or one is NaN.
         """
         low, high = parse_bounds(self.bounds)
         if not isinstance(self.bounds, str):
@@ -190,12 +191,16 @@ def parse_bounds(bounds: str | Sequence[float]) -> tuple[float, float]:
     Raises
     ------
     IdentificationError
-        If they are not two numbers.
+        If they are not two numbers, or one is NaN.
     """
+    parts = [each.strip() for each in bounds.split(",")] if isinstance(bounds, str) else bounds
     try:
-        low, high = map(float, bounds.split(",") if isinstance(bounds, str) else bounds)
+        low, high = map(float, parts)
     except (TypeError, ValueError) as error:
         raise IdentificationError(f"bounds {bounds!r} must be two numbers, e.g. '0,inf'") from error
+    for part, value in zip(parts, (low, high), strict=True):
+        if math.isnan(value):
+            raise IdentificationError(f"bounds {bounds!r}: {part!r} is not a number")
     return low, high
 
 

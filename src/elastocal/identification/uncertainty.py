@@ -24,9 +24,13 @@ from scipy.special import ndtri, stdtrit
 from elastocal.arrays import FloatArray, IndexArray
 from elastocal.identification.problem import Problem
 from elastocal.identification.solve import PoseGrams
+from elastocal.records import record
 from elastocal.results import brief_repr
 
 CONFIDENCE = 0.95
+MOST_UNEXPLAINED = 0.5
+"""Share of the deflection that a model may leave unexplained at left-out poses. Beyond it, it is
+no model of this arm: its bias, which no resampling sees, is larger than what it explains."""
 
 
 MOST_FOLDS = 100
@@ -57,11 +61,7 @@ class HeldOut:
         Vovk, A. Gammerman and G. Shafer, "Algorithmic Learning in a Random World", 2005). NaN
         where there are too few errors for it, or too many without a deflection.
         """
-        sizes = np.sort(self.share, axis=None)
-        rank = int(np.ceil(0.95 * (len(sizes) + 1)))
-        if rank > len(sizes) or not np.isfinite(sizes[rank - 1]):
-            return float("nan")
-        return float(sizes[rank - 1])
+        return _conformal(self.share)
 
     @property
     def mean(self) -> float:
@@ -77,6 +77,77 @@ class HeldOut:
     def folds(self) -> int:
         """Number of refits."""
         return len(self.compliance)
+
+
+def _conformal(share: FloatArray) -> float:
+    sizes = np.sort(share, axis=None)
+    rank = int(np.ceil(CONFIDENCE * (len(sizes) + 1)))
+    if rank > len(sizes) or not np.isfinite(sizes[rank - 1]):
+        return float("nan")
+    return float(sizes[rank - 1])
+
+
+@record()
+class IntervalCoverage:
+    """How often an interval that claims to cover did."""
+
+    nominal: float
+    """What it claims."""
+    share: float | None
+    """Share that lay inside; none where it is not known."""
+    count: int
+    """Number of components that were counted."""
+    reason: str | None = None
+    """Why it is not known."""
+
+
+@record()
+class Coverage:
+    """Measured coverage of both intervals of a prediction."""
+
+    measurement: IntervalCoverage
+    """Of the interval of a measurement: x, y and z of each reading at left-out poses."""
+    fit: IntervalCoverage
+    """Of the interval of the fit, which is one of the true deflection."""
+
+
+def measured_coverage(problem: Problem, held_out: HeldOut, deviations: FloatArray) -> Coverage:
+    """Return how many left-out readings lie inside the interval of a measurement there.
+
+    The interval is that of the refit without the reading's pose; its misfit is that of the other
+    poses' errors, or the readings would have a part in their own interval.
+
+    Parameters
+    ----------
+    problem : Problem
+        What was fitted.
+    held_out : HeldOut
+        Its refits.
+    deviations : ndarray, shape (draw, parameter)
+        Bootstrap draws minus the estimate.
+    """
+    predicted = np.einsum("rin,rn->ri", problem.O, held_out.compliance[held_out.fold])
+    misfit = np.array(
+        [_conformal(held_out.share[held_out.fold != fold]) for fold in range(held_out.folds)]
+    )
+    error = misfit[held_out.fold, None] * np.linalg.norm(predicted, axis=1, keepdims=True)
+    low, high = interval(np.moveaxis(problem.O @ deviations.T, -1, 0))
+    off = problem.d - predicted
+    inside = (off >= -np.hypot(np.minimum(low, 0.0), error)) & (
+        off <= np.hypot(np.maximum(high, 0.0), error)
+    )
+    known = np.isfinite(misfit).all()
+    return Coverage(
+        measurement=IntervalCoverage(
+            CONFIDENCE,
+            float(inside.mean()) if known else None,
+            int(inside.size) if known else 0,
+            None if known else "too few errors at left-out poses for an interval",
+        ),
+        fit=IntervalCoverage(
+            CONFIDENCE, None, 0, "readings hold noise, and the true deflection is not measured"
+        ),
+    )
 
 
 def leave_poses_out(problem: Problem) -> HeldOut:
@@ -149,6 +220,25 @@ def widening_factor(
     tail = 0.5 * (1.0 + CONFIDENCE)
     student = stdtrit(folds - 1, tail) / ndtri(tail)
     return max(1.0, float(student * np.sqrt(jackknife / bootstrap)))
+
+
+def distrust_factor(
+    problem: Problem, compliance: FloatArray, draws: FloatArray, held_out: HeldOut
+) -> float:
+    """Return the factor at which the draws spread as far as the errors at left-out poses.
+
+    For a model that leaves most unexplained: how much it changes from campaign to campaign says
+    nothing of how wrong it is.
+
+    Parameters
+    ----------
+    problem, compliance, draws
+        As for `widening_factor`.
+    held_out : HeldOut
+        Errors at left-out poses.
+    """
+    spread = _variance(problem, draws - compliance) / len(draws)
+    return float(np.sqrt(np.mean(np.square(held_out.error)) / spread)) if spread > 0.0 else 1.0
 
 
 def widen_draws(

@@ -9,6 +9,7 @@ from ._array_record import (
 from ._codec import (
     from_data as from_data,
     read_json as read_json,
+    read_json_data as read_json_data,
     record as record,
     schema_of as schema_of,
     to_data as to_data,
@@ -20,5 +21,9 @@ from ._netcdf import (
     read_arrays as read_arrays,
     write_arrays as write_arrays,
 )
-from ._strict import StrictModel as StrictModel, read_yaml as read_yaml
+from ._strict import (
+    StrictModel as StrictModel,
+    read_yaml as read_yaml,
+    read_yaml_data as read_yaml_data,
+)
 from ._validation import check_schema as check_schema, validate as validate

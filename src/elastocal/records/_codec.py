@@ -132,11 +132,34 @@ def read_json(path: Path, cls: type[T], schema: str = "") -> T:
     FileAccessError
         If it cannot be read.
     """
+    return from_data(cls, read_json_data(path), str(path), schema)
+
+
+def read_json_data(path: Path) -> Any:
+    """Return what a JSON file holds, whatever its schema.
+
+    Raises
+    ------
+    SchemaError
+        If the file is not JSON.
+    FileAccessError
+        If it cannot be read.
+    """
+    text = read_text(path)
     try:
-        data = json.loads(read_text(path))
+        return json.loads(text)
     except (ValueError, RecursionError) as error:
-        raise SchemaError(f"{path} is not valid JSON: {error}") from error
-    return from_data(cls, data, str(path), schema)
+        raise SchemaError(f"{path} is not valid JSON: {parser_reason(error)}") from error
+
+
+def parser_reason(error: Exception) -> str:
+    """Return why a parser gave up, without its advice to programmers."""
+    if isinstance(error, RecursionError):
+        return "its brackets are nested too deeply"
+    if "set_int_max_str_digits" in str(error):
+        return "it holds a number of thousands of digits"
+    # PyYAML has seen the text alone, and calls it a string in brackets.
+    return " ".join(str(error).split()).replace(' in "<unicode string>",', "")
 
 
 def _unstated(cls: Any, data: Any, what: str, schema: str = "") -> Any:

@@ -12,11 +12,13 @@ from typing import Any
 import numpy as np
 
 from elastocal.errors import FileAccessError, SchemaError
-from elastocal.files import replacing
+from elastocal.files import replacing, require_file
 from elastocal.results import brief_repr
 
 _SIGNATURE = b"\x89HDF\r\n\x1a\n"
 """First bytes of an HDF5 file, which every NetCDF4 file is (HDF5 file format, section II.A)."""
+_CHECKED = {"fletcher32": True}
+"""A checksum for each chunk: a byte that a disk has changed is an error, not another number."""
 _PACKED = {"compression": "gzip", "compression_opts": 4, "shuffle": True}
 _STORAGE = ("_FillValue", "missing_value", "scale_factor", "add_offset", "_Encoding", "coordinates")
 """Attributes that say how values are stored (CF section 2.5.1, 8.1), not what they mean."""
@@ -139,6 +141,7 @@ def write_arrays(path: Path, arrays: LabelledArrays) -> None:
 
 
 def _check_signature(path: Path) -> None:
+    require_file(path)
     try:
         with Path(path).open("rb") as file:
             start = file.read(len(_SIGNATURE))
@@ -207,8 +210,11 @@ def _unpacked(values: np.ndarray, stated: dict[str, Any]) -> np.ndarray:
 def _write(file: Any, name: str, array: LabelledArray) -> None:
     texts = array.values.dtype.kind in "UO"
     fill = np.nan if array.values.dtype.kind == "f" and not array.packed else None
-    # HDF5 cannot cut nothing into chunks.
-    storage = _PACKED if array.packed and array.values.size else {}
+    storage: dict[str, Any] = {}
+    # HDF5 cannot cut nothing, or a single number, into chunks; a text's checksum would be that of
+    # its place in the file.
+    if array.values.size and array.dims and not texts:
+        storage = {**_CHECKED, **(_PACKED if array.packed else {})}
     variable = file.create_variable(
         name, array.dims, _text_type() if texts else array.values.dtype, fillvalue=fill, **storage
     )

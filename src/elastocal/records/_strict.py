@@ -14,7 +14,7 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, ValidationInfo, fie
 
 from elastocal.errors import SchemaError
 from elastocal.files import read_text
-from elastocal.records._codec import from_data
+from elastocal.records._codec import from_data, parser_reason
 
 
 class StrictModel(BaseModel):
@@ -42,7 +42,7 @@ def _unique_mapping(loader: yaml.SafeLoader, node: yaml.MappingNode) -> dict[Any
     keys = [key.value for key, _ in node.value]
     twice = sorted({str(key) for key in keys if keys.count(key) > 1})
     if twice:
-        raise yaml.YAMLError(f"key {twice[0]!r} stands twice, {node.start_mark}")
+        raise yaml.YAMLError(f"key {twice[0]!r} stands twice,{node.start_mark}")
     return loader.construct_mapping(node, deep=True)
 
 
@@ -59,12 +59,25 @@ def read_yaml(path: Path, model: type[Model], schema: str) -> Model:
     FileAccessError
         If the file cannot be read.
     """
+    return from_data(model, read_yaml_data(path), str(path), schema)
+
+
+def read_yaml_data(path: Path) -> Any:
+    """Return what a YAML file holds, whatever its schema.
+
+    Raises
+    ------
+    SchemaError
+        If the file is not YAML, or a key stands twice.
+    FileAccessError
+        If it cannot be read.
+    """
+    text = read_text(path)
     try:
         # The loader is PyYAML's safe one with duplicate keys refused.
-        data = yaml.load(read_text(path), _UniqueKeyLoader)
+        return yaml.load(text, _UniqueKeyLoader)
     except (yaml.YAMLError, ValueError, RecursionError) as error:
-        raise SchemaError(f"{path} is not valid YAML: {' '.join(str(error).split())}") from error
-    return from_data(model, data, str(path), schema)
+        raise SchemaError(f"{path} is not valid YAML: {parser_reason(error)}") from error
 
 
 def _holds_truth(value: Any) -> bool:

@@ -40,6 +40,7 @@ from .urdf import (
     leaf_links as leaf_links,
     parse_urdf as parse_urdf,
     read_chain as read_chain,
+    refusals_naming as refusals_naming,
     robot_name as robot_name,
     root_link as root_link,
 )

@@ -13,7 +13,14 @@ from elastocal.errors import RobotError
 from elastocal.files import read_text, sha256
 from elastocal.results import brief_repr
 from elastocal.robot.chain import ChainJoint, ChainModel, SerialChain, build_model
-from elastocal.robot.urdf import Assumption, assumptions, parse_urdf, read_chain, robot_name
+from elastocal.robot.urdf import (
+    Assumption,
+    assumptions,
+    parse_urdf,
+    read_chain,
+    refusals_naming,
+    robot_name,
+)
 
 GRAVITY = (0.0, 0.0, -9.80665)
 """Standard gravity in the base frame of a robot that stands upright, in m/s² (ISO 80000-3)."""
@@ -128,7 +135,9 @@ class Robot:
     @classmethod
     def from_file(cls, path: Path, tip: str, base: str | None = None) -> "Robot":
         """Return the robot that a URDF file describes; see `from_urdf`."""
-        return cls.from_urdf(read_text(path), tip, base)
+        text = read_text(path)
+        with refusals_naming(path):
+            return cls.from_urdf(text, tip, base)
 
     @property
     def joint_names(self) -> tuple[str, ...]:

@@ -7,6 +7,7 @@ A URDF keeps the names that its author gave to the mesh files of collision shape
 that elastocal writes: kinematics reads no mesh, so that a plan or a model needs none.
 """
 
+import contextlib
 import math
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Iterator
@@ -48,6 +49,15 @@ class Assumption:
     ``shape``."""
     reason: str
     """Where the value comes from, in words."""
+
+
+@contextlib.contextmanager
+def refusals_naming(path: Path) -> Iterator[None]:
+    """Name the file in what is refused of its URDF in the block."""
+    try:
+        yield
+    except RobotError as error:
+        raise RobotError(f"{path}: {error}") from error
 
 
 def parse_urdf(text: str) -> ElementTree.Element:
@@ -138,7 +148,7 @@ def read_chain(text: str, tip: str, base: str | None = None) -> SerialChain:
 
 
 def _check_elements(root: ElementTree.Element) -> None:
-    """Refuse numbers that are none and names that stand twice.
+    """Refuse numbers that are none, and names that are missing or stand twice.
 
     Raises
     ------
@@ -147,19 +157,33 @@ def _check_elements(root: ElementTree.Element) -> None:
     """
     for kind in ("link", "joint"):
         names = [element.get("name", "") for element in root.findall(kind)]
+        unnamed = [index for index, name in enumerate(names) if not name.strip()]
+        if unnamed:
+            raise RobotError(f"URDF: {_place(root, kind, unnamed[0])} has no name")
         twice = sorted({name for name in names if names.count(name) > 1})
         if twice:
             raise RobotError(f"URDF has two {kind}s named {twice[0]!r}")
         for owner in root.findall(kind):
             for element in owner.iter():
                 _check_numbers(f"{kind} {owner.get('name')!r}", element)
-    links = {link.get("name", "") for link in root.findall("link")}
+    links = _link_names(root)
     for joint in root.findall("joint"):
         for role in ("parent", "child"):
             found = joint.find(role)
             name = "" if found is None else found.get("link", "")
             if name and name not in links:
-                raise RobotError(f"URDF joint {joint.get('name')!r}: no link {name!r} ({role})")
+                raise RobotError(
+                    f"URDF joint {joint.get('name')!r}: no link {name!r} ({role})"
+                    f"{nearest(name, links)} (links: {', '.join(links)})"
+                )
+
+
+def _place(root: ElementTree.Element, kind: str, index: int) -> str:
+    """Return where a link or joint without a name stands, in words."""
+    element = root.findall(kind)[index]
+    ends = (element.find(role) for role in ("parent", "child"))
+    linked = " to ".join(repr(end.get("link", "")) for end in ends if end is not None)
+    return f"{kind} {index + 1} of the file{f', from {linked},' if linked else ''}"
 
 
 def _check_numbers(owner: str, element: ElementTree.Element) -> None:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from elastocal.identification import SuspiciousReading
 from elastocal.identification.recertification import Verdict as Recertified
 from elastocal.verdict.evidence import Evidence
-from elastocal.wording import counted, mm, spans
+from elastocal.wording import capped, counted, mm, spans
 
 _ESSENTIAL = ("run", "journal", "cell", "plan", "summary of the run", "dataset",
               "calibrated model", "calibration made again")  # fmt: skip
@@ -45,7 +45,7 @@ def reading_findings(evidence: Evidence) -> Iterator[Finding]:
             " figure of this report speaks of it",
             advice="Measure again what was left out, so that nothing has to be.",
         )
-    for warning in figures.warnings:
+    for warning in capped(figures.warnings):
         yield Finding(f"calibration: {warning}")
     yield from _outside(evidence)
 
@@ -140,7 +140,13 @@ def codec_findings(evidence: Evidence) -> Iterator[Finding]:
     if best is None:
         return
     last = counted(best.last, "training pose")
-    if best.n_train == best.last:
+    if not best.explains:
+        yield Finding(
+            f"the codec has not saturated: with {last} its springs leave more than half of the"
+            " deflection",
+            advice="Calibrate with other springs, or look at the readings: more poses do not help.",
+        )
+    elif best.n_train == best.last:
         yield Finding(
             f"the codec has not saturated: the error still falls at {last}",
             advice="Measure more poses: the error still falls with every one.",

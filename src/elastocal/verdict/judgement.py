@@ -1,15 +1,16 @@
 """The verdict on a calibration: light, sentence, reasons, advice.
 
 Green: the upper end of the interval of the 95 % error is within the tolerance, no reading at an
-unseen pose is beyond it, and nothing holds it back. Red: the lower end is beyond it. Otherwise
-yellow, with every reason. Without a tolerance there is no light.
+unseen pose is beyond it, and nothing holds it back. Red: the lower end is beyond it, or, whatever
+the tolerance, the model leaves more than half of the deflection unexplained. Otherwise yellow, with
+every reason. Without a tolerance there is no light.
 """
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from enum import Enum
 
-from elastocal.identification import UnseenErrors
+from elastocal.identification import MOST_UNEXPLAINED, UnseenErrors
 from elastocal.results import brief_repr
 from elastocal.verdict.evidence import Evidence
 from elastocal.verdict.findings import Finding, find_everything
@@ -67,10 +68,15 @@ def judge(evidence: Evidence, findings: Sequence[Finding], advice: Sequence[str]
     notes = list(dict.fromkeys(each.text for each in findings if not each.holds_back))
     all_advice = dict.fromkeys((*(each.advice for each in findings if each.advice), *advice))
     light, own = _light(unseen, tolerance, bool(held))
+    left = evidence.figures.unexplained if evidence.figures is not None else 0.0
+    useless = left > MOST_UNEXPLAINED
+    if useless:
+        own = [f"the model leaves {left:.0%} of the deflection unexplained at left-out poses", *own]
+        light = Light.RED
     if evidence.calibrated is None:
         light, own = None, ["there is no calibrated model, so there is no accuracy to judge"]
-    word = _word(light, bool(own))
-    sentence = _sentence(evidence, unseen, light)
+    word = "Not fit for use" if useless and light else _word(light, bool(own))
+    sentence = _sentence(evidence, unseen, light, useless)
     return Verdict(light, word, sentence, (*own, *held), tuple(notes), tuple(all_advice))
 
 
@@ -112,7 +118,9 @@ def _against(unseen: UnseenErrors, tolerance: float) -> Iterator[str]:
         )
 
 
-def _sentence(evidence: Evidence, unseen: UnseenErrors | None, light: Light | None) -> str:
+def _sentence(
+    evidence: Evidence, unseen: UnseenErrors | None, light: Light | None, useless: bool
+) -> str:
     tolerance = evidence.limits.tolerance
     against = (
         "No tolerance was given, so this report does not say whether that is enough."
@@ -134,6 +142,8 @@ def _sentence(evidence: Evidence, unseen: UnseenErrors | None, light: Light | No
         Light.YELLOW: "Not everything that a green light needs is there; the reasons follow.",
         Light.RED: "The errors are beyond it.",
     }
+    if useless:
+        closing[Light.RED] = "The model explains less than half of what it should predict."
     return " ".join([accuracy, against, *([closing[light]] if light else [])])
 
 

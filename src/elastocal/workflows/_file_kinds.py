@@ -29,7 +29,7 @@ from elastocal.identification import read_model
 from elastocal.identification.recertification import CompareSummary
 from elastocal.planning.motion import mover_for, require_free_home
 from elastocal.records import read_json, schema_of
-from elastocal.robot import Robot, leaf_links, parse_urdf
+from elastocal.robot import Robot, leaf_links, parse_urdf, refusals_naming
 from elastocal.tables import opened_table
 
 FileDescription = tuple[str, dict[str, object]]
@@ -161,10 +161,11 @@ def dataset_file(path: Path) -> FileDescription:
 def robot_file(path: Path) -> FileDescription:
     """Describe a robot description."""
     text = read_text(path)
-    leaves = leaf_links(parse_urdf(text))
-    if not leaves:
-        raise RobotError(f"{path}: URDF has no link at the end of a chain")
-    robots = [Robot.from_urdf(text, leaf) for leaf in leaves]
+    with refusals_naming(path):
+        leaves = leaf_links(parse_urdf(text))
+        if not leaves:
+            raise RobotError("URDF has no link at the end of a chain")
+        robots = [Robot.from_urdf(text, leaf) for leaf in leaves]
     return "robot description", {
         "robot": robots[0].name,
         "tips": leaves,
@@ -340,7 +341,9 @@ def _journal(path: Path) -> tuple[tuple[procedure.Entry, ...], procedure.RunReco
     entries = procedure.read_journal(path)
     start = entries[0].run if entries else None
     if start is None:
-        raise SchemaError(f"{path} has no entry: nothing has moved in this run")
+        raise SchemaError(
+            f"{path} is empty or cut off: it has no whole entry and does not tell what was done"
+        )
     return entries, start
 
 

@@ -3,6 +3,7 @@
 Also that a model fits the cell, how far it carries, and that no output takes an input's place.
 """
 
+import contextlib
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -20,7 +21,15 @@ from elastocal.identification import (
     read_model,
     unseen_groups,
 )
-from elastocal.robot import Robot, T_from_xyzabc, catalogue, leaf_links, parse_urdf, with_tool
+from elastocal.robot import (
+    Robot,
+    T_from_xyzabc,
+    catalogue,
+    leaf_links,
+    parse_urdf,
+    refusals_naming,
+    with_tool,
+)
 from elastocal.units import parse_point, parse_quantity
 
 _TOOL_LINK = "tcp"
@@ -60,18 +69,12 @@ def find_robot(
     RobotError
         If there is no robot, or no way to tell its tool centre point.
     """
-    urdf = _find_urdf(robot, dataset)
+    urdf, path = _find_urdf(robot, dataset)
+    T_tcp_tool = None if tool is None else parse_frame(tool, "tool", error=RobotError)
     if robot is None and dataset is not None:
         tcp = tcp or dataset.tcp_frame
-    if not tcp:
-        leaves = leaf_links(parse_urdf(urdf))
-        if len(leaves) != 1:
-            raise RobotError(f"name the tool centre point with --tcp: {', '.join(leaves)}")
-        tcp = leaves[0]
-    if tool is not None:
-        urdf = with_tool(urdf, tcp, _TOOL_LINK, parse_frame(tool, "tool", error=RobotError))
-        tcp = _TOOL_LINK
-    arm = Robot.from_urdf(urdf, tcp)
+    with contextlib.nullcontext() if path is None else refusals_naming(path):
+        arm = _robot_at(urdf, tcp, T_tcp_tool)
     if dataset is None or dataset.gravity is None:
         return arm
     return replace(arm, gravity=dataset.gravity)
@@ -230,18 +233,31 @@ def refuse_overwriting(out: Path | None, *inputs: Path) -> None:
         raise FileAccessError(f"--out {out} is an input of this command: name another file")
 
 
-def _find_urdf(robot: str | None, dataset: Dataset | None) -> str:
+def _robot_at(urdf: str, tcp: str | None, T_tcp_tool: FloatArray | None) -> Robot:
+    """Return the robot of a URDF up to a link, its only leaf by default, or to a tool behind it."""
+    if not tcp:
+        leaves = leaf_links(parse_urdf(urdf))
+        if len(leaves) != 1:
+            raise RobotError(f"name the tool centre point with --tcp: {', '.join(leaves)}")
+        tcp = leaves[0]
+    if T_tcp_tool is not None:
+        urdf, tcp = with_tool(urdf, tcp, _TOOL_LINK, T_tcp_tool), _TOOL_LINK
+    return Robot.from_urdf(urdf, tcp)
+
+
+def _find_urdf(robot: str | None, dataset: Dataset | None) -> tuple[str, Path | None]:
+    """Return the URDF text that is meant, and its file where it has one."""
     if robot is None:
         if dataset is None or not dataset.robot_urdf:
             raise RobotError(
                 "the dataset names no robot: give --robot with a URDF file or a catalogue name"
                 " (see `elastocal robots`)"
             )
-        return dataset.robot_urdf
+        return dataset.robot_urdf, None
     path = Path(robot)
     if path.suffix.lower() in (".urdf", ".xml") or _is_file(path):
-        return read_text(path)
-    return catalogue.urdf(robot)
+        return read_text(path), path
+    return catalogue.urdf(robot), None
 
 
 def _is_file(path: Path) -> bool:

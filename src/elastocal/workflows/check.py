@@ -4,7 +4,6 @@ The kind of a file is found by its suffix and the schema that it states; a new k
 of `elastocal.workflows._file_kinds`, and its entry in a table here.
 """
 
-import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from os import PathLike
@@ -13,12 +12,11 @@ from pathlib import Path
 from elastocal.codec import ARRAYS, VERDICTS
 from elastocal.codec.study import DESIGN, PARTS
 from elastocal.compensation.process import TABLE
-from elastocal.errors import DatasetError, SchemaError
-from elastocal.files import read_text
+from elastocal.errors import DatasetError, SchemaError, nearest
 from elastocal.planning import PLAN
 from elastocal.procedure import JOURNAL
 from elastocal.progress import Progress
-from elastocal.records import read_arrays
+from elastocal.records import read_arrays, read_json_data, read_yaml_data
 from elastocal.results import Result, brief
 from elastocal.workflows import _file_kinds as kinds
 from elastocal.workflows._file_kinds import FileDescription
@@ -36,18 +34,21 @@ _JSON_KINDS: dict[str, _Describe] = {
     "elastocal.study_samples": kinds.study_samples,
     "elastocal.process": kinds.process_table,
     "elastocal.comparison": kinds.comparison_file,
+    "elastocal.model": kinds.model_file,
 }
-"""JSON files by the schema that they state, without its version; others are read as a model."""
+"""JSON files by the schema that they state, without its version."""
 _NETCDF_KINDS: dict[str, _Describe] = {
     "elastocal.codec": kinds.codec_arrays,
     "elastocal.pool": kinds.pool_file,
+    "elastocal.dataset": kinds.dataset_file,
 }
-"""NetCDF files likewise; others are read as a dataset."""
+"""NetCDF files likewise."""
 _YAML_KINDS: dict[str, _Describe] = {
     "elastocal.cell": kinds.cell_file,
     "elastocal.compensator": kinds.compensator_file,
+    "elastocal.springs": kinds.springs_file,
 }
-"""YAML files likewise; others are read as springs."""
+"""YAML files likewise."""
 
 _FOLDERS: tuple[tuple[tuple[str, ...], _Describe], ...] = (
     ((PLAN,), lambda folder: kinds.plan_file(folder / PLAN)),
@@ -57,9 +58,6 @@ _FOLDERS: tuple[tuple[tuple[str, ...], _Describe], ...] = (
     ((ARRAYS, VERDICTS), kinds.codec_folder),
 )
 """Folders by what lies in them."""
-
-_IN_JSON = re.compile(r'"schema":\s*"(elastocal\.[\w-]+)/')
-_IN_YAML = re.compile(r"^schema:\s*[\"']?(elastocal\.[\w-]+)/", re.MULTILINE)
 
 
 @dataclass(frozen=True)
@@ -142,27 +140,38 @@ def _netcdf(path: Path) -> FileDescription:
         stated = read_arrays(path).attributes.get("schema")
     except SchemaError as error:
         raise DatasetError(str(error)) from error
-    return _NETCDF_KINDS.get(str(stated).partition("/")[0], kinds.dataset_file)(path)
+    return _kind(path, stated, _NETCDF_KINDS)(path)
 
 
 def _json(path: Path) -> FileDescription:
-    """Describe a JSON file by the schema that it states; what states none is read as a model."""
-    return _JSON_KINDS.get(_stated(_IN_JSON, read_text(path)[:200]), kinds.model_file)(path)
+    """Describe a JSON file by the schema that it states."""
+    return _kind(path, _stated(read_json_data(path)), _JSON_KINDS)(path)
 
 
 def _table(path: Path) -> FileDescription:
     return kinds.table(path) if kinds.is_table(path) else kinds.dataset_file(path)
 
 
-def _stated(pattern: re.Pattern[str], text: str) -> str:
-    """Return the schema that a text states, without its version; empty when it states none."""
-    found = pattern.search(text)
-    return found[1] if found else ""
-
-
 def _settings(path: Path) -> FileDescription:
     """Describe a YAML file by the schema that it states."""
-    return _YAML_KINDS.get(_stated(_IN_YAML, read_text(path)), kinds.springs_file)(path)
+    return _kind(path, _stated(read_yaml_data(path)), _YAML_KINDS)(path)
+
+
+def _stated(data: object) -> object:
+    """Return the schema that keys and values state; None where there is none."""
+    return data.get("schema") if isinstance(data, dict) else None
+
+
+def _kind(path: Path, stated: object, known: Mapping[str, _Describe]) -> _Describe:
+    """Return what describes files of a schema; one that is not known is refused with all that are.
+
+    Its version is left to whoever reads the file.
+    """
+    name = str(stated or "").partition("/")[0]
+    if name in known:
+        return known[name]
+    found = "states no schema" if stated is None else f"has schema {stated!r}"
+    raise SchemaError(f"{path} {found}{nearest(name, known)} (known: {', '.join(sorted(known))})")
 
 
 _BY_SUFFIX: dict[str, _Describe] = {

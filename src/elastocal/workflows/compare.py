@@ -6,7 +6,7 @@ from pathlib import Path
 
 from elastocal import dataset
 from elastocal.arrays import FloatArray
-from elastocal.dataset import LoadRows, Readings, joint_dimensions, read_load_rows
+from elastocal.dataset import LoadRows, Readings, read_robot_rows
 from elastocal.errors import DatasetError
 from elastocal.identification import read_model
 from elastocal.identification.recertification import (
@@ -94,7 +94,7 @@ def _read_rows(path: Path, model: Path) -> _Loads:
     if suffix == ".nc":
         rows: LoadRows | Readings = _readings(path, robot, model)
     else:
-        rows = read_load_rows(path, joint_dimensions(robot.joint_names, robot.revolute))
+        rows = read_robot_rows(path, robot)
     if not len(rows.joint_position):
         raise DatasetError(f"{path} holds no row")
     return rows.joint_position, rows.force, rows.moment

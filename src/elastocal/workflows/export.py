@@ -11,6 +11,7 @@ from elastocal.compensation.conditioning import read_sensor_load
 from elastocal.compensation.export import write_c
 from elastocal.compensation.online import design
 from elastocal.errors import CompensationError
+from elastocal.identification import MOST_UNEXPLAINED
 from elastocal.progress import Progress
 from elastocal.records import record
 from elastocal.results import Result
@@ -87,6 +88,11 @@ def export(settings: ExportSettings, progress: Progress) -> ExportResult:  # noq
     """
     model = Path(settings.model)
     calibrated = settings.read_model(model)
+    if calibrated.unexplained > MOST_UNEXPLAINED:
+        raise CompensationError(
+            f"{model} leaves {calibrated.unexplained:.0%} of the deflection unexplained at left-out"
+            f" poses, at most {MOST_UNEXPLAINED:.0%} is allowed: it is no model of this arm"
+        )
     chosen = None if settings.settings is None else read_settings(settings.settings)
     load = read_sensor_load(settings.tool, calibrated.model.robot)
     try:

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from elastocal.arrays import FloatArray
-from elastocal.dataset import joint_dimensions, read_load_rows, write_load_rows
+from elastocal.dataset import read_robot_rows, write_load_rows
 from elastocal.identification import DeflectionSummary, OutsideRows, OutsideSummary, Prediction
 from elastocal.progress import Progress
 from elastocal.records import record
@@ -89,7 +89,7 @@ def predict(settings: PredictSettings, progress: Progress) -> PredictResult:  # 
     Raises
     ------
     SchemaError, DatasetError
-        If the model or the rows are not valid.
+        If the model or the rows are not valid: a joint far outside its limits among them.
     FileAccessError
         If a file cannot be read or written, or ``out`` is an input.
     """
@@ -97,7 +97,7 @@ def predict(settings: PredictSettings, progress: Progress) -> PredictResult:  # 
     refuse_overwriting(settings.out, model, rows)
     calibrated = settings.read_model(model)
     robot = calibrated.model.robot
-    loads = read_load_rows(rows, joint_dimensions(robot.joint_names, robot.revolute))
+    loads = read_robot_rows(rows, robot)
     prediction = calibrated.predict(loads.joint_position, loads.force, loads.moment)
     misfit = float(calibrated.misfit) if np.isfinite(calibrated.misfit) else None
     outside = None

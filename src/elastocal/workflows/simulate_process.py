@@ -293,11 +293,9 @@ def _run_effect(
     late = round(float(trial.settings.chain.delay()) / trial.settings.cycle)
     changed = replace(trial, cell=effect.changed(trial.cell))
     if effect.prompt:
-        none = {"median": 1, "notches": (), "low_pass": None}
-        bare = trial.settings.filter.model_copy(update=none)
         changed = replace(
             changed,
-            settings=trial.settings.model_copy(update={"filter": bare}),
+            settings=trial.settings.model_copy(update={"filter": trial.settings.filter.off()}),
             controller=replace(trial.controller, dead_cycles=0, lag=0.0),
         )
         courses = tuple(replace(course, ripple=()) for course in courses)

@@ -15,6 +15,7 @@ from elastocal.errors import CompensationError
 from elastocal.robot import Robot
 from support import compensated, exported
 from support.exported import SANITIZED, build, needs_gcc, written
+from support.filters import EXAMPLES, filter_settings
 from support.shared import GOLDEN, needs_shared
 from support.virtual_chain import ARMS
 
@@ -113,12 +114,9 @@ def course(rng, joints, count=2000):
     ("frame", "median"), [("base", 3), ("tcp", 1), ({"abc": ["30 deg", "-20 deg", "170 deg"]}, 5)]
 )
 def test_steps_are_those_of_python_and_clean_under_the_sanitizers(tmp_path, frame, median):
-    filters = {
-        "median": median,
-        "notches": [{"frequency": "50 Hz", "width": "10 Hz"}] if median == 3 else [],
-        "low_pass": {"cutoff": "15 Hz", "order": 3} if median > 1 else None,
-    }
-    chosen = compensated.settings(frame=frame, filter=filters)
+    # None, the last, every one.
+    names = {1: (), 5: tuple(EXAMPLES)[-1:], 3: tuple(EXAMPLES)}[median]
+    chosen = compensated.settings(frame=frame, filter=filter_settings(*names, median=median))
     numbers = design(compensated.arm("on a rail"), chosen, compensated.load())
     executable = build(written(tmp_path, numbers), "-O1", *SANITIZED)
     rows = course(np.random.default_rng(median), numbers.joints)

@@ -256,6 +256,32 @@ def test_an_interruption_retracts_and_can_be_resumed(run):
     assert sorted(committed(run)) == [0, 1]
 
 
+@pytest.mark.parametrize(
+    ("at", "change", "end", "message"),
+    [
+        (fault.pressing(2), fault.break_sensor, RunEnd.STOPPED, "north: force sensor fault: "),
+        (fault.moving, fault.stop_arm, RunEnd.STOPPED, "arm stopped: arm says: safety gate"),
+        (
+            fault.near,
+            fault.saturate_sensor,
+            RunEnd.INTERRUPTED,
+            "near: interrupted; force sensor saturated: ",
+        ),
+    ],
+)
+def test_a_fault_in_the_cycle_of_an_interruption_is_not_hidden(run, at, change, end, message):
+    pressed = []
+
+    def both(cell):
+        change(cell)
+        pressed.append(cell)
+
+    run.interrupted = lambda: bool(pressed)
+    result = run.start(when(at, both))
+    assert result.end is end
+    assert message in result.message
+
+
 class FullDisk(MemoryRecorder):
     def save(self, path):
         raise FileAccessError(f"cannot write {path.name}: No space left on device")

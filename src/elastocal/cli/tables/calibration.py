@@ -17,12 +17,13 @@ from elastocal.elastic import Unit, unit_of
 from elastocal.identification import (
     CalibrateResult,
     CalibrationSummary,
+    Coverage,
     RungSummary,
     SpringSummary,
     SuspiciousReading,
     describe,
 )
-from elastocal.wording import mm
+from elastocal.wording import capped, counted, mm
 
 if TYPE_CHECKING:
     from elastocal.identification.recertification import (
@@ -55,7 +56,7 @@ def _show_figures(console: Console, figures: CalibrationSummary) -> None:
     console.print(_spring_table(figures))
     _show_groups(console, figures)
     _show_suspicious(console, figures.suspicious)
-    for warning in figures.warnings:
+    for warning in capped(figures.warnings):
         console.print(f"[yellow]warning:[/yellow] {escape(warning)}")
 
 
@@ -81,6 +82,22 @@ def _show_fit(console: Console, figures: CalibrationSummary) -> None:
         "at the poses fitted", mm(fit.mean), f"{fit.mean / mean:.2%}", mm(fit.p95), mm(fit.max)
     )
     console.print(table)
+    if figures.coverage is not None:
+        console.print(_coverage_line(figures.coverage), soft_wrap=True)
+
+
+def _coverage_line(coverage: Coverage) -> str:
+    measured, fit = coverage.measurement, coverage.fit
+    inside = f"not known: {measured.reason}"
+    if measured.share is not None:
+        inside = (
+            f"{measured.share:.1%} of {measured.count} components at left-out poses lay inside"
+            f" ({measured.nominal:.0%} should)"
+        )
+    return (
+        f"interval of a measurement: {inside}; interval of the fit: coverage not known"
+        f" ({fit.reason})"
+    )
 
 
 def _show_ladder(console: Console, ladder: Sequence[RungSummary]) -> None:
@@ -124,6 +141,9 @@ def _spring_row(spring: SpringSummary) -> tuple[str, ...]:
     values = (spring.compliance, spring.low, spring.high)
     value, low, high = (shown.factor * each for each in values)
     unit = "" if shown == _USUAL_UNIT else f" {shown.shown}"
+    if spring.too_weak:
+        note = "[yellow]too weak to see[/yellow]"
+        return escape(spring.name), f"[dim]({value:.4f}{unit})[/dim]", "", "", note
     if not spring.observable:
         note = f"[yellow]not by itself[/yellow], group {spring.group}"
         return escape(spring.name), f"[dim]({value:.4f}{unit})[/dim]", "", "", note
@@ -138,22 +158,30 @@ def _spring_row(spring: SpringSummary) -> tuple[str, ...]:
 
 def _stiffness(value: float, unit: Unit) -> str:
     if not value > 0.0:
-        return "rigid"
+        return "rigid" if value == 0.0 else ""
     name = "" if unit == _USUAL_UNIT else f" {unit.stiffness}"
     return f"{1.0 / value:.3f}{name}" if unit.stiffness else ""
 
 
 def _known(value: float, low: float, high: float) -> str:
-    if not value > 0.0:
+    if value == 0.0:
         return "[yellow]at bound[/yellow]" + (f", below {high:.3f}" if high > 0.0 else "")
-    relative = (high - low) / 2.0 / value
+    relative = (high - low) / 2.0 / abs(value)
     colour = "green" if relative < 0.2 else "yellow" if relative < 0.5 else "red"
     return f"[{colour}]±{relative:.0%}[/{colour}]"
 
 
 def _show_groups(console: Console, figures: CalibrationSummary) -> None:
+    weak = sum(spring.too_weak for spring in figures.springs)
+    if weak:
+        console.print(
+            f"{counted(weak, 'spring')} too weak to see: a sensible value deflects the arm by less"
+            " than the noise of the readings hides",
+            soft_wrap=True,
+        )
     if not figures.unobservable:
-        console.print(f"every spring is observable; condition number {figures.condition:.0f}")
+        every = "" if weak else "every spring is observable; "
+        console.print(f"{every}condition number {figures.condition:.0f}")
         return
     missing = figures.rank_attainable - figures.rank
     meaning = (

@@ -132,6 +132,10 @@ class FilterSettings(StrictModel):
     notches: tuple[Notch, ...] = ()
     low_pass: LowPass | None = LowPass.model_construct(cutoff=15.0)
 
+    def off(self) -> "FilterSettings":
+        """Return the same settings without any filter; readings come as often."""
+        return self.model_copy(update={"median": 1, "notches": (), "low_pass": None})
+
     def chain(self, cycle: float) -> FilterChain:
         """Return the filters; made anew at every call.
 

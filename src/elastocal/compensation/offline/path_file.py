@@ -32,6 +32,7 @@ from elastocal.compensation.offline.path_joints import (
     posture_jumps,
 )
 from elastocal.errors import FileAccessError
+from elastocal.files import require_file
 from elastocal.identification import CalibratedModel
 from elastocal.progress import Progress, silent
 from elastocal.results import brief_repr
@@ -189,6 +190,7 @@ def _new_cells(
 
 def _count_lines(path: Path) -> int:
     """Return the number of lines of a file, for a progress bar."""
+    require_file(path)
     try:
         with Path(path).open("rb") as file:
             blocks = iter(lambda: file.read(_BYTES_AT_A_TIME), b"")

@@ -17,7 +17,7 @@ from elastocal.arrays import FloatArray
 from elastocal.compensation.offline import PathError, in_file
 from elastocal.compensation.programs.program import CorrectedPoint, Move, Words
 from elastocal.errors import FileAccessError
-from elastocal.files import replacing
+from elastocal.files import replacing, require_file
 from elastocal.results import brief_repr
 from elastocal.robot import T_from_xyzabc
 
@@ -124,6 +124,7 @@ def _read_lines(path: Path) -> list[str]:
     FileAccessError
         If the file cannot be read.
     """
+    require_file(path)
     try:
         text = Path(path).read_bytes().decode("latin-1")
     except OSError as error:

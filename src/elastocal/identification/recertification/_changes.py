@@ -362,6 +362,10 @@ def _unobservable(calibrated: CalibratedModel, springs: Sequence[Parameter]) -> 
         [term for term in group if term.spring in names]
         for group in calibrated.observability.unobservable
     ]
+    # What is too weak to see has no value to compare.
+    kept += [
+        [Term(each.name, 1.0)] for each in calibrated.observability.faint if each.name in names
+    ]
     return weights(kept, names)
 
 

@@ -83,6 +83,8 @@ def derive_run(run: Path) -> DerivedRun:
         If a file cannot be read.
     """
     folder = RunFolder(Path(run))
+    if not folder.path.exists():
+        raise FileAccessError(f"{run}: there is no such folder")
     if not folder.journal.is_file():
         raise FileAccessError(f"{run} is no folder of a run: it holds no {folder.journal.name}")
     entries = read_journal(folder.journal)

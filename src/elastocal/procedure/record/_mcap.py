@@ -32,7 +32,7 @@ from scipy.spatial.transform import Rotation
 from elastocal.arrays import FloatArray
 from elastocal.cell import ArmState, PointBlock, WrenchBlock
 from elastocal.errors import FileAccessError, SchemaError
-from elastocal.files import replacing
+from elastocal.files import replacing, require_file
 
 TimeArray = NDArray[np.int64]
 """Times in ns."""
@@ -131,6 +131,7 @@ def read_mcap(path: Path) -> Contents:
     SchemaError
         If it is no MCAP file, cut off or damaged.
     """
+    require_file(path)
     try:
         data = Path(path).read_bytes()
     except OSError as error:

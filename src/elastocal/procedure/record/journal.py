@@ -295,8 +295,8 @@ def _entry(path: Path, number: int, line: bytes) -> Entry:
         entry = Entry.model_validate_json(line)
     except ValidationError as error:
         first = error.errors(include_url=False)[0]
-        place = ".".join(map(str, first["loc"]))
-        raise SchemaError(f"{path}: line {number + 1}: {place}: {first['msg']}") from error
+        place = "".join(f"{part}: " for part in [".".join(map(str, first["loc"]))] if part)
+        raise SchemaError(f"{path}: line {number + 1}: {place}{first['msg']}") from error
     if entry.n != number:
         raise SchemaError(f"{path}: line {number + 1}: n must be {number}, got {entry.n}")
     return entry

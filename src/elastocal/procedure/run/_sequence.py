@@ -169,7 +169,7 @@ def _location_between_surfaces(a: Attempt) -> BackOffResult:
 
 
 def _may_be_in_contact(supervisor: Supervisor) -> bool:
-    arm = supervisor.ask_arm()
+    arm = supervisor.arm_state()
     return arm is None or arm.in_contact
 
 
@@ -186,7 +186,7 @@ def _attempt(supervisor: Supervisor, action: Action, motion: Callable[[], None])
 def _release(a: Attempt) -> None:
     """Ramp the force to zero; nothing but the arm is asked whether it is."""
     s = a.supervisor
-    arm = s.ask_arm()
+    arm = s.arm_state()
     if arm is None or arm.motion is not Motion.RELEASING:
         s.devices.arm.release(a.settings.procedure.ramp)
     _wait(s, is_idle, release_limit(a.settings))
@@ -195,11 +195,11 @@ def _release(a: Attempt) -> None:
 def _retract(a: Attempt) -> None:
     """Go straight back to the approach pose; nothing but the arm is asked whether it did."""
     s = a.supervisor
-    arm = s.ask_arm()
+    arm = s.arm_state()
     if arm is not None and arm.motion in (Motion.APPROACHING, Motion.RETRACTING):
         # An arm need not take a command while it carries out another; it always takes a stop.
         s.devices.arm.stop()
-        s.look_at_arm()
+        s.arm_cycle()
         s.devices.arm.enable()
     last = s.arm
     if last is None:
@@ -226,7 +226,7 @@ def _wait(supervisor: Supervisor, done: Callable[[ArmState], bool], limit: float
     # still do what it was told: it is given the time that this takes.
     patience = int((limit - procedure.timeout) / procedure.cycle) + 1
     for _ in range(int(limit / procedure.cycle) + 1):
-        arm = supervisor.look_at_arm()
+        arm = supervisor.arm_cycle()
         if arm is None:
             patience -= 1
             if not patience:

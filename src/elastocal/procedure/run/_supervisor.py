@@ -2,7 +2,8 @@
 
 The order within a cycle matters. Time passes first, so that what is read is news. Every device is
 read and recorded before anything is judged: the streams then hold what led to a fault. Only then
-may somebody interrupt, and the watchdog refuse, so that a wish to stop never hides a reading.
+may the watchdog refuse, and last somebody interrupt, so that a wish to stop hides neither a reading
+nor a fault.
 """
 
 import contextlib
@@ -25,7 +26,7 @@ from elastocal.procedure.run._watchdog import (
     check_wrenches,
 )
 from elastocal.procedure.run.settings import RunSettings
-from elastocal.procedure.run.steps import Fault, FaultError
+from elastocal.procedure.run.steps import Fault, FaultError, FaultScope
 
 TIME_SLACK = 1e-6
 """Times that differ by less are equal, in s: sums of cycles are not exact."""
@@ -71,7 +72,7 @@ class Supervisor:
         self._R_sensor_tcp = settings.R_tcp_sensor.T
         self._still = 0
         self._joints = len(devices.arm.joint_names)
-        self._last_look: float | None = None
+        self._last_read: float | None = None
         self.arm: ArmState | None = None
         """The last state of the arm; None before the first."""
 
@@ -89,7 +90,7 @@ class Supervisor:
 
     def pause(self) -> None:
         """Say that until the next cycle nobody needs to watch: the arm stands off the surface."""
-        self._last_look = None
+        self._last_read = None
 
     def tare(self, force_sensor: FloatArray) -> None:
         """Take a force in the sensor's frame, shape (3,), as that of the free tool, in N."""
@@ -111,15 +112,22 @@ class Supervisor:
         DeviceError
             If a device does not answer.
         """
-        seen = self._look()
+        seen = self._read_devices()
         self._observers.report(seen)
+        try:
+            marker_lost = self.watchdog.check(seen, guard)
+        except FaultError as error:
+            # After a fault of the attempt alone the arm would move on to another one.
+            if error.fault.scope is FaultScope.ATTEMPT and self._observers.interrupted():
+                raise FaultError(Fault.INTERRUPTED, f"; {error}") from error
+            raise
         if self._observers.interrupted():
             raise FaultError(Fault.INTERRUPTED)
-        if self.watchdog.check(seen, guard) and self.station is not None:
+        if marker_lost and self.station is not None:
             self.devices.metrology.look(self.station)
         return seen
 
-    def look_at_arm(self) -> ArmState | None:
+    def arm_cycle(self) -> ArmState | None:
         """Let one cycle pass and return what the arm says; None when it does not answer.
 
         For the way off the surface after a fault: the other devices and the clock may be what is
@@ -128,32 +136,32 @@ class Supervisor:
         self.pause()
         with contextlib.suppress(*DEVICE_ERRORS):
             self._pass_time()
-        for look in (self._look_at_sensor, self._look_at_points):
+        for read in (self._read_sensor, self._read_metrology):
             with contextlib.suppress(*DEVICE_ERRORS):
-                look()
-        return self.ask_arm()
+                read()
+        return self.arm_state()
 
-    def ask_arm(self) -> ArmState | None:
+    def arm_state(self) -> ArmState | None:
         """Return what the arm says now; None when it does not answer."""
         with contextlib.suppress(*DEVICE_ERRORS):
-            return self._look_at_arm()
+            return self._read_arm()
         return None
 
-    def _look(self) -> Snapshot:
+    def _read_devices(self) -> Snapshot:
         """Let one cycle pass and return what the devices say."""
         self._pass_time()
         arm, wrenches, points = (
-            self._look_at_arm(),
-            self._look_at_sensor(),
-            self._look_at_points(),
+            self._read_arm(),
+            self._read_sensor(),
+            self._read_metrology(),
         )
         force_tcp = (wrenches.force - self._tare) @ self._R_sensor_tcp
         # What happens from here to the next cycle, nobody watches.
-        self._last_look = now = self.devices.clock.now()
+        self._last_read = now = self.devices.clock.now()
         return Snapshot(now, arm, wrenches, points, force_tcp)
 
     # What has no form is not recorded either: it could not be written.
-    def _look_at_arm(self) -> ArmState:
+    def _read_arm(self) -> ArmState:
         state = self.devices.arm.state()
         check_arm(state, self._joints)
         self.arm = state
@@ -161,14 +169,14 @@ class Supervisor:
             self.recorder.arm(state)
         return state
 
-    def _look_at_sensor(self) -> WrenchBlock:
+    def _read_sensor(self) -> WrenchBlock:
         block = self.devices.sensor.read()
         check_wrenches(block)
         if self.recorder is not None:
             self.recorder.wrenches(block)
         return block
 
-    def _look_at_points(self) -> PointBlock:
+    def _read_metrology(self) -> PointBlock:
         block = self.devices.metrology.read()
         check_points(block)
         if self.recorder is not None:
@@ -211,8 +219,8 @@ class Supervisor:
     def _pass_time(self) -> None:
         clock, procedure = self.devices.clock, self.settings.procedure
         before, longest = clock.now(), max(procedure.stale, procedure.cycle * 5)
-        if self._last_look is not None and not before - self._last_look <= longest:
-            text = f"{before - self._last_look:.2f} s passed between two cycles"
+        if self._last_read is not None and not before - self._last_read <= longest:
+            text = f"{before - self._last_read:.2f} s passed between two cycles"
             raise FaultError(Fault.CLOCK, text)
         clock.sleep(procedure.cycle)
         passed = clock.now() - before

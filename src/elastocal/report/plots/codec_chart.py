@@ -156,6 +156,8 @@ def _draw_strip(axes: Axes, verdicts: Verdicts, styles: Sequence[VariantStyle], 
 
 def saturation_words(found: Saturation) -> str:
     """Return a saturation as a caption says it."""
+    if not found.explains:
+        return f"{found.variant}: not saturated: leaves more than half of the deflection"
     if found.n_train == found.last:
         return f"{found.variant}: still falls at {found.last} training poses"
     between = "no interval"

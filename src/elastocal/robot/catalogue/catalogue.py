@@ -4,6 +4,7 @@ The table `kuka.yaml` beside this file is the only copy of the numbers; the URDF
 on demand. What has no source says so in `Robot.assumptions`.
 """
 
+import difflib
 import functools
 import importlib.resources
 import re
@@ -12,7 +13,7 @@ from typing import Any
 
 import yaml
 
-from elastocal.errors import RobotError, SchemaError, nearest
+from elastocal.errors import RobotError, SchemaError
 from elastocal.records import check_schema, validate
 from elastocal.robot.catalogue.record import (
     CatalogueEntry,
@@ -24,6 +25,10 @@ from elastocal.robot.robot import Robot
 
 _FILE = "kuka.yaml"
 SCHEMA = "elastocal.catalogue/1"
+_SUGGESTED = 3
+"""Most names that are proposed for one that is not known."""
+_ALIKE = 0.4
+"""Least likeness of these, from 0 to 1; few letters and other digits are alike enough."""
 
 
 def names() -> tuple[str, ...]:
@@ -42,15 +47,15 @@ def entry(name: str) -> CatalogueEntry:
     Raises
     ------
     RobotError
-        If no robot has that name, with the nearest name and the list of all.
+        If no robot has that name, with the nearest names and where all are listed.
     """
     table = _entries()
     by_key = {_key(known): known for known in table}
     known = by_key.get(_key(name))
     if known is None:
         raise RobotError(
-            f"no robot {name!r} in the catalogue{_suggestion(name, by_key)}"
-            f" (robots: {', '.join(table)})"
+            f"no robot {name!r} in the catalogue{_suggestion(name, by_key)} (`elastocal robots`"
+            " lists them)"
         )
     return table[known]
 
@@ -131,8 +136,6 @@ def _key(name: str) -> str:
 
 
 def _suggestion(name: str, by_key: dict[str, str]) -> str:
-    """Return the nearest name as a person writes it; `nearest` compares spelling only."""
-    hint = nearest(_key(name), by_key)
-    for key, known in by_key.items():
-        hint = hint.replace(repr(key), repr(known))
-    return hint
+    """Return the nearest names as a person writes them."""
+    keys = difflib.get_close_matches(_key(name), list(by_key), n=_SUGGESTED, cutoff=_ALIKE)
+    return f"; did you mean {', '.join(repr(by_key[key]) for key in keys)}?" if keys else ""

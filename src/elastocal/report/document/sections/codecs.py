@@ -88,7 +88,7 @@ def _saturation(codec: CodecEvidence) -> blocks.Block:
     rows = tuple(
         (
             each.variant,
-            str(each.n_train),
+            str(each.n_train) if each.explains else "never",
             "not known" if each.low is None else f"{each.low} to {each.high}",
             mm(each.error),
             mm(each.last_error),
