@@ -7,7 +7,7 @@ of an unloaded arm, what intervals they have, and what happens when all postures
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from elastocal.compensation.conditioning import fit_tool, static_postures
+from elastocal.compensation.conditioning import ToolModel, choose_tool, static_postures
 
 MASS, CENTRE = 60.0, np.array([0.01, -0.02, 0.18])  # kg, m: a placement head
 BIAS, MOMENT_BIAS = np.array([12.0, -7.0, 30.0]), np.array([1.0, 0.4, -0.6])  # N, N·m
@@ -28,7 +28,8 @@ def raw_wrenches(R_base_flange):
 # Twelve postures that turn the sensor about two axes. It was mounted at 30 degrees, or nearly so.
 turned = Rotation.from_euler("xyz", rng.uniform(-1.2, 1.2, (12, 3))).as_matrix()
 nominal = Rotation.from_euler("z", 30.0, degrees=True).as_matrix()
-fit = fit_tool(static_postures(turned, *raw_wrenches(turned)), nominal)
+richest = ToolModel(rotation=True, drift=True, cross_talk=0.001)  # by the sensor's data sheet
+fit = choose_tool(static_postures(turned, *raw_wrenches(turned)), nominal, richest).fit
 
 off = Rotation.from_matrix(nominal.T @ fit.R_flange_sensor).as_rotvec(degrees=True)
 print(f"{fit.count} postures, scatter {fit.force_scatter:.2f} N")
@@ -39,6 +40,6 @@ print(f"rotation off the nominal one  {np.round(off, 2)} deg   (true 0, 0, 0.5)"
 
 # Turns about the vertical axis only: gravity always looks the same, and the fit says so.
 same = Rotation.from_euler("z", np.linspace(0.0, 3.0, 8)[:, None]).as_matrix()
-fit = fit_tool(static_postures(same, *raw_wrenches(same)), nominal)
+fit = choose_tool(static_postures(same, *raw_wrenches(same)), nominal, richest).fit
 print(f"\n{fit.count} postures turned about the vertical axis only")
 print("not determined:", ", ".join(fit.undetermined))

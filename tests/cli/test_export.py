@@ -3,7 +3,7 @@ import json
 import numpy as np
 import pytest
 
-from elastocal.compensation.conditioning import SensorMount, fit_tool, tool_result, write_tool
+from elastocal.compensation.conditioning import SensorMount, choose_tool, tool_result, write_tool
 from elastocal.identification import write_model
 from elastocal.records import to_data
 from elastocal.robot import Robot, catalogue, with_tool
@@ -29,7 +29,7 @@ def model(tmp_path_factory):
 @pytest.fixture
 def tool(tmp_path):
     rng = np.random.default_rng(0)
-    fit = fit_tool(PlantedTool().raw(turned(10, rng), rng))
+    fit = choose_tool(PlantedTool(R_flange_sensor=np.eye(3)).raw(turned(10, rng), rng))
     mount = SensorMount("flange", np.array([0.0, 0.0, 0.08]), GRAVITY)
     write_tool(tmp_path / "tool.json", tool_result(fit, mount, "static.csv"))
     return tmp_path / "tool.json"

@@ -38,7 +38,7 @@ def test_a_table_gives_the_planted_tool_within_its_intervals(tmp_path, postures)
         out,
         "--json",
         "--sensor",
-        "0 mm, 0 mm, 80 mm, 30 deg, 0 deg, 0 deg",
+        "0 mm, 0 mm, 80 mm, 30 deg, 2 deg, -3 deg",
     )
     assert result.code == 0, result.err
     found = json.loads(result.out)
@@ -49,7 +49,8 @@ def test_a_table_gives_the_planted_tool_within_its_intervals(tmp_path, postures)
 
 def test_people_see_the_intervals(tmp_path, postures):
     out = tmp_path / "tool.json"
-    result = elastocal("tool", table(tmp_path / "s.csv", postures), "--out", out)
+    data = table(tmp_path / "s.csv", postures)
+    result = elastocal("tool", data, "--out", out, "--free-rotation")
     assert "10 static postures" in result.err
     assert "mass" in result.err
 

@@ -21,15 +21,23 @@ class PlantedTool:
     R_flange_sensor: np.ndarray = field(
         default_factory=lambda: Rotation.from_euler("ZYX", [30, 2, -3], degrees=True).as_matrix()
     )
+    matrix: np.ndarray = field(default_factory=lambda: np.eye(6))
+    """What the sensor reads of a wrench without bias."""
+
+    @staticmethod
+    def cross_talk(share: float, rng: np.random.Generator, lever: float = 0.1) -> np.ndarray:
+        """Return a matrix with cross-talk of a share of the ranges, moments over forces lever."""
+        scale = np.repeat([1.0, lever], 3)
+        return np.eye(6) + share * rng.normal(size=(6, 6)) * np.divide.outer(scale, scale)
 
     def raw(
         self, R_base_flange: np.ndarray, rng: np.random.Generator, noise: float = 1.0
     ) -> StaticPostures:
         """Return raw wrenches; noise 1 is 0.5 N and 0.05 N m."""
         weight = self.mass * (GRAVITY @ R_base_flange @ self.R_flange_sensor)
-        force = weight + self.force_bias + 0.5 * noise * rng.normal(size=weight.shape)
-        moment = np.cross(self.centre, weight) + self.moment_bias
-        moment = moment + 0.05 * noise * rng.normal(size=weight.shape)
+        wrench = np.hstack([weight, np.cross(self.centre, weight)]) @ self.matrix.T
+        force = wrench[:, :3] + self.force_bias + 0.5 * noise * rng.normal(size=weight.shape)
+        moment = wrench[:, 3:] + self.moment_bias + 0.05 * noise * rng.normal(size=weight.shape)
         return static_postures(R_base_flange, force, moment, GRAVITY)
 
 

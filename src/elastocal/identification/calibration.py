@@ -16,6 +16,7 @@ from elastocal.elastic import ElasticModel, check_vectors
 from elastocal.errors import ConventionError, IdentificationError, SpringError
 from elastocal.identification.conventions import POOR_FIT, check_conventions, check_joints
 from elastocal.identification.domain import CalibrationDomain
+from elastocal.identification.frames import FrameSummary, frame_summaries
 from elastocal.identification.ladder import Climbed
 from elastocal.identification.observability import (
     Observability,
@@ -226,6 +227,8 @@ class Calibration:
     screening: Screening
     solution: Solution
     warnings: tuple[str, ...]
+    frames: tuple[FrameSummary, ...] = ()
+    """Frames that were estimated with the springs."""
 
     @property
     def residual_norm(self) -> FloatArray:
@@ -292,19 +295,23 @@ def calibrate(
     if unexplained > MOST_UNEXPLAINED:
         by = max(by, distrust_factor(weighted, solution.compliance, draws, held_out))
     widened = widen_draws(weighted, solution.compliance, draws, by)
+    springs, frames = weighted.springs, slice(weighted.springs.stop, None)
+    compliance, plain = solution.compliance[springs], weighted.without_frames()
     # A prior makes nothing observable: what was believed before is not measured.
-    seen = observability(factor(weighted.without_prior()), model.springs)
+    seen = observability(factor(plain.without_prior()), model.springs)
     calibrated = CalibratedModel(
         model,
-        solution.compliance,
-        widened,
-        find_faint(seen, weighted, solution.compliance, model.parameters),
+        compliance,
+        widened[:, springs],
+        find_faint(seen, plain, compliance, model.parameters),
         provenance,
         held_out.misfit,
         unexplained=unexplained,
         domain=CalibrationDomain.of(model.robot, readings.take(used), kept.block),
     )
-    offset = force_offset(model, readings.take(used), weighted, solution.compliance, marker_offset)
+    offset = force_offset(
+        model, readings.take(used), weighted, calibrated.compliance, marker_offset
+    )
     reach = max(attainable_rank(model, marker_offset), calibrated.observability.rank)
     warnings += [offset.message()] if offset else []
     warnings += _fit_warnings(calibrated, reach, weighted)
@@ -323,6 +330,7 @@ def calibrate(
         screening=screening,
         solution=solution,
         warnings=tuple(warnings),
+        frames=frame_summaries(weighted.frames, solution.compliance[frames], widened[:, frames]),
     )
 
 
@@ -339,7 +347,7 @@ def _data_warnings(
         for group in same_configuration(readings, problem.block)
     ]
     try:
-        left = check_conventions(model, readings, marker_offset)
+        left = check_conventions(model, readings, marker_offset, options.free_frame)
     except ConventionError as error:
         if not options.trust_conventions:
             raise
@@ -352,7 +360,8 @@ def _data_warnings(
 def _fit_warnings(calibrated: CalibratedModel, reach: int, problem: Problem) -> list[str]:
     """Return what limits the use of a fit, or refuse one that the data had no part in."""
     c = calibrated.compliance
-    if np.all((c == problem.lower) | (c == problem.upper)):
+    n = problem.springs
+    if np.all((c == problem.lower[n]) | (c == problem.upper[n])):
         raise IdentificationError(
             "every spring ends at a bound: the bounds, not the data, would make the model"
         )

@@ -1,4 +1,4 @@
-"""``tool``: tool weight, sensor bias and sensor rotation from static postures."""
+"""``tool``: tool weight, sensor bias, drift, matrix and rotation from static postures."""
 
 from dataclasses import dataclass, field
 from os import PathLike
@@ -10,7 +10,7 @@ from elastocal import procedure
 from elastocal.arrays import FloatArray
 from elastocal.cell import Cell, load_cell
 from elastocal.compensation import conditioning
-from elastocal.compensation.conditioning import SensorMount, StaticPostures, ToolResult
+from elastocal.compensation.conditioning import SensorMount, StaticPostures, ToolModel, ToolResult
 from elastocal.errors import CompensationError, ProcedureError
 from elastocal.identification import read_model
 from elastocal.progress import Progress
@@ -22,6 +22,8 @@ __all__ = ["ToolResult", "ToolSettings", "tool"]
 
 _AS_FLANGE = "0 mm, 0 mm, 0 mm, 0 deg, 0 deg, 0 deg"
 """A sensor whose frame is that of its link."""
+_LEVER = 0.1
+"""Moment range of a sensor over its force range, in m, where the ranges are not known."""
 
 
 @dataclass(frozen=True)
@@ -40,8 +42,13 @@ class ToolSettings:
     """Sensor in that link as mounted, ``"x, y, z, a, b, c"`` with units (Z-Y'-X'')."""
     down: tuple[float, float, float] = (0.0, 0.0, -1.0)
     """Direction of gravity in base, of any length."""
-    keep_rotation: bool = False
-    """Take the mounted rotation as it is."""
+    free_rotation: bool = False
+    """Find the sensor's rotation where unseen postures speak for it; else it is as mounted."""
+    matrix: bool = False
+    """Correct readings by the calibration matrix, too; the data that a model is calibrated from
+    must then be derived with this tool file."""
+    cross_talk: float = 0.01
+    """Cross-talk of the sensor by its data sheet, a share of its ranges; 0: it has none."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,11 +63,13 @@ class _PostureSource:
     """Centre of mass in the sensor's frame, in m."""
     points: dict[str, FloatArray] = field(default_factory=dict)
     """Points that moments may be about by mistake, in the sensor's frame, in m."""
+    lever: float = _LEVER
+    """The sensor's moment range over its force range, in m."""
 
 
 @workflow(ToolSettings)
 def tool(settings: ToolSettings, progress: Progress) -> ToolResult:  # noqa: ARG001 - done in an instant
-    """Find mass, centre of mass, sensor bias and sensor rotation from static postures.
+    """Find mass, centre of mass and sensor bias from static postures, and what else they carry.
 
     Parameters
     ----------
@@ -81,11 +90,23 @@ def tool(settings: ToolSettings, progress: Progress) -> ToolResult:  # noqa: ARG
     data = Path(settings.data)
     refuse_overwriting(settings.out, data)
     source = _from_run(data) if data.is_dir() else _from_table(data, settings)
-    fit = conditioning.fit_tool(source.postures, source.R_nominal, settings.keep_rotation)
-    conditioning.refuse_mistakes(
-        source.postures, fit, source.R_nominal, source.expected_centre, source.points
+    if not 0.0 <= settings.cross_talk < 0.5:
+        raise CompensationError(f"cross-talk {settings.cross_talk} must be from 0 to below 0.5")
+    richest = ToolModel(
+        rotation=settings.free_rotation,
+        drift=True,
+        cross_talk=settings.cross_talk,
+        lever=source.lever,
     )
-    result = conditioning.tool_result(fit, source.mount, str(data))
+    found = conditioning.choose_tool(source.postures, source.R_nominal, richest)
+    conditioning.refuse_mistakes(
+        source.postures.chosen(found.used),
+        found.fit,
+        source.R_nominal,
+        source.expected_centre,
+        source.points,
+    )
+    result = conditioning.tool_result(found, source.mount, str(data), settings.matrix)
     if settings.out is not None:
         conditioning.write_tool(settings.out, result)
     return result
@@ -137,15 +158,19 @@ def _from_run(run: Path) -> _PostureSource:
     centre = (cell.file.tool.centre - T[:3, 3]) @ T[:3, :3]
     points = {"tool centre point": T_sensor_tcp[:3, 3], "flange": -T[:3, 3] @ T[:3, :3]}
     mount = SensorMount(cell.file.robot.flange, T[:3, 3], cell.gravity_base)
-    return _PostureSource(_unloaded(poses, cell), mount, T[:3, :3], centre, points)
+    lever = float(np.mean(sensor.largest_moment) / np.mean(sensor.largest_force))
+    return _PostureSource(_unloaded(poses, cell), mount, T[:3, :3], centre, points, lever)
 
 
 def _unloaded(poses: list[procedure.PoseReadings], cell: Cell) -> StaticPostures:
-    states = [r.tool for pose in poses if (r := pose.reference) and r.tool]
+    references = [r for pose in poses if (r := pose.reference) and r.tool]
+    references.sort(key=lambda reference: reference.window.start)
+    states = [r.tool for r in references if r.tool]
     R_base_tcp = np.array([state.T_base_tcp[:3, :3] for state in states]).reshape(-1, 3, 3)
     return conditioning.static_postures(
         R_base_tcp @ cell.T_flange_tcp[:3, :3].T,
         np.array([state.force.value for state in states]).reshape(-1, 3),
         np.array([state.moment.value for state in states]).reshape(-1, 3),
         cell.gravity_base,
+        np.array([reference.window.start for reference in references]),
     )

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from elastocal.compensation.conditioning import fit_tool, refuse_mistakes
+from elastocal.compensation.conditioning import ToolModel, fit_tool, refuse_mistakes
 from elastocal.errors import CompensationError
 from support.static_postures import PlantedTool, turned
 
@@ -16,7 +16,9 @@ def raw(count=10, tool=TOOL, noise=1.0):
 
 
 def check(postures, nominal=None, known=False, **given):
-    refuse_mistakes(postures, fit_tool(postures, nominal, known), nominal, **given)
+    refuse_mistakes(
+        postures, fit_tool(postures, nominal, ToolModel(rotation=not known)), nominal, **given
+    )
 
 
 @pytest.mark.parametrize("what", ["force", "moment"])
@@ -38,7 +40,7 @@ def test_two_spoilt_postures_are_a_misfit():
 
 
 def test_a_rotation_that_is_not_as_mounted_is_named_with_its_angle():
-    with pytest.raises(CompensationError, match=r"it sits 30\.\d deg from there; leave out --keep"):
+    with pytest.raises(CompensationError, match=r"it sits 30\.\d deg from there; correct it"):
         check(raw(), np.eye(3), known=True)
 
 

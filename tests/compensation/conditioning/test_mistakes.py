@@ -2,11 +2,12 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from elastocal.compensation.conditioning import fit_tool, refuse_mistakes
+from elastocal.compensation.conditioning import ToolModel, fit_tool, refuse_mistakes
 from elastocal.errors import CompensationError
 from support.static_postures import PlantedTool, turned
 
 TOOL = PlantedTool()
+FREE = ToolModel(rotation=True)
 POINTS = {"tool centre point": np.array([0.0, 0.0, 0.35]), "flange": np.array([0.0, 0.0, -0.08])}
 
 
@@ -18,7 +19,7 @@ def postures():
 
 def check(postures, **known):
     refuse_mistakes(
-        postures, fit_tool(postures, TOOL.R_flange_sensor), TOOL.R_flange_sensor, **known
+        postures, fit_tool(postures, TOOL.R_flange_sensor, FREE), TOOL.R_flange_sensor, **known
     )
 
 
@@ -73,10 +74,10 @@ def test_a_turned_sign_is_named_where_postures_turn_about_one_axis_only():
     R = Rotation.from_euler("y", np.linspace(2.0, 4.0, 9)[:, None]).as_matrix()
     tool = PlantedTool(R_flange_sensor=np.eye(3))
     postures = tool.raw(R, rng)
-    refuse_mistakes(postures, fit_tool(postures))
+    refuse_mistakes(postures, fit_tool(postures, None, FREE))
     wrong = postures.read_as(-postures.force, -postures.moment)
     with pytest.raises(CompensationError, match=r"sign of the wrenches is turned.*from where it"):
-        refuse_mistakes(wrong, fit_tool(wrong))
+        refuse_mistakes(wrong, fit_tool(wrong, None, FREE))
 
 
 def test_inverse_orientations_are_named(postures):

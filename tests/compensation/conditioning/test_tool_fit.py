@@ -4,6 +4,7 @@ from scipy.spatial.transform import Rotation
 
 from elastocal.compensation.conditioning import (
     TOOL_UNKNOWNS,
+    ToolModel,
     fit_tool,
     static_postures,
     tool_derivatives,
@@ -14,6 +15,7 @@ from elastocal.errors import CompensationError
 from support.static_postures import PlantedTool, turned
 
 TOOL = PlantedTool()
+FREE = ToolModel(rotation=True)
 
 
 def errors(fit, tool=TOOL):
@@ -32,7 +34,7 @@ def errors(fit, tool=TOOL):
 
 def test_without_noise_the_planted_tool_is_found_exactly():
     rng = np.random.default_rng(0)
-    fit = fit_tool(TOOL.raw(turned(6, rng), rng, noise=0.0))
+    fit = fit_tool(TOOL.raw(turned(6, rng), rng, noise=0.0), None, FREE)
     np.testing.assert_allclose(errors(fit), 0.0, atol=1e-9)
     assert fit.undetermined == ()
 
@@ -42,7 +44,7 @@ def test_intervals_cover_planted_values_about_as_often_as_they_say(count):
     rng = np.random.default_rng(1)
     covered = []
     for _ in range(80):
-        fit = fit_tool(TOOL.raw(turned(count, rng), rng))
+        fit = fit_tool(TOOL.raw(turned(count, rng), rng), None, FREE)
         widths = np.array([fit.half_width[name] for name in TOOL_UNKNOWNS])
         covered.append(np.abs(errors(fit)) <= widths)
     assert 0.92 <= np.mean(covered) <= 0.98
@@ -51,21 +53,21 @@ def test_intervals_cover_planted_values_about_as_often_as_they_say(count):
 
 def test_scatter_is_that_of_the_noise():
     rng = np.random.default_rng(2)
-    fit = fit_tool(TOOL.raw(turned(200, rng), rng))
+    fit = fit_tool(TOOL.raw(turned(200, rng), rng), None, FREE)
     assert fit.force_scatter == pytest.approx(0.5, rel=0.1)
     assert fit.moment_scatter == pytest.approx(0.05, rel=0.1)
 
 
 def test_equal_postures_determine_nothing():
     rng = np.random.default_rng(3)
-    fit = fit_tool(TOOL.raw(np.repeat(turned(1, rng), 6, axis=0), rng))
+    fit = fit_tool(TOOL.raw(np.repeat(turned(1, rng), 6, axis=0), rng), None, FREE)
     assert fit.undetermined == TOOL_UNKNOWNS
     assert all(np.isnan(width) for width in fit.half_width.values())
 
 
 def test_too_similar_postures_name_what_they_do_not_determine():
     rng = np.random.default_rng(4)
-    fit = fit_tool(TOOL.raw(turned(5, rng, angle=0.01), rng), TOOL.R_flange_sensor)
+    fit = fit_tool(TOOL.raw(turned(5, rng, angle=0.01), rng), TOOL.R_flange_sensor, FREE)
     assert {"force bias y", "sensor rotation about x", "moment bias x"} <= set(fit.undetermined)
     assert np.isnan(fit.half_width["force bias y"])
 
@@ -73,15 +75,15 @@ def test_too_similar_postures_name_what_they_do_not_determine():
 def test_a_turn_about_the_vertical_alone_leaves_mass_and_bias_along_it_open():
     rng = np.random.default_rng(5)
     spin = Rotation.from_euler("z", rng.uniform(0, 6, (8, 1))).as_matrix()
-    fit = fit_tool(TOOL.raw(spin, rng), TOOL.R_flange_sensor, rotation_known=True)
+    fit = fit_tool(TOOL.raw(spin, rng), TOOL.R_flange_sensor)
     assert "mass" in fit.undetermined
 
 
 def test_a_known_rotation_leaves_less_open():
     rng = np.random.default_rng(4)
     postures = TOOL.raw(turned(5, rng, angle=0.01), rng)
-    free = fit_tool(postures, TOOL.R_flange_sensor)
-    known = fit_tool(postures, TOOL.R_flange_sensor, rotation_known=True)
+    free = fit_tool(postures, TOOL.R_flange_sensor, FREE)
+    known = fit_tool(postures, TOOL.R_flange_sensor)
     np.testing.assert_array_equal(known.R_flange_sensor, TOOL.R_flange_sensor)
     assert known.half_width["sensor rotation about z"] == 0.0
     assert set(known.undetermined) < set(free.undetermined)
@@ -94,13 +96,13 @@ def test_a_gravity_that_points_elsewhere_is_no_matter():
     tilted = static_postures(
         tilt @ postures.R_base_flange, postures.force, postures.moment, tilt @ postures.gravity
     )
-    np.testing.assert_allclose(errors(fit_tool(tilted)), 0.0, atol=1e-9)
+    np.testing.assert_allclose(errors(fit_tool(tilted, None, FREE)), 0.0, atol=1e-9)
 
 
 def test_residuals_are_what_the_fit_leaves():
     rng = np.random.default_rng(8)
     postures = TOOL.raw(turned(8, rng), rng)
-    force, moment = tool_residual(postures, fit_tool(postures))
+    force, moment = tool_residual(postures, fit_tool(postures, None, FREE))
     assert np.sqrt((force**2).mean()) < 0.7
     assert np.sqrt((moment**2).mean()) < 0.07
 

@@ -1,4 +1,4 @@
-"""``elastocal tool``: tool weight, sensor bias and sensor rotation from static postures."""
+"""``elastocal tool``: tool weight, sensor bias, drift and matrix from static postures."""
 
 from pathlib import Path
 from typing import Annotated
@@ -9,7 +9,7 @@ from elastocal import workflows
 from elastocal.cli import options, output, tables
 
 
-def _tool(
+def _tool(  # noqa: PLR0913 - one parameter an option
     data: Annotated[
         Path, typer.Argument(help="CSV of postures with raw wrenches, or the folder of a run.")
     ],
@@ -26,12 +26,27 @@ def _tool(
     down: Annotated[str, typer.Option(help="Direction of gravity in base: 'x, y, z'.")] = (
         "0, 0, -1"
     ),
-    keep_rotation: Annotated[
-        bool, typer.Option("--keep-rotation", help="Take the mounted rotation as it is.")
+    free_rotation: Annotated[
+        bool,
+        typer.Option(
+            "--free-rotation/--keep-rotation",
+            help="Find the sensor's rotation where unseen postures speak for it, or take it as"
+            " mounted.",
+        ),
     ] = False,
+    matrix: Annotated[
+        bool,
+        typer.Option(
+            "--matrix",
+            help="Correct readings by the calibration matrix, too (then derive --tool as well).",
+        ),
+    ] = False,
+    cross_talk: Annotated[
+        float, typer.Option(help="Cross-talk by the sensor's data sheet, a share of its ranges.")
+    ] = 0.01,
     as_json: options.Written = False,
 ) -> None:
-    """Find mass, centre of mass, sensor bias and sensor rotation from static postures."""
+    """Find mass, centre of mass and sensor bias from static postures, and what else they carry."""
     from elastocal.records import to_data
 
     result = workflows.tool(
@@ -41,7 +56,9 @@ def _tool(
         flange=flange,
         sensor=sensor,
         down=options.parse_direction(down),
-        keep_rotation=keep_rotation,
+        free_rotation=free_rotation,
+        matrix=matrix,
+        cross_talk=cross_talk,
     )
     if as_json:
         # What this command always printed: the file without its schema.

@@ -27,6 +27,10 @@ if TYPE_CHECKING:
 _SHOWN = {"mass": ("kg", 1.0), "sensor": ("deg", 180.0 / np.pi), "force": ("N", 1.0)}
 _SHOWN |= {"centre": ("mm", 1e3), "moment": ("N*m", 1.0)}
 
+_AXES = ("fx", "fy", "fz", "mx", "my", "mz")
+_DETERMINED = 0.75
+"""Share of an entry's prior variance that is gone where the postures halve its deviation."""
+
 
 def show_tool(console: Console, record: ToolResult, out: Path) -> None:
     """Print the unknowns with their intervals."""
@@ -38,15 +42,51 @@ def show_tool(console: Console, record: ToolResult, out: Path) -> None:
         width = record.half_width[name]
         if width is None:
             table.add_row(name, "not determined", "", "")
+        elif name.startswith("sensor") and record.rotation_known:
+            table.add_row(name, f"{scale * value:.4g}", "as mounted", unit)
         else:
             table.add_row(name, f"{scale * value:.4g}", f"{scale * width:.2g}", unit)
     console.print(table)
+    scatter = [
+        ("not known" if x is None else f"{x:.3g}")
+        for x in (record.force_scatter, record.moment_scatter)
+    ]
+    console.print(f"scatter of a component: {scatter[0]} N, {scatter[1]} N*m")
+    _show_tool_ladder(console, record)
+    for each in record.set_aside:
+        console.print(f"set aside: {each.text}")
+    for note in record.notes:
+        console.print(f"Note: {note}")
     if record.undetermined:
         console.print(
             f"not determined: {', '.join(record.undetermined)}. Take more postures that turn the"
             " sensor about two axes, 30 deg apart and more."
         )
     console.print(f"written to {out}")
+
+
+def _show_tool_ladder(console: Console, record: ToolResult) -> None:
+    """Print the models that were tried, and what is known of the sensor's matrix."""
+    if record.ladder:
+        table = Table("free", "force N", "moment N*m", "", title="left of unseen postures")
+        for rung in record.ladder:
+            taken = "taken" if rung.chosen else ""
+            table.add_row(rung.free, f"{rung.force:.3g}", f"{rung.moment:.3g}", taken)
+        console.print(table)
+    if record.drift is not None:
+        force, moment = (", ".join(f"{x:.3g}" for x in record.drift[k : k + 3]) for k in (0, 3))
+        console.print(f"drift from first to last posture: {force} N; {moment} N*m")
+    if record.matrix_determined is None:
+        return
+    shares = np.array(record.matrix_determined)
+    known = [
+        f"{_AXES[i]}<-{_AXES[k]}" for i in range(6) for k in range(6) if shares[i, k] > _DETERMINED
+    ]
+    use = "corrects readings" if record.matrix is not None else "takes the tool's weight only"
+    console.print(
+        f"sensor matrix: {record.matrix_rank} of 36 directions determined, the others stay at the"
+        f" identity; entries that are: {', '.join(known) or 'none alone'}. It {use}."
+    )
 
 
 def show_compensation(console: Console, result: "CompensateResult", out: Path) -> None:

@@ -26,9 +26,19 @@ from .tool import (
     tool_result as tool_result,
     write_tool as write_tool,
 )
+from .tool_choice import (
+    PostureSetAside as PostureSetAside,
+    ToolChoice as ToolChoice,
+    ToolRung as ToolRung,
+    affine_scatter as affine_scatter,
+    blunders as blunders,
+    choose_tool as choose_tool,
+    rotation_off as rotation_off,
+)
 from .tool_fit import (
     TOOL_UNKNOWNS as TOOL_UNKNOWNS,
     ToolFit as ToolFit,
+    ToolModel as ToolModel,
     fit_tool as fit_tool,
     tool_derivatives as tool_derivatives,
     tool_residual as tool_residual,

@@ -8,19 +8,32 @@ spoilt posture, a rotation that is not as mounted, a wrong unit.
 from collections.abc import Iterable, Mapping
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from elastocal.arrays import FloatArray
 from elastocal.compensation.conditioning.postures import LEAST_POSTURES, StaticPostures
-from elastocal.compensation.conditioning.tool_fit import ToolFit, fit_tool, tool_residual
+from elastocal.compensation.conditioning.tool_choice import affine_scatter
+from elastocal.compensation.conditioning.tool_fit import (
+    ToolFit,
+    ToolModel,
+    fit_tool,
+    tool_residual,
+)
 from elastocal.errors import CompensationError
+from elastocal.parallel import one_blas_thread
 
 _HEAVIEST = 5000.0
 """In kg; robots carry up to 2300 kg."""
+_FREE = ToolModel(rotation=True)
+_ORDERS = (("x y z w", "w x y z", [1, 2, 3, 0]), ("w x y z", "x y z w", [3, 0, 1, 2]))
+"""Orders of a quaternion: as the columns are named, as the numbers are, where these then stand."""
 _UNITS = ("N", "N*m")
 _POOR = 0.1
 """Part of what turns with the posture that may be left: noise, cross-talk leave a few percent."""
 _NOISE = np.array([5.0, 0.5])
-"""In N and N·m: what a noisy sensor leaves of a light tool, and what deflects no arm."""
+"""In N and N·m: noise of a sensor where too few postures tell it."""
+_ABOVE_NOISE = 3.0
+"""What is left, in what the best affine law of gravity leaves, that is more than noise."""
 _MUCH_BETTER = 0.2
 """Share of what is left, from which on another reading is believed."""
 _TRIED = 10
@@ -41,6 +54,7 @@ _CLOSE = 0.3
 """Largest distance of the centre of mass from where another point puts it, as a share."""
 
 
+@one_blas_thread()
 def refuse_mistakes(
     postures: StaticPostures,
     fit: ToolFit,
@@ -69,9 +83,12 @@ def refuse_mistakes(
     CompensationError
         Naming the mistake.
     """
-    _refuse_base(postures, fit)
-    _refuse_other_forces(postures, fit, R_nominal)
-    _refuse_other_moments(postures, fit)
+    # Judged with the rotation free: a sensor that sits elsewhere is another mistake.
+    free = fit if fit.model.rotation else fit_tool(postures, R_nominal, _FREE)
+    _refuse_other_order(postures, free, R_nominal)
+    _refuse_base(postures, free)
+    _refuse_other_forces(postures, fit, free, R_nominal)
+    _refuse_other_moments(postures, free)
     _refuse_far_centre(postures, fit)
     _refuse_misfit(postures, fit, R_nominal)
     if expected_centre is not None:
@@ -108,8 +125,8 @@ def _refuse_one_posture(
     if len(postures) <= LEAST_POSTURES + 1:
         return
     for row in _suspects(postures, fit):
-        others = postures.without(row)
-        refit = fit_tool(others, R_nominal, fit.rotation_known)
+        others = postures.chosen(np.arange(len(postures)) != row)
+        refit = fit_tool(others, R_nominal, fit.model)
         without = _left(others, refit)
         worst = int(np.argmax(left / np.maximum(without, np.finfo(float).tiny)))
         if np.all(without <= _allowed(others)) and without[worst] < _MUCH_BETTER * left[worst]:
@@ -131,14 +148,14 @@ def _suspects(postures: StaticPostures, fit: ToolFit) -> Iterable[int]:
 
 
 def _refuse_rotation(postures: StaticPostures, fit: ToolFit, left: FloatArray) -> None:
-    free = fit_tool(postures, fit.R_flange_sensor)
+    free = fit_tool(postures, fit.R_flange_sensor, _FREE)
     found = _left(postures, free)
     if np.any(found < _MUCH_BETTER * left):
         angle = np.degrees(_angle(fit.R_flange_sensor, free.R_flange_sensor))
         raise CompensationError(
             f"the sensor is not turned as --sensor says: with {left[0]:.3g} N left of a force"
-            f" component, {found[0]:.3g} N if it sits {angle:.1f} deg from there; leave out"
-            " --keep-rotation"
+            f" component, {found[0]:.3g} N if it sits {angle:.1f} deg from there; correct"
+            " it, or give --free-rotation"
         )
 
 
@@ -148,13 +165,37 @@ def _left(postures: StaticPostures, fit: ToolFit) -> FloatArray:
 
 
 def _allowed(postures: StaticPostures) -> FloatArray:
-    allowed: FloatArray = np.maximum(_POOR * _turning(postures), _NOISE)
+    scatter = affine_scatter(postures)
+    noise = _NOISE if scatter is None else _ABOVE_NOISE * scatter
+    allowed: FloatArray = np.maximum(_POOR * _turning(postures), noise)
     return allowed
 
 
 def _turning(postures: StaticPostures) -> FloatArray:
     """Return what changes with the posture of a component of force and moment."""
     return np.array([_rms(part - part.mean(axis=0)) for part in (postures.force, postures.moment)])
+
+
+def _refuse_other_order(
+    postures: StaticPostures, free: ToolFit, R_nominal: FloatArray | None
+) -> None:
+    """Refuse quaternions whose numbers stand in the other order of the two in use."""
+    if not postures.quaternions:
+        return
+    stated = _rms(tool_residual(postures, free)[0])
+    if not stated > _NOTICEABLE * _rms(postures.force):
+        return
+    quaternions = Rotation.from_matrix(postures.R_base_flange).as_quat()
+    for named, actual, places in _ORDERS:
+        R = Rotation.from_quat(quaternions[:, places]).as_matrix()
+        other = postures.read_as(R_base_flange=R)
+        left = _rms(tool_residual(other, fit_tool(other, R_nominal, _FREE))[0])
+        if left < _MUCH_BETTER * stated:
+            raise CompensationError(
+                f"the quaternions' numbers stand in the order {actual}, their columns are named"
+                f" {named}: read so, {left:.3g} N are left of a force component instead of"
+                f" {stated:.3g} N; rename the columns"
+            )
 
 
 def _refuse_base(postures: StaticPostures, fit: ToolFit) -> None:
@@ -181,9 +222,9 @@ def _refuse_base(postures: StaticPostures, fit: ToolFit) -> None:
 
 
 def _refuse_other_forces(
-    postures: StaticPostures, fit: ToolFit, R_nominal: FloatArray | None
+    postures: StaticPostures, fit: ToolFit, free: ToolFit, R_nominal: FloatArray | None
 ) -> None:
-    stated = _rms(tool_residual(postures, fit)[0])
+    stated = _rms(tool_residual(postures, free)[0])
     others = {
         "the sign of the wrenches is turned, or one of the sensor's axes (a left-handed frame)": (
             postures.read_as(-postures.force, -postures.moment)
@@ -192,7 +233,7 @@ def _refuse_other_forces(
             postures.read_as(R_base_flange=np.swapaxes(postures.R_base_flange, 1, 2))
         ),
     }
-    fits = {mistake: fit_tool(other, R_nominal) for mistake, other in others.items()}
+    fits = {mistake: fit_tool(other, R_nominal, _FREE) for mistake, other in others.items()}
     left = {mistake: _rms(tool_residual(others[mistake], fits[mistake])[0]) for mistake in others}
     best = min(left, key=left.__getitem__)
     if stated > _NOTICEABLE * _rms(postures.force) and left[best] < _BETTER * stated:
@@ -207,12 +248,12 @@ def _refuse_other_forces(
     weighs = _weight(postures, fit) > _NOTICEABLE * _rms(postures.force)
     if (fit.mass < 0.0 and weighs and "mass" not in fit.undetermined) or (
         fits_both
-        and _angle(fit.R_flange_sensor, as_mounted) > 0.5 * np.pi
+        and _angle(free.R_flange_sensor, as_mounted) > 0.5 * np.pi
         and _angle(fits[turned].R_flange_sensor, as_mounted) < 0.25 * np.pi
     ):
         raise CompensationError(
             f"{turned}: the mass comes out as {fit.mass:.3g} kg and the sensor"
-            f" {np.degrees(_angle(fit.R_flange_sensor, as_mounted)):.0f} deg from where it sits"
+            f" {np.degrees(_angle(free.R_flange_sensor, as_mounted)):.0f} deg from where it sits"
         )
 
 
@@ -222,7 +263,7 @@ def _refuse_other_moments(postures: StaticPostures, fit: ToolFit) -> None:
         return
     R = postures.R_base_flange @ fit.R_flange_sensor
     other = postures.read_as(moment=np.einsum("nji,nj->ni", R, postures.moment))
-    left = _rms(tool_residual(other, fit_tool(other, fit.R_flange_sensor, rotation_known=True))[1])
+    left = _rms(tool_residual(other, fit_tool(other, fit.R_flange_sensor))[1])
     if left < _BETTER * stated:
         raise CompensationError(
             f"moments seem to be in base while the forces are not: read so, {left:.3g} N*m are left"

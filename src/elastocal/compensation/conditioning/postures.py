@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from elastocal.arrays import FloatArray
+from elastocal.arrays import BoolArray, FloatArray
 from elastocal.compensation.offline import require_within_a_turn
 from elastocal.dataset import LoadRows, joint_dimensions, read_load_rows
 from elastocal.errors import CompensationError
@@ -40,6 +40,10 @@ class StaticPostures:
     """In the sensor's frame, about its origin, shape (posture, 3), in N·m."""
     gravity: FloatArray
     """Acceleration of gravity in base, shape (3,), in m/s²."""
+    course: FloatArray
+    """When each was taken: rises by 1 from first to last, mean 0, shape (posture,)."""
+    quaternions: bool = False
+    """Whether the orientations came as quaternions, of which there are two orders."""
 
     def __len__(self) -> int:
         """Return the number of postures."""
@@ -56,14 +60,14 @@ class StaticPostures:
         directions = self.gravity_flange / np.linalg.norm(self.gravity)
         return float(np.arccos(np.clip((directions @ directions.T).min(), -1.0, 1.0)))
 
-    def without(self, row: int) -> "StaticPostures":
-        """Return the other postures."""
-        kept = np.arange(len(self)) != row
+    def chosen(self, kept: BoolArray) -> "StaticPostures":
+        """Return some of the postures, in their order, at the times that they have."""
         return replace(
             self,
             R_base_flange=self.R_base_flange[kept],
             force=self.force[kept],
             moment=self.moment[kept],
+            course=self.course[kept],
         )
 
     def read_as(
@@ -86,8 +90,11 @@ def static_postures(
     force: FloatArray,
     moment: FloatArray,
     gravity: FloatArray | None = None,
+    time: FloatArray | None = None,
 ) -> StaticPostures:
-    """Return checked postures; see `StaticPostures`.
+    """Return checked postures in the order of time, at any ``time`` or evenly one by one.
+
+    See `StaticPostures`.
 
     Raises
     ------
@@ -95,10 +102,11 @@ def static_postures(
         If there are fewer than three, shapes differ, or a number is not finite.
     """
     gravity = np.array(GRAVITY) if gravity is None else gravity
-    made = StaticPostures(
-        *(np.array(x, dtype=float) for x in (R_base_flange, force, moment, gravity))
-    )
-    n = len(made.force)
+    n = len(force)
+    taken = np.arange(n, dtype=float) if time is None else np.array(time, dtype=float)
+    course = (taken - taken.mean()) / (np.ptp(taken) or 1.0) if n else taken
+    R, F, M, g = (np.array(x, dtype=float) for x in (R_base_flange, force, moment, gravity))
+    made = StaticPostures(R, F, M, g, course)
     if n < LEAST_POSTURES:
         raise CompensationError(
             f"{n} postures: the tool's weight needs at least {LEAST_POSTURES}, and better 8 or more"
@@ -160,7 +168,8 @@ def read_postures(
             " and three biases come from them"
         )
     try:
-        return static_postures(R, rows.force, rows.moment, gravity)
+        postures = static_postures(R, rows.force, rows.moment, gravity)
+        return replace(postures, quaternions=set(_QUATERNION) <= set(header))
     except CompensationError as error:
         raise CompensationError(f"{path}: {error}") from error
 

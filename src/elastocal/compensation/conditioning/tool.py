@@ -6,14 +6,16 @@ from pathlib import Path
 import numpy as np
 
 from elastocal.arrays import FloatArray
-from elastocal.cell import SensorLoad
-from elastocal.compensation.conditioning.tool_fit import TOOL_UNKNOWNS, ToolFit
+from elastocal.cell import SensorLoad, weight_response
+from elastocal.compensation.conditioning.tool_choice import PostureSetAside, ToolChoice, ToolRung
+from elastocal.compensation.conditioning.tool_fit import TOOL_UNKNOWNS
 from elastocal.errors import CompensationError, nearest
 from elastocal.records import read_json, record, write_json
 from elastocal.results import Result, brief_repr
 from elastocal.robot import Robot, inverse_transform, parse_urdf
 
 _Triple = tuple[float, float, float]
+_Rows = tuple[tuple[float, ...], ...]
 
 
 @record("elastocal.tool/1")
@@ -38,8 +40,26 @@ class ToolResult(Result):
     undetermined: tuple[str, ...]
     postures: int
     force_scatter: float | None
+    """What is left of a component, in N."""
     moment_scatter: float | None
     source: str
+    rotation_known: bool = False
+    """Whether the rotation was taken as mounted; files of before searched for it."""
+    response: _Rows | None = None
+    """Corrected reading per gravity, sensor frame, shape (6, 3); none: that of mass and centre."""
+    matrix: _Rows | None = None
+    """Correction of a reading without bias, shape (6, 6); none: readings are taken as they are."""
+    matrix_determined: _Rows | None = None
+    """Share of each entry that the postures determine, 0 to 1; the rest is the prior's."""
+    matrix_rank: int | None = None
+    """Directions of the matrix's 36 entries that the postures determine."""
+    ladder: tuple[ToolRung, ...] = ()
+    """Models that were tried, with what they leave of postures that they had not seen."""
+    drift: tuple[float, ...] | None = None
+    """Of the biases from first to last posture, shape (6,), in N and N·m; none: there is none."""
+    serial_correlation: float | None = None
+    set_aside: tuple[PostureSetAside, ...] = ()
+    notes: tuple[str, ...] = ()
 
     def facts(self) -> tuple[tuple[str, str], ...]:
         """Return what a person wants to know first."""
@@ -55,6 +75,9 @@ class ToolResult(Result):
             ("sensor's origin in the flange frame", vector(self.sensor_origin, "mm", 1e3)),
             ("not determined", ", ".join(self.undetermined) or "none"),
             ("static postures", str(self.postures)),
+            ("scatter", f"{_shown(self.force_scatter)} N, {_shown(self.moment_scatter)} N·m"),
+            *(("set aside", each.text) for each in self.set_aside),
+            *(("note", text) for text in self.notes),
             ("source", self.source),
         )
 
@@ -72,41 +95,74 @@ class SensorMount:
     """In base, shape (3,), in m/s²."""
 
 
-def tool_result(fit: ToolFit, mount: SensorMount, source: str) -> ToolResult:
+def tool_result(
+    found: ToolChoice, mount: SensorMount, source: str, with_matrix: bool = False
+) -> ToolResult:
     """Return a fit, and where the sensor sits, as the file keeps them.
 
     Parameters
     ----------
-    fit : ToolFit
+    found : ToolChoice
         Of static postures.
     mount : SensorMount
         Where the sensor sits.
     source : str
         Where the postures come from.
+    with_matrix : bool
+        Whether readings are to be corrected by the matrix; if not, only its response to the
+        tool's weight is kept, which takes the weight away to the noise.
     """
-
-    def triple(numbers: FloatArray) -> _Triple:
-        x, y, z = (float(number) for number in numbers)
-        return x, y, z
-
-    x, y, z = (triple(row) for row in fit.R_flange_sensor)
+    fit = found.fit
+    # Without a tool it comes out a rounding error below nothing; more is refused as a mistake.
+    mass = max(fit.mass, 0.0)
+    inverse = np.linalg.inv(fit.matrix).astype(float)
+    response = weight_response(mass, fit.centre)
+    response = response if with_matrix else fit.matrix @ response
+    drifts, has_matrix = fit.model.drift, fit.model.has_matrix
     return ToolResult(
         flange=mount.flange,
-        # Without a tool it comes out a rounding error below nothing; more is refused as a mistake.
-        mass=max(fit.mass, 0.0),
-        centre=triple(fit.centre),
-        force_bias=triple(fit.force_bias),
-        moment_bias=triple(fit.moment_bias),
-        R_flange_sensor=(x, y, z),
-        sensor_origin=triple(mount.origin),
-        gravity=triple(mount.gravity),
+        mass=mass,
+        centre=_triple(fit.centre),
+        force_bias=_triple(fit.force_bias),
+        moment_bias=_triple(fit.moment_bias),
+        R_flange_sensor=_rotation_rows(fit.R_flange_sensor),
+        sensor_origin=_triple(mount.origin),
+        gravity=_triple(mount.gravity),
         half_width={name: _or_none(width) for name, width in fit.half_width.items()},
         undetermined=fit.undetermined,
         postures=fit.count,
         force_scatter=_or_none(fit.force_scatter),
         moment_scatter=_or_none(fit.moment_scatter),
         source=source,
+        rotation_known=fit.rotation_known,
+        response=_rows(response) if has_matrix else None,
+        matrix=_rows(inverse) if has_matrix and with_matrix else None,
+        matrix_determined=_rows(fit.matrix_determined) if has_matrix else None,
+        matrix_rank=fit.matrix_rank if has_matrix else None,
+        ladder=found.ladder,
+        drift=tuple(fit.drift.tolist()) if drifts else None,
+        serial_correlation=_or_none(found.serial_correlation),
+        set_aside=found.set_aside,
+        notes=found.notes,
     )
+
+
+def _triple(numbers: FloatArray) -> _Triple:
+    x, y, z = (float(number) for number in numbers)
+    return x, y, z
+
+
+def _rotation_rows(R: FloatArray) -> tuple[_Triple, _Triple, _Triple]:
+    x, y, z = (_triple(row) for row in R)
+    return x, y, z
+
+
+def _rows(matrix: FloatArray) -> _Rows:
+    return tuple(tuple(row) for row in matrix.tolist())
+
+
+def _shown(number: float | None) -> str:
+    return "not known" if number is None else f"{number:.3g}"
 
 
 def write_tool(path: Path, result: ToolResult) -> None:
@@ -160,6 +216,8 @@ def sensor_load(tool: ToolResult, robot: Robot) -> SensorLoad:
         moment_bias=np.array(tool.moment_bias),
         T_tcp_sensor=inverse_transform(robot.forward(home)) @ T_base_sensor,
         gravity=np.array(tool.gravity),
+        matrix=np.eye(6) if tool.matrix is None else np.array(tool.matrix),
+        response=None if tool.response is None else np.array(tool.response),
     )
 
 

@@ -1,18 +1,24 @@
-"""Tool weight, centre of mass, sensor bias and sensor rotation from static postures.
+"""Tool weight, centre of mass, sensor bias, drift, matrix and rotation from static postures.
 
 With gravity ``u_i`` in the flange's axes, the rotation ``R`` of the sensor in the flange and
 ``h = mass c``, a sensor that carries nothing but its tool reads
 
-    F_i = mass R^T u_i + b,        M_i = h x R^T u_i + b_m.
+    y_i = (1 + X) [mass R^T u_i; h x R^T u_i] + [b; b_m] + s_i d,        s_i from -1/2 to 1/2.
 
-Thirteen unknowns: mass, a small rotation, ``b``, ``h``, ``b_m``. Gauss-Newton from the best
-rotation between forces and gravity (Kabsch 1976), with singular directions left where they
-started; force and moment are weighed by their own scatter. The intervals are those of the last
-linear step, by Student's t. This extends `elastocal.procedure.derive.tool`, which knows the
-rotation and looks for drift instead.
+Mass, ``h`` and the biases are always free. The rotation ``R`` is known from the drawing, unless
+asked for; drift ``d`` and matrix ``X`` (gains, cross-talk) are added where unseen postures say so
+(`elastocal.compensation.conditioning.tool_choice`). ``X`` has a prior: every entry is normal about
+0, with the sensor's cross-talk as its deviation, in units of its ranges. Without one it would take
+all: a rotation by a small angle is a matrix, too, and no static posture tells the two apart, nor
+mass from gain. A weight excites three directions of the six of a wrench (``[1; [c]x]``): 18 of the
+36 entries' combinations at most.
+
+Gauss-Newton from the best rotation between forces and gravity (Kabsch 1976), singular directions
+left where they started; force and moment weighed by their own scatter. The intervals are those of
+the last linear step with the prior as further rows, by Student's t.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -31,7 +37,9 @@ TOOL_UNKNOWNS = (
 )
 """The unknowns, in the order of every vector of them; in place of the centre of mass itself the
 vectors hold mass times centre."""
-_ROTATION = slice(1, 4)
+_PLAIN = len(TOOL_UNKNOWNS)
+_ROTATION, _DRIFT, _MATRIX = slice(1, 4), slice(_PLAIN, _PLAIN + 6), slice(_PLAIN + 6, _PLAIN + 42)
+_ALL = _PLAIN + 42
 _LEVEL = 0.95
 """Confidence level of the intervals."""
 _DEPENDENT = 1e-6
@@ -39,9 +47,11 @@ _DEPENDENT = 1e-6
 _LOADING = 1e-3
 """Part of an unknown in a dependent direction from which on it counts as not determined."""
 _STEPS = 30
-_DONE = 1e-13
+_DONE = 1e-11
 _NO_MASS = 1e-9
 """In kg; what divides by the mass divides by no less."""
+_ROUNDING = 1e-9
+"""Least scatter, as a share of the readings' size: what is exact is not weighed endlessly."""
 _WIDE_MASS = 0.2
 """Half interval of the mass, as a share of it, beyond which it counts as not determined."""
 _WIDE_ROTATION = np.radians(5.0)
@@ -52,27 +62,85 @@ _WIDE_BIAS = 0.2
 """Half interval of a bias, as a share of the weight (of weight times 0.1 m), beyond which."""
 
 
-def tool_wrenches(postures: StaticPostures, values: FloatArray, R: FloatArray) -> FloatArray:
-    """Return forces and moments, shape (posture, 6)."""
-    u = postures.gravity_flange @ R
-    force = values[0] * u + values[4:7]
-    return np.hstack([force, np.cross(values[7:10], u) + values[10:13]])
+@brief_repr
+@dataclass(frozen=True)
+class ToolModel:
+    """What is free beside mass, centre of mass and biases."""
+
+    rotation: bool = False
+    """The rotation of the sensor in the flange."""
+    drift: bool = False
+    """A drift of the biases, linear from the first posture to the last."""
+    cross_talk: float = 0.0
+    """Deviation of the matrix's entries before anything is measured, of the ranges; 0: none."""
+    lever: float = 0.1
+    """The sensor's moment range over its force range, in m."""
+
+    @property
+    def free(self) -> BoolArray:
+        """Which of all unknowns are free, shape (55,): those of a tool, drift, matrix."""
+        free = np.ones(_ALL, dtype=bool)
+        free[_ROTATION], free[_DRIFT], free[_MATRIX] = self.rotation, self.drift, self.has_matrix
+        return free
+
+    @property
+    def has_matrix(self) -> bool:
+        """Whether the matrix is free."""
+        return self.cross_talk > 0.0
+
+    @property
+    def spread(self) -> FloatArray:
+        """Deviation of the matrix's entries by the prior, shape (6, 6)."""
+        scale = np.repeat([1.0, self.lever], 3)
+        spread: FloatArray = self.cross_talk * np.divide.outer(scale, scale)
+        return spread
+
+    @property
+    def name(self) -> str:
+        """What is free, in words."""
+        parts = ("rotation", self.rotation), ("drift", self.drift), ("matrix", self.has_matrix)
+        return " + ".join(["tool and bias", *(part for part, free in parts if free)])
 
 
-def tool_derivatives(postures: StaticPostures, values: FloatArray, R: FloatArray) -> FloatArray:
-    """Return the derivatives of `tool_wrenches`, shape (posture, 6, 13).
+def tool_wrenches(
+    postures: StaticPostures, values: FloatArray, R: FloatArray, model: ToolModel | None = None
+) -> FloatArray:
+    """Return forces and moments, shape (posture, 6).
 
-    They are by mass, rotation (in sensor axes), b, h and b_m.
+    ``values`` holds mass, rotation (ignored: it is in ``R``), b, h, b_m, and with a model the drift
+    and the matrix by rows, in deviations of its prior.
     """
     u = postures.gravity_flange @ R
-    J = np.zeros((len(u), 6, len(TOOL_UNKNOWNS)))
+    wrench = np.hstack([values[0] * u, np.cross(values[7:10], u)])
+    found: FloatArray = wrench + np.concatenate([values[4:7], values[10:13]])
+    if model is not None:
+        X = values[_MATRIX].reshape(6, 6) * model.spread
+        found = found + wrench @ X.T + postures.course[:, None] * values[_DRIFT]
+    return found
+
+
+def tool_derivatives(
+    postures: StaticPostures, values: FloatArray, R: FloatArray, model: ToolModel | None = None
+) -> FloatArray:
+    """Return the derivatives of `tool_wrenches`, shape (posture, 6, 13), with a model (..., 55).
+
+    They are by mass, rotation (in sensor axes), b, h, b_m, drift and matrix.
+    """
+    u = postures.gravity_flange @ R
+    n = len(u)
+    J = np.zeros((n, 6, _PLAIN if model is None else _ALL))
     skew_u = _skew(u)
     J[:, :3, 0] = u
     J[:, :3, _ROTATION] = values[0] * skew_u
-    J[:, :3, 4:7] = np.eye(3)
     J[:, 3:, _ROTATION] = _skew(values[7:10]) @ skew_u
     J[:, 3:, 7:10] = -skew_u
-    J[:, 3:, 10:13] = np.eye(3)
+    if model is not None:
+        wrench = np.hstack([values[0] * u, np.cross(values[7:10], u)])
+        J[:, :, :_PLAIN] += (values[_MATRIX].reshape(6, 6) * model.spread) @ J[:, :, :_PLAIN]
+        J[:, :, _DRIFT] = postures.course[:, None, None] * np.eye(6)
+        by_entry = np.eye(6)[None, :, :, None] * (model.spread * wrench[:, None, :])[:, :, None, :]
+        J[:, :, _MATRIX] = by_entry.reshape(n, 6, 36)
+    J[:, :3, 4:7] = J[:, 3:, 10:13] = np.eye(3)
     return J
 
 
@@ -112,12 +180,25 @@ class ToolFit:
     """Standard deviation of what is left of a force component, in N; NaN: nothing is left over."""
     moment_scatter: float
     """The same of the moment, in N·m."""
-    rotation_known: bool = False
-    """Whether the rotation was taken as it is."""
+    model: ToolModel = field(default_factory=ToolModel)
+    """What was free."""
+    drift: FloatArray = field(default_factory=lambda: np.zeros(6))
+    """Change of the biases from the first posture to the last, shape (6,), in N and N·m."""
+    matrix: FloatArray = field(default_factory=lambda: np.eye(6))
+    """``1 + X``: what the sensor reads of a wrench, shape (6, 6)."""
+    matrix_determined: FloatArray = field(default_factory=lambda: np.zeros((6, 6)))
+    """Share of the prior's variance of each entry that the postures took away, 0 to 1."""
+    matrix_rank: int = 0
+    """Directions of the 36 entries of which the postures halve the prior's deviation."""
+
+    @property
+    def rotation_known(self) -> bool:
+        """Whether the rotation was taken as it is."""
+        return not self.model.rotation
 
 
 def fit_tool(
-    postures: StaticPostures, R_nominal: FloatArray | None = None, rotation_known: bool = False
+    postures: StaticPostures, R_nominal: FloatArray | None = None, model: ToolModel | None = None
 ) -> ToolFit:
     """Return tool and sensor from static postures.
 
@@ -128,29 +209,33 @@ def fit_tool(
     R_nominal : ndarray, shape (3, 3), optional
         Rotation of the sensor in the flange as it was mounted; the identity by default. What the
         postures do not determine stays there.
-    rotation_known : bool
-        Take that rotation as it is.
+    model : ToolModel, optional
+        What is free; by default mass, centre of mass and biases.
     """
     nominal = np.eye(3) if R_nominal is None else R_nominal
-    R = nominal if rotation_known else _rotation_between(postures, nominal)
-    free = np.ones(len(TOOL_UNKNOWNS), dtype=bool)
-    free[_ROTATION] = not rotation_known
-    weights = np.ones(2)
-    for _ in range(2):
-        values, R = _descend(postures, R, free, weights)
-        scatter = _scatter(postures, values, R, free)
-        weights = (
-            1.0 / np.where(scatter > 0.0, scatter, 1.0) if np.all(np.isfinite(scatter)) else weights
-        )
-    return _result(postures, values, R, free, weights, scatter)
+    model = model or ToolModel()
+    R = _rotation_between(postures, nominal) if model.rotation else nominal
+    size = np.array([np.abs(part).max() for part in (postures.force, postures.moment)])
+    least = _ROUNDING * np.where(size > 0.0, size, 1.0)
+    # Without the matrix first: the prior is worth what the scatter says, which is not known yet.
+    start = ToolModel(model.rotation, model.drift) if model.has_matrix else model
+    values, weights = np.zeros(_ALL), np.ones(2)
+    for stage in (start, start, model, model):
+        values, R = _descend(postures, values, R, stage, weights)
+        scatter = _scatter(postures, values, R, stage, weights)
+        if np.all(np.isfinite(scatter)):
+            weights = 1.0 / np.maximum(scatter, least)
+    return _result(postures, values, R, model, weights, scatter)
 
 
 def tool_residual(postures: StaticPostures, fit: ToolFit) -> tuple[FloatArray, FloatArray]:
     """Return what a fit leaves of forces and moments, shapes (posture, 3)."""
     weight = fit.mass * (postures.gravity_flange @ fit.R_flange_sensor)
+    wrench = np.hstack([weight, np.cross(fit.centre, weight)]) @ fit.matrix.T
+    wrench += postures.course[:, None] * fit.drift
     return (
-        postures.force - weight - fit.force_bias,
-        postures.moment - np.cross(fit.centre, weight) - fit.moment_bias,
+        postures.force - wrench[:, :3] - fit.force_bias,
+        postures.moment - wrench[:, 3:] - fit.moment_bias,
     )
 
 
@@ -167,16 +252,21 @@ def _rotation_between(postures: StaticPostures, nominal: FloatArray) -> FloatArr
 
 
 def _descend(
-    postures: StaticPostures, R: FloatArray, free: BoolArray, weights: FloatArray
+    postures: StaticPostures,
+    values: FloatArray,
+    R: FloatArray,
+    model: ToolModel,
+    weights: FloatArray,
 ) -> tuple[FloatArray, FloatArray]:
     """Return values (rotation 0, about the R returned) of the least squares."""
-    values = np.zeros(len(TOOL_UNKNOWNS))
     measured = np.hstack([postures.force, postures.moment])
+    values, free = values.copy(), model.free
     for _ in range(_STEPS):
-        left = (measured - tool_wrenches(postures, values, R)) * np.repeat(weights, 3)
-        u, s, vt, scale, kept = _decomposed(tool_derivatives(postures, values, R), free, weights)
-        step = np.zeros(len(TOOL_UNKNOWNS))
-        step[free] = (vt[kept].T @ ((u[:, kept].T @ left.ravel()) / s[kept])) / scale
+        left = (measured - tool_wrenches(postures, values, R, model)) * np.repeat(weights, 3)
+        rows = np.concatenate([left.ravel(), -values[_MATRIX][free[_MATRIX]]])
+        u, s, vt, scale, kept = _decomposed(postures, values, R, model, weights)
+        step = np.zeros(_ALL)
+        step[free] = (vt[kept].T @ ((u[:, kept].T @ rows) / s[kept])) / scale
         values = values + step
         R = R @ Rotation.from_rotvec(step[_ROTATION]).as_matrix()
         values[_ROTATION] = 0.0
@@ -186,14 +276,21 @@ def _descend(
 
 
 def _decomposed(
-    derivatives: FloatArray, free: BoolArray, weights: FloatArray
+    postures: StaticPostures,
+    values: FloatArray,
+    R: FloatArray,
+    model: ToolModel,
+    weights: FloatArray,
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, BoolArray]:
     """Return the singular value decomposition ``u s vt`` of the weighed derivatives.
 
-    Before it the columns of the free unknowns are divided by their ``scale``; the last array tells
-    the directions that the postures determine.
+    Below the postures' rows stand those of the prior. Before it the columns of the free unknowns
+    are divided by their ``scale``; the last array tells the directions that are determined.
     """
-    J = (derivatives * np.repeat(weights, 3)[:, None]).reshape(-1, len(TOOL_UNKNOWNS))[:, free]
+    free = model.free
+    J = tool_derivatives(postures, values, R, model) * np.repeat(weights, 3)[:, None]
+    prior = np.eye(_ALL)[_MATRIX][free[_MATRIX]]
+    J = np.vstack([J.reshape(-1, _ALL), prior])[:, free]
     scale = np.linalg.norm(J, axis=0)
     scale[scale <= _DEPENDENT * scale.max()] = scale.max()
     u, s, vt = np.linalg.svd(J / scale, full_matrices=False)
@@ -201,42 +298,64 @@ def _decomposed(
 
 
 def _scatter(
-    postures: StaticPostures, values: FloatArray, R: FloatArray, free: BoolArray
+    postures: StaticPostures,
+    values: FloatArray,
+    R: FloatArray,
+    model: ToolModel,
+    weights: FloatArray,
 ) -> FloatArray:
     """Return the standard deviations of what is left of force and moment components."""
-    left = np.hstack([postures.force, postures.moment]) - tool_wrenches(postures, values, R)
-    rows = 3 * len(postures)
-    over = rows - np.array([4 + 3 * bool(free[1]), 6])
+    left = np.hstack([postures.force, postures.moment]) - tool_wrenches(postures, values, R, model)
     squares = (left.reshape(-1, 2, 3) ** 2).sum(axis=(0, 2))
-    return np.where(over > 0, np.sqrt(squares / np.maximum(over, 1)), np.nan)
+    over = _left_over(postures, values, R, model, weights)
+    return np.where(over > 0.5, np.sqrt(squares / np.maximum(over, 0.5)), np.nan)
+
+
+def _left_over(
+    postures: StaticPostures,
+    values: FloatArray,
+    R: FloatArray,
+    model: ToolModel,
+    weights: FloatArray,
+) -> FloatArray:
+    """Return how many of the force and moment components are left over, by their leverage."""
+    u, _, _, _, kept = _decomposed(postures, values, R, model, weights)
+    rows = 6 * len(postures)
+    taken = (u[:rows, kept] ** 2).sum(axis=1).reshape(-1, 2, 3).sum(axis=(0, 2))
+    over: FloatArray = 0.5 * rows - taken
+    return over
 
 
 def _result(
     postures: StaticPostures,
     values: FloatArray,
     R: FloatArray,
-    free: BoolArray,
+    model: ToolModel,
     weights: FloatArray,
     scatter: FloatArray,
 ) -> ToolFit:
-    _, s, vt, scale, kept = _decomposed(tool_derivatives(postures, values, R), free, weights)
+    free = model.free
+    _, s, vt, scale, kept = _decomposed(postures, values, R, model, weights)
     mass = float(values[0])
     centre = values[7:10] / (mass if abs(mass) > 0.0 else np.inf)
     # Rows: how each unknown moves with the independent directions, each by its deviation.
-    moves = np.zeros((len(TOOL_UNKNOWNS), int(kept.sum())))
+    moves = np.zeros((_ALL, int(kept.sum())))
     moves[free] = (vt[kept] / s[kept, None]).T / scale[:, None]
     moves[7:10] = (moves[7:10] - centre[:, None] * moves[0]) / max(abs(mass), _NO_MASS)
     sigma = np.linalg.norm(moves, axis=1)
     # Columns that are weighed have scatter 1; those that are not have what is left of them.
     unit = 1.0 if np.all(scatter > 0.0) else float(np.nan_to_num(scatter).max())
-    degrees = 6 * len(postures) - int(free.sum())
-    half = stdtrit(max(degrees, 1), 0.5 + _LEVEL / 2) * sigma * unit
-    loose = np.zeros(len(TOOL_UNKNOWNS), dtype=bool)
+    degrees = float(_left_over(postures, values, R, model, weights).sum())
+    half = stdtrit(max(degrees, 1.0), 0.5 + _LEVEL / 2) * sigma[:_PLAIN] * unit
+    loose = np.zeros(_ALL, dtype=bool)
     loose[free] = np.linalg.norm(vt[~kept], axis=0) > _LOADING
-    if degrees < 1:
+    loose = loose[:_PLAIN]
+    if degrees < 0.5:
         half[:] = np.nan
     loose |= ~(half <= _widest(mass, postures))
     half[loose] = np.nan
+    # In deviations of the prior the entries' covariance is the identity before any posture.
+    entries = moves[_MATRIX] @ moves[_MATRIX].T if model.has_matrix else np.eye(36)
     return ToolFit(
         mass=mass,
         centre=centre,
@@ -248,7 +367,11 @@ def _result(
         count=len(postures),
         force_scatter=float(scatter[0]),
         moment_scatter=float(scatter[1]),
-        rotation_known=not free[1],
+        model=model,
+        drift=values[_DRIFT],
+        matrix=np.eye(6) + values[_MATRIX].reshape(6, 6) * model.spread,
+        matrix_determined=np.clip(1.0 - np.diag(entries), 0.0, 1.0).reshape(6, 6),
+        matrix_rank=int((np.linalg.eigvalsh(entries) < 0.25).sum()),
     )
 
 

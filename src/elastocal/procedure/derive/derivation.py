@@ -18,7 +18,7 @@ from pathlib import Path
 
 import numpy as np
 
-from elastocal.arrays import FloatArray
+from elastocal.arrays import FloatArray, IndexArray
 from elastocal.cell import Cell, SensorLoad
 from elastocal.dataset import STATUSES, Dataset, write
 from elastocal.errors import DatasetError, FileAccessError, ProcedureError, SchemaError
@@ -304,8 +304,12 @@ def _dataset(
         return values if np.all(values[ok] > 0) else None
 
     tools = {pose.pose: pose.reference.tool for pose in poses if pose.reference is not None}
-    unknown = np.full(3, np.nan)
-    tcp = [tool.T_base_tcp[:3, 3] if (tool := tools.get(pose)) else unknown for pose in labels]
+    reference = np.full((len(labels), len(robot.joint_names)), np.nan)
+    tcp = np.full((len(labels), 3), np.nan)
+    for index, pose in enumerate(labels):
+        tool = tools.get(pose)
+        if tool is not None:
+            reference[index], tcp[index] = tool.q, tool.T_base_tcp[:3, 3]
     return Dataset.from_arrays(
         joint_position=array("q", len(robot.joint_names)),
         force=array("force"),
@@ -318,10 +322,28 @@ def _dataset(
         load_cases=load_cases,
         poses=labels,
         status=status,
-        tcp_position=np.array(tcp),
+        sequence=_sequence(poses, labels, load_cases),
+        tcp_position=tcp,
+        reference_joint_position=reference,
+        # The force is counted from the reference, where the tool was off the surface.
+        reference_force=np.zeros((len(labels), 3)),
         robot_name=robot.name,
-        robot_urdf=robot.urdf,
+        robot_urdf=cell.urdf_with_tool_mass,
         tcp_frame=robot.tip,
         marker=tuple(lever.tolist()),
+        gravity=cell.gravity_of_mounting,
         provenance=provenance,
     )
+
+
+def _sequence(
+    poses: Sequence[PoseReadings], labels: Sequence[int], load_cases: Sequence[str]
+) -> IndexArray:
+    """Return the place in time of each load among those of its pose; -1 where it was not tried."""
+    sequence = np.full((len(labels), len(load_cases)), -1)
+    for pose in poses:
+        for place, load in enumerate(pose.loads):
+            if load.window.load_case in load_cases:
+                case = load_cases.index(load.window.load_case)
+                sequence[labels.index(pose.pose), case] = place
+    return sequence
