@@ -314,8 +314,7 @@ def calibrate(
     )
     reach = max(attainable_rank(model, marker_offset), calibrated.observability.rank)
     warnings += [offset.message()] if offset else []
-    warnings += _fit_warnings(calibrated, reach, weighted)
-    warnings += [] if solution.settled else [_unsettled(options.loss)]
+    warnings += _fit_warnings(calibrated, reach, weighted) + _unsettled(solution, options.loss)
     return Calibration(
         calibrated=calibrated,
         readings=readings,
@@ -382,8 +381,11 @@ def _fit_warnings(calibrated: CalibratedModel, reach: int, problem: Problem) -> 
     return warnings
 
 
-def _unsettled(loss: str) -> str:
-    return (
+def _unsettled(solution: Solution, loss: str) -> list[str]:
+    """Return the warning of a loss whose weights still changed when reweighting ended."""
+    if solution.settled:
+        return []
+    return [
         f"the {loss} loss had not settled when reweighting ended: its weights, and so the springs,"
         " depend on where it stopped"
-    )
+    ]
