@@ -146,7 +146,13 @@ class CalibratedModel:
         return interval(self.draws)
 
     def predict(
-        self, q: ArrayLike, force: ArrayLike, moment: ArrayLike | None = None
+        self,
+        q: ArrayLike,
+        force: ArrayLike,
+        moment: ArrayLike | None = None,
+        visit: ArrayLike | None = None,
+        *,
+        friction: FloatArray | None = None,
     ) -> Prediction:
         """Return the deflections at configurations under loads.
 
@@ -158,13 +164,31 @@ class CalibratedModel:
             Force on the robot at the tcp in base, in N.
         moment : array_like, shape (row, 3), optional
             Moment on the robot about the tcp in base, in N·m.
+        visit : array_like, shape (row,), optional
+            Rows with one value follow one another in time and share what friction remembers, which
+            is free before the first of them. Default: each row is pressed from rest.
+        friction : ndarray, shape (row, element), optional
+            Torque that each friction element bears, in N·m, instead.
+
+        Raises
+        ------
+        RobotError, SpringError
+            If an argument is not finite or has another shape.
         """
         q, force, moment = check_rows(self.model.robot, q, force, moment)
+        if visit is not None and np.shape(visit) != (len(q),):
+            raise SpringError(
+                f"visit {np.shape(visit)} does not have a value for each of {len(q)} rows"
+            )
+        if friction is None and visit is not None and len(self.model.friction):
+            load = self.model.load_torques(q, force, moment)
+            friction, _ = self.model.friction.visits(self.model.weight_torques(q), load, visit)
         result = np.empty((3, len(q), 3))
         for start in range(0, len(q), _CHUNK):
             rows = slice(start, start + _CHUNK)
             m = None if moment is None else moment[rows]
-            blocks = self.model.observation_blocks(q[rows], force[rows], m)
+            borne = None if friction is None else friction[rows]
+            blocks = self.model.observation_blocks(q[rows], force[rows], m, friction=borne)
             result[0, rows] = blocks @ self.compliance
             result[1:, rows] = interval(np.moveaxis(blocks @ self.draws.T, -1, 0))
         deflection, low, high = result
