@@ -13,7 +13,7 @@ it: 1 mrad makes 1 µm of each millimetre; the tracker's place does not enter at
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -49,6 +49,7 @@ from elastocal.procedure.record import (
     read_copies,
     read_journal,
     read_streams,
+    signs_of_a_cut,
 )
 from elastocal.procedure.registration import Registration, register
 from elastocal.records import write_json
@@ -89,8 +90,12 @@ def derive_run(run: Path) -> DerivedRun:
         raise FileAccessError(f"{run} is no folder of a run: it holds no {folder.journal.name}")
     entries = read_journal(folder.journal)
     logs = _latest(commits(entries))
+    signs = signs_of_a_cut(folder, entries)
     if not entries or entries[0].run is None or not logs:
-        raise ProcedureError(f"{folder.journal}: no pose is committed: there is nothing to derive")
+        why = "".join(f"; {sign}" for sign in signs)
+        raise ProcedureError(
+            f"{folder.journal}: no pose is committed: there is nothing to derive{why}"
+        )
     record = entries[0].run
     cell, plan = read_copies(folder, record)
     known = {e.log.streams: e.streams_sha256 for e in entries if e.log is not None}
@@ -98,9 +103,11 @@ def derive_run(run: Path) -> DerivedRun:
         check_stream(folder.streams / log.streams, known[log.streams])
     poses = [reduce_pose(log, _streams(folder, log, cell)) for log in logs]
     try:
-        return derive_poses(poses, cell, plan, entries, _provenance(folder, record))
+        derived = derive_poses(poses, cell, plan, entries, _provenance(folder, record))
     except (DatasetError, ProcedureError) as error:
         raise type(error)(f"{folder.path}: {error}") from error
+    warnings = (*signs, *derived.summary.warnings)
+    return replace(derived, summary=replace(derived.summary, warnings=warnings))
 
 
 def write_derived(run: Path, derived: DerivedRun) -> None:
