@@ -11,7 +11,7 @@ from .calibration import (
     check_rows as check_rows,
 )
 from .conventions import (
-    POOR as POOR,
+    POOR_FIT as POOR_FIT,
     check_conventions as check_conventions,
     check_joints as check_joints,
 )

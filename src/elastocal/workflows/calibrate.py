@@ -58,7 +58,7 @@ def calibrate(settings: CalibrateSettings, progress: Progress) -> CalibrateResul
     settings : CalibrateSettings
         Or its ``data``, and the other fields by name.
     progress : Progress, optional
-        Hears how far the work is.
+        Called with stage, done and total.
 
     Raises
     ------
