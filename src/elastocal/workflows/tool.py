@@ -79,7 +79,7 @@ def tool(settings: ToolSettings, progress: Progress) -> ToolResult:  # noqa: ARG
     settings : ToolSettings
         Or its ``data``, and the other fields by name.
     progress : Progress, optional
-        Hears how far the work is.
+        Called with stage, done and total.
 
     Raises
     ------
