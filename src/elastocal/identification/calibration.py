@@ -14,7 +14,7 @@ from elastocal.arrays import BoolArray, FloatArray
 from elastocal.dataset import Readings
 from elastocal.elastic import ElasticModel, check_vectors
 from elastocal.errors import ConventionError, IdentificationError, SpringError
-from elastocal.identification.conventions import POOR, check_conventions, check_joints
+from elastocal.identification.conventions import POOR_FIT, check_conventions, check_joints
 from elastocal.identification.domain import CalibrationDomain
 from elastocal.identification.frames import FrameSummary, frame_summaries
 from elastocal.identification.ladder import Climbed
@@ -146,7 +146,13 @@ class CalibratedModel:
         return interval(self.draws)
 
     def predict(
-        self, q: ArrayLike, force: ArrayLike, moment: ArrayLike | None = None
+        self,
+        q: ArrayLike,
+        force: ArrayLike,
+        moment: ArrayLike | None = None,
+        visit: ArrayLike | None = None,
+        *,
+        friction: FloatArray | None = None,
     ) -> Prediction:
         """Return the deflections at configurations under loads.
 
@@ -158,13 +164,31 @@ class CalibratedModel:
             Force on the robot at the tcp in base, in N.
         moment : array_like, shape (row, 3), optional
             Moment on the robot about the tcp in base, in N·m.
+        visit : array_like, shape (row,), optional
+            Rows with one value follow one another in time and share what friction remembers, which
+            is free before the first of them. Default: each row is pressed from rest.
+        friction : ndarray, shape (row, element), optional
+            Torque that each friction element bears, in N·m, instead.
+
+        Raises
+        ------
+        RobotError, SpringError
+            If an argument is not finite or has another shape.
         """
         q, force, moment = check_rows(self.model.robot, q, force, moment)
+        if visit is not None and np.shape(visit) != (len(q),):
+            raise SpringError(
+                f"visit {np.shape(visit)} does not have a value for each of {len(q)} rows"
+            )
+        if friction is None and visit is not None and len(self.model.friction):
+            load = self.model.load_torques(q, force, moment)
+            friction, _ = self.model.friction.visits(self.model.weight_torques(q), load, visit)
         result = np.empty((3, len(q), 3))
         for start in range(0, len(q), _CHUNK):
             rows = slice(start, start + _CHUNK)
             m = None if moment is None else moment[rows]
-            blocks = self.model.observation_blocks(q[rows], force[rows], m)
+            borne = None if friction is None else friction[rows]
+            blocks = self.model.observation_blocks(q[rows], force[rows], m, friction=borne)
             result[0, rows] = blocks @ self.compliance
             result[1:, rows] = interval(np.moveaxis(blocks @ self.draws.T, -1, 0))
         deflection, low, high = result
@@ -282,7 +306,7 @@ def calibrate(
     """
     options = options or FitOptions()
     problem = build(model, readings, options, marker_offset)
-    doubts = _doubts(model, readings, problem, options, marker_offset)
+    warnings = _data_warnings(model, readings, problem, options, marker_offset)
     screening = screen(problem)
     used = ~screening.blunder if options.set_blunders_aside else np.ones_like(screening.blunder)
     kept = problem.take(used)
@@ -313,8 +337,8 @@ def calibrate(
         model, readings.take(used), weighted, calibrated.compliance, marker_offset
     )
     reach = max(attainable_rank(model, marker_offset), calibrated.observability.rank)
-    doubts += [offset.message()] if offset else []
-    doubts += _worth(calibrated, reach, weighted)
+    warnings += [offset.message()] if offset else []
+    warnings += _fit_warnings(calibrated, reach, weighted) + _unsettled(solution, options.loss)
     return Calibration(
         calibrated=calibrated,
         readings=readings,
@@ -328,12 +352,12 @@ def calibrate(
         widening=by,
         screening=screening,
         solution=solution,
-        warnings=tuple(doubts),
+        warnings=tuple(warnings),
         frames=frame_summaries(weighted.frames, solution.compliance[frames], widened[:, frames]),
     )
 
 
-def _doubts(
+def _data_warnings(
     model: ElasticModel,
     readings: Readings,
     problem: Problem,
@@ -341,7 +365,7 @@ def _doubts(
     marker_offset: ArrayLike | None,
 ) -> list[str]:
     """Return what is odd about the data before they are fitted, or refuse them."""
-    doubts = list(check_joints(model.robot, readings)) + [
+    warnings = list(check_joints(model.robot, readings)) + [
         f"poses {', '.join(map(str, group))} are one configuration: resampled and left out together"
         for group in same_configuration(readings, problem.block)
     ]
@@ -350,13 +374,13 @@ def _doubts(
     except ConventionError as error:
         if not options.trust_conventions:
             raise
-        return [*doubts, f"fitted in spite of this: {error}"]
-    if left > POOR:
-        doubts.append(f"the springs leave {left:.0%} of the median deflection unexplained")
-    return doubts
+        return [*warnings, f"fitted in spite of this: {error}"]
+    if left > POOR_FIT:
+        warnings.append(f"the springs leave {left:.0%} of the median deflection unexplained")
+    return warnings
 
 
-def _worth(calibrated: CalibratedModel, reach: int, problem: Problem) -> list[str]:
+def _fit_warnings(calibrated: CalibratedModel, reach: int, problem: Problem) -> list[str]:
     """Return what limits the use of a fit, or refuse one that the data had no part in."""
     c = calibrated.compliance
     n = problem.springs
@@ -364,18 +388,28 @@ def _worth(calibrated: CalibratedModel, reach: int, problem: Problem) -> list[st
         raise IdentificationError(
             "every spring ends at a bound: the bounds, not the data, would make the model"
         )
-    doubts = []
+    warnings = []
     missing = reach - calibrated.observability.rank
     if missing > 0:
-        doubts.append(
+        warnings.append(
             f"poses and load cases determine {calibrated.observability.rank} of the {reach}"
             " directions that more of them would: predictions elsewhere are not covered"
         )
     left = calibrated.unexplained
     if left > MOST_UNEXPLAINED:
         none = "; it predicts no better than none at all" if left >= 1.0 else ""
-        doubts.append(
+        warnings.append(
             f"at left-out poses the model leaves {left:.0%} of the deflection unexplained, more"
             f" than half: it is not fit for use, and is not exported{none}"
         )
-    return doubts
+    return warnings
+
+
+def _unsettled(solution: Solution, loss: str) -> list[str]:
+    """Return the warning of a loss whose weights still changed when reweighting ended."""
+    if solution.settled:
+        return []
+    return [
+        f"the {loss} loss had not settled when reweighting ended: its weights, and so the springs,"
+        " depend on where it stopped"
+    ]

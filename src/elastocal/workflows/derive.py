@@ -8,6 +8,7 @@ from elastocal.dataset import Dataset
 from elastocal.procedure import RunFolder, RunSummary, derive_run, write_derived
 from elastocal.progress import Progress
 from elastocal.results import Result
+from elastocal.wording import counted
 from elastocal.workflows._workflow import workflow
 
 
@@ -30,7 +31,7 @@ class DeriveResult(Result):
     def facts(self) -> tuple[tuple[str, str], ...]:
         """Return what a person wants to know first."""
         return (
-            ("poses", str(len(self.dataset.poses))),
+            ("measured", self.poses()),
             ("readings", self.counts()),
             *(("warning", text) for text in self.summary.warnings),
         )
@@ -38,6 +39,13 @@ class DeriveResult(Result):
     def pictured(self) -> object:
         """Return the readings: the picture shows their deflections."""
         return self.dataset
+
+    def poses(self) -> str:
+        """Return the number of committed poses, with that of the plan where some are missing."""
+        found = self.summary.poses
+        if not found.missing:
+            return counted(found.committed, "pose")
+        return f"{found.committed} of {found.planned} planned poses"
 
     def counts(self) -> str:
         """Return the number of readings of each status, as a phrase."""
@@ -54,7 +62,7 @@ def derive(settings: DeriveSettings, progress: Progress) -> DeriveResult:  # noq
     settings : DeriveSettings
         Or its ``run``.
     progress : Progress, optional
-        Hears how far the work is.
+        Called with stage, done and total.
 
     Raises
     ------
