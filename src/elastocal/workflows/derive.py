@@ -62,7 +62,7 @@ def derive(settings: DeriveSettings, progress: Progress) -> DeriveResult:  # noq
     settings : DeriveSettings
         Or its ``run``.
     progress : Progress, optional
-        Hears how far the work is.
+        Called with stage, done and total.
 
     Raises
     ------
