@@ -63,13 +63,16 @@ class DerivedRun:
     summary: RunSummary
 
 
-def derive_run(run: Path) -> DerivedRun:
+def derive_run(run: Path, sensor: SensorLoad | None = None) -> DerivedRun:
     """Return dataset and summary of the poses that a run has committed.
 
     Parameters
     ----------
     run : Path
         Folder of the run: copies of cell and plan, journal, streams.
+    sensor : SensorLoad, optional
+        The tool on its sensor, with the matrix that corrects readings, from a tool file; by
+        default the cell file's, and readings are taken as they are.
 
     Raises
     ------
@@ -98,7 +101,8 @@ def derive_run(run: Path) -> DerivedRun:
         check_stream(folder.streams / log.streams, known[log.streams])
     poses = [reduce_pose(log, _streams(folder, log, cell)) for log in logs]
     try:
-        return derive_poses(poses, cell, plan, entries, _provenance(folder, record))
+        provenance = _provenance(folder, record, sensor)
+        return derive_poses(poses, cell, plan, entries, provenance, sensor)
     except (DatasetError, ProcedureError) as error:
         raise type(error)(f"{folder.path}: {error}") from error
 
@@ -122,6 +126,7 @@ def derive_poses(
     plan: PlanResult,
     entries: Sequence[Entry],
     provenance: str,
+    sensor: SensorLoad | None = None,
 ) -> DerivedRun:
     """Return dataset and summary of reduced poses.
 
@@ -137,6 +142,8 @@ def derive_poses(
         Of the journal, for times, retries and faults.
     provenance : str
         Where the data come from.
+    sensor : SensorLoad, optional
+        The tool on its sensor; by default the cell file's.
 
     Raises
     ------
@@ -145,7 +152,7 @@ def derive_poses(
     DatasetError
         If no reading is usable.
     """
-    tool, lever = _tool_load(cell), _lever_arm(cell)
+    tool, lever = sensor or _tool_load(cell), _lever_arm(cell)
     seen = marker_readings(poses, cell.robot, cell.gravity_base, lever)
     registration = register(seen, lever)
     rows = [_row(pose, load, registration, tool) for pose in poses for load in pose.loads]
@@ -203,8 +210,9 @@ def _reasons(rows: Sequence[LoadRow], registration: Registration) -> str:
     return next((row.note for row in rows if row.note), "there is none")
 
 
-def _provenance(folder: RunFolder, record: RunRecord) -> str:
-    return f"elastocal run {folder.path.resolve().name}, {record.origin}"
+def _provenance(folder: RunFolder, record: RunRecord, sensor: SensorLoad | None) -> str:
+    corrected = "" if sensor is None else ", sensor corrected by a tool file"
+    return f"elastocal run {folder.path.resolve().name}, {record.origin}{corrected}"
 
 
 @dataclass(frozen=True, eq=False)
