@@ -10,8 +10,10 @@ import pytest
 
 from elastocal import dataset
 from elastocal.dataset import read_load_rows
+from elastocal.identification import write_model
 from support.cells import Cell, linear_truth, robot, unseen, urdf
 from support.cli import elastocal
+from support.geared import geared
 
 KEYS = {
     "schema", "robot", "springs", "rank", "springs_total", "condition", "unobservable", "residual",
@@ -128,6 +130,30 @@ def test_predict_says_which_rows_lie_outside_of_what_was_calibrated(folder):
     figures = elastocal("predict", folder / "model.json", rows, "--out", out, "--json")
     outside = json.loads(figures.out)["outside"]
     assert (outside["rows"], outside["of"], outside["first"]) == (2, 2, 0)
+
+
+def test_rows_of_a_visit_share_what_friction_remembers_and_every_row_is_of_one(tmp_path):
+    write_model(tmp_path / "model.json", geared())
+    write_rows(tmp_path / "rows.csv")
+    header, *rows = (tmp_path / "rows.csv").read_text().splitlines()
+    visits = [f"{number // 4}" for number in range(len(rows))]
+    lines = [f"visit,{header}", *(",".join(pair) for pair in zip(visits, rows, strict=True))]
+    (tmp_path / "visits.csv").write_text("\n".join(lines) + "\n")
+    found = {}
+    for name in ("rows", "visits"):
+        arguments = (tmp_path / "model.json", tmp_path / f"{name}.csv")
+        assert elastocal("predict", *arguments, "--out", tmp_path / f"{name}_out.csv").code == 0
+        names = (f"deflection_{axis}[m]" for axis in "xyz")
+        found[name] = columns(tmp_path / f"{name}_out.csv", *names)
+    off = np.linalg.norm(found["visits"] - found["rows"], axis=1)
+    assert off[::4].max() < 1e-12
+    assert off.max() > 1e-6
+    assert (tmp_path / "visits_out.csv").read_text().startswith("visit,")
+    lines[3] = lines[3].replace("0,", " ,", 1)
+    (tmp_path / "visits.csv").write_text("\n".join(lines) + "\n")
+    refused = elastocal("predict", *arguments, "--out", tmp_path / "out.csv")
+    assert refused.code == 1
+    assert "row 4, column 'visit': empty, but every row is of some visit" in refused.reason
 
 
 def test_predict_with_a_model_that_does_not_know_its_misfit_says_what_is_missing(folder):

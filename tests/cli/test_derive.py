@@ -5,7 +5,7 @@ import typer
 
 from elastocal.cli.commands.derive import _derive
 from elastocal.dataset import read
-from elastocal.errors import FileAccessError
+from elastocal.errors import FileAccessError, ProcedureError
 from support.recorded_runs import record_run
 
 
@@ -29,6 +29,31 @@ def test_people_are_told_counts_and_places_on_standard_error(tmp_path, capsys):
 def test_a_folder_that_is_no_run_is_refused(tmp_path):
     with pytest.raises(FileAccessError, match=r"is no folder of a run: it holds no journal\.jsonl"):
         _derive(tmp_path)
+
+
+@pytest.mark.parametrize(("torn", "place"), [(0, ""), (9, "line 5 of journal.jsonl, its last,")])
+def test_a_journal_that_was_cut_shrinks_no_run_silently(tmp_path, capsys, torn, place):
+    run = record_run(tmp_path / "run")
+    journal = run.path / "journal.jsonl"
+    lines = journal.read_bytes().splitlines(keepends=True)
+    journal.write_bytes(b"".join(lines[: -3 if torn else -2]) + lines[-3][:torn])
+    left = 6 - (3 if torn else 2)
+    _derive(run.path)
+    told = capsys.readouterr().err
+    assert f"{left} of 6 planned poses, readings: " in told
+    assert f"it does not name {6 - left} of 6 recordings (pose_000{left}_1.mcap the first)" in told
+    warnings = json.loads((run.path / "summary.json").read_text())["warnings"]
+    assert any("was cut, or is not of this run" in text for text in warnings)
+    assert any(text.startswith(place) and "torn" in text for text in warnings) is bool(torn)
+
+
+def test_a_journal_without_a_pose_says_what_it_does_not_name(tmp_path):
+    run = record_run(tmp_path / "run")
+    journal = run.path / "journal.jsonl"
+    journal.write_bytes(journal.read_bytes().partition(b"\n")[0] + b"\n")
+    message = r"nothing to derive; journal\.jsonl was cut, .*does not name 6 of 6 recordings"
+    with pytest.raises(ProcedureError, match=message):
+        _derive(run.path)
 
 
 def test_a_folder_that_is_not_there_is_called_missing(tmp_path):

@@ -31,9 +31,9 @@ from elastocal.identification import (
     write_model,
 )
 from elastocal.records import from_data, to_data
-from elastocal.robot import Robot
-from support.cells import linkage, robot, urdf
+from support.cells import linkage, robot
 from support.exported import build as compiled_c, needs_gcc, written
+from support.geared import heavy_robot
 from support.problems import campaign
 from support.virtual_chain import configurations, numerical_column
 
@@ -57,21 +57,6 @@ CASES: dict[str, Spring] = {
 """Springs of each kind at joint 3."""
 RNG = np.random.default_rng(5)
 FORCE, MOMENT = RNG.normal(0.0, 800.0, (4, 3)), RNG.normal(0.0, 100.0, (4, 3))
-
-
-@cache
-def heavy_robot() -> Robot:
-    """Return the same arm with masses, each beside its joint's axis."""
-    text = urdf()
-    for k, mass in enumerate((280.0, 190.0, 150.0, 60.0, 25.0, 40.0), start=1):
-        bare = f'<link name="link_{k}"/>'
-        assert text.count(bare) == 1
-        inertial = (
-            f'<inertial><origin xyz="0.1 -0.05 {0.3 if k < 4 else 0.1}"/><mass value="{mass}"/>'
-            '<inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial>'
-        )
-        text = text.replace(bare, f'<link name="link_{k}">{inertial}</link>')
-    return Robot.from_urdf(text, "tcp")
 
 
 @cache

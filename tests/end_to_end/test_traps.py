@@ -11,6 +11,7 @@ import pytest
 
 from elastocal import dataset
 from elastocal.dataset import Dataset
+from elastocal.errors import DatasetError
 from elastocal.robot import Robot
 from elastocal.sim.arm import (
     Blunder,
@@ -237,7 +238,7 @@ def test_a_broken_table_is_refused_by_name(tmp_path, edit, message):
 def test_nan_in_a_reading_that_claims_to_be_ok_is_refused(tmp_path):
     values = arrays()
     values["force"][1, 2, 0] = np.nan
-    with pytest.raises(dataset.dataset.DatasetError, match=r"force.*pose 1.*south"):
+    with pytest.raises(DatasetError, match=r"force.*pose 1.*south"):
         changed(**values)
 
 
@@ -247,7 +248,7 @@ def test_a_load_case_without_any_reading_is_refused(tmp_path):
         array[:, 4] = np.nan
     status = np.zeros((POSES, 5), dtype=np.int8)
     status[:, 4] = 4
-    with pytest.raises(dataset.dataset.DatasetError, match="west"):
+    with pytest.raises(DatasetError, match="west"):
         changed(**values, status=status)
 
 

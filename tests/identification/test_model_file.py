@@ -1,5 +1,5 @@
 import json
-from dataclasses import fields
+from dataclasses import fields, replace
 from functools import cache
 
 import numpy as np
@@ -17,6 +17,7 @@ from elastocal.identification import (
     write_model,
 )
 from elastocal.records import read_json
+from elastocal.robot import GRAVITY
 from support.problems import campaign, elastic
 
 
@@ -47,6 +48,15 @@ def edited(path):
         return read_model(path)
 
     return read
+
+
+@pytest.mark.parametrize("gravity", [GRAVITY, (0.0, 9.80665, 0.0)])
+def test_a_model_keeps_where_gravity_points(path, gravity):
+    calibrated = calibration().calibrated
+    robot = replace(calibrated.model.robot, gravity=gravity)
+    hung = replace(calibrated, model=ElasticModel(robot, calibrated.model.springs))
+    write_model(path, hung)
+    assert read_model(path).model.robot.gravity == gravity
 
 
 def test_a_model_comes_back_to_the_last_digit(path):

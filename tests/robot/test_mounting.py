@@ -6,7 +6,15 @@ import numpy as np
 import pytest
 
 from elastocal.errors import RobotError
-from elastocal.robot import Rail, Robot, T_from_xyzabc, catalogue, on_rail, with_tool
+from elastocal.robot import (
+    Rail,
+    Robot,
+    T_from_xyzabc,
+    catalogue,
+    on_rail,
+    with_tool,
+    with_tool_mass,
+)
 from support.urdfs import KR_LIKE, opw_arm_urdf
 
 ARM = opw_arm_urdf(**KR_LIKE)
@@ -76,6 +84,30 @@ class TestWithTool:
     def test_text_that_is_no_urdf_is_refused(self):
         with pytest.raises(RobotError, match="not valid XML"):
             with_tool("<robot", "tcp", "tool", T_TOOL)
+
+
+class TestWithToolMass:
+    def test_its_weight_acts_at_the_centre_given(self):
+        robot = Robot.from_urdf(ARM, "tcp")
+        weighed = Robot.from_urdf(with_tool_mass(ARM, "tcp", 40.0, (0.0, 0.1, 0.2)), "tcp")
+        behind = Robot.from_urdf(
+            with_tool(ARM, "tcp", "centre", T_from_xyzabc(0.0, 0.1, 0.2, 0.0, 0.0, 0.0)), "centre"
+        )
+        weight = behind.jacobian(Q).translation.T @ [0.0, 0.0, -9.80665 * 40.0]
+        more = weighed.gravity_torques(Q)
+        if robot.has_masses:
+            more = more - robot.gravity_torques(Q)
+        np.testing.assert_allclose(more, -weight, atol=1e-9)
+        np.testing.assert_array_equal(weighed.forward(Q), robot.forward(Q))
+
+    def test_no_mass_leaves_the_text(self):
+        assert with_tool_mass(ARM, "tcp", 0.0, np.zeros(3)) == ARM
+
+    def test_a_link_that_is_not_there_or_weighed_already_is_refused(self):
+        with pytest.raises(RobotError, match=r"link 'tcq': no such link"):
+            with_tool_mass(ARM, "tcq", 1.0, np.zeros(3))
+        with pytest.raises(RobotError, match=r"link 'tcp': a mass already"):
+            with_tool_mass(with_tool_mass(ARM, "tcp", 1.0, np.zeros(3)), "tcp", 1.0, np.zeros(3))
 
 
 class TestOnRail:

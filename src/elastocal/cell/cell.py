@@ -57,6 +57,7 @@ from elastocal.robot import (
     on_rail,
     parse_urdf,
     with_tool,
+    with_tool_mass,
 )
 
 SCHEMA = "elastocal.cell/1"
@@ -167,7 +168,8 @@ class Cell:
     file: CellFile
     """Its contents."""
     robot: Robot
-    """From base (the rail's frame, if there is one) to the tool centre point."""
+    """From base (the rail's frame, if there is one) to the tool centre point; the tool's mass is
+    not in it, since checks and simulator add that themselves."""
     external_positions: FloatArray
     """Positions of the external axes to choose from, shape (combination, external axis)."""
     torque_limits: FloatArray
@@ -223,6 +225,18 @@ class Cell:
         """Centre of mass of the tool in the tcp frame, shape (3,), in m."""
         T = self.T_tcp_flange
         return T[:3, :3] @ self.file.tool.centre + T[:3, 3]
+
+    @property
+    def urdf_with_tool_mass(self) -> str:
+        """URDF of the robot whose tcp link has the tool's mass, for whoever reads it alone."""
+        mass = self.file.tool.mass
+        return with_tool_mass(self.robot.urdf, self.robot.tip, mass, self.tool_centre_tcp)
+
+    @property
+    def gravity_of_mounting(self) -> tuple[float, float, float] | None:
+        """Acceleration of gravity in base, in m/s²; None where the base stands upright."""
+        x, y, z = self.gravity_base.tolist()
+        return None if np.allclose((x, y, z), GRAVITY, rtol=0.0, atol=1e-9) else (x, y, z)
 
     @property
     def T_sensor_tcp(self) -> FloatArray | None:

@@ -15,7 +15,7 @@ from elastocal.errors import DatasetError, UnitError, nearest
 from elastocal.files import read_text
 from elastocal.results import brief_repr
 from elastocal.robot import Robot
-from elastocal.tables import Column, TableError, write_table
+from elastocal.tables import Column, TableError, TableRows, write_table
 from elastocal.units import factor, split_column
 
 LARGEST_FORCE, LARGEST_MOMENT = 1e5, 1e5
@@ -25,6 +25,7 @@ _BEYOND = 0.1
 that were called radians lie farther off."""
 _LARGEST_POSITION = 200.0 * np.pi
 """Of a joint without limits, in rad or m: 100 turns."""
+_VISIT = "visit"
 _EXAMPLES = {"angle": "rad", "length": "m", "force": "N", "moment": "N*m"}
 
 
@@ -39,6 +40,9 @@ class LoadRows:
     """Force on the robot at the tcp in base, shape (row, 3), in N."""
     moment: FloatArray | None
     """Moment on the robot about the tcp in base, shape (row, 3), in N·m; None: no columns."""
+    visit: tuple[str, ...] | None
+    """Rows with one text follow one another in time, shape (row,); None: no column, each row is a
+    visit of its own."""
     header: tuple[str, ...]
     cells: tuple[tuple[str, ...], ...]
     lines: tuple[int, ...]
@@ -104,7 +108,8 @@ def read_load_rows(path: Path, joint_units: Mapping[str, str]) -> LoadRows:
     Raises
     ------
     DatasetError
-        If a column is missing, has no unit or a wrong one, or a cell is not a finite number.
+        If a column is missing, has no unit or a wrong one, a cell is not a finite number, or a row
+        is of no visit where others are.
     FileAccessError
         If the file cannot be read.
     """
@@ -119,6 +124,7 @@ def read_load_rows(path: Path, joint_units: Mapping[str, str]) -> LoadRows:
         values = np.column_stack(
             [table.rows.numbers(_column(columns, *column)) for column in wanted]
         )
+        visit = _visits(table.rows, columns)
     except (DatasetError, TableError, UnitError) as error:
         raise DatasetError(f"{path}: {error}") from error
     n = len(joints)
@@ -126,6 +132,7 @@ def read_load_rows(path: Path, joint_units: Mapping[str, str]) -> LoadRows:
         values[:, :n],
         values[:, n : n + 3],
         values[:, n + 3 :] if has_moment else None,
+        visit,
         table.header,
         tuple(tuple(row) for row in table.rows.cells),
         tuple(table.rows.lines),
@@ -176,6 +183,22 @@ def _columns(header: Sequence[str]) -> dict[str, tuple[int, str | None]]:
             raise DatasetError(f"column {name!r} stands twice in the header")
         columns[name] = (index, unit)
     return columns
+
+
+def _visits(
+    rows: TableRows, columns: Mapping[str, tuple[int, str | None]]
+) -> tuple[str, ...] | None:
+    """Return the text of the column `visit`, which names visits as one likes."""
+    if _VISIT not in columns:
+        return None
+    index, unit = columns[_VISIT]
+    if unit is not None:
+        raise DatasetError(f"column {_VISIT!r} is written without a unit, not in {unit}")
+    visits = tuple(cells[index].strip() for cells in rows.cells)
+    if "" in visits:
+        line = rows.lines[visits.index("")]
+        raise DatasetError(f"row {line}, column {_VISIT!r}: empty, but every row is of some visit")
+    return visits
 
 
 def _column(columns: Mapping[str, tuple[int, str | None]], name: str, dimension: str) -> Column:

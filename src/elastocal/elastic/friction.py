@@ -13,6 +13,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from elastocal.arrays import FloatArray, IndexArray
 from elastocal.elastic.springs import Spring
@@ -80,3 +81,43 @@ class FrictionElements:
         for step, change in enumerate(np.diff(seen, axis=0), start=1):
             states[step] = np.clip(states[step - 1] + change, -self.limit, self.limit)
         return states
+
+    def visits(
+        self,
+        weight: FloatArray,
+        load: FloatArray,
+        visit: ArrayLike | None = None,
+        memory: FloatArray | None = None,
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return the states under loads, those of one visit one after the other in time.
+
+        Parameters
+        ----------
+        weight, load : ndarray, shape (row, axis)
+            Torque of the arm's own weight and of the load about each axis, in N·m.
+        visit : array_like, shape (row,), optional
+            Rows with one value are a visit: free before its first row, under the weight alone.
+            Default: all rows are one.
+        memory : ndarray, shape (element,), optional
+            What the visit of the first row remembers from before: states less the whole torque.
+
+        Returns
+        -------
+        states : ndarray, shape (row, element)
+            In N·m.
+        memory : ndarray, shape (element,)
+            After the last row.
+        """
+        total = weight + load
+        states = np.zeros((len(total), len(self)))
+        if not len(total):
+            return states, np.zeros(len(self)) if memory is None else memory
+        labels = np.zeros(len(total)) if visit is None else np.asarray(visit)
+        _, number = np.unique(labels, return_inverse=True)
+        order = np.argsort(number, kind="stable")
+        for rows in np.split(order, np.flatnonzero(np.diff(number[order])) + 1):
+            remembers = memory is not None and rows[0] == 0
+            before = memory if remembers else -weight[rows[0], self.axis]
+            way = np.concatenate([np.zeros((1, total.shape[1])), total[rows]])
+            states[rows] = self.path(way, before)[1:]
+        return states, states[-1] - total[-1, self.axis]

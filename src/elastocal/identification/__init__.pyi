@@ -39,6 +39,13 @@ from .figures import (
     spring_summaries as spring_summaries,
     summary as summary,
 )
+from .frames import (
+    NUMBERS as NUMBERS,
+    FrameColumns as FrameColumns,
+    FrameSummary as FrameSummary,
+    frame_columns as frame_columns,
+    frame_summaries as frame_summaries,
+)
 from .ladder import (
     AUTO as AUTO,
     RUNGS as RUNGS,
@@ -73,6 +80,7 @@ from .options import (
     MINIMUM_DRAWS as MINIMUM_DRAWS,
     FitOptions as FitOptions,
     FitSettings as FitSettings,
+    FreeFrame as FreeFrame,
     Prior as Prior,
     Weights as Weights,
     bounds as bounds,

@@ -16,6 +16,7 @@ from elastocal.elastic import ElasticModel, check_vectors
 from elastocal.errors import ConventionError, IdentificationError, SpringError
 from elastocal.identification.conventions import POOR, check_conventions, check_joints
 from elastocal.identification.domain import CalibrationDomain
+from elastocal.identification.frames import FrameSummary, frame_summaries
 from elastocal.identification.ladder import Climbed
 from elastocal.identification.observability import (
     Observability,
@@ -145,7 +146,13 @@ class CalibratedModel:
         return interval(self.draws)
 
     def predict(
-        self, q: ArrayLike, force: ArrayLike, moment: ArrayLike | None = None
+        self,
+        q: ArrayLike,
+        force: ArrayLike,
+        moment: ArrayLike | None = None,
+        visit: ArrayLike | None = None,
+        *,
+        friction: FloatArray | None = None,
     ) -> Prediction:
         """Return the deflections at configurations under loads.
 
@@ -157,13 +164,31 @@ class CalibratedModel:
             Force on the robot at the tcp in base, in N.
         moment : array_like, shape (row, 3), optional
             Moment on the robot about the tcp in base, in N·m.
+        visit : array_like, shape (row,), optional
+            Rows with one value follow one another in time and share what friction remembers, which
+            is free before the first of them. Default: each row is pressed from rest.
+        friction : ndarray, shape (row, element), optional
+            Torque that each friction element bears, in N·m, instead.
+
+        Raises
+        ------
+        RobotError, SpringError
+            If an argument is not finite or has another shape.
         """
         q, force, moment = check_rows(self.model.robot, q, force, moment)
+        if visit is not None and np.shape(visit) != (len(q),):
+            raise SpringError(
+                f"visit {np.shape(visit)} does not have a value for each of {len(q)} rows"
+            )
+        if friction is None and visit is not None and len(self.model.friction):
+            load = self.model.load_torques(q, force, moment)
+            friction, _ = self.model.friction.visits(self.model.weight_torques(q), load, visit)
         result = np.empty((3, len(q), 3))
         for start in range(0, len(q), _CHUNK):
             rows = slice(start, start + _CHUNK)
             m = None if moment is None else moment[rows]
-            blocks = self.model.observation_blocks(q[rows], force[rows], m)
+            borne = None if friction is None else friction[rows]
+            blocks = self.model.observation_blocks(q[rows], force[rows], m, friction=borne)
             result[0, rows] = blocks @ self.compliance
             result[1:, rows] = interval(np.moveaxis(blocks @ self.draws.T, -1, 0))
         deflection, low, high = result
@@ -226,6 +251,8 @@ class Calibration:
     screening: Screening
     solution: Solution
     warnings: tuple[str, ...]
+    frames: tuple[FrameSummary, ...] = ()
+    """Frames that were estimated with the springs."""
 
     @property
     def residual_norm(self) -> FloatArray:
@@ -292,19 +319,23 @@ def calibrate(
     if unexplained > MOST_UNEXPLAINED:
         by = max(by, distrust_factor(weighted, solution.compliance, draws, held_out))
     widened = widen_draws(weighted, solution.compliance, draws, by)
+    springs, frames = weighted.springs, slice(weighted.springs.stop, None)
+    compliance, plain = solution.compliance[springs], weighted.without_frames()
     # A prior makes nothing observable: what was believed before is not measured.
-    seen = observability(factor(weighted.without_prior()), model.springs)
+    seen = observability(factor(plain.without_prior()), model.springs)
     calibrated = CalibratedModel(
         model,
-        solution.compliance,
-        widened,
-        find_faint(seen, weighted, solution.compliance, model.parameters),
+        compliance,
+        widened[:, springs],
+        find_faint(seen, plain, compliance, model.parameters),
         provenance,
         held_out.misfit,
         unexplained=unexplained,
         domain=CalibrationDomain.of(model.robot, readings.take(used), kept.block),
     )
-    offset = force_offset(model, readings.take(used), weighted, solution.compliance, marker_offset)
+    offset = force_offset(
+        model, readings.take(used), weighted, calibrated.compliance, marker_offset
+    )
     reach = max(attainable_rank(model, marker_offset), calibrated.observability.rank)
     doubts += [offset.message()] if offset else []
     doubts += _worth(calibrated, reach, weighted)
@@ -322,6 +353,7 @@ def calibrate(
         screening=screening,
         solution=solution,
         warnings=tuple(doubts),
+        frames=frame_summaries(weighted.frames, solution.compliance[frames], widened[:, frames]),
     )
 
 
@@ -338,7 +370,7 @@ def _doubts(
         for group in same_configuration(readings, problem.block)
     ]
     try:
-        left = check_conventions(model, readings, marker_offset)
+        left = check_conventions(model, readings, marker_offset, options.free_frame)
     except ConventionError as error:
         if not options.trust_conventions:
             raise
@@ -351,7 +383,8 @@ def _doubts(
 def _worth(calibrated: CalibratedModel, reach: int, problem: Problem) -> list[str]:
     """Return what limits the use of a fit, or refuse one that the data had no part in."""
     c = calibrated.compliance
-    if np.all((c == problem.lower) | (c == problem.upper)):
+    n = problem.springs
+    if np.all((c == problem.lower[n]) | (c == problem.upper[n])):
         raise IdentificationError(
             "every spring ends at a bound: the bounds, not the data, would make the model"
         )

@@ -20,7 +20,7 @@ from elastocal.dataset import Readings
 from elastocal.elastic import ElasticModel
 from elastocal.errors import ConventionError, DatasetError, IdentificationError
 from elastocal.identification.displacement import displacement_blocks
-from elastocal.identification.options import FitOptions
+from elastocal.identification.options import FitOptions, FreeFrame
 from elastocal.identification.problem import Problem, build
 from elastocal.identification.solve import solve
 from elastocal.robot import Robot
@@ -50,7 +50,10 @@ _TCP_OFF = 0.005
 
 
 def check_conventions(
-    model: ElasticModel, readings: Readings, marker_offset: ArrayLike | None = None
+    model: ElasticModel,
+    readings: Readings,
+    marker_offset: ArrayLike | None = None,
+    free_frame: FreeFrame = "none",
 ) -> float:
     """Return the part of the median deflection that a robust fit leaves unexplained.
 
@@ -62,6 +65,8 @@ def check_conventions(
         What was measured.
     marker_offset : array_like, shape (3,), optional
         Marker in the tcp frame, in m.
+    free_frame : str
+        See `FitOptions.free_frame`.
 
     Raises
     ------
@@ -70,7 +75,7 @@ def check_conventions(
     IdentificationError
         If most deflections are zero.
     """
-    problem = build(model, readings, FitOptions(), marker_offset)
+    problem = build(model, readings, FitOptions(free_frame=free_frame), marker_offset)
     if not np.median(np.linalg.norm(problem.d, axis=1)) > 0.0:
         raise IdentificationError("most deflections are zero: there is nothing to identify")
     robust = solve(problem, "huber")
@@ -81,7 +86,7 @@ def check_conventions(
         undone = mistake.undo(model.robot, replace(readings, reference_joint_position=None))
         blocks = displacement_blocks(model, undone, marker_offset)
         # The weights of the stated reading keep a blunder out of every other one, too.
-        other = replace(problem, O=blocks, d=undone.deflection).reweighted(robust.reading_weight)
+        other = problem.with_springs(blocks, undone.deflection).reweighted(robust.reading_weight)
         found.append((_unexplained(other), mistake.message))
     best, message = min(found, key=itemgetter(0))
     few = problem.d.size < 4 * problem.columns

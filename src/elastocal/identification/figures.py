@@ -9,6 +9,7 @@ from elastocal.arrays import BoolArray, FloatArray
 from elastocal.dataset import Readings
 from elastocal.elastic import Spring
 from elastocal.identification.calibration import CalibratedModel, Calibration
+from elastocal.identification.frames import FrameSummary
 from elastocal.identification.ladder import Climbed
 from elastocal.identification.observability import Term
 from elastocal.identification.options import FitSettings
@@ -149,6 +150,8 @@ class CalibrationSummary:
     comparison: ComparisonSummary | None = None
     ladder: tuple[RungSummary, ...] = ()
     """The simplest model first; empty in calibrations before the ladder."""
+    frames: tuple[FrameSummary, ...] = ()
+    """Frames that were estimated with the springs."""
     coverage: Coverage | None = None
     """Measured coverage of the intervals of a prediction; none in calibrations of before."""
 
@@ -188,6 +191,7 @@ def summary(calibration: Calibration, settings: FitSettings | None = None) -> Ca
         warnings=calibration.warnings,
         settings=settings,
         ladder=tuple(map(_rung, calibration.ladder)),
+        frames=calibration.frames,
         coverage=calibration.coverage,
     )
 

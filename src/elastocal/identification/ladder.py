@@ -271,7 +271,8 @@ def _tried(
     held_out = leave_poses_out(problem)
     error = held_out.error.copy()
     low = load_levels(readings) == 0
-    if has_levels(readings):
+    # The frame of a load case that is left out is not known, so it cannot be judged.
+    if has_levels(readings) and options.free_frame != "load_case":
         error[low] = 0.5 * (error[low] + _left_out(problem, low))
     blocks, index = np.unique(problem.block, return_inverse=True)
     score = np.bincount(index, error, len(blocks)) / np.bincount(index, minlength=len(blocks))

@@ -1,5 +1,6 @@
 """Model file ``*.json``: a calibrated model with draws, observability, provenance and figures."""
 
+from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
 
@@ -17,7 +18,7 @@ from elastocal.identification.options import MINIMUM_DRAWS
 from elastocal.identification.tool_change import ToolChange
 from elastocal.records import read_json, record, write_json
 from elastocal.results import Result, brief_repr
-from elastocal.robot import Robot
+from elastocal.robot import GRAVITY, Robot
 from elastocal.wording import capped
 
 
@@ -31,6 +32,8 @@ class RobotRecord:
     urdf_sha256: str
     base: str
     tcp: str
+    gravity: tuple[float, float, float] | None = None
+    """Acceleration in base, in m/s²; none: the base stands upright."""
 
 
 @record("elastocal.model/1", eq=False)
@@ -83,8 +86,11 @@ class CalibrateResult(Result):
     ) -> "CalibrateResult":
         """Return the record of a calibrated model."""
         robot = calibrated.model.robot
+        gravity = None if robot.gravity == GRAVITY else robot.gravity
         return cls(
-            robot=RobotRecord(robot.name, robot.urdf, robot.urdf_hash, robot.base, robot.tip),
+            robot=RobotRecord(
+                robot.name, robot.urdf, robot.urdf_hash, robot.base, robot.tip, gravity
+            ),
             springs=calibrated.model.springs,
             compliance=calibrated.compliance,
             draws=calibrated.draws,
@@ -108,6 +114,8 @@ class CalibrateResult(Result):
             If the domain has poses of another number of joints.
         """
         robot = Robot.from_urdf(self.robot.urdf, self.robot.tcp, self.robot.base)
+        if self.robot.gravity is not None:
+            robot = replace(robot, gravity=self.robot.gravity)
         joints = len(robot.joint_names)
         if self.domain is not None and self.domain.joint_position.shape[1] != joints:
             raise SchemaError(f"domain.joint_position must have {joints} joints a pose")

@@ -21,6 +21,8 @@ from elastocal.results import brief_repr
 
 Weights = Literal["none", "sigma"]
 _WEIGHTS: tuple[Weights, ...] = get_args(Weights)
+FreeFrame = Literal["none", "load_case", "campaign"]
+_FREE_FRAMES: tuple[FreeFrame, ...] = get_args(FreeFrame)
 
 
 @brief_repr
@@ -61,6 +63,9 @@ class FitOptions:
     `suspicious`); they are always named."""
     trust_conventions: bool = False
     """Fit also data that would fit far better with a sign or frame read otherwise."""
+    free_frame: FreeFrame = "none"
+    """Whose frames of tracker and marker are estimated with the springs; see
+    `elastocal.identification.frames`."""
     draws: int = 200
     """Number of pose-block bootstrap draws."""
 
@@ -69,6 +74,11 @@ class FitOptions:
         if self.weights not in _WEIGHTS:
             raise IdentificationError(
                 f"unknown weights {self.weights!r} (allowed: {', '.join(_WEIGHTS)})"
+            )
+        if self.free_frame not in _FREE_FRAMES:
+            raise IdentificationError(
+                f"unknown free frame {self.free_frame!r}{nearest(self.free_frame, _FREE_FRAMES)}"
+                f" (allowed: {', '.join(_FREE_FRAMES)})"
             )
         if not self.draws >= MINIMUM_DRAWS or self.draws != int(self.draws):
             raise IdentificationError(
@@ -139,6 +149,8 @@ class FitSettings:
     """Fit also what cannot be a measurement."""
     trust_conventions: bool = False
     """Fit data that fit far better with a sign read otherwise."""
+    free_frame: FreeFrame = "none"
+    """``load_case`` or ``campaign``: estimate a frame of tracker and marker for each."""
     draws: int = 200
     """Bootstrap draws."""
     seed: int = 0
@@ -175,6 +187,7 @@ class FitSettings:
             loss=self.loss,
             set_blunders_aside=not self.keep_blunders,
             trust_conventions=self.trust_conventions,
+            free_frame=self.free_frame,
             draws=self.draws if draws is None else draws,
         )
 

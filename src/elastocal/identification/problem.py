@@ -20,6 +20,7 @@ from elastocal.elastic import ElasticModel, Parameter
 from elastocal.errors import IdentificationError
 from elastocal.identification._least_squares import RANK_TOLERANCE
 from elastocal.identification.displacement import displacement_blocks
+from elastocal.identification.frames import NUMBERS, FrameColumns, frame_columns
 from elastocal.identification.options import FitOptions, Prior, bounds
 from elastocal.results import brief_repr
 
@@ -68,6 +69,9 @@ class Problem:
     size: FloatArray | float = 1.0
     """Sensible size of each parameter over that of the first, shape (parameter,): what makes a
     column in m per rad/(N·m) comparable with one in m per m/N."""
+    frames: tuple[str, ...] = ()
+    """Sessions whose frames are free: their columns stand behind those of the springs
+    (`elastocal.identification.frames`)."""
 
     def __len__(self) -> int:
         """Return the number of readings."""
@@ -75,8 +79,13 @@ class Problem:
 
     @property
     def columns(self) -> int:
-        """Number of columns: of the parameters of all springs."""
+        """Number of columns: of the parameters of all springs, and of free frames."""
         return int(self.O.shape[2])
+
+    @property
+    def springs(self) -> slice:
+        """The columns of the springs."""
+        return slice(0, self.columns - NUMBERS * len(self.frames))
 
     def scaled(self) -> "ScaledRows":
         """Return the weighted observation blocks with columns of unit norm.
@@ -93,6 +102,37 @@ class Problem:
     def reweighted(self, factor: FloatArray) -> "Problem":
         """Return the problem with each reading's squared residual multiplied by a factor."""
         return replace(self, weight=self.weight * np.sqrt(factor)[:, None])
+
+    def with_springs(self, blocks: FloatArray, d: FloatArray | None = None) -> "Problem":
+        """Return the problem with other columns of the springs; frames stay as they are."""
+        behind = self.O[:, :, self.springs.stop :]
+        O = np.concatenate([blocks, behind], axis=2)  # noqa: E741 - the paper's name
+        return replace(self, O=O, d=self.d if d is None else d)
+
+    def without_frames(self) -> "Problem":
+        """Return the problem of the springs in what no frame can explain.
+
+        Weighted rows are projected on the complement of the frames' columns: what the springs'
+        fit and their observability rest on.
+        """
+        if not self.frames:
+            return self
+        n, size = self.springs.stop, np.broadcast_to(self.size, self.lower.shape)
+        rows = (self.O * self.weight[..., None]).reshape(-1, self.columns)
+        U, s, _ = np.linalg.svd(rows[:, n:], full_matrices=False)
+        Q = U[:, s > RANK_TOLERANCE * s[0]]
+        seen = np.column_stack([rows[:, :n], (self.d * self.weight).ravel()])
+        seen -= Q @ (Q.T @ seen)
+        return Problem(
+            O=seen[:, :n].reshape(-1, 3, n),
+            d=seen[:, n].reshape(-1, 3),
+            weight=np.ones_like(self.weight),
+            block=self.block,
+            lower=self.lower[:n],
+            upper=self.upper[:n],
+            prior_rows=self.prior_rows[:, [*range(n), -1]],
+            size=size[:n],
+        )
 
     def without_prior(self) -> "Problem":
         """Return the problem of the data alone."""
@@ -183,12 +223,13 @@ def build(
     Raises
     ------
     IdentificationError
-        If there are too few poses, impossible bounds, or weights without sigmas.
+        If there are too few poses, impossible bounds, weights without sigmas, or campaigns with
+        free frames that the readings do not name.
     """
     options = options or FitOptions()
     natural = [parameter.lower for parameter in model.parameters]
     lower, upper = bounds(options, len(natural), natural)
-    return Problem(
+    problem = Problem(
         O=displacement_blocks(model, readings, marker_offset),
         d=np.array(readings.deflection),
         weight=_weights(readings, options),
@@ -197,6 +238,31 @@ def build(
         upper=upper,
         prior_rows=_prior_rows(options.prior, len(model.parameters)),
         size=relative_sizes(model.parameters),
+    )
+    frames = frame_columns(model.robot, readings, options.free_frame, marker_offset)
+    if not frames.names:
+        return problem
+    return _with_frames(problem, frames, model.parameters[0].scale)
+
+
+def _with_frames(problem: Problem, frames: FrameColumns, scale: float) -> Problem:
+    """Return a problem of springs with the columns of free frames behind them."""
+    count, free = len(frames), np.full(len(frames), np.inf)
+    before = problem.prior_rows
+    prior = np.zeros((len(before) + count, problem.columns + count + 1))
+    prior[: len(before), : problem.columns], prior[: len(before), -1] = (
+        before[:, :-1],
+        before[:, -1],
+    )
+    prior[len(before) :, problem.columns : -1] = frames.prior
+    return replace(
+        problem,
+        O=np.concatenate([problem.O, frames.columns], axis=2),
+        lower=np.concatenate([problem.lower, -free]),
+        upper=np.concatenate([problem.upper, free]),
+        prior_rows=prior,
+        size=np.concatenate([np.atleast_1d(problem.size), frames.size / scale]),
+        frames=frames.names,
     )
 
 

@@ -194,8 +194,8 @@ def _settle(
         blocks = model.observation_blocks(
             readings.joint_position, force, readings.moment, marker_offset
         )
-        corrected = replace(problem, O=blocks)
-        compliance = solve(corrected).compliance
+        corrected = problem.with_springs(blocks)
+        compliance = solve(corrected).compliance[problem.springs]
         step = _step(corrected, -_yield(model, readings, compliance, marker_offset) @ R, frame)
         offset = offset + step.force
         if np.linalg.norm(step.force) < _SETTLED * np.linalg.norm(offset):

@@ -47,7 +47,7 @@ class HeldOut:
     fold: IndexArray
     """Which refit predicted each reading, shape (reading,)."""
     compliance: FloatArray
-    """Compliances of each refit, shape (fold, spring)."""
+    """Compliances of each refit, and free frames behind them, shape (fold, column)."""
     share: FloatArray
     """Size of the error along each axis as a share of the predicted deflection's norm, shape
     (reading, 3); infinite where no deflection was predicted."""
@@ -126,11 +126,13 @@ def measured_coverage(problem: Problem, held_out: HeldOut, deviations: FloatArra
     deviations : ndarray, shape (draw, parameter)
         Bootstrap draws minus the estimate.
     """
-    predicted = np.einsum("rin,rn->ri", problem.O, held_out.compliance[held_out.fold])
+    fitted, n = held_out.compliance[held_out.fold], problem.springs
+    predicted = np.einsum("rin,rn->ri", problem.O, fitted)
+    deflection = np.einsum("rin,rn->ri", problem.O[:, :, n], fitted[:, n])
     misfit = np.array(
         [_conformal(held_out.share[held_out.fold != fold]) for fold in range(held_out.folds)]
     )
-    error = misfit[held_out.fold, None] * np.linalg.norm(predicted, axis=1, keepdims=True)
+    error = misfit[held_out.fold, None] * np.linalg.norm(deflection, axis=1, keepdims=True)
     low, high = interval(np.moveaxis(problem.O @ deviations.T, -1, 0))
     off = problem.d - predicted
     inside = (off >= -np.hypot(np.minimum(low, 0.0), error)) & (
@@ -153,7 +155,8 @@ def measured_coverage(problem: Problem, held_out: HeldOut, deviations: FloatArra
 def leave_poses_out(problem: Problem) -> HeldOut:
     """Refit without each pose block in turn and predict its readings.
 
-    With more than `MOST_FOLDS` blocks, blocks are left out together in as many folds.
+    With more than `MOST_FOLDS` blocks, blocks are left out together in as many folds. Free frames
+    are estimated from the poses that are left, as the springs are.
     """
     blocks, index = np.unique(problem.block, return_inverse=True)
     folds = min(len(blocks), MOST_FOLDS)
@@ -162,7 +165,9 @@ def leave_poses_out(problem: Problem) -> HeldOut:
     compliance = PoseGrams.of(problem).refit(kept.astype(float))
     fold = fold_of_block[index]
     predicted = np.einsum("rin,rn->ri", problem.O, compliance[fold])
-    error, norm = predicted - problem.d, np.linalg.norm(predicted, axis=1, keepdims=True)
+    error, n = predicted - problem.d, problem.springs
+    deflection = np.einsum("rin,rn->ri", problem.O[:, :, n], compliance[fold][:, n])
+    norm = np.linalg.norm(deflection, axis=1, keepdims=True)
     share = np.divide(np.abs(error), norm, out=np.full_like(error, np.inf), where=norm > 0.0)
     return HeldOut(np.linalg.norm(error, axis=1), fold, compliance, share)
 
@@ -250,6 +255,8 @@ def widen_draws(
 
 def _variance(problem: Problem, deviations: FloatArray) -> float:
     """Return the sum over deviations of the mean squared change of predicted deflection."""
-    rows = problem.O.reshape(-1, problem.columns)
+    n = problem.springs
+    rows = problem.O[:, :, n].reshape(-1, n.stop)
     gram = rows.T @ rows / len(problem)
+    deviations = deviations[:, n]
     return float(np.einsum("dn,nm,dm->", deviations, gram, deviations))

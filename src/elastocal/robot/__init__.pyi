@@ -9,6 +9,7 @@ from .mounting import (
     Rail as Rail,
     on_rail as on_rail,
     with_tool as with_tool,
+    with_tool_mass as with_tool_mass,
     without_tool_mass as without_tool_mass,
 )
 from .robot import (

@@ -106,6 +106,36 @@ def with_tool(
     return _write(root)
 
 
+def with_tool_mass(urdf: str, tool: str, mass: float, centre: ArrayLike) -> str:
+    """Return a URDF whose link ``tool`` has a mass.
+
+    Parameters
+    ----------
+    urdf : str
+        The robot.
+    tool : str
+        A link without a mass.
+    mass : float
+        In kg; 0 leaves the URDF as it is.
+    centre : array_like, shape (3,)
+        Centre of that mass in the link's frame, in m.
+
+    Raises
+    ------
+    RobotError
+        If the URDF cannot be read, the link is missing or has a mass, or the mass is none.
+    """
+    if mass == 0.0:
+        return urdf
+    root = _parse(urdf)
+    link = next((link for link in root.iterfind("link") if link.get("name") == tool), None)
+    if link is None or link.find("inertial") is not None:
+        problem = "no such link" if link is None else "a mass already"
+        raise RobotError(f"URDF of {robot_name(root)}: link {tool!r}: {problem}")
+    link.append(_point_mass(f"tool {tool!r}", mass, centre))
+    return _write(root)
+
+
 def without_tool_mass(urdf: str, tool: str) -> str:
     """Return a URDF whose link ``tool`` has no mass, if it is fixed to the link before it.
 

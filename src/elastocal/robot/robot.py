@@ -244,6 +244,33 @@ class Robot:
         q = self.check_positions(q)
         return -evaluate_weight(self._rigid, q, self._rigid.joint_columns, acceleration)
 
+    def payload_wrench(
+        self, q: ArrayLike, mass: float, centre: ArrayLike
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return the load of a mass that hangs at the tool: a load case's force and moment.
+
+        The weight acts where it hangs: moved to the tool centre point it is a force, and a moment
+        by its lever arm.
+
+        Parameters
+        ----------
+        q : array_like, shape (..., joint)
+            Joint positions in rad or m.
+        mass : float
+            In kg.
+        centre : array_like, shape (3,)
+            Centre of the mass in the tcp frame, in m.
+
+        Returns
+        -------
+        force, moment : ndarray, shape (..., 3)
+            On the robot at the tool centre point, in base, in N and N·m.
+        """
+        R_base_tcp = self.forward(q)[..., :3, :3]
+        lever = R_base_tcp @ np.asarray(centre, dtype=float)
+        force = np.broadcast_to(mass * np.asarray(self.gravity), lever.shape)
+        return np.array(force), np.cross(lever, force)
+
     def check_positions(self, q: ArrayLike) -> FloatArray:
         """Return ``q`` as a float array, or refuse it by shape or value.
 

@@ -1,5 +1,6 @@
 """``calibrate``: from a measured dataset to a calibrated model (paper Eq. 15-19)."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from os import PathLike
 from pathlib import Path
@@ -7,7 +8,8 @@ from pathlib import Path
 import numpy as np
 
 from elastocal import identification
-from elastocal.dataset import read, without
+from elastocal.dataset import Dataset, merge, read, without
+from elastocal.errors import DatasetError
 from elastocal.identification import CalibrateResult, FitSettings, choose_model, summary
 from elastocal.progress import Progress
 from elastocal.records import write_json
@@ -23,8 +25,8 @@ __all__ = ["CalibrateResult", "CalibrateSettings", "calibrate"]
 class CalibrateSettings(FitSettings):
     """What to calibrate, from which readings, and how."""
 
-    data: str | PathLike[str]
-    """Dataset, ``.nc`` or ``.csv``."""
+    data: str | PathLike[str] | Sequence[str | PathLike[str]]
+    """Dataset, ``.nc`` or ``.csv``; several are campaigns, whose poses are numbered anew."""
     out: Path | None = None
     """Model file to write; none: the result is only returned."""
     robot: str | None = None
@@ -33,6 +35,13 @@ class CalibrateSettings(FitSettings):
     """Link at the tool centre point; by default the dataset's."""
     tool: str | None = None
     """Tcp behind that link, ``"x, y, z, a, b, c"`` with units (Z-Y'-X'')."""
+
+    @property
+    def files(self) -> tuple[Path, ...]:
+        """The datasets."""
+        if isinstance(self.data, str | PathLike):
+            return (Path(self.data),)
+        return tuple(map(Path, self.data))
 
     @property
     def fit(self) -> FitSettings:
@@ -56,11 +65,11 @@ def calibrate(settings: CalibrateSettings, progress: Progress) -> CalibrateResul
     DatasetError, ConventionError, IdentificationError, RobotError, SpringError
         If the readings, the robot or the settings do not fit; see `identification.calibrate`.
     FileAccessError
-        If a file cannot be read or written, or ``out`` is the dataset.
+        If a file cannot be read or written, or ``out`` is a dataset.
     """
-    data, options = Path(settings.data), settings.options()
-    refuse_overwriting(settings.out, data)
-    measured = read(data)
+    options = settings.options()
+    refuse_overwriting(settings.out, *settings.files)
+    measured, source = _measured(settings.files)
     arm = find_robot(settings.robot, settings.tcp, settings.tool, measured)
     readings = without(measured.readings(arm.joint_names), settings.exclude)
     marker = measured.marker if settings.marker is None else settings.marker
@@ -72,9 +81,25 @@ def calibrate(settings: CalibrateSettings, progress: Progress) -> CalibrateResul
         options,
         marker_offset=marker,
         ladder=choice.ladder,
-        provenance=f"{data}; {measured.provenance}" if measured.provenance else str(data),
+        provenance=f"{source}; {measured.provenance}" if measured.provenance else source,
     )
     result = CalibrateResult.of(calibration.calibrated, summary(calibration, settings.fit))
     if settings.out is not None:
         write_json(settings.out, result)
     return result
+
+
+def _measured(files: Sequence[Path]) -> tuple[Dataset, str]:
+    """Return the readings of all campaigns as one dataset, and where they come from."""
+    if not files:
+        raise DatasetError("nothing to calibrate from: give at least one dataset")
+    found, source = [read(path) for path in files], ", ".join(map(str, files))
+    if len(files) == 1:
+        return found[0], source
+    # Two campaigns of one name in two folders are two campaigns.
+    stems = [path.stem for path in files]
+    names = stems if len(set(stems)) == len(stems) else [str(path) for path in files]
+    try:
+        return merge(found, relabel=True, campaigns=names), source
+    except DatasetError as error:
+        raise DatasetError(f"{source}: {error}") from error

@@ -18,6 +18,7 @@ from elastocal.procedure import (
 )
 from elastocal.progress import Progress
 from elastocal.results import Result
+from elastocal.wording import counted
 from elastocal.workflows._workflow import workflow
 
 
@@ -43,7 +44,7 @@ class DeriveResult(Result):
     def facts(self) -> tuple[tuple[str, str], ...]:
         """Return what a person wants to know first."""
         return (
-            ("poses", str(len(self.dataset.poses))),
+            ("measured", self.poses()),
             ("readings", self.counts()),
             *(("warning", text) for text in self.summary.warnings),
         )
@@ -51,6 +52,13 @@ class DeriveResult(Result):
     def pictured(self) -> object:
         """Return the readings: the picture shows their deflections."""
         return self.dataset
+
+    def poses(self) -> str:
+        """Return the number of committed poses, with that of the plan where some are missing."""
+        found = self.summary.poses
+        if not found.missing:
+            return counted(found.committed, "pose")
+        return f"{found.committed} of {found.planned} planned poses"
 
     def counts(self) -> str:
         """Return the number of readings of each status, as a phrase."""

@@ -23,7 +23,7 @@ class PredictSettings(NewTool):
     model: str | PathLike[str]
     """Model file of `calibrate`."""
     rows: str | PathLike[str]
-    """CSV with joint columns, ``force_x[N] …`` and optionally ``moment_x[N*m] …``."""
+    """CSV with joint columns, ``force_x[N] …`` and optionally ``moment_x[N*m] …`` and ``visit``."""
     out: Path | None = None
     """CSV to write: the rows with their deflections and intervals."""
 
@@ -98,7 +98,7 @@ def predict(settings: PredictSettings, progress: Progress) -> PredictResult:  # 
     calibrated = settings.read_model(model)
     robot = calibrated.model.robot
     loads = read_robot_rows(rows, robot)
-    prediction = calibrated.predict(loads.joint_position, loads.force, loads.moment)
+    prediction = calibrated.predict(loads.joint_position, loads.force, loads.moment, loads.visit)
     misfit = float(calibrated.misfit) if np.isfinite(calibrated.misfit) else None
     outside = None
     if calibrated.domain is not None:

@@ -11,6 +11,7 @@ from elastocal.procedure import RunFolder, derive_run, read_journal, write_deriv
 from elastocal.procedure.derive.derivation import DerivedRun
 from elastocal.procedure.record import ReadingStatus, Window
 from elastocal.records import to_data
+from elastocal.robot import Robot
 from support.recorded_runs import Run, Truth, record_run
 
 
@@ -79,6 +80,36 @@ def test_the_summary_finds_station_and_tool(run, derived):
     }
     assert to_data(derived.summary)["poses"] == {"planned": 6, "committed": 6, "missing": []}
     assert to_data(derived.summary)["warnings"] == []
+
+
+def test_the_dataset_holds_where_and_how_each_zero_was_read(run, derived):
+    data = derived.dataset
+    assert data.attributes["schema"] == "elastocal.dataset/2"
+    robot = load_cell(RunFolder(run.path).cell / "cell.yaml").robot
+    rigid = robot.forward(data.reference_joint_position)
+    np.testing.assert_allclose(rigid[:, :3, 3], data.tcp_position, atol=1e-9)
+    assert not data.reference_force.any()
+    assert not data.conditioned
+
+
+def test_the_order_in_time_is_that_of_the_windows(run, derived):
+    sequence = derived.dataset.sequence
+    assert sequence.shape == (6, 5)
+    assert sequence.tolist() == [[0, 1, 2, 3, 4]] * 6
+
+
+def test_the_urdf_of_the_dataset_weighs_the_tool(run, derived):
+    cell = load_cell(RunFolder(run.path).cell / "cell.yaml")
+    data = derived.dataset
+    weighed = Robot.from_urdf(data.robot_urdf, data.tcp_frame)
+    q = data.reference_joint_position
+    J = weighed.jacobian(q)
+    lever = weighed.forward(q)[:, :3, :3] @ cell.tool_centre_tcp
+    at_centre = J.translation + np.cross(J.rotation, lever[..., None], axis=1)
+    tool = -np.einsum("pij,i->pj", at_centre, cell.file.tool.mass * cell.gravity_base)
+    more = weighed.gravity_torques(q) - cell.robot.gravity_torques(q)
+    np.testing.assert_allclose(more, tool, atol=1e-8)
+    assert np.abs(tool).max() > 100.0
 
 
 def test_deriving_again_gives_the_same_files(run, derived):

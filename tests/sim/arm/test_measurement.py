@@ -36,10 +36,46 @@ def exact(arm, poses, forces):
     return readings(arm, poses, forces)
 
 
-def test_without_noise_marker_minus_controller_is_the_deflection(arm, exact, forces):
-    truth = arm.equilibrium(exact["joint_position"].values, forces)
+def hanging(arm, q):
+    """Return by how much the unloaded tip hangs off where the joints say it is."""
+    return arm.equilibrium(q, np.zeros(3)).tcp_position - arm.linkage.forward(q)[..., :3, 3]
+
+
+def test_without_noise_or_weight_marker_minus_controller_is_the_deflection(linkage, poses, forces):
+    weightless = bearing_truth(linkage)
+    exact = readings(weightless, poses, forces)
+    truth = weightless.equilibrium(exact["joint_position"].values, forces)
     np.testing.assert_allclose(difference(exact), truth.deflection, rtol=0, atol=1e-15)
     np.testing.assert_array_equal(exact["force"].values, forces)
+    assert "reference_joint_position" not in exact
+
+
+def test_under_gravity_it_also_holds_the_change_of_sag_since_the_reference(arm, exact, forces):
+    # A tracker sees two true positions: what the arm sags differently at the two is among them.
+    q, q_0 = exact["joint_position"].values, exact["reference_joint_position"].values
+    change = hanging(arm, q) - hanging(arm, q_0)[:, None]
+    deflection = arm.equilibrium(q, forces).deflection
+    np.testing.assert_allclose(difference(exact), deflection + change, rtol=0, atol=1e-12)
+    assert np.linalg.norm(change, axis=-1).max() > 1e-6
+
+
+def test_the_marker_moves_between_two_true_positions_of_the_tip(arm, exact, forces):
+    q, q_0 = exact["joint_position"].values, exact["reference_joint_position"].values
+    before = arm.equilibrium(q_0, np.zeros(3)).tcp_position
+    after = arm.equilibrium(q, forces).tcp_position
+    moved = after - before[:, None]
+    np.testing.assert_allclose(moved, exact["marker_displacement"].values, rtol=0, atol=1e-7)
+
+
+def test_the_reference_is_read_where_the_tool_stops_off_the_surface(arm, exact):
+    rigid = arm.linkage.forward(exact["reference_joint_position"].values)[:, :3, 3]
+    np.testing.assert_allclose(rigid, exact["tcp_position"].values, rtol=0, atol=1e-9)
+
+
+def test_gravity_that_is_not_an_upright_base_s_is_recorded(linkage, poses, forces, exact):
+    sideways = readings(bearing_truth(linkage, gravity=(9.0, 0.0, 0.0)), poses, forces)
+    assert sideways.attrs["gravity"] == "9.0 m/s2, 0.0 m/s2, 0.0 m/s2"
+    assert "gravity" not in exact.attrs
 
 
 def test_recorded_joints_are_where_the_controller_says_it_is(arm, exact):

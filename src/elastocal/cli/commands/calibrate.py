@@ -11,7 +11,9 @@ from elastocal.units import parse_point
 
 
 def _calibrate(  # noqa: PLR0913 - one parameter an option
-    data: Annotated[Path, typer.Argument(help="Dataset, .nc or .csv.")],
+    data: Annotated[
+        list[Path], typer.Argument(help="Dataset, .nc or .csv; several are campaigns.")
+    ],
     out: Annotated[Path, typer.Option(help="Model file to write.")],
     *,
     robot: options.RobotName = None,
@@ -39,13 +41,19 @@ def _calibrate(  # noqa: PLR0913 - one parameter an option
             "--trust-conventions", help="Fit data that fit far better with a sign read otherwise."
         ),
     ] = False,
+    free_frame: Annotated[
+        str,
+        typer.Option(
+            help="none, load_case or campaign: estimate a frame of tracker and marker for each."
+        ),
+    ] = "none",
     draws: Annotated[int, typer.Option(help="Bootstrap draws.")] = 200,
     seed: Annotated[int, typer.Option(min=0, help="Seed of the bootstrap.")] = 0,
     as_json: options.Figures = False,
 ) -> None:
     """Identify the compliances of a robot from a measured dataset."""
     result = workflows.calibrate(
-        data,
+        tuple(data),
         out=out,
         robot=robot,
         tcp=tcp,
@@ -58,6 +66,7 @@ def _calibrate(  # noqa: PLR0913 - one parameter an option
         exclude=tuple(exclude or ()),
         keep_blunders=keep_blunders,
         trust_conventions=trust_conventions,
+        free_frame=free_frame,
         draws=draws,
         seed=seed,
     )

@@ -26,7 +26,7 @@ def _derive(
         output.print_json(result.summary)
         return
     console, folder = output.console(), result.folder
-    console.print(f"{len(result.dataset.poses)} poses, readings: {result.counts()}")
+    console.print(f"{result.poses()}, readings: {result.counts()}")
     for warning in result.summary.warnings:
         console.print(f"warning: {warning}", markup=False, soft_wrap=True)
     console.print(f"wrote {folder.dataset} and {folder.summary.name}", markup=False, soft_wrap=True)

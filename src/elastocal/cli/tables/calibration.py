@@ -18,6 +18,7 @@ from elastocal.identification import (
     CalibrateResult,
     CalibrationSummary,
     Coverage,
+    FrameSummary,
     RungSummary,
     SpringSummary,
     SuspiciousReading,
@@ -55,6 +56,7 @@ def _show_figures(console: Console, figures: CalibrationSummary) -> None:
     console.print()
     console.print(_spring_table(figures))
     _show_groups(console, figures)
+    _show_frames(console, figures.frames)
     _show_suspicious(console, figures.suspicious)
     for warning in capped(figures.warnings):
         console.print(f"[yellow]warning:[/yellow] {escape(warning)}")
@@ -120,6 +122,27 @@ def _show_ladder(console: Console, ladder: Sequence[RungSummary]) -> None:
             worse,
             "[bold]taken[/bold]" if rung.chosen else "",
         )
+    console.print(table)
+
+
+def _show_frames(console: Console, frames: Sequence[FrameSummary]) -> None:
+    """Print the frames that were estimated with the springs, each number with its interval."""
+    if not frames:
+        return
+    table = Table("frame of", "against its references", box=None, pad_edge=False)
+    for axis in "xyz":
+        table.add_column(axis, justify="right", no_wrap=True)
+    for frame in frames:
+        parts = (
+            ("tracker shift, µm", frame.translation, frame.half_width[:3]),
+            ("tracker turn, µrad", frame.rotation, frame.half_width[3:6]),
+            ("marker in tcp frame, µm", frame.marker, frame.half_width[6:]),
+        )
+        for name, (what, part, half) in zip((frame.name, "", ""), parts, strict=True):
+            numbers = zip(part, half, strict=True)
+            table.add_row(
+                escape(name), what, *(f"{1e6 * x:.0f} ±{1e6 * h:.0f}" for x, h in numbers)
+            )
     console.print(table)
 
 

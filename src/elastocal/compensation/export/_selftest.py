@@ -138,7 +138,7 @@ class _Remembering:
         still = blocks(np.zeros(len(limit)))
         unknown = sum(
             np.abs((blocks(one) - still) @ self.compliance)
-            for one in np.diag(np.maximum(limit - 0.5 * ranges, 0.0))
+            for one in np.diag(np.clip(2.0 * limit - ranges, 0.0, limit))
         )
         return (*_floats(blocks(borne)), *_floats(np.asarray(unknown)), *after)
 

@@ -93,23 +93,19 @@ class Laws:
     def unknown_angles(self, number: int) -> Angles:
         """Return by how much friction from before may have turned an axis beside `angles`.
 
-        An element that may have borne anything within ``+-r`` when the arm was free is known to
-        ``+-(r - R / 2)`` after torques that span ``R``, whatever their course.
+        An element slides at ``+-r`` and may have borne anything within when the arm was free; 0 is
+        taken. Torques that span ``R`` bring all histories to within ``2 r - R`` of one another,
+        and never farther apart than they began: ``min(r, 2 r - R)``, none beyond ``R = 2 r``.
         """
-        s, program = self._spring_of[number], self._program
+        s = self._spring_of[number]
         if not self._elements[s]:
             return []
         low, high, _ = self._ranges[self._axes[s][0]]
-        half = program.quantity("half", 0.5)
-        widths = {}
-        for e in self._elements[s]:
-            left = [(self._limit(e),), (-half, high), (half, low)]
-            width = program.positive(f"width{e + 1}", program.total(f"left{e + 1}", left))
-            widths[f"unknown{e + 1}"] = width
+        widths = {f"unknown{e + 1}": self._width(e, low, high) for e in self._elements[s]}
         row = self._axes[s].index(number)
         pairs = zip(self._rows(s, {})[row], self._rows(s, widths)[row], strict=True)
         return [
-            (p, program.total(f"open{p + 1}", [(moved,), (-still,)]))
+            (p, self._program.total(f"open{p + 1}", [(moved,), (-still,)]))
             for p, (still, moved) in zip(self._parameters[s], pairs, strict=True)
             if still != moved
         ]
@@ -152,6 +148,15 @@ class Laws:
         high = program.call(f"highest{a}", "max", Value(1, f"high{a}"), torque)
         self._ranges[first.number] = low, high, first.torque
         return borne
+
+    def _width(self, e: int, low: Value, high: Value) -> Value:
+        """Write ``(r + |2 r - R| - |r - R|) / 2``: ``r`` up to ``R = r``, then less, then 0."""
+        program, limit, name = self._program, self._limit(e), f"width{e + 1}"
+        left = program.total(f"{name}_left", [(limit,), (-high,), (low,)])
+        twice = program.total(f"{name}_twice", [(limit,), (left,)])
+        sizes = program.call(f"{name}_a", "fabs", twice), program.call(f"{name}_b", "fabs", left)
+        half = program.quantity("half", 0.5)
+        return program.total(name, [(half, limit), (half, sizes[0]), (-half, sizes[1])])
 
     def _limit(self, e: int) -> Value:
         return self._program.quantity(f"slip{e + 1}", self.memory.elements[e])

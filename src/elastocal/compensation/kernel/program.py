@@ -141,11 +141,6 @@ class Program:
         sizes = self.call(f"{name}_up", "fabs", ahead), self.call(f"{name}_down", "fabs", behind)
         return self.total(name, [(half, sizes[0]), (-half, sizes[1])])
 
-    def positive(self, name: str, value: Value) -> Value:
-        """Return a value where it is positive, else zero: ``(x + |x|) / 2``."""
-        half = self.quantity("half", 0.5)
-        return self.total(name, [(half, value), (half, self.call(f"{name}_size", "fabs", value))])
-
     def total(self, name: str, products: Iterable[Product]) -> Value:
         """Return a sum of products, left to right; a plain one needs no statement.
 

@@ -83,8 +83,8 @@ def observation_block(model: ElasticModel, compliance: Sequence[float] = ()) -> 
 
     The outputs are the x components of all parameters, then the y, then the z components. With
     friction, and with compliances, three follow: how far friction from before the memory began
-    may move x, y and z of the deflection, ``sum |J_i| f_j (r_j - R / 2)`` over the elements; then
-    the memory after the load, as of `deflection`.
+    may move x, y and z of the deflection, ``sum |J_i| f_j min(r_j, 2 r_j - R)`` over the elements
+    until torques have spanned ``R = 2 r_j``; then the memory after the load, as of `deflection`.
     """
     program = Program()
     laws = Laws(program, model)

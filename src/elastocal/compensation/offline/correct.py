@@ -8,9 +8,12 @@ by Newton steps of the rigid arm: ``J_arm dq = [p - p(q) - C(q) f; log(R R(q)^T)
 out of the derivative, ``d(C f)/dq``, is a deflection per metre, some 1e-3, so that each step gains
 three digits. The first step alone is what is usually done; its residual is reported. The figures of
 a whole path are added up block by block.
+
+Rows follow one another in time: gears with friction remember the rows before. A row without load
+is a way through the air, after which friction is taken to be free.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -63,11 +66,13 @@ class PathCorrection:
     pulled: BoolArray
     """Whether the force draws the tool out, along +z of the tcp, rather than aside or against it;
     a surface cannot: shape (row,)."""
+    memory: FloatArray
+    """What friction remembers after the last row, shape (element,), in N·m."""
     outside: OutsideRows | None = None
     """Rows beyond what was calibrated; none where the model does not know where that was."""
 
 
-def correct_rows(
+def correct_rows(  # noqa: PLR0913 (what goes on from block to block is one more)
     solver: InverseKinematics,
     calibrated: CalibratedModel,
     q: FloatArray,
@@ -77,6 +82,7 @@ def correct_rows(
     *,
     may_turn: bool = False,
     largest: float = LARGEST_DEFLECTION,
+    memory: FloatArray | None = None,
 ) -> PathCorrection:
     """Return the corrected rows of a path.
 
@@ -99,6 +105,8 @@ def correct_rows(
         in a path of poses the controller chooses the turn, in a path of joints it would rotate.
     largest : float
         Largest deflection that is taken for one, in m.
+    memory : ndarray, shape (element,), optional
+        What friction remembers of the rows before; by default it is free before the first row.
 
     Raises
     ------
@@ -108,7 +116,7 @@ def correct_rows(
     """
     robot = calibrated.model.robot
     check_limits(robot, q, where, "is programmed")
-    load = _Load(calibrated, *wrench)
+    load = _Load(calibrated, *wrench, memory).along(q)
     deflection = load.deflection(q, np.arange(len(q)))
     _check_size(deflection, largest, where)
     first = uncorrected = deflection.copy()
@@ -120,6 +128,9 @@ def correct_rows(
             break
         q[open_rows] += _newton_step(robot, q[open_rows], error[open_rows])
         reached[open_rows] = robot.forward(q[open_rows])
+        if load.remembers:
+            # Friction sees the corrected rows, all of them in their order.
+            load, open_rows = load.along(q), np.arange(len(q))
         deflection[open_rows] = load.deflection(q[open_rows], open_rows)
         error[open_rows] = _error(reached[open_rows], deflection[open_rows], T_base_tcp[open_rows])
         if step == 0:
@@ -134,7 +145,7 @@ def correct_rows(
     commanded = T_base_tcp.copy()
     commanded[:, :3, 3] = reached[:, :3, 3]
     residual = reached[:, :3, 3] + deflection - T_base_tcp[:, :3, 3]
-    predicted = calibrated.predict(q, *wrench)
+    predicted = calibrated.predict(q, *wrench, friction=load.borne)
     along = np.einsum("ri,ri->r", T_base_tcp[:, :3, 2], wrench[0])
     return PathCorrection(
         q,
@@ -146,6 +157,7 @@ def correct_rows(
         np.linalg.norm(first - uncorrected, axis=1),
         np.linalg.norm(residual, axis=1),
         np.asarray(along > 0.5 * np.linalg.norm(wrench[0], axis=1)),
+        load.after,
         None if calibrated.domain is None else calibrated.domain.outside(robot, q, *wrench),
     )
 
@@ -155,13 +167,40 @@ class _Load:
     calibrated: CalibratedModel
     force: FloatArray
     moment: FloatArray | None
+    memory: FloatArray | None
+    """What friction remembers of the rows before the first."""
+    borne: FloatArray | None = None
+    """What each friction element bears in each row, in N·m."""
+    after: FloatArray = field(default_factory=lambda: np.zeros(0))
+    """What friction remembers after the last row."""
+
+    @property
+    def remembers(self) -> bool:
+        return len(self.calibrated.model.friction) > 0
+
+    def along(self, q: FloatArray) -> "_Load":
+        """Return the load with what friction bears of it at the joints of all rows."""
+        if not self.remembers:
+            return self
+        model = self.calibrated.model
+        in_the_air = ~np.any(self.force, axis=1)
+        if self.moment is not None:
+            in_the_air &= ~np.any(self.moment, axis=1)
+        memory = None if in_the_air[0] else self.memory
+        # What overflows is refused by its size.
+        with np.errstate(over="ignore", invalid="ignore"):
+            load = model.load_torques(q, self.force, self.moment)
+            visit = np.cumsum(in_the_air)
+            borne, after = model.friction.visits(model.weight_torques(q), load, visit, memory)
+        return replace(self, borne=borne, after=after)
 
     def deflection(self, q: FloatArray, rows: IndexArray) -> FloatArray:
         model, c = self.calibrated.model, self.calibrated.compliance
         moment = None if self.moment is None else self.moment[rows]
         # What overflows is refused by its size.
         with np.errstate(over="ignore", invalid="ignore"):
-            return model.deflection(c, q, self.force[rows], moment)
+            borne = None if self.borne is None else self.borne[rows]
+            return model.deflection(c, q, self.force[rows], moment, borne)
 
 
 def _check_size(deflection: FloatArray, largest: float, where: RowName) -> None:

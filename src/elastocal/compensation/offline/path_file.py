@@ -92,7 +92,7 @@ def compensate_path(
         total = _count_lines(path) - len(layout.preamble) - 1
         kept = [i for i, name in enumerate(layout.header) if name.strip() not in _ADDED]
         header = (*(layout.header[i] for i in kept), *_ADDED)
-        summary, previous = CorrectionSummary(), settings.start
+        summary, previous, memory = CorrectionSummary(), settings.start, None
         with new_table(out, replace(layout, header=header)) as write:
             for block in row_blocks(path, layout, _ROWS_AT_A_TIME):
                 values = read_values(block, columns)
@@ -107,6 +107,7 @@ def compensate_path(
                     labels.__getitem__,
                     may_turn=columns.by_pose,
                     largest=settings.largest,
+                    memory=memory,
                 )
                 turned: list[int] = []
                 if columns.by_pose:
@@ -118,7 +119,7 @@ def compensate_path(
                 summary = summary.plus(
                     found, found.T_base_tcp[:, :3, 3] - T[:, :3, 3], labels, turned
                 )
-                previous = q[-1]
+                previous, memory = q[-1], found.memory
                 write(_new_cells(columns, robot.external_axes, block, kept, found))
                 progress("rows", summary.rows, total)
     return summary

@@ -13,13 +13,13 @@ it: 1 mrad makes 1 µm of each millimetre; the tracker's place does not enter at
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
-from elastocal.arrays import FloatArray
-from elastocal.cell import Cell, SensorLoad
+from elastocal.arrays import FloatArray, IndexArray
+from elastocal.cell import SENSOR_CORRECTED, Cell, SensorLoad
 from elastocal.dataset import STATUSES, Dataset, write
 from elastocal.errors import DatasetError, FileAccessError, ProcedureError, SchemaError
 from elastocal.planning import PlanResult
@@ -49,6 +49,7 @@ from elastocal.procedure.record import (
     read_copies,
     read_journal,
     read_streams,
+    signs_of_a_cut,
 )
 from elastocal.procedure.registration import Registration, register
 from elastocal.records import write_json
@@ -92,8 +93,12 @@ def derive_run(run: Path, sensor: SensorLoad | None = None) -> DerivedRun:
         raise FileAccessError(f"{run} is no folder of a run: it holds no {folder.journal.name}")
     entries = read_journal(folder.journal)
     logs = _latest(commits(entries))
+    signs = signs_of_a_cut(folder, entries)
     if not entries or entries[0].run is None or not logs:
-        raise ProcedureError(f"{folder.journal}: no pose is committed: there is nothing to derive")
+        why = "".join(f"; {sign}" for sign in signs)
+        raise ProcedureError(
+            f"{folder.journal}: no pose is committed: there is nothing to derive{why}"
+        )
     record = entries[0].run
     cell, plan = read_copies(folder, record)
     known = {e.log.streams: e.streams_sha256 for e in entries if e.log is not None}
@@ -102,9 +107,11 @@ def derive_run(run: Path, sensor: SensorLoad | None = None) -> DerivedRun:
     poses = [reduce_pose(log, _streams(folder, log, cell)) for log in logs]
     try:
         provenance = _provenance(folder, record, sensor)
-        return derive_poses(poses, cell, plan, entries, provenance, sensor)
+        derived = derive_poses(poses, cell, plan, entries, provenance, sensor)
     except (DatasetError, ProcedureError) as error:
         raise type(error)(f"{folder.path}: {error}") from error
+    warnings = (*signs, *derived.summary.warnings)
+    return replace(derived, summary=replace(derived.summary, warnings=warnings))
 
 
 def write_derived(run: Path, derived: DerivedRun) -> None:
@@ -211,7 +218,7 @@ def _reasons(rows: Sequence[LoadRow], registration: Registration) -> str:
 
 
 def _provenance(folder: RunFolder, record: RunRecord, sensor: SensorLoad | None) -> str:
-    corrected = "" if sensor is None else ", sensor corrected by a tool file"
+    corrected = "" if sensor is None else f", {SENSOR_CORRECTED}"
     return f"elastocal run {folder.path.resolve().name}, {record.origin}{corrected}"
 
 
@@ -312,8 +319,12 @@ def _dataset(
         return values if np.all(values[ok] > 0) else None
 
     tools = {pose.pose: pose.reference.tool for pose in poses if pose.reference is not None}
-    unknown = np.full(3, np.nan)
-    tcp = [tool.T_base_tcp[:3, 3] if (tool := tools.get(pose)) else unknown for pose in labels]
+    reference = np.full((len(labels), len(robot.joint_names)), np.nan)
+    tcp = np.full((len(labels), 3), np.nan)
+    for index, pose in enumerate(labels):
+        tool = tools.get(pose)
+        if tool is not None:
+            reference[index], tcp[index] = tool.q, tool.T_base_tcp[:3, 3]
     return Dataset.from_arrays(
         joint_position=array("q", len(robot.joint_names)),
         force=array("force"),
@@ -326,10 +337,28 @@ def _dataset(
         load_cases=load_cases,
         poses=labels,
         status=status,
-        tcp_position=np.array(tcp),
+        sequence=_sequence(poses, labels, load_cases),
+        tcp_position=tcp,
+        reference_joint_position=reference,
+        # The force is counted from the reference, where the tool was off the surface.
+        reference_force=np.zeros((len(labels), 3)),
         robot_name=robot.name,
-        robot_urdf=robot.urdf,
+        robot_urdf=cell.urdf_with_tool_mass,
         tcp_frame=robot.tip,
         marker=tuple(lever.tolist()),
+        gravity=cell.gravity_of_mounting,
         provenance=provenance,
     )
+
+
+def _sequence(
+    poses: Sequence[PoseReadings], labels: Sequence[int], load_cases: Sequence[str]
+) -> IndexArray:
+    """Return the place in time of each load among those of its pose; -1 where it was not tried."""
+    sequence = np.full((len(labels), len(load_cases)), -1)
+    for pose in poses:
+        for place, load in enumerate(pose.loads):
+            if load.window.load_case in load_cases:
+                case = load_cases.index(load.window.load_case)
+                sequence[labels.index(pose.pose), case] = place
+    return sequence

@@ -9,6 +9,7 @@ from .folder import (
     make_folder as make_folder,
     read_copies as read_copies,
     refuse_foreign_files as refuse_foreign_files,
+    signs_of_a_cut as signs_of_a_cut,
 )
 from .journal import (
     Action as Action,

@@ -6,6 +6,7 @@ Cell, plan and streams are known by their SHA-256 in the journal: what was chang
 import hashlib
 import os
 import shutil
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -13,7 +14,8 @@ from elastocal.cell import Cell, fingerprint, load_cell, named_files
 from elastocal.errors import FileAccessError, SchemaError
 from elastocal.files import read_text, replacing, sha256
 from elastocal.planning import PLAN, POOL, PlanResult, read_plan
-from elastocal.procedure.record.journal import RunRecord
+from elastocal.procedure.record.journal import Entry, RunRecord
+from elastocal.wording import counted
 
 JOURNAL = "journal.jsonl"
 
@@ -202,6 +204,48 @@ def check_plan(folder: RunFolder, record: RunRecord) -> None:
     """
     plan = folder.plan / PLAN
     _refuse_changed(plan, sha256(read_text(plan)), record.plan)
+
+
+def signs_of_a_cut(folder: RunFolder, entries: Sequence[Entry]) -> tuple[str, ...]:
+    """Return the signs that a journal has lost its end, a sentence each; none as a rule.
+
+    Every attempt at a pose is in the journal before it moves anything, so that no recording is
+    without an entry, and every entry ends its line.
+
+    Parameters
+    ----------
+    folder : RunFolder
+        Folder of the run.
+    entries : sequence of Entry
+        The whole entries of its journal.
+
+    Raises
+    ------
+    FileAccessError
+        If the journal or the folder of streams cannot be read.
+    """
+    try:
+        data = folder.journal.read_bytes()
+        recorded = {place.name for place in folder.streams.glob("pose_*.mcap")}
+    except OSError as error:
+        raise FileAccessError(f"cannot read {folder.path}: {error.strerror or error}") from error
+    signs = []
+    if not data.endswith(b"\n"):
+        last = data.count(b"\n") + 1
+        signs.append(f"line {last} of {JOURNAL}, its last, is torn and left out")
+    named = {entry.log.streams for entry in entries if entry.log is not None}
+    named |= {
+        folder.stream(entry.pose, entry.attempt).name
+        for entry in entries
+        if entry.pose is not None and entry.attempt is not None
+    }
+    if lost := sorted(recorded - named):
+        signs.append(
+            f"{JOURNAL} was cut, or is not of this run: it does not name {len(lost)} of"
+            f" {counted(len(recorded), 'recording')} ({lost[0]} the first): their poses are left"
+            " out"
+        )
+    return tuple(signs)
 
 
 def check_stream(path: Path, known: str | None) -> None:

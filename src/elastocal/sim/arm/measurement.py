@@ -6,7 +6,8 @@ the free spin about the tool axis drawn at random. The inverse kinematics is the
 The tool is stopped a few millimetres before contact and read (paper steps 7-9), then pressed until
 the load case stands, and read again (13-17). In between the controller drives through the gap and
 on against the arm's own compliance; the marker moves through the gap, and by what the friction
-disk gives and slips. Their difference is the deflection (Eq. 12, with our signs).
+disk gives and slips. Their difference is the deflection (Eq. 12, with our signs), and by how much
+less or more the arm sags at the loaded joints than at those of the first reading.
 """
 
 from collections.abc import Sequence
@@ -18,7 +19,7 @@ from numpy.typing import ArrayLike
 from elastocal.arrays import FloatArray
 from elastocal.dataset import Dataset
 from elastocal.errors import DatasetError, UnreachableError
-from elastocal.sim.arm.elastic_arm import ElasticArm
+from elastocal.sim.arm.elastic_arm import GRAVITY, ElasticArm
 from elastocal.sim.arm.linkage import Linkage, solve_inverse
 
 LOAD_CASES = ("normal", "north", "south", "east", "west")
@@ -90,7 +91,8 @@ def measure(
 
     The recorded joints are those the controller commands under load, so their forward kinematics
     is ``tcp_position + controller_displacement``. Without noise, marker minus controller
-    displacement is exactly the deflection of the arm at the recorded joints.
+    displacement is exactly the deflection of the arm at the recorded joints, and under gravity the
+    change of its sag since the reference joints, which are then recorded too.
 
     Parameters
     ----------
@@ -129,13 +131,14 @@ def measure(
     unloaded = T_base_touch[:, :3, 3] - contact.gap * T_base_touch[:, :3, 2]
     slip = contact.micro_slip * rng.standard_normal((*force.shape[:2], 2))
     travel = _marker_travel(T_base_touch, force, contact, slip)
-    joints, deflection = _press(arm, q, T_base_touch, unloaded, travel, force)
+    reference = _reference_joints(arm, q, T_base_touch, unloaded)
+    joints, shown = _press(arm, q, T_base_touch, unloaded, travel, force, reference)
     seen = _difference_of_readings(noise.marker, force.shape, rng)
     stops = _difference_of_readings(noise.controller, force.shape, rng)
     return Dataset.from_arrays(
         joint_position=joints,
         force=force + noise.force * rng.standard_normal(force.shape),
-        controller_displacement=travel - deflection + stops,
+        controller_displacement=travel - shown + stops,
         marker_displacement=travel + seen + _offsets(blunders, force.shape, load_cases),
         joint_names=arm.linkage.joint_names,
         load_cases=load_cases,
@@ -143,6 +146,8 @@ def measure(
         force_sigma=noise.force or None,
         marker_sigma=float(np.hypot(noise.marker, noise.controller) * np.sqrt(2.0)) or None,
         tcp_position=unloaded,
+        reference_joint_position=reference,
+        gravity=None if reference is None or arm.gravity == GRAVITY else arm.gravity,
         robot_name=arm.linkage.name,
         robot_urdf=arm.linkage.urdf,
         tcp_frame=arm.linkage.tip,
@@ -167,6 +172,25 @@ def _marker_travel(
     return travel
 
 
+def _reference_joints(
+    arm: ElasticArm, q: FloatArray, T_base_touch: FloatArray, unloaded: FloatArray
+) -> FloatArray | None:
+    """Return commanded joints of the unloaded reading, shape (pose, joint).
+
+    None without gravity: an arm that does not sag shows the same wherever it was read.
+    """
+    if not any(arm.gravity):
+        return None
+    goals = T_base_touch.copy()
+    goals[:, :3, 3] = unloaded
+    found = solve_inverse(arm.linkage, goals, q)
+    if not found.ok.all():
+        raise UnreachableError(
+            f"pose {int(np.argmin(found.ok))}: the arm cannot stop off the surface"
+        )
+    return found.q
+
+
 def _press(
     arm: ElasticArm,
     q: FloatArray,
@@ -174,18 +198,25 @@ def _press(
     unloaded: FloatArray,
     travel: FloatArray,
     force: FloatArray,
+    reference: FloatArray | None,
 ) -> tuple[FloatArray, FloatArray]:
-    """Return commanded joints under load, and the deflection there.
+    """Return commanded joints under load, and by how much more the tip moves than they say.
 
-    The controller keeps the orientation and pushes on until the tip is where the contact holds
-    it, ``unloaded + travel``, despite the deflection, which depends on the joints in turn.
+    The controller keeps the orientation and pushes on until the tip has moved by ``travel`` in
+    truth, despite the deflection and the sag, which depend on the joints in turn.
     """
     poses, cases = force.shape[:2]
+    sag = 0.0 if reference is None else _sag(arm, reference)[:, None]
+
+    def shown(joints: FloatArray) -> FloatArray:
+        deflection = arm.equilibrium(joints, force).deflection
+        return deflection if reference is None else deflection + _sag(arm, joints) - sag
+
     joints = np.repeat(q[:, None, :], cases, axis=1)
     goals = np.repeat(T_base_touch[:, None], cases, axis=1)
-    deflection = arm.equilibrium(joints, force).deflection
+    more = shown(joints)
     for _ in range(_SETTLING_ROUNDS):
-        goals[..., :3, 3] = unloaded[:, None] + travel - deflection
+        goals[..., :3, 3] = unloaded[:, None] + travel - more
         found = solve_inverse(
             arm.linkage, goals.reshape(-1, 4, 4), joints.reshape(poses * cases, -1)
         )
@@ -193,8 +224,15 @@ def _press(
             pose = int(np.argmin(found.ok)) // cases
             raise UnreachableError(f"pose {pose}: the arm cannot follow its load case")
         joints = found.q.reshape(joints.shape)
-        deflection = arm.equilibrium(joints, force).deflection
-    return joints, deflection
+        more = shown(joints)
+    return joints, more
+
+
+def _sag(arm: ElasticArm, q: FloatArray) -> FloatArray:
+    """Return how far the unloaded tip hangs from where the joints say it is, shape (..., 3)."""
+    hanging = arm.equilibrium(q, np.zeros(3)).tcp_position
+    sag: FloatArray = hanging - arm.linkage.forward(q)[..., :3, 3]
+    return sag
 
 
 def _difference_of_readings(

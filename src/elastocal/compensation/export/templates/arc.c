@@ -8,7 +8,7 @@ static double arc(double y, double x)
 {
     const double u = fabs(x);
     const double v = fabs(y);
-    const double steep = 0.5 + copysign(0.5, v - u);
+    const double steep = 0.5 - copysign(0.5, u - v);
     const double behind = 0.5 - copysign(0.5, x);
     const double low = (steep * u) + ((1.0 - steep) * v);
     const double high = (steep * v) + ((1.0 - steep) * u);
