@@ -1,4 +1,5 @@
 import json
+import shutil
 
 import numpy as np
 import pytest
@@ -116,3 +117,43 @@ def test_a_tool_file_of_before_is_still_read(tmp_path, postures):
     found = read_tool(out)
     assert found.matrix is None
     assert found.notes == ()
+
+
+@pytest.fixture(scope="module")
+def recorded(tmp_path_factory):
+    return record_run(tmp_path_factory.mktemp("tool") / "run", poses=6)
+
+
+@pytest.mark.parametrize(
+    "option",
+    [
+        ("--flange", "link_6"),
+        ("--sensor", "0 mm, 0 mm, 45 mm, 0 deg, 0 deg, 0 deg"),
+        ("--down", "0, 0, 1"),
+        ("--robot", "KR 120 R2700-2"),
+    ],
+)
+def test_what_the_cell_of_a_run_says_is_no_option(recorded, tmp_path, option):
+    out = tmp_path / "tool.json"
+    result = elastocal("tool", recorded.path, "--out", out, *option)
+    assert f"{option[0]} is for a table of postures" in result.reason
+    assert not out.exists()
+
+
+@pytest.mark.parametrize("file", ["streams/pose_0002_1.mcap", "plan/plan.json", "cell/cell.yaml"])
+def test_a_run_whose_files_were_changed_gives_no_tool(recorded, tmp_path, file):
+    shutil.copytree(recorded.path, tmp_path / "run")
+    path = tmp_path / "run" / file
+    data = path.read_bytes()
+    path.write_bytes(data.replace(b"60 kg", b"61 kg") if path.suffix == ".yaml" else data + b"\n")
+    result = elastocal("tool", tmp_path / "run", "--out", tmp_path / "tool.json")
+    assert "is not what the run wrote" in result.reason
+    assert not (tmp_path / "tool.json").exists()
+
+
+@pytest.mark.parametrize("name", ["model.json", "data.nc", "cell.yaml", "pose.mcap"])
+def test_another_kind_of_file_is_refused_in_one_line(tmp_path, name):
+    (tmp_path / name).write_text("x")
+    reason = elastocal("tool", tmp_path / name, "--out", tmp_path / "t.json").reason
+    assert "is not that of a table of postures (.csv), nor is it the folder of a run" in reason
+    assert "no such file" in elastocal("tool", tmp_path / "no.csv", "--out", tmp_path / "t").reason

@@ -75,7 +75,7 @@ def derive(settings: DeriveSettings, progress: Progress) -> DeriveResult:  # noq
     settings : DeriveSettings
         Or its ``run``, and the other fields by name.
     progress : Progress, optional
-        Hears how far the work is.
+        Called with stage, done and total.
 
     Raises
     ------

@@ -73,6 +73,7 @@ class Remark:
     text: str
 
 
+@brief_repr
 @dataclass(frozen=True)
 class Call:
     """``name = function(arguments)``."""

@@ -53,6 +53,7 @@ from elastocal.procedure.record import (
 )
 from elastocal.procedure.registration import Registration, register
 from elastocal.records import write_json
+from elastocal.results import brief_repr
 from elastocal.robot import inverse_transform
 
 
@@ -64,25 +65,38 @@ class DerivedRun:
     summary: RunSummary
 
 
-def derive_run(run: Path, sensor: SensorLoad | None = None) -> DerivedRun:
-    """Return dataset and summary of the poses that a run has committed.
+@brief_repr
+@dataclass(frozen=True, eq=False)
+class CommittedRun:
+    """The poses that a run has committed, from files that are what the run wrote."""
+
+    folder: RunFolder
+    entries: tuple[Entry, ...]
+    """Of the journal."""
+    record: RunRecord
+    """Its first entry."""
+    cell: Cell
+    plan: PlanResult
+    poses: tuple[PoseReadings, ...]
+    """In the order of time, the last one of each."""
+    signs: tuple[str, ...]
+    """Signs that the journal has lost its end; see `signs_of_a_cut`."""
+
+
+def read_run(run: Path) -> CommittedRun:
+    """Return the poses that a run has committed, its files held against their SHA-256.
 
     Parameters
     ----------
     run : Path
         Folder of the run: copies of cell and plan, journal, streams.
-    sensor : SensorLoad, optional
-        The tool on its sensor, with the matrix that corrects readings, from a tool file; by
-        default the cell file's, and readings are taken as they are.
 
     Raises
     ------
     ProcedureError
-        If no pose is committed, or the cell has no sensor or no tracker.
+        If no pose is committed.
     SchemaError
         If a file of the run is damaged, of another kind, or not what the run wrote.
-    DatasetError
-        If no reading is usable.
     FileAccessError
         If a file cannot be read.
     """
@@ -104,13 +118,37 @@ def derive_run(run: Path, sensor: SensorLoad | None = None) -> DerivedRun:
     known = {e.log.streams: e.streams_sha256 for e in entries if e.log is not None}
     for log in logs:
         check_stream(folder.streams / log.streams, known[log.streams])
-    poses = [reduce_pose(log, _streams(folder, log, cell)) for log in logs]
+    poses = tuple(reduce_pose(log, _streams(folder, log, cell)) for log in logs)
+    return CommittedRun(folder, entries, record, cell, plan, poses, signs)
+
+
+def derive_run(run: Path, sensor: SensorLoad | None = None) -> DerivedRun:
+    """Return dataset and summary of the poses that a run has committed.
+
+    Parameters
+    ----------
+    run : Path
+        Folder of the run; see `read_run`, also for what it raises.
+    sensor : SensorLoad, optional
+        The tool on its sensor, with the matrix that corrects readings, from a tool file; by
+        default the cell file's, and readings are taken as they are.
+
+    Raises
+    ------
+    ProcedureError
+        If no pose is committed, or the cell has no sensor or no tracker.
+    DatasetError
+        If no reading is usable.
+    """
+    found = read_run(run)
+    provenance = _provenance(found.folder, found.record, sensor)
     try:
-        provenance = _provenance(folder, record, sensor)
-        derived = derive_poses(poses, cell, plan, entries, provenance, sensor)
+        derived = derive_poses(
+            found.poses, found.cell, found.plan, found.entries, provenance, sensor
+        )
     except (DatasetError, ProcedureError) as error:
-        raise type(error)(f"{folder.path}: {error}") from error
-    warnings = (*signs, *derived.summary.warnings)
+        raise type(error)(f"{found.folder.path}: {error}") from error
+    warnings = (*found.signs, *derived.summary.warnings)
     return replace(derived, summary=replace(derived.summary, warnings=warnings))
 
 

@@ -26,6 +26,7 @@ import numpy as np
 
 from elastocal.arrays import FloatArray, IndexArray
 from elastocal.cell import Gears
+from elastocal.results import brief_repr
 from elastocal.sim.arm.springs import SpringResponse
 
 _STOPS = 4
@@ -84,6 +85,7 @@ class BalancerSpring:
         )
 
 
+@brief_repr
 @dataclass(frozen=True, eq=False)
 class GearLaws:
     """Growth, backlash and friction of the gears, beside their stiffness at high torque."""
@@ -133,6 +135,7 @@ class GearLaws:
         return height
 
 
+@brief_repr
 @dataclass(frozen=True, eq=False)
 class RobotSprings:
     """Springs of the robot with the memory of its gears: an `elastocal.sim.arm` `SpringBank`."""
