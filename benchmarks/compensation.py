@@ -1,7 +1,9 @@
 """Print how fast the compensator is: the exported C beside Pinocchio, and the Python step.
 
-Machines differ and are noisy, so the ratio to Pinocchio's own Jacobian of the same 18-spring
-model, in the same run, is what counts. Needs gcc. Run with ``python benchmarks/compensation.py``.
+Machines differ and are noisy, so the ratios count, taken in the same run: to Pinocchio's own
+Jacobian of the same 18-spring model, and of the richest model (gears of three knees and three
+friction elements at every joint, under the arm's own weight) to that one. Needs gcc.
+Run with ``python benchmarks/compensation.py``.
 """
 
 import shutil
@@ -17,13 +19,14 @@ import pinocchio as pin
 from elastocal.compensation import CompensatorSettings
 from elastocal.compensation.export import write_c
 from elastocal.compensation.online import Compensator, Design, Reading, design
-from elastocal.elastic import ElasticModel, layout
+from elastocal.elastic import ElasticModel, Gear, layout
 from elastocal.identification import CalibratedModel, Observability
 from elastocal.robot import ChainModel, InsertedJoint, Robot, build_model, catalogue, with_tool
 
 HARNESS = Path(__file__).parents[1] / "tests" / "support" / "export_harness.c"
 TOOL = np.array([[0.0, 0, 1, 0.15], [0, 1, 0, 0], [-1, 0, 0, 0.35], [0, 0, 0, 1]])
 ROWS, REPEATS = 1000, 5
+KNEES, SLIPS = (300.0, 1000.0, 3000.0), (30.0, 100.0, 300.0)
 SETTINGS = CompensatorSettings(
     filter={
         "median": 3,
@@ -33,12 +36,17 @@ SETTINGS = CompensatorSettings(
 )
 
 
-def calibrated() -> CalibratedModel:
+def calibrated(gears: bool = False) -> CalibratedModel:
     """Return an 18-spring KUKA arm with made-up compliances and 200 draws."""
     urdf = with_tool(catalogue.urdf("KR 120 R2700 extra HA"), "flange", "tcp", TOOL)
     robot = Robot.from_urdf(urdf, "tcp")
-    model = ElasticModel(robot, layout(robot, "bearing"))
-    rng, n = np.random.default_rng(0), len(model.springs)
+    springs = layout(robot, "bearing")
+    if gears:
+        axial, virtual = springs[: len(robot.joint_names)], springs[len(robot.joint_names) :]
+        geared = (Gear(s.name, s.joint, s.axes[0].axis, knees=KNEES, slips=SLIPS) for s in axial)
+        springs = (*geared, *virtual)
+    model = ElasticModel(robot, springs)
+    rng, n = np.random.default_rng(0), len(model.parameters)
     compliance = rng.uniform(1e-7, 1e-6, n)
     draws = compliance * (1.0 + 0.1 * rng.normal(size=(200, n)))
     return CalibratedModel(model, compliance, draws, Observability(n, 1.0, (True,) * n, ()))
@@ -119,12 +127,13 @@ def python_seconds(numbers: Design, data: np.ndarray) -> np.ndarray:
 
 def main() -> None:
     """Measure and print."""
-    model = calibrated()
-    numbers, data = design(model, SETTINGS), rows(model.model)
-    steps = python_seconds(numbers, np.tile(data, (3, 1)))
+    model, rich = calibrated(), calibrated(gears=True)
+    data = rows(model.model)
+    pairs = [design(each, SETTINGS) for each in (model, rich)]
+    plain, geared = (np.median(python_seconds(each, np.tile(data, (3, 1)))) for each in pairs)
     print(
-        f"Python step, 18 springs, median, notch and low-pass: {1e6 * np.median(steps):.1f} us"
-        f" median, {1e6 * np.percentile(steps, 99):.1f} us 99 %"
+        f"Python step with median, notch and low-pass: {1e6 * plain:.1f} us with 18 springs,"
+        f" {1e6 * geared:.1f} us with gears, weight and friction, {geared / plain:.2f} of it"
     )
     called, own = pinocchio_seconds(model.model, data)
     print(
@@ -134,11 +143,15 @@ def main() -> None:
     if shutil.which("gcc") is None:
         print("no gcc: the C is not timed")
         return
-    deflection, step = c_seconds(numbers, data)
+    (deflection, step), (richer, further) = (c_seconds(each, data) for each in pairs)
     print(
         f"C deflection, -O2: {1e6 * deflection:.3f} us, {deflection / called:.2f} and"
         f" {deflection / own:.2f} of these;"
         f" C step with filters and interval: {1e6 * step:.2f} us"
+    )
+    print(
+        f"C deflection with gears, weight and friction: {1e6 * richer:.3f} us,"
+        f" {richer / deflection:.1f} times the 18 springs; its step: {1e6 * further:.2f} us"
     )
 
 

@@ -40,6 +40,20 @@ def test_what_a_face_exports_is_there(faces):
         assert missing == [], package
 
 
+def test_every_public_name_of_a_plain_module_is_exported(measured):
+    assert house.forgotten_names(measured) == []
+
+
+def test_a_public_name_that_no_face_exports_is_seen(tmp_path):
+    package = tmp_path / "top" / "package"
+    package.mkdir(parents=True)
+    for folder in (package.parent, package):
+        (folder / "__init__.py").touch()
+    (package / "__init__.pyi").write_text("from .module import (shown as shown)")
+    (package / "module.py").write_text("shown, forgotten, _own = 1, 2, 3\n")
+    assert house.forgotten_names(house.measure(tmp_path)) == ["top.package.module.forgotten"]
+
+
 def test_no_module_hides_what_its_face_exports_under_the_same_name(measured, faces):
     hidden = [
         f"{package}.{name} (from {source})"
@@ -59,3 +73,10 @@ def test_no_function_is_longer_than_fifty_lines_of_code(measured):
 
 def test_no_file_is_longer_than_four_hundred_lines(measured):
     assert [m.name for m in measured.modules.values() if m.lines > house.LONG] == []
+
+
+@pytest.mark.parametrize("words", ["spec section", "hardware facts", "spec.md"])
+def test_no_source_cites_a_document_that_its_readers_have_not(words):
+    sources = (ROOT / "src").rglob("*.py")
+    texts = {path.name: " ".join(path.read_text(encoding="utf-8").split()) for path in sources}
+    assert [name for name, text in texts.items() if words in text] == []

@@ -228,6 +228,19 @@ def public_names(module: Module) -> set[str]:
     return {name for name in defined_names(module) if not name.startswith("_")}
 
 
+def forgotten_names(house: House) -> list[str]:
+    """Return the public names of plain modules that no face exports."""
+    faces = find_faces(house.modules)
+    exported = {(source, name) for names in faces.values() for name, source in names.items()}
+    return sorted(
+        f"{module.name}.{name}"
+        for module in house.modules.values()
+        for name in (() if module.is_face else public_names(module))
+        # A module right below the top is imported by its own name: it is a face itself.
+        if (module.name, name) not in exported and module.name.count(".") > 1
+    )
+
+
 def _is_dict_of_any(node: ast.AST) -> bool:
     return isinstance(node, ast.Subscript) and ast.unparse(node) == "dict[str, Any]"
 
@@ -248,14 +261,8 @@ def main() -> None:
         for module in rooms
         if len(house.importers[module.name]) == 1 and module.name not in shown
     )
-    exported = {(source, name) for names in faces.values() for name, source in names.items()}
     public = [(module.name, name) for module in rooms for name in public_names(module)]
-    hidden = sorted(
-        f"{module}.{name}"
-        for module, name in public
-        # A module right below the top is imported by its own name: it is a face itself.
-        if (module, name) not in exported and module.count(".") > 1
-    )
+    hidden = forgotten_names(house)
     loose = [
         f"{module.path}:{node.lineno}"
         for module in modules

@@ -4,7 +4,7 @@ from typing import Protocol
 
 
 class Progress(Protocol):
-    """Hears how far a piece of work is.
+    """Called with stage, done and total while work goes on.
 
     Whoever works calls it with the name of the stage, how much of it is done and how much there
     is; it never raises and never waits.

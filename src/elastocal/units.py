@@ -1,4 +1,4 @@
-"""Units: SI and radians inside, everything else only at the edges (spec section 1).
+"""Units: SI and radians inside, everything else only at the edges (docs/conventions.md).
 
 A person writes ``"175 mm"`` in YAML and ``force_x[kN]`` in a CSV header; the rest of the
 package only ever sees metres, radians, newtons. The table below is the whole list.
@@ -19,10 +19,25 @@ _FACTORS: dict[str, dict[str, float]] = {
     "angular speed": {"rad/s": 1.0, "deg/s": math.pi / 180.0},
     "force rate": {"N/s": 1.0, "kN/s": 1e3},
     "time": {"s": 1.0, "ms": 1e-3, "min": 60.0},
-    "rotational compliance": {"rad/(N*m)": 1.0, "rad/Nm": 1.0, "rad/(N·m)": 1.0},
-    "translational compliance": {"m/N": 1.0, "mm/N": 1e-3, "um/N": 1e-6},
-    "rotational stiffness": {"N*m/rad": 1.0, "Nm/rad": 1.0, "N·m/rad": 1.0},
-    "translational stiffness": {"N/m": 1.0, "N/mm": 1e3, "N/um": 1e6},
+    "rotational compliance": {
+        "rad/(N*m)": 1.0,
+        "rad/Nm": 1.0,
+        "rad/(N·m)": 1.0,
+        "urad/(N*m)": 1e-6,
+        "µrad/(N·m)": 1e-6,
+    },
+    "translational compliance": {"m/N": 1.0, "mm/N": 1e-3, "um/N": 1e-6, "µm/N": 1e-6},
+    "rotational stiffness": {
+        "N*m/rad": 1.0,
+        "Nm/rad": 1.0,
+        "N·m/rad": 1.0,
+        "kN*m/rad": 1e3,
+        "MN*m/rad": 1e6,
+        "MN·m/rad": 1e6,
+        "N*m/arcmin": 10800.0 / math.pi,
+        "Nm/arcmin": 10800.0 / math.pi,
+    },
+    "translational stiffness": {"N/m": 1.0, "N/mm": 1e3, "N/um": 1e6, "MN/m": 1e6},
     "frequency": {"Hz": 1.0},
     "acceleration": {"m/s2": 1.0, "m/s^2": 1.0, "m/s²": 1.0},
 }
@@ -88,6 +103,21 @@ def parse_quantity(text: object, dimension: str) -> float:
         raise UnitError(f"{text!r} is not a finite {dimension}")
     _check_size(value, dimension, f"{text!r}")
     return value
+
+
+def in_unit_of(value: float, quantity: str) -> str | None:
+    """Return an SI value in the unit of a quantity; None if the text is none.
+
+    >>> in_unit_of(0.02, "25 mm/s")
+    '20 mm/s'
+    """
+    match = _QUANTITY.fullmatch(quantity)
+    unit = match[2].strip() if match else ""
+    # A unit belongs to one dimension.
+    for table in _FACTORS.values():
+        if unit in table:
+            return f"{value / table[unit]:.6g} {unit}"
+    return None
 
 
 def parse_point(text: str) -> tuple[float, float, float]:

@@ -11,9 +11,9 @@ from elastocal.cell import load_cell
 from elastocal.codec.study import (
     Sample,
     StudyStore,
+    batch_executor,
     one_after_the_other,
     run_study,
-    spread_over,
 )
 from elastocal.elastic import ElasticModel, layout
 from elastocal.identification import calibrate
@@ -185,11 +185,11 @@ def test_cores_and_a_dask_cluster_give_the_same_numbers_bit_for_bit(tmp_path):
 
     here = run("here", one_after_the_other)
     for jobs in (1, 2):
-        with spread_over(jobs, None) as spread:
+        with batch_executor(jobs, None) as spread:
             assert run(f"{jobs} jobs", spread) == here
     with distributed.LocalCluster(
         n_workers=2, threads_per_worker=1, dashboard_address=None
     ) as cluster:
         address = cluster.scheduler_address
-        with spread_over(None, address) as spread:
+        with batch_executor(None, address) as spread:
             assert run("dask", spread) == here

@@ -1,26 +1,16 @@
 import json
+import shutil
 
 import numpy as np
 import pytest
-from scipy.spatial.transform import Rotation
 
+from elastocal import workflows
+from elastocal.compensation.conditioning import read_tool
 from support.cli import elastocal
 from support.recorded_runs import record_run
-from support.static_postures import PlantedTool, turned
+from support.static_postures import PlantedTool, posture_table, turned
 
 TOOL = PlantedTool()
-
-
-def table(path, postures, flip=1.0):
-    angles = Rotation.from_matrix(postures.R_base_flange).as_euler("ZYX", degrees=True)
-    header = "a[deg],b[deg],c[deg]," + ",".join(
-        f"{what}_{axis}[{unit}]"
-        for what, unit in (("force", "N"), ("moment", "N*m"))
-        for axis in "xyz"
-    )
-    rows = np.hstack([angles, flip * postures.force, flip * postures.moment])
-    np.savetxt(path, rows, delimiter=",", header=header, comments="")
-    return path
 
 
 @pytest.fixture
@@ -33,7 +23,7 @@ def test_a_table_gives_the_planted_tool_within_its_intervals(tmp_path, postures)
     out = tmp_path / "tool.json"
     result = elastocal(
         "tool",
-        table(tmp_path / "s.csv", postures),
+        posture_table(tmp_path / "s.csv", postures),
         "--out",
         out,
         "--json",
@@ -49,7 +39,7 @@ def test_a_table_gives_the_planted_tool_within_its_intervals(tmp_path, postures)
 
 def test_people_see_the_intervals(tmp_path, postures):
     out = tmp_path / "tool.json"
-    data = table(tmp_path / "s.csv", postures)
+    data = posture_table(tmp_path / "s.csv", postures)
     result = elastocal("tool", data, "--out", out, "--free-rotation")
     assert "10 static postures" in result.err
     assert "mass" in result.err
@@ -58,7 +48,9 @@ def test_people_see_the_intervals(tmp_path, postures):
 def test_too_few_directions_are_named(tmp_path):
     rng = np.random.default_rng(0)
     same = TOOL.raw(np.repeat(turned(1, rng), 4, axis=0), rng)
-    result = elastocal("tool", table(tmp_path / "s.csv", same), "--out", tmp_path / "t.json")
+    result = elastocal(
+        "tool", posture_table(tmp_path / "s.csv", same), "--out", tmp_path / "t.json"
+    )
     assert result.code == 0
     assert "not determined: mass" in " ".join(result.err.split())
 
@@ -72,14 +64,14 @@ def test_too_few_directions_are_named(tmp_path):
     ],
 )
 def test_options_that_do_not_fit_are_refused(tmp_path, postures, options, reason):
-    data = table(tmp_path / "s.csv", postures)
+    data = posture_table(tmp_path / "s.csv", postures)
     result = elastocal("tool", data, "--out", tmp_path / "t.json", *options)
     assert reason in result.reason
 
 
 def test_a_turned_sign_writes_nothing(tmp_path, postures):
     out = tmp_path / "tool.json"
-    result = elastocal("tool", table(tmp_path / "s.csv", postures, flip=-1.0), "--out", out)
+    result = elastocal("tool", posture_table(tmp_path / "s.csv", postures, flip=-1.0), "--out", out)
     assert "sign of the wrenches is turned" in result.reason
     assert not out.exists()
 
@@ -98,3 +90,70 @@ def test_a_folder_that_is_no_run_is_refused(tmp_path):
     (tmp_path / "empty").mkdir()
     result = elastocal("tool", tmp_path / "empty", "--out", tmp_path / "tool.json")
     assert "journal.jsonl" in result.reason
+
+
+def test_a_run_is_derived_with_the_matrix_of_its_tool_file(tmp_path):
+    run = record_run(tmp_path / "run", poses=8)
+    out = tmp_path / "tool.json"
+    assert elastocal("tool", run.path, "--out", out).code == 0
+    contents = json.loads(out.read_text())
+    plain = workflows.derive(run.path).dataset
+    gain = np.diag([1.02, 1.02, 1.02, 1.0, 1.0, 1.0]).tolist()
+    out.write_text(json.dumps(contents | {"matrix": gain}))
+    corrected = workflows.derive(run.path, tool=out).dataset
+    lengths = [np.linalg.norm(data.force, axis=-1) for data in (corrected, plain)]
+    np.testing.assert_allclose(lengths[0], 1.02 * lengths[1], rtol=2e-3)
+    assert "sensor corrected by a tool file" in corrected.provenance
+
+
+def test_a_tool_file_of_before_is_still_read(tmp_path, postures):
+    out = tmp_path / "tool.json"
+    data = posture_table(tmp_path / "s.csv", postures)
+    elastocal("tool", data, "--out", out, "--free-rotation")
+    keys = "flange mass centre force_bias moment_bias R_flange_sensor sensor_origin gravity"
+    keys += " half_width undetermined postures force_scatter moment_scatter source schema"
+    contents = json.loads(out.read_text())
+    out.write_text(json.dumps({key: contents[key] for key in keys.split()}))
+    found = read_tool(out)
+    assert found.matrix is None
+    assert found.notes == ()
+
+
+@pytest.fixture(scope="module")
+def recorded(tmp_path_factory):
+    return record_run(tmp_path_factory.mktemp("tool") / "run", poses=6)
+
+
+@pytest.mark.parametrize(
+    "option",
+    [
+        ("--flange", "link_6"),
+        ("--sensor", "0 mm, 0 mm, 45 mm, 0 deg, 0 deg, 0 deg"),
+        ("--down", "0, 0, 1"),
+        ("--robot", "KR 120 R2700-2"),
+    ],
+)
+def test_what_the_cell_of_a_run_says_is_no_option(recorded, tmp_path, option):
+    out = tmp_path / "tool.json"
+    result = elastocal("tool", recorded.path, "--out", out, *option)
+    assert f"{option[0]} is for a table of postures" in result.reason
+    assert not out.exists()
+
+
+@pytest.mark.parametrize("file", ["streams/pose_0002_1.mcap", "plan/plan.json", "cell/cell.yaml"])
+def test_a_run_whose_files_were_changed_gives_no_tool(recorded, tmp_path, file):
+    shutil.copytree(recorded.path, tmp_path / "run")
+    path = tmp_path / "run" / file
+    data = path.read_bytes()
+    path.write_bytes(data.replace(b"60 kg", b"61 kg") if path.suffix == ".yaml" else data + b"\n")
+    result = elastocal("tool", tmp_path / "run", "--out", tmp_path / "tool.json")
+    assert "is not what the run wrote" in result.reason
+    assert not (tmp_path / "tool.json").exists()
+
+
+@pytest.mark.parametrize("name", ["model.json", "data.nc", "cell.yaml", "pose.mcap"])
+def test_another_kind_of_file_is_refused_in_one_line(tmp_path, name):
+    (tmp_path / name).write_text("x")
+    reason = elastocal("tool", tmp_path / name, "--out", tmp_path / "t.json").reason
+    assert "is not that of a table of postures (.csv), nor is it the folder of a run" in reason
+    assert "no such file" in elastocal("tool", tmp_path / "no.csv", "--out", tmp_path / "t").reason

@@ -17,7 +17,7 @@ from elastocal.codec import (
 )
 from elastocal.codec.cross_validation import prepared_variants
 from elastocal.codec.indices import (
-    KINDS,
+    STATISTICS,
     _at_equal_size,
     _at_equal_size_and_split,
     _growth,
@@ -131,7 +131,7 @@ def test_growth_and_equal_size_are_means_of_spearmans(known):
 
 def test_an_index_that_is_the_accuracy_correlates_fully(known):
     found = planted(known, -known.data.errors("actuated"))
-    for kind in KINDS:
+    for kind in STATISTICS:
         assert found["o1", kind].correlation == pytest.approx(1.0)
         assert found["o1", kind].low > 0.99
         assert found["covering_radius", kind].correlation == pytest.approx(-1.0)
@@ -181,7 +181,7 @@ def test_intervals_hold_their_value_and_widen_with_what_splits_share(known):
 
 def test_every_index_error_and_kind_has_a_correlation(known):
     keys = {(e.variant, e.index, e.error, e.kind) for e in known.insight.correlations}
-    assert len(keys) == len(known.insight.correlations) == 2 * len(INDICES) * 2 * len(KINDS)
+    assert len(keys) == len(known.insight.correlations) == 2 * len(INDICES) * 2 * len(STATISTICS)
     assert all(-1.0 <= e.low <= e.high <= 1.0 for e in known.insight.correlations)
 
 

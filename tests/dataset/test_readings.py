@@ -1,8 +1,10 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
 
-from elastocal.dataset import Readings
+from elastocal.dataset import Readings, without
 from elastocal.errors import DatasetError
 from support.datasets import JOINTS, dataset
 
@@ -76,3 +78,19 @@ def test_a_mask_and_its_rows_take_the_same():
 def test_taking_a_row_that_does_not_exist_is_an_index_error():
     with pytest.raises(IndexError):
         READINGS.take([len(READINGS)])
+
+
+def test_one_name_to_exclude_is_not_split_into_letters():
+    readings = READINGS.take([0, 2, 4])
+    readings = replace(readings, pose=[1, 2, 12])
+    assert without(readings, "12").pose.tolist() == [1, 2]
+    assert without(readings, ["1", "2"]).pose.tolist() == [12]
+
+
+def test_a_name_that_excludes_nothing_is_refused_without_an_option_of_the_command():
+    readings = READINGS.take([0, 2, 4])
+    readings = replace(readings, pose=[1, 2, 12])
+    for name, message in (("7", "no usable reading at pose 7"), ("a", "must be POSE")):
+        with pytest.raises(DatasetError, match=message) as refused:
+            without(readings, name)
+        assert "--" not in str(refused.value)

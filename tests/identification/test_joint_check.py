@@ -52,6 +52,25 @@ def test_a_joint_clearly_outside_its_limits_is_refused_by_name(value):
         check_joints(elastic().robot, with_joint(value))
 
 
+def test_every_joint_outside_is_named_in_one_refusal():
+    readings = with_joint(LIMIT + 0.3, joint=2)
+    q = readings.joint_position.copy()
+    q[9, 4] = -LIMIT - 0.2
+    q[9, 5] = LIMIT + 0.01
+    with pytest.raises(DatasetError, match=r"joint_3 at pose 1 is .*; joint_5 at") as refused:
+        check_joints(elastic().robot, replace(readings, joint_position=q))
+    assert "joint_6" not in str(refused.value), "a little outside is no reason"
+
+
+def test_a_rail_a_little_outside_does_not_hide_behind_an_axis():
+    slider = Robot.from_urdf(sliding_arm_urdf(), "tcp")
+    q = np.tile([0.0, 0.0, 0.5, 0.0, 0.0, 0.0], (155, 1))
+    q[7, 2], q[9, 4] = 1.21, slider.limits.upper[4] + 0.05
+    rail, axis = check_joints(slider, replace(campaign(), joint_position=q, tcp_position=None))
+    assert rail.startswith("slide at pose 1 is 1.21 m")
+    assert slider.joint_names[4] in axis
+
+
 def test_a_joint_a_little_outside_is_worth_a_warning():
     (warning,) = check_joints(elastic().robot, with_joint(LIMIT + 0.08))
     assert warning.startswith("joint_3 at pose 1 is 3.222 rad, outside")

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from elastocal.errors import IdentificationError
-from elastocal.identification import MINIMUM_DRAWS, FitOptions
+from elastocal.identification import MINIMUM_DRAWS, FitOptions, FitSettings
 from elastocal.identification.options import bounds, parse_bounds
 
 
@@ -60,6 +60,19 @@ def test_impossible_bounds_are_refused_by_the_spring(lower, upper, message):
 def test_an_unknown_choice_is_refused_with_those_allowed(choice, message):
     with pytest.raises(IdentificationError, match=message):
         FitOptions(**choice)
+
+
+def test_bounds_may_be_two_numbers_and_are_kept_as_a_text():
+    settings = FitSettings(bounds=(0, 1e-5))
+    assert (settings.options().lower, settings.options().upper) == (0.0, 1e-5)
+    assert FitSettings(bounds=settings.bounds) == settings
+    assert FitSettings(bounds=(-np.inf, np.inf)).bounds == "-inf,inf"
+
+
+@pytest.mark.parametrize("wrong", [(0,), (0, 1, 2), 3.0, ("a", "b"), "0"])
+def test_bounds_that_are_not_two_numbers_are_refused(wrong):
+    with pytest.raises(IdentificationError, match="must be two numbers"):
+        FitSettings(bounds=wrong)
 
 
 @pytest.mark.parametrize("text", ["nan,1", "0, NaN"])

@@ -1,11 +1,12 @@
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from elastocal.errors import IdentificationError
 from elastocal.identification import pose_blocks, same_configuration
-from elastocal.identification.problem import MINIMUM_BLOCKS
+from elastocal.identification.problem import _SAME_CONFIGURATION, MINIMUM_BLOCKS
 from support.problems import campaign
 
 
@@ -71,3 +72,9 @@ def test_fewer_than_three_configurations_are_refused(offsets, message):
 
 def test_three_configurations_are_enough():
     assert len(np.unique(pose_blocks(with_joints([0.0, 0.1, 0.2])))) == MINIMUM_BLOCKS
+
+
+@pytest.mark.parametrize("page", ["how-to/when-it-refuses.md", "explanation/uncertainty.md"])
+def test_the_pages_state_the_distance_of_the_code(page):
+    stated = f"closer than {1e3 * _SAME_CONFIGURATION:g}e-3 rad"
+    assert stated in (Path(__file__).parents[2] / "docs" / page).read_text("utf-8")

@@ -21,7 +21,7 @@ from .data import (
 from .indices import (
     COVERING_RADIUS as COVERING_RADIUS,
     INDICES as INDICES,
-    KINDS as KINDS,
+    STATISTICS as STATISTICS,
     Correlation as Correlation,
     IndexValues as IndexValues,
     correlate as correlate,

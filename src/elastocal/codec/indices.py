@@ -67,8 +67,8 @@ def index_values(data: CodecData, prepared: PreparedVariant) -> IndexValues:
     """Return the indices of all training sets of a variant.
 
     All sets are measured by one rule: over the directions that all poses together observe under
-    the variant's load cases, columns scaled over all poses (spec section 2, trap 2). O1 is
-    Eq. 20 of the paper. For ``i``, the verification poses of the split under all load cases
+    the variant's load cases (docs/explanation/observability.md), columns scaled over all poses. O1
+    is Eq. 20 of the paper. For ``i``, the verification poses of the split under all load cases
     stand for the production. The covering radius is that over all poses of the codec.
 
     Parameters
@@ -163,7 +163,7 @@ class Correlation:
     error: str
     """``mean`` or ``max`` error norm."""
     kind: str
-    """One of `KINDS`."""
+    """One of `STATISTICS`."""
     correlation: float | None
     """Mean rank correlation of the index, turned so that more is better, with accuracy; None
     where the index never varies."""
@@ -194,7 +194,7 @@ def _at_equal_size_and_split(goodness: FloatArray, accuracy: FloatArray) -> floa
     return float(_pearson(left[0].reshape(1, -1), left[1].reshape(1, -1))[0])
 
 
-KINDS: dict[str, Callable[[FloatArray, FloatArray], float]] = {
+STATISTICS: dict[str, Callable[[FloatArray, FloatArray], float]] = {
     "growth": _growth,
     "size": _at_equal_size,
     "size_and_split": _at_equal_size_and_split,
@@ -220,7 +220,7 @@ def correlate(data: CodecData, indices: IndexValues) -> tuple[Correlation, ...]:
         accuracy = -data.errors(indices.variant, error)
         for name in INDICES:
             goodness = _rounded(indices.goodness(name))
-            for kind, statistic in KINDS.items():
+            for kind, statistic in STATISTICS.items():
                 figures = map(known, _interval(statistic, goodness, accuracy, overlap))
                 found.append(Correlation(indices.variant, name, error, kind, *figures))
     return tuple(found)

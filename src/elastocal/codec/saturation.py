@@ -141,7 +141,7 @@ class Saturation(SaturationInterval):
                 f"{self.variant}: the error still falls at {self.last} training poses: mean"
                 f" {micrometres(self.last_error)}; more poses may help{early}; {extent}"
             )
-        return f"{self._saturated(tolerance)}; {extent}{self._doubts()}"
+        return f"{self._saturated(tolerance)}; {extent}{self._caveat()}"
 
     def _saturated(self, tolerance: Tolerance) -> str:
         between = "these sets tell no interval"
@@ -159,7 +159,7 @@ class Saturation(SaturationInterval):
             f" {100.0 * tolerance.relative:.3g} % of that, or {micrometres(tolerance.floor)})"
         )
 
-    def _doubts(self) -> str:
+    def _caveat(self) -> str:
         if self.rises:
             return (
                 f"; the error rises again: {micrometres(self.least_error)} with {self.least}: look"
@@ -196,15 +196,17 @@ def find_saturation(
         Error of no model at all, in m; see `CodecData.zero_error`.
     """
     curve = np.median(errors, axis=0)
-    n = _first(tolerance.reached(curve))
+    n = _first_reached(tolerance.reached(curve))
     draws = median_draws(errors, overlap, rng)
     low, high = None, None
     if len(draws):
         tail, reached = 50.0 * (1.0 - CONFIDENCE), tolerance.reached(draws)
         # A noisy draw dips into the tolerance early, and leaves it again late; neither is news
         # of saturation. Whole numbers of poses: the ends are drawn values, no averages of two.
-        low = min(int(n), int(np.percentile(_for_good(reached), tail, method="lower")))
-        high = max(int(n), int(np.percentile(_first(reached), 100.0 - tail, method="higher")))
+        low = min(int(n), int(np.percentile(_steady_from(reached), tail, method="lower")))
+        high = max(
+            int(n), int(np.percentile(_first_reached(reached), 100.0 - tail, method="higher"))
+        )
     least = int(np.argmin(curve))
     return Saturation(
         variant=variant,
@@ -214,7 +216,7 @@ def find_saturation(
         error=float(curve[n - 1]),
         last_error=float(curve[-1]),
         last=len(curve),
-        stays=int(_for_good(tolerance.reached(curve))),
+        stays=int(_steady_from(tolerance.reached(curve))),
         least=least + 1,
         least_error=float(curve[least]),
         unexplained=None if zero is None else float(np.median(errors[:, -1] / zero)),
@@ -222,12 +224,12 @@ def find_saturation(
     )
 
 
-def _first(reached: BoolArray) -> IndexArray:
+def _first_reached(reached: BoolArray) -> IndexArray:
     """Return the size, from 1, of the first training set that has reached the last error."""
     return np.asarray(np.argmax(reached, axis=-1) + 1)
 
 
-def _for_good(reached: BoolArray) -> IndexArray:
+def _steady_from(reached: BoolArray) -> IndexArray:
     """Return the size, from 1, of the training set from which on all are within the tolerance."""
     outside = ~reached[..., ::-1]
     return np.where(outside.any(axis=-1), reached.shape[-1] - outside.argmax(axis=-1) + 1, 1)

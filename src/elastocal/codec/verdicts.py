@@ -1,4 +1,4 @@
-"""The verdicts on a codec, and its file ``codec.json`` (spec section 4).
+"""The verdicts on a codec, and its file ``codec.json`` (docs/reference/files.md).
 
 Each variant is judged by its saturation, each pair by its errors on the same splits.
 """
@@ -49,9 +49,14 @@ class PairVerdict:
     a: str
     b: str
     at: int
+    """Number of training poses at which the pair is judged: both variants have saturated."""
     better: str | None
+    """The variant with the smaller error there; None: cannot be told."""
     proved_from: int | None
+    """Number of training poses from which on, up to `at`, every interval says so; None: none."""
     crossing: int | None
+    """Number of training poses from which on, up to `at`, the difference keeps its sign; None: it
+    has it from the first on, or no difference is left."""
 
 
 @brief_repr

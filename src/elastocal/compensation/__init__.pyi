@@ -23,6 +23,7 @@ from .settings import (
     CompensatorSettings as CompensatorSettings,
     CorrectionLimits as CorrectionLimits,
     FixedFrame as FixedFrame,
+    FrictionReset as FrictionReset,
     SensorRange as SensorRange,
     read_settings as read_settings,
 )

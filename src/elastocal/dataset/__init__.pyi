@@ -9,6 +9,11 @@ from .load_rows import (
     read_robot_rows as read_robot_rows,
     write_load_rows as write_load_rows,
 )
-from .merging import merge as merge
-from .readings import Presses as Presses, Readings as Readings, without as without
+from .merging import merge as merge, selected as selected
+from .readings import (
+    Presses as Presses,
+    Readings as Readings,
+    usable_readings as usable_readings,
+    without as without,
+)
 from .store import read as read, read_dataset as read_dataset, write as write

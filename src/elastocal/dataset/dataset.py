@@ -63,7 +63,7 @@ class Dataset:
     Raises
     ------
     DatasetError
-        If the data break the contract of spec section 3; the message names the place.
+        If the data break the contract of docs/reference/files.md; the message names the place.
     SchemaError
         If the schema is not known.
     """
@@ -107,8 +107,7 @@ class Dataset:
     campaigns: tuple[str, ...] = ()
     """Campaign of each pose; empty where there are none."""
     attributes: Mapping[str, str] = field(default_factory=lambda: {"schema": SCHEMA})
-    """Attributes of the file: schema, robot, marker, gravity, provenance, and CF's remarks. The
-    schema becomes the first one that has all that the dataset has."""
+    """Attributes of the file. The schema becomes the first one that has all that is here."""
 
     def __post_init__(self) -> None:
         for name in ("poses", "load_cases", "joint_names", "joint_units", "campaigns"):
@@ -191,8 +190,7 @@ class Dataset:
         gravity : tuple of float, optional
             Acceleration of gravity in base, in m/s²; that of an upright base by default.
         conditioned : bool
-            Whether the first load case of each pose is a full press made before the reference was
-            read; else the arm came to it by free moves.
+            Whether each pose began with a full press, made before the reference was read.
 
         Raises
         ------
@@ -235,8 +233,7 @@ class Dataset:
     def from_labelled(cls, arrays: LabelledArrays) -> "Dataset":
         """Return the dataset of labelled arrays, such as a NetCDF file holds them.
 
-        Dimensions and axes may stand in any order. A stated unit that is not SI is converted,
-        since nothing is guessed; a missing one is refused.
+        Dimensions and axes may stand in any order; units that are not SI are converted.
 
         Raises
         ------
@@ -297,8 +294,7 @@ class Dataset:
     @property
     def arrays(self) -> dict[str, FloatArray]:
         """The quantities that are present, by name: all variables but status and sequence."""
-        names = [variable.name for variable in VARIABLES]
-        return {name: each for name, each in self._variables.items() if name in names}
+        return {each.name: v for each in VARIABLES if (v := getattr(self, each.name)) is not None}
 
     @property
     def _variables(self) -> dict[str, np.ndarray]:
@@ -372,8 +368,7 @@ class Dataset:
         """Return some poses and load cases, in the order asked for.
 
         Load cases that are not asked for by name and have no usable reading at the chosen poses
-        are left out. What was first in time remains so: where the load cases are not asked for in
-        that order, the dataset gets a ``sequence``.
+        are left out. Load cases asked for in another order get a ``sequence``: time stays.
 
         Parameters
         ----------

@@ -119,7 +119,7 @@ class Readings:
 
     @property
     def deflection(self) -> FloatArray:
-        """Real minus commanded TCP position, shape (reading, 3), in m (spec section 1).
+        """Real minus commanded TCP position, shape (reading, 3), in m (docs/conventions.md).
 
         ``deflection = marker_displacement - controller_displacement``: the paper's Eq. (10)
         and (13) with both signs turned.
@@ -218,19 +218,28 @@ def _unusable_presses(dataset: "Dataset", order: Sequence[int]) -> Presses | Non
     )
 
 
-def without(readings: Readings, excluded: Sequence[str]) -> Readings:
+def without(readings: Readings, excluded: str | Sequence[str]) -> Readings:
     """Return the readings without those named ``POSE`` or ``POSE:LOAD_CASE``.
+
+    Parameters
+    ----------
+    readings : Readings
+        All of them.
+    excluded : str or sequence of str
+        One name, or several.
 
     Raises
     ------
     DatasetError
         If a name matches no reading, or none is left.
     """
+    # A text is a sequence too: "12" would be the poses 1 and 2.
+    names = (excluded,) if isinstance(excluded, str) else tuple(excluded)
     keep = np.ones(len(readings), dtype=bool)
-    for name in excluded:
+    for name in names:
         keep &= ~_named(readings, name)
     if not np.any(keep):
-        raise DatasetError(f"--exclude {' '.join(excluded)} leaves no reading")
+        raise DatasetError(f"to exclude {', '.join(names)} leaves no reading")
     return readings.take(keep)
 
 
@@ -239,15 +248,15 @@ def _named(readings: Readings, name: str) -> np.ndarray:
     try:
         mask = readings.pose == int(pose)
     except ValueError as error:
-        raise DatasetError(f"--exclude {name!r} must be POSE or POSE:LOAD_CASE") from error
+        raise DatasetError(f"excluded reading {name!r} must be POSE or POSE:LOAD_CASE") from error
     if not np.any(mask):
-        raise DatasetError(f"--exclude {name!r}: there is no usable reading at pose {pose}")
+        raise DatasetError(f"excluded reading {name!r}: there is no usable reading at pose {pose}")
     if load_case:
         cases = sorted(set(readings.load_case[mask].tolist()))
         mask &= readings.load_case == load_case
         if not np.any(mask):
             raise DatasetError(
-                f"--exclude {name!r}: pose {pose} has no load case {load_case!r}"
+                f"excluded reading {name!r}: pose {pose} has no load case {load_case!r}"
                 f"{nearest(load_case, cases)} (it has {', '.join(cases)})"
             )
     return np.asarray(mask)

@@ -1,4 +1,5 @@
 from .friction import FrictionElements as FrictionElements
+from .known import Knowledge as Knowledge, KnownSpring as KnownSpring
 from .layouts import (
     AXES as AXES,
     LAYOUTS as LAYOUTS,
@@ -9,6 +10,7 @@ from .layouts import (
     bearing_ends as bearing_ends,
     bearing_joint as bearing_joint,
     custom as custom,
+    known_springs as known_springs,
     layout as layout,
     orthogonal_axes as orthogonal_axes,
     read_springs as read_springs,

@@ -9,6 +9,8 @@ changelog and an entry in ``tests/contracts/test_layouts.py``. A spring file::
       - {joint: joint_a2, axis: x}                          # torsion, bearing housing
       - {joint: joint_a3, axis: [0, 1, 1], frame: distal}   # any axis, behind the joint
       - {joint: joint_a6, axis: z, kind: prismatic, offset: ["0 mm", "0 mm", "150 mm"]}
+      - {joint: joint_a2, stiffness: "1.2 MN*m/rad", uncertainty: "20 %"}   # of a data sheet
+      - {joint: joint_a1, bounds: ["0.5 MN*m/rad", "5 MN*m/rad"]}
 """
 
 from collections.abc import Callable, Iterable
@@ -19,6 +21,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from pydantic import BeforeValidator, Field
 
+from elastocal.elastic.known import Knowledge, KnownSpring
 from elastocal.elastic.origins import joint_origins
 from elastocal.elastic.springs import KINDS, Hinge, Spring, SpringAxis, Tensor, as_axis, axial
 from elastocal.errors import SpringError, nearest
@@ -165,9 +168,33 @@ def layout(robot: Robot, name: str) -> tuple[Spring, ...]:
             f"unknown spring layout {name!r}{nearest(name, LAYOUTS)}"
             f" (allowed: {', '.join(LAYOUTS)}, or a .yaml file)"
         )
-    file = read_springs(path)
-    included = LAYOUTS[file.include](robot) if file.include else ()
-    return (*included, *custom(robot, file.springs))
+    return tuple(spring for spring, _ in _springs_of(robot, read_springs(path)))
+
+
+def known_springs(robot: Robot, name: str) -> tuple[KnownSpring, ...]:
+    """Return what a spring file knows of its springs; nothing for a layout by name.
+
+    Raises
+    ------
+    SpringError
+        If it does not fit a spring.
+    SchemaError, FileAccessError
+        If the file cannot be read or does not fit.
+    """
+    if Path(name).suffix not in (".yaml", ".yml"):
+        return ()
+    pairs = _springs_of(robot, read_springs(Path(name)))
+    return tuple(entry.of_spring(spring) for spring, entry in pairs if entry and entry.knows)
+
+
+def _springs_of(robot: Robot, file: "SpringFile") -> list[tuple[Spring, "SpringEntry | None"]]:
+    """Return the springs of a file with their entries; included ones may have none."""
+    included: tuple[Spring, ...] = LAYOUTS[file.include](robot) if file.include else ()
+    listed = dict(zip(custom(robot, file.springs), file.springs, strict=True))
+    # An entry that tells what is known of an included spring is no second spring.
+    told = {spring: entry for spring, entry in listed.items() if entry.knows}
+    found = [(spring, told.get(spring)) for spring in included]
+    return found + [(s, entry) for s, entry in listed.items() if s not in included or s not in told]
 
 
 def _words(known: Callable[[], Iterable[str]]) -> BeforeValidator:
@@ -187,7 +214,7 @@ _LayoutName = Annotated[str, _words(lambda: tuple(LAYOUTS))]
 _Kind = Annotated[str, _words(lambda: (*_MOTIONS, *(word for word in KINDS if word != _HINGE)))]
 
 
-class SpringEntry(StrictModel):
+class SpringEntry(Knowledge):
     """One spring as a person writes it."""
 
     joint: str

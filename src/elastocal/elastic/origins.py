@@ -31,7 +31,7 @@ _SAME_AXIS = 1e-6
 _ALIGNED = 1.0 - 1e-9
 """Cosine above which a direction counts as a coordinate axis."""
 
-Triple = tuple[float, float, float]
+_Triple = tuple[float, float, float]
 
 
 @brief_repr
@@ -39,12 +39,12 @@ Triple = tuple[float, float, float]
 class JointOrigin:
     """Origin of a joint and the directions of its virtual springs, in the joint's frame."""
 
-    offset: Triple
+    offset: _Triple
     """The origin in the joint's proximal frame, in m."""
-    far: Triple
+    far: _Triple
     """Where the common normal with the next axis, or for the last joint the one through the tip,
     meets the axis, likewise; the origin again where axes are parallel."""
-    directions: dict[str, Triple]
+    directions: dict[str, _Triple]
     """Unit vectors orthogonal to the joint axis by name: the common normal, and the direction
     orthogonal to it. Named after the frame's coordinate axes where they are those, else
     ``normal`` and ``binormal``."""
@@ -110,7 +110,7 @@ def _transverse(axis: FloatArray) -> FloatArray:
     return np.asarray(normal / np.linalg.norm(normal))
 
 
-def _named(normal: FloatArray, binormal: FloatArray) -> dict[str, Triple]:
+def _named(normal: FloatArray, binormal: FloatArray) -> dict[str, _Triple]:
     """Return two directions by name, coordinate axes in their order and positive."""
     found = []
     for name, direction in (("normal", normal), ("binormal", binormal)):
@@ -121,7 +121,7 @@ def _named(normal: FloatArray, binormal: FloatArray) -> dict[str, Triple]:
     return {name: as_axis(direction) for name, direction in pairs}
 
 
-def _triple(vector: FloatArray) -> Triple:
+def _triple(vector: FloatArray) -> _Triple:
     # A picometre is a rounding, and a zero has no sign.
     x, y, z = (float(round(value, 12)) + 0.0 for value in vector)
     return x, y, z

@@ -11,7 +11,7 @@ from .calibration import (
     check_rows as check_rows,
 )
 from .conventions import (
-    POOR as POOR,
+    POOR_FIT as POOR_FIT,
     check_conventions as check_conventions,
     check_joints as check_joints,
 )
@@ -46,6 +46,7 @@ from .frames import (
     frame_columns as frame_columns,
     frame_summaries as frame_summaries,
 )
+from .knowledge import with_knowledge as with_knowledge
 from .ladder import (
     AUTO as AUTO,
     RUNGS as RUNGS,

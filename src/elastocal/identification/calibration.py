@@ -14,7 +14,7 @@ from elastocal.arrays import BoolArray, FloatArray
 from elastocal.dataset import Readings
 from elastocal.elastic import ElasticModel, check_vectors
 from elastocal.errors import ConventionError, IdentificationError, SpringError
-from elastocal.identification.conventions import POOR, check_conventions, check_joints
+from elastocal.identification.conventions import POOR_FIT, check_conventions, check_joints
 from elastocal.identification.domain import CalibrationDomain
 from elastocal.identification.frames import FrameSummary, frame_summaries
 from elastocal.identification.ladder import Climbed
@@ -306,7 +306,7 @@ def calibrate(
     """
     options = options or FitOptions()
     problem = build(model, readings, options, marker_offset)
-    doubts = _doubts(model, readings, problem, options, marker_offset)
+    warnings = _data_warnings(model, readings, problem, options, marker_offset)
     screening = screen(problem)
     used = ~screening.blunder if options.set_blunders_aside else np.ones_like(screening.blunder)
     kept = problem.take(used)
@@ -337,8 +337,8 @@ def calibrate(
         model, readings.take(used), weighted, calibrated.compliance, marker_offset
     )
     reach = max(attainable_rank(model, marker_offset), calibrated.observability.rank)
-    doubts += [offset.message()] if offset else []
-    doubts += _worth(calibrated, reach, weighted)
+    warnings += [offset.message()] if offset else []
+    warnings += _fit_warnings(calibrated, reach, weighted) + _unsettled(solution, options.loss)
     return Calibration(
         calibrated=calibrated,
         readings=readings,
@@ -352,12 +352,12 @@ def calibrate(
         widening=by,
         screening=screening,
         solution=solution,
-        warnings=tuple(doubts),
+        warnings=tuple(warnings),
         frames=frame_summaries(weighted.frames, solution.compliance[frames], widened[:, frames]),
     )
 
 
-def _doubts(
+def _data_warnings(
     model: ElasticModel,
     readings: Readings,
     problem: Problem,
@@ -365,7 +365,7 @@ def _doubts(
     marker_offset: ArrayLike | None,
 ) -> list[str]:
     """Return what is odd about the data before they are fitted, or refuse them."""
-    doubts = list(check_joints(model.robot, readings)) + [
+    warnings = list(check_joints(model.robot, readings)) + [
         f"poses {', '.join(map(str, group))} are one configuration: resampled and left out together"
         for group in same_configuration(readings, problem.block)
     ]
@@ -374,13 +374,13 @@ def _doubts(
     except ConventionError as error:
         if not options.trust_conventions:
             raise
-        return [*doubts, f"fitted in spite of this: {error}"]
-    if left > POOR:
-        doubts.append(f"the springs leave {left:.0%} of the median deflection unexplained")
-    return doubts
+        return [*warnings, f"fitted in spite of this: {error}"]
+    if left > POOR_FIT:
+        warnings.append(f"the springs leave {left:.0%} of the median deflection unexplained")
+    return warnings
 
 
-def _worth(calibrated: CalibratedModel, reach: int, problem: Problem) -> list[str]:
+def _fit_warnings(calibrated: CalibratedModel, reach: int, problem: Problem) -> list[str]:
     """Return what limits the use of a fit, or refuse one that the data had no part in."""
     c = calibrated.compliance
     n = problem.springs
@@ -388,18 +388,28 @@ def _worth(calibrated: CalibratedModel, reach: int, problem: Problem) -> list[st
         raise IdentificationError(
             "every spring ends at a bound: the bounds, not the data, would make the model"
         )
-    doubts = []
+    warnings = []
     missing = reach - calibrated.observability.rank
     if missing > 0:
-        doubts.append(
+        warnings.append(
             f"poses and load cases determine {calibrated.observability.rank} of the {reach}"
             " directions that more of them would: predictions elsewhere are not covered"
         )
     left = calibrated.unexplained
     if left > MOST_UNEXPLAINED:
         none = "; it predicts no better than none at all" if left >= 1.0 else ""
-        doubts.append(
+        warnings.append(
             f"at left-out poses the model leaves {left:.0%} of the deflection unexplained, more"
             f" than half: it is not fit for use, and is not exported{none}"
         )
-    return doubts
+    return warnings
+
+
+def _unsettled(solution: Solution, loss: str) -> list[str]:
+    """Return the warning of a loss whose weights still changed when reweighting ended."""
+    if solution.settled:
+        return []
+    return [
+        f"the {loss} loss had not settled when reweighting ended: its weights, and so the springs,"
+        " depend on where it stopped"
+    ]

@@ -2,8 +2,8 @@
 
 A force with the wrong sign, in the wrong frame, or joints counted the other way round still make
 a solvable system; only the fit is worse. So the usual mistakes are undone one by one, and if the
-data are explained far better without one of them, the fit is refused with that message (spec
-sections 2 and 6; docs/decisions/0006-conventions-verdict.md).
+data are explained far better without one of them, the fit is refused with that message
+(docs/decisions/0006-conventions-verdict.md).
 
 A new mistake is a function that undoes it and an entry in `_MISTAKES`.
 """
@@ -25,18 +25,18 @@ from elastocal.identification.problem import Problem, build
 from elastocal.identification.solve import solve
 from elastocal.robot import Robot
 
-POOR = 0.35
+POOR_FIT = 0.35
 """Part of the median deflection that may stay unexplained without a warning."""
-_DECISIVE = 0.6
+_LEFT_BY_UNDOING = 0.6
 """A mistake is named when undoing it leaves at most this part of what was unexplained. Model
 errors and noise stay whichever way correct data are read, so that for correct data every
 mistake leaves more, not less."""
-_EXPLAINED = 0.2
+_FITS_WELL = 0.2
 """Part that a mistake's undoing may leave unexplained to be named: it has to fit well itself.
 Springs that the model lacks can make a wrong reading of good data fit less badly, never well."""
-_EXACT = 1e-8
+_ROUND_OFF = 1e-8
 """Unexplained part below which data are exact and comparing remainders compares round-off."""
-_NOTHING = 0.5
+_POOR_WITH_FEW_EQUATIONS = 0.5
 """Unexplained part above which a mistake is named even when there are fewer than four equations a
 spring; with so few, another reading may fit better by chance."""
 
@@ -90,8 +90,8 @@ def check_conventions(
         found.append((_unexplained(other), mistake.message))
     best, message = min(found, key=itemgetter(0))
     few = problem.d.size < 4 * problem.columns
-    enough = stated > (_NOTHING if few else _EXACT)
-    if enough and best <= min(_DECISIVE * stated, _EXPLAINED):
+    enough = stated > (_POOR_WITH_FEW_EQUATIONS if few else _ROUND_OFF)
+    if enough and best <= min(_LEFT_BY_UNDOING * stated, _FITS_WELL):
         raise ConventionError(
             f"{message}: read that way the fit leaves {best:.1%} of the median deflection"
             f" unexplained, as stated {stated:.1%}"
@@ -219,26 +219,37 @@ def check_joints(robot: Robot, readings: Readings) -> tuple[str, ...]:
 
 
 def _limits(robot: Robot, readings: Readings) -> list[str]:
-    margin = robot.limits.margin(readings.joint_position)
-    reading, joint = np.unravel_index(int(margin.argmin()), margin.shape)
-    worst, limits = float(margin[reading, joint]), robot.limits
-    if worst >= 0.0:
-        return []
-    value = readings.joint_position[reading, joint]
-    unit = "rad" if robot.revolute[joint] else "m"
-    message = (
-        f"{robot.joint_names[joint]} at pose {readings.pose[reading]} is {value:.4g} {unit},"
-        f" outside the robot's {limits.lower[joint]:.4g} to {limits.upper[joint]:.4g} {unit}"
-    )
-    if limits.lower[joint] >= limits.upper[joint]:
-        raise DatasetError(
-            f"URDF of {robot.name} leaves {robot.joint_names[joint]} no range: its limits are"
-            f" {limits.lower[joint]:g} to {limits.upper[joint]:g} {unit}"
-        )
+    """Return a warning for each joint that is ever outside its limits, or refuse them."""
+    limits, margin = robot.limits, robot.limits.margin(readings.joint_position)
+    # Joint by joint: a rail's metres and a wrist's radians have no common worst.
+    worst, rows = margin.min(axis=0), margin.argmin(axis=0)
+    outside = np.flatnonzero(worst < 0.0).tolist()
+    for joint in outside:
+        if limits.lower[joint] >= limits.upper[joint]:
+            raise DatasetError(
+                f"URDF of {robot.name} leaves {robot.joint_names[joint]} no range: its limits are"
+                f" {limits.lower[joint]:g} to {limits.upper[joint]:g} {_unit(robot, joint)}"
+            )
+    found = {joint: _outside(robot, readings, int(rows[joint]), joint) for joint in outside}
     assumed = any(assumption.field == "position" for assumption in robot.assumptions)
-    if worst < -_OUTSIDE and not assumed:
-        raise DatasetError(f"{message}: degrees, another joint order, or another robot?")
-    return [message + (" (limits assumed, no source)" if assumed else "")]
+    clearly = [message for joint, message in found.items() if worst[joint] < -_OUTSIDE]
+    if clearly and not assumed:
+        raise DatasetError(f"{'; '.join(clearly)}: degrees, another joint order, or another robot?")
+    note = " (limits assumed, no source)" if assumed else ""
+    return [message + note for message in found.values()]
+
+
+def _outside(robot: Robot, readings: Readings, reading: int, joint: int) -> str:
+    limits, unit = robot.limits, _unit(robot, joint)
+    return (
+        f"{robot.joint_names[joint]} at pose {readings.pose[reading]} is"
+        f" {readings.joint_position[reading, joint]:.4g} {unit}, outside the robot's"
+        f" {limits.lower[joint]:.4g} to {limits.upper[joint]:.4g} {unit}"
+    )
+
+
+def _unit(robot: Robot, joint: int) -> str:
+    return "rad" if robot.revolute[joint] else "m"
 
 
 def _positions(robot: Robot, readings: Readings) -> list[str]:

@@ -3,11 +3,14 @@
 One record, so that no two places can disagree. All numbers are SI.
 """
 
+from collections.abc import Sequence
+from dataclasses import replace
+
 import numpy as np
 
 from elastocal.arrays import BoolArray, FloatArray
 from elastocal.dataset import Readings
-from elastocal.elastic import Spring
+from elastocal.elastic import KnownSpring, Spring
 from elastocal.identification.calibration import CalibratedModel, Calibration
 from elastocal.identification.frames import FrameSummary
 from elastocal.identification.ladder import Climbed
@@ -38,6 +41,8 @@ class SpringSummary:
     """Number of the first unobservable combination that leaves it open."""
     too_weak: bool = False
     """Whether the deflection that a sensible value of it makes stays below the noise."""
+    prior: bool = False
+    """Whether a stiffness known beforehand had a part in it (`CalibrationSummary.known`)."""
 
 
 @brief_repr
@@ -125,7 +130,7 @@ class SuspiciousReading:
 @brief_repr
 @record("elastocal.calibration/1")
 class CalibrationSummary:
-    """The figures of a calibration (spec section 4)."""
+    """The figures of a calibration (docs/reference/files.md)."""
 
     robot: str
     springs: tuple[SpringSummary, ...]
@@ -154,6 +159,8 @@ class CalibrationSummary:
     """Frames that were estimated with the springs."""
     coverage: Coverage | None = None
     """Measured coverage of the intervals of a prediction; none in calibrations of before."""
+    known: tuple[KnownSpring, ...] = ()
+    """What the spring file knew of springs beforehand."""
 
     @property
     def unexplained(self) -> float:
@@ -161,15 +168,22 @@ class CalibrationSummary:
         return self.held_out.mean / self.deflection.mean
 
 
-def summary(calibration: Calibration, settings: FitSettings | None = None) -> CalibrationSummary:
-    """Return the figures of a calibration that was made with these settings."""
+def summary(
+    calibration: Calibration,
+    settings: FitSettings | None = None,
+    known: Sequence[KnownSpring] = (),
+) -> CalibrationSummary:
+    """Return the figures of a calibration that was made with these settings, and this knowledge."""
+    expected = {each.name for each in known if each.compliance is not None}
     calibrated = calibration.calibrated
     seen = calibrated.observability
     residual, deflection = calibration.residual_norm, calibration.deflection_norm
     rms = np.sqrt(np.mean(np.square(calibration.residual[calibration.used]), axis=0))
     return CalibrationSummary(
         robot=calibrated.model.robot.name,
-        springs=spring_summaries(calibrated),
+        springs=tuple(
+            replace(each, prior=each.name in expected) for each in spring_summaries(calibrated)
+        ),
         rank=seen.rank,
         rank_attainable=calibration.attainable_rank,
         springs_total=seen.springs,
@@ -193,6 +207,7 @@ def summary(calibration: Calibration, settings: FitSettings | None = None) -> Ca
         ladder=tuple(map(_rung, calibration.ladder)),
         frames=calibration.frames,
         coverage=calibration.coverage,
+        known=tuple(known),
     )
 
 

@@ -44,9 +44,9 @@ from elastocal.robot import Robot
 
 AUTO = "auto"
 """Asks for the rung that the readings carry."""
-KNEES = (0.3, 1.0, 3.0)
+_KNEES = (0.3, 1.0, 3.0)
 """Knees of the gears, in typical load torques of the joint: one below, at and above it."""
-SLIPS = (0.03, 0.1, 0.3, 1.0)
+_SLIPS = (0.03, 0.1, 0.3, 1.0)
 """Limits of the friction elements, likewise: from what barely matters to gears that stick."""
 _LOADED = 0.01
 """Part of the largest typical torque below which a joint counts as never loaded."""
@@ -54,6 +54,7 @@ _LOW_LEVEL = 0.6
 """A load case is of low load below this part of the largest force at its pose."""
 
 
+@brief_repr
 @dataclass(frozen=True)
 class Rung:
     """A model of the ladder."""
@@ -111,7 +112,7 @@ def gears(robot: Robot, readings: Readings, slips: tuple[float, ...] = ()) -> tu
         size = float(typical[spring.joint])
         if not (axial and axis.revolute and size > least):
             return spring
-        knees = tuple(_rounded(size * part) for part in KNEES)
+        knees = tuple(_rounded(size * part) for part in _KNEES)
         limits = tuple(_rounded(size * part) for part in slips)
         return Gear(spring.name, spring.joint, axis.axis, knees=knees, slips=limits)
 
@@ -129,7 +130,7 @@ RUNGS: dict[str, Rung] = {
         Rung("gears", gears),
         Rung(
             "gears+friction",
-            lambda robot, readings: gears(robot, readings, SLIPS),
+            lambda robot, readings: gears(robot, readings, _SLIPS),
             needs_levels=True,
         ),
     )
@@ -246,11 +247,11 @@ def climb(
 
 def has_levels(readings: Readings) -> bool:
     """Return whether load cases of low load stand beside those of full load."""
-    low = load_levels(readings) == 0
+    low = _load_levels(readings) == 0
     return bool(np.any(low) and not np.all(low))
 
 
-def load_levels(readings: Readings) -> IndexArray:
+def _load_levels(readings: Readings) -> IndexArray:
     """Return 0 for readings of low load, 1 for those of full load, shape (reading,)."""
     force = np.linalg.norm(readings.force, axis=1)
     labels, pose = np.unique(readings.pose, return_inverse=True)
@@ -270,7 +271,7 @@ def _tried(
     problem = build(model, readings, options, marker_offset)
     held_out = leave_poses_out(problem)
     error = held_out.error.copy()
-    low = load_levels(readings) == 0
+    low = _load_levels(readings) == 0
     # The frame of a load case that is left out is not known, so it cannot be judged.
     if has_levels(readings) and options.free_frame != "load_case":
         error[low] = 0.5 * (error[low] + _left_out(problem, low))

@@ -7,7 +7,7 @@ the constants are quantiles of that. A new one is a function and an entry in `LO
 """
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Literal, get_args
 
@@ -139,8 +139,9 @@ class FitSettings:
     """``linear``, ``huber`` or ``cauchy``."""
     weights: Weights = "none"
     """``sigma``: weigh by the measured standard deviations of the dataset."""
-    bounds: str = "0,inf"
-    """Lowest and highest compliance in SI units."""
+    bounds: str | tuple[float, float] = "0,inf"
+    """Lowest and highest compliance in SI units: two numbers, or a text of them; kept as a text,
+    since JSON has no infinity."""
     marker: tuple[float, float, float] | None = None
     """Metrology marker in the tcp frame, in m; none: the dataset's."""
     exclude: tuple[str, ...] = ()
@@ -164,7 +165,9 @@ class FitSettings:
         IdentificationError
             If they are not two numbers, or one is NaN.
         """
-        parse_bounds(self.bounds)
+        low, high = parse_bounds(self.bounds)
+        if not isinstance(self.bounds, str):
+            object.__setattr__(self, "bounds", f"{low!r},{high!r}")
 
     def options(self, draws: int | None = None) -> FitOptions:
         """Return the options of the fit.
@@ -192,24 +195,25 @@ class FitSettings:
         )
 
 
-def parse_bounds(text: str) -> tuple[float, float]:
-    """Return two bounds from ``"LOW,HIGH"``.
+def parse_bounds(bounds: str | Sequence[float]) -> tuple[float, float]:
+    """Return two bounds from ``"LOW,HIGH"`` or two numbers.
 
-    >>> parse_bounds("0,inf")
-    (0.0, inf)
+    >>> parse_bounds("0,inf"), parse_bounds((0, 1))
+    ((0.0, inf), (0.0, 1.0))
 
     Raises
     ------
     IdentificationError
-        If the text is not two numbers, or one is NaN.
+        If they are not two numbers, or one is NaN.
     """
+    parts = [each.strip() for each in bounds.split(",")] if isinstance(bounds, str) else bounds
     try:
-        low, high = (float(part) for part in text.split(","))
-    except ValueError as error:
-        raise IdentificationError(f"bounds {text!r} must be two numbers, e.g. '0,inf'") from error
-    for part, value in zip(text.split(","), (low, high), strict=True):
+        low, high = map(float, parts)
+    except (TypeError, ValueError) as error:
+        raise IdentificationError(f"bounds {bounds!r} must be two numbers, e.g. '0,inf'") from error
+    for part, value in zip(parts, (low, high), strict=True):
         if math.isnan(value):
-            raise IdentificationError(f"bounds {text!r}: {part.strip()!r} is not a number")
+            raise IdentificationError(f"bounds {bounds!r}: {part!r} is not a number")
     return low, high
 
 

@@ -14,6 +14,7 @@ from elastocal.arrays import FloatArray, IndexArray
 from elastocal.dataset import Dataset, without
 from elastocal.identification.calibration import CalibratedModel, Calibration, calibrate
 from elastocal.identification.figures import CalibrationSummary
+from elastocal.identification.knowledge import with_knowledge
 from elastocal.identification.options import MINIMUM_DRAWS, FitSettings
 from elastocal.identification.recertification import Estimate
 from elastocal.identification.uncertainty import interval
@@ -86,12 +87,15 @@ def reproduce_calibration(
     """
     settings = (figures and figures.settings) or FitSettings()
     readings = dataset.readings(found.model.robot.joint_names)
+    readings = without(readings, settings.exclude)
+    marker = settings.marker or dataset.marker
+    options, known = settings.options(MINIMUM_DRAWS), figures.known if figures else ()
     calibration = calibrate(
         found.model,
-        without(readings, settings.exclude),
+        readings,
         np.random.default_rng(0),
-        settings.options(MINIMUM_DRAWS),
-        marker_offset=settings.marker or dataset.marker,
+        with_knowledge(options, known, found.model, readings, marker),
+        marker_offset=marker,
     )
     same = _same_deflections(calibration, found) and _same_errors(calibration, figures)
     return Reproduction(calibration, unseen_errors(calibration, np.random.default_rng(0)), same)

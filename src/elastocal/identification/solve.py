@@ -12,7 +12,7 @@ readings to round-off.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -53,7 +53,9 @@ class Solution:
     reading_weight: FloatArray
     """Weight that the loss gave each reading, shape (reading,); 1 for the linear loss."""
     kkt_violation: float
-    """Largest violation of the optimality conditions, relative; see `least_squares`."""
+    """Largest violation of the optimality conditions, relative to the gradient at zero."""
+    settled: bool = True
+    """Whether weights of the loss or springs no longer changed when reweighting ended."""
 
 
 def factor(problem: Problem) -> Factored:
@@ -71,7 +73,7 @@ def factor(problem: Problem) -> Factored:
 
 
 def solve(problem: Problem, loss: str = "linear") -> Solution:
-    """Return the bounded solution of a problem.
+    """Return the bounded solution of a problem; see `Solution.settled` for losses.
 
     Raises
     ------
@@ -82,7 +84,7 @@ def solve(problem: Problem, loss: str = "linear") -> Solution:
     if loss == "linear":
         return _solve_linear(problem, np.ones(len(problem)))
     weigh = LOSSES[loss]
-    weight = np.ones(len(problem))
+    weight, settled = np.ones(len(problem)), False
     for _ in range(_ITERATIONS):
         solution = _solve_linear(problem, weight)
         updated = weigh(normalised_residuals(problem, solution.compliance))
@@ -90,7 +92,11 @@ def solve(problem: Problem, loss: str = "linear") -> Solution:
         weight = updated
         if settled:
             break
-    return _solve_linear(problem, weight)
+    final = _solve_linear(problem, weight)
+    # The weights of exact data follow round-off for ever, which moves no spring.
+    size = np.abs(final.compliance * final.factored.scale)
+    moved = np.abs(final.compliance - solution.compliance) * final.factored.scale
+    return replace(final, settled=settled or bool(moved.max() <= _SETTLED * size.max()))
 
 
 def normalised_residuals(

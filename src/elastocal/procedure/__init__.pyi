@@ -3,6 +3,7 @@ from .derive import (
     PoseReadings as PoseReadings,
     RunSummary as RunSummary,
     derive_run as derive_run,
+    read_run as read_run,
     read_summary as read_summary,
     reduce_pose as reduce_pose,
     write_derived as write_derived,

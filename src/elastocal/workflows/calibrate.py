@@ -9,8 +9,15 @@ import numpy as np
 
 from elastocal import identification
 from elastocal.dataset import Dataset, merge, read, without
+from elastocal.elastic import known_springs
 from elastocal.errors import DatasetError
-from elastocal.identification import CalibrateResult, FitSettings, choose_model, summary
+from elastocal.identification import (
+    CalibrateResult,
+    FitSettings,
+    choose_model,
+    summary,
+    with_knowledge,
+)
 from elastocal.progress import Progress
 from elastocal.records import write_json
 from elastocal.results import brief_repr
@@ -58,7 +65,7 @@ def calibrate(settings: CalibrateSettings, progress: Progress) -> CalibrateResul
     settings : CalibrateSettings
         Or its ``data``, and the other fields by name.
     progress : Progress, optional
-        Hears how far the work is.
+        Called with stage, done and total.
 
     Raises
     ------
@@ -74,6 +81,8 @@ def calibrate(settings: CalibrateSettings, progress: Progress) -> CalibrateResul
     readings = without(measured.readings(arm.joint_names), settings.exclude)
     marker = measured.marker if settings.marker is None else settings.marker
     choice = choose_model(arm, readings, settings.springs, options, marker)
+    known = known_springs(arm, settings.springs)
+    options = with_knowledge(options, known, choice.model, readings, marker)
     calibration = identification.calibrate(
         choice.model,
         readings,
@@ -83,7 +92,7 @@ def calibrate(settings: CalibrateSettings, progress: Progress) -> CalibrateResul
         ladder=choice.ladder,
         provenance=f"{source}; {measured.provenance}" if measured.provenance else source,
     )
-    result = CalibrateResult.of(calibration.calibrated, summary(calibration, settings.fit))
+    result = CalibrateResult.of(calibration.calibrated, summary(calibration, settings.fit, known))
     if settings.out is not None:
         write_json(settings.out, result)
     return result

@@ -92,7 +92,7 @@ def check(settings: CheckSettings, progress: Progress) -> CheckResult:  # noqa: 
     settings : CheckSettings
         Or its ``file``.
     progress : Progress, optional
-        Hears how far the work is.
+        Called with stage, done and total.
 
     Raises
     ------

@@ -103,7 +103,7 @@ def codec(settings: CodecSettings, progress: Progress) -> CodecResult:
     settings : CodecSettings
         Or its ``data``, and the other fields by name.
     progress : Progress, optional
-        Hears of each split that is done.
+        Called with stage, done and total.
 
     Raises
     ------

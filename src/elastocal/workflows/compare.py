@@ -53,7 +53,7 @@ def compare(settings: CompareSettings, progress: Progress) -> CompareResult:  # 
     settings : CompareSettings
         Or its ``old``, and the other fields by name.
     progress : Progress, optional
-        Hears how far the work is.
+        Called with stage, done and total.
 
     Raises
     ------

@@ -91,7 +91,7 @@ def compensate(settings: CompensateSettings, progress: Progress) -> CompensateRe
     settings : CompensateSettings
         Or its ``model``, and the other fields by name.
     progress : Progress, optional
-        Hears how many rows are done.
+        Called with stage, done and total.
 
     Raises
     ------

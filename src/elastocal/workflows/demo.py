@@ -166,7 +166,7 @@ def demo(settings: DemoSettings, progress: Progress) -> DemoResult:
     settings : DemoSettings
         Or its ``kind``, and the other fields by name.
     progress : Progress, optional
-        Hears how far the work is.
+        Called with stage, done and total.
 
     Raises
     ------

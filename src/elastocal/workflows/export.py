@@ -77,7 +77,7 @@ def export(settings: ExportSettings, progress: Progress) -> ExportResult:  # noq
     settings : ExportSettings
         Or its ``model``, and the other fields by name.
     progress : Progress, optional
-        Hears how far the work is.
+        Called with stage, done and total.
 
     Raises
     ------

@@ -43,7 +43,7 @@ def init(settings: InitSettings, progress: Progress) -> InitResult:  # noqa: ARG
     settings : InitSettings
         Or its ``folder``, and the other fields by name.
     progress : Progress, optional
-        Hears how far the work is.
+        Called with stage, done and total.
 
     Raises
     ------

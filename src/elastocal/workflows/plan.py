@@ -91,7 +91,7 @@ def plan(settings: PlanSettings, progress: Progress) -> PlanResult:
     settings : PlanSettings
         Or its ``cell``, and the other fields by name.
     progress : Progress, optional
-        Hears how far the work is.
+        Called with stage, done and total.
 
     Raises
     ------

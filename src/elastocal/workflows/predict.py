@@ -84,7 +84,7 @@ def predict(settings: PredictSettings, progress: Progress) -> PredictResult:  # 
     settings : PredictSettings
         Or its ``model``, and the other fields by name.
     progress : Progress, optional
-        Hears how far the work is.
+        Called with stage, done and total.
 
     Raises
     ------

@@ -109,7 +109,7 @@ def report(settings: ReportSettings, progress: Progress) -> ReportResult:
     settings : ReportSettings
         Or its ``run``, and the other fields by name.
     progress : Progress, optional
-        Hears how far the work is.
+        Called with stage, done and total.
 
     Raises
     ------

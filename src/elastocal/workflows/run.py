@@ -160,7 +160,7 @@ def run(settings: RunSettings, progress: Progress) -> RunResult:
     settings : RunSettings
         Or its ``cell``, and the other fields by name.
     progress : Progress, optional
-        Hears how many poses are measured.
+        Called with stage, done and total.
 
     Raises
     ------

@@ -178,7 +178,7 @@ def simulate_process(
     settings : SimulateProcessSettings
         Or its ``cell``, and the other fields by name.
     progress : Progress, optional
-        Hears how many courses are done.
+        Called with stage, done and total.
 
     Raises
     ------

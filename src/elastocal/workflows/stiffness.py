@@ -164,7 +164,7 @@ def stiffness(settings: StiffnessSettings, progress: Progress) -> StiffnessResul
     settings : StiffnessSettings
         Or its ``model``, and the other fields by name.
     progress : Progress, optional
-        Hears how many stations are done.
+        Called with stage, done and total.
 
     Raises
     ------

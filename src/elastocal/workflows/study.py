@@ -81,7 +81,7 @@ def study(settings: StudySettings, progress: Progress) -> StudyResult:
     settings : StudySettings
         Or its ``cell``, and the other fields by name.
     progress : Progress, optional
-        Hears of finished samples.
+        Called with stage, done and total.
 
     Raises
     ------
@@ -96,7 +96,7 @@ def study(settings: StudySettings, progress: Progress) -> StudyResult:
     conditions = study_conditions(cell, settings.vary)
     # Processes import the simulation while this one makes the pool.
     prepare = partial(importlib.import_module, _SIMULATION)
-    with studies.spread_over(settings.jobs, settings.dask, prepare) as spread:
+    with studies.batch_executor(settings.jobs, settings.dask, prepare) as execute:
         from elastocal.workflows._study_simulation import prepare_study
 
         prepared = prepare_study(
@@ -104,7 +104,7 @@ def study(settings: StudySettings, progress: Progress) -> StudyResult:
         )
         store, design = studies.StudyStore(settings.out), prepared.design
         results = studies.run_study(
-            store, design, settings.samples, prepared.simulate, spread, progress
+            store, design, settings.samples, prepared.simulate, execute, progress
         )
     summary = studies.study_summary(design, results, settings.target)
     names = studies.write_study(settings.out, design, results, summary)
@@ -121,5 +121,5 @@ def study_conditions(cell: Cell, vary: tuple[str, ...]) -> tuple[Condition, ...]
         If a factor or a value is unknown.
     """
     search = cell.file.search
-    base = Condition(poses=search.most or DEFAULT_POSES, search=search.technique)
+    base = Condition(poses=search.pose_limit or DEFAULT_POSES, search=search.technique)
     return studies.make_conditions(studies.read_variations(vary or (DEFAULT_VARIATION,)), base)

@@ -1,5 +1,6 @@
 """``tool``: tool weight, sensor bias, drift, matrix and rotation from static postures."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from os import PathLike
 from pathlib import Path
@@ -8,10 +9,10 @@ import numpy as np
 
 from elastocal import procedure
 from elastocal.arrays import FloatArray
-from elastocal.cell import Cell, load_cell
+from elastocal.cell import Cell
 from elastocal.compensation import conditioning
 from elastocal.compensation.conditioning import SensorMount, StaticPostures, ToolModel, ToolResult
-from elastocal.errors import CompensationError, ProcedureError
+from elastocal.errors import CompensationError, FileAccessError, ProcedureError
 from elastocal.identification import read_model
 from elastocal.progress import Progress
 from elastocal.robot import GRAVITY, Robot
@@ -22,6 +23,8 @@ __all__ = ["ToolResult", "ToolSettings", "tool"]
 
 _AS_FLANGE = "0 mm, 0 mm, 0 mm, 0 deg, 0 deg, 0 deg"
 """A sensor whose frame is that of its link."""
+_OF_A_TABLE = ("robot", "flange", "sensor", "down")
+"""Settings that the cell of a run says itself."""
 _LEVER = 0.1
 """Moment range of a sensor over its force range, in m, where the ranges are not known."""
 
@@ -76,7 +79,7 @@ def tool(settings: ToolSettings, progress: Progress) -> ToolResult:  # noqa: ARG
     settings : ToolSettings
         Or its ``data``, and the other fields by name.
     progress : Progress, optional
-        Hears how far the work is.
+        Called with stage, done and total.
 
     Raises
     ------
@@ -89,6 +92,7 @@ def tool(settings: ToolSettings, progress: Progress) -> ToolResult:  # noqa: ARG
     """
     data = Path(settings.data)
     refuse_overwriting(settings.out, data)
+    _require_postures(data, settings)
     source = _from_run(data) if data.is_dir() else _from_table(data, settings)
     if not 0.0 <= settings.cross_talk < 0.5:
         raise CompensationError(f"cross-talk {settings.cross_talk} must be from 0 to below 0.5")
@@ -110,6 +114,30 @@ def tool(settings: ToolSettings, progress: Progress) -> ToolResult:  # noqa: ARG
     if settings.out is not None:
         conditioning.write_tool(settings.out, result)
     return result
+
+
+def _require_postures(data: Path, settings: ToolSettings) -> None:
+    """Refuse what is neither a table nor the folder of a run, and settings that a run knows itself.
+
+    Raises
+    ------
+    FileAccessError, CompensationError
+        With the path, or the option.
+    """
+    if not data.exists():
+        raise FileAccessError(f"{data}: there is no such file or folder")
+    if not data.is_dir():
+        if data.suffix.lower() != ".csv":
+            raise CompensationError(
+                f"{data}: suffix {data.suffix!r} is not that of a table of postures (.csv), nor is"
+                " it the folder of a run"
+            )
+        return
+    for name in _OF_A_TABLE:
+        if getattr(settings, name) != getattr(ToolSettings, name):
+            raise CompensationError(
+                f"--{name} is for a table of postures: the cell of the run {data} says it itself"
+            )
 
 
 def _from_table(path: Path, settings: ToolSettings) -> _PostureSource:
@@ -136,33 +164,20 @@ def _from_table(path: Path, settings: ToolSettings) -> _PostureSource:
 
 def _from_run(run: Path) -> _PostureSource:
     """Return the unloaded references of a run as postures, the cell's sensor as mounted."""
-    folder = procedure.RunFolder(run)
-    entries = procedure.read_journal(folder.journal)
-    latest = {log.pose: log for log in procedure.commits(entries)}
-    if not entries or entries[0].run is None or not latest:
-        raise ProcedureError(f"{folder.journal}: no pose is committed")
-    cell = load_cell(folder.cell / entries[0].run.cell_file)
+    found = procedure.read_run(run)
+    cell = found.cell
     sensor, T_sensor_tcp = cell.file.sensor, cell.T_sensor_tcp
     if sensor is None or T_sensor_tcp is None:
         raise ProcedureError(f"cell {cell.name!r} has no force sensor (key 'sensor')")
-    poses = [
-        procedure.reduce_pose(
-            log,
-            procedure.read_streams(
-                folder.streams / log.streams, [(w.start, w.end) for w in log.windows]
-            ),
-        )
-        for log in latest.values()
-    ]
     T = sensor.T_flange_sensor
     centre = (cell.file.tool.centre - T[:3, 3]) @ T[:3, :3]
     points = {"tool centre point": T_sensor_tcp[:3, 3], "flange": -T[:3, 3] @ T[:3, :3]}
     mount = SensorMount(cell.file.robot.flange, T[:3, 3], cell.gravity_base)
     lever = float(np.mean(sensor.largest_moment) / np.mean(sensor.largest_force))
-    return _PostureSource(_unloaded(poses, cell), mount, T[:3, :3], centre, points, lever)
+    return _PostureSource(_unloaded(found.poses, cell), mount, T[:3, :3], centre, points, lever)
 
 
-def _unloaded(poses: list[procedure.PoseReadings], cell: Cell) -> StaticPostures:
+def _unloaded(poses: Sequence[procedure.PoseReadings], cell: Cell) -> StaticPostures:
     references = [r for pose in poses if (r := pose.reference) and r.tool]
     references.sort(key=lambda reference: reference.window.start)
     states = [r.tool for r in references if r.tool]

@@ -8,7 +8,7 @@ from functools import partial
 import pytest
 
 from elastocal.codec.study import sampling
-from elastocal.codec.study.sampling import spread_over
+from elastocal.codec.study.sampling import batch_executor
 from elastocal.errors import CodecError
 from support.cli import elastocal
 from support.simulated import example_cell
@@ -35,7 +35,7 @@ def listening(answer=b""):
 
 @pytest.mark.parametrize("jobs", [1, 2])
 def test_processes_that_got_ready_early_do_every_batch(jobs):
-    with spread_over(jobs, None) as spread:
+    with batch_executor(jobs, None) as spread:
         found = list(spread([partial(batch, number) for number in range(5)]))
     assert sorted(numbers(each)[0] for each in found) == [
         numbers(batch(number))[0] for number in range(5)
@@ -43,7 +43,7 @@ def test_processes_that_got_ready_early_do_every_batch(jobs):
 
 
 def test_processes_that_find_nothing_to_do_end_without_a_word(recwarn):
-    with spread_over(2, None):
+    with batch_executor(2, None):
         pass
     assert not recwarn.list
 

@@ -175,7 +175,7 @@ def _spring_row(spring: SpringSummary) -> tuple[str, ...]:
         f"{value:.4f}{unit}",
         f"{low:.3f} … {high:.3f}",
         _stiffness(value, shown),
-        _known(value, low, high),
+        _known(value, low, high) + (", prior" if spring.prior else ""),
     )
 
 

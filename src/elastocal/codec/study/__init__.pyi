@@ -35,12 +35,12 @@ from .samples import (
     read_part as read_part,
 )
 from .sampling import (
-    Spread as Spread,
+    BatchExecutor as BatchExecutor,
     Work as Work,
+    batch_executor as batch_executor,
     check_samples as check_samples,
     one_after_the_other as one_after_the_other,
     run_study as run_study,
-    spread_over as spread_over,
 )
 from .summary import (
     STUDY_SCHEMA as STUDY_SCHEMA,

@@ -29,7 +29,7 @@ _BATCH = 2
 
 Work = Callable[[], list[SampleResult]]
 """One batch."""
-Spread = Callable[[Iterable[Work]], Iterator[list[SampleResult]]]
+BatchExecutor = Callable[[Iterable[Work]], Iterator[list[SampleResult]]]
 """Has the batches done, somewhere and in any order, and yields each result when it is there."""
 _PATIENCE = 10.0
 """Longest time that a scheduler or its first worker may take to answer, in s."""
@@ -43,7 +43,7 @@ def run_study(
     design: StudyDesign,
     samples: int,
     simulate: Simulate,
-    spread: Spread,
+    execute: BatchExecutor,
     progress: Progress = silent,
 ) -> tuple[SampleResult, ...]:
     """Return the results of samples 0 to ``samples - 1``; those in the folder are not done again.
@@ -58,10 +58,10 @@ def run_study(
         Number of samples; a finished study goes on with a larger one.
     simulate : callable
         See `Simulate`.
-    spread : callable
-        Has batches done: see `one_after_the_other`, `spread_over`.
+    execute : callable
+        Has batches done: see `one_after_the_other`, `batch_executor`.
     progress : Progress
-        Hears of finished samples.
+        Called with stage, done and total.
 
     Raises
     ------
@@ -79,7 +79,7 @@ def run_study(
     if missing:
         parts = [missing[start : start + _BATCH] for start in range(0, len(missing), _BATCH)]
         work = [partial(_simulate_batch, simulate, design.seed, part) for part in parts]
-        for results in spread(work):
+        for results in execute(work):
             store.keep(design, results)
             done += len(results)
             progress(_STAGE, done, samples)
@@ -105,9 +105,9 @@ def one_after_the_other(batches: Iterable[Work]) -> Iterator[list[SampleResult]]
 
 
 @contextmanager
-def spread_over(
+def batch_executor(
     jobs: int | None, address: str | None, prepare: Callable[[], object] = list
-) -> Iterator[Spread]:
+) -> Iterator[BatchExecutor]:
     """Yield what has batches done; processes of this machine get ready in the meantime.
 
     Parameters

@@ -48,6 +48,7 @@ class Parameter:
     """Smallest value that makes sense, in SI."""
 
 
+@brief_repr
 @dataclass(frozen=True)
 class Characteristic:
     """A number that people state of a spring, as a data sheet would: a sum of its parameters."""

@@ -1,7 +1,9 @@
 from .derivation import (
+    CommittedRun as CommittedRun,
     DerivedRun as DerivedRun,
     derive_poses as derive_poses,
     derive_run as derive_run,
+    read_run as read_run,
     write_derived as write_derived,
 )
 from .findings import (

@@ -8,8 +8,8 @@ of the point at the lever arm ``r`` that moves rigidly with its tool frame,
     controller_displacement = (p_tcp + R_tcp r) - (p_tcp,0 + R_tcp,0 r).
 
 Their difference is the elastic deflection of the marker, which the marker's own Jacobian explains
-(spec section 2). An error of ``R_base_tracker`` by an angle turns the marker's displacement by
-it: 1 mrad makes 1 µm of each millimetre; the tracker's place does not enter at all.
+(docs/explanation/registration.md). An error of ``R_base_tracker`` by an angle turns the marker's
+displacement by it: 1 mrad makes 1 µm of each millimetre; the tracker's place does not enter at all.
 """
 
 from collections.abc import Sequence
@@ -19,7 +19,7 @@ from pathlib import Path
 import numpy as np
 
 from elastocal.arrays import FloatArray, IndexArray
-from elastocal.cell import Cell, SensorLoad
+from elastocal.cell import SENSOR_CORRECTED, Cell, SensorLoad
 from elastocal.dataset import STATUSES, Dataset, write
 from elastocal.errors import DatasetError, FileAccessError, ProcedureError, SchemaError
 from elastocal.planning import PlanResult
@@ -53,6 +53,7 @@ from elastocal.procedure.record import (
 )
 from elastocal.procedure.registration import Registration, register
 from elastocal.records import write_json
+from elastocal.results import brief_repr
 from elastocal.robot import inverse_transform
 
 
@@ -64,8 +65,26 @@ class DerivedRun:
     summary: RunSummary
 
 
-def derive_run(run: Path) -> DerivedRun:
-    """Return dataset and summary of the poses that a run has committed.
+@brief_repr
+@dataclass(frozen=True, eq=False)
+class CommittedRun:
+    """The poses that a run has committed, from files that are what the run wrote."""
+
+    folder: RunFolder
+    entries: tuple[Entry, ...]
+    """Of the journal."""
+    record: RunRecord
+    """Its first entry."""
+    cell: Cell
+    plan: PlanResult
+    poses: tuple[PoseReadings, ...]
+    """In the order of time, the last one of each."""
+    signs: tuple[str, ...]
+    """Signs that the journal has lost its end; see `signs_of_a_cut`."""
+
+
+def read_run(run: Path) -> CommittedRun:
+    """Return the poses that a run has committed, its files held against their SHA-256.
 
     Parameters
     ----------
@@ -75,11 +94,9 @@ def derive_run(run: Path) -> DerivedRun:
     Raises
     ------
     ProcedureError
-        If no pose is committed, or the cell has no sensor or no tracker.
+        If no pose is committed.
     SchemaError
         If a file of the run is damaged, of another kind, or not what the run wrote.
-    DatasetError
-        If no reading is usable.
     FileAccessError
         If a file cannot be read.
     """
@@ -101,12 +118,37 @@ def derive_run(run: Path) -> DerivedRun:
     known = {e.log.streams: e.streams_sha256 for e in entries if e.log is not None}
     for log in logs:
         check_stream(folder.streams / log.streams, known[log.streams])
-    poses = [reduce_pose(log, _streams(folder, log, cell)) for log in logs]
+    poses = tuple(reduce_pose(log, _streams(folder, log, cell)) for log in logs)
+    return CommittedRun(folder, entries, record, cell, plan, poses, signs)
+
+
+def derive_run(run: Path, sensor: SensorLoad | None = None) -> DerivedRun:
+    """Return dataset and summary of the poses that a run has committed.
+
+    Parameters
+    ----------
+    run : Path
+        Folder of the run; see `read_run`, also for what it raises.
+    sensor : SensorLoad, optional
+        The tool on its sensor, with the matrix that corrects readings, from a tool file; by
+        default the cell file's, and readings are taken as they are.
+
+    Raises
+    ------
+    ProcedureError
+        If no pose is committed, or the cell has no sensor or no tracker.
+    DatasetError
+        If no reading is usable.
+    """
+    found = read_run(run)
+    provenance = _provenance(found.folder, found.record, sensor)
     try:
-        derived = derive_poses(poses, cell, plan, entries, _provenance(folder, record))
+        derived = derive_poses(
+            found.poses, found.cell, found.plan, found.entries, provenance, sensor
+        )
     except (DatasetError, ProcedureError) as error:
-        raise type(error)(f"{folder.path}: {error}") from error
-    warnings = (*signs, *derived.summary.warnings)
+        raise type(error)(f"{found.folder.path}: {error}") from error
+    warnings = (*found.signs, *derived.summary.warnings)
     return replace(derived, summary=replace(derived.summary, warnings=warnings))
 
 
@@ -129,6 +171,7 @@ def derive_poses(
     plan: PlanResult,
     entries: Sequence[Entry],
     provenance: str,
+    sensor: SensorLoad | None = None,
 ) -> DerivedRun:
     """Return dataset and summary of reduced poses.
 
@@ -144,6 +187,8 @@ def derive_poses(
         Of the journal, for times, retries and faults.
     provenance : str
         Where the data come from.
+    sensor : SensorLoad, optional
+        The tool on its sensor; by default the cell file's.
 
     Raises
     ------
@@ -152,7 +197,7 @@ def derive_poses(
     DatasetError
         If no reading is usable.
     """
-    tool, lever = _tool_load(cell), _lever_arm(cell)
+    tool, lever = sensor or _tool_load(cell), _lever_arm(cell)
     seen = marker_readings(poses, cell.robot, cell.gravity_base, lever)
     registration = register(seen, lever)
     rows = [_row(pose, load, registration, tool) for pose in poses for load in pose.loads]
@@ -210,8 +255,9 @@ def _reasons(rows: Sequence[LoadRow], registration: Registration) -> str:
     return next((row.note for row in rows if row.note), "there is none")
 
 
-def _provenance(folder: RunFolder, record: RunRecord) -> str:
-    return f"elastocal run {folder.path.resolve().name}, {record.origin}"
+def _provenance(folder: RunFolder, record: RunRecord, sensor: SensorLoad | None) -> str:
+    corrected = "" if sensor is None else f", {SENSOR_CORRECTED}"
+    return f"elastocal run {folder.path.resolve().name}, {record.origin}{corrected}"
 
 
 @dataclass(frozen=True, eq=False)

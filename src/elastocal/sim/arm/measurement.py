@@ -91,8 +91,8 @@ def measure(
 
     The recorded joints are those the controller commands under load, so their forward kinematics
     is ``tcp_position + controller_displacement``. Without noise, marker minus controller
-    displacement is exactly the deflection of the arm at the recorded joints, and under gravity the
-    change of its sag since the reference joints, which are then recorded too.
+    displacement is exactly the deflection of the arm at the recorded joints; under gravity, plus
+    the change of its sag since the reference joints, recorded too.
 
     Parameters
     ----------
@@ -175,19 +175,15 @@ def _marker_travel(
 def _reference_joints(
     arm: ElasticArm, q: FloatArray, T_base_touch: FloatArray, unloaded: FloatArray
 ) -> FloatArray | None:
-    """Return commanded joints of the unloaded reading, shape (pose, joint).
-
-    None without gravity: an arm that does not sag shows the same wherever it was read.
-    """
+    """Return commanded joints of the unloaded reading; None where no gravity makes it matter."""
     if not any(arm.gravity):
         return None
     goals = T_base_touch.copy()
     goals[:, :3, 3] = unloaded
     found = solve_inverse(arm.linkage, goals, q)
     if not found.ok.all():
-        raise UnreachableError(
-            f"pose {int(np.argmin(found.ok))}: the arm cannot stop off the surface"
-        )
+        pose = int(np.argmin(found.ok))
+        raise UnreachableError(f"pose {pose}: the arm cannot stop off the surface")
     return found.q
 
 
@@ -231,8 +227,7 @@ def _press(
 def _sag(arm: ElasticArm, q: FloatArray) -> FloatArray:
     """Return how far the unloaded tip hangs from where the joints say it is, shape (..., 3)."""
     hanging = arm.equilibrium(q, np.zeros(3)).tcp_position
-    sag: FloatArray = hanging - arm.linkage.forward(q)[..., :3, 3]
-    return sag
+    return hanging - arm.linkage.forward(q)[..., :3, 3]
 
 
 def _difference_of_readings(
