@@ -6,15 +6,12 @@ from ._quantities import (
     PositiveMoment as PositiveMoment,
 )
 from .cell import (
-    RUN_SECTIONS as RUN_SECTIONS,
     SCHEMA as SCHEMA,
     TOOLING as TOOLING,
     Cell as Cell,
     CellFile as CellFile,
     ProcessFile as ProcessFile,
-    fingerprint as fingerprint,
     load_cell as load_cell,
-    named_files as named_files,
 )
 from .devices import (
     ArmState as ArmState,
@@ -56,6 +53,11 @@ from .hardware import (
     Tool as Tool,
     Tracker as Tracker,
 )
+from .identity import (
+    RUN_SECTIONS as RUN_SECTIONS,
+    fingerprint as fingerprint,
+    named_files as named_files,
+)
 from .motion import (
     MotionEntry as MotionEntry,
     axis_speeds as axis_speeds,
@@ -77,7 +79,11 @@ from .procedure import (
     Search as Search,
     TorqueLimits as TorqueLimits,
 )
-from .sensor import SensorLoad as SensorLoad, weight_response as weight_response
+from .sensor import (
+    SENSOR_CORRECTED as SENSOR_CORRECTED,
+    SensorLoad as SensorLoad,
+    weight_response as weight_response,
+)
 from .simulation import (
     Balancer as Balancer,
     Bearings as Bearings,

@@ -49,6 +49,8 @@ class SpringBar:
     high: float
     group: int | None
     """Number of the group of springs that it cannot be told apart from."""
+    too_weak: bool = False
+    """See `SpringSummary.too_weak`."""
 
 
 def spring_bars(model: CalibratedModel) -> list[SpringBar]:
@@ -57,7 +59,7 @@ def spring_bars(model: CalibratedModel) -> list[SpringBar]:
     for row in spring_summaries(model):
         unit = unit_of(row.unit)
         value, low, high = (unit.factor * each for each in (row.compliance, row.low, row.high))
-        bars.append(SpringBar(row.name, unit, value, low, high, row.group))
+        bars.append(SpringBar(row.name, unit, value, low, high, row.group, row.too_weak))
     return bars
 
 

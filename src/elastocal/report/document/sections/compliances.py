@@ -25,7 +25,7 @@ def _compliances(evidence: Evidence) -> Iterator[blocks.Block]:
         yield blocks.Paragraph("There is no calibrated model, so no compliance is known.")
         return
     springs = spring_bars(found.model)
-    observable = sum(each.group is None for each in springs)
+    observable = sum(each.group is None and not each.too_weak for each in springs)
     yield _head(found, observable)
     yield from _ladder(found.figures)
     yield blocks.picture(
@@ -45,6 +45,8 @@ def _row(spring: SpringBar) -> blocks.Row:
     if spring.group is not None:
         known = f"not by itself, group {spring.group}"
         return name, known, f"({value:.4f})", "none", unit.shown, "none"
+    if spring.too_weak:
+        return name, "too weak to see", f"({value:.4f})", "none", unit.shown, "none"
     stiff = f"{1.0 / value:.3f} {unit.stiffness}" if value > 0.0 else "rigid"
     if not unit.stiffness:
         stiff = "none"
