@@ -17,7 +17,6 @@ Against the arm without weight it is ``(O + S) c`` with the sag ``S c``; a displ
 reference and a loaded reading, millimetres apart, holds ``S(q) - S(q_0)`` besides ``O``.
 """
 
-from collections.abc import Hashable, Iterator, Sequence
 from dataclasses import dataclass, field
 from itertools import product
 
@@ -25,22 +24,18 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from elastocal.arrays import FloatArray, IndexArray
+from elastocal.elastic._groups import AlikeSprings, Columns, assembled, group_alike, insert_springs
 from elastocal.elastic.friction import FrictionElements
-from elastocal.elastic.springs import Parameter, Spring, SpringLoad, check_springs
+from elastocal.elastic.springs import Parameter, Spring, check_springs
 from elastocal.errors import SpringError
 from elastocal.results import brief_repr
 from elastocal.robot import (
     ChainModel,
-    InsertedJoint,
     Jacobian,
     Robot,
-    build_model,
     evaluate_jacobian,
     evaluate_weight,
 )
-
-_Columns = IndexArray | slice
-"""Columns of an array; those that lie side by side as a slice, which copies nothing."""
 
 
 @brief_repr
@@ -57,36 +52,6 @@ class CartesianCompliance:
     force."""
 
 
-@dataclass(frozen=True, eq=False)
-class _Alike:
-    """Springs that share a law and so are evaluated together."""
-
-    law: Spring
-    """One of them."""
-    axes: tuple[_Columns, ...]
-    """For each axis of the law, the column of the Jacobian of each spring."""
-    parameters: tuple[_Columns, ...]
-    """For each parameter of the law, its place in the compliance vector for each spring."""
-    friction: tuple[_Columns, ...]
-    """For each friction element of the law, its place among all for each spring."""
-
-    def load(
-        self,
-        torque: FloatArray,
-        weight: FloatArray | None = None,
-        friction: FloatArray | None = None,
-    ) -> SpringLoad[FloatArray]:
-        """Return the loads of these springs.
-
-        Of torques of load and weight of shape (..., axis), friction of shape (..., element).
-        """
-        return SpringLoad(
-            tuple(torque[..., axis] for axis in self.axes),
-            () if weight is None else tuple(weight[..., axis] for axis in self.axes),
-            () if friction is None else tuple(friction[..., place] for place in self.friction),
-        )
-
-
 @brief_repr
 @dataclass(frozen=True, eq=False)
 class ElasticModel:
@@ -100,18 +65,18 @@ class ElasticModel:
     """Of all springs."""
     _chain: ChainModel = field(init=False, repr=False)
     _columns: IndexArray = field(init=False, repr=False)
-    _groups: tuple[_Alike, ...] = field(init=False, repr=False)
+    _groups: tuple[AlikeSprings, ...] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "springs", tuple(self.springs))
         check_springs(self.springs, self.robot.joint_names)
-        chain, columns = _insert_springs(self.robot, self.springs)
+        chain, columns = insert_springs(self.robot, self.springs)
         parameters = tuple(p for spring in self.springs for p in spring.parameters)
         object.__setattr__(self, "parameters", parameters)
         object.__setattr__(self, "friction", FrictionElements.of(self.springs))
         object.__setattr__(self, "_chain", chain)
         object.__setattr__(self, "_columns", columns)
-        object.__setattr__(self, "_groups", tuple(_alike(self.springs)))
+        object.__setattr__(self, "_groups", tuple(group_alike(self.springs)))
 
     @property
     def spring_names(self) -> tuple[str, ...]:
@@ -251,14 +216,14 @@ class ElasticModel:
         friction: FloatArray | None = None,
     ) -> FloatArray:
         """Return the columns of all springs, shape (..., 3, parameter)."""
-        places: list[_Columns] = []
+        places: list[Columns] = []
         columns: list[FloatArray] = []
         for group in self._groups:
             J = [observed[..., axis] for axis in group.axes]
             places += group.parameters
             columns += group.law.columns(J, group.load(torque, weight, friction))
         # Springs of one law and one parameter, as hinges are, stand side by side already.
-        return columns[0] if len(columns) == 1 else _assembled(columns, places)
+        return columns[0] if len(columns) == 1 else assembled(columns, places)
 
     def deflection(
         self,
@@ -407,63 +372,3 @@ def spring_torques(
         m = np.asarray(moment, dtype=float)
         torques = torques + (m[..., None, :] @ jacobian.rotation)[..., 0, :]
     return torques
-
-
-def _insert_springs(robot: Robot, springs: Sequence[Spring]) -> tuple[ChainModel, IndexArray]:
-    """Build the chain and find the column of each axis; axial ones share that of the joint."""
-    joints = {joint.name: index for index, joint in enumerate(robot.chain.joints)}
-    axes = [axis for spring in springs for axis in spring.axes]
-    own = [axis.is_axis_of(robot.chain.joints[joints[axis.joint]]) for axis in axes]
-    inserted = [
-        InsertedJoint(
-            axis.name,
-            joints[axis.joint],
-            np.array(axis.axis),
-            axis.revolute,
-            axis.distal,
-            np.array(axis.offset),
-        )
-        for axis, shares in zip(axes, own, strict=True)
-        if not shares
-    ]
-    chain = build_model(robot.chain, inserted)
-    virtual = iter(chain.inserted_columns)
-    columns = [
-        chain.joint_columns[joints[axis.joint]] if shares else next(virtual)
-        for axis, shares in zip(axes, own, strict=True)
-    ]
-    return chain, np.array(columns, dtype=np.intp)
-
-
-def _alike(springs: Sequence[Spring]) -> Iterator[_Alike]:
-    """Group springs by their law."""
-    members: dict[Hashable, list[int]] = {}
-    for index, spring in enumerate(springs):
-        members.setdefault(spring.law, []).append(index)
-    first_axis = np.cumsum([0, *(len(spring.axes) for spring in springs)])
-    first_parameter = np.cumsum([0, *(len(spring.parameters) for spring in springs)])
-    first_element = np.cumsum([0, *(len(spring.friction_limits) for spring in springs)])
-    for indices in members.values():
-        law = springs[indices[0]]
-        yield _Alike(
-            law,
-            tuple(_side_by_side(first_axis[indices] + k) for k in range(len(law.axes))),
-            tuple(_side_by_side(first_parameter[indices] + k) for k in range(len(law.parameters))),
-            tuple(
-                _side_by_side(first_element[indices] + k) for k in range(len(law.friction_limits))
-            ),
-        )
-
-
-def _assembled(columns: Sequence[FloatArray], places: Sequence[_Columns]) -> FloatArray:
-    """Return columns of shape (..., 3, spring) as one array, each group at its places."""
-    n = sum(column.shape[-1] for column in columns)
-    blocks = np.empty((*columns[0].shape[:-1], n))
-    for place, column in zip(places, columns, strict=True):
-        blocks[..., place] = column
-    return blocks
-
-
-def _side_by_side(columns: IndexArray) -> _Columns:
-    start, stop = int(columns[0]), int(columns[-1]) + 1
-    return slice(start, stop) if np.array_equal(columns, np.arange(start, stop)) else columns

@@ -3,12 +3,14 @@ from ._least_squares import (
     RANK_TOLERANCE as RANK_TOLERANCE,
     rank as rank,
 )
-from .calibration import (
+from .calibrated import (
     CalibratedModel as CalibratedModel,
-    Calibration as Calibration,
     Prediction as Prediction,
-    calibrate as calibrate,
     check_rows as check_rows,
+)
+from .calibration import (
+    Calibration as Calibration,
+    calibrate as calibrate,
 )
 from .conventions import (
     POOR_FIT as POOR_FIT,

@@ -11,7 +11,8 @@ import numpy as np
 from elastocal.arrays import BoolArray, FloatArray
 from elastocal.dataset import Readings
 from elastocal.elastic import KnownSpring, Spring
-from elastocal.identification.calibration import CalibratedModel, Calibration
+from elastocal.identification.calibrated import CalibratedModel
+from elastocal.identification.calibration import Calibration
 from elastocal.identification.frames import FrameSummary
 from elastocal.identification.ladder import Climbed
 from elastocal.identification.observability import Term

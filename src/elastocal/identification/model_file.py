@@ -10,7 +10,7 @@ from elastocal.arrays import FloatArray
 from elastocal.elastic import AnySpring, ElasticModel
 from elastocal.errors import SchemaError
 from elastocal.files import sha256
-from elastocal.identification.calibration import CalibratedModel
+from elastocal.identification.calibrated import CalibratedModel
 from elastocal.identification.domain import CalibrationDomain
 from elastocal.identification.figures import CalibrationSummary
 from elastocal.identification.observability import Observability

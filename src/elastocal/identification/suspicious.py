@@ -158,10 +158,7 @@ def force_offset(
         Marker in the tcp frame, in m, as the problem was built with.
     """
     unknowns = problem.columns + 3
-    if (
-        len(np.unique(problem.block)) < _FEWEST_POSES
-        or problem.d.size < _ROWS_A_SPRING * unknowns
-    ):
+    if len(np.unique(problem.block)) < _FEWEST_POSES or problem.d.size < _ROWS_A_SPRING * unknowns:
         return None
     T_base_tcp = model.robot.forward(readings.joint_position)
     turns = {

@@ -35,7 +35,7 @@ import numpy as np
 from elastocal.arrays import FloatArray, IndexArray
 from elastocal.elastic import Parameter, Spring
 from elastocal.errors import IdentificationError
-from elastocal.identification.calibration import CalibratedModel
+from elastocal.identification.calibrated import CalibratedModel
 from elastocal.identification.observability import Term, describe, sparse_basis
 from elastocal.identification.recertification.result import (
     CommonGround,

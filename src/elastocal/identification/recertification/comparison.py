@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 
 from elastocal.arrays import FloatArray
 from elastocal.errors import IdentificationError, RobotError, SpringError
-from elastocal.identification.calibration import CalibratedModel, check_rows
+from elastocal.identification.calibrated import CalibratedModel, check_rows
 from elastocal.identification.model_file import CalibrateResult
 from elastocal.identification.recertification._changes import (
     Loads,

@@ -390,15 +390,12 @@ def press_forces(
 def _frame_along(direction: FloatArray) -> FloatArray:
     """Return a rotation whose z is a direction and whose x is nearest to base x (or z)."""
     z = direction / np.linalg.norm(direction)
-    helper = np.array([1.0, 0.0, 0.0]) if abs(z[0]) < 0.9 else np.array([0.0, 0.0, 1.0])
+    helper = np.eye(3)[0 if abs(z[0]) < 0.9 else 2]
     x = helper - z * (z @ helper)
     x /= np.linalg.norm(x)
     return np.column_stack([x, np.cross(z, x), z])
 
 
 def _about_z(angles: FloatArray) -> FloatArray:
-    turn = np.tile(np.eye(3), (len(angles), 1, 1))
-    turn[:, 0, 0] = turn[:, 1, 1] = np.cos(angles)
-    turn[:, 1, 0] = np.sin(angles)
-    turn[:, 0, 1] = -turn[:, 1, 0]
-    return turn
+    c, s, o = np.cos(angles), np.sin(angles), np.zeros_like(angles)
+    return np.stack([c, -s, o, s, c, o, o, o, o + 1.0], axis=-1).reshape(-1, 3, 3)

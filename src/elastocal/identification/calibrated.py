@@ -1,0 +1,199 @@
+"""The calibrated model: what the compensation and every prediction work with."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from elastocal.arrays import FloatArray
+from elastocal.elastic import ElasticModel, check_vectors
+from elastocal.errors import SpringError
+from elastocal.identification.domain import CalibrationDomain
+from elastocal.identification.observability import (
+    Observability,
+)
+from elastocal.identification.tool_change import ToolChange, change_tool
+from elastocal.identification.uncertainty import (
+    interval,
+)
+from elastocal.results import brief_repr
+from elastocal.robot import Robot
+
+_CHUNK = 2000
+"""Configurations predicted at a time, so that the draws of a long path fit into memory."""
+
+
+@brief_repr
+@dataclass(frozen=True)
+class Prediction:
+    """Predicted deflections with 95 % intervals: of the fit, and of what would be measured."""
+
+    deflection: FloatArray
+    """Real minus commanded tcp position in base, shape (row, 3), in m."""
+    low: FloatArray
+    """Lower ends of what another campaign would predict (bootstrap draws), shape (row, 3), in m."""
+    high: FloatArray
+    """Upper ends of that, shape (row, 3), in m."""
+    measured_low: FloatArray
+    """Lower ends of what would be measured, shape (row, 3), in m: with what the springs cannot
+    express, and the noise of a measurement. NaN where the model does not know its misfit."""
+    measured_high: FloatArray
+    """Upper ends of that, shape (row, 3), in m."""
+
+
+@brief_repr
+@dataclass(frozen=True, eq=False)
+class CalibratedModel:
+    """An elastic model with identified compliances and their bootstrap draws."""
+
+    model: ElasticModel
+    compliance: FloatArray
+    """Shape (spring,), in rad/(N·m) or m/N."""
+    draws: FloatArray
+    """Bootstrap draws, shape (draw, spring)."""
+    observability: Observability
+    provenance: str = ""
+    """Where the data came from."""
+    misfit: float = float("nan")
+    """Share of a predicted deflection that 95 % of the errors along an axis stayed below at
+    left-out poses; NaN: not known. See `HeldOut.misfit`."""
+    tool: ToolChange | None = None
+    """The tool that the model is for; none: the one that it was calibrated with."""
+    domain: CalibrationDomain | None = None
+    """Poses and loads of the calibration; none: not known, as in files of elastocal 0.1.0."""
+    unexplained: float = float("nan")
+    """Mean error at left-out poses over the mean deflection; NaN: not known."""
+
+    def __post_init__(self) -> None:
+        for name in ("compliance", "draws"):
+            array = np.array(getattr(self, name), dtype=float)
+            array.flags.writeable = False
+            object.__setattr__(self, name, array)
+
+    @property
+    def stiffness(self) -> FloatArray:
+        """Stiffness of each spring, ``1 / c``, infinite where the compliance is zero."""
+        return np.divide(
+            1.0,
+            self.compliance,
+            out=np.full_like(self.compliance, np.inf),
+            where=self.compliance != 0,
+        )
+
+    @property
+    def tool_name(self) -> str:
+        """The tool that the model is for, in words."""
+        if self.tool is None:
+            return f"{self.model.robot.tip}, as calibrated"
+        return self.tool.sentence
+
+    def with_tool(
+        self,
+        T_tcp_tool: ArrayLike,
+        mass: float | None = None,
+        centre: Sequence[float] | None = None,
+    ) -> "CalibratedModel":
+        """Return the model of the same springs at another tool's tcp.
+
+        Compliances, draws and observability are the arm's. Predictions are of the new tcp, under
+        forces and moments at it; a mass changes sag and the preload of gears, nothing else.
+
+        Parameters
+        ----------
+        T_tcp_tool : array_like, shape (4, 4)
+            New tcp in this model's tcp frame.
+        mass : float, optional
+            Mass of the new tool in kg, in place of what the tcp's link has; the same by default.
+        centre : array_like, shape (3,), optional
+            Centre of that mass in the new tcp's frame, in m.
+
+        Raises
+        ------
+        RobotError
+            If the transform is not rigid, or mass and centre do not come together.
+        """
+        model, tool = change_tool(self.model, self.tool, T_tcp_tool, mass, centre)
+        return replace(self, model=model, tool=tool)
+
+    def interval(self) -> tuple[FloatArray, FloatArray]:
+        """Return the 95 % intervals of the compliances, two arrays of shape (spring,)."""
+        return interval(self.draws)
+
+    def predict(
+        self,
+        q: ArrayLike,
+        force: ArrayLike,
+        moment: ArrayLike | None = None,
+        visit: ArrayLike | None = None,
+        *,
+        friction: FloatArray | None = None,
+    ) -> Prediction:
+        """Return the deflections at configurations under loads.
+
+        Parameters
+        ----------
+        q : array_like, shape (row, joint)
+            Joint positions in rad or m.
+        force : array_like, shape (row, 3)
+            Force on the robot at the tcp in base, in N.
+        moment : array_like, shape (row, 3), optional
+            Moment on the robot about the tcp in base, in N·m.
+        visit : array_like, shape (row,), optional
+            Rows with one value follow one another in time and share what friction remembers, which
+            is free before the first of them. Default: each row is pressed from rest.
+        friction : ndarray, shape (row, element), optional
+            Torque that each friction element bears, in N·m, instead.
+
+        Raises
+        ------
+        RobotError, SpringError
+            If an argument is not finite or has another shape.
+        """
+        q, force, moment = check_rows(self.model.robot, q, force, moment)
+        if visit is not None and np.shape(visit) != (len(q),):
+            raise SpringError(
+                f"visit {np.shape(visit)} does not have a value for each of {len(q)} rows"
+            )
+        if friction is None and visit is not None and len(self.model.friction):
+            load = self.model.load_torques(q, force, moment)
+            friction, _ = self.model.friction.visits(self.model.weight_torques(q), load, visit)
+        result = np.empty((3, len(q), 3))
+        for start in range(0, len(q), _CHUNK):
+            rows = slice(start, start + _CHUNK)
+            m = None if moment is None else moment[rows]
+            borne = None if friction is None else friction[rows]
+            blocks = self.model.observation_blocks(q[rows], force[rows], m, friction=borne)
+            result[0, rows] = blocks @ self.compliance
+            result[1:, rows] = interval(np.moveaxis(blocks @ self.draws.T, -1, 0))
+        deflection, low, high = result
+        return Prediction(deflection, low, high, *self._measured(deflection, low, high))
+
+    def _measured(
+        self, deflection: FloatArray, low: FloatArray, high: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """Widen the intervals of the fit by the misfit, as independent errors add up."""
+        error = self.misfit * np.linalg.norm(deflection, axis=1, keepdims=True)
+        # The point estimate may lie outside the draws when a spring is at its bound.
+        below, above = np.maximum(deflection - low, 0.0), np.maximum(high - deflection, 0.0)
+        return deflection - np.hypot(below, error), deflection + np.hypot(above, error)
+
+
+def check_rows(
+    robot: Robot, q: ArrayLike, force: ArrayLike, moment: ArrayLike | None
+) -> tuple[FloatArray, FloatArray, FloatArray | None]:
+    """Return rows of joint positions, forces and moments as arrays; see `CalibratedModel.predict`.
+
+    Raises
+    ------
+    RobotError, SpringError
+        If they are not finite or have other shapes.
+    """
+    joints, forces = robot.check_positions(q), check_vectors("force", force)
+    moments = None if moment is None else check_vectors("moment", moment)
+    for name, array in (("force", forces), ("moment", moments)):
+        if array is not None and (joints.ndim != 2 or array.shape != (len(joints), 3)):
+            raise SpringError(
+                f"{name} {array.shape} does not have a row for each of q {joints.shape}"
+            )
+    return joints, forces, moments
