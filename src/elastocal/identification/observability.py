@@ -210,8 +210,8 @@ class Observability:
         return float(np.linalg.norm([weights[name] * reach[name] for name in used]))
 
     @property
-    def springs(self) -> int:
-        """Number of springs."""
+    def parameters(self) -> int:
+        """Number of parameters of all springs."""
         return len(self.observable)
 
 
