@@ -3,25 +3,14 @@ import shutil
 
 import numpy as np
 import pytest
-from scipy.spatial.transform import Rotation
 
+from elastocal import workflows
+from elastocal.compensation.conditioning import read_tool
 from support.cli import elastocal
 from support.recorded_runs import record_run
-from support.static_postures import PlantedTool, turned
+from support.static_postures import PlantedTool, posture_table, turned
 
 TOOL = PlantedTool()
-
-
-def table(path, postures, flip=1.0):
-    angles = Rotation.from_matrix(postures.R_base_flange).as_euler("ZYX", degrees=True)
-    header = "a[deg],b[deg],c[deg]," + ",".join(
-        f"{what}_{axis}[{unit}]"
-        for what, unit in (("force", "N"), ("moment", "N*m"))
-        for axis in "xyz"
-    )
-    rows = np.hstack([angles, flip * postures.force, flip * postures.moment])
-    np.savetxt(path, rows, delimiter=",", header=header, comments="")
-    return path
 
 
 @pytest.fixture
@@ -34,7 +23,7 @@ def test_a_table_gives_the_planted_tool_within_its_intervals(tmp_path, postures)
     out = tmp_path / "tool.json"
     result = elastocal(
         "tool",
-        table(tmp_path / "s.csv", postures),
+        posture_table(tmp_path / "s.csv", postures),
         "--out",
         out,
         "--json",
@@ -50,7 +39,7 @@ def test_a_table_gives_the_planted_tool_within_its_intervals(tmp_path, postures)
 
 def test_people_see_the_intervals(tmp_path, postures):
     out = tmp_path / "tool.json"
-    data = table(tmp_path / "s.csv", postures)
+    data = posture_table(tmp_path / "s.csv", postures)
     result = elastocal("tool", data, "--out", out, "--free-rotation")
     assert "10 static postures" in result.err
     assert "mass" in result.err
@@ -59,7 +48,9 @@ def test_people_see_the_intervals(tmp_path, postures):
 def test_too_few_directions_are_named(tmp_path):
     rng = np.random.default_rng(0)
     same = TOOL.raw(np.repeat(turned(1, rng), 4, axis=0), rng)
-    result = elastocal("tool", table(tmp_path / "s.csv", same), "--out", tmp_path / "t.json")
+    result = elastocal(
+        "tool", posture_table(tmp_path / "s.csv", same), "--out", tmp_path / "t.json"
+    )
     assert result.code == 0
     assert "not determined: mass" in " ".join(result.err.split())
 
@@ -73,14 +64,14 @@ def test_too_few_directions_are_named(tmp_path):
     ],
 )
 def test_options_that_do_not_fit_are_refused(tmp_path, postures, options, reason):
-    data = table(tmp_path / "s.csv", postures)
+    data = posture_table(tmp_path / "s.csv", postures)
     result = elastocal("tool", data, "--out", tmp_path / "t.json", *options)
     assert reason in result.reason
 
 
 def test_a_turned_sign_writes_nothing(tmp_path, postures):
     out = tmp_path / "tool.json"
-    result = elastocal("tool", table(tmp_path / "s.csv", postures, flip=-1.0), "--out", out)
+    result = elastocal("tool", posture_table(tmp_path / "s.csv", postures, flip=-1.0), "--out", out)
     assert "sign of the wrenches is turned" in result.reason
     assert not out.exists()
 
@@ -99,6 +90,33 @@ def test_a_folder_that_is_no_run_is_refused(tmp_path):
     (tmp_path / "empty").mkdir()
     result = elastocal("tool", tmp_path / "empty", "--out", tmp_path / "tool.json")
     assert "journal.jsonl" in result.reason
+
+
+def test_a_run_is_derived_with_the_matrix_of_its_tool_file(tmp_path):
+    run = record_run(tmp_path / "run", poses=8)
+    out = tmp_path / "tool.json"
+    assert elastocal("tool", run.path, "--out", out).code == 0
+    contents = json.loads(out.read_text())
+    plain = workflows.derive(run.path).dataset
+    gain = np.diag([1.02, 1.02, 1.02, 1.0, 1.0, 1.0]).tolist()
+    out.write_text(json.dumps(contents | {"matrix": gain}))
+    corrected = workflows.derive(run.path, tool=out).dataset
+    lengths = [np.linalg.norm(data.force, axis=-1) for data in (corrected, plain)]
+    np.testing.assert_allclose(lengths[0], 1.02 * lengths[1], rtol=2e-3)
+    assert "sensor corrected by a tool file" in corrected.provenance
+
+
+def test_a_tool_file_of_before_is_still_read(tmp_path, postures):
+    out = tmp_path / "tool.json"
+    data = posture_table(tmp_path / "s.csv", postures)
+    elastocal("tool", data, "--out", out, "--free-rotation")
+    keys = "flange mass centre force_bias moment_bias R_flange_sensor sensor_origin gravity"
+    keys += " half_width undetermined postures force_scatter moment_scatter source schema"
+    contents = json.loads(out.read_text())
+    out.write_text(json.dumps({key: contents[key] for key in keys.split()}))
+    found = read_tool(out)
+    assert found.matrix is None
+    assert found.notes == ()
 
 
 @pytest.fixture(scope="module")

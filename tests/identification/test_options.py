@@ -39,8 +39,8 @@ def test_equal_bounds_fix_a_spring():
         (0.0, [1.0, np.nan, 1.0], "parameter 2 of 3"),
         (np.inf, np.inf, "parameter 1 of 3"),
         (-np.inf, -np.inf, "parameter 1 of 3"),
-        ([0.0, 0.0], np.inf, "one number for each of the 3 springs"),
-        (np.zeros((3, 3)), np.inf, "one number for each of the 3 springs"),
+        ([0.0, 0.0], np.inf, "one number for each of the 3 parameters"),
+        (np.zeros((3, 3)), np.inf, "one number for each of the 3 parameters"),
     ],
 )
 def test_impossible_bounds_are_refused_by_the_spring(lower, upper, message):

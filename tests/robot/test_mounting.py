@@ -14,6 +14,7 @@ from elastocal.robot import (
     on_rail,
     with_tool,
     with_tool_mass,
+    without_tool_mass,
 )
 from support.urdfs import KR_LIKE, opw_arm_urdf
 
@@ -53,6 +54,23 @@ class TestWithTool:
         text = with_tool(with_tool(ARM, "tcp", "sensor", T_TOOL), "sensor", "tip", T_TOOL)
         expected = Robot.from_urdf(ARM, "tcp").forward(Q) @ T_TOOL @ T_TOOL
         np.testing.assert_allclose(Robot.from_urdf(text, "tip").forward(Q), expected, atol=1e-12)
+
+    def test_a_mass_is_weighed_and_taken_off_again(self):
+        heavy = with_tool(ARM, "tcp", "tool", T_TOOL, 12.0, (0.01, 0.02, -0.1))
+        bare = Robot.from_urdf(with_tool(ARM, "tcp", "tool", T_TOOL), "tool")
+        robot = Robot.from_urdf(heavy, "tool")
+        masses = [sum(j.mass for j in each.chain.joints) for each in (robot, bare)]
+        assert masses[0] - masses[1] == pytest.approx(12.0)
+        light = Robot.from_urdf(without_tool_mass(heavy, "tool"), "tool")
+        assert sum(j.mass for j in light.chain.joints) == pytest.approx(masses[1])
+        np.testing.assert_allclose(light.forward(Q), robot.forward(Q), atol=1e-12)
+
+    def test_the_mass_of_a_link_of_the_arm_stays(self):
+        name = "KR 300 R2500 ultra"
+        urdf = catalogue.urdf(name)
+        last = Robot.from_urdf(urdf, "flange")
+        kept = Robot.from_urdf(without_tool_mass(urdf, "link_6"), "flange")
+        assert [j.mass for j in kept.chain.joints] == [j.mass for j in last.chain.joints]
 
     def test_missing_parent_is_refused_with_the_nearest_link(self):
         with pytest.raises(RobotError, match=r"no link 'link_66'.*did you mean 'link_6'\?"):

@@ -1,6 +1,7 @@
 """Static postures of a known tool."""
 
 from dataclasses import dataclass, field
+from pathlib import Path
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -45,3 +46,16 @@ def turned(count: int, rng: np.random.Generator, angle: float = 1.0) -> np.ndarr
     """Return rotations about the horizontal by about an angle (rad), shape (count, 3, 3)."""
     down = Rotation.from_euler("y", np.pi).as_matrix()
     return down @ Rotation.from_rotvec(angle * rng.normal(size=(count, 3))).as_matrix()
+
+
+def posture_table(path: Path, postures: StaticPostures, flip: float = 1.0) -> Path:
+    """Write postures as a CSV file with KUKA angles; return its path."""
+    angles = Rotation.from_matrix(postures.R_base_flange).as_euler("ZYX", degrees=True)
+    header = "a[deg],b[deg],c[deg]," + ",".join(
+        f"{what}_{axis}[{unit}]"
+        for what, unit in (("force", "N"), ("moment", "N*m"))
+        for axis in "xyz"
+    )
+    rows = np.hstack([angles, flip * postures.force, flip * postures.moment])
+    np.savetxt(path, rows, delimiter=",", header=header, comments="")
+    return path

@@ -77,7 +77,11 @@ from .procedure import (
     Search as Search,
     TorqueLimits as TorqueLimits,
 )
-from .sensor import SensorLoad as SensorLoad, weight_response as weight_response
+from .sensor import (
+    SENSOR_CORRECTED as SENSOR_CORRECTED,
+    SensorLoad as SensorLoad,
+    weight_response as weight_response,
+)
 from .simulation import (
     Balancer as Balancer,
     Bearings as Bearings,

@@ -26,6 +26,8 @@ from elastocal.errors import CompensationError
 from elastocal.results import brief_repr
 from elastocal.robot import GRAVITY
 
+SENSOR_CORRECTED = "sensor corrected by a tool file"
+"""In the provenance of data whose forces were corrected by a tool file's rotation and matrix."""
 _RIGID = 1e-6
 """Largest distance of a component of R R^T from the identity's."""
 _FAR = 0.5
@@ -121,6 +123,11 @@ class SensorLoad:
         """Return the corrected reading of the weight, ``K g``, shape (..., 6), sensor frame."""
         assert self.response is not None
         return (self.gravity @ R_base_sensor) @ self.response.T
+
+    @property
+    def has_matrix(self) -> bool:
+        """Whether readings are corrected by a matrix."""
+        return not np.array_equal(self.matrix, np.eye(6))
 
     @property
     def matrix_tcp(self) -> FloatArray:

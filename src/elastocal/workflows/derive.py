@@ -4,8 +4,18 @@ from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
 
+from elastocal.cell import SensorLoad
+from elastocal.compensation.conditioning import read_sensor_load
 from elastocal.dataset import Dataset
-from elastocal.procedure import RunFolder, RunSummary, derive_run, write_derived
+from elastocal.errors import ProcedureError
+from elastocal.procedure import (
+    RunFolder,
+    RunSummary,
+    derive_run,
+    read_copies,
+    read_journal,
+    write_derived,
+)
 from elastocal.progress import Progress
 from elastocal.results import Result
 from elastocal.wording import counted
@@ -18,6 +28,9 @@ class DeriveSettings:
 
     run: str | PathLike[str]
     """Folder of the run; dataset and summary in it are replaced."""
+    tool: Path | None = None
+    """Tool file of `tool`, whose sensor rotation and matrix correct the readings; the compensator
+    must have the same."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -60,7 +73,7 @@ def derive(settings: DeriveSettings, progress: Progress) -> DeriveResult:  # noq
     Parameters
     ----------
     settings : DeriveSettings
-        Or its ``run``.
+        Or its ``run``, and the other fields by name.
     progress : Progress, optional
         Called with stage, done and total.
 
@@ -72,6 +85,17 @@ def derive(settings: DeriveSettings, progress: Progress) -> DeriveResult:  # noq
         If a file cannot be read or written.
     """
     folder = RunFolder(Path(settings.run))
-    derived = derive_run(folder.path)
+    derived = derive_run(folder.path, _sensor(folder, settings.tool))
     write_derived(folder.path, derived)
     return DeriveResult(folder, derived.dataset, derived.summary)
+
+
+def _sensor(folder: RunFolder, tool: Path | None) -> SensorLoad | None:
+    """Return the tool of a file on the sensor of a run's cell; None for no file."""
+    if tool is None:
+        return None
+    entries = read_journal(folder.journal)
+    if not entries or entries[0].run is None:
+        raise ProcedureError(f"{folder.journal}: no pose is committed: there is nothing to derive")
+    cell, _ = read_copies(folder, entries[0].run)
+    return read_sensor_load(tool, cell.robot)

@@ -10,10 +10,11 @@ from elastocal.compensation.kernel import (
     deflection,
     observation_block,
     orientation,
+    python_text,
     sum_text,
     value_text,
 )
-from elastocal.compensation.kernel.program import ONE, ZERO, Program, needed, python_text
+from elastocal.compensation.kernel.program import ONE, ZERO, Program, needed
 from elastocal.elastic import ElasticModel
 from elastocal.robot import Robot
 from support.virtual_chain import ARMS

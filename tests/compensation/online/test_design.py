@@ -3,10 +3,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from elastocal.cell import SENSOR_CORRECTED
 from elastocal.compensation.online import design
 from elastocal.compensation.online.design import draws_factor
 from elastocal.errors import CompensationError
-from support.compensated import arm
+from support.compensated import arm, load
 
 
 def test_the_factor_squared_is_the_draws_covariance():
@@ -36,3 +37,11 @@ def test_a_draw_that_is_none_is_refused_by_spring():
     draws[7, 2] = np.nan
     with pytest.raises(CompensationError, match=r"a draw of spring joint_3\.axial is nan"):
         design(replace(arm(), draws=draws))
+
+
+def test_a_matrix_that_the_models_run_was_derived_without_is_refused():
+    of_a_run = replace(arm(), provenance="elastocal run r1, simulated")
+    with pytest.raises(CompensationError, match="the model is of a run without it"):
+        design(of_a_run, None, load())
+    corrected = replace(of_a_run, provenance=f"elastocal run r1, simulated, {SENSOR_CORRECTED}")
+    assert design(corrected, None, load()).load.has_matrix

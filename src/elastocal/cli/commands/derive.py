@@ -12,12 +12,16 @@ from elastocal.cli import output
 def _derive(
     run: Annotated[Path, typer.Argument(help="Folder of a run.")],
     *,
+    tool: Annotated[
+        Path | None,
+        typer.Option(help="Tool file whose sensor rotation and matrix correct the readings."),
+    ] = None,
     as_json: Annotated[
         bool, typer.Option("--json", help="Print the summary as one JSON object.")
     ] = False,
 ) -> None:
     """Derive dataset.nc and summary.json of a run again from its raw streams."""
-    result = workflows.derive(run)
+    result = workflows.derive(run, tool=tool)
     if as_json:
         output.print_json(result.summary)
         return

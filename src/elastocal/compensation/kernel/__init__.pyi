@@ -1,12 +1,16 @@
 from ._laws import written as written
+from .functions import (
+    Function as Function,
+    ModelFunctions as ModelFunctions,
+    compiled as compiled,
+    python_text as python_text,
+)
 from .program import (
     ONE as ONE,
     ZERO as ZERO,
     Assignment as Assignment,
     Call as Call,
-    Function as Function,
     Matrix as Matrix,
-    ModelFunctions as ModelFunctions,
     Naming as Naming,
     Product as Product,
     Program as Program,
@@ -16,9 +20,8 @@ from .program import (
     Turn as Turn,
     Value as Value,
     Vector as Vector,
-    compiled as compiled,
     needed as needed,
-    python_text as python_text,
+    statement_uses as statement_uses,
     sum_text as sum_text,
     used_names as used_names,
     value_text as value_text,

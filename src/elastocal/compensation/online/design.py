@@ -6,7 +6,7 @@ import numpy as np
 from scipy.special import ndtri
 
 from elastocal.arrays import FloatArray
-from elastocal.cell import SensorLoad
+from elastocal.cell import SENSOR_CORRECTED, SensorLoad
 from elastocal.compensation.conditioning import FilterChain
 from elastocal.compensation.kernel import (
     ModelFunctions,
@@ -91,7 +91,7 @@ class Design:
         """Whether readings are raw: bias and weight are taken away, or the wrench is moved."""
         load = self.load
         moved = not np.array_equal(load.T_tcp_sensor, np.eye(4))
-        moved |= not np.array_equal(load.matrix, np.eye(6))
+        moved |= load.has_matrix
         return bool(load.mass > 0.0 or load.force_bias.any() or load.moment_bias.any() or moved)
 
     @property
@@ -139,6 +139,7 @@ def design(
     """
     settings, load = settings or CompensatorSettings(), load or SensorLoad()
     _check_compliances(calibrated)
+    _require_same_sensor(calibrated, load)
     filters = settings.chain
     frame = settings.R_base_frame
     model = calibrated.model
@@ -182,6 +183,19 @@ def draws_factor(draws: FloatArray) -> FloatArray:
     kept[0] = True
     factor: FloatArray = vt[kept].T * s[kept]
     return factor
+
+
+def _require_same_sensor(calibrated: CalibratedModel, load: SensorLoad) -> None:
+    """Refuse a matrix that the forces of the model's calibration were not corrected by.
+
+    Such a model has taken the cross-talk up: a reading that is corrected then would be wrong by it.
+    """
+    derived = "elastocal run" in calibrated.provenance
+    if derived and SENSOR_CORRECTED not in calibrated.provenance and load.has_matrix:
+        raise CompensationError(
+            "the tool file corrects readings by a matrix, the model is of a run without it: run"
+            " `elastocal derive RUN --tool`, calibrate again, or leave --matrix out of `tool`"
+        )
 
 
 def _check_compliances(calibrated: CalibratedModel) -> None:

@@ -19,7 +19,7 @@ from pathlib import Path
 import numpy as np
 
 from elastocal.arrays import FloatArray, IndexArray
-from elastocal.cell import Cell, SensorLoad
+from elastocal.cell import SENSOR_CORRECTED, Cell, SensorLoad
 from elastocal.dataset import STATUSES, Dataset, write
 from elastocal.errors import DatasetError, FileAccessError, ProcedureError, SchemaError
 from elastocal.planning import PlanResult
@@ -122,13 +122,16 @@ def read_run(run: Path) -> CommittedRun:
     return CommittedRun(folder, entries, record, cell, plan, poses, signs)
 
 
-def derive_run(run: Path) -> DerivedRun:
+def derive_run(run: Path, sensor: SensorLoad | None = None) -> DerivedRun:
     """Return dataset and summary of the poses that a run has committed.
 
     Parameters
     ----------
     run : Path
         Folder of the run; see `read_run`, also for what it raises.
+    sensor : SensorLoad, optional
+        The tool on its sensor, with the matrix that corrects readings, from a tool file; by
+        default the cell file's, and readings are taken as they are.
 
     Raises
     ------
@@ -138,9 +141,11 @@ def derive_run(run: Path) -> DerivedRun:
         If no reading is usable.
     """
     found = read_run(run)
-    provenance = _provenance(found.folder, found.record)
+    provenance = _provenance(found.folder, found.record, sensor)
     try:
-        derived = derive_poses(found.poses, found.cell, found.plan, found.entries, provenance)
+        derived = derive_poses(
+            found.poses, found.cell, found.plan, found.entries, provenance, sensor
+        )
     except (DatasetError, ProcedureError) as error:
         raise type(error)(f"{found.folder.path}: {error}") from error
     warnings = (*found.signs, *derived.summary.warnings)
@@ -166,6 +171,7 @@ def derive_poses(
     plan: PlanResult,
     entries: Sequence[Entry],
     provenance: str,
+    sensor: SensorLoad | None = None,
 ) -> DerivedRun:
     """Return dataset and summary of reduced poses.
 
@@ -181,6 +187,8 @@ def derive_poses(
         Of the journal, for times, retries and faults.
     provenance : str
         Where the data come from.
+    sensor : SensorLoad, optional
+        The tool on its sensor; by default the cell file's.
 
     Raises
     ------
@@ -189,7 +197,7 @@ def derive_poses(
     DatasetError
         If no reading is usable.
     """
-    tool, lever = _tool_load(cell), _lever_arm(cell)
+    tool, lever = sensor or _tool_load(cell), _lever_arm(cell)
     seen = marker_readings(poses, cell.robot, cell.gravity_base, lever)
     registration = register(seen, lever)
     rows = [_row(pose, load, registration, tool) for pose in poses for load in pose.loads]
@@ -247,8 +255,9 @@ def _reasons(rows: Sequence[LoadRow], registration: Registration) -> str:
     return next((row.note for row in rows if row.note), "there is none")
 
 
-def _provenance(folder: RunFolder, record: RunRecord) -> str:
-    return f"elastocal run {folder.path.resolve().name}, {record.origin}"
+def _provenance(folder: RunFolder, record: RunRecord, sensor: SensorLoad | None) -> str:
+    corrected = "" if sensor is None else f", {SENSOR_CORRECTED}"
+    return f"elastocal run {folder.path.resolve().name}, {record.origin}{corrected}"
 
 
 @dataclass(frozen=True, eq=False)

@@ -49,6 +49,8 @@ class SpringBar:
     high: float
     group: int | None
     """Number of the group of springs that it cannot be told apart from."""
+    too_weak: bool = False
+    """See `SpringSummary.too_weak`."""
     at_bound: bool = False
     """Whether the fit ends at a bound of it."""
 
@@ -67,7 +69,9 @@ def spring_bars(model: CalibratedModel, settings: FitSettings | None = None) -> 
     for row in spring_summaries(model, settings):
         unit = unit_of(row.unit)
         value, low, high = (unit.factor * each for each in (row.compliance, row.low, row.high))
-        bars.append(SpringBar(row.name, unit, value, low, high, row.group, row.at_bound))
+        bars.append(
+            SpringBar(row.name, unit, value, low, high, row.group, row.too_weak, row.at_bound)
+        )
     return bars
 
 

@@ -26,7 +26,7 @@ def _compliances(evidence: Evidence) -> Iterator[blocks.Block]:
         return
     settings = found.figures.settings if found.figures else None
     springs = spring_bars(found.model, settings)
-    observable = sum(each.group is None for each in springs)
+    observable = sum(each.group is None and not each.too_weak for each in springs)
     yield _head(found, observable)
     yield from _ladder(found.figures)
     yield blocks.picture(
@@ -46,6 +46,8 @@ def _row(spring: SpringBar) -> blocks.Row:
     if spring.group is not None:
         known = f"not by itself, group {spring.group}"
         return name, known, f"({value:.4f})", "none", unit.shown, "none"
+    if spring.too_weak:
+        return name, "too weak to see", f"({value:.4f})", "none", unit.shown, "none"
     stiff = f"{1.0 / value:.3f} {unit.stiffness}" if value > 0.0 else "rigid"
     if not unit.stiffness or value < 0.0:
         stiff = "none"
