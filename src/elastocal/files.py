@@ -2,7 +2,7 @@
 
 A file that is being written lives beside its target under a temporary name and takes the
 target's name only after it has reached the disk, so that neither a crash nor Ctrl-C leaves
-half a file (spec section 3).
+half a file.
 """
 
 import contextlib

@@ -1,4 +1,4 @@
-"""Units: SI and radians inside, everything else only at the edges (spec section 1).
+"""Units: SI and radians inside, everything else only at the edges (docs/conventions.md).
 
 A person writes ``"175 mm"`` in YAML and ``force_x[kN]`` in a CSV header; the rest of the
 package only ever sees metres, radians, newtons. The table below is the whole list.
@@ -103,6 +103,21 @@ def parse_quantity(text: object, dimension: str) -> float:
         raise UnitError(f"{text!r} is not a finite {dimension}")
     _check_size(value, dimension, f"{text!r}")
     return value
+
+
+def in_unit_of(value: float, quantity: str) -> str | None:
+    """Return an SI value in the unit of a quantity; None if the text is none.
+
+    >>> in_unit_of(0.02, "25 mm/s")
+    '20 mm/s'
+    """
+    match = _QUANTITY.fullmatch(quantity)
+    unit = match[2].strip() if match else ""
+    # A unit belongs to one dimension.
+    for table in _FACTORS.values():
+        if unit in table:
+            return f"{value / table[unit]:.6g} {unit}"
+    return None
 
 
 def parse_point(text: str) -> tuple[float, float, float]:

@@ -80,7 +80,7 @@ def test_the_block_offers_five_faces(tmp_path):
     points = sample_uniform(surface_of(cell), 500, np.random.default_rng(0))
     assert len(np.unique(np.round(points.normal), axis=0)) == 5
     assert points.normal[:, 2].min() > -0.5
-    assert cell.file.search.most == 15
+    assert cell.file.search.pose_limit == 15
     assert len(cell.file.trackers) == 2
 
 

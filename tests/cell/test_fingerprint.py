@@ -1,13 +1,15 @@
 """The fingerprint: changes with what a cell is, not with how or where it is written down."""
 
 import shutil
+from dataclasses import replace
 
 import pytest
 import yaml
 
-from elastocal.cell import fingerprint, load_cell, named_files
+from elastocal.cell import SCHEMA, CellFile, Limits, fingerprint, load_cell, named_files
 from elastocal.cell.examples import write_example
 from elastocal.errors import FileAccessError
+from elastocal.records import read_yaml
 from elastocal.robot import catalogue
 
 
@@ -60,6 +62,41 @@ def test_another_place_and_another_name_of_the_file_do_not_change_it(folder):
 def test_a_number_changes_it(folder):
     before = of(folder)
     assert rewritten(folder, lambda data: data["load_cases"].update(fz="1501 N")) != before
+
+
+class LaterLimits(Limits):
+    """Limits with the key of a check that a later version has."""
+
+    reach: float | None = None
+
+
+class LaterCellFile(CellFile):
+    limits: LaterLimits = LaterLimits()
+
+
+def test_an_optional_key_that_is_not_given_leaves_it(folder):
+    cell = load_cell(folder / "cell.yaml")
+    later = read_yaml(cell.path, LaterCellFile, SCHEMA)
+    assert fingerprint(replace(cell, file=later)) == fingerprint(cell)
+
+
+def test_an_optional_key_that_is_given_changes_it(folder):
+    cell = load_cell(folder / "cell.yaml")
+    later = read_yaml(cell.path, LaterCellFile, SCHEMA)
+    limits = later.limits.model_copy(update={"reach": 2.0})
+    given = replace(cell, file=later.model_copy(update={"limits": limits}))
+    assert fingerprint(given) != fingerprint(cell)
+
+
+def test_plans_made_before_keys_could_be_left_out_still_match(folder):
+    # The block's mesh has whole numbers: the print is the same on every machine.
+    before = "79fc04c0b1c141621e6e0537074cad61a1d332ae27ce99b8d90b58ed08220fca"
+    assert of(folder) == before
+
+
+def test_a_key_that_was_null_and_is_given_changes_it(folder):
+    before = of(folder)
+    assert rewritten(folder, lambda data: data["limits"].update(payload="119 kg")) != before
 
 
 def test_a_byte_of_the_surface_changes_it(folder):

@@ -39,9 +39,9 @@ class TestExample:
 
     def test_every_posture_passes_every_check(self, like, folders):
         *_, pool = planned(like, folders[like])
-        assert np.all(pool.verdicts.passed)
+        assert np.all(pool.margins.passed)
         assert {"edge", "flatness", "torque", "sensor", "collision", "sight"} <= set(
-            pool.verdicts.names
+            pool.margins.names
         )
 
     def test_every_posture_presses_where_it_says(self, like, folders):

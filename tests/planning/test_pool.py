@@ -43,7 +43,7 @@ def test_every_posture_reaches_its_point_and_its_approach_pose():
 
 def test_every_posture_of_the_pool_passes_every_check():
     found = made(*SphericalCap().spread(80, 0.0))
-    assert np.all(found.verdicts.passed)
+    assert np.all(found.margins.passed)
     assert sum(found.refused.values()) + len(found.postures) == found.sampled == 80
 
 
@@ -92,7 +92,7 @@ def test_a_point_at_the_edge_is_refused_before_any_robot_is_asked():
     found = made(points, normals, quick=[Never(FORCE_TCP, 1.0, 1.0)], point=[edge])
     assert found.refused["edge"] == 10
     np.testing.assert_array_equal(found.refused_by[:10], 1)
-    assert found.verdicts.names == ("edge", "friction")
+    assert found.margins.names == ("edge", "friction")
     assert found.bottleneck == "edge"
     assert "disk" in found.advice
 
@@ -133,13 +133,13 @@ def test_parts_of_the_points_make_the_same_pool_as_all_of_them():
     whole = made(points, normals)
     np.testing.assert_array_equal(parts.postures.point, whole.postures.point)
     np.testing.assert_array_equal(parts.refused_by, whole.refused_by)
-    assert parts.verdicts.margin.shape == whole.verdicts.margin.shape
+    assert parts.margins.margin.shape == whole.margins.margin.shape
 
 
 def test_the_first_postures_keep_the_points_up_to_the_next():
     found = made(*SphericalCap().spread(40, 0.0))
     few = found.first(5)
-    assert len(few.postures) == few.verdicts.margin.shape[1] == 5
+    assert len(few.postures) == few.margins.margin.shape[1] == 5
     assert few.sampled == found.postures.point[5]
     assert np.count_nonzero(few.refused_by < 0) == 5
     assert found.first(10_000) is found
@@ -148,3 +148,18 @@ def test_the_first_postures_keep_the_points_up_to_the_next():
 def test_no_points_are_refused_by_name():
     with pytest.raises(PlanningError, match="no candidate points"):
         made(np.zeros((0, 3)), np.zeros((0, 3)))
+
+
+def test_the_two_commonest_refusals_are_named_with_their_advice():
+    points, normals = SphericalCap().spread(30, 0.0)
+    slippery = FrictionCheck(FORCE_TCP, 0.1, 1.0)
+    edge = EdgeCheck(np.where(np.arange(30) < 10, 0.0, 0.1), 0.025, 0.005)
+    found = made(points, normals, quick=[slippery], point=[edge])
+    assert found.commonest_refusals == ("friction", "edge")
+    assert found.advice == f"friction: {slippery.advice}; edge: {edge.advice}"
+
+
+def test_a_pool_without_a_refusal_gives_no_advice():
+    found = made(*SphericalCap().spread(10, 0.0), quick=[])
+    assert found.commonest_refusals == ()
+    assert found.advice == ""

@@ -36,7 +36,7 @@ def test_there_are_as_many_candidates_as_wanted(tmp_path, sampling):
     cell = example(tmp_path, pool=("pool: 3000", f"pool: 150\n  sampling: {sampling}"))
     found = gathered(cell)
     assert len(found.pool.postures) == 150
-    assert np.all(found.pool.verdicts.passed)
+    assert np.all(found.pool.margins.passed)
     assert len(found.points) == found.pool.sampled
     at = found.points.position[found.pool.postures.point]
     np.testing.assert_allclose(found.pool.postures.contact, at, atol=1e-8)
@@ -54,12 +54,12 @@ def test_blue_noise_candidates_keep_their_distance(tmp_path):
 
 
 def test_the_number_of_processes_does_not_change_the_pool(tmp_path, monkeypatch):
-    monkeypatch.setattr(gathering, "_WORTH_HELP", 1)
+    monkeypatch.setattr(gathering, "_PARALLEL_FROM", 1)
     monkeypatch.setattr(gathering, "_PART", 50)
     cell = example(tmp_path, pool=FEW)
     alone, helped = gathered(cell, jobs=1), gathered(cell, jobs=2)
     np.testing.assert_array_equal(alone.pool.postures.q, helped.pool.postures.q)
-    np.testing.assert_array_equal(alone.pool.verdicts.margin, helped.pool.verdicts.margin)
+    np.testing.assert_array_equal(alone.pool.margins.margin, helped.pool.margins.margin)
     np.testing.assert_array_equal(alone.pool.refused_by, helped.pool.refused_by)
 
 

@@ -6,15 +6,12 @@ from ._quantities import (
     PositiveMoment as PositiveMoment,
 )
 from .cell import (
-    RUN_SECTIONS as RUN_SECTIONS,
     SCHEMA as SCHEMA,
     TOOLING as TOOLING,
     Cell as Cell,
     CellFile as CellFile,
     ProcessFile as ProcessFile,
-    fingerprint as fingerprint,
     load_cell as load_cell,
-    named_files as named_files,
 )
 from .devices import (
     ArmState as ArmState,
@@ -55,6 +52,11 @@ from .hardware import (
     SurfaceEntry as SurfaceEntry,
     Tool as Tool,
     Tracker as Tracker,
+)
+from .identity import (
+    RUN_SECTIONS as RUN_SECTIONS,
+    fingerprint as fingerprint,
+    named_files as named_files,
 )
 from .motion import (
     MotionEntry as MotionEntry,

@@ -51,12 +51,16 @@ Angle = Annotated[float, _read("angle")]
 """In rad."""
 
 
-PositiveAngle = Annotated[float, _read("angle"), _POSITIVE, Field(le=math.pi)]
+PositiveAngleUpToPi = Annotated[float, _read("angle"), _POSITIVE, Field(le=math.pi)]
 """In rad, above 0, at most π."""
 
 
-SpanAngle = Annotated[float, _read("angle"), _NOT_NEGATIVE, Field(le=math.pi)]
+AngleUpToPi = Annotated[float, _read("angle"), _NOT_NEGATIVE, Field(le=math.pi)]
 """In rad, from 0 to π."""
+
+
+AngleBelowRight = Annotated[float, _read("angle"), _NOT_NEGATIVE, Field(lt=math.pi / 2.0)]
+"""In rad, from 0 to below π/2: an angle between two lines."""
 
 
 Force = Annotated[float, _read("force"), _NOT_NEGATIVE]

@@ -2,16 +2,16 @@
 
 An arm does the steps of paper Procedure 1 (4-25). Every command returns at once; the arm is asked
 how far it is by `RobotArm.state`. A caller looks again each supervision cycle, so that a watchdog
-can stop the arm at any step. Forces are those on the robot at the tool centre point (conventions
-of spec section 1).
+can stop the arm at any step. Forces are those on the robot at the tool centre point, as in
+docs/conventions.md.
 
 No call may take longer than a supervision cycle (``procedure.cycle``, 40 ms): the watchdog that
 calls is the same that stops the arm. A driver whose line may be slow talks to it in a thread of
 its own and answers from what came last. A call may raise `DeviceError`, or an `OSError` of its
 line; the arm is then brought off the surface with what still works.
 
-A new driver is one package under ``elastocal.drivers`` and an entry in the contract tests of
-``tests/contracts/``.
+A new source of devices is one package, ``drivers/NAME`` (none is there yet: the devices that
+exist are simulated), with its entries as docs/how-to/write-a-driver.md says.
 """
 
 from dataclasses import dataclass
@@ -104,7 +104,7 @@ class RobotArm(Protocol):
         direction_base : ndarray, shape (3,)
             Unit vector in base.
         distance : float
-            Longest way, in m.
+            Distance in m after which the arm stops if it has felt no force.
         speed : float
             In m/s.
         contact_force : float

@@ -14,7 +14,7 @@ from elastocal.cell._quantities import (
     Mass,
     Point,
     Pose,
-    PositiveAngle,
+    PositiveAngleUpToPi,
     PositiveForce,
     PositiveLength,
     PositiveMoment,
@@ -171,7 +171,7 @@ class SurfaceEntry(MeshFile):
     region: RegionEntry | None = None
     flip_normals: bool = False
     """Turn the normals round; they must point to the robot's side."""
-    crease_angle: PositiveAngle = math.radians(30.0)
+    crease_angle: PositiveAngleUpToPi = math.radians(30.0)
     """Neighbouring faces that differ by more meet in an edge that the disk must not hang over."""
 
 
@@ -290,7 +290,7 @@ class Marker(StrictModel):
     """In the tcp frame, in m."""
     axis: Direction
     """Direction that it looks in, in the tcp frame."""
-    acceptance: PositiveAngle
+    acceptance: PositiveAngleUpToPi
     """Largest angle between that axis and the beam, in rad."""
 
     @property

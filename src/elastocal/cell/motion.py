@@ -51,7 +51,9 @@ class MotionEntry(StrictModel):
     acceleration_time: PositiveTime = 0.5
     """Time in which a joint reaches its full speed, in s."""
     contact_speed: Annotated[PositiveSpeed, Field(ge=1e-4)] = 0.02
-    """Speed of the straight motion between approach pose and contact, in m/s."""
+    """Of the straight motion between approach pose and contact, in m/s, as the plan's times and
+    the KRL program take it. ``procedure.contact_speed`` is another: that of the last millimetres
+    in `elastocal run`."""
     unloaded_time: PositiveTime = 4.0
     """Time of the unloaded reference of a pose, in s."""
     load_time: PositiveTime = 8.0

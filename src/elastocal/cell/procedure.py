@@ -15,16 +15,17 @@ from pydantic_core import InitErrorDetails, PydanticCustomError
 
 from elastocal.arrays import FloatArray
 from elastocal.cell._quantities import (
+    AngleBelowRight,
+    AngleUpToPi,
     Distance,
     Force,
-    PositiveAngle,
+    PositiveAngleUpToPi,
     PositiveForce,
     PositiveForceRate,
     PositiveLength,
     PositiveMass,
     PositiveSpeed,
     PositiveTime,
-    SpanAngle,
     TranslationalCompliance,
     needed_for,
 )
@@ -45,7 +46,8 @@ DIRECTIONS = {
     "east": (0.0, -1.0, -1.0),
     "west": (0.0, 1.0, -1.0),
 }
-"""Signs of (fx, fy, fz) in the force on the robot (spec section 2, load cases)."""
+"""Signs of (fx, fy, fz) in the force on the robot (paper section 4.1; docs/conventions.md says why
+east is -fy)."""
 _CaseName = Literal["normal", "north", "south", "east", "west"]
 
 
@@ -89,7 +91,7 @@ class Engagement(StrictModel):
 
     disk_radius: PositiveLength
     """In m."""
-    normal_tolerance: PositiveAngle = math.radians(3.0)
+    normal_tolerance: PositiveAngleUpToPi = math.radians(3.0)
     """Largest angle between the disk's axis and the surface's normal under it, in rad."""
     edge_margin: Distance = 5e-3
     """Least distance from the rim of the disk to an edge of the surface, in m."""
@@ -128,7 +130,7 @@ class TorqueLimits(StrictModel):
     @classmethod
     def _positive(cls, values: dict[str, str]) -> dict[str, str]:
         for joint, text in values.items():
-            if not _either(text) > 0.0:
+            if not _torque_or_force(text) > 0.0:
                 raise ValueError(f"{joint} must be above 0")
         return values
 
@@ -156,16 +158,20 @@ class TorqueLimits(StrictModel):
 
 
 class Limits(StrictModel):
-    """Margins that every pose keeps."""
+    """Margins that every pose keeps.
 
-    joint_margin: SpanAngle = 0.0873
+    The limit of a new check is a field that is None by default: a cell that does not give it is
+    not judged by it, and keeps its fingerprint and its plans.
+    """
+
+    joint_margin: AngleUpToPi = 0.0873
     """Least distance of a revolute joint to its limits, in rad."""
     rail_margin: Distance = 0.0
     """Least distance of a prismatic joint to its limits, in m."""
     singular_value: Annotated[FiniteFloat, Field(ge=0.0, le=1.0)] = 0.05
     """Least singular value of the length-scaled Jacobian, without dimension."""
-    wrist_angle: SpanAngle = 0.1745
-    """Least |A5|, in rad."""
+    wrist_angle: AngleBelowRight = 0.1745
+    """Least angle between the lines of axes 4 and 6, in rad: |A5|, folded back above 90°."""
     clearance: Distance = 0.0
     """Least distance between solids that must not touch, in m."""
     payload: PositiveMass | None = None
@@ -173,7 +179,7 @@ class Limits(StrictModel):
     torque: TorqueLimits = TorqueLimits()
 
 
-def _either(text: str) -> float:
+def _torque_or_force(text: str) -> float:
     """Return a moment in N·m or a force in N: which one a joint has, only the robot knows."""
     return parse_quantity(text, "force" if text.rstrip().endswith("N") else "moment")
 
@@ -205,7 +211,7 @@ class Search(StrictModel):
         return pool
 
     @property
-    def most(self) -> int | None:
+    def pose_limit(self) -> int | None:
         """Largest number of poses; None when only ``d_max`` ends the search."""
         if self.poses is None and self.d_max is None:
             return DEFAULT_POSES
@@ -220,7 +226,9 @@ class ProcedureSettings(StrictModel):
     approach_speed: Annotated[PositiveSpeed, Field(ge=1e-4, le=0.25)] = 0.02
     """Between approach pose and near contact, and back, in m/s."""
     contact_speed: Annotated[PositiveSpeed, Field(ge=1e-4, le=0.02)] = 0.005
-    """From near contact to the surface, in m/s."""
+    """Of the guarded approach from near contact to the surface, in m/s: how fast `elastocal run`
+    touches. ``motion.contact_speed`` is another: the plan's and the KRL program's speed of the
+    whole straight way."""
     contact_force: PositiveForce = 60.0
     """Force at which the guarded approach stops, in N."""
     ramp: Annotated[PositiveForceRate, Field(ge=1.0, le=2e3)] = 400.0

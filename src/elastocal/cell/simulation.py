@@ -10,6 +10,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Field, FiniteFloat, field_validator, model_validator
 
 from elastocal.cell._quantities import (
+    AngleUpToPi,
     Distance,
     Force,
     Mass,
@@ -24,7 +25,6 @@ from elastocal.cell._quantities import (
     Scale,
     Share,
     ShareBelowHalf,
-    SpanAngle,
     Time,
     TranslationalStiffness,
 )
@@ -52,16 +52,16 @@ class Gears(StrictModel):
     """At high torque, in N·m/rad; by default those of a 1.1 t arm, scaled with the moved mass."""
     growth: ShareBelowHalf = 0.2
     """How much softer a gear is at rest, over its stiffness at high torque."""
-    growth_angle: Annotated[SpanAngle, Field(gt=0.0)] = 3e-4
+    growth_angle: Annotated[AngleUpToPi, Field(gt=0.0)] = 3e-4
     """Twist at which it is half way between the two, in rad."""
-    backlash: SpanAngle = 3e-5
+    backlash: AngleUpToPi = 3e-5
     """Twist that is lost between a torque and its opposite, in rad; there the gear is soft, not
     free."""
     hysteresis: Annotated[FiniteFloat, Field(ge=0.0, lt=0.3)] = 0.03
     """Friction in the gear over its torque at `reference_angle`: half the height of its loop."""
-    reference_angle: Annotated[SpanAngle, Field(gt=0.0)] = 5e-4
+    reference_angle: Annotated[AngleUpToPi, Field(gt=0.0)] = 5e-4
     """In rad."""
-    presliding: Annotated[SpanAngle, Field(gt=0.0)] = 6e-5
+    presliding: Annotated[AngleUpToPi, Field(gt=0.0)] = 6e-5
     """Twist from rest after which the friction is at its full height, in rad."""
 
 

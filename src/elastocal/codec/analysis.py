@@ -1,7 +1,7 @@
 """The training sets of a finished codec: which springs they tell apart, and their indices.
 
 A compliance that is not told apart has a value, the smallest one that explains the data, but the
-value is no finding (spec section 2, trap 1). Charts of compliances say so.
+value is no finding (docs/explanation/observability.md). Charts of compliances say so.
 """
 
 from dataclasses import dataclass

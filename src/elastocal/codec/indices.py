@@ -67,8 +67,8 @@ def index_values(data: CodecData, prepared: PreparedVariant) -> IndexValues:
     """Return the indices of all training sets of a variant.
 
     All sets are measured by one rule: over the directions that all poses together observe under
-    the variant's load cases, columns scaled over all poses (spec section 2, trap 2). O1 is
-    Eq. 20 of the paper. For ``i``, the verification poses of the split under all load cases
+    the variant's load cases (docs/explanation/observability.md), columns scaled over all poses. O1
+    is Eq. 20 of the paper. For ``i``, the verification poses of the split under all load cases
     stand for the production. The covering radius is that over all poses of the codec.
 
     Parameters

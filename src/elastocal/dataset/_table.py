@@ -1,4 +1,4 @@
-"""A dataset's CSV file, the lossless twin of the NetCDF file: a row a reading (spec section 3)."""
+"""A dataset's CSV file, the lossless twin of the NetCDF file: a row a reading."""
 
 import math
 from collections.abc import Mapping, Sequence

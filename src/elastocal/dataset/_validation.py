@@ -1,7 +1,7 @@
 """Checks of the numbers of a dataset; its names and shapes are already right here.
 
 Two kinds: numbers that a reading cannot have, and numbers that look like the unit mistakes of the
-shop floor, told apart from blunders (spec section 6). Degrees in a radian column or millimetres in
+shop floor, told apart from blunders. Degrees in a radian column or millimetres in
 a metre column shift *every* number by a factor; a broken beam shifts one. Displacements and forces
 are therefore judged by their median over the usable readings, which a single blunder cannot move;
 the fit names the blunder.

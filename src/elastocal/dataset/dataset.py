@@ -63,7 +63,7 @@ class Dataset:
     Raises
     ------
     DatasetError
-        If the data break the contract of spec section 3; the message names the place.
+        If the data break the contract of docs/reference/files.md; the message names the place.
     SchemaError
         If the schema is not known.
     """

@@ -1,4 +1,4 @@
-"""Rows of joints and forces, to predict deflections for (spec section 4, ``ROWS.csv``).
+"""Rows of joints and forces, to predict deflections for (``ROWS.csv``).
 
 Every other column is carried through untouched, in its place.
 """

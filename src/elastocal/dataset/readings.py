@@ -119,7 +119,7 @@ class Readings:
 
     @property
     def deflection(self) -> FloatArray:
-        """Real minus commanded TCP position, shape (reading, 3), in m (spec section 1).
+        """Real minus commanded TCP position, shape (reading, 3), in m (docs/conventions.md).
 
         ``deflection = marker_displacement - controller_displacement``: the paper's Eq. (10)
         and (13) with both signs turned.

@@ -2,8 +2,8 @@
 
 A force with the wrong sign, in the wrong frame, or joints counted the other way round still make
 a solvable system; only the fit is worse. So the usual mistakes are undone one by one, and if the
-data are explained far better without one of them, the fit is refused with that message (spec
-sections 2 and 6; docs/decisions/0006-conventions-verdict.md).
+data are explained far better without one of them, the fit is refused with that message
+(docs/decisions/0006-conventions-verdict.md).
 
 A new mistake is a function that undoes it and an entry in `_MISTAKES`.
 """

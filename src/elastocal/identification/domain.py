@@ -22,7 +22,7 @@ from elastocal.wording import counted
 
 REACH = 2.0
 """Largest distance from a calibrated pose, in usual distances of these from one another."""
-_SPARE = 0.05
+_TORQUE_ALLOWANCE = 0.05
 """Part of the largest calibrated torque by which every range is wider: forces are never met
 exactly, and a joint that no force loads has no range of its own."""
 _CHUNK = 2000
@@ -125,7 +125,7 @@ class CalibrationDomain:
             for start in range(0, len(q), _CHUNK)
         ]
         torque = _torques(robot, q, force, moment)
-        spare = _SPARE * max(self.torque_high.max(), -self.torque_low.min())
+        spare = _TORQUE_ALLOWANCE * max(self.torque_high.max(), -self.torque_low.min())
         inside = (torque >= self.torque_low - spare) & (torque <= self.torque_high + spare)
         far = np.concatenate([np.zeros(0), *distance]) > REACH * self.spacing(robot)
         return OutsideRows(far, np.asarray(~inside.all(axis=1)))

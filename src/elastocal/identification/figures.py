@@ -132,7 +132,7 @@ class SuspiciousReading:
 @brief_repr
 @record("elastocal.calibration/1")
 class CalibrationSummary:
-    """The figures of a calibration (spec section 4)."""
+    """The figures of a calibration (docs/reference/files.md)."""
 
     robot: str
     springs: tuple[SpringSummary, ...]

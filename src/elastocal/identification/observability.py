@@ -3,7 +3,7 @@
 With forces only and positions only, springs that share an origin add up to one symmetric tensor
 and consecutive wrist frames share axes, so some springs can never be told apart, however many
 poses are taken. Predictions need only the combinations that are observable; tables must say
-which springs are not (spec section 2, trap 1).
+which springs are not (docs/explanation/observability.md).
 
 Combinations are written in a readable basis of the null space: few springs a vector, springs of
 near joints together. Every vector of a subspace with the fewest possible non-zeros vanishes on
@@ -213,6 +213,11 @@ class Observability:
     def parameters(self) -> int:
         """Number of parameters of all springs."""
         return len(self.observable)
+
+    @property
+    def springs(self) -> int:
+        """Return `parameters`, by the name that ``check --json`` gives them."""
+        return self.parameters
 
 
 def observability(system: Factored, springs: Sequence[Spring]) -> Observability:

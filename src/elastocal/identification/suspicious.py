@@ -50,7 +50,7 @@ _REDUCTION = 0.3
 """Part of the sum of squared residuals that the offset must explain to be named."""
 _FEWEST_POSES = 10
 """With fewer poses, what the springs miss at one of them may pass for an offset."""
-_SPARE = 2.0
+_ROWS_A_SPRING = 2.0
 """Fewest equations for each unknown, offset included."""
 _ROUNDS = 20
 _SETTLED = 1e-3
@@ -158,7 +158,7 @@ def force_offset(
         Marker in the tcp frame, in m, as the problem was built with.
     """
     unknowns = problem.columns + 3
-    if len(np.unique(problem.block)) < _FEWEST_POSES or problem.d.size < _SPARE * unknowns:
+    if len(np.unique(problem.block)) < _FEWEST_POSES or problem.d.size < _ROWS_A_SPRING * unknowns:
         return None
     T_base_tcp = model.robot.forward(readings.joint_position)
     turns = {

@@ -1,11 +1,15 @@
+from .cell_checks import (
+    CHECKS as CHECKS,
+    POINT_CHECKS as POINT_CHECKS,
+    point_checks as point_checks,
+    robot_checks as robot_checks,
+)
 from .cell_setup import (
     cell_surface as cell_surface,
     collision_scene as collision_scene,
-    point_checks as point_checks,
-    robot_checks as robot_checks,
-    sight_check as sight_check,
+    fixture_bodies as fixture_bodies,
     surface_findings as surface_findings,
-    torque_check as torque_check,
+    tool_bodies as tool_bodies,
 )
 from .plan import (
     PlanAndPool as PlanAndPool,

@@ -13,10 +13,9 @@ from elastocal.errors import PlanningError
 from elastocal.planning.cell_setup import (
     cell_surface,
     collision_scene,
-    sight_check,
     surface_findings,
-    torque_check,
 )
+from elastocal.planning.checks import SightCheck
 from elastocal.planning.motion import (
     Mover,
     Route,
@@ -47,6 +46,7 @@ from elastocal.planning.search import Cover, CoverSelection, Selection, techniqu
 from elastocal.planning.search_pool import SearchPool
 from elastocal.planning.surface import Finding, Surface
 from elastocal.progress import Progress, silent
+from elastocal.robot import has_wrist
 
 _SURFACE, _SEARCH = "surface", "search"
 """Stages under which progress is reported, beside `CANDIDATES` and `VISITING`."""
@@ -179,13 +179,13 @@ def _require_enough(cell: Cell, sampled: SampledPool, findings: tuple[Finding, .
     found = len(pool.postures)
     if found >= wanted:
         return
-    refused = ", ".join(f"{name} {count}" for name, count in pool.refused.items() if count)
+    refused = ", ".join(f"{name} {pool.refused[name]}" for name in pool.commonest_refusals)
     odd = [f.message for f in findings if f.kind in ("tiny", "inverted")]
     why = "; ".join([*odd, pool.advice])
     short = f", and {wanted} poses are wanted (search.poses)" if wanted > 1 else ""
     raise PlanningError(
         f"{found} of {pool.sampled} points on the surface can be pressed on{short};"
-        f" refused by {refused}: {why}"
+        f" refused by {refused}; {why}"
     )
 
 
@@ -223,8 +223,8 @@ def _notes(cell: Cell, pool: Pool, search: SearchRecord) -> tuple[str, ...]:
     if len(pool.postures) < wanted:
         notes.append(
             f"only {len(pool.postures)} of {wanted} candidates were found among"
-            f" {pool.sampled} points; most of the others were refused by {pool.bottleneck}:"
-            f" {pool.advice}"
+            f" {pool.sampled} points; most of the others were refused by"
+            f" {' and '.join(pool.commonest_refusals[:2])}; {pool.advice}"
         )
     if search.d_max is not None and not search.covered:
         notes.append(
@@ -234,11 +234,23 @@ def _notes(cell: Cell, pool: Pool, search: SearchRecord) -> tuple[str, ...]:
     if search.d_max is not None and not isinstance(technique(search.name), Cover):
         notes.append(f"{search.name} knows no d_max: it chose as many poses as cover needs for it")
     notes.extend(f"assumed, {text}" for text in _assumptions(cell))
-    judged = torque_check(cell).judged
-    unknown = [name for name in cell.robot.joint_names if name not in judged]
+    notes.extend(_unjudged(cell))
+    return tuple(notes)
+
+
+def _unjudged(cell: Cell) -> list[str]:
+    """Return what a limit of the cell file asks for and no check can judge on this robot."""
+    notes: list[str] = []
+    known = zip(cell.robot.joint_names, np.isfinite(cell.torque_limits), strict=True)
+    unknown = [name for name, is_known in known if not is_known]
     if unknown:
         notes.append(f"torques of {', '.join(unknown)} are not known and not judged")
-    return tuple(notes)
+    if not has_wrist(cell.robot):
+        notes.append(
+            f"limits.wrist_angle is not judged: {cell.robot.name} has no six joints of which the"
+            " fourth and the sixth turn"
+        )
+    return notes
 
 
 def _assumptions(cell: Cell) -> list[str]:
@@ -279,14 +291,14 @@ def _contact(cell: Cell) -> ContactRecord:
 def _poses(choice: _Choice) -> tuple[PoseRecord, ...]:
     pool, robot = choice.pool, choice.cell.robot
     order = choice.selection.order[choice.route.order]
-    check = sight_check(choice.cell, choice.surface)
+    check = SightCheck.of(choice.cell, choice.surface)
     seen_by = check.seen_by(pool.postures.take(order)) if check else [None] * len(order)
     poses = []
     for number, candidate in enumerate(order.tolist()):
         posture = pool.postures.take([candidate])
         # From the joints and not from the frame wanted: what the robot will do.
         T = robot.forward(posture.q[0])
-        margins = dict(zip(pool.verdicts.names, pool.verdicts.margin[:, candidate], strict=True))
+        margins = dict(zip(pool.margins.names, pool.margins.margin[:, candidate], strict=True))
         x, y, z, w = Rotation.from_matrix(T[:3, :3]).as_quat()
         poses.append(
             PoseRecord(
@@ -327,7 +339,7 @@ def _search(choice: _Choice) -> SearchRecord:
         name=selection.name,
         metric=search.metric,
         seed=search.seed,
-        wanted=search.most,
+        wanted=search.pose_limit,
         d_max=search.d_max,
         covering_radius=spread.covering_radius,
         lower_bound=selection.lower_bound if isinstance(selection, CoverSelection) else None,
@@ -340,8 +352,8 @@ def _search(choice: _Choice) -> SearchRecord:
 
 def _pool(pool: Pool) -> PoolRecord:
     refused = pool.refused
-    units = (None, *pool.verdicts.units)
-    advice = (REACH_ADVICE, *pool.verdicts.advice)
+    units = (None, *pool.margins.units)
+    advice = (REACH_ADVICE, *pool.margins.advice)
     return PoolRecord(
         file=POOL,
         sampled=pool.sampled,
@@ -367,9 +379,9 @@ def _pool_data(choice: _Choice, sampled: FloatArray) -> PoolData:
         q_approach=postures.q_approach,
         joint_names=choice.cell.robot.joint_names,
         branch=pool.branch,
-        margin=pool.verdicts.margin,
-        check_names=pool.verdicts.names,
-        check_units=pool.verdicts.units,
+        margin=pool.margins.margin,
+        check_names=pool.margins.names,
+        check_units=pool.margins.units,
         boundary_distance=choice.search_pool.boundary_distance,
         pose_id=pose_id,
         point=postures.point,

@@ -18,7 +18,7 @@ import numpy as np
 
 from elastocal.arrays import BoolArray, FloatArray, IndexArray
 from elastocal.errors import PlanningError
-from elastocal.planning.checks import Checks, Verdicts, verdicts
+from elastocal.planning.checks import Checks, Margins, check_margins
 from elastocal.planning.postures import Postures
 from elastocal.planning.surface import contact_frames
 from elastocal.results import brief_repr
@@ -56,7 +56,7 @@ class Pool:
     """One posture for each point that has one; ``postures.point`` says which."""
     branch: IndexArray
     """Inverse kinematics branch of each posture, shape (posture,)."""
-    verdicts: Verdicts
+    margins: Margins
     """Margins of the postures under every check."""
     refused_by: IndexArray
     """For each sampled point the number in `refusals` of what left it without a posture, or -1
@@ -70,7 +70,7 @@ class Pool:
     @property
     def refusals(self) -> tuple[str, ...]:
         """Names of all that may refuse a point: the reach of the robot, then every check."""
-        return (UNREACHABLE, *self.verdicts.names)
+        return (UNREACHABLE, *self.margins.names)
 
     @property
     def refused(self) -> dict[str, int]:
@@ -90,10 +90,21 @@ class Pool:
         return worst if refused[worst] else None
 
     @property
+    def commonest_refusals(self) -> tuple[str, ...]:
+        """What left points without a posture, the commonest first."""
+        refused = self.refused
+        ranked = sorted(refused, key=lambda name: -refused[name])
+        return tuple(name for name in ranked if refused[name])
+
+    @property
     def advice(self) -> str:
-        """Advice on the bottleneck; empty when there is none."""
-        texts = dict(zip(self.refusals, (REACH_ADVICE, *self.verdicts.advice), strict=True))
-        return texts.get(self.bottleneck or "", "")
+        """Advice on the two commonest refusals, each with its name; empty when there is none.
+
+        Two, as the commonest is often one that no-one minds (the edge), and as a point that
+        several checks refuse counts for one of them alone.
+        """
+        texts = dict(zip(self.refusals, (REACH_ADVICE, *self.margins.advice), strict=True))
+        return "; ".join(f"{name}: {texts[name]}" for name in self.commonest_refusals[:2])
 
     def first(self, count: int) -> "Pool":
         """Return the pool without the postures beyond the first ``count`` ones.
@@ -107,7 +118,7 @@ class Pool:
         return Pool(
             self.postures.take(np.arange(count)),
             self.branch[:count],
-            self.verdicts.take(np.arange(count)),
+            self.margins.take(np.arange(count)),
             self.refused_by[:end],
         )
 
@@ -154,21 +165,21 @@ class _PoolSearch:
 
     def ask(self, postures: Postures, branch: int) -> None:
         """Give every waiting point the best of its postures in a branch that passes all checks."""
-        fast = verdicts(self.checks.quick, postures)
+        quick = check_margins(self.checks.quick, postures)
         before = 1 + len(self.checks.point)
-        self.refuse(postures, fast.margin, before, 1.0)
-        passed = np.flatnonzero(fast.passed)
-        order = np.lexsort((-fast.quality[passed], postures.point[passed]))
+        self.refuse(postures, quick.margin, before, 1.0)
+        passed = np.flatnonzero(quick.passed)
+        order = np.lexsort((-quick.quality[passed], postures.point[passed]))
         for index in _rounds(postures.point, passed[order]):
             asked = index[self.is_waiting[postures.point[index]]]
             if not len(asked):
                 return
-            late = verdicts(self.checks.slow, postures.take(asked))
+            slow = check_margins(self.checks.slow, postures.take(asked))
             # One slow check failed is nearer to a posture than one quick check.
             weight = 0.5 / (1 + len(self.checks.slow))
-            self.refuse(postures.take(asked), late.margin, before + len(self.checks.quick), weight)
-            good = asked[late.passed]
-            margin = np.vstack([fast.margin[:, good], late.margin[:, late.passed]])
+            self.refuse(postures.take(asked), slow.margin, before + len(self.checks.quick), weight)
+            good = asked[slow.passed]
+            margin = np.vstack([quick.margin[:, good], slow.margin[:, slow.passed]])
             self.accept(postures.take(good), branch, margin)
 
     def refuse(self, postures: Postures, margin: FloatArray, first: int, weight: float) -> None:
@@ -196,7 +207,7 @@ class _PoolSearch:
         postures = Postures.joined([none, *(part for part, _, _ in self.parts)])
         sizes = [len(part) for part, _, _ in self.parts]
         branch = np.repeat(np.array([b for _, b, _ in self.parts], dtype=np.intp), sizes)
-        empty = verdicts(self.checks.all, none)
+        empty = check_margins(self.checks.all, none)
         margin = np.hstack([empty.margin, *(margin for _, _, margin in self.parts)])
         order = np.argsort(postures.point)
         found = replace(empty, margin=margin[:, order])
@@ -205,7 +216,12 @@ class _PoolSearch:
 
 @dataclass(frozen=True, eq=False)
 class PostureSolver:
-    """Finds the postures that press on points of the surface and pass every check."""
+    """Finds the postures that press on points of the surface and pass every check.
+
+    Of each branch the inverse kinematics gives one posture: where joint 4 or 6 may stand a whole
+    turn away as well, within its limits, only the position nearest to zero is tried. A pose whose
+    cables would want the other turn is not found.
+    """
 
     inverse: InverseKinematics
     """Of the robot with its tool."""
@@ -290,7 +306,7 @@ def join_pools(pools: Sequence[Pool]) -> Pool:
     return Pool(
         Postures.joined(postures),
         np.concatenate([pool.branch for pool in pools]),
-        Verdicts.joined([pool.verdicts for pool in pools]),
+        Margins.joined([pool.margins for pool in pools]),
         np.concatenate([pool.refused_by for pool in pools]),
     )
 

@@ -18,8 +18,8 @@ from elastocal.arrays import BoolArray, FloatArray, IndexArray
 from elastocal.cell import Cell
 from elastocal.errors import PlanningError
 from elastocal.parallel import process_count, process_pool
-from elastocal.planning.cell_setup import point_checks, robot_checks
-from elastocal.planning.checks import verdicts
+from elastocal.planning.cell_checks import point_checks, robot_checks
+from elastocal.planning.checks import EdgeCheck, check_margins
 from elastocal.planning.pool import BasePlacement, Pool, PostureSolver, join_pools
 from elastocal.planning.surface import Surface, SurfacePoints, sample_blue_noise, sample_uniform
 from elastocal.progress import Progress, silent
@@ -32,15 +32,15 @@ _PART = 800
 """Points that are tried at once: bounds memory, and is what progress counts in."""
 _PROBES = 32
 """Points by which base placements are ranked."""
-_WORTH_HELP = 8000
+_PARALLEL_FROM = 8000
 """Candidates from which on other processes are started: it takes them seconds to get ready."""
-_HARDEST = 20
+_POINTS_PER_CANDIDATE = 20
 """Points that are tried for each candidate wanted, at most."""
-_ENOUGH = 1000
+_MOST_IN_VAIN = 1000
 """Points without a single candidate after which no more are tried."""
-_SPARE = 1.03
+_OVERSAMPLING = 1.03
 """Points that are sampled for each that should turn out to be missing."""
-_WORTH = 0.02
+_LEAST_GAIN = 0.02
 """Share of the points that a further base placement must serve alone."""
 
 
@@ -112,7 +112,8 @@ def _valid(pools: Sequence[Pool]) -> int:
 def _hopeless(pools: Sequence[Pool], wanted: int) -> bool:
     """Return whether points have been tried, and more of them would not help."""
     sampled = sum(pool.sampled for pool in pools)
-    return sampled >= _HARDEST * wanted or (_valid(pools) == 0 and sampled >= _ENOUGH)
+    in_vain = _valid(pools) == 0 and sampled >= _MOST_IN_VAIN
+    return in_vain or sampled >= _POINTS_PER_CANDIDATE * wanted
 
 
 def _sample(
@@ -120,12 +121,14 @@ def _sample(
 ) -> SurfacePoints:
     """Return points of which about ``missing`` should become candidates, in no order."""
     if pools:
-        share = max(_valid(pools) / sum(pool.sampled for pool in pools), 1.0 / _HARDEST)
+        share = max(
+            _valid(pools) / sum(pool.sampled for pool in pools), 1.0 / _POINTS_PER_CANDIDATE
+        )
     else:
         probe = sample_uniform(surface, 1000, rng)
-        edge = point_checks(cell, surface, probe)[0]
-        share = max(float(np.mean(edge.at_points > 0.0)), 1.0 / _HARDEST)
-    count = math.ceil(missing / share * _SPARE) + 4
+        edge = EdgeCheck.of(cell, surface, probe)
+        share = max(float(np.mean(edge.at_points > 0.0)), 1.0 / _POINTS_PER_CANDIDATE)
+    count = math.ceil(missing / share * _OVERSAMPLING) + 4
     if cell.file.search.sampling == "uniform":
         return sample_uniform(surface, count, rng)
     points = sample_blue_noise(surface, count, rng)
@@ -174,7 +177,7 @@ def _processes(jobs: int | None, wanted: int) -> int:
         processes = process_count(jobs)
     except ValueError as error:
         raise PlanningError(str(error)) from error
-    return processes if wanted >= _WORTH_HELP else 1
+    return processes if wanted >= _PARALLEL_FROM else 1
 
 
 @contextmanager
@@ -205,7 +208,7 @@ class _Survey:
     placement: BasePlacement
     served: BoolArray
     """Points with a posture, shape (point,); after the quick checks only, until asked."""
-    nearness: float
+    checks_passed: float
     """Mean over the points of the most checks that a posture passes; tells placements that serve
     no point apart, so that what refuses the points at the best of them is what a user hears."""
     quality: float
@@ -215,7 +218,7 @@ class _Survey:
 
     def rank(self, left: BoolArray) -> tuple[int, float, float]:
         """Return the ranks, most important first, for points that no better placement serves."""
-        return int(np.count_nonzero(self.served & left)), self.nearness, self.quality
+        return int(np.count_nonzero(self.served & left)), self.checks_passed, self.quality
 
 
 def rank_base_placements(
@@ -248,7 +251,7 @@ def rank_base_placements(
     left = np.ones(len(points), dtype=bool)
     while surveys:
         best = max(surveys, key=lambda one: one.rank(left))
-        if chosen and np.count_nonzero(best.served & left) < max(1.0, _WORTH * len(points)):
+        if chosen and np.count_nonzero(best.served & left) < max(1.0, _LEAST_GAIN * len(points)):
             break
         surveys.remove(best)
         if not best.asked:
@@ -264,7 +267,7 @@ def _survey(
     solver: PostureSolver, points: FloatArray, normals: FloatArray, external: tuple[float, ...]
 ) -> _Survey:
     options = solver.options(points, normals, external)
-    found = verdicts(solver.checks.quick, options.postures)
+    found = check_margins(solver.checks.quick, options.postures)
     served = np.zeros((solver.inverse.branches, len(points)), dtype=bool)
     served[options.branch[found.passed], options.point[found.passed]] = True
     best, nearest = np.zeros(len(points)), np.full(len(points), -1.0)

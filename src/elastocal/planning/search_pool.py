@@ -93,12 +93,12 @@ class SearchPool:
         search = cell.file.search
         wanted = technique(search.technique)
         cover = Cover(search.d_max)
-        most = search.most or len(left)
+        count = search.pose_limit or len(left)
         if isinstance(wanted, Cover):
-            return self.take(cover, left, most, rng)
+            return self.take(cover, left, count, rng)
         if search.d_max is not None:
-            most = len(self.take(cover, left, most, rng))
-        return self.take(wanted, left, most, rng)
+            count = len(self.take(cover, left, count, rng))
+        return self.take(wanted, left, count, rng)
 
     def take(
         self, wanted: SearchTechnique, left: IndexArray, count: int, rng: Generator

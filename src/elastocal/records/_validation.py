@@ -4,12 +4,14 @@ import dataclasses
 import json
 import types
 import typing
+from collections.abc import Mapping, Sequence
 from functools import cache
 from typing import Any, TypeVar
 
 from pydantic import BaseModel, TypeAdapter, ValidationError
 
 from elastocal.errors import SchemaError, nearest
+from elastocal.units import in_unit_of
 
 T = TypeVar("T")
 
@@ -46,7 +48,7 @@ def validate(data: Any, cls: type[T], what: str) -> T:
         # Strict checks know JSON's lists for tuples only where they read JSON itself.
         return adapter.validate_json(json.dumps(data), strict=True)
     except ValidationError as error:
-        raise SchemaError(f"{what}: {_first_problem(error, cls)}") from error
+        raise SchemaError(f"{what}: {_first_problem(error, cls, data)}") from error
 
 
 @cache
@@ -54,7 +56,7 @@ def _adapter(cls: Any) -> TypeAdapter[Any]:
     return TypeAdapter(cls)
 
 
-def _first_problem(error: ValidationError, cls: type) -> str:
+def _first_problem(error: ValidationError, cls: type, data: Any) -> str:
     """Return the first problem in the words of the file."""
     first = error.errors(include_url=False)[0]
     # An item of an array is known by its place in it; see `elastocal.arrays`.
@@ -69,10 +71,34 @@ def _first_problem(error: ValidationError, cls: type) -> str:
     if first["type"] in ("missing", "missing_argument"):
         return f"key {path!r} is missing"
     reason = first["msg"].removeprefix("Value error, ")
+    text = _at(data, first["loc"])
+    bound = _bound(item)
+    in_its_unit = None
+    if isinstance(text, str) and bound is not None:
+        in_its_unit = in_unit_of(bound, text)
+    if in_its_unit is not None:
+        # The bound of a quantity is shown in the unit that the quantity is given in.
+        reason = f"{reason.rpartition(' ')[0]} {in_its_unit}"
     message = f"{path}: {reason}" if path else reason
     # A whole section is no value that a person would recognise.
-    given = _shown(item.get("given", first["input"]))
+    shown = first["input"] if in_its_unit is None else text
+    given = _shown(item.get("given", shown))
     return message if given in reason or len(given) > _LONGEST_SHOWN else f"{message}, got {given}"
+
+
+def _bound(context: Mapping[str, Any]) -> float | None:
+    """Return the bound that a number breaks; None when the problem is another."""
+    return next((context[key] for key in ("ge", "gt", "le", "lt") if key in context), None)
+
+
+def _at(data: Any, path: Sequence[int | str]) -> object:
+    """Return what a file says at a place; None where the place is none of the file's."""
+    for part in path:
+        try:
+            data = data[part]
+        except (LookupError, TypeError):
+            return None
+    return data
 
 
 def _shown(value: Any) -> str:

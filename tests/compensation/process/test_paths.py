@@ -1,5 +1,7 @@
 """Courses on the example dome, rings in the example block, and the postures for them."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -9,9 +11,13 @@ from elastocal.compensation.process import (
     with_postures,
 )
 from elastocal.compensation.process.course import engaged, swing
+from elastocal.compensation.process.postures import _Trial
 from elastocal.errors import CompensationError
 from elastocal.planning import cell_surface
+from elastocal.robot import Robot, wrist_angle
+from elastocal.robot.inverse import inverse_for
 from support.simulated import example_cell
+from support.urdfs import KR_LIKE, opw_arm_urdf
 
 
 @pytest.fixture(scope="module")
@@ -119,3 +125,14 @@ def test_courses_out_of_reach_are_refused_by_name(courses):
     away = type(far)("course 1", far.step, T, far.force, far.direction)
     with pytest.raises(CompensationError, match="cannot follow course 1"):
         with_postures(example_cell("afp"), (away,))
+
+
+def test_a_posture_is_judged_by_the_wrist_angle_and_not_by_joint_five(courses, monkeypatch):
+    """The zero of joint 5 need not be where the wrist is straight."""
+    offset = Robot.from_urdf(opw_arm_urdf(**KR_LIKE, offsets=(0, 0, 0, 0, 0.5, 0)), "tcp")
+    cell = replace(example_cell("machining"), robot=offset)
+    straight = np.tile([0.1, -1.2, 1.4, 0.2, -0.5, 0.3], (3, 1))
+    assert wrist_angle(offset, straight).max() < 1e-9
+    monkeypatch.setattr(_Trial, "joints", lambda *_: straight)
+    margin = _Trial(inverse_for(offset), cell).margin(courses[1][0], 0.0, np.zeros(0))
+    assert margin == pytest.approx(-cell.file.limits.wrist_angle)

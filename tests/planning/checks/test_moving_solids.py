@@ -7,8 +7,8 @@ import trimesh
 
 from elastocal.cell import load_cell
 from elastocal.cell.examples import write_example
-from elastocal.planning import CollisionScene, sight_check
-from elastocal.planning.checks import HOUSED, SEAT, MovingSolids
+from elastocal.planning import CollisionScene
+from elastocal.planning.checks import HOUSING_DEPTH, MARKER_SEAT_LENGTH, MovingSolids, SightCheck
 from elastocal.planning.surface import load_surface
 from elastocal.robot import Robot
 from elastocal.shapes import Beams, Body, Box, Capsule, Cylinder, Mesh, Sphere
@@ -27,7 +27,7 @@ def example(request, tmp_path_factory):
     cell = load_cell(folder / "cell.yaml")
     entry = cell.file.surface
     surface = load_surface(cell.surface_path, entry.metres, cell.T_base_surface)
-    return sight_check(cell, surface)
+    return SightCheck.of(cell, surface)
 
 
 def random_postures(robot, count, rng):
@@ -67,7 +67,10 @@ def test_hides_what_exact_distances_along_the_beam_find_in_the_way(example):
         beams = beams_to(station.position, scene.robot, marker, q)
         hidden = example.moving.hide(q, beams)
         nearest = np.min(
-            [distance_along(s, beams, SEAT, STEP, T) for s, T in shapes_by_pinocchio(scene, q)],
+            [
+                distance_along(s, beams, MARKER_SEAT_LENGTH, STEP, T)
+                for s, T in shapes_by_pinocchio(scene, q)
+            ],
             axis=0,
         )
         assert np.all(hidden[nearest < -1e-6])
@@ -118,8 +121,8 @@ class TestTool:
         assert solids.housings == ()
 
     def test_a_face_drawn_a_little_too_high_does_not_blind(self):
-        block, widest = Box(0.1, 0.1, 0.1), np.arccos(HOUSED / SEAT)
-        _, hidden = self.hidden(block, [0.0, widest - 0.01], depth=0.99 * HOUSED)
+        block, widest = Box(0.1, 0.1, 0.1), np.arccos(HOUSING_DEPTH / MARKER_SEAT_LENGTH)
+        _, hidden = self.hidden(block, [0.0, widest - 0.01], depth=0.99 * HOUSING_DEPTH)
         assert not np.any(hidden)
 
     @pytest.mark.parametrize(

@@ -7,7 +7,7 @@ import pytest
 
 from elastocal.planning import CollisionScene
 from elastocal.planning.motion import Sweep
-from elastocal.planning.motion.mover import _FINEST
+from elastocal.planning.motion.mover import _SHORTEST_PIECE
 from elastocal.shapes import Body, Sphere
 from support.moving import BALL, CLEARANCE, box, dense, scene
 from support.postures import arm
@@ -23,7 +23,7 @@ def moves():
     )
     rng = np.random.default_rng(3)
     q = rng.uniform([-1.5, -1.8, 0.5, -1.5, -1.5, -1.5], [1.5, -0.6, 2.0, 1.5, 1.5, 1.5], (60, 6))
-    q = q[world.keeps(q, CLEARANCE + _FINEST)]
+    q = q[world.keeps(q, CLEARANCE + _SHORTEST_PIECE)]
     half = len(q) // 2
     sweep, start, end = Sweep(world, CLEARANCE), q[:half], q[half : 2 * half]
     nearest = [
@@ -42,7 +42,7 @@ def test_a_free_move_keeps_the_clearance_wherever_it_is_sampled():
 def test_a_blocked_move_comes_within_half_the_finest_piece_of_the_clearance():
     sweep, start, end, free, nearest = moves()
     between_samples = 0.5 * np.abs(end - start) @ sweep.radii / (SAMPLES - 1)
-    assert np.all((nearest <= CLEARANCE + 0.5 * _FINEST + between_samples)[~free])
+    assert np.all((nearest <= CLEARANCE + 0.5 * _SHORTEST_PIECE + between_samples)[~free])
 
 
 def test_there_and_back_have_the_same_verdict_and_batches_do_not_matter():

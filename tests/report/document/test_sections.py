@@ -6,11 +6,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from elastocal.cell import Limits
 from elastocal.identification import CalibrationSummary, describe
 from elastocal.procedure import RunSummary
 from elastocal.records import from_data, to_data
 from elastocal.report.document import SECTIONS
 from elastocal.report.document.sections import PAPER
+from elastocal.report.document.sections.cell import _LIMITS
 from elastocal.verdict import (
     MissingPart,
     codec_findings,
@@ -57,6 +59,19 @@ def test_the_cell_is_told_with_units(parts):
     for told in ("KR 120 R2700 extra HA", "60 kg", "2500, 2500, 6250 N", "1 to 15 m", "25.0 mm"):
         assert told in text
     assert "no real robot" in text
+
+
+def test_every_limit_of_the_cell_stands_in_its_table(parts):
+    text = words(cell, parts)
+    assert {*Limits.model_fields} - {"torque"} == {*_LIMITS}
+    for label, _ in _LIMITS.values():
+        assert label in text
+    assert "10.0°" in text
+
+
+def test_a_limit_that_the_table_does_not_know_stands_under_its_key(parts, monkeypatch):
+    monkeypatch.delitem(_LIMITS, "rail_margin")
+    assert "rail_margin, in SI units" in words(cell, parts)
 
 
 def test_poses_stand_with_their_places_and_the_other_technique(parts):

@@ -11,7 +11,8 @@ from elastocal.cell import Cell
 from elastocal.codec.study.conditions import Condition
 from elastocal.codec.variants import training_cases
 from elastocal.errors import CodecError
-from elastocal.planning import SearchPool, cell_surface, sample_pool, sight_check
+from elastocal.planning import SearchPool, cell_surface, sample_pool
+from elastocal.planning.checks import SightCheck
 from elastocal.planning.search import Candidates, RandomChoice, technique
 from elastocal.results import brief_repr
 
@@ -93,7 +94,7 @@ def study_poses(cell: Cell, verification: int, jobs: int | None) -> StudyPoses:
         )
     aside = np.sort(for_verification.choice(len(postures), verification, replace=False))
     left = np.setdiff1d(np.arange(len(postures)), aside)
-    check = sight_check(cell, surface)
+    check = SightCheck.of(cell, surface)
     assert check is not None  # a cell without tracker has been refused
     places = {each.name: each.position_base for each in cell.file.trackers}
     station = np.array([places[str(name)] for name in check.seen_by(postures)])

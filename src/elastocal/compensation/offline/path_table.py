@@ -1,4 +1,4 @@
-"""A programmed path as a table (spec section 4, ``PATH.csv``): columns, and rows in SI units.
+"""A programmed path as a table (``PATH.csv``): columns, and rows in SI units.
 
 Rows are read in blocks, so that a path of any length fits into memory.
 """

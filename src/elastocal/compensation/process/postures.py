@@ -16,6 +16,7 @@ from elastocal.compensation.process.placement import FibrePlacement
 from elastocal.compensation.process.roughing import Roughing
 from elastocal.errors import CompensationError
 from elastocal.planning import cell_surface
+from elastocal.robot import has_wrist, wrist_angle
 from elastocal.robot.inverse import InverseKinematics, inverse_for
 
 _SPINS = np.linspace(0.0, 2.0 * np.pi, 12, endpoint=False)
@@ -42,8 +43,11 @@ class _Trial:
             return -np.inf
         arm = slice(robot.external_axes, None)
         limits = robot.limits.margin(q) - self.cell.joint_margin
-        wrist = np.abs(q[:, -2]) - self.cell.file.limits.wrist_angle
-        return float(min(limits[:, arm].min(), wrist.min()))
+        margin = float(limits[:, arm].min())
+        if not has_wrist(robot):
+            return margin
+        wrist = wrist_angle(robot, q) - self.cell.file.limits.wrist_angle
+        return float(min(margin, wrist.min()))
 
     def joints(
         self, course: Course, spin: float, external: FloatArray, rows: FloatArray | slice

@@ -27,7 +27,7 @@ _ENTRIES = tuple(combinations_with_replacement(range(3), 2))
 class Tensor(Spring):
     """A symmetric compliance tensor in a joint's proximal frame: ``theta = C tau``.
 
-    What springs with one origin amount to whatever their directions (spec section 2, trap 1): the
+    What springs with one origin amount to whatever their directions: the
     six entries of ``C``. Tilted bearings and housings, whose principal axes are not the joint
     frame's, have entries beside the diagonal.
     """

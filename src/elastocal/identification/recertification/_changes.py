@@ -53,7 +53,7 @@ _ONE_SIDE = 50.0 * (1.0 + CONFIDENCE)
 """Percentile that leaves out half of what a 95 % interval leaves out."""
 _NORMAL = 1.959964
 """Normal quantile at that percentile; the draws are stretched for few poses already."""
-_ENOUGH = 0.75
+_LEAST_SHARE_COMMON = 0.75
 """Share of each campaign's readings that the other must cover for springs to be compared."""
 _SAME = 1e-4
 """Singular value, over the largest, below which unobservable combinations of the two models
@@ -131,7 +131,7 @@ def common_ground(
         new.domain.share_inside(old.domain, robot),
     )
     rows = (None, None) if loads is None else (count, len(number))
-    return CommonGround(*shares, min(shares) >= _ENOUGH, *rows), number
+    return CommonGround(*shares, min(shares) >= _LEAST_SHARE_COMMON, *rows), number
 
 
 def taken(loads: Loads, number: IndexArray) -> Loads:

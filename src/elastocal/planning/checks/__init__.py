@@ -1,7 +1,7 @@
 """Checks of calibration poses, one file each.
 
-A new check is one file here, an export, a changelog line, and an entry in
-``tests/contracts/test_checks.py``.
+A new check is one file here, an export, and its limit as a field of `elastocal.cell.Limits`.
+`elastocal.planning.CHECKS` is all that are exported, in their order.
 """
 
 import lazy_loader

@@ -1,9 +1,10 @@
 from .check import (
     Check as Check,
     Checks as Checks,
+    Margins as Margins,
     PointCheck as PointCheck,
-    Verdicts as Verdicts,
-    verdicts as verdicts,
+    PostureCheck as PostureCheck,
+    check_margins as check_margins,
 )
 from .collision import CollisionCheck as CollisionCheck
 from .engagement import EdgeCheck as EdgeCheck, FlatnessCheck as FlatnessCheck
@@ -14,8 +15,8 @@ from .joint_limits import (
 )
 from .sensor import SensorCheck as SensorCheck
 from .sight import (
-    HOUSED as HOUSED,
-    SEAT as SEAT,
+    HOUSING_DEPTH as HOUSING_DEPTH,
+    MARKER_SEAT_LENGTH as MARKER_SEAT_LENGTH,
     MovingSolids as MovingSolids,
     SightCheck as SightCheck,
     Station as Station,

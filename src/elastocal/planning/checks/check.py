@@ -1,19 +1,26 @@
 """The interface of all checks of a calibration pose.
 
-A check is one small class with two verbs' worth of interface: a name with a unit, and the margin
-of many candidates at once. Positive is fine. A check that lacks the numbers to judge says so; it
-neither passes nor refuses in silence.
+A check is one small class: a name with a unit, the margin of many candidates at once (positive is
+fine), and `of`, which makes it from the cell. A check that lacks the numbers to judge is None: it
+neither passes nor refuses in silence, the plan has a note.
+
+Checks judge calibration poses: in contact and, where a check says so, on the straight way off the
+surface to the approach pose. They do not reach HOME and the via poses between the calibration
+poses: those are looked at for joint limits and collision alone (`elastocal.planning.motion`), not
+for singularity, wrist, torque or sight.
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Protocol
+from typing import ClassVar, Protocol, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from elastocal.arrays import BoolArray, FloatArray
+from elastocal.cell import Cell
 from elastocal.planning.postures import Postures
+from elastocal.planning.surface import Surface, SurfacePoints
 from elastocal.results import brief_repr
 
 
@@ -36,8 +43,28 @@ class Check(Protocol):
         """Return how far each posture is from being refused, shape (pose,); positive is fine."""
 
 
+class PostureCheck(Check, Protocol):
+    """A check that the robot's posture decides."""
+
+    order: ClassVar[int]
+    """Place among the checks, in tables and when a pose fails several: the lower the earlier."""
+    slow: ClassVar[bool] = False
+    """Whether meshes are asked, so that only the most promising postures are judged."""
+
+    @classmethod
+    def of(cls, cell: Cell, surface: Surface) -> Self | None:
+        """Return the check of a cell; None when the cell lacks the numbers to judge."""
+
+
 class PointCheck(Check, Protocol):
     """A check that the point on the surface decides alone, whatever the robot does."""
+
+    order: ClassVar[int]
+    """Place among the checks of points."""
+
+    @classmethod
+    def of(cls, cell: Cell, surface: Surface, points: SurfacePoints) -> Self:
+        """Return the check of the points sampled on a cell's surface, by which it counts."""
 
     @property
     def at_points(self) -> FloatArray:
@@ -68,7 +95,7 @@ class Checks:
 
 @brief_repr
 @dataclass(frozen=True, eq=False)
-class Verdicts:
+class Margins:
     """The margins of many postures under many checks."""
 
     names: tuple[str, ...]
@@ -77,13 +104,13 @@ class Verdicts:
     margin: FloatArray
     """Shape (check, pose), each in its check's unit."""
 
-    def take(self, index: ArrayLike) -> "Verdicts":
-        """Return the verdicts of some of the postures (a mask or indices)."""
+    def take(self, index: ArrayLike) -> "Margins":
+        """Return the margins of some of the postures (a mask or indices)."""
         return replace(self, margin=self.margin[:, np.asarray(index)])
 
     @staticmethod
-    def joined(parts: "Sequence[Verdicts]") -> "Verdicts":
-        """Return the verdicts of several groups of postures under the same checks."""
+    def joined(parts: "Sequence[Margins]") -> "Margins":
+        """Return the margins of several groups of postures under the same checks."""
         return replace(parts[0], margin=np.hstack([part.margin for part in parts]))
 
     @property
@@ -103,10 +130,10 @@ class Verdicts:
         return np.asarray((self.margin / np.where(typical > 0.0, typical, 1.0)).min(axis=0))
 
 
-def verdicts(checks: Sequence[Check], postures: Postures) -> Verdicts:
+def check_margins(checks: Sequence[Check], postures: Postures) -> Margins:
     """Return the margins of postures under all checks."""
     margins = [np.asarray(check.margin(postures), dtype=float) for check in checks]
-    return Verdicts(
+    return Margins(
         tuple(check.name for check in checks),
         tuple(check.unit for check in checks),
         tuple(check.advice for check in checks),

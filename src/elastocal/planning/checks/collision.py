@@ -2,14 +2,19 @@
 
 import math
 from dataclasses import dataclass
+from typing import ClassVar, Self
 
 import numpy as np
 
 from elastocal.arrays import FloatArray
+from elastocal.cell import Cell
+from elastocal.planning.cell_setup import collision_scene
+from elastocal.planning.checks.check import PostureCheck
 from elastocal.planning.postures import Postures, retreat_joints
 from elastocal.planning.scene import CollisionScene
+from elastocal.planning.surface import Surface
 
-_SPARE = (1e-3, 1e-2, 3e-2, 1e-1)
+_DISTANCES_BEYOND = (1e-3, 1e-2, 3e-2, 1e-1)
 """Distances in m beyond the clearance asked for that are tried. Whether bodies keep a distance
 is decided by their bounding volumes, a hundred times faster than the distance is found."""
 
@@ -18,8 +23,8 @@ _STEP = 0.035
 
 
 @dataclass(frozen=True, eq=False)
-class CollisionCheck:
-    """Largest of the `_SPARE` distances that is kept beyond the clearance asked for.
+class CollisionCheck(PostureCheck):
+    """Largest of the `_DISTANCES_BEYOND` distances that is kept beyond the clearance asked for.
 
     In contact, and at places on the straight way to the approach pose. In contact the tool is not
     checked against what it presses on; near contact it must not touch it; from the first step of
@@ -27,7 +32,7 @@ class CollisionCheck:
     """
 
     scene: CollisionScene
-    keep: float
+    clearance: float
     """Clearance to keep, in m."""
     approach: float
     """Distance of the approach pose from the surface, in m."""
@@ -36,17 +41,30 @@ class CollisionCheck:
     name: str = "collision"
     unit: str = "m"
     advice: str = "move fixtures away, slim the tool's collision shape, or turn the tooling"
+    order: ClassVar[int] = 90
+    slow: ClassVar[bool] = True
+
+    @classmethod
+    def of(cls, cell: Cell, surface: Surface) -> Self:
+        """Return the check of robot and tool among tooling and fixtures."""
+        engagement = cell.file.engagement
+        return cls(
+            collision_scene(cell, surface),
+            cell.file.limits.clearance,
+            engagement.approach_distance,
+            engagement.near_contact,
+        )
 
     def margin(self, postures: Postures) -> FloatArray:
-        """Return the margin of each posture, shape (pose,), in m; minus ``keep`` when none."""
-        margin = np.full(len(postures), -max(self.keep, _SPARE[0]))
+        """Return the margin of each posture, shape (pose,), in m; minus ``clearance`` when none."""
+        margin = np.full(len(postures), -max(self.clearance, _DISTANCES_BEYOND[0]))
         left = np.arange(len(postures))
         places = self._places(postures)
-        for spare in reversed(_SPARE):
+        for beyond in reversed(_DISTANCES_BEYOND):
             kept = left
             for q, pressed in places:
-                kept = kept[self.scene.keeps(q[kept], self.keep + spare, pressed)]
-            margin[kept] = spare
+                kept = kept[self.scene.keeps(q[kept], self.clearance + beyond, pressed)]
+            margin[kept] = beyond
             left = np.setdiff1d(left, kept, assume_unique=True)
         return margin
 

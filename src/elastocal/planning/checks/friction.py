@@ -1,17 +1,21 @@
 """Check ``friction``: the disk sticks under every load case (paper section 4.1)."""
 
 from dataclasses import dataclass
+from typing import ClassVar, Self
 
 import numpy as np
 
 from elastocal.arrays import FloatArray
+from elastocal.cell import Cell
+from elastocal.planning.checks.check import PostureCheck
 from elastocal.planning.postures import Postures
+from elastocal.planning.surface import Surface
 from elastocal.results import brief_repr
 
 
 @brief_repr
 @dataclass(frozen=True, eq=False)
-class FrictionCheck:
+class FrictionCheck(PostureCheck):
     """``mu fz / safety - |f_lateral|``, the smallest over the load cases; alike at every pose."""
 
     force_tcp: FloatArray
@@ -23,6 +27,13 @@ class FrictionCheck:
     name: str = "friction"
     unit: str = "N"
     advice: str = "press harder, ask for less lateral force, or use a disk with more friction"
+    order: ClassVar[int] = 50
+
+    @classmethod
+    def of(cls, cell: Cell, surface: Surface) -> Self:
+        """Return the check of the load cases."""
+        loads = cell.file.load_cases
+        return cls(loads.force_tcp, loads.friction, loads.safety)
 
     def margin(self, postures: Postures) -> FloatArray:
         """Return the margin of each posture, shape (pose,), in N."""

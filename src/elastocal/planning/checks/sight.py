@@ -1,4 +1,4 @@
-"""Check ``sight``: some tracker station sees the marker (spec section 2).
+"""Check ``sight``: some tracker station sees the marker (paper section 2.2).
 
 A station sees the marker when the marker faces it within its acceptance angle, the distance is
 within the tracker's range, and neither a mesh of the cell nor a link or the tool stands between
@@ -9,23 +9,28 @@ a beam, and the tool with it, by less than the shapes of links and tool are know
 """
 
 from dataclasses import dataclass, field
+from typing import ClassVar, Self
 
 import numpy as np
 import trimesh
 
 from elastocal.arrays import BoolArray, FloatArray
+from elastocal.cell import Cell
 from elastocal.errors import RobotError
+from elastocal.planning.cell_setup import fixture_bodies, tool_bodies
+from elastocal.planning.checks.check import PostureCheck
 from elastocal.planning.postures import Postures
 from elastocal.planning.scene import CollisionScene
+from elastocal.planning.surface import Surface
 from elastocal.results import brief_repr
 from elastocal.shapes import Beams, Body, Mesh, SightSolid
 
-SEAT = 5e-3
+MARKER_SEAT_LENGTH = 5e-3
 """Distance from the marker, in m, from which on arm and tool count: a marker sits on something."""
-HOUSED = 1e-3
+HOUSING_DEPTH = 1e-3
 """A tool shape that the marker lies deeper in than this, in m, is taken as its housing. A marker
-less deep, on a face that is drawn a little too high, still sees through `SEAT` of it: all within
-78 deg (arc cosine of 1 mm over 5 mm) of the face's normal."""
+less deep, on a face that is drawn a little too high, still sees through `MARKER_SEAT_LENGTH` of
+it: all within 78 deg (arc cosine of 1 mm over 5 mm) of the face's normal."""
 _OFF_THE_MARKER = 1e-3
 """Distance from the marker, in m, from which on meshes of the cell count."""
 
@@ -48,11 +53,11 @@ class Station:
 class MovingSolids:
     """The collision shapes of links and tool, as solids that stop a beam.
 
-    A shape stops a beam that is inside it anywhere from `SEAT` off the marker to the station. One
-    rule keeps a marker from being blinded by what holds it: a shape of the tool in which the
-    marker lies deeper than `HOUSED` is drawn wider than the tool is, and stops only a beam that
-    enters it again from outside. A convex shape is never entered again and so never stops any; a
-    hollow mesh may. Links have no such exception.
+    A shape stops a beam that is inside it anywhere from `MARKER_SEAT_LENGTH` off the marker to the
+    station. One rule keeps a marker from being blinded by what holds it: a shape of the tool in
+    which the marker lies deeper than `HOUSING_DEPTH` is drawn wider than the tool is, and stops
+    only a beam that enters it again from outside. A convex shape is never entered again and so
+    never stops any; a hollow mesh may. Links have no such exception.
     """
 
     scene: CollisionScene
@@ -69,7 +74,7 @@ class MovingSolids:
         tool = self.scene.tool
         links = len(bodies) - len(tool)
         holds = [
-            solid.depth(_seen_from(body.T_frame_body, self.marker_tcp)) > HOUSED
+            solid.depth(_seen_from(body.T_frame_body, self.marker_tcp)) > HOUSING_DEPTH
             for body, solid in zip(tool, solids[links:], strict=True)
         ]
         names = tuple(body.name for body, held in zip(tool, holds, strict=True) if held)
@@ -95,13 +100,16 @@ class MovingSolids:
         bodies = self.scene.moving(q)
         for body, solid, holds in zip(bodies, self._solids, self._holds, strict=True):
             here = beams.seen_from(body.T_frame_body)
-            hidden |= solid.crosses_again(here) if holds else solid.crosses(here, SEAT)
+            if holds:
+                hidden |= solid.crosses_again(here)
+            else:
+                hidden |= solid.crosses(here, MARKER_SEAT_LENGTH)
         return hidden
 
 
 @brief_repr
 @dataclass(frozen=True, eq=False)
-class SightCheck:
+class SightCheck(PostureCheck):
     """Acceptance angle of the marker, less the angle at which the best station is seen."""
 
     stations: tuple[Station, ...]
@@ -109,7 +117,7 @@ class SightCheck:
     """Marker in the tcp frame, shape (3,), in m."""
     axis_tcp: FloatArray
     """Unit vector that the marker faces, in the tcp frame, shape (3,)."""
-    acceptance: float
+    acceptance_angle: float
     """Half angle of the cone within which the marker returns the beam, in rad."""
     obstacles: trimesh.Trimesh | None = None
     """All that stands still and may be in the way, in base."""
@@ -118,6 +126,29 @@ class SightCheck:
     name: str = "sight"
     unit: str = "rad"
     advice: str = "move or add a tracker station, or turn the marker clear of arm and tool"
+    order: ClassVar[int] = 80
+
+    @classmethod
+    def of(cls, cell: Cell, surface: Surface) -> Self | None:
+        """Return the check that a station sees the marker; None without marker or stations."""
+        marker, trackers = cell.file.marker, cell.file.trackers
+        if marker is None or not trackers:
+            return None
+        stations = tuple(
+            Station(tracker.name, tuple(tracker.position_base.tolist()), *map(float, tracker.range))
+            for tracker in trackers
+        )
+        standing = [surface.rays, *(body.triangulated() for body in fixture_bodies(cell))]
+        obstacles = trimesh.util.concatenate(standing)
+        assert isinstance(obstacles, trimesh.Trimesh)
+        return cls(
+            stations,
+            marker.position_tcp,
+            marker.axis_tcp,
+            marker.acceptance,
+            obstacles,
+            MovingSolids(CollisionScene(cell.robot, tool_bodies(cell), ()), marker.position_tcp),
+        )
 
     def margin(self, postures: Postures) -> FloatArray:
         """Return the margin of each posture, shape (pose,), in rad; -pi when no station sees."""
@@ -140,7 +171,7 @@ class SightCheck:
         distance = np.linalg.norm(towards, axis=1)
         direction = towards / distance[:, None]
         cosine = np.clip(np.sum((R @ self.axis_tcp) * direction, axis=1), -1.0, 1.0)
-        margin = self.acceptance - np.arccos(cosine)
+        margin = self.acceptance_angle - np.arccos(cosine)
         possible = (station.nearest <= distance) & (distance <= station.farthest) & (margin > 0.0)
         beams = Beams(marker, direction, distance).take(possible)
         possible[possible] = self._clear(postures.q[possible], beams)

@@ -10,24 +10,28 @@ with ``g`` the arm's gravity torques and ``m g`` the weight of the tool at its c
 """
 
 from dataclasses import dataclass, replace
+from typing import ClassVar, Self
 
 import numpy as np
 
 from elastocal.arrays import FloatArray
+from elastocal.cell import Cell
+from elastocal.planning.checks.check import PostureCheck
 from elastocal.planning.postures import Postures
+from elastocal.planning.surface import Surface
 from elastocal.results import brief_repr
 from elastocal.robot import GRAVITY, Robot
 
 
 @brief_repr
 @dataclass(frozen=True, eq=False)
-class TorqueCheck:
+class TorqueCheck(PostureCheck):
     """Smallest part of a joint's allowed torque that is left, over joints, loads and places."""
 
     robot: Robot
     force_tcp: FloatArray
     """Force on the robot in each load case, tcp frame, shape (load_case, 3), in N."""
-    allowed: FloatArray
+    torque_limits: FloatArray
     """Continuous torque of each joint, shape (joint,), in N·m (N); NaN: not known, not judged."""
     tool_mass: float
     """Mass behind the flange in kg."""
@@ -38,11 +42,25 @@ class TorqueCheck:
     name: str = "torque"
     unit: str = "1"
     advice: str = "lower the forces, bring the tooling nearer, or give the true continuous torques"
+    order: ClassVar[int] = 60
+
+    @classmethod
+    def of(cls, cell: Cell, surface: Surface) -> Self | None:
+        """Return the check of the actuators; None when the torque of no joint is known."""
+        check = cls(
+            cell.robot,
+            cell.file.load_cases.force_tcp,
+            cell.torque_limits,
+            cell.file.tool.mass,
+            cell.tool_centre_tcp,
+            tuple(cell.gravity_base.tolist()),
+        )
+        return check if check.judged else None
 
     @property
     def judged(self) -> tuple[str, ...]:
         """Names of the joints whose torque is known."""
-        known = np.isfinite(self.allowed)
+        known = np.isfinite(self.torque_limits)
         return tuple(
             name for name, is_known in zip(self.robot.joint_names, known, strict=True) if is_known
         )
@@ -61,12 +79,12 @@ class TorqueCheck:
 
     def margin(self, postures: Postures) -> FloatArray:
         """Return the margin of each posture, shape (pose,): 1 is unloaded, 0 at the limit."""
-        known = np.isfinite(self.allowed)
+        known = np.isfinite(self.torque_limits)
         if not np.any(known):
             return np.ones(len(postures))
         unloaded = replace(self, force_tcp=np.zeros((1, 3)))
         # The tool is turned at the approach pose as it is in contact.
         away = replace(postures, q=postures.q_approach)
         torques = [self.torques(postures), unloaded.torques(postures), unloaded.torques(away)]
-        used = np.abs(np.concatenate(torques)[..., known]) / self.allowed[known]
+        used = np.abs(np.concatenate(torques)[..., known]) / self.torque_limits[known]
         return np.asarray(1.0 - used.max(axis=(0, 2)))

@@ -1,7 +1,7 @@
 """Targets and speeds of the program: axis positions for ``PTP``, frames for ``LIN``.
 
 A frame carries no status and turn (S and T): ``LIN`` needs none, and which posture a number means
-depends on the robot (hardware facts, section 2.2). The axis positions of the approach pose choose
+depends on the robot (its manuals disagree on S). The axis positions of the approach pose choose
 the posture.
 """
 

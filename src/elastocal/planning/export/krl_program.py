@@ -1,4 +1,4 @@
-"""Write a plan as a KRL program (hardware facts, section 2.2); its text is in ``templates``.
+"""Write a plan as a KRL program (docs/how-to/plan-poses.md); its text is in ``templates``.
 
 Approach poses are ``PTP`` by axis values, everything near the surface is ``LIN``. The program
 stops (``HALT``) before it touches the surface and on it, so that a person or a force controller
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from jinja2 import Environment
 
 _LONGEST_FILE_NAME = 24
-"""With the suffix (hardware facts, section 2.2)."""
+"""With the suffix, as the KUKA System Software has it; not verified on a controller."""
 _SUFFIXES = (".src", ".dat")
 _NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 _KRL_WORDS = (

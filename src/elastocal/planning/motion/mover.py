@@ -29,12 +29,12 @@ _WIDTH = 0.6
 _STEP = 2e-3
 """Distance in m between the places that are looked at; a body that keeps half of it more than the
 clearance at both ends of a step keeps the clearance in between."""
-_COARSEST = 0.064
+_LONGEST_PIECE = 0.064
 """Length in m of the pieces that a move is first cut into: how far its points may move. The
 wrists of KUKA's arms keep 20 to 60 mm between links 4 and 6: longer pieces are cut anyway."""
-_GLANCE = 0.5
+_FIRST_LOOK_PIECE = 0.5
 """Length in m of the pieces at whose middles a move is looked at first."""
-_FINEST = 1e-3
+_SHORTEST_PIECE = 1e-3
 """Length in m of a piece that is not cut any more."""
 
 
@@ -126,22 +126,22 @@ class Sweep:
         Returns
         -------
         ndarray of bool, shape (move,)
-            False also for moves that pass within half a `_FINEST` of the clearance.
+            False also for moves that pass within half a `_SHORTEST_PIECE` of the clearance.
         """
         travel = end - start
         bound = np.abs(travel) @ self.radii
         # A look at a few postures first: most moves that are blocked are so for a long way.
-        move, middle, _ = _cut(bound, np.arange(len(start)), _GLANCE)
+        move, middle, _ = _cut(bound, np.arange(len(start)), _FIRST_LOOK_PIECE)
         seen = self.scene.keeps(start[move] + middle[:, None] * travel[move], self.clearance)
         blocked = np.zeros(len(start), dtype=bool)
         blocked[move[~seen]] = True
-        move, middle, width = _cut(bound, np.flatnonzero(~blocked), _COARSEST)
-        length = _COARSEST
+        move, middle, width = _cut(bound, np.flatnonzero(~blocked), _LONGEST_PIECE)
+        length = _LONGEST_PIECE
         while len(move):
             q = start[move] + middle[:, None] * travel[move]
             open_ = ~self.scene.keeps(q, self.clearance + 0.5 * length)
             move, middle, q = move[open_], middle[open_], q[open_]
-            if length <= _FINEST:
+            if length <= _SHORTEST_PIECE:
                 blocked[move] = True
                 break
             blocked[move[~self.scene.keeps(q, self.clearance)]] = True

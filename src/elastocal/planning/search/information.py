@@ -1,4 +1,4 @@
-"""Information of each candidate pose about the observable springs (spec section 2, traps 1 and 2).
+"""Information of each candidate pose about the observable springs.
 
 The information matrix of a choice of poses is ``S = eps I + sum O_p^T O_p``, with the rows of
 each pose scaled by column and projected on the directions that the pool observes at all.

@@ -8,8 +8,8 @@ of the point at the lever arm ``r`` that moves rigidly with its tool frame,
     controller_displacement = (p_tcp + R_tcp r) - (p_tcp,0 + R_tcp,0 r).
 
 Their difference is the elastic deflection of the marker, which the marker's own Jacobian explains
-(spec section 2). An error of ``R_base_tracker`` by an angle turns the marker's displacement by
-it: 1 mrad makes 1 µm of each millimetre; the tracker's place does not enter at all.
+(docs/explanation/registration.md). An error of ``R_base_tracker`` by an angle turns the marker's
+displacement by it: 1 mrad makes 1 µm of each millimetre; the tracker's place does not enter at all.
 """
 
 from collections.abc import Sequence

@@ -3,7 +3,7 @@
 How a sensor reads, and how a reading becomes the wrench on the robot, is in
 `elastocal.cell.sensor`, which the compensator takes its numbers from, too. The unloaded reference
 of the same pose is the tare: with almost the same rotation it takes bias and weight away, and what
-the weight turns by between the two is taken away by the cell file's mass (spec section 2).
+the weight turns by between the two is taken away by the cell file's mass.
 
 `estimate_tool` finds mass, centre of mass, bias and drift by the unloaded references of a run. With
 a bias that drifts linearly they are linear in the mass, ``h = mass c``, biases and drifts:

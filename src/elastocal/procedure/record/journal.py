@@ -21,7 +21,7 @@ from elastocal.records import StrictModel
 
 
 class ReadingStatus(Enum):
-    """Quality of a reading; the flags of the dataset's ``status`` (spec section 3)."""
+    """Quality of a reading; the flags of the dataset's ``status`` (docs/reference/files.md)."""
 
     OK = "ok"
     SLIPPED = "slipped"

@@ -40,7 +40,7 @@ def o1(information: Information, chosen: ArrayLike) -> float:
     """Return ``O1 = (s1 … sr)^(1/r) / sqrt(3 N M)`` of a choice of poses (paper Eq. 20).
 
     Over the observable directions of the pool, since over all springs it is zero for every
-    choice (spec section 2, trap 2); each singular value is ``sqrt(si^2 + eps)``.
+    choice (docs/explanation/observability.md); each singular value is ``sqrt(si^2 + eps)``.
 
     Parameters
     ----------

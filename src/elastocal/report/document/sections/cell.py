@@ -1,11 +1,11 @@
 """The cell, with units, and its instruments: stations, noise, drift, the weight of the tool."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from functools import partial
 
 import numpy as np
 
-from elastocal.cell import Cell
+from elastocal.cell import Cell, Limits
 from elastocal.compensation.conditioning import ToolResult
 from elastocal.procedure.derive import MoveSummary, RegistrationSummary, RunSummary, ToolSummary
 from elastocal.report.document import blocks
@@ -66,17 +66,32 @@ def _instruments(cell: Cell) -> Iterator[tuple[str, str]]:
     yield "Devices", f"arm {devices.arm}, sensor {devices.sensor}, metrology {devices.metrology}"
 
 
+def _degrees(angle: float) -> str:
+    return f"{np.degrees(angle):.1f}°"
+
+
+_LIMITS: Mapping[str, tuple[str, Callable[[float], str]]] = {
+    "joint_margin": ("Margin to joint limits", _degrees),
+    "rail_margin": ("Margin to the ends of sliding joints", partial(mm, digits=1)),
+    "singular_value": ("Least singular value", "{:g}".format),
+    "wrist_angle": ("Least angle between axes 4 and 6", _degrees),
+    "clearance": ("Clearance", partial(mm, digits=1)),
+    "payload": ("Payload", "{:g} kg".format),
+}
+"""Words and unit of each limit; one that is not here shows under its key."""
+
+
 def _limits(cell: Cell) -> Iterator[tuple[str, str]]:
     file = cell.file
     yield "Contact disk, radius", mm(file.engagement.disk_radius, 1)
     yield "Normals within", f"{np.degrees(file.engagement.normal_tolerance):.1f}°"
     yield "Distance to the edge", mm(file.engagement.edge_margin, 1)
     yield "Friction, safety factor", f"{file.load_cases.friction:g}, {file.load_cases.safety:g}"
-    yield "Margin to joint limits", f"{np.degrees(file.limits.joint_margin):.1f}°"
-    yield "Least singular value", f"{file.limits.singular_value:g}"
-    yield "Clearance", mm(file.limits.clearance, 1)
-    if file.limits.payload is not None:
-        yield "Payload", f"{file.limits.payload:g} kg"
+    for key in Limits.model_fields:
+        value = getattr(file.limits, key)
+        if isinstance(value, float):
+            label, written = _LIMITS.get(key, (f"{key}, in SI units", "{:g}".format))
+            yield label, written(value)
     known = np.isfinite(cell.torque_limits)
     pairs = zip(cell.robot.joint_names, cell.torque_limits, known, strict=True)
     torques = ", ".join(f"{name} {value:.0f}" for name, value, there in pairs if there)
