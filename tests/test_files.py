@@ -178,3 +178,13 @@ def test_a_pipe_is_refused_instead_of_waited_for(tmp_path):
 def test_a_folder_is_still_called_one(tmp_path):
     with pytest.raises(FileAccessError, match="Is a directory"):
         read_text(tmp_path)
+
+
+@pytest.mark.parametrize("below", ["", "c", "c/d"])
+def test_a_file_where_a_folder_should_be_is_called_one(tmp_path, below):
+    (tmp_path / "model.json").write_text("x")
+    with (
+        pytest.raises(FileAccessError, match=r"model\.json is a file, not a folder"),
+        filling(tmp_path / "model.json" / below, "a.c"),
+    ):
+        pass

@@ -1,7 +1,7 @@
 """List in the reference what the face of a package exports, so that neither can get ahead.
 
 A comment ``<!-- face: elastocal.codec -->`` in a page of the reference is replaced by an entry for
-each name that the package exports from its own modules and the page does not show yet.
+each name that the package exports from its own modules and no page shows yet.
 """
 
 import ast
@@ -12,6 +12,8 @@ from mkdocs.structure.pages import Page
 
 SOURCE = Path(__file__).resolve().parents[2] / "src"
 MARK = re.compile(r"<!-- face: (elastocal[\w.]*) -->")
+PAGES = Path(__file__).resolve().parents[1] / "reference" / "api"
+_BLOCK = re.compile(r"^::: (elastocal[\w.]*)\n((?:[ ].*\n|\n)*)", flags=re.MULTILINE)
 _ENTRY = re.compile(r"^::: elastocal[\w.]*\.(\w+)$", flags=re.MULTILINE)
 _MEMBER = re.compile(r"^\s+- (\w+)$", flags=re.MULTILINE)
 
@@ -48,11 +50,22 @@ def shown(markdown: str) -> set[str]:
     return {*_ENTRY.findall(markdown), *_MEMBER.findall(markdown)}
 
 
+def shown_elsewhere(page: str) -> set[str]:
+    """Return the members that other pages of the reference show, with their packages."""
+    return {
+        f"{package}.{member}"
+        for path in PAGES.glob("*.md")
+        if path.name != page
+        for package, options in _BLOCK.findall(path.read_text(encoding="utf-8"))
+        for member in _MEMBER.findall(options)
+    }
+
+
 def on_page_markdown(markdown: str, page: Page, **_: object) -> str:
     """Return the page with an entry for every exported name."""
     if not page.file.src_uri.startswith("reference/api/"):
         return markdown
-    known = shown(markdown)
+    known, elsewhere = shown(markdown), shown_elsewhere(Path(page.file.src_uri).name)
 
     def entries(match: re.Match[str]) -> str:
         package = match[1]
@@ -60,7 +73,9 @@ def on_page_markdown(markdown: str, page: Page, **_: object) -> str:
         rest = {
             name: home
             for name, home in exported(package).items()
-            if name not in known and name in defined(package, home)
+            if name not in known
+            and f"{package}.{name}" not in elsewhere
+            and name in defined(package, home)
         }
         # A function called like its module would show the module.
         paths = (

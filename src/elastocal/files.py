@@ -75,6 +75,9 @@ def filling(folder: Path, last: str, force: bool = False) -> Iterator[Path]:
         If the folder holds files and ``force`` is not given, or cannot be written.
     """
     folder = Path(folder)
+    for place in (folder, *folder.parents):
+        if place.is_file():
+            raise FileAccessError(f"cannot write {folder}: {place} is a file, not a folder")
     try:
         holds = sorted(entry.name for entry in folder.iterdir()) if folder.exists() else []
         if holds and not force:

@@ -6,10 +6,12 @@ import shutil
 import pytest
 
 from elastocal.errors import FileAccessError, SchemaError
+from elastocal.files import read_text
 from elastocal.verdict import (
     EvidenceOptions,
     gather_evidence,
 )
+from elastocal.verdict._files import EvidenceFolders, PartReader
 from support.cli import elastocal
 from support.reported import MADE, POSES
 
@@ -217,3 +219,11 @@ def test_an_earlier_model_is_compared_over_the_readings_of_the_run(finished, tmp
     found = parts.recertification
     assert found.deflection.rows == len(parts.reproduction.unseen.error)
     assert found.limit == pytest.approx(0.1e-3)
+
+
+@pytest.mark.parametrize("optional", [False, True])
+def test_an_optional_file_is_not_missed(tmp_path, optional):
+    reader = PartReader(EvidenceFolders(None, (tmp_path,)))
+    found = reader.find("log", None, "log.json", read_text, "nobody makes one", optional=optional)
+    assert found is None
+    assert [part.name for part in reader.missing] == ([] if optional else ["log"])

@@ -139,12 +139,17 @@ class PartReader:
         return part
 
     def find(
-        self, name: str, given: Path | None, default: str, read: Callable[[Path], Part], hint: str
-    ) -> Part | None:
-        """Return a part that may be named or lie under a default name."""
+        self, name: str, given: Path | None, default: str, read: Callable[[Path], Part], hint: str,
+        *, optional: bool = False,
+    ) -> Part | None:  # fmt: skip
+        """Return a part that may be named or lie under a default name.
+
+        One that is ``optional`` is not missed where it is not there: most runs have none.
+        """
         path = given or self.folders.default(default)
         if path is None:
-            self.note_missing(name, f"there is no {default}; {hint}")
+            if not optional:
+                self.note_missing(name, f"there is no {default}; {hint}")
             return None
         return self.read(name, path, lambda: read(path), named=given is not None)
 

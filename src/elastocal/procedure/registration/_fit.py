@@ -113,9 +113,12 @@ DEFAULT_SCATTER = 0.1e-3
 """Scatter of a coordinate where the readings do not show one, in m."""
 _ROUNDS = 4
 """Times that the weights are adapted to the scatter; it then is steady to a percent."""
-_STEPS = 20
-_SMALL = 1e-12
+_MOST_STEPS = 20
+"""Gauss-Newton steps that are taken at most."""
+_ARRIVED = 1e-12
 """Step in rad and m below which Gauss-Newton has arrived."""
+_LEAST_SCATTER = 1e-12
+"""Scatter of readings that fit exactly, in m: weights need one above zero."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -199,14 +202,14 @@ def _gauss_newton(
     weight = 1.0 / np.sqrt(readings.variance + scatter**2)
     lever, errors = np.array(lever_prior), np.zeros(readings.robot_error.shape[2])
     R, t = _start(readings, group, lever)
-    for _ in range(_STEPS):
+    for _ in range(_MOST_STEPS):
         A = _equations(readings, group, R, weight)
         residual = _residual(readings, group, R, t, lever)
         e = _right_side(readings, residual, errors, weight, lever - lever_prior)
         step = np.asarray(-np.linalg.lstsq(A, e, rcond=None)[0], dtype=float)
         R, t = _moved(readings, group, R, t, step)
         lever, errors = lever + step[6 * len(R) :][:3], errors + step[6 * len(R) + 3 :]
-        if np.max(np.abs(step)) < _SMALL:
+        if np.max(np.abs(step)) < _ARRIVED:
             break
     residual = _residual(readings, group, R, t, lever)
     e = _right_side(readings, residual, errors, weight, lever - lever_prior)
@@ -279,4 +282,4 @@ def _scatter(result: Fit, readings: UnloadedReadings) -> float:
     if not free >= 3.0:
         return DEFAULT_SCATTER
     left = (result.e[:rows].reshape(-1, 3) / result.weight[:, None]) ** 2
-    return float(np.sqrt(max(left.sum() / free - readings.variance.mean(), _SMALL**2)))
+    return float(np.sqrt(max(left.sum() / free - readings.variance.mean(), _LEAST_SCATTER**2)))
