@@ -80,6 +80,17 @@ def um(metres: float) -> str:
     return f"{1e6 * metres:.1f} µm"
 
 
+def springs_and_parameters(springs: int, parameters: int) -> str:
+    """Return a number of springs, with that of their parameters where it is another.
+
+    >>> springs_and_parameters(6, 6), springs_and_parameters(9, 11)
+    ('6 springs', '9 springs with 11 parameters')
+    """
+    return counted(springs, "spring") + (
+        f" with {counted(parameters, 'parameter')}" if parameters != springs else ""
+    )
+
+
 def counted(number: int, name: str) -> str:
     """Return a number with its noun.
 

@@ -33,14 +33,14 @@ def test_equal_bounds_fix_a_spring():
 @pytest.mark.parametrize(
     ("lower", "upper", "message"),
     [
-        (1.0, 0.0, "spring 1 of 3 would have to lie between 1 and 0"),
-        ([0.0, 0.0, 2.0], 1.0, "spring 3 of 3"),
-        (np.nan, 1.0, "spring 1 of 3"),
-        (0.0, [1.0, np.nan, 1.0], "spring 2 of 3"),
-        (np.inf, np.inf, "spring 1 of 3"),
-        (-np.inf, -np.inf, "spring 1 of 3"),
-        ([0.0, 0.0], np.inf, "one number for each of the 3 springs"),
-        (np.zeros((3, 3)), np.inf, "one number for each of the 3 springs"),
+        (1.0, 0.0, "parameter 1 of 3 would have to lie between 1 and 0"),
+        ([0.0, 0.0, 2.0], 1.0, "parameter 3 of 3"),
+        (np.nan, 1.0, "parameter 1 of 3"),
+        (0.0, [1.0, np.nan, 1.0], "parameter 2 of 3"),
+        (np.inf, np.inf, "parameter 1 of 3"),
+        (-np.inf, -np.inf, "parameter 1 of 3"),
+        ([0.0, 0.0], np.inf, "one number for each of the 3 parameters"),
+        (np.zeros((3, 3)), np.inf, "one number for each of the 3 parameters"),
     ],
 )
 def test_impossible_bounds_are_refused_by_the_spring(lower, upper, message):

@@ -1,10 +1,20 @@
 import json
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
 import pytest
 
-from elastocal.identification import Calibration, DeflectionSummary, FitOptions, calibrate, summary
+from elastocal.identification import (
+    CalibrateResult,
+    Calibration,
+    DeflectionSummary,
+    FitOptions,
+    FitSettings,
+    calibrate,
+    spring_summaries,
+    summary,
+)
 from elastocal.records import to_data
 from elastocal.sim.arm import (
     Blunder,
@@ -92,3 +102,21 @@ def test_the_same_seed_gives_the_same_figures():
     other = calibrate(elastic(), calibration().readings, np.random.default_rng(1))
     assert summary(other).springs != summary(made).springs
     assert summary(other).residual == summary(made).residual
+
+
+def test_a_spring_is_at_a_bound_of_the_fit_only():
+    made = calibration().calibrated
+    zero = np.where(np.arange(len(made.compliance)) == 0, 0.0, 1e-7)
+    rows = spring_summaries(replace(made, compliance=zero))
+    assert [row.at_bound for row in rows] == [True] + 17 * [False]
+    free = spring_summaries(replace(made, compliance=-zero), FitSettings(bounds="-inf,inf"))
+    assert not any(row.at_bound for row in free)
+    capped = spring_summaries(replace(made, compliance=zero), FitSettings(bounds="-1,1e-7"))
+    assert [row.at_bound for row in capped] == [False] + 17 * [True]
+
+
+def test_the_result_names_springs_and_loss():
+    settings = FitSettings(springs="bearing", loss="huber")
+    made = calibration()
+    text = repr(CalibrateResult.of(made.calibrated, summary(made, settings)))
+    assert "fit: springs bearing, loss huber" in text

@@ -16,7 +16,7 @@ from elastocal.identification.calibration import Calibration
 from elastocal.identification.frames import FrameSummary
 from elastocal.identification.ladder import Climbed
 from elastocal.identification.observability import Term
-from elastocal.identification.options import FitSettings
+from elastocal.identification.options import FitOptions, FitSettings, bounds
 from elastocal.identification.suspicious import Screening
 from elastocal.identification.uncertainty import Coverage, HeldOut, interval
 from elastocal.records import record
@@ -40,6 +40,8 @@ class SpringSummary:
     """Whether the data determine it by itself."""
     group: int | None = None
     """Number of the first unobservable combination that leaves it open."""
+    at_bound: bool = False
+    """Whether the fit ends at a bound of every parameter that it is made of."""
     too_weak: bool = False
     """Whether the deflection that a sensible value of it makes stays below the noise."""
     prior: bool = False
@@ -139,6 +141,7 @@ class CalibrationSummary:
     rank_attainable: int
     """Rank that any number of poses and forces would reach."""
     springs_total: int
+    """Number of parameters of all springs."""
     condition: float
     unobservable: tuple[tuple[Term, ...], ...]
     residual: ResidualSummary
@@ -160,6 +163,8 @@ class CalibrationSummary:
     """Frames that were estimated with the springs."""
     coverage: Coverage | None = None
     """Measured coverage of the intervals of a prediction; none in calibrations of before."""
+    spring_count: int | None = None
+    """Number of springs; none in calibrations before springs of several parameters."""
     known: tuple[KnownSpring, ...] = ()
     """What the spring file knew of springs beforehand."""
 
@@ -183,11 +188,13 @@ def summary(
     return CalibrationSummary(
         robot=calibrated.model.robot.name,
         springs=tuple(
-            replace(each, prior=each.name in expected) for each in spring_summaries(calibrated)
+            replace(each, prior=each.name in expected)
+            for each in spring_summaries(calibrated, settings)
         ),
         rank=seen.rank,
         rank_attainable=calibration.attainable_rank,
-        springs_total=seen.springs,
+        springs_total=seen.parameters,
+        spring_count=len(calibrated.model.springs),
         condition=seen.condition,
         unobservable=seen.unobservable,
         residual=ResidualSummary(
@@ -212,9 +219,22 @@ def summary(
     )
 
 
-def spring_summaries(calibrated: CalibratedModel) -> tuple[SpringSummary, ...]:
-    """Return what tables show of each spring: its characteristics, with their intervals."""
-    seen = calibrated.observability
+def spring_summaries(
+    calibrated: CalibratedModel, settings: FitSettings | None = None
+) -> tuple[SpringSummary, ...]:
+    """Return what tables show of each spring: its characteristics, with their intervals.
+
+    Parameters
+    ----------
+    calibrated : CalibratedModel
+        The model.
+    settings : FitSettings, optional
+        Of its fit, whose bounds count; by default those that make sense to each spring.
+    """
+    seen, natural = calibrated.observability, [p.lower for p in calibrated.model.parameters]
+    options = settings.options() if settings else FitOptions()
+    lower, upper = bounds(options, len(natural), natural)
+    at_bound = (calibrated.compliance <= lower) | (calibrated.compliance >= upper)
     first, rows = 0, list[SpringSummary]()
     for spring in calibrated.model.springs:
         own = slice(first, first + len(spring.parameters))
@@ -240,6 +260,7 @@ def spring_summaries(calibrated: CalibratedModel) -> tuple[SpringSummary, ...]:
                     high=high,
                     observable=group is None and reach is None,
                     group=group,
+                    at_bound=bool(np.all(at_bound[own][weights != 0.0])),
                     too_weak=group is None and reach is not None,
                 )
             )

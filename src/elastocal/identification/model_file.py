@@ -19,7 +19,7 @@ from elastocal.identification.tool_change import ToolChange
 from elastocal.records import read_json, record, write_json
 from elastocal.results import Result, brief_repr
 from elastocal.robot import GRAVITY, Robot
-from elastocal.wording import capped
+from elastocal.wording import capped, springs_and_parameters
 
 
 @brief_repr
@@ -73,12 +73,12 @@ class CalibrateResult(Result):
             raise SchemaError(f"{len(self.draws)} draws, at least {MINIMUM_DRAWS} are needed")
         for name, rows in (("compliance", self.compliance[None]), ("draws", self.draws)):
             if rows.ndim != 2 or rows.shape[1] != n:
-                raise SchemaError(f"{name} must have one number for each of {n} springs")
+                raise SchemaError(f"{name} must have one number for each of {n} parameters")
         if self.misfit is not None and not 0.0 <= self.misfit < np.inf:
             raise SchemaError(f"misfit {self.misfit:g} must be 0 or more")
         seen = self.observability
-        if seen.springs != n or not 0 <= seen.rank <= n:
-            raise SchemaError(f"observability (rank {seen.rank}) does not fit {n} springs")
+        if seen.parameters != n or not 0 <= seen.rank <= n:
+            raise SchemaError(f"observability (rank {seen.rank}) does not fit {n} parameters")
 
     @classmethod
     def of(
@@ -137,8 +137,21 @@ class CalibrateResult(Result):
         facts = [
             ("robot", f"{self.robot.name}, tool centre point {self.robot.tcp}"),
             *((("tool", self.tool.sentence),) if self.tool is not None else ()),
-            ("springs", f"{seen.springs}, rank {seen.rank}, {sum(seen.observable)} known alone"),
+            (
+                "springs",
+                f"{springs_and_parameters(len(self.springs), seen.parameters)}, rank {seen.rank},"
+                f" {sum(seen.observable)} known alone",
+            ),
         ]
+        if figures is not None and figures.settings is not None:
+            taken = [rung.springs for rung in figures.ladder if rung.chosen]
+            facts.append(
+                (
+                    "fit",
+                    f"springs {(taken or [figures.settings.springs])[0]},"
+                    f" loss {figures.settings.loss}",
+                )
+            )
         if figures is not None:
             held, mean = figures.held_out, figures.deflection.mean
             facts += [

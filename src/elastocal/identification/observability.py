@@ -210,9 +210,14 @@ class Observability:
         return float(np.linalg.norm([weights[name] * reach[name] for name in used]))
 
     @property
-    def springs(self) -> int:
-        """Number of springs."""
+    def parameters(self) -> int:
+        """Number of parameters of all springs."""
         return len(self.observable)
+
+    @property
+    def springs(self) -> int:
+        """Return `parameters`, by the name that ``check --json`` gives them."""
+        return self.parameters
 
 
 def observability(system: Factored, springs: Sequence[Spring]) -> Observability:

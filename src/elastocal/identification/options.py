@@ -117,12 +117,12 @@ def bounds(
         )
     except ValueError as error:
         raise IdentificationError(
-            f"bounds must be a number or one number for each of the {parameters} springs"
+            f"bounds must be a number or one number for each of the {parameters} parameters"
         ) from error
     bad = np.flatnonzero(~((lower <= upper) & (lower < np.inf) & (upper > -np.inf)))
     if len(bad):
         raise IdentificationError(
-            f"bounds exclude everything: spring {bad[0] + 1} of {parameters} would have to lie"
+            f"bounds exclude everything: parameter {bad[0] + 1} of {parameters} would have to lie"
             f" between {lower[bad[0]]:g} and {upper[bad[0]]:g}"
         )
     return lower, upper

@@ -282,7 +282,7 @@ def _prior_rows(prior: Prior | None, springs: int) -> FloatArray:
         return np.zeros((0, springs + 1))
     mean, sigma = np.asarray(prior.mean, dtype=float), np.asarray(prior.sigma, dtype=float)
     if mean.shape != (springs,) or sigma.shape != (springs,):
-        raise IdentificationError(f"prior must have one mean and sigma for {springs} springs")
+        raise IdentificationError(f"prior must have one mean and sigma for {springs} parameters")
     if not (np.all(np.isfinite(mean)) and np.all(sigma > 0.0) and 0.0 < prior.noise < np.inf):
         raise IdentificationError("prior needs finite means, and sigmas and noise above 0")
     gain = prior.noise / sigma

@@ -4,12 +4,15 @@ import matplotlib
 import numpy as np
 import pytest
 
+from elastocal.elastic import unit_of
 from elastocal.identification.recertification import recertify
 from elastocal.report import (
     write_recertification_figure,
 )
 from elastocal.report.plots import (
+    SpringBar,
     recertification_figure,
+    spring_figure,
     style,
 )
 from support.cells import linear_truth, unseen
@@ -99,3 +102,20 @@ def test_the_same_comparison_gives_the_same_bytes(found, tmp_path):
     files = [write_recertification_figure(tmp_path / f"{n}.svg", found) for n in "ab"]
     assert files[0].read_bytes() == files[1].read_bytes()
     assert b"Springs that moved: joint_3.axial" in files[0].read_bytes()
+
+
+def test_the_axis_holds_negative_values():
+    unit = unit_of("rad/(N*m)")
+    bars = [
+        SpringBar("xy", unit, -0.4, -0.6, -0.1, None),
+        SpringBar("xx", unit, 1.0, 0.9, 1.1, None),
+    ]
+    (axes,) = spring_figure(bars).axes
+    left, right = axes.get_xlim()
+    assert left < -0.6
+    assert right > 1.1
+
+
+def test_a_notebook_shows_a_figure():
+    png = style.new_figure(1.0, 1.0)._repr_png_()
+    assert png.startswith(b"\x89PNG")

@@ -24,7 +24,7 @@ from elastocal.identification import (
     SuspiciousReading,
     describe,
 )
-from elastocal.wording import capped, counted, mm
+from elastocal.wording import capped, counted, mm, springs_and_parameters
 
 if TYPE_CHECKING:
     from elastocal.identification.recertification import (
@@ -66,7 +66,7 @@ def _show_fit(console: Console, figures: CalibrationSummary) -> None:
     mean, peak = figures.deflection.mean, figures.deflection.max
     fit, held_out = figures.residual, figures.held_out
     console.print(
-        f"[bold]{escape(figures.robot)}[/bold]: {figures.springs_total} springs,"
+        f"[bold]{escape(figures.robot)}[/bold]: {_springs(figures)},"
         f" {figures.readings} readings at {figures.poses} poses,"
         f" measured deflection {mm(mean)} mean, {mm(peak)} max"
     )
@@ -100,6 +100,11 @@ def _coverage_line(coverage: Coverage) -> str:
         f"interval of a measurement: {inside}; interval of the fit: coverage not known"
         f" ({fit.reason})"
     )
+
+
+def _springs(figures: CalibrationSummary) -> str:
+    count = figures.springs_total if figures.spring_count is None else figures.spring_count
+    return springs_and_parameters(count, figures.springs_total)
 
 
 def _show_ladder(console: Console, ladder: Sequence[RungSummary]) -> None:
@@ -149,11 +154,12 @@ def _show_frames(console: Console, frames: Sequence[FrameSummary]) -> None:
 def _spring_table(figures: CalibrationSummary) -> Table:
     """Return a row a spring; linear springs, rare, name their own units."""
     table = Table(box=None, pad_edge=False)
-    table.add_column("spring", no_wrap=True)
+    # Where the terminal is narrow, words fold; a number that is cut would be another number.
+    table.add_column("spring", overflow="fold")
     table.add_column(f"compliance\n{_USUAL_UNIT.shown}", justify="right", no_wrap=True)
     table.add_column("95 %\ninterval", justify="right", no_wrap=True)
     table.add_column(f"stiffness\n{_USUAL_UNIT.stiffness}", justify="right", no_wrap=True)
-    table.add_column("known?", no_wrap=True)
+    table.add_column("known?", overflow="fold")
     for spring in figures.springs:
         table.add_row(*_spring_row(spring))
     return table
@@ -175,7 +181,7 @@ def _spring_row(spring: SpringSummary) -> tuple[str, ...]:
         f"{value:.4f}{unit}",
         f"{low:.3f} … {high:.3f}",
         _stiffness(value, shown),
-        _known(value, low, high) + (", prior" if spring.prior else ""),
+        _known(value, low, high, spring.at_bound) + (", prior" if spring.prior else ""),
     )
 
 
@@ -186,9 +192,14 @@ def _stiffness(value: float, unit: Unit) -> str:
     return f"{1.0 / value:.3f}{name}" if unit.stiffness else ""
 
 
-def _known(value: float, low: float, high: float) -> str:
+def _known(value: float, low: float, high: float, at_bound: bool) -> str:
+    if at_bound:
+        open_end = f", below {high:.3f}" if high > value else ""
+        return "[yellow]at bound[/yellow]" + (
+            open_end or (f", above {low:.3f}" if low < value else "")
+        )
     if value == 0.0:
-        return "[yellow]at bound[/yellow]" + (f", below {high:.3f}" if high > 0.0 else "")
+        return ""
     relative = (high - low) / 2.0 / abs(value)
     colour = "green" if relative < 0.2 else "yellow" if relative < 0.5 else "red"
     return f"[{colour}]±{relative:.0%}[/{colour}]"

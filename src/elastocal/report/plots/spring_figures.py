@@ -13,7 +13,7 @@ from matplotlib.ticker import FuncFormatter, MaxNLocator
 
 from elastocal.arrays import FloatArray
 from elastocal.elastic import Unit, unit_of
-from elastocal.identification import CalibratedModel, spring_summaries
+from elastocal.identification import CalibratedModel, FitSettings, spring_summaries
 from elastocal.identification.recertification import (
     CompareSummary,
     DeflectionChange,
@@ -51,15 +51,27 @@ class SpringBar:
     """Number of the group of springs that it cannot be told apart from."""
     too_weak: bool = False
     """See `SpringSummary.too_weak`."""
+    at_bound: bool = False
+    """Whether the fit ends at a bound of it."""
 
 
-def spring_bars(model: CalibratedModel) -> list[SpringBar]:
-    """Return the characteristics of a model, each with the first group that leaves it open."""
+def spring_bars(model: CalibratedModel, settings: FitSettings | None = None) -> list[SpringBar]:
+    """Return the characteristics of a model, each with the first group that leaves it open.
+
+    Parameters
+    ----------
+    model : CalibratedModel
+        The model.
+    settings : FitSettings, optional
+        Of its fit; see `spring_summaries`.
+    """
     bars = []
-    for row in spring_summaries(model):
+    for row in spring_summaries(model, settings):
         unit = unit_of(row.unit)
         value, low, high = (unit.factor * each for each in (row.compliance, row.low, row.high))
-        bars.append(SpringBar(row.name, unit, value, low, high, row.group, row.too_weak))
+        bars.append(
+            SpringBar(row.name, unit, value, low, high, row.group, row.too_weak, row.at_bound)
+        )
     return bars
 
 
@@ -85,8 +97,10 @@ def spring_figure(springs: Sequence[SpringBar]) -> Figure:
 
 def _draw_bars(axes: Axes, unit: str, bars: Sequence[SpringBar]) -> None:
     # A value that is not by itself has no interval that means anything.
-    ends = [bar.high if bar.group is None else bar.value for bar in bars]
-    top = max(0.0, *ends) or 1.0
+    highs = [bar.high if bar.group is None else bar.value for bar in bars]
+    lows = [bar.low if bar.group is None else bar.value for bar in bars]
+    bottom, top = min(0.0, *lows), max(0.0, *highs)
+    span = top - bottom or 1.0
     own = [(k, bar) for k, bar in enumerate(bars) if bar.group is None]
     rows = [k for k, _ in own]
     low, value, high = ([getattr(bar, key) for _, bar in own] for key in ("low", "value", "high"))
@@ -97,15 +111,15 @@ def _draw_bars(axes: Axes, unit: str, bars: Sequence[SpringBar]) -> None:
             axes.scatter(
                 bar.value, k, s=26, facecolors="none", edgecolors=style.REFUSED, marker="D"
             )
-            left = bar.value > 0.75 * top
+            left = bar.value > bottom + 0.75 * span
             axes.text(
-                bar.value + (-0.015 if left else 0.015) * top, k,
+                bar.value + (-0.015 if left else 0.015) * span, k,
                 f"not by itself, group {bar.group}", ha="right" if left else "left",
                 va="center", fontsize=7.5, color=style.MUTED, style="italic",
             )  # fmt: skip
     axes.set_yticks(range(len(bars)), [literal(bar.name) for bar in bars], fontsize=8)
     axes.set_ylim(len(bars) - 0.4, -0.6)
-    axes.set_xlim(-0.02 * top, 1.05 * top)
+    axes.set_xlim(bottom - 0.02 * span, bottom + 1.05 * span)
     axes.set_xlabel(f"compliance in {unit}; band: 95 % interval")
     style.open_frame(axes, grid="both", colour="#e6e6e2")
     axes.tick_params(length=0)

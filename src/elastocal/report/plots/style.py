@@ -56,6 +56,7 @@ _SCREEN = {"o": "circle", "s": "square", "^": "triangle-up", "D": "diamond", "v"
 _FILL = 0.35
 """Part of the colour in a box; the rest is paper."""
 _DPI = 200
+_SCREEN_DPI = 100
 _UNDATED: dict[str, dict[str, str | None]] = {
     ".svg": {"Date": None, "Creator": "elastocal"},
     ".pdf": {"CreationDate": None, "Creator": "elastocal"},
@@ -125,6 +126,12 @@ def tint(colour: str, part: float = _FILL, ground: int = 255) -> str:
 
 class Page(Figure):
     """A figure whose parts are placed in inches, from its left and lower edge."""
+
+    def _repr_png_(self) -> bytes:
+        """Return the picture that a notebook shows."""
+        buffer = io.BytesIO()
+        self.savefig(buffer, format="png", dpi=_SCREEN_DPI, metadata=_metadata(".png"))
+        return buffer.getvalue()
 
     def add_panel(self, left: float, bottom: float, width: float, height: float) -> Axes:
         """Return new axes."""

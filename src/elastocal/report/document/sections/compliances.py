@@ -24,7 +24,8 @@ def _compliances(evidence: Evidence) -> Iterator[blocks.Block]:
     if found is None:
         yield blocks.Paragraph("There is no calibrated model, so no compliance is known.")
         return
-    springs = spring_bars(found.model)
+    settings = found.figures.settings if found.figures else None
+    springs = spring_bars(found.model, settings)
     observable = sum(each.group is None and not each.too_weak for each in springs)
     yield _head(found, observable)
     yield from _ladder(found.figures)
@@ -48,11 +49,11 @@ def _row(spring: SpringBar) -> blocks.Row:
     if spring.too_weak:
         return name, "too weak to see", f"({value:.4f})", "none", unit.shown, "none"
     stiff = f"{1.0 / value:.3f} {unit.stiffness}" if value > 0.0 else "rigid"
-    if not unit.stiffness:
+    if not unit.stiffness or value < 0.0:
         stiff = "none"
-    known = "at its bound"
-    if value > 0.0:
-        known = f"±{(spring.high - spring.low) / 2 / value:.0%}"
+    known = "at its bound" if spring.at_bound else "zero"
+    if value != 0.0 and not spring.at_bound:
+        known = f"±{(spring.high - spring.low) / 2 / abs(value):.0%}"
     span = f"{spring.low:.3f} to {spring.high:.3f}"
     return name, known, f"{value:.4f}", span, unit.shown, stiff
 
@@ -63,9 +64,9 @@ def _head(found: ModelEvidence, observable: int) -> blocks.Block:
     return blocks.Facts(
         (
             ("Tool", found.model.tool_name),
-            ("Springs", seen.springs),
+            ("Parameters of the springs", seen.parameters),
             ("Known by themselves", observable),
-            ("Rank", f"{seen.rank} of {seen.springs}"),
+            ("Rank", f"{seen.rank} of {seen.parameters}"),
             ("Condition number", f"{seen.condition:.0f}"),
             ("Bootstrap draws", len(found.model.draws)),
             ("Residual at the poses fitted, mean", residual),

@@ -1,0 +1,41 @@
+"""The table of springs in a terminal: every number whole, and at bound only where it is one."""
+
+import io
+from dataclasses import replace
+
+import pytest
+from rich.console import Console
+
+from elastocal.cli.tables.calibration import _known, _spring_table, _springs
+from elastocal.identification import SpringSummary
+from support.summaries import made_up_summary
+
+NAME = "joint_2.axial with a long name, slip 3"
+ROWS = (
+    SpringSummary(NAME, "gear", "rad/(N*m)", 1.23456e-7, -2.5e-8, 1.25e-6, True),
+    SpringSummary("rail.axial", "hinge", "m/N", 1.447e-7, 3.8e-8, 2.86e-7, True),
+)
+
+
+@pytest.mark.parametrize("width", [80, 120])
+def test_no_number_is_cut(width):
+    console = Console(file=io.StringIO(), width=width)
+    console.print(_spring_table(replace(made_up_summary(), springs=ROWS)))
+    shown = console.file.getvalue()
+    for number in ("0.1235", "-0.025 … 1.250", "8.100", "0.1447 µm/N", "6.911 MN/m"):
+        assert number in shown
+    assert max(map(len, shown.splitlines())) <= width
+
+
+def test_a_negative_value_is_at_no_bound_unless_the_fit_says_so():
+    assert "bound" not in _known(-1.0, -1.1, -0.9, at_bound=False)
+    assert "±10%" in _known(-1.0, -1.1, -0.9, at_bound=False)
+    assert _known(0.0, 0.0, 0.5, at_bound=True).endswith("at bound[/yellow], below 0.500")
+    assert _known(2.0, 1.5, 2.0, at_bound=True).endswith(", above 1.500")
+    assert "bound" not in _known(0.0, -0.5, 0.5, at_bound=False)
+
+
+def test_parameters_are_counted_beside_springs_where_they_differ():
+    assert _springs(replace(made_up_summary(), springs_total=6)) == "6 springs"
+    found = replace(made_up_summary(), springs_total=11, spring_count=9)
+    assert _springs(found) == "9 springs with 11 parameters"
