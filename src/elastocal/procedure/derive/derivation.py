@@ -378,7 +378,7 @@ def _dataset(
         sequence=_sequence(poses, labels, load_cases),
         tcp_position=tcp,
         reference_joint_position=reference,
-        # The force is counted from the reference, where the tool was off the surface.
+        # Counted from the reference, where the tool was off the surface.
         reference_force=np.zeros((len(labels), 3)),
         robot_name=robot.name,
         robot_urdf=cell.urdf_with_tool_mass,
@@ -396,7 +396,6 @@ def _sequence(
     sequence = np.full((len(labels), len(load_cases)), -1)
     for pose in poses:
         for place, load in enumerate(pose.loads):
-            if load.window.load_case in load_cases:
-                case = load_cases.index(load.window.load_case)
-                sequence[labels.index(pose.pose), case] = place
+            case = np.flatnonzero(np.asarray(load_cases) == load.window.load_case)
+            sequence[labels.index(pose.pose), case] = place
     return sequence

@@ -391,8 +391,7 @@ def _frame_along(direction: FloatArray) -> FloatArray:
     """Return a rotation whose z is a direction and whose x is nearest to base x (or z)."""
     z = direction / np.linalg.norm(direction)
     helper = np.eye(3)[0 if abs(z[0]) < 0.9 else 2]
-    x = helper - z * (z @ helper)
-    x /= np.linalg.norm(x)
+    x = (helper - z * (z @ helper)) / np.linalg.norm(helper - z * (z @ helper))
     return np.column_stack([x, np.cross(z, x), z])
 
 
