@@ -396,6 +396,5 @@ def _sequence(
     sequence = np.full((len(labels), len(load_cases)), -1)
     for pose in poses:
         for place, load in enumerate(pose.loads):
-            case = np.flatnonzero(np.asarray(load_cases) == load.window.load_case)
-            sequence[labels.index(pose.pose), case] = place
+            sequence[labels.index(pose.pose), np.array(load_cases) == load.window.load_case] = place
     return sequence
