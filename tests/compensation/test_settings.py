@@ -51,7 +51,7 @@ def test_the_tcp_frame_has_no_fixed_rotation():
         ('"5 mm/s"', '"50 mm/s"', "fade 0.05 m/s is above rate 0.02 m/s"),
         ('"4 ms"', "0.004", "0.004 is not a time with its unit"),
         ("notches", "notchs", "did you mean 'notches'"),
-        ('"2 mm"', '"51 mm"', "limits.correction: Input should be less than or equal to 0.05"),
+        ('"2 mm"', '"51 mm"', "limits.correction: Input should be less than or equal to 50 mm"),
         ('"20 mm/s"', '"2 m/s"', "limits.rate: Input should be less than or equal to 1"),
         ("limits:", 'hold: "2 s"\nlimits:', "hold: Input should be less than or equal to 1"),
         ("limits:", 'hold: "1 ms"\nlimits:', "not longer than the time between readings"),

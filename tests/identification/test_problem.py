@@ -62,8 +62,8 @@ def test_a_prior_is_a_row_a_spring():
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"mean": 1e-6}, "one mean and sigma for 6 springs"),
-        ({"sigma": np.ones(5)}, "one mean and sigma for 6 springs"),
+        ({"mean": 1e-6}, "one mean and sigma for 6 parameters"),
+        ({"sigma": np.ones(5)}, "one mean and sigma for 6 parameters"),
         ({"mean": np.full(6, np.nan)}, "finite means"),
         ({"sigma": np.zeros(6)}, "above 0"),
         ({"sigma": np.full(6, np.nan)}, "above 0"),
