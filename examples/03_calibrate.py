@@ -50,11 +50,9 @@ mm = 1e3
 print(f"{figures.readings} readings at {figures.poses} poses")
 print(f"deflection measured: {mm * figures.deflection.mean:.3f} mm mean")
 print(f"error at left-out poses: {mm * figures.held_out.mean:.3f} mm mean")
-difference = figures.comparison.difference
-print(
-    f"6 springs miss by {mm * difference.mean:.3f} mm more"
-    f" (95 %: {mm * difference.low:.3f} to {mm * difference.high:.3f} mm)"
-)
+for rung in figures.ladder:  # models from simple to rich, at the same left-out poses
+    taken = "  taken" if rung.chosen else ""
+    print(f"{rung.springs:14s} misses by {mm * rung.held_out:.3f} mm{taken}")
 for spring in figures.springs[:6]:
     known = "" if spring.observable else "  (only in sum with others)"
     print(f"{spring.name:14s} {1e6 * spring.compliance:6.3f} µrad/(N·m){known}")

@@ -12,10 +12,10 @@ from pathlib import Path
 import numpy as np
 
 import elastocal as ec
+from elastocal.cell import SensorLoad
 from elastocal.dataset import write
-from elastocal.procedure.derive import ToolLoad
 from elastocal.procedure.registration import UnloadedReadings, register
-from elastocal.robot import GRAVITY, T_from_xyzabc, catalogue, with_tool
+from elastocal.robot import T_from_xyzabc, catalogue, with_tool
 from elastocal.sim.arm import (
     LOAD_CASES,
     SHOP_FLOOR,
@@ -39,8 +39,8 @@ data = measure(
     bearing_truth(linkage), pressed.joints, press_forces(pressed.T_base_tcp), SHOP_FLOOR, rng
 )
 q, contact_force, moved = data.joint_position, data.force, data.marker_displacement
-tool = ToolLoad(  # mass, centre of mass, gravity, place of the sensor
-    60.0, np.array([0.0, 0.0, 0.15]), np.array(GRAVITY), T_from_xyzabc(0, 0, -0.3, 0.5, 0, 0)
+tool = SensorLoad(
+    mass=60.0, centre=np.array([0, 0, 0.15]), T_tcp_sensor=T_from_xyzabc(0, 0, -0.3, 0.5, 0, 0)
 )
 T_tracker_base = T_from_xyzabc(2.0, 5.0, 1.0, 2.5, 0.02, -0.01)  # nobody knows it
 before = pressed.T_base_tcp.copy()  # the controller's pose unloaded, 3 mm before contact
@@ -48,8 +48,8 @@ before[:, :3, 3] = data.tcp_position
 loaded = robot.forward(q)  # and under each load
 bias = np.array([12.0, -7.0, 30.0])
 R, R_0 = tool.R_base_sensor(loaded), tool.R_base_sensor(before)
-raw = np.einsum("plji,plj->pli", R, contact_force) + tool.force(R) + bias  # sensor frame
-raw_0 = tool.force(R_0) + bias
+raw = np.einsum("plji,plj->pli", R, contact_force) + tool.weight(R)[..., :3] + bias  # sensor frame
+raw_0 = tool.weight(R_0)[..., :3] + bias
 R_tracker_base, t_tracker_base = T_tracker_base[:3, :3], T_tracker_base[:3, 3]
 marker_0 = before[:, :3, 3] @ R_tracker_base.T + t_tracker_base  # tracker frame
 marker = marker_0[:, None] + moved @ R_tracker_base.T
@@ -65,7 +65,7 @@ print(f"turn of the tracker known to {1e6 * found.stations[0].rotation_sigma:.0f
 print(f"marker in the tcp frame: {np.round(1e3 * found.lever_arm, 2) + 0.0} mm")
 
 # 2. Forces on the robot in base, f = R (F - F_0 - m (R^T g - R_0^T g)); displacements in base.
-shown = raw - raw_0[:, None] - (tool.force(R) - tool.force(R_0)[:, None])
+shown = raw - raw_0[:, None] - (tool.weight(R)[..., :3] - tool.weight(R_0)[..., :3][:, None])
 force = np.einsum("plij,plj->pli", R, shown)
 dataset = ec.Dataset.from_arrays(
     joint_position=q,

@@ -256,7 +256,7 @@ def test_a_load_case_without_any_reading_is_refused(tmp_path):
     ("options", "message"),
     [
         (("--bounds", "1,0"), "exclude everything"),
-        (("--bounds", "nan,1"), "exclude everything"),
+        (("--bounds", "nan,1"), "'nan' is not a number"),
         (("--springs", "bering"), "did you mean 'bearing'"),
         (("--loss", "hubert"), "did you mean 'huber'"),
         (("--weights", "equal"), "none, sigma"),

@@ -186,13 +186,15 @@ def test_axial_springs_alone_are_advised_to_be_compared_with_more(parts):
 
 
 def test_more_springs_that_predict_worse_hold_back(parts):
-    split = {"mean": 1e-5, "max": 2e-5, "readings": 9, "folds": 3}
-    worse = {"springs": "actuated", "held_out": split,
-             "difference": {"mean": -2e-5, "low": -3e-5, "high": -1e-5}}  # fmt: skip
-    assert (
-        "axial springs alone"
-        in findings(compliance_findings, with_figures(parts, comparison=worse))[0]
-    )
+    def rung(springs, difference, chosen):
+        return {
+            "springs": springs, "held_out": 1e-5, "parameters": 6, "chosen": chosen,
+            "difference": dict(zip(("mean", "low", "high"), difference, strict=True)),
+        }  # fmt: skip
+
+    ladder = [rung("actuated", (0.0, 0.0, 0.0), False), rung("bearing", (2e-5, 1e-5, 3e-5), True)]
+    found = findings(compliance_findings, with_figures(parts, ladder=ladder))
+    assert "other springs predict left-out poses better than bearing" in found[0]
 
 
 def saturated(parts, n_train, high, last=20):
