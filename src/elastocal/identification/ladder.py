@@ -22,6 +22,7 @@ from scipy.special import stdtrit
 from elastocal.arrays import BoolArray, FloatArray, IndexArray
 from elastocal.dataset import Readings
 from elastocal.elastic import (
+    LAYOUTS,
     ElasticModel,
     Gear,
     Spring,
@@ -31,7 +32,7 @@ from elastocal.elastic import (
     layout,
     tensor,
 )
-from elastocal.errors import IdentificationError
+from elastocal.errors import IdentificationError, SpringError, nearest
 from elastocal.identification.displacement import reference_joints
 from elastocal.identification.options import FitOptions
 from elastocal.identification.problem import Problem, build
@@ -182,7 +183,12 @@ def choose_model(
     allowed = {AUTO: tuple(RUNGS), "gears": ("gears", "gears+friction")}.get(springs, (springs,))
     rungs = dict(RUNGS)
     if springs not in (AUTO, *RUNGS):
-        # Refused here, before anything is fitted.
+        known = (AUTO, *RUNGS, *(name for name in LAYOUTS if name not in RUNGS))
+        if springs not in LAYOUTS and not springs.endswith((".yaml", ".yml")):
+            raise SpringError(
+                f"unknown spring layout {springs!r}{nearest(springs, known)}"
+                f" (allowed: {', '.join(known)}, or a .yaml file)"
+            )
         asked = layout(robot, springs)
         rungs[springs] = Rung(springs, lambda *_: asked)
     options = replace(options, prior=None)
