@@ -1,7 +1,6 @@
 from .friction import FrictionElements as FrictionElements
 from .known import Knowledge as Knowledge, KnownSpring as KnownSpring
 from .layouts import (
-    AXES as AXES,
     LAYOUTS as LAYOUTS,
     SpringEntry as SpringEntry,
     SpringFile as SpringFile,
@@ -28,6 +27,7 @@ from .origins import (
     joint_origins as joint_origins,
 )
 from .springs import (
+    AXES as AXES,
     KINDS as KINDS,
     AnySpring as AnySpring,
     Characteristic as Characteristic,

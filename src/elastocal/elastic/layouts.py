@@ -13,7 +13,7 @@ changelog and an entry in ``tests/contracts/test_layouts.py``. A spring file::
       - {joint: joint_a1, bounds: ["0.5 MN*m/rad", "5 MN*m/rad"]}
 """
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -23,15 +23,13 @@ from pydantic import BeforeValidator, Field
 
 from elastocal.elastic.known import Knowledge, KnownSpring
 from elastocal.elastic.origins import joint_origins
-from elastocal.elastic.springs import KINDS, Hinge, Spring, SpringAxis, Tensor, as_axis, axial
+from elastocal.elastic.springs import AXES, KINDS, Hinge, Spring, SpringAxis, Tensor, as_axis, axial
 from elastocal.errors import SpringError, nearest
 from elastocal.records import StrictModel, read_yaml
 from elastocal.robot import ChainJoint, Robot
 from elastocal.units import parse_quantity
 
 _SCHEMA = "elastocal.springs/1"
-AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
-"""Axes of a joint's frame by the words that spring files have for them."""
 _ALIGNED = 1.0 - 1e-9
 """Cosine above which a joint axis counts as a coordinate axis."""
 _APART = 1e-3
@@ -53,12 +51,7 @@ def bearing(robot: Robot) -> tuple[Spring, ...]:
     ``[c_a; c_v]`` of Eq. 11. The virtual ones sit at the Hartenberg-Denavit origins
     (`elastocal.elastic.origins`), so that they do not depend on where a joint's frame is drawn.
     """
-    virtual = (
-        Hinge(f"{joint.name}.{name}", joint.name, axis, offset=origin.offset)
-        for joint, origin in zip(robot.chain.joints, joint_origins(robot.chain), strict=True)
-        for name, axis in origin.directions.items()
-    )
-    return (*actuated(robot), *virtual)
+    return (*actuated(robot), *_tilts(robot))
 
 
 def bearing_ends(robot: Robot) -> tuple[Spring, ...]:
@@ -69,17 +62,18 @@ def bearing_ends(robot: Robot) -> tuple[Spring, ...]:
     and one at the end where that with the axis behind does, share out what lies between. Where
     both ends are one place there is one pair of springs.
     """
-    virtual: list[Spring] = []
+    return (*actuated(robot), *_tilts(robot, both_ends=True))
+
+
+def _tilts(robot: Robot, both_ends: bool = False) -> Iterator[Spring]:
+    """Yield the virtual springs at Hartenberg-Denavit origins, and at the far ends if asked."""
     for joint, origin in zip(robot.chain.joints, joint_origins(robot.chain), strict=True):
         places = {"": origin.offset}
-        if np.linalg.norm(np.subtract(origin.far, origin.offset)) > _APART:
+        if both_ends and np.linalg.norm(np.subtract(origin.far, origin.offset)) > _APART:
             places["far-"] = origin.far
-        virtual += [
-            Hinge(f"{joint.name}.{end}{name}", joint.name, axis, offset=place)
-            for end, place in places.items()
-            for name, axis in origin.directions.items()
-        ]
-    return (*actuated(robot), *virtual)
+        for end, place in places.items():
+            for name, axis in origin.directions.items():
+                yield Hinge(f"{joint.name}.{end}{name}", joint.name, axis, offset=place)
 
 
 def bearing_joint(robot: Robot, distal: bool = False) -> tuple[Spring, ...]:
@@ -152,8 +146,17 @@ LAYOUTS: dict[str, Callable[[Robot], tuple[Spring, ...]]] = {
 """Layouts by name."""
 
 
-def layout(robot: Robot, name: str) -> tuple[Spring, ...]:
+def layout(robot: Robot, name: str, beside: Sequence[str] = ()) -> tuple[Spring, ...]:
     """Return the springs of a layout by name, or of a YAML file by its path.
+
+    Parameters
+    ----------
+    robot : Robot
+        The robot.
+    name : str
+        Name or path.
+    beside : sequence of str
+        Words that the caller takes as well, for the refusal of others.
 
     Raises
     ------
@@ -164,9 +167,10 @@ def layout(robot: Robot, name: str) -> tuple[Spring, ...]:
         return LAYOUTS[name](robot)
     path = Path(name)
     if path.suffix not in (".yaml", ".yml"):
+        known = list(dict.fromkeys((*beside, *LAYOUTS)))
         raise SpringError(
-            f"unknown spring layout {name!r}{nearest(name, LAYOUTS)}"
-            f" (allowed: {', '.join(LAYOUTS)}, or a .yaml file)"
+            f"unknown spring layout {name!r}{nearest(name, known)}"
+            f" (allowed: {', '.join(known)}, or a .yaml file)"
         )
     return tuple(spring for spring, _ in _springs_of(robot, read_springs(path)))
 

@@ -88,10 +88,9 @@ def _meeting(
     sine = float(np.linalg.norm(across))
     if sine > PARALLEL:
         # Where the plane of the previous axis and the common normal cuts the axis.
-        along = np.cross(previous, across) / sine**2 @ (point - start)
-        return point - along / float(np.cross(previous, across) / sine**2 @ axis) * axis, (
-            across / sine
-        )
+        off_plane = np.cross(previous, across)
+        travel = float(off_plane @ (point - start)) / float(off_plane @ axis)
+        return point - travel * axis, across / sine
     origin = _foot(start, axis, point)
     normal = origin - start
     distance = float(np.linalg.norm(normal))

@@ -10,13 +10,9 @@ from elastocal.arrays import FloatArray
 from elastocal.elastic import ElasticModel, check_vectors
 from elastocal.errors import SpringError
 from elastocal.identification.domain import CalibrationDomain
-from elastocal.identification.observability import (
-    Observability,
-)
+from elastocal.identification.observability import Observability
 from elastocal.identification.tool_change import ToolChange, change_tool
-from elastocal.identification.uncertainty import (
-    interval,
-)
+from elastocal.identification.uncertainty import interval
 from elastocal.results import brief_repr
 from elastocal.robot import Robot
 

@@ -19,10 +19,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.special import stdtrit
 
-from elastocal.arrays import BoolArray, FloatArray, IndexArray
+from elastocal.arrays import BoolArray, FloatArray
 from elastocal.dataset import Readings
 from elastocal.elastic import (
-    LAYOUTS,
     ElasticModel,
     Gear,
     Spring,
@@ -32,7 +31,7 @@ from elastocal.elastic import (
     layout,
     tensor,
 )
-from elastocal.errors import IdentificationError, SpringError, nearest
+from elastocal.errors import IdentificationError
 from elastocal.identification.displacement import reference_joints
 from elastocal.identification.options import FitOptions
 from elastocal.identification.problem import Problem, build
@@ -183,13 +182,7 @@ def choose_model(
     allowed = {AUTO: tuple(RUNGS), "gears": ("gears", "gears+friction")}.get(springs, (springs,))
     rungs = dict(RUNGS)
     if springs not in (AUTO, *RUNGS):
-        known = (AUTO, *RUNGS, *(name for name in LAYOUTS if name not in RUNGS))
-        if springs not in LAYOUTS and not springs.endswith((".yaml", ".yml")):
-            raise SpringError(
-                f"unknown spring layout {springs!r}{nearest(springs, known)}"
-                f" (allowed: {', '.join(known)}, or a .yaml file)"
-            )
-        asked = layout(robot, springs)
+        asked = layout(robot, springs, beside=(AUTO, *RUNGS))
         rungs[springs] = Rung(springs, lambda *_: asked)
     options = replace(options, prior=None)
     # Sought once, not for every rung.
@@ -253,17 +246,17 @@ def climb(
 
 def has_levels(readings: Readings) -> bool:
     """Return whether load cases of low load stand beside those of full load."""
-    low = _load_levels(readings) == 0
-    return bool(np.any(low) and not np.all(low))
+    # The largest force at a pose is never low beside itself.
+    return bool(np.any(_of_low_load(readings)))
 
 
-def _load_levels(readings: Readings) -> IndexArray:
-    """Return 0 for readings of low load, 1 for those of full load, shape (reading,)."""
+def _of_low_load(readings: Readings) -> BoolArray:
+    """Return whether each reading is of low load beside others at its pose, shape (reading,)."""
     force = np.linalg.norm(readings.force, axis=1)
     labels, pose = np.unique(readings.pose, return_inverse=True)
     largest = np.zeros(len(labels))
     np.maximum.at(largest, pose, force)
-    return np.asarray(force >= _LOW_LEVEL * largest[pose], dtype=np.intp)
+    return np.asarray(force < _LOW_LEVEL * largest[pose])
 
 
 def _tried(
@@ -277,9 +270,9 @@ def _tried(
     problem = build(model, readings, options, marker_offset)
     held_out = leave_poses_out(problem)
     error = held_out.error.copy()
-    low = _load_levels(readings) == 0
+    low = _of_low_load(readings)
     # The frame of a load case that is left out is not known, so it cannot be judged.
-    if has_levels(readings) and options.free_frame != "load_case":
+    if np.any(low) and options.free_frame != "load_case":
         error[low] = 0.5 * (error[low] + _left_out(problem, low))
     blocks, index = np.unique(problem.block, return_inverse=True)
     score = np.bincount(index, error, len(blocks)) / np.bincount(index, minlength=len(blocks))

@@ -22,6 +22,7 @@ from .kinds import (
     unit_of as unit_of,
 )
 from .spring import (
+    AXES as AXES,
     Angles as Angles,
     Characteristic as Characteristic,
     OneAxisSpring as OneAxisSpring,

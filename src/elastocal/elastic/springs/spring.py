@@ -15,6 +15,8 @@ from elastocal.records import record
 from elastocal.results import brief_repr
 from elastocal.robot import ChainJoint
 
+AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
+"""Axes of a joint's frame by the words that spring files have for them."""
 _UNIT_LENGTH = 1e-9
 """Largest error of the length of a unit vector."""
 

@@ -9,6 +9,7 @@ from elastocal.arrays import FloatArray
 from elastocal.elastic.springs.expression import Quantity
 from elastocal.elastic.springs.hinge import COMPLIANCE_SCALE, TORSIONAL
 from elastocal.elastic.springs.spring import (
+    AXES,
     Angles,
     Parameter,
     Spring,
@@ -18,7 +19,6 @@ from elastocal.elastic.springs.spring import (
 )
 from elastocal.records import record
 
-_AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 _ENTRIES = tuple(combinations_with_replacement(range(3), 2))
 """Row and column of the entries on and above the diagonal."""
 
@@ -48,13 +48,13 @@ class Tensor(Spring):
         """The coordinate axes of the joint frame."""
         return tuple(
             SpringAxis(f"{self.name}.{name}", self.joint, axis, offset=self.offset)
-            for name, axis in _AXES.items()
+            for name, axis in AXES.items()
         )
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
         """The entries on and above the diagonal, in rad/(N·m); those on it are not negative."""
-        names = "".join(_AXES)
+        names = "".join(AXES)
         return tuple(
             Parameter(
                 f"{self.name}.{names[i]}{names[j]}",
