@@ -57,5 +57,6 @@ from .statics import (
     EnergyState as EnergyState,
     EquilibriumError as EquilibriumError,
     LoadedMechanism as LoadedMechanism,
+    Reaction as Reaction,
     SpringBank as SpringBank,
 )

@@ -184,16 +184,39 @@ def axial_spring(linkage: Linkage, joint: int, stiffness: float) -> TruthSpring:
     return TruthSpring(name, axis, Linear(stiffness), linkage.revolute[joint])
 
 
-def tilt_springs(linkage: Linkage, joint: int, stiffness: FloatArray) -> list[TruthSpring]:
-    """Return the two tilts of a joint's bearing, of stiffness (2,) in N·m/rad.
+def tilt_springs(
+    linkage: Linkage, joint: int, stiffness: FloatArray, turn: float = 0.0, offset: float = 0.0
+) -> list[TruthSpring]:
+    """Return the two tilts of a joint's bearing.
 
     They turn about the coordinate axes orthogonal to the joint's (for a skew axis: the two least
-    aligned with it, made orthonormal to it).
+    aligned with it, made orthonormal to it), or about axes turned against those.
+
+    Parameters
+    ----------
+    linkage : Linkage
+        The rigid arm.
+    joint : int
+        Number of the joint.
+    stiffness : ndarray, shape (2,)
+        In N·m/rad.
+    turn : float
+        How far their axes are turned about the joint's, in rad.
+    offset : float
+        How far along the joint's axis from its origin they sit, in m.
     """
-    name = linkage.joint_names[joint]
+    name, axis = linkage.joint_names[joint], linkage.axis[joint]
+    first, second = _transverse_axes(axis)
+    if turn:
+        c, s = np.cos(turn), np.sin(turn)
+        first, second = (
+            c * first + s * np.cross(axis, first),
+            c * second + s * np.cross(axis, second),
+        )
+    at = as_triple(offset * axis)
     return [
-        TruthSpring(name, as_triple(direction), Linear(float(k)))
-        for direction, k in zip(_transverse_axes(linkage.axis[joint]), stiffness, strict=True)
+        TruthSpring(name, as_triple(direction), Linear(float(k)), at=at)
+        for direction, k in zip((first, second), stiffness, strict=True)
     ]
 
 
