@@ -82,11 +82,12 @@ def test_k1_over_k3_is_what_the_growth_says(preset, share):
     np.testing.assert_allclose(far / k3, 1.0, rtol=1e-4)
 
 
-class TestFrictionAfterAFreeMove:
-    simulation = {"preset": "typical", "gears": {"residual": 1.0}}
+LEFT = {"preset": "typical", "gears": {"residual": 1.0}}
 
+
+class TestFrictionAfterAFreeMove:
     def test_it_is_another_one_in_every_visit(self):
-        still, q = statics(**self.simulation), places()[0].q
+        still, q = statics(**LEFT), places()[0].q
         at = [
             still.visited(VisitChance.of(0, key)).free(q, np.zeros(3), None).theta
             for key in ("a", "b", "a")
@@ -97,14 +98,14 @@ class TestFrictionAfterAFreeMove:
 
     def test_the_strains_are_still_there_when_the_robot_is_at_rest(self):
         chance = VisitChance.of(0, "a")
-        still = statics(**self.simulation).visited(chance)
+        still = statics(**LEFT).visited(chance)
         state = still.free(places()[0].q, np.zeros(3), None)
         gears = state.springs.gears
         left = state.theta[gears.which, None] - state.springs.slider
         np.testing.assert_allclose(left, gears.strain(chance.stroke), atol=1e-15)
 
     def test_a_robot_with_them_stays_where_it_is_without_force(self):
-        still = statics(**self.simulation).visited(VisitChance.of(0, "a"))
+        still = statics(**LEFT).visited(VisitChance.of(0, "a"))
         q = places()[0].q
         free = still.free(q, np.zeros(3), None)
         again = still.loaded(free, q, np.zeros(3), np.zeros(3))
@@ -113,7 +114,7 @@ class TestFrictionAfterAFreeMove:
     def test_they_change_a_deflection_by_no_more_than_the_lost_motion_can(self):
         q, moved = places()[0].q, []
         for key in "abcdef":
-            still = statics(**self.simulation).visited(VisitChance.of(0, key))
+            still = statics(**LEFT).visited(VisitChance.of(0, key))
             free = still.free(q, np.zeros(3), None)
             force = still.robot.forward(q)[:3, :3] @ FORCE
             moved.append((still.loaded(free, q, force, np.zeros(3)).twist - free.twist)[:3])
@@ -370,12 +371,8 @@ def test_every_figure_of_a_preset_arrives(preset):
     simulation = Simulation(preset=preset)
     for figure in PRESET_FIGURES:
         section, name = figure.key.split(".")
-        again = Simulation.model_validate(
-            {"preset": "kind", section: {name: figure.of(preset)}}
-        )
-        assert getattr(getattr(simulation, section), name) == getattr(
-            getattr(again, section), name
-        )
+        again = Simulation.model_validate({"preset": "kind", section: {name: figure.of(preset)}})
+        assert getattr(getattr(simulation, section), name) == getattr(getattr(again, section), name)
 
 
 def test_a_figure_of_the_file_wins_over_the_preset():

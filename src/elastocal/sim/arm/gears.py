@@ -39,6 +39,7 @@ import numpy as np
 
 from elastocal.arrays import FloatArray, IndexArray
 from elastocal.cell import Gears
+from elastocal.errors import SpringError
 from elastocal.results import brief_repr
 from elastocal.sim.arm.springs import SpringResponse
 
@@ -114,6 +115,28 @@ class BalancerSpring:
             self.rate * stretch * slope,
             self.rate * (slope**2 + stretch * bend),
         )
+
+
+@dataclass(frozen=True)
+class StiffeningGear:
+    """The law of the module without backlash and friction, as a torque law of a single spring."""
+
+    k: float
+    """Stiffness at rest, makers' K1, in N·m/rad."""
+    growth: float
+    """1 - K1/K3: what is missing at rest, over the stiffness at high torque."""
+    angle: float
+    """Twist at which it is half way between the two, in rad."""
+
+    def __post_init__(self) -> None:
+        if not (0.0 < self.k < np.inf and 0.0 <= self.growth < 1.0 and 0.0 < self.angle < np.inf):
+            raise SpringError(f"{self} must have k, angle above 0 and growth from 0 to below 1")
+
+    def evaluate(self, angle: FloatArray) -> SpringResponse:
+        """Return energy, torque and stiffness."""
+        high = self.k / (1.0 - self.growth)
+        energy, torque, stiffness = _softening(angle, np.array(high - self.k), np.array(self.angle))
+        return 0.5 * high * angle**2 - energy, high * angle - torque, high - stiffness
 
 
 @brief_repr

@@ -13,7 +13,7 @@ import numpy as np
 from elastocal.arrays import FloatArray
 from elastocal.cell import Geometry
 from elastocal.results import brief_repr
-from elastocal.sim.arm import Linkage, motions
+from elastocal.sim.arm import Linkage, Screws, motions
 from elastocal.sim.workcell._timeline import generator
 
 DRAWS = 64
@@ -89,32 +89,38 @@ def built(linkage: Linkage, entry: Geometry, external: int, seed: int) -> Linkag
 class Growth:
     """An arm that grows evenly away from its foot as it warms up."""
 
-    linkage: Linkage
-    external: int
-    """Number of joints before the arm."""
+    screws: Screws
+    """Axes before the arm."""
+    foot: FloatArray
+    """Where axis 1 is with those axes at zero, shape (4,): a point, and 1."""
     share: float
     """Growth when warm, over length."""
 
     @classmethod
-    def of(cls, linkage: Linkage, external: int, drift: float, home: FloatArray) -> "Growth":
-        """Return the growth that moves the tool by so much, in m, at HOME."""
-        growth = cls(linkage, external, 1.0)
-        return replace(growth, share=drift / float(np.linalg.norm(growth.shift(home))))
+    def of(
+        cls, screws: Screws, external: int, drift: float, home: FloatArray, tool: FloatArray
+    ) -> "Growth":
+        """Return the growth that moves the tool (3,) by so much, in m, at HOME (joint,)."""
+        before = Screws(*(each[:external] for each in (screws.axis, screws.point, screws.revolute)))
+        growth = cls(before, np.append(screws.point[external], 1.0), 1.0)
+        return replace(growth, share=drift / float(np.linalg.norm(growth.shift(home, tool))))
 
-    def shift(self, q: FloatArray) -> FloatArray:
+    def shift(self, q: FloatArray, tool: FloatArray) -> FloatArray:
         """Return how far the tool of a warm arm is from that of a cold one, shape (..., 3), in m.
 
         Parameters
         ----------
         q : ndarray, shape (..., joint)
             In rad or m.
+        tool : ndarray, shape (..., 3)
+            Tool centre point there, in base, in m.
         """
-        flat = q.reshape(-1, q.shape[-1])
-        total = motions(self.linkage.screws, flat)
-        foot = total[self.external] @ np.append(self.linkage.screws.point[self.external], 1.0)
-        tool = (total[-1] @ self.linkage.T_base_tip)[:, :3, 3]
-        shift: FloatArray = self.share * (tool - foot[:, :3])
-        return shift.reshape(*q.shape[:-1], 3)
+        count = len(self.screws.axis)
+        if count == 0:
+            return self.share * (tool - self.foot[:3])
+        total = motions(self.screws, q.reshape(-1, q.shape[-1])[:, :count])[-1]
+        foot: FloatArray = (total @ self.foot)[:, :3].reshape(tool.shape)
+        return self.share * (tool - foot)
 
 
 @dataclass(frozen=True)

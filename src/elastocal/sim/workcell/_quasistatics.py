@@ -47,7 +47,10 @@ class Quasistatics:
         marker = np.zeros(3) if cell.file.marker is None else cell.file.marker.position_tcp
         simulation = cell.file.simulation
         drift, external = simulation.thermal.drift, robot.external
-        growth = Growth.of(robot.linkage, external, drift, cell.home) if drift > 0.0 else None
+        growth = None
+        if drift > 0.0:
+            tool = robot.forward(cell.home)[:3, 3]
+            growth = Growth.of(robot.linkage.screws, external, drift, cell.home, tool)
         # The tool's own error is the last of those that add up to that of the tip.
         ends = [linkage.T_base_tip[:3, 3] - linkage.T_base_joint[-1, :3, 3]
                 for linkage in (robot.built, robot.linkage)]  # fmt: skip
@@ -71,7 +74,7 @@ class Quasistatics:
 
     def twist(self, q: FloatArray, rest: RobotEquilibrium) -> FloatArray:
         """Return the deviation of a resting robot from the same one undeformed, shape (..., 9)."""
-        T = self.robot.built.forward(q)
+        _, T = self.robot.undeformed(q)
         R_sensor = T[..., :3, :3] @ self.robot.T_tcp_sensor[:3, :3]
         turns = np.stack(
             [
@@ -102,10 +105,12 @@ class Quasistatics:
         robot, off = self.robot, None
         if robot.built is not robot.linkage:
             off = np.zeros((*q.shape[:-1], 9))
-            off[..., :3] = (robot.built.forward(q) - robot.forward(q))[..., :3, 3]
+            described, real = robot.undeformed(q)
+            off[..., :3] = (real - described)[..., :3, 3]
         if self.growth is not None:
             off = np.zeros((*q.shape[:-1], 9)) if off is None else off
-            off[..., :3] += self.warmth[..., None] * self.growth.shift(q)
+            tool = robot.forward(q)[..., :3, 3]
+            off[..., :3] += self.warmth[..., None] * self.growth.shift(q, tool)
         return off
 
     def free(self, q: FloatArray, stop_error: FloatArray, start: FloatArray | None) -> RobotState:

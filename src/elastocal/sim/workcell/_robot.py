@@ -102,6 +102,9 @@ class TrueRobot:
     _points: FloatArray = field(init=False, repr=False)
     _after: IndexArray = field(init=False, repr=False)
     _weights: FloatArray = field(init=False, repr=False)
+    _recent: dict[tuple[tuple[int, ...], bytes], tuple[FloatArray, FloatArray]] = field(
+        init=False, repr=False, default_factory=dict
+    )
 
     def __post_init__(self) -> None:
         linkage, ends = self.built, self.chain.ends
@@ -153,7 +156,20 @@ class TrueRobot:
         q : ndarray, shape (..., joint)
             In rad or m.
         """
-        return self.linkage.forward(q)
+        return self.undeformed(q)[0]
+
+    def undeformed(self, q: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return T_base_tcp of the undeformed robot as described and as built, (..., 4, 4) each.
+
+        One posture is asked for again and again; the last one is remembered.
+        """
+        key = (q.shape, q.tobytes())
+        if key not in self._recent:
+            T = self.linkage.forward(q)
+            exact = self.built is self.linkage
+            self._recent.clear()
+            self._recent[key] = (T, T if exact else self.built.forward(q))
+        return self._recent[key]
 
     def solve(self, T_base_tcp: FloatArray, start: FloatArray) -> InverseResult:
         """Return joints that bring the undeformed tool to poses, external axes where they start.

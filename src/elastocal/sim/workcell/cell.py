@@ -218,13 +218,13 @@ class ProcessCell:
     ) -> RobotState:
         """Return the robot at rest with a process whose force depends on where the tool is."""
         statics, robot = self._statics, self._statics.robot
-        T, outward = robot.forward(q), -robot.forward(q)[:3, 2]
+        T, real = robot.undeformed(q)
+        outward = -T[:3, 2]
         # The tool is where the springs have it, and beside that by what the controller knows
         # (a part of the sag) and what no spring makes; the rest of the way is the springs'.
         bare = statics.deviation(q, np.zeros(9)) - statics.compensation * state.sag
         unsprung = T[:3, 3] + bare[:3] + self._stop
-        at = robot.built.forward(q)[:3, 3]
-        reference = at + path_base - unsprung
+        reference = real[:3, 3] + path_base - unsprung
         lever = np.zeros(3) if attack is None else T[:3, :3] @ attack
         reaction = Reaction(outward[None], self._stiffness, (reference + lever)[None])
         rest = robot.rest(q, force_base, state.springs, state.theta, attack, reaction)
