@@ -101,7 +101,7 @@ class Growth:
         cls, screws: Screws, external: int, drift: float, home: FloatArray, tool: FloatArray
     ) -> "Growth":
         """Return the growth that moves the tool (3,) by so much, in m, at HOME (joint,)."""
-        before = Screws(*(each[:external] for each in (screws.axis, screws.point, screws.revolute)))
+        before = Screws(screws.axis[:external], screws.point[:external], screws.revolute[:external])
         growth = cls(before, np.append(screws.point[external], 1.0), 1.0)
         return replace(growth, share=drift / float(np.linalg.norm(growth.shift(home, tool))))
 
@@ -131,6 +131,13 @@ class ForceGain:
     """Per force at the tool centre point as described, shape (3, 3)."""
     moment: FloatArray
     """Per moment about that point, shape (3, 3), in N per N·m."""
+
+    def beside(self, lever: FloatArray) -> FloatArray:
+        """Return the gain (3, 3) for a force that acts so far (3,) from that point, in m."""
+        if not np.any(lever):
+            return self.force
+        gain: FloatArray = self.force + self.moment @ np.cross(lever, np.eye(3)).T
+        return gain
 
 
 class SensorHysteresis:

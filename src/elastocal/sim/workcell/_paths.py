@@ -378,10 +378,8 @@ class ForceControl:
         plant, statics = self._plant, self._plant.statics
         R_sensor_tcp = statics.robot.T_tcp_sensor[:3, :3].T
         wanted_sensor = R_sensor_tcp @ self._wanted
-        gain, attack = self._gain.force, contact.law.attack(self._wanted, contact.chance)
-        if attack is not None or np.any(statics.tcp_error):
-            beside = statics.tcp_error + (0.0 if attack is None else attack)
-            gain = gain + self._gain.moment @ np.cross(R_sensor_tcp @ beside, np.eye(3)).T
+        attack = contact.law.attack(self._wanted, contact.chance)
+        gain = self._gain.beside(R_sensor_tcp @ statics.lever(attack))
         # The sensor turns with the arm, so that it sees another part of the weight than before.
         felt = np.linalg.solve(gain, wanted_sensor) + self._R_zeroed.T @ statics.weight
 

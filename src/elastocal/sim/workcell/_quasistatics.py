@@ -173,7 +173,7 @@ class Quasistatics:
     ) -> RobotState:
         """Return the state of a robot at rest under a force; see `loaded`."""
         twist = self._left(self.deviation(q, self.twist(q, rest)), state.sag, error)
-        lever = self.tcp_error if attack_tcp is None else self.tcp_error + attack_tcp
+        lever = self.lever(attack_tcp)
         moment = np.zeros_like(force)
         if np.any(lever):
             R = self.robot.forward(q)[..., :3, :3]
@@ -182,6 +182,10 @@ class Quasistatics:
             state, q=q, twist=twist, force=force, moment=moment, springs=rest.springs,
             theta=rest.theta,
         )  # fmt: skip
+
+    def lever(self, attack_tcp: FloatArray | None) -> FloatArray:
+        """Return where a force acts from where the controller believes the tool, (..., 3), in m."""
+        return self.tcp_error if attack_tcp is None else self.tcp_error + attack_tcp
 
     def R_base_sensor(self, q: FloatArray, twist: FloatArray) -> FloatArray:
         """Return the true orientation of the sensor, shape (..., 3, 3)."""
