@@ -86,6 +86,35 @@ def test_load_cases_are_broadcast_over_a_pose(model):
     np.testing.assert_allclose(model.observation_blocks(repeated, cases), together, rtol=1e-13)
 
 
+def test_the_cartesian_compliance_of_hinges_is_the_papers_sum(model):
+    """``J diag(c) J^T`` and likewise (paper Eq. 10), whatever the load."""
+    found = model.cartesian_compliance(C, Q, FORCE, MOMENT)
+    J, W = model.spring_jacobian(Q).translation, model.spring_jacobian(Q).rotation
+    for part, left, right in (
+        (found.translation, J, J),
+        (found.rotation, W, W),
+        (found.coupling, J, W),
+    ):
+        np.testing.assert_allclose(part, (left * C) @ np.swapaxes(right, 1, 2), atol=1e-18)
+
+
+@pytest.mark.parametrize(
+    "name", ["force", "moment", "marker_offset", "direction", "force of a compliance"]
+)
+@pytest.mark.parametrize(
+    ("value", "message"),
+    [([0.0, np.nan, 0.0], "not finite"), ([1.0, 2.0], r"shape \(2,\).*x, y, z")],
+)
+def test_vectors_that_are_none_are_refused_by_name(model, name, value, message):
+    with pytest.raises(SpringError, match=rf"^{name.split()[0]} .*{message}"):
+        if name == "direction":
+            model.directional_rows(Q, value)
+        elif name == "force of a compliance":
+            model.cartesian_compliance(C, Q, value)
+        else:
+            model.observation_blocks(Q, **({"force": FORCE} | {name: value}))
+
+
 def test_a_marker_at_the_tcp_gives_the_rows_of_the_tcp(model):
     expected = model.observation_blocks(Q, FORCE, MOMENT)
     for offset in (None, np.zeros(3)):
