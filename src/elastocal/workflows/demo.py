@@ -225,7 +225,7 @@ def chapters(kind: str, out: Path, seed: int) -> tuple[Chapter, ...]:
         ("did the search help", "search", "cover,ioops"),
     )
     return (
-        _chapter("describe the cell", init, out, like=kind, force=True),
+        _chapter("describe the cell", init, out, kind=kind, force=True),
         _chapter("plan the poses", plan, cell, out=planned),
         _chapter("measure", run, cell, plan=planned, out=run_folder, seed=seed),
         _chapter("identify the springs", calibrate, data, out=model),
@@ -251,7 +251,7 @@ def chapters(kind: str, out: Path, seed: int) -> tuple[Chapter, ...]:
             path=process / "path.csv",
             out=out / "corrected.csv",
         ),
-        _chapter("write C for the robot", export, model, tool=weights, c=out / "c"),
+        _chapter("write C for the robot", export, model, tool=weights, out=out / "c"),
         _chapter("report", report, out, out=out / "report.html"),
     )
 
