@@ -3,6 +3,13 @@ from ._least_squares import (
     RANK_TOLERANCE as RANK_TOLERANCE,
     rank as rank,
 )
+from .budget import (
+    ErrorBudget as ErrorBudget,
+    ErrorPart as ErrorPart,
+    TermName as TermName,
+    TermWorth as TermWorth,
+    error_budget as error_budget,
+)
 from .calibrated import (
     CalibratedModel as CalibratedModel,
     Prediction as Prediction,
