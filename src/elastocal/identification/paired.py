@@ -23,6 +23,7 @@ from scipy.special import stdtrit
 
 from elastocal.arrays import BoolArray, FloatArray, IndexArray
 from elastocal.identification.uncertainty import CONFIDENCE
+from elastocal.results import brief_repr
 
 _TAIL = 0.5 * (1.0 + CONFIDENCE)
 _ALL = 1.0 - 1e-9
@@ -86,6 +87,7 @@ class Overlap:
         return float(stdtrit(self.sets - 1, _TAIL))
 
 
+@brief_repr
 @dataclass(frozen=True, eq=False)
 class MeanOverSets:
     """A mean over verification sets with its 95 % interval; NaN ends: no spread is known."""
@@ -131,6 +133,7 @@ def paired_difference(errors_a: FloatArray, errors_b: FloatArray, overlap: Overl
     return corrected_mean(np.where(round_off, 0.0, difference), overlap)
 
 
+@brief_repr
 @dataclass(frozen=True, eq=False)
 class Judgement:
     """Models from simple to rich, judged by their errors on the same held-out sets."""
