@@ -7,6 +7,8 @@ from elastocal.robot import Jacobian, Robot
 from elastocal.sim.arm import (
     Linkage,
 )
+from support.cells import linkage
+from support.geared import heavy_robot
 from support.problems import elastic
 from support.virtual_chain import ARMS, configurations, numerical_column
 
@@ -84,6 +86,48 @@ def test_load_cases_are_broadcast_over_a_pose(model):
     np.testing.assert_array_equal(model.observation_blocks(Q[0], cases[0]), together[0])
     repeated = np.repeat(Q[:, None], 5, axis=1)
     np.testing.assert_allclose(model.observation_blocks(repeated, cases), together, rtol=1e-13)
+
+
+def test_the_cartesian_compliance_of_hinges_is_the_papers_sum(model):
+    """``J diag(c) J^T`` and likewise (paper Eq. 10), whatever the load."""
+    found = model.cartesian_compliance(C, Q, FORCE, MOMENT)
+    J, W = model.spring_jacobian(Q).translation, model.spring_jacobian(Q).rotation
+    for part, left, right in (
+        (found.translation, J, J),
+        (found.rotation, W, W),
+        (found.coupling, J, W),
+    ):
+        np.testing.assert_allclose(part, (left * C) @ np.swapaxes(right, 1, 2), atol=1e-18)
+
+
+NAMED = {
+    "force": lambda model, value: model.observation_blocks(Q, value),
+    "moment": lambda model, value: model.observation_blocks(Q, FORCE, value),
+    "marker_offset": lambda model, value: model.observation_blocks(Q, FORCE, None, value),
+    "direction": lambda model, value: model.directional_rows(Q, value),
+    "force ": lambda model, value: model.cartesian_compliance(C, Q, value),
+}
+
+
+@pytest.mark.parametrize("name", NAMED)
+@pytest.mark.parametrize(
+    ("value", "message"),
+    [([0.0, np.nan, 0.0], "not finite"), ([1.0, 2.0], r"shape \(2,\).*x, y, z")],
+)
+def test_vectors_that_are_none_are_refused_by_name(model, name, value, message):
+    with pytest.raises(SpringError, match=rf"^{name.strip()} .*{message}"):
+        NAMED[name](model, value)
+
+
+def test_the_sag_of_a_marker_is_that_of_its_own_point():
+    robot = heavy_robot()
+    heavy = ElasticModel(robot, layout(robot, "bearing"))
+    offset = np.array([0.1, -0.05, 0.3])
+    rows = heavy.sag_blocks(Q, offset)
+    for q, torque, row in zip(Q, heavy.weight_torques(Q), rows, strict=True):
+        moved = [numerical_column(linkage(), q, spring, offset)[0] for spring in heavy.springs]
+        expected = np.transpose(moved) * torque
+        np.testing.assert_allclose(row, expected, rtol=1e-6, atol=1e-6 * np.abs(expected).max())
 
 
 def test_a_marker_at_the_tcp_gives_the_rows_of_the_tcp(model):

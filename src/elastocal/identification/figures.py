@@ -11,6 +11,7 @@ import numpy as np
 from elastocal.arrays import BoolArray, FloatArray
 from elastocal.dataset import Readings
 from elastocal.elastic import KnownSpring, Spring
+from elastocal.identification.budget import ErrorBudget
 from elastocal.identification.calibrated import CalibratedModel
 from elastocal.identification.calibration import Calibration
 from elastocal.identification.frames import FrameSummary
@@ -167,6 +168,8 @@ class CalibrationSummary:
     """Number of springs; none in calibrations before springs of several parameters."""
     known: tuple[KnownSpring, ...] = ()
     """What the spring file knew of springs beforehand."""
+    budget: ErrorBudget | None = None
+    """What the error at left-out poses is made of, where it was asked for."""
 
     @property
     def unexplained(self) -> float:
