@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, fields, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -181,7 +181,7 @@ def usable_readings(dataset: "Dataset", joint_names: Sequence[str]) -> Readings:
         )
     order = [dataset.joint_names.index(name) for name in wanted]
     pose, case = np.nonzero(dataset.usable)
-    flat: dict[str, Any] = {}
+    flat: dict[str, np.ndarray] = {}
     for variable in VARIABLES:
         values = dataset.arrays.get(variable.name)
         if values is not None and variable != LINK_JOINT_POSITION:

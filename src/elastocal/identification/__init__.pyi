@@ -6,11 +6,14 @@ from ._least_squares import (
 from .calibrated import (
     CalibratedModel as CalibratedModel,
     Prediction as Prediction,
+    ToolChange as ToolChange,
+    change_tool as change_tool,
     check_rows as check_rows,
 )
 from .calibration import (
     Calibration as Calibration,
     calibrate as calibrate,
+    with_knowledge as with_knowledge,
 )
 from .conventions import (
     POOR_FIT as POOR_FIT,
@@ -48,7 +51,6 @@ from .frames import (
     frame_columns as frame_columns,
     frame_summaries as frame_summaries,
 )
-from .knowledge import with_knowledge as with_knowledge
 from .ladder import (
     AUTO as AUTO,
     RUNGS as RUNGS,
@@ -127,7 +129,6 @@ from .suspicious import (
     leverage as leverage,
     screen as screen,
 )
-from .tool_change import ToolChange as ToolChange, change_tool as change_tool
 from .uncertainty import (
     CONFIDENCE as CONFIDENCE,
     MOST_FOLDS as MOST_FOLDS,
