@@ -106,6 +106,8 @@ NAMED = {
     "marker_offset": lambda model, value: model.observation_blocks(Q, FORCE, None, value),
     "direction": lambda model, value: model.directional_rows(Q, value),
     "force ": lambda model, value: model.cartesian_compliance(C, Q, value),
+    "moment ": lambda model, value: model.cartesian_compliance(C, Q, FORCE, value),
+    "moment  ": lambda model, value: model.load_torques(Q, FORCE, value),
 }
 
 
