@@ -14,8 +14,8 @@ from elastocal.compensation.kernel import (
     observation_block,
     python_text,
     rest,
+    statement_uses,
 )
-from elastocal.compensation.kernel.program import statement_uses
 from elastocal.elastic import ElasticModel, Gear, bearing
 from elastocal.robot import Robot
 from support.geared import SLIPS, geared, heavy_robot
