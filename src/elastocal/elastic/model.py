@@ -273,8 +273,7 @@ class ElasticModel:
         J, W = jacobian.translation, jacobian.rotation
         torques = spring_torques(jacobian, force, moment)
         weights = self.weight_torques(q) if self.bears_weight else None
-        shape = (*torques.shape[:-1], 3, 3)
-        translation, rotation, coupling = np.zeros(shape), np.zeros(shape), np.zeros(shape)
+        translation, rotation, coupling = np.zeros((3, *torques.shape[:-1], 3, 3))
         for group in self._groups:
             tangents = group.law.tangents(group.load(torques, weights))
             # A spring of several axes couples them: all pairs, of which a hinge has one.
@@ -395,9 +394,7 @@ def spring_torques(
     SpringError
         If force or moment has another shape or is not finite.
     """
-    f = check_vectors("force", force)
-    torques: FloatArray = (f[..., None, :] @ jacobian.translation)[..., 0, :]
+    torques = check_vectors("force", force)[..., None, :] @ jacobian.translation
     if moment is not None:
-        m = check_vectors("moment", moment)
-        torques = torques + (m[..., None, :] @ jacobian.rotation)[..., 0, :]
-    return torques
+        torques = torques + check_vectors("moment", moment)[..., None, :] @ jacobian.rotation
+    return np.asarray(torques[..., 0, :])
