@@ -45,9 +45,8 @@ def joint_path(statics: Quasistatics, start: RobotState, end: RobotState) -> Rob
     """Return the straight path in joint space; the small deviations change evenly."""
     progress = np.linspace(0.0, 1.0, _STEPS + 1)
     q = _between(start.q, end.q, progress)
-    twist = _between(start.twist, end.twist, progress)
-    nothing = np.zeros((len(q), 3))
-    return RobotPath(statics.knots(progress, q, twist, nothing, nothing), start, end)
+    twist, none = _between(start.twist, end.twist, progress), np.zeros((len(q), 3))
+    return RobotPath(statics.knots(progress, q, twist, none, none), start, end)
 
 
 def straight_path(statics: Quasistatics, states: list[RobotState]) -> RobotPath:
@@ -65,10 +64,8 @@ def straight_path(statics: Quasistatics, states: list[RobotState]) -> RobotPath:
     at = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(T[:, :3, 3], axis=0), axis=1))])
     at = at / at[-1] if at[-1] > 0.0 else np.linspace(0.0, 1.0, len(states))
     fine = np.unique(np.concatenate([at, np.linspace(0.0, 1.0, _STEPS + 1)]))
-    columns = (
-        np.stack([getattr(state, name) for state in states])
-        for name in ("twist", "force", "moment", "q")
-    )
+    names = ("twist", "force", "moment", "q")
+    columns = (np.stack([getattr(state, name) for state in states]) for name in names)
     twist, force, moment, coarse = (_interpolated(at, column, fine) for column in columns)
     points = _interpolated(at, T[:, :3, 3], fine)
     q = statics.along(states[0].q, T[0, :3, :3], points[1:-1])
@@ -168,8 +165,7 @@ def retract_path(
     if fades > distance:
         left = (1.0 - distance / fades) * start.force
         q = _moved(plant, start, distance * direction, error).q
-        attack = None if contact is None else contact.attack(left)
-        end = statics.loaded(start, q, left, error, attack)
+        end = statics.loaded(start, q, left, error, contact and contact.attack(left))
         return straight_path(statics, [start, end]), contact
     states = [start]
     if fades > 0.0:
