@@ -165,7 +165,7 @@ def retract_path(
     if fades > distance:
         left = (1.0 - distance / fades) * start.force
         q = _moved(plant, start, distance * direction, error).q
-        end = statics.loaded(start, q, left, error, contact and contact.attack(left))
+        end = statics.loaded(start, q, left, error, contact.attack(left) if contact else None)
         return straight_path(statics, [start, end]), contact
     states = [start]
     if fades > 0.0:
