@@ -100,3 +100,18 @@ def test_a_conditioning_press_that_slipped_still_conditions():
     part = replace(whole.take(kept), also_pressed=presses)
     # The zero is solved or recorded once a pose, so that no reading is needed to know it.
     np.testing.assert_allclose(displacement_blocks(model, part), rows[kept], rtol=0, atol=1e-18)
+
+
+def test_the_chain_is_evaluated_once_for_the_loaded_and_once_for_the_reference_joints(monkeypatch):
+    model, seen = with_friction(), readings()
+    evaluated = []
+    for name in ("spring_jacobian", "weight_torques"):
+        method = getattr(ElasticModel, name)
+
+        def counted(self, q, name=name, method=method):
+            evaluated.append(name)
+            return method(self, q)
+
+        monkeypatch.setattr(ElasticModel, name, counted)
+    displacement_blocks(model, seen, [0.0, 0.0, 0.1])
+    assert sorted(evaluated) == ["spring_jacobian"] * 2 + ["weight_torques"] * 2

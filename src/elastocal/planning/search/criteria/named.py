@@ -5,11 +5,17 @@ A new criterion is one file here, an entry in `CRITERIA`, a changelog line, and 
 """
 
 from elastocal.errors import PlanningError, nearest
-from elastocal.planning.search.criteria.a_optimal import AOptimal
 from elastocal.planning.search.criteria.criterion import Criterion
-from elastocal.planning.search.criteria.d_optimal import DOptimal
-from elastocal.planning.search.criteria.i_optimal import IOptimal
-from elastocal.planning.search.criteria.observability import O2, O3, O4, O5, EOptimal
+from elastocal.planning.search.criteria.observability import (
+    O2,
+    O3,
+    O4,
+    O5,
+    AOptimal,
+    DOptimal,
+    EOptimal,
+    IOptimal,
+)
 
 CRITERIA: dict[str, type[Criterion]] = {
     criterion.name: criterion
