@@ -148,7 +148,8 @@ def error_budget(
     readings : Readings
         Measurements, joints in the robot's order.
     options : FitOptions, optional
-        Bounds, weights, loss, free frames; a prior has no part in it.
+        Bounds, weights, loss, free frames. What is known of single springs (a prior, a bound for
+        each) speaks of one model and has no part in it, as in the ladder.
     marker_offset : array_like, shape (3,), optional
         Marker in the tcp frame, in m.
 
@@ -157,7 +158,7 @@ def error_budget(
     IdentificationError
         If there are too few poses.
     """
-    options = replace(options or FitOptions(), prior=None)
+    options = _for_any_model(options or FitOptions())
     # Sought once, not for every model.
     sought = reference_joints(model.robot, readings)
     readings = replace(readings, reference_joint_position=sought)
@@ -183,6 +184,13 @@ def error_budget(
         readings=len(readings),
         poses=len(squares),
     )
+
+
+def _for_any_model(options: FitOptions) -> FitOptions:
+    """Return the options without what speaks of single parameters."""
+    lower = 0.0 if np.ndim(options.lower) else options.lower
+    upper = np.inf if np.ndim(options.upper) else options.upper
+    return replace(options, prior=None, lower=lower, upper=upper)
 
 
 @dataclass(frozen=True, eq=False)
