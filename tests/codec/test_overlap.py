@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 from scipy.stats import t
 
-from elastocal.codec._overlap import Overlap, corrected_mean, median_draws
+from elastocal.codec import median_draws
+from elastocal.identification import Overlap, corrected_mean
 
 
 def rng() -> np.random.Generator:

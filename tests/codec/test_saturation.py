@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from elastocal.codec import Tolerance, find_saturation
-from elastocal.codec._overlap import Overlap
 from elastocal.errors import CodecError
+from elastocal.identification import Overlap
 
 CURVE = np.array([900.0, 400.0, 200.0, 110.0, 104.0, 101.0, 100.0, 100.0]) * 1e-6
 

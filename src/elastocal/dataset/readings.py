@@ -43,6 +43,17 @@ class Presses:
     moment: FloatArray | None = None
     """Moment on the robot at the TCP in base, shape (press, 3), in N·m; None: not measured."""
 
+    def with_others(self, others: "Presses") -> "Presses":
+        """Return these presses and others of the same campaign."""
+        moments = [each.moment for each in (self, others) if each.moment is not None]
+        return Presses(
+            np.concatenate([self.pose, others.pose]),
+            np.concatenate([self.sequence, others.sequence]),
+            np.concatenate([self.joint_position, others.joint_position]),
+            np.concatenate([self.force, others.force]),
+            np.concatenate(moments) if moments else None,
+        )
+
 
 @brief_repr
 @dataclass(frozen=True, eq=False)
@@ -152,6 +163,29 @@ class Readings:
             campaign=None if self.campaign is None else self.campaign[rows],
             **numbers,
         )
+
+    def set_aside(self, index: ArrayLike) -> "Readings":
+        """Return the readings without some that were pressed all the same: friction remembers.
+
+        Parameters
+        ----------
+        index : array_like of bool, shape (reading,)
+            Those to set aside.
+        """
+        aside = np.asarray(index, dtype=bool)
+        if not np.any(aside):
+            return self
+        order = np.arange(len(self)) if self.sequence is None else self.sequence
+        pressed = Presses(
+            self.pose[aside],
+            order[aside],
+            self.joint_position[aside],
+            self.force[aside],
+            None if self.moment is None else self.moment[aside],
+        )
+        if self.also_pressed is not None:
+            pressed = self.also_pressed.with_others(pressed)
+        return replace(replace(self, sequence=order).take(~aside), also_pressed=pressed)
 
     def _numbers(self) -> Iterator[tuple[str, FloatArray]]:
         for field in fields(self):

@@ -48,6 +48,8 @@ from .figures import (
     RungSummary as RungSummary,
     SpringSummary as SpringSummary,
     SuspiciousReading as SuspiciousReading,
+    ladder_sentence as ladder_sentence,
+    rung_summary as rung_summary,
     spring_summaries as spring_summaries,
     summary as summary,
 )
@@ -64,10 +66,16 @@ from .ladder import (
     Choice as Choice,
     Climbed as Climbed,
     Rung as Rung,
+    allowed_rungs as allowed_rungs,
     choose_model as choose_model,
     climb as climb,
     gears as gears,
     has_levels as has_levels,
+    low_loads as low_loads,
+    rung_of as rung_of,
+    take_simplest as take_simplest,
+    try_rung as try_rung,
+    usable_for_choice as usable_for_choice,
 )
 from .model_file import (
     CalibrateResult as CalibrateResult,
@@ -101,6 +109,14 @@ from .options import (
     huber as huber,
     linear as linear,
     parse_bounds as parse_bounds,
+)
+from .paired import (
+    Judgement as Judgement,
+    MeanOverSets as MeanOverSets,
+    Overlap as Overlap,
+    corrected_mean as corrected_mean,
+    judge_models as judge_models,
+    paired_difference as paired_difference,
 )
 from .problem import (
     MINIMUM_BLOCKS as MINIMUM_BLOCKS,

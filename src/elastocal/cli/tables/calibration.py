@@ -15,15 +15,16 @@ from rich.table import Table
 
 from elastocal.elastic import Unit, unit_of
 from elastocal.identification import (
+    AUTO,
     CalibrateResult,
     CalibrationSummary,
     Coverage,
     ErrorBudget,
     FrameSummary,
-    RungSummary,
     SpringSummary,
     SuspiciousReading,
     describe,
+    ladder_sentence,
 )
 from elastocal.wording import (
     capped,
@@ -59,7 +60,7 @@ def show_calibration(console: Console, result: CalibrateResult, out: Path) -> No
 
 def _show_figures(console: Console, figures: CalibrationSummary) -> None:
     _show_fit(console, figures)
-    _show_ladder(console, figures.ladder)
+    _show_ladder(console, figures)
     console.print()
     console.print(_spring_table(figures))
     _show_groups(console, figures)
@@ -115,8 +116,9 @@ def _springs(figures: CalibrationSummary) -> str:
     return springs_and_parameters(count, figures.springs_total)
 
 
-def _show_ladder(console: Console, ladder: Sequence[RungSummary]) -> None:
-    """Print the models that were tried, and the one that was taken."""
+def _show_ladder(console: Console, figures: CalibrationSummary) -> None:
+    """Print the models that were tried, the one that was taken, and why."""
+    ladder = figures.ladder
     if len(ladder) < 2:
         return
     table = Table(box=None, pad_edge=False)
@@ -136,6 +138,8 @@ def _show_ladder(console: Console, ladder: Sequence[RungSummary]) -> None:
             "[bold]taken[/bold]" if rung.chosen else "",
         )
     console.print(table)
+    if figures.settings is not None and figures.settings.springs == AUTO:
+        console.print(ladder_sentence(ladder), markup=False)
 
 
 def _show_frames(console: Console, frames: Sequence[FrameSummary]) -> None:

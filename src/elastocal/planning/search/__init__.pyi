@@ -22,11 +22,11 @@ from .information import (
 from .protocol import (
     Candidates as Candidates,
     Metric as Metric,
+    RandomChoice as RandomChoice,
     SearchTechnique as SearchTechnique,
     Selection as Selection,
     check_count as check_count,
 )
-from .random_choice import RandomChoice as RandomChoice
 from .techniques import (
     TECHNIQUES as TECHNIQUES,
     growing_choices as growing_choices,

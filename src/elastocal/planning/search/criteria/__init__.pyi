@@ -1,4 +1,3 @@
-from .alphabetic import AOptimal as AOptimal, DOptimal as DOptimal, IOptimal as IOptimal, o1 as o1
 from .criterion import (
     Criterion as Criterion,
     inverse_trace_loss as inverse_trace_loss,
@@ -6,4 +5,14 @@ from .criterion import (
     singular_values as singular_values,
 )
 from .named import CRITERIA as CRITERIA, criterion_class as criterion_class
-from .observability import O2 as O2, O3 as O3, O4 as O4, O5 as O5, EOptimal as EOptimal
+from .observability import (
+    O2 as O2,
+    O3 as O3,
+    O4 as O4,
+    O5 as O5,
+    AOptimal as AOptimal,
+    DOptimal as DOptimal,
+    EOptimal as EOptimal,
+    IOptimal as IOptimal,
+    o1 as o1,
+)

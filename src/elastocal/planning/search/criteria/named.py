@@ -5,9 +5,17 @@ A new criterion is one file here, an entry in `CRITERIA`, a changelog line, and 
 """
 
 from elastocal.errors import PlanningError, nearest
-from elastocal.planning.search.criteria.alphabetic import AOptimal, DOptimal, IOptimal
 from elastocal.planning.search.criteria.criterion import Criterion
-from elastocal.planning.search.criteria.observability import O2, O3, O4, O5, EOptimal
+from elastocal.planning.search.criteria.observability import (
+    O2,
+    O3,
+    O4,
+    O5,
+    AOptimal,
+    DOptimal,
+    EOptimal,
+    IOptimal,
+)
 
 CRITERIA: dict[str, type[Criterion]] = {
     criterion.name: criterion
