@@ -57,6 +57,7 @@ bench: $(VENV)/installed-dev
 	$(BIN)/python benchmarks/pool.py
 	$(BIN)/python benchmarks/study.py 50
 	$(BIN)/python benchmarks/compensation.py
+	$(BIN)/python benchmarks/ladder.py
 	$(BIN)/python benchmarks/codec.py
 	$(BIN)/python benchmarks/record.py
 
