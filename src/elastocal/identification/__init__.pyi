@@ -31,7 +31,6 @@ from .displacement import (
     displacement_blocks as displacement_blocks,
     friction_states as friction_states,
     reference_joints as reference_joints,
-    sag_changes as sag_changes,
 )
 from .domain import (
     REACH as REACH,

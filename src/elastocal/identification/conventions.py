@@ -19,11 +19,7 @@ from elastocal.arrays import FloatArray
 from elastocal.dataset import Readings
 from elastocal.elastic import ElasticModel
 from elastocal.errors import ConventionError, DatasetError, IdentificationError
-from elastocal.identification.displacement import (
-    displacement_blocks,
-    reference_joints,
-    sag_changes,
-)
+from elastocal.identification.displacement import displacement_blocks
 from elastocal.identification.options import FitOptions, FreeFrame
 from elastocal.identification.problem import Problem, build
 from elastocal.identification.solve import solve
@@ -79,23 +75,16 @@ def check_conventions(
     IdentificationError
         If most deflections are zero.
     """
-    q, q_0 = readings.joint_position, reference_joints(model.robot, readings)
-    readings = replace(readings, reference_joint_position=q_0)
     problem = build(model, readings, FitOptions(free_frame=free_frame), marker_offset)
     if not np.median(np.linalg.norm(problem.d, axis=1)) > 0.0:
         raise IdentificationError("most deflections are zero: there is nothing to identify")
     robust = solve(problem, "huber")
     stated = _unexplained(problem.reweighted(robust.reading_weight))
-    sag = sag_changes(model, q, q_0, marker_offset)
     found = []
     for mistake in _mistakes_of(model.robot):
-        undone = mistake.undo(model.robot, readings)
-        if np.array_equal(undone.joint_position, q):
-            blocks = displacement_blocks(model, undone, marker_offset, sag)
-        else:
-            # A mistake in the joints is one in those of the reference, which are sought anew.
-            undone = replace(undone, reference_joint_position=None)
-            blocks = displacement_blocks(model, undone, marker_offset)
+        # A mistake in the joints is one in those of the reference, which are sought anew.
+        undone = mistake.undo(model.robot, replace(readings, reference_joint_position=None))
+        blocks = displacement_blocks(model, undone, marker_offset)
         # The weights of the stated reading keep a blunder out of every other one, too.
         other = problem.with_springs(blocks, undone.deflection).reweighted(robust.reading_weight)
         found.append((_unexplained(other), mistake.message))

@@ -29,10 +29,7 @@ _ARM_JOINTS = 6
 
 
 def displacement_blocks(
-    model: ElasticModel,
-    readings: Readings,
-    marker_offset: ArrayLike | None = None,
-    sag: FloatArray | None = None,
+    model: ElasticModel, readings: Readings, marker_offset: ArrayLike | None = None
 ) -> FloatArray:
     """Return the rows that times ``c`` are what each reading shows as its deflection.
 
@@ -44,8 +41,6 @@ def displacement_blocks(
         With joints in the robot's order.
     marker_offset : array_like, shape (3,), optional
         Marker in the tcp frame, in m; see `ElasticModel.observation_blocks`.
-    sag : ndarray, shape (reading, 3, parameter), optional
-        From `sag_changes`, where it is known already.
 
     Returns
     -------
@@ -59,35 +54,13 @@ def displacement_blocks(
     if len(model.friction):
         loaded, reference = friction_states(model, readings, q, q_0)
     rows = model.observation_blocks(q, readings.force, readings.moment, marker_offset, loaded)
-    rows = rows + (sag_changes(model, q, q_0, marker_offset) if sag is None else sag)
+    rows = rows + model.sag_blocks(q, marker_offset) - model.sag_blocks(q_0, marker_offset)
     if readings.reference_force is None and reference is None:
         return rows
     force = np.zeros_like(readings.force)
     if readings.reference_force is not None:
         force = readings.reference_force
     return rows - model.observation_blocks(q_0, force, None, marker_offset, reference)
-
-
-def sag_changes(
-    model: ElasticModel, q: FloatArray, q_0: FloatArray, marker_offset: ArrayLike | None = None
-) -> FloatArray:
-    """Return ``S(q) - S(q_0)``: how much more the arm sags where it is loaded.
-
-    Parameters
-    ----------
-    model : ElasticModel
-        Robot and springs.
-    q, q_0 : ndarray, shape (reading, joint)
-        Loaded joints, and those of `reference_joints`, in rad or m.
-    marker_offset : array_like, shape (3,), optional
-        Marker in the tcp frame, in m.
-
-    Returns
-    -------
-    ndarray, shape (reading, 3, parameter)
-        In m per unit of each parameter.
-    """
-    return model.sag_blocks(q, marker_offset) - model.sag_blocks(q_0, marker_offset)
 
 
 def reference_joints(robot: Robot, readings: Readings) -> FloatArray:
