@@ -255,8 +255,8 @@ def _touch(
     touch = touching_state(statics, start, point, error)
     if _advance(plant, start, touch, direction) > distance:
         return None
-    R, chance = statics.robot.forward(start.q)[:3, :3], plant.chance.load(0)
-    return Contact(plant.contact_law, point, R, hit.normal, touch.q, chance), touch
+    place = (point, statics.robot.forward(start.q)[:3, :3], hit.normal, touch.q)
+    return Contact(plant.contact_law, *place, plant.chance.load(0)), touch
 
 
 def _moved(plant: Plant, start: RobotState, shift: FloatArray, error: FloatArray) -> RobotState:
@@ -373,11 +373,10 @@ class ForceControl:
         """Return the robot where the sensor reads the wanted force."""
         plant, statics = self._plant, self._plant.statics
         R_sensor_tcp = statics.robot.T_tcp_sensor[:3, :3].T
-        wanted_sensor = R_sensor_tcp @ self._wanted
-        attack = contact.law.attack(self._wanted, contact.chance)
-        gain = self._gain.beside(R_sensor_tcp @ statics.lever(attack))
+        lever = statics.lever(contact.law.attack(self._wanted, contact.chance))
         # The sensor turns with the arm, so that it sees another part of the weight than before.
-        felt = np.linalg.solve(gain, wanted_sensor) + self._R_zeroed.T @ statics.weight
+        felt = np.linalg.solve(self._gain.beside(R_sensor_tcp @ lever), R_sensor_tcp @ self._wanted)
+        felt = felt + self._R_zeroed.T @ statics.weight
 
         def force(R_base_sensor: FloatArray) -> FloatArray:
             true_force: FloatArray = R_base_sensor @ felt - statics.weight
