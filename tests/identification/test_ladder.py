@@ -112,18 +112,18 @@ def test_friction_is_not_offered_without_a_load_case_of_low_load():
         climb(robot(), campaign(), [RUNGS["gears+friction"]], ["gears+friction"], OPTIONS)
 
 
-def test_planted_friction_is_found_where_there_is_a_low_load():
+@pytest.mark.parametrize("springs", ["auto", "gears"])
+def test_planted_friction_is_found_where_there_is_a_low_load(springs):
     readings = with_low_load(campaign())
     assert has_levels(readings)
-    springs = gears(robot(), readings, (0.03, 0.1, 0.3))
-    model = ElasticModel(robot(), springs)
+    model = ElasticModel(robot(), gears(robot(), readings, (0.03, 0.1, 0.3)))
     c = np.array([1e-6 if "friction" in name else 2e-6 for name in model.parameter_names])
     exact = displacement_blocks(model, readings) @ c
     noise = 1e-6 * np.random.default_rng(0).normal(size=exact.shape)
     planted = replace(
         readings, marker_displacement=readings.controller_displacement + exact + noise
     )
-    ladder = choose_model(robot(), planted, "auto", OPTIONS).ladder
+    ladder = choose_model(robot(), planted, springs, OPTIONS).ladder
     assert taken({rung.name: rung for rung in ladder}) == "gears+friction"
 
 
