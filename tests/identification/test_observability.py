@@ -203,7 +203,7 @@ def test_a_parameter_is_faint_below_twice_the_noise_averaged_over_the_poses(sens
     if sensible == "what was fitted":
         c = np.array([2.0, 3.0, 7.0, 2.0, 3.0])
     elif sensible == "the others of its unit":
-        c = np.array([7.0, 7.0, 0.0, 7.0, 100.0])
+        c = np.array([7.0, 7.0, 0.0, 0.0, 100.0])
     else:
         scale[2] = 7.0
     noise = 0.01 * np.random.default_rng(1).normal(size=problem.d.shape)
