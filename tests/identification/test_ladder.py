@@ -94,6 +94,14 @@ def test_each_rung_can_be_forced(name):
     assert taken(chosen("rich", 8, name)) == name
 
 
+def test_the_score_of_a_pose_is_its_mean_error_where_no_load_is_low():
+    ladder = chosen("rich", 8)
+    readings = Cell(rich_truth(), seed=3, poses=8).readings()
+    for rung in ladder.values():
+        error = [rung.held_out.error[readings.pose == k].mean() for k in np.unique(readings.pose)]
+        np.testing.assert_allclose(rung.score, error)
+
+
 def test_a_layout_beside_the_ladder_is_taken_and_shown_with_it():
     ladder = chosen("linear", 8, "bearing-joint")
     assert taken(ladder) == "bearing-joint"
