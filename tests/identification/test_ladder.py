@@ -13,11 +13,16 @@ from elastocal.identification import (
     RUNGS,
     Climbed,
     FitOptions,
+    build,
     choose_model,
     climb,
     displacement_blocks,
     gears,
     has_levels,
+    leave_poses_out,
+    low_loads,
+    solve,
+    take_simplest,
 )
 from support.cells import Cell, linear_truth, rich_truth, robot
 from support.problems import campaign
@@ -100,6 +105,28 @@ def test_the_score_of_a_pose_is_its_mean_error_where_no_load_is_low():
     for rung in ladder.values():
         error = [rung.held_out.error[readings.pose == k].mean() for k in np.unique(readings.pose)]
         np.testing.assert_allclose(rung.score, error)
+
+
+def test_a_low_load_counts_half_at_its_pose_left_out_and_half_with_all_low_loads_left_out():
+    readings = with_low_load(campaign())
+    (rung,) = climb(robot(), readings, [RUNGS["bearing"]], ["bearing"], OPTIONS).ladder
+    problem = build(rung.model, readings, OPTIONS)
+    low = low_loads(readings)
+    np.testing.assert_array_equal(low, readings.load_case == "low")
+    error = leave_poses_out(problem).error
+    others = solve(problem.take(~low)).compliance
+    error[low] += np.linalg.norm(problem.take(low).residuals(others), axis=1)
+    error[low] /= 2.0
+    expected = [error[readings.pose == pose].mean() for pose in np.unique(readings.pose)]
+    np.testing.assert_allclose(rung.score, expected, rtol=1e-4)
+
+
+def test_rungs_that_were_not_tried_are_refused_by_name():
+    ladder = list(chosen("rich", 8).values())
+    with pytest.raises(
+        IdentificationError, match=r"springs gears\+friction, odd were not tried: no"
+    ):
+        take_simplest(ladder, ["gears+friction", "odd"])
 
 
 def test_a_layout_beside_the_ladder_is_taken_and_shown_with_it():
