@@ -8,7 +8,7 @@ from elastocal.sim.arm import (
     Linkage,
 )
 from support.cells import linkage
-from support.geared import heavy_robot
+from support.geared import geared, heavy_robot
 from support.problems import elastic
 from support.virtual_chain import ARMS, configurations, numerical_column
 
@@ -106,6 +106,8 @@ NAMED = {
     "marker_offset": lambda model, value: model.observation_blocks(Q, FORCE, None, value),
     "direction": lambda model, value: model.directional_rows(Q, value),
     "force ": lambda model, value: model.cartesian_compliance(C, Q, value),
+    "moment ": lambda model, value: model.cartesian_compliance(C, Q, FORCE, value),
+    "moment  ": lambda model, value: model.load_torques(Q, FORCE, value),
 }
 
 
@@ -185,8 +187,13 @@ def test_the_torque_of_a_force_through_the_axis_is_zero():
 
 @pytest.mark.parametrize("c", [np.ones(17), np.full(18, np.nan), 1.0, np.ones((18, 1))])
 def test_compliances_of_another_shape_or_not_finite_are_refused(model, c):
-    with pytest.raises(SpringError, match="18 finite numbers"):
+    with pytest.raises(SpringError, match=r"18 finite numbers, one a spring, got shape \("):
         model.deflection(c, Q, FORCE)
+
+
+def test_compliances_are_asked_for_by_the_parameter_where_springs_have_several():
+    with pytest.raises(SpringError, match=r"42 finite numbers, one a parameter, got shape \(18,\)"):
+        geared().model.deflection(C, Q, FORCE)
 
 
 @pytest.mark.parametrize("q", [np.zeros(5), np.full(6, np.nan), 0.0])
@@ -198,6 +205,7 @@ def test_joints_of_another_shape_or_not_finite_are_refused(model, q):
 def test_springs_are_kept_in_the_order_given():
     springs = elastic("bearing").springs[::-1]
     model = ElasticModel(elastic("bearing").robot, list(springs))
+    assert model.springs == springs
     assert model.spring_names == tuple(spring.name for spring in springs)
     np.testing.assert_allclose(
         model.spring_jacobian(Q).translation,

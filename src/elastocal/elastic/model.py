@@ -120,7 +120,7 @@ class ElasticModel:
 
         Arguments as for `observation_blocks`.
         """
-        return spring_torques(self.at(q).jacobian, check_vectors("force", force), moment)
+        return spring_torques(self.at(q).jacobian, force, moment)
 
     def weight_torques(self, q: ArrayLike) -> FloatArray:
         """Return the torque of the arm's own weight about each axis.
@@ -178,8 +178,6 @@ class ElasticModel:
         RobotError, SpringError
             If an argument has another shape or is not finite.
         """
-        force = check_vectors("force", force)
-        moment = None if moment is None else check_vectors("moment", moment)
         posture = self.at(q)
         torque = spring_torques(posture.jacobian, force, moment)
         weight = posture.weight if self.bears_weight else None
@@ -273,10 +271,9 @@ class ElasticModel:
         c = self.check_compliance(compliance)
         jacobian = self.spring_jacobian(q)
         J, W = jacobian.translation, jacobian.rotation
-        torques = spring_torques(jacobian, check_vectors("force", force), moment)
+        torques = spring_torques(jacobian, force, moment)
         weights = self.weight_torques(q) if self.bears_weight else None
-        shape = (*torques.shape[:-1], 3, 3)
-        translation, rotation, coupling = np.zeros(shape), np.zeros(shape), np.zeros(shape)
+        translation, rotation, coupling = np.zeros((3, *torques.shape[:-1], 3, 3))
         for group in self._groups:
             tangents = group.law.tangents(group.load(torques, weights))
             # A spring of several axes couples them: all pairs, of which a hinge has one.
@@ -391,10 +388,13 @@ def spring_torques(
     -------
     ndarray, shape (..., spring)
         In N·m, or N for prismatic springs.
+
+    Raises
+    ------
+    SpringError
+        If force or moment has another shape or is not finite.
     """
-    f = np.asarray(force, dtype=float)
-    torques: FloatArray = (f[..., None, :] @ jacobian.translation)[..., 0, :]
+    torques = check_vectors("force", force)[..., None, :] @ jacobian.translation
     if moment is not None:
-        m = np.asarray(moment, dtype=float)
-        torques = torques + (m[..., None, :] @ jacobian.rotation)[..., 0, :]
-    return torques
+        torques = torques + check_vectors("moment", moment)[..., None, :] @ jacobian.rotation
+    return np.asarray(torques[..., 0, :])

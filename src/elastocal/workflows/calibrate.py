@@ -41,7 +41,7 @@ class CalibrateSettings(FitSettings):
     """URDF file or catalogue name; by default the dataset's own."""
     tcp: str | None = None
     """Link at the tool centre point; by default the dataset's."""
-    tool: str | None = None
+    tool_frame: str | None = None
     """Tcp behind that link, ``"x, y, z, a, b, c"`` with units (Z-Y'-X'')."""
     budget: bool = False
     """State also what the error at left-out poses is made of."""
@@ -80,7 +80,7 @@ def calibrate(settings: CalibrateSettings, progress: Progress) -> CalibrateResul
     options = settings.options()
     refuse_overwriting(settings.out, *settings.files)
     measured, source = _measured(settings.files)
-    arm = find_robot(settings.robot, settings.tcp, settings.tool, measured)
+    arm = find_robot(settings.robot, settings.tcp, settings.tool_frame, measured)
     readings = without(measured.readings(arm.joint_names), settings.exclude)
     marker = measured.marker if settings.marker is None else settings.marker
     choice = choose_model(arm, readings, settings.springs, options, marker)

@@ -2,15 +2,16 @@
 
 import os
 from functools import cache
+from itertools import count
 
 import numpy as np
 import pytest
 
 from elastocal.cell import Motion
-from elastocal.procedure import Event, RunEnd, read_journal
+from elastocal.procedure import Event, RunEnd, RunFolder, read_journal
 from elastocal.procedure.record import read_commits
 from support.fake_devices import FakeCell
-from support.fake_runs import FakeRun
+from support.fake_runs import FakeRun, MemoryRecorder
 
 
 class KillRunError(BaseException):
@@ -144,3 +145,34 @@ def test_a_run_that_is_complete_only_says_so_again(tmp_path):
     assert run.resume().end is RunEnd.DONE
     assert run.cell.world.commands == ["enable", "disable"]
     assert read_journal(run.journal)[-1].event is Event.FINISH
+
+
+RECORDINGS = count()
+
+
+class FileRecorder(MemoryRecorder):
+    """Writes a file beside, as the recorder of a real run does."""
+
+    def save(self, path):
+        super().save(path)
+        path.parent.mkdir(exist_ok=True)
+        path.write_text(f"recording {next(RECORDINGS)}")
+
+
+@pytest.mark.parametrize("entries", [1, 2, 12, 30])
+def test_a_run_goes_on_behind_a_journal_that_was_cut_and_overwrites_no_recording(tmp_path, entries):
+    """A journal put back from a copy of before knows nothing of what was recorded since."""
+    run = FakeRun(tmp_path / "run")
+    run.recorder = lambda: FileRecorder(run.kept)
+    run.start()
+    streams = RunFolder(run.path).streams
+    before = {path.name: path.read_text() for path in streams.iterdir()}
+    assert sorted(before) == ["pose_0000_1.mcap", "pose_0001_1.mcap"]
+    lines = run.journal.read_bytes().splitlines(keepends=True)
+    run.journal.write_bytes(b"".join(lines[:entries]))
+    assert run.resume().end is RunEnd.DONE
+    assert {name: (streams / name).read_text() for name in before} == before
+    logs = {log.pose: log.streams for log in read_commits(run.journal)}
+    assert sorted(logs) == [0, 1]
+    assert logs[1] == "pose_0001_2.mcap"
+    assert len(list(streams.iterdir())) == (3 if entries == 30 else 4)

@@ -61,7 +61,7 @@ def _calibrate(  # noqa: PLR0913 - one parameter an option
         out=out,
         robot=robot,
         tcp=tcp,
-        tool=tool,
+        tool_frame=tool,
         springs=springs,
         loss=loss,
         weights=weights,
