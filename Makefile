@@ -54,6 +54,7 @@ bench: $(VENV)/installed-dev
 	$(BIN)/python benchmarks/search.py
 	$(BIN)/python benchmarks/pool.py
 	$(BIN)/python benchmarks/compensation.py
+	$(BIN)/python benchmarks/ladder.py
 	$(BIN)/python benchmarks/codec.py
 	$(BIN)/python benchmarks/record.py
 
