@@ -189,7 +189,7 @@ def _data_warnings(
         f"poses {', '.join(map(str, group))} are one configuration: resampled and left out together"
         for group in same_configuration(readings, problem.block)
     ]
-    if gap := model.robot.weight_gap:
+    if gap := model.robot.chain.weight_gap:
         warnings.append(
             f"robot {model.robot.name}: {gap}: the arm's own weight bends it otherwise at the"
             " reference than under load, and here that passes as deflection"

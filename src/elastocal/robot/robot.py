@@ -218,17 +218,6 @@ class Robot:
         """Whether any link has a mass, so that gravity torques are known."""
         return any(joint.mass > 0.0 for joint in self.chain.joints)
 
-    @property
-    def weight_gap(self) -> str:
-        """Why the arm's own weight is not known, in words; empty where it is.
-
-        The last joint carries the tool, whose mass says nothing of the arm.
-        """
-        *arm, last = (joint.mass > 0.0 for joint in self.chain.joints)
-        if any(arm):
-            return ""
-        return "only what the last joint carries has a mass" if last else "no link has a mass"
-
     def gravity_torques(self, q: ArrayLike, gravity: ArrayLike | None = None) -> FloatArray:
         """Return the joint torques that hold the robot still under its own weight.
 

@@ -152,7 +152,7 @@ def coverage_notes(calibrated: CalibratedModel) -> tuple[str, ...]:
         unseen = unseen_groups(calibrated.model, calibrated.observability)
         names = ", ".join(map(describe, unseen))
         notes = (_TOOL_LOADS.format(names=names),) if unseen else ()
-        gap = calibrated.model.robot.weight_gap
+        gap = calibrated.model.robot.chain.weight_gap
         alone = calibrated.tool.mass is not None and calibrated.model.bears_weight and gap
         return (*notes, _TOOL_ALONE.format(gap=gap)) if alone else notes
     covered = calibrated.observability.rank >= attainable_rank(calibrated.model)
