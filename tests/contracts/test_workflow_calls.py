@@ -94,7 +94,7 @@ class TestEveryWorkflow:
 
 
 def test_paths_given_as_texts_are_read_and_written(tmp_path_factory):
-    done = reported.finished(tmp_path_factory)
+    done = reported.finished()
     out = tmp_path_factory.mktemp("texts")
     model, data = str(done / "model.json"), str(done / "run" / "dataset.nc")
     rows, again = str(done / "process" / "path.csv"), str(out / "again.json")

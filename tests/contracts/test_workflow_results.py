@@ -32,7 +32,7 @@ WITHOUT = {
 @pytest.fixture(scope="module")
 def results(tmp_path_factory) -> dict[str, Result]:
     """One result of each workflow, by the name of its class."""
-    done = reported.finished(tmp_path_factory)
+    done = reported.finished()
     out = tmp_path_factory.mktemp("results")
     run = reported.copied(done, out) / "run"
     model, path, cell = done / "model.json", done / "process" / "path.csv", done / "cell/cell.yaml"

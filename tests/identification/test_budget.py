@@ -155,6 +155,12 @@ def test_free_frames_are_taken_out_as_registration():
     assert found.error == pytest.approx(np.sqrt(np.mean(held_out.error**2)), rel=1e-6)
 
 
+def test_what_is_known_of_single_springs_has_no_part_in_it():
+    plain = model("bearing", linear())
+    bounds = FitOptions(lower=np.full(18, 1e-8), upper=np.full(18, 2e-8))
+    assert error_budget(plain, linear(), bounds) == error_budget(plain, linear())
+
+
 def test_a_blunder_that_is_set_aside_is_no_part_of_the_budget():
     spoiled = linear().marker_displacement.copy()
     spoiled[7] += 0.5

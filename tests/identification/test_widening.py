@@ -6,7 +6,12 @@ from scipy.stats import norm, t
 
 from elastocal.identification import leave_poses_out, solve
 from elastocal.identification.solve import PoseGrams
-from elastocal.identification.uncertainty import bootstrap, widen_draws, widening_factor
+from elastocal.identification.uncertainty import (
+    bootstrap,
+    distrust_factor,
+    widen_draws,
+    widening_factor,
+)
 from support.problems import made_up
 
 
@@ -57,3 +62,15 @@ def test_stretched_draws_keep_the_bounds():
     bounded = replace(problem, lower=0.8 * c, upper=1.2 * c)
     draws = c * np.array([[0.9], [1.1]])
     np.testing.assert_allclose(widen_draws(bounded, c, draws, 10.0), c * [[0.8], [1.2]])
+
+
+def test_draws_of_a_model_that_is_not_trusted_spread_as_far_as_its_errors_at_left_out_poses():
+    problem, c = made_up(np.random.default_rng(0))
+    noise = np.random.default_rng(1).normal(0.0, 0.3, problem.d.shape)
+    held_out = leave_poses_out(replace(problem, d=problem.d + noise))
+    draws = c * (1.0 + 0.01 * np.random.default_rng(2).normal(size=(40, 5)))
+    by = distrust_factor(problem, c, draws, held_out)
+    moved = np.einsum("rin,dn->dri", problem.O, by * (draws - c))
+    spread = np.mean(np.sum(np.square(moved), axis=2))
+    assert spread == pytest.approx(np.mean(np.square(held_out.error)))
+    assert distrust_factor(problem, c, np.tile(c, (40, 1)), held_out) == 1.0

@@ -110,18 +110,21 @@ class Entrant:
     low: BoolArray
     """Whether each reading is of low load, shape (reading,)."""
 
-    def chosen(self, split: Split) -> PreparedVariant:
-        """Return the variant with the springs that the training poses of a split carry."""
+    def chosen(self, split: Split) -> str:
+        """Return the name of the springs that the training poses of a split carry."""
         poses = self.taken.can_train(split)
         if len(self.allowed) == 1 or len(poses) < MINIMUM_BLOCKS:
-            return self.allowed[0]
+            return self.allowed[0].springs
         rows = self.taken.trains & np.isin(self.taken.problem.block, poses)
         tried = [
             try_rung(each.springs, each.model, each.problem.take(rows), self.low[rows])
             for each in self.allowed
         ]
-        wanted = take_simplest(tried, [each.name for each in tried]).taken
-        return next(each for each in self.allowed if each.springs == wanted)
+        return take_simplest(tried, [each.name for each in tried]).taken
+
+    def with_springs(self, name: str) -> PreparedVariant:
+        """Return the variant with the springs of this name."""
+        return next(each for each in self.allowed if each.springs == name)
 
 
 def climbed_ladder(

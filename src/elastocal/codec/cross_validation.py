@@ -196,9 +196,14 @@ def _run_split(
 ) -> list[_LearningCurve]:
     """Return the learning curve of each variant on one split."""
     curves = []
+    # Variants that differ in their search alone choose the same springs.
+    known: dict[tuple[str, str, str], str] = {}
     for each in entrants:
+        variant = each.taken.variant
+        key = (variant.springs, variant.load_cases, variant.solver)
         try:
-            chosen = each.chosen(split)
+            known[key] = known.get(key) or each.chosen(split)
+            chosen = each.with_springs(known[key])
             curve = _train(chosen, split, most, seed)
             if chosen is not each.taken:
                 curve = replace(curve, compliance=_fit(each.taken, curve.chosen))

@@ -7,8 +7,8 @@ errors at left-out poses, a term is worth
     sign(m_without - m_with) sqrt(|m_without - m_with|),
 
 since independent errors add up in quadrature. The interval is that of the paired difference over
-pose blocks; its variance counts that refits share nearly all their poses (C. Nadeau, Y. Bengio,
-"Inference for the generalization error", Machine Learning 52, 2003), as the ladder's does.
+pose blocks, which counts that refits share nearly all their poses, as the ladder's does
+(`elastocal.identification.paired`).
 
 What is left at unseen poses is parted in quadrature too: noise of the instruments, as stated or
 as repeated readings scatter; the fit, which another choice of poses would change (jackknife over
@@ -20,7 +20,7 @@ from typing import Literal, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.special import chdtri, stdtrit
+from scipy.special import chdtri
 
 from elastocal.arrays import FloatArray
 from elastocal.dataset import Readings
@@ -28,6 +28,7 @@ from elastocal.elastic import ElasticModel, Gear, Spring
 from elastocal.identification.displacement import reference_joints
 from elastocal.identification.ladder import RUNGS, has_levels
 from elastocal.identification.options import FitOptions
+from elastocal.identification.paired import Overlap, corrected_mean
 from elastocal.identification.problem import Problem, build
 from elastocal.identification.solve import solve
 from elastocal.identification.suspicious import screen
@@ -148,7 +149,8 @@ def error_budget(
     readings : Readings
         Measurements, joints in the robot's order.
     options : FitOptions, optional
-        Bounds, weights, loss, free frames; a prior has no part in it.
+        Bounds, weights, loss, free frames. What is known of single springs (a prior, a bound for
+        each) speaks of one model and has no part in it, as in the ladder.
     marker_offset : array_like, shape (3,), optional
         Marker in the tcp frame, in m.
 
@@ -157,19 +159,19 @@ def error_budget(
     IdentificationError
         If there are too few poses.
     """
-    options = replace(options or FitOptions(), prior=None)
+    options = _for_any_model(options or FitOptions())
     # Sought once, not for every model.
     sought = reference_joints(model.robot, readings)
     readings = replace(readings, reference_joint_position=sought)
     problem = build(model, readings, options, marker_offset)
     if options.set_blunders_aside:
-        readings = readings.take(~screen(problem).blunder)
+        readings = readings.set_aside(screen(problem).blunder)
         problem = build(model, readings, options, marker_offset)
     weight = solve(problem, options.loss).reading_weight
     chosen = problem.reweighted(weight)
     held_out, compliance = leave_poses_out(chosen), solve(chosen).compliance
     squares = _mean_squares(chosen, held_out)
-    total = _part(*_with_reach(squares), f"{len(squares)} poses, each left out")
+    total = _part(*_with_interval(squares), f"{len(squares)} poses, each left out")
     noise = _noise(model, readings, chosen, compliance)
     fit = _fit(chosen, held_out, compliance)
     ablation = _Ablation(model, readings, options, marker_offset, weight, squares)
@@ -183,6 +185,13 @@ def error_budget(
         readings=len(readings),
         poses=len(squares),
     )
+
+
+def _for_any_model(options: FitOptions) -> FitOptions:
+    """Return the options without what speaks of single parameters."""
+    lower = 0.0 if np.ndim(options.lower) else options.lower
+    upper = np.inf if np.ndim(options.upper) else options.upper
+    return replace(options, prior=None, lower=lower, upper=upper)
 
 
 @dataclass(frozen=True, eq=False)
@@ -206,7 +215,7 @@ class _Ablation:
         problem = self._other(term).reweighted(self.weight)
         squares = _mean_squares(problem, leave_poses_out(problem))
         difference = squares - self.squares if taken else self.squares - squares
-        worth, low, high = map(_signed_root, _with_reach(difference))
+        worth, low, high = map(_signed_root, _with_interval(difference))
         return TermWorth(term, taken, float(np.sqrt(squares.mean())), worth, low, high)
 
     def _taken(self, term: TermName) -> bool:
@@ -309,12 +318,10 @@ def _mean_squares(problem: Problem, held_out: HeldOut) -> FloatArray:
     return np.bincount(index, np.square(held_out.error)) / np.bincount(index)
 
 
-def _with_reach(squares: FloatArray) -> tuple[float, float, float]:
+def _with_interval(squares: FloatArray) -> tuple[float, float, float]:
     """Return the mean over pose blocks and the ends of its 95 % interval, in m^2."""
-    count, mean = len(squares), float(squares.mean())
-    spread = float(squares.std(ddof=1)) * np.sqrt(1.0 / count + 1.0 / (count - 1))
-    reach = float(stdtrit(count - 1, 0.5 * (1.0 + CONFIDENCE))) * spread
-    return mean, mean - reach, mean + reach
+    found = corrected_mean(squares[:, None], Overlap.leaving_one_out(len(squares)))
+    return float(found.mean[0]), float(found.low[0]), float(found.high[0])
 
 
 def _signed_root(square: float) -> float:

@@ -334,11 +334,11 @@ def ladder_sentence(ladder: Sequence[RungSummary]) -> str:
         found = rung.difference
         return f"{um(found.mean)} (95 % interval {um(found.low)} to {um(found.high)})"
 
-    text = f"the readings carry {taken.springs}, the best at left-out poses"
+    text = f"{taken.springs} is taken, the best at left-out poses"
     if taken is not best:
         text = (
-            f"the readings carry {taken.springs}, the simplest springs within one standard error of"
-            f" the best at left-out poses, {best.springs}: worse by {by(taken)}"
+            f"{taken.springs} is taken, the simplest within one standard error of the best at"
+            f" left-out poses, {best.springs}: worse by {by(taken)}"
         )
     if worse:
         listed = ", ".join(f"{each.springs} by {by(each)}" for each in worse)

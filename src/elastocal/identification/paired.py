@@ -8,7 +8,7 @@ Nadeau and Y. Bengio ("Inference for the generalization error", Machine Learning
 ``n_2 / (n_1 + n_2)`` for random ones. COVER sets share more, so what they share is counted. Few
 sets, and those of a leave-one-out, share less, even nothing, but their training sets are then
 nearly the same poses; so ``rho`` is never taken below that of random sets. How often this claims
-a difference that is none: docs/decisions/0070-one-judgement.md.
+a difference that is none: docs/decisions/0069-one-judgement.md.
 
 Of models from simple to rich the simplest is taken that is not worse than the best by more than
 one standard error of their paired difference (L. Breiman, J. Friedman, R. Olshen, C. Stone,

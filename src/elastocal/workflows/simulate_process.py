@@ -309,7 +309,11 @@ def _run_courses(
     progress: Progress,
     stage: str = "courses",
 ) -> TrialRuns:
-    """Run every course twice; ``late`` is that of a perfect corrector, None: the model corrects."""
+    """Run every course without and with correction.
+
+    With ``late``, a corrector that knows the deflection acts that many cycles too late; None: the
+    model corrects.
+    """
     runs: dict[int, tuple[CourseRun, CourseRun]] = {}
     # The longest first, or the last one would be run while the other processes wait.
     order = sorted(range(len(courses)), key=lambda number: -len(courses[number].q))

@@ -83,9 +83,14 @@ def committed(run):
     return [log.pose for log in read_commits(run.journal)]
 
 
+def _some_now(cases):
+    """Return every other place to be killed at; the others are tried every night."""
+    return [pytest.param(*each, marks=[pytest.mark.slow] * (k % 2)) for k, each in enumerate(cases)]
+
+
 @pytest.mark.parametrize(
     ("boundary", "torn"),
-    [(n, False) for n in range(1, ENTRIES)] + [(n, True) for n in range(1, ENTRIES, 4)],
+    _some_now([(n, False) for n in range(1, ENTRIES)] + [(n, True) for n in range(1, ENTRIES, 4)]),
 )
 def test_a_killed_run_goes_on_to_the_same_readings(tmp_path, whole, boundary, torn):
     run = kill(tmp_path / "run", Killer(boundary, torn))
@@ -101,7 +106,7 @@ def test_a_killed_run_goes_on_to_the_same_readings(tmp_path, whole, boundary, to
 
 @pytest.mark.parametrize(
     ("boundary", "goes_on"),
-    [(n, False) for n in range(3, ENTRIES - 3)] + [(n, True) for n in range(3, 20)],
+    _some_now([(n, False) for n in range(3, ENTRIES - 3)] + [(n, True) for n in range(3, 20)]),
 )
 def test_an_arm_that_stands_where_it_was_finds_the_way_back(tmp_path, boundary, goes_on):
     """As on a real machine: the program dies, the arm keeps its place and its contact."""

@@ -22,7 +22,7 @@ def _codec(  # noqa: PLR0913 - one parameter an option
         typer.Option(
             metavar="KEY=A,B",
             help="What to compare: search, springs, load_cases or solver; repeatable,"
-            " then every combination.",
+            " then every combination. Springs as for calibrate; default: auto.",
         ),
     ] = None,
     robot: options.RobotName = None,

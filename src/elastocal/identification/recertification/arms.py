@@ -15,12 +15,8 @@ from elastocal.elastic import ElasticModel
 from elastocal.errors import IdentificationError
 from elastocal.identification.calibrated import CalibratedModel
 from elastocal.results import brief_repr
-from elastocal.robot import Robot
+from elastocal.robot import Robot, link_gap, probe_configurations, same_joints, tool_gap
 
-_PROBES, _SEED = 8, 0
-_LENGTH, _ANGLE = 1e-4, 1e-4
-"""Largest difference of two descriptions of one robot, in m and rad: on a lever of 2 m it changes
-a deflection by less than a part in ten thousand."""
 _WEIGHT = 1e-3
 """Largest difference of two weights of one arm, as a part of the largest gravity torque."""
 
@@ -83,18 +79,16 @@ def check_same_robot(old: Robot, new: Robot, names: tuple[str, str]) -> None:
         If joints or kinematics differ.
     """
     a, b = names
-    if old.joint_names != new.joint_names or old.revolute != new.revolute:
+    if not same_joints(old, new):
         raise IdentificationError(
             f"{a} and {b} are of different robots: {old.name} has the joints"
             f" {', '.join(old.joint_names)}, {new.name} has {', '.join(new.joint_names)}"
         )
-    q = _probes(old)
-    last = [robot.forward(q) @ np.linalg.inv(robot.chain.T_last_tip) for robot in (old, new)]
-    off, turned = _apart(*last)
-    if not (off <= _LENGTH and turned <= _ANGLE):
+    gap = link_gap(old, new)
+    if not gap.closed:
         raise IdentificationError(
             f"{a} ({old.name}) and {b} ({new.name}) are of different robots: at the same joints"
-            f" their last links are {1e3 * off:.3g} mm and {np.degrees(turned):.3g}° apart"
+            f" their last links are {gap} apart"
         )
 
 
@@ -104,7 +98,7 @@ def model_on(calibrated: CalibratedModel, arm: Robot) -> CalibratedModel:
     A model that was calibrated on such an arm comes back as it is.
     """
     robot = calibrated.model.robot
-    if not _tool_apart(robot, arm) and not _weighs_otherwise(robot, arm):
+    if tool_gap(robot, arm).closed and not _weighs_otherwise(robot, arm):
         return calibrated
     return replace(calibrated, model=ElasticModel(arm, calibrated.model.springs))
 
@@ -116,10 +110,10 @@ def arm_notes(
     notes = []
     for calibrated, name in zip(models, names, strict=True):
         robot = calibrated.model.robot
-        apart = _tool_apart(robot, arm)
-        if apart:
+        gap = tool_gap(robot, arm)
+        if not gap.closed:
             notes.append(
-                f"{name} was calibrated with another tool (tcp {robot.tip}, {apart} from the one"
+                f"{name} was calibrated with another tool (tcp {robot.tip}, {gap} from the one"
                 f" compared at, {arm.tip}): its springs are taken to be those of the arm alone"
             )
         if not calibrated.model.bears_weight:
@@ -137,34 +131,10 @@ def arm_notes(
     return tuple(notes)
 
 
-def _tool_apart(robot: Robot, arm: Robot) -> str:
-    """Return how far apart two tool centre points are, in words; empty: they are the same."""
-    off, turned = _apart(robot.chain.T_last_tip[None], arm.chain.T_last_tip[None])
-    if off <= _LENGTH and turned <= _ANGLE:
-        return ""
-    return f"{1e3 * off:.3g} mm and {np.degrees(turned):.3g}°"
-
-
 def _weighs_otherwise(robot: Robot, arm: Robot) -> bool:
     """Return whether the known weights of two arms differ; unknown ones do not."""
     if not (robot.has_masses and arm.has_masses):
         return False
-    here, there = (each.gravity_torques(_probes(arm)) for each in (robot, arm))
+    here, there = (each.gravity_torques(probe_configurations(arm)) for each in (robot, arm))
     largest = max(float(np.abs(here).max()), float(np.abs(there).max()))
     return float(np.abs(here - there).max()) > _WEIGHT * largest
-
-
-def _probes(robot: Robot) -> FloatArray:
-    """Return configurations at which two robots would show that they differ."""
-    limits = robot.limits
-    lower, upper = np.maximum(limits.lower, -np.pi), np.minimum(limits.upper, np.pi)
-    rng = np.random.default_rng(_SEED)
-    return np.vstack([np.zeros(len(lower)), rng.uniform(lower, upper, (_PROBES, len(lower)))])
-
-
-def _apart(a: FloatArray, b: FloatArray) -> tuple[float, float]:
-    """Return the largest distance in m and angle in rad between frames, shape (n, 4, 4)."""
-    distance = np.linalg.norm(a[:, :3, 3] - b[:, :3, 3], axis=1)
-    # The Frobenius norm of the difference of two rotations is sqrt(8) sin(angle / 2).
-    chord = np.linalg.norm(a[:, :3, :3] - b[:, :3, :3], axis=(1, 2)) / np.sqrt(8.0)
-    return float(distance.max()), float(2.0 * np.arcsin(np.minimum(chord.max(), 1.0)))
