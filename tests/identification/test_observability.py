@@ -1,6 +1,7 @@
 import json
 from dataclasses import replace
 from functools import partial
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -23,6 +24,7 @@ from elastocal.identification import (
     solve,
 )
 from elastocal.identification.observability import find_faint
+from elastocal.identification.solve import Factored
 from elastocal.robot import Robot
 from support.problems import campaign, elastic, made_up
 from support.shared import GOLDEN, needs_shared
@@ -203,7 +205,7 @@ def test_a_parameter_is_faint_below_twice_the_noise_averaged_over_the_poses(sens
     if sensible == "what was fitted":
         c = np.array([2.0, 3.0, 7.0, 2.0, 3.0])
     elif sensible == "the others of its unit":
-        c = np.array([7.0, 7.0, 0.0, 7.0, 100.0])
+        c = np.array([7.0, 7.0, 0.0, 0.0, 100.0])
     else:
         scale[2] = 7.0
     noise = 0.01 * np.random.default_rng(1).normal(size=problem.d.shape)
@@ -238,3 +240,19 @@ def test_the_attainable_rank_is_what_a_rich_campaign_reaches(offset):
         rich = build(model, replace(campaign(), moment=moment), marker_offset=offset)
         reached = observability(factor(rich), model.springs).rank
         assert attainable_rank(model, offset) == reached, name
+
+
+def test_weights_of_parameters_of_other_units_count_in_their_sensible_sizes():
+    """A weight of 1e-8 is small beside 1, but not where a sensible value is that small as well."""
+    big, small = (
+        SimpleNamespace(parameters=(Parameter(name, name, HINGE, scale),))
+        for name, scale in (("big", 1.0), ("small", 1e-8))
+    )
+    # Of both the data see the sum of multiples of their sizes alone.
+    seen = np.array([[1.0, 1.0], [1.0, -1.0]]) / np.sqrt(2.0)
+    system = Factored(np.array([1.0, 0.0]), seen, np.zeros(2), np.array([1.0, 1e8]))
+    found = observability(system, (big, small))
+    assert found.rank == 1
+    ((first, second),) = found.unobservable
+    assert (first.spring, second.spring) == ("big", "small")
+    assert (first.weight, second.weight) == pytest.approx((1.0, -1e-8))

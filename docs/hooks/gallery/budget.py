@@ -1,7 +1,8 @@
 """The error budget: of the simulated cell for fibre placement, and of real readings.
 
 The readings of the FANUC arm stand beside the repository; where they are not there, their budget is
-quoted from ``fanuc_budget.json``, which a test holds against them (tests/identification).
+quoted from ``fanuc_budget.json``, which a test holds against them (tests/identification). After a
+change of the estimator ``python -m gallery.budget``, run in ``docs/hooks``, writes it anew.
 """
 
 import json
@@ -17,7 +18,7 @@ from elastocal import dataset
 from elastocal.dataset import Readings
 from elastocal.elastic import ElasticModel
 from elastocal.identification import ErrorBudget, FitOptions, choose_model, error_budget
-from elastocal.records import from_data
+from elastocal.records import from_data, to_data
 from elastocal.report.plots import new_figure, style, write_figure
 from elastocal.robot import Robot
 from elastocal.sim.workcell import (
@@ -140,3 +141,7 @@ def _draw(budgets: dict[str, ErrorBudget]) -> Figure:
         if axes is not panels[0]:
             axes.set_yticklabels([])
     return figure
+
+
+if __name__ == "__main__":
+    QUOTED.write_text(json.dumps(to_data(fanuc_budget()), indent=1) + "\n", encoding="utf-8")
