@@ -19,6 +19,7 @@ from elastocal.planning.motion import (
     mover_for,
     plan_route,
     require_free_home,
+    straight_time,
 )
 from elastocal.planning.plan_result import (
     POOL,
@@ -282,6 +283,7 @@ def _contact(cell: Cell) -> ContactRecord:
         near_contact=engagement.near_contact,
         axis_override=cell.file.motion.override,
         contact_speed=cell.file.motion.contact_speed,
+        straight_time=straight_time(cell),
         load_cases={
             name: _vector(force) for name, force in zip(loads.cases, loads.force_tcp, strict=True)
         },

@@ -23,6 +23,7 @@ from elastocal.arrays import FloatArray, IndexArray
 from elastocal.cell import Cell
 from elastocal.dataset import Readings
 from elastocal.errors import DeviceError
+from elastocal.planning.motion import load_case_time
 from elastocal.results import brief_repr
 from elastocal.sim.workcell._contact import Contact, ContactLaw
 from elastocal.sim.workcell._instruments import COVERAGE, averaged_noise, sensor_range
@@ -316,6 +317,7 @@ class CampaignErrors:
         entry, procedure = cell.file.simulation, cell.file.procedure
         tracker, sensor, ranges = entry.tracker, entry.sensor, sensor_range(cell)
         times = (procedure.unloaded_average, procedure.average)
+        drift = sensor.drift / 60.0 * load_case_time(cell)
         averages = [averaged_noise(tracker.turbulence, time, tracker.rate) for time in times]
         force = [sensor.force_noise / math.sqrt(max(time * sensor.rate, 1.0)) for time in times]
         return cls(
@@ -324,7 +326,7 @@ class CampaignErrors:
             average=averages[1],
             unloaded_average=averages[0],
             force=(force[0], force[1]),
-            drift=sensor.drift / 60.0 * cell.file.motion.load_time * ranges[:3] / ranges[0],
+            drift=drift * ranges[:3] / ranges[0],
             gain=sensor.cross_talk * _gain(cell, ranges),
             repeatability=entry.controller.repeatability,
         )
