@@ -8,18 +8,16 @@ from scipy.spatial.transform import Rotation
 
 from elastocal import __version__
 from elastocal.arrays import FloatArray, IndexArray
-from elastocal.cell import Cell, fingerprint
+from elastocal.cell import Cell, contact_time, fingerprint, straight_time
 from elastocal.errors import PlanningError
 from elastocal.planning.checks import SightCheck
 from elastocal.planning.motion import (
     Mover,
     Route,
     clear_retreats,
-    contact_time,
     mover_for,
     plan_route,
     require_free_home,
-    straight_time,
 )
 from elastocal.planning.plan_result import (
     POOL,

@@ -14,10 +14,3 @@ from .route import (
     require_free_home as require_free_home,
 )
 from .tour import Tour as Tour, shortest_tour as shortest_tour
-from .visit import (
-    VisitStep as VisitStep,
-    contact_time as contact_time,
-    load_case_time as load_case_time,
-    straight_time as straight_time,
-    visit_steps as visit_steps,
-)

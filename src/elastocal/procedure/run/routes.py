@@ -11,9 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from elastocal.arrays import FloatArray
+from elastocal.cell import visit_steps
 from elastocal.errors import ProcedureError
 from elastocal.planning import Joints, PlanResult, PoseRecord
-from elastocal.planning.motion import visit_steps
 from elastocal.procedure.run.settings import RunSettings
 from elastocal.procedure.run.steps import Fault, FaultError, Step
 from elastocal.results import brief_repr

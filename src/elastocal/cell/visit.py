@@ -12,7 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from elastocal.cell import Cell, ProcedureSettings
+from elastocal.cell.cell import Cell
+from elastocal.cell.procedure import ProcedureSettings
 
 
 @dataclass(frozen=True)
