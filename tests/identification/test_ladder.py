@@ -23,9 +23,10 @@ from elastocal.identification import (
     low_loads,
     solve,
     take_simplest,
+    usable_for_choice,
 )
 from support.cells import Cell, linear_truth, rich_truth, robot
-from support.problems import campaign
+from support.problems import campaign, elastic
 
 OPTIONS = FitOptions()
 
@@ -171,10 +172,11 @@ def test_planted_friction_is_found_where_there_is_a_low_load(springs):
 
 
 def test_gears_are_scaled_to_the_load_of_each_joint():
-    readings = campaign()
+    moment = np.random.default_rng(0).normal(0.0, 300.0, (155, 3))
+    readings = replace(campaign(), moment=moment)
     springs = gears(robot(), readings, (0.03, 0.5))
     model = ElasticModel(robot(), bearing(robot()))
-    torque = model.load_torques(readings.joint_position, readings.force)
+    torque = model.load_torques(readings.joint_position, readings.force, moment)
     for index, spring in enumerate(springs[:5]):
         assert isinstance(spring, Gear)
         typical = np.median(np.abs(torque[:, index]))
@@ -187,6 +189,19 @@ def test_a_joint_that_is_never_loaded_keeps_a_linear_spring():
     springs = gears(robot(), replace(readings, force=0.0 * readings.force + [0.0, 0.0, -1000.0]))
     assert springs[0].kind == "revolute"
     assert springs[1].kind == "gear"
+
+
+def test_a_blunder_is_found_beside_what_a_marker_aside_shows():
+    """Taken for the tcp's, these readings fit so badly that one more misfit would not stand out."""
+    model, offset = elastic(), np.array([0.4, -0.3, 0.5])
+    readings = campaign()
+    shown = displacement_blocks(model, readings, offset) @ np.linspace(5e-7, 2e-6, 18)
+    shown += 1e-6 * np.random.default_rng(0).normal(size=shown.shape)
+    shown[33] += 5e-5
+    seen = replace(readings, marker_displacement=readings.controller_displacement + shown)
+    aside = usable_for_choice(robot(), seen, OPTIONS, offset)
+    assert len(aside) == len(readings) - 1
+    assert len(usable_for_choice(robot(), seen, OPTIONS)) == len(readings)
 
 
 def test_a_blunder_does_not_decide():
