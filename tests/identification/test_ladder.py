@@ -23,10 +23,9 @@ from elastocal.identification import (
     low_loads,
     solve,
     take_simplest,
-    usable_for_choice,
 )
 from support.cells import Cell, linear_truth, rich_truth, robot
-from support.problems import campaign, elastic
+from support.problems import campaign
 
 OPTIONS = FitOptions()
 
@@ -189,19 +188,6 @@ def test_a_joint_that_is_never_loaded_keeps_a_linear_spring():
     springs = gears(robot(), replace(readings, force=0.0 * readings.force + [0.0, 0.0, -1000.0]))
     assert springs[0].kind == "revolute"
     assert springs[1].kind == "gear"
-
-
-def test_a_blunder_is_found_beside_what_a_marker_aside_shows():
-    """Taken for the tcp's, these readings fit so badly that one more misfit would not stand out."""
-    model, offset = elastic(), np.array([0.4, -0.3, 0.5])
-    readings = campaign()
-    shown = displacement_blocks(model, readings, offset) @ np.linspace(5e-7, 2e-6, 18)
-    shown += 1e-6 * np.random.default_rng(0).normal(size=shown.shape)
-    shown[33] += 5e-5
-    seen = replace(readings, marker_displacement=readings.controller_displacement + shown)
-    aside = usable_for_choice(robot(), seen, OPTIONS, offset)
-    assert len(aside) == len(readings) - 1
-    assert len(usable_for_choice(robot(), seen, OPTIONS)) == len(readings)
 
 
 def test_a_blunder_does_not_decide():
