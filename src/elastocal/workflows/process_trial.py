@@ -50,7 +50,9 @@ class ProcessTrial:
 _Off = Mapping[str, Mapping[str, object]]
 """Figures of the section ``simulation`` by its parts."""
 _QUIET: _Off = {
-    "sensor": dict.fromkeys(("force_noise", "moment_noise", "drift", "cross_talk", "hysteresis"), 0.0),
+    "sensor": dict.fromkeys(
+        ("force_noise", "moment_noise", "drift", "cross_talk", "hysteresis"), 0.0
+    ),
     "controller": {"repeatability": 0.0},
 }
 _SUPPLE: _Off = {

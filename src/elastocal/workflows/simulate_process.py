@@ -4,8 +4,7 @@ Beside ``study`` the only workflow that brings simulator and estimator together.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
-from functools import partial
+from dataclasses import dataclass, field
 from importlib.metadata import version
 from os import PathLike
 from pathlib import Path
@@ -13,23 +12,18 @@ from typing import TypeVar
 
 import numpy as np
 
-from elastocal.arrays import FloatArray
-from elastocal.cell import Cell, SensorLoad, load_cell
+from elastocal.cell import Cell, load_cell
 from elastocal.compensation import CompensatorSettings, process, read_settings
 from elastocal.compensation.conditioning import read_sensor_load
-from elastocal.compensation.online import Compensator
-from elastocal.compensation.process import Course, CourseRun, ProcessRun, SimulateProcessResult
+from elastocal.compensation.process import Course, ProcessRun, SimulateProcessResult
 from elastocal.dataset import joint_dimensions
 from elastocal.errors import CompensationError
 from elastocal.files import filling, read_text, sha256
-from elastocal.identification import CalibratedModel
-from elastocal.parallel import map_in_processes, process_count
 from elastocal.progress import Progress
 from elastocal.results import brief_repr
-from elastocal.robot import inverse_transform
-from elastocal.sim.workcell import ProcessCell
-from elastocal.workflows._inputs import NewTool, require_same_robot
+from elastocal.workflows._inputs import NewTool, parse_posture, require_same_robot
 from elastocal.workflows._workflow import workflow
+from elastocal.workflows.process_trial import ProcessTrial, TrialRuns, run_budget, run_trial
 
 __all__ = [
     "SimulateProcessResult",

@@ -338,6 +338,4 @@ class CourseDeviation:
         """Return the deviations of a course that was run twice."""
         name, position = before.course.name, before.position
         spatial = np.stack([before.spatial, after.spatial], axis=1)
-        return cls(
-            seed, name, before.time, position, before.deviation, after.deviation, spatial
-        )
+        return cls(seed, name, before.time, position, before.deviation, after.deviation, spatial)

@@ -15,23 +15,21 @@ import numpy as np
 from scipy.spatial.transform import Rotation, Slerp
 
 from elastocal.arrays import FloatArray
-from elastocal.compensation.offline import (
+from elastocal.compensation.offline import programmed_rows
+from elastocal.compensation.process.course import Course, arc_length, unit_tangents
+from elastocal.dataset import (
     PathColumns,
-    PathError,
     PathValues,
-    check_limits,
     find_columns,
     in_file,
-    programmed_rows,
     read_layout,
     read_values,
     row_blocks,
     wrench_in_base,
 )
-from elastocal.compensation.process.course import Course, arc_length, unit_tangents
-from elastocal.errors import UnitError
+from elastocal.errors import PathError, UnitError
 from elastocal.robot import Robot
-from elastocal.robot.inverse import InverseKinematics, inverse_for
+from elastocal.robot.inverse import InverseKinematics, check_limits, inverse_for
 from elastocal.tables import Column, TableError, TableRows, finite_number, write_table
 from elastocal.units import factor, split_column
 
@@ -318,4 +316,5 @@ def _vector(text: str) -> FloatArray:
             f"direction {text!r} must be {LATERAL!r}, {NORMAL!r} or three numbers, not all 0,"
             " e.g. '1,0,0'"
         )
-    return vector / np.linalg.norm(vector)
+    unit: FloatArray = vector / np.linalg.norm(vector)
+    return unit
