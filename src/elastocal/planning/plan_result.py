@@ -68,7 +68,8 @@ class ContactRecord:
     """Speed of the straight motion between approach pose and contact that the times in contact
     are estimated for, in m/s."""
     load_cases: dict[str, Vector]
-    """Force on the robot in the tcp frame, in N, in the order in which they are applied."""
+    """Force on the robot in the tcp frame, in N, in the order in which they are applied; what
+    belongs to the reference (`CellFile.presses`) among them."""
 
 
 @brief_repr

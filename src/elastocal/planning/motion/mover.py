@@ -255,7 +255,7 @@ def contact_time(cell: Cell) -> float:
     """
     motion = cell.file.motion
     there_and_back = 2.0 * cell.file.engagement.approach_distance / motion.contact_speed
-    loads = len(cell.file.load_cases.cases) * motion.load_time
+    loads = len(cell.file.presses) * motion.load_time
     return there_and_back + motion.unloaded_time + loads
 
 
