@@ -16,6 +16,7 @@ from elastocal.identification import (
     choose_model,
     climb,
     displacement_blocks,
+    doubt,
     gears,
     has_levels,
 )
@@ -87,6 +88,20 @@ def test_the_interval_counts_that_refits_overlap():
     assert (rung.high - rung.low) / (2.0 * 2.0423 * naive) == pytest.approx(
         np.sqrt(1.0 + 31.0 / 30.0), rel=1e-3
     )
+
+
+def test_rungs_that_the_poses_do_not_tell_apart_are_a_doubt_about_the_chosen_one():
+    ladder = tuple(chosen("linear", 8).values())
+    (taken_one,) = [replace(rung, difference=0.0) for rung in ladder if rung.chosen]
+    assert taken_one.apart == 0.0
+    apart = {rung.name: rung.apart for rung in ladder}
+    assert 0.0 < doubt(ladder) < max(apart.values()) ** 2
+    # One that is far behind says nothing of a prediction.
+    behind = replace(taken_one, chosen=False, difference=1.0, standard_error=1e-3, apart=1.0)
+    assert doubt((taken_one, behind)) == 0.0
+    level = replace(behind, difference=0.0)
+    assert doubt((taken_one, level)) == pytest.approx(0.5)
+    assert doubt(()) == 0.0
 
 
 @pytest.mark.parametrize("name", ["actuated", "bearing", "tensor", "gears"])

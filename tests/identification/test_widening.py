@@ -6,7 +6,12 @@ from scipy.stats import norm, t
 
 from elastocal.identification import leave_poses_out, solve
 from elastocal.identification.solve import PoseGrams
-from elastocal.identification.uncertainty import bootstrap, widen_draws, widening_factor
+from elastocal.identification.uncertainty import (
+    bootstrap,
+    doubt_factor,
+    widen_draws,
+    widening_factor,
+)
 from support.problems import made_up
 
 
@@ -55,5 +60,29 @@ def test_draws_are_stretched_about_the_estimate():
 def test_stretched_draws_keep_the_bounds():
     problem, c = made_up(np.random.default_rng(0))
     bounded = replace(problem, lower=0.8 * c, upper=1.2 * c)
-    draws = c * np.array([[0.9], [1.1]])
-    np.testing.assert_allclose(widen_draws(bounded, c, draws, 10.0), c * [[0.8], [1.2]])
+    draws = c * np.array([[0.9], [1.1], [1.01]])
+    found = widen_draws(bounded, c, draws, 10.0)
+    assert np.all((found >= 0.8 * c) & (found <= 1.2 * c))
+    np.testing.assert_allclose(found[2], 1.1 * c)
+
+
+def test_stretching_beyond_a_bound_moves_no_prediction_that_other_springs_can_keep():
+    """Two springs that nearly share a deflection: what one may not take, the other does."""
+    problem, c = made_up(np.random.default_rng(0))
+    alike = problem.O.copy()
+    alike[..., 1] = alike[..., 0]
+    problem = replace(problem, O=alike)
+    step = np.array([0.6, -0.6, 0.0, 0.0, 0.0]) * c[0]
+    estimate = np.concatenate([[c[0], c[0]], c[2:]])
+    found = widen_draws(problem, estimate, estimate + np.array([step, -step]), 3.0)
+    assert np.all(found >= problem.lower)
+    predicted = (alike @ (found - estimate).T).ravel()
+    np.testing.assert_allclose(predicted, 0.0, atol=1e-6 * np.abs(alike @ estimate).max())
+
+
+def test_doubt_about_the_model_adds_to_the_variance():
+    problem, c = made_up(np.random.default_rng(0), blocks=5)
+    draws = c + np.array([[1.0], [-1.0]]) * np.eye(5)[0] * 1e-3
+    spread = float(np.mean(np.sum(np.square(problem.O @ (draws[0] - c)), axis=1)))
+    assert doubt_factor(problem, c, draws, 3.0 * spread) == pytest.approx(2.0)
+    assert doubt_factor(problem, c, draws, 0.0) == 1.0

@@ -278,10 +278,11 @@ class ElasticModel:
         J, W = jacobian.translation, jacobian.rotation
         torques = spring_torques(jacobian, check_vectors("force", force), moment)
         weights = self.weight_torques(q) if self.bears_weight else None
+        friction = self.friction.press(torques) if len(self.friction) else None
         shape = (*torques.shape[:-1], 3, 3)
         translation, rotation, coupling = np.zeros(shape), np.zeros(shape), np.zeros(shape)
         for group in self._groups:
-            tangents = group.law.tangents(group.load(torques, weights))
+            tangents = group.law.tangents(group.load(torques, weights, friction))
             # A spring of several axes couples them: all pairs, of which a hinge has one.
             for (a, axis), (b, other) in product(enumerate(group.axes), repeat=2):
                 terms = zip(group.parameters, tangents[a][b], strict=True)

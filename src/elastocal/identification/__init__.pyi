@@ -57,6 +57,7 @@ from .ladder import (
     Rung as Rung,
     choose_model as choose_model,
     climb as climb,
+    doubt as doubt,
     gears as gears,
     has_levels as has_levels,
 )
@@ -137,6 +138,7 @@ from .uncertainty import (
     IntervalCoverage as IntervalCoverage,
     bootstrap as bootstrap,
     distrust_factor as distrust_factor,
+    doubt_factor as doubt_factor,
     interval as interval,
     leave_poses_out as leave_poses_out,
     measured_coverage as measured_coverage,

@@ -18,7 +18,7 @@ from elastocal.identification.calibrated import CalibratedModel
 from elastocal.identification.conventions import POOR_FIT, check_conventions, check_joints
 from elastocal.identification.domain import CalibrationDomain
 from elastocal.identification.frames import FrameSummary, frame_summaries
-from elastocal.identification.ladder import Climbed
+from elastocal.identification.ladder import Climbed, doubt
 from elastocal.identification.observability import (
     attainable_rank,
     find_faint,
@@ -34,6 +34,7 @@ from elastocal.identification.uncertainty import (
     HeldOut,
     bootstrap,
     distrust_factor,
+    doubt_factor,
     leave_poses_out,
     measured_coverage,
     widen_draws,
@@ -132,9 +133,9 @@ def calibrate(
     solution = solve(kept, options.loss)
     weighted = kept.reweighted(solution.reading_weight)
     held_out = leave_poses_out(weighted)
-    draws = bootstrap(PoseGrams.of(weighted), options.draws, rng)
-    by = widening_factor(weighted, solution.compliance, draws, held_out.compliance)
     unexplained = held_out.mean / float(np.linalg.norm(kept.d, axis=1).mean())
+    draws = bootstrap(PoseGrams.of(weighted), options.draws, rng)
+    by = _widening(weighted, solution.compliance, draws, held_out, doubt(ladder))
     if unexplained > MOST_UNEXPLAINED:
         by = max(by, distrust_factor(weighted, solution.compliance, draws, held_out))
     widened = widen_draws(weighted, solution.compliance, draws, by)
@@ -174,6 +175,19 @@ def calibrate(
         warnings=tuple(warnings),
         frames=frame_summaries(weighted.frames, solution.compliance[frames], widened[:, frames]),
     )
+
+
+def _widening(
+    problem: Problem,
+    compliance: FloatArray,
+    draws: FloatArray,
+    held_out: HeldOut,
+    about_model: float,
+) -> float:
+    """Return how far draws are stretched for few poses, and for doubt about the model."""
+    by = widening_factor(problem, compliance, draws, held_out.compliance)
+    stretched = compliance + by * (draws - compliance)
+    return by * doubt_factor(problem, compliance, stretched, about_model)
 
 
 def _data_warnings(

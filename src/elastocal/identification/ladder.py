@@ -29,6 +29,7 @@ from elastocal.elastic import (
     bearing,
     bearing_ends,
     layout,
+    links,
     tensor,
 )
 from elastocal.errors import IdentificationError
@@ -46,7 +47,9 @@ AUTO = "auto"
 """Asks for the rung that the readings carry."""
 _KNEES = (0.3, 1.0, 3.0)
 """Knees of the gears, in typical load torques of the joint: one below, at and above it."""
-_SLIPS = (0.03, 0.1, 0.3, 1.0)
+_KNEES_OF_PLAYS = (0.5, 2.0)
+"""Knees of gears with friction, whose elements are knees as well."""
+_SLIPS = (0.15, 0.3, 0.6, 1.5)
 """Limits of the friction elements, likewise: from what barely matters to gears that stick."""
 _LOADED = 0.01
 """Part of the largest typical torque below which a joint counts as never loaded."""
@@ -86,10 +89,13 @@ class Climbed:
     standard_error: float = 0.0
     """Of the difference, in m."""
     chosen: bool = False
+    apart: float = 0.0
+    """Root mean square distance of its predictions at left-out poses from those of the chosen
+    rung, in m."""
 
 
 def gears(robot: Robot, readings: Readings, slips: tuple[float, ...] = ()) -> tuple[Spring, ...]:
-    """Return the layout `bearing_ends` with gears for axial springs.
+    """Return the layout `links` with gears for axial springs.
 
     Parameters
     ----------
@@ -101,7 +107,7 @@ def gears(robot: Robot, readings: Readings, slips: tuple[float, ...] = ()) -> tu
     slips : tuple of float
         Limits of friction elements, in that torque; none without.
     """
-    springs = bearing_ends(robot)
+    springs = links(robot)
     model = ElasticModel(robot, actuated(robot))
     torque = model.load_torques(readings.joint_position, readings.force, readings.moment)
     typical = dict(zip(robot.joint_names, np.median(np.abs(torque), axis=0), strict=True))
@@ -112,9 +118,11 @@ def gears(robot: Robot, readings: Readings, slips: tuple[float, ...] = ()) -> tu
         size = float(typical[spring.joint])
         if not (axial and axis.revolute and size > least):
             return spring
-        knees = tuple(_rounded(size * part) for part in _KNEES)
+        parts = _KNEES_OF_PLAYS if slips else _KNEES
+        knees = tuple(_rounded(size * part) for part in parts)
         limits = tuple(_rounded(size * part) for part in slips)
-        return Gear(spring.name, spring.joint, axis.axis, knees=knees, slips=limits)
+        place = (spring.name, spring.joint, axis.axis)
+        return Gear(*place, knees=knees, slips=limits, plays=bool(limits))
 
     count = len(robot.joint_names)
     return tuple(geared(spring, index < count) for index, spring in enumerate(springs))
@@ -126,6 +134,7 @@ RUNGS: dict[str, Rung] = {
         Rung("actuated", lambda robot, _: actuated(robot)),
         Rung("bearing", lambda robot, _: bearing(robot)),
         Rung("bearing-ends", lambda robot, _: bearing_ends(robot)),
+        Rung("links", lambda robot, _: links(robot)),
         Rung("tensor", lambda robot, _: tensor(robot)),
         Rung("gears", gears),
         Rung(
@@ -226,12 +235,14 @@ def climb(
         If the readings allow none of them.
     """
     tried: list[Climbed] = []
+    predicted: dict[str, FloatArray] = {}
     reason = f"no load case has less than {_LOW_LEVEL:.0%} of the largest force at its pose"
     for rung in rungs:
         if rung.needs_levels and not has_levels(readings):
             continue
         try:
-            tried.append(_tried(rung, robot, readings, options, marker_offset))
+            climbed, predicted[rung.name] = _tried(rung, robot, readings, options, marker_offset)
+            tried.append(climbed)
         except IdentificationError as error:
             reason = str(error)
     candidates = [each for each in tried if each.name in allowed]
@@ -240,8 +251,38 @@ def climb(
     best = min(candidates, key=lambda each: float(each.score.mean()))
     compared = [_against(each, best) for each in tried]
     chosen = next(e for e in compared if e.name in allowed and e.difference <= e.standard_error)
-    ladder = tuple(replace(each, chosen=each is chosen) for each in compared)
+    ladder = tuple(
+        replace(
+            each,
+            chosen=each is chosen,
+            apart=_distance(predicted[each.name], predicted[chosen.name]),
+        )
+        for each in compared
+    )
     return Choice(chosen.model, ladder)
+
+
+def doubt(ladder: Sequence[Climbed]) -> float:
+    """Return the mean square by which the choice of a rung may have moved a prediction, in m².
+
+    A choice is not known to be right: had the poses been others, another rung would have been
+    taken. Each counts with the weight ``exp(-z^2 / 2)`` of how far it is behind the best, ``z``
+    being the difference in standard errors; 1 if it predicts better (S. T. Buckland, K. P.
+    Burnham, N. H. Augustin, "Model selection: an integral part of inference", Biometrics 53, 1997).
+
+    Parameters
+    ----------
+    ladder : sequence of Climbed
+        With a chosen rung; 0 without any.
+    """
+    if not ladder:
+        return 0.0
+    difference = np.array([each.difference for each in ladder])
+    error = np.array([each.standard_error for each in ladder])
+    z = np.divide(difference, error, out=np.zeros_like(difference), where=error > 0.0)
+    weight = np.exp(-0.5 * np.square(np.maximum(z, 0.0)))
+    apart = np.array([each.apart for each in ladder])
+    return float(weight @ np.square(apart) / weight.sum())
 
 
 def has_levels(readings: Readings) -> bool:
@@ -265,7 +306,8 @@ def _tried(
     readings: Readings,
     options: FitOptions,
     marker_offset: ArrayLike | None,
-) -> Climbed:
+) -> tuple[Climbed, FloatArray]:
+    """Return a rung with its errors, and what it predicts at left-out poses, (reading, 3), in m."""
     model = ElasticModel(robot, rung.springs(robot, readings))
     problem = build(model, readings, options, marker_offset)
     held_out = leave_poses_out(problem)
@@ -276,7 +318,16 @@ def _tried(
         error[low] = 0.5 * (error[low] + _left_out(problem, low))
     blocks, index = np.unique(problem.block, return_inverse=True)
     score = np.bincount(index, error, len(blocks)) / np.bincount(index, minlength=len(blocks))
-    return Climbed(rung.name, model, held_out, score, 0.0, 0.0, 0.0)
+    n = problem.springs
+    predicted = np.einsum(
+        "rin,rn->ri", problem.O[:, :, n], held_out.compliance[held_out.fold][:, n]
+    )
+    return Climbed(rung.name, model, held_out, score, 0.0, 0.0, 0.0), predicted
+
+
+def _distance(a: FloatArray, b: FloatArray) -> float:
+    """Return the root mean square distance of predictions, in m."""
+    return float(np.sqrt(np.mean(np.sum(np.square(a - b), axis=1))))
 
 
 def _left_out(problem: Problem, rows: BoolArray) -> FloatArray:

@@ -22,8 +22,9 @@ from numpy.random import Generator
 from scipy.special import ndtri, stdtrit
 
 from elastocal.arrays import FloatArray, IndexArray
+from elastocal.identification._least_squares import minimise
 from elastocal.identification.problem import Problem
-from elastocal.identification.solve import PoseGrams
+from elastocal.identification.solve import PoseGrams, factor
 from elastocal.records import record
 from elastocal.results import brief_repr
 
@@ -227,6 +228,24 @@ def widening_factor(
     return max(1.0, float(student * np.sqrt(jackknife / bootstrap)))
 
 
+def doubt_factor(
+    problem: Problem, compliance: FloatArray, draws: FloatArray, doubt: float
+) -> float:
+    """Return the factor at which widened draws hold the doubt about the model besides.
+
+    Parameters
+    ----------
+    problem, compliance : Problem, ndarray
+        As for `widening_factor`.
+    draws : ndarray, shape (draw, spring)
+        As they are to be stretched further.
+    doubt : float
+        Mean square by which another model would have moved a prediction, in m².
+    """
+    spread = _variance(problem, draws - compliance) / len(draws)
+    return float(np.sqrt(1.0 + doubt / spread)) if spread > 0.0 else 1.0
+
+
 def distrust_factor(
     problem: Problem, compliance: FloatArray, draws: FloatArray, held_out: HeldOut
 ) -> float:
@@ -249,8 +268,23 @@ def distrust_factor(
 def widen_draws(
     problem: Problem, compliance: FloatArray, draws: FloatArray, by: float
 ) -> FloatArray:
-    """Return the draws stretched about the estimate, kept within the bounds."""
-    return np.asarray(np.clip(compliance + by * (draws - compliance), problem.lower, problem.upper))
+    """Return the draws stretched about the estimate, within the bounds.
+
+    A stretched draw beyond a bound is taken to the point within that predicts most like it at the
+    measured readings. Clipped one by one, springs that share a deflection would be cut where they
+    shrink and kept where they grow, and every prediction would grow with the stretching.
+    """
+    stretched = compliance + by * (draws - compliance)
+    lower, upper = problem.lower, problem.upper
+    beyond = np.any((stretched < lower) | (stretched > upper), axis=1)
+    if not np.any(beyond):
+        return np.asarray(stretched)
+    system = factor(problem)
+    s, Vt, scale = system.s, system.Vt, system.scale
+    for draw in np.flatnonzero(beyond):
+        y = s * (Vt @ (stretched[draw] * scale))
+        stretched[draw] = minimise(s, Vt, y, lower * scale, upper * scale) / scale
+    return np.asarray(np.clip(stretched, lower, upper))
 
 
 def _variance(problem: Problem, deviations: FloatArray) -> float:
