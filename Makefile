@@ -4,6 +4,8 @@
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
+# Neighbours stay together, so that what a file prepares is seldom prepared twice.
+SHARED_OUT := -n auto --dist worksteal
 
 .PHONY: demo test lint units end-to-end browser docs-strict nightly slow coverage mutation docs bench house clean
 
@@ -19,13 +21,13 @@ lint: $(VENV)/installed-dev
 	$(BIN)/lint-imports
 
 units: $(VENV)/installed-dev
-	$(BIN)/pytest -n auto -m 'not slow and not end_to_end and not browser'
+	$(BIN)/pytest $(SHARED_OUT) -m 'not slow and not end_to_end and not browser'
 
 end-to-end: $(VENV)/installed-dev
-	$(BIN)/pytest -n auto -m 'end_to_end and not slow and not browser' tests
+	$(BIN)/pytest $(SHARED_OUT) -m 'end_to_end and not slow and not browser' tests
 
 browser: $(VENV)/installed-dev
-	$(BIN)/pytest -n auto -m 'browser and not slow' tests
+	$(BIN)/pytest $(SHARED_OUT) -m 'browser and not slow' tests
 
 docs-strict: $(VENV)/installed-dev
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet
@@ -33,15 +35,18 @@ docs-strict: $(VENV)/installed-dev
 nightly: slow coverage mutation
 
 slow: $(VENV)/installed-dev
-	$(BIN)/pytest -n auto -m slow -rA
+	$(BIN)/pytest $(SHARED_OUT) -m slow -rA
 
 # Tests that count imported modules would count those of coverage.
 coverage: $(VENV)/installed-nightly
-	$(BIN)/pytest -n auto --cov --cov-report=term:skip-covered --deselect tests/test_startup.py
+	$(BIN)/pytest $(SHARED_OUT) --cov --cov-report=term:skip-covered --deselect tests/test_startup.py
 
+# A tenth of all mutants, another one each day of ten; `make mutation TENTH=3` chooses. Two hours at
+# most: what is not tried then is not counted.
+TENTH ?= $(shell date +%j | tail -c 2)
 mutation: $(VENV)/installed-nightly
-	$(BIN)/mutmut run
-	$(BIN)/mutmut results
+	timeout 2h $(BIN)/mutmut run '*__mutmut_*$(TENTH)' > mutants.log || test $$? -eq 124
+	$(BIN)/python tools/survivors.py
 
 docs: $(VENV)/installed-dev
 	$(BIN)/mkdocs serve
@@ -50,7 +55,9 @@ bench: $(VENV)/installed-dev
 	$(BIN)/python benchmarks/run.py
 	$(BIN)/python benchmarks/search.py
 	$(BIN)/python benchmarks/pool.py
+	$(BIN)/python benchmarks/study.py 50
 	$(BIN)/python benchmarks/compensation.py
+	$(BIN)/python benchmarks/ladder.py
 	$(BIN)/python benchmarks/codec.py
 	$(BIN)/python benchmarks/record.py
 

@@ -3,8 +3,9 @@
 Runs the command itself on the example cell, so that starting, pool and results count. On a shared
 machine other processes take their part, so three figures are printed: the CPU time over that of
 all cores, the part that others took, and how many cores the study's processes were ready to run on
-(looked at every 20 ms; what the first would be with nobody else there). Linux only. Run with
-``python benchmarks/study.py [SAMPLES ...]``.
+(looked at every 20 ms; what the first would be with nobody else there). The reference is the same
+study by one process, in the same run: how much sooner all cores are done, and how much more CPU
+time they take. Linux only. Run with ``python benchmarks/study.py [SAMPLES ...]``.
 """
 
 import os
@@ -87,13 +88,16 @@ def main() -> None:
         cell.mkdir()
         write_example(cell, "afp")
         for samples in wanted:
-            use = run(cell / "cell.yaml", Path(folder) / f"study_{samples}", samples)
+            out = Path(folder) / f"study_{samples}"
+            use = run(cell / "cell.yaml", out, samples)
+            alone = run(cell / "cell.yaml", out.with_suffix(".alone"), samples, "--jobs", "1")
             everything = CORES * use.wall
             print(
                 f"  {samples:4d} samples: {use.wall:6.1f} s, {use.own:6.1f} s CPU;"
                 f" user / (wall x {CORES}) {use.user / everything:.0%}, others took"
                 f" {max(use.busy - use.own, 0.0) / everything:.0%}; ready for"
-                f" {use.ready:.0%} of the cores",
+                f" {use.ready:.0%} of the cores; one process {alone.wall:.1f} s, ratio"
+                f" {alone.wall / use.wall:.2f}, of the CPU time {use.own / alone.own:.2f}",
                 flush=True,
             )
 

@@ -27,7 +27,7 @@ from elastocal.planning.surface import distance_to_boundary, load_surface
 
 folder = Path(sys.argv[1]) if len(sys.argv) > 1 else Path(tempfile.mkdtemp(prefix="elastocal-"))
 folder.mkdir(parents=True, exist_ok=True)
-cell_file = ec.init(folder / "cell", like="afp").cell
+cell_file = ec.init(folder / "cell", kind="afp").cell
 text = cell_file.read_text(encoding="utf-8").replace("pool: 3000", "pool: 1000")
 cell_file.write_text(text, encoding="utf-8")
 

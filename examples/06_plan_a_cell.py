@@ -14,7 +14,7 @@ folder = Path(sys.argv[1]) if len(sys.argv) > 1 else Path(tempfile.mkdtemp(prefi
 folder.mkdir(parents=True, exist_ok=True)
 
 # A smaller pool than the example's 3000 keeps this short.
-cell_file = ec.init(folder / "cell", like="machining").cell
+cell_file = ec.init(folder / "cell", kind="machining").cell
 text = cell_file.read_text(encoding="utf-8").replace("pool: 3000", "pool: 200")
 cell_file.write_text(text, encoding="utf-8")
 

@@ -31,7 +31,7 @@ folder = Path(sys.argv[1]) if len(sys.argv) > 1 else Path(tempfile.mkdtemp(prefi
 folder.mkdir(parents=True, exist_ok=True)
 
 # A plan of a single pose: this is about the streams, not about the calibration.
-cell_file = ec.init(folder / "cell", like="afp").cell
+cell_file = ec.init(folder / "cell", kind="afp").cell
 text = cell_file.read_text(encoding="utf-8")
 text = text.replace("pool: 3000", "pool: 20").replace('d_max: "175 mm"', "poses: 1")
 cell_file.write_text(text, encoding="utf-8")

@@ -24,7 +24,7 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
         if not item.path.is_relative_to(TESTS):
             continue
         place = item.path.relative_to(TESTS)
-        if place.name in BROWSER or "browser" in item.fixturenames:
+        if place.name in BROWSER or "browser" in item.fixturenames or "in_a_browser" in item.name:
             item.add_marker("browser")
         elif any(place.is_relative_to(part) for part in END_TO_END):
             item.add_marker("end_to_end")

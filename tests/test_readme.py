@@ -45,12 +45,12 @@ def shell_lines() -> list[str]:
     return [line for block in blocks("sh") for line in block.splitlines() if line.strip()]
 
 
-def done(arguments: list[str], base: Path) -> Result:
+def done(arguments: list[str]) -> Result:
     """Run a command; the demo is that of all tests, told as if it stood here."""
     if arguments[0] != "demo":
         return elastocal(*arguments)
     assert arguments == ["demo", "--out", "demo"]
-    folder, told = finished_demo("afp", base), demo_result("afp", base)
+    folder, told = finished_demo("afp"), demo_result("afp")
     shutil.copytree(folder, "demo")
     return Result(told.code, told.out, told.err.replace(str(folder), "demo"))
 
@@ -63,7 +63,7 @@ def toured(tmp_path_factory):
         for line in shell_lines():
             command, *arguments = shlex.split(line)
             assert command == "elastocal", line
-            results[line] = done(arguments, tmp_path_factory.getbasetemp())
+            results[line] = done(arguments)
     return Toured(folder, results)
 
 
@@ -244,11 +244,10 @@ def models_in(annotation: object) -> list[type[BaseModel]]:
     return [model for part in get_args(annotation) for model in models_in(part)]
 
 
-def test_the_output_that_the_tutorial_quotes_is_that_of_the_demo(tmp_path_factory):
-    base = tmp_path_factory.getbasetemp()
-    folder = finished_demo("afp", base)
+def test_the_output_that_the_tutorial_quotes_is_that_of_the_demo():
+    folder = finished_demo("afp")
     log = (folder / "log.txt").read_text(encoding="utf-8", errors="replace")
-    words = f"{log}\n{demo_result('afp', base).err}".replace(str(folder), "demo").split()
+    words = f"{log}\n{demo_result('afp').err}".replace(str(folder), "demo").split()
     page = (ROOT / "docs/tutorial.md").read_text(encoding="utf-8")
     quoted = re.findall(r"^```text\n(.*?)^```", page, flags=re.MULTILINE | re.DOTALL)
     assert len(quoted) > 5

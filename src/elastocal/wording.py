@@ -62,6 +62,21 @@ def _three_digits(value: float) -> str:
     return text.rstrip("0").rstrip(".") if "." in text else text
 
 
+def lengths_with_interval(
+    value: float | None, low: float | None, high: float | None
+) -> tuple[str, str]:
+    """Return a length and its interval in mm; a lone number where it has none.
+
+    >>> lengths_with_interval(0.00012, 0.0001, 0.0002), lengths_with_interval(None, None, None)
+    (('0.120 mm', '0.100 to 0.200'), ('not known', ''))
+    """
+    if value is None:
+        return "not known", ""
+    if low is None or high is None:
+        return mm(value), ""
+    return mm(value), f"{1e3 * low:.3f} to {1e3 * high:.3f}"
+
+
 def mm(metres: float, digits: int = 3) -> str:
     """Return a length in mm.
 

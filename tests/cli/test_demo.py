@@ -15,14 +15,9 @@ from support.cli import elastocal
 from support.demos import demo_result, finished_demo
 
 
-@pytest.fixture(scope="module")
-def base(tmp_path_factory):
-    return tmp_path_factory.getbasetemp()
-
-
-def test_a_demo_says_what_it_does_and_what_came_of_it(base):
-    told = demo_result("afp", base).err
-    folder = finished_demo("afp", base)
+def test_a_demo_says_what_it_does_and_what_came_of_it():
+    told = demo_result("afp").err
+    folder = finished_demo("afp")
     for chapter in chapters("afp", folder, 0):
         assert chapter.line in told
     table = json.loads((folder / "process/table.json").read_text())
@@ -31,8 +26,8 @@ def test_a_demo_says_what_it_does_and_what_came_of_it(base):
     assert str(folder / "report.html") in told
 
 
-def test_every_file_that_the_demos_readme_names_is_there(base):
-    folder = finished_demo("afp", base)
+def test_every_file_that_the_demos_readme_names_is_there():
+    folder = finished_demo("afp")
     text = (folder / README).read_text(encoding="utf-8")
     named = re.findall(r"\]\(([^)]+)\)", text)
     assert len(named) > 10
@@ -41,16 +36,16 @@ def test_every_file_that_the_demos_readme_names_is_there(base):
     assert top <= {name.split("/")[0] for name in named} | {README, "dome.stl"}
 
 
-def test_the_log_of_a_demo_holds_every_command_with_its_output(base):
-    log = (finished_demo("afp", base) / "log.txt").read_text(encoding="utf-8")
+def test_the_log_of_a_demo_holds_every_command_with_its_output():
+    log = (finished_demo("afp") / "log.txt").read_text(encoding="utf-8")
     commands = re.findall(r"^\$ elastocal (\S+)", log, flags=re.MULTILINE)
-    assert commands == [c.words[0] for c in chapters("afp", base, 0)]
+    assert commands == [c.words[0] for c in chapters("afp", Path("demo"), 0)]
     assert "model written to" in log
     assert re.search(r"^gears .* taken", log, flags=re.MULTILINE)
 
 
-def test_a_demo_reaches_the_papers_reductions_in_its_own_table(base):
-    table = json.loads((finished_demo("afp", base) / "process/table.json").read_text())
+def test_a_demo_reaches_the_papers_reductions_in_its_own_table():
+    table = json.loads((finished_demo("afp") / "process/table.json").read_text())
     reduction = table["lines"][-1]["reduction"]
     assert reduction["mean"] >= 0.89
     assert reduction["max"] >= 0.70
@@ -58,8 +53,8 @@ def test_a_demo_reaches_the_papers_reductions_in_its_own_table(base):
 
 
 @pytest.mark.slow
-def test_the_machining_demo_reaches_the_papers_reductions(base):
-    table = json.loads((finished_demo("machining", base) / "process/table.json").read_text())
+def test_the_machining_demo_reaches_the_papers_reductions():
+    table = json.loads((finished_demo("machining") / "process/table.json").read_text())
     reduction = table["lines"][-1]["reduction"]
     assert reduction["mean"] >= 0.83
     assert reduction["max"] >= 0.74

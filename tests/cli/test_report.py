@@ -11,8 +11,8 @@ from support.cli import elastocal
 
 
 @pytest.fixture(scope="module")
-def finished(tmp_path_factory):
-    return reported.finished(tmp_path_factory)
+def finished():
+    return reported.finished()
 
 
 @pytest.fixture

@@ -96,6 +96,15 @@ def test_a_sample_is_calibrated_as_the_dataset_of_a_run_would_be():
     np.testing.assert_allclose(full.calibrated.compliance, found.compliance, rtol=1e-9)
 
 
+def test_springs_that_readings_decide_are_chosen_for_each_arm_and_not_tabulated():
+    study = prepared("poses=12", "springs=bearing,tensor,gears,auto")
+    assert study.design.springs["auto"] == study.design.springs["gears"] == ()
+    bearing, tensor, gears, auto = study.simulate(Sample(0, 0)).outcomes
+    assert len(tensor.compliance) > len(bearing.compliance) > len(auto.compliance) == 0
+    assert gears.error_mean != bearing.error_mean
+    assert auto.error_mean < 0.1 * auto.deflection_mean
+
+
 def test_verification_poses_are_never_chosen():
     simulate = prepared("poses=12,48", "search=cover,ioops,random").simulate
     aside = set(simulate.pool.verification.tolist())

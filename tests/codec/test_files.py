@@ -28,7 +28,10 @@ def data() -> CodecData:
     return cross_validate(
         robot(),
         Cell(linear_truth(), poses=8).readings(),
-        [Variant("six", springs="actuated"), Variant("one load", load_cases="normal")],
+        [
+            Variant("six", springs="actuated"),
+            Variant("one load", springs="bearing", load_cases="normal"),
+        ],
         CodecOptions(splits=4, seed=3),
         provenance="test",
     )

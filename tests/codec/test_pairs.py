@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from elastocal.codec import paired_difference
-from elastocal.codec._overlap import Overlap
+from elastocal.codec import compare_variants
+from elastocal.identification import Overlap
 
 OVERLAP = Overlap(31, 0.4)
 COMMON = 1e-3 * np.exp(np.random.default_rng(0).normal(size=(31, 6)))
@@ -13,7 +13,7 @@ NOISE = 1e-6 * np.random.default_rng(1).normal(size=(31, 6))
 
 
 def pair(gain, at=6, overlap=OVERLAP):
-    return paired_difference("a", "b", COMMON + np.asarray(gain) + NOISE, COMMON, overlap, at)
+    return compare_variants("a", "b", COMMON + np.asarray(gain) + NOISE, COMMON, overlap, at)
 
 
 def test_a_difference_far_below_the_scatter_of_the_sets_is_found_and_bracketed():
@@ -48,13 +48,13 @@ def test_noise_alone_proves_nothing():
 
 
 def test_round_off_is_no_difference():
-    found = paired_difference("a", "b", COMMON * (1.0 + 1e-14), COMMON, OVERLAP, 6)
+    found = compare_variants("a", "b", COMMON * (1.0 + 1e-14), COMMON, OVERLAP, 6)
     np.testing.assert_array_equal(found.difference, 0.0)
     assert (found.better, found.crossing) == (None, None)
 
 
 def test_one_set_tells_no_interval():
-    found = paired_difference("a", "b", 2 * COMMON[:1], COMMON[:1], Overlap(1, 1.0), 6)
+    found = compare_variants("a", "b", 2 * COMMON[:1], COMMON[:1], Overlap(1, 1.0), 6)
     assert np.isnan(found.low).all()
     assert found.better is None
     assert found.difference == pytest.approx(COMMON[0])

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from elastocal.codec import Tolerance, find_saturation
-from elastocal.codec._overlap import Overlap
+from elastocal.codec import Tolerance, find_saturation, median_draws
 from elastocal.errors import CodecError
+from elastocal.identification import Overlap
 
 CURVE = np.array([900.0, 400.0, 200.0, 110.0, 104.0, 101.0, 100.0, 100.0]) * 1e-6
 
@@ -88,3 +88,20 @@ def test_springs_that_leave_more_than_half_of_the_zero_model_are_not_saturated()
     good = find_saturation("x", errors, Tolerance(), overlap, rng, np.full(31, 1000e-6))
     assert good.explains
     assert good.settled
+
+
+def test_draws_of_the_median_have_the_corrected_spread_and_stay_positive():
+    values = np.exp(0.3 * np.random.default_rng(0).normal(size=(400, 1)))
+    loose, tied = (
+        np.log(median_draws(values, Overlap(400, rho), np.random.default_rng(1)))
+        for rho in (0.0, 0.4)
+    )
+    median_sigma = 0.3 * np.sqrt(np.pi / 2 / 400)
+    assert loose.std() == pytest.approx(median_sigma, rel=0.3)
+    widened = np.sqrt((1 / 400 + 0.4 / 0.6) / (1 / 400))
+    assert tied.std() / loose.std() == pytest.approx(widened, rel=1e-6)
+
+
+def test_sets_without_spread_have_no_draws():
+    values = np.ones((5, 2))
+    assert median_draws(values, Overlap(5, 1.0), np.random.default_rng(0)).shape == (0, 2)

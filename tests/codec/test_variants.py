@@ -10,7 +10,7 @@ from elastocal.errors import CodecError, DatasetError, PlanningError
 
 
 def test_nothing_to_compare_is_the_default_alone():
-    assert make_variants({}) == (Variant("default", "cover", "bearing", "all", "bounded"),)
+    assert make_variants({}) == (Variant("default", "cover", "auto", "all", "bounded"),)
 
 
 def test_one_key_names_variants_after_its_values():

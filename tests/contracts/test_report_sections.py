@@ -57,7 +57,7 @@ def whole(tmp_path_factory):
     """All parts, an earlier calibration among them."""
     from support.cli import elastocal
 
-    folder = reported.finished(tmp_path_factory)
+    folder = reported.finished()
     old = tmp_path_factory.mktemp("old") / "old.json"
     data = folder / "run" / "dataset.nc"
     made = elastocal("calibrate", data, "--out", old, "--exclude", 0, "--draws", 40)

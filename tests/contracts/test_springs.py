@@ -1,5 +1,6 @@
 """What every kind of spring keeps: place, law, tangent, units, files, fit, C."""
 
+import json
 from dataclasses import replace
 from functools import cache
 
@@ -15,6 +16,7 @@ from elastocal.elastic import (
     Spring,
     SpringLoad,
     Tensor,
+    Unit,
     axial,
     unit_of,
 )
@@ -59,12 +61,14 @@ CASES: dict[str, Spring] = {
         slips=(50.0, 150.0),
         plays=True,
     ),
+    "gear without friction on a heavy arm": Gear("joint_3.gear", "joint_3", (0.0, 1.0, 0.0)),
     "tensor": Tensor("joint_3.tensor", "joint_3"),
     "tensor off the origin": Tensor("joint_3.tensor", "joint_3", (0.1, -0.2, 0.3)),
 }
 """Springs of each kind at joint 3."""
 RNG = np.random.default_rng(5)
 FORCE, MOMENT = RNG.normal(0.0, 800.0, (4, 3)), RNG.normal(0.0, 100.0, (4, 3))
+MARKER = np.array([0.2, -0.3, 0.5])
 
 
 @cache
@@ -162,20 +166,30 @@ class TestEverySpring:
             np.testing.assert_allclose(found, np.swapaxes(found, 0, 1))
 
     def test_cartesian_compliance_is_the_derivative_of_the_deflection_by_the_load(self, case):
+        """Of the tcp, and of a marker beside it, which a rotation moves as well."""
         arm, c = model(case), planted(case)
-        q, f = configurations(linkage(), 1)[0], FORCE[0]
-        found = arm.cartesian_compliance(c, q, f)
-        for step, column, turned in zip(
-            np.eye(3), found.translation.T, found.coupling.T, strict=True
+        q, f, m = configurations(linkage(), 1)[0], FORCE[0], MOMENT[0]
+        found = arm.cartesian_compliance(c, q, f, m)
+        lever = arm.robot.forward(q)[:3, :3] @ MARKER
+        for step, column, coupled, turned in zip(
+            np.eye(3), found.translation.T, found.coupling.T, found.rotation.T, strict=True
         ):
-            by_force = (arm.deflection(c, q, f + step) - arm.deflection(c, q, f - step)) / 2.0
+            by_force = (arm.deflection(c, q, f + step, m) - arm.deflection(c, q, f - step, m)) / 2.0
             np.testing.assert_allclose(column, by_force, rtol=1e-4, atol=1e-12)
-            by_moment = (arm.deflection(c, q, f, step) - arm.deflection(c, q, f, -step)) / 2.0
-            np.testing.assert_allclose(turned, by_moment, rtol=1e-4, atol=1e-12)
+            ahead, behind = (
+                np.array([arm.deflection(c, q, f, m + by), blocks @ c])
+                for by in (step, -step)
+                for blocks in [arm.observation_blocks(q, f, m + by, MARKER)]
+            )
+            at_tcp, at_marker = (ahead - behind) / 2.0
+            np.testing.assert_allclose(coupled, at_tcp, rtol=1e-4, atol=1e-12)
+            np.testing.assert_allclose(
+                coupled + np.cross(turned, lever), at_marker, rtol=1e-4, atol=1e-12
+            )
 
     def test_directional_rows_are_the_compliance_without_load_along_a_direction(self, case):
         arm, c, u = model(case), planted(case), np.array([0.6, 0.0, -0.8])
-        q = configurations(linkage(), 3)
+        q = configurations(linkage(), 6).reshape(2, 3, -1)
         C = arm.cartesian_compliance(c, q).translation
         np.testing.assert_allclose(arm.directional_rows(q, u) @ c, u @ C @ u, rtol=1e-10)
 
@@ -269,3 +283,16 @@ def test_hinges_are_what_a_file_means_that_names_no_kind(tmp_path):
     (tmp_path / "odd.json").write_text(text.replace(name, f'"kind": "odd", {name}'))
     with pytest.raises(SchemaError, match=r"springs\.2: unknown kind of spring \(allowed: hinge"):
         read_model(tmp_path / "odd.json")
+
+
+def test_a_spring_of_a_file_that_is_none_is_refused(tmp_path):
+    write_model(tmp_path / "model.json", calibrated("hinge"))
+    data = json.loads((tmp_path / "model.json").read_text())
+    data["springs"][2] = "joint_3.x"
+    (tmp_path / "model.json").write_text(json.dumps(data))
+    with pytest.raises(SchemaError, match=r"springs\.2"):
+        read_model(tmp_path / "model.json")
+
+
+def test_a_unit_that_no_kind_has_is_shown_as_the_file_states_it():
+    assert unit_of("m/(N*m)") == Unit("m/(N*m)", "m/(N*m)", 1.0, "")

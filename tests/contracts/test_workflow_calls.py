@@ -2,6 +2,7 @@
 
 import dataclasses
 import inspect
+import re
 import typing
 from pathlib import Path
 
@@ -32,6 +33,33 @@ def _paths(settings: type) -> dict[str, object]:
 
 def test_every_workflow_is_looked_at():
     assert len(NAMES) >= 17
+
+
+def _kind(hint: object) -> str:
+    """Return what a field takes: a path, a text, a number, or the class that it names."""
+    text = str(hint)
+    if "Path" in text:
+        return "path"
+    for kind in ("str", "bool", "float", "int"):
+        if re.search(rf"\b{kind}\b", text):
+            return kind
+    return text
+
+
+def test_a_name_has_one_meaning_in_all_settings():
+    kinds: dict[str, set[str]] = {}
+    for settings in NAMES.values():
+        for name, hint in typing.get_type_hints(settings).items():
+            kinds.setdefault(name, set()).add(_kind(hint))
+    assert {name: found for name, found in kinds.items() if len(found) > 1} == {}
+
+
+def test_what_is_written_goes_to_out():
+    # `check` writes nothing, `derive` into the run that it starts from.
+    writing = NAMES.keys() - {"check", "derive"}
+    assert [
+        name for name in writing if "out" not in inspect.signature(NAMES[name]).parameters
+    ] == []
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -66,7 +94,7 @@ class TestEveryWorkflow:
 
 
 def test_paths_given_as_texts_are_read_and_written(tmp_path_factory):
-    done = reported.finished(tmp_path_factory)
+    done = reported.finished()
     out = tmp_path_factory.mktemp("texts")
     model, data = str(done / "model.json"), str(done / "run" / "dataset.nc")
     rows, again = str(done / "process" / "path.csv"), str(out / "again.json")
@@ -76,8 +104,8 @@ def test_paths_given_as_texts_are_read_and_written(tmp_path_factory):
     ec.compensate(model, path=rows, out=str(out / "corrected.csv"))
     figure = str(out / "compared.svg")
     ec.compare(model, new=again, rows=rows, out=str(out / "compared.json"), figure=figure)
-    ec.export(model, c=str(out / "c"))
-    ec.stiffness(model, path=rows, out=str(out / "s"), spins=4, stands=3, stations=5)
+    ec.export(model, out=str(out / "c"))
+    ec.stiffness(model, path=rows, out=str(out / "s"), spins=4, external_positions=3, stations=5)
     assert {each.name for each in out.iterdir()} == {
         *("again.json", "predicted.csv", "tool.json", "corrected.csv", "compared.json"),
         *("compared.svg", "c", "s"),

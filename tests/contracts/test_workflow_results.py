@@ -32,7 +32,7 @@ WITHOUT = {
 @pytest.fixture(scope="module")
 def results(tmp_path_factory) -> dict[str, Result]:
     """One result of each workflow, by the name of its class."""
-    done = reported.finished(tmp_path_factory)
+    done = reported.finished()
     out = tmp_path_factory.mktemp("results")
     run = reported.copied(done, out) / "run"
     model, path, cell = done / "model.json", done / "process" / "path.csv", done / "cell/cell.yaml"
@@ -53,14 +53,14 @@ def results(tmp_path_factory) -> dict[str, Result]:
         derived,
         workflows.dry_run(settings),
         workflows.DemoResult(out, process),
-        workflows.export(model, c=out / "c"),
+        workflows.export(model, out=out / "c"),
         workflows.init(out / "new"),
         plans.plan(),
         workflows.predict(model, rows=path),
         workflows.report(run, out=out / "report.html"),
         workflows.RunResult(figures, RunEnd.DONE, derived.summary, None),
         process,
-        workflows.stiffness(model, path=path, spins=4, stands=3, stations=5),
+        workflows.stiffness(model, path=path, spins=4, external_positions=3, stations=5),
         workflows.StudyResult(study_summary(design, samples, None), design, samples, ()),
         workflows.tool(run),
     )

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from elastocal.dataset import Dataset
-from elastocal.dataset._table import read_table
+from elastocal.dataset._store import read_table
 from elastocal.errors import DatasetError, FileAccessError, SchemaError
 from support.datasets import write_lines
 

@@ -1,7 +1,7 @@
 import pytest
 
 from elastocal.dataset import Dataset
-from elastocal.dataset._table import write_table
+from elastocal.dataset._store import write_table
 from support.datasets import dataset, full_keywords
 
 

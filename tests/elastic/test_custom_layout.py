@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from elastocal.elastic import ElasticModel, layout
+from elastocal.elastic import ElasticModel, Gear, Hinge, Tensor, layout
 from elastocal.errors import FileAccessError, SchemaError, SpringError
 from elastocal.robot import Robot
 from support.cells import robot
@@ -48,15 +48,37 @@ def test_a_spring_has_the_name_it_is_given(read):
     assert spring.name == "spindle"
 
 
-@pytest.mark.parametrize("kind", ["revolute", "prismatic"])
-@pytest.mark.parametrize("frame", ["proximal", "distal"])
-@pytest.mark.parametrize("axis", ["axial", "x", "[1, 1, 0]"])
-def test_springs_that_differ_have_names_that_differ(read, kind, frame, axis):
-    usual = (kind, frame) == ("revolute", "proximal")
-    wanted = f"{{joint: joint_6, axis: {axis}, kind: {kind}, frame: {frame}}}"
-    (spring,) = read(f"springs: [{wanted}]")
-    (plain,) = read(f"springs: [{{joint: joint_6, axis: {axis}}}]")
-    assert (spring.name == plain.name) == usual
+@pytest.mark.parametrize(
+    ("entry", "name"),
+    [
+        ("axis: axial", "joint_6.axial"),
+        ("axis: x, kind: revolute", "joint_6.x"),
+        ("axis: x, kind: prismatic", "joint_6.linear-x"),
+        ("axis: axial, kind: prismatic, frame: distal", "joint_6.linear-distal-axial"),
+        ("axis: [1, 1, 0], frame: distal", "joint_6.distal-(0.707 0.707 0)"),
+        ("kind: gear", "joint_6.gear-axial"),
+        ("axis: y, kind: gear, frame: distal", "joint_6.gear-distal-y"),
+        ("kind: tensor", "joint_6.tensor-axial"),
+    ],
+)
+def test_a_name_tells_what_distinguishes_a_spring(read, entry, name):
+    """Model files and tables name springs so; another name would orphan them."""
+    (spring,) = read(f"springs: [{{joint: joint_6, {entry}}}]")
+    assert spring.name == name
+
+
+def test_a_torsion_of_a_joint_that_slides_says_so(tmp_path):
+    path = tmp_path / "springs.yml"
+    path.write_text(HEAD + "springs: [{joint: slide, kind: revolute}, {joint: slide, axis: x}]")
+    sliding = Robot.from_urdf(sliding_arm_urdf(), "tcp")
+    names = [spring.name for spring in layout(sliding, str(path))]
+    assert names == ["slide.torsion-axial", "slide.x"]
+
+
+@pytest.mark.parametrize(("word", "kind"), [("gear", Gear), ("tensor", Tensor), (None, Hinge)])
+def test_a_spring_is_of_the_kind_that_a_file_asks_for(read, word, kind):
+    (spring,) = read(f"springs: [{{joint: joint_6{f', kind: {word}' if word else ''}}}]")
+    assert type(spring) is kind
 
 
 def test_an_axial_spring_takes_the_kind_of_its_joint(tmp_path):

@@ -8,7 +8,7 @@ X, Y = Input("x"), Input("y")
 
 
 def law(x, y):
-    return (2.0 * x - y / 4.0 + 1.0) * -x + (3.0 - atan2(x * y, x)) + (0.5 + y)
+    return (2.0 * x - y / 4.0 + 1.0) * -x + (3.0 - atan2(x * y, x)) + (0.5 + atan2(1.0, y))
 
 
 def evaluated(formula: Expression, values: dict[str, float]) -> float:

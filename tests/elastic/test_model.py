@@ -7,6 +7,8 @@ from elastocal.robot import Jacobian, Robot
 from elastocal.sim.arm import (
     Linkage,
 )
+from support.cells import linkage
+from support.geared import geared, heavy_robot
 from support.problems import elastic
 from support.virtual_chain import ARMS, configurations, numerical_column
 
@@ -86,6 +88,50 @@ def test_load_cases_are_broadcast_over_a_pose(model):
     np.testing.assert_allclose(model.observation_blocks(repeated, cases), together, rtol=1e-13)
 
 
+def test_the_cartesian_compliance_of_hinges_is_the_papers_sum(model):
+    """``J diag(c) J^T`` and likewise (paper Eq. 10), whatever the load."""
+    found = model.cartesian_compliance(C, Q, FORCE, MOMENT)
+    J, W = model.spring_jacobian(Q).translation, model.spring_jacobian(Q).rotation
+    for part, left, right in (
+        (found.translation, J, J),
+        (found.rotation, W, W),
+        (found.coupling, J, W),
+    ):
+        np.testing.assert_allclose(part, (left * C) @ np.swapaxes(right, 1, 2), atol=1e-18)
+
+
+NAMED = {
+    "force": lambda model, value: model.observation_blocks(Q, value),
+    "moment": lambda model, value: model.observation_blocks(Q, FORCE, value),
+    "marker_offset": lambda model, value: model.observation_blocks(Q, FORCE, None, value),
+    "direction": lambda model, value: model.directional_rows(Q, value),
+    "force ": lambda model, value: model.cartesian_compliance(C, Q, value),
+    "moment ": lambda model, value: model.cartesian_compliance(C, Q, FORCE, value),
+    "moment  ": lambda model, value: model.load_torques(Q, FORCE, value),
+}
+
+
+@pytest.mark.parametrize("name", NAMED)
+@pytest.mark.parametrize(
+    ("value", "message"),
+    [([0.0, np.nan, 0.0], "not finite"), ([1.0, 2.0], r"shape \(2,\).*x, y, z")],
+)
+def test_vectors_that_are_none_are_refused_by_name(model, name, value, message):
+    with pytest.raises(SpringError, match=rf"^{name.strip()} .*{message}"):
+        NAMED[name](model, value)
+
+
+def test_the_sag_of_a_marker_is_that_of_its_own_point():
+    robot = heavy_robot()
+    heavy = ElasticModel(robot, layout(robot, "bearing"))
+    offset = np.array([0.1, -0.05, 0.3])
+    rows = heavy.sag_blocks(Q, offset)
+    for q, torque, row in zip(Q, heavy.weight_torques(Q), rows, strict=True):
+        moved = [numerical_column(linkage(), q, spring, offset)[0] for spring in heavy.springs]
+        expected = np.transpose(moved) * torque
+        np.testing.assert_allclose(row, expected, rtol=1e-6, atol=1e-6 * np.abs(expected).max())
+
+
 def test_a_marker_at_the_tcp_gives_the_rows_of_the_tcp(model):
     expected = model.observation_blocks(Q, FORCE, MOMENT)
     for offset in (None, np.zeros(3)):
@@ -141,8 +187,13 @@ def test_the_torque_of_a_force_through_the_axis_is_zero():
 
 @pytest.mark.parametrize("c", [np.ones(17), np.full(18, np.nan), 1.0, np.ones((18, 1))])
 def test_compliances_of_another_shape_or_not_finite_are_refused(model, c):
-    with pytest.raises(SpringError, match="18 finite numbers"):
+    with pytest.raises(SpringError, match=r"18 finite numbers, one a spring, got shape \("):
         model.deflection(c, Q, FORCE)
+
+
+def test_compliances_are_asked_for_by_the_parameter_where_springs_have_several():
+    with pytest.raises(SpringError, match=r"42 finite numbers, one a parameter, got shape \(18,\)"):
+        geared().model.deflection(C, Q, FORCE)
 
 
 @pytest.mark.parametrize("q", [np.zeros(5), np.full(6, np.nan), 0.0])
@@ -154,6 +205,7 @@ def test_joints_of_another_shape_or_not_finite_are_refused(model, q):
 def test_springs_are_kept_in_the_order_given():
     springs = elastic("bearing").springs[::-1]
     model = ElasticModel(elastic("bearing").robot, list(springs))
+    assert model.springs == springs
     assert model.spring_names == tuple(spring.name for spring in springs)
     np.testing.assert_allclose(
         model.spring_jacobian(Q).translation,

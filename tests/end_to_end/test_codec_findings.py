@@ -2,6 +2,7 @@
 
 import json
 from functools import cache
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,6 +14,7 @@ from support.cli import elastocal
 from support.shared import FANUC, needs_shared
 
 SEEDS = range(200, 210)
+DOCS = Path(__file__).parents[2] / "docs"
 
 
 @needs_shared
@@ -31,6 +33,38 @@ def test_six_and_eighteen_springs_cross_between_four_and_fifteen_poses(tmp_path)
     assert 4 < found["crossings"][0]["crossing"] <= 15
     assert eighteen[29] == pytest.approx(0.271e-3, rel=0.08)
     assert found["settings"]["poses"] == 43
+
+
+@needs_shared
+def test_calibrate_and_codec_say_the_same_of_one_file_and_the_page_quotes_them(tmp_path):
+    """On the FANUC readings: the ladder, the pairs of layouts, and the words."""
+    asked = (FANUC / "measurements.csv", "--robot", FANUC / "fanuc_r2000ic.urdf", "--tcp", "tcp")
+    calibrated = elastocal("calibrate", *asked, "--out", tmp_path / "m.json", "--json")
+    layouts = ("actuated", "bearing", "bearing-ends", "tensor", "auto")
+    compare = ("--compare", f"springs={','.join(layouts)}")
+    judged = elastocal("codec", *asked, *compare, "--out", tmp_path / "c", "--json")
+    assert (calibrated.code, judged.code) == (0, 0), calibrated.err + judged.err
+    one, other = json.loads(calibrated.out), json.loads(judged.out)
+    assert other["ladder"] == one["ladder"]
+    ladder = {rung["springs"]: rung["difference"] for rung in one["ladder"]}
+    best = min(ladder, key=lambda name: ladder[name]["mean"])
+    for pair in other["crossings"]:
+        if best in (pair["a"], pair["b"]) and "auto" not in (pair["a"], pair["b"]):
+            worse = pair["a"] if pair["b"] == best else pair["b"]
+            shown = ladder[worse]["low"] > 0.0
+            assert pair["better"] == (best if shown else None)
+            difference = pair["all_but_one"]["difference"] * (1 if worse == pair["a"] else -1)
+            assert difference == pytest.approx(ladder[worse]["mean"], rel=1e-9)
+    auto = other["variants"]["auto"]
+    assert auto["layout"] == next(rung["springs"] for rung in one["ladder"] if rung["chosen"])
+    said = " ".join(elastocal("codec", *asked, "--out", tmp_path / "d").err.split())
+    page = " ".join((DOCS / "how-to/read-the-table.md").read_text(encoding="utf-8").split())
+    for sentence in other["springs"]:
+        sentence = sentence.replace("auto: springs", "default: springs")
+        assert sentence in said
+        assert sentence.removeprefix("springs, as calibrate judges: ") in page
+    said = " ".join(elastocal("calibrate", *asked, "--out", tmp_path / "n.json").err.split())
+    assert other["springs"][0].removeprefix("springs, as calibrate judges: ") in said
 
 
 @cache

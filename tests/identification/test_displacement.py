@@ -9,7 +9,7 @@ import pytest
 from elastocal.dataset import Dataset, Presses, Readings
 from elastocal.elastic import ElasticModel, bearing_joint
 from elastocal.identification import displacement_blocks, gears
-from elastocal.robot import Robot
+from elastocal.robot import Robot, T_from_xyzabc, with_tool
 from elastocal.sim.arm import (
     GRAVITY,
     ElasticArm,
@@ -43,10 +43,13 @@ def readings() -> Readings:
     return measured().readings(robot().joint_names)
 
 
-def error_of_fit(rows: np.ndarray, deflection_rows: np.ndarray) -> float:
+def error_of_fit(
+    rows: np.ndarray, deflection_rows: np.ndarray, shown: np.ndarray | None = None
+) -> float:
     """Return the mean error of the true deflection, as a part of it, fitted to what was seen."""
     seen = readings()
-    c = np.linalg.lstsq(rows.reshape(-1, rows.shape[-1]), seen.deflection.ravel(), rcond=None)[0]
+    shown = seen.deflection if shown is None else shown
+    c = np.linalg.lstsq(rows.reshape(-1, rows.shape[-1]), shown.ravel(), rcond=None)[0]
     true = truth().equilibrium(seen.joint_position, seen.force).deflection
     error = np.linalg.norm(deflection_rows @ c - true, axis=1).mean()
     return float(error / np.linalg.norm(true, axis=1).mean())
@@ -65,8 +68,72 @@ def test_rows_with_sag_find_the_true_deflection_of_a_heavy_arm(recorded):
     assert with_sag < 0.002 < 0.004 < without
 
 
+def test_rows_against_a_lightly_loaded_reference_find_the_whole_deflection():
+    """The simulator's arm was deflected already when the zero was read, so less was shown."""
+    model, seen = ElasticModel(robot(), bearing_joint(robot())), readings()
+    lightly = 0.2 * seen.force[:, [1, 2, 0]]
+    hidden = truth().equilibrium(seen.reference_joint_position, lightly).deflection
+    rows = displacement_blocks(model, replace(seen, reference_force=lightly))
+    at_the_same_joints = model.observation_blocks(seen.joint_position, seen.force)
+    shown = seen.deflection - hidden
+    assert error_of_fit(rows, at_the_same_joints, shown) < 0.002
+    assert error_of_fit(displacement_blocks(model, seen), at_the_same_joints, shown) > 0.02
+
+
+def test_rows_of_a_marker_are_those_of_an_arm_whose_tcp_it_is():
+    """Loads keep their place: about the marker they have a moment as well."""
+    offset, seen = np.array([0.1, -0.2, 0.3]), readings()
+    urdf = with_tool(measured().robot_urdf, "tcp", "marker", T_from_xyzabc(*offset, 0.0, 0.0, 0.0))
+    aside = Robot.from_urdf(urdf, "marker")
+    springs = bearing_joint(robot())
+    lever = robot().forward(seen.joint_position)[:, :3, :3] @ offset
+    moved = replace(seen, moment=np.cross(-lever, seen.force))
+    rows = displacement_blocks(ElasticModel(robot(), springs), seen, offset)
+    expected = displacement_blocks(ElasticModel(aside, springs), moved)
+    np.testing.assert_allclose(rows, expected, atol=1e-9 * np.abs(expected).max())
+
+
 def with_friction() -> ElasticModel:
     return ElasticModel(robot(), gears(robot(), readings(), slips=(0.1, 0.3)))
+
+
+@pytest.mark.parametrize("lightly", [0.0, 0.1])
+@pytest.mark.parametrize("conditioned", [False, True])
+def test_friction_goes_from_free_by_way_of_the_zero_through_the_presses_of_a_pose(
+    conditioned, lightly
+):
+    """A conditioned pose is pressed once before its zero is read."""
+    model, offset = with_friction(), np.array([0.0, 0.1, 0.2])
+    seen = replace(
+        readings(),
+        sequence=np.tile(np.arange(5), 12),
+        conditioned=conditioned,
+        reference_force=lightly * readings().force,
+    )
+    q, q_0, f, f_0 = (
+        seen.joint_position,
+        seen.reference_joint_position,
+        seen.force,
+        seen.reference_force,
+    )
+    pressed = model.load_torques(q, f) + model.weight_torques(q)
+    zero = model.load_torques(q_0, f_0) + model.weight_torques(q_0)
+    found = displacement_blocks(model, seen, offset)
+    for first in range(0, len(seen), 5):
+        rows = slice(first, first + 5)
+        way = [model.weight_torques(q_0[first]), zero[first], *pressed[rows]]
+        at_zero, presses = 1, [2, 3, 4, 5, 6]
+        if conditioned:
+            way[1:3] = pressed[first], zero[first]
+            at_zero, presses = 2, [1, 3, 4, 5, 6]
+        states = model.friction.path(np.array(way))
+        expected = (
+            model.observation_blocks(q[rows], f[rows], None, offset, states[presses])
+            + model.sag_blocks(q[rows], offset)
+            - model.sag_blocks(q_0[rows], offset)
+            - model.observation_blocks(q_0[rows], f_0[rows], None, offset, states[at_zero])
+        )
+        np.testing.assert_allclose(found[rows], expected, atol=1e-12 * np.abs(expected).max())
 
 
 def test_friction_felt_a_press_that_gave_no_reading():
@@ -100,3 +167,18 @@ def test_a_conditioning_press_that_slipped_still_conditions():
     part = replace(whole.take(kept), also_pressed=presses)
     # The zero is solved or recorded once a pose, so that no reading is needed to know it.
     np.testing.assert_allclose(displacement_blocks(model, part), rows[kept], rtol=0, atol=1e-18)
+
+
+def test_the_chain_is_evaluated_once_for_the_loaded_and_once_for_the_reference_joints(monkeypatch):
+    model, seen = with_friction(), readings()
+    evaluated = []
+    for name in ("spring_jacobian", "weight_torques"):
+        method = getattr(ElasticModel, name)
+
+        def counted(self, q, name=name, method=method):
+            evaluated.append(name)
+            return method(self, q)
+
+        monkeypatch.setattr(ElasticModel, name, counted)
+    displacement_blocks(model, seen, [0.0, 0.0, 0.1])
+    assert sorted(evaluated) == ["spring_jacobian"] * 2 + ["weight_torques"] * 2

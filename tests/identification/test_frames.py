@@ -16,6 +16,7 @@ from elastocal.identification import (
     build,
     calibrate,
     frame_columns,
+    frame_summaries,
     solve,
 )
 from elastocal.robot import Robot, T_from_xyzabc, catalogue, with_tool
@@ -219,6 +220,17 @@ def test_refits_by_gram_blocks_are_those_of_the_solver_with_frames_too():
     # The marker beside a shift is told apart by orientations alone; predictions are what counts.
     expected = problem.O @ solve(problem).compliance
     np.testing.assert_allclose(problem.O @ found, expected, atol=1e-9)
+
+
+def test_numbers_and_half_widths_of_a_session_are_its_own_in_order():
+    """Nine a session: shift, rotation, marker; half of what holds 19 of 20 draws."""
+    values = np.arange(18.0)
+    draws = values + np.linspace(-1.0, 1.0, 201)[:, None] * np.arange(1.0, 19.0)
+    first, second = frame_summaries(("a", "b"), values, draws)
+    assert (first.name, second.name) == ("a", "b")
+    assert (first.translation, first.rotation) == ((0.0, 1.0, 2.0), (3.0, 4.0, 5.0))
+    assert second.marker == (15.0, 16.0, 17.0)
+    assert second.half_width == pytest.approx(0.95 * np.arange(10.0, 19.0))
 
 
 def test_campaigns_each_have_a_frame():

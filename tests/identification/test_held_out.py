@@ -77,6 +77,14 @@ def test_the_misfit_where_nothing_is_predicted_is_not_known():
     assert np.isnan(replace(found, share=np.full_like(found.share, np.inf)).misfit)
 
 
+def test_the_share_of_a_reading_that_no_spring_deflects_is_infinite():
+    problem, _ = noisy(blocks=8)
+    problem.O[5] = 0.0
+    share = leave_poses_out(problem).share
+    assert np.all(np.isinf(share[5]))
+    assert np.all(np.isfinite(np.delete(share, 5, axis=0)))
+
+
 def test_mean_and_max_are_those_of_the_errors():
     found = leave_poses_out(noisy(blocks=4)[0])
     assert (found.mean, found.max) == (found.error.mean(), found.error.max())

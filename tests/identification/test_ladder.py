@@ -13,12 +13,16 @@ from elastocal.identification import (
     RUNGS,
     Climbed,
     FitOptions,
+    build,
     choose_model,
     climb,
     displacement_blocks,
-    doubt,
     gears,
     has_levels,
+    leave_poses_out,
+    low_loads,
+    solve,
+    take_simplest,
 )
 from support.cells import Cell, linear_truth, rich_truth, robot
 from support.problems import campaign
@@ -90,23 +94,45 @@ def test_the_interval_counts_that_refits_overlap():
     )
 
 
-def test_rungs_that_the_poses_do_not_tell_apart_are_a_doubt_about_the_chosen_one():
-    ladder = tuple(chosen("linear", 8).values())
-    (taken_one,) = [replace(rung, difference=0.0) for rung in ladder if rung.chosen]
-    assert taken_one.apart == 0.0
-    apart = {rung.name: rung.apart for rung in ladder}
-    assert 0.0 < doubt(ladder) < max(apart.values()) ** 2
-    # One that is far behind says nothing of a prediction.
-    behind = replace(taken_one, chosen=False, difference=1.0, standard_error=1e-3, apart=1.0)
-    assert doubt((taken_one, behind)) == 0.0
-    level = replace(behind, difference=0.0)
-    assert doubt((taken_one, level)) == pytest.approx(0.5)
-    assert doubt(()) == 0.0
+def test_rungs_are_apart_from_the_chosen_one_by_what_they_predict():
+    ladder = chosen("linear", 8)
+    assert ladder[taken(ladder)].apart == 0.0
+    assert min(rung.apart for name, rung in ladder.items() if name != taken(ladder)) > 0.0
 
 
 @pytest.mark.parametrize("name", ["actuated", "bearing", "tensor", "gears"])
 def test_each_rung_can_be_forced(name):
     assert taken(chosen("rich", 8, name)) == name
+
+
+def test_the_score_of_a_pose_is_its_mean_error_where_no_load_is_low():
+    ladder = chosen("rich", 8)
+    readings = Cell(rich_truth(), seed=3, poses=8).readings()
+    for rung in ladder.values():
+        error = [rung.held_out.error[readings.pose == k].mean() for k in np.unique(readings.pose)]
+        np.testing.assert_allclose(rung.score, error)
+
+
+def test_a_low_load_counts_half_at_its_pose_left_out_and_half_with_all_low_loads_left_out():
+    readings = with_low_load(campaign())
+    (rung,) = climb(robot(), readings, [RUNGS["bearing"]], ["bearing"], OPTIONS).ladder
+    problem = build(rung.model, readings, OPTIONS)
+    low = low_loads(readings)
+    np.testing.assert_array_equal(low, readings.load_case == "low")
+    error = leave_poses_out(problem).error
+    others = solve(problem.take(~low)).compliance
+    error[low] += np.linalg.norm(problem.take(low).residuals(others), axis=1)
+    error[low] /= 2.0
+    expected = [error[readings.pose == pose].mean() for pose in np.unique(readings.pose)]
+    np.testing.assert_allclose(rung.score, expected, rtol=1e-4)
+
+
+def test_rungs_that_were_not_tried_are_refused_by_name():
+    ladder = list(chosen("rich", 8).values())
+    with pytest.raises(
+        IdentificationError, match=r"springs gears\+friction, odd were not tried: no"
+    ):
+        take_simplest(ladder, ["gears+friction", "odd"])
 
 
 def test_a_layout_beside_the_ladder_is_taken_and_shown_with_it():
@@ -127,18 +153,18 @@ def test_friction_is_not_offered_without_a_load_case_of_low_load():
         climb(robot(), campaign(), [RUNGS["gears+friction"]], ["gears+friction"], OPTIONS)
 
 
-def test_planted_friction_is_found_where_there_is_a_low_load():
+@pytest.mark.parametrize("springs", ["auto", "gears"])
+def test_planted_friction_is_found_where_there_is_a_low_load(springs):
     readings = with_low_load(campaign())
     assert has_levels(readings)
-    springs = gears(robot(), readings, (0.03, 0.1, 0.3))
-    model = ElasticModel(robot(), springs)
+    model = ElasticModel(robot(), gears(robot(), readings, (0.03, 0.1, 0.3)))
     c = np.array([1e-6 if "friction" in name else 2e-6 for name in model.parameter_names])
     exact = displacement_blocks(model, readings) @ c
     noise = 1e-6 * np.random.default_rng(0).normal(size=exact.shape)
     planted = replace(
         readings, marker_displacement=readings.controller_displacement + exact + noise
     )
-    ladder = choose_model(robot(), planted, "auto", OPTIONS).ladder
+    ladder = choose_model(robot(), planted, springs, OPTIONS).ladder
     assert taken({rung.name: rung for rung in ladder}) == "gears+friction"
 
 

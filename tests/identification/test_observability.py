@@ -1,16 +1,21 @@
 import json
 from dataclasses import replace
 from functools import partial
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from scipy.stats import chi
 
 from elastocal.dataset import Readings
-from elastocal.elastic import ElasticModel, bearing_joint, layout
+from elastocal.elastic import ElasticModel, Hinge, Parameter, bearing_joint, layout
 from elastocal.identification import (
+    FaintParameter,
     FitOptions,
+    Observability,
     Prior,
     Term,
+    attainable_rank,
     build,
     calibrate,
     describe,
@@ -18,10 +23,13 @@ from elastocal.identification import (
     observability,
     solve,
 )
+from elastocal.identification.observability import find_faint
+from elastocal.identification.solve import Factored
 from elastocal.robot import Robot
-from support.problems import campaign, elastic
+from support.problems import campaign, elastic, made_up
 from support.shared import GOLDEN, needs_shared
 
+HINGE = Hinge("j.x", "j", (1.0, 0.0, 0.0)).parameters[0].unit
 WRIST = [
     "joint_a4.axial - joint_a5.x",
     "joint_a5.axial - joint_a6.y",
@@ -149,3 +157,102 @@ def test_a_prior_makes_nothing_observable():
 )
 def test_a_combination_is_written_as_a_person_would(group, expected):
     assert describe([Term(*term) for term in group]) == expected
+
+
+A_MINUS_B = (Term("a", 1.0), Term("b", -1.0))
+FAINT = tuple(FaintParameter(name, 1e-6, 2e-6, reach) for name, reach in (("d", 3e-7), ("e", 4e-7)))
+FIVE = Observability(3, 10.0, (False, False, True, False, False), (A_MINUS_B,), FAINT)
+
+
+@pytest.mark.parametrize(
+    ("weights", "number"),
+    [
+        ({"a": 1.0}, 1),
+        ({"a": 1.0, "b": -1.0}, 1),
+        # What the data leave open moves both alike, so it cancels in their sum.
+        ({"a": 1.0, "b": 1.0}, None),
+        ({"a": 1.0, "b": 1.0 + 1e-9}, None),
+        ({"c": 1.0}, None),
+        ({"b": 2.0, "f": 1.0}, 1),
+        ({"f": 1.0}, 2),
+    ],
+)
+def test_a_sum_of_springs_is_open_where_a_combination_changes_it(weights, number):
+    seen = replace(FIVE, unobservable=(A_MINUS_B, (Term("f", 1.0),)))
+    assert seen.group_of(weights) == number
+
+
+@pytest.mark.parametrize(
+    ("weights", "reach"),
+    [
+        ({"d": 2.0}, 6e-7),
+        ({"d": 1.0, "e": -1.0}, 5e-7),
+        ({"d": 1.0, "c": 0.0}, 3e-7),
+        ({"d": 1.0, "c": 1.0}, None),
+    ],
+)
+def test_noise_leaves_a_sum_open_as_far_as_independent_parts_where_none_is_seen(weights, reach):
+    found = FIVE.faint_reach(weights)
+    assert found is None if reach is None else found == pytest.approx(reach)
+
+
+@pytest.mark.parametrize("sensible", ["its scale", "what was fitted", "the others of its unit"])
+@pytest.mark.parametrize(("part", "hidden"), [(0.98, True), (1.02, False)])
+def test_a_parameter_is_faint_below_twice_the_noise_averaged_over_the_poses(sensible, part, hidden):
+    problem, truth = made_up(np.random.default_rng(0), blocks=9)
+    c = truth.copy()
+    scale = np.full(5, 1e-9)
+    if sensible == "what was fitted":
+        c = np.array([2.0, 3.0, 7.0, 2.0, 3.0])
+    elif sensible == "the others of its unit":
+        c = np.array([7.0, 7.0, 0.0, 0.0, 100.0])
+    else:
+        scale[2] = 7.0
+    noise = 0.01 * np.random.default_rng(1).normal(size=problem.d.shape)
+    hides = 2.0 * np.median(np.linalg.norm(noise, axis=1)) / chi.median(3) / np.sqrt(9)
+    # The root mean square deflection that 7 of the third parameter make.
+    size = 7.0 * np.sqrt(np.mean(np.sum(problem.O[:, :, 2] ** 2, axis=1)))
+    problem.O[:, :, 2] *= part * hides / size
+    problem.O[:, :, [0, 1, 3, 4]] *= 100.0
+    problem = replace(problem, d=problem.O @ c + noise)
+    units = [HINGE, HINGE, HINGE, HINGE, replace(HINGE, si="m/N")]
+    parameters = [
+        Parameter(name, "j", unit, float(s))
+        for name, unit, s in zip("abcde", units, scale, strict=True)
+    ]
+    whole = Observability(5, 1.0, (True,) * 5, ())
+    found = find_faint(whole, problem, c, parameters)
+    assert found.observable == (True, True, not hidden, True, True)
+    if hidden:
+        (faint,) = found.faint
+        assert faint.name == "c"
+        assert (faint.deflection, faint.noise) == pytest.approx((part * hides, hides))
+        assert faint.reach == pytest.approx(7.0 / part)
+    in_a_group = replace(whole, unobservable=((Term("c", 1.0),),))
+    assert find_faint(in_a_group, problem, c, parameters).faint == ()
+
+
+@pytest.mark.parametrize("offset", [None, [0.1, 0.2, 0.3]])
+def test_the_attainable_rank_is_what_a_rich_campaign_reaches(offset):
+    moment = np.random.default_rng(0).normal(0.0, 200.0, (155, 3))
+    for name in ("actuated", "bearing", "bearing-ends", "tensor"):
+        model = elastic(name)
+        rich = build(model, replace(campaign(), moment=moment), marker_offset=offset)
+        reached = observability(factor(rich), model.springs).rank
+        assert attainable_rank(model, offset) == reached, name
+
+
+def test_weights_of_parameters_of_other_units_count_in_their_sensible_sizes():
+    """A weight of 1e-8 is small beside 1, but not where a sensible value is that small as well."""
+    big, small = (
+        SimpleNamespace(parameters=(Parameter(name, name, HINGE, scale),))
+        for name, scale in (("big", 1.0), ("small", 1e-8))
+    )
+    # Of both the data see the sum of multiples of their sizes alone.
+    seen = np.array([[1.0, 1.0], [1.0, -1.0]]) / np.sqrt(2.0)
+    system = Factored(np.array([1.0, 0.0]), seen, np.zeros(2), np.array([1.0, 1e8]))
+    found = observability(system, (big, small))
+    assert found.rank == 1
+    ((first, second),) = found.unobservable
+    assert (first.spring, second.spring) == ("big", "small")
+    assert (first.weight, second.weight) == pytest.approx((1.0, -1e-8))

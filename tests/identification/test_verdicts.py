@@ -163,6 +163,27 @@ def test_a_misfit_that_is_too_small_for_the_errors_lowers_the_coverage():
     assert measured_coverage(problem, shrunk, nothing).measurement.share < 0.6
 
 
+def test_a_left_out_reading_is_inside_where_draws_and_misfit_together_reach_it():
+    """Each side by itself, and draws that all lie to one side of the estimate widen that alone."""
+    problem, truth = planted(20e-6, seed=1)
+    held_out = leave_poses_out(problem)
+    held_out = replace(held_out, share=0.3 * held_out.share)
+    spread = 0.02 + 0.01 * np.random.default_rng(0).normal(size=(60, problem.columns))
+    deviations = truth * spread
+    inside = []
+    for rows, d, fold in zip(problem.O, problem.d, held_out.fold, strict=True):
+        predicted = rows @ held_out.compliance[fold]
+        others = replace(held_out, share=held_out.share[held_out.fold != fold])
+        error = others.misfit * np.linalg.norm(predicted)
+        low, high = np.percentile(deviations @ rows.T, [2.5, 97.5], axis=0)
+        down, up = np.minimum(low, 0.0), np.maximum(high, 0.0)
+        off = d - predicted
+        inside.append((off >= -np.hypot(down, error)) & (off <= np.hypot(up, error)))
+    assert 0.1 < np.mean(inside) < 0.9
+    found = measured_coverage(problem, held_out, deviations).measurement
+    assert found.share == pytest.approx(np.mean(inside), abs=1e-12)
+
+
 def test_with_too_few_errors_the_coverage_is_none_with_a_reason():
     problem, _ = planted(20e-6, poses=31)
     few = problem.take(np.isin(problem.block, np.unique(problem.block)[:3]) & _first(problem))

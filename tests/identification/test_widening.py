@@ -8,6 +8,8 @@ from elastocal.identification import leave_poses_out, solve
 from elastocal.identification.solve import PoseGrams
 from elastocal.identification.uncertainty import (
     bootstrap,
+    distrust_factor,
+    doubt,
     doubt_factor,
     widen_draws,
     widening_factor,
@@ -86,3 +88,27 @@ def test_doubt_about_the_model_adds_to_the_variance():
     spread = float(np.mean(np.sum(np.square(problem.O @ (draws[0] - c)), axis=1)))
     assert doubt_factor(problem, c, draws, 3.0 * spread) == pytest.approx(2.0)
     assert doubt_factor(problem, c, draws, 0.0) == 1.0
+
+
+def test_draws_of_a_model_that_is_not_trusted_spread_as_far_as_its_errors_at_left_out_poses():
+    problem, c = made_up(np.random.default_rng(0))
+    noise = np.random.default_rng(1).normal(0.0, 0.3, problem.d.shape)
+    held_out = leave_poses_out(replace(problem, d=problem.d + noise))
+    draws = c * (1.0 + 0.01 * np.random.default_rng(2).normal(size=(40, 5)))
+    by = distrust_factor(problem, c, draws, held_out)
+    moved = np.einsum("rin,dn->dri", problem.O, by * (draws - c))
+    spread = np.mean(np.sum(np.square(moved), axis=2))
+    assert spread == pytest.approx(np.mean(np.square(held_out.error)))
+    assert distrust_factor(problem, c, np.tile(c, (40, 1)), held_out) == 1.0
+
+
+def test_models_that_the_poses_do_not_tell_apart_are_a_doubt_about_the_chosen_one():
+    apart = np.array([0.0, 2.0])
+    assert doubt(np.zeros(2), np.ones(2), apart) == pytest.approx(2.0)
+    assert doubt(np.array([0.0, -9.0]), np.ones(2), apart) == pytest.approx(2.0)
+    weight = norm.pdf(1.5) / norm.pdf(0.0)
+    one_and_a_half = doubt(np.array([0.0, 1.5]), np.array([0.0, 1.0]), apart)
+    assert one_and_a_half == pytest.approx(4.0 * weight / (1.0 + weight))
+    # One that is far behind says nothing of a prediction.
+    assert doubt(np.array([0.0, 9.0]), np.ones(2), apart) == pytest.approx(0.0, abs=1e-15)
+    assert doubt(np.zeros(0), np.zeros(0), np.zeros(0)) == 0.0

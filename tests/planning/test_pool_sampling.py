@@ -64,7 +64,7 @@ def test_the_number_of_processes_does_not_change_the_pool(tmp_path, monkeypatch)
 
 
 def test_the_seed_decides_the_pool(tmp_path):
-    cell = example(tmp_path, pool=FEW)
+    cell = example(tmp_path, pool=("pool: 3000", "pool: 30"))
     one, again, other = (gathered(cell, seed=seed).pool.postures.q for seed in (0, 0, 1))
     np.testing.assert_array_equal(one, again)
     assert not np.array_equal(one, other)

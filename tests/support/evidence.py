@@ -11,9 +11,9 @@ from support import reported
 
 
 @pytest.fixture(scope="session")
-def finished(tmp_path_factory):
+def finished():
     """A folder with everything that a report is made from; shared, not to be changed."""
-    return reported.finished(tmp_path_factory)
+    return reported.finished()
 
 
 @pytest.fixture(scope="session")

@@ -1,36 +1,24 @@
 """A small cell taken through every command, once, as a user would: what reports are made from."""
 
-import fcntl
-import os
 import shutil
 from pathlib import Path
-
-import pytest
 
 from elastocal.cell import load_cell
 from elastocal.planning import make_plan, write_plan, write_pool
 from support.cli import elastocal
+from support.kept import kept
 from support.run_cells import planned_cell
 
 POSES = 7
 MADE = "2026-01-02T03:04:05+00:00"
 
 
-def finished(factory: pytest.TempPathFactory) -> Path:
+def finished() -> Path:
     """Return a folder with ``run``, ``model.json``, ``tool.json``, ``codec`` and ``process``.
 
-    All processes of a test run share it: copy what is to be changed.
+    All tests share it: copy what is to be changed.
     """
-    base = factory.getbasetemp()
-    shared = base.parent if "PYTEST_XDIST_WORKER" in os.environ else base
-    folder, ready = shared / "reported", shared / "reported.ready"
-    with (shared / "reported.lock").open("w") as lock:
-        fcntl.flock(lock, fcntl.LOCK_EX)
-        if not ready.exists():
-            folder.mkdir()
-            _make(folder)
-            ready.touch()
-    return folder
+    return kept("reported", _make)
 
 
 def _make(folder: Path) -> None:

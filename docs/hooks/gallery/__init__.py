@@ -5,5 +5,6 @@
 `placement`  figures of the fibre placement example
 `machining`  figures of the machining example
 `small`      the k-centre problem, and the streams of one pose
+`budget`     what the error of a calibration is made of
 ===========  ====================================================================
 """

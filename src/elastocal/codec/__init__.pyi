@@ -1,13 +1,13 @@
+from ._prepared import (
+    PreparedVariant as PreparedVariant,
+    prepared_variants as prepared_variants,
+)
 from .analysis import (
     CodecAnalysis as CodecAnalysis,
     SpringObservability as SpringObservability,
     analyse as analyse,
 )
-from .cross_validation import (
-    PreparedVariant as PreparedVariant,
-    cross_validate as cross_validate,
-    prepared_variants as prepared_variants,
-)
+from .cross_validation import cross_validate as cross_validate
 from .data import (
     ARRAYS as ARRAYS,
     ARRAYS_SCHEMA as ARRAYS_SCHEMA,
@@ -15,6 +15,7 @@ from .data import (
     NO_POSE as NO_POSE,
     CodecData as CodecData,
     SpringLabels as SpringLabels,
+    known as known,
     read_codec as read_codec,
     write_codec as write_codec,
 )
@@ -28,11 +29,18 @@ from .indices import (
     index_values as index_values,
     write_index_table as write_index_table,
 )
+from .pairs import (
+    DifferenceAtSize as DifferenceAtSize,
+    PairedDifference as PairedDifference,
+    PairVerdict as PairVerdict,
+    compare_variants as compare_variants,
+)
 from .saturation import (
     Saturation as Saturation,
     SaturationInterval as SaturationInterval,
     Tolerance as Tolerance,
     find_saturation as find_saturation,
+    median_draws as median_draws,
 )
 from .splits import (
     Campaign as Campaign,
@@ -60,13 +68,9 @@ from .verdicts import (
     CodecSetup as CodecSetup,
     CodecSummary as CodecSummary,
     Curve as Curve,
-    DifferenceAtSize as DifferenceAtSize,
-    PairedDifference as PairedDifference,
-    PairVerdict as PairVerdict,
     Verdicts as Verdicts,
     codec_summary as codec_summary,
     judge as judge,
-    paired_difference as paired_difference,
     read_codec_folder as read_codec_folder,
     read_codec_summary as read_codec_summary,
     write_codec_summary as write_codec_summary,

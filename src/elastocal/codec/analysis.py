@@ -10,11 +10,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from elastocal.arrays import BoolArray, FloatArray
-from elastocal.codec.cross_validation import PreparedVariant, prepared_variants
+from elastocal.codec._prepared import PreparedVariant, prepared_variants
 from elastocal.codec.data import NO_POSE, CodecData
 from elastocal.codec.indices import Correlation, IndexValues, correlate, index_values
 from elastocal.dataset import Readings
-from elastocal.elastic import layout
 from elastocal.identification import Term, factor, observability, rank, unit_columns
 from elastocal.results import brief_repr
 from elastocal.robot import Robot
@@ -84,7 +83,7 @@ def analyse(
         If readings or layouts are not those of the codec.
     """
     variants = prepared_variants(robot, readings, data, marker_offset)
-    seen = tuple(_spring_observability(robot, data, each) for each in variants)
+    seen = tuple(_spring_observability(data, each) for each in variants)
     if not with_indices:
         return CodecAnalysis(seen)
     indices = tuple(index_values(data, each) for each in variants)
@@ -92,16 +91,14 @@ def analyse(
     return CodecAnalysis(seen, indices, correlations)
 
 
-def _spring_observability(
-    robot: Robot, data: CodecData, prepared: PreparedVariant
-) -> SpringObservability:
+def _spring_observability(data: CodecData, prepared: PreparedVariant) -> SpringObservability:
     variant, rows = prepared.variant, prepared.triangles.rows[:, :, :-1]
     chosen, size = data.chosen[data.index(variant.name)], prepared.problem.size
     determined = np.array(
         [[_determined(rows[poses[poses != NO_POSE]], size) for poses in row] for row in chosen]
     )
     system = factor(prepared.problem.take(prepared.trains))
-    found = observability(system, layout(robot, variant.springs))
+    found = observability(system, prepared.model.springs)
     return SpringObservability(variant.name, determined, found.unobservable)
 
 

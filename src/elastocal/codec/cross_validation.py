@@ -4,7 +4,7 @@ Each variant on each split: choose, fit, verify (lines 8 to 18).
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from importlib.metadata import version
 
@@ -12,96 +12,42 @@ import numpy as np
 from numpy.random import Generator
 from numpy.typing import ArrayLike
 
-from elastocal.arrays import BoolArray, FloatArray, IndexArray
-from elastocal.codec.data import NO_POSE, CodecData, SpringLabels
-from elastocal.codec.splits import (
-    Campaign,
-    CodecOptions,
-    Split,
-    make_campaign,
-    make_splits,
-    split_sizes,
+from elastocal.arrays import FloatArray, IndexArray
+from elastocal.codec._prepared import (
+    Entrant,
+    PreparedVariant,
+    climbed_ladder,
+    left_out_errors,
+    make_entrant,
+    taken_springs,
 )
-from elastocal.codec.variants import Variant, check_different, training_cases
+from elastocal.codec.data import NO_POSE, CodecData, SpringLabels
+from elastocal.codec.splits import CodecOptions, Split, make_campaign, make_splits, split_sizes
+from elastocal.codec.variants import Variant, check_different
 from elastocal.dataset import Readings
-from elastocal.elastic import ElasticModel, layout
 from elastocal.errors import CodecError, IdentificationError
-from elastocal.identification import PoseTriangles, Problem, build, solve
+from elastocal.identification import Problem, rung_summary, solve
 from elastocal.parallel import map_in_processes, one_blas_thread, process_count
 from elastocal.planning.search import Candidates, growing_choices, technique
 from elastocal.progress import Progress, silent
-from elastocal.results import brief_repr
 from elastocal.robot import Robot
 
-_SAME = 1e-9
-"""Largest distance of a pose from where the codec has it, in m."""
 _STAGE = "splits"
 _WORTH_PROCESSES = 2000
 """Fits behind a search of their own, or by a robust loss, from which on all cores are used."""
 _PACKAGES = ("elastocal", "numpy", "scipy")
 
 
-@brief_repr
-@dataclass(frozen=True, eq=False)
-class PreparedVariant:
-    """A variant with all that it needs of the campaign, prepared once for all splits."""
-
-    variant: Variant
-    problem: Problem
-    """All readings; blocks are the numbers of the physical poses."""
-    trains: BoolArray
-    """Whether the variant may train with each reading, shape (reading,)."""
-    triangles: PoseTriangles
-    """Triangles of the training readings of each pose."""
-    contact: FloatArray
-    """Tcp positions, shape (pose, 3), in m."""
-
-    @classmethod
-    def of(
-        cls,
-        variant: Variant,
-        model: ElasticModel,
-        campaign: Campaign,
-        marker_offset: ArrayLike | None,
-    ) -> "PreparedVariant":
-        """Return a variant prepared for a campaign.
-
-        Raises
-        ------
-        DatasetError
-            If the dataset lacks a load case.
-        """
-        problem = build(model, campaign.readings, variant.options, marker_offset)
-        cases = training_cases(variant.load_cases, campaign.load_cases)
-        trains = np.isin(campaign.readings.load_case, cases)
-        poses = np.arange(len(campaign))
-        triangles = PoseTriangles.of(problem.take(trains), poses)
-        return cls(variant, problem, trains, triangles, campaign.contact)
-
-    def can_train(self, split: Split) -> IndexArray:
-        """Return the training poses of a split that have a reading to train with, rising."""
-        return split.training[np.isin(split.training, self.problem.block[self.trains])]
-
-    def rows(self, poses: IndexArray, which: BoolArray) -> FloatArray:
-        """Return observation rows of poses, zeros where readings are missing.
-
-        Shape (pose, row, spring).
-        """
-        found = [self.problem.O[which & (self.problem.block == pose)] for pose in poses]
-        rows = np.zeros((len(poses), max(map(len, found)), 3, self.problem.columns))
-        for filled, blocks in zip(rows, found, strict=True):
-            filled[: len(blocks)] = blocks
-        return rows.reshape(len(poses), -1, self.problem.columns)
-
-
 @dataclass(frozen=True, eq=False)
 class _LearningCurve:
     """Choices, fits and errors of a variant on a split, for 1, 2, … training poses."""
 
+    springs: str
+    """Name of the springs that the errors are of."""
     chosen: tuple[IndexArray, ...]
     """Numbers of the training poses, in the order of choice."""
     compliance: FloatArray
-    """Shape (n_train, spring), in rad/(N·m) or m/N."""
+    """Of the springs that the file carries, shape (n_train, spring), in rad/(N·m) or m/N."""
     error_mean: FloatArray
     """Mean absolute residual at the verification poses, shape (n_train, 4), in m; see `AXES`."""
     error_max: FloatArray
@@ -154,15 +100,19 @@ def cross_validate(
         sign or frame read otherwise.
     """
     options = options or CodecOptions()
-    layouts = {each.springs: layout(robot, each.springs) for each in variants}
-    models = {name: ElasticModel(robot, springs) for name, springs in layouts.items()}
-    campaign = make_campaign(list(models.values()), readings, options, marker_offset)
+    ladder = climbed_ladder(robot, readings, variants, options, marker_offset)
+    taken = [taken_springs(ladder, each.springs) for each in variants]
+    models = {each.name: each.model for each in ladder.ladder}
+    compared = [models[name] for name in dict.fromkeys(taken)]
+    campaign = make_campaign(compared, readings, options, marker_offset)
     check_different(variants, campaign.load_cases)
     training, verification = split_sizes(len(campaign), options.ratio)
     splits = make_splits(campaign.contact, options.splits, verification)
-    prepared = [
-        PreparedVariant.of(each, models[each.springs], campaign, marker_offset) for each in variants
+    entrants = [
+        make_entrant(each, name, models, campaign, marker_offset)
+        for each, name in zip(variants, taken, strict=True)
     ]
+    prepared = [each.taken for each in entrants]
     most = min(_largest_training_set(each, splits) for each in prepared)
     findings = list(campaign.findings)
     if most < training:
@@ -171,12 +121,12 @@ def cross_validate(
             " load cases that a variant trains with"
         )
     processes = _processes(jobs, variants, most, len(splits))
-    curves = _run_splits(prepared, splits, most, options.seed, processes, progress)
+    curves = _run_splits(entrants, splits, most, options.seed, processes, progress)
     for each, found in zip(prepared, curves, strict=True):
         _require_a_fit(each, found)
     return CodecData(
         variants=tuple(variants),
-        springs=tuple(SpringLabels.of(layouts[each.springs]) for each in variants),
+        springs=tuple(SpringLabels.of(models[name].springs) for name in taken),
         pose_labels=campaign.labels,
         contact=campaign.contact,
         seed_pose=np.array([split.seed_pose for split in splits]),
@@ -192,6 +142,10 @@ def cross_validate(
         findings=tuple(findings),
         versions={name: version(name) for name in _PACKAGES},
         zero_error=np.array([_zero_error(prepared[0].problem, split) for split in splits]),
+        layouts=tuple(taken),
+        split_layouts=tuple(tuple(each.springs for each in found) for found in curves),
+        ladder=tuple(map(rung_summary, ladder.ladder)),
+        left_out=left_out_errors(ladder, variants),
     )
 
 
@@ -220,7 +174,7 @@ def _processes(jobs: int | None, variants: Sequence[Variant], most: int, splits:
 
 
 def _run_splits(
-    prepared: Sequence[PreparedVariant],
+    entrants: Sequence[Entrant],
     splits: Sequence[Split],
     most: int,
     seed: int,
@@ -228,7 +182,7 @@ def _run_splits(
     progress: Progress,
 ) -> list[list[_LearningCurve]]:
     """Return the learning curves by variant and split."""
-    run = partial(_run_split, prepared, most, seed)
+    run = partial(_run_split, entrants, most, seed)
     found = []
     progress(_STAGE, 0, len(splits))
     for curves in map_in_processes(run, splits, processes):
@@ -238,16 +192,26 @@ def _run_splits(
 
 
 def _run_split(
-    prepared: Sequence[PreparedVariant], most: int, seed: int, split: Split
+    entrants: Sequence[Entrant], most: int, seed: int, split: Split
 ) -> list[_LearningCurve]:
     """Return the learning curve of each variant on one split."""
     curves = []
-    for each in prepared:
+    # Variants that differ in their search alone choose the same springs.
+    known: dict[tuple[str, str, str], str] = {}
+    for each in entrants:
+        variant = each.taken.variant
+        key = (variant.springs, variant.load_cases, variant.solver)
         try:
-            curves.append(_train(each, split, most, seed))
+            known[key] = known.get(key) or each.chosen(split)
+            chosen = each.with_springs(known[key])
+            curve = _train(chosen, split, most, seed)
+            if chosen is not each.taken:
+                curve = replace(curve, compliance=_fit(each.taken, curve.chosen))
+            curves.append(curve)
         except IdentificationError as error:
             raise IdentificationError(
-                f"variant {each.variant.name!r}, split grown from pose {split.seed_pose}: {error}"
+                f"variant {each.taken.variant.name!r}, split grown from pose"
+                f" {split.seed_pose}: {error}"
             ) from error
     return curves
 
@@ -287,10 +251,7 @@ def _train(prepared: PreparedVariant, split: Split, most: int, seed: int) -> _Le
         variants with one technique draw alike.
     """
     chosen = _choices(prepared, split, most, seed)
-    if prepared.variant.options.loss == "linear":
-        compliance = prepared.triangles.fit(chosen)
-    else:
-        compliance = np.array([_robust_fit(prepared, poses) for poses in chosen])
+    compliance = _fit(prepared, chosen)
     verified = np.isin(prepared.problem.block, split.verification)
     O, d = prepared.problem.O[verified], prepared.problem.d[verified]  # noqa: E741 - paper
     # Verification always takes all load cases, whatever was trained with.
@@ -298,7 +259,16 @@ def _train(prepared: PreparedVariant, split: Split, most: int, seed: int) -> _Le
     residual = residual.reshape(len(chosen), -1, 3)
     norm = np.sqrt(np.square(residual).sum(axis=2, keepdims=True))
     errors = np.concatenate([residual, norm], axis=2)
-    return _LearningCurve(tuple(chosen), compliance, errors.mean(axis=1), errors.max(axis=1))
+    return _LearningCurve(
+        prepared.springs, tuple(chosen), compliance, errors.mean(axis=1), errors.max(axis=1)
+    )
+
+
+def _fit(prepared: PreparedVariant, chosen: Sequence[IndexArray]) -> FloatArray:
+    """Return the compliances of each choice of poses, shape (choice, spring)."""
+    if prepared.variant.options.loss == "linear":
+        return prepared.triangles.fit(chosen)
+    return np.array([_robust_fit(prepared, poses) for poses in chosen])
 
 
 def _choices(prepared: PreparedVariant, split: Split, most: int, seed: int) -> list[IndexArray]:
@@ -323,49 +293,3 @@ def _choices(prepared: PreparedVariant, split: Split, most: int, seed: int) -> l
 def _robust_fit(prepared: PreparedVariant, poses: IndexArray) -> FloatArray:
     used = prepared.trains & np.isin(prepared.problem.block, poses)
     return solve(prepared.problem.take(used), prepared.variant.options.loss).compliance
-
-
-def prepared_variants(
-    robot: Robot, readings: Readings, data: CodecData, marker_offset: ArrayLike | None = None
-) -> tuple[PreparedVariant, ...]:
-    """Return the variants of a finished codec, prepared again from its readings.
-
-    Parameters
-    ----------
-    robot : Robot
-        The robot.
-    readings : Readings
-        Those that the codec was made from.
-    data : CodecData
-        The codec.
-    marker_offset : array_like, shape (3,), optional
-        Metrology marker in the tcp frame, in m.
-
-    Raises
-    ------
-    CodecError
-        If the readings have other poses than the codec, or a layout has other springs.
-    DatasetError
-        If the data lack a load case, or joints are not this robot's.
-    """
-    models = {
-        each.springs: ElasticModel(robot, layout(robot, each.springs)) for each in data.variants
-    }
-    for each, labels in zip(data.variants, data.springs, strict=True):
-        found = models[each.springs].parameter_names
-        if found != labels.names:
-            raise CodecError(
-                f"variant {each.name!r} was made with {len(labels.names)} springs;"
-                f" {each.springs!r} now has {len(found)}, or others"
-            )
-    campaign = make_campaign(list(models.values()), readings, data.options, marker_offset)
-    contact = campaign.contact
-    if contact.shape != data.contact.shape or not np.all(np.abs(contact - data.contact) <= _SAME):
-        raise CodecError(
-            f"the readings are not those of the codec: they have {len(contact)} poses, the codec"
-            f" {len(data.contact)}, or poses lie elsewhere"
-        )
-    return tuple(
-        PreparedVariant.of(each, models[each.springs], campaign, marker_offset)
-        for each in data.variants
-    )

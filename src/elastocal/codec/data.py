@@ -18,13 +18,16 @@ from elastocal.codec.splits import CodecOptions
 from elastocal.codec.variants import KEYS, Variant
 from elastocal.elastic import Spring
 from elastocal.errors import CodecError, SchemaError, nearest
+from elastocal.identification import RungSummary
 from elastocal.records import (
     LabelledArray,
     LabelledArrays,
     Variable,
     array_fields,
     arrays_of,
+    from_data,
     read_arrays,
+    to_data,
     write_arrays,
 )
 from elastocal.results import brief_repr
@@ -124,6 +127,16 @@ class CodecData:
     zero_error: FloatArray | None = None
     """Mean error norm of no model at all, which is the mean deflection, at the verification poses,
     shape (cv,), in m; none in files of elastocal 0.1.0."""
+    layouts: tuple[str, ...] = ()
+    """Springs of each variant: what `calibrate` takes on this file for the variant's word."""
+    split_layouts: tuple[tuple[str, ...], ...] = ()
+    """Springs that the errors are of, by variant and split: chosen from the split's training poses
+    where there is a choice."""
+    ladder: tuple[RungSummary, ...] = ()
+    """The ladder of `calibrate` on this file, and other compared layouts; empty in files before."""
+    left_out: FloatArray | None = None
+    """Errors at left-out poses by which `calibrate` judges, shape (variant, left-out pose), in m;
+    NaN for variants that it cannot judge; none in files before."""
 
     def __post_init__(self) -> None:
         for name in ("contact", "error_mean", "error_max"):
@@ -132,6 +145,13 @@ class CodecData:
             self._own(name, np.array(getattr(self, name), dtype=np.intp))
         if self.zero_error is not None:
             self._own("zero_error", np.array(self.zero_error, dtype=float))
+        if self.left_out is not None:
+            self._own("left_out", np.array(self.left_out, dtype=float))
+        # Before there was a choice, every split had the springs of its variant.
+        layouts = self.layouts or tuple(each.springs for each in self.variants)
+        splits = self.split_layouts or tuple((name,) * len(self.seed_pose) for name in layouts)
+        object.__setattr__(self, "layouts", layouts)
+        object.__setattr__(self, "split_layouts", splits)
         compliance = tuple(np.array(each, dtype=float) for each in self.compliance)
         for each in compliance:
             each.flags.writeable = False
@@ -193,7 +213,11 @@ class CodecData:
         }
         if self.zero_error is not None:
             expected["zero_error"] = (cv,)
+        if self.left_out is not None:
+            expected["left_out"] = (v, self.left_out.shape[-1])
         found = {name: getattr(self, name).shape for name in expected}
+        found["split_layouts"] = np.shape(self.split_layouts)
+        expected["split_layouts"] = (v, cv)
         for k, (array, springs) in enumerate(zip(self.compliance, self.springs, strict=True)):
             expected[f"compliance of variant {k}"] = (cv, n, len(springs.names))
             found[f"compliance of variant {k}"] = array.shape
@@ -206,6 +230,11 @@ class CodecData:
             outside = getattr(self, name)
             if np.any((outside < NO_POSE) | (outside >= poses)):
                 raise CodecError(f"{name} names a pose that is not one of the {poses}")
+
+
+def known(value: float) -> float | None:
+    """Return a figure as files hold it: None where it is NaN."""
+    return None if np.isnan(value) else float(value)
 
 
 def write_codec(folder: Path, data: CodecData) -> Path:
@@ -251,6 +280,13 @@ def _arrays_of(data: CodecData) -> LabelledArrays:
         notes = {"long_name": f"compliances of variant {data.variants[k].name}"}
         variables[f"compliance_{k}"] = LabelledArray(dims, compliance, notes, packed=True)
         variables[f"spring_unit_{k}"] = _texts(f"spring_{k}", springs.units)
+    if data.left_out is not None:
+        notes = {"long_name": "errors by which calibrate judges", "units": "m"}
+        by_pose = ("variant", "left_out_pose")
+        variables["left_out"] = LabelledArray(by_pose, data.left_out, notes, packed=True)
+    variables["variant_layout"] = _texts("variant", data.layouts)
+    names = np.array(data.split_layouts, dtype=np.str_)
+    variables["split_layout"] = LabelledArray(("variant", "cv"), names)
     for key in KEYS:
         variables[f"variant_{key}"] = _texts("variant", [getattr(v, key) for v in data.variants])
     labels = [", ".join(map(str, group)) for group in data.pose_labels]
@@ -277,6 +313,7 @@ def _attributes(data: CodecData) -> dict[str, str]:
         "load_cases": json.dumps(data.load_cases),
         "findings": json.dumps(data.findings),
         "versions": json.dumps(data.versions),
+        "ladder": json.dumps([to_data(rung) for rung in data.ladder]),
     }
 
 
@@ -310,8 +347,19 @@ def _data_of(found: LabelledArrays) -> CodecData:
         findings=tuple(json.loads(found.attributes["findings"])),
         versions=json.loads(found.attributes["versions"]),
         zero_error=found["zero_error"].values if "zero_error" in found else None,
+        layouts=_listed(found["variant_layout"]) if "variant_layout" in found else (),
+        split_layouts=_rows(found["split_layout"]) if "split_layout" in found else (),
+        ladder=tuple(
+            from_data(RungSummary, rung, "ladder")
+            for rung in json.loads(found.attributes.get("ladder", "[]"))
+        ),
+        left_out=found["left_out"].values if "left_out" in found else None,
         **arrays,
     )
+
+
+def _rows(texts: LabelledArray) -> tuple[tuple[str, ...], ...]:
+    return tuple(tuple(map(str, row)) for row in texts.values.tolist())
 
 
 def _listed(texts: LabelledArray) -> tuple[str, ...]:

@@ -24,11 +24,16 @@ from pathlib import Path
 import numpy as np
 
 from elastocal.arrays import BoolArray, FloatArray, IndexArray
-from elastocal.codec._overlap import Overlap, corrected_mean, known
-from elastocal.codec.cross_validation import PreparedVariant
-from elastocal.codec.data import CodecData
-from elastocal.planning.search import Candidates, build_information, covering_radius
-from elastocal.planning.search.criteria import CRITERIA, IOptimal
+from elastocal.codec._prepared import PreparedVariant
+from elastocal.codec.data import CodecData, known
+from elastocal.identification import Overlap, corrected_mean
+from elastocal.planning.search import (
+    CRITERIA,
+    Candidates,
+    IOptimal,
+    build_information,
+    covering_radius,
+)
 from elastocal.records import record
 from elastocal.results import brief_repr
 from elastocal.tables import write_table

@@ -4,12 +4,17 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.random import Generator
+from scipy.special import ndtri
 
 from elastocal.arrays import BoolArray, FloatArray, IndexArray
-from elastocal.codec._overlap import Overlap, median_draws, micrometres
 from elastocal.errors import CodecError
-from elastocal.identification import CONFIDENCE, MOST_UNEXPLAINED
+from elastocal.identification import CONFIDENCE, MOST_UNEXPLAINED, Overlap
 from elastocal.records import record
+from elastocal.wording import um
+
+_DRAWS = 1000
+"""Bootstrap draws."""
+_SMALLEST = np.finfo(float).tiny
 
 
 @dataclass(frozen=True)
@@ -119,19 +124,19 @@ class Saturation(SaturationInterval):
         """
         if self.last == 1:
             return (
-                f"{self.variant}: training sets of one pose only ({micrometres(self.error)}):"
+                f"{self.variant}: training sets of one pose only ({um(self.error)}):"
                 f" nothing can be said of saturation ({where})"
             )
         if self.unexplained is not None and not self.explains:
             return (
                 f"{self.variant}: not saturated: with {self.last} training poses the error is"
-                f" {micrometres(self.last_error)}, {100.0 * self.unexplained:.0f} % of what no"
+                f" {um(self.last_error)}, {100.0 * self.unexplained:.0f} % of what no"
                 f" model at all leaves: these springs do not describe the arm ({where})"
             )
         worst = largest[:, self.n_train - 1]
         extent = (
-            f"largest error with {self.n_train}: {micrometres(float(np.median(worst)))} in the"
-            f" median set, {micrometres(float(worst.max()))} in the worst; {where}"
+            f"largest error with {self.n_train}: {um(float(np.median(worst)))} in the"
+            f" median set, {um(float(worst.max()))} in the worst; {where}"
         )
         if self.n_train == self.last:
             early = ""
@@ -139,7 +144,7 @@ class Saturation(SaturationInterval):
                 early = f"; that it has saturated from {self.low} on cannot be ruled out"
             return (
                 f"{self.variant}: the error still falls at {self.last} training poses: mean"
-                f" {micrometres(self.last_error)}; more poses may help{early}; {extent}"
+                f" {um(self.last_error)}; more poses may help{early}; {extent}"
             )
         return f"{self._saturated(tolerance)}; {extent}{self._caveat()}"
 
@@ -154,15 +159,15 @@ class Saturation(SaturationInterval):
                 f" from {self.stays} on"
             )
         return (
-            f"{self.variant}: {from_on}: mean error (median set) {micrometres(self.error)} there,"
-            f" {micrometres(self.last_error)} with {self.last} (tolerance"
-            f" {100.0 * tolerance.relative:.3g} % of that, or {micrometres(tolerance.floor)})"
+            f"{self.variant}: {from_on}: mean error (median set) {um(self.error)} there,"
+            f" {um(self.last_error)} with {self.last} (tolerance"
+            f" {100.0 * tolerance.relative:.3g} % of that, or {um(tolerance.floor)})"
         )
 
     def _caveat(self) -> str:
         if self.rises:
             return (
-                f"; the error rises again: {micrometres(self.least_error)} with {self.least}: look"
+                f"; the error rises again: {um(self.least_error)} with {self.least}: look"
                 " for a bad reading, or springs too many for these loads"
             )
         if self.settled or self.high is None:
@@ -233,3 +238,34 @@ def _steady_from(reached: BoolArray) -> IndexArray:
     """Return the size, from 1, of the training set from which on all are within the tolerance."""
     outside = ~reached[..., ::-1]
     return np.where(outside.any(axis=-1), reached.shape[-1] - outside.argmax(axis=-1) + 1, 1)
+
+
+def median_draws(values: FloatArray, overlap: Overlap, rng: Generator) -> FloatArray:
+    """Return bootstrap draws of the median over verification sets, shape (draw, n).
+
+    Whole sets are drawn, so that all sizes of one set stay together. The draws are stretched
+    about the median to the variance and the quantile of `corrected_mean`, in logarithms, which
+    keeps errors positive. There are none where no spread is known.
+
+    Parameters
+    ----------
+    values : ndarray, shape (cv, n)
+        A figure above 0 of each verification set, for each number of training poses.
+    overlap : Overlap
+        Of the sets.
+    rng : Generator
+        Source of randomness.
+    """
+    sets, estimate = len(values), _log_median(values)
+    if not overlap.known:
+        return np.empty((0, len(estimate)))
+    chosen = rng.integers(sets, size=(_DRAWS, sets))
+    drawn = np.array([_log_median(values[draw]) for draw in chosen])
+    # Draws spread as the population of the sets does, (1 - 1 / J) / J of the sample variance.
+    by = np.sqrt(overlap.variance * sets * sets / (sets - 1.0))
+    by *= overlap.student / float(ndtri(0.5 * (1.0 + CONFIDENCE)))
+    return np.asarray(np.exp(estimate + by * (drawn - estimate)))
+
+
+def _log_median(values: FloatArray) -> FloatArray:
+    return np.asarray(np.log(np.maximum(np.median(values, axis=0), _SMALLEST)))

@@ -129,7 +129,7 @@ def make_campaign(
             " it cannot be a measurement of this robot"
             for row in np.flatnonzero(blunder)
         ]
-        readings = readings.take(~blunder)
+        readings = readings.set_aside(blunder)
     return _group_by_pose(models[0].robot, readings, findings)
 
 

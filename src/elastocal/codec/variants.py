@@ -8,7 +8,7 @@ from typing import TypeVar
 import numpy as np
 
 from elastocal.errors import CodecError, DatasetError, nearest
-from elastocal.identification import FitOptions
+from elastocal.identification import AUTO, FitOptions
 from elastocal.planning.search import technique
 
 _Value = TypeVar("_Value")
@@ -42,8 +42,9 @@ class Variant:
     name: str = _DEFAULT
     search: str = "cover"
     """Technique that chooses the training poses; one of `planning.search.TECHNIQUES`."""
-    springs: str = "bearing"
-    """Spring layout by name, or a YAML file."""
+    springs: str = AUTO
+    """As for `calibrate`: ``auto``, the name of a layout, ``gears``, or a YAML file. Where there is
+    a choice, each split makes it anew."""
     load_cases: str = ALL_LOADS
     """Load cases to train with: ``all``, or names joined by ``+``, e.g. ``normal``."""
     solver: str = "bounded"

@@ -1,180 +1,36 @@
 """The verdicts on a codec, and its file ``codec.json`` (docs/reference/files.md).
 
-Each variant is judged by its saturation, each pair by its errors on the same splits.
+Each variant is judged by its saturation, each pair by its errors on the same held-out poses.
 """
 
+from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 from itertools import combinations
 from pathlib import Path
 
 import numpy as np
 
-from elastocal.arrays import BoolArray, FloatArray
-from elastocal.codec._overlap import Overlap, corrected_mean, known, micrometres
+from elastocal.arrays import FloatArray
 from elastocal.codec.data import ARRAYS, CodecData, read_codec
 from elastocal.codec.indices import Correlation
+from elastocal.codec.pairs import (
+    DifferenceAtSize,
+    PairedDifference,
+    PairVerdict,
+    compare_variants,
+)
 from elastocal.codec.saturation import Saturation, SaturationInterval, Tolerance, find_saturation
 from elastocal.codec.variants import KEYS
 from elastocal.errors import SchemaError
+from elastocal.identification import Overlap, RungSummary, ladder_sentence
 from elastocal.records import read_json, record, write_json
 from elastocal.results import brief_repr
+from elastocal.wording import counted
 
-_ROUND_OFF = 1e-9
-"""Part of an error below which a difference is round-off: techniques that choose the same poses
-in another order."""
 VERDICTS_SCHEMA = "elastocal.codec_verdicts/1"
 VERDICTS = "codec.json"
 """Name of the file in a codec's folder."""
-
-
-@record()
-class DifferenceAtSize:
-    """The difference of the errors of two variants at one number of training poses."""
-
-    a: str
-    b: str
-    n_train: int
-    difference: float
-    """Error of ``a`` minus error of ``b``, mean over the verification sets, in m."""
-    low: float | None
-    """Ends of the 95 % interval, in m; None where no spread is known."""
-    high: float | None
-
-
-@record()
-class PairVerdict:
-    """The better one of two variants, and from where on; see `PairedDifference`."""
-
-    a: str
-    b: str
-    at: int
-    """Number of training poses at which the pair is judged: both variants have saturated."""
-    better: str | None
-    """The variant with the smaller error there; None: cannot be told."""
-    proved_from: int | None
-    """Number of training poses from which on, up to `at`, every interval says so; None: none."""
-    crossing: int | None
-    """Number of training poses from which on, up to `at`, the difference keeps its sign; None: it
-    has it from the first on, or no difference is left."""
-
-
-@brief_repr
-@dataclass(frozen=True, eq=False)
-class PairedDifference:
-    """The difference of the errors of two variants, for 1, 2, … training poses."""
-
-    a: str
-    b: str
-    at: int
-    """Number of training poses at which the pair is judged: both variants have saturated."""
-    difference: FloatArray
-    """Mean over the verification sets of the mean error norm of ``a`` minus that of ``b`` on the
-    same set, shape (n_train,), in m; positive: b is better."""
-    low: FloatArray
-    """Lower ends of the 95 % intervals, in m; NaN where no spread is known."""
-    high: FloatArray
-    """Upper ends."""
-
-    @property
-    def better(self) -> str | None:
-        """The variant that is better at `at` training poses; None: cannot be told."""
-        if self.low[self.at - 1] > 0.0:
-            return self.b
-        return self.a if self.high[self.at - 1] < 0.0 else None
-
-    @property
-    def proved_from(self) -> int | None:
-        """Smallest training set from which on, up to `at`, every interval says so."""
-        if self.better is None:
-            return None
-        clear = self.low > 0.0 if self.better == self.b else self.high < 0.0
-        return _since(clear[: self.at])
-
-    @property
-    def crossing(self) -> int | None:
-        """Smallest training set from which on, up to `at`, the difference keeps its sign.
-
-        None when it has that sign from the first set on, or no difference is left at `at`.
-        """
-        sign = np.sign(self.difference[: self.at])
-        since = _since(sign == sign[-1])
-        return None if since == 1 or sign[-1] == 0.0 else since
-
-    def at_each_size(self) -> tuple[DifferenceAtSize, ...]:
-        """Return the difference for each number of training poses, as files hold it."""
-        rows = zip(self.difference.tolist(), self.low.tolist(), self.high.tolist(), strict=True)
-        return tuple(
-            DifferenceAtSize(self.a, self.b, n, difference, known(low), known(high))
-            for n, (difference, low, high) in enumerate(rows, start=1)
-        )
-
-    def verdict(self) -> PairVerdict:
-        """Return from where on one of the two is better, as files hold it."""
-        return PairVerdict(self.a, self.b, self.at, self.better, self.proved_from, self.crossing)
-
-    def sentence(self, where: str) -> str:
-        """Return the verdict at `at` training poses in words.
-
-        Parameters
-        ----------
-        where : str
-            What the figures were measured on.
-        """
-        at = self.at
-        ends = (self.difference, self.low, self.high)
-        difference, low, high = (float(each[at - 1]) for each in ends)
-        smaller, larger = (self.a, self.b) if difference < 0.0 else (self.b, self.a)
-        size = f"{at} training pose{'s' if at > 1 else ''}"
-        there = f"where both have saturated, with {size}" if at < len(self.low) else f"with {size}"
-        if np.isnan(low):
-            return (
-                f"{smaller} against {larger}: smaller by {micrometres(abs(difference))} {there};"
-                f" the verification sets tell no interval ({where})"
-            )
-        if self.better is None:
-            return (
-                f"{self.a} against {self.b}: no difference can be told {there} (first minus second,"
-                f" mean over the sets: {micrometres(difference)}, 95 % interval {micrometres(low)}"
-                f" to {micrometres(high)}; {where})"
-            )
-        nearest, farthest = sorted((abs(low), abs(high)))
-        text = (
-            f"{smaller} is better than {larger} by {micrometres(abs(difference))} (95 % interval"
-            f" {micrometres(nearest)} to {micrometres(farthest)}) {there}, clearly so from"
-            f" {self.proved_from} on"
-        )
-        if self.crossing is not None:
-            text += f"; with fewer than {self.crossing} it is not always so"
-        return f"{text} ({where})"
-
-
-def paired_difference(
-    a: str, b: str, errors_a: FloatArray, errors_b: FloatArray, overlap: Overlap, at: int
-) -> PairedDifference:
-    """Return the paired difference of two variants.
-
-    Parameters
-    ----------
-    a, b : str
-        Names.
-    errors_a, errors_b : ndarray, shape (cv, n_train)
-        Mean error norm of each verification set, in m.
-    overlap : Overlap
-        Of the verification sets.
-    at : int
-        Number of training poses at which the pair is judged.
-    """
-    difference = errors_a - errors_b
-    round_off = np.abs(difference) <= _ROUND_OFF * np.maximum(errors_a, errors_b)
-    found = corrected_mean(np.where(round_off, 0.0, difference), overlap)
-    return PairedDifference(a, b, at, found.mean, found.low, found.high)
-
-
-def _since(holds: BoolArray) -> int:
-    """Return the size, from 1, from which on a condition holds that holds at the end."""
-    fails = np.flatnonzero(~holds)
-    return int(fails[-1]) + 2 if len(fails) else 1
 
 
 @brief_repr
@@ -189,6 +45,9 @@ class Verdicts:
     tolerance: Tolerance
     sentences: tuple[str, ...]
     """One for each variant, then one for each pair."""
+    springs: tuple[str, ...] = ()
+    """What springs the readings carry, as `calibrate` says, then what variants took for springs
+    that they leave to the readings; empty in codecs of before."""
 
 
 @brief_repr
@@ -205,6 +64,10 @@ class Curve:
     springs: str
     load_cases: str
     solver: str
+    layout: str = ""
+    """Springs that `calibrate` takes on this file for the word in ``springs``."""
+    layouts: dict[str, int] = field(default_factory=dict)
+    """Springs that the errors are of, with the number of splits whose training poses chose them."""
 
 
 @brief_repr
@@ -255,6 +118,11 @@ class CodecSummary:
     findings: tuple[str, ...]
     """Notes on the data."""
     versions: dict[str, str]
+    ladder: tuple[RungSummary, ...] = ()
+    """The ladder of `calibrate` on this file, and other compared layouts."""
+    springs: tuple[str, ...] = ()
+    """The ladder in words, as `calibrate` says it, and what variants took that leave their springs
+    to the readings."""
 
 
 def judge(data: CodecData, tolerance: Tolerance | None = None) -> Verdicts:
@@ -286,7 +154,9 @@ def judge(data: CodecData, tolerance: Tolerance | None = None) -> Verdicts:
     )
     sizes = {each.variant: each.n_train for each in found}
     pairs = tuple(
-        paired_difference(a, b, errors[a], errors[b], overlap, max(sizes[a], sizes[b]))
+        compare_variants(
+            a, b, errors[a], errors[b], overlap, max(sizes[a], sizes[b]), _left_out(data, a, b)
+        )
         for a, b in combinations(errors, 2)
     )
     where = f"{sets} verification set{'s' if sets > 1 else ''} of {size} held-out poses"
@@ -294,7 +164,30 @@ def judge(data: CodecData, tolerance: Tolerance | None = None) -> Verdicts:
         *(each.sentence(tolerance, data.errors(each.variant, "max"), where) for each in found),
         *(each.sentence(where) for each in pairs),
     )
-    return Verdicts(found, pairs, tolerance, sentences)
+    return Verdicts(found, pairs, tolerance, sentences, _springs(data))
+
+
+def _springs(data: CodecData) -> tuple[str, ...]:
+    """Return the springs that readings and splits carry, in words."""
+    found = [f"springs, as calibrate judges: {ladder_sentence(data.ladder)}"] if data.ladder else []
+    rows = zip(data.variants, data.layouts, data.split_layouts, strict=True)
+    for variant, layout, splits in rows:
+        if variant.springs != layout:
+            chosen = ", ".join(f"{n} in {counted(k, 'split')}" for n, k in Counter(splits).items())
+            found.append(
+                f"{variant.name}: springs {variant.springs} are {layout} on these readings; its"
+                " errors are those of springs chosen in each split from its training poses alone:"
+                f" {chosen}"
+            )
+    return tuple(found)
+
+
+def _left_out(data: CodecData, a: str, b: str) -> FloatArray | None:
+    """Return the errors at left-out poses of two variants that differ in their springs alone."""
+    i, j = data.index(a), data.index(b)
+    if data.left_out is None or data.variants[i].springs == data.variants[j].springs:
+        return None
+    return data.left_out[[i, j]]
 
 
 def codec_summary(
@@ -320,6 +213,8 @@ def codec_summary(
         sentences=verdicts.sentences,
         findings=data.findings,
         versions=data.versions,
+        ladder=data.ladder,
+        springs=verdicts.springs,
     )
 
 
@@ -383,10 +278,13 @@ def _setup(data: CodecData, tolerance: Tolerance) -> CodecSetup:
 
 
 def _curve(data: CodecData, name: str) -> Curve:
-    variant = data.variants[data.index(name)]
+    number = data.index(name)
+    variant = data.variants[number]
     return Curve(
         tuple(data.n_train.tolist()),
         tuple(np.median(data.errors(name, "mean"), axis=0).tolist()),
         tuple(np.median(data.errors(name, "max"), axis=0).tolist()),
         **{key: getattr(variant, key) for key in KEYS},
+        layout=data.layouts[number],
+        layouts=dict(Counter(data.split_layouts[number])),
     )

@@ -1,4 +1,5 @@
 from ._layout import SCHEMA as SCHEMA, SCHEMAS as SCHEMAS, STATUSES as STATUSES
+from ._store import read as read, read_dataset as read_dataset, write as write
 from .dataset import Dataset as Dataset
 from .load_rows import (
     LARGEST_FORCE as LARGEST_FORCE,
@@ -16,4 +17,3 @@ from .readings import (
     usable_readings as usable_readings,
     without as without,
 )
-from .store import read as read, read_dataset as read_dataset, write as write

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Hashable, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -58,11 +58,14 @@ def merge(
     cases = tuple(dict.fromkeys(case for dataset in datasets for case in dataset.load_cases))
     poses = tuple(pose for dataset in datasets for pose in dataset.poses)
     names = dict.fromkeys(name for dataset in datasets for name in dataset.arrays)
-    joined: dict[str, Any] = {name: _joined(datasets, name, cases) for name in names}
+    joined: dict[str, np.ndarray] = {name: _joined(datasets, name, cases) for name in names}
     sources = [dataset.provenance for dataset in datasets if dataset.provenance]
     provenance = "; ".join(dict.fromkeys(sources))
     return replace(
         datasets[0],
+        # Said again for the type checker: the arrays by name are none of these.
+        joint_names=datasets[0].joint_names,
+        joint_units=datasets[0].joint_units,
         poses=tuple(range(len(poses))) if relabel else poses,
         load_cases=cases,
         status=np.concatenate([_spread(each, each.status, cases, MISSING) for each in datasets]),
@@ -122,11 +125,15 @@ def selected(
 def _taken(dataset: "Dataset", rows: Sequence[int], columns: Sequence[int]) -> "Dataset":
     """Return the poses and load cases at some positions."""
     index = np.ix_(rows, columns)
-    variables: dict[str, Any] = dict(dataset.arrays)
+    variables: dict[str, np.ndarray] = dict(dataset.arrays)
     if dataset.sequence is not None or sorted(columns) != list(columns):
         variables[SEQUENCE.name] = dataset.order
     return replace(
         dataset,
+        # Said again for the type checker: the arrays by name are none of these.
+        joint_names=dataset.joint_names,
+        joint_units=dataset.joint_units,
+        attributes=dataset.attributes,
         poses=tuple(dataset.poses[row] for row in rows),
         load_cases=tuple(dataset.load_cases[column] for column in columns),
         campaigns=tuple(dataset.campaigns[row] for row in rows) if dataset.campaigns else (),

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, fields, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -42,6 +42,17 @@ class Presses:
     """Force on the robot at the TCP in base, shape (press, 3), in N."""
     moment: FloatArray | None = None
     """Moment on the robot at the TCP in base, shape (press, 3), in N·m; None: not measured."""
+
+    def with_others(self, others: "Presses") -> "Presses":
+        """Return these presses and others of the same campaign."""
+        moments = [each.moment for each in (self, others) if each.moment is not None]
+        return Presses(
+            np.concatenate([self.pose, others.pose]),
+            np.concatenate([self.sequence, others.sequence]),
+            np.concatenate([self.joint_position, others.joint_position]),
+            np.concatenate([self.force, others.force]),
+            np.concatenate(moments) if moments else None,
+        )
 
 
 @brief_repr
@@ -153,6 +164,29 @@ class Readings:
             **numbers,
         )
 
+    def set_aside(self, index: ArrayLike) -> "Readings":
+        """Return the readings without some that were pressed all the same: friction remembers.
+
+        Parameters
+        ----------
+        index : array_like of bool, shape (reading,)
+            Those to set aside.
+        """
+        aside = np.asarray(index, dtype=bool)
+        if not np.any(aside):
+            return self
+        order = np.arange(len(self)) if self.sequence is None else self.sequence
+        pressed = Presses(
+            self.pose[aside],
+            order[aside],
+            self.joint_position[aside],
+            self.force[aside],
+            None if self.moment is None else self.moment[aside],
+        )
+        if self.also_pressed is not None:
+            pressed = self.also_pressed.with_others(pressed)
+        return replace(replace(self, sequence=order).take(~aside), also_pressed=pressed)
+
     def _numbers(self) -> Iterator[tuple[str, FloatArray]]:
         for field in fields(self):
             value = getattr(self, field.name)
@@ -181,7 +215,7 @@ def usable_readings(dataset: "Dataset", joint_names: Sequence[str]) -> Readings:
         )
     order = [dataset.joint_names.index(name) for name in wanted]
     pose, case = np.nonzero(dataset.usable)
-    flat: dict[str, Any] = {}
+    flat: dict[str, np.ndarray] = {}
     for variable in VARIABLES:
         values = dataset.arrays.get(variable.name)
         if values is not None and variable != LINK_JOINT_POSITION:

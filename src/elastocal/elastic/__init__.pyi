@@ -19,6 +19,7 @@ from .layouts import (
 from .model import (
     CartesianCompliance as CartesianCompliance,
     ElasticModel as ElasticModel,
+    ModelPosture as ModelPosture,
     check_vectors as check_vectors,
     spring_torques as spring_torques,
 )

@@ -34,12 +34,8 @@ class FrictionElements:
     def of(cls, springs: Sequence[Spring]) -> "FrictionElements":
         """Return the elements of springs, in their order."""
         first = np.cumsum([0, *(len(spring.axes) for spring in springs)])
-        pairs = [
-            (first[index], limit)
-            for index, spring in enumerate(springs)
-            for limit in spring.friction_limits
-        ]
-        axis, limit = (np.array(part) for part in zip(*pairs, strict=True)) if pairs else ([], [])
+        axis = [first[k] for k, spring in enumerate(springs) for _ in spring.friction_limits]
+        limit = [limit for spring in springs for limit in spring.friction_limits]
         return cls(np.array(axis, dtype=np.intp), np.array(limit, dtype=float))
 
     def __len__(self) -> int:

@@ -23,18 +23,26 @@ from pydantic import BeforeValidator, Field
 
 from elastocal.elastic.known import Knowledge, KnownSpring
 from elastocal.elastic.origins import joint_origins, link_middles
-from elastocal.elastic.springs import AXES, KINDS, Hinge, Spring, SpringAxis, Tensor, as_axis, axial
+from elastocal.elastic.springs import (
+    AXES,
+    DEFAULT_KIND,
+    KINDS,
+    Hinge,
+    Spring,
+    SpringAxis,
+    Tensor,
+    as_axis,
+    axial,
+    coordinate_axis,
+)
 from elastocal.errors import SpringError, nearest
 from elastocal.records import StrictModel, read_yaml
 from elastocal.robot import ChainJoint, Robot
 from elastocal.units import parse_quantity
 
 _SCHEMA = "elastocal.springs/1"
-_ALIGNED = 1.0 - 1e-9
-"""Cosine above which a joint axis counts as a coordinate axis."""
 _APART = 1e-3
 """Distance in m from which two places on an axis are two."""
-_HINGE = "hinge"
 _MOTIONS = ("revolute", "prismatic")
 """What a hinge may do; other kinds of springs are asked for by their word."""
 
@@ -136,9 +144,9 @@ def orthogonal_axes(axis: ArrayLike) -> dict[str, tuple[float, float, float]]:
     """
     unit = np.asarray(as_axis(axis))
     alignment = np.abs(unit)
-    if alignment.max() >= _ALIGNED:
-        along = int(alignment.argmax())
-        return {name: AXES[name] for index, name in enumerate(AXES) if index != along}
+    along = coordinate_axis(unit)
+    if along is not None:
+        return {name: AXES[name] for name in AXES if name != along}
     first, second = np.argsort(alignment, kind="stable")[:2]
     names = list(AXES)
     made: dict[str, tuple[float, float, float]] = {}
@@ -232,7 +240,9 @@ def _words(known: Callable[[], Iterable[str]]) -> BeforeValidator:
 
 _Length = Annotated[float, BeforeValidator(lambda text: parse_quantity(text, "length"))]
 _LayoutName = Annotated[str, _words(lambda: tuple(LAYOUTS))]
-_Kind = Annotated[str, _words(lambda: (*_MOTIONS, *(word for word in KINDS if word != _HINGE)))]
+_Kind = Annotated[
+    str, _words(lambda: (*_MOTIONS, *(word for word in KINDS if word != DEFAULT_KIND)))
+]
 
 
 class SpringEntry(Knowledge):
@@ -284,7 +294,7 @@ def _spring(entry: SpringEntry, joints: dict[str, ChainJoint]) -> Spring:
     parts += ["distal"] if distal else []
     parts += [entry.axis if isinstance(entry.axis, str) else _direction(axis)]
     name = entry.name or f"{joint.name}.{'-'.join(parts)}"
-    kind = KINDS.get(entry.kind or _HINGE, Hinge)
+    kind = KINDS.get(entry.kind or DEFAULT_KIND, Hinge)
     return kind.at(SpringAxis(name, joint.name, axis, revolute, distal, entry.offset))
 
 

@@ -18,6 +18,7 @@ reference and a loaded reading, millimetres apart, holds ``S(q) - S(q_0)`` besid
 """
 
 from dataclasses import dataclass, field
+from functools import cached_property
 from itertools import product
 
 import numpy as np
@@ -88,6 +89,10 @@ class ElasticModel:
         """Names of the parameters, in the order of every compliance vector."""
         return tuple(parameter.name for parameter in self.parameters)
 
+    def at(self, q: "ArrayLike | ModelPosture") -> "ModelPosture":
+        """Return the model at joint positions ``q``, for several questions about them."""
+        return q if isinstance(q, ModelPosture) else ModelPosture(self, q)
+
     def spring_jacobian(self, q: ArrayLike) -> Jacobian:
         """Return the Jacobian of the tool centre point for the springs (paper Eq. 1-3).
 
@@ -109,13 +114,13 @@ class ElasticModel:
         return any(group.law.bears_weight for group in self._groups)
 
     def load_torques(
-        self, q: ArrayLike, force: ArrayLike, moment: ArrayLike | None = None
+        self, q: "ArrayLike | ModelPosture", force: ArrayLike, moment: ArrayLike | None = None
     ) -> FloatArray:
         """Return the torque of a load about each axis (paper Eq. 9), shape (..., axis), in N·m.
 
         Arguments as for `observation_blocks`.
         """
-        return spring_torques(self.spring_jacobian(q), check_vectors("force", force), moment)
+        return spring_torques(self.at(q).jacobian, force, moment)
 
     def weight_torques(self, q: ArrayLike) -> FloatArray:
         """Return the torque of the arm's own weight about each axis.
@@ -137,7 +142,7 @@ class ElasticModel:
 
     def observation_blocks(
         self,
-        q: ArrayLike,
+        q: "ArrayLike | ModelPosture",
         force: ArrayLike,
         moment: ArrayLike | None = None,
         marker_offset: ArrayLike | None = None,
@@ -150,7 +155,7 @@ class ElasticModel:
 
         Parameters
         ----------
-        q : array_like, shape (..., joint)
+        q : array_like, shape (..., joint), or ModelPosture
             Joint positions after the load case has settled, in rad or m.
         force : array_like, shape (..., 3)
             Force on the robot at the tool centre point, in base, in N.
@@ -173,21 +178,21 @@ class ElasticModel:
         RobotError, SpringError
             If an argument has another shape or is not finite.
         """
-        force = check_vectors("force", force)
-        moment = None if moment is None else check_vectors("moment", moment)
-        jacobian = self.spring_jacobian(q)
-        torque = spring_torques(jacobian, force, moment)
-        weight = self.weight_torques(q) if self.bears_weight else None
+        posture = self.at(q)
+        torque = spring_torques(posture.jacobian, force, moment)
+        weight = posture.weight if self.bears_weight else None
         if friction is None and len(self.friction):
             friction = self.friction.press(torque)
-        return self._blocks(self._observed(q, jacobian, marker_offset), torque, weight, friction)
+        return self._blocks(posture.observed(marker_offset), torque, weight, friction)
 
-    def sag_blocks(self, q: ArrayLike, marker_offset: ArrayLike | None = None) -> FloatArray:
+    def sag_blocks(
+        self, q: "ArrayLike | ModelPosture", marker_offset: ArrayLike | None = None
+    ) -> FloatArray:
         """Return the rows ``S`` of the sag: ``S c`` is what the arm's own weight deflects.
 
         Parameters
         ----------
-        q, marker_offset : array_like
+        q, marker_offset
             As for `observation_blocks`.
 
         Returns
@@ -195,18 +200,8 @@ class ElasticModel:
         ndarray, shape (..., 3, parameter)
             Against the arm without weight; zero where the robot's links have no masses.
         """
-        observed = self._observed(q, self.spring_jacobian(q), marker_offset)
-        return self._blocks(observed, self.weight_torques(q))
-
-    def _observed(
-        self, q: ArrayLike, jacobian: Jacobian, marker_offset: ArrayLike | None
-    ) -> FloatArray:
-        """Return the translational Jacobian of the observed point, shape (..., 3, axis)."""
-        if marker_offset is None or not np.any(marker_offset):
-            return jacobian.translation
-        rotation = self.robot.forward(q)[..., :3, :3]
-        lever = rotation @ check_vectors("marker_offset", marker_offset)
-        return jacobian.translation + np.cross(jacobian.rotation, lever[..., None], axis=-2)
+        posture = self.at(q)
+        return self._blocks(posture.observed(marker_offset), posture.weight)
 
     def _blocks(
         self,
@@ -273,14 +268,12 @@ class ElasticModel:
         force, moment : array_like, shape (..., 3), optional
             Load at the tool centre point, in base, in N and N·m. Default: none.
         """
-        c = self.check_compliance(compliance)
-        jacobian = self.spring_jacobian(q)
+        c, jacobian = self.check_compliance(compliance), self.spring_jacobian(q)
         J, W = jacobian.translation, jacobian.rotation
-        torques = spring_torques(jacobian, check_vectors("force", force), moment)
+        torques = spring_torques(jacobian, force, moment)
         weights = self.weight_torques(q) if self.bears_weight else None
         friction = self.friction.press(torques) if len(self.friction) else None
-        shape = (*torques.shape[:-1], 3, 3)
-        translation, rotation, coupling = np.zeros(shape), np.zeros(shape), np.zeros(shape)
+        translation, rotation, coupling = np.zeros((3, *torques.shape[:-1], 3, 3))
         for group in self._groups:
             tangents = group.law.tangents(group.load(torques, weights, friction))
             # A spring of several axes couples them: all pairs, of which a hinge has one.
@@ -341,6 +334,35 @@ class ElasticModel:
         return c
 
 
+@brief_repr
+@dataclass(frozen=True, eq=False)
+class ModelPosture:
+    """A model at joint positions: Jacobian and weight, each computed once and when asked for."""
+
+    model: ElasticModel
+    q: ArrayLike
+    """Joint positions, shape (..., joint), in rad or m."""
+
+    @cached_property
+    def jacobian(self) -> Jacobian:
+        """Jacobian of the springs, see `ElasticModel.spring_jacobian`."""
+        return self.model.spring_jacobian(self.q)
+
+    @cached_property
+    def weight(self) -> FloatArray:
+        """Torque of the arm's own weight about each axis, see `ElasticModel.weight_torques`."""
+        return self.model.weight_torques(self.q)
+
+    def observed(self, marker_offset: ArrayLike | None = None) -> FloatArray:
+        """Return the translational Jacobian of a marker, shape (..., 3, axis), or of the tcp."""
+        if marker_offset is None or not np.any(marker_offset):
+            return self.jacobian.translation
+        rotation = self.model.robot.forward(self.q)[..., :3, :3]
+        lever = rotation @ check_vectors("marker_offset", marker_offset)
+        J, W = self.jacobian.translation, self.jacobian.rotation
+        return J + np.cross(W, lever[..., None], axis=-2)
+
+
 def check_vectors(name: str, vectors: ArrayLike) -> FloatArray:
     """Return vectors as a float array, or refuse them by name.
 
@@ -366,10 +388,13 @@ def spring_torques(
     -------
     ndarray, shape (..., spring)
         In N·m, or N for prismatic springs.
+
+    Raises
+    ------
+    SpringError
+        If force or moment has another shape or is not finite.
     """
-    f = np.asarray(force, dtype=float)
-    torques: FloatArray = (f[..., None, :] @ jacobian.translation)[..., 0, :]
+    torques = check_vectors("force", force)[..., None, :] @ jacobian.translation
     if moment is not None:
-        m = np.asarray(moment, dtype=float)
-        torques = torques + (m[..., None, :] @ jacobian.rotation)[..., 0, :]
-    return torques
+        torques = torques + check_vectors("moment", moment)[..., None, :] @ jacobian.rotation
+    return np.asarray(torques[..., 0, :])

@@ -18,9 +18,10 @@ from dataclasses import dataclass
 from itertools import accumulate, pairwise
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from elastocal.arrays import FloatArray
-from elastocal.elastic.springs import as_axis
+from elastocal.elastic.springs import AXES, as_axis, coordinate_axis
 from elastocal.results import brief_repr
 from elastocal.robot import SerialChain
 
@@ -30,8 +31,6 @@ _SHORTEST_LINK = 1e-2
 """Distance in m below which two origins have no link between them."""
 _SAME_AXIS = 1e-6
 """Distance in m below which two parallel axes count as one line."""
-_ALIGNED = 1.0 - 1e-9
-"""Cosine above which a direction counts as a coordinate axis."""
 
 _Triple = tuple[float, float, float]
 
@@ -163,12 +162,11 @@ def _transverse(axis: FloatArray) -> FloatArray:
 
 def _named(normal: FloatArray, binormal: FloatArray) -> dict[str, _Triple]:
     """Return two directions by name, coordinate axes in their order and positive."""
-    found = []
+    found: list[tuple[str, ArrayLike]] = []
     for name, direction in (("normal", normal), ("binormal", binormal)):
-        along = int(np.argmax(np.abs(direction)))
-        plain = abs(direction[along]) >= _ALIGNED
-        found.append(("xyz"[along], _triple(np.eye(3)[along])) if plain else (name, direction))
-    pairs = sorted(found, key=lambda pair: pair[0]) if found[0][0] in "xyz" else found
+        along = coordinate_axis(direction)
+        found.append((name, direction) if along is None else (along, AXES[along]))
+    pairs = sorted(found, key=lambda pair: pair[0]) if found[0][0] in AXES else found
     return {name: as_axis(direction) for name, direction in pairs}
 
 

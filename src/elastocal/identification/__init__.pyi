@@ -3,14 +3,24 @@ from ._least_squares import (
     RANK_TOLERANCE as RANK_TOLERANCE,
     rank as rank,
 )
+from .budget import (
+    ErrorBudget as ErrorBudget,
+    ErrorPart as ErrorPart,
+    TermName as TermName,
+    TermWorth as TermWorth,
+    error_budget as error_budget,
+)
 from .calibrated import (
     CalibratedModel as CalibratedModel,
     Prediction as Prediction,
+    ToolChange as ToolChange,
+    change_tool as change_tool,
     check_rows as check_rows,
 )
 from .calibration import (
     Calibration as Calibration,
     calibrate as calibrate,
+    with_knowledge as with_knowledge,
 )
 from .conventions import (
     POOR_FIT as POOR_FIT,
@@ -38,6 +48,8 @@ from .figures import (
     RungSummary as RungSummary,
     SpringSummary as SpringSummary,
     SuspiciousReading as SuspiciousReading,
+    ladder_sentence as ladder_sentence,
+    rung_summary as rung_summary,
     spring_summaries as spring_summaries,
     summary as summary,
 )
@@ -48,18 +60,22 @@ from .frames import (
     frame_columns as frame_columns,
     frame_summaries as frame_summaries,
 )
-from .knowledge import with_knowledge as with_knowledge
 from .ladder import (
     AUTO as AUTO,
     RUNGS as RUNGS,
     Choice as Choice,
     Climbed as Climbed,
     Rung as Rung,
+    allowed_rungs as allowed_rungs,
     choose_model as choose_model,
     climb as climb,
-    doubt as doubt,
     gears as gears,
     has_levels as has_levels,
+    low_loads as low_loads,
+    rung_of as rung_of,
+    take_simplest as take_simplest,
+    try_rung as try_rung,
+    usable_for_choice as usable_for_choice,
 )
 from .model_file import (
     CalibrateResult as CalibrateResult,
@@ -93,6 +109,14 @@ from .options import (
     huber as huber,
     linear as linear,
     parse_bounds as parse_bounds,
+)
+from .paired import (
+    Judgement as Judgement,
+    MeanOverSets as MeanOverSets,
+    Overlap as Overlap,
+    corrected_mean as corrected_mean,
+    judge_models as judge_models,
+    paired_difference as paired_difference,
 )
 from .problem import (
     MINIMUM_BLOCKS as MINIMUM_BLOCKS,
@@ -128,7 +152,6 @@ from .suspicious import (
     leverage as leverage,
     screen as screen,
 )
-from .tool_change import ToolChange as ToolChange, change_tool as change_tool
 from .uncertainty import (
     CONFIDENCE as CONFIDENCE,
     MOST_FOLDS as MOST_FOLDS,
@@ -138,6 +161,7 @@ from .uncertainty import (
     IntervalCoverage as IntervalCoverage,
     bootstrap as bootstrap,
     distrust_factor as distrust_factor,
+    doubt as doubt,
     doubt_factor as doubt_factor,
     interval as interval,
     leave_poses_out as leave_poses_out,

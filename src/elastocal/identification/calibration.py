@@ -1,10 +1,11 @@
 """From a dataset to a calibrated model: build, solve, certify (paper Eq. 15-19).
 
-The calibrated model is what the compensation and every prediction work with.
+What a spring file knows beforehand goes in as bounds and a prior (`with_knowledge`). The calibrated
+model is what the compensation and every prediction work with.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.random import Generator
@@ -12,19 +13,19 @@ from numpy.typing import ArrayLike
 
 from elastocal.arrays import BoolArray, FloatArray
 from elastocal.dataset import Readings
-from elastocal.elastic import ElasticModel
+from elastocal.elastic import ElasticModel, KnownSpring
 from elastocal.errors import ConventionError, IdentificationError
 from elastocal.identification.calibrated import CalibratedModel
 from elastocal.identification.conventions import POOR_FIT, check_conventions, check_joints
 from elastocal.identification.domain import CalibrationDomain
 from elastocal.identification.frames import FrameSummary, frame_summaries
-from elastocal.identification.ladder import Climbed, doubt
+from elastocal.identification.ladder import Climbed
 from elastocal.identification.observability import (
     attainable_rank,
     find_faint,
     observability,
 )
-from elastocal.identification.options import FitOptions
+from elastocal.identification.options import MEDIAN_NORM, FitOptions, Prior, bounds
 from elastocal.identification.problem import Problem, build, same_configuration
 from elastocal.identification.solve import PoseGrams, Solution, factor, solve
 from elastocal.identification.suspicious import Screening, force_offset, screen
@@ -34,6 +35,7 @@ from elastocal.identification.uncertainty import (
     HeldOut,
     bootstrap,
     distrust_factor,
+    doubt,
     doubt_factor,
     leave_poses_out,
     measured_coverage,
@@ -135,7 +137,7 @@ def calibrate(
     held_out = leave_poses_out(weighted)
     unexplained = held_out.mean / float(np.linalg.norm(kept.d, axis=1).mean())
     draws = bootstrap(PoseGrams.of(weighted), options.draws, rng)
-    by = _widening(weighted, solution.compliance, draws, held_out, doubt(ladder))
+    by = _widening(weighted, solution.compliance, draws, held_out, ladder)
     if unexplained > MOST_UNEXPLAINED:
         by = max(by, distrust_factor(weighted, solution.compliance, draws, held_out))
     widened = widen_draws(weighted, solution.compliance, draws, by)
@@ -182,12 +184,14 @@ def _widening(
     compliance: FloatArray,
     draws: FloatArray,
     held_out: HeldOut,
-    about_model: float,
+    ladder: Sequence[Climbed],
 ) -> float:
     """Return how far draws are stretched for few poses, and for doubt about the model."""
     by = widening_factor(problem, compliance, draws, held_out.compliance)
     stretched = compliance + by * (draws - compliance)
-    return by * doubt_factor(problem, compliance, stretched, about_model)
+    figures = ((each.difference, each.standard_error, each.apart) for each in ladder)
+    moved = doubt(*np.array(list(figures)).reshape(-1, 3).T)
+    return by * doubt_factor(problem, compliance, stretched, moved)
 
 
 def _data_warnings(
@@ -246,3 +250,59 @@ def _unsettled(solution: Solution, loss: str) -> list[str]:
         f"the {loss} loss had not settled when reweighting ended: its weights, and so the springs,"
         " depend on where it stopped"
     ]
+
+
+def with_knowledge(
+    options: FitOptions,
+    known: Sequence[KnownSpring],
+    model: ElasticModel,
+    readings: Readings,
+    marker_offset: ArrayLike | None = None,
+) -> FitOptions:
+    """Return options of a fit that uses what is known of springs.
+
+    A prior is weighed against the noise of one component of a deflection: the robust residual of a
+    fit without it.
+
+    Parameters
+    ----------
+    options : FitOptions
+        What else was chosen.
+    known : sequence of KnownSpring
+        What is known; the options as they are without any.
+    model : ElasticModel
+        Robot and springs.
+    readings : Readings
+        Measurements, joints in the robot's order.
+    marker_offset : array_like, shape (3,), optional
+        Marker in the tcp frame, in m.
+
+    Raises
+    ------
+    IdentificationError
+        If a spring is not the model's, or bounds contradict those of the options.
+    """
+    if not known:
+        return options
+    names = list(model.parameter_names)
+    unknown = [each.name for each in known if each.name not in names]
+    if unknown:
+        raise IdentificationError(f"the model has no spring {unknown[0]!r} to know anything of")
+    natural = [parameter.lower for parameter in model.parameters]
+    lower, upper = (np.array(each) for each in bounds(options, len(names), natural))
+    mean, sigma = np.zeros(len(names)), np.full(len(names), np.inf)
+    for each in known:
+        index = names.index(each.name)
+        lower[index] = lower[index] if each.low is None else max(lower[index], each.low)
+        upper[index] = upper[index] if each.high is None else min(upper[index], each.high)
+        if each.compliance is not None and each.sigma is not None:
+            mean[index], sigma[index] = each.compliance, each.sigma
+    bounded = replace(options, lower=lower, upper=upper, prior=None)
+    if not np.isfinite(sigma).any():
+        return bounded
+    problem = build(model, readings, bounded, marker_offset)
+    residual = np.linalg.norm(problem.residuals(solve(problem, "huber").compliance), axis=1)
+    # Readings without any noise leave a prior no part, but not none at all.
+    smallest = np.finfo(float).eps * float(np.abs(problem.d).max())
+    noise = max(float(np.median(residual)) / MEDIAN_NORM, smallest)
+    return replace(bounded, prior=Prior(mean, sigma, noise))

@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike
 
 from elastocal.arrays import FloatArray, IndexArray
 from elastocal.dataset import Readings
-from elastocal.elastic import ElasticModel
+from elastocal.elastic import ElasticModel, ModelPosture
 from elastocal.robot import Robot
 
 _ROUNDS = 3
@@ -47,10 +47,12 @@ def displacement_blocks(
     ndarray, shape (reading, 3, parameter)
         In m per unit of each parameter.
     """
-    q, q_0 = readings.joint_position, reference_joints(model.robot, readings)
+    # A posture is evaluated once, whatever is asked of it: loads, sag, friction.
+    q = model.at(readings.joint_position)
+    q_0 = model.at(reference_joints(model.robot, readings))
     loaded, reference = None, None
     if len(model.friction):
-        loaded, reference = friction_states(model, readings, q_0)
+        loaded, reference = friction_states(model, readings, q, q_0)
     rows = model.observation_blocks(q, readings.force, readings.moment, marker_offset, loaded)
     rows = rows + model.sag_blocks(q, marker_offset) - model.sag_blocks(q_0, marker_offset)
     if readings.reference_force is None and reference is None:
@@ -86,7 +88,7 @@ def reference_joints(robot: Robot, readings: Readings) -> FloatArray:
 
 
 def friction_states(
-    model: ElasticModel, readings: Readings, q_0: FloatArray
+    model: ElasticModel, readings: Readings, loaded_at: ModelPosture, reference_at: ModelPosture
 ) -> tuple[FloatArray, FloatArray]:
     """Return what each friction element bears under load, and when the zero was read.
 
@@ -98,24 +100,24 @@ def friction_states(
         Those of a pose, with what else pressed there (`Readings.also_pressed`), are taken to be
         all that the arm felt. A press of which no force is known (aborted, missing) is not among
         them: friction remembers the readings after it wrongly, until a larger one.
-    q_0 : ndarray, shape (reading, joint)
-        From `reference_joints`.
+    loaded_at, reference_at : ModelPosture, shape (reading, joint)
+        The model at the readings' joints, and at their `reference_joints`.
 
     Returns
     -------
     loaded, reference : ndarray, shape (reading, element)
         In N·m.
     """
-    q, rest = readings.joint_position, np.zeros((len(readings), 3))
+    rest = np.zeros((len(readings), 3))
     lightly = rest if readings.reference_force is None else readings.reference_force
-    total = model.load_torques(q, readings.force, readings.moment) + model.weight_torques(q)
+    total = model.load_torques(loaded_at, readings.force, readings.moment) + loaded_at.weight
     others = readings.also_pressed
     if others is not None:
-        q = others.joint_position
-        torque = model.load_torques(q, others.force, others.moment) + model.weight_torques(q)
+        at = model.at(others.joint_position)
+        torque = model.load_torques(at, others.force, others.moment) + at.weight
         total = np.concatenate([total, torque])
-    zero = model.load_torques(q_0, lightly) + model.weight_torques(q_0)
-    free = model.weight_torques(q_0)
+    free = reference_at.weight
+    zero = model.load_torques(reference_at, lightly) + free
     loaded = np.zeros((len(readings), len(model.friction)))
     reference = np.zeros_like(loaded)
     for steps in _visits(readings):

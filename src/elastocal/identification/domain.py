@@ -130,10 +130,23 @@ class CalibrationDomain:
         far = np.concatenate([np.zeros(0), *distance]) > REACH * self.spacing(robot)
         return OutsideRows(far, np.asarray(~inside.all(axis=1)))
 
-    def share_inside(self, other: "CalibrationDomain", robot: Robot) -> float:
-        """Return the share of this calibration's readings that another one covers."""
+    def share_inside(
+        self, other: "CalibrationDomain", robot: Robot, *, any_load: bool = False
+    ) -> float:
+        """Return the share of this calibration's readings that another one covers.
+
+        Parameters
+        ----------
+        other : CalibrationDomain
+            The other one.
+        robot : Robot
+            The robot with the tool of this calibration.
+        any_load : bool
+            Whether the pose alone decides.
+        """
         q = self.joint_position[self.reading_pose]
-        return float(np.mean(~other.outside(robot, q, self.force, self.moment).any))
+        found = other.outside(robot, q, self.force, self.moment)
+        return float(np.mean(~(found.pose if any_load else found.any)))
 
 
 @brief_repr

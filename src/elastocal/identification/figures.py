@@ -11,6 +11,7 @@ import numpy as np
 from elastocal.arrays import BoolArray, FloatArray
 from elastocal.dataset import Readings
 from elastocal.elastic import KnownSpring, Spring
+from elastocal.identification.budget import ErrorBudget
 from elastocal.identification.calibrated import CalibratedModel
 from elastocal.identification.calibration import Calibration
 from elastocal.identification.frames import FrameSummary
@@ -21,6 +22,7 @@ from elastocal.identification.suspicious import Screening
 from elastocal.identification.uncertainty import Coverage, HeldOut, interval
 from elastocal.records import record
 from elastocal.results import brief_repr
+from elastocal.wording import um
 
 
 @record()
@@ -167,6 +169,8 @@ class CalibrationSummary:
     """Number of springs; none in calibrations before springs of several parameters."""
     known: tuple[KnownSpring, ...] = ()
     """What the spring file knew of springs beforehand."""
+    budget: ErrorBudget | None = None
+    """What the error at left-out poses is made of, where it was asked for."""
 
     @property
     def unexplained(self) -> float:
@@ -212,7 +216,7 @@ def summary(
         interval_widening=calibration.widening,
         warnings=calibration.warnings,
         settings=settings,
-        ladder=tuple(map(_rung, calibration.ladder)),
+        ladder=tuple(map(rung_summary, calibration.ladder)),
         frames=calibration.frames,
         coverage=calibration.coverage,
         known=tuple(known),
@@ -302,7 +306,8 @@ def _held_out(held_out: HeldOut) -> HeldOutSummary:
     )
 
 
-def _rung(rung: Climbed) -> RungSummary:
+def rung_summary(rung: Climbed) -> RungSummary:
+    """Return the figures of a rung of the ladder."""
     return RungSummary(
         springs=rung.name,
         held_out=rung.held_out.mean,
@@ -310,3 +315,34 @@ def _rung(rung: Climbed) -> RungSummary:
         parameters=len(rung.model.parameters),
         chosen=rung.chosen,
     )
+
+
+def ladder_sentence(ladder: Sequence[RungSummary]) -> str:
+    """Return in words which model readings carry, and no more than they say.
+
+    Parameters
+    ----------
+    ladder : sequence of RungSummary
+        Of a choice between all rungs.
+    """
+    taken = next(rung for rung in ladder if rung.chosen)
+    best = min(ladder, key=lambda rung: rung.difference.mean)
+    worse = [rung for rung in ladder if rung.difference.low > 0.0]
+    others = [rung.springs for rung in ladder if rung not in (taken, best, *worse)]
+
+    def by(rung: RungSummary) -> str:
+        found = rung.difference
+        return f"{um(found.mean)} (95 % interval {um(found.low)} to {um(found.high)})"
+
+    text = f"{taken.springs} is taken, the best at left-out poses"
+    if taken is not best:
+        text = (
+            f"{taken.springs} is taken, the simplest within one standard error of the best at"
+            f" left-out poses, {best.springs}: worse by {by(taken)}"
+        )
+    if worse:
+        listed = ", ".join(f"{each.springs} by {by(each)}" for each in worse)
+        text += f"; shown to be worse than the best: {listed}"
+    if others:
+        text += f"; not told apart from the best: {', '.join(others)}"
+    return text

@@ -3,13 +3,8 @@
 More springs always fit better; whether they predict better is seen at poses that a refit has not
 seen, and at a low load that it has not seen, where there is one. (A refit without the full load
 would have to extrapolate, which no rung is asked to.) The rung taken is the simplest that is not
-worse than the best by more than one standard error of their paired difference (the rule of L.
-Breiman, J. Friedman, R. Olshen, C. Stone, *Classification and Regression Trees*, 1984, section
-3.4.3). Refits without one pose each share nearly all their poses, so that their errors are not
-independent; the standard error counts that by the corrected resampled t-test (C. Nadeau, Y.
-Bengio, "Inference for the generalization error", Machine Learning 52, 2003): the variance of a
-mean over ``J`` test sets is ``s^2 (1 / J + n_test / n_train)``. Why not a 95 % interval: see
-docs/decisions/0066-ladder.md.
+worse than the best by more than one standard error of their paired difference, which counts that
+the refits overlap (`elastocal.identification.paired`).
 """
 
 from collections.abc import Callable, Sequence
@@ -17,7 +12,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.special import stdtrit
 
 from elastocal.arrays import BoolArray, FloatArray
 from elastocal.dataset import Readings
@@ -35,10 +29,11 @@ from elastocal.elastic import (
 from elastocal.errors import IdentificationError
 from elastocal.identification.displacement import reference_joints
 from elastocal.identification.options import FitOptions
+from elastocal.identification.paired import Overlap, judge_models
 from elastocal.identification.problem import Problem, build
 from elastocal.identification.solve import PoseGrams
 from elastocal.identification.suspicious import screen
-from elastocal.identification.uncertainty import CONFIDENCE, HeldOut, leave_poses_out
+from elastocal.identification.uncertainty import HeldOut, leave_poses_out
 from elastocal.parallel import one_blas_thread
 from elastocal.results import brief_repr
 from elastocal.robot import Robot
@@ -55,6 +50,7 @@ _LOADED = 0.01
 """Part of the largest typical torque below which a joint counts as never loaded."""
 _LOW_LEVEL = 0.6
 """A load case is of low load below this part of the largest force at its pose."""
+_NO_LEVELS = f"no load case has less than {_LOW_LEVEL:.0%} of the largest force at its pose"
 
 
 @brief_repr
@@ -80,11 +76,13 @@ class Climbed:
     """Errors at left-out poses."""
     score: FloatArray
     """Mean error of each pose block, its low load left out too, shape (block,), in m."""
-    difference: float
+    predicted: FloatArray
+    """What it predicts of each reading at left-out poses, shape (reading, 3), in m."""
+    difference: float = 0.0
     """Mean score minus that of the best rung, in m."""
-    low: float
+    low: float = 0.0
     """Lower end of its 95 % interval, in m."""
-    high: float
+    high: float = 0.0
     """Upper end, in m."""
     standard_error: float = 0.0
     """Of the difference, in m."""
@@ -156,6 +154,30 @@ class Choice:
     ladder: tuple[Climbed, ...]
     """Every rung that the readings allow, the simplest first."""
 
+    @property
+    def taken(self) -> str:
+        """Name of the chosen rung."""
+        return next(each.name for each in self.ladder if each.chosen)
+
+
+def allowed_rungs(springs: str) -> tuple[str, ...]:
+    """Return the names of the rungs that a user's word for springs leaves to choose from."""
+    return {AUTO: tuple(RUNGS), "gears": ("gears", "gears+friction")}.get(springs, (springs,))
+
+
+def rung_of(robot: Robot, name: str) -> Rung:
+    """Return a rung, or a layout beside the ladder as one.
+
+    Raises
+    ------
+    SpringError
+        If the name is neither a rung, nor a layout, nor a spring file.
+    """
+    if name in RUNGS:
+        return RUNGS[name]
+    springs = layout(robot, name, beside=(AUTO, *RUNGS))
+    return Rung(name, lambda *_: springs)
+
 
 @one_blas_thread()
 def choose_model(
@@ -164,6 +186,7 @@ def choose_model(
     springs: str,
     options: FitOptions,
     marker_offset: ArrayLike | None = None,
+    beside: Sequence[str] = (),
 ) -> Choice:
     """Return the elastic model that a user asks for.
 
@@ -180,6 +203,8 @@ def choose_model(
         Bounds, weights; a prior speaks of one model and has no part in the choice.
     marker_offset : array_like, shape (3,), optional
         Marker in the tcp frame, in m.
+    beside : sequence of str
+        Other layouts or spring files to judge with the ladder; none of them is taken.
 
     Raises
     ------
@@ -188,20 +213,35 @@ def choose_model(
     IdentificationError
         If the readings carry no model that was asked for.
     """
-    allowed = {AUTO: tuple(RUNGS), "gears": ("gears", "gears+friction")}.get(springs, (springs,))
-    rungs = dict(RUNGS)
-    if springs not in (AUTO, *RUNGS):
-        asked = layout(robot, springs, beside=(AUTO, *RUNGS))
-        rungs[springs] = Rung(springs, lambda *_: asked)
+    allowed = allowed_rungs(springs)
+    names = dict.fromkeys((*RUNGS, *allowed, *beside))
+    rungs = tuple(rung_of(robot, name) for name in names if name != AUTO)
     options = replace(options, prior=None)
+    readings = usable_for_choice(robot, readings, options, marker_offset)
+    return climb(robot, readings, rungs, allowed, options, marker_offset)
+
+
+def usable_for_choice(
+    robot: Robot,
+    readings: Readings,
+    options: FitOptions,
+    marker_offset: ArrayLike | None = None,
+) -> Readings:
+    """Return the readings that a choice of springs rests on, with their references.
+
+    Parameters
+    ----------
+    robot, readings, options, marker_offset
+        As for `choose_model`.
+    """
     # Sought once, not for every rung.
     sought = reference_joints(robot, readings)
     readings = replace(readings, reference_joint_position=sought)
-    if options.set_blunders_aside:
-        # Judged by springs that every reading can be judged by; they would decide otherwise.
-        plain = build(ElasticModel(robot, bearing(robot)), readings, options, marker_offset)
-        readings = readings.take(~screen(plain).blunder)
-    return climb(robot, readings, tuple(rungs.values()), allowed, options, marker_offset)
+    if not options.set_blunders_aside:
+        return readings
+    # Judged by springs that every reading can be judged by; they would decide otherwise.
+    plain = build(ElasticModel(robot, bearing(robot)), readings, options, marker_offset)
+    return readings.set_aside(screen(plain).blunder)
 
 
 def climb(
@@ -235,63 +275,67 @@ def climb(
         If the readings allow none of them.
     """
     tried: list[Climbed] = []
-    predicted: dict[str, FloatArray] = {}
-    reason = f"no load case has less than {_LOW_LEVEL:.0%} of the largest force at its pose"
+    low, reason = low_loads(readings), _NO_LEVELS
+    # The frame of a load case that is left out is not known, so it cannot be judged.
+    judged = low & (options.free_frame != "load_case")
     for rung in rungs:
-        if rung.needs_levels and not has_levels(readings):
+        if rung.needs_levels and not np.any(low):
             continue
+        model = ElasticModel(robot, rung.springs(robot, readings))
         try:
-            climbed, predicted[rung.name] = _tried(rung, robot, readings, options, marker_offset)
-            tried.append(climbed)
+            problem = build(model, readings, options, marker_offset)
+            tried.append(try_rung(rung.name, model, problem, judged))
         except IdentificationError as error:
             reason = str(error)
-    candidates = [each for each in tried if each.name in allowed]
-    if not candidates:
+    if not any(each.name in allowed for each in tried):
         raise IdentificationError(reason)
-    best = min(candidates, key=lambda each: float(each.score.mean()))
-    compared = [_against(each, best) for each in tried]
-    chosen = next(e for e in compared if e.name in allowed and e.difference <= e.standard_error)
-    ladder = tuple(
-        replace(
-            each,
-            chosen=each is chosen,
-            apart=_distance(predicted[each.name], predicted[chosen.name]),
-        )
-        for each in compared
-    )
-    return Choice(chosen.model, ladder)
+    return take_simplest(tried, allowed)
 
 
-def doubt(ladder: Sequence[Climbed]) -> float:
-    """Return the mean square by which the choice of a rung may have moved a prediction, in m².
-
-    A choice is not known to be right: had the poses been others, another rung would have been
-    taken. Each counts with the weight ``exp(-z^2 / 2)`` of how far it is behind the best, ``z``
-    being the difference in standard errors; 1 if it predicts better (S. T. Buckland, K. P.
-    Burnham, N. H. Augustin, "Model selection: an integral part of inference", Biometrics 53, 1997).
+def take_simplest(tried: Sequence[Climbed], allowed: Sequence[str]) -> Choice:
+    """Return the simplest of the allowed rungs that is not worse than the best of them.
 
     Parameters
     ----------
-    ladder : sequence of Climbed
-        With a chosen rung; 0 without any.
+    tried : sequence of Climbed
+        Tried on the same readings, the simplest first.
+    allowed : sequence of str
+        Names of the rungs to choose from; the others are judged beside them.
+
+    Raises
+    ------
+    IdentificationError
+        If none of them was tried: gears with friction memory, without load cases of low load.
     """
-    if not ladder:
-        return 0.0
-    difference = np.array([each.difference for each in ladder])
-    error = np.array([each.standard_error for each in ladder])
-    z = np.divide(difference, error, out=np.zeros_like(difference), where=error > 0.0)
-    weight = np.exp(-0.5 * np.square(np.maximum(z, 0.0)))
-    apart = np.array([each.apart for each in ladder])
-    return float(weight @ np.square(apart) / weight.sum())
+    may = np.array([each.name in allowed for each in tried])
+    if not np.any(may):
+        raise IdentificationError(f"springs {', '.join(allowed)} were not tried: {_NO_LEVELS}")
+    score = np.stack([each.score for each in tried], axis=1)
+    found = judge_models(score, may, Overlap.leaving_one_out(len(score)))
+    each = found.difference
+    figures = (each.mean, each.low, each.high, np.nan_to_num(each.standard_error))
+    ladder = tuple(
+        replace(
+            rung,
+            difference=float(mean),
+            low=float(low),
+            high=float(high),
+            standard_error=float(error),
+            chosen=number == found.chosen,
+            apart=_distance(rung.predicted, tried[found.chosen].predicted),
+        )
+        for number, (rung, mean, low, high, error) in enumerate(zip(tried, *figures, strict=True))
+    )
+    return Choice(ladder[found.chosen].model, ladder)
 
 
 def has_levels(readings: Readings) -> bool:
     """Return whether load cases of low load stand beside those of full load."""
     # The largest force at a pose is never low beside itself.
-    return bool(np.any(_of_low_load(readings)))
+    return bool(np.any(low_loads(readings)))
 
 
-def _of_low_load(readings: Readings) -> BoolArray:
+def low_loads(readings: Readings) -> BoolArray:
     """Return whether each reading is of low load beside others at its pose, shape (reading,)."""
     force = np.linalg.norm(readings.force, axis=1)
     labels, pose = np.unique(readings.pose, return_inverse=True)
@@ -300,29 +344,31 @@ def _of_low_load(readings: Readings) -> BoolArray:
     return np.asarray(force < _LOW_LEVEL * largest[pose])
 
 
-def _tried(
-    rung: Rung,
-    robot: Robot,
-    readings: Readings,
-    options: FitOptions,
-    marker_offset: ArrayLike | None,
-) -> tuple[Climbed, FloatArray]:
-    """Return a rung with its errors, and what it predicts at left-out poses, (reading, 3), in m."""
-    model = ElasticModel(robot, rung.springs(robot, readings))
-    problem = build(model, readings, options, marker_offset)
+def try_rung(name: str, model: ElasticModel, problem: Problem, low: BoolArray) -> Climbed:
+    """Return a rung with its errors at left-out poses, and left-out low load.
+
+    Parameters
+    ----------
+    name : str
+        Of the rung.
+    model : ElasticModel
+        Its model.
+    problem : Problem
+        What it is judged by; rows of some poses, cut from a problem of all, know of friction what
+        all readings at these poses did.
+    low : ndarray of bool, shape (reading,)
+        Readings that are also left out together.
+    """
     held_out = leave_poses_out(problem)
     error = held_out.error.copy()
-    low = _of_low_load(readings)
-    # The frame of a load case that is left out is not known, so it cannot be judged.
-    if np.any(low) and options.free_frame != "load_case":
+    if np.any(low):
         error[low] = 0.5 * (error[low] + _left_out(problem, low))
     blocks, index = np.unique(problem.block, return_inverse=True)
     score = np.bincount(index, error, len(blocks)) / np.bincount(index, minlength=len(blocks))
     n = problem.springs
-    predicted = np.einsum(
-        "rin,rn->ri", problem.O[:, :, n], held_out.compliance[held_out.fold][:, n]
-    )
-    return Climbed(rung.name, model, held_out, score, 0.0, 0.0, 0.0), predicted
+    fitted = held_out.compliance[held_out.fold][:, n]
+    predicted = np.einsum("rin,rn->ri", problem.O[:, :, n], fitted)
+    return Climbed(name, model, held_out, score, predicted)
 
 
 def _distance(a: FloatArray, b: FloatArray) -> float:
@@ -335,18 +381,6 @@ def _left_out(problem: Problem, rows: BoolArray) -> FloatArray:
     rest = PoseGrams.of(problem.take(~rows))
     compliance = rest.refit(np.ones((1, len(rest.gram))))[0]
     return np.asarray(np.linalg.norm(problem.take(rows).residuals(compliance), axis=1))
-
-
-def _against(rung: Climbed, best: Climbed) -> Climbed:
-    """Return the rung with its difference from the best, and the interval of that."""
-    difference = rung.score - best.score
-    count = len(difference)
-    spread = float(difference.std(ddof=1)) * np.sqrt(1.0 / count + 1.0 / (count - 1))
-    reach = float(stdtrit(count - 1, 0.5 * (1.0 + CONFIDENCE))) * spread
-    mean = float(difference.mean())
-    return replace(
-        rung, difference=mean, low=mean - reach, high=mean + reach, standard_error=spread
-    )
 
 
 def _rounded(torque: float) -> float:

@@ -10,12 +10,11 @@ from elastocal.arrays import FloatArray
 from elastocal.elastic import AnySpring, ElasticModel
 from elastocal.errors import SchemaError
 from elastocal.files import sha256
-from elastocal.identification.calibrated import CalibratedModel
+from elastocal.identification.calibrated import CalibratedModel, ToolChange
 from elastocal.identification.domain import CalibrationDomain
 from elastocal.identification.figures import CalibrationSummary
 from elastocal.identification.observability import Observability
 from elastocal.identification.options import MINIMUM_DRAWS
-from elastocal.identification.tool_change import ToolChange
 from elastocal.records import read_json, record, write_json
 from elastocal.results import Result, brief_repr
 from elastocal.robot import GRAVITY, Robot

@@ -79,7 +79,7 @@ def _circuits(null_space: FloatArray, involved: IndexArray) -> Iterator[FloatArr
     seen: set[tuple[float, ...]] = set()
     for coefficients in Vt[unique, -1]:
         vector = _normalised(null_space @ coefficients)
-        key = tuple(np.round(vector, 4) + 0.0)
+        key = tuple(np.round(vector, 4))
         if key not in seen:
             seen.add(key)
             yield vector

@@ -228,8 +228,31 @@ def widening_factor(
     return max(1.0, float(student * np.sqrt(jackknife / bootstrap)))
 
 
+def doubt(difference: FloatArray, standard_error: FloatArray, apart: FloatArray) -> float:
+    """Return the mean square by which the choice of a model may have moved a prediction, in m².
+
+    A choice is not known to be right: had the poses been others, another model would have been
+    taken. Each counts with the weight ``exp(-z^2 / 2)`` of how far it is behind the best, ``z``
+    being the difference in standard errors; 1 if it predicts better (S. T. Buckland, K. P.
+    Burnham, N. H. Augustin, "Model selection: an integral part of inference", Biometrics 53, 1997).
+
+    Parameters
+    ----------
+    difference, standard_error : ndarray, shape (model,)
+        Error at left-out poses less that of the best of them, the chosen one included, in m.
+    apart : ndarray, shape (model,)
+        Distance of its predictions there from those of the chosen one, in m.
+    """
+    if not len(apart):
+        return 0.0
+    behind = np.maximum(difference, 0.0)
+    z = np.divide(behind, standard_error, out=np.zeros_like(behind), where=standard_error > 0.0)
+    weight = np.exp(-0.5 * np.square(z))
+    return float(weight @ np.square(apart) / weight.sum())
+
+
 def doubt_factor(
-    problem: Problem, compliance: FloatArray, draws: FloatArray, doubt: float
+    problem: Problem, compliance: FloatArray, draws: FloatArray, moved: float
 ) -> float:
     """Return the factor at which widened draws hold the doubt about the model besides.
 
@@ -239,11 +262,11 @@ def doubt_factor(
         As for `widening_factor`.
     draws : ndarray, shape (draw, spring)
         As they are to be stretched further.
-    doubt : float
-        Mean square by which another model would have moved a prediction, in m².
+    moved : float
+        From `doubt`.
     """
     spread = _variance(problem, draws - compliance) / len(draws)
-    return float(np.sqrt(1.0 + doubt / spread)) if spread > 0.0 else 1.0
+    return float(np.sqrt(1.0 + moved / spread)) if spread > 0.0 else 1.0
 
 
 def distrust_factor(

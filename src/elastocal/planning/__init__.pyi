@@ -1,16 +1,3 @@
-from .cell_checks import (
-    CHECKS as CHECKS,
-    POINT_CHECKS as POINT_CHECKS,
-    point_checks as point_checks,
-    robot_checks as robot_checks,
-)
-from .cell_setup import (
-    cell_surface as cell_surface,
-    collision_scene as collision_scene,
-    fixture_bodies as fixture_bodies,
-    surface_findings as surface_findings,
-    tool_bodies as tool_bodies,
-)
 from .plan import (
     PlanAndPool as PlanAndPool,
     make_plan as make_plan,
@@ -56,9 +43,13 @@ from .pool_file import (
 )
 from .pool_sampling import (
     CANDIDATES as CANDIDATES,
+    CHECKS as CHECKS,
+    POINT_CHECKS as POINT_CHECKS,
     PoolBuilder as PoolBuilder,
     SampledPool as SampledPool,
+    point_checks as point_checks,
     rank_base_placements as rank_base_placements,
+    robot_checks as robot_checks,
     sample_pool as sample_pool,
 )
 from .postures import (
@@ -67,5 +58,12 @@ from .postures import (
     read_only as read_only,
     retreat_joints as retreat_joints,
 )
-from .scene import CollisionScene as CollisionScene
+from .scene import (
+    CollisionScene as CollisionScene,
+    cell_surface as cell_surface,
+    collision_scene as collision_scene,
+    fixture_bodies as fixture_bodies,
+    surface_findings as surface_findings,
+    tool_bodies as tool_bodies,
+)
 from .search_pool import SearchPool as SearchPool

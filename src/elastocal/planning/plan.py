@@ -10,11 +10,6 @@ from elastocal import __version__
 from elastocal.arrays import FloatArray, IndexArray
 from elastocal.cell import Cell, fingerprint
 from elastocal.errors import PlanningError
-from elastocal.planning.cell_setup import (
-    cell_surface,
-    collision_scene,
-    surface_findings,
-)
 from elastocal.planning.checks import SightCheck
 from elastocal.planning.motion import (
     Mover,
@@ -42,6 +37,11 @@ from elastocal.planning.plan_result import (
 from elastocal.planning.pool import REACH_ADVICE, Pool
 from elastocal.planning.pool_file import NOT_CHOSEN, PoolData
 from elastocal.planning.pool_sampling import SampledPool, sample_pool
+from elastocal.planning.scene import (
+    cell_surface,
+    collision_scene,
+    surface_findings,
+)
 from elastocal.planning.search import Cover, CoverSelection, Selection, technique
 from elastocal.planning.search_pool import SearchPool
 from elastocal.planning.surface import Finding, Surface

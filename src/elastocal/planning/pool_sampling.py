@@ -1,7 +1,7 @@
 """The pool of a cell: points are sampled until as many candidates are valid as were asked for.
 
 Points are tried in parts, on all cores. Which part a point is in does not depend on the number of
-cores, so neither do the candidates.
+cores, so neither do the candidates. `CHECKS` and `POINT_CHECKS` list what each must pass.
 """
 
 import math
@@ -18,8 +18,8 @@ from elastocal.arrays import BoolArray, FloatArray, IndexArray
 from elastocal.cell import Cell
 from elastocal.errors import PlanningError
 from elastocal.parallel import process_count, process_pool
-from elastocal.planning.cell_checks import point_checks, robot_checks
-from elastocal.planning.checks import EdgeCheck, check_margins
+from elastocal.planning import checks as exported
+from elastocal.planning.checks import Checks, EdgeCheck, PointCheck, PostureCheck, check_margins
 from elastocal.planning.pool import BasePlacement, Pool, PostureSolver, join_pools
 from elastocal.planning.surface import Surface, SurfacePoints, sample_blue_noise, sample_uniform
 from elastocal.progress import Progress, silent
@@ -42,6 +42,44 @@ _OVERSAMPLING = 1.03
 """Points that are sampled for each that should turn out to be missing."""
 _LEAST_GAIN = 0.02
 """Share of the points that a further base placement must serve alone."""
+_EXPORTED = tuple(getattr(exported, name) for name in dir(exported))
+
+CHECKS: tuple[type[PostureCheck], ...] = tuple(
+    sorted(
+        (each for each in _EXPORTED if PostureCheck in getattr(each, "__mro__", ())[1:]),
+        key=lambda each: each.order,
+    )
+)
+"""Every check of postures that `elastocal.planning.checks` exports, in order."""
+POINT_CHECKS: tuple[type[PointCheck], ...] = tuple(
+    sorted(
+        (each for each in _EXPORTED if PointCheck in getattr(each, "__mro__", ())[1:]),
+        key=lambda each: each.order,
+    )
+)
+"""Every check that a sampled point decides alone, in order."""
+
+
+def point_checks(cell: Cell, surface: Surface, points: SurfacePoints) -> tuple[PointCheck, ...]:
+    """Return the checks that sampled points decide alone.
+
+    Parameters
+    ----------
+    cell : Cell
+        The cell.
+    surface : Surface
+        What the robot presses on.
+    points : SurfacePoints
+        The sampled points that postures refer to.
+    """
+    return tuple(kind.of(cell, surface, points) for kind in POINT_CHECKS)
+
+
+def robot_checks(cell: Cell, surface: Surface) -> Checks:
+    """Return the checks that postures decide, of all `CHECKS` that the cell has numbers for."""
+    made = [check for kind in CHECKS if (check := kind.of(cell, surface)) is not None]
+    quick = tuple(check for check in made if not check.slow)
+    return Checks((), quick, tuple(check for check in made if check.slow))
 
 
 @brief_repr

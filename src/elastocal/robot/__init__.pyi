@@ -5,6 +5,14 @@ from .chain import (
     SerialChain as SerialChain,
     build_model as build_model,
 )
+from .identity import (
+    Gap as Gap,
+    link_gap as link_gap,
+    probe_configurations as probe_configurations,
+    same_joints as same_joints,
+    tcp_gap as tcp_gap,
+    tool_gap as tool_gap,
+)
 from .mounting import (
     Rail as Rail,
     on_rail as on_rail,

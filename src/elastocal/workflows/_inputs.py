@@ -28,6 +28,8 @@ from elastocal.robot import (
     leaf_links,
     parse_urdf,
     refusals_naming,
+    same_joints,
+    tcp_gap,
     with_tool,
 )
 from elastocal.units import parse_point, parse_quantity
@@ -42,10 +44,6 @@ _TOOL_LOADS = (
     "forces at this tool load what the calibration did not see: {names}; its share is missing from"
     " predictions and their intervals"
 )
-_SAMPLES = 5
-"""Joint positions at which two robots are compared."""
-_SAME = 1e-6
-"""Difference of their poses by rounding, in m or as a number of a rotation."""
 
 
 def find_robot(
@@ -96,18 +94,17 @@ def require_same_robot(model: Robot, cell: Robot, names: tuple[str, str]) -> Non
         If joints have other names, or the same joints lead elsewhere.
     """
     file, name = names
-    if model.joint_names != cell.joint_names:
+    if not same_joints(model, cell):
         raise RobotError(
             f"{file}: the model's robot has the joints {', '.join(model.joint_names)}, that of"
             f" cell {name} {', '.join(cell.joint_names)}: they must be the same"
         )
-    low, high = (np.clip(end, -np.pi, np.pi) for end in (cell.limits.lower, cell.limits.upper))
-    q = np.linspace(low, high, _SAMPLES)
-    gap = float(np.abs(model.forward(q) - cell.forward(q)).max())
-    if not gap <= _SAME:
+    gap = tcp_gap(model, cell)
+    if not gap.closed:
         raise RobotError(
-            f"{file}: the same joints lead {1e3 * gap:.3g} mm apart in the model and in cell"
-            f" {name}: another tool centre point, base or robot"
+            f"{file}: the same joints lead {np.degrees(gap.angle):.3g}° and"
+            f" {1e3 * gap.distance:.3g} mm apart in the model and in cell {name}: another tool"
+            " centre point, base or robot"
         )
 
 

@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib.metadata import version
 
 import numpy as np
@@ -11,10 +11,13 @@ from elastocal.arrays import FloatArray, IndexArray
 from elastocal.cell import Cell, fingerprint
 from elastocal.codec import ALL_LOADS, study as studies, training_cases
 from elastocal.codec.study import Condition, ConditionResult, Sample, SampleResult, StudyDesign
-from elastocal.elastic import ElasticModel, layout
+from elastocal.dataset import Readings
+from elastocal.elastic import LAYOUTS, ElasticModel, layout
 from elastocal.errors import CodecError, DeviceError, nearest
 from elastocal.files import sha256
+from elastocal.identification import AUTO, RUNGS, FitOptions, choose_model
 from elastocal.records import to_data
+from elastocal.robot import Robot
 from elastocal.sim.workcell import (
     CampaignErrors,
     CampaignSimulator,
@@ -33,8 +36,9 @@ class StudySimulation:
     conditions: tuple[Condition, ...]
     chosen: tuple[studies.PoseChoice, ...]
     """Calibration poses of each condition."""
+    robot: Robot
     models: dict[str, ElasticModel]
-    """By spring layout."""
+    """By spring layout; those that readings decide are chosen anew in each sample."""
     truth: CampaignSimulator
     errors: CampaignErrors
     pool: studies.StudyPool
@@ -90,11 +94,21 @@ class StudySimulation:
             station = self.pool.station[poses]
             readings = self.errors.readings(settled, own, scales, station, cases)
             mine = np.isin(readings.pose, np.searchsorted(poses, order))
-            model = self.models[condition.springs]
-            found[number] = studies.calibrated(
-                model, readings.take(mine), self.marker, verification
-            )
+            found[number] = self._fitted(condition.springs, readings.take(mine), verification)
         return found
+
+    def _fitted(
+        self, springs: str, readings: Readings, verification: studies.Verification
+    ) -> ConditionResult:
+        """Calibrate as a user would with these springs."""
+        model = self.models.get(springs)
+        if model is not None:
+            return studies.calibrated(model, readings, self.marker, verification)
+        options = FitOptions(set_blunders_aside=False)
+        model = choose_model(self.robot, readings, springs, options, self.marker).model
+        found = studies.calibrated(model, readings, self.marker, verification)
+        # Each sample may have other springs, so there is no table of their compliances.
+        return replace(found, compliance=np.zeros(0))
 
     def _verification(self, arm: CampaignSimulator) -> studies.Verification:
         settled = arm.settle(self.places(self.pool.verification), self.force_tcp)
@@ -134,9 +148,11 @@ def prepare_study(
         If the cell cannot be simulated, a value does not fit it, or the pool is too small.
     """
     loads = cell.file.load_cases
+    words = dict.fromkeys(each.springs for each in conditions)
     models = {
-        name: ElasticModel(cell.robot, layout(cell.robot, name))
-        for name in dict.fromkeys(each.springs for each in conditions)
+        name: ElasticModel(cell.robot, layout(cell.robot, name, beside=(AUTO, *RUNGS)))
+        for name in words
+        if name in LAYOUTS or name not in (AUTO, *RUNGS)
     }
     for each in conditions:
         _check_load_cases(each.load_cases, loads.cases)
@@ -149,6 +165,7 @@ def prepare_study(
     simulate = StudySimulation(
         conditions=tuple(conditions),
         chosen=chosen,
+        robot=cell.robot,
         models=models,
         truth=truth,
         errors=errors,
@@ -179,6 +196,8 @@ def _design(
 ) -> StudyDesign:
     simulated = cell.file.model_dump(mode="json", include={"simulation", "procedure"})
     springs = {name: to_data(model.springs) for name, model in models.items()}
+    # The springs of a choice are in no file yet; its rungs are those of this version.
+    chosen = {each.springs: () for each in conditions if each.springs not in models}
     text = json.dumps([simulated, springs], sort_keys=True, allow_nan=False)
     return StudyDesign(
         cell=cell.name,
@@ -192,6 +211,7 @@ def _design(
         springs={
             name: tuple(studies.SpringLabel(name=p.name, unit=p.unit.si) for p in model.parameters)
             for name, model in models.items()
-        },
+        }
+        | chosen,
         versions={name: version(name) for name in _PACKAGES},
     )

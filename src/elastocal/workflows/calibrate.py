@@ -1,7 +1,7 @@
 """``calibrate``: from a measured dataset to a calibrated model (paper Eq. 15-19)."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from os import PathLike
 from pathlib import Path
 
@@ -15,6 +15,7 @@ from elastocal.identification import (
     CalibrateResult,
     FitSettings,
     choose_model,
+    error_budget,
     summary,
     with_knowledge,
 )
@@ -40,8 +41,10 @@ class CalibrateSettings(FitSettings):
     """URDF file or catalogue name; by default the dataset's own."""
     tcp: str | None = None
     """Link at the tool centre point; by default the dataset's."""
-    tool: str | None = None
+    tool_frame: str | None = None
     """Tcp behind that link, ``"x, y, z, a, b, c"`` with units (Z-Y'-X'')."""
+    budget: bool = False
+    """State also what the error at left-out poses is made of."""
 
     @property
     def files(self) -> tuple[Path, ...]:
@@ -77,7 +80,7 @@ def calibrate(settings: CalibrateSettings, progress: Progress) -> CalibrateResul
     options = settings.options()
     refuse_overwriting(settings.out, *settings.files)
     measured, source = _measured(settings.files)
-    arm = find_robot(settings.robot, settings.tcp, settings.tool, measured)
+    arm = find_robot(settings.robot, settings.tcp, settings.tool_frame, measured)
     readings = without(measured.readings(arm.joint_names), settings.exclude)
     marker = measured.marker if settings.marker is None else settings.marker
     choice = choose_model(arm, readings, settings.springs, options, marker)
@@ -92,7 +95,10 @@ def calibrate(settings: CalibrateSettings, progress: Progress) -> CalibrateResul
         ladder=choice.ladder,
         provenance=f"{source}; {measured.provenance}" if measured.provenance else source,
     )
-    result = CalibrateResult.of(calibration.calibrated, summary(calibration, settings.fit, known))
+    figures = summary(calibration, settings.fit, known)
+    if settings.budget:
+        figures = replace(figures, budget=error_budget(choice.model, readings, options, marker))
+    result = CalibrateResult.of(calibration.calibrated, figures)
     if settings.out is not None:
         write_json(settings.out, result)
     return result

@@ -47,7 +47,7 @@ class CodecSettings:
     """URDF file or catalogue name; by default the dataset's own."""
     tcp: str | None = None
     """Link at the tool centre point; by default the dataset's."""
-    tool: str | None = None
+    tool_frame: str | None = None
     """Tcp behind that link, ``"x, y, z, a, b, c"`` with units (Z-Y'-X'')."""
     marker: tuple[float, float, float] | None = None
     """Metrology marker in the tcp frame, in m; none: the dataset's."""
@@ -55,7 +55,7 @@ class CodecSettings:
     """Readings to leave out, each ``POSE`` or ``POSE:LOAD_CASE``."""
     options: CodecOptions = field(default_factory=CodecOptions)
     """Number of splits, ratio, seed; whether blunders are set aside and conventions trusted."""
-    tolerance: Tolerance = field(default_factory=Tolerance)
+    saturation: Tolerance = field(default_factory=Tolerance)
     """Distance from the last error that counts as saturated."""
     indices: bool = False
     """Correlate observability indices and covering radius with accuracy."""
@@ -117,7 +117,7 @@ def codec(settings: CodecSettings, progress: Progress) -> CodecResult:
     variants = make_variants(read_comparisons(settings.compare))
     path = Path(settings.data)
     measured = read(path)
-    arm = find_robot(settings.robot, settings.tcp, settings.tool, measured)
+    arm = find_robot(settings.robot, settings.tcp, settings.tool_frame, measured)
     readings = without(measured.readings(arm.joint_names), settings.exclude)
     marker = measured.marker if settings.marker is None else settings.marker
     with filling(Path(settings.out), VERDICTS, settings.force) as folder:
@@ -131,7 +131,7 @@ def codec(settings: CodecSettings, progress: Progress) -> CodecResult:
             jobs=settings.jobs,
             progress=progress,
         )
-        verdicts = judge(data, settings.tolerance)
+        verdicts = judge(data, settings.saturation)
         analysis = analyse(arm, readings, data, marker_offset=marker, with_indices=settings.indices)
         summary = codec_summary(data, verdicts, analysis.correlations)
         axes = ("x", "y", "z") if settings.per_axis else ()

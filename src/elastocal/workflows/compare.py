@@ -1,15 +1,15 @@
 """``compare``: two calibrations of one cell (recertification)."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from os import PathLike
 from pathlib import Path
 
 from elastocal import dataset
-from elastocal.arrays import FloatArray
-from elastocal.dataset import LoadRows, Readings, read_robot_rows
+from elastocal.dataset import read_robot_rows
 from elastocal.errors import DatasetError
 from elastocal.identification import read_model
 from elastocal.identification.recertification import (
+    ComparedRows,
     CompareResult,
     check_same_robot,
     recertify_files,
@@ -21,9 +21,6 @@ from elastocal.workflows._inputs import refuse_overwriting
 from elastocal.workflows._workflow import workflow
 
 __all__ = ["CompareResult", "CompareSettings", "compare", "measured_rows"]
-
-_Loads = tuple[FloatArray, FloatArray, FloatArray | None]
-"""Joint positions, forces, and moments if there are any, a row each."""
 
 
 @dataclass(frozen=True)
@@ -68,8 +65,8 @@ def compare(settings: CompareSettings, progress: Progress) -> CompareResult:  # 
     inputs = [old, new] if settings.rows is None else [old, new, settings.rows]
     for path in (settings.out, settings.figure):
         refuse_overwriting(path, *inputs)
-    loads = (None, None, None) if settings.rows is None else _read_rows(settings.rows, new)
-    found = recertify_files(old, new, *loads, limit=settings.limit)
+    rows = None if settings.rows is None else _read_rows(settings.rows, new)
+    found = recertify_files(old, new, rows=rows, limit=settings.limit)
     if settings.figure is not None:
         from elastocal.report import write_recertification_figure
 
@@ -85,28 +82,34 @@ def measured_rows(provenance: str) -> Path | None:
     return path if path.suffix.lower() in (".nc", ".csv") and path.is_file() else None
 
 
-def _read_rows(path: Path, model: Path) -> _Loads:
+def _read_rows(path: Path, model: Path) -> ComparedRows:
     """Return the rows of a CSV file or the readings of a dataset, for the robot of a model."""
     robot = read_model(model).model.robot
     suffix = path.suffix.lower()
     if suffix not in (".csv", ".nc"):
         raise DatasetError(f"{path}: suffix {path.suffix!r} is not one of .csv, .nc")
     if suffix == ".nc":
-        rows: LoadRows | Readings = _readings(path, robot, model)
-    else:
-        rows = read_robot_rows(path, robot)
+        return _readings(path, robot, model)
+    rows = read_robot_rows(path, robot)
     if not len(rows.joint_position):
         raise DatasetError(f"{path} holds no row")
-    return rows.joint_position, rows.force, rows.moment
+    return ComparedRows(rows.joint_position, rows.force, rows.moment, rows.visit)
 
 
-def _readings(path: Path, robot: Robot, model: Path) -> Readings:
+def _readings(path: Path, robot: Robot, model: Path) -> ComparedRows:
+    """Return the readings of a dataset, and the arm that they were taken on."""
     data = dataset.read(path)
+    arm = robot
     if data.robot_urdf is not None and data.tcp_frame is not None:
         base = robot.base if data.robot_urdf == robot.urdf else None
-        measured = Robot.from_urdf(data.robot_urdf, data.tcp_frame, base)
-        check_same_robot(measured, robot, (str(path), str(model)))
+        arm = Robot.from_urdf(data.robot_urdf, data.tcp_frame, base)
+        check_same_robot(arm, robot, (str(path), str(model)))
+    if data.gravity is not None:
+        arm = replace(arm, gravity=data.gravity)
     try:
-        return data.readings(robot.joint_names)
+        readings = data.readings(robot.joint_names)
     except DatasetError as error:
         raise DatasetError(f"{path}: {error}") from error
+    if not len(readings):
+        raise DatasetError(f"{path} holds no row")
+    return ComparedRows.of(readings, arm)

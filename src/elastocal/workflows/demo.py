@@ -50,7 +50,13 @@ _FILES = (
     (LOG, "every command as it was given, and what it printed"),
 )
 _FLAGS = {"models": "--model", "tools": "--tool", "seeds": "--seed", "path": ""}
-"""How a command names a field that its workflow calls otherwise; empty: by its place."""
+"""How commands name a field that workflows call otherwise; empty: by its place."""
+_OWN_FLAGS = {
+    ("init", "kind"): "--like",
+    ("simulate_process", "kind"): "--process",
+    ("export", "out"): "--c",
+}
+"""The same for one command alone."""
 
 
 @brief_repr
@@ -225,7 +231,7 @@ def chapters(kind: str, out: Path, seed: int) -> tuple[Chapter, ...]:
         ("did the search help", "search", "cover,ioops"),
     )
     return (
-        _chapter("describe the cell", init, out, like=kind, force=True),
+        _chapter("describe the cell", init, out, kind=kind, force=True),
         _chapter("plan the poses", plan, cell, out=planned),
         _chapter("measure", run, cell, plan=planned, out=run_folder, seed=seed),
         _chapter("identify the springs", calibrate, data, out=model),
@@ -240,7 +246,7 @@ def chapters(kind: str, out: Path, seed: int) -> tuple[Chapter, ...]:
             cell,
             models=(model,),
             tools=(weights,),
-            process=kind,
+            kind=kind,
             seeds=(seed,),
             out=process,
         ),
@@ -251,7 +257,7 @@ def chapters(kind: str, out: Path, seed: int) -> tuple[Chapter, ...]:
             path=process / "path.csv",
             out=out / "corrected.csv",
         ),
-        _chapter("write C for the robot", export, model, tool=weights, c=out / "c"),
+        _chapter("write C for the robot", export, model, tool=weights, out=out / "c"),
         _chapter("report", report, out, out=out / "report.html"),
     )
 
@@ -262,7 +268,7 @@ def _chapter(
     """Return a workflow with its options, and the command that does the same."""
     words = [workflow.__name__.replace("_", "-"), str(source)]
     for name, value in options.items():
-        flag = _FLAGS.get(name, f"--{name}")
+        flag = _OWN_FLAGS.get((workflow.__name__, name), _FLAGS.get(name, f"--{name}"))
         for each in value if isinstance(value, tuple) else (value,):
             words += [word for word in (flag, "" if each is True else str(each)) if word]
 

@@ -25,9 +25,9 @@ class ExportSettings(NewTool):
 
     model: str | PathLike[str]
     """Model file of `calibrate`."""
-    c: Path
+    out: Path
     """Folder to write the C files into."""
-    settings: Path | None = None
+    compensator: Path | None = None
     """Settings of the compensator (.yaml)."""
     tool: Path | None = None
     """Tool file of `tool`: weight, bias, sensor."""
@@ -93,15 +93,15 @@ def export(settings: ExportSettings, progress: Progress) -> ExportResult:  # noq
             f"{model} leaves {calibrated.unexplained:.0%} of the deflection unexplained at left-out"
             f" poses, at most {MOST_UNEXPLAINED:.0%} is allowed: it is no model of this arm"
         )
-    chosen = None if settings.settings is None else read_settings(settings.settings)
+    chosen = None if settings.compensator is None else read_settings(settings.compensator)
     load = read_sensor_load(settings.tool, calibrated.model.robot)
     try:
         numbers = design(calibrated, chosen, load)
     except CompensationError as error:
         raise CompensationError(f"{model}: {error}") from error
-    files = write_c(settings.c, numbers, settings.force)
+    files = write_c(settings.out, numbers, settings.force)
     return ExportResult(
-        folder=str(settings.c),
+        folder=str(settings.out),
         files=tuple(files),
         robot=calibrated.model.robot.name,
         joints=numbers.joints,

@@ -14,9 +14,9 @@ from elastocal.workflows._workflow import workflow
 class InitSettings:
     """Which example goes where."""
 
-    folder: str | PathLike[str]
+    out: str | PathLike[str]
     """Folder to write into."""
-    like: str = "afp"
+    kind: str = "afp"
     """``afp`` or ``machining``."""
     force: bool = False
     """Replace files that are there."""
@@ -41,7 +41,7 @@ def init(settings: InitSettings, progress: Progress) -> InitResult:  # noqa: ARG
     Parameters
     ----------
     settings : InitSettings
-        Or its ``folder``, and the other fields by name.
+        Or its ``out``, and the other fields by name.
     progress : Progress, optional
         Called with stage, done and total.
 
@@ -52,5 +52,5 @@ def init(settings: InitSettings, progress: Progress) -> InitResult:  # noqa: ARG
     FileAccessError
         If a file is there already or cannot be written.
     """
-    cell, *meshes = write_example(Path(settings.folder), settings.like, settings.force)
+    cell, *meshes = write_example(Path(settings.out), settings.kind, settings.force)
     return InitResult(cell, tuple(meshes))

@@ -54,7 +54,7 @@ class SimulateProcessSettings(NewTool):
     """Cell file."""
     models: tuple[Path, ...]
     """Model files of this cell; one, or one for each seed."""
-    process: str
+    kind: str
     """``afp`` (courses) or ``machining`` (rings of a dome)."""
     out: Path
     """Folder to write into."""
@@ -237,7 +237,7 @@ def _simulate(
     budget: tuple[process.DeviationComparison, ...] = ()
     programmed: tuple[Course, ...] = ()
     for trial in trials:
-        courses = process.process_courses(settings.process, cell, trial.seed, settings.courses)
+        courses = process.process_courses(settings.kind, cell, trial.seed, settings.courses)
         programmed = programmed or courses
         found = run_trial(trial, courses, progress)
         lines.append(found.line(f"seed {trial.seed}"))
@@ -251,7 +251,7 @@ def _simulate(
         lines.append(process.pooled("all seeds", lines))
     table = SimulateProcessResult(
         cell=cell.name,
-        process=settings.process,
+        process=settings.kind,
         runs=runs,
         settings=compensator.model_dump(mode="json"),
         versions={name: version(name) for name in _PACKAGES},
@@ -265,7 +265,7 @@ def _simulate(
 def _compensator_settings(settings: SimulateProcessSettings) -> CompensatorSettings:
     if settings.compensator is None:
         # A process that is not known is refused when its courses are made.
-        known = process.PROCESSES.get(settings.process)
+        known = process.PROCESSES.get(settings.kind)
         return CompensatorSettings() if known is None else known.compensator
     found = read_settings(settings.compensator)
     if found.frame != "base":
@@ -309,7 +309,11 @@ def _run_courses(
     progress: Progress,
     stage: str = "courses",
 ) -> TrialRuns:
-    """Run every course twice; ``late`` is that of a perfect corrector, None: the model corrects."""
+    """Run every course without and with correction.
+
+    With ``late``, a corrector that knows the deflection acts that many cycles too late; None: the
+    model corrects.
+    """
     runs: dict[int, tuple[CourseRun, CourseRun]] = {}
     # The longest first, or the last one would be run while the other processes wait.
     order = sorted(range(len(courses)), key=lambda number: -len(courses[number].q))

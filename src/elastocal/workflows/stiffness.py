@@ -45,7 +45,7 @@ class StiffnessSettings(NewTool):
     """``normal`` (axis of the tool) or a vector in base, ``"1,0,0"``."""
     spins: int = 36
     """Turns about the tool's axis to try."""
-    stands: int = 9
+    external_positions: int = 9
     """Positions of each external axis to try; with a cell, its own are taken."""
     stations: int = 60
     """Rows of the path to look at."""
@@ -240,7 +240,7 @@ def _grid(
 ) -> tuple[compensation.PostureGrid, tuple[compensation.PostureConstraint, ...]]:
     """Return what may be chosen at every station, and what a posture must pass."""
     spins = np.linspace(0.0, 2.0 * np.pi, settings.spins, endpoint=False)
-    external = _external_grid(robot, settings.stands)
+    external = _external_grid(robot, settings.external_positions)
     if settings.cell is None:
         return compensation.PostureGrid(spins, external), ()
     cell = load_cell(settings.cell)

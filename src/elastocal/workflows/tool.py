@@ -33,7 +33,7 @@ _LEVER = 0.1
 class ToolSettings:
     """Which static postures, and how the sensor was mounted."""
 
-    data: str | PathLike[str]
+    postures: str | PathLike[str]
     """CSV of postures with raw wrenches, or the folder of a run."""
     out: Path | None = None
     """Tool file to write; none: the result is only returned."""
@@ -77,7 +77,7 @@ def tool(settings: ToolSettings, progress: Progress) -> ToolResult:  # noqa: ARG
     Parameters
     ----------
     settings : ToolSettings
-        Or its ``data``, and the other fields by name.
+        Or its ``postures``, and the other fields by name.
     progress : Progress, optional
         Called with stage, done and total.
 
@@ -90,7 +90,7 @@ def tool(settings: ToolSettings, progress: Progress) -> ToolResult:  # noqa: ARG
     FileAccessError
         If a file cannot be read or written, or ``out`` is an input.
     """
-    data = Path(settings.data)
+    data = Path(settings.postures)
     refuse_overwriting(settings.out, data)
     _require_postures(data, settings)
     source = _from_run(data) if data.is_dir() else _from_table(data, settings)

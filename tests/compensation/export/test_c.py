@@ -60,17 +60,21 @@ def soft_everywhere(robot):
     return (*(axial(joint) for joint in robot.chain.joints), *custom(robot, entries))
 
 
+at_many_states = pytest.mark.parametrize(
+    "count", [10_000, pytest.param(STATES, marks=pytest.mark.slow, id="hundred thousand")]
+)
+
+
 @needs_shared
-def test_golden_robot_at_a_hundred_thousand_states(tmp_path):
+@at_many_states
+def test_golden_robot(tmp_path, count):
     robot = Robot.from_file(GOLDEN / "golden_6r.urdf", "tcp")
     calibrated = compensated.calibrated(robot)
     executable = build(written(tmp_path, design(calibrated)), "-O2")
-    assert_deflections_agree(executable, calibrated, STATES)
+    assert_deflections_agree(executable, calibrated, count)
 
 
-@pytest.mark.parametrize(
-    "count", [10_000, pytest.param(STATES, marks=pytest.mark.slow, id="hundred thousand")]
-)
+@at_many_states
 @pytest.mark.parametrize("like", ["afp", "machining"])
 def test_example_robots_one_of_them_on_a_rail(tmp_path, like, count):
     calibrated = compensated.calibrated(compensated.example_robot(like, tmp_path / "cell"))
@@ -114,11 +118,11 @@ def course(rng, joints, count=2000):
 @pytest.mark.parametrize(
     ("frame", "median", "calibrated"),
     [
-        ("base", 3, "hinges"),
+        pytest.param("base", 3, "hinges", marks=pytest.mark.slow),
         ("tcp", 1, "hinges"),
         ({"abc": ["30 deg", "-20 deg", "170 deg"]}, 5, "hinges"),
         ("base", 3, "gears"),
-        ("tcp", 1, "gears"),
+        pytest.param("tcp", 1, "gears", marks=pytest.mark.slow),
     ],
 )
 def test_steps_are_those_of_python_and_clean_under_the_sanitizers(

@@ -94,10 +94,17 @@ class TestProgram:
             Assignment("y", ((1, ("a", "a")),)),
         )
 
-    def test_a_sum_reads_left_to_right_with_every_product_in_parentheses(self):
-        assert sum_text(Assignment("x", ((-1, ("a", "b")), (1, ("c",)), (-1, ("d", "e"))))) == (
-            "-(a * b) + c - (d * e)"
-        )
+    @pytest.mark.parametrize(
+        ("terms", "text"),
+        [
+            (((-1, ("a", "b")), (1, ("c",)), (-1, ("d", "e"))), "-(a * b) + c - (d * e)"),
+            (((1, ("a", "b")), (1, ())), "(a * b) + 1.0"),
+            (((1, ("a", "b")),), "a * b"),
+            (((-1, ("a", "b")),), "-(a * b)"),
+        ],
+    )
+    def test_a_sum_reads_left_to_right_with_its_products_in_parentheses(self, terms, text):
+        assert sum_text(Assignment("x", terms)) == text
 
     @pytest.mark.parametrize(
         ("value", "text"), [(ZERO, "0.0"), (-ONE, "-1.0"), (Value(-1, "a"), "-a")]

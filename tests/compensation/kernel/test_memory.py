@@ -6,12 +6,15 @@ import numpy as np
 import pytest
 
 from elastocal.compensation.kernel import (
+    Assignment,
     Call,
+    Turn,
     compiled,
     deflection,
     observation_block,
     python_text,
     rest,
+    statement_uses,
 )
 from elastocal.elastic import ElasticModel, Gear, bearing
 from elastocal.robot import Robot
@@ -162,6 +165,32 @@ def test_an_unknown_start_moves_the_deflection_by_at_most_what_is_said_and_is_fo
     span = np.ptp(total, axis=0)[:6]
     assert np.all(span > 2.0 * max(SLIPS)), span
     assert bound[-1].max() == pytest.approx(0.0, abs=1e-15)
+
+
+def test_no_name_is_written_twice_and_none_is_read_before():
+    """Programs are straight lines: a name that two statements wrote would change what was meant."""
+    model, c = geared().model, geared().compliance.tolist()
+    for routine in (rest(model), deflection(model, c), observation_block(model, c)):
+        known = {*routine.constants, *routine.memory, *(f"q{k}" for k in range(1, 7))}
+        known |= {"fx", "fy", "fz", "mx", "my", "mz"}
+        for statement in routine.statements:
+            match statement:
+                case Turn(sine, cosine, _):
+                    names = {sine, cosine}
+                case Assignment(name) | Call(name):
+                    names = {name}
+                case _:
+                    continue
+            assert statement_uses(statement) <= {*known, ""}
+            assert not names & known
+            assert all(name.isidentifier() for name in names)
+            known |= names
+        assert {value.name for value in routine.outputs} <= {*known, ""}
+
+
+def test_without_gravity_nothing_weighs():
+    model = geared((0.0, 0.0, 0.0)).model
+    np.testing.assert_array_equal(compiled(rest(model), 6, loaded=False)(Q[0].tolist()), 0.0)
 
 
 def test_hinges_of_a_heavy_arm_ask_for_neither_weight_nor_memory():

@@ -3,7 +3,7 @@ import pytest
 
 from elastocal.errors import IdentificationError
 from elastocal.identification import Term
-from elastocal.identification.recertification._changes import (
+from elastocal.identification.recertification._sums import (
     common_springs,
     comparable_sums,
     sum_text,

@@ -3,7 +3,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from elastocal.identification.recertification import Estimate, Verdict
+from elastocal.identification.recertification import ComparedRows, Estimate, Verdict
 from elastocal.identification.recertification._changes import Spread, compare_rows
 from elastocal.identification.recertification.comparison import _judge
 from support.problems import campaign
@@ -15,9 +15,8 @@ def change():
     """A largest change of 0.2 mm, 0.1 to 0.3 mm."""
     old, new = made_up(0), made_up(1)
     loads = campaign()
-    found = compare_rows(
-        old, new, Spread.of(old, new), loads.joint_position[:2], loads.force[:2], None
-    )
+    rows = ComparedRows(loads.joint_position[:2], loads.force[:2])
+    found = compare_rows(old, new, Spread.of(old, new), rows)
     return replace(found, largest=Estimate(2e-4, 1e-4, 3e-4))
 
 

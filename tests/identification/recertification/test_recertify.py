@@ -48,16 +48,16 @@ def test_it_is_found_on_an_arm_that_no_springs_express(loads):
 
 @pytest.mark.parametrize("arm", [linear_truth, rich_truth])
 def test_of_unchanged_cells_few_are_called_moved(arm, loads):
-    """At a rate of 5 %, more than 2 of 6 pairs would be called so once in 450 times.
+    """At a rate of 5 %, more than 1 of 3 pairs would be called so once in 138 times.
 
     No campaign stands in two pairs, or an odd one would count twice. The rate itself is counted
     by the slow test below.
     """
     pairs = [
         compare(calibrated(arm(), n), calibrated(arm(), n + 1), *loads, limit=0.4e-3)
-        for n in range(0, 12, 2)
+        for n in range(0, 6, 2)
     ]
-    assert sum(bool(each.moved) for each in pairs) <= 2
+    assert sum(bool(each.moved) for each in pairs) <= 1
     assert all(each.deflection.largest.low < 20e-6 for each in pairs)
     assert all(each.verdict is Verdict.PASS for each in pairs)
 

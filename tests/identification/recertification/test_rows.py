@@ -1,6 +1,7 @@
 import numpy as np
 import pytest
 
+from elastocal.identification.recertification import ComparedRows
 from elastocal.identification.recertification._changes import Spread, compare_rows
 from support.problems import campaign
 from support.recertified import made_up
@@ -12,7 +13,7 @@ CHANGED = TRUTH * [1.0, 1.0, 1.3, 1.0, 1.0, 1.0]
 
 
 def compared(old, new, moment=None):
-    return compare_rows(old, new, Spread.of(old, new), Q, FORCE, moment)
+    return compare_rows(old, new, Spread.of(old, new), ComparedRows(Q, FORCE, moment))
 
 
 def true_size(model) -> np.ndarray:
@@ -61,7 +62,7 @@ def test_rows_are_compared_alike_however_many_there_are():
     """Rows go through in chunks of a hundred."""
     old, new = made_up(0), made_up(1)
     spread = Spread.of(old, new)
-    many = compare_rows(old, new, spread, np.tile(Q, (6, 1)), np.tile(FORCE, (6, 1)), None)
+    many = compare_rows(old, new, spread, ComparedRows(np.tile(Q, (6, 1)), np.tile(FORCE, (6, 1))))
     few = compared(old, new)
     np.testing.assert_allclose(many.high, np.tile(few.high, 6))
     for name in ("mean", "largest"):
@@ -71,6 +72,6 @@ def test_rows_are_compared_alike_however_many_there_are():
 
 def test_a_row_without_force_has_no_change_and_no_interval():
     old, new = made_up(0), made_up(1)
-    found = compare_rows(old, new, Spread.of(old, new), Q[:1], np.zeros((1, 3)), None)
+    found = compare_rows(old, new, Spread.of(old, new), ComparedRows(Q[:1], np.zeros((1, 3))))
     assert (found.largest.low, found.largest.value, found.largest.high) == (0.0, 0.0, 0.0)
     assert found.old_share[0] == 0.0

@@ -140,6 +140,46 @@ def test_a_reading_that_slipped_keeps_its_numbers_and_its_status(tmp_path):
     ]
 
 
+@pytest.mark.parametrize("status", [ReadingStatus.UNSTABLE, ReadingStatus.ABORTED])
+@pytest.mark.parametrize("station", ["station_1", "station_2"])
+def test_a_press_that_was_given_up_keeps_its_force_and_its_place_in_time(tmp_path, status, station):
+    def give_up(pose: int, window: Window) -> Window:
+        if (pose, window.load_case) == (2, "south"):
+            lost = {"status": status, "station": station, "start": window.end}
+            return window.model_copy(update=lost)
+        return window
+
+    run = record_run(tmp_path / "run", change=give_up)
+    data = derive_run(run.path).dataset
+    case = data.load_cases.index("south")
+    assert data.sequence[2].tolist() == [0, 1, 2, 3, 4]
+    np.testing.assert_allclose(data.force[2, case], run.force[2, case], atol=0.4)
+    readings = data.readings(data.joint_names)
+    assert not np.any((readings.pose == 2) & (readings.load_case == "south"))
+    pressed = readings.also_pressed
+    assert (pressed.pose.tolist(), pressed.sequence.tolist()) == ([2], [case])
+    np.testing.assert_array_equal(pressed.force[0], data.force[2, case])
+    np.testing.assert_array_equal(pressed.joint_position[0], data.joint_position[2, case])
+
+
+def test_a_press_that_was_given_up_is_not_known_by_what_was_pressed_before_it(tmp_path):
+    """Its last second may reach back into the window before."""
+
+    def give_up(pose: int, window: Window) -> Window:
+        if (pose, window.load_case) == (2, "north"):
+            return window.model_copy(update={"end": window.end + 1.9})
+        if (pose, window.load_case) == (2, "south"):
+            start = window.start - 0.05
+            lost = {"status": ReadingStatus.UNSTABLE, "start": start, "end": start}
+            return window.model_copy(update=lost)
+        return window
+
+    run = record_run(tmp_path / "run", change=give_up)
+    data = derive_run(run.path).dataset
+    case = data.load_cases.index("south")
+    np.testing.assert_allclose(data.force[2, case], run.force[2, case], atol=0.8)
+
+
 def test_a_window_without_samples_is_missing_and_says_how_many_there_are(tmp_path):
     def shorten(pose: int, window: Window) -> Window:
         if (pose, window.load_case) == (1, "west"):

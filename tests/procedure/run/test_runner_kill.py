@@ -2,15 +2,16 @@
 
 import os
 from functools import cache
+from itertools import count
 
 import numpy as np
 import pytest
 
 from elastocal.cell import Motion
-from elastocal.procedure import Event, RunEnd, read_journal
+from elastocal.procedure import Event, RunEnd, RunFolder, read_journal
 from elastocal.procedure.record import read_commits
 from support.fake_devices import FakeCell
-from support.fake_runs import FakeRun
+from support.fake_runs import FakeRun, MemoryRecorder
 
 
 class KillRunError(BaseException):
@@ -82,9 +83,14 @@ def committed(run):
     return [log.pose for log in read_commits(run.journal)]
 
 
+def _some_now(cases):
+    """Return every other place to be killed at; the others are tried every night."""
+    return [pytest.param(*each, marks=[pytest.mark.slow] * (k % 2)) for k, each in enumerate(cases)]
+
+
 @pytest.mark.parametrize(
     ("boundary", "torn"),
-    [(n, False) for n in range(1, ENTRIES)] + [(n, True) for n in range(1, ENTRIES, 4)],
+    _some_now([(n, False) for n in range(1, ENTRIES)] + [(n, True) for n in range(1, ENTRIES, 4)]),
 )
 def test_a_killed_run_goes_on_to_the_same_readings(tmp_path, whole, boundary, torn):
     run = kill(tmp_path / "run", Killer(boundary, torn))
@@ -100,7 +106,7 @@ def test_a_killed_run_goes_on_to_the_same_readings(tmp_path, whole, boundary, to
 
 @pytest.mark.parametrize(
     ("boundary", "goes_on"),
-    [(n, False) for n in range(3, ENTRIES - 3)] + [(n, True) for n in range(3, 20)],
+    _some_now([(n, False) for n in range(3, ENTRIES - 3)] + [(n, True) for n in range(3, 20)]),
 )
 def test_an_arm_that_stands_where_it_was_finds_the_way_back(tmp_path, boundary, goes_on):
     """As on a real machine: the program dies, the arm keeps its place and its contact."""
@@ -144,3 +150,34 @@ def test_a_run_that_is_complete_only_says_so_again(tmp_path):
     assert run.resume().end is RunEnd.DONE
     assert run.cell.world.commands == ["enable", "disable"]
     assert read_journal(run.journal)[-1].event is Event.FINISH
+
+
+RECORDINGS = count()
+
+
+class FileRecorder(MemoryRecorder):
+    """Writes a file beside, as the recorder of a real run does."""
+
+    def save(self, path):
+        super().save(path)
+        path.parent.mkdir(exist_ok=True)
+        path.write_text(f"recording {next(RECORDINGS)}")
+
+
+@pytest.mark.parametrize("entries", [1, 2, 12, 30])
+def test_a_run_goes_on_behind_a_journal_that_was_cut_and_overwrites_no_recording(tmp_path, entries):
+    """A journal put back from a copy of before knows nothing of what was recorded since."""
+    run = FakeRun(tmp_path / "run")
+    run.recorder = lambda: FileRecorder(run.kept)
+    run.start()
+    streams = RunFolder(run.path).streams
+    before = {path.name: path.read_text() for path in streams.iterdir()}
+    assert sorted(before) == ["pose_0000_1.mcap", "pose_0001_1.mcap"]
+    lines = run.journal.read_bytes().splitlines(keepends=True)
+    run.journal.write_bytes(b"".join(lines[:entries]))
+    assert run.resume().end is RunEnd.DONE
+    assert {name: (streams / name).read_text() for name in before} == before
+    logs = {log.pose: log.streams for log in read_commits(run.journal)}
+    assert sorted(logs) == [0, 1]
+    assert logs[1] == "pose_0001_2.mcap"
+    assert len(list(streams.iterdir())) == (3 if entries == 30 else 4)

@@ -145,6 +145,7 @@ def memory_growth(folder, poses, memory, **changes):
     return taken[poses - 1] - taken[poses // 10], run.cell.world.clock.now()
 
 
+@pytest.mark.slow
 def test_memory_does_not_grow_with_the_number_of_poses(tmp_path):
     tracemalloc.start()
     try:

@@ -170,6 +170,22 @@ def test_no_spring_that_is_not_observable_is_shown_without_saying_so(parts):
         assert describe(group) in text
 
 
+def test_an_error_budget_stands_in_the_report_where_calibrate_was_asked_for_it(parts):
+    assert "What the error is made of" not in words(compliances, parts)
+    part = {"error": 3e-5, "low": 2e-5, "high": 4e-5, "source": "31 poses, each left out"}
+    unknown = {"error": None, "low": None, "high": None, "source": "nothing was repeated"}
+    sag = {"term": "sag", "taken": False, "error": None, "worth": None, "low": None, "high": None}
+    budget = {
+        "deflection": 1e-3, "total": part, "noise": unknown, "fit": part, "rest": part,
+        "terms": [{**sag, "reason": "no masses in the URDF"}], "readings": 155, "poses": 31,
+    }  # fmt: skip
+    text = words(compliances, with_figures(parts, budget=budget))
+    assert "all, at left-out poses 0.030 mm 0.020 to 0.040 31 poses, each left out" in text
+    assert "noise of a reading not known" in text
+    assert "gravity sag no not known" in text
+    assert "no masses in the URDF" in text
+
+
 def test_axial_springs_alone_are_advised_to_be_compared_with_more(parts):
     few = tuple(s for s in parts.calibrated.model.model.springs if s.name.endswith(".axial"))
     model = parts.calibrated.model

@@ -47,6 +47,10 @@ def _calibrate(  # noqa: PLR0913 - one parameter an option
             help="none, load_case or campaign: estimate a frame of tracker and marker for each."
         ),
     ] = "none",
+    budget: Annotated[
+        bool,
+        typer.Option("--budget", help="State also what the error at left-out poses is made of."),
+    ] = False,
     draws: Annotated[int, typer.Option(help="Bootstrap draws.")] = 200,
     seed: Annotated[int, typer.Option(min=0, help="Seed of the bootstrap.")] = 0,
     as_json: options.Figures = False,
@@ -57,7 +61,7 @@ def _calibrate(  # noqa: PLR0913 - one parameter an option
         out=out,
         robot=robot,
         tcp=tcp,
-        tool=tool,
+        tool_frame=tool,
         springs=springs,
         loss=loss,
         weights=weights,
@@ -67,6 +71,7 @@ def _calibrate(  # noqa: PLR0913 - one parameter an option
         keep_blunders=keep_blunders,
         trust_conventions=trust_conventions,
         free_frame=free_frame,
+        budget=budget,
         draws=draws,
         seed=seed,
     )

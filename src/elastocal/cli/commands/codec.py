@@ -22,7 +22,7 @@ def _codec(  # noqa: PLR0913 - one parameter an option
         typer.Option(
             metavar="KEY=A,B",
             help="What to compare: search, springs, load_cases or solver; repeatable,"
-            " then every combination.",
+            " then every combination. Springs as for calibrate; default: auto.",
         ),
     ] = None,
     robot: options.RobotName = None,
@@ -84,11 +84,11 @@ def _codec(  # noqa: PLR0913 - one parameter an option
             compare=tuple(compare or ()),
             robot=robot,
             tcp=tcp,
-            tool=tool,
+            tool_frame=tool,
             marker=None if marker is None else parse_point(marker),
             exclude=tuple(exclude or ()),
             options=chosen,
-            tolerance=_parse_tolerance(tolerance),
+            saturation=_parse_tolerance(tolerance),
             indices=indices,
             per_axis=per_axis,
             jobs=jobs,

@@ -28,8 +28,8 @@ def _export(
         raise CompensationError(f"--tool names {len(files)} tool files: a compensator has one")
     result = workflows.export(
         model,
-        c=c,
-        settings=settings,
+        out=c,
+        compensator=settings,
         tool=files[0] if files else None,
         force=force,
         tool_frame=frame,

@@ -17,4 +17,4 @@ def _init(
     force: Annotated[bool, typer.Option("--force", help="Replace files that are there.")] = False,
 ) -> None:
     """Write a commented example cell with its mesh."""
-    tables.show_example(output.console(), workflows.init(folder, like=like, force=force))
+    tables.show_example(output.console(), workflows.init(folder, kind=like, force=force))

@@ -43,7 +43,7 @@ def _simulate_process(  # noqa: PLR0913 (a command has as many options as it has
     given = workflows.SimulateProcessSettings(
         cell,
         models=tuple(model),
-        process=process,
+        kind=process,
         out=out,
         tools=tools,
         seeds=tuple(seed or (0,)),

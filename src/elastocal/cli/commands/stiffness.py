@@ -41,7 +41,7 @@ def _stiffness(  # noqa: PLR0913 (a command has as many options as it has)
         out=out,
         direction=direction,
         spins=spins,
-        stands=stands,
+        external_positions=stands,
         stations=stations,
         cell=cell,
         start=start,

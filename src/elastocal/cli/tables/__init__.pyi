@@ -13,9 +13,11 @@ from .compensation import (
 )
 from .plan import (
     dry_figures as dry_figures,
+    robot_facts as robot_facts,
     show_example as show_example,
     show_itinerary as show_itinerary,
     show_plan as show_plan,
+    show_robot as show_robot,
+    show_robots as show_robots,
     show_run as show_run,
 )
-from .robots import robot_facts as robot_facts, show_robot as show_robot, show_robots as show_robots

@@ -15,16 +15,24 @@ from rich.table import Table
 
 from elastocal.elastic import Unit, unit_of
 from elastocal.identification import (
+    AUTO,
     CalibrateResult,
     CalibrationSummary,
     Coverage,
+    ErrorBudget,
     FrameSummary,
-    RungSummary,
     SpringSummary,
     SuspiciousReading,
     describe,
+    ladder_sentence,
 )
-from elastocal.wording import capped, counted, mm, springs_and_parameters
+from elastocal.wording import (
+    capped,
+    counted,
+    lengths_with_interval,
+    mm,
+    springs_and_parameters,
+)
 
 if TYPE_CHECKING:
     from elastocal.identification.recertification import (
@@ -52,11 +60,12 @@ def show_calibration(console: Console, result: CalibrateResult, out: Path) -> No
 
 def _show_figures(console: Console, figures: CalibrationSummary) -> None:
     _show_fit(console, figures)
-    _show_ladder(console, figures.ladder)
+    _show_ladder(console, figures)
     console.print()
     console.print(_spring_table(figures))
     _show_groups(console, figures)
     _show_frames(console, figures.frames)
+    _show_budget(console, figures.budget)
     _show_suspicious(console, figures.suspicious)
     for warning in capped(figures.warnings):
         console.print(f"[yellow]warning:[/yellow] {escape(warning)}")
@@ -107,8 +116,9 @@ def _springs(figures: CalibrationSummary) -> str:
     return springs_and_parameters(count, figures.springs_total)
 
 
-def _show_ladder(console: Console, ladder: Sequence[RungSummary]) -> None:
-    """Print the models that were tried, and the one that was taken."""
+def _show_ladder(console: Console, figures: CalibrationSummary) -> None:
+    """Print the models that were tried, the one that was taken, and why."""
+    ladder = figures.ladder
     if len(ladder) < 2:
         return
     table = Table(box=None, pad_edge=False)
@@ -128,6 +138,8 @@ def _show_ladder(console: Console, ladder: Sequence[RungSummary]) -> None:
             "[bold]taken[/bold]" if rung.chosen else "",
         )
     console.print(table)
+    if figures.settings is not None and figures.settings.springs == AUTO:
+        console.print(ladder_sentence(ladder), markup=False)
 
 
 def _show_frames(console: Console, frames: Sequence[FrameSummary]) -> None:
@@ -149,6 +161,28 @@ def _show_frames(console: Console, frames: Sequence[FrameSummary]) -> None:
                 escape(name), what, *(f"{1e6 * x:.0f} ±{1e6 * h:.0f}" for x, h in numbers)
             )
     console.print(table)
+
+
+def _show_budget(console: Console, budget: ErrorBudget | None) -> None:
+    """Print what the error is made of, and what each term takes from it."""
+    if budget is None:
+        return
+    table = Table(box=None, pad_edge=False)
+    for heading in ("error budget", "rms", "95 %", "known from"):
+        table.add_column(heading, justify="right" if heading in ("rms", "95 %") else "left")
+    for name, part in budget.parts:
+        value, span = lengths_with_interval(part.error, part.low, part.high)
+        table.add_row(name, value, span, part.source)
+    console.print()
+    console.print(table)
+    terms = Table(box=None, pad_edge=False)
+    for heading in ("term", "taken", "takes away", "95 %", "error"):
+        terms.add_column(heading, justify="left" if heading == "term" else "right")
+    for term in budget.terms:
+        value, span = lengths_with_interval(term.worth, term.low, term.high)
+        other = "" if term.error is None else f"{mm(term.error)} {term.toggled}"
+        terms.add_row(term.label, "yes" if term.taken else "no", value, span, other or term.reason)
+    console.print(terms)
 
 
 def _spring_table(figures: CalibrationSummary) -> Table:

@@ -18,6 +18,8 @@ _MOST_SIZES = 12
 def show_codec(console: Console, result: CodecSummary, out: Path, names: Sequence[str]) -> None:
     """Print the verdicts of a codec."""
     console.print(f"[bold]{escape(result.robot)}[/bold]: {result.settings.sentence}")
+    for sentence in result.springs:
+        console.print(sentence, markup=False)
     console.print(_codec_table(result))
     for sentence in result.sentences:
         console.print(sentence, markup=False)

@@ -64,7 +64,7 @@ FACTORS: dict[str, Factor] = {
     "poses": Factor("a number of calibration poses, 1 or more", "", _count),
     "search": Factor("a search technique", "", _technique),
     "load_cases": Factor("'all', or load cases of the cell joined by '+'", "", str),
-    "springs": Factor("a spring layout, or a .yaml file", "", str),
+    "springs": Factor("springs as for calibrate, or a .yaml file", "", str),
     "tracker_noise": _SCALE,
     "force_noise": _SCALE,
     "truth": Factor(
@@ -88,7 +88,8 @@ class Condition:
     load_cases: str = ALL_LOADS
     """Load cases of the calibration: ``all``, or names joined by ``+``."""
     springs: str = "bearing"
-    """Spring layout by name, or a YAML file."""
+    """As for `calibrate`: the name of a layout, ``gears``, ``auto``, or a YAML file. A choice is
+    made in each sample by its own readings, as on a real arm; it takes some three times as long."""
     tracker_noise: float = 1.0
     """Factor on the tracker's noise in the cell file."""
     force_noise: float = 1.0

@@ -1,4 +1,10 @@
 from ._laws import written as written
+from ._statics import (
+    deflection as deflection,
+    observation_block as observation_block,
+    orientation as orientation,
+    rest as rest,
+)
 from .functions import (
     Function as Function,
     ModelFunctions as ModelFunctions,
@@ -25,10 +31,4 @@ from .program import (
     sum_text as sum_text,
     used_names as used_names,
     value_text as value_text,
-)
-from .statics import (
-    deflection as deflection,
-    observation_block as observation_block,
-    orientation as orientation,
-    rest as rest,
 )

@@ -77,10 +77,7 @@ def python_text(routine: Routine, joints: int, loaded: bool) -> str:
 
     def naming(name: str) -> str:
         number = routine.constants.get(name)
-        if number is None:
-            return variables.read(name)
-        # In parentheses, since "a - -1.0" is no C and its twin here reads the same.
-        return repr(number) if number >= 0 else f"({number!r})"
+        return variables.read(name) if number is None else repr(number)
 
     inputs = {"q": [f"q{k + 1}" for k in range(joints)]}
     if loaded:

@@ -16,6 +16,7 @@ from .hinge import (
     axial as axial,
 )
 from .kinds import (
+    DEFAULT_KIND as DEFAULT_KIND,
     KINDS as KINDS,
     AnySpring as AnySpring,
     check_springs as check_springs,
@@ -33,5 +34,6 @@ from .spring import (
     Tangents as Tangents,
     Unit as Unit,
     as_axis as as_axis,
+    coordinate_axis as coordinate_axis,
 )
 from .tensor import Tensor as Tensor

@@ -13,16 +13,17 @@ from elastocal.elastic.springs.spring import Spring, Unit
 from elastocal.elastic.springs.tensor import Tensor
 from elastocal.errors import SpringError
 
-_USUAL = "hinge"
-"""The kind of a spring whose kind a file does not name."""
+DEFAULT_KIND = "hinge"
+"""Kind of a spring whose kind a file does not name."""
 
-KINDS: dict[str, type[Spring]] = {_USUAL: Hinge, "gear": Gear, "tensor": Tensor}
+KINDS: dict[str, type[Spring]] = {DEFAULT_KIND: Hinge, "gear": Gear, "tensor": Tensor}
 """Kinds of springs by the word that files have for them."""
 
 
 def _tag(spring: Any) -> str:
     """Return the tag of the class that a spring in a file is read as."""
-    return f"<{spring.get('kind', _USUAL) if isinstance(spring, Mapping) else _USUAL}>"
+    kind = spring.get("kind", DEFAULT_KIND) if isinstance(spring, Mapping) else DEFAULT_KIND
+    return f"<{kind}>"
 
 
 if TYPE_CHECKING:

@@ -19,6 +19,8 @@ AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 """Axes of a joint's frame by the words that spring files have for them."""
 _UNIT_LENGTH = 1e-9
 """Largest error of the length of a unit vector."""
+_ALIGNED = 1.0 - 1e-9
+"""Cosine from which a direction counts as a coordinate axis."""
 
 
 @dataclass(frozen=True)
@@ -275,3 +277,16 @@ def as_axis(vector: ArrayLike) -> tuple[float, float, float]:
         raise SpringError(f"axis {vector!r} must be three finite numbers that are not all zero")
     unit: FloatArray = array / length
     return float(unit[0]), float(unit[1]), float(unit[2])
+
+
+def coordinate_axis(unit: ArrayLike) -> str | None:
+    """Return the name of the coordinate axis along which a unit vector points, either way.
+
+    None where it points along none of them.
+
+    >>> coordinate_axis([0.0, -1.0, 0.0])
+    'y'
+    """
+    alignment = np.abs(np.asarray(unit, dtype=float))
+    nearest = int(alignment.argmax())
+    return tuple(AXES)[nearest] if alignment[nearest] >= _ALIGNED else None

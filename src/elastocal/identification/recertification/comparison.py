@@ -14,21 +14,27 @@ from numpy.typing import ArrayLike
 from elastocal.arrays import FloatArray
 from elastocal.errors import IdentificationError, RobotError, SpringError
 from elastocal.identification.calibrated import CalibratedModel, check_rows
+from elastocal.identification.figures import CalibrationSummary
 from elastocal.identification.model_file import CalibrateResult
 from elastocal.identification.recertification._changes import (
-    Loads,
     Spread,
     common_ground,
-    common_springs,
     compare_rows,
     compare_springs,
-    taken,
+)
+from elastocal.identification.recertification._sums import common_springs, shared_numbers
+from elastocal.identification.recertification.arms import (
+    ComparedRows,
+    arm_notes,
+    check_same_robot,
+    model_on,
 )
 from elastocal.identification.recertification.result import (
     CommonGround,
     CompareResult,
     CompareSummary,
     RowComparison,
+    SpringChange,
     Verdict,
 )
 from elastocal.records import read_json
@@ -40,10 +46,6 @@ _MOST = 20
 _PLAN = re.compile(r"\bplan ([0-9a-f]{12,})\b")
 _LIKE = 1.25
 """Mean measured deflections further apart than by this factor come from other loads."""
-_PROBES, _SEED = 8, 0
-_LENGTH, _ANGLE = 1e-4, 1e-4
-"""Largest difference of two descriptions of one robot, in m and rad: on a lever of 2 m it changes
-a deflection by less than a part in ten thousand."""
 
 
 def _judge(
@@ -158,6 +160,12 @@ def _notes_on(
             f"{ground.left_out} of {counted(ground.rows or 0, 'row')} lie outside of what both"
             " campaigns cover, by pose or by load, and were left out: nothing is known of them"
         )
+    if ground is not None and ground.rows and not ground.alike:
+        notes.append(
+            f"the campaigns were made at other poses or loads ({ground.old_covered:.0%} and"
+            f" {ground.new_covered:.0%} of their readings lie where the other measured too): the"
+            " intervals of the change hold what springs cannot express"
+        )
     if outside:
         notes.append(f"{outside} rows lie outside the joint limits of the robot")
     return tuple(notes)
@@ -182,6 +190,20 @@ def _load_note(old: float | None, new: float | None) -> str | None:
     )
 
 
+def _frame_note(old: CalibrationSummary | None, new: CalibrationSummary | None) -> str | None:
+    """Return what frames that were estimated do to a comparison; None where they were alike."""
+    free = [
+        "none" if each is None or each.settings is None else each.settings.free_frame
+        for each in (old, new)
+    ]
+    if free[0] == free[1]:
+        return None
+    return (
+        f"the old calibration estimated frames of the tracker by: {free[0]}, the new one by:"
+        f" {free[1]}; a tracker or marker that moved looks like a change where none were estimated"
+    )
+
+
 def _same_plan(old: CalibratedModel, new: CalibratedModel) -> bool:
     plans = [_PLAN.search(each.provenance) for each in (old, new)]
     return plans[0] is not None and plans[1] is not None and plans[0][1] == plans[1][1]
@@ -194,15 +216,16 @@ def recertify_files(
     force: ArrayLike | None = None,
     moment: ArrayLike | None = None,
     *,
+    rows: ComparedRows | None = None,
     limit: float | None = None,
 ) -> CompareResult:
-    """Compare two model files; as `recertify`, with a note where the loads were others.
+    """Compare two model files; as `recertify`, with a note on other loads or free frames.
 
     Parameters
     ----------
     old, new : Path
         Model files of `elastocal calibrate`.
-    q, force, moment, limit
+    q, force, moment, rows, limit
         As for `recertify`.
 
     Raises
@@ -214,13 +237,17 @@ def recertify_files(
     """
     if Path(old).resolve() == Path(new).resolve():
         raise IdentificationError(f"{old} and {new} are one and the same file: nothing to compare")
-    (old_model, old_deflection), (new_model, new_deflection) = _read(old), _read(new)
+    (old_model, old_figures), (new_model, new_figures) = _read(old), _read(new)
     names = (str(old), str(new))
-    found = recertify(old_model, new_model, q, force, moment, limit=limit, names=names)
-    note = _load_note(old_deflection, new_deflection)
-    if note is None:
-        return found
-    return replace(found, summary=replace(found.summary, notes=(*found.summary.notes, note)))
+    found = recertify(old_model, new_model, q, force, moment, rows=rows, limit=limit, names=names)
+    notes = [_frame_note(old_figures, new_figures)]
+    if not (old_model.model.bears_weight and new_model.model.bears_weight):
+        means = [
+            None if each is None else each.deflection.mean for each in (old_figures, new_figures)
+        ]
+        notes.append(_load_note(*means))
+    said = tuple(note for note in notes if note is not None)
+    return replace(found, summary=replace(found.summary, notes=(*found.summary.notes, *said)))
 
 
 def recertify(
@@ -230,6 +257,7 @@ def recertify(
     force: ArrayLike | None = None,
     moment: ArrayLike | None = None,
     *,
+    rows: ComparedRows | None = None,
     limit: float | None = None,
     names: tuple[str, str] = ("the old model", "the new model"),
 ) -> CompareResult:
@@ -238,7 +266,7 @@ def recertify(
     Parameters
     ----------
     old, new : CalibratedModel
-        The calibrations, of the same robot and tcp.
+        The calibrations, of the same robot.
     q : array_like, shape (row, joint), optional
         Joint positions at which predictions are compared, in rad or m. Without rows only
         springs are compared.
@@ -246,6 +274,9 @@ def recertify(
         Force on the robot at the tcp in base, in N; needed with ``q``.
     moment : array_like, shape (row, 3), optional
         Moment on the robot about the tcp in base, in N·m.
+    rows : ComparedRows, optional
+        In place of ``q``, ``force`` and ``moment``: rows with what friction remembers, the readings
+        of a dataset, or those of an arm that stands otherwise than at the new calibration.
     limit : float, optional
         Largest change of predicted deflection that is accepted at these rows, in m.
     names : tuple of str
@@ -254,40 +285,41 @@ def recertify(
     Raises
     ------
     IdentificationError
-        If the models are of different robots or tool centre points, are one and the same, or the
-        limit is not a positive number.
+        If the models are of different robots, are one and the same, or the limit is not a positive
+        number.
     SpringError, RobotError
         If rows have another shape or are not finite.
     """
     if limit is not None and not 0.0 < limit < np.inf:
         raise IdentificationError(f"limit {limit:g} m: a largest accepted change is above 0")
     check_same_robot(old.model.robot, new.model.robot, names)
+    given = _given_rows(new.model.robot, q, force, moment, rows)
+    arm = new.model.robot if given is None or given.arm is None else given.arm
     if np.array_equal(old.compliance, new.compliance) and np.array_equal(old.draws, new.draws):
         raise IdentificationError(
             f"{names[0]} and {names[1]} are one and the same calibration: nothing to compare"
         )
     spread = Spread.of(old, new)
-    loads = None if q is None else _checked_rows(new.model.robot, q, force, moment)
-    ground, number = common_ground(old, new, loads)
-    rows = None
-    if loads is not None and len(number):
-        rows = compare_rows(old, new, spread, *taken(loads, number), number)
-    verdict, reason = _judge(rows, limit, ground)
-    springs = compare_springs(old, new, spread)
-    if ground is not None and not ground.springs_judged:
-        springs = tuple(replace(each, moved=False) for each in springs)
+    ground, number = common_ground(old, new, given, arm)
+    changes = None
+    if given is not None and len(number):
+        alike = ground is None or ground.alike
+        on_arm = model_on(old, arm), model_on(new, arm)
+        changes = compare_rows(*on_arm, spread, given, number, alike=alike)
+    verdict, reason = _judge(changes, limit, ground)
+    springs = _judged_springs(old, new, spread, ground)
     moved = sorted(
         (each for each in springs if each.moved), key=lambda each: each.certainty, reverse=True
     )
     common = [spring.name for spring in common_springs(old, new)]
-    compared = {term.spring for change in springs for term in change.terms}
+    compared = _compared_springs(old, new, springs)
     only_old, only_new = (
         tuple(name for name in each.model.spring_names if name not in common) for each in (old, new)
     )
-    outside = 0 if loads is None else _count_outside_limits(new.model.robot, loads[0])
+    outside = 0 if given is None else _count_outside_limits(arm, given.q)
     result = CompareSummary(
         robot=new.model.robot.name,
-        tcp=new.model.robot.tip,
+        tcp=arm.tip,
         old_provenance=old.provenance,
         new_provenance=new.provenance,
         springs=springs,
@@ -295,63 +327,61 @@ def recertify(
         not_compared=tuple(name for name in common if name not in compared),
         only_old=only_old,
         only_new=only_new,
-        deflection=None if rows is None else rows.summary(),
+        deflection=None if changes is None else changes.summary(),
         limit=limit,
         verdict=verdict,
         reason=reason,
-        notes=_notes_on(old, new, not only_old and not only_new, outside, ground),
+        notes=(
+            *_notes_on(old, new, not only_old and not only_new, outside, ground),
+            *arm_notes((old, new), arm, names),
+        ),
         ground=ground,
     )
-    return CompareResult(result, rows)
+    return CompareResult(result, changes)
 
 
-def check_same_robot(old: Robot, new: Robot, names: tuple[str, str]) -> None:
-    """Refuse two robots that are not the same, or not with the same tool centre point.
-
-    Parameters
-    ----------
-    old, new : Robot
-        The robots.
-    names : tuple of str
-        What they belong to, for the message.
-
-    Raises
-    ------
-    IdentificationError
-        If joints, kinematics or tool centre points differ.
-    """
-    a, b = names
-    if old.joint_names != new.joint_names or old.revolute != new.revolute:
-        raise IdentificationError(
-            f"{a} and {b} are of different robots: {old.name} has the joints"
-            f" {', '.join(old.joint_names)}, {new.name} has {', '.join(new.joint_names)}"
-        )
-    q = _probes(old)
-    last = [robot.forward(q) @ np.linalg.inv(robot.chain.T_last_tip) for robot in (old, new)]
-    off, turned = _apart(*last)
-    if not (off <= _LENGTH and turned <= _ANGLE):
-        raise IdentificationError(
-            f"{a} ({old.name}) and {b} ({new.name}) are of different robots: at the same joints"
-            f" their last links are {1e3 * off:.3g} mm and {np.degrees(turned):.3g}° apart"
-        )
-    off, turned = _apart(old.chain.T_last_tip[None], new.chain.T_last_tip[None])
-    if not (off <= _LENGTH and turned <= _ANGLE):
-        raise IdentificationError(
-            f"{a} (tcp {old.tip}) and {b} (tcp {new.tip}) have different tool centre points,"
-            f" {1e3 * off:.3g} mm and {np.degrees(turned):.3g}° apart: calibrate both for one"
-        )
+def _judged_springs(
+    old: CalibratedModel, new: CalibratedModel, spread: Spread, ground: CommonGround | None
+) -> tuple[SpringChange, ...]:
+    """Return the changes of springs, of which none moved where the campaigns do not tell."""
+    springs = compare_springs(old, new, spread)
+    if ground is not None and not ground.springs_judged:
+        return tuple(replace(each, moved=False) for each in springs)
+    return springs
 
 
-def _checked_rows(
-    robot: Robot, q: ArrayLike, force: ArrayLike | None, moment: ArrayLike | None
-) -> Loads:
-    """Return rows as arrays, or refuse them by shape or value."""
-    if force is None:
+def _compared_springs(
+    old: CalibratedModel, new: CalibratedModel, changes: tuple[SpringChange, ...]
+) -> set[str]:
+    """Return the names of the springs that stand in a comparison."""
+    terms = {term.spring for change in changes for term in change.terms}
+    return {each.spring for each in shared_numbers(old, new) if each.name in terms}
+
+
+def _given_rows(
+    robot: Robot,
+    q: ArrayLike | None,
+    force: ArrayLike | None,
+    moment: ArrayLike | None,
+    rows: ComparedRows | None,
+) -> ComparedRows | None:
+    """Return the rows that matter, or refuse them by shape or value; None: there are none."""
+    if rows is None and q is None:
+        return None
+    if rows is None and force is None:
         raise SpringError("rows have joint positions q but no force")
+    if rows is not None:
+        q, force, moment = rows.q, rows.force, rows.moment
+        if rows.arm is not None:
+            check_same_robot(rows.arm, robot, ("the robot of the rows", "that of the new model"))
+    assert q is not None
+    assert force is not None
     joints, forces, moments = check_rows(robot, q, force, moment)
     if not len(joints):
         raise SpringError(f"force {forces.shape} does not have a row for each of q {joints.shape}")
-    return joints, forces, moments
+    if rows is not None and rows.visit is not None and len(rows.visit) != len(joints):
+        raise SpringError(f"visit has {len(rows.visit)} values for {len(joints)} rows")
+    return rows or ComparedRows(joints, forces, moments)
 
 
 def _count_outside_limits(robot: Robot, q: FloatArray) -> int:
@@ -359,28 +389,11 @@ def _count_outside_limits(robot: Robot, q: FloatArray) -> int:
     return int(np.sum(np.any(robot.limits.margin(q) < 0.0, axis=1)))
 
 
-def _probes(robot: Robot) -> FloatArray:
-    """Return configurations at which two robots would show that they differ."""
-    limits = robot.limits
-    lower, upper = np.maximum(limits.lower, -np.pi), np.minimum(limits.upper, np.pi)
-    rng = np.random.default_rng(_SEED)
-    return np.vstack([np.zeros(len(lower)), rng.uniform(lower, upper, (_PROBES, len(lower)))])
-
-
-def _apart(a: FloatArray, b: FloatArray) -> tuple[float, float]:
-    """Return the largest distance in m and angle in rad between frames, shape (n, 4, 4)."""
-    distance = np.linalg.norm(a[:, :3, 3] - b[:, :3, 3], axis=1)
-    # The Frobenius norm of the difference of two rotations is sqrt(8) sin(angle / 2).
-    chord = np.linalg.norm(a[:, :3, :3] - b[:, :3, :3], axis=(1, 2)) / np.sqrt(8.0)
-    return float(distance.max()), float(2.0 * np.arcsin(np.minimum(chord.max(), 1.0)))
-
-
-def _read(path: Path) -> tuple[CalibratedModel, float | None]:
-    """Return the model of a file, and the mean measured deflection that it states, in m."""
+def _read(path: Path) -> tuple[CalibratedModel, CalibrationSummary | None]:
+    """Return the model of a file, and the figures of its calibration."""
     found = read_json(path, CalibrateResult)
-    figures = found.calibration
     try:
-        return found.calibrated, None if figures is None else figures.deflection.mean
+        return found.calibrated, found.calibration
     except (SpringError, RobotError) as error:
         # Of two files, a refusal has to say which.
         raise type(error)(f"{path}: {error}") from error

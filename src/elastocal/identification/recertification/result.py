@@ -11,6 +11,8 @@ from elastocal.records import record
 from elastocal.results import Result, brief_repr
 
 SCHEMA = "elastocal.comparison/1"
+LEAST_COVERED = 0.75
+"""Share of each campaign's readings that the other must cover for the two to be alike."""
 
 
 class Verdict(StrEnum):
@@ -97,6 +99,11 @@ class CommonGround:
     """Number of rows that were given; none without rows."""
     rows_covered: int | None = None
     """Number of those that both campaigns cover: only these are compared."""
+
+    @property
+    def alike(self) -> bool:
+        """Whether both campaigns were made at like poses and loads."""
+        return min(self.old_covered, self.new_covered) >= LEAST_COVERED
 
     @property
     def left_out(self) -> int:

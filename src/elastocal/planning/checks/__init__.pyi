@@ -8,12 +8,15 @@ from .check import (
 )
 from .collision import CollisionCheck as CollisionCheck
 from .engagement import EdgeCheck as EdgeCheck, FlatnessCheck as FlatnessCheck
-from .friction import FrictionCheck as FrictionCheck
 from .joint_limits import (
     JointLimitsCheck as JointLimitsCheck,
     TravelLimitsCheck as TravelLimitsCheck,
 )
-from .sensor import SensorCheck as SensorCheck
+from .loads import (
+    FrictionCheck as FrictionCheck,
+    SensorCheck as SensorCheck,
+    TorqueCheck as TorqueCheck,
+)
 from .sight import (
     HOUSING_DEPTH as HOUSING_DEPTH,
     MARKER_SEAT_LENGTH as MARKER_SEAT_LENGTH,
@@ -23,4 +26,3 @@ from .sight import (
     sight_solid as sight_solid,
 )
 from .singularity import SingularityCheck as SingularityCheck, WristCheck as WristCheck
-from .torque import TorqueCheck as TorqueCheck

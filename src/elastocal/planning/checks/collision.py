@@ -8,10 +8,9 @@ import numpy as np
 
 from elastocal.arrays import FloatArray
 from elastocal.cell import Cell
-from elastocal.planning.cell_setup import collision_scene
 from elastocal.planning.checks.check import PostureCheck
 from elastocal.planning.postures import Postures, retreat_joints
-from elastocal.planning.scene import CollisionScene
+from elastocal.planning.scene import CollisionScene, collision_scene
 from elastocal.planning.surface import Surface
 
 _DISTANCES_BEYOND = (1e-3, 1e-2, 3e-2, 1e-1)

@@ -17,10 +17,9 @@ import trimesh
 from elastocal.arrays import BoolArray, FloatArray
 from elastocal.cell import Cell
 from elastocal.errors import RobotError
-from elastocal.planning.cell_setup import fixture_bodies, tool_bodies
 from elastocal.planning.checks.check import PostureCheck
 from elastocal.planning.postures import Postures
-from elastocal.planning.scene import CollisionScene
+from elastocal.planning.scene import CollisionScene, fixture_bodies, tool_bodies
 from elastocal.planning.surface import Surface
 from elastocal.results import brief_repr
 from elastocal.shapes import Beams, Body, Mesh, SightSolid

@@ -72,7 +72,7 @@ class ExchangeSearch:
     Parameters
     ----------
     criterion : str
-        Name in `elastocal.planning.search.criteria.CRITERIA`. ``d`` is the paper's IOOPS.
+        Name in `elastocal.planning.search.CRITERIA`. ``d`` is the paper's IOOPS.
     starts : int
         Random starts. Each ends in a local optimum; the values of all are in the result.
     cap : int

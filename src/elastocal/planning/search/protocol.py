@@ -1,9 +1,9 @@
-"""The interface of all search techniques: candidates in, selection out."""
+"""The interface of all search techniques, candidates in, selection out; and the simplest one."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
-from typing import Protocol
+from typing import ClassVar, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -185,3 +185,20 @@ def check_count(candidates: Candidates, count: int) -> None:
             f"{count} poses wanted from a pool of {len(candidates)} candidates:"
             " must be at least 1 and no more than the pool holds"
         )
+
+
+@dataclass(frozen=True)
+class RandomChoice:
+    """Draw without replacement, every candidate as likely as any other: what others must beat."""
+
+    name: ClassVar[str] = "random"
+    nested: ClassVar[bool] = True
+    """Smaller choices are prefixes of larger ones if the generators are equal."""
+
+    def search(
+        self, candidates: Candidates, count: int, rng: np.random.Generator | None = None
+    ) -> Selection:
+        """Return candidates in the order in which they are drawn; see `SearchTechnique`."""
+        check_count(candidates, count)
+        rng = np.random.default_rng(0) if rng is None else rng
+        return Selection(rng.permutation(len(candidates))[:count], self.name)

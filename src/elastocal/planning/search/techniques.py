@@ -11,8 +11,12 @@ from elastocal.planning.search.cover import Cover
 from elastocal.planning.search.criteria import CRITERIA
 from elastocal.planning.search.exchange import ExchangeSearch
 from elastocal.planning.search.information import build_information
-from elastocal.planning.search.protocol import Candidates, SearchTechnique, check_count
-from elastocal.planning.search.random_choice import RandomChoice
+from elastocal.planning.search.protocol import (
+    Candidates,
+    RandomChoice,
+    SearchTechnique,
+    check_count,
+)
 
 TECHNIQUES: dict[str, Callable[[], SearchTechnique]] = {
     "cover": Cover,

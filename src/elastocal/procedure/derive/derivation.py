@@ -8,8 +8,12 @@ of the point at the lever arm ``r`` that moves rigidly with its tool frame,
     controller_displacement = (p_tcp + R_tcp r) - (p_tcp,0 + R_tcp,0 r).
 
 Their difference is the elastic deflection of the marker, which the marker's own Jacobian explains
-(docs/explanation/registration.md). An error of ``R_base_tracker`` by an angle turns the marker's
-displacement by it: 1 mrad makes 1 µm of each millimetre; the tracker's place does not enter at all.
+(docs/explanation/registration.md). A press that gave no reading keeps its force and joints, and
+its place in time: friction felt it. Presses of an attempt that failed are left out: the arm was
+retracted by a free motion after them, and the reference was read anew.
+
+An error of ``R_base_tracker`` by an angle turns the marker's displacement by it: 1 mrad makes 1 µm
+of each millimetre; the tracker's place does not enter at all.
 """
 
 from collections.abc import Sequence
@@ -18,7 +22,7 @@ from pathlib import Path
 
 import numpy as np
 
-from elastocal.arrays import FloatArray, IndexArray
+from elastocal.arrays import FloatArray
 from elastocal.cell import SENSOR_CORRECTED, Cell, SensorLoad
 from elastocal.dataset import STATUSES, Dataset, write
 from elastocal.errors import DatasetError, FileAccessError, ProcedureError, SchemaError
@@ -31,12 +35,19 @@ from elastocal.procedure.derive.readings import (
     PoseReadings,
     Reading,
     ToolState,
+    felt_windows,
     marker_readings,
+    places_in_time,
     reduce_pose,
     tool_readings,
 )
 from elastocal.procedure.derive.summary import RunSummary
-from elastocal.procedure.derive.tool import estimate_tool, turned_sigma, wrench_on_robot
+from elastocal.procedure.derive.tool import (
+    estimate_tool,
+    sensor_load,
+    turned_sigma,
+    wrench_on_robot,
+)
 from elastocal.procedure.record import (
     Entry,
     PoseLog,
@@ -54,7 +65,6 @@ from elastocal.procedure.record import (
 from elastocal.procedure.registration import Registration, register
 from elastocal.records import write_json
 from elastocal.results import brief_repr
-from elastocal.robot import inverse_transform
 
 
 @dataclass(frozen=True, eq=False)
@@ -197,7 +207,7 @@ def derive_poses(
     DatasetError
         If no reading is usable.
     """
-    tool, lever = sensor or _tool_load(cell), _lever_arm(cell)
+    tool, lever = sensor or sensor_load(cell), _lever_arm(cell)
     seen = marker_readings(poses, cell.robot, cell.gravity_base, lever)
     registration = register(seen, lever)
     rows = [_row(pose, load, registration, tool) for pose in poses for load in pose.loads]
@@ -219,24 +229,13 @@ def _latest(logs: Sequence[PoseLog]) -> list[PoseLog]:
 
 def _streams(folder: RunFolder, log: PoseLog, cell: Cell) -> Streams:
     path = folder.streams / log.streams
-    streams = read_streams(path, [(window.start, window.end) for window in log.windows])
+    streams = read_streams(path, [(window.start, window.end) for window in felt_windows(log)])
     if streams.joint_names != cell.robot.joint_names:
         raise SchemaError(
             f"{path}: joints are {', '.join(streams.joint_names)}, those of the cell"
             f" {', '.join(cell.robot.joint_names)}"
         )
     return streams
-
-
-def _tool_load(cell: Cell) -> SensorLoad:
-    sensor, T_sensor_tcp = cell.file.sensor, cell.T_sensor_tcp
-    if sensor is None or T_sensor_tcp is None:
-        raise ProcedureError(f"cell {cell.name!r} has no force sensor (key 'sensor')")
-    T_sensor_flange = inverse_transform(sensor.T_flange_sensor)
-    centre = T_sensor_flange[:3, :3] @ cell.file.tool.centre + T_sensor_flange[:3, 3]
-    mass = cell.file.tool.mass
-    T = inverse_transform(T_sensor_tcp)
-    return SensorLoad(mass, centre, T_tcp_sensor=T, gravity=cell.gravity_base)
 
 
 def _lever_arm(cell: Cell) -> FloatArray:
@@ -280,9 +279,22 @@ def _row(
     if isinstance(pair, _LoadAndReference):
         numbers = _numbers(pair, registration.lever_arm, tool)
         return LoadRow(pose.pose, case, window.status, window.note, numbers)
-    if window.status is not ReadingStatus.OK:
-        return LoadRow(pose.pose, case, window.status, window.note or pair, None)
-    return LoadRow(pose.pose, case, ReadingStatus.MISSING, pair, None)
+    if window.status is ReadingStatus.OK:
+        return LoadRow(pose.pose, case, ReadingStatus.MISSING, pair, None)
+    pressed = _press(pose, load, registration.lever_arm, tool)
+    return LoadRow(pose.pose, case, window.status, window.note or pair, pressed)
+
+
+def _press(
+    pose: PoseReadings, load: Reading, lever: FloatArray, tool: SensorLoad
+) -> LoadValues | None:
+    """Return what friction in the gears felt of a press that gave no reading, if it is known."""
+    reference = None if pose.reference is None else pose.reference.tool
+    if load.tool is None or reference is None:
+        return None
+    nan = np.full(3, np.nan)
+    unseen = Mean(nan, nan, nan, 0, np.nan)
+    return _numbers(_LoadAndReference(load.tool, unseen, reference, unseen, np.eye(3)), lever, tool)
 
 
 def _pair(pose: PoseReadings, load: Reading, registration: Registration) -> _LoadAndReference | str:
@@ -339,14 +351,13 @@ def _dataset(
         for r in rows
         if r.load_case in load_cases
     }
-    shape = (len(labels), len(load_cases))
-    status = np.full(shape, STATUSES.index(ReadingStatus.MISSING.value))
+    status = np.full((len(labels), len(load_cases)), STATUSES.index(ReadingStatus.MISSING.value))
     for place, row in placed.items():
         status[place] = STATUSES.index(row.status.value)
     ok = status == STATUSES.index(ReadingStatus.OK.value)
 
     def array(name: str, width: int = 3) -> FloatArray:
-        values = np.full((*shape, width), np.nan)
+        values = np.full((*status.shape, width), np.nan)
         for place, row in placed.items():
             if row.numbers is not None:
                 values[place] = getattr(row.numbers, name)
@@ -356,7 +367,7 @@ def _dataset(
         values = array(name)
         return values if np.all(values[ok] > 0) else None
 
-    tools = {pose.pose: pose.reference.tool for pose in poses if pose.reference is not None}
+    tools = {pose.pose: pose.reference.tool for pose in poses if pose.reference}
     reference = np.full((len(labels), len(robot.joint_names)), np.nan)
     tcp = np.full((len(labels), 3), np.nan)
     for index, pose in enumerate(labels):
@@ -375,7 +386,7 @@ def _dataset(
         load_cases=load_cases,
         poses=labels,
         status=status,
-        sequence=_sequence(poses, labels, load_cases),
+        sequence=places_in_time(poses, labels, load_cases),
         tcp_position=tcp,
         reference_joint_position=reference,
         # Counted from the reference, where the tool was off the surface.
@@ -387,14 +398,3 @@ def _dataset(
         gravity=cell.gravity_of_mounting,
         provenance=provenance,
     )
-
-
-def _sequence(
-    poses: Sequence[PoseReadings], labels: Sequence[int], load_cases: Sequence[str]
-) -> IndexArray:
-    """Return the place in time of each load among those of its pose; -1 where it was not tried."""
-    sequence = np.full((len(labels), len(load_cases)), -1)
-    for pose in poses:
-        for place, load in enumerate(pose.loads):
-            sequence[labels.index(pose.pose), np.array(load_cases) == load.window.load_case] = place
-    return sequence

@@ -9,11 +9,11 @@ with ``r`` cut off below at 0; a sensor's own filter makes samples that are not 
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from elastocal.arrays import BoolArray, FloatArray
+from elastocal.arrays import BoolArray, FloatArray, IndexArray
 from elastocal.cell import SensorLoad
 from elastocal.procedure.derive.tool import RawWrench, UnloadedWrenches
 from elastocal.procedure.record import SAME_TIME, PoseLog, ReadingStatus, Streams, Window
@@ -23,6 +23,9 @@ from elastocal.robot import Robot
 
 LEAST_SAMPLES = 5
 """Fewer good samples than this make no reading: their scatter says nothing."""
+_LAST = 1.0
+"""A press that gave no window is known by what the arm felt in the last s before it was given up:
+the force was on, though it shook or the marker was not seen."""
 _MOST_CORRELATED = 0.99
 """Largest lag-1 autocorrelation that is believed; beyond it the samples drift."""
 
@@ -184,6 +187,23 @@ class PoseReadings:
         return self.log.pose
 
 
+def felt_windows(log: PoseLog) -> tuple[Window, ...]:
+    """Return the windows of a pose; of a press that gave none, the end of its time at that force.
+
+    Parameters
+    ----------
+    log : PoseLog
+        Its windows; that of a load case that was given up has no length.
+    """
+    before = (-np.inf, *(window.end for window in log.windows[:-1]))
+    return tuple(
+        window.model_copy(update={"start": max(end, window.end - _LAST)})
+        if window.start == window.end and window.load_case is not None
+        else window
+        for window, end in zip(log.windows, before, strict=False)
+    )
+
+
 def reduce_pose(log: PoseLog, streams: Streams) -> PoseReadings:
     """Return the readings of a pose.
 
@@ -194,7 +214,11 @@ def reduce_pose(log: PoseLog, streams: Streams) -> PoseReadings:
     streams : Streams
         Its raw streams.
     """
-    readings = [average(streams, window) for window in log.windows]
+    felt = zip(log.windows, felt_windows(log), strict=True)
+    readings = [
+        average(streams, own) if own is window else replace(average(streams, own), window=window)
+        for window, own in felt
+    ]
     unloaded = [reading for reading in readings if reading.window.load_case is None]
     return PoseReadings(
         log,
@@ -202,6 +226,17 @@ def reduce_pose(log: PoseLog, streams: Streams) -> PoseReadings:
         tuple(reading for reading in readings if reading.window.load_case is not None),
         unloaded[-1] if len(unloaded) > 1 else None,
     )
+
+
+def places_in_time(
+    poses: Sequence[PoseReadings], labels: Sequence[int], load_cases: Sequence[str]
+) -> IndexArray:
+    """Return the place in time of each load among those of its pose; -1 where it was not tried."""
+    sequence = np.full((len(labels), len(load_cases)), -1)
+    for pose in poses:
+        for place, load in enumerate(pose.loads):
+            sequence[labels.index(pose.pose), np.array(load_cases) == load.window.load_case] = place
+    return sequence
 
 
 JOINT_ERROR = 0.5e-3
@@ -309,9 +344,9 @@ class LoadValues:
     controller_displacement: FloatArray
     """Displacement of the marker by the controller, shape (3,), in m."""
     marker_displacement: FloatArray
-    """Shape (3,), in m."""
+    """Shape (3,), in m; NaN of a press that no station saw."""
     marker_sigma: FloatArray
-    """Shape (3,), in m."""
+    """Shape (3,), in m; likewise."""
     force: FloatArray
     """Force on the robot, shape (3,), in N."""
     moment: FloatArray

@@ -23,8 +23,10 @@ import numpy as np
 from scipy.special import fdtrc, stdtrit
 
 from elastocal.arrays import FloatArray
-from elastocal.cell import SensorLoad
+from elastocal.cell import Cell, SensorLoad
+from elastocal.errors import ProcedureError
 from elastocal.results import brief_repr
+from elastocal.robot import inverse_transform
 
 
 @brief_repr
@@ -49,6 +51,24 @@ class RobotWrench:
     """Shape (3,), in N."""
     moment: FloatArray
     """About the tool centre point, shape (3,), in N·m."""
+
+
+def sensor_load(cell: Cell) -> SensorLoad:
+    """Return the tool on its sensor as the cell file states it.
+
+    Raises
+    ------
+    ProcedureError
+        If the cell has no sensor.
+    """
+    sensor, T_sensor_tcp = cell.file.sensor, cell.T_sensor_tcp
+    if sensor is None or T_sensor_tcp is None:
+        raise ProcedureError(f"cell {cell.name!r} has no force sensor (key 'sensor')")
+    T_sensor_flange = inverse_transform(sensor.T_flange_sensor)
+    centre = T_sensor_flange[:3, :3] @ cell.file.tool.centre + T_sensor_flange[:3, 3]
+    mass = cell.file.tool.mass
+    T = inverse_transform(T_sensor_tcp)
+    return SensorLoad(mass, centre, T_tcp_sensor=T, gravity=cell.gravity_base)
 
 
 def wrench_on_robot(loaded: RawWrench, tare: RawWrench, sensor: SensorLoad) -> RobotWrench:

@@ -198,7 +198,11 @@ class Runner:
         self._supervisor.pause()
 
     def _new_attempt(self, pose: PoseRecord, legs: tuple[Joints, ...]) -> Attempt:
-        number = self._attempts[pose.id] = self._attempts.get(pose.id, 0) + 1
+        number = self._attempts.get(pose.id, 0) + 1
+        # A journal that has lost its end does not know all recordings: none may be overwritten.
+        while self._session.folder.stream(pose.id, number).exists():
+            number += 1
+        self._attempts[pose.id] = number
         self._log.pose, self._log.attempt = pose.id, number
         self._pose_start = self._supervisor.now
         streams, station = self._session.folder.stream(pose.id, number).name, pose.seen_by or ""

@@ -135,6 +135,7 @@ def write_codec_page(
         data={"variants": variants, "charts": charts},
         provenance=data.provenance,
         figures=_key_figures(data),
+        springs=verdicts.springs,
         saturations=verdicts.sentences[:first],
         pairs=verdicts.sentences[first:],
         pair_count=len(verdicts.pairs),

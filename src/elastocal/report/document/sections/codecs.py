@@ -40,7 +40,7 @@ def _body(evidence: Evidence) -> Iterator[blocks.Block]:
 def _codec(codec: CodecEvidence) -> Iterator[blocks.Block]:
     data, verdicts = codec.data, codec.verdicts
     yield blocks.Heading(_title(data))
-    yield blocks.Bullets(tuple(map(_micro, verdicts.sentences)))
+    yield blocks.Bullets(tuple(map(_micro, (*verdicts.springs, *verdicts.sentences))))
     try:
         yield blocks.picture(
             partial(codec_chart, data, verdicts),

@@ -14,7 +14,7 @@ from elastocal.identification.recertification import (
 from elastocal.report.document import blocks
 from elastocal.report.plots import SpringBar, recertification_figure, spring_bars, spring_figure
 from elastocal.verdict import Evidence, ModelEvidence
-from elastocal.wording import mm
+from elastocal.wording import lengths_with_interval, mm
 
 _MOST_TERMS = 6
 
@@ -39,6 +39,7 @@ def _compliances(evidence: Evidence) -> Iterator[blocks.Block]:
     heads = ("Spring", "Known?", "Compliance", "95 % interval", "Unit", "Stiffness")
     yield blocks.Table("Compliances", heads, tuple(map(_row, springs)), texts=2)
     yield from _not_told_apart(found)
+    yield from _budget(found.figures)
 
 
 def _row(spring: SpringBar) -> blocks.Row:
@@ -92,6 +93,34 @@ def _ladder(figures: CalibrationSummary | None) -> Iterator[blocks.Block]:
                 "taken" if rung.chosen else "",
             )
             for rung in figures.ladder
+        ),
+    )
+
+
+def _budget(figures: CalibrationSummary | None) -> Iterator[blocks.Block]:
+    """Yield what the error at left-out poses is made of, where ``calibrate`` was asked."""
+    if figures is None or figures.budget is None:
+        return
+    yield blocks.Heading("What the error is made of")
+    yield blocks.Table(
+        "Parts of the root mean square error at left-out poses, which add up in quadrature",
+        ("Part", "Error", "95 % interval in mm", "Known from"),
+        tuple(
+            (name, *lengths_with_interval(part.error, part.low, part.high), part.source)
+            for name, part in figures.budget.parts
+        ),
+    )
+    yield blocks.Table(
+        "What each term takes away, likewise; below zero where it adds",
+        ("Term", "In the model", "Takes away", "95 % interval in mm", ""),
+        tuple(
+            (
+                term.label,
+                "yes" if term.taken else "no",
+                *lengths_with_interval(term.worth, term.low, term.high),
+                term.reason or "",
+            )
+            for term in figures.budget.terms
         ),
     )
 

@@ -1,4 +1,4 @@
-"""A dataset's CSV file, the lossless twin of the NetCDF file: a row a reading."""
+"""Dataset files: NetCDF, or its lossless twin in CSV with a row a reading, as the suffix says."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -26,14 +26,87 @@ from elastocal.dataset._layout import (
 )
 from elastocal.dataset._structure import assemble
 from elastocal.dataset.dataset import Dataset
-from elastocal.errors import DatasetError, nearest
+from elastocal.errors import DatasetError, SchemaError, nearest
 from elastocal.files import read_text
-from elastocal.records import LabelledArrays
+from elastocal.records import LabelledArrays, read_arrays, write_arrays
 from elastocal.tables import Column, TableError, write_table as write_rows
 from elastocal.units import split_column
 
 _MEASURED = ("force", "moment", "controller_displacement", "marker_displacement")
 """Vectors that, with the joint positions, make a reading; a row with none of them is missing."""
+_SUFFIXES = (".nc", ".csv")
+
+
+def read(path: Path | str) -> Dataset:
+    """Return the dataset in a file, validated and plausible.
+
+    Parameters
+    ----------
+    path : path-like
+        A NetCDF4 file (``.nc``) or its CSV twin (``.csv``).
+
+    Raises
+    ------
+    DatasetError
+        If the suffix is unknown or the contents break the contract; the message names the file.
+    SchemaError
+        If the schema of the file is not known.
+    FileAccessError
+        If the file cannot be read.
+    """
+    path = Path(path)
+    arrays = _read_netcdf(path) if _suffix(path) == ".nc" else None
+    try:
+        dataset = Dataset.from_labelled(arrays or read_table(path))
+        dataset.require_plausible()
+    except (DatasetError, SchemaError) as error:
+        raise type(error)(f"{path}: {error}") from error
+    return dataset
+
+
+def write(dataset: Dataset, path: Path | str) -> None:
+    """Write a dataset to a file, whole or not at all.
+
+    Parameters
+    ----------
+    dataset : Dataset
+        What to write.
+    path : path-like
+        A file name that ends in ``.nc`` or ``.csv``.
+
+    Raises
+    ------
+    DatasetError
+        If the suffix is unknown.
+    FileAccessError
+        If the file cannot be written.
+    """
+    path = Path(path)
+    if _suffix(path) == ".nc":
+        write_arrays(path, dataset.to_labelled())
+    else:
+        write_table(dataset, path)
+
+
+def _suffix(path: Path) -> str:
+    suffix = path.suffix.lower()
+    if suffix not in _SUFFIXES:
+        raise DatasetError(
+            f"{path}: suffix {path.suffix!r} is not that of a dataset: allowed are"
+            f" {', '.join(_SUFFIXES)}"
+        )
+    return suffix
+
+
+def _read_netcdf(path: Path) -> LabelledArrays:
+    try:
+        return read_arrays(path)
+    except SchemaError as error:
+        raise DatasetError(str(error)) from error
+
+
+read_dataset = read
+"""`read` under the name that it has in the face of `elastocal`."""
 
 
 @dataclass(frozen=True)

@@ -1,10 +1,10 @@
-"""Intervals over verification sets that share poses."""
+"""Judgements over held-out sets that share poses."""
 
 import numpy as np
 import pytest
 from scipy.stats import t
 
-from elastocal.codec._overlap import Overlap, corrected_mean, median_draws
+from elastocal.identification import Overlap, corrected_mean, judge_models
 
 
 def rng() -> np.random.Generator:
@@ -42,19 +42,6 @@ def test_without_spread_the_interval_is_unknown_and_never_zero(overlap):
     found = corrected_mean(values, overlap)
     assert np.isnan(found.low).all()
     assert np.isnan(found.high).all()
-    assert median_draws(values, overlap, rng()).shape == (0, 2)
-
-
-def test_draws_of_the_median_have_the_corrected_spread_and_stay_positive():
-    values = np.exp(0.3 * rng().normal(size=(400, 1)))
-    loose, tied = (
-        np.log(median_draws(values, Overlap(400, rho), np.random.default_rng(1)))
-        for rho in (0.0, 0.4)
-    )
-    median_sigma = 0.3 * np.sqrt(np.pi / 2 / 400)
-    assert loose.std() == pytest.approx(median_sigma, rel=0.3)
-    widened = np.sqrt((1 / 400 + 0.4 / 0.6) / (1 / 400))
-    assert tied.std() / loose.std() == pytest.approx(widened, rel=1e-6)
 
 
 @pytest.mark.slow
@@ -68,3 +55,39 @@ def test_the_interval_covers_the_mean_of_sets_correlated_by_their_overlap():
         found = corrected_mean(poses[sets].mean(axis=1)[:, None], Overlap.of(sets, 31))
         covered.append(found.low[0] <= 0.0 <= found.high[0])
     assert 0.92 <= np.mean(covered) <= 1.0
+
+
+def test_sets_of_one_pose_each_count_that_their_refits_share_all_other_poses():
+    assert Overlap.leaving_one_out(31).variance == pytest.approx(1 / 31 + 1 / 30)
+    assert Overlap.of(np.arange(31)[:, None], 31).variance == pytest.approx(1 / 31 + 1 / 30)
+
+
+def errors(*means: float) -> np.ndarray:
+    """Return errors of 31 sets with these means in µm, and 2 µm of scatter in each."""
+    scatter = rng().normal(size=(31, len(means)))
+    return 1e-6 * (np.array(means) + 2.0 * (scatter - scatter.mean(axis=0)))
+
+
+ANY = np.ones(3, dtype=bool)
+
+
+def test_the_simplest_model_near_the_best_is_taken():
+    judged = judge_models(errors(60.0, 50.4, 50.0), ANY, Overlap.leaving_one_out(31))
+    assert judged.chosen == 1
+    assert judged.difference.low[0] > 0.0 > judged.difference.low[1]
+
+
+def test_a_model_that_is_far_better_is_taken_however_rich():
+    assert judge_models(errors(60.0, 55.0, 50.0), ANY, Overlap.leaving_one_out(31)).chosen == 2
+
+
+def test_a_model_that_is_not_allowed_is_judged_and_not_taken():
+    judged = judge_models(errors(60.0, 50.0, 55.0), ~ANY | [True, False, False], Overlap(31, 0.4))
+    assert judged.chosen == 0
+    assert judged.difference.high[1] < 0.0
+
+
+def test_one_set_tells_no_standard_error_and_the_best_is_taken():
+    judged = judge_models(errors(60.0, 50.0, 55.0)[:1], ANY, Overlap(1, 1.0))
+    assert judged.chosen == 1
+    assert np.isnan(judged.difference.low).all()

@@ -1,0 +1,239 @@
+"""Variants prepared for a campaign: their rows, and the springs that readings carry.
+
+Where a variant leaves its springs to the readings (``auto``), the ladder of `calibrate` is climbed
+once on all of them, which says what springs the file carries; and anew in each split on its
+training poses alone, so that errors at the verification poses have seen no choice that these had a
+part in. Rows are those of all readings at a pose, so that friction remembers the same in any split.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from elastocal.arrays import BoolArray, FloatArray, IndexArray
+from elastocal.codec.data import CodecData
+from elastocal.codec.splits import Campaign, CodecOptions, Split, make_campaign
+from elastocal.codec.variants import ALL_LOADS, Variant, training_cases
+from elastocal.dataset import Readings
+from elastocal.elastic import ElasticModel
+from elastocal.errors import CodecError
+from elastocal.identification import (
+    AUTO,
+    MINIMUM_BLOCKS,
+    Choice,
+    FitOptions,
+    PoseTriangles,
+    Problem,
+    allowed_rungs,
+    build,
+    choose_model,
+    low_loads,
+    rung_of,
+    take_simplest,
+    try_rung,
+    usable_for_choice,
+)
+from elastocal.results import brief_repr
+from elastocal.robot import Robot
+
+_SAME = 1e-9
+"""Largest distance of a pose from where the codec has it, in m."""
+
+
+@brief_repr
+@dataclass(frozen=True, eq=False)
+class PreparedVariant:
+    """A variant with all that it needs of the campaign, prepared once for all splits."""
+
+    variant: Variant
+    springs: str
+    """Name of its springs."""
+    model: ElasticModel
+    problem: Problem
+    """All readings; blocks are the numbers of the physical poses."""
+    trains: BoolArray
+    """Whether the variant may train with each reading, shape (reading,)."""
+    triangles: PoseTriangles
+    """Triangles of the training readings of each pose."""
+    contact: FloatArray
+    """Tcp positions, shape (pose, 3), in m."""
+
+    @classmethod
+    def of(
+        cls,
+        variant: Variant,
+        springs: str,
+        model: ElasticModel,
+        campaign: Campaign,
+        marker_offset: ArrayLike | None,
+    ) -> "PreparedVariant":
+        """Return a variant prepared for a campaign.
+
+        Raises
+        ------
+        DatasetError
+            If the dataset lacks a load case.
+        """
+        problem = build(model, campaign.readings, variant.options, marker_offset)
+        cases = training_cases(variant.load_cases, campaign.load_cases)
+        trains = np.isin(campaign.readings.load_case, cases)
+        poses = np.arange(len(campaign))
+        triangles = PoseTriangles.of(problem.take(trains), poses)
+        return cls(variant, springs, model, problem, trains, triangles, campaign.contact)
+
+    def can_train(self, split: Split) -> IndexArray:
+        """Return the training poses of a split that have a reading to train with, rising."""
+        return split.training[np.isin(split.training, self.problem.block[self.trains])]
+
+    def rows(self, poses: IndexArray, which: BoolArray) -> FloatArray:
+        """Return observation rows of poses, zeros where readings are missing.
+
+        Shape (pose, row, spring).
+        """
+        found = [self.problem.O[which & (self.problem.block == pose)] for pose in poses]
+        rows = np.zeros((len(poses), max(map(len, found)), 3, self.problem.columns))
+        for filled, blocks in zip(rows, found, strict=True):
+            filled[: len(blocks)] = blocks
+        return rows.reshape(len(poses), -1, self.problem.columns)
+
+
+@dataclass(frozen=True, eq=False)
+class Entrant:
+    """A variant with all springs that a split may choose from."""
+
+    taken: PreparedVariant
+    """With the springs that the file carries."""
+    allowed: tuple[PreparedVariant, ...]
+    """With each of the springs to choose from, the simplest first; one where they are given."""
+    low: BoolArray
+    """Whether each reading is of low load, shape (reading,)."""
+
+    def chosen(self, split: Split) -> str:
+        """Return the name of the springs that the training poses of a split carry."""
+        poses = self.taken.can_train(split)
+        if len(self.allowed) == 1 or len(poses) < MINIMUM_BLOCKS:
+            return self.allowed[0].springs
+        rows = self.taken.trains & np.isin(self.taken.problem.block, poses)
+        tried = [
+            try_rung(each.springs, each.model, each.problem.take(rows), self.low[rows])
+            for each in self.allowed
+        ]
+        return take_simplest(tried, [each.name for each in tried]).taken
+
+    def with_springs(self, name: str) -> PreparedVariant:
+        """Return the variant with the springs of this name."""
+        return next(each for each in self.allowed if each.springs == name)
+
+
+def climbed_ladder(
+    robot: Robot,
+    readings: Readings,
+    variants: Sequence[Variant],
+    options: CodecOptions,
+    marker_offset: ArrayLike | None,
+) -> Choice:
+    """Return the ladder of `calibrate` on all readings, with what else is compared beside it."""
+    for each in variants:
+        # Refuses an unknown word before any fit.
+        _ = each.springs == AUTO or rung_of(robot, each.springs)
+    fit = FitOptions(set_blunders_aside=options.set_blunders_aside)
+    beside = [each.springs for each in variants]
+    return choose_model(robot, readings, AUTO, fit, marker_offset, beside)
+
+
+def taken_springs(ladder: Choice, springs: str) -> str:
+    """Return the name of the springs that `calibrate` takes for a user's word."""
+    return take_simplest(ladder.ladder, allowed_rungs(springs)).taken
+
+
+def make_entrant(
+    variant: Variant,
+    taken: str,
+    models: Mapping[str, ElasticModel],
+    campaign: Campaign,
+    marker_offset: ArrayLike | None,
+) -> Entrant:
+    """Return a variant prepared with each of the springs that it may have.
+
+    Parameters
+    ----------
+    variant, campaign, marker_offset
+        As for `PreparedVariant.of`.
+    taken : str
+        From `taken_springs`.
+    models : mapping of str to ElasticModel
+        By rung of the ladder.
+    """
+    allowed = [name for name in allowed_rungs(variant.springs) if name in models]
+    prepared = {
+        name: PreparedVariant.of(variant, name, models[name], campaign, marker_offset)
+        for name in allowed
+    }
+    return Entrant(prepared[taken], tuple(prepared.values()), low_loads(campaign.readings))
+
+
+def left_out_errors(ladder: Choice, variants: Sequence[Variant]) -> FloatArray:
+    """Return the errors at left-out poses by which `calibrate` judges each variant.
+
+    Shape (variant, pose), in m; NaN for variants that train or fit otherwise than `calibrate`, or
+    whose springs have been chosen by these very errors.
+    """
+    scores = {each.name: each.score for each in ladder.ladder}
+    unknown = np.full(len(ladder.ladder[0].score), np.nan)
+    found = []
+    for each in variants:
+        choice = [name for name in allowed_rungs(each.springs) if name in scores]
+        usual = each.load_cases == ALL_LOADS and each.solver == Variant.solver
+        found.append(scores[choice[0]] if usual and len(choice) == 1 else unknown)
+    return np.array(found)
+
+
+def prepared_variants(
+    robot: Robot, readings: Readings, data: CodecData, marker_offset: ArrayLike | None = None
+) -> tuple[PreparedVariant, ...]:
+    """Return the variants of a finished codec, prepared again from its readings.
+
+    Parameters
+    ----------
+    robot : Robot
+        The robot.
+    readings : Readings
+        Those that the codec was made from.
+    data : CodecData
+        The codec.
+    marker_offset : array_like, shape (3,), optional
+        Metrology marker in the tcp frame, in m.
+
+    Raises
+    ------
+    CodecError
+        If the readings have other poses than the codec, or a layout has other springs.
+    DatasetError
+        If the data lack a load case, or joints are not this robot's.
+    """
+    aside = FitOptions(set_blunders_aside=data.options.set_blunders_aside)
+    kept = usable_for_choice(robot, readings, aside, marker_offset)
+    models = {
+        name: ElasticModel(robot, rung_of(robot, name).springs(robot, kept))
+        for name in dict.fromkeys(data.layouts)
+    }
+    for each, name, labels in zip(data.variants, data.layouts, data.springs, strict=True):
+        found = models[name].parameter_names
+        if found != labels.names:
+            raise CodecError(
+                f"variant {each.name!r} was made with {len(labels.names)} springs;"
+                f" {name!r} now has {len(found)}, or others"
+            )
+    campaign = make_campaign(list(models.values()), readings, data.options, marker_offset)
+    contact = campaign.contact
+    if contact.shape != data.contact.shape or not np.all(np.abs(contact - data.contact) <= _SAME):
+        raise CodecError(
+            f"the readings are not those of the codec: they have {len(contact)} poses, the codec"
+            f" {len(data.contact)}, or poses lie elsewhere"
+        )
+    return tuple(
+        PreparedVariant.of(each, name, models[name], campaign, marker_offset)
+        for each, name in zip(data.variants, data.layouts, strict=True)
+    )

@@ -1,0 +1,140 @@
+"""The rows that matter, and the arm at them: perhaps with another tool, weight or mounting.
+
+Springs belong to the arm. So two models are held against one another on one arm as it stands, with
+one tool and one weight: what a tool changes is no change of the robot.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from elastocal.arrays import FloatArray, IndexArray
+from elastocal.dataset import Readings
+from elastocal.elastic import ElasticModel
+from elastocal.errors import IdentificationError
+from elastocal.identification.calibrated import CalibratedModel
+from elastocal.results import brief_repr
+from elastocal.robot import Robot, link_gap, probe_configurations, same_joints, tool_gap
+
+_WEIGHT = 1e-3
+"""Largest difference of two weights of one arm, as a part of the largest gravity torque."""
+
+
+@brief_repr
+@dataclass(frozen=True, eq=False)
+class ComparedRows:
+    """Poses and loads that matter, in order in time."""
+
+    q: FloatArray
+    """Joint positions, shape (row, joint), in rad or m."""
+    force: FloatArray
+    """Force on the robot at the tcp in base, shape (row, 3), in N."""
+    moment: FloatArray | None = None
+    """Moment on the robot about the tcp in base, shape (row, 3), in N·m; None: none."""
+    visit: Sequence[object] | None = None
+    """Rows with one value share what friction remembers; None: each is pressed from rest."""
+    readings: Readings | None = None
+    """The readings that the rows are: what matters then is the displacement that each shows,
+    against its reference and after what the arm felt before."""
+    arm: Robot | None = None
+    """The robot as it stands there, with its tool, weight and mounting; None: the new model's."""
+
+    @classmethod
+    def of(cls, readings: Readings, arm: Robot | None = None) -> "ComparedRows":
+        """Return readings as rows."""
+        q, force, moment = readings.joint_position, readings.force, readings.moment
+        return cls(q, force, moment, readings=readings, arm=arm)
+
+    def __len__(self) -> int:
+        return len(self.q)
+
+    def friction(self, model: ElasticModel) -> FloatArray | None:
+        """Return what friction elements bear, shape (row, element); None: pressed from rest."""
+        if self.visit is None or not len(model.friction):
+            return None
+        at = model.at(self.q)
+        load = model.load_torques(at, self.force, self.moment)
+        return model.friction.visits(at.weight, load, np.asarray(self.visit))[0]
+
+    def taken(self, number: IndexArray) -> "ComparedRows":
+        """Return some of the rows, of which friction has to be known already."""
+        moment = None if self.moment is None else self.moment[number]
+        return ComparedRows(self.q[number], self.force[number], moment)
+
+
+def check_same_robot(old: Robot, new: Robot, names: tuple[str, str]) -> None:
+    """Refuse two robots that are not the same; their tools may differ.
+
+    Parameters
+    ----------
+    old, new : Robot
+        The robots.
+    names : tuple of str
+        What they belong to, for the message.
+
+    Raises
+    ------
+    IdentificationError
+        If joints or kinematics differ.
+    """
+    a, b = names
+    if not same_joints(old, new):
+        raise IdentificationError(
+            f"{a} and {b} are of different robots: {old.name} has the joints"
+            f" {', '.join(old.joint_names)}, {new.name} has {', '.join(new.joint_names)}"
+        )
+    gap = link_gap(old, new)
+    if not gap.closed:
+        raise IdentificationError(
+            f"{a} ({old.name}) and {b} ({new.name}) are of different robots: at the same joints"
+            f" their last links are {gap} apart"
+        )
+
+
+def model_on(calibrated: CalibratedModel, arm: Robot) -> CalibratedModel:
+    """Return a model on an arm that is the same robot, with its tool, weight and mounting.
+
+    A model that was calibrated on such an arm comes back as it is.
+    """
+    robot = calibrated.model.robot
+    if tool_gap(robot, arm).closed and not _weighs_otherwise(robot, arm):
+        return calibrated
+    return replace(calibrated, model=ElasticModel(arm, calibrated.model.springs))
+
+
+def arm_notes(
+    models: tuple[CalibratedModel, CalibratedModel], arm: Robot, names: tuple[str, str]
+) -> tuple[str, ...]:
+    """Return what differs between the arms of two models and the one that both are put on."""
+    notes = []
+    for calibrated, name in zip(models, names, strict=True):
+        robot = calibrated.model.robot
+        gap = tool_gap(robot, arm)
+        if not gap.closed:
+            notes.append(
+                f"{name} was calibrated with another tool (tcp {robot.tip}, {gap} from the one"
+                f" compared at, {arm.tip}): its springs are taken to be those of the arm alone"
+            )
+        if not calibrated.model.bears_weight:
+            continue
+        if _weighs_otherwise(robot, arm):
+            notes.append(
+                f"{name} was calibrated under another weight of the arm (tool or mounting):"
+                " deflections are compared under one"
+            )
+        elif robot.has_masses != arm.has_masses:
+            notes.append(
+                f"{name} knows {'a' if robot.has_masses else 'no'} weight of the arm, which the"
+                f" other side does {'not' if robot.has_masses else 'know'}: gears stiffen with it"
+            )
+    return tuple(notes)
+
+
+def _weighs_otherwise(robot: Robot, arm: Robot) -> bool:
+    """Return whether the known weights of two arms differ; unknown ones do not."""
+    if not (robot.has_masses and arm.has_masses):
+        return False
+    here, there = (each.gravity_torques(probe_configurations(arm)) for each in (robot, arm))
+    largest = max(float(np.abs(here).max()), float(np.abs(there).max()))
+    return float(np.abs(here - there).max()) > _WEIGHT * largest
