@@ -189,8 +189,9 @@ def _widening(
     """Return how far draws are stretched for few poses, and for doubt about the model."""
     by = widening_factor(problem, compliance, draws, held_out.compliance)
     stretched = compliance + by * (draws - compliance)
-    figures = ((each.difference, each.standard_error, each.apart) for each in ladder)
-    moved = doubt(*np.array(list(figures)).reshape(-1, 3).T)
+    open_to_choice = [each for each in ladder if np.isfinite(each.apart)]
+    figures = [(each.difference, each.standard_error, each.apart) for each in open_to_choice]
+    moved = doubt(*np.array(figures).reshape(-1, 3).T)
     return by * doubt_factor(problem, compliance, stretched, moved)
 
 

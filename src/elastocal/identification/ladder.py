@@ -87,9 +87,9 @@ class Climbed:
     standard_error: float = 0.0
     """Of the difference, in m."""
     chosen: bool = False
-    apart: float = 0.0
+    apart: float = float("nan")
     """Root mean square distance of its predictions at left-out poses from those of the chosen
-    rung, in m."""
+    rung, in m; NaN where it was not to choose from."""
 
 
 def gears(robot: Robot, readings: Readings, slips: tuple[float, ...] = ()) -> tuple[Spring, ...]:
@@ -322,7 +322,7 @@ def take_simplest(tried: Sequence[Climbed], allowed: Sequence[str]) -> Choice:
             high=float(high),
             standard_error=float(error),
             chosen=number == found.chosen,
-            apart=_distance(rung.predicted, tried[found.chosen].predicted),
+            apart=_distance(rung, tried[found.chosen]) if may[number] else float("nan"),
         )
         for number, (rung, mean, low, high, error) in enumerate(zip(tried, *figures, strict=True))
     )
@@ -371,9 +371,10 @@ def try_rung(name: str, model: ElasticModel, problem: Problem, low: BoolArray) -
     return Climbed(name, model, held_out, score, predicted)
 
 
-def _distance(a: FloatArray, b: FloatArray) -> float:
-    """Return the root mean square distance of predictions, in m."""
-    return float(np.sqrt(np.mean(np.sum(np.square(a - b), axis=1))))
+def _distance(one: Climbed, other: Climbed) -> float:
+    """Return the root mean square distance of two rungs' predictions, in m."""
+    squares = np.sum(np.square(one.predicted - other.predicted), axis=1)
+    return float(np.sqrt(np.mean(squares)))
 
 
 def _left_out(problem: Problem, rows: BoolArray) -> FloatArray:
