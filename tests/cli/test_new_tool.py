@@ -1,14 +1,19 @@
 """``--tool``: every command that uses a model works at another tool's tcp, and says so."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from elastocal.elastic import ElasticModel
 from elastocal.identification import read_model, write_model
 from elastocal.robot import T_from_xyzabc
+from elastocal.workflows._inputs import coverage_notes
+from support.cells import robot
 from support.cli import elastocal
+from support.geared import geared
 from support.paths import (
     FORCE_TCP,
     calibrated,
@@ -147,3 +152,13 @@ def test_a_compensator_for_two_tools_is_refused(folder):
         "export", folder / "model.json", "--c", folder / "two", "--tool", LONGER, "--tool", SHORTER
     )
     assert "--tool names 2 tcps" in found.reason
+
+
+def test_a_tools_mass_that_preloads_the_gears_of_an_arm_without_masses_is_told():
+    tool = (T_LONGER, 20.0, (0.0, 0.0, -0.1))
+    heavy = geared()
+    bare = replace(heavy, model=ElasticModel(robot(), heavy.model.springs))
+    (note,) = [each for each in coverage_notes(bare.with_tool(*tool)) if "gears were" in each]
+    assert note.startswith("only what the last joint carries has a mass")
+    assert not any("gears were" in each for each in coverage_notes(heavy.with_tool(*tool)))
+    assert not any("gears were" in each for each in coverage_notes(bare.with_tool(T_LONGER)))

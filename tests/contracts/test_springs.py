@@ -13,6 +13,7 @@ from elastocal.elastic import (
     ElasticModel,
     Gear,
     Hinge,
+    Knowledge,
     Spring,
     SpringLoad,
     Tensor,
@@ -21,7 +22,7 @@ from elastocal.elastic import (
     unit_of,
 )
 from elastocal.elastic.springs import Input
-from elastocal.errors import SchemaError
+from elastocal.errors import SchemaError, SpringError
 from elastocal.identification import (
     CalibratedModel,
     Observability,
@@ -88,6 +89,10 @@ def planted(case: str) -> np.ndarray:
     return np.where(free, -0.2 * made, made)
 
 
+def planted_of(spring: Spring) -> np.ndarray:
+    return np.arange(1.0, 1.0 + len(spring.parameters)) * 1e-7
+
+
 def calibrated(case: str) -> CalibratedModel:
     c = planted(case)
     draws = c * (1.0 + 0.1 * np.random.default_rng(2).normal(size=(50, len(c))))
@@ -114,6 +119,33 @@ class TestEverySpring:
             assert parameter.unit.shown
             assert parameter.unit.factor > 0.0
             assert parameter.lower < parameter.scale < np.inf
+
+    def test_what_a_file_knows_of_it_is_one_number_or_a_data_sheet(self, case):
+        """One number takes a stiffness, a gear K1 to K3, anything else says that it takes none."""
+        spring = CASES[case]
+        unit = "N*m/rad" if spring.axes[0].revolute else "N/m"
+        number = Knowledge(stiffness=f"1e6 {unit}", uncertainty="20 %")
+        sheet = Knowledge(
+            K1="1 MN*m/rad", T1="100 N*m", K2="2 MN*m/rad", T2="1 kN*m", K3="3 MN*m/rad",
+            uncertainty="20 %",
+        )  # fmt: skip
+        if len(spring.parameters) == 1:
+            (known,) = number.of_spring(spring)
+            assert (known.name, known.weights) == (spring.name, None)
+        else:
+            with pytest.raises(SpringError, match="numbers"):
+                number.of_spring(spring)
+        if not isinstance(spring, Gear):
+            with pytest.raises(SpringError, match="is no gear"):
+                sheet.of_spring(spring)
+            return
+        for known, low, high in zip(
+            sheet.of_spring(spring), (0, 100, 1000), (100, 1000, 2000), strict=True
+        ):
+            load = SpringLoad((np.array(high - low, dtype=float),), (np.array(low, dtype=float),))
+            turned = np.dot(np.array(spring.angles(load)[0], dtype=float), planted_of(spring))
+            mean = np.dot(known.weights, planted_of(spring))
+            assert mean == pytest.approx(turned / (high - low), rel=1e-12)
 
     def test_it_is_a_value(self, case):
         spring = CASES[case]

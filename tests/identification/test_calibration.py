@@ -5,7 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from elastocal.elastic import ElasticModel, actuated
 from elastocal.identification import FitOptions, build, calibrate, leave_poses_out, solve
+from elastocal.robot import Robot, with_tool
+from support.cells import robot, urdf
+from support.geared import heavy_robot
 from support.problems import campaign, elastic, linear_readings
 
 
@@ -72,4 +76,27 @@ def test_a_fit_that_explains_little_is_worth_a_warning():
     readings, _ = linear_readings("actuated")
     spoiled = replace(readings, marker_displacement=readings.marker_displacement + noise)
     assert any("unexplained" in warning for warning in made(spoiled).warnings)
-    assert not made(readings).warnings
+    # The arm of these tests weighs nothing, which is worth a warning of its own.
+    assert [text for text in made(readings).warnings if "has a mass" not in text] == []
+
+
+TOOL_ALONE = with_tool(urdf(), "tcp", "cutter", np.eye(4), 12.0, (0.0, 0.0, 0.1))
+
+
+@pytest.mark.parametrize(
+    ("arm", "said"),
+    [
+        (robot(), "no link has a mass"),
+        (Robot.from_urdf(TOOL_ALONE, "cutter"), "only what the last joint carries has a mass"),
+        (heavy_robot(), None),
+    ],
+)
+def test_an_arm_whose_weight_is_not_known_is_told_in_one_line(arm, said):
+    readings, _ = linear_readings("actuated")
+    model = ElasticModel(arm, actuated(arm))
+    found = calibrate(model, readings, np.random.default_rng(0), FitOptions(trust_conventions=True))
+    told = [text for text in found.warnings if "has a mass" in text]
+    assert len(told) == (said is not None)
+    for text in told:
+        assert f"robot arm: {said}: the arm's own weight" in text
+        assert "\n" not in text

@@ -8,9 +8,9 @@ import numpy as np
 from elastocal.elastic import ElasticModel, layout
 from elastocal.identification import CalibratedModel, Observability, Term, calibrate
 from elastocal.sim.arm import (
-    CubicGear,
     ElasticArm,
     Linear,
+    StiffeningGear,
 )
 from support.cells import Cell, linear_truth, robot
 from support.problems import elastic
@@ -33,7 +33,7 @@ def softened(arm: ElasticArm, joint: str = "joint_3", by: float = SOFTER) -> Ela
 
 
 def _softer(law, by: float):
-    assert isinstance(law, Linear | CubicGear)
+    assert isinstance(law, Linear | StiffeningGear)
     return replace(law, k=law.k / by)
 
 

@@ -34,7 +34,14 @@ def _folder(like: str) -> Path:
 
 
 def example_cell(like: str = "afp", **sections: object) -> Cell:
-    """Return an example cell with some sections of its file put in."""
+    """Return an example cell with some sections of its file put in.
+
+    Its truth is the preset `kind` unless the section says otherwise: most tests that look into a
+    simulated cell test the numerics of something, not how hard the truth is.
+    """
+    simulation = sections.get("simulation", {})
+    if isinstance(simulation, dict):
+        sections = sections | {"simulation": {"preset": "kind"} | simulation}
     folder = _folder(like)
     data = yaml.safe_load((folder / "cell.yaml").read_text()) | sections
     path = folder / f"changed_{abs(hash(repr(sections)))}.yaml"

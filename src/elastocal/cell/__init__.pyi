@@ -66,6 +66,14 @@ from .motion import (
     joint_margins as joint_margins,
     torque_limits as torque_limits,
 )
+from .presets import (
+    PRESET_FIGURES as PRESET_FIGURES,
+    PRESETS as PRESETS,
+    Preset as Preset,
+    PresetFigure as PresetFigure,
+    kind_default as kind_default,
+    with_preset as with_preset,
+)
 from .procedure import (
     DEFAULT_POSES as DEFAULT_POSES,
     DIRECTIONS as DIRECTIONS,
@@ -95,9 +103,11 @@ from .simulation import (
     FaultKind as FaultKind,
     Floor as Floor,
     Gears as Gears,
+    Geometry as Geometry,
     Links as Links,
     SensorTruth as SensorTruth,
     Simulation as Simulation,
+    Thermal as Thermal,
     TrackerTruth as TrackerTruth,
     TruthScale as TruthScale,
 )

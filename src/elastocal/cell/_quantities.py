@@ -119,6 +119,10 @@ TranslationalStiffness = Annotated[float, _read("translational stiffness"), _POS
 """In N/m, above 0."""
 
 
+StiffnessOrNone = Annotated[float, _read("translational stiffness"), _NOT_NEGATIVE]
+"""In N/m, 0 or above."""
+
+
 Share = Annotated[FiniteFloat, Field(ge=0.0, lt=1.0)]
 """From 0 to below 1, without dimension."""
 

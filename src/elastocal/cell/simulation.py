@@ -1,7 +1,8 @@
 """The hidden truth of the simulated cell, the figures of its devices, and the faults it injects.
 
-Only the simulation reads this; nothing here is known to planning, procedure or calibration. All
-defaults are assumptions of a plausible size, none is taken from a data sheet.
+Only the simulation reads this; nothing here is known to planning, procedure or calibration. What
+makes one cell harder than another is in the table of `presets`, each figure with its source; all
+other defaults are assumptions of a plausible size.
 """
 
 import math
@@ -25,12 +26,15 @@ from elastocal.cell._quantities import (
     Scale,
     Share,
     ShareBelowHalf,
+    StiffnessOrNone,
     Time,
     TranslationalStiffness,
 )
+from elastocal.cell.presets import PRESETS, Preset, kind_default, with_preset
 from elastocal.records import StrictModel
 
 _SIX = Field(min_length=6, max_length=6)
+_SmallAngle = Annotated[AngleUpToPi, Field(le=0.01)]
 
 
 class TruthScale(StrictModel):
@@ -38,7 +42,7 @@ class TruthScale(StrictModel):
 
     gears: Scale = 1.0
     bearings: Scale = 1.0
-    links: Scale = 1.0
+    links: Scale = kind_default("truth.links")
     balancer: Scale = 1.0
     floor: Scale = 1.0
     external: Scale = 1.0
@@ -50,26 +54,37 @@ class Gears(StrictModel):
 
     stiffness: Annotated[tuple[RotationalStiffness, ...], _SIX] | None = None
     """At high torque, in N·m/rad; by default those of a 1.1 t arm, scaled with the moved mass."""
-    growth: ShareBelowHalf = 0.2
+    growth: ShareBelowHalf = kind_default("gears.growth")
     """How much softer a gear is at rest, over its stiffness at high torque."""
     growth_angle: Annotated[AngleUpToPi, Field(gt=0.0)] = 3e-4
     """Twist at which it is half way between the two, in rad."""
     backlash: AngleUpToPi = 3e-5
     """Twist that is lost between a torque and its opposite, in rad; there the gear is soft, not
     free."""
+    lost_motion: Annotated[tuple[_SmallAngle, ...], _SIX] | None = kind_default("gears.lost_motion")
+    """Width of the loop at no torque after a load there and back, backlash and friction together,
+    in rad; None: what `hysteresis` makes of it."""
     hysteresis: Annotated[FiniteFloat, Field(ge=0.0, lt=0.3)] = 0.03
-    """Friction in the gear over its torque at `reference_angle`: half the height of its loop."""
+    """Friction in the gear over its torque at `reference_angle`: half the height of its loop. Not
+    looked at where there is a `lost_motion`."""
     reference_angle: Annotated[AngleUpToPi, Field(gt=0.0)] = 5e-4
     """In rad."""
-    presliding: Annotated[AngleUpToPi, Field(gt=0.0)] = 6e-5
+    presliding: Annotated[AngleUpToPi, Field(gt=0.0)] = kind_default("gears.presliding")
     """Twist from rest after which the friction is at its full height, in rad."""
+    residual: Annotated[FiniteFloat, Field(ge=0.0, le=10.0)] = kind_default("gears.residual")
+    """Standard deviation of the last stroke of a gear before it stands, over `presliding`: what a
+    free move leaves of the friction."""
 
 
 class Bearings(StrictModel):
     """Tilt of the bearings."""
 
-    ratio: tuple[Scale, Scale] = (4.0, 6.0)
+    ratio: tuple[Scale, Scale] = kind_default("bearings.ratio")
     """Stiffness of the two tilts over that of the joint's gear."""
+    turn: AngleUpToPi = kind_default("bearings.turn")
+    """How far the axes of the tilts are turned about the joint's, in rad."""
+    offset: Distance = kind_default("bearings.offset")
+    """How far along its axis from the joint's origin they sit, in m."""
 
 
 class Links(StrictModel):
@@ -92,6 +107,8 @@ class Balancer(StrictModel):
     """Distance of its end on the carousel from axis 2, in m."""
     lever: PositiveLength = 0.18
     """Distance of its end on the arm from axis 2, in m; below ``anchor``."""
+    seal_friction: Force = kind_default("balancer.seal_friction")
+    """Friction of the seals of its cylinder, in N."""
     fitted: bool = True
     """Whether the robot has one."""
 
@@ -147,6 +164,13 @@ class ContactTruth(StrictModel):
     """Stiffness of the tooling along its normal, in N/m."""
     surface_offset: Point = (0.0, 0.0, 0.0)
     """How far the tooling stands from where the cell file puts it, in base, in m."""
+    tilt: AngleUpToPi = kind_default("contact.tilt")
+    """Standard deviation of the disk's tilt on the tooling in a visit, about each lateral axis, in
+    rad: it moves the point of attack."""
+    wander: Distance = kind_default("contact.wander")
+    """Standard deviation of the point of attack of a load case, along each lateral axis, in m."""
+    process_stiffness: StiffnessOrNone = kind_default("contact.process_stiffness")
+    """Force of a process per shift of the tool along the surface's normal, in N/m."""
 
 
 class ControllerTruth(StrictModel):
@@ -158,7 +182,7 @@ class ControllerTruth(StrictModel):
     """Amplitude of the unrest of a held force, in N."""
     reaction: PositiveTime = 0.004
     """From the contact force to the standstill of a guarded approach, in s."""
-    repeatability: Distance = 10e-6
+    repeatability: Distance = kind_default("controller.repeatability")
     """Standard deviation of a stop along each axis of base, in m; the controller knows nothing
     of it."""
     gravity_compensation: Annotated[FiniteFloat, Field(ge=0.0, le=1.0)] = 0.9
@@ -182,8 +206,11 @@ class SensorTruth(StrictModel):
     drift: Force = 0.3
     """Standard deviation of the drift of a force axis within a minute, in N; a moment axis drifts
     as much in proportion to its range."""
-    cross_talk: Share = 0.001
+    cross_talk: Share = kind_default("sensor.cross_talk")
     """Standard deviation of what an axis reads of each axis, itself too, over the ranges."""
+    hysteresis: Share = kind_default("sensor.hysteresis")
+    """How much more an axis reads on the way down than up, at half of a load of a fifth of its
+    range, over that load."""
 
 
 class TrackerTruth(StrictModel):
@@ -200,9 +227,28 @@ class TrackerTruth(StrictModel):
     """Standard deviation of the station's true place about that of the cell file, in m."""
 
 
+class Geometry(StrictModel):
+    """How the robot is built, against how its description has it."""
+
+    tcp: Distance = kind_default("geometry.tcp")
+    """Length of the error of the tool centre point, in a random direction, in m."""
+    links: Distance = kind_default("geometry.links")
+    """Length of the error of each joint's place against the joint before, likewise, in m."""
+
+
+class Thermal(StrictModel):
+    """Growth of the arm by its own warmth."""
+
+    drift: Distance = kind_default("thermal.drift")
+    """How far the tool drifts at HOME between cold and warm, away from the foot, in m. A visit of
+    the calibration finds the arm somewhere between; a process has it warm."""
+
+
 class Simulation(StrictModel):
     """Section ``simulation`` of the cell file."""
 
+    preset: Preset = "typical"
+    """Gives the figures that the file leaves out; see `elastocal.cell.presets`."""
     seed: Annotated[int, Field(ge=0)] = 0
     """Seed of everything random in the simulated devices."""
     truth: TruthScale = TruthScale()
@@ -214,10 +260,21 @@ class Simulation(StrictModel):
     floor: Floor = Floor()
     external: ExternalAxes = ExternalAxes()
     end_effector: EndEffector = EndEffector()
+    geometry: Geometry = Geometry()
+    thermal: Thermal = Thermal()
     contact: ContactTruth = ContactTruth()
     controller: ControllerTruth = ControllerTruth()
     sensor: SensorTruth = SensorTruth()
     tracker: TrackerTruth = TrackerTruth()
+
+    @model_validator(mode="before")
+    @classmethod
+    def _from_preset(cls, data: Any) -> Any:
+        """Fill in what the preset says and the file does not."""
+        if not isinstance(data, dict):
+            return data
+        preset = data.get("preset", "typical")
+        return with_preset(data, preset) if preset in PRESETS else data
 
 
 FaultKind = Literal[

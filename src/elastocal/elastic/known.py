@@ -1,13 +1,19 @@
 """What is known of springs before the data: bounds, and stiffnesses of data sheets.
 
-People write both as stiffness or as compliance, with units; here they are compliances.
+People write both as stiffness or as compliance, with units; here they are compliances. Makers of
+gears state up to three stiffnesses: ``K1`` up to the torque ``T1``, ``K2`` from there to ``T2``,
+``K3`` beyond. Each is the mean compliance of the gear between two torques, which is linear in its
+parameters.
 """
 
+from collections.abc import Iterator
 from typing import Annotated, NamedTuple
 
+import numpy as np
 from pydantic import BeforeValidator, PlainValidator, model_validator
 
-from elastocal.elastic.springs import Spring
+from elastocal.arrays import FloatArray
+from elastocal.elastic.springs import OneAxisSpring, Spring, SpringLoad
 from elastocal.errors import SpringError, UnitError
 from elastocal.records import StrictModel, record
 from elastocal.units import parse_quantity
@@ -34,6 +40,9 @@ class KnownSpring:
     """Expected compliance, a prior; none: nothing is expected."""
     sigma: float | None = None
     """Its standard deviation."""
+    weights: tuple[float, ...] | None = None
+    """Weights over the parameters of the spring of that name that make the compliance; none: it is
+    the parameter of that name."""
 
 
 class _Compliance(NamedTuple):
@@ -72,6 +81,15 @@ def _parse_share(text: object) -> float:
     return share
 
 
+def _parse_torque(text: object) -> float:
+    """Return a torque above 0 in N·m."""
+    value = parse_quantity(text, "moment")
+    if not value > 0.0:
+        raise ValueError(f"{text!r} must be above 0")
+    return value
+
+
+_Torque = Annotated[float, BeforeValidator(_parse_torque)]
 _Written = Annotated[_Compliance, PlainValidator(_parse_compliance)]
 
 
@@ -83,12 +101,28 @@ class Knowledge(StrictModel):
     stiffness: _Written | None = None
     """Expected, of a data sheet."""
     uncertainty: Annotated[float, BeforeValidator(_parse_share)] | None = None
-    """Standard deviation of that, as a percentage."""
+    """Standard deviation of that, or of each of the next three, as a percentage."""
+    K1: _Written | None = None
+    """Of a gear up to ``T1``; without torque where that is not given."""
+    K2: _Written | None = None
+    """From ``T1`` to ``T2``."""
+    K3: _Written | None = None
+    """Beyond ``T2``."""
+    T1: _Torque | None = None
+    T2: _Torque | None = None
 
     @model_validator(mode="after")
     def _require_pairs(self) -> "Knowledge":
-        if (self.stiffness is None) != (self.uncertainty is None):
-            raise ValueError("stiffness and uncertainty come together or not at all")
+        stated = any(each is not None for each in (self.stiffness, self.K1, self.K2, self.K3))
+        if stated != (self.uncertainty is not None):
+            name = "stiffness" if self.stiffness is not None or not stated else "K1, K2, K3"
+            raise ValueError(f"{name} and uncertainty come together or not at all")
+        missing = {"K2": self.T1 is None or self.T2 is None, "K3": self.T2 is None}
+        for name, torques in (("K2", "T1 and T2"), ("K3", "T2")):
+            if getattr(self, name) is not None and missing[name]:
+                raise ValueError(f"{name} holds between torques: it needs {torques}")
+        if self.T1 is not None and self.T2 is not None and not self.T1 < self.T2:
+            raise ValueError("T1 must be below T2")
         if self.bounds is not None and self.bounds[0].value == self.bounds[1].value:
             raise ValueError("bounds must be two different values")
         return self
@@ -96,16 +130,21 @@ class Knowledge(StrictModel):
     @property
     def knows(self) -> bool:
         """Whether anything is known."""
-        return self.bounds is not None or self.stiffness is not None
+        stated = (self.bounds, self.stiffness, self.K1, self.K2, self.K3)
+        return any(each is not None for each in stated)
 
-    def of_spring(self, spring: Spring) -> KnownSpring:
-        """Return what is known of a spring.
+    def of_spring(self, spring: Spring) -> tuple[KnownSpring, ...]:
+        """Return what is known of a spring; of a gear, one for each stiffness of its data sheet.
 
         Raises
         ------
         SpringError
-            If the spring has several parameters, or turns where the values are of one that slides.
+            If the spring has several parameters and is no gear, or turns where the values are of
+            one that slides.
         """
+        gear = tuple(self._of_gear(spring))
+        if gear and self.bounds is None and self.stiffness is None:
+            return gear
         if len(spring.parameters) != 1:
             raise SpringError(
                 f"spring {spring.name!r} ({spring.kind}) has {len(spring.parameters)} numbers:"
@@ -122,4 +161,34 @@ class Knowledge(StrictModel):
         low, high = (None, None) if self.bounds is None else sorted(b.value for b in self.bounds)
         mean = None if self.stiffness is None else self.stiffness.value
         sigma = None if mean is None or self.uncertainty is None else mean * self.uncertainty
-        return KnownSpring(parameter.name, low, high, mean, sigma)
+        return (KnownSpring(parameter.name, low, high, mean, sigma),)
+
+    def _of_gear(self, spring: Spring) -> Iterator[KnownSpring]:
+        """Yield what a data sheet says: the mean compliance between two torques, or at none."""
+        beyond = 0.0 if self.T2 is None else 2.0 * self.T2
+        ways = ((self.K1, 0.0, self.T1), (self.K2, self.T1, self.T2), (self.K3, self.T2, beyond))
+        for stiffness, low, high in ways:
+            if stiffness is None or self.uncertainty is None:
+                continue
+            if not (isinstance(spring, OneAxisSpring) and spring.bears_weight):
+                raise SpringError(
+                    f"spring {spring.name!r} ({spring.kind}) is no gear: K1, K2 and K3 are what"
+                    " makers state of one"
+                )
+            if not stiffness.revolute:
+                raise SpringError(f"spring {spring.name!r} turns: K1, K2 and K3 are in N*m/rad")
+            weights = _mean_compliance(spring, low or 0.0, high or 0.0)
+            yield KnownSpring(
+                spring.name,
+                compliance=stiffness.value,
+                sigma=stiffness.value * self.uncertainty,
+                weights=tuple(weights.tolist()),
+            )
+
+
+def _mean_compliance(spring: Spring, low: float, high: float) -> FloatArray:
+    """Return the weights over a spring's parameters of its mean compliance between two torques."""
+    if high > low:
+        between = SpringLoad((np.array(high - low),), (np.array(low),))
+        return np.array(spring.angles(between)[0], dtype=float) / (high - low)
+    return np.array(spring.tangents(SpringLoad((np.array(0.0),)))[0][0], dtype=float)

@@ -11,6 +11,7 @@ changelog and an entry in ``tests/contracts/test_layouts.py``. A spring file::
       - {joint: joint_a6, axis: z, kind: prismatic, offset: ["0 mm", "0 mm", "150 mm"]}
       - {joint: joint_a2, stiffness: "1.2 MN*m/rad", uncertainty: "20 %"}   # of a data sheet
       - {joint: joint_a1, bounds: ["0.5 MN*m/rad", "5 MN*m/rad"]}
+      - {joint: joint_a4, kind: gear, K1: "0.3 MN*m/rad", uncertainty: "30 %"}
 """
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -213,7 +214,12 @@ def known_springs(robot: Robot, name: str) -> tuple[KnownSpring, ...]:
     if Path(name).suffix not in (".yaml", ".yml"):
         return ()
     pairs = _springs_of(robot, read_springs(Path(name)))
-    return tuple(entry.of_spring(spring) for spring, entry in pairs if entry and entry.knows)
+    return tuple(
+        known
+        for spring, entry in pairs
+        if entry and entry.knows
+        for known in entry.of_spring(spring)
+    )
 
 
 def _springs_of(robot: Robot, file: "SpringFile") -> list[tuple[Spring, "SpringEntry | None"]]:

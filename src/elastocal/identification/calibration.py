@@ -207,6 +207,11 @@ def _data_warnings(
         f"poses {', '.join(map(str, group))} are one configuration: resampled and left out together"
         for group in same_configuration(readings, problem.block)
     ]
+    if gap := model.robot.chain.weight_gap:
+        warnings.append(
+            f"robot {model.robot.name}: {gap}: the arm's own weight bends it otherwise at the"
+            " reference than under load, and here that passes as deflection"
+        )
     try:
         left = check_conventions(model, readings, marker_offset, options.free_frame)
     except ConventionError as error:
@@ -286,18 +291,22 @@ def with_knowledge(
     if not known:
         return options
     names = list(model.parameter_names)
-    unknown = [each.name for each in known if each.name not in names]
-    if unknown:
-        raise IdentificationError(f"the model has no spring {unknown[0]!r} to know anything of")
     natural = [parameter.lower for parameter in model.parameters]
     lower, upper = (np.array(each) for each in bounds(options, len(names), natural))
-    mean, sigma = np.zeros(len(names)), np.full(len(names), np.inf)
-    for each in known:
-        index = names.index(each.name)
-        lower[index] = lower[index] if each.low is None else max(lower[index], each.low)
-        upper[index] = upper[index] if each.high is None else min(upper[index], each.high)
+    rows, mean, sigma = (
+        np.zeros((len(known), len(names))),
+        np.zeros(len(known)),
+        np.ones(len(known)),
+    )
+    sigma *= np.inf
+    for number, each in enumerate(known):
+        columns = _columns_of(each, model)
+        rows[number, columns] = 1.0 if each.weights is None else each.weights
+        if each.weights is None:
+            lower[columns] = np.maximum(lower[columns], -np.inf if each.low is None else each.low)
+            upper[columns] = np.minimum(upper[columns], np.inf if each.high is None else each.high)
         if each.compliance is not None and each.sigma is not None:
-            mean[index], sigma[index] = each.compliance, each.sigma
+            mean[number], sigma[number] = each.compliance, each.sigma
     bounded = replace(options, lower=lower, upper=upper, prior=None)
     if not np.isfinite(sigma).any():
         return bounded
@@ -306,4 +315,15 @@ def with_knowledge(
     # Readings without any noise leave a prior no part, but not none at all.
     smallest = np.finfo(float).eps * float(np.abs(problem.d).max())
     noise = max(float(np.median(residual)) / MEDIAN_NORM, smallest)
-    return replace(bounded, prior=Prior(mean, sigma, noise))
+    return replace(bounded, prior=Prior(mean, sigma, noise, rows))
+
+
+def _columns_of(known: KnownSpring, model: ElasticModel) -> list[int]:
+    """Return the parameters that something is known of: all of a gear, or the one of that name."""
+    names = list(model.parameter_names)
+    if known.weights is None and known.name in names:
+        return [names.index(known.name)]
+    springs = {spring.name: spring for spring in model.springs}
+    if known.weights is None or known.name not in springs:
+        raise IdentificationError(f"the model has no spring {known.name!r} to know anything of")
+    return [names.index(parameter.name) for parameter in springs[known.name].parameters]

@@ -30,7 +30,7 @@ _FREE_FRAMES: tuple[FreeFrame, ...] = get_args(FreeFrame)
 class Prior:
     """Knowledge of the compliances before the data, e.g. from last year's calibration.
 
-    Adds the rows ``noise / sigma * (c - mean)`` to the least-squares system.
+    Adds the rows ``noise / sigma * (rows c - mean)`` to the least-squares system.
     """
 
     mean: ArrayLike
@@ -40,6 +40,8 @@ class Prior:
     noise: float
     """Standard deviation of one component of a deflection that the prior is weighed against,
     in m."""
+    rows: ArrayLike | None = None
+    """Sums of compliances that mean and sigma are of, shape (sum, spring); none: each alone."""
 
 
 @brief_repr

@@ -281,12 +281,13 @@ def _prior_rows(prior: Prior | None, springs: int) -> FloatArray:
     if prior is None:
         return np.zeros((0, springs + 1))
     mean, sigma = np.asarray(prior.mean, dtype=float), np.asarray(prior.sigma, dtype=float)
-    if mean.shape != (springs,) or sigma.shape != (springs,):
+    rows = np.eye(springs) if prior.rows is None else np.asarray(prior.rows, dtype=float)
+    if mean.shape != sigma.shape or mean.ndim != 1 or rows.shape != (mean.size, springs):
         raise IdentificationError(f"prior must have one mean and sigma for {springs} parameters")
     if not (np.all(np.isfinite(mean)) and np.all(sigma > 0.0) and 0.0 < prior.noise < np.inf):
         raise IdentificationError("prior needs finite means, and sigmas and noise above 0")
     gain = prior.noise / sigma
-    return np.column_stack([np.diag(gain), gain * mean])
+    return np.column_stack([gain[:, None] * rows, gain * mean])
 
 
 def pose_blocks(readings: Readings) -> IndexArray:

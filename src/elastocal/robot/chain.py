@@ -55,6 +55,17 @@ class SerialChain:
     def __repr__(self) -> str:
         return f"{len(self.joints)} joints from {self.base!r} to {self.tip!r}"
 
+    @property
+    def weight_gap(self) -> str:
+        """Why the arm's own weight is not known, in words; empty where it is.
+
+        The last joint carries the tool, whose mass says nothing of the arm.
+        """
+        *arm, last = (joint.mass > 0.0 for joint in self.joints)
+        if any(arm):
+            return ""
+        return "only what the last joint carries has a mass" if last else "no link has a mass"
+
 
 @brief_repr
 @dataclass(frozen=True)

@@ -40,6 +40,10 @@ _NOT_COVERED = (
     "the calibration saw fewer combinations of springs than a force can load: predictions away from"
     " its poses are not covered by the intervals"
 )
+_TOOL_ALONE = (
+    "{gap}: gears were calibrated as if the arm weighed nothing, and the new tool's mass now"
+    " preloads them alone"
+)
 _TOOL_LOADS = (
     "forces at this tool load what the calibration did not see: {names}; its share is missing from"
     " predictions and their intervals"
@@ -147,7 +151,10 @@ def coverage_notes(calibrated: CalibratedModel) -> tuple[str, ...]:
     if calibrated.tool is not None:
         unseen = unseen_groups(calibrated.model, calibrated.observability)
         names = ", ".join(map(describe, unseen))
-        return (_TOOL_LOADS.format(names=names),) if unseen else ()
+        notes = (_TOOL_LOADS.format(names=names),) if unseen else ()
+        gap = calibrated.model.robot.chain.weight_gap
+        alone = calibrated.tool.mass is not None and calibrated.model.bears_weight and gap
+        return (*notes, _TOOL_ALONE.format(gap=gap)) if alone else notes
     covered = calibrated.observability.rank >= attainable_rank(calibrated.model)
     return () if covered else (_NOT_COVERED,)
 

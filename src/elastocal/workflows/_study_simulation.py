@@ -58,7 +58,7 @@ class StudySimulation:
         found: dict[int, ConditionResult] = {}
         for spread in dict.fromkeys(each.truth for each in self.conditions):
             arm = self.truth.stiffened(np.exp(spread * stiffness), float(np.exp(spread * balancer)))
-            verification = self._verification(arm)
+            verification = self._verification(arm, 2 * sample.number + 1)
             for cases in dict.fromkeys(each.load_cases for each in self.conditions):
                 numbers = [
                     number
@@ -85,7 +85,7 @@ class StudySimulation:
         poses = np.unique(np.concatenate(chosen))
         cases = training_cases(self.conditions[numbers[0]].load_cases, self.load_cases)
         loads = np.array([self.load_cases.index(case) for case in cases])
-        settled = arm.settle(self.places(poses), self.force_tcp[loads])
+        settled = arm.settle(self.places(poses), self.force_tcp[loads], seed=2 * sample.number)
         own = draws.take(poses, loads)
         found = {}
         for number, order in zip(numbers, chosen, strict=True):
@@ -110,8 +110,8 @@ class StudySimulation:
         # Each sample may have other springs, so there is no table of their compliances.
         return replace(found, compliance=np.zeros(0))
 
-    def _verification(self, arm: CampaignSimulator) -> studies.Verification:
-        settled = arm.settle(self.places(self.pool.verification), self.force_tcp)
+    def _verification(self, arm: CampaignSimulator, seed: int) -> studies.Verification:
+        settled = arm.settle(self.places(self.pool.verification), self.force_tcp, seed=seed)
         flat = (settled.q, settled.force, settled.deflection)
         return studies.Verification(*(array.reshape(-1, array.shape[-1]) for array in flat))
 

@@ -105,7 +105,7 @@ class _Effect:
     prompt: bool = False
     """No delay of filters and controller."""
     supple: bool = False
-    """No backlash and hysteresis of the gears."""
+    """No backlash, lost motion and hysteresis of the gears and the balancer's seals."""
     exact: bool = False
     """The deflection is known, though as late as the filters and the controller make it."""
 
@@ -114,12 +114,15 @@ class _Effect:
         simulation = cell.file.simulation
         update: dict[str, object] = {}
         if self.quiet:
-            silent = {"force_noise": 0.0, "moment_noise": 0.0, "drift": 0.0, "cross_talk": 0.0}
+            quiet = ("force_noise", "moment_noise", "drift", "cross_talk", "hysteresis")
+            silent = dict.fromkeys(quiet, 0.0)
             update["sensor"] = simulation.sensor.model_copy(update=silent)
             update["controller"] = simulation.controller.model_copy(update={"repeatability": 0.0})
         if self.supple:
-            easy = {"backlash": 0.0, "hysteresis": 0.0}
+            easy = {"backlash": 0.0, "hysteresis": 0.0, "lost_motion": None}
             update["gears"] = simulation.gears.model_copy(update=easy)
+            smooth = {"seal_friction": 0.0}
+            update["balancer"] = simulation.balancer.model_copy(update=smooth)
         changed = simulation.model_copy(update=update)
         return replace(cell, file=cell.file.model_copy(update={"simulation": changed}))
 

@@ -2,9 +2,11 @@
 
 import re
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from elastocal.cell import Limits
 from elastocal.identification import CalibrationSummary, describe
@@ -12,7 +14,7 @@ from elastocal.procedure import RunSummary
 from elastocal.records import from_data, to_data
 from elastocal.report.document import SECTIONS
 from elastocal.report.document.sections import PAPER
-from elastocal.report.document.sections.cell import _LIMITS
+from elastocal.report.document.sections.cell import _LIMITS, _tool_file
 from elastocal.verdict import (
     MissingPart,
     codec_findings,
@@ -145,6 +147,23 @@ def test_registration_tool_and_noise_are_those_of_the_summary(parts):
     assert f"{parts.summary.tool.mass_kg.value:.2f}" in text
     assert "No station moved" in text
     assert f"{parts.tool.mass:.2f} kg" in text
+
+
+@pytest.mark.parametrize("turn", [0.0, 2.0])
+def test_the_sensors_turn_is_counted_from_where_the_cell_file_has_it(parts, turn):
+    """A sensor that is mounted half round is not turned."""
+    mounted, more = (
+        Rotation.from_euler("z", angle, degrees=True).as_matrix() for angle in (180.0, turn)
+    )
+    T = np.eye(4)
+    T[:3, :3] = mounted
+    sensor = SimpleNamespace(T_flange_sensor=T)
+    cell = SimpleNamespace(file=SimpleNamespace(sensor=sensor))
+    tool = replace(parts.tool, R_flange_sensor=tuple(map(tuple, (mounted @ more).tolist())))
+    told = _tool_file(tool, cell)
+    assert ("Sensor turned against the cell file's pose of it by", f"{turn:.2f}°") in told.rows
+    ((_, alone),) = [row for row in _tool_file(tool, None).rows if row[0].startswith("Sensor")]
+    assert float(alone.rstrip("°")) > 177.0
 
 
 def test_a_station_that_moved_holds_back_with_advice(parts):

@@ -2,11 +2,11 @@ import numpy as np
 import pytest
 
 from elastocal.sim.arm import (
-    CubicGear,
     DeadLoads,
     Linear,
     LoadedMechanism,
     Screws,
+    StiffeningGear,
 )
 
 STEP = 1e-6
@@ -24,7 +24,7 @@ def mechanism(request):
     loads = DeadLoads(
         rng.standard_normal((4, 3)), np.array([7, 3, 5, 1]), 50 * rng.standard_normal((4, 4, 3))
     )
-    laws = [Linear(200.0), CubicGear(150.0, 0.3), *3 * [Linear(99)]]
+    laws = [Linear(200.0), StiffeningGear(150.0, 0.4, 0.3), *3 * [Linear(99)]]
     return LoadedMechanism(screws, np.array([0, 2, 3, 5, 6]), laws, held, loads)
 
 

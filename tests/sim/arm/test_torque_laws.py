@@ -3,11 +3,11 @@ import pytest
 
 from elastocal.errors import SpringError
 from elastocal.sim.arm import (
-    CubicGear,
     Linear,
+    StiffeningGear,
 )
 
-LAWS = [Linear(2e6), CubicGear(1e6, 2e-3)]
+LAWS = [Linear(2e6), StiffeningGear(1e6, 0.3, 5e-4)]
 ANGLES = np.linspace(-5e-3, 5e-3, 41)
 STEP = 1e-7
 
@@ -35,8 +35,15 @@ class TestEveryTorqueLaw:
         assert np.all(law.evaluate(ANGLES)[2] > 0.0)
 
 
-def test_cubic_gear_has_twice_the_linear_torque_at_its_scale():
-    assert CubicGear(3e5, 1e-3).evaluate(np.array(1e-3))[1] == pytest.approx(2 * 3e5 * 1e-3)
+def test_a_stiffening_gear_goes_from_k1_to_k3():
+    law = StiffeningGear(7e5, 0.3, 5e-4)
+    stiffness = law.evaluate(np.array([0.0, 5e-4, 1.0]))[2]
+    np.testing.assert_allclose(stiffness, [7e5, 8.5e5, 1e6], rtol=1e-6)
+
+
+def test_a_gear_that_stiffens_beyond_all_bounds_is_refused():
+    with pytest.raises(SpringError, match="growth from 0 to below 1"):
+        StiffeningGear(1e6, 1.0, 5e-4)
 
 
 @pytest.mark.parametrize("value", [0.0, -1.0, np.nan, np.inf])

@@ -7,11 +7,11 @@ import pytest
 from elastocal.errors import RobotError, SpringError
 from elastocal.sim.arm import (
     GRAVITY,
-    CubicGear,
     ElasticArm,
     EquilibriumError,
     Linear,
     Linkage,
+    StiffeningGear,
     TruthSpring,
     bearing_truth,
     with_link_bending,
@@ -184,7 +184,7 @@ def test_gravity_sags_the_arm_downwards_by_the_order_of_the_load(linkage, poses)
 
 def test_springs_are_kept_from_base_to_tip(linkage):
     distal = TruthSpring("a2", (1.0, 0.0, 0.0), Linear(1e6), distal=True)
-    proximal = TruthSpring("a2", (0.0, 1.0, 0.0), CubicGear(1e6, 1e-3))
+    proximal = TruthSpring("a2", (0.0, 1.0, 0.0), StiffeningGear(1e6, 0.3, 1e-3))
     first = TruthSpring("a1", (0.0, 0.0, 1.0), Linear(1e6))
     assert ElasticArm(linkage, (distal, proximal, first)).springs == (first, proximal, distal)
 

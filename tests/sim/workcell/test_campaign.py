@@ -123,7 +123,7 @@ def test_cross_talk_is_that_of_the_simulated_sensor():
     cell, seed = example_cell("afp"), 3
     talk = generator(seed, "sensor", "cross-talk").standard_normal((6, 6))
     gain = np.eye(3) + np.einsum("ijkl,kl->ij", CampaignErrors.of(cell).gain, talk)
-    np.testing.assert_allclose(gain, force_gain(cell, seed), atol=1e-12)
+    np.testing.assert_allclose(gain, force_gain(cell, seed).force, atol=1e-12)
 
 
 def test_a_part_of_the_draws_is_drawn_as_in_the_whole():

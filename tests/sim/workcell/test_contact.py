@@ -9,7 +9,7 @@ NORMAL = -R[:, 2]
 
 
 def contact():
-    return Contact(LAW, np.array([1.0, 2.0, 3.0]), R, NORMAL, np.zeros(6))
+    return Contact(LAW, np.array([1.0, 2.0, 3.0]), R, NORMAL, np.zeros(6), np.zeros(4))
 
 
 def moved_tcp(force_tcp):

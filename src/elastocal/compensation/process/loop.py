@@ -4,7 +4,8 @@ The truth costs milliseconds, so it is asked at the rows of the course only (eve
 which the forces change by a few percent) and taken as linear in between; readings, correction and
 deviation go at their own rates. A row is asked with the correction of the row before: the robot
 stands at most 0.1 mm elsewhere, by which its compliance changes less than one part in 10^4. The
-corrector is the online compensator, or one that knows the deflection but is late.
+corrector is the online compensator, or one that knows the deflection but is late. A force may
+react to where the tool is; the truth then is at rest with it at every row, correction included.
 """
 
 from collections import deque
@@ -119,8 +120,10 @@ class TrueCell(Protocol):
     def free_shift(self, q: FloatArray) -> FloatArray:
         """Return the shift of the tool in the air, shape (3,), in m."""
 
-    def press(self, q: FloatArray, force_base: FloatArray) -> LoadedRobot:
-        """Go on to joints and a force on the robot."""
+    def press(
+        self, q: FloatArray, force_base: FloatArray, path_base: FloatArray | None = None
+    ) -> LoadedRobot:
+        """Go on to joints and a force on the robot, programmed for the path in the air (3,)."""
 
     def read(self, since: FloatArray, wrench: FloatArray) -> FloatArray:
         """Return what the sensor says of true wrenches, shape (sample, 6)."""
@@ -225,10 +228,12 @@ def run_course(
     parts = np.arange(1, cycles + 1)[:, None] / cycles
     drives = _Drives(controller)
     into_joints = _into_joints(robot, course.q)
-    before = cell.press(course.q[0], course.force[0])
+    paths = course.T_base_tcp[:, :3, 3] + air
+    before = cell.press(course.q[0], course.force[0], paths[0])
     shifts = []
     for row in range(1, len(course.q)):
-        now = cell.press(course.q[row] + into_joints[row] @ drives.done, course.force[row])
+        q = course.q[row] + into_joints[row] @ drives.done
+        now = cell.press(q, course.force[row], paths[row])
         time, raw = _readings(cell, course, (row, cycles), controller.readings, before, now)
         deflection = _between(before.shift - air[row - 1], now.shift - air[row], parts)
         joints = _between(course.q[row - 1], course.q[row], parts)

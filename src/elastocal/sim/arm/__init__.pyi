@@ -1,6 +1,7 @@
 from .elastic_arm import (
     AXIAL_STIFFNESS as AXIAL_STIFFNESS,
-    GEAR_SCALE as GEAR_SCALE,
+    GEAR_ANGLE as GEAR_ANGLE,
+    GEAR_GROWTH as GEAR_GROWTH,
     GRAVITY as GRAVITY,
     LINK_BENDING as LINK_BENDING,
     TRANSVERSE_RATIO as TRANSVERSE_RATIO,
@@ -14,6 +15,7 @@ from .gears import (
     BalancerSpring as BalancerSpring,
     GearLaws as GearLaws,
     RobotSprings as RobotSprings,
+    StiffeningGear as StiffeningGear,
 )
 from .linkage import (
     InverseResult as InverseResult,
@@ -39,7 +41,6 @@ from .measurement import (
     press_poses as press_poses,
 )
 from .springs import (
-    CubicGear as CubicGear,
     Linear as Linear,
     SpringChain as SpringChain,
     SpringResponse as SpringResponse,
@@ -57,5 +58,6 @@ from .statics import (
     EnergyState as EnergyState,
     EquilibriumError as EquilibriumError,
     LoadedMechanism as LoadedMechanism,
+    Reaction as Reaction,
     SpringBank as SpringBank,
 )

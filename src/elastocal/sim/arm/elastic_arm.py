@@ -15,9 +15,9 @@ from numpy.typing import ArrayLike
 
 from elastocal.arrays import FloatArray
 from elastocal.errors import RobotError, SpringError
+from elastocal.sim.arm.gears import StiffeningGear
 from elastocal.sim.arm.linkage import Linkage
 from elastocal.sim.arm.springs import (
-    CubicGear,
     Linear,
     SpringChain,
     TruthSpring,
@@ -48,9 +48,12 @@ crossed-roller bearings, which are stiffer than gears, but not so stiff as to be
 LINK_BENDING = 9.0e6
 """Bending stiffness of an arm-sized link hinged at its middle, in N·m/rad. An assumption: that
 is ``E I / length`` of a 1.15 m iron box of 0.25 m with 10 mm walls (1.1e11 Pa, 9.2e-5 m⁴)."""
-GEAR_SCALE = 2.0e-3
-"""Angle in rad at which a stiffening gear has twice the torque of a linear one. An assumption:
-2 kN·m on joint 2 (1100 N at 1.8 m, 0.7 mrad) then raise its torque by about a tenth."""
+GEAR_GROWTH = 0.25
+"""1 - K1/K3 of a stiffening gear: between Harmonic Drive's and Nabtesco's catalogues, see
+`elastocal.cell.presets`."""
+GEAR_ANGLE = 5.0e-4
+"""Twist in rad at which half of that is back. An assumption: 2 kN·m on joint 2 (1100 N at 1.8 m,
+0.7 mrad) then need about a tenth less twist."""
 
 
 @dataclass(frozen=True)
@@ -235,7 +238,7 @@ def with_link_bending(
 
 
 def with_stiffening_gears(
-    arm: ElasticArm, scale: float = GEAR_SCALE, joints: Sequence[str] | None = None
+    arm: ElasticArm, growth: float = GEAR_GROWTH, joints: Sequence[str] | None = None
 ) -> ElasticArm:
     """Return the arm with gears that stiffen under load, as soft at rest as the linear ones.
 
@@ -243,8 +246,8 @@ def with_stiffening_gears(
     ----------
     arm : ElasticArm
         The arm; its linear axial springs are replaced.
-    scale : float
-        Angle in rad at which the torque is twice that of the linear spring.
+    growth : float
+        1 - K1/K3: what is missing at rest, over the stiffness at high torque.
     joints : sequence of str, optional
         Names of the joints; all by default.
 
@@ -261,7 +264,7 @@ def with_stiffening_gears(
     for spring in arm.springs:
         gear = spring.joint in joints and _is_axial(arm.linkage, spring)
         if gear and isinstance(spring.law, Linear):
-            spring = replace(spring, law=CubicGear(spring.law.k, scale))
+            spring = replace(spring, law=StiffeningGear(spring.law.k, growth, GEAR_ANGLE))
         springs.append(spring)
     return replace(arm, springs=tuple(springs))
 

@@ -15,6 +15,19 @@ gives way at the travel ``d_i``: the stop operators of Prandtl and Ishlinskii (A
 the sliders ``s_i`` stand, which is the memory; it does not depend on speed. A reversal starts stiff
 and ends ``2 sum kappa_i d_i`` below the torque of the way up; loops close at once (Masing's rule).
 
+*Lost motion* ``w`` is the width of that loop at no torque. Each branch crosses zero where the
+elastic torque ``g`` is the friction's, so ``sum kappa_i d_i = g(w / 2)`` gives the friction of a
+gear whose lost motion a catalogue states; play is then in it.
+
+*What a free move leaves* is the state of a gear that last moved by a stroke ``v``: strains
+``clip(v, -d_i, d_i)``, held while the free robot comes to rest.
+
+The seals of the balancer's cylinder rub too: one more stop beside the gear of axis 2, whose torque
+is the seals' force times the balancer's lever at that posture.
+
+The estimator has stops on *torque* and a compliance in arc tangents of torque; here stops are on
+*twist*, in parallel with a spring that is not linear, so neither is the inverse of the other.
+
 At given sliders the torque has a potential, so that an equilibrium is a minimum; afterwards the
 sliders are drawn along. That is exact as long as no gear turns back within one step of load.
 """
@@ -26,11 +39,14 @@ import numpy as np
 
 from elastocal.arrays import FloatArray, IndexArray
 from elastocal.cell import Gears
+from elastocal.errors import SpringError
 from elastocal.results import brief_repr
 from elastocal.sim.arm.springs import SpringResponse
 
 _STOPS = 4
 """Number of sliders of a gear's friction."""
+_SEAL_TRAVEL = 20e-6
+"""How far a seal yields before it slides, in m. An assumption."""
 _PLAY_FLOOR = 0.2
 """Stiffness in the middle of the backlash over that at high torque: soft, not free."""
 
@@ -63,6 +79,22 @@ class BalancerSpring:
     """b in m, other than ``anchor``."""
     upright: float
     """Joint angle at which the arm is upright, in rad."""
+    seal_friction: float = 0.0
+    """Friction of the cylinder's seals, in N."""
+
+    def seal_torque(self, angle: FloatArray) -> FloatArray:
+        """Return the friction of the seals about the axis, in N·m.
+
+        Parameters
+        ----------
+        angle : ndarray
+            Angle of the joint in rad.
+        """
+        alpha = angle - self.upright
+        product = self.anchor * self.lever
+        length = np.sqrt(self.anchor**2 + self.lever**2 - 2.0 * product * np.cos(alpha))
+        torque: FloatArray = self.seal_friction * np.abs(product * np.sin(alpha)) / length
+        return torque
 
     def evaluate(self, angle: FloatArray) -> SpringResponse:
         """Return energy in J, torque dE/dalpha in N·m and stiffness d²E/dalpha² in N·m/rad.
@@ -85,6 +117,28 @@ class BalancerSpring:
         )
 
 
+@dataclass(frozen=True)
+class StiffeningGear:
+    """The law of the module without backlash and friction, as a torque law of a single spring."""
+
+    k: float
+    """Stiffness at rest, makers' K1, in N·m/rad."""
+    growth: float
+    """1 - K1/K3: what is missing at rest, over the stiffness at high torque."""
+    angle: float
+    """Twist at which it is half way between the two, in rad."""
+
+    def __post_init__(self) -> None:
+        if not (0.0 < self.k < np.inf and 0.0 <= self.growth < 1.0 and 0.0 < self.angle < np.inf):
+            raise SpringError(f"{self} must have k, angle above 0 and growth from 0 to below 1")
+
+    def evaluate(self, angle: FloatArray) -> SpringResponse:
+        """Return energy, torque and stiffness."""
+        high = self.k / (1.0 - self.growth)
+        energy, torque, stiffness = _softening(angle, np.array(high - self.k), np.array(self.angle))
+        return 0.5 * high * angle**2 - energy, high * angle - torque, high - stiffness
+
+
 @brief_repr
 @dataclass(frozen=True, eq=False)
 class GearLaws:
@@ -97,9 +151,11 @@ class GearLaws:
     angle: FloatArray
     """a: twist at which half of it is back, shape (gear, effect), in rad."""
     stop_stiffness: FloatArray
-    """kappa, shape (gear, stop), in N·m/rad."""
+    """kappa, shape (gear, stop), or (posture, gear, stop) where seals rub, in N·m/rad."""
     stop_travel: FloatArray
     """d, shape (gear, stop), in rad."""
+    residual: float = 0.0
+    """Standard deviation of the last stroke of a free move, in rad."""
 
     @classmethod
     def of(cls, entry: Gears, which: IndexArray, stiffness: FloatArray) -> "GearLaws":
@@ -119,20 +175,58 @@ class GearLaws:
         loss = np.multiply.outer(stiffness, [entry.growth, play])
         angle = np.broadcast_to([entry.growth_angle, play_angle], loss.shape)
         travel = entry.presliding * np.arange(1, _STOPS + 1) / _STOPS
-        friction = entry.hysteresis * entry.reference_angle * stiffness
+        if entry.lost_motion is None:
+            friction = entry.hysteresis * entry.reference_angle * stiffness
+        else:
+            half = 0.5 * np.array(entry.lost_motion)
+            friction = stiffness * half - _softening(half[:, None], loss, angle)[1].sum(axis=1)
         return cls(
             which=which,
             loss=loss,
             angle=angle,
             stop_stiffness=friction[:, None] / (_STOPS * travel),
             stop_travel=np.broadcast_to(travel, (len(which), _STOPS)),
+            residual=entry.residual * entry.presliding,
         )
 
     @property
     def friction(self) -> FloatArray:
         """Torque of all stops of each gear, shape (gear,), in N·m: half the height of its loop."""
-        height: FloatArray = np.sum(self.stop_stiffness * self.stop_travel, axis=1)
+        height: FloatArray = np.sum(self.stop_stiffness * self.stop_travel, axis=-1)
         return height
+
+    def strain(self, stroke: FloatArray) -> FloatArray | None:
+        """Return what a stroke leaves of the friction, shape (..., gear, stop), in rad.
+
+        Parameters
+        ----------
+        stroke : ndarray, shape (..., gear)
+            Last stroke of each gear in standard deviations.
+        """
+        if self.residual == 0.0:
+            return None
+        travel = self.stop_travel
+        return np.clip(self.residual * stroke[..., None], -travel, travel)
+
+    def with_seals(self, lever: float) -> "GearLaws":
+        """Return the laws with one more stop, for the seals beside one of the gears.
+
+        Parameters
+        ----------
+        lever : float
+            Longest lever of the cylinder, in m: seals yield by `_SEAL_TRAVEL` before they slide.
+        """
+        column = np.zeros((len(self.which), 1))
+        travel = np.concatenate([self.stop_travel, column + _SEAL_TRAVEL / lever], axis=1)
+        stiffness = np.concatenate([self.stop_stiffness, column], axis=1)
+        return replace(self, stop_stiffness=stiffness, stop_travel=travel)
+
+    def rubbing(self, gear: int, torque: FloatArray) -> "GearLaws":
+        """Return the laws with the seals' friction, shape () or (posture,), in N·m."""
+        base = self.stop_stiffness
+        stiffness = np.broadcast_to(base, (*torque.shape, *base.shape[-2:])).copy()
+        stiffness[..., gear, -1] = torque / self.stop_travel[gear, -1]
+        return replace(self, stop_stiffness=stiffness)
 
 
 @brief_repr
@@ -151,6 +245,8 @@ class RobotSprings:
     """Which spring the balancer lies beside."""
     joint_angle: FloatArray
     """Angle that the motor of the balanced joint holds, shape () or (posture,), in rad."""
+    strain: FloatArray | None = None
+    """Strains that friction keeps while the robot is free, shape (..., gear, stop), in rad."""
 
     def evaluate(self, theta: FloatArray) -> SpringResponse:
         """Return energy (batch,), torques and stiffnesses (batch, spring); see the module.
@@ -176,6 +272,10 @@ class RobotSprings:
             torque[:, which] += np.sum(law.stop_stiffness * held, axis=2)
             stiffness[:, which] += np.sum(law.stop_stiffness * (held == drawn), axis=2)
             energy += np.sum(law.stop_stiffness * (held * drawn - 0.5 * held**2), axis=(1, 2))
+        elif self.strain is not None:
+            kept = np.sum(law.stop_stiffness * self.strain, axis=-1)
+            torque[:, which] += kept
+            energy += np.sum(kept * theta[:, which], axis=1)
         if self.balancer is not None:
             angle = self.joint_angle + theta[:, self.balanced]
             stored, moment, rate = self.balancer.evaluate(angle)
@@ -186,7 +286,15 @@ class RobotSprings:
 
     def at_joint(self, angle: FloatArray) -> "RobotSprings":
         """Return the springs with the balanced joint's motor elsewhere, in rad."""
-        return replace(self, joint_angle=angle)
+        if self.balancer is None or self.balancer.seal_friction == 0.0:
+            return replace(self, joint_angle=angle)
+        gear = int(np.flatnonzero(self.gears.which == self.balanced)[0])
+        rubbing = self.gears.rubbing(gear, self.balancer.seal_torque(np.asarray(angle)))
+        return replace(self, joint_angle=angle, gears=rubbing)
+
+    def strained(self, strain: FloatArray | None) -> "RobotSprings":
+        """Return the springs of a free robot whose gears keep strains; see `GearLaws.strain`."""
+        return replace(self, slider=None, strain=strain)
 
     def relaxed(self, theta: FloatArray) -> "RobotSprings":
         """Return the springs with every slider drawn to where nothing strains it.
@@ -208,7 +316,10 @@ class RobotSprings:
             Where the springs are now.
         """
         if self.slider is None:
-            return self.relaxed(theta)
+            if self.strain is None:
+                return self.relaxed(theta)
+            slider = theta[..., self.gears.which, None] - self.strain
+            return replace(self, slider=slider, strain=None)
         travel = self.gears.stop_travel
         twist = theta[..., self.gears.which, None]
         return replace(self, slider=twist - np.clip(twist - self.slider, -travel, travel))

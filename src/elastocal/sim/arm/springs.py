@@ -6,7 +6,7 @@ Motors and springs together are one row of screws from base to tip, the spring c
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
@@ -36,47 +36,12 @@ class Linear:
     """Stiffness in N·m/rad, or N/m."""
 
     def __post_init__(self) -> None:
-        _require_positive(self)
+        if not 0.0 < self.k < np.inf:
+            raise SpringError(f"Linear k is {self.k!r}: must be positive and finite")
 
     def evaluate(self, angle: FloatArray) -> SpringResponse:
         """Return energy, torque and stiffness."""
         return 0.5 * self.k * angle**2, self.k * angle, np.full_like(angle, self.k)
-
-
-@dataclass(frozen=True)
-class CubicGear:
-    """A gear that stiffens without end: ``torque = k angle (1 + (angle / scale)²)``.
-
-    Its energy is ``k angle² (1 + (angle / scale)² / 2) / 2``, its stiffness
-    ``k (1 + 3 (angle / scale)²)``.
-
-    A linear plus a cubic term is the stiffness curve with which Tuttle and Seering, "A nonlinear
-    dynamic model of a harmonic drive gear transmission", IEEE Trans. Robotics and Automation 12
-    (1996), describe strain-wave gears: more teeth share the load as it grows.
-    """
-
-    k: float
-    """Stiffness at rest in N·m/rad."""
-    scale: float
-    """Angle in rad at which the torque is twice that of the linear spring."""
-
-    def __post_init__(self) -> None:
-        _require_positive(self)
-
-    def evaluate(self, angle: FloatArray) -> SpringResponse:
-        """Return energy, torque and stiffness."""
-        square = (angle / self.scale) ** 2
-        energy = 0.5 * self.k * angle**2 * (1.0 + 0.5 * square)
-        return energy, self.k * angle * (1.0 + square), self.k * (1.0 + 3.0 * square)
-
-
-def _require_positive(law: Linear | CubicGear) -> None:
-    for parameter in fields(law):
-        value = getattr(law, parameter.name)
-        if not 0.0 < value < np.inf:
-            raise SpringError(
-                f"{type(law).__name__} {parameter.name} is {value!r}: must be positive and finite"
-            )
 
 
 @dataclass(frozen=True)
@@ -184,16 +149,39 @@ def axial_spring(linkage: Linkage, joint: int, stiffness: float) -> TruthSpring:
     return TruthSpring(name, axis, Linear(stiffness), linkage.revolute[joint])
 
 
-def tilt_springs(linkage: Linkage, joint: int, stiffness: FloatArray) -> list[TruthSpring]:
-    """Return the two tilts of a joint's bearing, of stiffness (2,) in N·m/rad.
+def tilt_springs(
+    linkage: Linkage, joint: int, stiffness: FloatArray, turn: float = 0.0, offset: float = 0.0
+) -> list[TruthSpring]:
+    """Return the two tilts of a joint's bearing.
 
     They turn about the coordinate axes orthogonal to the joint's (for a skew axis: the two least
-    aligned with it, made orthonormal to it).
+    aligned with it, made orthonormal to it), or about axes turned against those.
+
+    Parameters
+    ----------
+    linkage : Linkage
+        The rigid arm.
+    joint : int
+        Number of the joint.
+    stiffness : ndarray, shape (2,)
+        In N·m/rad.
+    turn : float
+        How far their axes are turned about the joint's, in rad.
+    offset : float
+        How far along the joint's axis from its origin they sit, in m.
     """
-    name = linkage.joint_names[joint]
+    name, axis = linkage.joint_names[joint], linkage.axis[joint]
+    first, second = _transverse_axes(axis)
+    if turn:
+        c, s = np.cos(turn), np.sin(turn)
+        first, second = (
+            c * first + s * np.cross(axis, first),
+            c * second + s * np.cross(axis, second),
+        )
+    at = as_triple(offset * axis)
     return [
-        TruthSpring(name, as_triple(direction), Linear(float(k)))
-        for direction, k in zip(_transverse_axes(linkage.axis[joint]), stiffness, strict=True)
+        TruthSpring(name, as_triple(direction), Linear(float(k)), at=at)
+        for direction, k in zip((first, second), stiffness, strict=True)
     ]
 
 

@@ -47,11 +47,29 @@ class DeadLoads:
     """Forces that keep their direction in base, however the arm moves."""
 
     point: FloatArray
-    """Points of attack in base with the arm at zero, shape (load, 3), in m."""
+    """Points of attack in base with the arm at zero, shape (load, 3) or (load, batch, 3), in m."""
     after: NDArray[np.intp]
     """Number of elements in front of the body that each acts on, shape (load,)."""
     force: FloatArray
     """Shape (batch, load, 3), in N."""
+
+
+@brief_repr
+@dataclass(frozen=True)
+class Reaction:
+    """A spring between the first load's point of attack and the surroundings."""
+
+    normal: FloatArray
+    """Direction in which it acts, in base, shape (batch, 3)."""
+    stiffness: float
+    """In N/m."""
+    reference: FloatArray
+    """Where it is relaxed, in base, shape (batch, 3), in m."""
+
+    def shift(self, point: FloatArray) -> FloatArray:
+        """Return how far a point (batch, 3) is beyond the reference, shape (batch, 1), in m."""
+        beyond: FloatArray = np.sum(self.normal * (point - self.reference), axis=1, keepdims=True)
+        return beyond
 
 
 @brief_repr
@@ -96,6 +114,8 @@ class LoadedMechanism:
     held: FloatArray
     """Positions of all elements, 0 for the springs, shape (batch, element), in rad or m."""
     loads: DeadLoads
+    reaction: Reaction | None = None
+    """Pushes back on the first load where there is one."""
 
     def motions(self, theta: FloatArray) -> FloatArray:
         """Return the motions in front of each element and of the tip; see `screws.motions`."""
@@ -105,8 +125,9 @@ class LoadedMechanism:
 
     def load_points(self, total: FloatArray) -> FloatArray:
         """Return where the points of attack are now, shape (load, batch, 3), in m."""
-        here = total[self.loads.after]
-        turned = (here[..., :3, :3] @ self.loads.point[:, None, :, None])[..., 0]
+        here, point = total[self.loads.after], self.loads.point
+        point = point[:, None] if point.ndim == 2 else point
+        turned = (here[..., :3, :3] @ point[..., None])[..., 0]
         return turned + here[..., :3, 3]
 
     def evaluate(self, theta: FloatArray, rest_points: FloatArray) -> EnergyState:
@@ -123,7 +144,13 @@ class LoadedMechanism:
         total = self.motions(theta)
         points = self.load_points(total)
         phi, torque, stiffness = _evaluate_laws(self.laws, theta)
-        work = np.einsum("kbx,bkx->b", points - rest_points, self.loads.force)
+        loads = self.loads.force
+        work = np.einsum("kbx,bkx->b", points - rest_points, loads)
+        if self.reaction is not None:
+            push = -self.reaction.stiffness * self.reaction.shift(points[0])
+            work += 0.5 * np.sum(push * self.reaction.shift(points[0]), axis=1)
+            loads = loads.copy()
+            loads[:, 0] += push * self.reaction.normal
         axis, point = moved_axes(
             Screws(
                 self.screws.axis[self.springs],
@@ -132,13 +159,17 @@ class LoadedMechanism:
             ),
             total[self.springs],
         )
-        virial, force = self._carried(points)
+        virial, force = self._carried(points, loads)
         virial -= point[..., :, None] * force[..., None, :]
         turns = self.screws.revolute[self.springs]
         load_torque = _load_torque(axis, virial, force, turns)
         hessian = _load_stiffness(axis, virial, force, turns)
         diagonal = np.arange(len(self.springs))
         hessian[:, diagonal, diagonal] += stiffness
+        if self.reaction is not None:
+            slide = np.where(turns[:, None, None], np.cross(axis, points[0] - point), axis)
+            along = np.sum(slide * self.reaction.normal, axis=-1).T
+            hessian += self.reaction.stiffness * along[:, :, None] * along[:, None]
         return EnergyState(phi - work, torque - load_torque, hessian, stiffness)
 
     def rest(
@@ -164,9 +195,9 @@ class LoadedMechanism:
         scale = np.sum(np.linalg.norm(self.loads.force, axis=-1) * (1.0 + reach), axis=1)
         return _minimise(lambda theta: self.evaluate(theta, rest_points), start, balance * scale)
 
-    def _carried(self, points: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def _carried(self, points: FloatArray, loads: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return sum p F^T and sum F over the loads behind each spring, spring axis first."""
-        force = self.loads.force.transpose(1, 0, 2)
+        force = loads.transpose(1, 0, 2)
         behind = (self.loads.after[None, :] > self.springs[:, None]).astype(float)
         moments = points[..., :, None] * force[..., None, :]
         return np.tensordot(behind, moments, 1), np.tensordot(behind, force, 1)

@@ -1,11 +1,13 @@
 from ._timeline import SimClock as SimClock
 from .campaign import (
-    CampaignErrors as CampaignErrors,
     CampaignSimulator as CampaignSimulator,
     ContactPoses as ContactPoses,
+    TrueReadings as TrueReadings,
+)
+from .campaign_errors import (
+    CampaignErrors as CampaignErrors,
     ErrorDraws as ErrorDraws,
     ErrorScales as ErrorScales,
-    TrueReadings as TrueReadings,
 )
 from .cell import (
     ProcessCell as ProcessCell,

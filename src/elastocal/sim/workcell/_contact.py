@@ -12,6 +12,11 @@ elastic bodies in contact", J. Appl. Mech. 16, 1949; K. L. Johnson, "Contact Mec
 which starts as ``f_l / k_s`` and ends in full sliding at Coulomb's limit ``f_l = mu f_n``. It is
 taken without its own hysteresis. The ring does not slip the same way twice: a random part of the
 slip grows towards the limit.
+
+The force attacks the disk beside its middle. A disk of radius R that is tilted by ``a`` on the
+tooling is pressed unevenly, with the moment ``k_n R² a / 4`` of an elastic bed (Johnson, chapter
+4), so that the force moves by that over ``f_n``, at most to half the radius; and it wanders a
+little from load case to load case.
 """
 
 from dataclasses import dataclass, replace
@@ -44,6 +49,12 @@ class ContactLaw:
     """mu."""
     micro_slip: float
     """Standard deviation of the random slip along each axis at half the limit, in m."""
+    radius: float = 0.0
+    """R in m."""
+    tilt: float = 0.0
+    """Standard deviation of a along each axis, in rad."""
+    wander: float = 0.0
+    """Standard deviation of the point of attack along each axis, in m."""
 
     @classmethod
     def of(cls, cell: Cell) -> "ContactLaw":
@@ -56,7 +67,31 @@ class ContactLaw:
             entry.tooling_stiffness,
             cell.file.load_cases.friction if friction is None else friction,
             entry.micro_slip,
+            cell.file.engagement.disk_radius,
+            entry.tilt,
+            entry.wander,
         )
+
+    def attack(self, force_tcp: FloatArray, chance: FloatArray) -> FloatArray | None:
+        """Return where forces act, from the disk's middle, tcp frame, (..., 3) in m; None: there.
+
+        Parameters
+        ----------
+        force_tcp : ndarray, shape (..., 3)
+            On the robot, in the tcp frame, in N.
+        chance : ndarray, shape (..., 4)
+            Tilt and wander in standard deviations; see `VisitChance.load`.
+        """
+        if self.tilt == 0.0 and self.wander == 0.0:
+            return None
+        pressed = np.maximum(np.abs(force_tcp[..., 2:]), 1e-9)
+        uneven = (
+            0.25 * self.normal_stiffness * self.radius**2 * self.tilt * chance[..., :2] / pressed
+        )
+        beside = uneven + self.wander * chance[..., 2:]
+        size = np.linalg.norm(beside, axis=-1, keepdims=True)
+        beside = beside * np.minimum(1.0, 0.5 * self.radius / np.maximum(size, 1e-12))
+        return np.concatenate([beside, np.zeros_like(beside[..., :1])], axis=-1)
 
     def effort(self, force_tcp: FloatArray) -> float:
         """Return the lateral force over the friction limit; above 1 the contact slides.
@@ -106,6 +141,12 @@ class Contact:
     """Outward normal of the tooling in base, shape (3,)."""
     q_touch: FloatArray
     """Joints at which the tool touches without force, shape (joint,), in rad or m."""
+    chance: FloatArray
+    """Tilt and wander of the load case, shape (4,); see `ContactLaw.attack`."""
+
+    def attack(self, force_base: FloatArray) -> FloatArray | None:
+        """Return where a force in base acts on the tool, tcp frame, shape (3,), in m."""
+        return self.law.attack(self.R_base_tcp.T @ force_base, self.chance)
 
     def tool_position(self, force_base: FloatArray) -> FloatArray:
         """Return where the tool is under a force on the robot, in base, shape (3,), in m."""

@@ -2,10 +2,10 @@
 
 The sensor (see `elastocal.cell.devices.ForceSensor`) shows
 
-    reading = (1 + X) wrench + zero + drift t + noise
+    reading = (1 + X) wrench + lag + zero + drift t + noise
 
 with the wrench of contact and tool weight in the sensor's frame, and cross-talk ``X`` over the
-ranges of the axes, itself too (gain). The drift counts from the last restart.
+ranges of the axes, itself too (gain). Drift and hysteresis (lag) count from the last restart.
 
 Each tracker station (see `elastocal.cell.devices.Metrology`) stands near where the cell file puts
 it, turned as it happens to be; that turn is what the registration of a run has to find. Noise grows
@@ -23,6 +23,7 @@ from scipy.spatial.transform import Rotation
 from elastocal.arrays import FloatArray, IndexArray
 from elastocal.cell import BeamState, Cell, PointBlock, SensorStatus, WrenchBlock
 from elastocal.errors import DeviceError, nearest
+from elastocal.sim.workcell._imperfections import ForceGain, SensorHysteresis
 from elastocal.sim.workcell._plant import Plant
 from elastocal.sim.workcell._timeline import MICROSECONDS, Segment, generator
 
@@ -146,6 +147,8 @@ class SimulatedForceSensor(_SimulatedInstrument):
         self._entry, self.range = entry, sensor_range(cell)
         self.matrix, self.zero = sensor_matrix(cell, plant.seed), sensor_zero(cell, plant.seed)
         self.sigma = np.repeat([entry.force_noise, entry.moment_noise], 3)
+        share = entry.hysteresis
+        self._hysteresis = SensorHysteresis(share, self.range) if share > 0.0 else None
         self._still: tuple[Segment, FloatArray] | None = None
         self._last = np.zeros(6)
         self._saturated = False
@@ -179,6 +182,9 @@ class SimulatedForceSensor(_SimulatedInstrument):
     def restart(self, now: int, key: str) -> None:
         """Begin to count samples, with the noise and drift that belong to a key."""
         super().restart(now, key)
+        self._still = None
+        if self._hysteresis is not None:
+            self._hysteresis.relax()
         self._slope = self.slope(generator(self._plant.seed, "drift", key))
 
     def _measure(self, times: IndexArray, noise: FloatArray) -> tuple[IndexArray, FloatArray]:
@@ -198,7 +204,10 @@ class SimulatedForceSensor(_SimulatedInstrument):
         if self._still is not None and self._still[0] is segment:
             reading = self._still[1]
         else:
-            reading = segment.seen(times)[:, 3:] @ self.matrix.T + self.zero
+            wrench = segment.seen(times)[:, 3:]
+            reading = wrench @ self.matrix.T + self.zero
+            if self._hysteresis is not None:
+                reading += self._hysteresis.lag(wrench)
             if times[0] >= segment.end:
                 self._still = (segment, reading)
         unrest = segment.unrest(times)
@@ -346,12 +355,12 @@ def sensor_matrix(cell: Cell, seed: int) -> FloatArray:
     return np.eye(6) + talk * np.divide.outer(scale, scale)
 
 
-def force_gain(cell: Cell, seed: int) -> FloatArray:
-    """Return the force that the sensor reads per force at the tool, sensor frame, (3, 3)."""
+def force_gain(cell: Cell, seed: int) -> ForceGain:
+    """Return what the sensor's force axes read."""
     matrix, T_sensor_tcp = sensor_matrix(cell, seed), cell.T_sensor_tcp
     assert T_sensor_tcp is not None
     moment = np.cross(T_sensor_tcp[:3, 3], np.eye(3)).T
-    return matrix[:3, :3] + matrix[:3, 3:] @ moment
+    return ForceGain(matrix[:3, :3] + matrix[:3, 3:] @ moment, matrix[:3, 3:])
 
 
 def _station(seed: int, name: str, position: FloatArray, placing: float) -> FloatArray:

@@ -16,6 +16,7 @@ from elastocal.arrays import FloatArray
 from elastocal.cell import Fault, Motion
 from elastocal.errors import DeviceError
 from elastocal.sim.workcell._contact import Contact
+from elastocal.sim.workcell._imperfections import ForceGain
 from elastocal.sim.workcell._plant import Plant
 from elastocal.sim.workcell._quasistatics import Quasistatics
 from elastocal.sim.workcell._timeline import (
@@ -44,8 +45,8 @@ def joint_path(statics: Quasistatics, start: RobotState, end: RobotState) -> Rob
     """Return the straight path in joint space; the small deviations change evenly."""
     progress = np.linspace(0.0, 1.0, _STEPS + 1)
     q = _between(start.q, end.q, progress)
-    twist = _between(start.twist, end.twist, progress)
-    return RobotPath(statics.knots(progress, q, twist, np.zeros((len(q), 3))), start, end)
+    twist, none = _between(start.twist, end.twist, progress), np.zeros((len(q), 3))
+    return RobotPath(statics.knots(progress, q, twist, none, none), start, end)
 
 
 def straight_path(statics: Quasistatics, states: list[RobotState]) -> RobotPath:
@@ -63,14 +64,13 @@ def straight_path(statics: Quasistatics, states: list[RobotState]) -> RobotPath:
     at = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(T[:, :3, 3], axis=0), axis=1))])
     at = at / at[-1] if at[-1] > 0.0 else np.linspace(0.0, 1.0, len(states))
     fine = np.unique(np.concatenate([at, np.linspace(0.0, 1.0, _STEPS + 1)]))
-    columns = (
-        np.stack([getattr(state, name) for state in states]) for name in ("twist", "force", "q")
-    )
-    twist, force, coarse = (_interpolated(at, column, fine) for column in columns)
+    names = ("twist", "force", "moment", "q")
+    columns = (np.stack([getattr(state, name) for state in states]) for name in names)
+    twist, force, moment, coarse = (_interpolated(at, column, fine) for column in columns)
     points = _interpolated(at, T[:, :3, 3], fine)
     q = statics.along(states[0].q, T[0, :3, :3], points[1:-1])
     q = np.concatenate([coarse[:1], q, coarse[-1:]])
-    return RobotPath(statics.knots(fine, q, twist, force), states[0], states[-1])
+    return RobotPath(statics.knots(fine, q, twist, force, moment), states[0], states[-1])
 
 
 @dataclass(frozen=True, eq=False)
@@ -165,7 +165,8 @@ def retract_path(
     if fades > distance:
         left = (1.0 - distance / fades) * start.force
         q = _moved(plant, start, distance * direction, error).q
-        return straight_path(statics, [start, statics.loaded(start, q, left, error)]), contact
+        end = statics.loaded(start, q, left, error, contact.attack(left) if contact else None)
+        return straight_path(statics, [start, end]), contact
     states = [start]
     if fades > 0.0:
         states.append(_moved(plant, start, fades * direction, error))
@@ -202,7 +203,8 @@ def pressed_state(
     q, reached = start.q, start
     for _ in range(_ROUNDS):
         wanted = force(statics.R_base_sensor(q, reached.twist))
-        reached = statics.loaded(replace(start, theta=reached.theta), q, wanted, stop_error)
+        before, attack = replace(start, theta=reached.theta), contact.attack(wanted)
+        reached = statics.loaded(before, q, wanted, stop_error, attack)
         goal = contact.tool_position(wanted)
         if np.linalg.norm(goal - statics.tool_position(reached)) < CLOSED:
             break
@@ -253,8 +255,8 @@ def _touch(
     touch = touching_state(statics, start, point, error)
     if _advance(plant, start, touch, direction) > distance:
         return None
-    R = statics.robot.forward(start.q)[:3, :3]
-    return Contact(plant.contact_law, point, R, hit.normal, touch.q), touch
+    place = (point, statics.robot.forward(start.q)[:3, :3], hit.normal, touch.q)
+    return Contact(plant.contact_law, *place, plant.chance.load(0)), touch
 
 
 def _moved(plant: Plant, start: RobotState, shift: FloatArray, error: FloatArray) -> RobotState:
@@ -291,8 +293,8 @@ _NEVER_AT_REST = (0.9, 1.7)
 class ForceControl:
     """The controller in force control."""
 
-    def __init__(self, plant: Plant, gain: FloatArray) -> None:
-        """Control with a sensor that reads ``gain`` per force at the tool, its frame, (3, 3)."""
+    def __init__(self, plant: Plant, gain: ForceGain) -> None:
+        """Control with a sensor of such a gain; its hysteresis is not looked at."""
         self._plant, self._gain = plant, gain
         self.load = -1
         self._wanted: FloatArray = np.zeros(3)
@@ -343,7 +345,7 @@ class ForceControl:
         plant, contact = self._plant, self._plant.contact
         assert contact is not None
         start = plant.robot_state()
-        contact = contact.slipped(slip)
+        contact = replace(contact.slipped(slip), chance=plant.chance.load(self.load))
         end = self._equilibrium(start, contact)
         plant.contact = contact
         ramp = max(float(np.linalg.norm(end.force - start.force)) / self._rate, least)
@@ -370,9 +372,11 @@ class ForceControl:
     def _equilibrium(self, start: RobotState, contact: Contact) -> RobotState:
         """Return the robot where the sensor reads the wanted force."""
         plant, statics = self._plant, self._plant.statics
-        wanted_sensor = statics.robot.T_tcp_sensor[:3, :3].T @ self._wanted
+        R_sensor_tcp = statics.robot.T_tcp_sensor[:3, :3].T
+        lever = statics.lever(contact.law.attack(self._wanted, contact.chance))
         # The sensor turns with the arm, so that it sees another part of the weight than before.
-        felt = np.linalg.solve(self._gain, wanted_sensor) + self._R_zeroed.T @ statics.weight
+        felt = np.linalg.solve(self._gain.beside(R_sensor_tcp @ lever), R_sensor_tcp @ self._wanted)
+        felt = felt + self._R_zeroed.T @ statics.weight
 
         def force(R_base_sensor: FloatArray) -> FloatArray:
             true_force: FloatArray = R_base_sensor @ felt - statics.weight

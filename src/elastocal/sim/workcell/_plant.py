@@ -11,6 +11,7 @@ from elastocal.cell import Cell, Fault, Motion
 from elastocal.errors import DeviceError, nearest
 from elastocal.robot import inverse_transform
 from elastocal.sim.workcell._contact import Contact, ContactLaw, TrueSurface
+from elastocal.sim.workcell._imperfections import DRAWS, VisitChance
 from elastocal.sim.workcell._quasistatics import Quasistatics
 from elastocal.sim.workcell._robot import TrueRobot
 from elastocal.sim.workcell._timeline import (
@@ -30,8 +31,6 @@ FOREVER = 1 << 62
 """Later than any time, in µs."""
 SPANS = ("beam_break", "ft_dropout", "ft_frozen", "ft_saturation", "stale_clock")
 """Faults that last for a while, whatever the arm does."""
-_DRAWS = 64
-"""Random stops and slips of a visit; more begin anew."""
 _DONE = 1.0 - 1e-3
 """A change of force this far along counts as made when the gears' memory is asked."""
 
@@ -161,7 +160,7 @@ class Plant:
         self._pressing = _unit_wrench(self.statics.robot)
         self.visit = -1
         self.key = posture_key(cell.home)
-        self._stops, self._slips = np.zeros((_DRAWS, 3)), np.zeros((_DRAWS, 2))
+        self._stops, self._slips = np.zeros((DRAWS, 3)), np.zeros((DRAWS, 2))
         self._drawn = 0
         self._draw()
         self._events: list[tuple[int, Callable[[], None]]] = []
@@ -198,16 +197,19 @@ class Plant:
         """Begin to approach the surface from the posture that the arm was last sent to."""
         self.visit += 1
         more = sum(fault.mass for fault in self.schedule.lasting("tool_weight", self.visit))
-        self.statics = self._weighed.heavier(more) if more else self._weighed
+        weighed = self._weighed.heavier(more) if more else self._weighed
+        self.statics = weighed.visited(self.chance)
         self._drawn = 1
         self._restart_instruments("from")
 
     def _draw(self) -> None:
         entry = self.cell.file.simulation.controller
-        stops = generator(self.seed, "stops", self.key).standard_normal((_DRAWS, 3))
+        stops = generator(self.seed, "stops", self.key).standard_normal((DRAWS, 3))
         self._stops = entry.repeatability * stops
-        self._slips = generator(self.seed, "slips", self.key).standard_normal((_DRAWS, 2))
+        self._slips = generator(self.seed, "slips", self.key).standard_normal((DRAWS, 2))
         self._drawn = 0
+        self.chance = VisitChance.of(self.seed, self.key)
+        self.statics = self.statics.visited(self.chance)
 
     def _restart_instruments(self, what: str) -> None:
         for instrument in self.instruments:
@@ -217,12 +219,12 @@ class Plant:
     def stop_error(self) -> FloatArray:
         """Return the error of the next stop, shape (3,), in m."""
         self._drawn += 1
-        error: FloatArray = self._stops[self._drawn % _DRAWS]
+        error: FloatArray = self._stops[self._drawn % DRAWS]
         return error
 
     def slip(self, load: int) -> FloatArray:
         """Return the random slip of a load case in standard deviations, shape (2,)."""
-        slip: FloatArray = self._slips[load % _DRAWS]
+        slip: FloatArray = self._slips[load % DRAWS]
         return slip
 
     def run(
@@ -262,14 +264,15 @@ class Plant:
         """Return where the robot is now, with the memory that it has gathered so far."""
         path, progress = self.segment.path, self.segment.progress(self.now)
         knots, where = path.knots, np.array([progress])
-        columns = (knots.q, knots.twist, knots.force)
-        q, twist, force = (knots.at(column, where)[0] for column in columns)
+        columns = (knots.q, knots.twist, knots.force, knots.moment)
+        q, twist, force, moment = (knots.at(column, where)[0] for column in columns)
         done = progress >= _DONE
         springs, theta = (path.end if done else path.start).springs, path.end.theta
         if not done and self.contact is not None:
-            rest = self.statics.robot.rest(q, force, springs, theta)
+            attack = self.contact.attack(force)
+            rest = self.statics.robot.rest(q, force, springs, theta, attack)
             springs, theta = rest.springs, rest.theta
-        return RobotState(q, twist, force, springs, theta, path.end.sag)
+        return RobotState(q, twist, force, moment, springs, theta, path.end.sag)
 
 
 def _unit_wrench(robot: TrueRobot) -> FloatArray:

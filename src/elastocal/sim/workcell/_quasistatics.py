@@ -3,10 +3,11 @@
 The controller believes in the undeformed robot. What it is off by is the *twist*: shift and turn
 of the tool, and turn of the sensor, in base. Assumption: the controller takes out a part of the
 sag under weight that it knows from its load data, so the part is subtracted from the twist as it
-was when the tool last was free.
+was when the tool last was free. It knows nothing of how the robot is built, how warm it is, and
+where on the disk the force acts.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -15,6 +16,7 @@ from elastocal.arrays import FloatArray
 from elastocal.cell import Cell
 from elastocal.errors import DeviceError
 from elastocal.robot import inverse_transform
+from elastocal.sim.workcell._imperfections import Growth, VisitChance
 from elastocal.sim.workcell._robot import RobotEquilibrium, TrueRobot
 from elastocal.sim.workcell._timeline import Knots, RobotPath, RobotState
 
@@ -30,13 +32,38 @@ class Quasistatics:
     """Shape (3,), in m."""
     weight: FloatArray
     """Weight of the tool that the sensor carries, in base, shape (3,), in N."""
+    tcp_error: FloatArray
+    """Where the tool centre point is, in the tcp frame, shape (3,), in m."""
+    growth: Growth | None = None
+    """How the arm grows as it warms up."""
+    warmth: FloatArray = field(default_factory=lambda: np.zeros(()))
+    """How warm the arm is, from 0 to 1, shape () or (posture,)."""
+    strain: FloatArray | None = None
+    """Strains that friction keeps while the robot is free, shape (..., gear, stop), in rad."""
 
     @classmethod
     def of(cls, cell: Cell, robot: TrueRobot) -> "Quasistatics":
-        """Return the statics of a cell."""
+        """Return the statics of a cell, its arm cold and its gears without strain."""
         marker = np.zeros(3) if cell.file.marker is None else cell.file.marker.position_tcp
-        compensation = cell.file.simulation.controller.gravity_compensation
-        return cls(robot, compensation, marker, cell.file.tool.mass * cell.gravity_base)
+        simulation = cell.file.simulation
+        drift, external = simulation.thermal.drift, robot.external
+        growth = None
+        if drift > 0.0:
+            tool = robot.forward(cell.home)[:3, 3]
+            growth = Growth.of(robot.linkage.screws, external, drift, cell.home, tool)
+        # The tool's own error is the last of those that add up to that of the tip.
+        ends = [linkage.T_base_tip[:3, 3] - linkage.T_base_joint[-1, :3, 3]
+                for linkage in (robot.built, robot.linkage)]  # fmt: skip
+        error = (ends[0] - ends[1]) @ robot.linkage.T_base_tip[:3, :3]
+        weight = cell.file.tool.mass * cell.gravity_base
+        compensation = simulation.controller.gravity_compensation
+        return cls(robot, compensation, marker, weight, error, growth)
+
+    def visited(self, chance: VisitChance, warmth: FloatArray | None = None) -> "Quasistatics":
+        """Return the statics in a visit, or many; ``warmth`` in place of the visit's own."""
+        warm = chance.warmth if warmth is None else warmth
+        strain = self.robot.springs.gears.strain(chance.stroke)
+        return replace(self, warmth=warm, strain=strain)
 
     def heavier(self, mass: float) -> "Quasistatics":
         """Return the same with some kg more on the tool than was weighed.
@@ -46,8 +73,8 @@ class Quasistatics:
         return replace(self, weight=self.weight + mass * self.robot.gravity)
 
     def twist(self, q: FloatArray, rest: RobotEquilibrium) -> FloatArray:
-        """Return the deviation of a resting robot from the undeformed one, shape (..., 9)."""
-        T = self.robot.forward(q)
+        """Return the deviation of a resting robot from the same one undeformed, shape (..., 9)."""
+        _, T = self.robot.undeformed(q)
         R_sensor = T[..., :3, :3] @ self.robot.T_tcp_sensor[:3, :3]
         turns = np.stack(
             [
@@ -60,8 +87,34 @@ class Quasistatics:
         vectors = Rotation.from_matrix(turns.reshape(-1, 3, 3)).as_rotvec()
         return np.concatenate([shift, vectors.reshape(*q.shape[:-1], 6)], axis=-1)
 
+    def deviation(self, q: FloatArray, sag: FloatArray) -> FloatArray:
+        """Return the twist of a robot that sags, with how it is built and how warm it is.
+
+        Parameters
+        ----------
+        q : ndarray, shape (..., joint)
+            In rad or m.
+        sag : ndarray, shape (..., 9)
+            What its springs make of it.
+        """
+        unsprung = self._unsprung(q)
+        return sag.copy() if unsprung is None else sag + unsprung
+
+    def _unsprung(self, q: FloatArray) -> FloatArray | None:
+        """Return what is off without any spring, shape (..., 9); None: nothing."""
+        robot, off = self.robot, None
+        if robot.built is not robot.linkage:
+            off = np.zeros((*q.shape[:-1], 9))
+            described, real = robot.undeformed(q)
+            off[..., :3] = (real - described)[..., :3, 3]
+        if self.growth is not None:
+            off = np.zeros((*q.shape[:-1], 9)) if off is None else off
+            tool = robot.forward(q)[..., :3, 3]
+            off[..., :3] += self.warmth[..., None] * self.growth.shift(q, tool)
+        return off
+
     def free(self, q: FloatArray, stop_error: FloatArray, start: FloatArray | None) -> RobotState:
-        """Return the robot free of contact, its gears relaxed.
+        """Return the robot free of contact, its gears as a free move leaves them.
 
         Parameters
         ----------
@@ -73,10 +126,10 @@ class Quasistatics:
             Spring positions near the result.
         """
         nothing = np.zeros((*q.shape[:-1], 3))
-        rest = self.robot.rest(q, nothing, self.robot.springs, start)
+        rest = self.robot.rest(q, nothing, self.robot.springs.strained(self.strain), start)
         sag = self.twist(q, rest)
-        twist = self._left(sag, sag, stop_error)
-        return RobotState(q, twist, nothing, rest.springs, rest.theta, sag)
+        twist = self._left(self.deviation(q, sag), sag, stop_error)
+        return RobotState(q, twist, nothing, nothing, rest.springs, rest.theta, sag)
 
     def _left(self, twist: FloatArray, sag: FloatArray, stop_error: FloatArray) -> FloatArray:
         left = twist - self.compensation * sag
@@ -84,7 +137,12 @@ class Quasistatics:
         return left
 
     def loaded(
-        self, state: RobotState, q: FloatArray, force: FloatArray, error: FloatArray
+        self,
+        state: RobotState,
+        q: FloatArray,
+        force: FloatArray,
+        error: FloatArray,
+        attack_tcp: FloatArray | None = None,
     ) -> RobotState:
         """Return the robot under a force, from a state whose gears remember.
 
@@ -98,10 +156,36 @@ class Quasistatics:
             On the robot, in base, in N.
         error : ndarray, shape (3,)
             Error of the stop, in base, in m.
+        attack_tcp : ndarray, shape (3,), optional
+            Where on the disk the force acts, in the tcp frame, in m.
         """
-        rest = self.robot.rest(q, force, state.springs, state.theta)
-        twist = self._left(self.twist(q, rest), state.sag, error)
-        return replace(state, q=q, twist=twist, force=force, springs=rest.springs, theta=rest.theta)
+        rest = self.robot.rest(q, force, state.springs, state.theta, attack_tcp)
+        return self.rested(state, q, force, error, rest, attack_tcp)
+
+    def rested(
+        self,
+        state: RobotState,
+        q: FloatArray,
+        force: FloatArray,
+        error: FloatArray,
+        rest: RobotEquilibrium,
+        attack_tcp: FloatArray | None,
+    ) -> RobotState:
+        """Return the state of a robot at rest under a force; see `loaded`."""
+        twist = self._left(self.deviation(q, self.twist(q, rest)), state.sag, error)
+        lever = self.lever(attack_tcp)
+        moment = np.zeros_like(force)
+        if np.any(lever):
+            R = self.robot.forward(q)[..., :3, :3]
+            moment = np.cross((R @ lever[..., None])[..., 0], force)
+        return replace(
+            state, q=q, twist=twist, force=force, moment=moment, springs=rest.springs,
+            theta=rest.theta,
+        )  # fmt: skip
+
+    def lever(self, attack_tcp: FloatArray | None) -> FloatArray:
+        """Return where a force acts from where the controller believes the tool, (..., 3), in m."""
+        return self.tcp_error if attack_tcp is None else self.tcp_error + attack_tcp
 
     def R_base_sensor(self, q: FloatArray, twist: FloatArray) -> FloatArray:
         """Return the true orientation of the sensor, shape (..., 3, 3)."""
@@ -146,12 +230,17 @@ class Quasistatics:
 
     def path(self, start: RobotState, end: RobotState) -> RobotPath:
         """Return the path on which joints, force and deviation change evenly together."""
-        both = (start, end)
-        columns = (np.stack([getattr(s, name) for s in both]) for name in ("q", "twist", "force"))
+        names = ("q", "twist", "force", "moment")
+        columns = (np.stack([getattr(s, name) for s in (start, end)]) for name in names)
         return RobotPath(self.knots(np.array([0.0, 1.0]), *columns), start, end)
 
     def knots(
-        self, progress: FloatArray, q: FloatArray, twist: FloatArray, force: FloatArray
+        self,
+        progress: FloatArray,
+        q: FloatArray,
+        twist: FloatArray,
+        force: FloatArray,
+        moment: FloatArray,
     ) -> Knots:
         """Return knots with what instruments see there.
 
@@ -160,7 +249,7 @@ class Quasistatics:
         progress : ndarray, shape (knot,)
         q : ndarray, shape (knot, joint)
         twist : ndarray, shape (knot, 9)
-        force : ndarray, shape (knot, 3)
+        force, moment : ndarray, shape (knot, 3)
         """
         T = self.robot.forward(q)
         turn = Rotation.from_rotvec(twist[:, 3:].reshape(-1, 3)).as_matrix().reshape(-1, 2, 3, 3)
@@ -168,7 +257,9 @@ class Quasistatics:
         marker = T[:, :3, 3] + twist[:, :3] + R_tcp @ self.marker_tcp
         R_sensor = turn[:, 1] @ T[:, :3, :3] @ self.robot.T_tcp_sensor[:3, :3]
         wrench = self._wrench(R_sensor, force)
-        return Knots(progress, q, twist, force, np.concatenate([marker, wrench], axis=1))
+        wrench[:, 3:] += np.einsum("kji,kj->ki", R_sensor, moment)
+        seen = np.concatenate([marker, wrench], axis=1)
+        return Knots(progress, q, twist, force, moment, seen)
 
     def _wrench(self, R_base_sensor: FloatArray, force_base: FloatArray) -> FloatArray:
         """Return force and moment at the sensor, in its frame, shape (knot, 6).

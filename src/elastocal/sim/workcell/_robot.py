@@ -15,7 +15,7 @@ nonlinear equilibrium with a memory, of one posture or many.
 
 import itertools
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -33,6 +33,7 @@ from elastocal.sim.arm import (
     Linear,
     Linkage,
     LoadedMechanism,
+    Reaction,
     RobotSprings,
     SpringChain,
     TruthSpring,
@@ -43,6 +44,7 @@ from elastocal.sim.arm import (
     solve_inverse,
     tilt_springs,
 )
+from elastocal.sim.workcell._imperfections import built
 
 ARM_JOINTS = 6
 MOVED_MASS = 850.0
@@ -81,6 +83,9 @@ class TrueRobot:
     """A robot on its floor with its tool; make one with `of`."""
 
     linkage: Linkage
+    """As described: what the controller believes."""
+    built: Linkage
+    """As it is."""
     chain: SpringChain
     springs: RobotSprings
     """Without friction and memory."""
@@ -97,9 +102,12 @@ class TrueRobot:
     _points: FloatArray = field(init=False, repr=False)
     _after: IndexArray = field(init=False, repr=False)
     _weights: FloatArray = field(init=False, repr=False)
+    _recent: dict[tuple[tuple[int, ...], bytes], tuple[FloatArray, FloatArray]] = field(
+        init=False, repr=False, default_factory=dict
+    )
 
     def __post_init__(self) -> None:
-        linkage, ends = self.linkage, self.chain.ends
+        linkage, ends = self.built, self.chain.ends
         T = linkage.T_base_tip
         tool = T[:3, :3] @ self.tool_centre_tcp + T[:3, 3]
         bodies = [(b.centre, ends[b.joint - 1], b.mass) for b in linkage.masses]
@@ -125,9 +133,12 @@ class TrueRobot:
                 f"the simulated arm needs six joints; {linkage.name} has"
                 f" {len(linkage.joint_names)} ({', '.join(linkage.joint_names)})"
             )
-        chain, springs = _springs(cell, linkage, external)
+        simulation = cell.file.simulation
+        real = built(linkage, simulation.geometry, external, simulation.seed)
+        chain, springs = _springs(cell, real, external)
         return cls(
             linkage,
+            real,
             chain,
             springs,
             external,
@@ -145,7 +156,20 @@ class TrueRobot:
         q : ndarray, shape (..., joint)
             In rad or m.
         """
-        return self.linkage.forward(q)
+        return self.undeformed(q)[0]
+
+    def undeformed(self, q: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return T_base_tcp of the undeformed robot as described and as built, (..., 4, 4) each.
+
+        One posture is asked for again and again; the last one is remembered.
+        """
+        key = (q.shape, q.tobytes())
+        if key not in self._recent:
+            T = self.linkage.forward(q)
+            exact = self.built is self.linkage
+            self._recent.clear()
+            self._recent[key] = (T, T if exact else self.built.forward(q))
+        return self._recent[key]
 
     def solve(self, T_base_tcp: FloatArray, start: FloatArray) -> InverseResult:
         """Return joints that bring the undeformed tool to poses, external axes where they start.
@@ -164,6 +188,8 @@ class TrueRobot:
         force_base: FloatArray,
         springs: RobotSprings,
         start: FloatArray | None = None,
+        attack_tcp: FloatArray | None = None,
+        reaction: Reaction | None = None,
     ) -> RobotEquilibrium:
         """Return where the robot rests, in one posture or in many side by side.
 
@@ -179,6 +205,10 @@ class TrueRobot:
             The springs, with what they remember.
         start : ndarray, shape (spring,) or (posture, spring), optional
             Spring positions near the result.
+        attack_tcp : ndarray, shape (3,) or (posture, 3), optional
+            Where the force acts on the tool, in its own frame, in m.
+        reaction : Reaction, optional
+            What pushes back on the tool beside the force.
 
         Raises
         ------
@@ -188,12 +218,15 @@ class TrueRobot:
         springs = springs.at_joint(q[..., self.external + 1])
         batch = q.shape[:-1]
         mechanism = self._mechanism(np.atleast_2d(q), np.atleast_2d(force_base), springs)
+        mechanism = replace(mechanism, reaction=reaction)
+        if attack_tcp is not None:
+            mechanism = replace(mechanism, loads=self._attacked(mechanism.loads, attack_tcp))
         theta = np.zeros((*batch, len(springs.stiffness))) if start is None else start
         theta = np.atleast_2d(theta)
         points = mechanism.load_points(mechanism.motions(theta))
         theta, state = mechanism.rest(theta, points, BALANCE)
         total = mechanism.motions(theta)
-        T_base_tip = self.linkage.T_base_tip
+        T_base_tip = self.built.T_base_tip
         tool = total[-1] @ T_base_tip
         sensor = total[-1 - _END_EFFECTOR] @ T_base_tip @ self.T_tcp_sensor
         theta = theta.reshape(*batch, -1)
@@ -215,6 +248,13 @@ class TrueRobot:
         loads = DeadLoads(self._points, self._after, forces)
         return LoadedMechanism(chain.screws, chain.spring_elements, springs, chain.held(q), loads)
 
+    def _attacked(self, loads: DeadLoads, attack_tcp: FloatArray) -> DeadLoads:
+        """Return the loads with the first one at a point (..., 3) of the tool."""
+        T, attack = self.built.T_base_tip, np.atleast_2d(attack_tcp)
+        point = np.repeat(loads.point[:, None], len(attack), axis=1)
+        point[0] = attack @ T[:3, :3].T + T[:3, 3]
+        return replace(loads, point=point)
+
 
 def _springs(cell: Cell, linkage: Linkage, external: int) -> tuple[SpringChain, RobotSprings]:
     """Return where the springs of a cell's robot sit, and their laws."""
@@ -225,7 +265,11 @@ def _springs(cell: Cell, linkage: Linkage, external: int) -> tuple[SpringChain, 
     bearings = scale.bearings / scale.gears * np.array(truth.bearings.ratio)
     bending = scale.links * (truth.links.bending or size * LINK_BENDING)
     gears = [axial_spring(linkage, joint, float(k)) for joint, k in enumerate(stiffness, external)]
-    tilts = [tilt_springs(linkage, j, k * bearings) for j, k in enumerate(stiffness, external)]
+    turn, offset = truth.bearings.turn, truth.bearings.offset
+    tilts = [
+        tilt_springs(linkage, joint, k * bearings, turn, offset)
+        for joint, k in enumerate(stiffness, external)
+    ]
     springs = [
         *_drives(cell, linkage, external),
         *_floor(linkage, external, scale.floor * truth.floor.tilt),
@@ -240,6 +284,8 @@ def _springs(cell: Cell, linkage: Linkage, external: int) -> tuple[SpringChain, 
     which = np.array([order.index(id(gear)) for gear in gears])
     laws = GearLaws.of(truth.gears, which, ks[which])
     balancer = _balancer(cell, linkage, size)
+    if balancer is not None and balancer.seal_friction > 0.0:
+        laws = laws.with_seals(balancer.lever)
     return chain, RobotSprings(ks, laws, None, balancer, int(which[1]), np.zeros(()))
 
 
@@ -313,4 +359,5 @@ def _balancer(cell: Cell, linkage: Linkage, size: float) -> BalancerSpring | Non
         return None
     upright = math.atan2(float(axis @ np.cross(link, up)), float(link @ up))
     rate = scale * (entry.rate or size * BALANCER_RATE)
-    return BalancerSpring(rate, entry.free_length, entry.anchor, entry.lever, upright)
+    lengths = (entry.free_length, entry.anchor, entry.lever)
+    return BalancerSpring(rate, *lengths, upright, entry.seal_friction)

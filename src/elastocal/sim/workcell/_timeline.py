@@ -208,6 +208,9 @@ class Knots:
     base, shape (knot, 9)."""
     force: FloatArray
     """Force on the robot in base, shape (knot, 3), in N."""
+    moment: FloatArray
+    """Its moment about where the controller believes the tool centre point, in base, shape
+    (knot, 3), in N·m."""
     seen: FloatArray
     """Truth that instruments see: marker in base in m, wrench at the sensor in its frame in N and
     N·m, weight in; shape (knot, 9)."""
@@ -236,6 +239,8 @@ class RobotState:
     """See `Knots.twist`, shape (..., 9)."""
     force: FloatArray
     """Force on the robot in base, shape (..., 3), in N."""
+    moment: FloatArray
+    """See `Knots.moment`, shape (..., 3)."""
     springs: RobotSprings
     """With the memory of the gears."""
     theta: FloatArray

@@ -9,7 +9,12 @@ Assumptions of the process, beside those of `elastocal.sim.workcell._quasistatic
 * what counts is how far a path under force lies from the same path run in the air, as a tracker
   on the tool measures it: sag under weight is in both;
 * the controller takes out a part of the sag as it was where the course began;
-* the path as a whole is off by the error of one stop, drawn anew for every course.
+* the path as a whole is off by the error of one stop, drawn anew for every course;
+* the path in the air is that of a cold arm, the process finds it warm;
+* gears begin a course with strains that the free move before it has left; in the air they keep
+  those (the way along the course twists no gear by more than the weight does);
+* a force reacts to where the tool is: along the tool's axis it falls by `process_stiffness` times
+  the shift away from the surface, at rest with the arm.
 """
 
 from dataclasses import dataclass, replace
@@ -19,7 +24,9 @@ import numpy as np
 from elastocal.arrays import FloatArray
 from elastocal.cell import Cell, Devices
 from elastocal.results import brief_repr
+from elastocal.sim.arm import Reaction
 from elastocal.sim.workcell._controller import SimulatedArm
+from elastocal.sim.workcell._imperfections import SensorHysteresis, VisitChance
 from elastocal.sim.workcell._instruments import (
     SimulatedForceSensor,
     SimulatedTracker,
@@ -83,7 +90,8 @@ class ProcessState:
     shift: FloatArray
     """How far the tool is from where the undeformed robot would have it, in base, shape (3,), m."""
     wrench: FloatArray
-    """True wrench at the sensor in its frame, weight in, shape (6,), in N and N·m."""
+    """Wrench at the sensor in its frame, weight in, and what its hysteresis adds, shape (6,), in N
+    and N·m."""
     felt: FloatArray
     """The part of the wrench that the process force makes, shape (6,)."""
 
@@ -117,9 +125,13 @@ class ProcessCell:
         DeviceError
             If the cell has no sensor or no tracker, or its robot fewer than six joints.
         """
-        run = SimulatedCell.of(cell, seed)
+        run, simulation = SimulatedCell.of(cell, seed), cell.file.simulation
         self._statics, self._sensor, self._seed = run.plant.statics, run.sensor, seed
-        self._repeatability = cell.file.simulation.controller.repeatability
+        self._law, self._chance = run.plant.contact_law, run.plant.chance
+        self._repeatability = simulation.controller.repeatability
+        self._stiffness = simulation.contact.process_stiffness
+        share = simulation.sensor.hysteresis
+        self._hysteresis = SensorHysteresis(share, run.sensor.range) if share > 0.0 else None
         self._state: RobotState | None = None
         self._pressed = self._free = _SpringTrail()
         self._stop = np.zeros(3)
@@ -127,7 +139,7 @@ class ProcessCell:
         self._slope = np.zeros(6)
 
     def lift(self, course: str, q: FloatArray) -> None:
-        """Begin a course in the air: gears relaxed, noise, drift and stop error of its own.
+        """Begin a course in the air: strains, noise, drift and stop error of its own.
 
         Parameters
         ----------
@@ -139,8 +151,13 @@ class ProcessCell:
         self._rng = generator(self._seed, "process", course)
         self._stop = self._repeatability * self._rng.standard_normal(3)
         self._slope = self._sensor.slope(self._rng)
+        self._chance = VisitChance.of(self._seed, f"process {course}")
+        self._statics = self._statics.visited(self._chance, np.ones(()))
         self._state = self._statics.free(q, np.zeros(3), None)
         self._pressed, self._free = _SpringTrail(self._state), _SpringTrail(self._state)
+        if self._hysteresis is not None:
+            self._hysteresis.relax()
+            self._hysteresis.lag(self._seen(self._state))
 
     def free_shift(self, q: FloatArray) -> FloatArray:
         """Return the shift of the tool in the air, shape (3,), in m.
@@ -150,14 +167,17 @@ class ProcessCell:
         assert self._state is not None, "lift comes first"
         state = self._statics.free(q, np.zeros(3), self._free.next())
         self._free.went(state)
-        return self._left(state.sag)[:3]
+        cold = replace(self._statics, warmth=np.zeros(()))
+        return self._left(cold.deviation(q, state.sag))[:3]
 
     def _left(self, twist: FloatArray) -> FloatArray:
         """Take out what the controller does of the sag, as it was where the course began."""
         assert self._state is not None, "lift comes first"
         return twist - self._statics.compensation * self._state.sag
 
-    def press(self, q: FloatArray, force_base: FloatArray) -> ProcessState:
+    def press(
+        self, q: FloatArray, force_base: FloatArray, path_base: FloatArray | None = None
+    ) -> ProcessState:
         """Go on to joints and a force on the robot.
 
         Parameters
@@ -165,16 +185,57 @@ class ProcessCell:
         q : ndarray, shape (joint,)
             In rad or m, near those before.
         force_base : ndarray, shape (3,)
-            On the robot at the tool centre point, in base, in N.
+            On the robot, in base, in N; programmed, where there is a path to be on.
+        path_base : ndarray, shape (3,), optional
+            Where the tool centre point is on the programmed path in the air, in base, in m: there
+            the force is the programmed one. Without it the force is given.
         """
         assert self._state is not None, "lift comes first"
         statics = self._statics
         state = replace(self._state, theta=self._pressed.next())
-        state = statics.loaded(state, q, force_base, self._stop)
+        T = statics.robot.forward(q)
+        attack = self._law.attack(T[:3, :3].T @ force_base, self._chance.load(0))
+        if path_base is None or self._stiffness == 0.0:
+            state = statics.loaded(state, q, force_base, self._stop, attack)
+        else:
+            state = self._reacting(state, q, force_base, path_base, attack)
         self._pressed.went(state)
         self._state, twist = state, state.twist
-        seen = statics.path(state, replace(state, force=np.zeros(3))).knots.seen[:, 3:]
-        return ProcessState(twist[:3], seen[0], seen[0] - seen[1])
+        nothing = np.zeros(3)
+        seen = statics.path(state, replace(state, force=nothing, moment=nothing)).knots.seen[:, 3:]
+        felt, strained = seen[0] - seen[1], seen[0]
+        if self._hysteresis is not None:
+            strained = strained + self._hysteresis.lag(seen[:1])[0]
+        return ProcessState(twist[:3], strained, felt)
+
+    def _reacting(
+        self,
+        state: RobotState,
+        q: FloatArray,
+        force_base: FloatArray,
+        path_base: FloatArray,
+        attack: FloatArray | None,
+    ) -> RobotState:
+        """Return the robot at rest with a process whose force depends on where the tool is."""
+        statics, robot = self._statics, self._statics.robot
+        T, real = robot.undeformed(q)
+        outward = -T[:3, 2]
+        # The tool is where the springs have it, and beside that by what the controller knows
+        # (a part of the sag) and what no spring makes; the rest of the way is the springs'.
+        bare = statics.deviation(q, np.zeros(9)) - statics.compensation * state.sag
+        unsprung = T[:3, 3] + bare[:3] + self._stop
+        reference = real[:3, 3] + path_base - unsprung
+        lever = np.zeros(3) if attack is None else T[:3, :3] @ attack
+        reaction = Reaction(outward[None], self._stiffness, (reference + lever)[None])
+        rest = robot.rest(q, force_base, state.springs, state.theta, attack, reaction)
+        beyond = outward @ (rest.T_base_tcp[:3, 3] - reference)
+        force = force_base - self._stiffness * beyond * outward
+        return statics.rested(state, q, force, self._stop, rest, attack)
+
+    def _seen(self, state: RobotState) -> FloatArray:
+        """Return the true wrench at the sensor, shape (1, 6)."""
+        seen: FloatArray = self._statics.path(state, state).knots.seen[:1, 3:]
+        return seen
 
     def read(self, since: FloatArray, wrench: FloatArray) -> FloatArray:
         """Return what the sensor says: cross-talk, zero, drift, noise, end of its range.

@@ -106,12 +106,12 @@ def _stations_sensor_tool(evidence: Evidence) -> Iterator[blocks.Block]:
     if summary is None:
         text = "The summary of the run is not known: stations and sensor are not judged."
         yield blocks.Paragraph(text)
-        yield _tool_file(evidence.tool)
+        yield _tool_file(evidence.tool, evidence.cell)
         return
     yield from _stations(summary.registration)
     yield _noise(summary)
     yield from _tool(summary.tool)
-    yield _tool_file(evidence.tool)
+    yield _tool_file(evidence.tool, evidence.cell)
     yield blocks.Heading("Warnings of the run")
     none = blocks.Paragraph("The run gave no warning.")
     yield blocks.Bullets(summary.warnings) if summary.warnings else none
@@ -204,19 +204,22 @@ def _scaled(scale: float, *values: float | None) -> tuple[str, ...]:
     return tuple(_or_unknown(value, lambda v: f"{scale * v:.2f}") for value in values)
 
 
-def _tool_file(tool: ToolResult | None) -> blocks.Block:
+def _tool_file(tool: ToolResult | None, cell: Cell | None) -> blocks.Block:
     if tool is None:
         return blocks.Paragraph(
             "There is no tool file: sensor rotation and bias were not identified."
         )
-    R = np.array(tool.R_flange_sensor)
+    sensor = None if cell is None else cell.file.sensor
+    described = np.eye(3) if sensor is None else sensor.T_flange_sensor[:3, :3]
+    R = described.T @ np.array(tool.R_flange_sensor)
     turned = np.degrees(np.arccos(np.clip(0.5 * (np.trace(R) - 1.0), -1.0, 1.0)))
+    other = tool.flange if sensor is None else "the cell file's pose of it"
     rows = (
         ("Mass", f"{tool.mass:.2f} kg"),
         ("Centre of mass in the sensor's frame", f"{point(tool.centre)} mm"),
         ("Force bias", f"{point(tool.force_bias, 1.0)} N"),
         ("Moment bias", f"{point(tool.moment_bias, 1.0, 2)} N·m"),
-        ("Sensor turned against its mounting by", f"{turned:.2f}°"),
+        (f"Sensor turned against {other} by", f"{turned:.2f}°"),
         ("Static postures", str(tool.postures)),
         ("Not determined", ", ".join(tool.undetermined) or "nothing"),
     )

@@ -1,0 +1,171 @@
+"""What the instruments add to the truth of a campaign.
+
+The devices sample, the procedure averages; here the averages are drawn at once, with the standard
+deviations that follow from the same figures of the cell file. Assumed perfect: weight of the tool
+and zero of the sensor (identified at every pose), registration of the tracker (0.01 mrad turns 5 mm
+by 50 nm).
+"""
+
+import math
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import numpy as np
+
+from elastocal.arrays import FloatArray, IndexArray
+from elastocal.cell import Cell
+from elastocal.dataset import Readings
+from elastocal.results import brief_repr
+from elastocal.sim.workcell._instruments import COVERAGE, averaged_noise, sensor_range
+from elastocal.sim.workcell.campaign import TrueReadings
+
+
+class ErrorScales(NamedTuple):
+    """Factors on the errors of the instruments; 1 is the cell file's."""
+
+    tracker: float = 1.0
+    force: float = 1.0
+
+
+@dataclass(frozen=True, eq=False)
+class ErrorDraws:
+    """Unit normals behind all errors of one campaign, whatever part of it is measured."""
+
+    marker: FloatArray
+    """Shape (place, 1 + load, 3); the first is the unloaded reading."""
+    sensor: FloatArray
+    """Likewise."""
+    stop: FloatArray
+    """Likewise."""
+    drift: FloatArray
+    """Shape (place, 3)."""
+    cross_talk: FloatArray
+    """Shape (6, 6)."""
+
+    def __repr__(self) -> str:
+        places, readings, _ = self.marker.shape
+        return f"ErrorDraws({places} places, {readings - 1} loads)"
+
+    @classmethod
+    def of(cls, places: int, loads: int, rng: np.random.Generator) -> "ErrorDraws":
+        """Draw for some places under some load cases."""
+        marker, sensor, stop = rng.standard_normal((3, places, 1 + loads, 3))
+        return cls(
+            marker, sensor, stop, rng.standard_normal((places, 3)), rng.standard_normal((6, 6))
+        )
+
+    def take(self, places: IndexArray, loads: IndexArray) -> "ErrorDraws":
+        """Return the draws of some places and load cases."""
+        rows = np.ix_(places, np.concatenate([[0], 1 + loads]))
+        return ErrorDraws(
+            self.marker[rows], self.sensor[rows], self.stop[rows], self.drift[places],
+            self.cross_talk,
+        )  # fmt: skip
+
+
+@brief_repr
+@dataclass(frozen=True, eq=False)
+class CampaignErrors:
+    """Standard deviations of averaged readings; make one with `of`."""
+
+    noise: float
+    """Noise of a sample of the tracker at no distance, in m."""
+    noise_per_metre: float
+    average: float
+    """Standard deviation of a loaded average of the tracker over that of a sample."""
+    unloaded_average: float
+    """The same of an unloaded one."""
+    force: tuple[float, float]
+    """Noise of an unloaded and of a loaded average of the sensor, in N."""
+    drift: FloatArray
+    """Drift of each force axis per load case, in N, shape (3,)."""
+    gain: FloatArray = field(repr=False)
+    """Change of the gain per unit of cross-talk, shape (3, 3, 6, 6)."""
+    repeatability: float
+    """Error of a stop, in m."""
+
+    @classmethod
+    def of(cls, cell: Cell) -> "CampaignErrors":
+        """Return the errors of a cell's instruments.
+
+        Raises
+        ------
+        DeviceError
+            If the cell has no force sensor.
+        """
+        entry, procedure = cell.file.simulation, cell.file.procedure
+        tracker, sensor, ranges = entry.tracker, entry.sensor, sensor_range(cell)
+        times = (procedure.unloaded_average, procedure.average)
+        averages = [averaged_noise(tracker.turbulence, time, tracker.rate) for time in times]
+        force = [sensor.force_noise / math.sqrt(max(time * sensor.rate, 1.0)) for time in times]
+        return cls(
+            noise=tracker.noise / COVERAGE,
+            noise_per_metre=tracker.noise_per_metre / COVERAGE,
+            average=averages[1],
+            unloaded_average=averages[0],
+            force=(force[0], force[1]),
+            drift=sensor.drift / 60.0 * cell.file.motion.load_time * ranges[:3] / ranges[0],
+            gain=sensor.cross_talk * _gain(cell, ranges),
+            repeatability=entry.controller.repeatability,
+        )
+
+    def readings(
+        self,
+        settled: TrueReadings,
+        draws: ErrorDraws,
+        scales: ErrorScales,
+        station: FloatArray,
+        load_cases: tuple[str, ...],
+    ) -> Readings:
+        """Return the truth as the instruments show it, places numbered from 0.
+
+        Parameters
+        ----------
+        settled : TrueReadings
+            The truth.
+        draws : ErrorDraws
+            Of these places and load cases.
+        scales : ErrorScales
+            How large the errors are.
+        station : ndarray, shape (place, 3)
+            Tracker station that looks at each place, in base, in m.
+        load_cases : tuple of str
+            Names of the loads.
+        """
+        places, loads = settled.force.shape[:2]
+        distance = np.linalg.norm(settled.marker - station, axis=1)[:, None, None]
+        sigma = scales.tracker * (self.noise + self.noise_per_metre * distance)
+        marker = sigma * (
+            self.average * draws.marker[:, 1:] - self.unloaded_average * draws.marker[:, :1]
+        )
+        # The encoders do not see where the arm truly stops; the tracker does.
+        marker += self.repeatability * (draws.stop[:, 1:] - draws.stop[:, :1])
+        rows = (places * loads, -1)
+        return Readings(
+            pose=np.repeat(np.arange(places), loads),
+            load_case=np.tile(load_cases, places),
+            joint_position=settled.q.reshape(rows),
+            force=self._force(settled, draws, scales.force).reshape(rows),
+            controller_displacement=settled.controller_displacement.reshape(rows),
+            marker_displacement=(settled.marker_displacement + marker).reshape(rows),
+        )
+
+    def _force(self, settled: TrueReadings, draws: ErrorDraws, scale: float) -> FloatArray:
+        """Return the force in base as the sensor shows it, shape (place, load, 3), in N."""
+        gain = np.eye(3) + scale * np.einsum("ijkl,kl->ij", self.gain, draws.cross_talk)
+        noise = self.force[1] * draws.sensor[:, 1:] - self.force[0] * draws.sensor[:, :1]
+        since = np.arange(1, settled.force.shape[1] + 1)[:, None]
+        noise = noise + since * self.drift * draws.drift[:, None]
+        shown = settled.felt @ gain.T + scale * noise
+        force: FloatArray = np.einsum("pij,plj->pli", settled.R_base_sensor, shown)
+        return force
+
+
+def _gain(cell: Cell, ranges: FloatArray) -> FloatArray:
+    """Return d gain / d cross-talk; see `force_gain`. Shape (3, 3, 6, 6)."""
+    T_sensor_tcp = cell.T_sensor_tcp
+    assert T_sensor_tcp is not None
+    wrench = np.vstack([np.eye(3), np.cross(T_sensor_tcp[:3, 3], np.eye(3)).T])
+    ratio = np.divide.outer(ranges, ranges)
+    gain: FloatArray = np.einsum("ik,kl,lj->ijkl", np.eye(3, 6), ratio, wrench)
+    return gain
