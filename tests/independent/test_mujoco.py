@@ -132,9 +132,7 @@ def test_without_friction_memory_lost_motion_leaves_several_times_as_much():
     assert bearing > 4.0 * relative_errors(STICKING, FIVE_LOADS_AND_A_LOW_ONE)[0]
 
 
-@pytest.mark.xfail(
-    strict=True, reason="0.56 %; 0.15 % without noise: 49 numbers from readings of 15 µm"
-)
+@pytest.mark.xfail(strict=True, reason="0.56 %; 0.15 % without noise of 15 µm")
 def test_hard_truth_leaves_the_0_40_percent_of_issue_13():
     assert relative_errors(HARD, FIVE_LOADS_AND_A_LOW_ONE)[0] < 0.0040
 

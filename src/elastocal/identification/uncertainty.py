@@ -232,9 +232,10 @@ def doubt(difference: FloatArray, standard_error: FloatArray, apart: FloatArray)
     """Return the mean square by which the choice of a model may have moved a prediction, in m².
 
     A choice is not known to be right: had the poses been others, another model would have been
-    taken. Each of those to choose from counts with the weight ``exp(-z^2 / 2)`` of how far it is behind the best, ``z``
-    being the difference in standard errors; 1 if it predicts better (S. T. Buckland, K. P.
-    Burnham, N. H. Augustin, "Model selection: an integral part of inference", Biometrics 53, 1997).
+    taken. Each of those to choose from counts with the weight ``exp(-z^2 / 2)`` of how far it is
+    behind the best, ``z`` being the difference in standard errors; 1 if it predicts better (S. T.
+    Buckland, K. P. Burnham, N. H. Augustin, "Model selection: an integral part of inference",
+    Biometrics 53, 1997).
 
     Parameters
     ----------
