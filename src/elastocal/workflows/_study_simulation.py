@@ -43,9 +43,9 @@ class StudySimulation:
     errors: CampaignErrors
     pool: studies.StudyPool
     load_cases: tuple[str, ...]
-    """Those that a condition may ask for."""
+    """The full cases: what a condition may name, and what all are verified under."""
     force_tcp: FloatArray
-    """Force of each full case in the tcp frame, shape (load_case, 3), in N: verification."""
+    """Their force in the tcp frame, shape (load_case, 3), in N."""
     presses: dict[str, FloatArray]
     """All that is pressed at a pose, in order in time; see `CellFile.presses`."""
     check: str | None
@@ -116,15 +116,14 @@ class StudySimulation:
         return found
 
     def _pressed(self, spec: str) -> tuple[str, ...]:
-        """Return what is pressed under a condition: its load cases, and what the reference needs.
+        """Return what is pressed under a condition: everything, or some cases at the reference.
 
-        The load case that checks the fit is pressed where all are, as friction feels it.
+        The load case that checks the fit is pressed too: friction feels it.
         """
-        cases = training_cases(spec, self.load_cases)
-        if spec != ALL_LOADS:
-            before = [name for name in (CONDITIONING, LIGHT_CONTACT) if name in self.presses]
-            return (*before, *(case for case in cases if case not in before))
-        return tuple(self.presses)
+        if spec == ALL_LOADS:
+            return tuple(self.presses)
+        before = (name for name in (CONDITIONING, LIGHT_CONTACT) if name in self.presses)
+        return (*before, *training_cases(spec, self.load_cases))
 
     def _fitted(
         self, springs: str, readings: Readings, verification: studies.Verification
@@ -177,7 +176,6 @@ def prepare_study(
         If the cell cannot be simulated, a value does not fit it, or the pool is too small.
     """
     loads = cell.file.load_cases
-    known = tuple(name for name in loads.levels if name != loads.check_case)
     words = dict.fromkeys(each.springs for each in conditions)
     models = {
         name: ElasticModel(cell.robot, layout(cell.robot, name, beside=(AUTO, *RUNGS)))
@@ -185,7 +183,7 @@ def prepare_study(
         if name in LAYOUTS or name not in (AUTO, *RUNGS)
     }
     for each in conditions:
-        _check_load_cases(each.load_cases, known)
+        _check_load_cases(each.load_cases, loads.cases)
     if cell.file.marker is None or not cell.file.trackers:
         raise DeviceError(f"cell {cell.name} has no tracker to simulate (key 'trackers')")
     truth, errors = CampaignSimulator.of(cell), CampaignErrors.of(cell)
@@ -200,7 +198,7 @@ def prepare_study(
         truth=truth,
         errors=errors,
         pool=poses.pool,
-        load_cases=known,
+        load_cases=loads.cases,
         force_tcp=loads.force_tcp,
         presses=cell.file.presses,
         check=loads.check_case,
