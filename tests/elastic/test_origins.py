@@ -110,6 +110,8 @@ def test_an_origin_is_where_the_common_normal_with_the_axis_before_meets_the_axi
         np.testing.assert_allclose(found, expected, atol=1e-9)
         # Model files hold the numbers: no zero with a sign.
         assert not any(np.signbit(x) and x == 0.0 for x in (*origin.offset, *origin.far))
+        names = list(origin.directions)
+        assert names == ["normal", "binormal"] or names == sorted(names)
         directions = np.array([R @ direction for direction in origin.directions.values()])
         frame = np.array([axis, *directions])
         np.testing.assert_allclose(frame @ frame.T, np.eye(3), atol=1e-9)
