@@ -9,6 +9,7 @@ from .budget import (
     TermName as TermName,
     TermWorth as TermWorth,
     error_budget as error_budget,
+    stated_noise as stated_noise,
 )
 from .calibrated import (
     CalibratedModel as CalibratedModel,
@@ -77,6 +78,7 @@ from .ladder import (
     try_rung as try_rung,
     usable_for_choice as usable_for_choice,
 )
+from .load_check import LoadCheck as LoadCheck, check_loads as check_loads
 from .model_file import (
     CalibrateResult as CalibrateResult,
     RobotRecord as RobotRecord,
@@ -161,6 +163,8 @@ from .uncertainty import (
     IntervalCoverage as IntervalCoverage,
     bootstrap as bootstrap,
     distrust_factor as distrust_factor,
+    doubt as doubt,
+    doubt_factor as doubt_factor,
     interval as interval,
     leave_poses_out as leave_poses_out,
     measured_coverage as measured_coverage,
