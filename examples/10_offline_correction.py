@@ -12,11 +12,11 @@ from pathlib import Path
 import numpy as np
 
 import elastocal as ec
-from elastocal.compensation.offline import compensate_path, joints_along_path
+from elastocal.compensation.offline import compensate_path
 from elastocal.elastic import layout
 from elastocal.identification import calibrate
 from elastocal.robot import T_from_xyzabc, catalogue, with_tool
-from elastocal.robot.inverse import inverse_for
+from elastocal.robot.inverse import inverse_for, joints_along_path
 from elastocal.sim.arm import (
     LINK_BENDING,
     SHOP_FLOOR,

@@ -65,6 +65,10 @@ class CompensationError(ElastocalError, ValueError):
     """A correction that cannot be made: bad limits, a filter beyond Nyquist, an unknown tool."""
 
 
+class PathError(CompensationError):
+    """A programmed path that cannot be corrected; the message names its line or point."""
+
+
 class ReportError(ElastocalError, ValueError):
     """A picture or page that cannot be made."""
 

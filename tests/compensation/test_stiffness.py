@@ -14,16 +14,11 @@ from elastocal.compensation import (
     read_stations,
     survey_postures,
 )
-from elastocal.compensation.offline import (
-    PathError,
-    joints_along_path,
-)
+from elastocal.errors import PathError
 from elastocal.identification import CalibratedModel
 from elastocal.robot import Robot
-from elastocal.robot.inverse import NumericalInverse, inverse_for
-from elastocal.sim.arm import (
-    START,
-)
+from elastocal.robot.inverse import NumericalInverse, inverse_for, joints_along_path
+from elastocal.sim.arm import START
 from support.cells import rich_truth, robot
 from support.paths import calibrated, dome_course, euler_columns, made_up, write_csv
 from support.simulated import example_cell, places

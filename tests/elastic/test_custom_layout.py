@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from elastocal.elastic import ElasticModel, Gear, Hinge, Tensor, layout
+from elastocal.elastic import ElasticModel, Gear, Hinge, Tensor, bearing_joint, layout
 from elastocal.errors import FileAccessError, SchemaError, SpringError
 from elastocal.robot import Robot
 from support.cells import robot
@@ -71,8 +71,28 @@ def test_a_torsion_of_a_joint_that_slides_says_so(tmp_path):
     path = tmp_path / "springs.yml"
     path.write_text(HEAD + "springs: [{joint: slide, kind: revolute}, {joint: slide, axis: x}]")
     sliding = Robot.from_urdf(sliding_arm_urdf(), "tcp")
-    names = [spring.name for spring in layout(sliding, str(path))]
-    assert names == ["slide.torsion-axial", "slide.x"]
+    found = layout(sliding, str(path))
+    assert [spring.name for spring in found] == ["slide.torsion-axial", "slide.x"]
+    assert all(spring.revolute for spring in found)
+
+
+def test_a_tensor_sits_at_the_offset_that_a_file_gives(read):
+    (spring,) = read('springs: [{joint: joint_6, kind: tensor, offset: ["1 mm", "0 mm", "2 mm"]}]')
+    assert spring == Tensor("joint_6.tensor-axial", "joint_6", (0.001, 0.0, 0.002))
+
+
+def test_tensors_of_joints_that_slide_stand_behind_linear_springs():
+    sliding = Robot.from_urdf(sliding_arm_urdf(), "tcp")
+    springs = layout(sliding, "tensor")
+    joints = [joint.name for joint in sliding.chain.joints]
+    assert [spring.name for spring in springs] == ["slide.axial", *(f"{j}.tensor" for j in joints)]
+    assert [spring.kind for spring in springs] == ["prismatic"] + ["tensor"] * len(joints)
+
+
+def test_virtual_springs_may_sit_behind_the_motion():
+    springs = bearing_joint(robot(), distal=True)
+    assert [spring.distal for spring in springs] == [False] * 6 + [True] * 12
+    assert not any(spring.distal for spring in bearing_joint(robot()))
 
 
 @pytest.mark.parametrize(("word", "kind"), [("gear", Gear), ("tensor", Tensor), (None, Hinge)])
@@ -95,7 +115,10 @@ def test_an_axial_spring_takes_the_kind_of_its_joint(tmp_path):
         ("springs: [{joint: joint_6, axs: x}]", r"'springs\.0\.axs'; did you mean 'axis'"),
         ("springs: [{axis: x}]", r"'springs\.0\.joint' is missing"),
         ("springs: [{joint: joint_6, axis: w}]", r"springs\.0\.axis.*got 'w'"),
-        ("springs: [{joint: joint_6, kind: linear}]", r"springs\.0\.kind.*got 'linear'"),
+        (
+            "springs: [{joint: joint_6, kind: linear}]",
+            "be 'revolute', 'prismatic', 'gear' or 'tensor'.*'linear'",
+        ),
         ("springs: [{joint: joint_6, frame: middle}]", r"springs\.0\.frame.*'proximal'"),
         ("springs: [{joint: joint_6, offset: [1, 2, 3]}]", "1 is not a length with its unit"),
         ("springs: [{joint: joint_6, offset: [1 mm, 2 N, 3 mm]}]", "'N' is not a length"),

@@ -9,7 +9,7 @@ import pytest
 
 from elastocal.dataset import Dataset, Presses, Readings
 from elastocal.elastic import ElasticModel, bearing_joint
-from elastocal.identification import displacement_blocks, gears
+from elastocal.identification import displacement_blocks, gears, reference_joints
 from elastocal.robot import Rail, Robot, T_from_xyzabc, on_rail, with_tool
 from elastocal.sim.arm import (
     GRAVITY,
@@ -22,6 +22,7 @@ from elastocal.sim.arm import (
     press_poses,
 )
 from sim.conftest import ARM_URDF
+from support.virtual_chain import ARMS
 
 
 @cache
@@ -79,6 +80,23 @@ def test_rows_against_a_lightly_loaded_reference_find_the_whole_deflection():
     shown = seen.deflection - hidden
     assert error_of_fit(rows, at_the_same_joints, shown) < 0.002
     assert error_of_fit(displacement_blocks(model, seen), at_the_same_joints, shown) > 0.02
+
+
+@pytest.mark.parametrize("arm", ["six axes", "on a rail", "offset wrist on a turntable"])
+def test_an_unrecorded_reference_is_where_the_controller_began_with_external_axes_still(arm):
+    made = Robot.from_urdf(ARMS[arm], "tcp")
+    rng, external = np.random.default_rng(0), len(made.joint_names) - 6
+    q = rng.uniform(-1.0, 1.0, (20, len(made.joint_names)))
+    q[:, external + 2] += 1.5
+    q[:, external + 4] = np.copysign(0.3 + np.abs(q[:, external + 4]), q[:, external + 4])
+    moved = 5e-3 * rng.normal(size=(20, 3))
+    nothing = np.zeros((20, 3))
+    seen = Readings(np.arange(20), np.array(["normal"] * 20), q, nothing, moved, nothing)
+    q_0 = reference_joints(made, seen)
+    here, there = made.forward(q), made.forward(q_0)
+    np.testing.assert_array_equal(q_0[:, :external], q[:, :external])
+    np.testing.assert_allclose(there[:, :3, 3], here[:, :3, 3] - moved, atol=1e-9)
+    np.testing.assert_allclose(there[:, :3, :3], here[:, :3, :3], atol=1e-9)
 
 
 def test_rows_of_a_marker_are_those_of_an_arm_whose_tcp_it_is():

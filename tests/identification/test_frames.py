@@ -263,6 +263,11 @@ def test_campaigns_that_nobody_named_are_refused():
         fitted(payload_readings(poses=4), "campaign")
 
 
+def test_frames_that_are_known_have_no_column():
+    found = frame_columns(ROBOT, payload_readings(poses=4), "none")
+    assert (found.names, found.columns.shape) == ((), (12, 3, 0))
+
+
 def test_an_unknown_kind_is_refused_with_the_nearest_one():
     with pytest.raises(IdentificationError, match="did you mean 'campaign'"):
         FitOptions(free_frame="campain")

@@ -45,6 +45,8 @@ def test_a_file_says_what_is_known_of_included_springs_and_adds_none(tmp_path):
     )
     assert layout(robot(), name) == layout(robot(), "actuated")
     known = {each.name: each for each in known_springs(robot(), name)}
+    shorter = str(Path(name).rename(tmp_path / "springs.yml"))
+    assert known_springs(robot(), shorter) == tuple(known.values())
     first, second, third = (known[each] for each in NAMES[:3])
     assert (second.name, second.compliance) == (NAMES[1], pytest.approx(0.8e-6))
     assert second.sigma == pytest.approx(0.16e-6)
@@ -63,6 +65,7 @@ def test_a_layout_by_name_knows_nothing():
         ('joint: joint_2, uncertainty: "20 %"', "come together"),
         ('joint: joint_2, stiffness: "1.2", uncertainty: "20 %"', "not a stiffness or compliance"),
         ('joint: joint_2, stiffness: "1 MN*m/rad", uncertainty: "0.2"', "must be a percentage"),
+        ('joint: joint_2, stiffness: "1 MN*m/rad", uncertainty: "much %"', "must be a percentage"),
         ('joint: joint_2, stiffness: "0 N*m/rad", uncertainty: "2 %"', "must be above 0"),
         ('joint: joint_2, bounds: ["1 N*m/rad", "1 N*m/rad"]', "two different values"),
         ('joint: joint_2, stiffness: "1 N/um", uncertainty: "2 %"', "must have the unit of rad"),

@@ -121,6 +121,14 @@ def test_a_low_load_counts_half_at_its_pose_left_out_and_half_with_all_low_loads
     np.testing.assert_allclose(rung.score, expected, rtol=1e-4)
 
 
+def test_a_low_load_whose_frame_is_free_is_judged_at_its_pose_alone():
+    readings, options = with_low_load(campaign()), FitOptions(free_frame="load_case")
+    (rung,) = climb(robot(), readings, [RUNGS["bearing"]], ["bearing"], options).ladder
+    error = rung.held_out.error
+    expected = [error[readings.pose == pose].mean() for pose in np.unique(readings.pose)]
+    np.testing.assert_allclose(rung.score, expected)
+
+
 def test_rungs_that_were_not_tried_are_refused_by_name():
     ladder = list(chosen("rich", 8).values())
     with pytest.raises(
@@ -163,14 +171,16 @@ def test_planted_friction_is_found_where_there_is_a_low_load(springs):
 
 
 def test_gears_are_scaled_to_the_load_of_each_joint():
-    readings = campaign()
-    springs = gears(robot(), readings)
+    moment = np.random.default_rng(0).normal(0.0, 300.0, (155, 3))
+    readings = replace(campaign(), moment=moment)
+    springs = gears(robot(), readings, (0.03, 0.5))
     model = ElasticModel(robot(), bearing(robot()))
-    torque = model.load_torques(readings.joint_position, readings.force)
+    torque = model.load_torques(readings.joint_position, readings.force, moment)
     for index, spring in enumerate(springs[:5]):
         assert isinstance(spring, Gear)
         typical = np.median(np.abs(torque[:, index]))
         np.testing.assert_allclose(spring.knees, np.array([0.3, 1.0, 3.0]) * typical, rtol=0.06)
+        np.testing.assert_allclose(spring.slips, np.array([0.03, 0.5]) * typical, rtol=0.06)
 
 
 def test_a_joint_that_is_never_loaded_keeps_a_linear_spring():

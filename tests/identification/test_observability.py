@@ -256,3 +256,13 @@ def test_weights_of_parameters_of_other_units_count_in_their_sensible_sizes():
     ((first, second),) = found.unobservable
     assert (first.spring, second.spring) == ("big", "small")
     assert (first.weight, second.weight) == pytest.approx((1.0, -1e-8))
+
+
+def test_a_marker_on_the_axis_of_the_last_joint_never_shows_its_spring():
+    model, q = elastic("actuated"), np.array([0.1, -0.8, 1.2, 0.3, 0.7, 0.2])
+    assert attainable_rank(model) == 6
+    jacobian = model.spring_jacobian(q)
+    to_axis = np.cross(jacobian.rotation[:, 5], jacobian.translation[:, 5])
+    offset = model.robot.forward(q)[:3, :3].T @ to_axis
+    assert np.linalg.norm(offset) > 0.01
+    assert attainable_rank(model, offset) == 5

@@ -188,7 +188,7 @@ def test_with_too_few_errors_the_coverage_is_none_with_a_reason():
     problem, _ = planted(20e-6, poses=31)
     few = problem.take(np.isin(problem.block, np.unique(problem.block)[:3]) & _first(problem))
     coverage = measured_coverage(few, leave_poses_out(few), np.zeros((40, few.columns)))
-    assert coverage.measurement.share is None
+    assert (coverage.measurement.share, coverage.measurement.count) == (None, 0)
     assert "too few" in coverage.measurement.reason
 
 

@@ -52,6 +52,14 @@ def test_a_memory_goes_on_where_the_rows_before_ended():
     np.testing.assert_allclose(last, after, atol=1e-9)
 
 
+@pytest.mark.parametrize("memory", [None, np.arange(12.0)])
+def test_no_row_leaves_the_memory_as_it_was(memory):
+    friction, nothing = geared().model.friction, np.zeros((0, 24))
+    states, after = friction.visits(nothing, nothing, memory=memory)
+    assert states.shape == (0, 12)
+    np.testing.assert_array_equal(after, np.zeros(12) if memory is None else memory)
+
+
 def test_a_visit_for_every_row_or_none():
     with pytest.raises(SpringError, match=r"visit \(3,\) does not have a value for each of 30"):
         geared().predict(Q, FORCE, None, VISIT[:3])

@@ -25,16 +25,10 @@ from numpy.typing import ArrayLike
 
 from elastocal.arrays import BoolArray, FloatArray
 from elastocal.cell import Cell
-from elastocal.compensation.offline import (
-    PathError,
-    find_columns,
-    in_file,
-    programmed_rows,
-    read_layout,
-    read_values,
-    row_blocks,
-)
+from elastocal.compensation.offline import programmed_rows
 from elastocal.compensation.process import arc_length
+from elastocal.dataset import find_columns, in_file, read_layout, read_values, row_blocks
+from elastocal.errors import PathError
 from elastocal.identification import CalibratedModel, interval
 from elastocal.planning import cell_surface, collision_scene
 from elastocal.results import brief_repr

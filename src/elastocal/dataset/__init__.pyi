@@ -11,6 +11,20 @@ from .load_rows import (
     write_load_rows as write_load_rows,
 )
 from .merging import merge as merge, selected as selected
+from .path_table import (
+    PathColumns as PathColumns,
+    PathValues as PathValues,
+    WrenchColumns as WrenchColumns,
+    find_columns as find_columns,
+    find_wrench_columns as find_wrench_columns,
+    in_file as in_file,
+    read_layout as read_layout,
+    read_values as read_values,
+    require_within_a_turn as require_within_a_turn,
+    row_blocks as row_blocks,
+    turned_to_base as turned_to_base,
+    wrench_in_base as wrench_in_base,
+)
 from .readings import (
     Presses as Presses,
     Readings as Readings,

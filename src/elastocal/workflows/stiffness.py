@@ -14,7 +14,7 @@ from elastocal import compensation
 from elastocal.arrays import FloatArray
 from elastocal.cell import load_cell
 from elastocal.compensation import PathPostures, PathStations, PostureChoice, PostureSurvey
-from elastocal.compensation.offline import PathError, posture_jumps
+from elastocal.errors import PathError
 from elastocal.files import filling
 from elastocal.identification import CalibratedModel
 from elastocal.progress import Progress
@@ -22,7 +22,7 @@ from elastocal.records import record, write_json
 from elastocal.report import Curve, drawn, stiffness_figure, write_stiffness_figure
 from elastocal.results import Result, brief_repr
 from elastocal.robot import Robot
-from elastocal.robot.inverse import inverse_for
+from elastocal.robot.inverse import inverse_for, posture_jumps
 from elastocal.workflows._inputs import NewTool, coverage_notes, parse_posture, require_same_robot
 from elastocal.workflows._workflow import workflow
 

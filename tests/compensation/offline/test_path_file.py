@@ -5,22 +5,18 @@ import re
 import numpy as np
 import pytest
 
-from elastocal.compensation.offline import (
-    CorrectionSettings,
-    PathError,
-    compensate_path,
-    correct_rows,
+from elastocal.compensation.offline import CorrectionSettings, compensate_path, correct_rows
+from elastocal.elastic import ElasticModel
+from elastocal.errors import PathError
+from elastocal.identification import CalibratedModel
+from elastocal.robot import Robot
+from elastocal.robot.inverse import (
+    inverse_for,
     joints_along_path,
     nearest_zero_posture,
     posture_jumps,
 )
-from elastocal.elastic import ElasticModel
-from elastocal.identification import CalibratedModel
-from elastocal.robot import Robot
-from elastocal.robot.inverse import inverse_for
-from elastocal.sim.arm import (
-    START,
-)
+from elastocal.sim.arm import START
 from support.cells import rich_truth, robot, urdf
 from support.paths import (
     FORCE_TCP,

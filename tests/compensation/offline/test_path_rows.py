@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from elastocal.compensation.offline import (
-    PathError,
+from elastocal.dataset import (
     find_columns,
     in_file,
     read_layout,
@@ -12,7 +11,7 @@ from elastocal.compensation.offline import (
     row_blocks,
     turned_to_base,
 )
-from elastocal.errors import CompensationError, FileAccessError
+from elastocal.errors import CompensationError, FileAccessError, PathError
 from elastocal.robot import Robot
 from support.cells import robot
 from support.paths import dome_course, euler_columns, force_columns, quaternion_columns, write_csv

@@ -12,8 +12,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from elastocal.arrays import BoolArray, FloatArray
-from elastocal.compensation.offline import require_within_a_turn
-from elastocal.dataset import LoadRows, joint_dimensions, read_load_rows
+from elastocal.dataset import LoadRows, joint_dimensions, read_load_rows, require_within_a_turn
 from elastocal.errors import CompensationError
 from elastocal.results import brief_repr
 from elastocal.robot import GRAVITY, Robot, T_from_xyzabc

@@ -18,18 +18,19 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from elastocal.arrays import BoolArray, FloatArray, IndexArray
-from elastocal.compensation.offline import PathError
-from elastocal.compensation.offline.path_joints import (
-    RowName,
-    check_limits,
-    largest_move,
-    turned_inside,
-)
+from elastocal.errors import PathError
 from elastocal.identification import CalibratedModel, OutsideRows, OutsideSummary
 from elastocal.records import record
 from elastocal.results import brief_repr
 from elastocal.robot import Robot
-from elastocal.robot.inverse import InverseKinematics, pose_error
+from elastocal.robot.inverse import (
+    InverseKinematics,
+    RowName,
+    check_limits,
+    largest_move,
+    pose_error,
+    turned_inside,
+)
 
 LARGEST_DEFLECTION = 0.02
 """Largest deflection that is taken for one, in m."""

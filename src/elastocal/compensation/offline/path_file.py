@@ -7,9 +7,14 @@ from pathlib import Path
 import numpy as np
 
 from elastocal.arrays import FloatArray
-from elastocal.compensation.offline import (
+from elastocal.compensation.offline.correct import (
+    LARGEST_DEFLECTION,
+    CorrectionSummary,
+    PathCorrection,
+    correct_rows,
+)
+from elastocal.dataset import (
     PathColumns,
-    PathError,
     PathValues,
     find_columns,
     in_file,
@@ -18,25 +23,20 @@ from elastocal.compensation.offline import (
     row_blocks,
     wrench_in_base,
 )
-from elastocal.compensation.offline.correct import (
-    LARGEST_DEFLECTION,
-    CorrectionSummary,
-    PathCorrection,
-    correct_rows,
-)
-from elastocal.compensation.offline.path_joints import (
-    RowName,
-    check_limits,
-    joints_along_path,
-    nearest_zero_posture,
-    posture_jumps,
-)
-from elastocal.errors import FileAccessError
+from elastocal.errors import FileAccessError, PathError
 from elastocal.files import require_file
 from elastocal.identification import CalibratedModel
 from elastocal.progress import Progress, silent
 from elastocal.results import brief_repr
-from elastocal.robot.inverse import InverseKinematics, inverse_for
+from elastocal.robot.inverse import (
+    InverseKinematics,
+    RowName,
+    check_limits,
+    inverse_for,
+    joints_along_path,
+    nearest_zero_posture,
+    posture_jumps,
+)
 from elastocal.tables import TableRows, new_table
 
 _ROWS_AT_A_TIME = 2000

@@ -10,14 +10,13 @@ import numpy as np
 
 from elastocal.arrays import FloatArray
 from elastocal.cell import Cell
-from elastocal.compensation.offline import PathError, joints_along_path, posture_jumps
 from elastocal.compensation.process.course import Course, Process
 from elastocal.compensation.process.placement import FibrePlacement
 from elastocal.compensation.process.roughing import Roughing
-from elastocal.errors import CompensationError
+from elastocal.errors import CompensationError, PathError
 from elastocal.planning import cell_surface
 from elastocal.robot import has_wrist, wrist_angle
-from elastocal.robot.inverse import InverseKinematics, inverse_for
+from elastocal.robot.inverse import InverseKinematics, inverse_for, joints_along_path, posture_jumps
 
 _SPINS = np.linspace(0.0, 2.0 * np.pi, 12, endpoint=False)
 _FEW = 25

@@ -11,20 +11,8 @@ from elastocal.arrays import FloatArray
 from elastocal.compensation.offline import (
     CorrectionSettings,
     CorrectionSummary,
-    PathColumns,
     PathCorrection,
-    PathError,
-    PathValues,
-    RowName,
-    check_limits,
     correct_rows,
-    find_wrench_columns,
-    in_file,
-    joints_along_path,
-    read_layout,
-    read_values,
-    row_blocks,
-    wrench_in_base,
 )
 from elastocal.compensation.programs.krl import read_krl
 from elastocal.compensation.programs.program import (
@@ -33,11 +21,27 @@ from elastocal.compensation.programs.program import (
     Move,
     ProgramPoint,
 )
-from elastocal.errors import nearest
+from elastocal.dataset import (
+    PathColumns,
+    PathValues,
+    find_wrench_columns,
+    in_file,
+    read_layout,
+    read_values,
+    row_blocks,
+    wrench_in_base,
+)
+from elastocal.errors import PathError, nearest
 from elastocal.identification import CalibratedModel
 from elastocal.results import brief_repr
 from elastocal.robot import inverse_transform
-from elastocal.robot.inverse import InverseKinematics, inverse_for
+from elastocal.robot.inverse import (
+    InverseKinematics,
+    RowName,
+    check_limits,
+    inverse_for,
+    joints_along_path,
+)
 
 PROGRAM_READERS: Mapping[str, Callable[[Path], ControllerProgram]] = {".src": read_krl}
 """Readers of programs by the suffix of their main file."""

@@ -14,9 +14,9 @@ from typing import ClassVar
 import numpy as np
 
 from elastocal.arrays import FloatArray
-from elastocal.compensation.offline import PathError, in_file
 from elastocal.compensation.programs.program import CorrectedPoint, Move, Words
-from elastocal.errors import FileAccessError
+from elastocal.dataset import in_file
+from elastocal.errors import FileAccessError, PathError
 from elastocal.files import replacing, require_file
 from elastocal.results import brief_repr
 from elastocal.robot import T_from_xyzabc

@@ -16,6 +16,15 @@ from .opw import (
     derive_opw as derive_opw,
     opw_branches as opw_branches,
 )
+from .path_joints import (
+    RowName as RowName,
+    check_limits as check_limits,
+    joints_along_path as joints_along_path,
+    largest_move as largest_move,
+    nearest_zero_posture as nearest_zero_posture,
+    posture_jumps as posture_jumps,
+    turned_inside as turned_inside,
+)
 from .solver import (
     InverseKinematics as InverseKinematics,
     InverseSolutions as InverseSolutions,

@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 
 from elastocal.arrays import FloatArray
 from elastocal.dataset import joint_dimensions
-from elastocal.errors import CompensationError, UnitError, nearest
+from elastocal.errors import PathError, UnitError, nearest
 from elastocal.results import brief_repr
 from elastocal.robot import Robot, T_from_xyzabc
 from elastocal.tables import Column, TableError, TableLayout, TableRows, opened_table
@@ -28,10 +28,6 @@ _MOST = 2.0 * np.pi * (1.0 + 1e-6)
 _UNIT_NORM = 1e-3
 """Largest distance of the norm of a quaternion from 1."""
 _Found = Mapping[str, tuple[tuple[int, str | None], ...]]
-
-
-class PathError(CompensationError):
-    """A programmed path that cannot be corrected; the message names its line or point."""
 
 
 @contextmanager

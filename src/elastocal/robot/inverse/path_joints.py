@@ -5,7 +5,7 @@ from collections.abc import Callable
 import numpy as np
 
 from elastocal.arrays import FloatArray, IndexArray
-from elastocal.compensation.offline import PathError
+from elastocal.errors import PathError
 from elastocal.robot import Robot
 from elastocal.robot.inverse import TURN, InverseKinematics
 
