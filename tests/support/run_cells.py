@@ -24,7 +24,7 @@ class PlannedCell:
 
 
 def planned_cell(folder: Path, poses: int = 4) -> PlannedCell:
-    """Write the fibre placement cell with a small pool, two load cases and a kind truth; plan it."""
+    """Write the fibre placement cell, its pool and load cases few and its truth kind; plan it."""
     cell = write_example(folder / "cell", "afp")[0]
     text = cell.read_text(encoding="utf-8")
     for pattern, replacement in (
