@@ -1,5 +1,6 @@
 """From a cell to a plan: surface, pool, search, visiting order (paper 2.2, 3.1)."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,7 +11,7 @@ from elastocal import __version__
 from elastocal.arrays import FloatArray, IndexArray
 from elastocal.cell import Cell, contact_time, fingerprint, straight_time
 from elastocal.errors import PlanningError
-from elastocal.planning.checks import SightCheck
+from elastocal.planning.checks import SightCheck, registration_shortages, shortage_text
 from elastocal.planning.motion import (
     Mover,
     Route,
@@ -133,17 +134,22 @@ def make_plan(
         compared = ComparisonRecord(
             name=other.name, candidates=tuple(taken.tolist()), spread=spread
         )
+    poses = _poses(chosen)
     plan = PlanResult(
         elastocal=__version__,
         cell=CellRecord(name=cell.name, file=str(cell.path), fingerprint=fingerprint(cell)),
         robot=_robot(cell),
         contact=_contact(cell),
-        poses=_poses(chosen),
+        poses=poses,
         moves=_moves(route),
         search=search,
         comparison=compared,
         pool=_pool(sampled.pool),
-        findings=(*(each.message for each in findings), *_notes(cell, sampled.pool, search)),
+        findings=(
+            *(each.message for each in findings),
+            *_notes(cell, sampled.pool, search),
+            *_shortages(poses),
+        ),
     )
     return PlanAndPool(plan, _pool_data(chosen, sampled.points.position), surface)
 
@@ -252,6 +258,13 @@ def _unjudged(cell: Cell) -> list[str]:
     return notes
 
 
+def _shortages(poses: tuple[PoseRecord, ...]) -> Iterator[str]:
+    """Yield each station that no choice of stations gives enough poses to be registered."""
+    for station, few in registration_shortages([pose.seen_by for pose in poses]).items():
+        advice = "no station sees enough poses beside: move or add one, or plan more poses"
+        yield f"{shortage_text(station, few)}; {advice}"
+
+
 def _assumptions(cell: Cell) -> list[str]:
     """Return what the robot's description assumes and the cell file does not replace."""
     given = set()
@@ -292,7 +305,7 @@ def _poses(choice: _Choice) -> tuple[PoseRecord, ...]:
     pool, robot = choice.pool, choice.cell.robot
     order = choice.selection.order[choice.route.order]
     check = SightCheck.of(choice.cell, choice.surface)
-    seen_by = check.seen_by(pool.postures.take(order)) if check else [None] * len(order)
+    seen_by = check.assigned(pool.postures.take(order)) if check else [None] * len(order)
     poses = []
     for number, candidate in enumerate(order.tolist()):
         posture = pool.postures.take([candidate])
