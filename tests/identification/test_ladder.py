@@ -94,6 +94,14 @@ def test_the_interval_counts_that_refits_overlap():
     )
 
 
+def test_rungs_are_apart_from_the_chosen_one_by_what_they_predict():
+    ladder = chosen("linear", 8)
+    assert ladder[taken(ladder)].apart == 0.0
+    assert min(rung.apart for name, rung in ladder.items() if name != taken(ladder)) > 0.0
+    forced = chosen("linear", 8, "bearing")
+    assert [name for name, rung in forced.items() if np.isfinite(rung.apart)] == ["bearing"]
+
+
 @pytest.mark.parametrize("name", ["actuated", "bearing", "tensor", "gears"])
 def test_each_rung_can_be_forced(name):
     assert taken(chosen("rich", 8, name)) == name
