@@ -37,6 +37,10 @@ from elastocal.planning.plan_result import (
 from elastocal.planning.pool import REACH_ADVICE, Pool
 from elastocal.planning.pool_file import NOT_CHOSEN, PoolData
 from elastocal.planning.pool_sampling import SampledPool, sample_pool
+from elastocal.planning.requirements import (
+    require_loads_possible_anywhere,
+    require_possible_search,
+)
 from elastocal.planning.scene import (
     cell_surface,
     collision_scene,
@@ -115,6 +119,7 @@ def make_plan(
     progress(_SURFACE, 0, 1)
     surface = cell_surface(cell)
     findings = surface_findings(cell, surface, for_findings)
+    require_loads_possible_anywhere(cell, surface)
     mover = mover_for(cell, collision_scene(cell, surface))
     require_free_home(cell.home, mover)
     progress(_SURFACE, 1, 1)
@@ -152,30 +157,6 @@ def make_plan(
         ),
     )
     return PlanAndPool(plan, _pool_data(chosen, sampled.points.position), surface)
-
-
-def require_possible_search(cell: Cell, compare: str | None = None) -> None:
-    """Require a search that can be made, as far as no pool is needed to tell.
-
-    Parameters
-    ----------
-    cell : Cell
-        The cell.
-    compare : str, optional
-        Search technique to lay beside the cell's own.
-
-    Raises
-    ------
-    PlanningError
-        If a technique is unknown, or needs a process that the cell does not name.
-    """
-    wanted = technique(cell.file.search.technique)
-    for name in (wanted.name, compare):
-        if name in ("i_optimal", "exchange-i") and cell.process is None:
-            raise PlanningError(
-                f"search technique {name!r} needs the production's poses and forces:"
-                " name their file in process.file of the cell file"
-            )
 
 
 def _require_enough(cell: Cell, sampled: SampledPool, findings: tuple[Finding, ...]) -> None:

@@ -59,6 +59,7 @@ def cell_file(path: Path) -> FileDescription:
     planning.require_possible_search(cell)
     surface = planning.cell_surface(cell)
     findings = planning.surface_findings(cell, surface, np.random.default_rng(search.seed))
+    planning.require_loads_possible_anywhere(cell, surface)
     require_free_home(cell.home, mover_for(cell, planning.collision_scene(cell, surface)))
     return "cell file", {
         "schema": "elastocal.cell/1",
