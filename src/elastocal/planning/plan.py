@@ -269,16 +269,14 @@ def _robot(cell: Cell) -> RobotRecord:
 
 
 def _contact(cell: Cell) -> ContactRecord:
-    engagement, loads = cell.file.engagement, cell.file.load_cases
+    engagement = cell.file.engagement
     return ContactRecord(
         approach_distance=engagement.approach_distance,
         near_contact=engagement.near_contact,
         axis_override=cell.file.motion.override,
         contact_speed=cell.file.motion.contact_speed,
         straight_time=straight_time(cell),
-        load_cases={
-            name: _vector(force) for name, force in zip(loads.cases, loads.force_tcp, strict=True)
-        },
+        load_cases={name: _vector(force) for name, force in cell.file.presses.items()},
     )
 
 

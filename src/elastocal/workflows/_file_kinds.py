@@ -58,7 +58,7 @@ def cell_file(path: Path) -> FileDescription:
         "schema": "elastocal.cell/1",
         "cell": cell.name,
         "robot": cell.robot.name,
-        "load_cases": list(cell.file.load_cases.cases),
+        "load_cases": list(cell.file.presses),
         "trackers": [tracker.name for tracker in cell.file.trackers],
         "technique": search.technique,
         "faces": len(surface.mesh.faces),

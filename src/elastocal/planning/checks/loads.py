@@ -88,7 +88,7 @@ class TorqueCheck(PostureCheck):
         """Return the check of the actuators; None when the torque of no joint is known."""
         check = cls(
             cell.robot,
-            cell.file.load_cases.force_tcp,
+            np.array([*cell.file.presses.values()]),
             cell.torque_limits,
             cell.file.tool.mass,
             cell.tool_centre_tcp,
@@ -163,7 +163,7 @@ class SensorCheck(PostureCheck):
             return None
         centre = T_sensor_tcp[:3, :3] @ cell.tool_centre_tcp + T_sensor_tcp[:3, 3]
         return cls(
-            cell.file.load_cases.force_tcp,
+            np.array([*cell.file.presses.values()]),
             T_sensor_tcp,
             sensor.largest_force,
             sensor.largest_moment,

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from elastocal.arrays import FloatArray
-from elastocal.cell import Cell, ProcedureSettings
+from elastocal.cell import LIGHT_CONTACT, Cell, ProcedureSettings
 from elastocal.errors import ProcedureError
 from elastocal.planning import PlanResult
 from elastocal.planning.checks import REGISTRATION_POSES, registration_shortages, shortage_text
@@ -50,7 +50,7 @@ class RunSettings:
     approach_distance: float
     """Distance from the surface at the approach pose, in m."""
     loads: tuple[tuple[str, FloatArray], ...]
-    """Name of each load case and force on the robot in the tcp frame, shape (3,), in N."""
+    """Name of each press and force on the robot in the tcp frame, shape (3,), in N, in order."""
 
 
 def run_settings(cell: Cell, plan: PlanResult) -> RunSettings:
@@ -96,7 +96,8 @@ def run_settings(cell: Cell, plan: PlanResult) -> RunSettings:
 
 def _check_contact_force(cell: Cell, loads: tuple[tuple[str, FloatArray], ...]) -> None:
     """Refuse a guarded approach that would press more than a load case does."""
-    name, least = min(((name, -float(f[2])) for name, f in loads), key=lambda load: load[1])
+    pressed = ((name, -float(f[2])) for name, f in loads if name != LIGHT_CONTACT)
+    name, least = min(pressed, key=lambda load: load[1])
     contact_force = cell.file.procedure.contact_force
     if not contact_force < least:
         raise ProcedureError(
@@ -183,18 +184,18 @@ def _about_robot(plan: PlanResult, cell: Cell) -> Iterator[str]:
 
 
 def _about_contact(plan: PlanResult, cell: Cell) -> Iterator[str]:
-    engagement, loads = cell.file.engagement, cell.file.load_cases
+    engagement, presses = cell.file.engagement, cell.file.presses
     for key in ("approach_distance", "near_contact"):
         found, wanted = getattr(plan.contact, key), getattr(engagement, key)
         if not _same(found, wanted):
             yield f"contact.{key} is {found:g} m, engagement.{key} of the cell {wanted:g} m"
-    if tuple(plan.contact.load_cases) != tuple(loads.cases):
+    if tuple(plan.contact.load_cases) != tuple(presses):
         yield (
             f"contact.load_cases are {', '.join(plan.contact.load_cases)}, those of the cell"
-            f" {', '.join(loads.cases)}"
+            f" {', '.join(presses)}"
         )
         return
-    for name, wanted in zip(loads.cases, loads.force_tcp, strict=True):
+    for name, wanted in presses.items():
         if not _same(found := plan.contact.load_cases[name], wanted):
             yield f"load case {name!r} is {_listed(found)} N, that of the cell {_listed(wanted)} N"
 
