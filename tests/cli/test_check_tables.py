@@ -76,7 +76,5 @@ def test_a_dataset_without_a_column_is_refused_as_one(tmp_path):
 
 
 def test_columns_of_no_table_of_ours_are_refused_with_what_is_known(tmp_path):
-    with pytest.raises(
-        SchemaError, match="columns colour, taste are of no table of ours"
-    ) as caught:
+    with pytest.raises(SchemaError, match="columns colour, taste are of no table of ours"):
         describe_file(written(tmp_path, "colour,taste", "red,sweet"))

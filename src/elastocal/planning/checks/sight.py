@@ -267,7 +267,7 @@ def _too_few(chosen: IndexArray, stations: int) -> list[int]:
     """Return the stations that cannot be registered, those with the fewest poses first."""
     count = np.bincount(chosen[chosen >= 0], minlength=stations)
     few = np.flatnonzero((count > 0) & (count < REGISTRATION_POSES))
-    return few[np.argsort(count[few], kind="stable")].tolist()
+    return sorted(map(int, few), key=lambda station: (count[station], station))
 
 
 def _give_spare_poses(chosen: IndexArray, station: int, margins: FloatArray) -> None:
