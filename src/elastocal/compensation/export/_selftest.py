@@ -256,11 +256,13 @@ def _episodes(numbers: Design, model: ModelFunctions) -> list[_Episode]:
 def _without_numbers(good: Reading) -> list[tuple[int, Reading]]:
     """Return readings with a NaN or an infinity, each followed by one that is good."""
     course = []
-    for name in ("time", "q", "force", "moment"):
-        for bad in (math.nan, math.inf, -math.inf):
-            spoilt = good._replace(time=bad)
-            if name != "time":
-                spoilt = good._replace(**{name: [*getattr(good, name)[:-1], bad]})
+    for bad in (math.nan, math.inf, -math.inf):
+        for spoilt in (
+            good._replace(time=bad),
+            good._replace(q=[*good.q[:-1], bad]),
+            good._replace(force=[*good.force[:-1], bad]),
+            good._replace(moment=[bad, *good.moment[1:]]),
+        ):
             course += [(1, spoilt), (2, good)]
     return course
 
