@@ -1,7 +1,7 @@
 """Print how fast the compensator is: the exported C beside Pinocchio, and the Python step.
 
 Machines differ and are noisy, so the ratios count, taken in the same run: to Pinocchio's own
-Jacobian of the same 18-spring model, and of the richest model (gears of three knees and three
+Jacobian of the same 18-spring model, and of the richest model (gears of two knees and four
 friction elements at every joint, under the arm's own weight) to that one. Needs gcc.
 Run with ``python benchmarks/compensation.py``.
 """
@@ -26,7 +26,7 @@ from elastocal.robot import ChainModel, InsertedJoint, Robot, build_model, catal
 HARNESS = Path(__file__).parents[1] / "tests" / "support" / "export_harness.c"
 TOOL = np.array([[0.0, 0, 1, 0.15], [0, 1, 0, 0], [-1, 0, 0, 0.35], [0, 0, 0, 1]])
 ROWS, REPEATS = 1000, 5
-KNEES, SLIPS = (300.0, 1000.0, 3000.0), (30.0, 100.0, 300.0)
+KNEES, SLIPS = (500.0, 2000.0), (150.0, 300.0, 600.0, 1500.0)
 SETTINGS = CompensatorSettings(
     filter={
         "median": 3,
@@ -40,10 +40,11 @@ def calibrated(gears: bool = False) -> CalibratedModel:
     """Return an 18-spring KUKA arm with made-up compliances and 200 draws."""
     urdf = with_tool(catalogue.urdf("KR 120 R2700 extra HA"), "flange", "tcp", TOOL)
     robot = Robot.from_urdf(urdf, "tcp")
-    springs = layout(robot, "bearing")
+    springs = layout(robot, "links" if gears else "bearing")
     if gears:
         axial, virtual = springs[: len(robot.joint_names)], springs[len(robot.joint_names) :]
-        geared = (Gear(s.name, s.joint, s.axes[0].axis, knees=KNEES, slips=SLIPS) for s in axial)
+        places = ((s.name, s.joint, s.axes[0].axis) for s in axial)
+        geared = (Gear(*place, knees=KNEES, slips=SLIPS, plays=True) for place in places)
         springs = (*geared, *virtual)
     model = ElasticModel(robot, springs)
     rng, n = np.random.default_rng(0), len(model.parameters)

@@ -17,6 +17,7 @@ from elastocal import procedure
 from elastocal.cell import fingerprint, load_cell
 from elastocal.errors import DatasetError, FileAccessError
 from elastocal.planning import read_plan, write_plan
+from elastocal.planning.export._krl_motion import speeds_of
 from elastocal.procedure import (
     Journal,
     RunFolder,
@@ -133,6 +134,17 @@ def test_a_dry_run_lists_the_steps_and_writes_nothing(planned, tmp_path):
     )
     assert not (tmp_path / "dry").exists()
     assert "Nothing was moved." in run(planned, tmp_path / "dry", "--dry-run").err
+
+
+def test_plan_rehearsal_run_and_krl_program_name_one_duration(planned, whole, tmp_path):
+    plan, cell = read_plan(planned.plan), load_cell(planned.cell)
+    rehearsed = json.loads(run(planned, tmp_path / "dry", "--dry-run", "--json").out)["seconds"]
+    assert rehearsed == pytest.approx(plan.total_time, rel=1e-9)
+    assert json.loads(whole[1].out)["seconds"] == pytest.approx(plan.total_time, rel=0.1)
+    program = speeds_of(plan)
+    slower = 100.0 * cell.file.motion.override / program.ptp_percent
+    wanted = plan.total_time + (slower - 1.0) * plan.travel_time
+    assert program.total_time(plan) == pytest.approx(wanted, rel=0.01)
 
 
 def test_a_folder_that_holds_a_run_is_refused(planned, whole):

@@ -54,6 +54,14 @@ CASES: dict[str, Spring] = {
     "gear on a heavy arm": Gear(
         "joint_3.gear", "joint_3", (0.0, 1.0, 0.0), knees=(400.0, 1300.0), slips=(50.0, 150.0)
     ),
+    "gear of plays on a heavy arm": Gear(
+        "joint_3.gear",
+        "joint_3",
+        (0.0, 1.0, 0.0),
+        knees=(400.0, 1300.0),
+        slips=(50.0, 150.0),
+        plays=True,
+    ),
     "gear without friction on a heavy arm": Gear("joint_3.gear", "joint_3", (0.0, 1.0, 0.0)),
     "tensor": Tensor("joint_3.tensor", "joint_3"),
     "tensor off the origin": Tensor("joint_3.tensor", "joint_3", (0.1, -0.2, 0.3)),

@@ -7,7 +7,14 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from elastocal.elastic import LAYOUTS, ElasticModel, bearing, bearing_ends, joint_origins
+from elastocal.elastic import (
+    LAYOUTS,
+    ElasticModel,
+    bearing,
+    bearing_ends,
+    joint_origins,
+    link_middles,
+)
 from elastocal.robot import Robot, SerialChain, catalogue
 from support.virtual_chain import ARMS
 
@@ -103,6 +110,8 @@ def test_an_origin_is_where_the_common_normal_with_the_axis_before_meets_the_axi
         np.testing.assert_allclose(found, expected, atol=1e-9)
         # Model files hold the numbers: no zero with a sign.
         assert not any(np.signbit(x) and x == 0.0 for x in (*origin.offset, *origin.far))
+        names = list(origin.directions)
+        assert names == ["normal", "binormal"] or names == sorted(names)
         directions = np.array([R @ direction for direction in origin.directions.values()])
         frame = np.array([axis, *directions])
         np.testing.assert_allclose(frame @ frame.T, np.eye(3), atol=1e-9)
@@ -216,3 +225,19 @@ def test_turning_a_frame_about_its_axis_turns_no_spring(name, angle):
 
 def test_an_arm_with_a_spherical_wrist_has_eighteen_springs_still():
     assert len(bearing(ROBOTS["catalogue"])) == 18
+
+
+def test_middles_of_links_lie_between_origins_and_their_hinges_across():
+    robot = ROBOTS["catalogue"]
+    joints, origins = robot.chain.joints, joint_origins(robot.chain)
+    found = {link.joint: link for link in link_middles(robot.chain)}
+    # Axes 4, 5 and 6 meet: no link lies between them.
+    assert set(found) == {"joint_a1", "joint_a2", "joint_a3", "joint_a4"}
+    upper = found["joint_a2"]
+    end = joints[2].placement[:3, :3] @ np.array(origins[2].offset) + joints[2].placement[:3, 3]
+    np.testing.assert_allclose(upper.middle, 0.5 * (np.array(origins[1].offset) + end), atol=1e-12)
+    along = (end - origins[1].offset) / np.linalg.norm(end - origins[1].offset)
+    np.testing.assert_allclose([along @ d for d in upper.directions.values()], 0.0, atol=1e-9)
+    assert tuple(joints[1].axis) in {tuple(np.abs(d)) for d in upper.directions.values()} | {
+        tuple(d) for d in upper.directions.values()
+    }

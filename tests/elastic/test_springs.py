@@ -6,7 +6,10 @@ from hypothesis import given, strategies as st
 
 from elastocal.elastic import (
     ElasticModel,
+    FrictionElements,
+    Gear,
     Hinge,
+    SpringLoad,
     as_axis,
     axial,
     check_springs,
@@ -14,6 +17,7 @@ from elastocal.elastic import (
     orthogonal_axes,
 )
 from elastocal.errors import SpringError
+from elastocal.records import from_data, to_data
 from support.cells import robot
 
 COMPONENT = st.floats(-10.0, 10.0).filter(lambda x: abs(x) > 1e-3 or x == 0.0)
@@ -104,3 +108,40 @@ def test_bearing_has_the_papers_eighteen_springs_in_its_order():
     assert names[:6] == [f"joint_{number}.axial" for number in range(1, 7)]
     assert names[6:10] == ["joint_1.x", "joint_1.y", "joint_2.x", "joint_2.z"]
     assert len(names) == 18
+
+
+PLAYS = Gear(
+    "a.gear", "a", (0.0, 0.0, 1.0), knees=(400.0, 1500.0), slips=(100.0, 300.0), plays=True
+)
+
+
+def turned(gear: Gear, torques: np.ndarray, c: np.ndarray) -> np.ndarray:
+    """Return the angles along a course of torques, the first of which finds the gear free."""
+    friction = FrictionElements(np.array([0, 0]), np.array(gear.slips))
+    states = friction.path(torques[:, None])
+    load = SpringLoad((torques,), (), tuple(states.T))
+    return c @ np.array(gear.angles(load)[0])
+
+
+def test_a_gear_of_plays_grows_with_the_torque_whatever_came_before():
+    rng = np.random.default_rng(0)
+    for c in rng.uniform(0.0, 1e-6, (20, 5)):
+        torques = np.cumsum(rng.normal(0.0, 300.0, 50))
+        change, angle = np.diff(torques), np.diff(turned(PLAYS, torques, c))
+        assert np.all(angle * np.sign(change) >= -1e-18)
+    stops = dataclasses.replace(PLAYS, plays=False)
+    assert np.any(np.diff(turned(stops, np.array([0.0, 50.0]), np.ones(5) * [0, 0, 0, 1, 1])) < 0)
+
+
+def test_lost_motion_is_what_large_torques_of_both_signs_leave():
+    c = np.array([1.0, 2.0, 3.0, 4.0, 5.0]) * 1e-7
+    for gear in (PLAYS, dataclasses.replace(PLAYS, plays=False)):
+        there, back = (turned(gear, np.array([0.0, s * 1e4, 0.0]), c)[-1] for s in (1.0, -1.0))
+        (lost,) = [each for each in gear.characteristics if "lost motion" in each.name]
+        assert abs(there - back) == pytest.approx(c @ np.array(lost.weights), rel=1e-12)
+
+
+def test_a_gear_of_a_file_that_does_not_speak_of_plays_has_none():
+    data = to_data(dataclasses.replace(PLAYS, plays=False))
+    data.pop("plays", None)
+    assert from_data(Gear, data, "a file") == dataclasses.replace(PLAYS, plays=False)

@@ -6,7 +6,9 @@ import pytest
 from elastocal.elastic import ElasticModel, layout
 from elastocal.identification import Calibration, calibrate
 from elastocal.sim.arm import (
+    LINK_BENDING,
     Blunder,
+    with_link_bending,
 )
 from support.cells import QUIET, TRACKED, Cell, linear_truth, rich_truth, robot, unseen
 
@@ -37,6 +39,14 @@ def test_bending_links_stiffening_gears_and_noise_leave_two_percent():
     six = relative_error(fitted(cell, "actuated"), rich_truth())
     assert 1e-4 < eighteen < 0.02
     assert six > 4.0 * eighteen
+
+
+def test_links_that_bend_need_springs_in_their_middle():
+    joints = robot().joint_names
+    arm = with_link_bending(linear_truth(), dict.fromkeys(joints[1:3], LINK_BENDING))
+    cell = Cell(arm, noise=QUIET)
+    ends, middles = (relative_error(fitted(cell, name), arm) for name in ("bearing-ends", "links"))
+    assert middles < 0.5 * ends
 
 
 @pytest.mark.parametrize("offset", [(3e-3, 0.0, 0.0), (0.0, -0.5, 0.0)], ids=["3 mm", "500 mm"])

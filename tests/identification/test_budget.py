@@ -73,13 +73,13 @@ def test_a_worth_is_the_difference_in_quadrature_at_left_out_poses():
     budget, found = budget_of_gears(), worth(budget_of_gears(), "gears")
     assert found.error**2 - budget.total.error**2 == pytest.approx(found.worth**2)
     # Without gears the layout is that of the rung below.
-    held_out = leave_poses_out(build(model("bearing-ends", stiffening()), stiffening()))
+    held_out = leave_poses_out(build(model("links", stiffening()), stiffening()))
     assert found.error == pytest.approx(np.sqrt(np.mean(held_out.error**2)), rel=1e-6)
 
 
 def test_a_term_is_worth_the_same_whether_it_is_taken_out_or_added():
     out = worth(budget_of_gears(), "gears")
-    added = worth(error_budget(model("bearing-ends", stiffening()), stiffening()), "gears")
+    added = worth(error_budget(model("links", stiffening()), stiffening()), "gears")
     assert (out.taken, added.taken) == (True, False)
     np.testing.assert_allclose([added.worth, added.low, added.high], [out.worth, out.low, out.high])
 

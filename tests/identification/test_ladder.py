@@ -94,6 +94,14 @@ def test_the_interval_counts_that_refits_overlap():
     )
 
 
+def test_rungs_are_apart_from_the_chosen_one_by_what_they_predict():
+    ladder = chosen("linear", 8)
+    assert ladder[taken(ladder)].apart == 0.0
+    assert min(rung.apart for name, rung in ladder.items() if name != taken(ladder)) > 0.0
+    forced = chosen("linear", 8, "bearing")
+    assert [name for name, rung in forced.items() if np.isfinite(rung.apart)] == ["bearing"]
+
+
 @pytest.mark.parametrize("name", ["actuated", "bearing", "tensor", "gears"])
 def test_each_rung_can_be_forced(name):
     assert taken(chosen("rich", 8, name)) == name
@@ -173,14 +181,15 @@ def test_planted_friction_is_found_where_there_is_a_low_load(springs):
 def test_gears_are_scaled_to_the_load_of_each_joint():
     moment = np.random.default_rng(0).normal(0.0, 300.0, (155, 3))
     readings = replace(campaign(), moment=moment)
-    springs = gears(robot(), readings, (0.03, 0.5))
+    springs, remembering = gears(robot(), readings), gears(robot(), readings, (0.03, 0.5))
     model = ElasticModel(robot(), bearing(robot()))
     torque = model.load_torques(readings.joint_position, readings.force, moment)
     for index, spring in enumerate(springs[:5]):
         assert isinstance(spring, Gear)
         typical = np.median(np.abs(torque[:, index]))
         np.testing.assert_allclose(spring.knees, np.array([0.3, 1.0, 3.0]) * typical, rtol=0.06)
-        np.testing.assert_allclose(spring.slips, np.array([0.03, 0.5]) * typical, rtol=0.06)
+        slips = remembering[index].slips
+        np.testing.assert_allclose(slips, np.array([0.03, 0.5]) * typical, rtol=0.06)
 
 
 def test_a_joint_that_is_never_loaded_keeps_a_linear_spring():

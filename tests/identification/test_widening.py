@@ -9,6 +9,8 @@ from elastocal.identification.solve import PoseGrams
 from elastocal.identification.uncertainty import (
     bootstrap,
     distrust_factor,
+    doubt,
+    doubt_factor,
     widen_draws,
     widening_factor,
 )
@@ -60,8 +62,32 @@ def test_draws_are_stretched_about_the_estimate():
 def test_stretched_draws_keep_the_bounds():
     problem, c = made_up(np.random.default_rng(0))
     bounded = replace(problem, lower=0.8 * c, upper=1.2 * c)
-    draws = c * np.array([[0.9], [1.1]])
-    np.testing.assert_allclose(widen_draws(bounded, c, draws, 10.0), c * [[0.8], [1.2]])
+    draws = c * np.array([[0.9], [1.1], [1.01]])
+    found = widen_draws(bounded, c, draws, 10.0)
+    assert np.all((found >= 0.8 * c) & (found <= 1.2 * c))
+    np.testing.assert_allclose(found[2], 1.1 * c)
+
+
+def test_stretching_beyond_a_bound_moves_no_prediction_that_other_springs_can_keep():
+    """Two springs that nearly share a deflection: what one may not take, the other does."""
+    problem, c = made_up(np.random.default_rng(0))
+    alike = problem.O.copy()
+    alike[..., 1] = alike[..., 0]
+    problem = replace(problem, O=alike)
+    step = np.array([0.6, -0.6, 0.0, 0.0, 0.0]) * c[0]
+    estimate = np.concatenate([[c[0], c[0]], c[2:]])
+    found = widen_draws(problem, estimate, estimate + np.array([step, -step]), 3.0)
+    assert np.all(found >= problem.lower)
+    predicted = (alike @ (found - estimate).T).ravel()
+    np.testing.assert_allclose(predicted, 0.0, atol=1e-6 * np.abs(alike @ estimate).max())
+
+
+def test_doubt_about_the_model_adds_to_the_variance():
+    problem, c = made_up(np.random.default_rng(0), blocks=5)
+    draws = c + np.array([[1.0], [-1.0]]) * np.eye(5)[0] * 1e-3
+    spread = float(np.mean(np.sum(np.square(problem.O @ (draws[0] - c)), axis=1)))
+    assert doubt_factor(problem, c, draws, 3.0 * spread) == pytest.approx(2.0)
+    assert doubt_factor(problem, c, draws, 0.0) == 1.0
 
 
 def test_draws_of_a_model_that_is_not_trusted_spread_as_far_as_its_errors_at_left_out_poses():
@@ -74,3 +100,15 @@ def test_draws_of_a_model_that_is_not_trusted_spread_as_far_as_its_errors_at_lef
     spread = np.mean(np.sum(np.square(moved), axis=2))
     assert spread == pytest.approx(np.mean(np.square(held_out.error)))
     assert distrust_factor(problem, c, np.tile(c, (40, 1)), held_out) == 1.0
+
+
+def test_models_that_the_poses_do_not_tell_apart_are_a_doubt_about_the_chosen_one():
+    apart = np.array([0.0, 2.0])
+    assert doubt(np.zeros(2), np.ones(2), apart) == pytest.approx(2.0)
+    assert doubt(np.array([0.0, -9.0]), np.ones(2), apart) == pytest.approx(2.0)
+    weight = norm.pdf(1.5) / norm.pdf(0.0)
+    one_and_a_half = doubt(np.array([0.0, 1.5]), np.array([0.0, 1.0]), apart)
+    assert one_and_a_half == pytest.approx(4.0 * weight / (1.0 + weight))
+    # One that is far behind says nothing of a prediction.
+    assert doubt(np.array([0.0, 9.0]), np.ones(2), apart) == pytest.approx(0.0, abs=1e-15)
+    assert doubt(np.zeros(0), np.zeros(0), np.zeros(0)) == 0.0

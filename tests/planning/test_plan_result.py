@@ -51,6 +51,22 @@ def test_a_plan_comes_back_as_it_was(tmp_path):
     assert read_plan(tmp_path) == read_plan(path) == plans.plan()
 
 
+def test_a_plan_of_an_earlier_version_is_read(tmp_path):
+    path = write_plan(tmp_path, plans.plan())
+    old = edited(path, lambda data: data["contact"].pop("straight_time"))
+    assert read_plan(old) == plans.plan()
+    assert plans.plan().contact.straight_time is None
+
+
+def test_the_time_of_the_straight_ways_counts_in_the_hash(tmp_path):
+    plan = plans.plan()
+    plan = replace(plan, contact=replace(plan.contact, straight_time=10.5))
+    path = write_plan(tmp_path, plan)
+    assert read_plan(tmp_path) == plan
+    change = edited(path, lambda data: data["contact"].update(straight_time=11.0))
+    assert "was changed by hand" in refusal(change)
+
+
 def test_the_load_cases_keep_their_order(written):
     assert list(read_plan(written).contact.load_cases) == list(plans.LOAD_CASES)
 

@@ -116,3 +116,10 @@ from .simulation import (
     TrackerTruth as TrackerTruth,
     TruthScale as TruthScale,
 )
+from .visit import (
+    VisitStep as VisitStep,
+    contact_time as contact_time,
+    load_case_time as load_case_time,
+    straight_time as straight_time,
+    visit_steps as visit_steps,
+)

@@ -51,13 +51,13 @@ class MotionEntry(StrictModel):
     acceleration_time: PositiveTime = 0.5
     """Time in which a joint reaches its full speed, in s."""
     contact_speed: Annotated[PositiveSpeed, Field(ge=1e-4)] = 0.02
-    """Of the straight motion between approach pose and contact, in m/s, as the plan's times and
-    the KRL program take it. ``procedure.contact_speed`` is another: that of the last millimetres
-    in `elastocal run`."""
+    """Fastest straight motion of the KRL program between approach pose and contact, in m/s.
+    `elastocal run` has ``procedure.approach_speed``, and for the last millimetres
+    ``procedure.contact_speed``: the times of a plan are for those."""
     unloaded_time: PositiveTime = 4.0
-    """Time of the unloaded reference of a pose, in s."""
+    """Without effect, and read for cells of earlier versions: times follow from ``procedure``."""
     load_time: PositiveTime = 8.0
-    """Time of one load case, in s: ramp, settle, average."""
+    """Without effect, likewise."""
 
 
 def home_position(robot: Robot, entry: MotionEntry) -> FloatArray:

@@ -11,6 +11,7 @@ from .layouts import (
     custom as custom,
     known_springs as known_springs,
     layout as layout,
+    links as links,
     orthogonal_axes as orthogonal_axes,
     read_springs as read_springs,
     tensor as tensor,
@@ -25,7 +26,9 @@ from .model import (
 from .origins import (
     PARALLEL as PARALLEL,
     JointOrigin as JointOrigin,
+    LinkMiddle as LinkMiddle,
     joint_origins as joint_origins,
+    link_middles as link_middles,
 )
 from .springs import (
     AXES as AXES,

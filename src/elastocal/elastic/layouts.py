@@ -23,7 +23,7 @@ from numpy.typing import ArrayLike
 from pydantic import BeforeValidator, Field
 
 from elastocal.elastic.known import Knowledge, KnownSpring
-from elastocal.elastic.origins import joint_origins
+from elastocal.elastic.origins import joint_origins, link_middles
 from elastocal.elastic.springs import (
     AXES,
     DEFAULT_KIND,
@@ -72,6 +72,22 @@ def bearing_ends(robot: Robot) -> tuple[Spring, ...]:
     both ends are one place there is one pair of springs.
     """
     return (*actuated(robot), *_tilts(robot, both_ends=True))
+
+
+def links(robot: Robot) -> tuple[Spring, ...]:
+    """Return the layout of both bearing ends with links that bend.
+
+    A beam that bends does so all along its length, which springs at its ends express badly: their
+    lever to the tcp is another. Two hinges in the middle of each link stand for it.
+    """
+    bends = (
+        Hinge(f"{link.joint}.bend-{name}", link.joint, axis, distal=True, offset=link.middle)
+        for link in link_middles(robot.chain)
+        for name, axis in link.directions.items()
+    )
+    axial_ones, tilts = actuated(robot), bearing_ends(robot)[len(robot.joint_names) :]
+    order = {name: index for index, name in enumerate(robot.joint_names)}
+    return (*axial_ones, *sorted((*tilts, *bends), key=lambda spring: order[spring.joint]))
 
 
 def _tilts(robot: Robot, both_ends: bool = False) -> Iterator[Spring]:
@@ -150,6 +166,7 @@ LAYOUTS: dict[str, Callable[[Robot], tuple[Spring, ...]]] = {
     "bearing": bearing,
     "bearing-joint": bearing_joint,
     "bearing-ends": bearing_ends,
+    "links": links,
     "tensor": tensor,
 }
 """Layouts by name."""

@@ -268,14 +268,14 @@ class ElasticModel:
         force, moment : array_like, shape (..., 3), optional
             Load at the tool centre point, in base, in N and N·m. Default: none.
         """
-        c = self.check_compliance(compliance)
-        jacobian = self.spring_jacobian(q)
+        c, jacobian = self.check_compliance(compliance), self.spring_jacobian(q)
         J, W = jacobian.translation, jacobian.rotation
         torques = spring_torques(jacobian, force, moment)
         weights = self.weight_torques(q) if self.bears_weight else None
+        friction = self.friction.press(torques) if len(self.friction) else None
         translation, rotation, coupling = np.zeros((3, *torques.shape[:-1], 3, 3))
         for group in self._groups:
-            tangents = group.law.tangents(group.load(torques, weights))
+            tangents = group.law.tangents(group.load(torques, weights, friction))
             # A spring of several axes couples them: all pairs, of which a hinge has one.
             for (a, axis), (b, other) in product(enumerate(group.axes), repeat=2):
                 terms = zip(group.parameters, tangents[a][b], strict=True)

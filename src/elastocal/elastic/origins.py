@@ -15,7 +15,7 @@ turning it about it, moves nothing. Special cases:
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from itertools import accumulate
+from itertools import accumulate, pairwise
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -27,6 +27,8 @@ from elastocal.robot import SerialChain
 
 PARALLEL = 1e-2
 """Angle in rad below which two axes count as parallel."""
+_SHORTEST_LINK = 1e-2
+"""Distance in m below which two origins have no link between them."""
 _SAME_AXIS = 1e-6
 """Distance in m below which two parallel axes count as one line."""
 
@@ -49,15 +51,65 @@ class JointOrigin:
     ``normal`` and ``binormal``."""
 
 
+@brief_repr
+@dataclass(frozen=True)
+class LinkMiddle:
+    """The middle of the link behind a joint, in the joint's frame behind its motion."""
+
+    joint: str
+    """Name of the joint in front of the link."""
+    middle: _Triple
+    """Half-way to the next joint's origin, in m."""
+    directions: dict[str, _Triple]
+    """Unit vectors orthogonal to the link by name, as those of `JointOrigin`."""
+
+
 def joint_origins(chain: SerialChain) -> tuple[JointOrigin, ...]:
     """Return the Hartenberg-Denavit origin of every joint of a chain."""
     return tuple(_origins(chain))
 
 
-def _origins(chain: SerialChain) -> Iterator[JointOrigin]:
+def link_middles(chain: SerialChain) -> tuple[LinkMiddle, ...]:
+    """Return the middle of every link between two joints of a chain that has a length.
+
+    A link runs from one Hartenberg-Denavit origin to the next, so that neither its middle nor its
+    directions depend on how joints are drawn: one is the part of the axis in front of it that is
+    orthogonal to it, or of the axis behind where the first runs along it.
+    """
+    return tuple(_middles(chain))
+
+
+def _middles(chain: SerialChain) -> Iterator[LinkMiddle]:
+    frames, axes, _ = _at_zero(chain)
+    origins = [
+        T[:3, :3] @ np.array(origin.offset) + T[:3, 3]
+        for T, origin in zip(frames, joint_origins(chain), strict=True)
+    ]
+    for k, (start, end) in enumerate(pairwise(origins)):
+        length = float(np.linalg.norm(end - start))
+        if length < _SHORTEST_LINK:
+            continue
+        along = (end - start) / length
+        across = [axis - along * float(axis @ along) for axis in axes[k : k + 2]]
+        first = next((n for n in across if np.linalg.norm(n) > PARALLEL), _transverse(along))
+        first = first / np.linalg.norm(first)
+        R, drawn = frames[k][:3, :3], frames[k][:3, 3]
+        yield LinkMiddle(
+            chain.joints[k].name,
+            _triple(R.T @ (0.5 * (start + end) - drawn)),
+            _named(R.T @ first, R.T @ np.cross(along, first)),
+        )
+
+
+def _at_zero(chain: SerialChain) -> tuple[list[FloatArray], list[FloatArray], FloatArray]:
+    """Return frames and axes of the joints and the tip in base, at positions zero."""
     frames = list(accumulate((joint.placement for joint in chain.joints), np.matmul))
     axes = [T[:3, :3] @ joint.axis for T, joint in zip(frames, chain.joints, strict=True)]
-    tip = (frames[-1] @ chain.T_last_tip)[:3, 3]
+    return frames, axes, (frames[-1] @ chain.T_last_tip)[:3, 3]
+
+
+def _origins(chain: SerialChain) -> Iterator[JointOrigin]:
+    frames, axes, tip = _at_zero(chain)
     before: tuple[FloatArray, FloatArray] | None = None
     for k, (joint, T_base_joint, axis) in enumerate(zip(chain.joints, frames, axes, strict=True)):
         R, drawn = T_base_joint[:3, :3], T_base_joint[:3, 3]

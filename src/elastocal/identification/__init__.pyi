@@ -171,6 +171,8 @@ from .uncertainty import (
     IntervalCoverage as IntervalCoverage,
     bootstrap as bootstrap,
     distrust_factor as distrust_factor,
+    doubt as doubt,
+    doubt_factor as doubt_factor,
     interval as interval,
     leave_poses_out as leave_poses_out,
     measured_coverage as measured_coverage,

@@ -276,8 +276,11 @@ class _Ablation:
                 knees = () if taken else gears[spring.joint].knees
             else:
                 slips = () if taken else gears[spring.joint].slips
+            plays = bool(slips)
+            if isinstance(spring, Gear) and spring.slips:
+                plays = spring.plays
             axis = spring.axes[0].axis
-            return Gear(spring.name, spring.joint, axis, knees=knees, slips=slips)
+            return Gear(spring.name, spring.joint, axis, knees=knees, slips=slips, plays=plays)
 
         return tuple(map(changed, springs))
 

@@ -35,6 +35,8 @@ from elastocal.identification.uncertainty import (
     HeldOut,
     bootstrap,
     distrust_factor,
+    doubt,
+    doubt_factor,
     leave_poses_out,
     measured_coverage,
     widen_draws,
@@ -133,9 +135,9 @@ def calibrate(
     solution = solve(kept, options.loss)
     weighted = kept.reweighted(solution.reading_weight)
     held_out = leave_poses_out(weighted)
-    draws = bootstrap(PoseGrams.of(weighted), options.draws, rng)
-    by = widening_factor(weighted, solution.compliance, draws, held_out.compliance)
     unexplained = held_out.mean / float(np.linalg.norm(kept.d, axis=1).mean())
+    draws = bootstrap(PoseGrams.of(weighted), options.draws, rng)
+    by = _widening(weighted, solution.compliance, draws, held_out, ladder)
     if unexplained > MOST_UNEXPLAINED:
         by = max(by, distrust_factor(weighted, solution.compliance, draws, held_out))
     widened = widen_draws(weighted, solution.compliance, draws, by)
@@ -175,6 +177,22 @@ def calibrate(
         warnings=tuple(warnings),
         frames=frame_summaries(weighted.frames, solution.compliance[frames], widened[:, frames]),
     )
+
+
+def _widening(
+    problem: Problem,
+    compliance: FloatArray,
+    draws: FloatArray,
+    held_out: HeldOut,
+    ladder: Sequence[Climbed],
+) -> float:
+    """Return how far draws are stretched for few poses, and for doubt about the model."""
+    by = widening_factor(problem, compliance, draws, held_out.compliance)
+    stretched = compliance + by * (draws - compliance)
+    open_to_choice = [each for each in ladder if np.isfinite(each.apart)]
+    figures = [(each.difference, each.standard_error, each.apart) for each in open_to_choice]
+    moved = doubt(*np.array(figures).reshape(-1, 3).T)
+    return by * doubt_factor(problem, compliance, stretched, moved)
 
 
 def _data_warnings(

@@ -23,6 +23,7 @@ from elastocal.elastic import (
     bearing,
     bearing_ends,
     layout,
+    links,
     tensor,
 )
 from elastocal.errors import IdentificationError
@@ -41,7 +42,9 @@ AUTO = "auto"
 """Asks for the rung that the readings carry."""
 _KNEES = (0.3, 1.0, 3.0)
 """Knees of the gears, in typical load torques of the joint: one below, at and above it."""
-_SLIPS = (0.03, 0.1, 0.3, 1.0)
+_KNEES_OF_PLAYS = (0.5, 2.0)
+"""Knees of gears with friction, whose elements are knees as well."""
+_SLIPS = (0.15, 0.3, 0.6, 1.5)
 """Limits of the friction elements, likewise: from what barely matters to gears that stick."""
 _LOADED = 0.01
 """Part of the largest typical torque below which a joint counts as never loaded."""
@@ -73,6 +76,8 @@ class Climbed:
     """Errors at left-out poses."""
     score: FloatArray
     """Mean error of each pose block, its low load left out too, shape (block,), in m."""
+    predicted: FloatArray
+    """What it predicts of each reading at left-out poses, shape (reading, 3), in m."""
     difference: float = 0.0
     """Mean score minus that of the best rung, in m."""
     low: float = 0.0
@@ -82,10 +87,13 @@ class Climbed:
     standard_error: float = 0.0
     """Of the difference, in m."""
     chosen: bool = False
+    apart: float = float("nan")
+    """Root mean square distance of its predictions at left-out poses from those of the chosen
+    rung, in m; NaN where it was not to choose from."""
 
 
 def gears(robot: Robot, readings: Readings, slips: tuple[float, ...] = ()) -> tuple[Spring, ...]:
-    """Return the layout `bearing_ends` with gears for axial springs.
+    """Return the layout `links` with gears for axial springs.
 
     Parameters
     ----------
@@ -97,7 +105,7 @@ def gears(robot: Robot, readings: Readings, slips: tuple[float, ...] = ()) -> tu
     slips : tuple of float
         Limits of friction elements, in that torque; none without.
     """
-    springs = bearing_ends(robot)
+    springs = links(robot)
     model = ElasticModel(robot, actuated(robot))
     torque = model.load_torques(readings.joint_position, readings.force, readings.moment)
     typical = dict(zip(robot.joint_names, np.median(np.abs(torque), axis=0), strict=True))
@@ -108,9 +116,11 @@ def gears(robot: Robot, readings: Readings, slips: tuple[float, ...] = ()) -> tu
         size = float(typical[spring.joint])
         if not (axial and axis.revolute and size > least):
             return spring
-        knees = tuple(_rounded(size * part) for part in _KNEES)
+        parts = _KNEES_OF_PLAYS if slips else _KNEES
+        knees = tuple(_rounded(size * part) for part in parts)
         limits = tuple(_rounded(size * part) for part in slips)
-        return Gear(spring.name, spring.joint, axis.axis, knees=knees, slips=limits)
+        place = (spring.name, spring.joint, axis.axis)
+        return Gear(*place, knees=knees, slips=limits, plays=bool(limits))
 
     count = len(robot.joint_names)
     return tuple(geared(spring, index < count) for index, spring in enumerate(springs))
@@ -122,6 +132,7 @@ RUNGS: dict[str, Rung] = {
         Rung("actuated", lambda robot, _: actuated(robot)),
         Rung("bearing", lambda robot, _: bearing(robot)),
         Rung("bearing-ends", lambda robot, _: bearing_ends(robot)),
+        Rung("links", lambda robot, _: links(robot)),
         Rung("tensor", lambda robot, _: tensor(robot)),
         Rung("gears", gears),
         Rung(
@@ -311,6 +322,7 @@ def take_simplest(tried: Sequence[Climbed], allowed: Sequence[str]) -> Choice:
             high=float(high),
             standard_error=float(error),
             chosen=number == found.chosen,
+            apart=_distance(rung, tried[found.chosen]) if may[number] else float("nan"),
         )
         for number, (rung, mean, low, high, error) in enumerate(zip(tried, *figures, strict=True))
     )
@@ -353,7 +365,16 @@ def try_rung(name: str, model: ElasticModel, problem: Problem, low: BoolArray) -
         error[low] = 0.5 * (error[low] + _left_out(problem, low))
     blocks, index = np.unique(problem.block, return_inverse=True)
     score = np.bincount(index, error, len(blocks)) / np.bincount(index, minlength=len(blocks))
-    return Climbed(name, model, held_out, score)
+    n = problem.springs
+    fitted = held_out.compliance[held_out.fold][:, n]
+    predicted = np.einsum("rin,rn->ri", problem.O[:, :, n], fitted)
+    return Climbed(name, model, held_out, score, predicted)
+
+
+def _distance(one: Climbed, other: Climbed) -> float:
+    """Return the root mean square distance of two rungs' predictions, in m."""
+    squares = np.sum(np.square(one.predicted - other.predicted), axis=1)
+    return float(np.sqrt(np.mean(squares)))
 
 
 def _left_out(problem: Problem, rows: BoolArray) -> FloatArray:

@@ -22,8 +22,9 @@ from numpy.random import Generator
 from scipy.special import ndtri, stdtrit
 
 from elastocal.arrays import FloatArray, IndexArray
+from elastocal.identification._least_squares import minimise
 from elastocal.identification.problem import Problem
-from elastocal.identification.solve import PoseGrams
+from elastocal.identification.solve import PoseGrams, factor
 from elastocal.records import record
 from elastocal.results import brief_repr
 
@@ -227,6 +228,48 @@ def widening_factor(
     return max(1.0, float(student * np.sqrt(jackknife / bootstrap)))
 
 
+def doubt(difference: FloatArray, standard_error: FloatArray, apart: FloatArray) -> float:
+    """Return the mean square by which the choice of a model may have moved a prediction, in m².
+
+    A choice is not known to be right: had the poses been others, another model would have been
+    taken. Each of those to choose from counts with the weight ``exp(-z^2 / 2)`` of how far it is
+    behind the best, ``z`` being the difference in standard errors; 1 if it predicts better (S. T.
+    Buckland, K. P. Burnham, N. H. Augustin, "Model selection: an integral part of inference",
+    Biometrics 53, 1997).
+
+    Parameters
+    ----------
+    difference, standard_error : ndarray, shape (model,)
+        Error at left-out poses less that of the best of them, the chosen one included, in m.
+    apart : ndarray, shape (model,)
+        Distance of its predictions there from those of the chosen one, in m.
+    """
+    if not len(apart):
+        return 0.0
+    behind = np.maximum(difference, 0.0)
+    z = np.divide(behind, standard_error, out=np.zeros_like(behind), where=standard_error > 0.0)
+    weight = np.exp(-0.5 * np.square(z))
+    return float(weight @ np.square(apart) / weight.sum())
+
+
+def doubt_factor(
+    problem: Problem, compliance: FloatArray, draws: FloatArray, moved: float
+) -> float:
+    """Return the factor at which widened draws hold the doubt about the model besides.
+
+    Parameters
+    ----------
+    problem, compliance : Problem, ndarray
+        As for `widening_factor`.
+    draws : ndarray, shape (draw, spring)
+        As they are to be stretched further.
+    moved : float
+        From `doubt`.
+    """
+    spread = _variance(problem, draws - compliance) / len(draws)
+    return float(np.sqrt(1.0 + moved / spread)) if spread > 0.0 else 1.0
+
+
 def distrust_factor(
     problem: Problem, compliance: FloatArray, draws: FloatArray, held_out: HeldOut
 ) -> float:
@@ -249,8 +292,23 @@ def distrust_factor(
 def widen_draws(
     problem: Problem, compliance: FloatArray, draws: FloatArray, by: float
 ) -> FloatArray:
-    """Return the draws stretched about the estimate, kept within the bounds."""
-    return np.asarray(np.clip(compliance + by * (draws - compliance), problem.lower, problem.upper))
+    """Return the draws stretched about the estimate, within the bounds.
+
+    A stretched draw beyond a bound is taken to the point within that predicts most like it at the
+    measured readings. Clipped one by one, springs that share a deflection would be cut where they
+    shrink and kept where they grow, and every prediction would grow with the stretching.
+    """
+    stretched = compliance + by * (draws - compliance)
+    lower, upper = problem.lower, problem.upper
+    beyond = np.any((stretched < lower) | (stretched > upper), axis=1)
+    if not np.any(beyond):
+        return np.asarray(stretched)
+    system = factor(problem)
+    s, Vt, scale = system.s, system.Vt, system.scale
+    for draw in np.flatnonzero(beyond):
+        y = s * (Vt @ (stretched[draw] * scale))
+        stretched[draw] = minimise(s, Vt, y, lower * scale, upper * scale) / scale
+    return np.asarray(np.clip(stretched, lower, upper))
 
 
 def _variance(problem: Problem, deviations: FloatArray) -> float:

@@ -8,14 +8,13 @@ from scipy.spatial.transform import Rotation
 
 from elastocal import __version__
 from elastocal.arrays import FloatArray, IndexArray
-from elastocal.cell import Cell, fingerprint
+from elastocal.cell import Cell, contact_time, fingerprint, straight_time
 from elastocal.errors import PlanningError
 from elastocal.planning.checks import SightCheck
 from elastocal.planning.motion import (
     Mover,
     Route,
     clear_retreats,
-    contact_time,
     mover_for,
     plan_route,
     require_free_home,
@@ -282,6 +281,7 @@ def _contact(cell: Cell) -> ContactRecord:
         near_contact=engagement.near_contact,
         axis_override=cell.file.motion.override,
         contact_speed=cell.file.motion.contact_speed,
+        straight_time=straight_time(cell),
         load_cases={
             name: _vector(force) for name, force in zip(loads.cases, loads.force_tcp, strict=True)
         },

@@ -65,10 +65,12 @@ class ContactRecord:
     axis_override: float
     """Part of the axes' largest speeds that the times of moves are estimated for."""
     contact_speed: float
-    """Speed of the straight motion between approach pose and contact that the times in contact
-    are estimated for, in m/s."""
+    """Fastest straight motion of the KRL program between approach pose and contact, in m/s."""
     load_cases: dict[str, Vector]
     """Force on the robot in the tcp frame, in N, in the order in which they are applied."""
+    straight_time: float | None = None
+    """How much of each ``contact_time`` the straight ways take, in s; None in plans of earlier
+    versions, whose times are for ``contact_speed`` there and back."""
 
 
 @brief_repr
@@ -251,9 +253,13 @@ def _content_hash(plan: PlanResult) -> str:
     """Return a SHA-256 over everything that a plan says, by which a change by hand is found.
 
     It is taken over the numbers as they are read: line breaks and the way a number is written do
-    not count, the order of load cases does.
+    not count, the order of load cases does. A key that earlier versions did not write counts only
+    where it says something.
     """
-    return sha256(json.dumps(to_data(plan), separators=(",", ":"), allow_nan=False))
+    data = to_data(plan)
+    if plan.contact.straight_time is None:
+        del data["contact"]["straight_time"]
+    return sha256(json.dumps(data, separators=(",", ":"), allow_nan=False))
 
 
 def write_plan(folder: Path, plan: PlanResult) -> Path:

@@ -167,10 +167,27 @@ def test_an_unknown_start_moves_the_deflection_by_at_most_what_is_said_and_is_fo
     assert bound[-1].max() == pytest.approx(0.0, abs=1e-15)
 
 
+def test_an_unknown_start_may_move_each_component_by_what_the_elements_can_still_differ():
+    """``sum |J_i| f_j min(r_j, 2 r_j - R)``, none beyond ``R = 2 r_j``."""
+    calibrated = geared()
+    model, c = calibrated.model, calibrated.compliance
+    free, _, blocked = routines(calibrated)
+    J = model.spring_jacobian(Q[0]).translation[:, model.friction.axis]
+    limit = model.friction.limit
+    weakness = c[["friction" in name for name in model.parameter_names]]
+    for part in (0.0, 0.1, 0.5, 1.0):
+        given = part * FORCE[0], part * MOMENT[0]
+        span = np.abs(model.load_torques(Q[0], *given))[model.friction.axis]
+        out = blocked(Q[0].tolist(), *(each.tolist() for each in given), free(Q[0].tolist()))
+        expected = np.abs(J) @ (weakness * np.clip(2.0 * limit - span, 0.0, limit))
+        np.testing.assert_allclose(out[3 * len(c) : 3 * len(c) + 3], expected, rtol=1e-9)
+
+
 def test_no_name_is_written_twice_and_none_is_read_before():
     """Programs are straight lines: a name that two statements wrote would change what was meant."""
     model, c = geared().model, geared().compliance.tolist()
     for routine in (rest(model), deflection(model, c), observation_block(model, c)):
+        assert all(name.isidentifier() for name in routine.constants)
         known = {*routine.constants, *routine.memory, *(f"q{k}" for k in range(1, 7))}
         known |= {"fx", "fy", "fz", "mx", "my", "mz"}
         for statement in routine.statements:

@@ -52,7 +52,7 @@ def test_it_says_which_speeds_it_drives_and_for_which_the_times_hold():
     assert "PTP at 10 percent, LIN at 20 mm/s and, for the last 3.0 mm, at 5 mm/s" in said
     assert "never faster than the cell file has it (20 percent, 20 mm/s)" in said
     assert "The times here are for these speeds" in said
-    assert "Those of the plan's other files are for the cell file's speeds: 7 min" in said
+    assert "Those of the plan's other files are for the speeds of elastocal run: 7 min" in said
 
 
 def test_a_tilted_tool_is_written_in_kukas_angles():

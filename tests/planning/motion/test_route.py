@@ -10,7 +10,7 @@ from elastocal.cell import load_cell
 from elastocal.cell.examples import write_example
 from elastocal.errors import PlanningError, RobotError
 from elastocal.planning import cell_surface, collision_scene
-from elastocal.planning.motion import contact_time, mover_for, plan_route
+from elastocal.planning.motion import mover_for, plan_route
 from elastocal.planning.motion.route import _Roadmap
 from elastocal.planning.pool_sampling import PoolBuilder
 from elastocal.planning.postures import Postures
@@ -170,11 +170,6 @@ def test_the_poses_of_an_example_are_visited(like, tmp_path):
         way = dense(chain(move, postures, cell.home))
         keeps = robot.sweep.scene.keeps(way, cell.file.limits.clearance)
         assert keeps.all()
-
-
-def test_a_pose_takes_its_approach_its_reference_and_its_load_cases(tmp_path):
-    cell = load_cell(write_example(tmp_path, "afp")[0])
-    assert contact_time(cell) == pytest.approx(2 * 0.1 / 0.02 + 4.0 + 5 * 8.0)
 
 
 def test_the_speeds_of_the_cell_are_those_of_the_moves(tmp_path):

@@ -16,7 +16,7 @@ from numpy.random import Generator
 from elastocal.arrays import FloatArray
 from elastocal.compensation.kernel import ModelFunctions
 from elastocal.compensation.online import Compensator, Design, Reading
-from elastocal.elastic import ElasticModel
+from elastocal.elastic import ElasticModel, SpringLoad
 from elastocal.errors import CompensationError
 from elastocal.identification import CalibratedModel
 
@@ -127,20 +127,30 @@ class _Remembering:
         force, moment, _ = given
         borne, after = self._loaded(q, *given)
 
-        def blocks(friction: FloatArray) -> FloatArray:
-            return self.model.observation_blocks(q, force, moment, friction=friction)
-
         # Each element by itself moves the deflection by what it may bear besides.
         limit, axes = self.model.friction.limit, self._axes
         low, high = np.reshape(after[len(limit) : len(limit) + 2 * len(axes)], (2, -1))
         spanned = dict(zip(axes, high - low, strict=True))
         ranges = np.array([spanned[axis] for axis in self.model.friction.axis.tolist()])
-        still = blocks(np.zeros(len(limit)))
-        unknown = sum(
-            np.abs((blocks(one) - still) @ self.compliance)
-            for one in np.diag(np.clip(2.0 * limit - ranges, 0.0, limit))
-        )
-        return (*_floats(blocks(borne)), *_floats(np.asarray(unknown)), *after)
+        found = self.model.observation_blocks(q, force, moment, friction=borne)
+        unknown = self._turned(q, 0.5 * np.clip(2.0 * limit - ranges, 0.0, limit))
+        return (*_floats(found), *_floats(2.0 * unknown), *after)
+
+    def _turned(self, q: Sequence[float], borne: FloatArray) -> FloatArray:
+        """Return the sizes of what each friction element by itself moves an unloaded tcp, added."""
+        model, moved = self.model, np.zeros(3)
+        J = model.spring_jacobian(q).translation
+        counts = [(len(s.axes), len(s.friction_limits), len(s.parameters)) for s in model.springs]
+        starts = np.cumsum([(0, 0, 0), *counts], axis=0)
+        for spring, (axis, element, parameter), (axes, elements, parameters) in zip(
+            model.springs, starts, counts, strict=False
+        ):
+            still = (np.zeros(()),) * axes
+            for one in np.diag(borne[element : element + elements]):
+                angles = np.array(spring.angles(SpringLoad(still, (), tuple(map(np.asarray, one)))))
+                turned = angles @ self.compliance[parameter : parameter + parameters]
+                moved += np.abs(J[:, axis : axis + axes] @ turned)
+        return moved
 
     def _loaded(
         self,

@@ -100,15 +100,28 @@ class Laws:
         s = self._spring_of[number]
         if not self._elements[s]:
             return []
+        program, spring = self._program, self._springs[s]
         low, high, _ = self._ranges[self._axes[s][0]]
-        widths = {f"unknown{e + 1}": self._width(e, low, high) for e in self._elements[s]}
-        row = self._axes[s].index(number)
-        pairs = zip(self._rows(s, {})[row], self._rows(s, widths)[row], strict=True)
-        return [
-            (p, self._program.total(f"open{p + 1}", [(moved,), (-still,)]))
-            for p, (still, moved) in zip(self._parameters[s], pairs, strict=True)
-            if still != moved
+        half = program.quantity("half", 0.5)
+        widths = {
+            f"unknown{e + 1}": program.total(
+                f"half_width{e + 1}", [(half, self._width(e, low, high))]
+            )
+            for e in self._elements[s]
+        }
+        # A law that stiffens with the size of its torque yields most about zero: what friction
+        # turns there, half its width to either side, no load makes larger.
+        still = tuple(Number(0.0) for _ in self._axes[s])
+        weight = still if self._heavy and spring.bears_weight else ()
+        load = SpringLoad[Expression](still, weight, tuple(map(Input, widths)))
+        row = spring.angles(load)[self._axes[s].index(number)]
+        known: dict[Expression, Value] = {}
+        sides = [
+            (p, written(program, angle, widths, self._names[s], known))
+            for p, angle in zip(self._parameters[s], row, strict=True)
+            if reads(angle)
         ]
+        return [(p, program.total(f"open{p + 1}", [(side,), (side,)])) for p, side in sides]
 
     def remembered(self) -> list[Value]:
         """Return the memory after the loads."""
@@ -188,6 +201,14 @@ def written(
     if x not in known:
         known[x] = _statement(program, x, inputs, names, known)
     return known[x]
+
+
+def reads(x: Expression) -> bool:
+    """Return whether a formula has an input."""
+    match x:
+        case Sum(parts) | Product(parts) | Function(_, parts):
+            return any(map(reads, parts))
+    return isinstance(x, Input)
 
 
 def _statement(

@@ -42,12 +42,22 @@ class Gear(OneAxisSpring):
     M. Ruderman, F. Hoffmann, T. Bertram, "Modeling and identification of elastic robot joints
     with hysteresis and backlash", IEEE Trans. Industrial Electronics 56, 2009). Lost motion is
     twice ``sum f_j r_j``.
+
+    With `plays`, friction stands beside each elasticity and not behind all of them:
+
+        theta = c_0 t + sum_k c_k (T_k atan((w + t - s_1) / T_k) - T_k atan(w / T_k))
+                + sum_j f_j (t - s_j).
+
+    ``t - s_j`` is the play operator, so that every term grows with the torque whatever the
+    history, and what turns the teeth is the torque that friction leaves over.
     """
 
     knees: tuple[float, ...] = (300.0, 1000.0, 3000.0)
     """``T_k``: torques about which the stiffness changes, in N·m."""
     slips: tuple[float, ...] = ()
     """``r_j``: torques at which friction elements slide, in N·m; empty: no friction."""
+    plays: bool = False
+    """Whether friction holds back each elasticity by itself; files of before do not say so."""
     kind: Literal["gear"] = "gear"
 
     units = (TORSIONAL, LOST_MOTION)
@@ -66,20 +76,22 @@ class Gear(OneAxisSpring):
     @property
     def characteristics(self) -> tuple[Characteristic, ...]:
         """Compliance without torque (makers' K1) and at the middle knee (K2), and lost motion."""
-        still = (0.0,) * len(self.slips)
+        sliding = (1.0 if self.plays else 0.0,) * len(self.slips)
+        usual = float(np.exp(np.median(np.log(self.knees))))
         found = [
             Characteristic(
                 self.name if torque == 0.0 else f"{self.name} at {torque:.0f} N·m",
-                (1.0, *(1.0 / (1.0 + (torque / T) ** 2) for T in self.knees), *still),
+                (1.0, *(1.0 / (1.0 + (torque / T) ** 2) for T in self.knees), *sliding),
                 TORSIONAL,
             )
-            for torque in (0.0, self.knees[len(self.knees) // 2])
+            for torque in (0.0, usual)
         ]
         if self.slips:
-            elastic = (0.0,) * (1 + len(self.knees))
-            both_ways = tuple(2.0 * r for r in self.slips)
+            held = self.slips[0] if self.plays else 0.0
+            soft = (2.0 * T * float(np.arctan2(held, T)) for T in self.knees)
+            both_ways = (2.0 * r for r in self.slips)
             found.append(
-                Characteristic(f"{self.name} lost motion", (*elastic, *both_ways), LOST_MOTION)
+                Characteristic(f"{self.name} lost motion", (0.0, *soft, *both_ways), LOST_MOTION)
             )
         return tuple(found)
 
@@ -91,25 +103,28 @@ class Gear(OneAxisSpring):
     def angles(self, load: SpringLoad[Quantity]) -> Angles[Quantity]:
         """Return the angle of one unit of each parameter."""
         (t,) = load.torque
+        borne = load.friction or tuple(0.0 * t for _ in self.slips)
+        turning = t - borne[0] if self.plays and borne else t
         row: list[Quantity] = [t]
-        row.extend(self._softness(load, T) for T in self.knees)
-        row.extend(-1.0 * s for s in load.friction or [0.0 * t for _ in self.slips])
+        row.extend(self._softness(load, turning, T) for T in self.knees)
+        row.extend(t - s if self.plays else -1.0 * s for s in borne)
         return (tuple(row),)
 
     @staticmethod
-    def _softness(load: SpringLoad[Quantity], T: float) -> Quantity:
+    def _softness(load: SpringLoad[Quantity], t: Quantity, T: float) -> Quantity:
         """Return ``T atan((w + t) / T) - T atan(w / T)``, as one angle.
 
         The tangent of a difference makes it that of ``(T^2 + (w + t) w, T t)``: nothing is lost
         where a small load meets a heavy arm, and half the arc tangents are left to compute.
         """
-        (t,) = load.torque
         w = load.weight[0] if load.weight else 0.0 * t
         return T * atan2(T * t, T * T + (w + t) * w)
 
     def tangents(self, load: SpringLoad[FloatArray]) -> Tangents:
-        """Return 1, ``1 / (1 + ((w + t) / T_k)^2)``, and 0: friction that slides adds none."""
+        """Return 1 and ``1 / (1 + ((w + t) / T_k)^2)``, friction sliding: 0, or 1 of plays."""
         (t,) = load.torque
-        total = t + load.weight[0] if load.weight else t
+        turning = t - load.friction[0] if self.plays and load.friction else t
+        total = turning + load.weight[0] if load.weight else turning
         soft = (1.0 / (1.0 + np.square(total / T)) for T in self.knees)
-        return (((1.0, *soft, *(0.0,) * len(self.slips)),),)
+        sliding = (1.0 if self.plays else 0.0,) * len(self.slips)
+        return (((1.0, *soft, *sliding),),)

@@ -236,12 +236,14 @@ class Speeds:
     def contact_time(self, plan: PlanResult, pose: PoseRecord) -> float:
         """Return the seconds from the approach pose through all load cases and back to it.
 
-        The plan's own figure is for one speed from approach pose to contact; the retreat to near
-        contact is at the touch speed too.
+        The plan's own figure is for the speeds of the run; here the retreat to near contact is at
+        the touch speed too.
         """
         contact = plan.contact
         far = contact.approach_distance - contact.near_contact
-        planned = 2.0 * contact.approach_distance / contact.contact_speed
+        planned = contact.straight_time
+        if planned is None:
+            planned = 2.0 * contact.approach_distance / contact.contact_speed
         driven = 2.0 * (far / self.lin + contact.near_contact / self.touch)
         return pose.contact_time - planned + driven
 

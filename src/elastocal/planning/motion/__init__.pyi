@@ -3,7 +3,6 @@ from .mover import (
     Mover as Mover,
     Sweep as Sweep,
     clear_retreats as clear_retreats,
-    contact_time as contact_time,
     joint_radii as joint_radii,
     mover_for as mover_for,
 )

@@ -246,19 +246,6 @@ def mover_for(cell: Cell, scene: CollisionScene) -> Mover:
     )
 
 
-def contact_time(cell: Cell) -> float:
-    """Return the estimated time at one pose, in s.
-
-    From the approach pose down and back up, the unloaded reference, and all load cases:
-
-        2 approach_distance / contact_speed + unloaded_time + load cases * load_time.
-    """
-    motion = cell.file.motion
-    there_and_back = 2.0 * cell.file.engagement.approach_distance / motion.contact_speed
-    loads = len(cell.file.load_cases.cases) * motion.load_time
-    return there_and_back + motion.unloaded_time + loads
-
-
 def clear_retreats(cell: Cell, mover: Mover, postures: Postures) -> BoolArray:
     """Return whether each posture's way off the surface is free, shape (pose,).
 

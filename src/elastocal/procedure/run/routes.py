@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from elastocal.arrays import FloatArray
+from elastocal.cell import visit_steps
 from elastocal.errors import ProcedureError
 from elastocal.planning import Joints, PlanResult, PoseRecord
 from elastocal.procedure.run.settings import RunSettings
@@ -224,7 +225,14 @@ def itinerary(plan: PlanResult, settings: RunSettings) -> tuple[PlannedStep, ...
     steps: list[PlannedStep] = []
     for pose in plan.poses:
         steps.append(_travel(plan, settings, pose.id - 1, pose.id))
-        steps += (PlannedStep(pose.id, *rest) for rest in _at_pose(settings, pose.seen_by or ""))
+        visit = visit_steps(
+            settings.procedure,
+            settings.near_contact,
+            settings.approach_distance,
+            dict(settings.loads),
+            pose.seen_by or "",
+        )
+        steps += (PlannedStep(pose.id, Step(s.name), s.what, s.seconds) for s in visit)
     steps.append(_travel(plan, settings, len(plan.poses) - 1, len(plan.poses)))
     return tuple(steps)
 
@@ -249,22 +257,3 @@ def _travel(plan: PlanResult, settings: RunSettings, start: int, end: int) -> Pl
     stops = f" by way of {via} via pose{'s' if via > 1 else ''}" if via else ""
     begin = "from HOME " if start == HOME_AT_START else ""
     return PlannedStep(None if home else end, Step.MOVE, f"{begin}to {target}{stops}", seconds)
-
-
-def _at_pose(settings: RunSettings, station: str) -> Iterator[tuple[Step, str, float]]:
-    p, near = settings.procedure, settings.near_contact
-    way_in = (settings.approach_distance - near) / p.approach_speed
-    yield Step.AIM, f"{station} finds the marker", p.dwell
-    yield Step.NEAR, f"to {near * 1e3:g} mm off the surface", way_in
-    yield Step.UNLOADED, "unloaded reference", p.dwell + p.unloaded_average
-    yield Step.ENGAGE, f"until {p.contact_force:g} N are felt", near / p.contact_speed
-    before = np.array([0.0, 0.0, -p.contact_force])
-    for name, force in settings.loads:
-        yield Step.LOAD, name, float(np.linalg.norm(force - before)) / p.ramp
-        yield Step.SETTLE, name, p.dwell
-        yield Step.AVERAGE, name, p.average
-        before = force
-    yield Step.RELEASE, "force to zero", float(np.linalg.norm(before)) / p.ramp
-    yield Step.LIFT, f"to {near * 1e3:g} mm off the surface", near / p.approach_speed
-    yield Step.RELEASED, "unloaded reference again", p.dwell + p.unloaded_average
-    yield Step.RETRACT, "to the approach pose", way_in

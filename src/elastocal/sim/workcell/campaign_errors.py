@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from elastocal.arrays import FloatArray, IndexArray
-from elastocal.cell import Cell
+from elastocal.cell import Cell, load_case_time
 from elastocal.dataset import Readings
 from elastocal.results import brief_repr
 from elastocal.sim.workcell._instruments import COVERAGE, averaged_noise, sensor_range
@@ -104,7 +104,7 @@ class CampaignErrors:
             average=averages[1],
             unloaded_average=averages[0],
             force=(force[0], force[1]),
-            drift=sensor.drift / 60.0 * cell.file.motion.load_time * ranges[:3] / ranges[0],
+            drift=sensor.drift / 60.0 * load_case_time(cell) * ranges[:3] / ranges[0],
             gain=sensor.cross_talk * _gain(cell, ranges),
             repeatability=entry.controller.repeatability,
         )
