@@ -178,6 +178,13 @@ class Cell:
         return self.file.name or self.path.resolve().parent.name
 
     @property
+    def technique(self) -> str:
+        """Search technique: that of the file, else I-optimality where a process is named."""
+        search = self.file.search
+        is_named = "technique" in search.model_fields_set
+        return "i_optimal" if self.process is not None and not is_named else search.technique
+
+    @property
     def T_flange_tcp(self) -> FloatArray:
         """Tool centre point in the flange frame, shape (4, 4)."""
         return self.file.tcp.T
@@ -275,7 +282,7 @@ def load_cell(path: Path, *, production: bool = True) -> Cell:
     process, entry = None, file.process
     if entry is not None and production:
         process = _at(
-            f"{path}: process",
+            f"{path}: process.file",
             lambda: read_production(path.parent / entry.file, entry, robot, home, positions),
         )
     for array in (positions, torques, home, speeds):

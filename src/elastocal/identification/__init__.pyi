@@ -136,6 +136,7 @@ from .production import (
     RAIL_REACH as RAIL_REACH,
     CalibratedLoads as CalibratedLoads,
     ProductionCoverage as ProductionCoverage,
+    near_postures as near_postures,
     posture_reach as posture_reach,
     production_coverage as production_coverage,
 )

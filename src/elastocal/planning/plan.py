@@ -36,6 +36,7 @@ from elastocal.planning.plan_result import (
 from elastocal.planning.pool import REACH_ADVICE, Pool
 from elastocal.planning.pool_file import NOT_CHOSEN, PoolData
 from elastocal.planning.pool_sampling import SampledPool, sample_pool
+from elastocal.planning.production import production_findings
 from elastocal.planning.scene import (
     cell_surface,
     collision_scene,
@@ -125,9 +126,10 @@ def make_plan(
     chosen = _Choice(cell, surface, sampled.pool, search_pool, selection, route)
     search = _search(chosen)
     progress(_SEARCH, 1, 1)
+    production = search_pool.production(cell, selection.order)
     compared = None
     if other is not None:
-        everyone = np.arange(len(search_pool.candidates))
+        everyone = search_pool.preferred(cell, np.arange(len(search_pool.candidates)))
         taken = search_pool.take(other, everyone, len(selection), for_search).order
         spread = search_pool.spread(taken)
         compared = ComparisonRecord(
@@ -143,7 +145,12 @@ def make_plan(
         search=search,
         comparison=compared,
         pool=_pool(sampled.pool),
-        findings=(*(each.message for each in findings), *_notes(cell, sampled.pool, search)),
+        findings=(
+            *(each.message for each in findings),
+            *_notes(cell, sampled.pool, search),
+            *production_findings(cell, production),
+        ),
+        production=production,
     )
     return PlanAndPool(plan, _pool_data(chosen, sampled.points.position), surface)
 
@@ -161,15 +168,16 @@ def require_possible_search(cell: Cell, compare: str | None = None) -> None:
     Raises
     ------
     PlanningError
-        If a technique is unknown, or needs a process that the cell does not name.
+        If a technique is unknown, or an accuracy is wanted where no process is named.
     """
-    wanted = technique(cell.file.search.technique)
-    for name in (wanted.name, compare):
-        if name in ("i_optimal", "exchange-i") and cell.process is None:
-            raise PlanningError(
-                f"search technique {name!r} needs the production's poses and forces:"
-                " name their file in process.file of the cell file"
-            )
+    technique(cell.technique)
+    if compare is not None:
+        technique(compare)
+    if cell.file.search.accuracy is not None and cell.process is None:
+        raise PlanningError(
+            "search.accuracy is the error on production: name its path in process.file of the cell"
+            " file"
+        )
 
 
 def _require_enough(cell: Cell, sampled: SampledPool, findings: tuple[Finding, ...]) -> None:
@@ -334,7 +342,7 @@ def _moves(route: Route) -> tuple[MoveRecord, ...]:
 def _search(choice: _Choice) -> SearchRecord:
     search, selection, pool = choice.cell.file.search, choice.selection, choice.search_pool
     spread = pool.spread(selection.order)
-    has_process = pool.candidates.process is not None
+    has_process = choice.cell.process is not None
     return SearchRecord(
         name=selection.name,
         metric=search.metric,
