@@ -75,8 +75,10 @@ from .presets import (
     with_preset as with_preset,
 )
 from .procedure import (
+    CONDITIONING as CONDITIONING,
     DEFAULT_POSES as DEFAULT_POSES,
     DIRECTIONS as DIRECTIONS,
+    LIGHT_CONTACT as LIGHT_CONTACT,
     SIMULATED as SIMULATED,
     Acceptance as Acceptance,
     DeviceNames as DeviceNames,

@@ -30,6 +30,8 @@ from elastocal.cell.motion import (
     torque_limits,
 )
 from elastocal.cell.procedure import (
+    CONDITIONING,
+    LIGHT_CONTACT,
     Acceptance,
     DeviceNames,
     Engagement,
@@ -96,6 +98,20 @@ class CellFile(StrictModel):
 
     __str__ = __repr__
 
+    @property
+    def presses(self) -> dict[str, FloatArray]:
+        """Every press at a pose, by name, in order in time: force on the robot, tcp frame, in N.
+
+        `LoadCases.levels`, and before them what belongs to the reference: a full press, and the
+        light contact in which it is read. Shape (3,) each.
+        """
+        loads, procedure, before = self.load_cases, self.procedure, dict[str, FloatArray]()
+        if procedure.conditioning:
+            before[CONDITIONING] = np.array([0.0, 0.0, -loads.fz])
+        if procedure.reference == LIGHT_CONTACT:
+            before[LIGHT_CONTACT] = np.array([0.0, 0.0, -procedure.contact_force])
+        return before | loads.levels
+
     def summary(self) -> list[str]:
         """Return what stands in the cell, one line a subject."""
         robot, loads, sensor = self.robot, self.load_cases, self.sensor
@@ -105,7 +121,7 @@ class CellFile(StrictModel):
             f"tool: {self.tool.mass:g} kg, sensor: {'none' if sensor is None else sensor.name}",
             f"trackers: {', '.join(tracker.name for tracker in self.trackers) or 'none'}",
             f"surface: {self.surface.file}, {len(self.fixtures)} fixtures",
-            f"load cases: {', '.join(loads.cases)};"
+            f"load cases: {', '.join(self.presses)};"
             f" fx {loads.fx:g} N, fy {loads.fy:g} N, fz {loads.fz:g} N",
             f"search: {self.search.technique}, {self.search.pose_limit or 'any number of'} poses",
         ]

@@ -9,6 +9,7 @@ from .budget import (
     TermName as TermName,
     TermWorth as TermWorth,
     error_budget as error_budget,
+    stated_noise as stated_noise,
 )
 from .calibrated import (
     CalibratedModel as CalibratedModel,
@@ -77,6 +78,7 @@ from .ladder import (
     try_rung as try_rung,
     usable_for_choice as usable_for_choice,
 )
+from .load_check import LoadCheck as LoadCheck, check_loads as check_loads
 from .model_file import (
     CalibrateResult as CalibrateResult,
     RobotRecord as RobotRecord,

@@ -5,7 +5,6 @@ from .near_production import (
 from .plan import (
     PlanAndPool as PlanAndPool,
     make_plan as make_plan,
-    require_possible_search as require_possible_search,
 )
 from .plan_result import (
     PLAN as PLAN,
@@ -71,6 +70,10 @@ from .production import (
     expected_errors as expected_errors,
     plan_coverage as plan_coverage,
     production_findings as production_findings,
+)
+from .requirements import (
+    require_loads_possible_anywhere as require_loads_possible_anywhere,
+    require_possible_search as require_possible_search,
 )
 from .scene import (
     CollisionScene as CollisionScene,

@@ -68,7 +68,8 @@ class ContactRecord:
     contact_speed: float
     """Fastest straight motion of the KRL program between approach pose and contact, in m/s."""
     load_cases: dict[str, Vector]
-    """Force on the robot in the tcp frame, in N, in the order in which they are applied."""
+    """Force on the robot in the tcp frame, in N, in the order in which they are applied; what
+    belongs to the reference (`CellFile.presses`) among them."""
     straight_time: float | None = None
     """How much of each ``contact_time`` the straight ways take, in s; None in plans of earlier
     versions, whose times are for ``contact_speed`` there and back."""

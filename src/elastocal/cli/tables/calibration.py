@@ -92,6 +92,11 @@ def _show_fit(console: Console, figures: CalibrationSummary) -> None:
     table.add_row(
         "at the poses fitted", mm(fit.mean), f"{fit.mean / mean:.2%}", mm(fit.p95), mm(fit.max)
     )
+    if (check := figures.check) is not None:
+        noise = "not known" if check.noise is None else mm(check.noise)
+        label = f"at {', '.join(check.load_cases)}, kept out of the fit (noise {noise})"
+        share = f"{check.mean / check.deflection:.2%}"
+        table.add_row(label, mm(check.mean), share, mm(check.p95), mm(check.max))
     console.print(table)
     if figures.coverage is not None:
         console.print(_coverage_line(figures.coverage), soft_wrap=True)
