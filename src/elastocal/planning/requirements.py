@@ -25,7 +25,7 @@ def require_possible_search(cell: Cell, compare: str | None = None) -> None:
     Raises
     ------
     PlanningError
-        If a technique is unknown, or an accuracy is wanted where no process is named; if the process
+        If a technique is unknown, or an accuracy is wanted without a process; if the process
         has no force, or fewer candidates are asked for than poses.
     """
     search = cell.file.search
