@@ -1,4 +1,4 @@
-"""What is pressed at a pose, in order in time: levels, the check, and what belongs to a reference."""
+"""What is pressed at a pose, in order in time: levels, the check, the reference."""
 
 import numpy as np
 import pytest
