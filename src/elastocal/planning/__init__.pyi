@@ -1,7 +1,6 @@
 from .plan import (
     PlanAndPool as PlanAndPool,
     make_plan as make_plan,
-    require_possible_search as require_possible_search,
 )
 from .plan_result import (
     PLAN as PLAN,
@@ -57,6 +56,10 @@ from .postures import (
     Rows as Rows,
     read_only as read_only,
     retreat_joints as retreat_joints,
+)
+from .requirements import (
+    require_loads_possible_anywhere as require_loads_possible_anywhere,
+    require_possible_search as require_possible_search,
 )
 from .scene import (
     CollisionScene as CollisionScene,
