@@ -40,12 +40,17 @@ class FrictionCheck(PostureCheck):
         loads = cell.file.load_cases
         return cls(loads.force_tcp, loads.friction, loads.safety)
 
-    def margin(self, postures: Postures) -> FloatArray:
-        """Return the margin of each posture, shape (pose,), in N."""
+    @property
+    def everywhere(self) -> float:
+        """Margin at whatever posture, in N."""
         lateral = np.hypot(self.force_tcp[:, 0], self.force_tcp[:, 1])
         # Pushing onto the surface is a force on the robot along -z of the tcp.
         held = self.mu * -self.force_tcp[:, 2] / self.safety
-        return np.full(len(postures), float(np.min(held - lateral)))
+        return float(np.min(held - lateral))
+
+    def margin(self, postures: Postures) -> FloatArray:
+        """Return the margin of each posture, shape (pose,), in N."""
+        return np.full(len(postures), self.everywhere)
 
 
 @brief_repr
@@ -166,8 +171,9 @@ class SensorCheck(PostureCheck):
             float(np.linalg.norm(centre)),
         )
 
-    def margin(self, postures: Postures) -> FloatArray:
-        """Return the margin of each posture, shape (pose,): 1 is unloaded, 0 at the limit."""
+    @property
+    def everywhere(self) -> float:
+        """Margin at whatever posture: 1 is unloaded, 0 at the limit."""
         R, r = self.T_sensor_tcp[:3, :3], self.T_sensor_tcp[:3, 3]
         force = self.force_tcp @ R.T
         moment = np.cross(r, force)
@@ -175,4 +181,8 @@ class SensorCheck(PostureCheck):
             (np.abs(force) + self.tool_weight) / self.force_range,
             (np.abs(moment) + self.tool_weight * self.tool_lever) / self.moment_range,
         )
-        return np.full(len(postures), 1.0 - float(used.max()))
+        return 1.0 - float(used.max())
+
+    def margin(self, postures: Postures) -> FloatArray:
+        """Return the margin of each posture, shape (pose,): 1 is unloaded, 0 at the limit."""
+        return np.full(len(postures), self.everywhere)

@@ -4,6 +4,7 @@ The fingerprint says which cell a plan was made for. It says nothing of the plan
 those are what the arm is sent to and presses with.
 """
 
+from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
 
@@ -13,14 +14,13 @@ from elastocal.arrays import FloatArray
 from elastocal.cell import LIGHT_CONTACT, Cell, ProcedureSettings
 from elastocal.errors import ProcedureError
 from elastocal.planning import PlanResult
+from elastocal.planning.checks import REGISTRATION_POSES, registration_shortages, shortage_text
 from elastocal.planning.motion import AxisMotion
 from elastocal.results import brief_repr
 from elastocal.robot import GRAVITY
 
 _LIMIT_PER_LOAD = 1.3
 """Default force limit, as a multiple of the largest load case."""
-_LEAST_POSES = 3
-"""Unloaded marker readings that the rotation of a station needs."""
 _SAME_PLACE = 1e-5
 """Largest distance between a frame and where its joints lead, in m."""
 _SAME_TURN = 1e-5
@@ -162,22 +162,15 @@ def registration_warnings(plan: PlanResult) -> tuple[str, ...]:
     ProcedureError
         If that holds for every station: no reading of the run would be of use.
     """
-    seen: dict[str, list[int]] = {}
-    for pose in plan.poses:
-        if pose.seen_by is not None:
-            seen.setdefault(pose.seen_by, []).append(pose.id)
-    few = {station: poses for station, poses in seen.items() if len(poses) < _LEAST_POSES}
-    if seen and len(few) == len(seen):
-        most = max(len(poses) for poses in seen.values())
+    seen_by = [pose.seen_by for pose in plan.poses]
+    few, count = registration_shortages(seen_by), Counter(name for name in seen_by if name)
+    if count and len(few) == len(count):
         raise ProcedureError(
-            f"no tracker station sees {_LEAST_POSES} poses of the plan, {most} at most: none could"
-            " be registered, and no reading used; plan more poses"
+            f"no tracker station sees {REGISTRATION_POSES} poses of the plan,"
+            f" {max(count.values())} at most: none could be registered, and no reading used; plan"
+            " more poses"
         )
-    return tuple(
-        f"station {station} sees {len(poses)} of the {_LEAST_POSES} poses that it needs to be"
-        f" registered: the readings at pose {', '.join(map(str, poses))} will be missing"
-        for station, poses in few.items()
-    )
+    return tuple(shortage_text(station, poses) for station, poses in few.items())
 
 
 def _about_robot(plan: PlanResult, cell: Cell) -> Iterator[str]:
