@@ -77,7 +77,7 @@ def test_a_run_commits_every_pose_and_writes_the_dataset(whole):
 def test_the_live_view_names_each_pose(whole):
     lines = whole[1].err.splitlines()
     assert sum(line.startswith("pose ") for line in lines) == 4
-    assert lines[0].startswith("pose 1 of 4")
+    assert lines[0].startswith("pose 0 (1 of 4)")
 
 
 def test_the_copies_in_the_folder_are_the_cell_and_the_plan(planned, whole):

@@ -322,9 +322,7 @@ def _check_folder(job: _Job, entries: tuple[procedure.Entry, ...], resume: bool)
     if not resume:
         known, count = procedure.last_known(entries), len(job.plan.poses)
         left = known.left_to_do(count)
-        advice = (
-            f"--resume {left}" if left else f"nothing is left to do, see `elastocal check {out}`"
-        )
+        advice = f"--resume {left}" if left else "nothing is left to do"
         raise ProcedureError(
             f"{out} holds this run already ({len(known.committed)} of {count} poses committed):"
             f" {advice}; for a new run name another folder"

@@ -188,3 +188,14 @@ def test_a_plan_that_contradicts_itself_is_not_programmed(tmp_path):
     plan = plans.plan()
     with pytest.raises(SchemaError, match="moves"):
         write_krl(tmp_path, replace(plan, moves=plan.moves[1:]))
+
+
+def test_poses_are_named_by_their_ids_alone(tmp_path):
+    plan = plans.plan()
+    text = write_krl(tmp_path, plan)[0].read_text()
+    titles = re.findall(r"^;FOLD (POSE .*?), about|^;FOLD (POSE .*?): about", text, re.MULTILINE)
+    last = len(plan.poses) - 1
+    assert [one or other for one, other in titles] == [
+        f"POSE {pose.id} of 0 to {last}" for pose in plan.poses
+    ]
+    assert "candidate" not in text
