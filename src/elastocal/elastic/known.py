@@ -27,6 +27,10 @@ _DIMENSIONS = {
 """Whether a quantity is of a torsional spring, and whether it is a stiffness."""
 
 
+_STIFFEST, _SOFTEST = 1e-15, 1.0
+"""Compliances in rad/(N·m) or m/N beyond which nothing in an arm is a spring."""
+
+
 @record()
 class KnownSpring:
     """What is known of a spring, as compliances in rad/(N·m) or m/N."""
@@ -63,7 +67,10 @@ def _parse_compliance(text: object) -> _Compliance:
             continue
         if not value > 0.0:
             raise ValueError(f"{text!r} must be above 0")
-        return _Compliance(1.0 / value if stiff else value, revolute)
+        compliance = 1.0 / value if stiff else value
+        if not _STIFFEST <= compliance <= _SOFTEST:
+            raise ValueError(f"{text!r} is no spring of an arm: is it in another unit?")
+        return _Compliance(compliance, revolute)
     raise ValueError(
         f"{text!r} is not a stiffness or compliance with its unit, e.g. '1.2 MN*m/rad'"
     )
@@ -123,9 +130,20 @@ class Knowledge(StrictModel):
                 raise ValueError(f"{name} holds between torques: it needs {torques}")
         if self.T1 is not None and self.T2 is not None and not self.T1 < self.T2:
             raise ValueError("T1 must be below T2")
-        if self.bounds is not None and self.bounds[0].value == self.bounds[1].value:
-            raise ValueError("bounds must be two different values")
+        stated_gear = [each.value for each in (self.K1, self.K2, self.K3) if each is not None]
+        if stated_gear != sorted(stated_gear, reverse=True):
+            raise ValueError("K1, K2, K3 must grow: a gear stiffens with its torque")
+        self._require_bounds()
         return self
+
+    def _require_bounds(self) -> None:
+        if self.bounds is None:
+            return
+        low, high = sorted(bound.value for bound in self.bounds)
+        if low == high:
+            raise ValueError("bounds must be two different values")
+        if self.stiffness is not None and not low <= self.stiffness.value <= high:
+            raise ValueError("stiffness must lie within bounds")
 
     @property
     def knows(self) -> bool:
