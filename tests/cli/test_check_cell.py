@@ -1,6 +1,7 @@
 """`elastocal check` on cells, plans and runs: it refuses what planning would refuse at once."""
 
 import json
+import re
 
 import pytest
 import yaml
@@ -8,6 +9,7 @@ import yaml
 from elastocal.cell.examples import write_example
 from elastocal.errors import SchemaError
 from elastocal.planning import write_plan
+from elastocal.robot import catalogue
 from elastocal.workflows import describe_file
 from support import plans
 from support.cli import elastocal
@@ -61,6 +63,46 @@ def test_a_surface_in_the_wrong_place_and_a_home_in_the_table_are_refused(folder
     assert "nearest point" in far.reason
     table = {"box": {"size": ["2 m", "2 m", "3 m"]}, "pose": {"xyz": ["1.5 m", "0 m", "1 m"]}}
     assert "HOME" in check(folder, fixtures=[table]).reason
+
+
+def without_masses(folder):
+    """Write the example's robot as a URDF whose links weigh nothing."""
+    text = catalogue.urdf(yaml.safe_load((folder / "cell.yaml").read_text())["robot"]["model"])
+    (folder / "light.urdf").write_text(re.sub(r"<inertial>.*?</inertial>", "", text, flags=re.S))
+    return {"robot": {"urdf": "light.urdf"}}
+
+
+def process_of(folder, force):
+    """Write a process of one row with a force."""
+    joints = [f"joint_a{number}[deg]" for number in range(1, 7)]
+    header = ",".join([*joints, *(f"force_{axis}[N]" for axis in "xyz")])
+    (folder / "process.csv").write_text(f"{header}\n{'10,' * 6}{force}\n")
+    return {"process": {"file": "process.csv"}}
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        (without_masses, "limits.torque: the torques of joint_a1, .* give its links masses in the"),
+        (lambda folder: process_of(folder, "0,0,0"), "process.file: no row has a force"),
+        (lambda _: {"load_cases__friction": 0.01}, "friction is .* N short of holding them"),
+        (lambda _: {"sensor__force_range": ["10 N"] * 3}, "need .* times the sensor's range"),
+        (lambda _: {"search": {"pool": 10}}, "search.pool: must be at least the 31 poses"),
+        (
+            lambda _: {"surface__region": {"box": {"min": ["5 m"] * 3, "max": ["6 m"] * 3}}},
+            "the region holds none",
+        ),
+    ],
+)
+def test_what_check_refuses_plan_refuses_in_the_same_words(folder, changes, words):
+    reason = check(folder, **changes(folder)).reason
+    assert re.search(words, reason), reason
+    planned = elastocal("plan", folder / "changed.yaml", "--out", folder / "plan")
+    assert planned.reason == reason
+
+
+def test_a_process_with_a_force_passes(folder):
+    assert check(folder, **process_of(folder, "0,0,-10")).code == 0
 
 
 def test_the_folder_of_a_plan_is_its_plan(tmp_path):

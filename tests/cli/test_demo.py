@@ -41,15 +41,18 @@ def test_the_log_of_a_demo_holds_every_command_with_its_output():
     commands = re.findall(r"^\$ elastocal (\S+)", log, flags=re.MULTILINE)
     assert commands == [c.words[0] for c in chapters("afp", Path("demo"), 0)]
     assert "model written to" in log
-    assert re.search(r"^gears .* taken", log, flags=re.MULTILINE)
+    # Gears with memory are not told apart from it where a free move leaves friction unknown.
+    assert re.search(r"^bearing .* taken", log, flags=re.MULTILINE)
 
 
-def test_a_demo_reaches_the_papers_reductions_in_its_own_table():
+def test_a_demo_on_the_typical_truth_takes_out_two_thirds_of_the_deviation():
     table = json.loads((finished_demo("afp") / "process/table.json").read_text())
     reduction = table["lines"][-1]["reduction"]
-    assert reduction["mean"] >= 0.89
-    assert reduction["max"] >= 0.70
-    assert table["lines"][-1]["after"]["max"] <= 0.3e-3
+    # On the truth `typical`, calibrated at another place of the rail than it works (issue 14):
+    # the paper's 0.89 and 0.70 were reached on `kind` (tests/end_to_end/test_table1.py).
+    assert reduction["mean"] >= 0.70
+    assert reduction["max"] >= 0.40
+    assert table["lines"][-1]["after"]["max"] <= 0.6e-3
 
 
 @pytest.mark.slow

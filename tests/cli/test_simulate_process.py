@@ -110,6 +110,84 @@ def test_what_does_not_fit_is_refused_in_one_line(folder, arguments, model, reas
     assert not (folder / "refused").exists()
 
 
+def own(folder: Path, out: str, *arguments: object):
+    """Run the path of one's own that an earlier test's process has written."""
+    path = folder / "built_in/path.csv"
+    if not path.exists():
+        result = run(folder, "built_in", "--seed", 2)
+        assert result.code == 0, result.err
+    return elastocal(
+        "simulate-process", example_cell("afp").path, "--path", path, "--model",
+        folder / "model.json", "--out", folder / out, "--seed", 2, "--json", *arguments,
+    )  # fmt: skip
+
+
+def test_a_path_of_ones_own_deviates_as_the_built_in_process_that_it_repeats(folder):
+    result = own(folder, "own", "--load", "0.5,-1")
+    assert result.code == 0, result.err
+    table = json.loads(result.out)
+    built_in = json.loads((folder / "built_in/table.json").read_text())
+    for key in ("lines", "spatial"):
+        (found,), (wanted,) = table[key], built_in[key]
+        for side in ("before", "after"):
+            assert found[side]["mean"] == pytest.approx(wanted[side]["mean"], rel=0.02)
+    assert table["process"] == "path.csv"
+    assert table["direction"] == built_in["direction"] == "lateral"
+    half, turned = table["loads"]
+    assert (half["load"], turned["load"]) == (0.5, -1.0)
+    assert 0.35 < half["spatial"][0]["before"]["mean"] / table["spatial"][0]["before"]["mean"] < 0.7
+    assert [(each["name"], each["load"]) for each in table["means"]] == [
+        ("lateral", 1.0), ("3-D", 1.0), ("lateral", 0.5), ("3-D", 0.5), ("lateral", -1.0),
+        ("3-D", -1.0),
+    ]  # fmt: skip
+    assert table["means"][0]["mean_reduction"]["low"] is None
+    assert "a single seed" in table["notes"][0]
+
+
+def test_the_3d_deviation_is_never_below_its_component(folder):
+    result = own(folder, "spatial")
+    assert result.code == 0, result.err
+    (trace,) = read_process(folder / "spatial").courses
+    for k, component in enumerate((trace.before, trace.after)):
+        assert np.all(trace.spatial[:, k] >= np.abs(component) - 1e-8)
+    table = json.loads(result.out)
+    assert table["spatial"][0]["before"]["mean"] == pytest.approx(
+        trace.spatial[:, 0].mean(), abs=1e-9
+    )
+
+
+@pytest.mark.parametrize(
+    ("arguments", "reason"),
+    [
+        (("--process", "afp"), "give either --process afp or machining, or --path"),
+        (("--courses", 2), "--courses goes with --process only"),
+        (("--load", "0"), "--load 0: a share of the force is not 0"),
+        (("--load", "0.5,0.5"), "--load 0.5 is run once"),
+        (("--load", "half"), "--load 'half' must be numbers"),
+        (("--direction", "up"), "direction 'up' must be 'lateral', 'normal' or three numbers"),
+        (("--speed", "5"), "5"),
+    ],
+)
+def test_what_does_not_go_with_a_path_is_refused(folder, arguments, reason):
+    result = own(folder, "refused", *arguments)
+    assert result.code != 0
+    assert reason in result.err
+    assert not (folder / "refused").exists()
+
+
+def test_over_several_seeds_means_have_an_interval(folder):
+    result = run(folder, "seeds", "--seed", 2, "--seed", 3, "--json")
+    assert result.code == 0, result.err
+    table = json.loads(result.out)
+    lateral = table["means"][0]
+    each = [line["reduction"]["mean"] for line in table["lines"][:2]]
+    assert lateral["mean_reduction"]["mean"] == pytest.approx(np.mean(each))
+    # Student's t of two seeds: 12.706 standard errors.
+    half = 12.706 * abs(each[1] - each[0]) / 2.0
+    assert lateral["mean_reduction"]["high"] == pytest.approx(np.mean(each) + half, rel=1e-3)
+    assert table["notes"] == []
+
+
 def test_an_unknown_process_is_refused(folder):
     result = elastocal(
         "simulate-process", example_cell("afp").path, "--process", "milling", "--model",

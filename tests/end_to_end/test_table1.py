@@ -1,5 +1,8 @@
 """The paper's Table 1 by simulation: plan, run, calibrate, find the tool, work. Five seeds.
 
+On the truth `kind`, whose figures these goals were set with; `typical` is held by the demo's tests
+until poses are planned where production runs (issue 14).
+
 Goals: AFP mean 89 %, max 70 %, every point within ±0.3 mm; machining 83 % and 74 %.
 """
 
@@ -25,6 +28,9 @@ def done(*arguments: object) -> str:
 def test_a_model_from_the_procedure_reaches_the_reductions_of_table_1(kind, tmp_path):
     cell, plan = tmp_path / kind / "cell.yaml", tmp_path / "plan"
     done("init", tmp_path / kind, "--like", kind)
+    text = cell.read_text(encoding="utf-8")
+    assert "preset: typical" in text
+    cell.write_text(text.replace("preset: typical", "preset: kind"), encoding="utf-8")
     done("plan", cell, "--out", plan, "--compare", "none")
     pairs: list[object] = []
     for seed in SEEDS:

@@ -94,7 +94,10 @@ def test_a_layout_by_name_knows_nothing():
             ' uncertainty: "20 %"',
             "stiffness must lie within bounds",
         ),
-        ('joint: joint_2, stiffness: "1e-9 N*m/rad", uncertainty: "2 %"', "no spring of an arm"),
+        (
+            'joint: joint_2, stiffness: "1e-9 N*m/rad", uncertainty: "2 %"',
+            "largest rotational compliance",
+        ),
     ],
 )
 def test_what_cannot_be_meant_is_refused_in_one_line(tmp_path, spring, message):

@@ -24,12 +24,13 @@ class PlannedCell:
 
 
 def planned_cell(folder: Path, poses: int = 4) -> PlannedCell:
-    """Write the fibre placement cell with a small pool and two load cases, and plan it."""
+    """Write the fibre placement cell, its pool and load cases few and its truth kind; plan it."""
     cell = write_example(folder / "cell", "afp")[0]
     text = cell.read_text(encoding="utf-8")
     for pattern, replacement in (
         (r"\n  d_max: .*", f"\n  poses: {poses}"),
         (r"\n  pool: .*", "\n  pool: 40"),
+        (r"\n  preset: .*", "\n  preset: kind"),
         (r"\n  cases: .*", "\n  cases: [normal, north]"),
     ):
         text, count = re.subn(pattern, replacement, text)

@@ -30,6 +30,8 @@ from elastocal.cell.motion import (
     torque_limits,
 )
 from elastocal.cell.procedure import (
+    CONDITIONING,
+    LIGHT_CONTACT,
     Acceptance,
     DeviceNames,
     Engagement,
@@ -38,8 +40,8 @@ from elastocal.cell.procedure import (
     ProcedureSettings,
     Search,
 )
+from elastocal.cell.production import ProcessFile, ProductionPath, read_production
 from elastocal.cell.simulation import Fault, Simulation
-from elastocal.dataset import LoadRows, joint_dimensions, read_load_rows
 from elastocal.errors import ElastocalError, FileAccessError, SchemaError
 from elastocal.files import read_text
 from elastocal.records import StrictModel, read_yaml
@@ -59,14 +61,6 @@ from elastocal.robot import (
 SCHEMA = "elastocal.cell/1"
 TOOLING = "tooling"
 """Name of the surface among the solids of the cell; no fixture may have it."""
-
-
-class ProcessFile(StrictModel):
-    """Poses and forces of the production process."""
-
-    file: str
-    """CSV with joint and force columns (the ROWS.csv of `elastocal predict`), relative to the
-    cell file."""
 
 
 class CellFile(StrictModel):
@@ -104,6 +98,20 @@ class CellFile(StrictModel):
 
     __str__ = __repr__
 
+    @property
+    def presses(self) -> dict[str, FloatArray]:
+        """Every press at a pose, by name, in order in time: force on the robot, tcp frame, in N.
+
+        `LoadCases.levels`, and before them what belongs to the reference: a full press, and the
+        light contact in which it is read. Shape (3,) each.
+        """
+        loads, procedure, before = self.load_cases, self.procedure, dict[str, FloatArray]()
+        if procedure.conditioning:
+            before[CONDITIONING] = np.array([0.0, 0.0, -loads.fz])
+        if procedure.reference == LIGHT_CONTACT:
+            before[LIGHT_CONTACT] = np.array([0.0, 0.0, -procedure.contact_force])
+        return before | loads.levels
+
     def summary(self) -> list[str]:
         """Return what stands in the cell, one line a subject."""
         robot, loads, sensor = self.robot, self.load_cases, self.sensor
@@ -113,7 +121,7 @@ class CellFile(StrictModel):
             f"tool: {self.tool.mass:g} kg, sensor: {'none' if sensor is None else sensor.name}",
             f"trackers: {', '.join(tracker.name for tracker in self.trackers) or 'none'}",
             f"surface: {self.surface.file}, {len(self.fixtures)} fixtures",
-            f"load cases: {', '.join(loads.cases)};"
+            f"load cases: {', '.join(self.presses)};"
             f" fx {loads.fx:g} N, fy {loads.fy:g} N, fz {loads.fz:g} N",
             f"search: {self.search.technique}, {self.search.pose_limit or 'any number of'} poses",
         ]
@@ -174,7 +182,7 @@ class Cell:
     """Joint positions where the robot starts and ends, shape (joint,), in rad or m."""
     axis_speeds: FloatArray
     """Speeds that are used between poses, override included, shape (joint,), in rad/s or m/s."""
-    process: LoadRows | None = None
+    process: ProductionPath | None = None
     """Poses and forces of the production process."""
 
     def __repr__(self) -> str:
@@ -184,6 +192,13 @@ class Cell:
     def name(self) -> str:
         """Name that the file gives the cell, else the name of its folder."""
         return self.file.name or self.path.resolve().parent.name
+
+    @property
+    def technique(self) -> str:
+        """Search technique: that of the file, else I-optimality where a process is named."""
+        search = self.file.search
+        is_named = "technique" in search.model_fields_set
+        return "i_optimal" if self.process is not None and not is_named else search.technique
 
     @property
     def T_flange_tcp(self) -> FloatArray:
@@ -251,13 +266,15 @@ class Cell:
         return self.path.parent / file
 
 
-def load_cell(path: Path) -> Cell:
+def load_cell(path: Path, *, production: bool = True) -> Cell:
     """Return the cell that a file describes.
 
     Parameters
     ----------
     path : Path
         YAML with the schema ``elastocal.cell/1``; the files that it names are relative to it.
+    production : bool
+        Whether the production path is read; not while it is yet to be made.
 
     Raises
     ------
@@ -278,7 +295,12 @@ def load_cell(path: Path) -> Cell:
     for key, mesh in _meshes(file):
         if not (path.parent / mesh.file).is_file():
             raise FileAccessError(f"{path}: {key}.file: there is no file {path.parent / mesh.file}")
-    process = _at(f"{path}: process.file", lambda: _process(path, file, robot))
+    process, entry = None, file.process
+    if entry is not None and production:
+        process = _at(
+            f"{path}: process.file",
+            lambda: read_production(path.parent / entry.file, entry, robot, home, positions),
+        )
     for array in (positions, torques, home, speeds):
         array.setflags(write=False)
     return Cell(path, file, robot, positions, torques, home, speeds, process)
@@ -318,10 +340,3 @@ def _meshes(file: CellFile) -> list[tuple[str, MeshFile]]:
 
     tool, fixtures = of("tool.shapes", file.tool.shapes), of("fixtures", file.fixtures)
     return [("surface", file.surface), *tool, *fixtures]
-
-
-def _process(path: Path, file: CellFile, robot: Robot) -> LoadRows | None:
-    if file.process is None:
-        return None
-    joints = joint_dimensions(robot.joint_names, robot.revolute)
-    return read_load_rows(path.parent / file.process.file, joints)

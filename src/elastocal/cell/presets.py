@@ -29,7 +29,8 @@ class PresetFigure:
     typical: _Value
     harsh: _Value
     source: str
-    """Where the magnitude comes from; begins with "assumption" where nobody was found to say it."""
+    """Where the magnitude comes from: "assumption" where nobody was found to say it, † where a data
+    sheet is cited from memory."""
 
     def of(self, preset: Preset) -> _Value:
         """Return the figure of a preset."""
@@ -46,8 +47,8 @@ PRESET_FIGURES = (
         0.2,
         0.3,
         0.4,
-        "Harmonic Drive and Nabtesco catalogues state stiffness by zones of torque: K1/K3 about"
-        " 0.55 (CSG) to 0.8 (RV)",
+        "catalogues of strain-wave gears state K1, K2, K3 by zones of torque: K1/K3 about 0.55"
+        " (Harmonic Drive CSG †); RV gears are straighter, 0.8 is an assumption",
     ),
     PresetFigure(
         "gears.lost_motion",
@@ -55,7 +56,7 @@ PRESET_FIGURES = (
         None,
         ("0.005 deg", "0.005 deg", "0.006 deg", "0.008 deg", "0.009 deg", "0.01 deg"),
         ("0.01 deg", "0.01 deg", "0.012 deg", "0.016 deg", "0.018 deg", "0.02 deg"),
-        "Nabtesco RV-E, RV-N catalogues: at most 1 arc min new; 0.3' to 0.6' is half of it,"
+        "Nabtesco RV-E, RV-N catalogues †: at most 1 arc min new; 0.3' to 0.6' is half of it,"
         " smaller on the large gears; harsh: the limit, and a little worn at the wrist",
     ),
     PresetFigure(
@@ -64,7 +65,7 @@ PRESET_FIGURES = (
         "60e-6 rad",
         "100e-6 rad",
         "150e-6 rad",
-        "assumption: of the size of the lost motion, as loops in Ruderman, Hoffmann, Bertram 2009",
+        "assumption: of the size of the lost motion, as in Ruderman, Hoffmann, Bertram 2009 †",
     ),
     PresetFigure(
         "gears.residual",
@@ -97,8 +98,7 @@ PRESET_FIGURES = (
         "0 mm",
         "60 mm",
         "120 mm",
-        "assumption: half the length of a main bearing with its gear; KR QUANTEC drawings leave"
-        " 100 to 300 mm for it",
+        "assumption: half the length of a main bearing with its gear",
     ),
     PresetFigure(
         "truth.links",
@@ -114,7 +114,7 @@ PRESET_FIGURES = (
         "0 N",
         "300 N",
         "600 N",
-        "assumption: 1.5 and 3 % of its force of some 20 kN; makers state a few percent",
+        "assumption: 1.5 and 3 % of its force of some 20 kN",
     ),
     PresetFigure(
         "contact.tilt",
@@ -147,8 +147,8 @@ PRESET_FIGURES = (
         "0.01 mm",
         "0.02 mm",
         "0.04 mm",
-        "data sheets of KR QUANTEC: pose repeatability 0.05 to 0.06 mm (ISO 9283), three standard"
-        " deviations of the distance",
+        "data sheets of KR QUANTEC †: pose repeatability 0.05 to 0.06 mm (ISO 9283: mean distance"
+        " and three standard deviations)",
     ),
     PresetFigure(
         "sensor.cross_talk",
@@ -156,7 +156,8 @@ PRESET_FIGURES = (
         0.001,
         0.01,
         0.02,
-        "ATI states 1 to 1.5 % of full scale for Omega; Humanetics: 1 to 5 % uncorrected",
+        "data sheets of ATI Omega †: uncertainty of 1 to 1.5 % of full scale; Humanetics"
+        " (hitec.humaneticsgroup.com): cross-talk of 1 to 5 % before it is calibrated away",
     ),
     PresetFigure(
         "sensor.hysteresis",
@@ -164,7 +165,7 @@ PRESET_FIGURES = (
         0.0,
         0.005,
         0.01,
-        "part of the same 1 %; Koike, Sakaino, Tsuji 2019 correct for it; the share is assumed",
+        "part of the uncertainty above; Koike, Sakaino, Tsuji 2019 correct for it; share assumed",
     ),
     PresetFigure(
         "geometry.tcp",

@@ -10,7 +10,14 @@ from collections.abc import Iterator
 from typing import Annotated, Any, Literal, get_args
 
 import numpy as np
-from pydantic import Field, FiniteFloat, ValidationError, field_validator, model_validator
+from pydantic import (
+    AfterValidator,
+    Field,
+    FiniteFloat,
+    ValidationError,
+    field_validator,
+    model_validator,
+)
 from pydantic_core import InitErrorDetails, PydanticCustomError
 
 from elastocal.arrays import FloatArray
@@ -49,6 +56,21 @@ DIRECTIONS = {
 """Signs of (fx, fy, fz) in the force on the robot (paper section 4.1; docs/conventions.md says why
 east is -fy)."""
 _CaseName = Literal["normal", "north", "south", "east", "west"]
+CONDITIONING = "conditioning"
+"""Name of the full press before the reference is read."""
+LIGHT_CONTACT = "light_contact"
+"""Name of the press under which the reference is read; it is no load case of a dataset."""
+_PERCENT = 1e-9
+"""How near to a whole percent a level is."""
+
+
+def _whole_percent(level: float) -> float:
+    if not abs(100.0 * level - round(100.0 * level)) <= 100.0 * _PERCENT:
+        raise ValueError("must be a whole percent of the full load, such as 0.45")
+    return level
+
+
+_Level = Annotated[FiniteFloat, Field(ge=0.01, le=0.99), AfterValidator(_whole_percent)]
 
 
 class LoadCases(StrictModel):
@@ -65,6 +87,12 @@ class LoadCases(StrictModel):
     safety: Annotated[FiniteFloat, Field(ge=1.0, le=100.0)] = 1.5
     """Factor by which the friction must exceed the lateral force."""
     cases: Annotated[tuple[_CaseName, ...], Field(validate_default=True)] = get_args(_CaseName)
+    level: _Level | None = None
+    """Part of ``fz`` that is pressed with before the cases, on the way up, and after them, on the
+    way down: it tells play and stiffening from compliance. None: the full cases alone."""
+    check: _Level | None = None
+    """Part of ``fz`` that is pressed with and kept out of every fit: it shows what the model is
+    worth between the loads that it has seen. None: there is no such press."""
 
     @field_validator("cases")
     @classmethod
@@ -79,11 +107,43 @@ class LoadCases(StrictModel):
                 raise ValueError(f"{' and '.join(pushed)} need {axis} above 0")
         return cases
 
+    @field_validator("check")
+    @classmethod
+    def _not_the_level(cls, check: float | None, info: Any) -> float | None:
+        if check is not None and check == info.data.get("level"):
+            raise ValueError("must differ from level: what the fit has seen is no check")
+        return check
+
     @property
     def force_tcp(self) -> FloatArray:
         """Force on the robot in each case, tcp frame, shape (load_case, 3), in N."""
         signs = np.array([DIRECTIONS[name] for name in self.cases])
         return signs * (self.fx, self.fy, self.fz)
+
+    @property
+    def check_case(self) -> str | None:
+        """Name of the load case that is kept out of every fit."""
+        return None if self.check is None else _level_name(self.check)
+
+    @property
+    def levels(self) -> dict[str, FloatArray]:
+        """Force on the robot in each load case, tcp frame, shape (3,), in N, in order in time.
+
+        The level, the cases, the check, the level again: the load comes up to the full cases and
+        goes down from them.
+        """
+        pressed = dict(zip(self.cases, self.force_tcp, strict=True))
+        full = np.array([0.0, 0.0, -self.fz])
+        if self.check is not None:
+            pressed[_level_name(self.check)] = self.check * full
+        if self.level is not None:
+            name, force = _level_name(self.level), self.level * full
+            pressed = {name: force, **pressed, f"{name}_back": force}
+        return pressed
+
+
+def _level_name(level: float) -> str:
+    return f"normal_{round(100.0 * level)}"
 
 
 class Engagement(StrictModel):
@@ -188,13 +248,22 @@ class Search(StrictModel):
     """Pool and technique; ends at ``poses`` or at ``d_max``, whichever comes first."""
 
     technique: str = "cover"
-    """Name of a search technique (`elastocal.planning.search`)."""
+    """Name of a search technique (`elastocal.planning.search`); `Cell.technique` says which is
+    taken where the file names none."""
     metric: Literal["euclidean", "geodesic"] = "euclidean"
     """How COVER measures the distance between contact points."""
     poses: Annotated[int, Field(ge=1, le=_MOST_CANDIDATES)] | None = None
     """Largest number of poses N."""
     d_max: PositiveLength | None = None
     """Cover distance at which COVER may stop, in m."""
+    accuracy: PositiveLength | None = None
+    """Error on production that is wanted, in m: as few poses as it is expected from."""
+    sigma: PositiveLength | None = None
+    """Standard deviation of a measured coordinate of a deflection that errors are expected with, in
+    m; by default that of a laser tracker at some metres."""
+    floor: PositiveLength | None = None
+    """Error that the model leaves however many poses there are, in m, as `elastocal study` finds
+    it; not known by default."""
     pool: Annotated[int, Field(ge=1, le=_MOST_CANDIDATES)] = 3000
     """Number of candidates."""
     sampling: Literal["blue_noise", "uniform"] = "blue_noise"
@@ -248,6 +317,12 @@ class ProcedureSettings(StrictModel):
     force_spread: Annotated[PositiveForce, Field(le=50.0)] = 8.0
     """Largest width of the force about its drift that holds 95 % of the samples, each axis, in N;
     counted as four standard deviations."""
+    reference: Literal["unloaded", "light_contact"] = "unloaded"
+    """Where the zero of the displacements is read: near contact without load, or pressing with
+    ``contact_force``, so that the settling of disk and tooling is no displacement."""
+    conditioning: bool = False
+    """Whether a full press goes before the reference, so that the gears' friction starts from a
+    known load at every pose and not from wherever the way there has left it."""
     dwell: Annotated[PositiveTime, Field(le=60.0)] = 0.5
     """How long the force must be like that before it is averaged, in s."""
     average: Annotated[PositiveTime, Field(le=60.0)] = 1.0
@@ -289,6 +364,9 @@ class ProcedureSettings(StrictModel):
         if not self.contact_force > self.force_spread:
             least_felt = f"must be above force_spread ({self.force_spread:g} N)"
             yield "contact_force", f"{least_felt}: less is felt without contact"
+        if self.conditioning and self.reference != "light_contact":
+            needed = "needs reference: light_contact"
+            yield "conditioning", f"{needed}: a tool that is lifted wipes out what the press did"
         least = self.dwell + self.average
         if not self.timeout >= least:
             yield "timeout", f"must be at least dwell and average together ({least:g} s)"

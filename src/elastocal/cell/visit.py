@@ -85,12 +85,11 @@ def load_case_time(cell: Cell) -> float:
     """Return the mean time of one load case, in s: ramp, settle, average."""
     steps = ("load", "settle", "average")
     total = sum(step.seconds for step in _steps_of(cell) if step.name in steps)
-    return total / len(cell.file.load_cases.cases)
+    return total / len(cell.file.presses)
 
 
 def _steps_of(cell: Cell) -> Iterator[VisitStep]:
-    engagement, loads = cell.file.engagement, cell.file.load_cases
-    forces = dict(zip(loads.cases, loads.force_tcp, strict=True))
+    engagement, forces = cell.file.engagement, cell.file.presses
     return visit_steps(
         cell.file.procedure, engagement.near_contact, engagement.approach_distance, forces
     )

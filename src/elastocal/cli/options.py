@@ -97,6 +97,23 @@ def parse_direction(text: str) -> tuple[float, float, float]:
     return x, y, z
 
 
+def parse_loads(text: str | None) -> tuple[float, ...]:
+    """Return shares of a load from ``"0.5,-1"``.
+
+    >>> parse_loads("0.5,-1")
+    (0.5, -1.0)
+
+    Raises
+    ------
+    CompensationError
+        If a part is not a number.
+    """
+    try:
+        return tuple(float(part) for part in (text or "").split(",") if text)
+    except ValueError as error:
+        raise CompensationError(f"--load {text!r} must be numbers, e.g. '0.5,-1'") from error
+
+
 def split_tools(given: list[str] | None) -> tuple[tuple[Path, ...], str | None]:
     """Return the tool files, and the frame of another tool, among the values of ``--tool``.
 

@@ -57,6 +57,7 @@ ATTRIBUTES = (
     "tcp_frame",
     "marker",
     "gravity",
+    "check",
     "provenance",
 )
 """Global attributes with a meaning here, in the order in which they are written."""

@@ -159,6 +159,7 @@ class Dataset:
         marker: Vector | None = None,
         gravity: Vector | None = None,
         conditioned: bool = False,
+        check: Sequence[str] = (),
         provenance: str = "",
     ) -> "Dataset":
         """Return the dataset of plain arrays in SI units, if it is plausible.
@@ -191,6 +192,8 @@ class Dataset:
             Acceleration of gravity in base, in m/s²; that of an upright base by default.
         conditioned : bool
             Whether each pose began with a full press, made before the reference was read.
+        check : sequence of str
+            Load cases that are kept out of every fit.
 
         Raises
         ------
@@ -219,6 +222,7 @@ class Dataset:
             "tcp_frame": tcp_frame,
             "marker": None if marker is None else write_vector(marker),
             "gravity": None if gravity is None else write_vector(gravity, "m/s2"),
+            "check": ", ".join(check) or None,
             "history": CONDITIONED if conditioned else None,
             "provenance": provenance,
         }
@@ -352,6 +356,11 @@ class Dataset:
         return self.attributes.get("history") == CONDITIONED
 
     @property
+    def check_cases(self) -> tuple[str, ...]:
+        """Load cases that are kept out of every fit, to check it; those that are not here too."""
+        return tuple(filter(None, map(str.strip, self.attributes.get("check", "").split(","))))
+
+    @property
     def order(self) -> IntArray:
         """Place of each reading in time among those of its pose, shape (pose, load_case)."""
         default = np.tile(np.arange(len(self.load_cases)), (len(self.poses), 1))
@@ -384,17 +393,19 @@ class Dataset:
         """
         return selected(self, poses, load_cases)
 
-    def readings(self, joint_names: Sequence[str]) -> Readings:
+    def readings(self, joint_names: Sequence[str], *, check: bool = False) -> Readings:
         """Return the usable readings as flat arrays, the joints in the robot's order.
 
         Parameters
         ----------
         joint_names : sequence of str
             Joints of the robot; the columns are brought into this order *by name*.
+        check : bool
+            Those that are kept out of every fit, in place of the others; friction felt both.
 
         Raises
         ------
         DatasetError
             If the dataset's joints are not these, or there was no metrology.
         """
-        return usable_readings(self, joint_names)
+        return usable_readings(self, joint_names, check=check)

@@ -71,9 +71,15 @@ def merge(
         status=np.concatenate([_spread(each, each.status, cases, MISSING) for each in datasets]),
         sequence=_sequence(datasets, cases),
         campaigns=_campaigns(datasets, campaigns),
-        attributes={**datasets[0].attributes, "provenance": provenance},
+        attributes={**datasets[0].attributes, **_check(datasets), "provenance": provenance},
         **joined,
     )
+
+
+def _check(datasets: Sequence["Dataset"]) -> dict[str, str]:
+    """Return the attribute of the load cases that any of the datasets keeps out of every fit."""
+    kept_out = dict.fromkeys(case for dataset in datasets for case in dataset.check_cases)
+    return {"check": ", ".join(kept_out)} if kept_out else {}
 
 
 def _sequence(datasets: Sequence["Dataset"], cases: Sequence[str]) -> IntArray | None:

@@ -200,7 +200,9 @@ class Readings:
         object.__setattr__(self, name, array)
 
 
-def usable_readings(dataset: "Dataset", joint_names: Sequence[str]) -> Readings:
+def usable_readings(
+    dataset: "Dataset", joint_names: Sequence[str], *, check: bool = False
+) -> Readings:
     """Return the usable readings of a dataset as flat arrays; see `Dataset.readings`."""
     if dataset.marker_displacement is None:
         raise DatasetError(
@@ -226,13 +228,15 @@ def usable_readings(dataset: "Dataset", joint_names: Sequence[str]) -> Readings:
         flat["sequence"] = dataset.order[pose, case]
     if dataset.campaigns:
         flat["campaign"] = np.array(dataset.campaigns)[pose]
-    return Readings(
+    readings = Readings(
         np.array(dataset.poses)[pose],
         np.array(dataset.load_cases)[case],
         conditioned=dataset.conditioned,
         also_pressed=presses,
         **flat,
     )
+    kept_out = np.isin(readings.load_case, dataset.check_cases)
+    return readings.set_aside(~kept_out if check else kept_out)
 
 
 def _unusable_presses(dataset: "Dataset", order: Sequence[int]) -> Presses | None:

@@ -9,6 +9,7 @@ from .budget import (
     TermName as TermName,
     TermWorth as TermWorth,
     error_budget as error_budget,
+    stated_noise as stated_noise,
 )
 from .calibrated import (
     CalibratedModel as CalibratedModel,
@@ -77,6 +78,7 @@ from .ladder import (
     try_rung as try_rung,
     usable_for_choice as usable_for_choice,
 )
+from .load_check import LoadCheck as LoadCheck, check_loads as check_loads
 from .model_file import (
     CalibrateResult as CalibrateResult,
     RobotRecord as RobotRecord,
@@ -129,6 +131,17 @@ from .problem import (
     relative_sizes as relative_sizes,
     same_configuration as same_configuration,
     unit_columns as unit_columns,
+)
+from .production import (
+    ENOUGH as ENOUGH,
+    JOINT_REACH as JOINT_REACH,
+    LEVEL_REACH as LEVEL_REACH,
+    RAIL_REACH as RAIL_REACH,
+    CalibratedLoads as CalibratedLoads,
+    ProductionCoverage as ProductionCoverage,
+    near_postures as near_postures,
+    posture_reach as posture_reach,
+    production_coverage as production_coverage,
 )
 from .reproduction import (
     Reproduction as Reproduction,

@@ -362,11 +362,27 @@ def _noise(
         return _part(3.0 * scatter / freedom, low, high, f"{freedom // 3} repeated readings")
     if readings.marker_sigma is None:
         return ErrorPart(None, None, None, "no repeated reading, no stated deviation")
+    return stated_noise(model, readings, compliance[: len(model.parameters)])
+
+
+def stated_noise(model: ElasticModel, readings: Readings, compliance: FloatArray) -> ErrorPart:
+    """Return the noise of a reading as the readings state it: root mean square of norms.
+
+    Parameters
+    ----------
+    model : ElasticModel
+        Turns a deviation of the force into one of the deflection.
+    readings : Readings
+        With their standard deviations, or without: then it is not known.
+    compliance : ndarray, shape (parameter,)
+        Of the springs.
+    """
+    if readings.marker_sigma is None:
+        return ErrorPart(None, None, None, "no stated deviation")
     square, source = np.sum(np.square(readings.marker_sigma), axis=1), "metrology"
     if readings.force_sigma is not None:
-        c = compliance[: len(model.parameters)]
         place = (readings.joint_position, readings.force, readings.moment)
-        C = model.cartesian_compliance(c, *place).translation
+        C = model.cartesian_compliance(compliance, *place).translation
         square = square + np.sum(np.square(C * readings.force_sigma[:, None, :]), axis=(1, 2))
         source = "metrology and force sensor"
     return _part(float(square.mean()), None, None, f"stated: {source}")

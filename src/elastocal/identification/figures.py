@@ -16,6 +16,7 @@ from elastocal.identification.calibrated import CalibratedModel
 from elastocal.identification.calibration import Calibration
 from elastocal.identification.frames import FrameSummary
 from elastocal.identification.ladder import Climbed
+from elastocal.identification.load_check import LoadCheck
 from elastocal.identification.observability import Term
 from elastocal.identification.options import FitOptions, FitSettings, bounds
 from elastocal.identification.suspicious import Screening
@@ -171,6 +172,8 @@ class CalibrationSummary:
     """What the spring file knew of springs beforehand."""
     budget: ErrorBudget | None = None
     """What the error at left-out poses is made of, where it was asked for."""
+    check: LoadCheck | None = None
+    """The error at load cases that are kept out of every fit, where there are any."""
 
     @property
     def unexplained(self) -> float:

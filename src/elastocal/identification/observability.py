@@ -34,7 +34,7 @@ _ZERO = 1e-6
 """Components below this part of the largest count as zero."""
 _NOTICEABLE = 1e-2
 """Smaller parts of a combination are not named: the data leave such a spring open by less than a
-hundredth of a sensible value. In rich models nearly every spring has a trace in some combination."""
+hundredth of a sensible value. In rich models nearly every spring has a trace in one of them."""
 _MOST_SETS = 20_000
 """Largest number of coordinate sets to try; beyond it elimination gives a sparse enough basis."""
 _TWICE = 2.0

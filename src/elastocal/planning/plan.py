@@ -1,5 +1,6 @@
 """From a cell to a plan: surface, pool, search, visiting order (paper 2.2, 3.1)."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,7 +11,7 @@ from elastocal import __version__
 from elastocal.arrays import FloatArray, IndexArray
 from elastocal.cell import Cell, contact_time, fingerprint, straight_time
 from elastocal.errors import PlanningError
-from elastocal.planning.checks import SightCheck
+from elastocal.planning.checks import SightCheck, registration_shortages, shortage_text
 from elastocal.planning.motion import (
     Mover,
     Route,
@@ -36,6 +37,11 @@ from elastocal.planning.plan_result import (
 from elastocal.planning.pool import REACH_ADVICE, Pool
 from elastocal.planning.pool_file import NOT_CHOSEN, PoolData
 from elastocal.planning.pool_sampling import SampledPool, sample_pool
+from elastocal.planning.production import production_findings
+from elastocal.planning.requirements import (
+    require_loads_possible_anywhere,
+    require_possible_search,
+)
 from elastocal.planning.scene import (
     cell_surface,
     collision_scene,
@@ -114,6 +120,7 @@ def make_plan(
     progress(_SURFACE, 0, 1)
     surface = cell_surface(cell)
     findings = surface_findings(cell, surface, for_findings)
+    require_loads_possible_anywhere(cell, surface)
     mover = mover_for(cell, collision_scene(cell, surface))
     require_free_home(cell.home, mover)
     progress(_SURFACE, 1, 1)
@@ -125,51 +132,35 @@ def make_plan(
     chosen = _Choice(cell, surface, sampled.pool, search_pool, selection, route)
     search = _search(chosen)
     progress(_SEARCH, 1, 1)
+    production = search_pool.production(cell, selection.order)
     compared = None
     if other is not None:
-        everyone = np.arange(len(search_pool.candidates))
+        everyone = search_pool.preferred(cell, np.arange(len(search_pool.candidates)))
         taken = search_pool.take(other, everyone, len(selection), for_search).order
         spread = search_pool.spread(taken)
         compared = ComparisonRecord(
             name=other.name, candidates=tuple(taken.tolist()), spread=spread
         )
+    poses = _poses(chosen)
     plan = PlanResult(
         elastocal=__version__,
         cell=CellRecord(name=cell.name, file=str(cell.path), fingerprint=fingerprint(cell)),
         robot=_robot(cell),
         contact=_contact(cell),
-        poses=_poses(chosen),
+        poses=poses,
         moves=_moves(route),
         search=search,
         comparison=compared,
         pool=_pool(sampled.pool),
-        findings=(*(each.message for each in findings), *_notes(cell, sampled.pool, search)),
+        findings=(
+            *(each.message for each in findings),
+            *_notes(cell, sampled.pool, search),
+            *_shortages(poses),
+            *production_findings(cell, production),
+        ),
+        production=production,
     )
     return PlanAndPool(plan, _pool_data(chosen, sampled.points.position), surface)
-
-
-def require_possible_search(cell: Cell, compare: str | None = None) -> None:
-    """Require a search that can be made, as far as no pool is needed to tell.
-
-    Parameters
-    ----------
-    cell : Cell
-        The cell.
-    compare : str, optional
-        Search technique to lay beside the cell's own.
-
-    Raises
-    ------
-    PlanningError
-        If a technique is unknown, or needs a process that the cell does not name.
-    """
-    wanted = technique(cell.file.search.technique)
-    for name in (wanted.name, compare):
-        if name in ("i_optimal", "exchange-i") and cell.process is None:
-            raise PlanningError(
-                f"search technique {name!r} needs the production's poses and forces:"
-                " name their file in process.file of the cell file"
-            )
 
 
 def _require_enough(cell: Cell, sampled: SampledPool, findings: tuple[Finding, ...]) -> None:
@@ -252,6 +243,13 @@ def _unjudged(cell: Cell) -> list[str]:
     return notes
 
 
+def _shortages(poses: tuple[PoseRecord, ...]) -> Iterator[str]:
+    """Yield each station that no choice of stations gives enough poses to be registered."""
+    for station, few in registration_shortages([pose.seen_by for pose in poses]).items():
+        advice = "no station sees enough poses beside: move or add one, or plan more poses"
+        yield f"{shortage_text(station, few)}; {advice}"
+
+
 def _assumptions(cell: Cell) -> list[str]:
     """Return what the robot's description assumes and the cell file does not replace."""
     given = set()
@@ -275,16 +273,14 @@ def _robot(cell: Cell) -> RobotRecord:
 
 
 def _contact(cell: Cell) -> ContactRecord:
-    engagement, loads = cell.file.engagement, cell.file.load_cases
+    engagement = cell.file.engagement
     return ContactRecord(
         approach_distance=engagement.approach_distance,
         near_contact=engagement.near_contact,
         axis_override=cell.file.motion.override,
         contact_speed=cell.file.motion.contact_speed,
         straight_time=straight_time(cell),
-        load_cases={
-            name: _vector(force) for name, force in zip(loads.cases, loads.force_tcp, strict=True)
-        },
+        load_cases={name: _vector(force) for name, force in cell.file.presses.items()},
     )
 
 
@@ -292,7 +288,7 @@ def _poses(choice: _Choice) -> tuple[PoseRecord, ...]:
     pool, robot = choice.pool, choice.cell.robot
     order = choice.selection.order[choice.route.order]
     check = SightCheck.of(choice.cell, choice.surface)
-    seen_by = check.seen_by(pool.postures.take(order)) if check else [None] * len(order)
+    seen_by = check.assigned(pool.postures.take(order)) if check else [None] * len(order)
     poses = []
     for number, candidate in enumerate(order.tolist()):
         posture = pool.postures.take([candidate])
@@ -334,7 +330,7 @@ def _moves(route: Route) -> tuple[MoveRecord, ...]:
 def _search(choice: _Choice) -> SearchRecord:
     search, selection, pool = choice.cell.file.search, choice.selection, choice.search_pool
     spread = pool.spread(selection.order)
-    has_process = pool.candidates.process is not None
+    has_process = choice.cell.process is not None
     return SearchRecord(
         name=selection.name,
         metric=search.metric,

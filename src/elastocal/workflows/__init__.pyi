@@ -86,6 +86,12 @@ from .predict import (
     PredictSummary as PredictSummary,
     predict as predict,
 )
+from .process_trial import (
+    ProcessTrial as ProcessTrial,
+    TrialRuns as TrialRuns,
+    run_budget as run_budget,
+    run_trial as run_trial,
+)
 from .report import (
     ReportFigures as ReportFigures,
     ReportResult as ReportResult,
@@ -103,11 +109,8 @@ from .run import (
     run as run,
 )
 from .simulate_process import (
-    ProcessTrial as ProcessTrial,
     SimulateProcessResult as SimulateProcessResult,
     SimulateProcessSettings as SimulateProcessSettings,
-    TrialRuns as TrialRuns,
-    run_trial as run_trial,
     simulate_process as simulate_process,
 )
 from .stiffness import (

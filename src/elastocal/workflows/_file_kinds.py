@@ -3,12 +3,11 @@
 A new kind is a function here and its entry in a table of `elastocal.workflows.check`.
 """
 
-from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 
-from elastocal import dataset, planning, procedure
+from elastocal import planning, procedure
 from elastocal.cell import load_cell
 from elastocal.codec import (
     ARRAYS_SCHEMA,
@@ -30,16 +29,10 @@ from elastocal.identification.recertification import CompareSummary
 from elastocal.planning.motion import mover_for, require_free_home
 from elastocal.records import read_json, schema_of
 from elastocal.robot import Robot, leaf_links, parse_urdf, refusals_naming
-from elastocal.tables import opened_table
+from elastocal.workflows._table_kinds import dataset_file
 
 FileDescription = tuple[str, dict[str, object]]
 """The kind of a file, and what it holds: figures by name, JSON-ready."""
-
-_TABLES: dict[tuple[str, ...], str] = {
-    ("variant", "seed_pose", "n_train"): "table of the indices of a codec",
-    ("sample", "poses", "search"): "table of a study",
-}
-"""What a table is, by its first columns."""
 
 
 def cell_file(path: Path) -> FileDescription:
@@ -59,14 +52,15 @@ def cell_file(path: Path) -> FileDescription:
     planning.require_possible_search(cell)
     surface = planning.cell_surface(cell)
     findings = planning.surface_findings(cell, surface, np.random.default_rng(search.seed))
+    planning.require_loads_possible_anywhere(cell, surface)
     require_free_home(cell.home, mover_for(cell, planning.collision_scene(cell, surface)))
     return "cell file", {
         "schema": "elastocal.cell/1",
         "cell": cell.name,
         "robot": cell.robot.name,
-        "load_cases": list(cell.file.load_cases.cases),
+        "load_cases": list(cell.file.presses),
         "trackers": [tracker.name for tracker in cell.file.trackers],
-        "technique": search.technique,
+        "technique": cell.technique,
         "faces": len(surface.mesh.faces),
         "findings": [finding.message for finding in findings],
     }
@@ -143,19 +137,6 @@ def summary_file(path: Path) -> FileDescription:
     counts, warnings = summary.readings.counts, len(summary.warnings)
     schema = schema_of(procedure.RunSummary)
     return "summary of a run", {"schema": schema, "readings": counts, "warnings": warnings}
-
-
-def dataset_file(path: Path) -> FileDescription:
-    """Describe a dataset."""
-    data = dataset.read(path)
-    return "dataset", {
-        "readings": len(data.readings(data.joint_names)),
-        "poses": len(data.poses),
-        "load_cases": list(data.load_cases),
-        "joints": list(data.joint_names),
-        "robot": data.robot_name or None,
-        "tcp": data.tcp_frame,
-    }
 
 
 def robot_file(path: Path) -> FileDescription:
@@ -302,32 +283,6 @@ def study_record(path: Path) -> FileDescription:
         "median_error_m": {each.name: each.error_mean.median for each in found.conditions},
         "advice": found.advice or None,
     }
-
-
-def is_table(path: Path) -> bool:
-    """Return whether a CSV file begins as a table that a codec or a study writes."""
-    return _first_columns(read_text(path).partition("\n")[0].strip().split(",")) in _TABLES
-
-
-def table(path: Path) -> FileDescription:
-    """Describe a table of results.
-
-    Raises
-    ------
-    SchemaError
-        If a row has more or fewer cells than the header.
-    """
-    with opened_table(path) as table:
-        header, rows = list(table.layout.header), table.rows()
-    uneven = rows.uneven(len(header))
-    if uneven:
-        line, cells = uneven
-        raise SchemaError(f"{path}, line {line}: {cells} cells, not {len(header)}")
-    return _TABLES[_first_columns(header)], {"rows": len(rows), "columns": header}
-
-
-def _first_columns(header: Sequence[str]) -> tuple[str, ...]:
-    return tuple(header[:3])
 
 
 def _picked(found: object, *names: str) -> dict[str, object]:

@@ -8,7 +8,7 @@ from importlib.metadata import version
 import numpy as np
 
 from elastocal.arrays import FloatArray, IndexArray
-from elastocal.cell import Cell, fingerprint
+from elastocal.cell import CONDITIONING, LIGHT_CONTACT, Cell, fingerprint
 from elastocal.codec import ALL_LOADS, study as studies, training_cases
 from elastocal.codec.study import Condition, ConditionResult, Sample, SampleResult, StudyDesign
 from elastocal.dataset import Readings
@@ -43,8 +43,13 @@ class StudySimulation:
     errors: CampaignErrors
     pool: studies.StudyPool
     load_cases: tuple[str, ...]
+    """The full cases: what a condition may name, and what all are verified under."""
     force_tcp: FloatArray
-    """Force of each load case in the tcp frame, shape (load_case, 3), in N."""
+    """Their force in the tcp frame, shape (load_case, 3), in N."""
+    presses: dict[str, FloatArray]
+    """All that is pressed at a pose, in order in time; see `CellFile.presses`."""
+    check: str | None
+    """The load case that is kept out of every fit."""
     marker: FloatArray
     """In the tcp frame, shape (3,), in m."""
 
@@ -53,7 +58,7 @@ class StudySimulation:
         rng = sample.generator(studies.Purpose.TRUTH)
         stiffness, balancer = rng.standard_normal(self.truth.springs), rng.standard_normal()
         draws = ErrorDraws.of(
-            len(self.pool), len(self.load_cases), sample.generator(studies.Purpose.ERRORS)
+            len(self.pool), len(self.measured), sample.generator(studies.Purpose.ERRORS)
         )
         found: dict[int, ConditionResult] = {}
         for spread in dict.fromkeys(each.truth for each in self.conditions):
@@ -67,6 +72,11 @@ class StudySimulation:
                 ]
                 found |= self._calibrated(sample, arm, draws, numbers, verification)
         return SampleResult(sample.number, tuple(found[i] for i in range(len(self.conditions))))
+
+    @property
+    def measured(self) -> tuple[str, ...]:
+        """Presses that become readings, in order in time: all but that of the reference."""
+        return tuple(name for name in self.presses if name != LIGHT_CONTACT)
 
     def places(self, poses: IndexArray) -> ContactPoses:
         """Return some poses of the pool as the simulator wants them."""
@@ -83,19 +93,37 @@ class StudySimulation:
         """Calibrate one arm under conditions with the same load cases, measuring each pose once."""
         chosen = [self.chosen[i].of(sample.generator(studies.Purpose.CHOICE)) for i in numbers]
         poses = np.unique(np.concatenate(chosen))
-        cases = training_cases(self.conditions[numbers[0]].load_cases, self.load_cases)
-        loads = np.array([self.load_cases.index(case) for case in cases])
-        settled = arm.settle(self.places(poses), self.force_tcp[loads], seed=2 * sample.number)
-        own = draws.take(poses, loads)
+        pressed = self._pressed(self.conditions[numbers[0]].load_cases)
+        cases = tuple(name for name in pressed if name != LIGHT_CONTACT)
+        settled = arm.settle(
+            self.places(poses),
+            np.array([self.presses[name] for name in pressed]),
+            seed=2 * sample.number,
+            reference=pressed.index(LIGHT_CONTACT) if LIGHT_CONTACT in pressed else None,
+        )
+        own = draws.take(poses, np.array([self.measured.index(case) for case in cases]))
         found = {}
         for number, order in zip(numbers, chosen, strict=True):
             condition = self.conditions[number]
             scales = ErrorScales(condition.tracker_noise, condition.force_noise)
             station = self.pool.station[poses]
-            readings = self.errors.readings(settled, own, scales, station, cases)
-            mine = np.isin(readings.pose, np.searchsorted(poses, order))
-            found[number] = self._fitted(condition.springs, readings.take(mine), verification)
+            readings = self.errors.readings(
+                settled, own, scales, station, cases, conditioned=CONDITIONING in cases
+            )
+            mine = readings.take(np.isin(readings.pose, np.searchsorted(poses, order)))
+            mine = mine.set_aside(mine.load_case == self.check)
+            found[number] = self._fitted(condition.springs, mine, verification)
         return found
+
+    def _pressed(self, spec: str) -> tuple[str, ...]:
+        """Return what is pressed under a condition: everything, or some cases at the reference.
+
+        The load case that checks the fit is pressed too: friction feels it.
+        """
+        if spec == ALL_LOADS:
+            return tuple(self.presses)
+        before = (name for name in (CONDITIONING, LIGHT_CONTACT) if name in self.presses)
+        return (*before, *training_cases(spec, self.load_cases))
 
     def _fitted(
         self, springs: str, readings: Readings, verification: studies.Verification
@@ -172,6 +200,8 @@ def prepare_study(
         pool=poses.pool,
         load_cases=loads.cases,
         force_tcp=loads.force_tcp,
+        presses=cell.file.presses,
+        check=loads.check_case,
         marker=np.array(cell.file.marker.position_tcp),
     )
     return PreparedStudy(design, simulate)

@@ -14,6 +14,7 @@ from elastocal.errors import DatasetError
 from elastocal.identification import (
     CalibrateResult,
     FitSettings,
+    check_loads,
     choose_model,
     error_budget,
     summary,
@@ -96,6 +97,9 @@ def calibrate(settings: CalibrateSettings, progress: Progress) -> CalibrateResul
         provenance=f"{source}; {measured.provenance}" if measured.provenance else source,
     )
     figures = summary(calibration, settings.fit, known)
+    if measured.check_cases:
+        kept_out = measured.readings(arm.joint_names, check=True)
+        figures = replace(figures, check=check_loads(calibration, kept_out, marker))
     if settings.budget:
         figures = replace(figures, budget=error_budget(choice.model, readings, options, marker))
     result = CalibrateResult.of(calibration.calibrated, figures)

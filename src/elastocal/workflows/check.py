@@ -20,6 +20,7 @@ from elastocal.records import read_arrays, read_json_data, read_yaml_data
 from elastocal.results import Result, brief
 from elastocal.workflows import _file_kinds as kinds
 from elastocal.workflows._file_kinds import FileDescription
+from elastocal.workflows._table_kinds import dataset_file, table_file
 from elastocal.workflows._workflow import workflow
 
 _Describe = Callable[[Path], FileDescription]
@@ -40,7 +41,7 @@ _JSON_KINDS: dict[str, _Describe] = {
 _NETCDF_KINDS: dict[str, _Describe] = {
     "elastocal.codec": kinds.codec_arrays,
     "elastocal.pool": kinds.pool_file,
-    "elastocal.dataset": kinds.dataset_file,
+    "elastocal.dataset": dataset_file,
 }
 """NetCDF files likewise."""
 _YAML_KINDS: dict[str, _Describe] = {
@@ -148,10 +149,6 @@ def _json(path: Path) -> FileDescription:
     return _kind(path, _stated(read_json_data(path)), _JSON_KINDS)(path)
 
 
-def _table(path: Path) -> FileDescription:
-    return kinds.table(path) if kinds.is_table(path) else kinds.dataset_file(path)
-
-
 def _settings(path: Path) -> FileDescription:
     """Describe a YAML file by the schema that it states."""
     return _kind(path, _stated(read_yaml_data(path)), _YAML_KINDS)(path)
@@ -176,7 +173,7 @@ def _kind(path: Path, stated: object, known: Mapping[str, _Describe]) -> _Descri
 
 _BY_SUFFIX: dict[str, _Describe] = {
     ".nc": _netcdf,
-    ".csv": _table,
+    ".csv": table_file,
     ".json": _json,
     ".urdf": kinds.robot_file,
     ".jsonl": kinds.journal_file,

@@ -4,8 +4,7 @@ Beside ``study`` the only workflow that brings simulator and estimator together.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
-from functools import partial
+from dataclasses import dataclass, field
 from importlib.metadata import version
 from os import PathLike
 from pathlib import Path
@@ -13,36 +12,29 @@ from typing import TypeVar
 
 import numpy as np
 
-from elastocal.arrays import FloatArray
-from elastocal.cell import Cell, SensorLoad, load_cell
+from elastocal.cell import Cell, load_cell
 from elastocal.compensation import CompensatorSettings, process, read_settings
 from elastocal.compensation.conditioning import read_sensor_load
-from elastocal.compensation.online import Compensator
-from elastocal.compensation.process import Course, CourseRun, ProcessRun, SimulateProcessResult
+from elastocal.compensation.process import Course, ProcessRun, SimulateProcessResult
 from elastocal.dataset import joint_dimensions
 from elastocal.errors import CompensationError
 from elastocal.files import filling, read_text, sha256
-from elastocal.identification import CalibratedModel
-from elastocal.parallel import map_in_processes, process_count
 from elastocal.progress import Progress
 from elastocal.results import brief_repr
-from elastocal.robot import inverse_transform
-from elastocal.sim.workcell import ProcessCell
-from elastocal.workflows._inputs import NewTool, require_same_robot
+from elastocal.workflows._inputs import NewTool, parse_posture, require_same_robot
 from elastocal.workflows._workflow import workflow
+from elastocal.workflows.process_trial import ProcessTrial, TrialRuns, run_budget, run_trial
 
 __all__ = [
-    "ProcessTrial",
     "SimulateProcessResult",
     "SimulateProcessSettings",
-    "TrialRuns",
-    "run_trial",
     "simulate_process",
 ]
 _File = TypeVar("_File", bound=Path | None)
 _PACKAGES = ("elastocal", "numpy", "scipy")
-_ZEROING = 250
-"""Readings in the air that a sensor is zeroed by when no tool file says its bias."""
+_LARGEST_LOAD = 5.0
+_SUDDEN = 0.1
+"""Share of a course's largest force that it may begin or end with."""
 
 
 @brief_repr
@@ -54,10 +46,20 @@ class SimulateProcessSettings(NewTool):
     """Cell file."""
     models: tuple[Path, ...]
     """Model files of this cell; one, or one for each seed."""
-    kind: str
-    """``afp`` (courses) or ``machining`` (rings of a dome)."""
     out: Path
     """Folder to write into."""
+    kind: str | None = None
+    """``afp`` (courses) or ``machining`` (rings of a dome); none: a process of one's own."""
+    path: Path | None = None
+    """That process: CSV as for `compensate`, with columns ``course`` and ``time[s]``."""
+    speed: float | None = None
+    """Of the tool along `path`, in m/s; by default its column ``time[s]`` says it."""
+    direction: str = process.LATERAL
+    """What the deviation of `path` counts along: ``lateral``, ``normal`` or ``"1,0,0"``."""
+    start: str | None = None
+    """Posture before the first row of a path of poses, a quantity a joint from base to tip."""
+    loads: tuple[float, ...] = ()
+    """Further shares of the force to run the same courses under; see `process.at_load`."""
     tools: tuple[Path, ...] = ()
     """Tool files; as ``models``. None: the cell's tool, and a sensor zeroed in the air."""
     seeds: tuple[int, ...] = (0,)
@@ -72,102 +74,6 @@ class SimulateProcessSettings(NewTool):
     """Processes; by default all cores."""
     force: bool = False
     """Replace files that are there."""
-
-
-@dataclass(frozen=True, eq=False)
-class ProcessTrial:
-    """A simulated cell, and the compensator that corrects it."""
-
-    cell: Cell
-    model: CalibratedModel
-    load: SensorLoad | None
-    """None: the cell file's tool, and a bias that is measured in the air."""
-    settings: CompensatorSettings
-    seed: int
-    controller: process.Controller = field(default_factory=process.Controller)
-    jobs: int | None = None
-    """Processes; by default all cores."""
-
-    @property
-    def clocked(self) -> process.Controller:
-        """The controller in step with the settings."""
-        sample = self.settings.filter.sample or self.settings.cycle
-        return replace(self.controller, cycle=self.settings.cycle, sample=sample)
-
-
-@dataclass(frozen=True)
-class _Effect:
-    """A line of the error budget: something is switched off."""
-
-    name: str
-    quiet: bool = False
-    """No noise, drift or cross-talk of the sensor, no stop error of the robot."""
-    prompt: bool = False
-    """No delay of filters and controller."""
-    supple: bool = False
-    """No backlash, lost motion and hysteresis of the gears and the balancer's seals."""
-    exact: bool = False
-    """The deflection is known, though as late as the filters and the controller make it."""
-
-    def changed(self, cell: Cell) -> Cell:
-        """Return the cell with those parts of its simulated truth switched off."""
-        simulation = cell.file.simulation
-        update: dict[str, object] = {}
-        if self.quiet:
-            quiet = ("force_noise", "moment_noise", "drift", "cross_talk", "hysteresis")
-            silent = dict.fromkeys(quiet, 0.0)
-            update["sensor"] = simulation.sensor.model_copy(update=silent)
-            update["controller"] = simulation.controller.model_copy(update={"repeatability": 0.0})
-        if self.supple:
-            easy = {"backlash": 0.0, "hysteresis": 0.0, "lost_motion": None}
-            update["gears"] = simulation.gears.model_copy(update=easy)
-            smooth = {"seal_friction": 0.0}
-            update["balancer"] = simulation.balancer.model_copy(update=smooth)
-        changed = simulation.model_copy(update=update)
-        return replace(cell, file=cell.file.model_copy(update={"simulation": changed}))
-
-
-_BUDGET = (
-    _Effect("everything on"),
-    _Effect("without noise, drift, cross-talk, stop error", quiet=True),
-    _Effect("without delay of filters and controller", prompt=True),
-    _Effect("without backlash and hysteresis", supple=True),
-    _Effect("with a perfect model, delays on", exact=True),
-    _Effect(
-        "none of noise, delay, backlash: the model alone", quiet=True, prompt=True, supple=True
-    ),
-)
-
-
-@brief_repr
-@dataclass(frozen=True, eq=False)
-class TrialRuns:
-    """Every course without and with correction."""
-
-    before: tuple[CourseRun, ...]
-    after: tuple[CourseRun, ...]
-
-    def line(self, name: str) -> process.DeviationComparison:
-        """Return the line of the table."""
-        return process.compare_deviations(
-            name, *([run.deviation for run in side] for side in (self.before, self.after))
-        )
-
-    def deviations(self, seed: int) -> list[process.CourseDeviation]:
-        """Return the deviations of each course at every cycle."""
-        pairs = zip(self.before, self.after, strict=True)
-        return [process.CourseDeviation.of(seed, before, after) for before, after in pairs]
-
-
-def run_trial(trial: ProcessTrial, courses: tuple[Course, ...], progress: Progress) -> TrialRuns:
-    """Run courses without and with correction.
-
-    Raises
-    ------
-    DeviceError, EquilibriumError
-        If the cell cannot be simulated, or not under these forces.
-    """
-    return _run_courses(trial, courses, None, progress)
 
 
 @workflow(SimulateProcessSettings)
@@ -186,7 +92,8 @@ def simulate_process(
     Raises
     ------
     CompensationError
-        If the process is not known, or the robot cannot follow.
+        If the process is not known, or the robot cannot follow; if a path of one's own does not
+        fit, by its line.
     RobotError
         If a model is of another robot or tool than the cell's.
     DeviceError, EquilibriumError
@@ -194,6 +101,7 @@ def simulate_process(
     SchemaError, FileAccessError
         If a file does not fit, cannot be read or written, or is there already.
     """
+    _require_one_process(settings)
     runs = _runs(settings)
     cell = load_cell(Path(settings.cell))
     with filling(settings.out, process.TABLE, settings.force) as folder:
@@ -235,41 +143,158 @@ def _simulate(
     """Run the process for every seed; return also the path with the forces of the first."""
     compensator = _compensator_settings(settings)
     trials = [_trial(cell, compensator, run, settings) for run in runs]
-    lines: list[process.DeviationComparison] = []
+    own = None if settings.path is None else _own_courses(settings, cell, compensator)
+    loads = {load: _Lines() for load in (1.0, *_further_loads(settings))}
     deviations: list[process.CourseDeviation] = []
     budget: tuple[process.DeviationComparison, ...] = ()
     programmed: tuple[Course, ...] = ()
     for trial in trials:
-        courses = process.process_courses(settings.kind, cell, trial.seed, settings.courses)
+        courses = own or _built_in_courses(settings, cell, trial.seed)
         programmed = programmed or courses
-        found = run_trial(trial, courses, progress)
-        lines.append(found.line(f"seed {trial.seed}"))
-        deviations += found.deviations(trial.seed)
+        for load, lines in loads.items():
+            loaded = courses if load == 1.0 else tuple(process.at_load(c, load) for c in courses)
+            found = run_trial(trial, loaded, progress)
+            lines.add(f"seed {trial.seed}", found)
+            if load == 1.0:
+                deviations += found.deviations(trial.seed)
         if settings.budget and not budget:
-            budget = tuple(
-                _run_effect(trial, courses, effect, progress).line(effect.name)
-                for effect in _BUDGET
-            )
-    if len(lines) > 1:
-        lines.append(process.pooled("all seeds", lines))
+            budget = run_budget(trial, courses, progress)
+    name = _direction_name(settings)
+    simulation, usual = cell.file.simulation, loads.pop(1.0)
     table = SimulateProcessResult(
         cell=cell.name,
-        process=settings.kind,
+        process=settings.kind or Path(str(settings.path)).name,
         runs=runs,
         settings=compensator.model_dump(mode="json"),
-        versions={name: version(name) for name in _PACKAGES},
-        lines=tuple(lines),
+        versions={package: version(package) for package in _PACKAGES},
+        lines=usual.pooled(usual.lines),
         budget=budget,
         tool=trials[0].model.tool_name,
+        direction=name,
+        spatial=usual.pooled(usual.spatial),
+        loads=tuple(
+            process.LoadLines(load, each.pooled(each.lines), each.pooled(each.spatial))
+            for load, each in loads.items()
+        ),
+        means=tuple(
+            process.SeedMeans.of(measure, load, lines)
+            for load, each in ({1.0: usual} | loads).items()
+            for measure, lines in ((name, each.lines), ("3-D", each.spatial))
+        ),
+        path="" if settings.path is None else str(settings.path),
+        path_sha256="" if settings.path is None else sha256(read_text(settings.path)),
+        preset=simulation.preset,
+        process_stiffness=simulation.contact.process_stiffness,
+        notes=_notes(settings, programmed, len(runs)),
     )
     return process.SimulatedProcess(table, tuple(deviations)), programmed
 
 
+@dataclass(frozen=True)
+class _Lines:
+    """The lines of the seeds so far, at one load."""
+
+    lines: list[process.DeviationComparison] = field(default_factory=list)
+    spatial: list[process.DeviationComparison] = field(default_factory=list)
+
+    def add(self, name: str, found: TrialRuns) -> None:
+        self.lines.append(found.line(name))
+        self.spatial.append(found.spatial(name))
+
+    @staticmethod
+    def pooled(
+        lines: list[process.DeviationComparison],
+    ) -> tuple[process.DeviationComparison, ...]:
+        """Return the lines, with one over all where there are several."""
+        return (*lines, process.pooled("all seeds", lines)) if len(lines) > 1 else tuple(lines)
+
+
+def _built_in_courses(
+    settings: SimulateProcessSettings, cell: Cell, seed: int
+) -> tuple[Course, ...]:
+    assert settings.kind is not None
+    return process.process_courses(settings.kind, cell, seed, settings.courses)
+
+
+def _own_courses(
+    settings: SimulateProcessSettings, cell: Cell, compensator: CompensatorSettings
+) -> tuple[Course, ...]:
+    assert settings.path is not None
+    start = parse_posture(cell.robot, settings.start)
+    timing = process.PathTiming(settings.speed, compensator.cycle, start)
+    return process.read_programmed_path(settings.path, cell.robot, timing, settings.direction)
+
+
+def _require_one_process(settings: SimulateProcessSettings) -> None:
+    """Refuse both, or neither, of a built-in process and a path; and options of the other."""
+    if (settings.kind is None) == (settings.path is None):
+        known = " or ".join(process.PROCESSES)
+        raise CompensationError(f"give either --process {known}, or --path with your own")
+    path_only = {
+        "--speed": settings.speed is not None,
+        "--direction": settings.direction != process.LATERAL,
+        "--start": settings.start is not None,
+    }
+    foreign = path_only if settings.path is None else {"--courses": settings.courses is not None}
+    for option, given in foreign.items():
+        if given:
+            other = "--path" if settings.path is None else "--process"
+            raise CompensationError(f"{option} goes with {other} only")
+
+
+def _further_loads(settings: SimulateProcessSettings) -> tuple[float, ...]:
+    for load in settings.loads:
+        if not (load != 0.0 and abs(load) <= _LARGEST_LOAD):
+            raise CompensationError(
+                f"--load {load:g}: a share of the force is not 0 and at most {_LARGEST_LOAD:g} in"
+                " size; below 0 turns the lateral force round"
+            )
+        if settings.loads.count(load) > 1 or load == 1.0:
+            raise CompensationError(f"--load {load:g} is run once: name each further share once")
+    return settings.loads
+
+
+def _direction_name(settings: SimulateProcessSettings) -> str:
+    """Return the component that counts, in a word."""
+    if settings.kind is not None:
+        return process.PROCESSES[settings.kind].direction
+    known = settings.direction in (process.LATERAL, process.NORMAL)
+    return settings.direction if known else f"along ({settings.direction})"
+
+
+def _notes(
+    settings: SimulateProcessSettings, courses: tuple[Course, ...], seeds: int
+) -> tuple[str, ...]:
+    notes = []
+    if seeds == 1:
+        notes.append("a single seed: the figures have no interval, and another seed has others")
+    if settings.path is not None:
+        sizes = [np.linalg.norm(course.force, axis=1) for course in courses]
+        sudden = [
+            course.name
+            for course, size in zip(courses, sizes, strict=True)
+            if max(size[0], size[-1]) > _SUDDEN * size.max()
+        ]
+        if sudden:
+            notes.append(
+                f"{', '.join(sudden)}: the force is there from the first row or until the last; no"
+                " correction can be there at once. Let it rise and fall in the path as it does in"
+                " the cell"
+            )
+    if any(load < 0.0 for load in settings.loads):
+        notes.append(
+            "a load below 0 is the force aside and along the feed turned round; along the tool's"
+            " axis it keeps its sign, since what presses cannot pull"
+        )
+    return tuple(notes)
+
+
 def _compensator_settings(settings: SimulateProcessSettings) -> CompensatorSettings:
     if settings.compensator is None:
-        # A process that is not known is refused when its courses are made.
-        known = process.PROCESSES.get(settings.kind)
-        return CompensatorSettings() if known is None else known.compensator
+        if settings.kind is None:
+            return CompensatorSettings()
+        process.require_process(settings.kind)
+        return process.PROCESSES[settings.kind].compensator
     found = read_settings(settings.compensator)
     if found.frame != "base":
         raise CompensationError(
@@ -287,79 +312,3 @@ def _trial(
     require_same_robot(robot, cell.robot, (run.model, cell.name))
     load = read_sensor_load(Path(run.tool) if run.tool else None, robot)
     return ProcessTrial(cell, calibrated, load, compensator, run.seed, jobs=settings.jobs)
-
-
-def _run_effect(
-    trial: ProcessTrial, courses: tuple[Course, ...], effect: _Effect, progress: Progress
-) -> TrialRuns:
-    """Run courses with something switched off."""
-    late = round(float(trial.settings.chain.delay()) / trial.settings.cycle)
-    changed = replace(trial, cell=effect.changed(trial.cell))
-    if effect.prompt:
-        changed = replace(
-            changed,
-            settings=trial.settings.model_copy(update={"filter": trial.settings.filter.off()}),
-            controller=replace(trial.controller, dead_cycles=0, lag=0.0),
-        )
-        courses = tuple(replace(course, ripple=()) for course in courses)
-    return _run_courses(changed, courses, late if effect.exact else None, progress, effect.name)
-
-
-def _run_courses(
-    trial: ProcessTrial,
-    courses: tuple[Course, ...],
-    late: int | None,
-    progress: Progress,
-    stage: str = "courses",
-) -> TrialRuns:
-    """Run every course without and with correction.
-
-    With ``late``, a corrector that knows the deflection acts that many cycles too late; None: the
-    model corrects.
-    """
-    runs: dict[int, tuple[CourseRun, CourseRun]] = {}
-    # The longest first, or the last one would be run while the other processes wait.
-    order = sorted(range(len(courses)), key=lambda number: -len(courses[number].q))
-    progress(stage, 0, len(courses))
-    run = partial(_run_twice, trial, zeroed_at=courses[0].q[0], late=late)
-    processes = process_count(trial.jobs, len(courses))
-    found = map_in_processes(run, [courses[number] for number in order], processes)
-    for number, pair in zip(order, found, strict=True):
-        runs[number] = pair
-        progress(stage, len(runs), len(courses))
-    before, after = zip(*(runs[number] for number in range(len(courses))), strict=True)
-    return TrialRuns(before, after)
-
-
-def _run_twice(
-    trial: ProcessTrial, course: Course, *, zeroed_at: FloatArray, late: int | None
-) -> tuple[CourseRun, CourseRun]:
-    """Return a course without and with correction; courses know nothing of one another."""
-    truth, robot = ProcessCell(trial.cell, trial.seed), trial.cell.robot
-    corrector = (
-        _corrector(trial, truth, zeroed_at) if late is None else process.PerfectCorrector(late)
-    )
-    air = process.air_shifts(truth, course)
-    before = process.run_course(truth, robot, course, air, trial.clocked, None)
-    return before, process.run_course(truth, robot, course, air, trial.clocked, corrector)
-
-
-def _corrector(trial: ProcessTrial, truth: ProcessCell, zeroed_at: FloatArray) -> process.Corrector:
-    load = trial.load or _zeroed(trial.cell, truth, zeroed_at)
-    return process.ModelCorrector(Compensator.of(trial.model, trial.settings, load))
-
-
-def _zeroed(cell: Cell, truth: ProcessCell, q: FloatArray) -> SensorLoad:
-    """Return the cell file's tool with the bias that the sensor shows in the air."""
-    T_sensor_tcp = cell.T_sensor_tcp
-    assert T_sensor_tcp is not None
-    T = inverse_transform(T_sensor_tcp)
-    centre = T_sensor_tcp[:3, :3] @ cell.tool_centre_tcp + T_sensor_tcp[:3, 3]
-    truth.lift("zeroing", q)
-    wrench = truth.press(q, np.zeros(3)).wrench
-    raw = truth.read(np.zeros(_ZEROING), np.repeat(wrench[None], _ZEROING, axis=0)).mean(axis=0)
-    mass, gravity = cell.file.tool.mass, cell.gravity_base
-    weight = mass * gravity @ cell.robot.forward(q)[:3, :3] @ T[:3, :3]
-    known = np.concatenate([weight, np.cross(centre, weight)])
-    bias = raw - known
-    return SensorLoad(mass, centre, bias[:3], bias[3:], T, gravity)

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from elastocal.cell import SensorLoad
+from elastocal.procedure.derive import LoadRow
 from elastocal.procedure.derive.findings import run_warnings
-from elastocal.procedure.derive.readings import LoadRow
 from elastocal.procedure.derive.tool import Interval, ToolChange, ToolEstimate
 from elastocal.procedure.record import ReadingStatus
 from elastocal.procedure.registration import Blunder, Registration, StationFit, StationMove

@@ -15,9 +15,26 @@ def _simulate_process(  # noqa: PLR0913 (a command has as many options as it has
         list[Path],
         typer.Option(help="Model of this cell from calibrate; once, or once for each --seed."),
     ],
-    process: Annotated[str, typer.Option(help="afp (courses) or machining (rings of a dome).")],
     out: Annotated[Path, typer.Option(metavar="DIR", help="Folder to write into.")],
     *,
+    process: Annotated[
+        str | None, typer.Option(help="afp (courses) or machining (rings of a dome).")
+    ] = None,
+    path: Annotated[
+        Path | None,
+        typer.Option(help="Or a process of your own: CSV as for compensate; course, time[s]."),
+    ] = None,
+    speed: Annotated[
+        str | None, typer.Option(help="Of --path, '0.1 m/s'; default: its column time[s].")
+    ] = None,
+    direction: Annotated[
+        str, typer.Option(help="Of --path, what counts: lateral, normal or a vector in base.")
+    ] = "lateral",
+    start: Annotated[str | None, typer.Option(help=options.START_HELP)] = None,
+    load: Annotated[
+        str | None,
+        typer.Option(help="Also at these shares of the force: '0.5,-1'; -1 turns it aside."),
+    ] = None,
     tool: options.NewToolOrFile = None,
     tool_mass: options.ToolMass = None,
     tool_centre: options.ToolCentre = None,
@@ -38,13 +55,19 @@ def _simulate_process(  # noqa: PLR0913 (a command has as many options as it has
 ) -> None:
     """Run a process on the simulated cell without and with correction: how much is left."""
     from elastocal.records import to_data
+    from elastocal.units import parse_quantity
 
     tools, frame = options.split_tools(tool)
     given = workflows.SimulateProcessSettings(
         cell,
         models=tuple(model),
-        kind=process,
         out=out,
+        kind=process,
+        path=path,
+        speed=None if speed is None else parse_quantity(speed, "speed"),
+        direction=direction,
+        start=start,
+        loads=options.parse_loads(load),
         tools=tools,
         seeds=tuple(seed or (0,)),
         compensator=settings,

@@ -13,7 +13,11 @@ from rich.table import Table
 from scipy.spatial.transform import Rotation
 
 from elastocal.compensation.conditioning import TOOL_UNKNOWNS, ToolResult
-from elastocal.compensation.process import DeviationComparison, SimulateProcessResult
+from elastocal.compensation.process import (
+    DeviationComparison,
+    SeedMean,
+    SimulateProcessResult,
+)
 
 if TYPE_CHECKING:
     from elastocal.workflows import (
@@ -156,24 +160,64 @@ def _cells(choice: "ChosenStiffness", rail: "tuple[ExternalAxis, ...]") -> list[
 
 
 def show_process(console: Console, result: SimulateProcessResult) -> None:
-    """Print the table in mm, and the budget below it."""
+    """Print the table in mm, the other loads, the means over seeds, and the budget below it."""
     points = f"{result.lines[-1].points} points"
     title = f"{result.cell}, {result.process}: absolute deviation in mm at {points}"
-    console.print(_deviation_table(title, result.lines))
+    component = f", {result.direction}" if result.direction else ""
+    lines = [(line.name + component, line) for line in result.lines]
+    lines += [(f"{line.name}, 3-D", line) for line in result.spatial[-1:]]
+    for each in result.loads:
+        name = f"{each.lines[-1].name}, load {each.load:g}"
+        lines += [(name + component, each.lines[-1]), (f"{name}, 3-D", each.spatial[-1])]
+    console.print(_deviation_table(title, lines))
+    if len(result.runs) > 1:
+        console.print(_means_table(result))
+    if result.preset:
+        reacts = result.process_stiffness
+        forces = f"react by {1e-3 * reacts:g} N/mm" if reacts else "are given, they do not react"
+        console.print(f"truth: {result.preset}; forces {forces}")
     console.print(f"tool: {result.tool}", soft_wrap=True)
     if result.budget:
-        console.print(
-            _deviation_table(f"error budget of seed {result.runs[0].seed}", result.budget)
+        budget = [(line.name, line) for line in result.budget]
+        console.print(_deviation_table(f"error budget of seed {result.runs[0].seed}", budget))
+    for note in result.notes:
+        console.print(f"Note: {note}", soft_wrap=True)
+
+
+def _means_table(result: SimulateProcessResult) -> Table:
+    """Return the means over seeds with their intervals."""
+    title = f"means over {len(result.runs)} seeds (95 % interval)"
+    table = Table("", title=title, show_lines=True)
+    for name in ("mean in mm", "reduction", "max in mm", "reduction"):
+        table.add_column(name, justify="right")
+    for each in result.means:
+        table.add_row(
+            each.title,
+            f"{_length(each.mean_before)} > {_length(each.mean_after)}",
+            _share(each.mean_reduction),
+            f"{_length(each.max_before)} > {_length(each.max_after)}",
+            _share(each.max_reduction),
         )
+    return table
 
 
-def _deviation_table(title: str, lines: Sequence[DeviationComparison]) -> Table:
+def _length(figure: SeedMean) -> str:
+    return f"{1e3 * figure.mean:.3f}"
+
+
+def _share(figure: SeedMean) -> str:
+    if figure.low is None or figure.high is None:
+        return f"{100 * figure.mean:.1f} %"
+    return f"{100 * figure.mean:.1f} %\n({100 * figure.low:.1f} to {100 * figure.high:.1f})"
+
+
+def _deviation_table(title: str, lines: Sequence[tuple[str, DeviationComparison]]) -> Table:
     """Return a table with two lines of text a line: before and after, reduction below."""
     table = Table("before > after, reduction", title=title, show_lines=True)
     for name in ("mean", "max", "st. dev."):
         table.add_column(name, justify="right", no_wrap=True)
-    for line in lines:
+    for name, line in lines:
         triples = zip(line.before.values, line.after.values, line.reduction.values, strict=True)
         cells = [f"{1e3 * b:.3f} > {1e3 * a:.3f}\n{100 * r:.1f} %" for b, a, r in triples]
-        table.add_row(line.name, *cells)
+        table.add_row(name, *cells)
     return table

@@ -5,8 +5,10 @@
 `placement`    fibre placement courses on a dome (paper 4.2)
 `roughing`     rings of a dome roughed from a block (paper 4.3)
 `postures`     the processes by name; one spin and rail position for their courses
+`programmed`   the path as a file: written, and a user's own courses read
 `loop`         cycle by cycle: readings, corrector, delay, deviation
-`result`       mean, max and standard deviation; reduction: Table 1, and its folder
+`statistics`   mean, max and standard deviation; reduction: the lines of Table 1
+`result`       Table 1 with what it rests on, and its folder
 =============  ====================================================================
 
 Nothing here knows what the cell truly does: it comes in as a `loop.TrueCell`.

@@ -3,6 +3,7 @@ from .course import (
     Process as Process,
     Ripple as Ripple,
     arc_length as arc_length,
+    at_load as at_load,
     engaged as engaged,
     evenly_spaced as evenly_spaced,
     swing as swing,
@@ -26,22 +27,34 @@ from .placement import FibrePlacement as FibrePlacement
 from .postures import (
     PROCESSES as PROCESSES,
     process_courses as process_courses,
+    require_process as require_process,
     with_postures as with_postures,
+)
+from .programmed import (
+    LATERAL as LATERAL,
+    NORMAL as NORMAL,
+    PathTiming as PathTiming,
+    read_programmed_path as read_programmed_path,
+    write_programmed_path as write_programmed_path,
 )
 from .result import (
     DEVIATIONS as DEVIATIONS,
     PROGRAMMED_PATH as PROGRAMMED_PATH,
     TABLE as TABLE,
-    DeviationComparison as DeviationComparison,
-    DeviationStatistics as DeviationStatistics,
     ProcessRun as ProcessRun,
     SimulatedProcess as SimulatedProcess,
     SimulateProcessResult as SimulateProcessResult,
-    compare_deviations as compare_deviations,
-    pooled as pooled,
     read_process as read_process,
     read_table as read_table,
     write_process as write_process,
-    write_programmed_path as write_programmed_path,
 )
 from .roughing import Roughing as Roughing
+from .statistics import (
+    DeviationComparison as DeviationComparison,
+    DeviationStatistics as DeviationStatistics,
+    LoadLines as LoadLines,
+    SeedMean as SeedMean,
+    SeedMeans as SeedMeans,
+    compare_deviations as compare_deviations,
+    pooled as pooled,
+)

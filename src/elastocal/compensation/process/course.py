@@ -6,7 +6,7 @@ that change slowly. A further process is a file with a subclass of `Process`, an
 """
 
 from abc import ABC, abstractmethod
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import ClassVar
 
 import numpy as np
@@ -58,6 +58,8 @@ class Process(ABC):
     """Number of courses."""
     compensator: ClassVar[CompensatorSettings] = CompensatorSettings()
     """Settings of the compensator that suit its forces."""
+    direction: ClassVar[str] = "lateral"
+    """The component of the deviation that counts, in a word."""
 
     @abstractmethod
     def courses(self, surface: Surface, rng: Generator) -> tuple[Course, ...]:
@@ -75,6 +77,24 @@ class Process(ABC):
         CompensationError
             If the surface is too small.
         """
+
+
+def at_load(course: Course, load: float) -> Course:
+    """Return a course under a share of its force; below 0 with the lateral force turned round.
+
+    The part of the force along the tool's axis keeps its sign, since a roller or cutter that
+    presses cannot pull: -1 is the same pressure with the force aside and against the feed turned.
+
+    Parameters
+    ----------
+    course : Course
+        As programmed.
+    load : float
+        Share, not 0.
+    """
+    axis = course.T_base_tcp[:, :3, 2]
+    along = np.einsum("rk,rk->r", course.force, axis)[:, None] * axis
+    return replace(course, force=abs(load) * along + load * (course.force - along))
 
 
 def evenly_spaced(points: FloatArray, speed: float, step: float) -> FloatArray:

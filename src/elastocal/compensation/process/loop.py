@@ -175,6 +175,12 @@ class CourseRun:
     deviation: FloatArray
     """The part of it that counts, signed, shape (cycle,), in m."""
 
+    @property
+    def spatial(self) -> FloatArray:
+        """The 3-D deviation, length of the shift, shape (cycle,), in m."""
+        length: FloatArray = np.linalg.norm(self.shift, axis=1)
+        return length
+
 
 class _Drives:
     """Correction that the robot carries out: late by dead cycles, then with a lag."""
@@ -324,9 +330,12 @@ class CourseDeviation:
     """Signed deviation without correction, shape (cycle,), in m."""
     after: FloatArray
     """Signed deviation with correction, shape (cycle,), in m."""
+    spatial: FloatArray | None = None
+    """3-D deviation (length of the shift) without and with correction, shape (cycle, 2), in m."""
 
     @classmethod
     def of(cls, seed: int, before: CourseRun, after: CourseRun) -> "CourseDeviation":
         """Return the deviations of a course that was run twice."""
-        name = before.course.name
-        return cls(seed, name, before.time, before.position, before.deviation, after.deviation)
+        name, position = before.course.name, before.position
+        spatial = np.stack([before.spatial, after.spatial], axis=1)
+        return cls(seed, name, before.time, position, before.deviation, after.deviation, spatial)

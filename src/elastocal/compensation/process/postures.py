@@ -64,6 +64,18 @@ PROCESSES: Mapping[str, type[Process]] = {"afp": FibrePlacement, "machining": Ro
 """The processes that can be simulated, by the name that a command gives them."""
 
 
+def require_process(name: str) -> None:
+    """Refuse a process that is not one of `PROCESSES`.
+
+    Raises
+    ------
+    CompensationError
+        If it is none.
+    """
+    if name not in PROCESSES:
+        raise CompensationError(f"process {name!r} is not one of {', '.join(PROCESSES)}")
+
+
 def process_courses(name: str, cell: Cell, seed: int, count: int | None) -> tuple[Course, ...]:
     """Return the courses of a process on the cell's surface, with joints.
 
@@ -83,8 +95,7 @@ def process_courses(name: str, cell: Cell, seed: int, count: int | None) -> tupl
     CompensationError
         If there is no such process, or the robot cannot follow.
     """
-    if name not in PROCESSES:
-        raise CompensationError(f"process {name!r} is not one of {', '.join(PROCESSES)}")
+    require_process(name)
     process = PROCESSES[name]() if count is None else PROCESSES[name](count=count)
     rng = np.random.default_rng([seed, 6])
     return with_postures(cell, process.courses(cell_surface(cell), rng))

@@ -1,8 +1,6 @@
 """The result of a simulated process: the paper's Table 1 and every point behind it.
 
-Table 1 gives mean, maximum and standard deviation of the absolute deviation, before and after
-correction, and the reduction. The folder that keeps them has, lengths in m and reductions as shares
-of 1 where no unit is named:
+Its folder has, lengths in m and reductions as shares of 1 where no unit is named:
 
 ==================  ==============================================================
 ``table.json``      the table with what it rests on: `SimulateProcessResult`
@@ -13,7 +11,7 @@ of 1 where no unit is named:
 ==================  ==============================================================
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import groupby
 from pathlib import Path
@@ -21,8 +19,14 @@ from pathlib import Path
 import numpy as np
 
 from elastocal.arrays import FloatArray
-from elastocal.compensation.process.course import Course
 from elastocal.compensation.process.loop import CourseDeviation
+from elastocal.compensation.process.statistics import (
+    DeviationComparison,
+    DeviationStatistics,
+    LoadLines,
+    SeedMeans,
+    compare_deviations,
+)
 from elastocal.errors import CompensationError
 from elastocal.records import read_json, record, write_json
 from elastocal.results import Result, brief_repr
@@ -32,63 +36,12 @@ TABLE = "table.json"
 """Name of the file by which the folder is known."""
 DEVIATIONS = "deviations.csv"
 PROGRAMMED_PATH = "path.csv"
-_HEADER = ("seed", "course", "time[s]", "x[mm]", "y[mm]", "z[mm]", "before[mm]", "after[mm]")
+_OLD_HEADER = ("seed", "course", "time[s]", "x[mm]", "y[mm]", "z[mm]", "before[mm]", "after[mm]")
+"""Columns of ``deviations.csv`` before it told the 3-D deviation."""
+_HEADER = (*_OLD_HEADER, "before_3d[mm]", "after_3d[mm]")
 """Columns of ``deviations.csv``; the place is the programmed tool centre point in base."""
 _ALIKE = 1e-8
 """Deviations are written to the nanometre; figures that differ by more, in m, are of others."""
-_UNITS = {"angle": "rad", "length": "m"}
-
-
-@record()
-class DeviationStatistics:
-    """Mean, maximum and standard deviation of absolute deviations, or of their reduction."""
-
-    mean: float
-    max: float
-    standard_deviation: float
-
-    @property
-    def values(self) -> tuple[float, float, float]:
-        """The three of them, in the order of Table 1."""
-        return self.mean, self.max, self.standard_deviation
-
-    @classmethod
-    def of(cls, deviation: FloatArray) -> "DeviationStatistics":
-        """Return the statistics of signed deviations, shape (point,), in m."""
-        size = np.abs(deviation)
-        return cls(float(size.mean()), float(size.max()), float(size.std()))
-
-
-@record()
-class DeviationComparison:
-    """A line of the table: the same path before and after correction."""
-
-    name: str
-    points: int
-    before: DeviationStatistics
-    """In m."""
-    after: DeviationStatistics
-    """In m."""
-    reduction: DeviationStatistics
-    """1 is all of it, below 0 it grew."""
-
-    @property
-    def sentence(self) -> str:
-        """The line in words."""
-        return (
-            f"{1e3 * self.before.mean:.3f} mm mean before, {1e3 * self.after.mean:.3f} mm after"
-            f" correction ({self.reduction.mean:.1%} less); largest {1e3 * self.before.max:.3f} mm,"
-            f" then {1e3 * self.after.max:.3f} mm"
-        )
-
-    @classmethod
-    def of(
-        cls, name: str, points: int, before: DeviationStatistics, after: DeviationStatistics
-    ) -> "DeviationComparison":
-        """Return a line with the reduction worked out."""
-        pairs = zip(before.values, after.values, strict=True)
-        reduction = DeviationStatistics(*(1.0 - a / b if b > 0.0 else 0.0 for b, a in pairs))
-        return cls(name, points, before, after, reduction)
 
 
 @record()
@@ -119,6 +72,23 @@ class SimulateProcessResult(Result):
     budget: tuple[DeviationComparison, ...] = ()
     tool: str = ""
     """The tool that the models are for, in words; empty in files before it was written."""
+    direction: str = ""
+    """The component that ``lines`` count, in a word; likewise."""
+    spatial: tuple[DeviationComparison, ...] = ()
+    """As ``lines``, of the 3-D deviation (the length of the shift); likewise."""
+    loads: tuple[LoadLines, ...] = ()
+    """The same process at other shares of its load, where that was asked for."""
+    means: tuple[SeedMeans, ...] = ()
+    """Each measure at each load over the seeds; of a single seed without interval."""
+    path: str = ""
+    """File of a user's own process; empty: one of the built-in ones."""
+    path_sha256: str = ""
+    preset: str = ""
+    """How hard the truth of the cell is; see `elastocal.cell.presets`."""
+    process_stiffness: float = 0.0
+    """How the force reacts to the tool's shift along its axis, in N/m; 0: forces are given."""
+    notes: tuple[str, ...] = ()
+    """Sentences that a person must know."""
 
     def facts(self) -> tuple[tuple[str, str], ...]:
         """Return what a person wants to know first."""
@@ -126,6 +96,8 @@ class SimulateProcessResult(Result):
             ("process", f"{self.process} in cell {self.cell}"),
             *((("tool", self.tool),) if self.tool else ()),
             *((line.name, line.sentence) for line in (*self.lines, *self.budget)),
+            *((f"{line.name}, 3-D", line.sentence) for line in self.spatial[-1:]),
+            *(("note", text) for text in self.notes),
         )
 
 
@@ -137,46 +109,6 @@ class SimulatedProcess:
     table: SimulateProcessResult
     courses: tuple[CourseDeviation, ...]
     """Every course of every seed."""
-
-
-def compare_deviations(
-    name: str, before: Sequence[FloatArray], after: Sequence[FloatArray]
-) -> DeviationComparison:
-    """Return a line of the table over all points of some courses.
-
-    Parameters
-    ----------
-    name : str
-        The line's name.
-    before, after : sequence of ndarray, shape (point,)
-        Signed deviations of each course, in m.
-    """
-    uncorrected, corrected = np.concatenate(before), np.concatenate(after)
-    return DeviationComparison.of(
-        name, len(corrected), DeviationStatistics.of(uncorrected), DeviationStatistics.of(corrected)
-    )
-
-
-def pooled(name: str, lines: Sequence[DeviationComparison]) -> DeviationComparison:
-    """Return the line over several: every point of each counts, the maximum is that of all."""
-    points = np.array([line.points for line in lines])
-    before, after = (
-        _pooled_statistics(points, side)
-        for side in ([line.before for line in lines], [line.after for line in lines])
-    )
-    return DeviationComparison.of(name, int(points.sum()), before, after)
-
-
-def _pooled_statistics(
-    points: np.ndarray, parts: Sequence[DeviationStatistics]
-) -> DeviationStatistics:
-    means = np.array([part.mean for part in parts])
-    share = points / points.sum()
-    mean = float(share @ means)
-    # The mean square of all points, less the square of their mean: each part's own mean counts.
-    squares = share @ (np.array([part.standard_deviation for part in parts]) ** 2 + means**2)
-    spread = float(np.sqrt(max(squares - mean**2, 0.0)))
-    return DeviationStatistics(mean, max(part.max for part in parts), spread)
 
 
 def write_process(folder: Path, process: SimulatedProcess) -> None:
@@ -200,40 +132,6 @@ def write_process(folder: Path, process: SimulatedProcess) -> None:
         _write_lines(folder / "budget.csv", process.table.budget)
     _write_deviations(folder / DEVIATIONS, process.courses)
     write_json(folder / TABLE, process.table)
-
-
-def write_programmed_path(
-    path: Path, courses: Sequence[Course], joint_units: Mapping[str, str]
-) -> None:
-    """Write programmed joints and expected forces, a row a cycle, atomically.
-
-    The columns are those that ``elastocal compensate`` and ``elastocal predict`` read; forces are
-    on the robot, in base.
-
-    Parameters
-    ----------
-    path : Path
-        A CSV file.
-    courses : sequence of Course
-        With joints.
-    joint_units : mapping of str to str
-        The robot's joints, from base to tip, with their dimension: ``angle`` or ``length``.
-
-    Raises
-    ------
-    FileAccessError
-        If the file cannot be written.
-    """
-    names = [f"{name}[{_UNITS[dimension]}]" for name, dimension in joint_units.items()]
-    rows: list[list[str]] = []
-    for course in courses:
-        time = course.step * np.arange(len(course.q))
-        numbers = zip(time.tolist(), course.q.tolist(), course.force.tolist(), strict=True)
-        for t, q, force in numbers:
-            row = [f"{value:.9f}" for value in q] + [f"{value:.3f}" for value in force]
-            rows.append([course.name, f"{t:.3f}", *row])
-    header = ["course", "time[s]", *names, *(f"force_{axis}[N]" for axis in "xyz")]
-    write_table(path, header, rows)
 
 
 def read_table(path: Path) -> SimulateProcessResult:
@@ -307,10 +205,13 @@ def _write_deviations(path: Path, courses: Sequence[CourseDeviation]) -> None:
     rows: list[list[object]] = []
     for course in courses:
         lengths = np.column_stack([course.position, course.before, course.after])
+        if course.spatial is not None:
+            lengths = np.hstack([lengths, course.spatial])
         for time, row in zip(course.time.tolist(), (1e3 * lengths).tolist(), strict=True):
             numbers = [f"{value:.6f}" for value in row]
             rows.append([course.seed, course.course, f"{time:.6f}", *numbers])
-    write_table(path, _HEADER, rows)
+    told = all(course.spatial is not None for course in courses)
+    write_table(path, _HEADER if told else _OLD_HEADER, rows)
 
 
 def _read_deviations(path: Path) -> tuple[CourseDeviation, ...]:
@@ -320,31 +221,32 @@ def _read_deviations(path: Path) -> tuple[CourseDeviation, ...]:
             header, rows = table.layout.header, table.rows()
     except TableError as error:
         raise CompensationError(f"{path}: {error}") from error
-    if header != _HEADER:
+    if header not in (_HEADER, _OLD_HEADER):
         raise CompensationError(
             f"{path}: header {','.join(header)!r} is not that of deviations, {','.join(_HEADER)!r}"
         )
     if not rows:
         raise CompensationError(f"{path} has no rows")
-    if uneven := rows.uneven(len(_HEADER)):
+    if uneven := rows.uneven(len(header)):
         raise CompensationError(
-            f"{path}: line {uneven[0]} has {uneven[1]} fields, not {len(_HEADER)}"
+            f"{path}: line {uneven[0]} has {uneven[1]} fields, not {len(header)}"
         )
-    numbers = _numbers(path, rows)
+    numbers = _numbers(path, header, rows)
     courses = groupby(range(len(rows)), key=lambda n: (numbers[n, 0], rows.cells[n][1]))
     found = []
     for (seed, name), lines in courses:
         own = numbers[list(lines)]
         time, lengths = own[:, 1], 1e-3 * own[:, 2:]
         before, after = lengths[:, 3], lengths[:, 4]
-        found.append(CourseDeviation(int(seed), name, time, lengths[:, :3], before, after))
+        spatial = lengths[:, 5:7] if header == _HEADER else None
+        found.append(CourseDeviation(int(seed), name, time, lengths[:, :3], before, after, spatial))
     return tuple(found)
 
 
-def _numbers(path: Path, rows: TableRows) -> FloatArray:
-    """Return all columns but the course, shape (row, 7)."""
-    names = [name for name in _HEADER if name != "course"]
-    places = [_HEADER.index(name) for name in names]
+def _numbers(path: Path, header: Sequence[str], rows: TableRows) -> FloatArray:
+    """Return all columns but the course, shape (row, 7 or 9)."""
+    names = [name for name in header if name != "course"]
+    places = [header.index(name) for name in names]
     found = np.empty((len(rows), len(names)))
     for row, (line, cells) in enumerate(zip(rows.lines, rows.cells, strict=True)):
         for column, (name, place) in enumerate(zip(names, places, strict=True)):

@@ -62,6 +62,7 @@ class Roughing(Process):
     """Length over which the cutter rolls in and out, in m."""
     ripple: tuple[Ripple, ...] = (Ripple(2.0 * _SPINDLE, 0.4), Ripple(_SPINDLE, 0.15))
 
+    direction: ClassVar[str] = "normal to the part"
     # The lines at 200 and 400 Hz cannot be notched at a cycle of 4 ms: readings come every 1 ms.
     compensator: ClassVar[CompensatorSettings] = CompensatorSettings.model_validate(
         {

@@ -20,9 +20,13 @@ from .loads import (
 from .sight import (
     HOUSING_DEPTH as HOUSING_DEPTH,
     MARKER_SEAT_LENGTH as MARKER_SEAT_LENGTH,
+    REGISTRATION_POSES as REGISTRATION_POSES,
     MovingSolids as MovingSolids,
     SightCheck as SightCheck,
     Station as Station,
+    assign_stations as assign_stations,
+    registration_shortages as registration_shortages,
+    shortage_text as shortage_text,
     sight_solid as sight_solid,
 )
 from .singularity import SingularityCheck as SingularityCheck, WristCheck as WristCheck

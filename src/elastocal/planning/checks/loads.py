@@ -40,12 +40,17 @@ class FrictionCheck(PostureCheck):
         loads = cell.file.load_cases
         return cls(loads.force_tcp, loads.friction, loads.safety)
 
-    def margin(self, postures: Postures) -> FloatArray:
-        """Return the margin of each posture, shape (pose,), in N."""
+    @property
+    def everywhere(self) -> float:
+        """Margin at whatever posture, in N."""
         lateral = np.hypot(self.force_tcp[:, 0], self.force_tcp[:, 1])
         # Pushing onto the surface is a force on the robot along -z of the tcp.
         held = self.mu * -self.force_tcp[:, 2] / self.safety
-        return np.full(len(postures), float(np.min(held - lateral)))
+        return float(np.min(held - lateral))
+
+    def margin(self, postures: Postures) -> FloatArray:
+        """Return the margin of each posture, shape (pose,), in N."""
+        return np.full(len(postures), self.everywhere)
 
 
 @brief_repr
@@ -83,7 +88,7 @@ class TorqueCheck(PostureCheck):
         """Return the check of the actuators; None when the torque of no joint is known."""
         check = cls(
             cell.robot,
-            cell.file.load_cases.force_tcp,
+            np.array([*cell.file.presses.values()]),
             cell.torque_limits,
             cell.file.tool.mass,
             cell.tool_centre_tcp,
@@ -158,7 +163,7 @@ class SensorCheck(PostureCheck):
             return None
         centre = T_sensor_tcp[:3, :3] @ cell.tool_centre_tcp + T_sensor_tcp[:3, 3]
         return cls(
-            cell.file.load_cases.force_tcp,
+            np.array([*cell.file.presses.values()]),
             T_sensor_tcp,
             sensor.largest_force,
             sensor.largest_moment,
@@ -166,8 +171,9 @@ class SensorCheck(PostureCheck):
             float(np.linalg.norm(centre)),
         )
 
-    def margin(self, postures: Postures) -> FloatArray:
-        """Return the margin of each posture, shape (pose,): 1 is unloaded, 0 at the limit."""
+    @property
+    def everywhere(self) -> float:
+        """Margin at whatever posture: 1 is unloaded, 0 at the limit."""
         R, r = self.T_sensor_tcp[:3, :3], self.T_sensor_tcp[:3, 3]
         force = self.force_tcp @ R.T
         moment = np.cross(r, force)
@@ -175,4 +181,8 @@ class SensorCheck(PostureCheck):
             (np.abs(force) + self.tool_weight) / self.force_range,
             (np.abs(moment) + self.tool_weight * self.tool_lever) / self.moment_range,
         )
-        return np.full(len(postures), 1.0 - float(used.max()))
+        return 1.0 - float(used.max())
+
+    def margin(self, postures: Postures) -> FloatArray:
+        """Return the margin of each posture, shape (pose,): 1 is unloaded, 0 at the limit."""
+        return np.full(len(postures), self.everywhere)

@@ -8,13 +8,14 @@ Postures are judged in contact. Unloaded readings are taken some 3 mm off the su
 a beam, and the tool with it, by less than the shapes of links and tool are known.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import ClassVar, Self
 
 import numpy as np
 import trimesh
 
-from elastocal.arrays import BoolArray, FloatArray
+from elastocal.arrays import BoolArray, FloatArray, IndexArray
 from elastocal.cell import Cell
 from elastocal.errors import RobotError
 from elastocal.planning.checks.check import PostureCheck
@@ -30,6 +31,8 @@ HOUSING_DEPTH = 1e-3
 """A tool shape that the marker lies deeper in than this, in m, is taken as its housing. A marker
 less deep, on a face that is drawn a little too high, still sees through `MARKER_SEAT_LENGTH` of
 it: all within 78 deg (arc cosine of 1 mm over 5 mm) of the face's normal."""
+REGISTRATION_POSES = 3
+"""Poses that a station must measure to be registered: its rotation needs three points."""
 _OFF_THE_MARKER = 1e-3
 """Distance from the marker, in m, from which on meshes of the cell count."""
 
@@ -163,6 +166,16 @@ class SightCheck(PostureCheck):
             for pose, station in enumerate(best)
         ]
 
+    def assigned(self, postures: Postures) -> list[str | None]:
+        """Return the station that is to measure each posture, None where none sees it.
+
+        The one that sees it best, but none that would measure fewer poses than its registration
+        needs: see `assign_stations`.
+        """
+        margins = np.array([self._of_station(station, postures) for station in self.stations])
+        chosen = assign_stations(margins).tolist()
+        return [self.stations[station].name if station >= 0 else None for station in chosen]
+
     def _of_station(self, station: Station, postures: Postures) -> FloatArray:
         R, p = postures.T_base_tcp[:, :3, :3], postures.contact
         marker = p + R @ self.marker_tcp
@@ -185,6 +198,90 @@ class SightCheck(PostureCheck):
         if self.moving is not None:
             clear[clear] = ~self.moving.hide(q[clear], beams.take(clear))
         return clear
+
+
+def assign_stations(margins: FloatArray) -> IndexArray:
+    """Return the station of each pose, so that each one used measures enough to be registered.
+
+    Each pose goes to the station with the largest margin. A station that is left with fewer than
+    `REGISTRATION_POSES` gives its poses to others that see them; where one of its poses is seen by
+    no other, it is given poses that others can spare. Where neither helps, it keeps what it has.
+
+    Parameters
+    ----------
+    margins : ndarray, shape (station, pose)
+        Positive where a station sees a pose.
+
+    Returns
+    -------
+    ndarray of int, shape (pose,)
+        Number of the station, -1 where none sees the pose.
+    """
+    margins = np.where(margins > 0.0, margins, -np.inf)
+    open_ = np.ones(len(margins), dtype=bool)
+    for _ in range(len(margins)):
+        chosen = _best(margins, open_)
+        few = _too_few(chosen, len(margins))
+        for station in few:
+            others = open_ & (np.arange(len(margins)) != station)
+            if (_best(margins, others)[chosen == station] >= 0).all():
+                open_ = others
+                break
+        else:
+            break
+    for station in few:
+        _give_spare_poses(chosen, station, margins)
+    return chosen
+
+
+def registration_shortages(seen_by: Sequence[str | None]) -> dict[str, tuple[int, ...]]:
+    """Return the poses of each station that measures too few to be registered, by its name.
+
+    Parameters
+    ----------
+    seen_by : sequence of str or None
+        The station of each pose, in the order of their ids.
+    """
+    poses: dict[str, tuple[int, ...]] = {}
+    for number, station in enumerate(seen_by):
+        if station is not None:
+            poses[station] = (*poses.get(station, ()), number)
+    return {name: few for name, few in poses.items() if len(few) < REGISTRATION_POSES}
+
+
+def shortage_text(station: str, poses: tuple[int, ...]) -> str:
+    """Return what becomes of the poses of a station that cannot be registered."""
+    return (
+        f"station {station} sees {len(poses)} of the {REGISTRATION_POSES} poses that it needs to be"
+        f" registered: the readings at pose {', '.join(map(str, poses))} will be missing"
+    )
+
+
+def _best(margins: FloatArray, open_: BoolArray) -> IndexArray:
+    """Return the open station that sees each pose best, -1 where none does."""
+    seen = np.where(open_[:, None], margins, -np.inf)
+    return np.where(np.isfinite(seen).any(axis=0), seen.argmax(axis=0), -1)
+
+
+def _too_few(chosen: IndexArray, stations: int) -> list[int]:
+    """Return the stations that cannot be registered, those with the fewest poses first."""
+    count = np.bincount(chosen[chosen >= 0], minlength=stations)
+    few = np.flatnonzero((count > 0) & (count < REGISTRATION_POSES))
+    return sorted(map(int, few), key=lambda station: (count[station], station))
+
+
+def _give_spare_poses(chosen: IndexArray, station: int, margins: FloatArray) -> None:
+    """Fill a station up in place, with the poses that it sees with the least loss of margin."""
+    sees = np.isfinite(margins[station]) & (chosen >= 0) & (chosen != station)
+    candidates = np.flatnonzero(sees)
+    loss = margins[chosen[candidates], candidates] - margins[station, candidates]
+    wanted = REGISTRATION_POSES - np.count_nonzero(chosen == station)
+    taken = chosen.copy()
+    for pose in candidates[np.argsort(loss, kind="stable")].tolist():
+        if wanted and np.count_nonzero(taken == taken[pose]) > REGISTRATION_POSES:
+            taken[pose], wanted = station, wanted - 1
+    if not wanted:
+        chosen[:] = taken
 
 
 def sight_solid(body: Body) -> SightSolid:

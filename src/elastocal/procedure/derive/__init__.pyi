@@ -1,3 +1,4 @@
+from ._rows import LoadRow as LoadRow, LoadValues as LoadValues
 from .derivation import (
     CommittedRun as CommittedRun,
     DerivedRun as DerivedRun,
@@ -15,8 +16,6 @@ from .readings import (
     JOINT_ERROR as JOINT_ERROR,
     LEAST_SAMPLES as LEAST_SAMPLES,
     SAG as SAG,
-    LoadRow as LoadRow,
-    LoadValues as LoadValues,
     Mean as Mean,
     PoseReadings as PoseReadings,
     Reading as Reading,

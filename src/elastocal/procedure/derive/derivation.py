@@ -1,6 +1,7 @@
 """From a run folder's journal and raw streams to its dataset and summary.
 
-The dataset holds displacements and force of every load against the unloaded reference of its pose.
+The dataset holds the displacements of every load against the reference of its pose, which is
+unloaded or in light contact, and its force against the unloaded sensor.
 Both displacements are those of the marker: the tracker's, turned into base, and the controller's,
 of the point at the lever arm ``r`` that moves rigidly with its tool frame,
 
@@ -23,18 +24,14 @@ from pathlib import Path
 import numpy as np
 
 from elastocal.arrays import FloatArray
-from elastocal.cell import SENSOR_CORRECTED, Cell, SensorLoad
+from elastocal.cell import CONDITIONING, SENSOR_CORRECTED, Cell, SensorLoad
 from elastocal.dataset import STATUSES, Dataset, write
 from elastocal.errors import DatasetError, FileAccessError, ProcedureError, SchemaError
 from elastocal.planning import PlanResult
+from elastocal.procedure.derive._rows import LoadRow, load_rows
 from elastocal.procedure.derive.findings import RunFindings, summarise
 from elastocal.procedure.derive.readings import (
-    LoadRow,
-    LoadValues,
-    Mean,
     PoseReadings,
-    Reading,
-    ToolState,
     felt_windows,
     marker_readings,
     places_in_time,
@@ -45,7 +42,6 @@ from elastocal.procedure.derive.summary import RunSummary
 from elastocal.procedure.derive.tool import (
     estimate_tool,
     sensor_load,
-    turned_sigma,
     wrench_on_robot,
 )
 from elastocal.procedure.record import (
@@ -210,12 +206,14 @@ def derive_poses(
     tool, lever = sensor or sensor_load(cell), _lever_arm(cell)
     seen = marker_readings(poses, cell.robot, cell.gravity_base, lever)
     registration = register(seen, lever)
-    rows = [_row(pose, load, registration, tool) for pose in poses for load in pose.loads]
+    conditioned = cell.file.procedure.conditioning
+    rows = load_rows(poses, registration, tool, conditioned=conditioned)
     had = {row.load_case for row in rows if row.status is ReadingStatus.OK}
     if not had:
         raise DatasetError(f"no usable reading among {len(rows)}: {_reasons(rows, registration)}")
-    cases = [case for case in plan.contact.load_cases if case in had]
-    dataset = _dataset(poses, rows, cases, cell, registration.lever_arm, provenance)
+    # The press before the reference stays, usable or not: the others' friction begins with it.
+    cases = [case for case in plan.contact.load_cases if case in had or case == CONDITIONING]
+    dataset = _dataset(poses, rows, cases, cell, registration.lever_arm, tool, provenance)
     estimate = estimate_tool(tool_readings(poses, tool), tool.mass)
     found = RunFindings(poses, rows, registration, tool, estimate, dataset, plan, entries)
     return DerivedRun(dataset, summarise(found))
@@ -259,85 +257,13 @@ def _provenance(folder: RunFolder, record: RunRecord, sensor: SensorLoad | None)
     return f"elastocal run {folder.path.resolve().name}, {record.origin}{corrected}"
 
 
-@dataclass(frozen=True, eq=False)
-class _LoadAndReference:
-    """A load and its reference, with nothing missing."""
-
-    load: ToolState
-    load_marker: Mean
-    reference: ToolState
-    reference_marker: Mean
-    R_base_tracker: FloatArray
-
-
-def _row(
-    pose: PoseReadings, load: Reading, registration: Registration, tool: SensorLoad
-) -> LoadRow:
-    """Return a load as the dataset holds it; without reference, station or stream it is missing."""
-    window, case = load.window, str(load.window.load_case)
-    pair = _pair(pose, load, registration)
-    if isinstance(pair, _LoadAndReference):
-        numbers = _numbers(pair, registration.lever_arm, tool)
-        return LoadRow(pose.pose, case, window.status, window.note, numbers)
-    if window.status is ReadingStatus.OK:
-        return LoadRow(pose.pose, case, ReadingStatus.MISSING, pair, None)
-    pressed = _press(pose, load, registration.lever_arm, tool)
-    return LoadRow(pose.pose, case, window.status, window.note or pair, pressed)
-
-
-def _press(
-    pose: PoseReadings, load: Reading, lever: FloatArray, tool: SensorLoad
-) -> LoadValues | None:
-    """Return what friction in the gears felt of a press that gave no reading, if it is known."""
-    reference = None if pose.reference is None else pose.reference.tool
-    if load.tool is None or reference is None:
-        return None
-    nan = np.full(3, np.nan)
-    unseen = Mean(nan, nan, nan, 0, np.nan)
-    return _numbers(_LoadAndReference(load.tool, unseen, reference, unseen, np.eye(3)), lever, tool)
-
-
-def _pair(pose: PoseReadings, load: Reading, registration: Registration) -> _LoadAndReference | str:
-    """Return load and reference, or why a reading has no numbers."""
-    reference, station = pose.reference, load.window.station
-    if reference is None:
-        return "there is no unloaded reference"
-    if reference.window.status is not ReadingStatus.OK:
-        return f"the unloaded reference is {reference.window.status.value}: {reference.window.note}"
-    if not station:
-        return "no tracker station measured"
-    if station != reference.window.station:
-        return f"station {station} measured it, {reference.window.station} its unloaded reference"
-    fit = registration.station_of(station, pose.pose)
-    if fit is None:
-        return f"station {station} is not registered: {registration.unregistered.get(station, '')}"
-    means = (load.tool, load.marker, reference.tool, reference.marker)
-    if means[0] is None or means[1] is None or means[2] is None or means[3] is None:
-        return load.window.note or "a stream says too little"
-    return _LoadAndReference(means[0], means[1], means[2], means[3], fit.T_base_tracker[:3, :3])
-
-
-def _numbers(pair: _LoadAndReference, lever: FloatArray, tool: SensorLoad) -> LoadValues:
-    load, reference, R = pair.load, pair.reference, pair.R_base_tracker
-    T, T_0 = load.T_base_tcp, reference.T_base_tcp
-    wrench = wrench_on_robot(load.wrench, reference.wrench, tool)
-    return LoadValues(
-        q=load.q,
-        controller_displacement=T[:3, 3] - T_0[:3, 3] + (T[:3, :3] - T_0[:3, :3]) @ lever,
-        marker_displacement=R @ (pair.load_marker.value - pair.reference_marker.value),
-        marker_sigma=turned_sigma(R, pair.load_marker.sigma, pair.reference_marker.sigma),
-        force=wrench.force,
-        moment=wrench.moment,
-        force_sigma=turned_sigma(tool.R_base_sensor(T), load.force.sigma, reference.force.sigma),
-    )
-
-
 def _dataset(
     poses: Sequence[PoseReadings],
     rows: Sequence[LoadRow],
     load_cases: Sequence[str],
     cell: Cell,
     lever: FloatArray,
+    sensor: SensorLoad,
     provenance: str,
 ) -> Dataset:
     """Return the dataset of all rows, with the load cases to keep.
@@ -367,13 +293,15 @@ def _dataset(
         values = array(name)
         return values if np.all(values[ok] > 0) else None
 
-    tools = {pose.pose: pose.reference.tool for pose in poses if pose.reference}
     reference = np.full((len(labels), len(robot.joint_names)), np.nan)
-    tcp = np.full((len(labels), 3), np.nan)
-    for index, pose in enumerate(labels):
-        tool = tools.get(pose)
-        if tool is not None:
-            reference[index], tcp[index] = tool.q, tool.T_base_tcp[:3, 3]
+    tcp, light = np.full((len(labels), 3), np.nan), np.zeros((len(labels), 3))
+    for pose in poses:
+        tare = None if pose.reference is None else pose.reference.tool
+        zero = None if pose.zero is None else pose.zero.tool
+        if tare is not None and zero is not None:
+            index = labels.index(pose.pose)
+            reference[index], tcp[index] = zero.q, tare.T_base_tcp[:3, 3]
+            light[index] = wrench_on_robot(zero.wrench, tare.wrench, sensor).force
     return Dataset.from_arrays(
         joint_position=array("q", len(robot.joint_names)),
         force=array("force"),
@@ -389,12 +317,14 @@ def _dataset(
         sequence=places_in_time(poses, labels, load_cases),
         tcp_position=tcp,
         reference_joint_position=reference,
-        # Counted from the reference, where the tool was off the surface.
-        reference_force=np.zeros((len(labels), 3)),
+        # As all forces counted from where the tool was off the surface: none, or light contact.
+        reference_force=light,
         robot_name=robot.name,
         robot_urdf=cell.urdf_with_tool_mass,
         tcp_frame=robot.tip,
         marker=tuple(lever.tolist()),
         gravity=cell.gravity_of_mounting,
+        conditioned=cell.file.procedure.conditioning,
+        check=[case for case in load_cases if case == cell.file.load_cases.check_case],
         provenance=provenance,
     )

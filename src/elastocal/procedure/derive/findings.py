@@ -8,11 +8,12 @@ import numpy as np
 
 from elastocal import __version__
 from elastocal.arrays import FloatArray
-from elastocal.cell import SensorLoad
+from elastocal.cell import LIGHT_CONTACT, SensorLoad
 from elastocal.dataset import Dataset
 from elastocal.planning import PlanResult
 from elastocal.procedure.derive import summary
-from elastocal.procedure.derive.readings import LoadRow, LoadValues, PoseReadings, weighed_poses
+from elastocal.procedure.derive._rows import LoadRow, LoadValues
+from elastocal.procedure.derive.readings import PoseReadings, weighed_poses
 from elastocal.procedure.derive.tool import Interval, ToolEstimate
 from elastocal.procedure.record import Entry, Event, ReadingStatus
 from elastocal.procedure.registration import Registration, StationFit
@@ -51,7 +52,8 @@ class RunFindings:
 def summarise(found: RunFindings) -> summary.RunSummary:
     """Return the summary of a run."""
     committed, weighed = [pose.pose for pose in found.poses], weighed_poses(found.poses)
-    planned, cases = [pose.id for pose in found.plan.poses], tuple(found.plan.contact.load_cases)
+    planned = [pose.id for pose in found.plan.poses]
+    cases = [case for case in found.plan.contact.load_cases if case != LIGHT_CONTACT]
     registration, tool, estimate = found.registration, found.tool, found.estimate
     missing = tuple(pose for pose in planned if pose not in committed)
     warnings = run_warnings(found.rows, registration, tool, estimate, cases, weighed)

@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from elastocal.arrays import BoolArray, FloatArray, IndexArray
-from elastocal.cell import SensorLoad
+from elastocal.cell import CONDITIONING, LIGHT_CONTACT, SensorLoad
 from elastocal.procedure.derive.tool import RawWrench, UnloadedWrenches
 from elastocal.procedure.record import SAME_TIME, PoseLog, ReadingStatus, Streams, Window
 from elastocal.procedure.registration import UnloadedReadings
@@ -180,11 +180,24 @@ class PoseReadings:
     """One a load case, in the order in which they were applied."""
     released: Reading | None
     """A later unloaded window, after the loads; None when there is none."""
+    light: Reading | None = None
+    """The reference in light contact; None: the reference is the unloaded one."""
 
     @property
     def pose(self) -> int:
         """Id in the plan."""
         return self.log.pose
+
+    @property
+    def zero(self) -> Reading | None:
+        """The reading that both displacements count from; the force counts from `reference`."""
+        return self.reference if self.light is None else self.light
+
+    @property
+    def conditioning(self) -> ToolState | None:
+        """The press before the reference; None where there was none, or nothing is known of it."""
+        found = [r.tool for r in self.loads if r.window.load_case == CONDITIONING]
+        return found[0] if found else None
 
 
 def felt_windows(log: PoseLog) -> tuple[Window, ...]:
@@ -220,11 +233,13 @@ def reduce_pose(log: PoseLog, streams: Streams) -> PoseReadings:
         for window, own in felt
     ]
     unloaded = [reading for reading in readings if reading.window.load_case is None]
+    light = [reading for reading in readings if reading.window.load_case == LIGHT_CONTACT]
     return PoseReadings(
         log,
         unloaded[0] if unloaded else None,
-        tuple(reading for reading in readings if reading.window.load_case is not None),
+        tuple(r for r in readings if r.window.load_case not in (None, LIGHT_CONTACT)),
         unloaded[-1] if len(unloaded) > 1 else None,
+        light[0] if light else None,
     )
 
 
@@ -332,37 +347,3 @@ def tool_readings(poses: Sequence[PoseReadings], tool: SensorLoad) -> UnloadedWr
         R_base_sensor=tool.R_base_sensor(T),
         gravity=tool.gravity,
     )
-
-
-@brief_repr
-@dataclass(frozen=True, eq=False)
-class LoadValues:
-    """The numbers of a reading, in base and SI units."""
-
-    q: FloatArray
-    """Shape (joint,)."""
-    controller_displacement: FloatArray
-    """Displacement of the marker by the controller, shape (3,), in m."""
-    marker_displacement: FloatArray
-    """Shape (3,), in m; NaN of a press that no station saw."""
-    marker_sigma: FloatArray
-    """Shape (3,), in m; likewise."""
-    force: FloatArray
-    """Force on the robot, shape (3,), in N."""
-    moment: FloatArray
-    """Moment on the robot about the tcp, shape (3,), in N·m."""
-    force_sigma: FloatArray
-    """Shape (3,), in N."""
-
-
-@dataclass(frozen=True, eq=False)
-class LoadRow:
-    """One load case at one pose, as the dataset holds it."""
-
-    pose: int
-    load_case: str
-    status: ReadingStatus
-    note: str
-    """Why it is not ok."""
-    numbers: LoadValues | None
-    """None where something that they need is missing."""

@@ -3,7 +3,9 @@
 The order is what makes a reading worth something, and the cell safe. The sensor is tared in free
 air just before contact, so that its drift since the last pose and the weight of the tool are not
 taken for load; the reference of the tracker is taken there too, so that only what happens between
-it and the load counts as deflection. Contact is made in position control, slowly and up to a small
+it and the load counts as deflection. With ``procedure.reference: light_contact`` that is read once
+more, in contact, as the first press or the second: no step is added, the force of it is in the
+plan's list of presses. Contact is made in position control, slowly and up to a small
 force; only then is force control switched on. It is switched off, with the force ramped to zero,
 before the tool leaves the surface: an arm in force control in free air would accelerate.
 """
@@ -11,7 +13,7 @@ before the tool leaves the surface: an arm in force control in free air would ac
 import numpy as np
 
 from elastocal.arrays import FloatArray
-from elastocal.cell import Motion
+from elastocal.cell import LIGHT_CONTACT, Motion
 from elastocal.procedure.record import Action, ReadingStatus
 from elastocal.procedure.run._attempt import (
     Attempt,
@@ -268,6 +270,9 @@ def _why_slipped(a: Attempt, positions: FloatArray, force: FloatArray) -> str:
     assert slide is not None
     assert jump is not None
     a.slip = reference.so_far(positions)
+    if a.load[0] == LIGHT_CONTACT:
+        # The zero is read here: where the marker stands now is where it counts from.
+        a.slip_origin = a.slip
     moved, limit = abs(a.slip - a.slip_origin), procedure.slip_limit
     expected = procedure.contact_compliance * float(np.linalg.norm(force))
     for length, most, what in (

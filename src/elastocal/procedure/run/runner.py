@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from elastocal.cell import Devices, Motion
+from elastocal.cell import CONDITIONING, LIGHT_CONTACT, Devices, Motion
 from elastocal.errors import ProcedureError
 from elastocal.planning import Joints, PoseRecord
 from elastocal.procedure.record import (
@@ -280,7 +280,7 @@ class Runner:
         if not self._given_up:
             return ""
         numbers = ", ".join(map(str, self._given_up))
-        return f"given up: pose {numbers}; `--resume` tries again"
+        return f"given up: pose {numbers}; `--resume` tries again once the cause is mended"
 
     def _failure(self, fault: FaultError, location: ArmLocation) -> SessionResult:
         end = RunEnd.INTERRUPTED if fault.fault is Fault.INTERRUPTED else RunEnd.STOPPED
@@ -307,7 +307,16 @@ def _save(recorder: StreamRecorder, path: Path) -> str | None:
 
 
 def _require_settled_load_case(a: Attempt) -> None:
-    """Refuse a pose of which no load case has settled: it is not the load case then."""
+    """Refuse a pose without its reference, or of which no load case has settled.
+
+    Without the press before the reference friction has another history than the dataset says.
+    """
+    for window in a.windows:
+        wanted = window.load_case in (CONDITIONING, LIGHT_CONTACT)
+        # A press that slipped has pressed all the same; a reference has to stand still.
+        slipped = window.load_case == CONDITIONING and window.status is ReadingStatus.SLIPPED
+        if wanted and window.status is not ReadingStatus.OK and not slipped:
+            raise FaultError(Fault.REFERENCE_LOST, f"{window.load_case}: {window.note}")
     loaded = [window for window in a.windows if window.load_case is not None]
     if loaded and all(window.status is ReadingStatus.UNSTABLE for window in loaded):
         raise FaultError(Fault.UNSTABLE, loaded[-1].note)

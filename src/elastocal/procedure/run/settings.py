@@ -4,23 +4,23 @@ The fingerprint says which cell a plan was made for. It says nothing of the plan
 those are what the arm is sent to and presses with.
 """
 
+from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 
 from elastocal.arrays import FloatArray
-from elastocal.cell import Cell, ProcedureSettings
+from elastocal.cell import LIGHT_CONTACT, Cell, ProcedureSettings
 from elastocal.errors import ProcedureError
 from elastocal.planning import PlanResult
+from elastocal.planning.checks import REGISTRATION_POSES, registration_shortages, shortage_text
 from elastocal.planning.motion import AxisMotion
 from elastocal.results import brief_repr
 from elastocal.robot import GRAVITY
 
 _LIMIT_PER_LOAD = 1.3
 """Default force limit, as a multiple of the largest load case."""
-_LEAST_POSES = 3
-"""Unloaded marker readings that the rotation of a station needs."""
 _SAME_PLACE = 1e-5
 """Largest distance between a frame and where its joints lead, in m."""
 _SAME_TURN = 1e-5
@@ -50,7 +50,7 @@ class RunSettings:
     approach_distance: float
     """Distance from the surface at the approach pose, in m."""
     loads: tuple[tuple[str, FloatArray], ...]
-    """Name of each load case and force on the robot in the tcp frame, shape (3,), in N."""
+    """Name of each press and force on the robot in the tcp frame, shape (3,), in N, in order."""
 
 
 def run_settings(cell: Cell, plan: PlanResult) -> RunSettings:
@@ -96,7 +96,8 @@ def run_settings(cell: Cell, plan: PlanResult) -> RunSettings:
 
 def _check_contact_force(cell: Cell, loads: tuple[tuple[str, FloatArray], ...]) -> None:
     """Refuse a guarded approach that would press more than a load case does."""
-    name, least = min(((name, -float(f[2])) for name, f in loads), key=lambda load: load[1])
+    pressed = ((name, -float(f[2])) for name, f in loads if name != LIGHT_CONTACT)
+    name, least = min(pressed, key=lambda load: load[1])
     contact_force = cell.file.procedure.contact_force
     if not contact_force < least:
         raise ProcedureError(
@@ -161,22 +162,15 @@ def registration_warnings(plan: PlanResult) -> tuple[str, ...]:
     ProcedureError
         If that holds for every station: no reading of the run would be of use.
     """
-    seen: dict[str, list[int]] = {}
-    for pose in plan.poses:
-        if pose.seen_by is not None:
-            seen.setdefault(pose.seen_by, []).append(pose.id)
-    few = {station: poses for station, poses in seen.items() if len(poses) < _LEAST_POSES}
-    if seen and len(few) == len(seen):
-        most = max(len(poses) for poses in seen.values())
+    seen_by = [pose.seen_by for pose in plan.poses]
+    few, count = registration_shortages(seen_by), Counter(name for name in seen_by if name)
+    if count and len(few) == len(count):
         raise ProcedureError(
-            f"no tracker station sees {_LEAST_POSES} poses of the plan, {most} at most: none could"
-            " be registered, and no reading used; plan more poses"
+            f"no tracker station sees {REGISTRATION_POSES} poses of the plan,"
+            f" {max(count.values())} at most: none could be registered, and no reading used; plan"
+            " more poses"
         )
-    return tuple(
-        f"station {station} sees {len(poses)} of the {_LEAST_POSES} poses that it needs to be"
-        f" registered: the readings at pose {', '.join(map(str, poses))} will be missing"
-        for station, poses in few.items()
-    )
+    return tuple(shortage_text(station, poses) for station, poses in few.items())
 
 
 def _about_robot(plan: PlanResult, cell: Cell) -> Iterator[str]:
@@ -190,18 +184,18 @@ def _about_robot(plan: PlanResult, cell: Cell) -> Iterator[str]:
 
 
 def _about_contact(plan: PlanResult, cell: Cell) -> Iterator[str]:
-    engagement, loads = cell.file.engagement, cell.file.load_cases
+    engagement, presses = cell.file.engagement, cell.file.presses
     for key in ("approach_distance", "near_contact"):
         found, wanted = getattr(plan.contact, key), getattr(engagement, key)
         if not _same(found, wanted):
             yield f"contact.{key} is {found:g} m, engagement.{key} of the cell {wanted:g} m"
-    if tuple(plan.contact.load_cases) != tuple(loads.cases):
+    if tuple(plan.contact.load_cases) != tuple(presses):
         yield (
             f"contact.load_cases are {', '.join(plan.contact.load_cases)}, those of the cell"
-            f" {', '.join(loads.cases)}"
+            f" {', '.join(presses)}"
         )
         return
-    for name, wanted in zip(loads.cases, loads.force_tcp, strict=True):
+    for name, wanted in presses.items():
         if not _same(found := plan.contact.load_cases[name], wanted):
             yield f"load case {name!r} is {_listed(found)} N, that of the cell {_listed(wanted)} N"
 

@@ -145,6 +145,7 @@ class Fault(Enum):
     BEAM_LOST = (FaultScope.ATTEMPT, "beam lost: {}")
     SENSOR_SATURATED = (FaultScope.ATTEMPT, "force sensor saturated: {}")
     UNSTABLE = (FaultScope.ATTEMPT, "no load case settles: {}")
+    REFERENCE_LOST = (FaultScope.ATTEMPT, "reference not had: {}")
     SENSOR_OVERLOAD = (FaultScope.RUN, "force sensor saturated in contact: {}")
     FORCE_LIMIT = (FaultScope.RUN, "force limit exceeded: {}")
     TRAVEL_LIMIT = (FaultScope.RUN, "travel limit exceeded: {}")

@@ -51,7 +51,8 @@ class TrueReadings:
     deflection: FloatArray
     """Deflection of the tool in base against touching without force, (place, load, 3), in m."""
     controller_displacement: FloatArray
-    """Displacement of the marker by the controller against near contact, (place, load, 3), in m."""
+    """Displacement of the marker by the controller against the reference, (place, load, 3), in m:
+    near contact, or light contact."""
     marker_displacement: FloatArray
     """True one of the marker, likewise."""
     marker: FloatArray
@@ -61,6 +62,11 @@ class TrueReadings:
     the sensor's hysteresis, in its true frame, shape (place, load, 3), in N."""
     R_base_sensor: FloatArray
     """Orientation of the sensor by the controller, shape (place, 3, 3)."""
+    reference_q: FloatArray
+    """Joints of the controller where the displacements count from, shape (place, joint), in rad
+    or m: near contact, or in light contact."""
+    reference_felt: FloatArray
+    """As `felt`, there, shape (place, 3), in N."""
 
     def __repr__(self) -> str:
         return "TrueReadings({} places, {} loads)".format(*self.force.shape)
@@ -131,6 +137,7 @@ class CampaignSimulator:
         force_tcp: FloatArray,
         seed: int = 0,
         visits: VisitChance | None = None,
+        reference: int | None = None,
     ) -> TrueReadings:
         """Return what is true at every place under every load case, in this order.
 
@@ -144,6 +151,9 @@ class CampaignSimulator:
             Of what differs from visit to visit.
         visits : VisitChance, optional
             That itself, with a leading axis of places, in place of what the seed gives.
+        reference : int, optional
+            Number of the press that the displacements count from, in place of near contact; it is
+            no load case of its own.
 
         Raises
         ------
@@ -156,11 +166,15 @@ class CampaignSimulator:
             each = [VisitChance.of(seed, posture_key(q)) for q in places.q]
             visits = VisitChance.stack(each)
         return replace(self, statics=self.statics.visited(visits))._pressed(
-            places, force_tcp, visits
+            places, force_tcp, visits, reference
         )
 
     def _pressed(
-        self, places: ContactPoses, force_tcp: FloatArray, visits: VisitChance
+        self,
+        places: ContactPoses,
+        force_tcp: FloatArray,
+        visits: VisitChance,
+        reference: int | None,
     ) -> TrueReadings:
         """Return what is true in visits whose chance the statics have."""
         T = self.statics.robot.forward(places.q)
@@ -174,7 +188,7 @@ class CampaignSimulator:
             attack = self.law.attack(wanted, visits.load(number))
             state = self._press(state, contacts, held + weight @ zero, attack)
             states.append(state)
-        return self._settled(near, touch, states)
+        return self._settled(near, touch, states, reference)
 
     def _press(
         self,
@@ -247,7 +261,7 @@ class CampaignSimulator:
         return T[..., :3, 3] + lever, T[..., :3, 3] + twist[..., :3] + turned
 
     def _settled(
-        self, near: RobotState, touch: RobotState, states: list[RobotState]
+        self, near: RobotState, touch: RobotState, states: list[RobotState], reference: int | None
     ) -> TrueReadings:
         weight, statics = self.statics.weight, self.statics
         q, twist, force = (
@@ -264,13 +278,20 @@ class CampaignSimulator:
             loads = np.zeros((1 + len(states), len(felt), 6))
             loads[1:, :, :3] = felt.swapaxes(0, 1)
             felt = felt + SensorHysteresis(share, ranges).lag(loads)[1:, :, :3].swapaxes(0, 1)
+        kept, zero, zero_q, zero_felt = slice(None), unloaded, near.q, np.zeros_like(unloaded[0])
+        if reference is not None:
+            kept = np.arange(len(states)) != reference
+            zero, zero_q = (loaded[0][:, reference], loaded[1][:, reference]), q[:, reference]
+            zero_felt = felt[:, reference]
         return TrueReadings(
-            q=q,
-            force=force,
-            deflection=twist[..., :3] - touch.twist[:, None, :3],
-            controller_displacement=loaded[0] - unloaded[0][:, None],
-            marker_displacement=loaded[1] - unloaded[1][:, None],
+            q=q[:, kept],
+            force=force[:, kept],
+            deflection=twist[:, kept, :3] - touch.twist[:, None, :3],
+            controller_displacement=loaded[0][:, kept] - zero[0][:, None],
+            marker_displacement=loaded[1][:, kept] - zero[1][:, None],
             marker=unloaded[1],
-            felt=felt,
+            felt=felt[:, kept],
             R_base_sensor=R,
+            reference_q=zero_q,
+            reference_felt=zero_felt,
         )

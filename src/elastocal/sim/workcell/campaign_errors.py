@@ -116,6 +116,8 @@ class CampaignErrors:
         scales: ErrorScales,
         station: FloatArray,
         load_cases: tuple[str, ...],
+        *,
+        conditioned: bool = False,
     ) -> Readings:
         """Return the truth as the instruments show it, places numbered from 0.
 
@@ -131,6 +133,8 @@ class CampaignErrors:
             Tracker station that looks at each place, in base, in m.
         load_cases : tuple of str
             Names of the loads.
+        conditioned : bool
+            Whether the first of them went before the reference.
         """
         places, loads = settled.force.shape[:2]
         distance = np.linalg.norm(settled.marker - station, axis=1)[:, None, None]
@@ -148,17 +152,33 @@ class CampaignErrors:
             force=self._force(settled, draws, scales.force).reshape(rows),
             controller_displacement=settled.controller_displacement.reshape(rows),
             marker_displacement=(settled.marker_displacement + marker).reshape(rows),
+            reference_joint_position=np.repeat(settled.reference_q, loads, axis=0),
+            reference_force=np.repeat(self._reference(settled, draws, scales.force), loads, axis=0),
+            conditioned=conditioned,
         )
 
     def _force(self, settled: TrueReadings, draws: ErrorDraws, scale: float) -> FloatArray:
         """Return the force in base as the sensor shows it, shape (place, load, 3), in N."""
-        gain = np.eye(3) + scale * np.einsum("ijkl,kl->ij", self.gain, draws.cross_talk)
+        gain = self._true_gain(draws, scale)
         noise = self.force[1] * draws.sensor[:, 1:] - self.force[0] * draws.sensor[:, :1]
         since = np.arange(1, settled.force.shape[1] + 1)[:, None]
         noise = noise + since * self.drift * draws.drift[:, None]
         shown = settled.felt @ gain.T + scale * noise
         force: FloatArray = np.einsum("pij,plj->pli", settled.R_base_sensor, shown)
         return force
+
+    def _reference(self, settled: TrueReadings, draws: ErrorDraws, scale: float) -> FloatArray:
+        """Return the force at the reference, shape (place, 3), in N: 0 near contact.
+
+        Averaged as long as what it is counted from, whose noise is in all forces of a place alike.
+        """
+        shown = settled.reference_felt @ self._true_gain(draws, scale).T
+        force: FloatArray = np.einsum("pij,pj->pi", settled.R_base_sensor, shown)
+        return force
+
+    def _true_gain(self, draws: ErrorDraws, scale: float) -> FloatArray:
+        gain: FloatArray = np.eye(3) + scale * np.einsum("ijkl,kl->ij", self.gain, draws.cross_talk)
+        return gain
 
 
 def _gain(cell: Cell, ranges: FloatArray) -> FloatArray:

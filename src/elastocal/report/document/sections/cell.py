@@ -25,13 +25,12 @@ def _cell(evidence: Evidence) -> Iterator[blocks.Block]:
         yield blocks.Paragraph(text, "banner")
     heads = ("What", "Value")
     yield blocks.Table("Robot, tool and instruments", heads, tuple(_instruments(cell)), texts=2)
-    cases = cell.file.load_cases
     yield blocks.Table(
-        "Load cases: force on the robot in the tcp frame, in N",
+        "Presses at a pose, in order: force on the robot in the tcp frame, in N",
         ("Load case", "x", "y", "z"),
         tuple(
             (name, *(f"{value + 0.0:.0f}" for value in force))
-            for name, force in zip(cases.cases, cases.force_tcp, strict=True)
+            for name, force in cell.file.presses.items()
         ),
     )
     yield blocks.Table("Limits of the poses", heads, tuple(_limits(cell)), texts=2)

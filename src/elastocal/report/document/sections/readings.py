@@ -31,6 +31,7 @@ def _body(evidence: Evidence) -> Iterator[blocks.Block]:
     yield from _suspicious(evidence)
     if reproduction is not None:
         yield _worst(reproduction.unseen)
+    yield from _load_check(evidence.figures)
 
 
 def _counts(dataset: Dataset, summary: RunSummary | None) -> Iterator[blocks.Block]:
@@ -153,6 +154,38 @@ def _worst(unseen: UnseenErrors) -> blocks.Block:
         (f"pose {unseen.pose[k]} {unseen.load_case[k]}", mm(float(unseen.error[k]))) for k in order
     )
     return blocks.Table("Largest errors, each at a left-out pose", ("Reading", "Error"), rows)
+
+
+def _load_check(figures: CalibrationSummary | None) -> Iterator[blocks.Block]:
+    """Yield the error at the load level that no fit has seen, where one was pressed."""
+    check = None if figures is None else figures.check
+    if check is None:
+        return
+    yield blocks.Table(
+        "Check at a load level that was kept out of the fit",
+        (
+            "Load case",
+            "Readings",
+            "Deflection",
+            "Error, mean",
+            "95 %",
+            "Largest",
+            "Noise",
+            "Noise from",
+        ),
+        (
+            (
+                ", ".join(check.load_cases),
+                str(check.readings),
+                mm(check.deflection),
+                mm(check.mean),
+                mm(check.p95),
+                mm(check.max),
+                "not known" if check.noise is None else mm(check.noise),
+                check.source,
+            ),
+        ),
+    )
 
 
 READINGS = blocks.Section("readings", "What was measured", 30, _body)

@@ -1,0 +1,91 @@
+"""What a cell must have before any candidate is made: `elastocal check` and `plan` ask the same.
+
+What depends on the pose alone is left to the checks of the pool.
+"""
+
+import numpy as np
+
+from elastocal.cell import Cell
+from elastocal.errors import PlanningError
+from elastocal.planning.checks import FrictionCheck, SensorCheck, TorqueCheck
+from elastocal.planning.search import technique
+from elastocal.planning.surface import Surface, sample_uniform
+
+
+def require_possible_search(cell: Cell, compare: str | None = None) -> None:
+    """Require a search that can be made, as far as no pool is needed to tell.
+
+    Parameters
+    ----------
+    cell : Cell
+        The cell.
+    compare : str, optional
+        Search technique to lay beside the cell's own.
+
+    Raises
+    ------
+    PlanningError
+        If a technique is unknown, or an accuracy is wanted without a process; if the process
+        has no force, or fewer candidates are asked for than poses.
+    """
+    search = cell.file.search
+    technique(cell.technique)
+    if compare is not None:
+        technique(compare)
+    if search.accuracy is not None and cell.process is None:
+        raise PlanningError(
+            "search.accuracy is the error on production: name its path in process.file of the cell"
+            " file"
+        )
+    if cell.process is not None and not np.any(cell.process.force):
+        raise PlanningError(
+            "process.file: no row has a force, and a process without forces deflects nothing: give"
+            " the force on the robot of each row (force_x[N] …), or leave process out"
+        )
+    wanted = search.pose_limit or 0
+    if not search.pool >= wanted:
+        raise PlanningError(
+            f"search.pool: must be at least the {wanted} poses that are to be chosen (the default"
+            f" of search.poses), got {search.pool}"
+        )
+
+
+def require_loads_possible_anywhere(cell: Cell, surface: Surface) -> None:
+    """Require load cases that a pose could hold, and a robot whose torques can be judged.
+
+    Parameters
+    ----------
+    cell : Cell
+        The cell.
+    surface : Surface
+        What the robot presses on.
+
+    Raises
+    ------
+    PlanningError
+        If friction, or the sensor's range, refuses the load cases wherever they are applied; if
+        torques are limited and the robot has no masses to tell what gravity takes of them.
+    SurfaceError
+        If the region holds no part of the surface.
+    """
+    friction, sensor = FrictionCheck.of(cell, surface), SensorCheck.of(cell, surface)
+    if not friction.everywhere > 0.0:
+        raise PlanningError(
+            f"load_cases: at every pose friction is {-friction.everywhere:.4g} N short of holding"
+            f" them (friction fz / safety against the lateral force): {friction.advice}"
+        )
+    if sensor is not None and not sensor.everywhere > 0.0:
+        raise PlanningError(
+            "load_cases: at every pose they need"
+            f" {1.0 - sensor.everywhere:.3g} times the sensor's range, the tool's weight included:"
+            f" {sensor.advice}"
+        )
+    torque = TorqueCheck.of(cell, surface)
+    if torque is not None and not cell.robot.has_masses:
+        raise PlanningError(
+            f"limits.torque: the torques of {', '.join(torque.judged)} are limited, and what the"
+            f" arm's weight takes of them is not known: robot {cell.robot.name!r} has no link"
+            " masses; give its links masses in the URDF (<inertial>), or leave the torques out"
+            " (effort in the URDF, limits.torque.values)"
+        )
+    sample_uniform(surface, 1, np.random.default_rng(cell.file.search.seed))
