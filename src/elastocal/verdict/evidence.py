@@ -300,7 +300,7 @@ def _why_not_reproduced(evidence: Evidence) -> str:
     also = "" if alike else " from other readings"
     return (
         f"the model was made by an earlier version of elastocal{also}; calibrate again with this"
-        f" one ({__version__})"
+        " one"
     )
 
 
