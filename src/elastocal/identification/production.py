@@ -135,6 +135,31 @@ class ProductionCoverage:
     courses: tuple[str, ...]
     """Courses with rows that are not covered."""
 
+    def plus(self, other: "ProductionCoverage") -> "ProductionCoverage":
+        """Return the coverage of these rows and others."""
+        own, rows = self.rows / (self.rows + other.rows), self.rows + other.rows
+
+        def mean(name: str) -> float:
+            return float(own * getattr(self, name) + (1.0 - own) * getattr(other, name))
+
+        farthest = max(self, other, key=lambda each: each.farthest)
+        is_known = self.level is not None and other.level is not None
+        return ProductionCoverage(
+            rows=rows,
+            covered=mean("covered"),
+            joints=mean("joints"),
+            rail=None if self.rail is None else mean("rail"),
+            load=mean("load"),
+            farthest=farthest.farthest,
+            farthest_joint=farthest.farthest_joint,
+            farthest_rail=None
+            if self.farthest_rail is None
+            else max(self.farthest_rail, other.farthest_rail or 0.0),
+            level=max(self.level or 0.0, other.level or 0.0) if is_known else None,
+            direction=max(self.direction, other.direction),
+            courses=tuple(dict.fromkeys((*self.courses, *other.courses))),
+        )
+
     @property
     def is_enough(self) -> bool:
         """Whether the share that is covered is `ENOUGH`."""

@@ -38,6 +38,8 @@ _NOTHING = 1.0
 """Force in N that needs no load case."""
 _MOST_ROWS = 500
 """Rows of production that are looked at when poses are chosen to cover it."""
+_SHOWN = (3, 4, 5, 6, 8, 10, 12, 15, 20, 25, 30)
+"""Numbers of poses that tables show."""
 _STEP = 10.0
 """Amplitudes are proposed in steps of this, in N."""
 
@@ -79,6 +81,11 @@ class ProductionRecord:
     def expected_of(self, poses: int) -> ExpectedError | None:
         """Return the error to expect from a number of poses; None where it is not known."""
         return next((each for each in self.expected if each.poses == poses), None)
+
+    def some_expected(self) -> tuple[ExpectedError, ...]:
+        """Return the errors for numbers of poses that a person compares, the plan's among them."""
+        shown = {*_SHOWN, self.poses}
+        return tuple(each for each in self.expected if each.poses in shown)
 
     def facts(self) -> tuple[tuple[str, str], ...]:
         """Return coverage and the error to expect, in a few words."""
