@@ -28,16 +28,18 @@ PROCESS_FILE = "process.csv"
 """Name of an example's production path."""
 _WITH_PROCESS = (
     (
-        re.compile(r"^  technique: cover\n", re.MULTILINE),
+        re.compile(r"^  technique: cover\n", re.M),
         "  # technique: cover                  # i_optimal for the process unless one is named\n",
     ),
     (
-        re.compile(r'^  (?:d_max: "175 mm"|poses: 15) .*\n(?:  # .*\n)', re.MULTILINE),
-        "  poses: 15                           # 6 to 8 may do: the plan tells what to expect\n"
-        '  # accuracy: "0.05 mm"               # or the error on production that is wanted\n',
+        re.compile(
+            r'^  (?:d_max: "175 mm" .*\n  # poses: (\d+) .*|poses: (\d+) .*\n  # .*)\n', re.M
+        ),
+        r"  poses: \1\2                           # 6 to 8 may do: the plan tells what to expect"
+        '\n  # accuracy: "0.05 mm"               # or the error on production that is wanted\n',
     ),
     (
-        re.compile(r"^# process: \{file: process\.csv\} .*\n", re.MULTILINE),
+        re.compile(r"^# process: \{file: process\.csv\} .*\n", re.M),
         "process: {file: process.csv}          # joints or tcp poses and forces of production\n",
     ),
 )
