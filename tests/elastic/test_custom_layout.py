@@ -159,3 +159,16 @@ def test_a_name_that_is_no_layout_is_refused_with_the_nearest():
 def test_a_missing_file_is_refused_by_its_path(tmp_path):
     with pytest.raises(FileAccessError, match=r"cannot read .*none\.yaml"):
         layout(robot(), str(tmp_path / "none.yaml"))
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("1e-3 N*m/rad", "is 1000 rad/.N.m.: the largest rotational compliance is 1 rad"),
+        ("1e13 N*m/rad", "'1e13 N.m/rad' is too large: the largest rotational stiffness"),
+        ("2 km", "is not a stiffness or compliance with its unit"),
+    ],
+)
+def test_a_stiffness_that_no_arm_has_is_refused(read, text, message):
+    with pytest.raises(SchemaError, match=message):
+        read(f'springs: [{{joint: joint_6, axis: x, stiffness: "{text}", uncertainty: "20 %"}}]')

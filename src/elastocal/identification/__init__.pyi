@@ -131,6 +131,17 @@ from .problem import (
     same_configuration as same_configuration,
     unit_columns as unit_columns,
 )
+from .production import (
+    ENOUGH as ENOUGH,
+    JOINT_REACH as JOINT_REACH,
+    LEVEL_REACH as LEVEL_REACH,
+    RAIL_REACH as RAIL_REACH,
+    CalibratedLoads as CalibratedLoads,
+    ProductionCoverage as ProductionCoverage,
+    near_postures as near_postures,
+    posture_reach as posture_reach,
+    production_coverage as production_coverage,
+)
 from .reproduction import (
     Reproduction as Reproduction,
     UnseenErrors as UnseenErrors,

@@ -27,6 +27,7 @@ from elastocal.robot import (
     without_tool_mass,
     xyzabc_from_T,
 )
+from elastocal.units import impossible
 
 _LINK = "tool_tcp"
 """Name of the link at another tool's tcp; with a number where it is taken."""
@@ -44,6 +45,24 @@ class ToolChange:
     """Mass of the tool in kg; none: that of the calibrated tool."""
     centre: tuple[float, float, float] | None = None
     """Centre of that mass in the new tcp's frame, in m."""
+
+    def __post_init__(self) -> None:
+        """Refuse a tool that no robot carries.
+
+        Raises
+        ------
+        RobotError
+            If a length, an angle or the mass is none of a robot cell's.
+        """
+        for what, dimension, values in (
+            ("pose of the tool", "length", self.pose[:3]),
+            ("pose of the tool", "angle", self.pose[3:]),
+            ("mass of the tool", "mass", () if self.mass is None else (self.mass,)),
+            ("centre of mass of the tool", "length", self.centre or ()),
+        ):
+            problem = impossible(dimension, *values)
+            if problem is not None:
+                raise RobotError(f"{what} is {problem}")
 
     @property
     def sentence(self) -> str:

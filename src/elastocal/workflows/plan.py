@@ -104,7 +104,7 @@ def plan(settings: PlanSettings, progress: Progress) -> PlanResult:
     cell = load_cell(Path(settings.cell))
     compare = settings.compare
     if compare is None:
-        compare = "cover" if cell.file.search.technique != "cover" else "ioops"
+        compare = "cover" if cell.technique != "cover" else "ioops"
     with filling(Path(settings.out), PLAN, settings.force) as folder:
         planned = planning.make_plan(
             cell, None if compare == "none" else compare, settings.jobs, progress

@@ -320,10 +320,12 @@ def _check_folder(job: _Job, entries: tuple[procedure.Entry, ...], resume: bool)
     assert started is not None
     procedure.check_same_run(started, job.record, str(out))
     if not resume:
-        done, count = len(procedure.last_known(entries).committed), len(job.plan.poses)
+        known, count = procedure.last_known(entries), len(job.plan.poses)
+        left = known.left_to_do(count)
+        advice = f"--resume {left}" if left else "nothing is left to do"
         raise ProcedureError(
-            f"{out} holds this run already ({done} of {count} poses committed):"
-            " go on with --resume, or name another folder"
+            f"{out} holds this run already ({len(known.committed)} of {count} poses committed):"
+            f" {advice}; for a new run name another folder"
         )
     used, _ = procedure.read_copies(job.folder, started)
     procedure.check_same_settings(used, job.cell)

@@ -123,7 +123,7 @@ def test_a_fault_of_one_attempt_is_tried_again(run, moment, change, message):
 def test_a_pose_that_fails_every_time_is_given_up_and_the_next_one_is_visited(run):
     result = run.start(when(fault.approaching, fault.lower_floor, times=2))
     assert (result.end, result.given_up, result.failed_attempts) == (RunEnd.DONE, (0,), 2)
-    assert result.message == "given up: pose 0; `--resume` tries again"
+    assert result.message == ("given up: pose 0; `--resume` tries again once the cause is mended")
     assert committed(run) == [1]
     assert "contact missed" in texts(run, Event.GIVEN_UP)[0]
 

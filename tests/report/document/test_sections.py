@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from elastocal.cell import Limits
 from elastocal.identification import CalibrationSummary, describe
-from elastocal.procedure import RunSummary
+from elastocal.procedure import Event, RunSummary
 from elastocal.records import from_data, to_data
 from elastocal.report.document import SECTIONS
 from elastocal.report.document.sections import PAPER
@@ -128,10 +128,26 @@ def test_a_partial_run_holds_back_and_names_the_poses(parts):
 def test_a_pose_without_a_usable_reading_counts_as_missing(parts):
     data = parts.dataset.to_xarray().copy(deep=True)
     data["status"].values[0] = 1
-    (told, *_) = findings(
-        reading_findings, replace(parts, dataset=type(parts.dataset).from_xarray(data))
-    )
+    spoiled = replace(parts, dataset=type(parts.dataset).from_xarray(data))
+    (told, *_) = findings(reading_findings, spoiled)
     assert told.startswith("the run is partial: 1 of")
+    # The pose is committed: to resume would repeat nothing.
+    advice = next(reading_findings(spoiled)).advice
+    assert advice.startswith("Pose 0 is committed and --resume does not repeat")
+    assert "a new run" in advice
+
+
+def test_what_was_not_committed_can_be_resumed_and_nothing_else(parts):
+    some = replace(parts, dataset=parts.dataset.select(poses=parts.dataset.poses[2:]))
+    begun = tuple(
+        entry
+        for entry in parts.journal
+        if not (entry.event is Event.COMMIT and entry.log is not None and entry.log.pose == 1)
+    )
+    advice = next(reading_findings(replace(some, journal=begun))).advice
+    assert "`elastocal run --resume` measures pose 1, with the cell file" in advice
+    assert "Pose 0 is committed and --resume does not repeat" in advice
+    assert "--resume" not in next(reading_findings(replace(some, journal=None))).advice
 
 
 def test_readings_that_were_left_out_by_hand_hold_back_by_name(parts):
