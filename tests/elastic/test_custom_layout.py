@@ -108,6 +108,13 @@ def test_an_axial_spring_takes_the_kind_of_its_joint(tmp_path):
     assert [spring.revolute for spring in layout(sliding, str(path))] == [False, True]
 
 
+def test_a_joint_that_slides_has_no_gear(tmp_path):
+    path = tmp_path / "springs.yaml"
+    path.write_text(HEAD + "springs: [{joint: slide, kind: gear}]")
+    with pytest.raises(SpringError, match="'slide': a gear turns, and this joint slides"):
+        layout(Robot.from_urdf(sliding_arm_urdf(), "tcp"), str(path))
+
+
 @pytest.mark.parametrize(
     ("text", "message"),
     [
@@ -139,6 +146,11 @@ def test_a_file_that_does_not_fit_is_refused_by_its_place(read, text, message):
     [
         ("springs: [{joint: joint_9}]", SpringError, "'joint_9'.*joint_1, joint_2"),
         ("springs: [{joint: joint_6, axis: [0, 0, 0]}]", SpringError, "not all zero"),
+        (
+            "springs: [{joint: joint_6, axis: x}, {joint: joint_6, axis: x}]",
+            SpringError,
+            "'joint_6.x' is listed twice",
+        ),
     ],
 )
 def test_springs_that_do_not_fit_the_robot_are_refused(read, text, error, message):

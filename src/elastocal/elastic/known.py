@@ -126,9 +126,20 @@ class Knowledge(StrictModel):
                 raise ValueError(f"{name} holds between torques: it needs {torques}")
         if self.T1 is not None and self.T2 is not None and not self.T1 < self.T2:
             raise ValueError("T1 must be below T2")
-        if self.bounds is not None and self.bounds[0].value == self.bounds[1].value:
-            raise ValueError("bounds must be two different values")
+        stated_gear = [each.value for each in (self.K1, self.K2, self.K3) if each is not None]
+        if stated_gear != sorted(stated_gear, reverse=True):
+            raise ValueError("K1, K2, K3 must grow: a gear stiffens with its torque")
+        self._require_bounds()
         return self
+
+    def _require_bounds(self) -> None:
+        if self.bounds is None:
+            return
+        low, high = sorted(bound.value for bound in self.bounds)
+        if low == high:
+            raise ValueError("bounds must be two different values")
+        if self.stiffness is not None and not low <= self.stiffness.value <= high:
+            raise ValueError("stiffness must lie within bounds")
 
     @property
     def knows(self) -> bool:

@@ -233,6 +233,16 @@ class CalibratedModel:
         model, tool = change_tool(self.model, self.tool, T_tcp_tool, mass, centre)
         return replace(self, model=model, tool=tool)
 
+    @property
+    def calibrated_model(self) -> ElasticModel:
+        """The model at the tool that it was calibrated with."""
+        if self.tool is None:
+            return self.model
+        robot = self.model.robot
+        tip = self.tool.calibrated_tcp
+        as_before = Robot.from_urdf(robot.urdf, tip, robot.base, robot.meshes)
+        return ElasticModel(replace(as_before, gravity=robot.gravity), self.model.springs)
+
     def interval(self) -> tuple[FloatArray, FloatArray]:
         """Return the 95 % intervals of the compliances, two arrays of shape (spring,)."""
         return interval(self.draws)
