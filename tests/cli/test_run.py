@@ -133,7 +133,31 @@ def test_a_dry_run_lists_the_steps_and_writes_nothing(planned, tmp_path):
         sum(step["seconds"] for step in figures["steps"]), abs=0.1
     )
     assert not (tmp_path / "dry").exists()
-    assert "Nothing was moved." in run(planned, tmp_path / "dry", "--dry-run").err
+    rehearsed = run(planned, tmp_path / "dry", "--dry-run")
+    assert "Nothing was moved." in rehearsed.err
+    plan, robot = read_plan(planned.plan), load_cell(planned.cell).robot
+    lines = [dict(word.split("=") for word in line.split()) for line in rehearsed.out.splitlines()]
+    assert [int(line["pose"]) for line in lines] == [0, 1, 2, 3]
+    for line, pose, begin in zip(lines, plan.poses, starts(plan), strict=True):
+        assert float(line["start[s]"]) == pytest.approx(begin, abs=0.06)
+        assert line["station"] == pose.seen_by
+        for name, value, turns in zip(robot.joint_names, pose.joints, robot.revolute, strict=True):
+            unit, scale = ("deg", np.degrees(1.0)) if turns else ("mm", 1e3)
+            assert float(line[f"{name}[{unit}]"]) == pytest.approx(scale * value, abs=1e-4)
+
+
+def starts(plan):
+    """Return when the way to each pose begins, by the plan's own times."""
+    each = [m.duration + p.contact_time for m, p in zip(plan.moves, plan.poses, strict=False)]
+    return np.cumsum([0.0, *each])[:-1]
+
+
+def test_a_dry_run_of_plan_writes_nothing_and_prints_the_poses_of_the_plan(planned, tmp_path):
+    out = tmp_path / "nothing"
+    result = elastocal("plan", planned.cell, "--out", out, "--compare", "none", "--dry-run")
+    assert (result.code, out.exists()) == (0, False)
+    assert "Nothing was written." in result.err
+    assert result.out == run(planned, tmp_path / "dry", "--dry-run").out
 
 
 def test_plan_rehearsal_run_and_krl_program_name_one_duration(planned, whole, tmp_path):

@@ -91,6 +91,7 @@ from .observability import (
     Term as Term,
     attainable_rank as attainable_rank,
     describe as describe,
+    describe_briefly as describe_briefly,
     find_faint as find_faint,
     observability as observability,
     sparse_basis as sparse_basis,

@@ -23,7 +23,7 @@ from elastocal.identification import (
     FrameSummary,
     SpringSummary,
     SuspiciousReading,
-    describe,
+    describe_briefly,
     ladder_sentence,
 )
 from elastocal.wording import (
@@ -46,8 +46,6 @@ if TYPE_CHECKING:
 _USUAL_UNIT = unit_of("rad/(N*m)")
 """The unit of most springs stands in the headings; other springs name their own."""
 _MOST_SUSPICIOUS = 10
-_MOST_TERMS = 6
-"""A combination of more springs than this tells a reader nothing."""
 
 
 def show_calibration(console: Console, result: CalibrateResult, out: Path) -> None:
@@ -273,8 +271,7 @@ def _show_groups(console: Console, figures: CalibrationSummary) -> None:
         f" {figures.condition:.0f}): {meaning}"
     )
     for number, group in enumerate(figures.unobservable, start=1):
-        shown = describe(group) if len(group) <= _MOST_TERMS else f"{len(group)} springs mixed"
-        console.print(f"   group {number}: {escape(shown)}")
+        console.print(f"   group {number}: {escape(describe_briefly(group))}")
 
 
 def _show_suspicious(console: Console, suspicious: tuple[SuspiciousReading, ...]) -> None:
