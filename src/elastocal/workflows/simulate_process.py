@@ -175,6 +175,11 @@ def _simulate(
             budget = run_budget(trial, courses, progress)
     name = _direction_name(settings)
     simulation, usual = cell.file.simulation, loads.pop(1.0)
+    covered = trials[0].model.coverage(
+        np.vstack([course.q for course in programmed]),
+        np.vstack([course.force for course in programmed]),
+        [course.name for course in programmed for _ in course.q],
+    )
     table = SimulateProcessResult(
         cell=cell.name,
         process=settings.kind or Path(str(settings.path)).name,
@@ -208,7 +213,11 @@ def _simulate(
         path_sha256="" if settings.path is None else sha256(read_text(settings.path)),
         preset=simulation.preset,
         process_stiffness=simulation.contact.process_stiffness,
-        notes=_notes(settings, programmed, len(runs)),
+        notes=(
+            *_notes(settings, programmed, len(runs)),
+            *(() if covered is None else (covered.sentence(),)),
+        ),
+        coverage=covered,
     )
     return process.SimulatedProcess(table, tuple(deviations)), programmed
 

@@ -29,6 +29,7 @@ from elastocal.compensation.process.statistics import (
     compare_deviations,
 )
 from elastocal.errors import CompensationError
+from elastocal.identification import ProductionCoverage
 from elastocal.records import read_json, record, write_json
 from elastocal.results import Result, brief_repr
 from elastocal.tables import TableError, TableRows, opened_table, write_table
@@ -92,6 +93,8 @@ class SimulateProcessResult(Result):
     """How the force reacts to the tool's shift along its axis, in N/m; 0: forces are given."""
     notes: tuple[str, ...] = ()
     """Sentences that a person must know."""
+    coverage: ProductionCoverage | None = None
+    """How much of the process the first model's calibration covers; none where it is not known."""
 
     def facts(self) -> tuple[tuple[str, str], ...]:
         """Return what a person wants to know first."""
