@@ -37,8 +37,17 @@ def _table(kind: str) -> str:
     return (
         f"{table}\n| paper | 18 springs | Table 1 | {paper.before[0]:.3f} → {paper.after[0]:.3f} |"
         f" {paper.reduction[0]:.2%} | {paper.before[1]:.3f} → {paper.after[1]:.3f} |"
-        f" {paper.reduction[1]:.2%} |\n\nMeans over {' or '.join(map(str, seeds))} seeds, in"
-        f" brackets their 95 % interval (Student's t). {paper.measures}"
+        f" {paper.reduction[1]:.2%} |\n\n{_over(seeds)} {paper.measures}"
+    )
+
+
+def _over(seeds: list[int]) -> str:
+    """Return how many seeds the figures are of."""
+    if seeds == [1]:
+        return "A single seed: there is no interval, and another seed has other figures."
+    return (
+        f"Means over {' or '.join(map(str, seeds))} seeds, in brackets their 95 % interval"
+        " (Student's t)."
     )
 
 
