@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given, strategies as st
 
 from elastocal.errors import UnitError
-from elastocal.units import factor, parse_quantity, split_column
+from elastocal.units import dimension_of, factor, impossible, parse_quantity, split_column
 
 
 @pytest.mark.parametrize(
@@ -98,3 +98,27 @@ def test_a_header_is_a_name_and_a_unit(header, expected):
 def test_a_header_of_another_form_is_refused(header):
     with pytest.raises(UnitError, match=r"is not of the form name\[unit\]"):
         split_column(header)
+
+
+@pytest.mark.parametrize(
+    ("dimension", "values", "words"),
+    [
+        ("length", (0.0, 1e160), "1e+160 m: the largest length is 1 km"),
+        ("length", (math.nan,), "nan m: it must be finite"),
+        ("mass", (-1.0,), "-1 kg: it must not be negative"),
+        ("mass", (1e300,), "1e+300 kg: the largest mass is 1000 t"),
+        ("rotational compliance", (1e9,), "1e+09 rad/(N*m): the largest rotational compliance"),
+        ("rotational compliance", (-1e-6, 1.0), None),
+        ("length", (-1e3, 1e3), None),
+    ],
+)
+def test_a_number_that_is_none_of_a_robot_cell_is_named(dimension, values, words):
+    problem = impossible(dimension, *values)
+    assert problem is None if words is None else problem.startswith(words)
+
+
+@pytest.mark.parametrize(
+    ("text", "dimension"), [("3 mm", "length"), ("1 Nm/arcmin", "rotational stiffness"), (3, None)]
+)
+def test_the_unit_says_the_dimension(text, dimension):
+    assert dimension_of(text) == dimension

@@ -43,18 +43,27 @@ _FACTORS: dict[str, dict[str, float]] = {
 }
 
 _LARGEST: dict[str, tuple[float, str]] = {
-    "length": (1e3, "1 km"),
+    "length": (1e3, "1 km"),  # the longest rails and halls are some hundred metres
     "angle": (200.0 * math.pi, "100 turns"),
-    "force": (1e7, "10 MN"),
+    "force": (1e7, "10 MN"),  # a large forging press
     "moment": (1e7, "10 MN·m"),
-    "mass": (1e6, "1000 t"),
+    "mass": (1e6, "1000 t"),  # the heaviest robots are some ten tonnes, gantries some hundred
     "speed": (1e3, "1 km/s"),
     "angular speed": (1e3, "1000 rad/s"),
     "force rate": (1e9, "1 GN/s"),
     "time": (1e6, "1e6 s"),
     "acceleration": (1e3, "1000 m/s2"),
+    # A metre under a newton, a radian under a newton metre: not even a toy's servo is as soft. The
+    # stiffest bearings of large machines have some 1e10 N/m and N·m/rad.
+    "rotational compliance": (1.0, "1 rad/(N·m)"),
+    "translational compliance": (1.0, "1 m/N"),
+    "rotational stiffness": (1e12, "1e12 N·m/rad"),
+    "translational stiffness": (1e12, "1e12 N/m"),
 }
-"""Largest magnitude of what belongs to a robot cell, in SI: more is a slip of the keyboard."""
+"""Largest magnitude of what belongs to a robot cell, in SI: more is a slip of the keyboard, or a
+damaged file. Whatever reads or makes such numbers asks here (`impossible`): within these, products
+of them are finite, so that a correction can only be a number."""
+_NEVER_NEGATIVE = ("mass", "rotational stiffness", "translational stiffness")
 _SMALLEST = 1e-12
 """Smallest magnitude of the same, in SI, but for 0."""
 
@@ -105,19 +114,47 @@ def parse_quantity(text: object, dimension: str) -> float:
     return value
 
 
+def impossible(dimension: str, *values: float) -> str | None:
+    """Return why a number in SI can be none of a robot cell's; None if all can. NaN is none.
+
+    >>> impossible("length", 0.5, 1e160)
+    '1e+160 m: the largest length is 1 km'
+    """
+    largest, name = _LARGEST[dimension]
+    for value in values:
+        text = f"{value:g} {next(iter(_FACTORS[dimension]))}"
+        if not math.isfinite(value):
+            return f"{text}: it must be finite"
+        if not abs(value) <= largest:
+            return f"{text}: the largest {dimension} is {name}"
+        if value < 0.0 and dimension in _NEVER_NEGATIVE:
+            return f"{text}: it must not be negative"
+    return None
+
+
+def dimension_of(quantity: object) -> str | None:
+    """Return the dimension of a quantity's unit; None if the text is no quantity.
+
+    >>> dimension_of("1.2 MN*m/rad")
+    'rotational stiffness'
+    """
+    match = _QUANTITY.fullmatch(quantity) if isinstance(quantity, str) else None
+    unit = match[2].strip() if match else ""
+    # A unit belongs to one dimension.
+    return next((name for name, table in _FACTORS.items() if unit in table), None)
+
+
 def in_unit_of(value: float, quantity: str) -> str | None:
     """Return an SI value in the unit of a quantity; None if the text is none.
 
     >>> in_unit_of(0.02, "25 mm/s")
     '20 mm/s'
     """
-    match = _QUANTITY.fullmatch(quantity)
-    unit = match[2].strip() if match else ""
-    # A unit belongs to one dimension.
-    for table in _FACTORS.values():
-        if unit in table:
-            return f"{value / table[unit]:.6g} {unit}"
-    return None
+    match, dimension = _QUANTITY.fullmatch(quantity), dimension_of(quantity)
+    if match is None or dimension is None:
+        return None
+    unit = match[2].strip()
+    return f"{value / _FACTORS[dimension][unit]:.6g} {unit}"
 
 
 def parse_point(text: str) -> tuple[float, float, float]:

@@ -8,7 +8,7 @@ from elastocal.errors import CompensationError
 @pytest.mark.parametrize(
     ("change", "reason"),
     [
-        ({"mass": -1.0}, "mass of the tool is -1.0 kg"),
+        ({"mass": -1.0}, "mass of the tool is -1 kg"),
         ({"mass": np.nan}, "mass of the tool is nan kg"),
         ({"centre": [0.0, np.inf, 0.0]}, "centre of the tool must be finite"),
         ({"moment_bias": [0.0]}, "moment_bias of the tool must be finite numbers of shape"),

@@ -154,6 +154,9 @@ def test_rows_of_a_visit_share_what_friction_remembers_and_every_row_is_of_one(t
     refused = elastocal("predict", *arguments, "--out", tmp_path / "out.csv")
     assert refused.code == 1
     assert "row 4, column 'visit': empty, but every row is of some visit" in refused.reason
+    (tmp_path / "visits.csv").write_text("\n".join(["Visits" + lines[0][5:], *lines[1:]]) + "\n")
+    refused = elastocal("predict", *arguments, "--out", tmp_path / "out.csv")
+    assert "column 'Visits' is written 'visit'" in refused.reason
 
 
 def test_predict_with_a_model_that_does_not_know_its_misfit_says_what_is_missing(folder):

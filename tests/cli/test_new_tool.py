@@ -137,6 +137,11 @@ def test_a_process_is_simulated_with_the_cells_tool_by_a_model_of_another_one(fo
         (("--tool-mass", "3 kg"), "a tool's mass needs its tcp"),
         (("--tool", LONGER, "--tool-mass", "3 kg"), "both a mass and a centre"),
         (("--tool", LONGER, "--tool-mass", "3 mm"), "unit 'mm'"),
+        (("--tool", LONGER.replace("100 mm", "100 m")), "tcp lies 100 m from the calibrated one"),
+        (
+            ("--tool", LONGER, "--tool-mass", "3 kg", "--tool-centre", "0 m, 80 m, 0 m"),
+            "centre of mass lies 80 m from its tcp",
+        ),
     ],
 )
 def test_a_tool_that_is_not_understood_is_refused_in_one_line(folder, given, why):

@@ -77,7 +77,7 @@ def test_a_run_commits_every_pose_and_writes_the_dataset(whole):
 def test_the_live_view_names_each_pose(whole):
     lines = whole[1].err.splitlines()
     assert sum(line.startswith("pose ") for line in lines) == 4
-    assert lines[0].startswith("pose 1 of 4")
+    assert lines[0].startswith("pose 0 (1 of 4)")
 
 
 def test_the_copies_in_the_folder_are_the_cell_and_the_plan(planned, whole):
@@ -133,7 +133,31 @@ def test_a_dry_run_lists_the_steps_and_writes_nothing(planned, tmp_path):
         sum(step["seconds"] for step in figures["steps"]), abs=0.1
     )
     assert not (tmp_path / "dry").exists()
-    assert "Nothing was moved." in run(planned, tmp_path / "dry", "--dry-run").err
+    rehearsed = run(planned, tmp_path / "dry", "--dry-run")
+    assert "Nothing was moved." in rehearsed.err
+    plan, robot = read_plan(planned.plan), load_cell(planned.cell).robot
+    lines = [dict(word.split("=") for word in line.split()) for line in rehearsed.out.splitlines()]
+    assert [int(line["pose"]) for line in lines] == [0, 1, 2, 3]
+    for line, pose, begin in zip(lines, plan.poses, starts(plan), strict=True):
+        assert float(line["start[s]"]) == pytest.approx(begin, abs=0.06)
+        assert line["station"] == pose.seen_by
+        for name, value, turns in zip(robot.joint_names, pose.joints, robot.revolute, strict=True):
+            unit, scale = ("deg", np.degrees(1.0)) if turns else ("mm", 1e3)
+            assert float(line[f"{name}[{unit}]"]) == pytest.approx(scale * value, abs=1e-4)
+
+
+def starts(plan):
+    """Return when the way to each pose begins, by the plan's own times."""
+    each = [m.duration + p.contact_time for m, p in zip(plan.moves, plan.poses, strict=False)]
+    return np.cumsum([0.0, *each])[:-1]
+
+
+def test_a_dry_run_of_plan_writes_nothing_and_prints_the_poses_of_the_plan(planned, tmp_path):
+    out = tmp_path / "nothing"
+    result = elastocal("plan", planned.cell, "--out", out, "--compare", "none", "--dry-run")
+    assert (result.code, out.exists()) == (0, False)
+    assert "Nothing was written." in result.err
+    assert result.out == run(planned, tmp_path / "dry", "--dry-run").out
 
 
 def test_plan_rehearsal_run_and_krl_program_name_one_duration(planned, whole, tmp_path):
@@ -149,13 +173,25 @@ def test_plan_rehearsal_run_and_krl_program_name_one_duration(planned, whole, tm
 
 def test_a_folder_that_holds_a_run_is_refused(planned, whole):
     reason = run(planned, whole[0]).reason
-    assert "holds this run already (4 of 4 poses committed): go on with --resume" in reason
+    assert "holds this run already (4 of 4 poses committed): nothing is left to do" in reason
+    assert "--resume" not in reason
+    assert "for a new run name another folder" in reason
+
+
+def test_resume_is_advised_with_what_it_would_do(planned, whole, tmp_path):
+    lines = RunFolder(whole[0]).journal.read_text().splitlines(keepends=True)
+    commits = [number for number, line in enumerate(lines) if '"event":"commit"' in line]
+    for last, words in ((commits[1], "--resume measures pose 2, 3"), (commits[3], "to HOME")):
+        out = tmp_path / str(last)
+        shutil.copytree(whole[0], out)
+        RunFolder(out).journal.write_text("".join(lines[: last + 1]))
+        assert words in run(planned, out).reason
 
 
 def test_a_folder_that_holds_another_run_is_refused(planned, whole):
     for more in ((), ("--resume", "--yes")):
         reason = run(planned, whole[0], "--seed", 5, *more).reason
-        assert "holds another run: its seed is 0, not 5" in reason
+        assert "holds another run: its seed is 0, not 5; to go on with it give --seed 0" in reason
 
 
 def test_a_folder_that_holds_something_else_is_refused(planned, tmp_path):

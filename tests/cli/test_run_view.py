@@ -42,7 +42,10 @@ def test_each_pose_has_its_line():
             tell(report(pose))
         tell(report(2, attempt=2))
     lines = text.getvalue().splitlines()
-    assert [line[:11] for line in lines] == ["pose 1 of 9", "pose 2 of 9", *["pose 3 of 9"] * 2]
+    assert [line[:15] for line in lines] == [
+        *("pose 0 (1 of 9)", "pose 1 (2 of 9)"),
+        *["pose 2 (3 of 9)"] * 2,
+    ]
 
 
 def test_a_terminal_shows_the_newest_report():
@@ -50,7 +53,7 @@ def test_a_terminal_shows_the_newest_report():
     with watching(Console(file=text, force_terminal=True, width=100), 9) as tell:
         for pose in range(9):
             tell(report(pose))
-    assert "pose 9 of 9" in text.getvalue()
+    assert "pose 8 (9 of 9)" in text.getvalue()
 
 
 @pytest.mark.parametrize("terminal", [True, False])

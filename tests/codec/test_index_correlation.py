@@ -232,3 +232,11 @@ def test_table_has_a_row_for_every_training_set_without_loss(known, tmp_path):
     assert (
         float(row["covering_radius[m]"]) == known.insight.indices[1].values["covering_radius"][3, 4]
     )
+
+
+def test_the_table_names_poses_as_the_dataset_does(known, tmp_path):
+    labels = tuple((100 + place,) for place in range(len(known.data.pose_labels)))
+    data = replace(known.data, pose_labels=labels)
+    path = write_index_table(tmp_path, data, known.insight.indices)
+    rows = list(csv.DictReader(path.read_text().splitlines()))
+    assert {int(row["seed_pose"]) for row in rows} == set((100 + known.data.seed_pose).tolist())

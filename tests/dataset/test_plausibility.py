@@ -79,6 +79,17 @@ def test_a_single_blunder_of_half_a_metre_is_left_to_the_fit():
     )
 
 
+def test_a_reference_loaded_more_than_its_pose_is_refused():
+    """Raw wrenches with the tool's weight in them, or another unit."""
+    largest = np.linalg.norm(ARGUMENTS["force"], axis=2).max(axis=1)
+    light = np.zeros((3, 3))
+    light[:, 2] = largest * [0.9, 1.1, 0.0]
+    with pytest.raises(DatasetError, match=r"^reference_force of pose 1 is .* more than its"):
+        dataset(reference_force=light)
+    light[1] = 0.0
+    assert dataset(reference_force=light).poses == (0, 1, 2)
+
+
 def test_a_joint_at_its_widest_range_is_plausible():
     joints = np.full((3, 2, 2), np.radians(690.0))
     assert dataset(joint_position=joints).poses == (0, 1, 2)

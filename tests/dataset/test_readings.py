@@ -87,6 +87,15 @@ def test_one_name_to_exclude_is_not_split_into_letters():
     assert without(readings, ["1", "2"]).pose.tolist() == [12]
 
 
+def test_friction_remembers_a_press_whose_reading_is_excluded():
+    readings = READINGS.take([0, 1, 2, 3])
+    left = without(readings, f"{readings.pose[0]}:{readings.load_case[0]}")
+    assert len(left) == 3
+    np.testing.assert_array_equal(left.also_pressed.force, readings.force[:1])
+    assert left.sequence.tolist() == [1, 2, 3]
+    assert left.also_pressed.sequence.tolist() == [0]
+
+
 def test_a_name_that_excludes_nothing_is_refused_without_an_option_of_the_command():
     readings = READINGS.take([0, 2, 4])
     readings = replace(readings, pose=[1, 2, 12])

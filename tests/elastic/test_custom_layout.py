@@ -108,6 +108,13 @@ def test_an_axial_spring_takes_the_kind_of_its_joint(tmp_path):
     assert [spring.revolute for spring in layout(sliding, str(path))] == [False, True]
 
 
+def test_a_joint_that_slides_has_no_gear(tmp_path):
+    path = tmp_path / "springs.yaml"
+    path.write_text(HEAD + "springs: [{joint: slide, kind: gear}]")
+    with pytest.raises(SpringError, match="'slide': a gear turns, and this joint slides"):
+        layout(Robot.from_urdf(sliding_arm_urdf(), "tcp"), str(path))
+
+
 @pytest.mark.parametrize(
     ("text", "message"),
     [
@@ -139,6 +146,11 @@ def test_a_file_that_does_not_fit_is_refused_by_its_place(read, text, message):
     [
         ("springs: [{joint: joint_9}]", SpringError, "'joint_9'.*joint_1, joint_2"),
         ("springs: [{joint: joint_6, axis: [0, 0, 0]}]", SpringError, "not all zero"),
+        (
+            "springs: [{joint: joint_6, axis: x}, {joint: joint_6, axis: x}]",
+            SpringError,
+            "'joint_6.x' is listed twice",
+        ),
     ],
 )
 def test_springs_that_do_not_fit_the_robot_are_refused(read, text, error, message):
@@ -159,3 +171,16 @@ def test_a_name_that_is_no_layout_is_refused_with_the_nearest():
 def test_a_missing_file_is_refused_by_its_path(tmp_path):
     with pytest.raises(FileAccessError, match=r"cannot read .*none\.yaml"):
         layout(robot(), str(tmp_path / "none.yaml"))
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("1e-3 N*m/rad", "is 1000 rad/.N.m.: the largest rotational compliance is 1 rad"),
+        ("1e13 N*m/rad", "'1e13 N.m/rad' is too large: the largest rotational stiffness"),
+        ("2 km", "is not a stiffness or compliance with its unit"),
+    ],
+)
+def test_a_stiffness_that_no_arm_has_is_refused(read, text, message):
+    with pytest.raises(SchemaError, match=message):
+        read(f'springs: [{{joint: joint_6, axis: x, stiffness: "{text}", uncertainty: "20 %"}}]')

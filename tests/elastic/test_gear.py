@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from elastocal.elastic import FrictionElements, Gear, SpringLoad
+from elastocal.errors import SpringError
 
 GEAR = Gear("a.gear", "a", (0.0, 0.0, 1.0), knees=(400.0,), slips=(50.0, 150.0))
 C = np.array([2e-7, 3e-7, 1e-7, 4e-7])
@@ -54,3 +55,16 @@ def test_makers_stiffnesses_are_the_slope_without_torque_and_at_the_middle_knee(
             np.array(gear.angles(SpringLoad((np.array(torque + by),)))[0]) for by in (0.1, -0.1)
         )
         assert np.dot(stated.weights, c) == pytest.approx((ahead - behind) @ c / 0.2, rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("torques", "message"),
+    [
+        ({"knees": (300.0, 1e300)}, "a knee of gear 'a.gear' is 1e.300 N.m: the largest moment"),
+        ({"knees": (0.0,)}, "a knee of gear 'a.gear' is 0 N.m: it must be above 0"),
+        ({"slips": (-5.0,)}, "a slip of gear 'a.gear' is -5 N.m: it must be above 0"),
+    ],
+)
+def test_torques_that_no_gear_bears_are_refused(torques, message):
+    with pytest.raises(SpringError, match=message):
+        Gear("a.gear", "a", (0.0, 0.0, 1.0), **torques)

@@ -190,9 +190,9 @@ def test_an_unknown_technique_is_refused_before_the_long_work(tmp_path):
     assert "did you mean 'cover'" in reason
 
 
-def test_i_optimal_without_a_process_says_what_it_needs(tmp_path):
-    reason = refusal(tmp_path, ("technique: cover", "technique: i_optimal"))
-    assert "process" in reason
+def test_an_accuracy_without_a_process_says_what_it_needs(tmp_path):
+    reason = refusal(tmp_path, ("technique: cover", 'accuracy: "0.05 mm"'))
+    assert "process.file" in reason
 
 
 def test_a_folder_that_holds_files_is_left_alone(tmp_path):

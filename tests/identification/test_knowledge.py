@@ -84,6 +84,20 @@ def test_a_layout_by_name_knows_nothing():
             ' uncertainty: "20 %"',
             "T1 must be below T2",
         ),
+        (
+            'joint: joint_2, kind: gear, K1: "5 MN*m/rad", T1: "300 N*m", T2: "900 N*m",'
+            ' K3: "1 MN*m/rad", uncertainty: "20 %"',
+            "K1, K2, K3 must grow: a gear stiffens",
+        ),
+        (
+            'joint: joint_2, bounds: ["1 MN*m/rad", "2 MN*m/rad"], stiffness: "3 MN*m/rad",'
+            ' uncertainty: "20 %"',
+            "stiffness must lie within bounds",
+        ),
+        (
+            'joint: joint_2, stiffness: "1e-9 N*m/rad", uncertainty: "2 %"',
+            "largest rotational compliance",
+        ),
     ],
 )
 def test_what_cannot_be_meant_is_refused_in_one_line(tmp_path, spring, message):

@@ -129,6 +129,14 @@ def test_the_figures_of_the_calibration_stand_in_the_file(path):
         (["compliance", 0], "soft", r"compliance\.0: .*got 'soft'"),
         (["compliance", 0], float("nan"), r"compliance\.0: .*finite"),
         (["draws", 0, 1], float("inf"), r"draws\.0\.1: .*finite"),
+        (["compliance", 0], 1e9, r"1e\+09 rad/\(N\*m\): the largest rotational compliance is 1 "),
+        (["draws", 0, 1], -1e9, "draws of spring .* is -1e.09 rad"),
+        (["robot", "gravity"], [0.0, 0.0, -1e300], "robot.gravity is -1e.300 m/s2: the largest"),
+        (
+            ["tool"],
+            {"calibrated_tcp": "tcp", "pose": [1e160, 0, 0, 0, 0, 0]},
+            "pose of the tool is 1e.160 m: the largest length is 1 km",
+        ),
         (["springs", 0, "offset", 1], float("inf"), r"springs\.0\.offset\.1: .*finite"),
         (["springs", 0, "axes"], [1, 0, 0], r"'springs\.0\.axes'; did you mean 'axis'"),
         (["observability", "observable"], [True], "observab"),
@@ -149,6 +157,7 @@ def test_a_file_that_contradicts_itself_is_refused(edited, where, value, message
         (["robot", "tcp"], "spindle", RobotError, "no tip link 'spindle'"),
         (["springs", 8, "joint"], "joint_9", SpringError, "'joint_9'"),
         (["springs", 8, "axis"], [0.0, 0.0, 2.0], SpringError, "unit vector"),
+        (["springs", 8, "offset"], [0.0, 1e160, 0.0], SpringError, "the largest length is 1 km"),
         (["springs", 8, "name"], "joint_1.axial", SpringError, "listed twice"),
     ],
 )

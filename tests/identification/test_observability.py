@@ -19,6 +19,7 @@ from elastocal.identification import (
     build,
     calibrate,
     describe,
+    describe_briefly,
     factor,
     observability,
     solve,
@@ -256,6 +257,25 @@ def test_weights_of_parameters_of_other_units_count_in_their_sensible_sizes():
     ((first, second),) = found.unobservable
     assert (first.spring, second.spring) == ("big", "small")
     assert (first.weight, second.weight) == pytest.approx((1.0, -1e-8))
+
+
+def test_a_spring_with_but_a_trace_in_a_combination_is_observable():
+    """Rich models have combinations that are all but invisible, with a part of every spring."""
+    springs = [
+        SimpleNamespace(parameters=(Parameter(name, name, HINGE, 1.0),)) for name in ("a", "b", "c")
+    ]
+    hidden = np.array([1.0, -0.5, 0.005])
+    seen = np.linalg.svd(hidden[None] / np.linalg.norm(hidden))[2]
+    system = Factored(np.array([1.0, 0.9, 0.0]), np.roll(seen, -1, axis=0), np.zeros(3), np.ones(3))
+    found = observability(system, springs)
+    assert [describe(group) for group in found.unobservable] == ["a - 0.5 b"]
+    assert found.observable == (False, False, True)
+
+
+def test_a_long_combination_is_told_by_its_size():
+    terms = [Term(name, 1.0) for name in "abcdefg"]
+    assert describe_briefly(terms[:2]) == "(a + b)"
+    assert describe_briefly(terms) == "7 springs mixed"
 
 
 def test_a_marker_on_the_axis_of_the_last_joint_never_shows_its_spring():

@@ -179,6 +179,32 @@ def test_springs_that_only_the_new_tool_loads_are_named():
         len(names) - 1, 9.0, tuple(name != last for name in names), ((Term(last, 1.0),),)
     )
     calibrated = CalibratedModel(model, np.full(18, 1e-7), np.full((40, 18), 1e-7), seen)
-    assert unseen_groups(model, seen) == ()
-    assert unseen_groups(calibrated.with_tool(LONGER).model, seen) == ()
-    assert unseen_groups(calibrated.with_tool(ASIDE).model, seen) == seen.unobservable
+    assert unseen_groups(calibrated.with_tool(LONGER).model, seen, model) == ()
+    assert unseen_groups(calibrated.with_tool(ASIDE).model, seen, model) == seen.unobservable
+
+
+def test_a_combination_that_both_tools_load_alike_is_no_matter_of_the_tool():
+    """Few poses hide what forces elsewhere load; the tool has no part in it."""
+    robot = Robot.from_urdf(URDF, "tcp")
+    model = ElasticModel(robot, bearing(robot))
+    names = model.parameter_names
+    hidden = (Term("joint_a2.axial", 1.0),)
+    seen = Observability(
+        len(names) - 1, 9.0, tuple(n != hidden[0].spring for n in names), (hidden,)
+    )
+    calibrated = CalibratedModel(model, np.full(18, 1e-7), np.full((40, 18), 1e-7), seen)
+    for tool in (np.eye(4), LONGER, ASIDE):
+        other = calibrated.with_tool(tool)
+        assert unseen_groups(other.model, seen, other.calibrated_model) == ()
+
+
+def test_the_model_at_the_calibrated_tool_is_found_again():
+    robot = Robot.from_urdf(URDF, "tcp")
+    model = ElasticModel(replace(robot, gravity=(0.0, 9.8, 0.0)), bearing(robot))
+    seen = Observability(18, 9.0, (True,) * 18, ())
+    calibrated = CalibratedModel(model, np.full(18, 1e-7), np.full((40, 18), 1e-7), seen)
+    again = calibrated.with_tool(LONGER).with_tool(ASIDE).calibrated_model
+    np.testing.assert_allclose(
+        again.observation_blocks(Q, FORCE), model.observation_blocks(Q, FORCE), rtol=1e-12
+    )
+    np.testing.assert_allclose(again.sag_blocks(Q), model.sag_blocks(Q), rtol=1e-12)

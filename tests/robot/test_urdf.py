@@ -200,6 +200,33 @@ class TestRefusals:
             read_chain(text, "tcp", "base")
         assert capfd.readouterr() == ("", "")
 
+    @pytest.mark.parametrize(
+        ("old", "new", "message"),
+        [
+            (
+                '<link name="a"/>',
+                '<link name="a"><inertial><mass value="-2"/></inertial></link>',
+                "link 'a': <mass value='-2'> is -2 kg: it must not be negative",
+            ),
+            (
+                '<link name="a"/>',
+                '<link name="a"><inertial><mass value="1e300"/></inertial></link>',
+                "link 'a': <mass value='1e300'> is 1e+300 kg: the largest mass is 1000 t",
+            ),
+            ('axis xyz="0 0 1"', 'axis xyz="1e200 0 0"', "must have a length from 1e-06 to 1e+06"),
+            (
+                'origin xyz="0 0 1"',
+                'origin xyz="0 1e160 0"',
+                "<origin xyz='0 1e160 0'> is 1e+160 m: the largest length is 1 km",
+            ),
+        ],
+    )
+    def test_what_no_robot_has_is_refused(self, old, new, message):
+        assert old in TWO_JOINTS
+        with pytest.raises(RobotError) as caught:
+            read_chain(TWO_JOINTS.replace(old, new, 1), "tcp", "base")
+        assert message in str(caught.value)
+
     def test_a_refusal_names_the_file(self, tmp_path):
         path = tmp_path / "bad.urdf"
         path.write_text(TWO_JOINTS.replace('name="j2"', ""))

@@ -31,7 +31,22 @@ def test_a_model_of_other_readings_is_doubted(copied):
     model.write_text(json.dumps(record))
     parts = gather_evidence(EvidenceOptions(folder), MADE)
     assert not parts.reproduction.same
-    assert any("does not give the figures of the model file" in doubt for doubt in parts.doubts)
+    (doubt,) = (d for d in parts.doubts if "does not give the figures of the model file" in d)
+    assert "of other data or other settings, or was made by an earlier version" in doubt
+
+
+def test_a_model_of_an_earlier_version_is_named_as_the_reason(copied):
+    folder = copied("run", "model.json")
+    model = folder / "model.json"
+    record = json.loads(model.read_text())
+    record["calibration"]["held_out"]["mean"] *= 1.01
+    # What calibrations of before did not say.
+    del record["calibration"]["spring_count"], record["calibration"]["coverage"]
+    model.write_text(json.dumps(record))
+    parts = gather_evidence(EvidenceOptions(folder), MADE)
+    (doubt,) = (d for d in parts.doubts if "does not give the figures of the model file" in d)
+    assert "the model was made by an earlier version of elastocal; calibrate again" in doubt
+    assert "other data" not in doubt
 
 
 def test_a_model_of_another_robot_is_no_part_of_the_run(copied, tmp_path):

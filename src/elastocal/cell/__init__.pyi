@@ -10,7 +10,6 @@ from .cell import (
     TOOLING as TOOLING,
     Cell as Cell,
     CellFile as CellFile,
-    ProcessFile as ProcessFile,
     load_cell as load_cell,
 )
 from .devices import (
@@ -64,6 +63,7 @@ from .motion import (
     external_positions as external_positions,
     home_position as home_position,
     joint_margins as joint_margins,
+    joint_positions as joint_positions,
     torque_limits as torque_limits,
 )
 from .presets import (
@@ -88,6 +88,11 @@ from .procedure import (
     ProcedureSettings as ProcedureSettings,
     Search as Search,
     TorqueLimits as TorqueLimits,
+)
+from .production import (
+    ProcessFile as ProcessFile,
+    ProductionPath as ProductionPath,
+    read_production as read_production,
 )
 from .sensor import (
     SENSOR_CORRECTED as SENSOR_CORRECTED,

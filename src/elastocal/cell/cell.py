@@ -40,8 +40,8 @@ from elastocal.cell.procedure import (
     ProcedureSettings,
     Search,
 )
+from elastocal.cell.production import ProcessFile, ProductionPath, read_production
 from elastocal.cell.simulation import Fault, Simulation
-from elastocal.dataset import LoadRows, joint_dimensions, read_load_rows
 from elastocal.errors import ElastocalError, FileAccessError, SchemaError
 from elastocal.files import read_text
 from elastocal.records import StrictModel, read_yaml
@@ -61,14 +61,6 @@ from elastocal.robot import (
 SCHEMA = "elastocal.cell/1"
 TOOLING = "tooling"
 """Name of the surface among the solids of the cell; no fixture may have it."""
-
-
-class ProcessFile(StrictModel):
-    """Poses and forces of the production process."""
-
-    file: str
-    """CSV with joint and force columns (the ROWS.csv of `elastocal predict`), relative to the
-    cell file."""
 
 
 class CellFile(StrictModel):
@@ -190,7 +182,7 @@ class Cell:
     """Joint positions where the robot starts and ends, shape (joint,), in rad or m."""
     axis_speeds: FloatArray
     """Speeds that are used between poses, override included, shape (joint,), in rad/s or m/s."""
-    process: LoadRows | None = None
+    process: ProductionPath | None = None
     """Poses and forces of the production process."""
 
     def __repr__(self) -> str:
@@ -200,6 +192,13 @@ class Cell:
     def name(self) -> str:
         """Name that the file gives the cell, else the name of its folder."""
         return self.file.name or self.path.resolve().parent.name
+
+    @property
+    def technique(self) -> str:
+        """Search technique: that of the file, else I-optimality where a process is named."""
+        search = self.file.search
+        is_named = "technique" in search.model_fields_set
+        return "i_optimal" if self.process is not None and not is_named else search.technique
 
     @property
     def T_flange_tcp(self) -> FloatArray:
@@ -267,13 +266,15 @@ class Cell:
         return self.path.parent / file
 
 
-def load_cell(path: Path) -> Cell:
+def load_cell(path: Path, *, production: bool = True) -> Cell:
     """Return the cell that a file describes.
 
     Parameters
     ----------
     path : Path
         YAML with the schema ``elastocal.cell/1``; the files that it names are relative to it.
+    production : bool
+        Whether the production path is read; not while it is yet to be made.
 
     Raises
     ------
@@ -294,7 +295,12 @@ def load_cell(path: Path) -> Cell:
     for key, mesh in _meshes(file):
         if not (path.parent / mesh.file).is_file():
             raise FileAccessError(f"{path}: {key}.file: there is no file {path.parent / mesh.file}")
-    process = _at(f"{path}: process.file", lambda: _process(path, file, robot))
+    process, entry = None, file.process
+    if entry is not None and production:
+        process = _at(
+            f"{path}: process.file",
+            lambda: read_production(path.parent / entry.file, entry, robot, home, positions),
+        )
     for array in (positions, torques, home, speeds):
         array.setflags(write=False)
     return Cell(path, file, robot, positions, torques, home, speeds, process)
@@ -334,10 +340,3 @@ def _meshes(file: CellFile) -> list[tuple[str, MeshFile]]:
 
     tool, fixtures = of("tool.shapes", file.tool.shapes), of("fixtures", file.fixtures)
     return [("surface", file.surface), *tool, *fixtures]
-
-
-def _process(path: Path, file: CellFile, robot: Robot) -> LoadRows | None:
-    if file.process is None:
-        return None
-    joints = joint_dimensions(robot.joint_names, robot.revolute)
-    return read_load_rows(path.parent / file.process.file, joints)

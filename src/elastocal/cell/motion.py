@@ -2,7 +2,7 @@
 
 import itertools
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from typing import Annotated
 
 import numpy as np
@@ -61,14 +61,21 @@ class MotionEntry(StrictModel):
 
 
 def home_position(robot: Robot, entry: MotionEntry) -> FloatArray:
-    """Return the joint positions of HOME.
+    """Return the joint positions of HOME; see `joint_positions`."""
+    return joint_positions(robot, "home", entry.home)
+
+
+def joint_positions(robot: Robot, key: str, positions: Mapping[str, str]) -> FloatArray:
+    """Return a posture that a cell file gives joint by joint.
 
     Parameters
     ----------
     robot : Robot
         The robot, with its rail.
-    entry : MotionEntry
-        What the cell file says.
+    key : str
+        The key of the cell file, for refusals.
+    positions : mapping of str to str
+        Position of every joint with its unit, by name.
 
     Returns
     -------
@@ -82,23 +89,23 @@ def home_position(robot: Robot, entry: MotionEntry) -> FloatArray:
     UnitError
         If a position has no unit or a wrong one.
     """
-    _require_joints(robot, "home: ", entry.home)
-    limits, home = robot.limits, np.empty(len(robot.joint_names))
+    _require_joints(robot, f"{key}: ", positions)
+    limits, found = robot.limits, np.empty(len(robot.joint_names))
     for index, name in enumerate(robot.joint_names):
-        if name not in entry.home:
+        if name not in positions:
             raise RobotError(
-                f"home.{name} is missing: every joint needs a position"
+                f"{key}.{name} is missing: every joint needs a position"
                 f" (joints: {', '.join(robot.joint_names)})"
             )
-        home[index] = _parse(f"home.{name}", entry.home[name], robot.revolute[index])
+        found[index] = _parse(f"{key}.{name}", positions[name], robot.revolute[index])
         lower, upper = limits.lower[index], limits.upper[index]
-        if not lower <= home[index] <= upper:
+        if not lower <= found[index] <= upper:
             one, unit = (math.radians(1.0), "deg") if robot.revolute[index] else (1e-3, "mm")
             raise RobotError(
-                f"home.{name}: {entry.home[name]} must be within {lower / one:g} {unit} and"
+                f"{key}.{name}: {positions[name]} must be within {lower / one:g} {unit} and"
                 f" {upper / one:g} {unit}"
             )
-    return home
+    return found
 
 
 def axis_speeds(robot: Robot, entry: MotionEntry) -> FloatArray:

@@ -248,13 +248,22 @@ class Search(StrictModel):
     """Pool and technique; ends at ``poses`` or at ``d_max``, whichever comes first."""
 
     technique: str = "cover"
-    """Name of a search technique (`elastocal.planning.search`)."""
+    """Name of a search technique (`elastocal.planning.search`); `Cell.technique` says which is
+    taken where the file names none."""
     metric: Literal["euclidean", "geodesic"] = "euclidean"
     """How COVER measures the distance between contact points."""
     poses: Annotated[int, Field(ge=1, le=_MOST_CANDIDATES)] | None = None
     """Largest number of poses N."""
     d_max: PositiveLength | None = None
     """Cover distance at which COVER may stop, in m."""
+    accuracy: PositiveLength | None = None
+    """Error on production that is wanted, in m: as few poses as it is expected from."""
+    sigma: PositiveLength | None = None
+    """Standard deviation of a measured coordinate of a deflection that errors are expected with, in
+    m; by default that of a laser tracker at some metres."""
+    floor: PositiveLength | None = None
+    """Error that the model leaves however many poses there are, in m, as `elastocal study` finds
+    it; not known by default."""
     pool: Annotated[int, Field(ge=1, le=_MOST_CANDIDATES)] = 3000
     """Number of candidates."""
     sampling: Literal["blue_noise", "uniform"] = "blue_noise"

@@ -25,6 +25,7 @@ from elastocal.arrays import FloatArray
 from elastocal.errors import CompensationError
 from elastocal.results import brief_repr
 from elastocal.robot import GRAVITY
+from elastocal.units import impossible
 
 SENSOR_CORRECTED = "sensor corrected by a tool file"
 """In the provenance of data whose forces were corrected by a tool file's rotation and matrix."""
@@ -100,12 +101,25 @@ class SensorLoad:
             ("matrix", (6, 6)),
         ):
             object.__setattr__(self, name, _finite(name, getattr(self, name), shape))
-        if not 0.0 <= self.mass < np.inf:
-            raise CompensationError(f"mass of the tool is {self.mass} kg: it must be 0 or above")
+        for name, dimension, values in (
+            ("mass", "mass", (self.mass,)),
+            ("centre", "length", self.centre),
+            ("force_bias", "force", self.force_bias),
+            ("moment_bias", "moment", self.moment_bias),
+            ("place of the sensor", "length", self.T_tcp_sensor[:3, 3]),
+            ("gravity", "acceleration", self.gravity),
+        ):
+            problem = impossible(dimension, *map(float, values))
+            if problem is not None:
+                raise CompensationError(f"{name} of the tool is {problem}")
         response = (
             weight_response(self.mass, self.centre) if self.response is None else self.response
         )
         object.__setattr__(self, "response", _finite("response", response, (6, 3)))
+        # What a reading gives way per gravity: a mass, and a mass times a lever of some metres.
+        problem = impossible("mass", *np.abs(response).ravel().tolist())
+        if problem is not None:
+            raise CompensationError(f"response of the tool is {problem}")
         R = self.T_tcp_sensor[:3, :3]
         if not np.abs(R @ R.T - np.eye(3)).max() <= _RIGID or not np.linalg.det(R) > 0.0:
             raise CompensationError("T_tcp_sensor of the tool does not hold a rotation")

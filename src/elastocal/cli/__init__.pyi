@@ -18,4 +18,9 @@ from .options import (
     parse_limit as parse_limit,
     split_tools as split_tools,
 )
-from .output import console as console, print_json as print_json, progress_bars as progress_bars
+from .output import (
+    console as console,
+    print_json as print_json,
+    print_lines as print_lines,
+    progress_bars as progress_bars,
+)

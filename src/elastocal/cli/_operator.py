@@ -36,9 +36,11 @@ def progress_text(step: Progress) -> str:
 
     >>> from elastocal.procedure.run import Step
     >>> progress_text(Progress(1.0, 3, 31, 2, 1, Step.SETTLE, "north", 1135.2, 4e-5, 754.0))
-    'pose 3 of 31  settle north  1135 N  slip 0.04 mm  13 min left'
+    'pose 2 (3 of 31)  settle north  1135 N  slip 0.04 mm  13 min left'
     """
-    where = f"pose {step.number} of {step.count}" if step.pose is not None else "to HOME"
+    where = "to HOME"
+    if step.pose is not None:
+        where = f"pose {step.pose} ({step.number} of {step.count})"
     again = f" (attempt {step.attempt})" if step.attempt > 1 else ""
     what = f"{step.step.value} {step.load_case or ''}".rstrip()
     return (

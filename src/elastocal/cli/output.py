@@ -5,7 +5,7 @@ Rich is imported when something is printed: help does without most of it.
 
 import json
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
@@ -28,6 +28,12 @@ def print_json(data: object) -> None:
 
     sys.stdout.write(json.dumps(to_data(data), allow_nan=False) + "\n")
     # A disk that is full is to be known now, not when Python ends.
+    sys.stdout.flush()
+
+
+def print_lines(lines: Iterable[str]) -> None:
+    """Print lines on standard output, for programs."""
+    sys.stdout.writelines(f"{line}\n" for line in lines)
     sys.stdout.flush()
 
 

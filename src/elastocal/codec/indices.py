@@ -144,7 +144,7 @@ def _rows(data: CodecData, indices: IndexValues) -> Iterator[list[object]]:
     columns = [*(indices.values[name] for name in INDICES), *errors]
     for cv, n in np.ndindex(columns[0].shape):
         numbers = [float(column[cv, n]) for column in columns]
-        yield [indices.variant, data.seed_pose[cv], data.n_train[n], *numbers]
+        yield [indices.variant, data.pose_labels[data.seed_pose[cv]][0], data.n_train[n], *numbers]
 
 
 def _process(rows: FloatArray, scale: FloatArray, basis: FloatArray) -> FloatArray:

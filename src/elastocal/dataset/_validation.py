@@ -118,8 +118,24 @@ def check_plausible(labels: Labels, arrays: Arrays, joint_units: Sequence[str]) 
     _check_median("force", force, _MAX_MEDIAN_FORCE, "N", "mN")
     if not force.any():
         raise DatasetError(f"force is zero in all {len(force)} usable readings: nothing to fit")
+    if "reference_force" in arrays:
+        _check_reference(labels, arrays["reference_force"], arrays["force"], ok)
     if "marker_displacement" in arrays:
         _check_compliance(_norms(marker - controller), force)
+
+
+def _check_reference(
+    labels: Labels, reference: FloatArray, force: FloatArray, ok: BoolArray
+) -> None:
+    """Refuse a reference loaded more than its pose: another unit, or raw wrenches with weight."""
+    largest = np.where(ok, _norms(force), 0.0).max(axis=1)
+    light = _norms(reference)
+    for pose in np.flatnonzero((light > largest) & ok.any(axis=1))[:1].tolist():
+        raise DatasetError(
+            f"reference_force of pose {labels['pose'][pose]} is {light[pose]:.4g} N, more than its"
+            f" largest load of {largest[pose]:.4g} N: it must be that of a light contact, tool"
+            " weight removed"
+        )
 
 
 def _offences(
@@ -195,7 +211,7 @@ def _check_near(
             raise DatasetError(
                 f"{variable.name} is a median of {median:g} {unit} away from joint_position over"
                 f" {len(apart)} readings, more than {_MAX_APART[unit]:.3g} {unit}: looks like"
-                f" {mistake} in a column of {unit}"
+                f" {mistake} in a column of {unit}, or like those of other poses"
             )
 
 

@@ -190,6 +190,10 @@ def _visits(
 ) -> tuple[str, ...] | None:
     """Return the text of the column `visit`, which names visits as one likes."""
     if _VISIT not in columns:
+        # Carried through as any other column it would cost the friction's memory, unseen.
+        for name in columns:
+            if name.casefold().removesuffix("s") == _VISIT:
+                raise DatasetError(f"column {name!r} is written {_VISIT!r}")
         return None
     index, unit = columns[_VISIT]
     if unit is not None:

@@ -259,6 +259,8 @@ def _unusable_presses(dataset: "Dataset", order: Sequence[int]) -> Presses | Non
 def without(readings: Readings, excluded: str | Sequence[str]) -> Readings:
     """Return the readings without those named ``POSE`` or ``POSE:LOAD_CASE``.
 
+    They were pressed all the same, and friction remembers: see `Readings.set_aside`.
+
     Parameters
     ----------
     readings : Readings
@@ -278,7 +280,7 @@ def without(readings: Readings, excluded: str | Sequence[str]) -> Readings:
         keep &= ~_named(readings, name)
     if not np.any(keep):
         raise DatasetError(f"to exclude {', '.join(names)} leaves no reading")
-    return readings.take(keep)
+    return readings.set_aside(~keep)
 
 
 def _named(readings: Readings, name: str) -> np.ndarray:

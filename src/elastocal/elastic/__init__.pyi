@@ -47,5 +47,6 @@ from .springs import (
     as_axis as as_axis,
     axial as axial,
     check_springs as check_springs,
+    require_possible as require_possible,
     unit_of as unit_of,
 )

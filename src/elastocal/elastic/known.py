@@ -14,9 +14,9 @@ from pydantic import BeforeValidator, PlainValidator, model_validator
 
 from elastocal.arrays import FloatArray
 from elastocal.elastic.springs import OneAxisSpring, Spring, SpringLoad
-from elastocal.errors import SpringError, UnitError
+from elastocal.errors import SpringError
 from elastocal.records import StrictModel, record
-from elastocal.units import parse_quantity
+from elastocal.units import dimension_of, impossible, parse_quantity
 
 _DIMENSIONS = {
     "rotational stiffness": (True, True),
@@ -56,17 +56,20 @@ class _Compliance(NamedTuple):
 
 def _parse_compliance(text: object) -> _Compliance:
     """Return the compliance that a stiffness or compliance with its unit says."""
-    for dimension, (revolute, stiff) in _DIMENSIONS.items():
-        try:
-            value = parse_quantity(text, dimension)
-        except UnitError:
-            continue
-        if not value > 0.0:
-            raise ValueError(f"{text!r} must be above 0")
-        return _Compliance(1.0 / value if stiff else value, revolute)
-    raise ValueError(
-        f"{text!r} is not a stiffness or compliance with its unit, e.g. '1.2 MN*m/rad'"
-    )
+    dimension = dimension_of(text)
+    if dimension not in _DIMENSIONS:
+        raise ValueError(
+            f"{text!r} is not a stiffness or compliance with its unit, e.g. '1.2 MN*m/rad'"
+        )
+    (revolute, stiff), value = _DIMENSIONS[dimension], parse_quantity(text, dimension)
+    if not value > 0.0:
+        raise ValueError(f"{text!r} must be above 0")
+    compliance = 1.0 / value if stiff else value
+    kind = "rotational compliance" if revolute else "translational compliance"
+    problem = impossible(kind, compliance)
+    if problem is not None:
+        raise ValueError(f"{text!r} is {problem}")
+    return _Compliance(compliance, revolute)
 
 
 def _parse_share(text: object) -> float:
@@ -123,9 +126,20 @@ class Knowledge(StrictModel):
                 raise ValueError(f"{name} holds between torques: it needs {torques}")
         if self.T1 is not None and self.T2 is not None and not self.T1 < self.T2:
             raise ValueError("T1 must be below T2")
-        if self.bounds is not None and self.bounds[0].value == self.bounds[1].value:
-            raise ValueError("bounds must be two different values")
+        stated_gear = [each.value for each in (self.K1, self.K2, self.K3) if each is not None]
+        if stated_gear != sorted(stated_gear, reverse=True):
+            raise ValueError("K1, K2, K3 must grow: a gear stiffens with its torque")
+        self._require_bounds()
         return self
+
+    def _require_bounds(self) -> None:
+        if self.bounds is None:
+            return
+        low, high = sorted(bound.value for bound in self.bounds)
+        if low == high:
+            raise ValueError("bounds must be two different values")
+        if self.stiffness is not None and not low <= self.stiffness.value <= high:
+            raise ValueError("stiffness must lie within bounds")
 
     @property
     def knows(self) -> bool:

@@ -225,7 +225,11 @@ def known_springs(robot: Robot, name: str) -> tuple[KnownSpring, ...]:
 def _springs_of(robot: Robot, file: "SpringFile") -> list[tuple[Spring, "SpringEntry | None"]]:
     """Return the springs of a file with their entries; included ones may have none."""
     included: tuple[Spring, ...] = LAYOUTS[file.include](robot) if file.include else ()
-    listed = dict(zip(custom(robot, file.springs), file.springs, strict=True))
+    listed: dict[Spring, SpringEntry] = {}
+    for spring, entry in zip(custom(robot, file.springs), file.springs, strict=True):
+        if spring in listed:
+            raise SpringError(f"spring {spring.name!r} is listed twice")
+        listed[spring] = entry
     # An entry that tells what is known of an included spring is no second spring.
     told = {spring: entry for spring, entry in listed.items() if entry.knows}
     found = [(spring, told.get(spring)) for spring in included]
@@ -293,6 +297,8 @@ def _spring(entry: SpringEntry, joints: dict[str, ChainJoint]) -> Spring:
     joint = joints[entry.joint]
     usual = joint.revolute if entry.axis == "axial" else True
     revolute = entry.kind == "revolute" if entry.kind in _MOTIONS else usual
+    if entry.kind == "gear" and entry.axis == "axial" and not joint.revolute:
+        raise SpringError(f"spring at joint {joint.name!r}: a gear turns, and this joint slides")
     axis, distal = _axis(entry, joint), entry.frame == "distal"
     # A name tells what distinguishes a spring, e.g. x, distal-x, linear-z.
     parts = [] if entry.kind in (None, *_MOTIONS) else [str(entry.kind)]

@@ -91,6 +91,7 @@ from .observability import (
     Term as Term,
     attainable_rank as attainable_rank,
     describe as describe,
+    describe_briefly as describe_briefly,
     find_faint as find_faint,
     observability as observability,
     sparse_basis as sparse_basis,
@@ -130,6 +131,17 @@ from .problem import (
     relative_sizes as relative_sizes,
     same_configuration as same_configuration,
     unit_columns as unit_columns,
+)
+from .production import (
+    ENOUGH as ENOUGH,
+    JOINT_REACH as JOINT_REACH,
+    LEVEL_REACH as LEVEL_REACH,
+    RAIL_REACH as RAIL_REACH,
+    CalibratedLoads as CalibratedLoads,
+    ProductionCoverage as ProductionCoverage,
+    near_postures as near_postures,
+    posture_reach as posture_reach,
+    production_coverage as production_coverage,
 )
 from .reproduction import (
     Reproduction as Reproduction,

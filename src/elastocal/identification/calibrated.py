@@ -27,6 +27,7 @@ from elastocal.robot import (
     without_tool_mass,
     xyzabc_from_T,
 )
+from elastocal.units import impossible
 
 _LINK = "tool_tcp"
 """Name of the link at another tool's tcp; with a number where it is taken."""
@@ -44,6 +45,24 @@ class ToolChange:
     """Mass of the tool in kg; none: that of the calibrated tool."""
     centre: tuple[float, float, float] | None = None
     """Centre of that mass in the new tcp's frame, in m."""
+
+    def __post_init__(self) -> None:
+        """Refuse a tool that no robot carries.
+
+        Raises
+        ------
+        RobotError
+            If a length, an angle or the mass is none of a robot cell's.
+        """
+        for what, dimension, values in (
+            ("pose of the tool", "length", self.pose[:3]),
+            ("pose of the tool", "angle", self.pose[3:]),
+            ("mass of the tool", "mass", () if self.mass is None else (self.mass,)),
+            ("centre of mass of the tool", "length", self.centre or ()),
+        ):
+            problem = impossible(dimension, *values)
+            if problem is not None:
+                raise RobotError(f"{what} is {problem}")
 
     @property
     def sentence(self) -> str:
@@ -213,6 +232,16 @@ class CalibratedModel:
         """
         model, tool = change_tool(self.model, self.tool, T_tcp_tool, mass, centre)
         return replace(self, model=model, tool=tool)
+
+    @property
+    def calibrated_model(self) -> ElasticModel:
+        """The model at the tool that it was calibrated with."""
+        if self.tool is None:
+            return self.model
+        robot = self.model.robot
+        tip = self.tool.calibrated_tcp
+        as_before = Robot.from_urdf(robot.urdf, tip, robot.base, robot.meshes)
+        return ElasticModel(replace(as_before, gravity=robot.gravity), self.model.springs)
 
     def interval(self) -> tuple[FloatArray, FloatArray]:
         """Return the 95 % intervals of the compliances, two arrays of shape (spring,)."""

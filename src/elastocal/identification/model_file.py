@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from elastocal.arrays import FloatArray
-from elastocal.elastic import AnySpring, ElasticModel
+from elastocal.elastic import AnySpring, ElasticModel, require_possible
 from elastocal.errors import SchemaError
 from elastocal.files import sha256
 from elastocal.identification.calibrated import CalibratedModel, ToolChange
@@ -18,6 +18,7 @@ from elastocal.identification.options import MINIMUM_DRAWS
 from elastocal.records import read_json, record, write_json
 from elastocal.results import Result, brief_repr
 from elastocal.robot import GRAVITY, Robot
+from elastocal.units import impossible
 from elastocal.wording import capped, springs_and_parameters
 
 
@@ -62,8 +63,8 @@ class CalibrateResult(Result):
 
         Raises
         ------
-        SchemaError
-            If the URDF was changed, or numbers and springs differ in count.
+        SchemaError, SpringError
+            If the URDF was changed, numbers and springs differ in count, or are no arm's.
         """
         if sha256(self.robot.urdf) != self.robot.urdf_sha256:
             raise SchemaError("robot.urdf was changed: its hash is not robot.urdf_sha256")
@@ -73,6 +74,10 @@ class CalibrateResult(Result):
         for name, rows in (("compliance", self.compliance[None]), ("draws", self.draws)):
             if rows.ndim != 2 or rows.shape[1] != n:
                 raise SchemaError(f"{name} must have one number for each of {n} parameters")
+            require_possible([p for s in self.springs for p in s.parameters], rows, name)
+        gravity = impossible("acceleration", *(self.robot.gravity or ()))
+        if gravity is not None:
+            raise SchemaError(f"robot.gravity is {gravity}")
         if self.misfit is not None and not 0.0 <= self.misfit < np.inf:
             raise SchemaError(f"misfit {self.misfit:g} must be 0 or more")
         seen = self.observability

@@ -32,10 +32,16 @@ from elastocal.results import brief_repr
 
 _ZERO = 1e-6
 """Components below this part of the largest count as zero."""
+_NOTICEABLE = 1e-2
+"""Smaller parts of a combination are not named: the data leave such a spring open by less than a
+hundredth of a sensible value. In rich models nearly every spring has a trace in one of them."""
 _MOST_SETS = 20_000
 """Largest number of coordinate sets to try; beyond it elimination gives a sparse enough basis."""
 _TWICE = 2.0
 """Standard deviations to either side of a 95 % interval, about."""
+_MUCH_MORE = 2.0
+"""Times that forces at another tool must load a combination more than at the calibrated one."""
+_MOST_TERMS = 6
 _PROBES, _PROBE_SEED = 60, 0
 """Number and seed of the configurations that show what could be observed at all."""
 
@@ -165,9 +171,9 @@ class Observability:
     observable: tuple[bool, ...]
     """Whether each spring is determined by itself."""
     unobservable: tuple[tuple[Term, ...], ...]
-    """Combinations of compliances that the data do not see, in a sparse basis: adding any
-    multiple of one of them changes no deflection that was measured. Whether it changes others
-    is told by `attainable_rank`."""
+    """Combinations of compliances that the data do not see, in a sparse basis, without parts too
+    small to matter: adding any multiple of one of them changes no deflection that was measured.
+    Whether it changes others is told by `attainable_rank`."""
     faint: tuple[FaintParameter, ...] = ()
     """Parameters that are too weak to see; not in a group, since only noise hides them."""
 
@@ -322,22 +328,25 @@ def _probe_blocks(model: ElasticModel, marker_offset: ArrayLike | None = None) -
     return blocks.reshape(-1, 3, len(model.parameters))
 
 
-def unseen_groups(model: ElasticModel, seen: Observability) -> tuple[tuple[Term, ...], ...]:
-    """Return the unobservable combinations that forces at a model's tcp nevertheless load.
+def unseen_groups(
+    model: ElasticModel, seen: Observability, calibrated: ElasticModel
+) -> tuple[tuple[Term, ...], ...]:
+    """Return the unobservable combinations that forces at another tool's tcp load.
 
-    None at the tcp of a calibration of attainable rank; another tool may load springs that the
-    calibrated one could not, such as the last joint with a tcp beside its axis.
+    E.g. the last joint, with a tcp beside its axis; not what the calibrated tool loads as much.
 
     Parameters
     ----------
     model : ElasticModel
-        Robot, perhaps with another tool, and the springs.
+        Robot with another tool, and the springs.
     seen : Observability
         Of the calibration.
+    calibrated : ElasticModel
+        Robot with the calibrated tool, and the springs.
     """
     names = list(model.parameter_names)
     size = relative_sizes(model.parameters)
-    blocks = _probe_blocks(model)
+    blocks, before = _probe_blocks(model), _probe_blocks(calibrated)
     largest = float((np.linalg.norm(blocks, axis=(0, 1)) * size).max())
     found = []
     for group in seen.unobservable:
@@ -345,7 +354,8 @@ def unseen_groups(model: ElasticModel, seen: Observability) -> tuple[tuple[Term,
         for term in group:
             vector[names.index(term.spring)] = term.weight
         vector /= np.abs(vector / size).max()
-        if float(np.linalg.norm(blocks @ vector)) > _CANCELS * largest:
+        known = _MUCH_MORE * float(np.linalg.norm(before @ vector))
+        if float(np.linalg.norm(blocks @ vector)) > known + _CANCELS * largest:
             found.append(group)
     return tuple(found)
 
@@ -355,10 +365,11 @@ def _readable(
 ) -> tuple[tuple[Term, ...], ...]:
     """Return the null space of the compliances, by name."""
     joints = list(dict.fromkeys(parameter.joint for parameter in parameters))
-    # Which weights count as zero is judged in multiples of sensible sizes, which have no unit.
+    # Which weights count as zero is judged in multiples of sensible sizes: they have no unit.
     size = relative_sizes(parameters)
     orthonormal = np.linalg.qr(null_space / size[:, None])[0]
-    basis = sparse_basis(orthonormal, [joints.index(each.joint) for each in parameters]) * size
+    basis = sparse_basis(orthonormal, [joints.index(each.joint) for each in parameters])
+    basis = np.where(np.abs(basis) < _NOTICEABLE, 0.0, basis) * size
     return tuple(
         tuple(Term(parameters[i].name, float(vector[i])) for i in map(int, np.flatnonzero(vector)))
         for vector in basis
@@ -377,6 +388,11 @@ def describe(group: Sequence[Term]) -> str:
     )
     written = [f"({' + '.join(side)})" if len(side) > 1 else side[0] for side in sides if side]
     return " - ".join(written)
+
+
+def describe_briefly(group: Sequence[Term]) -> str:
+    """Return an unobservable combination for a line of text, a long one by its size."""
+    return describe(group) if len(group) <= _MOST_TERMS else f"{len(group)} springs mixed"
 
 
 def _written(term: Term) -> str:

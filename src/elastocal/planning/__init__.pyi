@@ -1,3 +1,7 @@
+from .near_production import (
+    NearProduction as NearProduction,
+    ProductionPlace as ProductionPlace,
+)
 from .plan import (
     PlanAndPool as PlanAndPool,
     make_plan as make_plan,
@@ -56,6 +60,16 @@ from .postures import (
     Rows as Rows,
     read_only as read_only,
     retreat_joints as retreat_joints,
+)
+from .production import (
+    SIGMA as SIGMA,
+    ExpectedError as ExpectedError,
+    ProductionRecord as ProductionRecord,
+    covering_candidates as covering_candidates,
+    expected_error as expected_error,
+    expected_errors as expected_errors,
+    plan_coverage as plan_coverage,
+    production_findings as production_findings,
 )
 from .requirements import (
     require_loads_possible_anywhere as require_loads_possible_anywhere,

@@ -37,6 +37,7 @@ from elastocal.planning.plan_result import (
 from elastocal.planning.pool import REACH_ADVICE, Pool
 from elastocal.planning.pool_file import NOT_CHOSEN, PoolData
 from elastocal.planning.pool_sampling import SampledPool, sample_pool
+from elastocal.planning.production import production_findings
 from elastocal.planning.requirements import (
     require_loads_possible_anywhere,
     require_possible_search,
@@ -131,9 +132,10 @@ def make_plan(
     chosen = _Choice(cell, surface, sampled.pool, search_pool, selection, route)
     search = _search(chosen)
     progress(_SEARCH, 1, 1)
+    production = search_pool.production(cell, selection.order)
     compared = None
     if other is not None:
-        everyone = np.arange(len(search_pool.candidates))
+        everyone = search_pool.preferred(cell, np.arange(len(search_pool.candidates)))
         taken = search_pool.take(other, everyone, len(selection), for_search).order
         spread = search_pool.spread(taken)
         compared = ComparisonRecord(
@@ -154,7 +156,9 @@ def make_plan(
             *(each.message for each in findings),
             *_notes(cell, sampled.pool, search),
             *_shortages(poses),
+            *production_findings(cell, production),
         ),
+        production=production,
     )
     return PlanAndPool(plan, _pool_data(chosen, sampled.points.position), surface)
 
@@ -326,7 +330,7 @@ def _moves(route: Route) -> tuple[MoveRecord, ...]:
 def _search(choice: _Choice) -> SearchRecord:
     search, selection, pool = choice.cell.file.search, choice.selection, choice.search_pool
     spread = pool.spread(selection.order)
-    has_process = pool.candidates.process is not None
+    has_process = choice.cell.process is not None
     return SearchRecord(
         name=selection.name,
         metric=search.metric,

@@ -6,7 +6,7 @@ SI; joint positions are in rad (m for prismatic joints) in the order of ``robot.
 
 import json
 from collections.abc import Iterator
-from dataclasses import fields
+from dataclasses import field, fields
 from itertools import pairwise
 from pathlib import Path
 
@@ -17,6 +17,7 @@ from elastocal.arrays import FloatArray
 from elastocal.cell import Cell
 from elastocal.errors import PlanningError, SchemaError
 from elastocal.files import sha256, write_json
+from elastocal.planning.production import ProductionRecord
 from elastocal.records import read_json, record, to_data
 from elastocal.results import Result, brief_repr
 
@@ -219,6 +220,8 @@ class PlanResult(Result):
     pool: PoolRecord
     findings: tuple[str, ...]
     """Findings that a user should know, a line each."""
+    production: ProductionRecord | None = None
+    """None in a cell that names no process."""
 
     def facts(self) -> tuple[tuple[str, str], ...]:
         """Return the plan in a few words, for a console or a notebook."""
@@ -228,6 +231,7 @@ class PlanResult(Result):
             ("robot", self.robot.name),
             ("poses", f"{len(self.poses)} by {search.name} from {self.pool.valid} candidates"),
             ("covering radius", f"{1e3 * search.covering_radius:.4g} mm"),
+            *(() if self.production is None else self.production.facts()),
             ("estimated time", f"{self.total_time / 60.0:.0f} min"),
         )
 
@@ -246,7 +250,7 @@ class PlanResult(Result):
 class _WrittenPlan(PlanResult):
     """A plan as it stands in its file."""
 
-    sha256: str
+    sha256: str = field(kw_only=True)
     """See `_content_hash`."""
 
 
@@ -260,6 +264,8 @@ def _content_hash(plan: PlanResult) -> str:
     data = to_data(plan)
     if plan.contact.straight_time is None:
         del data["contact"]["straight_time"]
+    if plan.production is None:
+        del data["production"]
     return sha256(json.dumps(data, separators=(",", ":"), allow_nan=False))
 
 

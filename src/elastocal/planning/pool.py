@@ -19,6 +19,7 @@ import numpy as np
 from elastocal.arrays import BoolArray, FloatArray, IndexArray
 from elastocal.errors import PlanningError
 from elastocal.planning.checks import Checks, Margins, check_margins
+from elastocal.planning.near_production import NearProduction
 from elastocal.planning.postures import Postures
 from elastocal.planning.surface import contact_frames
 from elastocal.results import brief_repr
@@ -32,6 +33,8 @@ REACH_ADVICE = (
 )
 """Advice to a user when most points are out of reach."""
 
+_NEAREST = 24
+"""Postures of a point that are asked, at most, those nearest to production."""
 _ROUNDS = 6
 """Postures of a point and branch that the slow checks are asked about, at most."""
 
@@ -137,9 +140,13 @@ class Options:
         """Point of each option, shape (option,)."""
         return self.postures.point
 
-    def of(self, branch: int, is_waiting: BoolArray) -> Postures:
-        """Return the postures of a branch at points that still wait for one."""
-        return self.postures.take((self.branch == branch) & is_waiting[self.point])
+    def of(self, branch: int, is_waiting: BoolArray) -> "Options":
+        """Return the options of a branch at points that still wait for one."""
+        return self.take((self.branch == branch) & is_waiting[self.point])
+
+    def take(self, index: BoolArray | IndexArray) -> "Options":
+        """Return some of the options."""
+        return Options(self.postures.take(index), self.branch[index])
 
 
 class _PoolSearch:
@@ -147,7 +154,7 @@ class _PoolSearch:
 
     def __init__(self, checks: Checks, points: int) -> None:
         self.checks = checks
-        self.parts: list[tuple[Postures, int, FloatArray]] = []
+        self.parts: list[tuple[Options, FloatArray]] = []
         self.is_waiting = np.ones(points, dtype=bool)
         self.failures = np.full(points, np.inf)
         self.refused_by = np.zeros(points, dtype=np.intp)
@@ -163,13 +170,18 @@ class _PoolSearch:
             self.refused_by[bad] = number
             self.is_waiting[bad] = False
 
-    def ask(self, postures: Postures, branch: int) -> None:
-        """Give every waiting point the best of its postures in a branch that passes all checks."""
+    def ask(self, options: Options, distance: FloatArray | None = None) -> None:
+        """Give every waiting point the best of its options that passes all checks.
+
+        The best has the largest margins, or the least ``distance``, shape (option,), where given.
+        """
+        postures = options.postures
         quick = check_margins(self.checks.quick, postures)
         before = 1 + len(self.checks.point)
         self.refuse(postures, quick.margin, before, 1.0)
         passed = np.flatnonzero(quick.passed)
-        order = np.lexsort((-quick.quality[passed], postures.point[passed]))
+        rank = -quick.quality if distance is None else distance
+        order = np.lexsort((rank[passed], postures.point[passed]))
         for index in _rounds(postures.point, passed[order]):
             asked = index[self.is_waiting[postures.point[index]]]
             if not len(asked):
@@ -180,7 +192,7 @@ class _PoolSearch:
             self.refuse(postures.take(asked), slow.margin, before + len(self.checks.quick), weight)
             good = asked[slow.passed]
             margin = np.vstack([quick.margin[:, good], slow.margin[:, slow.passed]])
-            self.accept(postures.take(good), branch, margin)
+            self.accept(options.take(good), margin)
 
     def refuse(self, postures: Postures, margin: FloatArray, first: int, weight: float) -> None:
         """Remember, for each point, the check that its least bad posture fails."""
@@ -195,20 +207,20 @@ class _PoolSearch:
         self.failures[postures.point[better]] = failures[better]
         self.refused_by[postures.point[better]] = first + fails[:, better].argmax(axis=0)
 
-    def accept(self, postures: Postures, branch: int, margin: FloatArray) -> None:
+    def accept(self, options: Options, margin: FloatArray) -> None:
         """Keep postures with their margins under the quick and the slow checks."""
-        of_points = [check.margin(postures) for check in self.checks.point]
-        self.parts.append((postures, branch, np.vstack([*of_points, margin])))
-        self.is_waiting[postures.point] = False
-        self.refused_by[postures.point] = -1
+        of_points = [check.margin(options.postures) for check in self.checks.point]
+        self.parts.append((options, np.vstack([*of_points, margin])))
+        self.is_waiting[options.point] = False
+        self.refused_by[options.point] = -1
 
     def pool(self, joints: int) -> Pool:
         none = Postures.none(joints)
-        postures = Postures.joined([none, *(part for part, _, _ in self.parts)])
-        sizes = [len(part) for part, _, _ in self.parts]
-        branch = np.repeat(np.array([b for _, b, _ in self.parts], dtype=np.intp), sizes)
+        postures = Postures.joined([none, *(part.postures for part, _ in self.parts)])
+        nowhere = np.zeros(0, dtype=np.intp)
+        branch = np.concatenate([nowhere, *(part.branch for part, _ in self.parts)])
         empty = check_margins(self.checks.all, none)
-        margin = np.hstack([empty.margin, *(margin for _, _, margin in self.parts)])
+        margin = np.hstack([empty.margin, *(margin for _, margin in self.parts)])
         order = np.argsort(postures.point)
         found = replace(empty, margin=margin[:, order])
         return Pool(postures.take(order), branch[order], found, self.refused_by)
@@ -231,6 +243,8 @@ class PostureSolver:
     """Distance of the approach pose from the surface along the normal, in m."""
     spins: int = 8
     """Number of turns of the tool about its axis that are tried."""
+    production: NearProduction | None = None
+    """Where production runs: postures near to it come first. None: those with large margins."""
 
     def pool(
         self,
@@ -257,6 +271,9 @@ class PostureSolver:
             raise PlanningError("the surface has no candidate points: is its region empty?")
         found = _PoolSearch(self.checks, len(points))
         found.refuse_points()
+        if self.production is not None:
+            self._ask_nearest(found, points, normals, self.production)
+            placements = ()
         for placement in placements:
             waiting = found.waiting
             if not len(waiting):
@@ -265,11 +282,41 @@ class PostureSolver:
             options = Options(options.postures.at(waiting[options.point]), options.branch)
             order = placement.branches
             for branch in range(self.inverse.branches) if order is None else order:
-                found.ask(options.of(branch, found.is_waiting), branch)
+                found.ask(options.of(branch, found.is_waiting))
         return found.pool(len(self.inverse.robot.joint_names))
 
+    def _ask_nearest(
+        self,
+        found: _PoolSearch,
+        points: FloatArray,
+        normals: FloatArray,
+        production: NearProduction,
+    ) -> None:
+        """Ask the postures of every point that are nearest to those of production."""
+        waiting = found.waiting
+        if not len(waiting):
+            return
+        parts = [
+            self.options(points[waiting], normals[waiting], place.external, spin)
+            for place in production.places
+            for spin in [place.spins(points[waiting], normals[waiting], self.spins)]
+        ]
+        postures = Postures.joined([part.postures for part in parts])
+        options = Options(
+            postures.at(waiting[postures.point]), np.concatenate([each.branch for each in parts])
+        )
+        distance = production.distance(options.postures.q)
+        order = np.lexsort((distance, options.point))
+        first = np.searchsorted(options.point[order], options.point[order])
+        kept = order[np.arange(len(order)) - first < _NEAREST]
+        found.ask(options.take(kept), distance[kept])
+
     def options(
-        self, points: FloatArray, normals: FloatArray, external: tuple[float, ...]
+        self,
+        points: FloatArray,
+        normals: FloatArray,
+        external: tuple[float, ...],
+        spins: FloatArray | None = None,
     ) -> Options:
         """Return all configurations that reach contact and approach pose in one branch.
 
@@ -279,10 +326,13 @@ class PostureSolver:
             As for `pool`.
         external : tuple of float
             Positions of the external axes, in rad or m.
+        spins : ndarray, shape (point, spin), optional
+            Turns of the tool that are tried at each point, in rad; by default even ones.
         """
         parts: list[Postures] = []
         branches: list[IndexArray] = []
-        spins = 2.0 * np.pi * np.arange(self.spins) / self.spins
+        if spins is None:
+            spins = 2.0 * np.pi * np.arange(self.spins) / self.spins
         for contact in np.moveaxis(contact_frames(points, normals, spins), 1, 0):
             off = contact.copy()
             off[:, :3, 3] += self.approach * normals

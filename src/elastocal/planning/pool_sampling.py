@@ -20,6 +20,7 @@ from elastocal.errors import PlanningError
 from elastocal.parallel import process_count, process_pool
 from elastocal.planning import checks as exported
 from elastocal.planning.checks import Checks, EdgeCheck, PointCheck, PostureCheck, check_margins
+from elastocal.planning.near_production import NearProduction
 from elastocal.planning.pool import BasePlacement, Pool, PostureSolver, join_pools
 from elastocal.planning.surface import Surface, SurfacePoints, sample_blue_noise, sample_uniform
 from elastocal.progress import Progress, silent
@@ -191,10 +192,17 @@ class PoolBuilder:
     def of(cell: Cell, surface: Surface) -> "PoolBuilder":
         """Return the builder of a cell's pool."""
         checks, approach = robot_checks(cell, surface), cell.file.engagement.approach_distance
-        return PoolBuilder(cell, surface, PostureSolver(inverse_for(cell.robot), checks, approach))
+        production = NearProduction.of(cell)
+        solver = PostureSolver(inverse_for(cell.robot), checks, approach, production=production)
+        return PoolBuilder(cell, surface, solver)
 
     def rank(self, probes: SurfacePoints) -> tuple[BasePlacement, ...]:
-        """Return where the external axes should carry the arm, judged by some tens of points."""
+        """Return where the external axes should carry the arm, judged by some tens of points.
+
+        Where production runs is known they stand as there, and nothing is judged.
+        """
+        if self.solver.production is not None:
+            return tuple(BasePlacement(place.external) for place in self.solver.production.places)
         coarse = replace(self.solver, spins=self.solver.spins // 2)
         external = self.cell.external_positions
         return rank_base_placements(coarse, probes.position, probes.normal, external)

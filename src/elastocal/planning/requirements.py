@@ -25,16 +25,18 @@ def require_possible_search(cell: Cell, compare: str | None = None) -> None:
     Raises
     ------
     PlanningError
-        If a technique is unknown, or needs a process that the cell does not name; if the process
+        If a technique is unknown, or an accuracy is wanted without a process; if the process
         has no force, or fewer candidates are asked for than poses.
     """
     search = cell.file.search
-    for name in (technique(search.technique).name, compare):
-        if name in ("i_optimal", "exchange-i") and cell.process is None:
-            raise PlanningError(
-                f"search technique {name!r} needs the production's poses and forces:"
-                " name their file in process.file of the cell file"
-            )
+    technique(cell.technique)
+    if compare is not None:
+        technique(compare)
+    if search.accuracy is not None and cell.process is None:
+        raise PlanningError(
+            "search.accuracy is the error on production: name its path in process.file of the cell"
+            " file"
+        )
     if cell.process is not None and not np.any(cell.process.force):
         raise PlanningError(
             "process.file: no row has a force, and a process without forces deflects nothing: give"

@@ -7,14 +7,26 @@ from numpy.random import Generator
 
 from elastocal.arrays import FloatArray, IndexArray
 from elastocal.cell import Cell
+from elastocal.dataset import Readings
 from elastocal.elastic import ElasticModel, layout
 from elastocal.errors import PlanningError
+from elastocal.identification import RUNGS
+from elastocal.planning.near_production import NearProduction
 from elastocal.planning.plan_result import SpreadRecord
 from elastocal.planning.pool_sampling import SampledPool
 from elastocal.planning.postures import Postures
+from elastocal.planning.production import (
+    SIGMA,
+    ExpectedError,
+    ProductionRecord,
+    covering_candidates,
+    expected_errors,
+    plan_coverage,
+)
 from elastocal.planning.search import (
     Candidates,
     Cover,
+    ExchangeSearch,
     Information,
     SearchTechnique,
     Selection,
@@ -29,7 +41,22 @@ from elastocal.results import brief_repr
 
 _SPRINGS = "bearing"
 """Spring layout that poses are judged by: the paper's 18 on a six-axis arm."""
+_GEARS, _GEARS_AND_FRICTION = "gears", "gears+friction"
+"""Models that they are judged by where production is known: the richest that the load cases carry.
+Friction memory shows in low loads beside full ones."""
+_LOW_LEVEL = 0.6
+_SCALED_BY = 200
+"""Candidates whose torques scale the gears."""
+_LEAST_CHOICE, _CHOICE = 50, 5
+"""Candidates that a search has at least, and for each pose wanted: where fewer than these are near
+production, the nearest."""
+_MOST_POSES = 40
+"""Poses that a wanted accuracy may take, where ``search.poses`` sets no limit."""
+_TABLE = 30
+"""Poses up to which errors are expected, at least."""
 _CHUNK = 5000
+_MOST_ROWS = 5000
+"""Rows of production that the search weighs."""
 
 
 @brief_repr
@@ -42,22 +69,29 @@ class SearchPool:
     boundary_distance: FloatArray
     """Distance of each candidate from the edge, shape (candidate,), in m; infinite on a surface
     without edge."""
+    q: FloatArray
+    """Postures of the candidates in contact, shape (candidate, joint), in rad or m."""
+    springs: str = _SPRINGS
+    """Model whose parameters the observation rows are of."""
 
     @staticmethod
     def of(cell: Cell, surface: Surface, sampled: SampledPool) -> "SearchPool":
         """Return the pool of a cell with its observation rows and its metric."""
         postures = sampled.pool.postures
         points = sampled.points.take(postures.point)
-        model = ElasticModel(cell.robot, layout(cell.robot, _SPRINGS))
+        springs, model = _judging_model(cell, postures)
         geodesic = cell.file.search.metric == "geodesic"
+        rows = _pose_rows(cell, model, postures)
+        production = _process_rows(cell, model)
         candidates = Candidates(
             postures.contact,
-            _pose_rows(cell, model, postures),
+            rows,
             geodesic_distance(surface, points) if geodesic else None,
-            _process_rows(cell, model),
+            # Where nobody says where production runs, the whole pool stands for it.
+            rows.reshape(-1, rows.shape[2]) if production is None else production,
         )
         edge = distance_to_boundary(surface, points)
-        return SearchPool(candidates, build_information(candidates), edge)
+        return SearchPool(candidates, build_information(candidates), edge, postures.q, springs)
 
     def spread(self, chosen: IndexArray) -> SpreadRecord:
         """Return how chosen candidates lie in the pool, shape (n,)."""
@@ -91,14 +125,90 @@ class SearchPool:
             If the technique is unknown, or more poses are wanted than there are candidates.
         """
         search = cell.file.search
-        wanted = technique(search.technique)
+        wanted = technique(cell.technique)
         cover = Cover(search.d_max)
+        left = self.preferred(cell, left)
         count = search.pose_limit or len(left)
         if isinstance(wanted, Cover):
             return self.take(cover, left, count, rng)
-        if search.d_max is not None:
+        if search.accuracy is not None and cell.process is not None:
+            count = self._needed(cell, left)
+        elif search.d_max is not None:
             count = len(self.take(cover, left, count, rng))
-        return self.take(wanted, left, count, rng)
+        found = self.take(wanted, left, count, rng)
+        return self._covering(cell, wanted, left, found, rng)
+
+    def preferred(self, cell: Cell, left: IndexArray) -> IndexArray:
+        """Return the candidates near production, or the nearest where those are too few.
+
+        All of them where the cell names no process.
+        """
+        production = NearProduction.of(cell)
+        if production is None:
+            return left
+        distance = production.distance(self.q[left])
+        least = max(_LEAST_CHOICE, _CHOICE * (cell.file.search.pose_limit or 1))
+        farthest = np.sort(distance)[min(least, len(left)) - 1]
+        near: IndexArray = left[distance <= max(1.0, farthest)]
+        return near
+
+    def _needed(self, cell: Cell, left: IndexArray) -> int:
+        """Return the number of poses from which ``search.accuracy`` is expected, or the limit."""
+        search = cell.file.search
+        most = min(search.poses or _MOST_POSES, len(left))
+        table = expected_errors(cell, self.information.take(left), left[:0], most)
+        assert search.accuracy is not None
+        enough = (each.poses for each in table if each.error <= search.accuracy)
+        return next(enough, most)
+
+    def _covering(
+        self,
+        cell: Cell,
+        wanted: SearchTechnique,
+        left: IndexArray,
+        found: Selection,
+        rng: Generator,
+    ) -> Selection:
+        """Return a choice of an exchange with poses that cover production, if it does not."""
+        coverage = plan_coverage(cell, self.q[found.order])
+        if coverage is None or coverage.is_enough or not isinstance(wanted, ExchangeSearch):
+            return found
+        kept = tuple(covering_candidates(cell, self.q[left]).tolist())
+        other = self.take(replace(wanted, kept=kept), left, len(found), rng)
+        better = plan_coverage(cell, self.q[other.order])
+        assert better is not None
+        return other if better.covered > coverage.covered else found
+
+    def _expected(self, cell: Cell, chosen: IndexArray) -> tuple[ExpectedError, ...]:
+        """Return the error to expect on production from 1, 2, … poses.
+
+        The first are the chosen ones in their order; further ones are added, each the best next.
+        """
+        others = np.setdiff1d(self.preferred(cell, np.arange(len(self.q))), chosen)
+        some = np.concatenate([chosen, others])
+        order = np.arange(len(chosen))
+        return expected_errors(cell, self.information.take(some), order, _TABLE)
+
+    def production(self, cell: Cell, chosen: IndexArray) -> ProductionRecord | None:
+        """Return what chosen poses promise for production; None where the cell names none."""
+        search, process, coverage = (
+            cell.file.search,
+            cell.process,
+            plan_coverage(cell, self.q[chosen]),
+        )
+        if coverage is None or process is None or cell.file.process is None:
+            return None
+        return ProductionRecord(
+            file=cell.file.process.file,
+            courses=tuple(name for name, _ in process.courses),
+            coverage=coverage,
+            poses=len(chosen),
+            springs=self.springs,
+            sigma=search.sigma or SIGMA,
+            floor=search.floor,
+            accuracy=search.accuracy,
+            expected=self._expected(cell, chosen),
+        )
 
     def take(
         self, wanted: SearchTechnique, left: IndexArray, count: int, rng: Generator
@@ -111,6 +221,26 @@ class SearchPool:
             )
         found = wanted.search(self.candidates.take(left), count, rng)
         return replace(found, order=left[found.order])
+
+
+def _judging_model(cell: Cell, postures: Postures) -> tuple[str, ElasticModel]:
+    """Return the model that poses are judged by, with its name.
+
+    Where production is known: gears, scaled by the torques of the pool, with friction memory where
+    a load case is low beside the others; else the paper's springs.
+    """
+    robot, force_tcp = cell.robot, cell.file.load_cases.force_tcp
+    if cell.process is None or not len(postures):
+        return _SPRINGS, ElasticModel(robot, layout(robot, _SPRINGS))
+    some = postures.take(np.unique(np.linspace(0, len(postures) - 1, _SCALED_BY).astype(int)))
+    force = np.einsum("pij,lj->pli", some.T_base_tcp[:, :3, :3], force_tcp).reshape(-1, 3)
+    q, still = np.repeat(some.q, len(force_tcp), axis=0), np.zeros_like(force)
+    cases = np.tile(np.arange(len(force_tcp)).astype(str), len(some))
+    pose = np.repeat(np.arange(len(some)), len(force_tcp))
+    size = np.linalg.norm(force_tcp, axis=1)
+    name = _GEARS_AND_FRICTION if np.any(size < _LOW_LEVEL * size.max()) else _GEARS
+    springs = RUNGS[name].springs(robot, Readings(pose, cases, q, force, still, still))
+    return name, ElasticModel(robot, springs)
 
 
 def _pose_rows(cell: Cell, model: ElasticModel, postures: Postures) -> FloatArray:
@@ -144,10 +274,13 @@ def _pose_rows(cell: Cell, model: ElasticModel, postures: Postures) -> FloatArra
 def _process_rows(cell: Cell, model: ElasticModel) -> FloatArray | None:
     """Return the rows at the production's poses and forces, shape (row, spring).
 
-    In m per unit of compliance; None when the cell names no process.
+    In m per unit of compliance; None when the cell names no process. Production of very many rows
+    is thinned.
     """
     process = cell.process
     if process is None:
         return None
-    blocks = model.observation_blocks(process.joint_position, process.force, process.moment)
+    some = np.unique(np.linspace(0, len(process) - 1, _MOST_ROWS).astype(int))
+    moment = None if process.moment is None else process.moment[some]
+    blocks = model.observation_blocks(process.joint_position[some], process.force[some], moment)
     return blocks.reshape(-1, len(model.parameters))

@@ -13,6 +13,7 @@ from elastocal.errors import RobotError, nearest
 from elastocal.results import brief_repr
 from elastocal.robot.transforms import xyzabc_from_T
 from elastocal.robot.urdf import parse_urdf, robot_name, root_link
+from elastocal.units import impossible
 
 _RIGID = 1e-6
 """How far R R^T of a transform that a person wrote may be from identity."""
@@ -241,17 +242,22 @@ def _transform(T: ArrayLike, what: str) -> FloatArray:
             f"transform of {what} is not a rotation and a translation: off by {error:.1g}"
             f" (allowed: {_RIGID:g})"
         )
+    problem = impossible("length", *T[:3, 3].tolist())
+    if problem is not None:
+        raise RobotError(f"translation of {what} is {problem}")
     return T
 
 
 def _point_mass(what: str, mass: float, centre: ArrayLike) -> ElementTree.Element:
     """Return the element of a mass without inertia, of which statics needs none."""
     point = np.asarray(centre, dtype=float)
-    if not 0.0 < mass < math.inf or point.shape != (3,) or not np.all(np.isfinite(point)):
+    if not mass > 0.0 or point.shape != (3,):
         raise RobotError(
-            f"mass of {what} is {mass} kg at {centre!r} m: it must be above 0, at three finite"
-            " coordinates"
+            f"mass of {what} is {mass} kg at {centre!r} m: it must be above 0, at a point"
         )
+    problem = impossible("mass", float(mass)) or impossible("length", *point.tolist())
+    if problem is not None:
+        raise RobotError(f"mass of {what}, or a coordinate of it, is {problem}")
     inertial = ElementTree.Element("inertial")
     ElementTree.SubElement(inertial, "origin", xyz=_text(point), rpy="0 0 0")
     ElementTree.SubElement(inertial, "mass", value=repr(float(mass)))

@@ -20,6 +20,7 @@ import pinocchio as pin
 
 from elastocal.errors import FileAccessError, RobotError, nearest
 from elastocal.robot.chain import ChainJoint, SerialChain
+from elastocal.units import impossible
 
 _PACKAGE, _FILE = "package://", "file://"
 _NUMBERS = {
@@ -34,6 +35,18 @@ _NUMBERS = {
     "mesh": {"scale": 3},
 }
 """How many numbers each attribute of each element holds (ROS wiki, urdf/XML)."""
+_DIMENSIONS = {
+    ("origin", "xyz"): "length",
+    ("origin", "rpy"): "angle",
+    ("mass", "value"): "mass",
+    ("box", "size"): "length",
+    ("sphere", "radius"): "length",
+    ("cylinder", "radius"): "length",
+    ("cylinder", "length"): "length",
+}
+"""Of those whose size is bounded: limits of joints often hold 1e16 for "none"."""
+_AXIS_LENGTHS = (1e-6, 1e6)
+"""Lengths of a joint's axis: its square must neither vanish nor overflow when it is normed."""
 
 
 @dataclass(frozen=True)
@@ -200,6 +213,15 @@ def _check_numbers(owner: str, element: ElementTree.Element) -> None:
             raise RobotError(f"URDF {owner}: <{element.tag} {name}={text!r}> must be {what}")
         if element.tag == "axis" and not any(values):
             raise RobotError(f"URDF {owner}: <axis xyz={text!r}> must not be zero")
+        low, high = _AXIS_LENGTHS
+        if element.tag == "axis" and not low <= math.hypot(*values) <= high:
+            raise RobotError(
+                f"URDF {owner}: <axis xyz={text!r}> must have a length from {low:g} to {high:g}"
+            )
+        dimension = _DIMENSIONS.get((element.tag, name))
+        problem = impossible(dimension, *values) if dimension else None
+        if problem is not None:
+            raise RobotError(f"URDF {owner}: <{element.tag} {name}={text!r}> is {problem}")
 
 
 def _link_names(root: ElementTree.Element) -> list[str]:

@@ -275,7 +275,7 @@ def _doubts(evidence: Evidence) -> Iterator[str]:
     if evidence.reproduction is not None and not evidence.reproduction.same:
         yield (
             "the calibration made again from the dataset does not give the figures of the model"
-            " file: the model is of other data or other settings"
+            f" file: {_why_not_reproduced(evidence)}"
         )
     # The origins that the files state tell which part is of another run than the others.
     for doubts in (_dataset, _summary, _codecs, _process):
@@ -285,6 +285,23 @@ def _doubts(evidence: Evidence) -> Iterator[str]:
         foreign = sorted(set(dataset.poses) - planned)
         if foreign:
             yield f"the dataset has pose {foreign[0]}, which the plan does not have"
+
+
+def _why_not_reproduced(evidence: Evidence) -> str:
+    """Return why a calibration that was made again has other figures, as far as files tell."""
+    figures, dataset = evidence.figures, evidence.dataset
+    if figures is None or figures.spring_count is not None:
+        return (
+            "the model is of other data or other settings, or was made by an earlier version of"
+            " elastocal"
+        )
+    # What every calibration of today says is missing; whether it is of these data is another thing.
+    alike = dataset is not None and figures.readings == len(dataset.readings(dataset.joint_names))
+    also = "" if alike else " from other readings"
+    return (
+        f"the model was made by an earlier version of elastocal{also}; calibrate again with this"
+        " one"
+    )
 
 
 def _dataset(evidence: Evidence) -> Iterator[str]:

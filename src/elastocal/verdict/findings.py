@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 from elastocal.identification import SuspiciousReading
 from elastocal.identification.recertification import Verdict as Recertified
+from elastocal.procedure import commits
 from elastocal.verdict.evidence import Evidence
 from elastocal.wording import capped, counted, mm, spans
 
@@ -76,8 +77,29 @@ def _missing_poses(evidence: Evidence) -> Iterator[Finding]:
             f" {counted(len(evidence.plan.poses), 'planned pose')}"
             f" {'has' if len(missing) == 1 else 'have'} no usable reading"
             f" (pose {spans(missing)})",
-            advice="Finish the run: `elastocal run --resume` measures the missing poses.",
+            advice=_advice_on_missing(evidence, missing),
         )
+
+
+def _advice_on_missing(evidence: Evidence, missing: list[int]) -> str:
+    """Return what to do about poses without a usable reading: not all of it can be resumed."""
+    if not evidence.journal:
+        return "Measure them in another run, and calibrate with both datasets."
+    committed = {log.pose for log in commits(evidence.journal)}
+    left, spoiled = set(missing) - committed, set(missing) & committed
+    texts = []
+    if left:
+        texts.append(
+            f"Finish the run: `elastocal run --resume` measures pose {spans(sorted(left))}, with"
+            " the cell file and the plan that it was begun with."
+        )
+    if spoiled:
+        texts.append(
+            f"Pose {spans(sorted(spoiled))} {'is' if len(spoiled) == 1 else 'are'} committed and"
+            " --resume does not repeat them: mend what spoiled the readings, and measure in a new"
+            " run; calibrate takes both datasets."
+        )
+    return " ".join(texts)
 
 
 def _suspicious(each: SuspiciousReading) -> Finding:

@@ -60,7 +60,7 @@ def cell_file(path: Path) -> FileDescription:
         "robot": cell.robot.name,
         "load_cases": list(cell.file.presses),
         "trackers": [tracker.name for tracker in cell.file.trackers],
-        "technique": search.technique,
+        "technique": cell.technique,
         "faces": len(surface.mesh.faces),
         "findings": [finding.message for finding in findings],
     }

@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from elastocal.arrays import FloatArray
 from elastocal.dataset import Dataset
@@ -17,7 +18,7 @@ from elastocal.files import read_text
 from elastocal.identification import (
     CalibratedModel,
     attainable_rank,
-    describe,
+    describe_briefly,
     read_model,
     unseen_groups,
 )
@@ -34,6 +35,8 @@ from elastocal.robot import (
 )
 from elastocal.units import parse_point, parse_quantity
 
+_LONGEST_TOOL = 10.0
+"""In m: no tool of a robot is longer; what is, was meant in mm."""
 _TOOL_LINK = "tcp"
 """Name of the link that a tool given by numbers gets."""
 _NOT_COVERED = (
@@ -143,14 +146,34 @@ class NewTool:
         T_tcp_tool = parse_frame(self.tool_frame, "tool", error=RobotError)
         mass = None if self.tool_mass is None else parse_quantity(self.tool_mass, "mass")
         centre = None if self.tool_centre is None else parse_point(self.tool_centre)
+        _require_near("tcp", T_tcp_tool[:3, 3], "the calibrated one")
+        if centre is not None:
+            _require_near("centre of mass", centre, "its tcp")
         return calibrated.with_tool(T_tcp_tool, mass, centre)
+
+
+def _require_near(what: str, point: ArrayLike, origin: str) -> None:
+    """Refuse a point of a tool that lies farther off than tools are long.
+
+    Raises
+    ------
+    RobotError
+        If it does.
+    """
+    distance = float(np.linalg.norm(point))
+    if not distance <= _LONGEST_TOOL:
+        raise RobotError(
+            f"the tool's {what} lies {distance:.4g} m from {origin}: at most {_LONGEST_TOOL:g} m"
+            " are allowed"
+        )
 
 
 def coverage_notes(calibrated: CalibratedModel) -> tuple[str, ...]:
     """Return a warning unless every combination that forces can load was determined."""
     if calibrated.tool is not None:
-        unseen = unseen_groups(calibrated.model, calibrated.observability)
-        names = ", ".join(map(describe, unseen))
+        seen, before = calibrated.observability, calibrated.calibrated_model
+        unseen = unseen_groups(calibrated.model, seen, before)
+        names = ", ".join(map(describe_briefly, unseen))
         notes = (_TOOL_LOADS.format(names=names),) if unseen else ()
         gap = calibrated.model.robot.chain.weight_gap
         alone = calibrated.tool.mass is not None and calibrated.model.bears_weight and gap

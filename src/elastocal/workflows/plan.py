@@ -38,6 +38,8 @@ class PlanSettings:
     """Processes for large pools; by default all cores."""
     force: bool = False
     """Replace the files of a plan that is there."""
+    dry_run: bool = False
+    """Make the plan, and write nothing."""
 
 
 @record()
@@ -104,11 +106,12 @@ def plan(settings: PlanSettings, progress: Progress) -> PlanResult:
     cell = load_cell(Path(settings.cell))
     compare = settings.compare
     if compare is None:
-        compare = "cover" if cell.file.search.technique != "cover" else "ioops"
+        compare = "cover" if cell.technique != "cover" else "ioops"
+    other = None if compare == "none" else compare
+    if settings.dry_run:
+        return planning.make_plan(cell, other, settings.jobs, progress).plan
     with filling(Path(settings.out), PLAN, settings.force) as folder:
-        planned = planning.make_plan(
-            cell, None if compare == "none" else compare, settings.jobs, progress
-        )
+        planned = planning.make_plan(cell, other, settings.jobs, progress)
         _write_folder(folder, cell, planned, settings.program)
     return planned.plan
 

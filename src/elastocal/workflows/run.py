@@ -4,7 +4,8 @@ Nothing moves before cell, plan, folder and devices have been found to fit toget
 that a person must look at first moves before the operator has agreed.
 """
 
-from collections import Counter
+from collections import Counter, defaultdict
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from os import PathLike
@@ -15,6 +16,7 @@ from elastocal.cell import Cell, Devices, load_cell
 from elastocal.errors import ElastocalError, ProcedureError
 from elastocal.files import read_text
 from elastocal.planning import PLAN, PlanResult, read_plan
+from elastocal.planning.export import pose_lines
 from elastocal.procedure import Event, Journal, LastKnown, RunEnd, RunFolder, RunSummary, Session
 from elastocal.procedure.run import PlannedStep
 from elastocal.progress import Progress
@@ -114,6 +116,7 @@ class DryRunResult(Result):
     """The steps that a run would take, with their times."""
 
     steps: tuple[PlannedStep, ...]
+    plan: PlanResult
     poses: int
     load_cases: tuple[str, ...]
     force_limit: float
@@ -124,6 +127,14 @@ class DryRunResult(Result):
     def seconds(self) -> float:
         """How long it would take, in s."""
         return float(sum(step.seconds for step in self.steps))
+
+    def pose_lines(self) -> Iterator[str]:
+        """Yield a line a pose: id, begin and time in s, station, joints in contact."""
+        seconds: defaultdict[int, float] = defaultdict(float)
+        for step in self.steps:
+            if step.pose is not None:
+                seconds[step.pose] += step.seconds
+        return pose_lines(self.plan, seconds)
 
     def facts(self) -> tuple[tuple[str, str], ...]:
         """Return what a person wants to know first."""
@@ -207,6 +218,7 @@ def dry_run(settings: RunSettings, progress: Progress) -> DryRunResult:  # noqa:
     job = _prepare(settings)
     return DryRunResult(
         steps=procedure.itinerary(job.plan, job.settings),
+        plan=job.plan,
         poses=len(job.plan.poses),
         load_cases=tuple(name for name, _ in job.settings.loads),
         force_limit=job.settings.force_limit,
@@ -320,10 +332,12 @@ def _check_folder(job: _Job, entries: tuple[procedure.Entry, ...], resume: bool)
     assert started is not None
     procedure.check_same_run(started, job.record, str(out))
     if not resume:
-        done, count = len(procedure.last_known(entries).committed), len(job.plan.poses)
+        known, count = procedure.last_known(entries), len(job.plan.poses)
+        left = known.left_to_do(count)
+        advice = f"--resume {left}" if left else "nothing is left to do"
         raise ProcedureError(
-            f"{out} holds this run already ({done} of {count} poses committed):"
-            " go on with --resume, or name another folder"
+            f"{out} holds this run already ({len(known.committed)} of {count} poses committed):"
+            f" {advice}; for a new run name another folder"
         )
     used, _ = procedure.read_copies(job.folder, started)
     procedure.check_same_settings(used, job.cell)

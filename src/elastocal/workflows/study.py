@@ -121,5 +121,5 @@ def study_conditions(cell: Cell, vary: tuple[str, ...]) -> tuple[Condition, ...]
         If a factor or a value is unknown.
     """
     search = cell.file.search
-    base = Condition(poses=search.pose_limit or DEFAULT_POSES, search=search.technique)
+    base = Condition(poses=search.pose_limit or DEFAULT_POSES, search=cell.technique)
     return studies.make_conditions(studies.read_variations(vary or (DEFAULT_VARIATION,)), base)

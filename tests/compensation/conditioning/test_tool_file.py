@@ -1,3 +1,4 @@
+import json
 from dataclasses import replace
 
 import numpy as np
@@ -75,3 +76,24 @@ def test_another_kind_of_file_is_refused(tmp_path):
     (tmp_path / "x.json").write_text('{"schema": "elastocal.model/1"}')
     with pytest.raises(SchemaError, match=r"has schema 'elastocal.model/1'"):
         read_tool(tmp_path / "x.json")
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "message"),
+    [
+        ("mass", 1e300, "mass of the tool is 1e.300 kg: the largest mass is 1000 t"),
+        ("mass", -1.0, "mass of the tool is -1 kg: it must not be negative"),
+        ("centre", [0.0, 1e160, 0.0], "centre of the tool is 1e.160 m: the largest length"),
+        ("gravity", [0.0, 0.0, -1e9], "gravity of the tool is -1e.09 m/s2"),
+        ("sensor_origin", [1e5, 0.0, 0.0], "place of the sensor of the tool is 1"),
+        ("R_flange_sensor", [[2.0, 0, 0], [0, 1.0, 0], [0, 0, 1.0]], "does not hold a rotation"),
+    ],
+)
+def test_a_tool_that_no_robot_carries_is_refused_on_reading(tmp_path, fit, key, value, message):
+    path = tmp_path / "tool.json"
+    write_tool(path, tool_result(fit, MOUNT, ""))
+    path.write_text(json.dumps(json.loads(path.read_text()) | {key: value}))
+    with pytest.raises(SchemaError, match=message) as refusal:
+        read_tool(path)
+    assert "tool.json" in str(refusal.value)
+    assert "\n" not in str(refusal.value)

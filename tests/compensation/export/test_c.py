@@ -210,6 +210,8 @@ class TestSelfTest:
             ("state->z1[s][i] *= share", "state->z1[s][i] *= 1.0", 3),
             ("state->missed += 1", "state->missed += 2", 3),
             ("1000.0 * correction[i]", "1001.0 * correction[i]", 3),
+            ("if (is_number(value) == 0) {", "if (0) {", 3),
+            ("if (is_number(&reading->time) != 0) {\n        state", "if (1) {\n        state", 3),
         ],
     )
     def test_a_change_of_the_code_is_found(self, folder, tmp_path, old, new, code):
@@ -218,6 +220,52 @@ class TestSelfTest:
         (tmp_path / "elastocal_model.h").write_bytes((folder / "elastocal_model.h").read_bytes())
         (tmp_path / "elastocal_model.c").write_text(text.replace(old, new))
         assert build(tmp_path, "-O0", "-Wno-error").selftest() == code
+
+
+MACROS = ["__FINITE_MATH_ONLY__", "__FAST_MATH__", "__ASSOCIATIVE_MATH__"]
+UNNAMED = [f"-U{name}" for name in MACROS]
+"""As a compiler that does not say what it was told."""
+
+
+class TestFastMath:
+    @pytest.mark.parametrize(
+        "flag",
+        [
+            "-ffast-math",
+            "-Ofast",
+            "-ffinite-math-only",
+            "-funsafe-math-optimizations",
+            "-D_M_FP_FAST=1",
+        ],
+    )
+    def test_a_compiler_that_is_told_so_refuses_the_file(self, folder, tmp_path, flag):
+        command = [exported.GCC, "-std=c99", "-O2", flag, "-c", folder / "elastocal_model.c"]
+        done = subprocess.run(
+            [*command, "-o", tmp_path / "m.o"], capture_output=True, text=True, check=False
+        )
+        assert done.returncode != 0
+        assert 'error: #error "elastocal: compile with' in done.stderr
+
+    @pytest.mark.parametrize("level", ["-O1", "-O3"])
+    def test_nan_is_refused_without_the_help_of_the_compiler(self, folder, level):
+        flags = (level, "-ffinite-math-only", *UNNAMED)
+        executable = build(folder, *flags, name=f"finite{level}")
+        assert executable.selftest() == 0
+        numbers = design(compensated.arm(), compensated.settings(), compensated.load())
+        rows = course(np.random.default_rng(3), numbers.joints)
+        expected = build(folder, level, name=f"strict{level}").numbers("steps", rows)
+        found = executable.numbers("steps", rows)
+        np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-12)
+
+    def test_a_guard_that_the_compiler_drops_is_found_by_the_self_test(self, folder, tmp_path):
+        text = (folder / "elastocal_model.c").read_text()
+        guard = "(bits & UINT64_C(0x7FF0000000000000)) != UINT64_C(0x7FF0000000000000)"
+        assert guard in text
+        folded = text.replace(guard, "(bits == 0U) || (isfinite(*value) != 0)")
+        (tmp_path / "elastocal_model.h").write_bytes((folder / "elastocal_model.h").read_bytes())
+        (tmp_path / "elastocal_model.c").write_text(folded)
+        flags = ("-O2", "-ffinite-math-only", *UNNAMED)
+        assert build(tmp_path, *flags).selftest() == 3
 
 
 @pytest.fixture(scope="module")

@@ -1,12 +1,15 @@
+import re
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from elastocal.cell import SENSOR_CORRECTED
-from elastocal.compensation.online import design
+from elastocal.compensation.online import Compensator, Reading, design
 from elastocal.compensation.online.design import draws_factor
+from elastocal.elastic import ElasticModel
 from elastocal.errors import CompensationError
+from elastocal.robot import Robot
 from support.compensated import arm, load
 
 
@@ -32,6 +35,14 @@ def test_a_compliance_that_is_none_is_refused_by_spring(value):
         design(replace(arm(), compliance=compliance))
 
 
+def test_a_spring_that_moves_against_its_load_is_refused():
+    compliance = arm().compliance.copy()
+    compliance[3] = -1e-6
+    name = arm().model.spring_names[3]
+    with pytest.raises(CompensationError, match=f"compliance of spring {name} is -1e-06 rad"):
+        design(replace(arm(), compliance=compliance))
+
+
 def test_a_draw_that_is_none_is_refused_by_spring():
     draws = arm().draws.copy()
     draws[7, 2] = np.nan
@@ -45,3 +56,19 @@ def test_a_matrix_that_the_models_run_was_derived_without_is_refused():
         design(of_a_run, None, load())
     corrected = replace(of_a_run, provenance=f"elastocal run r1, simulated, {SENSOR_CORRECTED}")
     assert design(corrected, None, load()).load.has_matrix
+
+
+def test_the_largest_arm_that_is_allowed_is_corrected_by_numbers():
+    urdf, moved = re.subn(r'(<origin\s+xyz=)"[^"]*"', r'\1"999 -999 999"', arm().model.robot.urdf)
+    assert moved > 2
+    model = ElasticModel(Robot.from_urdf(urdf, arm().model.robot.tip), arm().model.springs)
+    n = len(arm().compliance)
+    largest = replace(arm(), model=model, compliance=np.ones(n), draws=np.ones((50, n)))
+    sensor = replace(load(), mass=1e6, centre=np.full(3, 0.3), response=np.full((6, 3), 1e6))
+    compensator = Compensator(design(largest, None, sensor))
+    state = compensator.start()
+    for time in (0.004, 0.008, 0.012):
+        reading = Reading(time, [1.0] * len(model.robot.joint_names), [9e4] * 3, [9e4] * 3)
+        state, told = compensator.step(state, reading)
+    assert np.all(np.isfinite([*told.correction, *told.deflection, told.half_width]))
+    assert 0.0 < np.linalg.norm(told.correction) <= 3e-3

@@ -1,5 +1,6 @@
 """The KRL program, read back by a reader that shares no code with the writer."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -188,3 +189,13 @@ def test_a_plan_that_contradicts_itself_is_not_programmed(tmp_path):
     plan = plans.plan()
     with pytest.raises(SchemaError, match="moves"):
         write_krl(tmp_path, replace(plan, moves=plan.moves[1:]))
+
+
+def test_poses_are_named_by_their_ids_alone(tmp_path):
+    plan = plans.plan()
+    text = write_krl(tmp_path, plan)[0].read_text()
+    last = len(plan.poses) - 1
+    assert re.findall(r"^;FOLD (POSE .*?): about", text, re.MULTILINE) == [
+        f"POSE {pose.id} of 0 to {last}" for pose in plan.poses
+    ]
+    assert "candidate" not in text

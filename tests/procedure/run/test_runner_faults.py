@@ -9,7 +9,7 @@ from elastocal.procedure.record import ReadingStatus, read_commits
 from elastocal.procedure.run.steps import ArmLocation
 from support import fake_faults as fault
 from support.fake_faults import when
-from support.fake_runs import FakeRun, MemoryRecorder
+from support.fake_runs import FakeRun, MemoryRecorder, plan, replace
 
 OVERSHOOT = 1600.0 * 0.04
 """One cycle's ramp, in N."""
@@ -123,7 +123,7 @@ def test_a_fault_of_one_attempt_is_tried_again(run, moment, change, message):
 def test_a_pose_that_fails_every_time_is_given_up_and_the_next_one_is_visited(run):
     result = run.start(when(fault.approaching, fault.lower_floor, times=2))
     assert (result.end, result.given_up, result.failed_attempts) == (RunEnd.DONE, (0,), 2)
-    assert result.message == "given up: pose 0; `--resume` tries again"
+    assert result.message == ("given up: pose 0; `--resume` tries again once the cause is mended")
     assert committed(run) == [1]
     assert "contact missed" in texts(run, Event.GIVEN_UP)[0]
 
@@ -351,3 +351,43 @@ def test_every_status_but_missing_can_come_from_a_run():
     assert {status.value for status in ReadingStatus} == {
         "ok", "slipped", "unstable", "aborted", "missing"
     }  # fmt: skip
+
+
+@pytest.fixture
+def conditioned(tmp_path):
+    """A run that presses before its reference, and reads it in light contact."""
+    presses = {
+        "conditioning": (0.0, 0.0, -300.0),
+        "light_contact": (0.0, 0.0, -20.0),
+        "normal": (0.0, 0.0, -300.0),
+    }
+    made = plan()
+    return FakeRun(
+        tmp_path / "run", replace(made, contact=replace(made.contact, load_cases=presses))
+    )
+
+
+@pytest.mark.parametrize("number", [1, 2])
+def test_a_press_that_the_reference_needs_and_that_never_settles_makes_the_pose_be_tried_again(
+    conditioned, number
+):
+    result = conditioned.start(when(fault.pressing(number), fault.wobble))
+    assert (result.end, result.failed_attempts) == (RunEnd.DONE, 1)
+    assert set(statuses(conditioned).values()) == {"ok"}
+    lost = ["conditioning", "light_contact"][number - 1]
+    assert f"reference not had: {lost}: not stable within 4 s" in texts(conditioned, Event.FAULT)[0]
+
+
+def test_a_conditioning_press_that_slips_has_pressed_all_the_same(conditioned):
+    result = conditioned.start(when(fault.pressing(1), fault.slip))
+    assert (result.end, result.failed_attempts) == (RunEnd.DONE, 0)
+    assert statuses(conditioned)[0, "conditioning"] == "slipped"
+    assert statuses(conditioned)[0, "normal"] == "ok"
+
+
+def test_the_presses_of_a_pose_that_is_tried_again_are_in_order_in_time(conditioned):
+    conditioned.start(when(fault.pressing(3), fault.saturate_sensor))
+    for log in read_commits(conditioned.journal):
+        names = [window.load_case for window in log.windows]
+        assert names == [None, "conditioning", "light_contact", "normal", None]
+        assert sorted(window.start for window in log.windows) == [w.start for w in log.windows]

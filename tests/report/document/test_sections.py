@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from elastocal.cell import Limits
 from elastocal.identification import CalibrationSummary, describe
-from elastocal.procedure import RunSummary
+from elastocal.procedure import Event, RunSummary
 from elastocal.records import from_data, to_data
 from elastocal.report.document import SECTIONS
 from elastocal.report.document.sections import PAPER
@@ -128,16 +128,44 @@ def test_a_partial_run_holds_back_and_names_the_poses(parts):
 def test_a_pose_without_a_usable_reading_counts_as_missing(parts):
     data = parts.dataset.to_xarray().copy(deep=True)
     data["status"].values[0] = 1
-    (told, *_) = findings(
-        reading_findings, replace(parts, dataset=type(parts.dataset).from_xarray(data))
-    )
+    spoiled = replace(parts, dataset=type(parts.dataset).from_xarray(data))
+    (told, *_) = findings(reading_findings, spoiled)
     assert told.startswith("the run is partial: 1 of")
+    # The pose is committed: to resume would repeat nothing.
+    advice = next(reading_findings(spoiled)).advice
+    assert advice.startswith("Pose 0 is committed and --resume does not repeat")
+    assert "a new run" in advice
+
+
+def test_what_was_not_committed_can_be_resumed_and_nothing_else(parts):
+    some = replace(parts, dataset=parts.dataset.select(poses=parts.dataset.poses[2:]))
+    begun = tuple(
+        entry
+        for entry in parts.journal
+        if not (entry.event is Event.COMMIT and entry.log is not None and entry.log.pose == 1)
+    )
+    advice = next(reading_findings(replace(some, journal=begun))).advice
+    assert "`elastocal run --resume` measures pose 1, with the cell file" in advice
+    assert "Pose 0 is committed and --resume does not repeat" in advice
+    assert "--resume" not in next(reading_findings(replace(some, journal=None))).advice
 
 
 def test_readings_that_were_left_out_by_hand_hold_back_by_name(parts):
     settings = {**to_data(parts.calibrated.figures.settings), "exclude": ["2", "3:north"]}
     (told, *_) = findings(reading_findings, with_figures(parts, settings=settings, suspicious=[]))
     assert told.startswith("2, 3:north (pose, or pose:load case) was left out by hand")
+
+
+def test_the_check_at_a_load_level_stands_beside_its_noise(parts):
+    assert "kept out of the fit" not in words(readings, parts)
+    check = {
+        "load_cases": ["normal_75"], "readings": 30, "mean": 61e-6, "p95": 0.1e-3, "max": 0.124e-3,
+        "rms": 70e-6, "deflection": 1.1e-3, "noise": 12e-6, "source": "stated: metrology",
+    }  # fmt: skip
+    text = words(readings, with_figures(parts, check=check))
+    assert "Check at a load level that was kept out of the fit" in text
+    for part in ("normal_75", "0.061 mm", "0.124 mm", "0.012 mm", "stated: metrology"):
+        assert part in text
 
 
 def test_registration_tool_and_noise_are_those_of_the_summary(parts):

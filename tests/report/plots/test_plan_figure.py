@@ -71,10 +71,13 @@ def test_without_a_comparison_there_is_one_panel(on_block):
     assert width < 6.0
 
 
-def test_poses_are_numbered_in_search_order(on_block):
-    panel = plan_figure(*on_block).axes[0]
-    numbers = [text for text in _texts(panel) if text.isdigit()]
-    assert numbers == [str(n) for n in range(1, len(on_block[1].poses) + 1)]
+def test_poses_carry_their_ids_and_what_is_no_pose_of_the_plan_carries_none(on_block):
+    plan = on_block[1]
+    panels = plan_figure(*on_block).axes[:2]
+    numbers = [[text for text in _texts(panel) if text.isdigit()] for panel in panels]
+    assert numbers == [[str(pose) for pose in plan.search.order], []]
+    # Each stands by its own candidate: the first label is the pose that was chosen first.
+    assert sorted(map(int, numbers[0])) == [pose.id for pose in plan.poses]
 
 
 def test_numbers_under_a_panel_carry_their_units(on_block):

@@ -103,6 +103,6 @@ def test_a_cell_without_stations_has_no_line_of_sight(cell, block, plan, pool):
 def test_hover_tells_rank_margins_with_units_and_times(view, plan):
     (poses,) = [trace for trace in view.figure.data if trace.name == "poses"]
     text = poses.hovertext[2]
-    rank = plan.search.order.index(2) + 1
-    for wanted in ("<b>pose 2</b>", f"number {rank}", "wrist: ", "°", "1 min 02 s in contact"):
+    rank = plan.search.order.index(2)
+    for wanted in ("<b>pose 2</b>", f"search rank {rank}", "wrist: ", "°", "1 min 02 s in contact"):
         assert wanted in text

@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 
 from elastocal.cell.devices import Motion
+from elastocal.elastic import ElasticModel, layout
+from elastocal.identification import build, solve
 from elastocal.sim.workcell import (
     CampaignErrors,
     CampaignSimulator,
@@ -49,6 +51,69 @@ def test_quick_readings_are_those_of_the_devices(like):
         np.testing.assert_allclose(ours, deflection, atol=20 * NANOMETRE)
         np.testing.assert_allclose(quick.felt[1, load], (wrench - tare)[:3], atol=0.05)
         np.testing.assert_allclose(quick.q[1, load], state.q, atol=5e-6)
+
+
+PRESSES = np.array(
+    [[0.0, 0.0, -1100.0], [0.0, 0.0, -60.0], [0.0, 0.0, -495.0], [280.0, 0.0, -1100.0]]
+)
+"""Conditioning, light contact, a level, north."""
+
+
+def test_quick_readings_after_conditioning_count_from_the_light_contact_as_the_devices_do():
+    cell, place = example_cell("afp", simulation=QUIET), places("afp", 3)[1]
+    quick = CampaignSimulator.of(cell).settle(where("afp"), PRESSES, reference=1)
+    session = Session.of(cell)
+    session.near(place)
+    tare, _ = session.average()
+    session.touch(place)
+    seen = []
+    for force in PRESSES:
+        state = session.hold(force)
+        wrench, marker = session.average()
+        seen.append((marker - marker_by_controller(state, cell), (wrench - tare)[:3], state.q))
+    zero = seen.pop(1)
+    np.testing.assert_allclose(quick.reference_q[1], zero[2], atol=5e-6)
+    np.testing.assert_allclose(quick.reference_felt[1], zero[1], atol=0.05)
+    for load, (deflection, felt, _) in enumerate(seen):
+        ours = quick.marker_displacement[1, load] - quick.controller_displacement[1, load]
+        np.testing.assert_allclose(ours, deflection - zero[0], atol=20 * NANOMETRE)
+        np.testing.assert_allclose(quick.felt[1, load], felt, atol=0.05)
+
+
+def test_a_full_press_before_the_reference_changes_what_a_low_one_shows():
+    """Friction keeps a part of it: the level after it is reached from above, not from rest."""
+    quick = CampaignSimulator.of(example_cell("afp", simulation=QUIET | {"preset": "typical"}))
+    after = quick.settle(where("afp"), PRESSES, reference=1)
+    without = quick.settle(where("afp"), PRESSES[1:], reference=0)
+    gap = (after.marker_displacement - after.controller_displacement)[:, 1] - (
+        without.marker_displacement - without.controller_displacement
+    )[:, 0]
+    assert np.linalg.norm(gap, axis=1).max() > 20e-6
+
+
+def test_light_contact_gives_the_springs_of_an_unloaded_reference_where_nothing_sticks():
+    still = {"gears": {"backlash": "0 rad", "hysteresis": 0.0, "growth": 0.0}}
+    still |= {"balancer": {"fitted": False}, "controller": QUIET["controller"]}
+    cell, loads = example_cell("afp", simulation=QUIET | still), None
+    quick, errors = CampaignSimulator.of(cell), CampaignErrors.of(cell)
+    marker, found = np.array(cell.file.marker.position_tcp), []
+    poses = ContactPoses(*(np.array(each) for each in zip(*_poses(12), strict=True)))
+    for presses, reference in ((PRESSES[2:], None), (PRESSES[1:], 0)):
+        settled = quick.settle(poses, presses, reference=reference)
+        draws = ErrorDraws.of(12, 2, np.random.default_rng(0))
+        readings = errors.readings(
+            settled, draws, ErrorScales(0.0, 0.0), np.zeros((12, 3)), ("level", "north")
+        )
+        model = ElasticModel(cell.robot, layout(cell.robot, "actuated"))
+        compliance = solve(build(model, readings, None, marker)).compliance
+        loads = loads or readings
+        found.append(model.deflection(compliance, loads.joint_position, loads.force))
+    gap = np.linalg.norm(found[1] - found[0], axis=1)
+    assert gap.max() < 0.01 * np.linalg.norm(found[0], axis=1).max()
+
+
+def _poses(count):
+    return [(place.q, place.normal) for place in places("afp", count)]
 
 
 def test_gears_remember_the_load_cases_before():

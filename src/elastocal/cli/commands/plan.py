@@ -1,5 +1,6 @@
 """``elastocal plan``: from a cell to an ordered, checked, executable set of poses."""
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
@@ -27,14 +28,26 @@ def _plan(
     force: Annotated[
         bool, typer.Option("--force", help="Replace the files of a plan that is there.")
     ] = False,
+    dry_run: Annotated[
+        bool,
+        typer.Option(
+            "--dry-run", help="Write nothing; a line a pose on standard output: id, time, joints."
+        ),
+    ] = False,
     as_json: options.KeyFigures = False,
 ) -> None:
     """Choose calibration poses on the tooling, check them, and put them in order."""
-    settings = workflows.PlanSettings(cell, out, compare, program, jobs, force)
+    from elastocal.planning.export import pose_lines
+
+    settings = workflows.PlanSettings(cell, out, compare, program, jobs, force, dry_run)
     with output.progress_bars() as progress:
         found = workflows.plan(settings, progress)
     figures = workflows.plan_figures(found, out, program)
+    if dry_run:
+        figures = replace(figures, files=())
     if as_json:
         output.print_json(figures)
     else:
         tables.show_plan(output.console(), found, figures)
+        if dry_run:
+            output.print_lines(pose_lines(found))

@@ -21,7 +21,10 @@ def _run(
         bool, typer.Option("--yes", help="Do not ask: a person has looked at the cell.")
     ] = False,
     dry_run: Annotated[
-        bool, typer.Option("--dry-run", help="List the steps with their times; nothing moves.")
+        bool,
+        typer.Option(
+            "--dry-run", help="A line a pose on standard output: id, time, joints; nothing moves."
+        ),
     ] = False,
     seed: Annotated[
         int | None, typer.Option(min=0, help="Seed of simulated devices; default: the cell's.")
@@ -41,6 +44,7 @@ def _run(
             output.print_json(tables.dry_figures(rehearsed))
         else:
             tables.show_itinerary(output.console(), rehearsed)
+            output.print_lines(rehearsed.pose_lines())
         return
     finished = workflows.run(settings)
     if as_json and finished.end is RunEnd.DONE:

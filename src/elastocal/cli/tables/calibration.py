@@ -23,7 +23,7 @@ from elastocal.identification import (
     FrameSummary,
     SpringSummary,
     SuspiciousReading,
-    describe,
+    describe_briefly,
     ladder_sentence,
 )
 from elastocal.wording import (
@@ -46,8 +46,6 @@ if TYPE_CHECKING:
 _USUAL_UNIT = unit_of("rad/(N*m)")
 """The unit of most springs stands in the headings; other springs name their own."""
 _MOST_SUSPICIOUS = 10
-_MOST_TERMS = 6
-"""A combination of more springs than this tells a reader nothing."""
 
 
 def show_calibration(console: Console, result: CalibrateResult, out: Path) -> None:
@@ -93,10 +91,12 @@ def _show_fit(console: Console, figures: CalibrationSummary) -> None:
         "at the poses fitted", mm(fit.mean), f"{fit.mean / mean:.2%}", mm(fit.p95), mm(fit.max)
     )
     if (check := figures.check) is not None:
-        noise = "not known" if check.noise is None else mm(check.noise)
-        label = f"at {', '.join(check.load_cases)}, kept out of the fit (noise {noise})"
-        share = f"{check.mean / check.deflection:.2%}"
-        table.add_row(label, mm(check.mean), share, mm(check.p95), mm(check.max))
+        label, share = (
+            f"at {', '.join(check.load_cases)}, not fitted",
+            check.mean / check.deflection,
+        )
+        table.add_row(label, mm(check.mean), f"{share:.2%}", mm(check.p95), mm(check.max))
+        table.add_row("noise there", "not known" if check.noise is None else mm(check.noise))
     console.print(table)
     if figures.coverage is not None:
         console.print(_coverage_line(figures.coverage), soft_wrap=True)
@@ -269,8 +269,7 @@ def _show_groups(console: Console, figures: CalibrationSummary) -> None:
         f" {figures.condition:.0f}): {meaning}"
     )
     for number, group in enumerate(figures.unobservable, start=1):
-        shown = describe(group) if len(group) <= _MOST_TERMS else f"{len(group)} springs mixed"
-        console.print(f"   group {number}: {escape(shown)}")
+        console.print(f"   group {number}: {escape(describe_briefly(group))}")
 
 
 def _show_suspicious(console: Console, suspicious: tuple[SuspiciousReading, ...]) -> None:

@@ -121,8 +121,8 @@ def show_export(console: Console, result: "ExportResult", with_tool: bool) -> No
     console.print(f"the filters delay a slow wrench by {1e3 * result.filter_delay:.1f} ms")
     if not with_tool:
         console.print(
-            "no --tool: wrenches are taken as at the tool centre point, in its axes, bias and tool"
-            " weight removed"
+            "no tool file: wrenches are taken as at the tool centre point, in its axes, bias and"
+            " tool weight removed"
         )
 
 

@@ -41,8 +41,10 @@ def show_plan(console: Console, plan: PlanResult, figures: PlanFigures) -> None:
         console.print(f"marker seen by: {seen}", markup=False)
     for finding in plan.findings:
         console.print(f"note: {finding}", markup=False, soft_wrap=True)
-    written = ", ".join(figures.files)
-    console.print(f"written to {figures.folder}: {written}", markup=False, soft_wrap=True)
+    written = f"written to {figures.folder}: {', '.join(figures.files)}"
+    console.print(
+        written if figures.files else "Nothing was written.", markup=False, soft_wrap=True
+    )
 
 
 def _spread_table(plan: PlanResult) -> Table:
@@ -135,17 +137,10 @@ def dry_figures(found: DryRunResult) -> _DryRunFigures:
 
 
 def show_itinerary(console: Console, found: DryRunResult) -> None:
-    """Print the steps of a run with their times."""
-    table = Table("pose", "step", "what", "s", "until", box=None, pad_edge=False)
-    total = 0.0
-    for step in found.steps:
-        total += step.seconds
-        pose = "" if step.pose is None else str(step.pose)
-        table.add_row(pose, step.step.value, step.what, f"{step.seconds:.1f}", f"{total:.0f}")
-    console.print(table)
+    """Print what a run would take; its poses are for standard output, its steps for ``--json``."""
     console.print(
         f"{found.poses} poses, {len(found.load_cases)} load cases,"
-        f" about {total / 60.0:.0f} min; force limit {found.force_limit:.0f} N."
+        f" about {found.seconds / 60.0:.0f} min; force limit {found.force_limit:.0f} N."
         " Nothing was moved.",
         soft_wrap=True,
     )

@@ -61,6 +61,44 @@ class ToolResult(Result):
     set_aside: tuple[PostureSetAside, ...] = ()
     notes: tuple[str, ...] = ()
 
+    def __post_init__(self) -> None:
+        """Refuse a tool, or a place of a sensor, that is none.
+
+        Raises
+        ------
+        CompensationError
+            As `SensorLoad` says; the centre of mass counts only where it is determined.
+        """
+        T_flange_sensor = np.eye(4)
+        T_flange_sensor[:3, :3] = self.R_flange_sensor
+        T_flange_sensor[:3, 3] = self.sensor_origin
+        self.load_at(T_flange_sensor)
+
+    def load_at(self, T_tcp_sensor: FloatArray) -> SensorLoad:
+        """Return the tool on a sensor at a place.
+
+        Parameters
+        ----------
+        T_tcp_sensor : ndarray, shape (4, 4)
+            The sensor's measuring frame in the tcp frame.
+
+        Raises
+        ------
+        CompensationError
+            If a value is none of a tool's.
+        """
+        determined = not any(name.startswith("centre") for name in self.undetermined)
+        return SensorLoad(
+            mass=self.mass,
+            centre=np.array(self.centre) if determined else np.zeros(3),
+            force_bias=np.array(self.force_bias),
+            moment_bias=np.array(self.moment_bias),
+            T_tcp_sensor=T_tcp_sensor,
+            gravity=np.array(self.gravity),
+            matrix=np.eye(6) if self.matrix is None else np.array(self.matrix),
+            response=None if self.response is None else np.array(self.response),
+        )
+
     def facts(self) -> tuple[tuple[str, str], ...]:
         """Return what a person wants to know first."""
 
@@ -209,16 +247,7 @@ def sensor_load(tool: ToolResult, robot: Robot) -> SensorLoad:
     T_flange_sensor[:3, :3] = tool.R_flange_sensor
     T_flange_sensor[:3, 3] = tool.sensor_origin
     T_base_sensor = _flange(robot, tool.flange).forward(home) @ T_flange_sensor
-    return SensorLoad(
-        mass=tool.mass,
-        centre=np.array(tool.centre),
-        force_bias=np.array(tool.force_bias),
-        moment_bias=np.array(tool.moment_bias),
-        T_tcp_sensor=inverse_transform(robot.forward(home)) @ T_base_sensor,
-        gravity=np.array(tool.gravity),
-        matrix=np.eye(6) if tool.matrix is None else np.array(tool.matrix),
-        response=None if tool.response is None else np.array(tool.response),
-    )
+    return tool.load_at(inverse_transform(robot.forward(home)) @ T_base_sensor)
 
 
 def read_sensor_load(tool: Path | None, robot: Robot) -> SensorLoad | None:

@@ -6,6 +6,8 @@ itself. A compiler is not on every machine, so before anything is written the st
 evaluated in Python and must agree with the model, too.
 """
 
+import math
+import struct
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -43,15 +45,7 @@ def selftest_tables(numbers: Design) -> dict[str, str]:
         memory = _check_statements(exported, model, load, memory)
     course = _episodes(numbers, model)
     load_rows = [_struct(*load) for load in loads]
-    episode_rows = [
-        _struct(
-            str(x.times),
-            _struct(*x.reading[:4], str(int(x.reading.ok))),
-            x.correction,
-            f"{x.status}U",
-        )
-        for x in course
-    ]
+    episode_rows = [_episode_row(episode) for episode in course]
     return {
         "LOADS": str(len(loads)),
         "LOAD_DATA": ",\n".join(f"    {row}" for row in load_rows),
@@ -76,7 +70,7 @@ class _Episode:
 
     times: int
     reading: Reading
-    """Its time is added to the course's clock."""
+    """Its time is added to the course's clock. One of its numbers at most is a NaN or infinite."""
     correction: tuple[float, ...]
     status: int
 
@@ -232,7 +226,8 @@ def _episodes(numbers: Design, model: ModelFunctions) -> list[_Episode]:
 
     Loads that make a deflection within the deadband, a middle one and more than the limit;
     readings that fail until the correction fades; readings beyond the range, a good one, one from
-    a clock that was set back, and good ones again.
+    a clock that was set back, and good ones again; readings with a NaN or an infinity in every
+    place, between good ones.
     """
     rng = np.random.default_rng(_SEED + 1)
     limits, settings = numbers.settings.limits, numbers.settings
@@ -252,9 +247,24 @@ def _episodes(numbers: Design, model: ModelFunctions) -> list[_Episode]:
         (1, middle._replace(time=-1e3)),
         (2, middle),
         (4, middle),
+        *_without_numbers(middle),
         *_free_motion(numbers, (first, large)),
     ]
     return _played(Compensator(numbers, model), course)
+
+
+def _without_numbers(good: Reading) -> list[tuple[int, Reading]]:
+    """Return readings with a NaN or an infinity, each followed by one that is good."""
+    course = []
+    for bad in (math.nan, math.inf, -math.inf):
+        for spoilt in (
+            good._replace(time=bad),
+            good._replace(q=[*good.q[:-1], bad]),
+            good._replace(force=[*good.force[:-1], bad]),
+            good._replace(moment=[bad, *good.moment[1:]]),
+        ):
+            course += [(1, spoilt), (2, good)]
+    return course
 
 
 def _free_motion(numbers: Design, pressed: tuple[Reading, Reading]) -> list[tuple[int, Reading]]:
@@ -316,6 +326,27 @@ def _configurations(numbers: Design, rng: Generator, count: int) -> FloatArray:
     limits = numbers.calibrated.model.robot.limits
     lower, upper = np.maximum(limits.lower, -3.0), np.minimum(limits.upper, 3.0)
     return rng.uniform(lower, upper, (count, numbers.joints))
+
+
+def _episode_row(episode: _Episode) -> str:
+    """Return an episode as C: what is no number as its place in the reading, and its bits."""
+    reading = episode.reading
+    numbers = [reading.time, *reading.q, *reading.force, *reading.moment]
+    spoilt = [(place, x) for place, x in enumerate(numbers, start=1) if not math.isfinite(x)]
+    place, bad = spoilt[0] if spoilt else (0, 0.0)
+    (bits,) = struct.unpack("<Q", struct.pack("<d", bad))
+    time, q, force, moment = (
+        [x if math.isfinite(x) else 0.0 for x in part]
+        for part in ([reading.time], reading.q, reading.force, reading.moment)
+    )
+    return _struct(
+        str(episode.times),
+        _struct(time[0], q, force, moment, str(int(reading.ok))),
+        str(place),
+        f"UINT64_C(0x{bits:016X})",
+        episode.correction,
+        f"{episode.status}U",
+    )
 
 
 def _struct(*parts: str | float | Sequence[float]) -> str:

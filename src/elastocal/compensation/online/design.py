@@ -18,7 +18,8 @@ from elastocal.compensation.kernel import (
     rest,
 )
 from elastocal.compensation.settings import CompensatorSettings
-from elastocal.errors import CompensationError
+from elastocal.elastic import require_possible
+from elastocal.errors import CompensationError, SpringError
 from elastocal.identification import CalibratedModel
 from elastocal.results import brief_repr
 
@@ -26,8 +27,8 @@ LONG_AGO = -1.0e300
 """Time of a reading that never was, in s."""
 JOINT_RANGE = 1000.0
 """Positions beyond it are no joint's, in rad or m."""
-_LARGEST_COMPLIANCE = 1.0
-"""In rad/(N·m) or m/N: a spring that yields a metre under a newton is a broken file."""
+_PUSHING = 1e-12
+"""Compliance below its smallest by which rounding may have brought it there, in SI."""
 _NEGLIGIBLE = 1e-9
 """Share of the largest standard deviation below which a direction of the draws is left out."""
 _Z = float(ndtri(0.975))
@@ -135,7 +136,7 @@ def design(
     Raises
     ------
     CompensationError
-        If a compliance is not finite or senseless, or a filter cannot be made.
+        If a compliance is negative or beyond any arm's, or a filter cannot be made.
     """
     settings, load = settings or CompensatorSettings(), load or SensorLoad()
     _check_compliances(calibrated)
@@ -199,12 +200,16 @@ def _require_same_sensor(calibrated: CalibratedModel, load: SensorLoad) -> None:
 
 
 def _check_compliances(calibrated: CalibratedModel) -> None:
-    names = calibrated.model.parameter_names
-    for what, values in (("compliance", calibrated.compliance[None]), ("a draw", calibrated.draws)):
-        bad = np.argwhere(~(np.abs(values) <= _LARGEST_COMPLIANCE))
-        if len(bad):
-            row, column = bad[0]
+    """Refuse a model that no arm is like: a spring that pushes back corrects the wrong way."""
+    parameters = calibrated.model.parameters
+    try:
+        require_possible(parameters, calibrated.compliance[None], "compliance")
+        require_possible(parameters, calibrated.draws, "a draw")
+    except SpringError as error:
+        raise CompensationError(str(error)) from error
+    for parameter, value in zip(parameters, calibrated.compliance.tolist(), strict=True):
+        if value < parameter.lower - _PUSHING:
             raise CompensationError(
-                f"{what} of spring {names[column]} is {values[row, column]:g}: it must be finite"
-                f" and at most {_LARGEST_COMPLIANCE:g} in size"
+                f"compliance of spring {parameter.name} is {value:g} {parameter.unit.si}: a spring"
+                " that moves against its load is none; calibrate without bounds below 0"
             )

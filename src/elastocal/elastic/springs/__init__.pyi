@@ -35,5 +35,6 @@ from .spring import (
     Unit as Unit,
     as_axis as as_axis,
     coordinate_axis as coordinate_axis,
+    require_possible as require_possible,
 )
 from .tensor import Tensor as Tensor

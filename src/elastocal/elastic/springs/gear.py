@@ -16,7 +16,9 @@ from elastocal.elastic.springs.spring import (
     Tangents,
     Unit,
 )
+from elastocal.errors import SpringError
 from elastocal.records import record
+from elastocal.units import impossible
 
 LOST_MOTION = Unit("rad", "arcmin", 10_800.0 / np.pi)
 """Unit of the angle between a torque and its opposite that friction leaves."""
@@ -59,6 +61,21 @@ class Gear(OneAxisSpring):
     plays: bool = False
     """Whether friction holds back each elasticity by itself; files of before do not say so."""
     kind: Literal["gear"] = "gear"
+
+    def __post_init__(self) -> None:
+        """Refuse torques that no gear bears.
+
+        Raises
+        ------
+        SpringError
+            If a knee or a slip is not above 0, or beyond what any machine bears.
+        """
+        for what, torques in (("knee", self.knees), ("slip", self.slips)):
+            problem = impossible("moment", *torques)
+            if problem is None and not all(t > 0.0 for t in torques):
+                problem = f"{min(torques):g} N*m: it must be above 0"
+            if problem is not None:
+                raise SpringError(f"a {what} of gear {self.name!r} is {problem}")
 
     units = (TORSIONAL, LOST_MOTION)
     bears_weight = True

@@ -14,6 +14,7 @@ from elastocal.errors import SpringError, nearest
 from elastocal.records import record
 from elastocal.results import brief_repr
 from elastocal.robot import ChainJoint
+from elastocal.units import dimension_of, impossible
 
 AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 """Axes of a joint's frame by the words that spring files have for them."""
@@ -50,6 +51,31 @@ class Parameter:
     """A sensible size, in SI: what makes parameters of different units comparable."""
     lower: float = 0.0
     """Smallest value that makes sense, in SI."""
+
+
+def require_possible(parameters: Sequence[Parameter], rows: FloatArray, what: str) -> None:
+    """Refuse coefficients that no arm's spring has, by the limits of `elastocal.units.impossible`.
+
+    Parameters
+    ----------
+    parameters : sequence of Parameter
+        Of all springs.
+    rows : ndarray, shape (row, parameter)
+        Their values, in SI.
+    what : str
+        What a row is, e.g. ``"compliance"``.
+
+    Raises
+    ------
+    SpringError
+        With the first that is none.
+    """
+    for parameter, low, high in zip(parameters, rows.min(axis=0), rows.max(axis=0), strict=True):
+        dimension = dimension_of(f"1 {parameter.unit.si}")
+        assert dimension is not None, parameter
+        problem = impossible(dimension, float(low), float(high))
+        if problem is not None:
+            raise SpringError(f"{what} of spring {parameter.name} is {problem}")
 
 
 @brief_repr
@@ -103,8 +129,9 @@ class SpringAxis:
             )
         if not abs(float(np.linalg.norm(self.axis)) - 1.0) < _UNIT_LENGTH:
             raise SpringError(f"axis of spring {self.name!r} is {self.axis}, not a unit vector")
-        if not np.all(np.isfinite(self.offset)):
-            raise SpringError(f"offset of spring {self.name!r} is {self.offset}, not finite")
+        problem = impossible("length", *self.offset)
+        if problem is not None:
+            raise SpringError(f"offset of spring {self.name!r} is {problem}")
 
 
 @brief_repr

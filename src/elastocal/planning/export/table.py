@@ -3,6 +3,8 @@
 The plan itself is ``plan.json``; this table is rounded and nothing reads it back.
 """
 
+import shlex
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 from elastocal.planning.plan_result import Joints, PlanResult, PoseRecord
@@ -40,6 +42,39 @@ def write_table(folder: Path, plan: PlanResult) -> Path:
     path = Path(folder) / PLAN_TABLE
     write_rows(path, header, ([row.get(key, "") for key in header] for row in rows))
     return path
+
+
+def pose_lines(plan: PlanResult, seconds: Mapping[int, float] | None = None) -> Iterator[str]:
+    """Yield a line a pose, in visiting order: words ``key=value``, for programs and for people.
+
+    ``pose=0 start[s]=0.0 time[s]=34.8 station=tracker rail[mm]=… joint_a1[deg]=…``: the joints are
+    those in contact, the time is that of the way to the pose and at it.
+
+    Parameters
+    ----------
+    plan : PlanResult
+        The plan.
+    seconds : mapping of int to float, optional
+        Time of each pose, by its id, in s; by default the plan's own.
+
+    Raises
+    ------
+    RobotError
+        If the plan's robot cannot be read.
+    """
+    robot = Robot.from_urdf(plan.robot.urdf, plan.robot.tcp, plan.robot.base)
+    start = 0.0
+    for pose, move in zip(plan.poses, plan.moves, strict=False):
+        lasts = move.duration + pose.contact_time if seconds is None else seconds[pose.id]
+        row: dict[str, object] = {
+            "pose": pose.id,
+            "start[s]": f"{start:.1f}",
+            "time[s]": f"{lasts:.1f}",
+        }
+        row |= {"station": shlex.quote(pose.seen_by or "")}
+        row |= _joints(plan.robot.joints, pose.joints, robot.revolute)
+        yield " ".join(f"{key}={value}" for key, value in row.items())
+        start += lasts
 
 
 def _row(

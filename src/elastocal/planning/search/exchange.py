@@ -79,6 +79,8 @@ class ExchangeSearch:
         Most steps a run may take.
     label : str, optional
         Name of the technique; ``exchange-`` and the criterion by default.
+    kept : tuple of int
+        Candidates that every choice has.
 
     Raises
     ------
@@ -92,6 +94,7 @@ class ExchangeSearch:
     starts: int = 5
     cap: int = 1000
     label: str = ""
+    kept: tuple[int, ...] = ()
 
     def __post_init__(self) -> None:
         criterion_class(self.criterion)
@@ -138,8 +141,13 @@ class ExchangeSearch:
         """
         rng = np.random.default_rng(0) if rng is None else rng
         criterion = criterion_class(self.criterion).of(information)
-        starts = [rng.permutation(len(information))[:count] for _ in range(self.starts)]
-        runs = tuple(_exchange_poses(information, criterion, start, self.cap) for start in starts)
+        kept = _indices(list(self.kept[:count]))
+        starts = [
+            _with_kept(kept, rng.permutation(len(information)), count) for _ in range(self.starts)
+        ]
+        runs = tuple(
+            _exchange_poses(information, criterion, start, self.cap, kept) for start in starts
+        )
         best = int(np.argmax([run.value for run in runs]))
         order, values = _greedy_order(information, criterion, runs[best].chosen)
         return ExchangeSelection(
@@ -147,8 +155,17 @@ class ExchangeSearch:
         )
 
 
+def _with_kept(kept: IndexArray, order: IndexArray, count: int) -> IndexArray:
+    """Return the first of an order behind those that are kept, shape (count,)."""
+    return np.concatenate([kept, order[~np.isin(order, kept)]])[:count]
+
+
 def _exchange_poses(
-    information: Information, criterion: Criterion, start: ArrayLike, cap: int
+    information: Information,
+    criterion: Criterion,
+    start: ArrayLike,
+    cap: int,
+    kept: ArrayLike = (),
 ) -> Exchange:
     """Return a choice that no single exchange of its worst pose improves.
 
@@ -167,6 +184,8 @@ def _exchange_poses(
         Poses to begin with, none twice.
     cap : int
         Most steps to take.
+    kept : array_like of int, shape (n,)
+        Poses of the start that are never dropped.
 
     Raises
     ------
@@ -181,7 +200,7 @@ def _exchange_poses(
     ended = "whole pool" if len(chosen) == len(information) else "cap"
     while ended == "cap" and len(added) < cap:
         best = _best_addition(information, criterion, chosen)
-        worst = _worst(information, criterion, chosen, best)
+        worst = _worst(information, criterion, chosen, best, kept)
         added.append(best)
         dropped.append(worst)
         if best == worst:
@@ -225,13 +244,21 @@ def _greedy_order(
     return chosen[_indices(order)], np.array(values)
 
 
-def _worst(information: Information, criterion: Criterion, chosen: IndexArray, newest: int) -> int:
-    """Return the pose whose loss costs least; the newest one if it is among these."""
+def _worst(
+    information: Information,
+    criterion: Criterion,
+    chosen: IndexArray,
+    newest: int,
+    kept: ArrayLike = (),
+) -> int:
+    """Return the pose whose loss costs least, the newest if it is among these; none of ``kept``."""
     members = np.append(chosen, newest)
     # Few matrices of full size: subtracting is exact enough where a low-rank downdate of an
     # ill-conditioned inverse would not be.
     remaining = information.matrix(members) - information.gram[members]
-    tied = _best(criterion.value(remaining), criterion)
+    values = np.array(criterion.value(remaining))
+    values[np.isin(members, np.asarray(kept, dtype=np.intp))] = -np.inf
+    tied = _best(values, criterion)
     return newest if len(chosen) in tied else int(members[tied[0]])
 
 

@@ -27,7 +27,7 @@ def contact_frames(position: FloatArray, normal: FloatArray, spin: FloatArray) -
         Contact points in base, in m.
     normal : ndarray, shape (point, 3)
         Outward unit normals.
-    spin : ndarray, shape (spin,)
+    spin : ndarray, shape (spin,) or (point, spin)
         In rad.
 
     Returns

@@ -280,7 +280,7 @@ class Runner:
         if not self._given_up:
             return ""
         numbers = ", ".join(map(str, self._given_up))
-        return f"given up: pose {numbers}; `--resume` tries again"
+        return f"given up: pose {numbers}; `--resume` tries again once the cause is mended"
 
     def _failure(self, fault: FaultError, location: ArmLocation) -> SessionResult:
         end = RunEnd.INTERRUPTED if fault.fault is Fault.INTERRUPTED else RunEnd.STOPPED

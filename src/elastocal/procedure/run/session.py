@@ -28,6 +28,7 @@ from elastocal.procedure.run.settings import RunSettings
 from elastocal.procedure.run.steps import ArmLocation, Progress
 from elastocal.records import StrictModel
 from elastocal.results import brief_repr
+from elastocal.wording import spans
 
 _SAME_SECTIONS = ("procedure", "devices", "simulation")
 """Sections of the cell file that must not change within a run: its readings would not belong
@@ -107,6 +108,19 @@ class LastKnown:
     """Whether the tool may have been at the surface when the journal ends."""
     uncommitted: int | None = None
     """The pose that was worked on last, if it was not finished."""
+
+    @property
+    def finished(self) -> bool:
+        """Whether a session has come to its end, with the arm at HOME."""
+        text = self.entry.text
+        return self.entry.event is Event.FINISH and text.startswith(RunEnd.DONE.value)
+
+    def left_to_do(self, poses: int) -> str:
+        """Return what `--resume` would do of a plan of so many poses; empty: nothing."""
+        left = sorted(set(range(poses)) - set(self.committed))
+        if left:
+            return f"measures pose {spans(left)}"
+        return "" if self.finished else "only brings the arm to HOME, every pose is committed"
 
     @property
     def lines(self) -> tuple[str, ...]:
@@ -189,11 +203,17 @@ def check_same_run(record: RunRecord, wanted: RunRecord, where: str) -> None:
     ProcedureError
         With what differs.
     """
-    for key, what in (("plan", "plan"), ("cell", "cell"), ("seed", "seed")):
+    remedies = {
+        "plan": "give the plan that it was begun with",
+        "cell": "set the cell file back, which is in its folder cell",
+        "seed": f"give --seed {record.seed}",
+    }
+    for key, remedy in remedies.items():
         found, asked = getattr(record, key), getattr(wanted, key)
         if found != asked:
             raise ProcedureError(
-                f"{where} holds another run: its {what} is {_short(found)}, not {_short(asked)}"
+                f"{where} holds another run: its {key} is {_short(found)}, not {_short(asked)};"
+                f" to go on with it {remedy}, for a new run name another folder"
             )
 
 

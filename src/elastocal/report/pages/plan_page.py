@@ -72,7 +72,7 @@ def key_figures(plan: PlanResult) -> tuple[tuple[str, str], ...]:
 def _cells(plan: PlanResult, pose: PoseRecord, worst: str) -> list[str]:
     way = sum(move.duration for move in plan.moves if move.end == pose.id)
     return [
-        str(plan.search.order.index(pose.id) + 1),
+        str(plan.search.order.index(pose.id)),
         *(f"{1e3 * value + 0.0:.1f}" for value in pose.tcp_position),
         worst,
         pose.seen_by or "no station",

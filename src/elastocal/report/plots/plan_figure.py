@@ -49,6 +49,8 @@ class _Choice:
     marker: str
     order: list[int]
     """Candidates in search order."""
+    names: list[str]
+    """Id of the pose at each; empty where it is no pose of the plan."""
     distance: FloatArray
     """How far each candidate is from the nearest chosen one, straight, in m."""
     spread: SpreadRecord
@@ -108,14 +110,20 @@ def _choices(plan: PlanResult, pool: PoolData) -> list[_Choice]:
     """Return what the plan's technique chose, and the one that it is compared with."""
     candidate = {pose.id: pose.candidate for pose in plan.poses}
     search, other = plan.search, plan.comparison
-    found = [(search.name, "this plan", [candidate[i] for i in search.order], search.spread)]
+    ids = [str(pose) for pose in search.order]
+    found = [(search.name, "this plan", [candidate[i] for i in search.order], ids, search.spread)]
     if other is not None:
-        found.append((other.name, "for comparison", list(other.candidates), other.spread))
+        unnamed = [""] * len(other.candidates)
+        found.append((other.name, "for comparison", list(other.candidates), unnamed, other.spread))
     choices = []
-    for (name, role, order, spread), colour, marker in zip(found, style.CHOSEN, "os", strict=False):
+    for (name, role, order, names, spread), colour, marker in zip(
+        found, style.CHOSEN, "os", strict=False
+    ):
         distance = np.asarray(cKDTree(pool.contact[order]).query(pool.contact)[0])
         title = f"{name.upper()} ({role})"
-        choices.append(_Choice(title, colour, marker, order, distance, spread, search.metric))
+        choices.append(
+            _Choice(title, colour, marker, order, names, distance, spread, search.metric)
+        )
     return choices
 
 
@@ -202,9 +210,9 @@ def _draw_chosen(axes: Axes, anchor: FloatArray, choice: _Choice) -> None:
         place[:, 0], place[:, 1], s=points**2, c=style.PAPER, edgecolors=choice.colour,
         linewidths=1.3, marker=choice.marker, zorder=4,
     )  # fmt: skip
-    for number, (x, y) in enumerate(place, start=1):
+    for name, (x, y) in zip(choice.names, place, strict=True):
         axes.text(
-            x, y, str(number), ha="center", va="center_baseline", fontsize=0.5 * points, zorder=5,
+            x, y, name, ha="center", va="center_baseline", fontsize=0.5 * points, zorder=5,
         )  # fmt: skip
 
 

@@ -233,7 +233,7 @@ def _refused(pool: PoolData) -> list[Layer]:
 
 
 def _poses(plan: PlanResult, lift: float) -> Any:
-    rank = {pose: number for number, pose in enumerate(plan.search.order, start=1)}
+    rank = {pose: number for number, pose in enumerate(plan.search.order)}
     return scatter(
         np.array([_above(pose, lift) for pose in plan.poses]), "markers+text", "poses", "text",
         text=[str(pose.id) for pose in plan.poses], textposition="middle center",
@@ -249,7 +249,7 @@ def _hover(plan: PlanResult, pose: PoseRecord, rank: int | None) -> str:
     way = sum(move.duration for move in plan.moves if move.end == pose.id)
     seen = f"seen by {escape(pose.seen_by)}" if pose.seen_by else "not seen by a station"
     lines = [
-        f"<b>pose {pose.id}</b>, chosen as number {rank}",
+        f"<b>pose {pose.id}</b>, search rank {rank}",
         f"x, y, z: {millimetres(pose.tcp_position)} mm",
         seen,
         f"{duration(way)} on the way, {duration(pose.contact_time)} in contact",

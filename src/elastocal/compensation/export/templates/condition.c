@@ -3,35 +3,59 @@
 
 @MEDIAN_CODE@
 
-static unsigned int out_of(double value, double range)
+/* 1 for a number, 0 for a NaN or an infinity. By its bits (IEEE 754: the exponent is all ones) and
+ * from memory: compilers may be told that no double is one, and drop a comparison. */
+static int is_number(const double *value)
+{
+    uint64_t bits;
+    (void)memcpy(&bits, value, sizeof bits);
+    return ((bits & UINT64_C(0x7FF0000000000000)) != UINT64_C(0x7FF0000000000000)) ? 1 : 0;
+}
+
+static unsigned int out_of(const double *value, double range)
 {
     unsigned int problem = 0U;
-    if (!((value > -range) && (value < range))) {
-        problem = (isfinite(value) != 0) ? ELASTOCAL_SATURATED : ELASTOCAL_INVALID;
+    if (is_number(value) == 0) {
+        problem = ELASTOCAL_INVALID;
+    } else if (!((*value > -range) && (*value < range))) {
+        problem = ELASTOCAL_SATURATED;
+    } else {
+        problem = 0U;
     }
     return problem;
+}
+
+/* 1 for joint positions, 0 where one is none. */
+static int are_joints(const double q[])
+{
+    int all = 1;
+    int i;
+    for (i = 0; i < ELASTOCAL_JOINTS; i++) {
+        if ((is_number(&q[i]) == 0) || !((q[i] > -JOINT_RANGE) && (q[i] < JOINT_RANGE))) {
+            all = 0;
+        }
+    }
+    return all;
 }
 
 /* Why a reading cannot be used; 0 if it can. */
 static unsigned int problem_of(const elastocal_state *state, const elastocal_reading *reading)
 {
-    const double passed = reading->time - state->time;
-    unsigned int problem = 0U;
+    unsigned int problem = ELASTOCAL_STALE;
     int i;
-    if (!((passed > 0.0) && (passed <= LONGEST_GAP))) {
-        problem |= ELASTOCAL_STALE;
+    if (is_number(&reading->time) != 0) {
+        const double passed = reading->time - state->time;
+        problem = ((passed > 0.0) && (passed <= LONGEST_GAP)) ? 0U : ELASTOCAL_STALE;
     }
     if (reading->ok == 0) {
         problem |= ELASTOCAL_SENSOR;
     }
     for (i = 0; i < 3; i++) {
-        problem |= out_of(reading->force[i], RANGE[i]);
-        problem |= out_of(reading->moment[i], RANGE[i + 3]);
+        problem |= out_of(&reading->force[i], RANGE[i]);
+        problem |= out_of(&reading->moment[i], RANGE[i + 3]);
     }
-    for (i = 0; i < ELASTOCAL_JOINTS; i++) {
-        if (!((reading->q[i] > -JOINT_RANGE) && (reading->q[i] < JOINT_RANGE))) {
-            problem |= ELASTOCAL_INVALID;
-        }
+    if (are_joints(reading->q) == 0) {
+        problem |= ELASTOCAL_INVALID;
     }
     return problem;
 }
@@ -115,7 +139,7 @@ void elastocal_condition(elastocal_state *state, const elastocal_reading *readin
     double wrench[6];
     int i;
     /* A clock that was set anew costs one reading, not all that follow. */
-    if (isfinite(reading->time) != 0) {
+    if (is_number(&reading->time) != 0) {
         state->time = reading->time;
     }
     state->problem = problem;

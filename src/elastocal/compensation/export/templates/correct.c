@@ -170,11 +170,9 @@ void elastocal_correct(elastocal_state *state, const double q[], elastocal_corre
     int usable = state->fresh;
     int i;
     out->status = state->problem;
-    for (i = 0; i < ELASTOCAL_JOINTS; i++) {
-        if (!((q[i] > -JOINT_RANGE) && (q[i] < JOINT_RANGE))) {
-            usable = 0;
-            out->status |= ELASTOCAL_INVALID;
-        }
+    if (are_joints(q) == 0) {
+        usable = 0;
+        out->status |= ELASTOCAL_INVALID;
     }
     if (usable != 0) {
         out->status |= follow(state, q);

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from functools import partial
 
 from elastocal.elastic import unit_of
-from elastocal.identification import CalibrationSummary, Term, describe
+from elastocal.identification import CalibrationSummary, describe_briefly
 from elastocal.identification.recertification import (
     CompareSummary,
     DeflectionChange,
@@ -15,8 +15,6 @@ from elastocal.report.document import blocks
 from elastocal.report.plots import SpringBar, recertification_figure, spring_bars, spring_figure
 from elastocal.verdict import Evidence, ModelEvidence
 from elastocal.wording import lengths_with_interval, mm
-
-_MOST_TERMS = 6
 
 
 def _compliances(evidence: Evidence) -> Iterator[blocks.Block]:
@@ -140,12 +138,8 @@ def _not_told_apart(found: ModelEvidence) -> Iterator[blocks.Block]:
         else f"{missing} more directions could be seen with other poses or load cases, so that not"
         " all of these combinations are harmless."
     )
-    groups = enumerate(seen.unobservable, start=1)
-    yield blocks.Bullets(tuple(f"Group {number}: {_described(group)}" for number, group in groups))
-
-
-def _described(group: tuple[Term, ...]) -> str:
-    return describe(group) if len(group) <= _MOST_TERMS else f"{len(group)} springs mixed"
+    groups = enumerate(map(describe_briefly, seen.unobservable), start=1)
+    yield blocks.Bullets(tuple(f"Group {number}: {group}" for number, group in groups))
 
 
 COMPLIANCES = blocks.Section("compliances", "Compliances", 50, _compliances)

@@ -45,13 +45,13 @@ def _poses(plan: PlanResult, buttons: bool) -> blocks.Block:
     rows = tuple(
         (
             blocks.PoseButton(pose.id) if buttons else str(pose.id),
-            str(plan.search.order.index(pose.id) + 1),
+            str(plan.search.order.index(pose.id)),
             *(f"{1e3 * value + 0.0:.1f}" for value in pose.tcp_position),
             pose.seen_by or "no station",
         )
         for pose in plan.poses
     )
-    heads = ("Pose", "Chosen as no.", "x in mm", "y in mm", "z in mm", "Seen by")
+    heads = ("Pose", "Search rank", "x in mm", "y in mm", "z in mm", "Seen by")
     caption = "Poses in visiting order, contact point in base"
     table = blocks.Table(caption, heads, rows, name="pose-table")
     return blocks.Details(f"The {counted(len(plan.poses), 'pose')} in visiting order", (table,))

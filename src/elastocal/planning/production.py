@@ -1,0 +1,239 @@
+"""What a plan promises for production: coverage, loads, and the error to expect.
+
+The standard deviation that ``sigma`` of a measured coordinate leaves in the predicted deflections
+of production is, with the information matrix ``S`` of the chosen poses and ``P`` the mean of
+``z z^T`` over the rows of production (Klimchik 2012; see `IOptimal`),
+
+    noise = sigma sqrt(3 tr(P S^-1)),      expected = hypot(noise, floor),
+
+the root mean square of the deviation's length. What the springs cannot express is not in the noise:
+it is the floor, which `elastocal study` measures on a simulated cell.
+"""
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+
+from elastocal.arrays import FloatArray, IndexArray
+from elastocal.cell import Cell
+from elastocal.identification import (
+    LEVEL_REACH,
+    CalibratedLoads,
+    ProductionCoverage,
+    near_postures,
+    production_coverage,
+)
+from elastocal.planning.search import CRITERIA, Information
+from elastocal.records import record
+from elastocal.results import brief_repr
+from elastocal.wording import mm, um
+
+SIGMA = 25e-6
+"""Standard deviation of a measured coordinate of a deflection, in m, where the cell file says none:
+a laser tracker at some metres, averaged over a second, and a controller that stops."""
+_SIDES = {"north": (0, "fx"), "south": (1, "fx"), "east": (3, "fy"), "west": (2, "fy")}
+"""Load case that pushes to each side (+x, -x, +y, -y), and the key of its amplitude."""
+_NOTHING = 1.0
+"""Force in N that needs no load case."""
+_MOST_ROWS = 500
+"""Rows of production that are looked at when poses are chosen to cover it."""
+_STEP = 10.0
+"""Amplitudes are proposed in steps of this, in N."""
+
+
+@record()
+class ExpectedError:
+    """The error to expect on production from a number of poses."""
+
+    poses: int
+    noise: float
+    """What the noise of the measurement makes of it, root mean square of the length, in m."""
+    error: float
+    """With the floor of the model, in m."""
+
+
+@brief_repr
+@record()
+class ProductionRecord:
+    """What a plan promises for production."""
+
+    file: str
+    """As the cell file names it."""
+    courses: tuple[str, ...]
+    coverage: ProductionCoverage
+    """By the chosen poses."""
+    poses: int
+    """Number of chosen poses."""
+    springs: str
+    """Model whose parameters the poses were chosen for."""
+    sigma: float
+    """Standard deviation of a measured coordinate that the errors are expected with, in m."""
+    floor: float | None
+    """Error that the model leaves however many poses there are, in m; None: not known."""
+    accuracy: float | None
+    """Error that was asked for, in m."""
+    expected: tuple[ExpectedError, ...]
+    """Error to expect, pose by pose."""
+
+    def expected_of(self, poses: int) -> ExpectedError | None:
+        """Return the error to expect from a number of poses; None where it is not known."""
+        return next((each for each in self.expected if each.poses == poses), None)
+
+    def facts(self) -> tuple[tuple[str, str], ...]:
+        """Return coverage and the error to expect, in a few words."""
+        found = self.expected_of(self.poses)
+        if found is None:
+            return (("production", self.coverage.sentence()),)
+        floor = (
+            "the model's own error is not known and comes on top"
+            if self.floor is None
+            else f"with the model's own error of {um(self.floor)}"
+        )
+        text = f"{um(found.error)} for sigma {um(self.sigma)}; {floor}"
+        return (("production", self.coverage.sentence()), ("expected error", text))
+
+
+def plan_coverage(cell: Cell, q: FloatArray) -> ProductionCoverage | None:
+    """Return how much of production calibration poses cover; None when the cell names none.
+
+    Parameters
+    ----------
+    cell : Cell
+        For its process and its load cases.
+    q : ndarray, shape (pose, joint)
+        Postures in contact, in rad or m.
+    """
+    process = cell.process
+    if process is None:
+        return None
+    force_tcp = cell.file.load_cases.force_tcp
+    pose = np.repeat(np.arange(len(q)), len(force_tcp))
+    loads = CalibratedLoads.of_forces(q, np.tile(force_tcp, (len(q), 1)), pose)
+    return production_coverage(
+        cell.robot, loads, process.joint_position, process.force, process.course
+    )
+
+
+def covering_candidates(cell: Cell, q: FloatArray) -> IndexArray:
+    """Return as few candidates as cover what all of them cover of production, in greedy order.
+
+    Parameters
+    ----------
+    cell : Cell
+        For its process.
+    q : ndarray, shape (candidate, joint)
+        Postures in contact, in rad or m.
+    """
+    assert cell.process is not None
+    rows = cell.process.joint_position
+    some = rows[np.unique(np.linspace(0, len(rows) - 1, _MOST_ROWS).astype(int))]
+    near = near_postures(cell.robot, some, q).T
+    left, chosen = near.any(axis=0), []
+    while left.any():
+        best = int(np.argmax((near & left).sum(axis=1)))
+        chosen.append(best)
+        left &= ~near[best]
+    return np.array(chosen, dtype=np.intp)
+
+
+def expected_errors(
+    cell: Cell, information: Information, order: IndexArray, most: int
+) -> tuple[ExpectedError, ...]:
+    """Return the error to expect from 1, 2, … poses, as far as their springs are all observed.
+
+    Parameters
+    ----------
+    cell : Cell
+        For ``search.sigma`` and ``search.floor``.
+    information : Information
+        Of the candidates, with a process.
+    order : ndarray of int, shape (n,)
+        Poses to begin with, in the order of choice.
+    most : int
+        Number of poses up to which others are added, each the best next one.
+    """
+    criterion = CRITERIA["i"].of(information)
+    chosen = order.tolist()
+    while len(chosen) < min(most, len(information)):
+        values = np.array(criterion.after_adding(information.matrix(chosen), information))
+        values[chosen] = -np.inf
+        chosen.append(int(np.argmax(values)))
+    found = []
+    for count in range(1, len(chosen) + 1):
+        if count * len(information.rows) >= information.rank:
+            value = float(criterion.value(information.matrix(chosen[:count])))
+            found.append(expected_error(cell, count, value))
+    return tuple(found)
+
+
+def expected_error(cell: Cell, count: int, value: float) -> ExpectedError:
+    """Return the error to expect from poses with a value of the criterion I."""
+    search = cell.file.search
+    noise = (search.sigma or SIGMA) * math.sqrt(max(-3.0 * value, 0.0))
+    return ExpectedError(count, noise, math.hypot(noise, search.floor or 0.0))
+
+
+def _load_findings(cell: Cell) -> Iterator[str]:
+    """Yield where production pushes harder than the load cases, with the amplitudes to ask for."""
+    process, loads = cell.process, cell.file.load_cases
+    if process is None:
+        return
+    R_base_tcp = cell.robot.forward(process.joint_position)[:, :3, :3]
+    force_tcp = np.einsum("rji,rj->ri", R_base_tcp, process.force)
+    pressed = CalibratedLoads.of_forces(
+        process.joint_position[:1], loads.force_tcp, np.zeros(len(loads.force_tcp), dtype=np.intp)
+    )
+    level = pressed.levels(force_tcp)[:, 0]
+    if not np.any(level > LEVEL_REACH):
+        return
+    x, y, z = force_tcp[level > LEVEL_REACH].T
+    pushed = np.stack([x, -x, y, -y]).max(axis=1)
+    for case, (side, key) in _SIDES.items():
+        if pushed[side] > _NOTHING and not pressed.largest[0, side] > 0.0:
+            yield (
+                f"load case {case} is missing: production pushes the robot with {pushed[side]:.0f}"
+                f' N to that side; add it to load_cases.cases, with {key}: "{_up(pushed[side])} N"'
+            )
+    lateral = float(np.hypot(x, y).max())
+    known = float(pressed.largest[0, :4].max())
+    press = float((-z).max())
+    if known > 0.0 and lateral > LEVEL_REACH * known:
+        held = _up(lateral * loads.safety / loads.friction)
+        yield (
+            f"production pushes aside with {lateral:.0f} N, the load cases with {known:.0f} N: ask"
+            f' for load_cases.fx and fy of "{_up(lateral)} N", which friction holds from fz of'
+            f' "{max(held, _up(loads.fz))} N" on'
+        )
+    if press > LEVEL_REACH * loads.fz:
+        yield (
+            f"production presses with {press:.0f} N, the load cases with {loads.fz:.0f} N: ask for"
+            f' load_cases.fz of "{_up(press)} N"'
+        )
+    if float(z.max()) > (LEVEL_REACH - 1.0) * loads.fz:
+        yield (
+            f"production pulls the tool with {z.max():.0f} N, which no press on a surface does: the"
+            " calibration does not cover it"
+        )
+
+
+def _up(force: float) -> int:
+    return int(math.ceil(force / _STEP) * _STEP)
+
+
+def production_findings(cell: Cell, record: ProductionRecord | None) -> Iterator[str]:
+    """Yield what a user should know of production before the robot moves."""
+    yield from _load_findings(cell)
+    if record is None:
+        return
+    if not record.coverage.is_enough:
+        yield (
+            f"production is not covered: {record.coverage.sentence()}; let the external axes be"
+            " searched, widen surface.region towards it, or ask for more poses (search.poses)"
+        )
+    wanted, found = record.accuracy, record.expected_of(record.poses)
+    if wanted is not None and found is not None and found.error > wanted:
+        yield (
+            f"an error of {mm(wanted)} (search.accuracy) is not expected from {record.poses} poses:"
+            f" {mm(found.error)} is; raise search.poses, or press harder"
+        )
