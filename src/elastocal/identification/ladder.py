@@ -46,6 +46,10 @@ _KNEES_OF_PLAYS = (0.5, 2.0)
 """Knees of gears with friction, whose elements are knees as well."""
 _SLIPS = (0.15, 0.3, 0.6, 1.5)
 """Limits of the friction elements, likewise: from what barely matters to gears that stick."""
+_SLIDES = 0.6
+"""Part of the joint's largest load torque up to which a friction element is fitted. One that slid
+little or never has a column near zero, and a compliance that says nothing of the arm: where
+production loads the joint a little more it would bend by millimetres."""
 _LOADED = 0.01
 """Part of the largest typical torque below which a joint counts as never loaded."""
 _LOW_LEVEL = 0.6
@@ -103,12 +107,14 @@ def gears(robot: Robot, readings: Readings, slips: tuple[float, ...] = ()) -> tu
         Their median torque about each joint scales its gear; joints that they do not load keep
         linear springs.
     slips : tuple of float
-        Limits of friction elements, in that torque; none without.
+        Limits of friction elements, in that torque; none without. Those that no load made slide
+        by far are left out.
     """
     springs = links(robot)
     model = ElasticModel(robot, actuated(robot))
     torque = model.load_torques(readings.joint_position, readings.force, readings.moment)
     typical = dict(zip(robot.joint_names, np.median(np.abs(torque), axis=0), strict=True))
+    largest = dict(zip(robot.joint_names, np.abs(torque).max(axis=0), strict=True))
     least = _LOADED * max(typical.values())
 
     def geared(spring: Spring, axial: bool) -> Spring:
@@ -116,9 +122,10 @@ def gears(robot: Robot, readings: Readings, slips: tuple[float, ...] = ()) -> tu
         size = float(typical[spring.joint])
         if not (axial and axis.revolute and size > least):
             return spring
-        parts = _KNEES_OF_PLAYS if slips else _KNEES
+        slides = [size * part for part in slips if size * part <= _SLIDES * largest[spring.joint]]
+        parts = _KNEES_OF_PLAYS if slides else _KNEES
         knees = tuple(_rounded(size * part) for part in parts)
-        limits = tuple(_rounded(size * part) for part in slips)
+        limits = tuple(map(_rounded, slides))
         place = (spring.name, spring.joint, axis.axis)
         return Gear(*place, knees=knees, slips=limits, plays=bool(limits))
 

@@ -139,7 +139,7 @@ def run_trial(trial: ProcessTrial, courses: tuple[Course, ...], progress: Progre
     DeviceError, EquilibriumError
         If the cell cannot be simulated, or not under these forces.
     """
-    return _run_courses(trial, courses, None, progress)
+    return _run_courses(trial, courses, False, progress)
 
 
 def run_budget(
@@ -155,7 +155,6 @@ def _run_effect(
     trial: ProcessTrial, courses: tuple[Course, ...], effect: _Effect, progress: Progress
 ) -> TrialRuns:
     """Run courses with something switched off."""
-    late = round(float(trial.settings.chain.delay()) / trial.settings.cycle)
     changed = replace(trial, cell=effect.changed(trial.cell))
     if effect.prompt:
         changed = replace(
@@ -164,26 +163,26 @@ def _run_effect(
             controller=replace(trial.controller, dead_cycles=0, lag=0.0),
         )
         courses = tuple(replace(course, ripple=()) for course in courses)
-    return _run_courses(changed, courses, late if effect.exact else None, progress, effect.name)
+    return _run_courses(changed, courses, effect.exact, progress, effect.name)
 
 
 def _run_courses(
     trial: ProcessTrial,
     courses: tuple[Course, ...],
-    late: int | None,
+    exact: bool,
     progress: Progress,
     stage: str = "courses",
 ) -> TrialRuns:
     """Run every course without and with correction.
 
-    With ``late``, a corrector that knows the deflection acts that many cycles too late; None: the
-    model corrects.
+    With ``exact``, a corrector that knows the deflection acts as late as the filters make it, in
+    place of the model's.
     """
     runs: dict[int, tuple[CourseRun, CourseRun]] = {}
     # The longest first, or the last one would be run while the other processes wait.
     order = sorted(range(len(courses)), key=lambda number: -len(courses[number].q))
     progress(stage, 0, len(courses))
-    run = partial(_run_twice, trial, zeroed_at=courses[0].q[0], late=late)
+    run = partial(_run_twice, trial, zeroed_at=courses[0].q[0], exact=exact)
     processes = process_count(trial.jobs, len(courses))
     found = map_in_processes(run, [courses[number] for number in order], processes)
     for number, pair in zip(order, found, strict=True):
@@ -194,16 +193,21 @@ def _run_courses(
 
 
 def _run_twice(
-    trial: ProcessTrial, course: Course, *, zeroed_at: FloatArray, late: int | None
+    trial: ProcessTrial, course: Course, *, zeroed_at: FloatArray, exact: bool
 ) -> tuple[CourseRun, CourseRun]:
     """Return a course without and with correction; courses know nothing of one another."""
     truth, robot = ProcessCell(trial.cell, trial.seed), trial.cell.robot
-    corrector = (
-        _corrector(trial, truth, zeroed_at) if late is None else process.PerfectCorrector(late)
-    )
+    corrector = _perfect(trial.settings) if exact else _corrector(trial, truth, zeroed_at)
     air = process.air_shifts(truth, course)
     before = process.run_course(truth, robot, course, air, trial.clocked, None)
     return before, process.run_course(truth, robot, course, air, trial.clocked, corrector)
+
+
+def _perfect(settings: CompensatorSettings) -> process.Corrector:
+    """Return the corrector that knows the deflection, as late as the filters, and as far ahead."""
+    filters, cycle = settings.filter, settings.cycle
+    late = float(filters.model_copy(update={"lead": None}).chain(cycle).delay())
+    return process.PerfectCorrector(round(late / cycle), (filters.lead or 0.0) / cycle)
 
 
 def _corrector(trial: ProcessTrial, truth: ProcessCell, zeroed_at: FloatArray) -> process.Corrector:

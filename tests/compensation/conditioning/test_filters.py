@@ -2,7 +2,12 @@ import numpy as np
 import pytest
 from scipy import signal
 
-from elastocal.compensation.conditioning.filters import FilterChain, low_pass, notch
+from elastocal.compensation.conditioning.filters import (
+    FilterChain,
+    FilterSettings,
+    low_pass,
+    notch,
+)
 from elastocal.errors import CompensationError
 
 SAMPLE = 0.004
@@ -73,3 +78,28 @@ def test_a_notch_takes_out_its_line_and_has_no_delay_there():
 def test_filters_that_cannot_be_made_are_refused(make, reason):
     with pytest.raises(CompensationError, match=reason):
         make()
+
+
+def test_a_lead_brings_a_slow_wrench_out_earlier_by_its_time():
+    filtered = FilterSettings.model_validate({"low_pass": {"cutoff": "15 Hz"}})
+    led = filtered.model_copy(update={"lead": 0.04}).chain(SAMPLE)
+    assert led.delay() == pytest.approx(float(filtered.chain(SAMPLE).delay()) - 0.04)
+    ramp = SAMPLE * np.arange(4000)
+    assert (ramp - signal.sosfilt(sos(led), ramp))[-1] == pytest.approx(0.0188 - 0.04, abs=5e-3)
+
+
+def test_behind_a_low_pass_a_lead_amplifies_noise_by_less_than_three():
+    filtered = FilterSettings.model_validate({"low_pass": {"cutoff": "15 Hz"}, "lead": "40 ms"})
+    assert filtered.chain(SAMPLE).gain(np.linspace(0.0, 124.0, 500)).max() < 3.0
+
+
+@pytest.mark.parametrize(
+    ("settings", "reason"),
+    [
+        ({"low_pass": None, "lead": "10 ms"}, "filter.lead needs a low_pass"),
+        ({"lead": "200 ms"}, r"lead 0.2 s must be above 0 and at most 0.1 s"),
+    ],
+)
+def test_a_lead_that_makes_noise_or_guesses_too_far_is_refused(settings, reason):
+    with pytest.raises(CompensationError, match=reason):
+        FilterSettings.model_validate(settings).chain(SAMPLE)

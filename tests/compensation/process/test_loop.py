@@ -96,6 +96,11 @@ def test_delay_leaves_the_slope_times_the_delay(filters, dead):
     np.testing.assert_allclose(passage.deviation[20:], slope * 0.004 * (filters + dead), rtol=1e-9)
 
 
+def test_a_lead_by_the_whole_delay_leaves_nothing_of_a_ramp():
+    passage, _ = run(Controller(dead_cycles=3, lag=0.0), PerfectCorrector(4, lead=7.0))
+    assert np.abs(passage.deviation[20:]).max() < 1e-9 * np.abs(COMPLIANCE * 500.0) + 1e-12
+
+
 def test_a_lag_leaves_the_slope_times_its_time_constant():
     lag = 0.05
     passage, _ = run(Controller(dead_cycles=0, lag=lag), PerfectCorrector(0))

@@ -7,6 +7,7 @@ from .filters import (
     Notch as Notch,
     Section as Section,
     Speed as Speed,
+    lead_section as lead_section,
     low_pass as low_pass,
     notch as notch,
 )

@@ -5,7 +5,12 @@ of the last readings, then second-order sections in the transposed direct form I
 
     y = b0 x + z1,    z1' = b1 x - a1 y + z2,    z2' = b2 x - a2 y.
 
-Every section is scaled to pass a constant unchanged. A further linear filter is a settings class
+Every section is scaled to pass a constant unchanged. Last may come a lead,
+
+    y = x + lead / sample (x - x1),
+
+which goes ahead along the slope of what was filtered, by as much as filters and controller are
+late. A further linear filter is a settings class
 with a method ``sections`` here, and its key in `FilterSettings`: compensator and C export run
 whatever sections there are.
 """
@@ -32,6 +37,8 @@ _MEDIANS = (1, 3, 5)
 """Lengths of the median; 1 is none."""
 _LARGEST_ORDER = 8
 """Highest order of the low-pass: with more, sections lose digits and the delay is too long."""
+_LONGEST_LEAD = 0.1
+"""Longest time to go ahead along a slope, in s: for longer no slope of a force stays as it is."""
 _LONGEST_DELAY = 0.5
 """Longest delay of all filters together, in s."""
 
@@ -70,7 +77,7 @@ class FilterChain:
             raise CompensationError(f"median of {self.median} readings: allowed are 1, 3 and 5")
 
     def delay(self, frequency: ArrayLike = 0.0) -> FloatArray:
-        """Return the group delay, the median's ``(n - 1) / 2`` readings included.
+        """Return the group delay, the median's ``(n - 1) / 2`` readings included, less a lead.
 
         With ``H = B/A`` and ``z = exp(i w)`` the delay of a polynomial ``P`` of ``1/z`` is the
         real part of ``sum(k p_k z^-k) / P`` in readings (Oppenheim and Schafer, Discrete-Time
@@ -93,7 +100,7 @@ class FilterChain:
         return readings * self.sample
 
     def gain(self, frequency: ArrayLike) -> FloatArray:
-        """Return how much of an oscillation the sections let through, between 0 and about 1."""
+        """Return how much of an oscillation the sections let through; above 1 with a lead only."""
         z = np.exp(-2j * np.pi * np.asarray(frequency, dtype=float) * self.sample)
         passed = np.ones(z.shape)
         for b0, b1, b2, a1, a2 in self.sections:
@@ -131,10 +138,13 @@ class FilterSettings(StrictModel):
     median: Literal[1, 3, 5] = 3
     notches: tuple[Notch, ...] = ()
     low_pass: LowPass | None = LowPass.model_construct(cutoff=15.0)
+    lead: Duration | None = None
+    """Time to go ahead along the slope of the filtered wrench, in s: the delay of these filters and
+    of the controller, as measured. None: a correction is late by both."""
 
     def off(self) -> "FilterSettings":
         """Return the same settings without any filter; readings come as often."""
-        return self.model_copy(update={"median": 1, "notches": (), "low_pass": None})
+        return self.model_copy(update={"median": 1, "notches": (), "low_pass": None, "lead": None})
 
     def chain(self, cycle: float) -> FilterChain:
         """Return the filters; made anew at every call.
@@ -147,12 +157,19 @@ class FilterSettings(StrictModel):
         Raises
         ------
         CompensationError
-            If a frequency is not below half the rate of readings, or they delay a wrench too long.
+            If a frequency is not below half the rate of readings, they delay a wrench too long, or
+            a lead is too long or goes along unfiltered readings.
         """
         sample = self.sample or cycle
         sections = tuple(section for each in self.notches for section in each.sections(sample))
         if self.low_pass is not None:
             sections += self.low_pass.sections(sample)
+        if self.lead is not None:
+            if self.low_pass is None:
+                raise CompensationError(
+                    "filter.lead needs a low_pass: the slope of readings as they come is noise"
+                )
+            sections += (lead_section(self.lead, sample),)
         chain = FilterChain(sample, self.median, sections)
         delay = float(chain.delay())
         if not delay <= _LONGEST_DELAY:
@@ -210,6 +227,26 @@ def notch(frequency: float, width: float, sample: float) -> tuple[Section, ...]:
         )
     b, a = signal.iirnotch(frequency, frequency / width, fs=1.0 / sample)
     return _sections(np.concatenate([b, a])[None])
+
+
+def lead_section(time: float, sample: float) -> Section:
+    """Return the section that goes ahead along a slope by a time, both in s.
+
+    A slow wrench comes out earlier by the time; an oscillation of frequency ``f`` comes out larger
+    by about ``2 pi f time``, which is what a low-pass of order 2 and more before it takes back.
+
+    Raises
+    ------
+    CompensationError
+        If the time is too long.
+    """
+    if not 0.0 < time <= _LONGEST_LEAD:
+        raise CompensationError(
+            f"lead {time:g} s must be above 0 and at most {_LONGEST_LEAD:g} s: for longer no slope"
+            " of a force stays as it is"
+        )
+    ahead = time / sample
+    return 1.0 + ahead, -ahead, 0.0, 0.0, 0.0
 
 
 def _check_frequency(what: str, frequency: float, sample: float) -> None:

@@ -26,8 +26,10 @@ from .loop import (
 from .placement import FibrePlacement as FibrePlacement
 from .postures import (
     PROCESSES as PROCESSES,
+    StiffestPosture as StiffestPosture,
     process_courses as process_courses,
     require_process as require_process,
+    stiffest_posture as stiffest_posture,
     with_postures as with_postures,
 )
 from .programmed import (

@@ -80,19 +80,22 @@ class ModelCorrector:
 class PerfectCorrector:
     """Knows the deflection exactly, and says so late: what a perfect model would reach."""
 
-    def __init__(self, cycles: int) -> None:
-        """Be late by so many cycles."""
-        self._cycles = cycles
+    def __init__(self, cycles: int, lead: float = 0.0) -> None:
+        """Be late by so many cycles, then go ahead along the slope by as many as ``lead`` says."""
+        self._cycles, self._lead = cycles, lead
         self.start()
 
     def start(self) -> None:
         """Forget what was."""
         self._line = deque(np.zeros(3) for _ in range(self._cycles))
+        self._last = np.zeros(3)
 
     def correct(self, cycle: CycleInput) -> FloatArray:
         """Return the correction from the deflection; the readings are not looked at."""
         self._line.append(-cycle.deflection)
-        return self._line.popleft()
+        late, before = self._line.popleft(), self._last
+        self._last = late
+        return late + self._lead * (late - before)
 
 
 class LoadedRobot(Protocol):

@@ -6,6 +6,7 @@ assumed here.
 """
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 import trimesh
@@ -22,6 +23,7 @@ from elastocal.compensation.process.course import (
     tool_frames,
     unit_tangents,
 )
+from elastocal.compensation.settings import CompensatorSettings
 from elastocal.errors import CompensationError
 from elastocal.planning.surface import Surface
 
@@ -51,6 +53,11 @@ class FibrePlacement(Process):
     """Against the direction of travel, in N."""
     rise: float = 0.5
     """Time in which the roller comes down, in s."""
+
+    compensator: ClassVar[CompensatorSettings] = CompensatorSettings.model_validate(
+        {"filter": {"lead": "40 ms"}}
+    )
+    """The lead makes up for filters (19 ms) and controller (22 ms, `loop.Controller`)."""
 
     def courses(self, surface: Surface, rng: Generator) -> tuple[Course, ...]:
         """Return courses across the surface; see `Process.courses`."""

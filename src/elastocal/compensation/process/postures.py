@@ -1,6 +1,8 @@
 """The processes by name, and joints for their courses.
 
-The tool is turned by one angle for all courses; the rail stands still along each of them.
+The tool is turned by one angle for all courses; the rail stands still along each of them. Before a
+calibration the posture is the one farthest from limits (`with_postures`); a calibrated model says
+which one is stiffest (`stiffest_posture`, paper section 4.3.1).
 """
 
 from collections.abc import Mapping
@@ -8,19 +10,35 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from elastocal.arrays import FloatArray
+from elastocal.arrays import BoolArray, FloatArray
 from elastocal.cell import Cell
+from elastocal.compensation import (
+    PostureConstraint,
+    PostureGrid,
+    cell_constraints,
+    choose_postures,
+    directional_stiffness,
+    survey_postures,
+)
 from elastocal.compensation.process.course import Course, Process
 from elastocal.compensation.process.placement import FibrePlacement
 from elastocal.compensation.process.roughing import Roughing
 from elastocal.errors import CompensationError, PathError
+from elastocal.identification import CalibratedModel
 from elastocal.planning import cell_surface
+from elastocal.results import brief_repr
 from elastocal.robot import has_wrist, wrist_angle
 from elastocal.robot.inverse import InverseKinematics, inverse_for, joints_along_path, posture_jumps
 
 _SPINS = np.linspace(0.0, 2.0 * np.pi, 12, endpoint=False)
 _FEW = 25
 """Rows of a course that a posture is tried at."""
+_FINE_SPINS = np.linspace(0.0, 2.0 * np.pi, 36, endpoint=False)
+"""The same for the stiffest posture, from the programmed orientation on."""
+_STATIONS = 7
+"""Rows of a course that its stiffness is compared at."""
+_NEAR = float(np.radians(30.0))
+"""Largest distance from a calibrated posture in a turning joint, in rad."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,13 +69,26 @@ class _Trial:
     def joints(
         self, course: Course, spin: float, external: FloatArray, rows: FloatArray | slice
     ) -> FloatArray:
-        c, s = np.cos(spin), np.sin(spin)
-        turn = np.array([[c, -s, 0, 0], [s, c, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1.0]])
-        T = course.T_base_tcp[rows] @ turn
+        T = course.T_base_tcp[rows] @ _turn(spin)
         positions = np.repeat(external[None], len(T), axis=0)
         return joints_along_path(
             self.solver, T, positions, self.cell.home, lambda row: f"row {row + 1}"
         )
+
+    def follow(self, course: Course, spin: float, first: FloatArray) -> Course:
+        """Return a course with the tool turned, on the branch of a posture at its first row."""
+        T = course.T_base_tcp @ _turn(spin)
+        external = np.repeat(first[None, : self.cell.robot.external_axes], len(T), axis=0)
+        q = joints_along_path(
+            self.solver, T, external, first, lambda row: f"{course.name}, row {row + 1}"
+        )
+        return replace(course, T_base_tcp=T, q=q)
+
+
+def _turn(spin: float) -> FloatArray:
+    """Return a turn about the tool's axis, shape (4, 4)."""
+    c, s = np.cos(spin), np.sin(spin)
+    return np.array([[c, -s, 0, 0], [s, c, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1.0]])
 
 
 PROCESSES: Mapping[str, type[Process]] = {"afp": FibrePlacement, "machining": Roughing}
@@ -148,3 +179,99 @@ def _best_positions(
         best = int(np.argmax(margins))
         result.append((margins[best], some[best]))
     return result
+
+
+@brief_repr
+@dataclass(frozen=True, eq=False)
+class StiffestPosture:
+    """Courses in the posture that a model finds stiffest."""
+
+    courses: tuple[Course, ...]
+    spin: float
+    """Turn of the tool about its axis from the programmed orientation, in rad."""
+    softest: float
+    """Stiffness along the deviation that counts where it is smallest, in N/m."""
+    softest_programmed: float
+    """The same in the programmed posture."""
+
+
+def stiffest_posture(
+    calibrated: CalibratedModel, cell: Cell, courses: tuple[Course, ...]
+) -> StiffestPosture:
+    """Return courses with the tool turned about its axis to where the arm is stiffest.
+
+    One spin, one branch and one position of the external axes for all courses; of those that keep
+    the cell's margins and collide nowhere, near calibrated postures, the stiffest where it is
+    softest along the deviation that counts. The programmed posture is among them.
+
+    Parameters
+    ----------
+    calibrated : CalibratedModel
+        Of the cell's robot.
+    cell : Cell
+        The cell.
+    courses : tuple of Course
+        With joints.
+
+    Raises
+    ------
+    CompensationError
+        If no posture is allowed at all stations.
+    """
+    solver, stations = inverse_for(cell.robot), _Stations.of(courses)
+    grid = PostureGrid(_FINE_SPINS, np.unique([c.q[0, : cell.robot.external_axes]
+                                               for c in courses], axis=0))  # fmt: skip
+    constraints = (*_calibrated_nearby(calibrated), *cell_constraints(cell))
+    survey = survey_postures(calibrated, solver, stations.T, stations.direction, grid, constraints)
+    one = choose_postures(survey, solver).one
+    if one is None:
+        raise CompensationError(
+            f"no posture of {cell.robot.name} is allowed along all of {len(courses)} courses:"
+            " within the cell's margins, free of collision, and near calibrated postures"
+        )
+    spin, first = float(one.spin[0]), one.q[::_STATIONS]
+    trial = _Trial(solver, cell)
+    turned = tuple(
+        trial.follow(course, spin, first[number]) for number, course in enumerate(courses)
+    )
+    here, there = (
+        directional_stiffness(calibrated, q, stations.direction).stiffness.min()
+        for q in (stations.q, one.q)
+    )
+    return StiffestPosture(turned, spin, float(there), float(here))
+
+
+@dataclass(frozen=True, eq=False)
+class _Stations:
+    """Rows of all courses at which postures are compared."""
+
+    T: FloatArray
+    q: FloatArray
+    direction: FloatArray
+
+    @classmethod
+    def of(cls, courses: tuple[Course, ...]) -> "_Stations":
+        rows = [
+            np.linspace(0, len(course.q) - 1, _STATIONS).round().astype(int) for course in courses
+        ]
+        T, q, direction = (
+            np.concatenate([getattr(c, name)[some] for c, some in zip(courses, rows, strict=True)])
+            for name in ("T_base_tcp", "q", "direction")
+        )
+        return cls(T, q, direction)
+
+
+def _calibrated_nearby(calibrated: CalibratedModel) -> tuple[PostureConstraint, ...]:
+    """Return the constraint of a calibrated posture near by: elsewhere nobody knows how stiff."""
+    domain = calibrated.domain
+    if domain is None:
+        return ()
+    robot, known = calibrated.model.robot, domain.joint_position
+    counted = np.array(robot.revolute)
+    counted[-1] = False  # the last axis only turns the tool
+
+    def near(q: FloatArray) -> BoolArray:
+        apart = np.abs(q[:, None, counted] - known[None][..., counted])
+        return np.asarray(np.any(np.all(apart <= _NEAR, axis=2), axis=1))
+
+    return (PostureConstraint("calibrated near by", near),)

@@ -73,6 +73,7 @@ class Roughing(Process):
                     {"frequency": f"{2.0 * _SPINDLE:g} Hz", "width": "20 Hz"},
                 ],
                 "low_pass": {"cutoff": "25 Hz"},
+                "lead": "32 ms",
             }
         }
     )
