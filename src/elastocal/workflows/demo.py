@@ -27,7 +27,7 @@ from elastocal.workflows.init import init
 from elastocal.workflows.plan import plan
 from elastocal.workflows.report import report
 from elastocal.workflows.run import RunResult, run
-from elastocal.workflows.simulate_process import simulate_process
+from elastocal.workflows.simulate_process import STIFFEST, simulate_process
 from elastocal.workflows.tool import tool
 
 LOG = "log.txt"
@@ -52,6 +52,8 @@ _FILES = (
 )
 _FLAGS = {"models": "--model", "tools": "--tool", "seeds": "--seed", "path": ""}
 """How commands name a field that workflows call otherwise; empty: by its place."""
+_POSTURES: dict[str, dict[str, str]] = {"machining": {"posture": STIFFEST}}
+"""A spindle may be turned about its axis: there the posture is chosen (paper 4.3.1)."""
 _OWN_FLAGS = {
     ("init", "kind"): "--like",
     ("simulate_process", "kind"): "--process",
@@ -250,6 +252,7 @@ def chapters(kind: str, out: Path, seed: int) -> tuple[Chapter, ...]:
             kind=kind,
             seeds=(seed,),
             out=process,
+            **_POSTURES.get(kind, {}),
         ),
         _chapter(
             "correct offline",

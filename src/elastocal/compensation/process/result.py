@@ -24,6 +24,7 @@ from elastocal.compensation.process.statistics import (
     DeviationComparison,
     DeviationStatistics,
     LoadLines,
+    PostureGain,
     SeedMeans,
     compare_deviations,
 )
@@ -79,6 +80,8 @@ class SimulateProcessResult(Result):
     """As ``lines``, of the 3-D deviation (the length of the shift); likewise."""
     loads: tuple[LoadLines, ...] = ()
     """The same process at other shares of its load, where that was asked for."""
+    posture: PostureGain | None = None
+    """Where the stiffest posture was taken; none: the courses as they are programmed."""
     means: tuple[SeedMeans, ...] = ()
     """Each measure at each load over the seeds; of a single seed without interval."""
     path: str = ""
