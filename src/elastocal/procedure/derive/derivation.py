@@ -293,15 +293,7 @@ def _dataset(
         values = array(name)
         return values if np.all(values[ok] > 0) else None
 
-    reference = np.full((len(labels), len(robot.joint_names)), np.nan)
-    tcp, light = np.full((len(labels), 3), np.nan), np.zeros((len(labels), 3))
-    for pose in poses:
-        tare = None if pose.reference is None else pose.reference.tool
-        zero = None if pose.zero is None else pose.zero.tool
-        if tare is not None and zero is not None:
-            index = labels.index(pose.pose)
-            reference[index], tcp[index] = zero.q, tare.T_base_tcp[:3, 3]
-            light[index] = wrench_on_robot(zero.wrench, tare.wrench, sensor).force
+    reference, light, tcp = _references(poses, labels, len(robot.joint_names), sensor)
     return Dataset.from_arrays(
         joint_position=array("q", len(robot.joint_names)),
         force=array("force"),
@@ -328,3 +320,19 @@ def _dataset(
         check=[case for case in load_cases if case == cell.file.load_cases.check_case],
         provenance=provenance,
     )
+
+
+def _references(
+    poses: Sequence[PoseReadings], labels: Sequence[int], joints: int, sensor: SensorLoad
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return joints (pose, joint), force (pose, 3) and TCP (pose, 3) when the zero was read."""
+    reference = np.full((len(labels), joints), np.nan)
+    tcp, light = np.full((len(labels), 3), np.nan), np.zeros((len(labels), 3))
+    for pose in poses:
+        tare = None if pose.reference is None else pose.reference.tool
+        zero = None if pose.zero is None else pose.zero.tool
+        if tare is not None and zero is not None:
+            index = labels.index(pose.pose)
+            reference[index], tcp[index] = zero.q, tare.T_base_tcp[:3, 3]
+            light[index] = wrench_on_robot(zero.wrench, tare.wrench, sensor).force
+    return reference, light, tcp
