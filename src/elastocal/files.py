@@ -72,7 +72,7 @@ def filling(folder: Path, last: str, force: bool = False) -> Iterator[Path]:
     Raises
     ------
     FileAccessError
-        If the folder holds files and ``force`` is not given, or cannot be written.
+        If the folder holds files and ``force`` is not given, or it or a file cannot be written.
     """
     folder = Path(folder)
     for place in (folder, *folder.parents):
@@ -92,15 +92,26 @@ def filling(folder: Path, last: str, force: bool = False) -> Iterator[Path]:
             raise
         raise FileAccessError(f"cannot write {folder}: {error.strerror or error}") from error
     with made as temporary:
-        yield Path(temporary)
         try:
+            yield Path(temporary)
             folder.mkdir(exist_ok=True)
             (folder / last).unlink(missing_ok=True)
             names = sorted(entry.name for entry in Path(temporary).iterdir())
             for name in sorted(names, key=lambda name: name == last):
                 (Path(temporary) / name).replace(folder / name)
+        except FileAccessError as error:
+            # Nobody has asked for the temporary folder, and it is gone when this is read.
+            raise FileAccessError(str(error).replace(temporary, str(folder))) from error
         except OSError as error:
+            if error.filename is not None and temporary not in str(error.filename):
+                raise  # of a file elsewhere, which its name says
             raise FileAccessError(f"cannot write {folder}: {error.strerror or error}") from error
+
+
+def write_bytes(path: Path, data: bytes | memoryview) -> None:
+    """Write ``data`` to ``path`` atomically."""
+    with replacing(path) as temporary:
+        temporary.write_bytes(data)
 
 
 def write_text(path: Path, text: str) -> None:

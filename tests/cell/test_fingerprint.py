@@ -91,7 +91,13 @@ def test_an_optional_key_that_is_given_changes_it(folder):
 def test_plans_made_before_keys_could_be_left_out_still_match(folder):
     # The block's mesh has whole numbers: the print is the same on every machine.
     before = "79fc04c0b1c141621e6e0537074cad61a1d332ae27ce99b8d90b58ed08220fca"
-    assert of(folder) == before
+    assert rewritten(folder, without_levels) == before
+
+
+def without_levels(data):
+    """Take out of the example what cells of then did not have."""
+    for key in ("level", "check"):
+        del data["load_cases"][key]
 
 
 def test_a_key_that_was_null_and_is_given_changes_it(folder):

@@ -84,11 +84,13 @@ def test_a_sample_is_calibrated_as_the_dataset_of_a_run_would_be():
     stiffness, balancer = rng.standard_normal(simulate.truth.springs), rng.standard_normal()
     arm = simulate.truth.stiffened(np.exp(0.2 * stiffness), np.exp(0.2 * balancer))
     poses = np.sort(simulate.chosen[0].order)
-    draws = ErrorDraws.of(POOL, 5, sample.generator(1)).take(poses, np.arange(5))
-    settled = arm.settle(simulate.places(poses), simulate.force_tcp)
+    count = len(simulate.measured)
+    draws = ErrorDraws.of(POOL, count, sample.generator(1)).take(poses, np.arange(count))
+    settled = arm.settle(simulate.places(poses), np.array([*simulate.presses.values()]))
     readings = simulate.errors.readings(
-        settled, draws, ErrorScales(), simulate.pool.station[poses], simulate.load_cases
+        settled, draws, ErrorScales(), simulate.pool.station[poses], simulate.measured
     )
+    readings = readings.set_aside(readings.load_case == "normal_75")
     robot = load_cell(cell_path()).robot
     model = ElasticModel(robot, layout(robot, "bearing"))
     full = calibrate(model, readings, np.random.default_rng(0), marker_offset=simulate.marker)

@@ -31,7 +31,7 @@ def planned_cell(folder: Path, poses: int = 4) -> PlannedCell:
         (r"\n  d_max: .*", f"\n  poses: {poses}"),
         (r"\n  pool: .*", "\n  pool: 40"),
         (r"\n  preset: .*", "\n  preset: kind"),
-        (r"\n  cases: .*", "\n  cases: [normal, north]"),
+        (r"\n  cases: .*\n  level: .*\n  check: .*", "\n  cases: [normal, north]"),
     ):
         text, count = re.subn(pattern, replacement, text)
         assert count == 1, pattern

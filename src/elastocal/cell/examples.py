@@ -9,7 +9,7 @@ import numpy as np
 
 from elastocal.arrays import FloatArray, IndexArray
 from elastocal.errors import FileAccessError, SchemaError, nearest
-from elastocal.files import replacing, write_text
+from elastocal.files import write_bytes, write_text
 from elastocal.results import brief_repr
 
 _DOME_RADII = (2.4, 1.5)
@@ -154,8 +154,7 @@ def write_example(folder: Path, like: str, force: bool = False) -> tuple[Path, .
         raise FileAccessError(f"cannot make folder {folder}: {error.strerror}") from error
     # The cell file comes last: where it is, its meshes are.
     for name, triangles in example.meshes.items():
-        with replacing(folder / name) as temporary:
-            temporary.write_bytes(binary_stl(triangles()))
+        write_bytes(folder / name, binary_stl(triangles()))
     text = importlib.resources.files(__package__).joinpath("templates", example.template)
     write_text(paths[0], text.read_text(encoding="utf-8"))
     return paths

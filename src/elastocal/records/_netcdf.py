@@ -13,13 +13,14 @@ import dataclasses
 import typing
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from io import BytesIO
 from pathlib import Path
 from typing import Any, TypeVar
 
 import numpy as np
 
 from elastocal.errors import ElastocalError, FileAccessError, SchemaError
-from elastocal.files import replacing, require_file
+from elastocal.files import require_file, write_bytes
 from elastocal.records._codec import schema_of
 from elastocal.results import brief_repr
 
@@ -140,7 +141,9 @@ def write_arrays(path: Path, arrays: LabelledArrays) -> None:
     """
     import h5netcdf
 
-    with replacing(path) as temporary, h5netcdf.File(temporary, "w") as file:
+    # In memory: HDF5 crashes the process when a disk is full, at the latest when it closes.
+    image = BytesIO()
+    with h5netcdf.File(image, "w") as file:
         file.attrs.update(arrays.attributes)
         file.dimensions = arrays.sizes
         for name, array in arrays.variables.items():
@@ -148,6 +151,7 @@ def write_arrays(path: Path, arrays: LabelledArrays) -> None:
             labels = [each for each in arrays.auxiliary if _labels(arrays, each, name)]
             if labels:
                 file.variables[name].attrs["coordinates"] = " ".join(labels)
+    write_bytes(path, image.getbuffer())
 
 
 def _check_signature(path: Path) -> None:

@@ -156,6 +156,18 @@ def test_readings_that_were_left_out_by_hand_hold_back_by_name(parts):
     assert told.startswith("2, 3:north (pose, or pose:load case) was left out by hand")
 
 
+def test_the_check_at_a_load_level_stands_beside_its_noise(parts):
+    assert "kept out of the fit" not in words(readings, parts)
+    check = {
+        "load_cases": ["normal_75"], "readings": 30, "mean": 61e-6, "p95": 0.1e-3, "max": 0.124e-3,
+        "rms": 70e-6, "deflection": 1.1e-3, "noise": 12e-6, "source": "stated: metrology",
+    }  # fmt: skip
+    text = words(readings, with_figures(parts, check=check))
+    assert "Check at a load level that was kept out of the fit" in text
+    for part in ("normal_75", "0.061 mm", "0.124 mm", "0.012 mm", "stated: metrology"):
+        assert part in text
+
+
 def test_registration_tool_and_noise_are_those_of_the_summary(parts):
     text = words(instruments, parts)
     registration = to_data(parts.summary.registration)

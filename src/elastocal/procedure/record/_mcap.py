@@ -32,7 +32,7 @@ from scipy.spatial.transform import Rotation
 from elastocal.arrays import FloatArray
 from elastocal.cell import ArmState, PointBlock, WrenchBlock
 from elastocal.errors import FileAccessError, SchemaError
-from elastocal.files import replacing, require_file
+from elastocal.files import require_file, write_bytes
 
 TimeArray = NDArray[np.int64]
 """Times in ns."""
@@ -98,8 +98,7 @@ def write_mcap(path: Path, topics: Sequence[Topic], library: str, metadata: Meta
     for time, channel, row, data in sorted(messages, key=itemgetter(0)):
         writer.add_message(channel, time, data, publish_time=time, sequence=row)
     writer.finish()  # type: ignore[no-untyped-call]
-    with replacing(path) as temporary:
-        temporary.write_bytes(buffer.getbuffer())
+    write_bytes(path, buffer.getbuffer())
 
 
 @dataclass

@@ -257,7 +257,10 @@ def write_kinds(
         for path, place in zip(paths, temporary, strict=True):
             suffix = path.suffix.lower()
             notes = _metadata(suffix, title, description)
-            figure.savefig(place, format=suffix[1:], dpi=_DPI, metadata=notes)
+            # In memory: what a library leaves of a file on a full disk is its own affair.
+            image = io.BytesIO()
+            figure.savefig(image, format=suffix[1:], dpi=_DPI, metadata=notes)
+            place.write_bytes(image.getbuffer())
     return paths
 
 
