@@ -10,7 +10,7 @@ import re
 from elastocal.errors import UnitError, nearest
 
 _FACTORS: dict[str, dict[str, float]] = {
-    "length": {"m": 1.0, "mm": 1e-3, "um": 1e-6, "µm": 1e-6},
+    "length": {"m": 1.0, "mm": 1e-3, "um": 1e-6, "µm": 1e-6, "in": 0.0254},
     "angle": {"rad": 1.0, "deg": math.pi / 180.0},
     "force": {"N": 1.0, "kN": 1e3},
     "moment": {"N*m": 1.0, "Nm": 1.0, "N·m": 1.0, "kN*m": 1e3, "N*mm": 1e-3},

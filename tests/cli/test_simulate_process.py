@@ -175,6 +175,27 @@ def test_what_does_not_go_with_a_path_is_refused(folder, arguments, reason):
     assert not (folder / "refused").exists()
 
 
+def test_the_stiffest_posture_is_stiffer_than_the_programmed_one_and_is_compared_with_it(folder):
+    result = elastocal(
+        "simulate-process", example_cell("machining").path, "--process", "machining",
+        "--courses", 1, "--model", folder / "other.json", "--out", folder / "stiff",
+        "--posture", "stiffest", "--json",
+    )  # fmt: skip
+    assert result.code == 0, result.err
+    table = json.loads(result.out)
+    gain = table["posture"]
+    assert gain["softest"] > gain["softest_programmed"] > 0.0
+    assert gain["lines"][0]["points"] == table["lines"][0]["points"]
+    assert gain["lines"][0]["before"] != table["lines"][0]["before"]
+    (course,) = read_process(folder / "stiff").courses
+    assert len(course.time) == table["lines"][0]["points"]
+
+
+def test_an_unknown_posture_is_refused(folder):
+    result = run(folder, "lazy", "--posture", "laziest")
+    assert "--posture 'laziest' is not one of programmed, stiffest" in result.reason
+
+
 def test_over_several_seeds_means_have_an_interval(folder):
     result = run(folder, "seeds", "--seed", 2, "--seed", 3, "--json")
     assert result.code == 0, result.err

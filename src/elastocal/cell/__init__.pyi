@@ -28,10 +28,12 @@ from .devices import (
 from .examples import (
     BLOCK_SIZE as BLOCK_SIZE,
     EXAMPLES as EXAMPLES,
+    PROCESS_FILE as PROCESS_FILE,
     Example as Example,
     binary_stl as binary_stl,
     block_mesh as block_mesh,
     dome_section as dome_section,
+    name_process as name_process,
     require_example as require_example,
     write_example as write_example,
 )

@@ -1,6 +1,7 @@
 """Example cells with toolings that are made by code: always the same bytes."""
 
 import importlib.resources
+import re
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -23,6 +24,26 @@ BLOCK_SIZE = (0.6, 0.4, 0.3)
 """Edge lengths of the block of raw material along x, y, z in m."""
 _STL_FACE = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
 _CELL_FILE = "cell.yaml"
+PROCESS_FILE = "process.csv"
+"""Name of an example's production path."""
+_WITH_PROCESS = (
+    (
+        re.compile(r"^  technique: cover\n", re.M),
+        "  # technique: cover                  # i_optimal for the process unless one is named\n",
+    ),
+    (
+        re.compile(
+            r'^  (?:d_max: "175 mm" .*\n  # poses: (\d+) .*|poses: (\d+) .*\n  # .*)\n', re.M
+        ),
+        r"  poses: \1\2                           # 6 to 8 may do: the plan tells what to expect"
+        '\n  # accuracy: "0.05 mm"               # or the error on production that is wanted\n',
+    ),
+    (
+        re.compile(r"^# process: \{file: process\.csv\} .*\n", re.M),
+        "process: {file: process.csv}          # joints or tcp poses and forces of production\n",
+    ),
+)
+"""Lines of an example's cell file, and what stands there once its process is named."""
 
 
 def dome_section() -> FloatArray:
@@ -158,6 +179,23 @@ def write_example(folder: Path, like: str, force: bool = False) -> tuple[Path, .
     text = importlib.resources.files(__package__).joinpath("templates", example.template)
     write_text(paths[0], text.read_text(encoding="utf-8"))
     return paths
+
+
+def name_process(text: str) -> str:
+    """Return the text of an example's cell file that names its production path, `PROCESS_FILE`.
+
+    The poses are then chosen for production, as many as before.
+
+    Raises
+    ------
+    SchemaError
+        If it is not the text of an example.
+    """
+    for pattern, replacement in _WITH_PROCESS:
+        text, count = pattern.subn(replacement, text)
+        if count != 1:
+            raise SchemaError(f"a cell file of an example has no line like {pattern.pattern!r}")
+    return text
 
 
 def binary_stl(triangles: FloatArray) -> bytes:

@@ -59,7 +59,7 @@ class MeshFile(StrictModel):
     file: str
     """STL, OBJ or PLY; relative to the cell file."""
     unit: str
-    """Unit of the file's numbers: ``mm`` or ``m``; mesh files do not say."""
+    """Unit of the file's numbers: ``mm``, ``m`` or ``in``; mesh files do not say."""
 
     @model_validator(mode="after")
     def _known_unit(self) -> Self:

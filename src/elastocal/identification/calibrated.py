@@ -16,6 +16,11 @@ from elastocal.elastic import ElasticModel, check_vectors
 from elastocal.errors import RobotError, SpringError
 from elastocal.identification.domain import CalibrationDomain
 from elastocal.identification.observability import Observability
+from elastocal.identification.production import (
+    CalibratedLoads,
+    ProductionCoverage,
+    production_coverage,
+)
 from elastocal.identification.uncertainty import interval
 from elastocal.records import record
 from elastocal.results import brief_repr
@@ -197,6 +202,19 @@ class CalibratedModel:
             out=np.full_like(self.compliance, np.inf),
             where=self.compliance != 0,
         )
+
+    def coverage(
+        self, q: FloatArray, force: FloatArray, course: Sequence[str] = ()
+    ) -> ProductionCoverage | None:
+        """Return how much of some rows of production was calibrated; see `production_coverage`.
+
+        None where the model does not know where it was calibrated.
+        """
+        if self.domain is None:
+            return None
+        robot = self.model.robot
+        loads = CalibratedLoads.of_domain(robot, self.domain)
+        return production_coverage(robot, loads, q, force, course)
 
     @property
     def tool_name(self) -> str:

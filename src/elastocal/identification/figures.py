@@ -19,6 +19,7 @@ from elastocal.identification.ladder import Climbed
 from elastocal.identification.load_check import LoadCheck
 from elastocal.identification.observability import Term
 from elastocal.identification.options import FitOptions, FitSettings, bounds
+from elastocal.identification.production import ProductionCoverage
 from elastocal.identification.suspicious import Screening
 from elastocal.identification.uncertainty import Coverage, HeldOut, interval
 from elastocal.records import record
@@ -166,6 +167,8 @@ class CalibrationSummary:
     """Frames that were estimated with the springs."""
     coverage: Coverage | None = None
     """Measured coverage of the intervals of a prediction; none in calibrations of before."""
+    production: ProductionCoverage | None = None
+    """How much of production the calibration covers; none where no path was named."""
     spring_count: int | None = None
     """Number of springs; none in calibrations before springs of several parameters."""
     known: tuple[KnownSpring, ...] = ()

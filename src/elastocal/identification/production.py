@@ -76,6 +76,11 @@ class CalibratedLoads:
         x, y, z = force_tcp.T
         largest = np.zeros((len(q), len(_SIDES)))
         np.maximum.at(largest, pose, np.stack([x, -x, y, -y, -z], axis=1))
+        # Lateral loads may point between the axes of the tool: each is within what was pressed.
+        own = _aside(_parts(_sides(force_tcp), largest[pose]))
+        beyond = np.ones(len(q))
+        np.maximum.at(beyond, pose, np.where(np.isfinite(own), own, 1.0))
+        largest[:, :4] *= beyond[:, None]
         size = np.linalg.norm(force_tcp, axis=1, keepdims=True)
         units = (force_tcp / np.maximum(size, _LEAST))[size[:, 0] > _LEAST]
         # Readings of one load case at all poses point almost the same way: one of them will do.
@@ -90,14 +95,22 @@ class CalibratedLoads:
         force_tcp : ndarray, shape (row, 3)
             Force on the robot in the tcp frame, in N.
         """
-        pushed = _sides(force_tcp)[:, None]
-        with np.errstate(divide="ignore"):
-            part = pushed / np.where(self.largest > _LEAST, self.largest, 0.0)[None]
-        part = np.where(pushed > _LEAST, part, 0.0)
-        aside = np.hypot(part[..., :2].max(axis=-1), part[..., 2:4].max(axis=-1))
+        part = _parts(_sides(force_tcp)[:, None], self.largest)
         pull = np.maximum(force_tcp[:, 2:3], 0.0) / np.maximum(self.largest[:, 4], _LEAST)
         pulls = np.where(pull > LEVEL_REACH - 1.0, np.inf, 0.0)
-        return np.asarray(np.maximum(np.maximum(aside, part[..., 4]), pulls))
+        return np.asarray(np.maximum(np.maximum(_aside(part), part[..., 4]), pulls))
+
+
+def _parts(pushed: FloatArray, largest: FloatArray) -> FloatArray:
+    """Return forces to each side in parts of the largest there; infinite where nothing was."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        part = pushed / np.where(largest > _LEAST, largest, 0.0)
+    return np.where(pushed > _LEAST, part, 0.0)
+
+
+def _aside(part: FloatArray) -> FloatArray:
+    """Return the level of the lateral forces, shape (...), of their parts (..., 5)."""
+    return np.asarray(np.hypot(part[..., :2].max(axis=-1), part[..., 2:4].max(axis=-1)))
 
 
 def _sides(force_tcp: FloatArray) -> FloatArray:
@@ -134,6 +147,31 @@ class ProductionCoverage:
     presses production pushes, and refuses nothing."""
     courses: tuple[str, ...]
     """Courses with rows that are not covered."""
+
+    def plus(self, other: "ProductionCoverage") -> "ProductionCoverage":
+        """Return the coverage of these rows and others."""
+        own, rows = self.rows / (self.rows + other.rows), self.rows + other.rows
+
+        def mean(name: str) -> float:
+            return float(own * getattr(self, name) + (1.0 - own) * getattr(other, name))
+
+        farthest = max(self, other, key=lambda each: each.farthest)
+        is_known = self.level is not None and other.level is not None
+        return ProductionCoverage(
+            rows=rows,
+            covered=mean("covered"),
+            joints=mean("joints"),
+            rail=None if self.rail is None else mean("rail"),
+            load=mean("load"),
+            farthest=farthest.farthest,
+            farthest_joint=farthest.farthest_joint,
+            farthest_rail=None
+            if self.farthest_rail is None
+            else max(self.farthest_rail, other.farthest_rail or 0.0),
+            level=max(self.level or 0.0, other.level or 0.0) if is_known else None,
+            direction=max(self.direction, other.direction),
+            courses=tuple(dict.fromkeys((*self.courses, *other.courses))),
+        )
 
     @property
     def is_enough(self) -> bool:

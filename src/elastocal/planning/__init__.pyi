@@ -70,6 +70,7 @@ from .production import (
     expected_errors as expected_errors,
     plan_coverage as plan_coverage,
     production_findings as production_findings,
+    weighing_candidates as weighing_candidates,
 )
 from .requirements import (
     require_loads_possible_anywhere as require_loads_possible_anywhere,

@@ -170,7 +170,7 @@ def _require_enough(cell: Cell, sampled: SampledPool, findings: tuple[Finding, .
     if found >= wanted:
         return
     refused = ", ".join(f"{name} {pool.refused[name]}" for name in pool.commonest_refusals)
-    odd = [f.message for f in findings if f.kind in ("tiny", "inverted")]
+    odd = [f.message for f in findings if f.kind in ("tiny", "inches", "inverted")]
     why = "; ".join([*odd, pool.advice])
     short = f", and {wanted} poses are wanted (search.poses)" if wanted > 1 else ""
     raise PlanningError(

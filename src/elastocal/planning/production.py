@@ -38,6 +38,12 @@ _NOTHING = 1.0
 """Force in N that needs no load case."""
 _MOST_ROWS = 500
 """Rows of production that are looked at when poses are chosen to cover it."""
+_TILT = float(np.sin(np.radians(10.0)))
+"""Spread of the direction of gravity in the tool from which on it tells the tool's weight."""
+_TILTED = 2
+"""Axes about which the tool must be turned to be weighed."""
+_SHOWN = (3, 4, 5, 6, 8, 10, 12, 15, 20, 25, 30)
+"""Numbers of poses that tables show."""
 _STEP = 10.0
 """Amplitudes are proposed in steps of this, in N."""
 
@@ -79,6 +85,11 @@ class ProductionRecord:
     def expected_of(self, poses: int) -> ExpectedError | None:
         """Return the error to expect from a number of poses; None where it is not known."""
         return next((each for each in self.expected if each.poses == poses), None)
+
+    def some_expected(self) -> tuple[ExpectedError, ...]:
+        """Return the errors for numbers of poses that a person compares, the plan's among them."""
+        shown = {*_SHOWN, self.poses}
+        return tuple(each for each in self.expected if each.poses in shown)
 
     def facts(self) -> tuple[tuple[str, str], ...]:
         """Return coverage and the error to expect, in a few words."""
@@ -135,6 +146,42 @@ def covering_candidates(cell: Cell, q: FloatArray) -> IndexArray:
         chosen.append(best)
         left &= ~near[best]
     return np.array(chosen, dtype=np.intp)
+
+
+def weighing_candidates(cell: Cell, chosen: FloatArray, q: FloatArray) -> IndexArray:
+    """Return candidates to add so that the poses turn the tool about two axes, at most two.
+
+    `elastocal tool` finds mass, centre of mass and the sensor's bias from the unloaded readings of
+    the run, if gravity points to different sides of the tool. A process that never tilts its tool
+    has no such poses near it.
+
+    Parameters
+    ----------
+    cell : Cell
+        For gravity, and whether there is a sensor.
+    chosen, q : ndarray, shapes (pose, joint) and (candidate, joint)
+        Postures that are chosen, and all that may be, in rad or m.
+    """
+    if cell.file.sensor is None:
+        return np.zeros(0, dtype=np.intp)
+    down = cell.gravity_base / np.linalg.norm(cell.gravity_base)
+    own, others = (
+        cell.robot.forward(each)[:, :3, :3].transpose(0, 2, 1) @ down for each in (chosen, q)
+    )
+    middle = own.mean(axis=0)
+    _, size, axes = np.linalg.svd(own - middle, full_matrices=False)
+    known = axes[size >= _TILT * math.sqrt(len(own))]
+    found: list[int] = []
+    while len(known) < _TILTED:
+        apart = others - middle
+        rest = np.linalg.norm(apart - apart @ known.T @ known, axis=1)
+        best = int(np.argmax(rest))
+        if rest[best] < _TILT:
+            break
+        found.append(best)
+        new = apart[best] - apart[best] @ known.T @ known
+        known = np.vstack([known, new / np.linalg.norm(new)])
+    return np.array(found, dtype=np.intp)
 
 
 def expected_errors(

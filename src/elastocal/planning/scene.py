@@ -33,6 +33,7 @@ from elastocal.planning.surface import (
     mesh_findings,
     placement_findings,
     read_mesh,
+    unit_findings,
 )
 from elastocal.results import brief_repr
 from elastocal.robot import Robot, collision_model
@@ -240,7 +241,8 @@ def surface_findings(cell: Cell, surface: Surface, rng: Generator) -> tuple[Find
     external = cell.external_positions
     # The middle and the ends of a grid will do to see from which side the robot can work.
     few = external[np.unique(np.linspace(0, len(external) - 1, 3).astype(int))]
-    found = mesh_findings(surface) + placement_findings(
+    found = unit_findings(cell.surface_path, cell.file.surface.unit)
+    found += mesh_findings(surface) + placement_findings(
         surface,
         first_joint_positions(cell.robot, external),
         arm_reach(cell.robot),

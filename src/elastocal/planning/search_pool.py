@@ -22,6 +22,7 @@ from elastocal.planning.production import (
     covering_candidates,
     expected_errors,
     plan_coverage,
+    weighing_candidates,
 )
 from elastocal.planning.search import (
     Candidates,
@@ -47,11 +48,13 @@ Friction memory shows in low loads beside full ones."""
 _LOW_LEVEL = 0.6
 _SCALED_BY = 200
 """Candidates whose torques scale the gears."""
-_LEAST_CHOICE, _CHOICE = 50, 5
+_LEAST_CHOICE, _CHOICE = 20, 3
 """Candidates that a search has at least, and for each pose wanted: where fewer than these are near
 production, the nearest."""
 _MOST_POSES = 40
 """Poses that a wanted accuracy may take, where ``search.poses`` sets no limit."""
+_NEAR = 6
+"""Poses near production that none is given up for to weigh the tool."""
 _TABLE = 30
 """Poses up to which errors are expected, at least."""
 _CHUNK = 5000
@@ -127,7 +130,7 @@ class SearchPool:
         search = cell.file.search
         wanted = technique(cell.technique)
         cover = Cover(search.d_max)
-        left = self.preferred(cell, left)
+        anywhere, left = left, self.preferred(cell, left)
         count = search.pose_limit or len(left)
         if isinstance(wanted, Cover):
             return self.take(cover, left, count, rng)
@@ -136,7 +139,7 @@ class SearchPool:
         elif search.d_max is not None:
             count = len(self.take(cover, left, count, rng))
         found = self.take(wanted, left, count, rng)
-        return self._covering(cell, wanted, left, found, rng)
+        return self._for_production(cell, wanted, (left, anywhere), found, rng)
 
     def preferred(self, cell: Cell, left: IndexArray) -> IndexArray:
         """Return the candidates near production, or the nearest where those are too few.
@@ -161,23 +164,33 @@ class SearchPool:
         enough = (each.poses for each in table if each.error <= search.accuracy)
         return next(enough, most)
 
-    def _covering(
+    def _for_production(
         self,
         cell: Cell,
         wanted: SearchTechnique,
-        left: IndexArray,
+        left: tuple[IndexArray, IndexArray],
         found: Selection,
         rng: Generator,
     ) -> Selection:
-        """Return a choice of an exchange with poses that cover production, if it does not."""
+        """Return a choice of an exchange with poses that it lacks: to cover, and to weigh the tool.
+
+        ``left`` are the candidates near production, and all that may be chosen.
+        """
+        near, anywhere = left
         coverage = plan_coverage(cell, self.q[found.order])
-        if coverage is None or coverage.is_enough or not isinstance(wanted, ExchangeSearch):
+        if coverage is None or not isinstance(wanted, ExchangeSearch):
             return found
-        kept = tuple(covering_candidates(cell, self.q[left]).tolist())
-        other = self.take(replace(wanted, kept=kept), left, len(found), rng)
-        better = plan_coverage(cell, self.q[other.order])
-        assert better is not None
-        return other if better.covered > coverage.covered else found
+        tilted = anywhere[weighing_candidates(cell, self.q[found.order], self.q[anywhere])]
+        if len(found) < _NEAR + len(tilted):
+            tilted = tilted[:0]
+        kept = tilted
+        if not coverage.is_enough:
+            kept = np.concatenate([tilted, near[covering_candidates(cell, self.q[near])]])
+        if not len(kept):
+            return found
+        some = np.union1d(near, tilted)
+        numbers = tuple(np.searchsorted(some, kept).tolist())
+        return self.take(replace(wanted, kept=numbers), some, len(found), rng)
 
     def _expected(self, cell: Cell, chosen: IndexArray) -> tuple[ExpectedError, ...]:
         """Return the error to expect on production from 1, 2, … poses.

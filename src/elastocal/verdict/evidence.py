@@ -17,7 +17,13 @@ from elastocal.compensation.conditioning import ToolResult
 from elastocal.compensation.process import SimulatedProcess
 from elastocal.dataset import Dataset
 from elastocal.errors import CodecError, CompensationError, IdentificationError
-from elastocal.identification import CalibratedModel, CalibrationSummary, Reproduction, UnseenErrors
+from elastocal.identification import (
+    CalibratedModel,
+    CalibrationSummary,
+    ProductionCoverage,
+    Reproduction,
+    UnseenErrors,
+)
 from elastocal.identification.recertification import CompareSummary
 from elastocal.planning import PlanResult, PoolData
 from elastocal.planning.surface import Surface
@@ -149,6 +155,14 @@ class Evidence:
     def unseen(self) -> UnseenErrors | None:
         """Errors at unseen poses; none where the reproduction is not the model file's."""
         return self.reproduction.unseen if self.reproduction and self.reproduction.same else None
+
+    @property
+    def coverage(self) -> ProductionCoverage | None:
+        """How much of the cell's production the calibration covers; none where not known."""
+        process = None if self.cell is None else self.cell.process
+        if process is None or self.calibrated is None:
+            return None
+        return self.calibrated.model.coverage(process.joint_position, process.force, process.course)
 
     @property
     def saturation(self) -> Saturation | None:
@@ -323,7 +337,7 @@ def _summary(evidence: Evidence) -> Iterator[str]:
         yield "the summary is of a run that began at another time than the one of the journal"
     if evidence.dataset is None:
         return
-    usable = len(evidence.dataset.readings(evidence.dataset.joint_names))
+    usable = int(evidence.dataset.usable.sum())
     stated = evidence.summary.readings.counts.get("ok", 0)
     if usable != stated:
         yield (

@@ -52,18 +52,18 @@ def reading_findings(evidence: Evidence) -> Iterator[Finding]:
 
 
 def _outside(evidence: Evidence) -> Iterator[Finding]:
-    process = None if evidence.cell is None else evidence.cell.process
-    domain = None if evidence.calibrated is None else evidence.calibrated.model.domain
-    if process is None or domain is None or evidence.calibrated is None:
+    """Yield how much of production the calibration covers; too little holds the light back."""
+    covered = evidence.coverage
+    if covered is None:
         return
-    robot = evidence.calibrated.model.model.robot
-    load = (process.force, process.moment)
-    found = domain.outside(robot, process.joint_position, *load).summary()
-    if found.rows:
-        yield Finding(
-            f"process path: {found.sentence()}",
-            advice="Plan the calibration where the process works, and under its forces.",
-        )
+    yield Finding(
+        covered.sentence(),
+        holds_back=not covered.is_enough,
+        advice=""
+        if covered.is_enough
+        else "Plan the calibration where production runs, and under its forces: name its path in"
+        " process.file of the cell file.",
+    )
 
 
 def _missing_poses(evidence: Evidence) -> Iterator[Finding]:

@@ -109,6 +109,8 @@ from .run import (
     run as run,
 )
 from .simulate_process import (
+    PROGRAMMED as PROGRAMMED,
+    STIFFEST as STIFFEST,
     SimulateProcessResult as SimulateProcessResult,
     SimulateProcessSettings as SimulateProcessSettings,
     simulate_process as simulate_process,

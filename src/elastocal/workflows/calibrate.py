@@ -8,12 +8,15 @@ from pathlib import Path
 import numpy as np
 
 from elastocal import identification
+from elastocal.cell import ProcessFile, read_production
 from elastocal.dataset import Dataset, merge, read, without
 from elastocal.elastic import known_springs
 from elastocal.errors import DatasetError
 from elastocal.identification import (
+    CalibratedModel,
     CalibrateResult,
     FitSettings,
+    ProductionCoverage,
     check_loads,
     choose_model,
     error_budget,
@@ -23,6 +26,7 @@ from elastocal.identification import (
 from elastocal.progress import Progress
 from elastocal.records import write_json
 from elastocal.results import brief_repr
+from elastocal.robot.inverse import nearest_zero_posture
 from elastocal.workflows._inputs import find_robot, refuse_overwriting
 from elastocal.workflows._workflow import workflow
 
@@ -46,6 +50,8 @@ class CalibrateSettings(FitSettings):
     """Tcp behind that link, ``"x, y, z, a, b, c"`` with units (Z-Y'-X'')."""
     budget: bool = False
     """State also what the error at left-out poses is made of."""
+    process: Path | None = None
+    """Path of production, ``.csv``: state also how much of it the readings cover."""
 
     @property
     def files(self) -> tuple[Path, ...]:
@@ -102,10 +108,21 @@ def calibrate(settings: CalibrateSettings, progress: Progress) -> CalibrateResul
         figures = replace(figures, check=check_loads(calibration, kept_out, marker))
     if settings.budget:
         figures = replace(figures, budget=error_budget(choice.model, readings, options, marker))
+    if settings.process is not None:
+        figures = replace(figures, production=_coverage(settings.process, calibration.calibrated))
     result = CalibrateResult.of(calibration.calibrated, figures)
     if settings.out is not None:
         write_json(settings.out, result)
     return result
+
+
+def _coverage(path: Path, calibrated: CalibratedModel) -> ProductionCoverage | None:
+    """Return how much of a production path the calibration covers."""
+    robot = calibrated.model.robot
+    start = nearest_zero_posture(robot)
+    held = start[None, : robot.external_axes]
+    found = read_production(path, ProcessFile(file=path.name), robot, start, held)
+    return calibrated.coverage(found.joint_position, found.force, found.course)
 
 
 def _measured(files: Sequence[Path]) -> tuple[Dataset, str]:

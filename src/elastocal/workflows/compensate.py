@@ -13,7 +13,7 @@ from elastocal.compensation.offline import (
 )
 from elastocal.compensation.programs import PROGRAM_READERS, compensate_program
 from elastocal.errors import FileAccessError
-from elastocal.identification import OutsideSummary
+from elastocal.identification import OutsideSummary, ProductionCoverage
 from elastocal.progress import Progress
 from elastocal.records import record
 from elastocal.results import Result
@@ -59,6 +59,8 @@ class CompensateResult(Result, CorrectionFigures):
     """Sentences that a person must know."""
     outside: OutsideSummary | None = None
     """Rows beyond what was calibrated; none where the model does not know where that was."""
+    coverage: ProductionCoverage | None = None
+    """How much of the path was calibrated: postures, rail and loads; likewise."""
 
     def facts(self) -> tuple[tuple[str, str], ...]:
         """Return what a person wants to know first."""
@@ -127,6 +129,7 @@ def compensate(settings: CompensateSettings, progress: Progress) -> CompensateRe
         tool=calibrated.tool_name,
         notes=(*coverage_notes(calibrated), *notes, *_force_notes(summary), *_outside(summary)),
         outside=summary.outside,
+        coverage=summary.coverage,
     )
 
 
@@ -149,7 +152,8 @@ def _path_notes(summary: CorrectionSummary, robot: Robot, start: str | None) -> 
 
 def _outside(summary: CorrectionSummary) -> tuple[str, ...]:
     text = "" if summary.outside is None else summary.outside.sentence()
-    return (text,) if text else ()
+    coverage = "" if summary.coverage is None else summary.coverage.sentence()
+    return tuple(each for each in (text, coverage) if each)
 
 
 def _force_notes(summary: CorrectionSummary) -> tuple[str, ...]:

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any, Protocol, TextIO
 
 from elastocal import __version__
-from elastocal.cell import require_example
+from elastocal.cell import PROCESS_FILE, require_example
 from elastocal.compensation.process import SimulateProcessResult
 from elastocal.errors import FileAccessError
 from elastocal.files import write_text
@@ -27,7 +27,7 @@ from elastocal.workflows.init import init
 from elastocal.workflows.plan import plan
 from elastocal.workflows.report import report
 from elastocal.workflows.run import RunResult, run
-from elastocal.workflows.simulate_process import simulate_process
+from elastocal.workflows.simulate_process import STIFFEST, simulate_process
 from elastocal.workflows.tool import tool
 
 LOG = "log.txt"
@@ -38,6 +38,7 @@ _FIRST = "# A demo of elastocal:"
 _FILES = (
     ("report.html", "the report: open it in a browser; it needs no network"),
     ("cell.yaml", "the cell: robot, tool, sensor, trackers, tooling, load cases, limits"),
+    ("process.csv", "where production runs: joints and forces of its courses"),
     ("plan/plan.html", "the chosen poses in three dimensions; plan.json holds them for programs"),
     ("run/", "cell and plan as used, journal, raw streams (.mcap), dataset.nc, summary.json"),
     ("model.json", "the calibrated model: compliances, their bootstrap draws, what is observable"),
@@ -51,6 +52,8 @@ _FILES = (
 )
 _FLAGS = {"models": "--model", "tools": "--tool", "seeds": "--seed", "path": ""}
 """How commands name a field that workflows call otherwise; empty: by its place."""
+_POSTURES: dict[str, dict[str, str]] = {"machining": {"posture": STIFFEST}}
+"""A spindle may be turned about its axis: there the posture is chosen (paper 4.3.1)."""
 _OWN_FLAGS = {
     ("init", "kind"): "--like",
     ("simulate_process", "kind"): "--process",
@@ -234,7 +237,7 @@ def chapters(kind: str, out: Path, seed: int) -> tuple[Chapter, ...]:
         _chapter("describe the cell", init, out, kind=kind, force=True),
         _chapter("plan the poses", plan, cell, out=planned),
         _chapter("measure", run, cell, plan=planned, out=run_folder, seed=seed),
-        _chapter("identify the springs", calibrate, data, out=model),
+        _chapter("identify the springs", calibrate, data, out=model, process=out / PROCESS_FILE),
         _chapter("weigh the tool", tool, run_folder, out=weights),
         *(
             _chapter(title, codec, data, compare=(f"{key}={values}",), out=out / "codec" / key)
@@ -249,6 +252,7 @@ def chapters(kind: str, out: Path, seed: int) -> tuple[Chapter, ...]:
             kind=kind,
             seeds=(seed,),
             out=process,
+            **_POSTURES.get(kind, {}),
         ),
         _chapter(
             "correct offline",

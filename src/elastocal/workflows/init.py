@@ -1,13 +1,20 @@
-"""``init``: a commented example cell with its mesh, to be edited into one's own."""
+"""``init``: a commented example cell with its mesh and its production, to be edited."""
 
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
 
-from elastocal.cell import write_example
+from elastocal.cell import PROCESS_FILE, load_cell, name_process, write_example
+from elastocal.compensation.process import process_courses, write_programmed_path
+from elastocal.dataset import joint_dimensions
+from elastocal.errors import FileAccessError
+from elastocal.files import read_text, write_text
 from elastocal.progress import Progress
 from elastocal.results import Result
 from elastocal.workflows._workflow import workflow
+
+_SEED = 0
+"""Of the forces of production."""
 
 
 @dataclass(frozen=True)
@@ -28,15 +35,23 @@ class InitResult(Result):
 
     cell: Path
     meshes: tuple[Path, ...]
+    process: Path
+    """Production path: joints and forces."""
 
     def facts(self) -> tuple[tuple[str, str], ...]:
         """Return what was written."""
-        return (("cell", str(self.cell)), ("meshes", ", ".join(map(str, self.meshes)) or "none"))
+        return (
+            ("cell", str(self.cell)),
+            ("meshes", ", ".join(map(str, self.meshes)) or "none"),
+            ("process", str(self.process)),
+        )
 
 
 @workflow(InitSettings)
-def init(settings: InitSettings, progress: Progress) -> InitResult:  # noqa: ARG001 - an instant
-    """Write a commented example cell with its mesh.
+def init(settings: InitSettings, progress: Progress) -> InitResult:  # noqa: ARG001 - seconds
+    """Write a commented example cell with its mesh and its production path.
+
+    The path is the one that ``simulate-process`` runs for seed 0.
 
     Parameters
     ----------
@@ -52,5 +67,14 @@ def init(settings: InitSettings, progress: Progress) -> InitResult:  # noqa: ARG
     FileAccessError
         If a file is there already or cannot be written.
     """
-    cell, *meshes = write_example(Path(settings.out), settings.kind, settings.force)
-    return InitResult(cell, tuple(meshes))
+    path = Path(settings.out) / PROCESS_FILE
+    if path.exists() and not settings.force:
+        raise FileAccessError(f"{path} is there already: give --force to replace it")
+    file, *meshes = write_example(Path(settings.out), settings.kind, settings.force)
+    cell = load_cell(file)
+    courses = process_courses(settings.kind, cell, _SEED, None)
+    units = joint_dimensions(cell.robot.joint_names, cell.robot.revolute)
+    write_programmed_path(path, courses, units)
+    # Last: a cell file that names a path has one.
+    write_text(file, name_process(read_text(file)))
+    return InitResult(file, tuple(meshes), path)

@@ -8,7 +8,7 @@ from pathlib import Path
 from elastocal import planning
 from elastocal.cell import Cell, load_cell
 from elastocal.files import filling
-from elastocal.planning import PLAN, PlanResult, SpreadRecord
+from elastocal.planning import PLAN, PlanResult, ProductionRecord, SpreadRecord
 from elastocal.planning.export import PLAN_TABLE, check_name, takes_krl, write_krl, write_table
 from elastocal.progress import Progress
 from elastocal.records import record
@@ -82,6 +82,8 @@ class PlanFigures:
     """How many poses each tracker station sees."""
     time: PlanTimes
     findings: tuple[str, ...]
+    production: ProductionRecord | None = None
+    """Coverage of production and the error to expect there; none where the cell names none."""
 
 
 @workflow(PlanSettings)
@@ -138,6 +140,7 @@ def plan_figures(found: PlanResult, folder: Path, program: str) -> PlanFigures:
         stations=dict(sorted(seeing.items())),
         time=PlanTimes(found.travel_time, found.total_time),
         findings=found.findings,
+        production=found.production,
     )
 
 

@@ -26,10 +26,13 @@ from elastocal.workflows._workflow import workflow
 from elastocal.workflows.process_trial import ProcessTrial, TrialRuns, run_budget, run_trial
 
 __all__ = [
+    "PROGRAMMED",
+    "STIFFEST",
     "SimulateProcessResult",
     "SimulateProcessSettings",
     "simulate_process",
 ]
+PROGRAMMED, STIFFEST = "programmed", "stiffest"
 _File = TypeVar("_File", bound=Path | None)
 _PACKAGES = ("elastocal", "numpy", "scipy")
 _LARGEST_LOAD = 5.0
@@ -62,6 +65,8 @@ class SimulateProcessSettings(NewTool):
     """Further shares of the force to run the same courses under; see `process.at_load`."""
     tools: tuple[Path, ...] = ()
     """Tool files; as ``models``. None: the cell's tool, and a sensor zeroed in the air."""
+    posture: str = PROGRAMMED
+    """``programmed``, or ``stiffest``: the tool turned about its axis as the first model says."""
     seeds: tuple[int, ...] = (0,)
     """Seeds of forces and devices."""
     compensator: Path | None = None
@@ -102,6 +107,10 @@ def simulate_process(
         If a file does not fit, cannot be read or written, or is there already.
     """
     _require_one_process(settings)
+    if settings.posture not in (PROGRAMMED, STIFFEST):
+        raise CompensationError(
+            f"--posture {settings.posture!r} is not one of {PROGRAMMED}, {STIFFEST}"
+        )
     runs = _runs(settings)
     cell = load_cell(Path(settings.cell))
     with filling(settings.out, process.TABLE, settings.force) as folder:
@@ -148,8 +157,13 @@ def _simulate(
     deviations: list[process.CourseDeviation] = []
     budget: tuple[process.DeviationComparison, ...] = ()
     programmed: tuple[Course, ...] = ()
+    plain, stiffest = _Lines(), None
     for trial in trials:
         courses = own or _built_in_courses(settings, cell, trial.seed)
+        if settings.posture == STIFFEST:
+            plain.add(f"seed {trial.seed}", run_trial(trial, courses, progress))
+            stiffest = process.stiffest_posture(trials[0].model, cell, courses)
+            courses = stiffest.courses
         programmed = programmed or courses
         for load, lines in loads.items():
             loaded = courses if load == 1.0 else tuple(process.at_load(c, load) for c in courses)
@@ -161,6 +175,11 @@ def _simulate(
             budget = run_budget(trial, courses, progress)
     name = _direction_name(settings)
     simulation, usual = cell.file.simulation, loads.pop(1.0)
+    covered = trials[0].model.coverage(
+        np.vstack([course.q for course in programmed]),
+        np.vstack([course.force for course in programmed]),
+        [course.name for course in programmed for _ in course.q],
+    )
     table = SimulateProcessResult(
         cell=cell.name,
         process=settings.kind or Path(str(settings.path)).name,
@@ -176,6 +195,15 @@ def _simulate(
             process.LoadLines(load, each.pooled(each.lines), each.pooled(each.spatial))
             for load, each in loads.items()
         ),
+        posture=None
+        if stiffest is None
+        else process.PostureGain(
+            stiffest.spin,
+            stiffest.softest,
+            stiffest.softest_programmed,
+            plain.pooled(plain.lines),
+            plain.pooled(plain.spatial),
+        ),
         means=tuple(
             process.SeedMeans.of(measure, load, lines)
             for load, each in ({1.0: usual} | loads).items()
@@ -185,7 +213,11 @@ def _simulate(
         path_sha256="" if settings.path is None else sha256(read_text(settings.path)),
         preset=simulation.preset,
         process_stiffness=simulation.contact.process_stiffness,
-        notes=_notes(settings, programmed, len(runs)),
+        notes=(
+            *_notes(settings, programmed, len(runs)),
+            *(() if covered is None else (covered.sentence(),)),
+        ),
+        coverage=covered,
     )
     return process.SimulatedProcess(table, tuple(deviations)), programmed
 

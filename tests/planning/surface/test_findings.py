@@ -17,6 +17,7 @@ from elastocal.planning.surface import (
     mesh_findings,
     placement_findings,
     sample_uniform,
+    unit_findings,
 )
 from elastocal.robot.inverse import inverse_for
 from support.tooling import plane, soup
@@ -65,6 +66,34 @@ def test_a_mesh_in_mm_that_is_read_as_m_is_found_by_the_reach(cell):
 
 def test_a_mesh_in_m_that_is_read_as_mm_is_tiny(cell):
     assert "tiny" in kinds(cell, placed(cell, unit=1e-6))
+
+
+def test_a_mesh_in_inches_that_is_read_as_mm_is_named(cell):
+    size = np.linalg.norm(np.ptp(placed(cell).mesh.vertices, axis=0))
+    small = 0.015 * arm_reach(cell.robot) / size
+    found = kinds(cell, placed(cell, unit=small * cell.file.surface.metres))
+    assert "is the mesh in inches and read as mm (surface.unit)?" in found["tiny"].message
+
+
+@pytest.mark.parametrize(
+    ("head", "unit", "found"),
+    [
+        ("solid part UNITS=inches", "mm", True),
+        ("solid part units: in", "mm", True),
+        ("solid Einzelteil, 1 inch", "m", True),
+        ("solid part units: in", "in", False),
+        ("solid finch in mm", "mm", False),
+    ],
+)
+def test_a_mesh_that_speaks_of_inches_is_named(tmp_path, head, unit, found):
+    path = tmp_path / "part.stl"
+    path.write_text(f"{head}\n")
+    words = [finding.message for finding in unit_findings(path, unit)]
+    assert words == (
+        [f"part.stl speaks of inches and is read in {unit}: write surface.unit: in, if it is so"]
+        if found
+        else []
+    )
 
 
 def test_the_reach_is_a_bound_that_a_stretched_arm_nearly_attains(cell):

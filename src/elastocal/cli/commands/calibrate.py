@@ -51,6 +51,10 @@ def _calibrate(  # noqa: PLR0913 - one parameter an option
         bool,
         typer.Option("--budget", help="State also what the error at left-out poses is made of."),
     ] = False,
+    process: Annotated[
+        Path | None,
+        typer.Option(help="Path of production (.csv): state also how much of it is covered."),
+    ] = None,
     draws: Annotated[int, typer.Option(help="Bootstrap draws.")] = 200,
     seed: Annotated[int, typer.Option(min=0, help="Seed of the bootstrap.")] = 0,
     as_json: options.Figures = False,
@@ -72,6 +76,7 @@ def _calibrate(  # noqa: PLR0913 - one parameter an option
         trust_conventions=trust_conventions,
         free_frame=free_frame,
         budget=budget,
+        process=process,
         draws=draws,
         seed=seed,
     )

@@ -31,6 +31,9 @@ def _simulate_process(  # noqa: PLR0913 (a command has as many options as it has
         str, typer.Option(help="Of --path, what counts: lateral, normal or a vector in base.")
     ] = "lateral",
     start: Annotated[str | None, typer.Option(help=options.START_HELP)] = None,
+    posture: Annotated[
+        str, typer.Option(help="programmed, or stiffest: the tool turned as the model says.")
+    ] = "programmed",
     load: Annotated[
         str | None,
         typer.Option(help="Also at these shares of the force: '0.5,-1'; -1 turns it aside."),
@@ -68,6 +71,7 @@ def _simulate_process(  # noqa: PLR0913 (a command has as many options as it has
         direction=direction,
         start=start,
         loads=options.parse_loads(load),
+        posture=posture,
         tools=tools,
         seeds=tuple(seed or (0,)),
         compensator=settings,

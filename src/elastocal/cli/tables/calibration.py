@@ -100,6 +100,8 @@ def _show_fit(console: Console, figures: CalibrationSummary) -> None:
     console.print(table)
     if figures.coverage is not None:
         console.print(_coverage_line(figures.coverage), soft_wrap=True)
+    if figures.production is not None:
+        console.print(figures.production.sentence(), markup=False, soft_wrap=True)
 
 
 def _coverage_line(coverage: Coverage) -> str:

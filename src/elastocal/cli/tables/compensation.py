@@ -169,7 +169,15 @@ def show_process(console: Console, result: SimulateProcessResult) -> None:
     for each in result.loads:
         name = f"{each.lines[-1].name}, load {each.load:g}"
         lines += [(name + component, each.lines[-1]), (f"{name}, 3-D", each.spatial[-1])]
+    if result.posture is not None:
+        last = (result.posture.lines[-1], result.posture.spatial[-1])
+        lines += [
+            (f"programmed posture, {what}", line)
+            for what, line in zip((result.direction, "3-D"), last, strict=True)
+        ]
     console.print(_deviation_table(title, lines))
+    if result.posture is not None:
+        console.print(f"posture: {result.posture.sentence}", soft_wrap=True)
     if len(result.runs) > 1:
         console.print(_means_table(result))
     if result.preset:

@@ -10,15 +10,17 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from elastocal.planning import PlanResult, SpreadRecord
+from elastocal.planning import PlanResult, ProductionRecord, SpreadRecord
 from elastocal.records import record
 from elastocal.robot import catalogue
+from elastocal.wording import um
 from elastocal.workflows import DryRunResult, InitResult, PlanFigures, RunResult
 
 
 def show_example(console: Console, result: InitResult) -> None:
     """Print where an example cell was written, and what comes next."""
-    cell, names = escape(str(result.cell)), ", ".join(mesh.name for mesh in result.meshes)
+    cell = escape(str(result.cell))
+    names = ", ".join(path.name for path in (*result.meshes, result.process))
     console.print(
         f"wrote [bold]{cell}[/bold] and {names}: edit it, then `elastocal check {cell}`",
         soft_wrap=True,
@@ -36,6 +38,10 @@ def show_plan(console: Console, plan: PlanResult, figures: PlanFigures) -> None:
     )
     console.print(_spread_table(plan))
     console.print(_check_table(plan))
+    if plan.production is not None:
+        console.print(_expected_table(plan.production))
+        for name, text in plan.production.facts():
+            console.print(f"{name}: {text}", markup=False, soft_wrap=True)
     if figures.stations:
         seen = ", ".join(f"{name} {count}" for name, count in figures.stations.items())
         console.print(f"marker seen by: {seen}", markup=False)
@@ -63,6 +69,21 @@ def _spread_table(plan: PlanResult) -> Table:
 def _lengths(spread: SpreadRecord) -> list[str]:
     values = (spread.covering_radius, spread.boundary_distance, spread.nearest_neighbour)
     return ["none" if value is None else f"{1e3 * value:.1f} mm" for value in values]
+
+
+def _expected_table(production: ProductionRecord) -> Table:
+    """Return the error to expect on production from some numbers of poses."""
+    table = Table(title="Error to expect on production", title_justify="left")
+    for title in ("poses", "from noise", "with the model's own"):
+        table.add_column(title, justify="right")
+    for each in production.some_expected():
+        mark = " <- plan" if each.poses == production.poses else ""
+        table.add_row(
+            f"{each.poses}{mark}",
+            um(each.noise),
+            "not known" if production.floor is None else um(each.error),
+        )
+    return table
 
 
 def _check_table(plan: PlanResult) -> Table:

@@ -19,7 +19,12 @@ import numpy as np
 
 from elastocal.arrays import BoolArray, FloatArray, IndexArray
 from elastocal.errors import PathError
-from elastocal.identification import CalibratedModel, OutsideRows, OutsideSummary
+from elastocal.identification import (
+    CalibratedModel,
+    OutsideRows,
+    OutsideSummary,
+    ProductionCoverage,
+)
 from elastocal.records import record
 from elastocal.results import brief_repr
 from elastocal.robot import Robot
@@ -71,6 +76,8 @@ class PathCorrection:
     """What friction remembers after the last row, shape (element,), in N·m."""
     outside: OutsideRows | None = None
     """Rows beyond what was calibrated; none where the model does not know where that was."""
+    coverage: ProductionCoverage | None = None
+    """How much of the rows was calibrated; likewise."""
 
 
 def correct_rows(  # noqa: PLR0913 (what goes on from block to block is one more)
@@ -160,6 +167,7 @@ def correct_rows(  # noqa: PLR0913 (what goes on from block to block is one more
         np.asarray(along > 0.5 * np.linalg.norm(wrench[0], axis=1)),
         load.after,
         None if calibrated.domain is None else calibrated.domain.outside(robot, q, *wrench),
+        calibrated.coverage(q, wrench[0]),
     )
 
 
@@ -336,6 +344,8 @@ class CorrectionSummary:
     """Joints that were found for the first row of a path of poses, in rad or m."""
     outside: OutsideSummary | None = None
     """Rows beyond what was calibrated; none where the model does not know where that was."""
+    coverage: ProductionCoverage | None = None
+    """How much of the rows was calibrated; likewise."""
 
     def plus(
         self, correction: PathCorrection, shift: FloatArray, labels: list[str], jumps: list[int]
@@ -362,6 +372,9 @@ class CorrectionSummary:
         outside = None if correction.outside is None else correction.outside.summary()
         if outside is not None and self.outside is not None:
             outside = self.outside.plus(outside)
+        coverage = correction.coverage
+        if coverage is not None and self.coverage is not None:
+            coverage = self.coverage.plus(coverage)
         return replace(
             self,
             rows=self.rows + len(labels),
@@ -372,6 +385,7 @@ class CorrectionSummary:
             first_jump=self.first_jump or (labels[jumps[0]] if jumps else ""),
             pulled=self.pulled + int(correction.pulled.sum()),
             outside=outside,
+            coverage=coverage,
         )
 
     def figures(self) -> CorrectionFigures:

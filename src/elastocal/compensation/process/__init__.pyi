@@ -55,6 +55,7 @@ from .statistics import (
     DeviationComparison as DeviationComparison,
     DeviationStatistics as DeviationStatistics,
     LoadLines as LoadLines,
+    PostureGain as PostureGain,
     SeedMean as SeedMean,
     SeedMeans as SeedMeans,
     compare_deviations as compare_deviations,

@@ -24,10 +24,12 @@ from elastocal.compensation.process.statistics import (
     DeviationComparison,
     DeviationStatistics,
     LoadLines,
+    PostureGain,
     SeedMeans,
     compare_deviations,
 )
 from elastocal.errors import CompensationError
+from elastocal.identification import ProductionCoverage
 from elastocal.records import read_json, record, write_json
 from elastocal.results import Result, brief_repr
 from elastocal.tables import TableError, TableRows, opened_table, write_table
@@ -78,6 +80,8 @@ class SimulateProcessResult(Result):
     """As ``lines``, of the 3-D deviation (the length of the shift); likewise."""
     loads: tuple[LoadLines, ...] = ()
     """The same process at other shares of its load, where that was asked for."""
+    posture: PostureGain | None = None
+    """Where the stiffest posture was taken; none: the courses as they are programmed."""
     means: tuple[SeedMeans, ...] = ()
     """Each measure at each load over the seeds; of a single seed without interval."""
     path: str = ""
@@ -89,6 +93,8 @@ class SimulateProcessResult(Result):
     """How the force reacts to the tool's shift along its axis, in N/m; 0: forces are given."""
     notes: tuple[str, ...] = ()
     """Sentences that a person must know."""
+    coverage: ProductionCoverage | None = None
+    """How much of the process the first model's calibration covers; none where it is not known."""
 
     def facts(self) -> tuple[tuple[str, str], ...]:
         """Return what a person wants to know first."""

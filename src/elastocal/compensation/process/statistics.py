@@ -128,6 +128,31 @@ class SeedMeans:
 
 
 @record()
+class PostureGain:
+    """What the posture that the model finds stiffest does, against the programmed one."""
+
+    spin: float
+    """Turn of the tool about its axis from the programmed orientation, in rad."""
+    softest: float
+    """Stiffness by the model along the deviation that counts, where smallest, in N/m."""
+    softest_programmed: float
+    """The same in the programmed posture."""
+    lines: tuple[DeviationComparison, ...]
+    """Of the programmed posture, one a seed, as those of the table."""
+    spatial: tuple[DeviationComparison, ...]
+    """The same of the 3-D deviation."""
+
+    @property
+    def sentence(self) -> str:
+        """The choice in words."""
+        return (
+            f"tool turned by {np.degrees(self.spin):.0f} deg about its axis, stiffest by the model:"
+            f" {1e-6 * self.softest:.3g} N/µm where softest, {1e-6 * self.softest_programmed:.3g}"
+            " N/µm as programmed"
+        )
+
+
+@record()
 class LoadLines:
     """The process at another share of its load."""
 

@@ -1,12 +1,15 @@
 """Oddities of a surface, in one line each, before a robot is sent there."""
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 from numpy.random import Generator
 
 from elastocal.arrays import BoolArray, FloatArray
+from elastocal.meshes import says_inches
 from elastocal.planning.surface.contact import contact_frames
 from elastocal.planning.surface.sampling import sample_uniform
 from elastocal.planning.surface.surface import Surface, SurfacePoints
@@ -20,6 +23,9 @@ _HUGE = 50.0
 """So is one whose bounding box is larger than this many reaches: a ship is not."""
 _TINY = 0.02
 """So is one whose bounding box is smaller than this part of the reach."""
+_TOO_LARGE = {"mm and read as m": 1e-3, "inches and read as m": 0.0254}
+_TOO_SMALL = {"m and read as mm": 1e3, "inches and read as mm": 25.4}
+"""Mistakes about a unit, and by what the size is to be multiplied to mend them."""
 _POINTS = 200
 _SPINS = 4
 _CLEARLY = 0.25
@@ -34,7 +40,7 @@ class Finding:
 
     kind: str
     """``open``, ``non-manifold``, ``winding``, ``degenerate``, ``duplicate``, ``far``, ``huge``,
-    ``tiny`` or ``inverted``."""
+    ``tiny``, ``inches`` or ``inverted``."""
     message: str
     """One line."""
     fatal: bool = False
@@ -96,21 +102,51 @@ def placement_findings(
     if not gap <= _FAR * reach:
         text = (
             f"{name}: its nearest point is {gap:.3g} m from the robot, whose reach is"
-            f" {reach:.3g} m: is the mesh in mm and read as m (surface.unit), or its pose wrong?"
+            f" {reach:.3g} m: is the mesh in {_misread(size, reach)} (surface.unit), or its pose"
+            " wrong?"
         )
         return (Finding("far", text, fatal=True),)
     if not size <= _HUGE * reach:
         text = (
             f"{name} is {size:.3g} m across; the reach of the robot is {reach:.3g} m: is"
-            " the mesh in mm and read as m (surface.unit)?"
+            f" the mesh in {_misread(size, reach)} (surface.unit)?"
         )
         return (Finding("huge", text, fatal=True),)
     text = (
         f"{name} is only {1e3 * size:.3g} mm across; the reach of the robot is"
-        f" {reach:.3g} m: is the mesh in m and read as mm (surface.unit)?"
+        f" {reach:.3g} m: is the mesh in {_misread(size, reach)} (surface.unit)?"
     )
     tiny = (Finding("tiny", text),) if size < _TINY * reach else ()
     return tiny + inverted_finding(surface, reachable, rng)
+
+
+def _misread(size: float, reach: float) -> str:
+    """Return the mistake about the unit that would make a surface as large as the arm reaches."""
+    mistakes = _TOO_LARGE if size > reach else _TOO_SMALL
+    return min(mistakes, key=lambda words: abs(math.log(mistakes[words] * size / reach)))
+
+
+def unit_findings(path: Path, unit: str) -> tuple[Finding, ...]:
+    """Return a finding when a mesh file speaks of inches and is read in another unit.
+
+    Parameters
+    ----------
+    path : Path
+        The mesh file.
+    unit : str
+        What its numbers are read in.
+
+    Raises
+    ------
+    FileAccessError
+        If it cannot be read.
+    """
+    if unit == "in" or not says_inches(path):
+        return ()
+    text = (
+        f"{path.name} speaks of inches and is read in {unit}: write surface.unit: in, if it is so"
+    )
+    return (Finding("inches", text),)
 
 
 def inverted_finding(surface: Surface, reachable: Reachable, rng: Generator) -> tuple[Finding, ...]:

@@ -5,11 +5,18 @@ from pathlib import Path
 
 from elastocal.cell import Cell
 from elastocal.files import write_text
-from elastocal.planning import PlanResult, PoolData, PoseRecord, check_plan_robot, check_pool_of
+from elastocal.planning import (
+    PlanResult,
+    PoolData,
+    PoseRecord,
+    ProductionRecord,
+    check_plan_robot,
+    check_pool_of,
+)
 from elastocal.planning.surface import Surface
 from elastocal.report.pages.templating import render
 from elastocal.report.plots import PlanView, plan_view, weakest_margins
-from elastocal.wording import duration, millimetres, readable
+from elastocal.wording import duration, millimetres, readable, um
 
 
 def write_plan_page(
@@ -49,6 +56,16 @@ def write_plan_page(
         plan=plan,
         figures=key_figures(plan),
         rows=[(pose.id, _cells(plan, pose, worst[pose.candidate])) for pose in plan.poses],
+        expected=[
+            (
+                each.poses,
+                um(each.noise),
+                "not known" if production.floor is None else um(each.error),
+            )
+            for production in [plan.production]
+            if production is not None
+            for each in production.some_expected()
+        ],
         notes=[layer.note for layer in view.layers if layer.note],
     )
     write_text(path, page)
@@ -66,7 +83,14 @@ def key_figures(plan: PlanResult) -> tuple[tuple[str, str], ...]:
         ("of it on the way", duration(plan.travel_time)),
         ("Points with a posture", f"{pool.valid} of {pool.sampled}"),
         ("Check that refused most", pool.bottleneck or "none"),
+        *(_covered(plan.production) if plan.production is not None else ()),
     )
+
+
+def _covered(production: ProductionRecord) -> tuple[tuple[str, str], ...]:
+    found = production.expected_of(production.poses)
+    error = (("Expected error on production", um(found.error)),) if found is not None else ()
+    return (("Production covered", f"{production.coverage.covered:.0%}"), *error)
 
 
 def _cells(plan: PlanResult, pose: PoseRecord, worst: str) -> list[str]:

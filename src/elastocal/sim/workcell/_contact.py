@@ -23,11 +23,11 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-import trimesh
 
 from elastocal.arrays import FloatArray
 from elastocal.cell import Cell
-from elastocal.errors import FileAccessError, SchemaError
+from elastocal.errors import SchemaError
+from elastocal.meshes import load_triangles
 
 LIMIT = 0.999
 """Part of the friction limit that a sliding contact keeps up: its shear is finite."""
@@ -231,15 +231,9 @@ class TrueSurface:
 
 def _triangles(path: Path) -> FloatArray:
     """Return the triangles of a mesh file in its own unit, shape (face, 3, 3)."""
-    try:
-        with path.open("rb") as file:
-            mesh = trimesh.load_mesh(file, file_type=path.suffix[1:].lower(), process=False)
-    except OSError as error:
-        raise FileAccessError(f"cannot read {path}: {error.strerror or error}") from error
-    except (ValueError, IndexError, KeyError, TypeError, AttributeError) as error:
-        reason = " ".join(str(error).split()) or type(error).__name__
-        raise SchemaError(f"mesh {path} cannot be read: {reason}") from error
-    triangles: FloatArray = np.asarray(getattr(mesh, "triangles", ()), dtype=np.float64)
+    triangles: FloatArray = np.asarray(
+        getattr(load_triangles(path), "triangles", ()), dtype=np.float64
+    )
     if not len(triangles):
         raise SchemaError(f"mesh {path} has no triangle")
     return triangles

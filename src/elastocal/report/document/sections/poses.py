@@ -3,12 +3,12 @@
 from collections.abc import Iterator
 from functools import partial
 
-from elastocal.planning import PlanResult
+from elastocal.planning import PlanResult, ProductionRecord
 from elastocal.report.document import blocks
 from elastocal.report.pages import key_figures, view_data
 from elastocal.report.plots import plan_figure, plan_view
 from elastocal.verdict import Evidence
-from elastocal.wording import counted, mm
+from elastocal.wording import counted, mm, um
 
 
 def _body(evidence: Evidence) -> Iterator[blocks.Block]:
@@ -19,6 +19,8 @@ def _body(evidence: Evidence) -> Iterator[blocks.Block]:
         return
     yield blocks.Facts(key_figures(plan))
     yield _spreads(plan)
+    if plan.production is not None:
+        yield _expected(plan.production)
     pictures = tuple(_pictures(evidence, plan))
     yield from pictures or (blocks.Paragraph("Without cell, mesh and pool there is no picture."),)
     yield from _notes(plan)
@@ -72,6 +74,19 @@ def _spreads(plan: PlanResult) -> blocks.Block:
                 f"{spread.o1:.4f}",
             )
             for name, spread in rows
+        ),
+    )
+
+
+def _expected(production: ProductionRecord) -> blocks.Block:
+    """Return the error to expect from some numbers of poses."""
+    floor = production.floor
+    return blocks.Table(
+        f"Error to expect on production, planned with sigma {um(production.sigma)}",
+        ("Poses", "From noise", "With the model's own"),
+        tuple(
+            (str(each.poses), um(each.noise), "not known" if floor is None else um(each.error))
+            for each in production.some_expected()
         ),
     )
 

@@ -93,6 +93,10 @@ def _table_1(record: SimulatedProcess) -> Iterator[blocks.Block]:
         text = f"at {each.load:g} of the load, {each.lines[-1].name}"
         named += [(f"{deviation} {text}", each.lines[-1])]
         named += [(f"3-D deviation {text}", each.spatial[-1])]
+    if table.posture is not None:
+        text = "in the programmed posture"
+        named += [(f"{deviation} {text}", table.posture.lines[-1])]
+        named += [(f"3-D deviation {text}", table.posture.spatial[-1])]
     for name, line in named:
         rows += [
             (f"{name} ({line.points} points), without correction in mm", *_mm(line.before)),
@@ -111,6 +115,8 @@ def _table_1(record: SimulatedProcess) -> Iterator[blocks.Block]:
         yield _means(table.means)
     if paper is not None:
         yield blocks.Paragraph(f"{_SIDE_BY_SIDE} {paper.measures}", "sub")
+    if table.posture is not None:
+        yield blocks.Paragraph(f"Posture (paper 4.3.1): {table.posture.sentence}.", "sub")
     for note in (*_truth(table), *table.notes):
         yield blocks.Paragraph(note, "sub")
 

@@ -1,0 +1,147 @@
+"""A plan is made where production runs, says so, and says what error to expect there."""
+
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from elastocal.cell import Cell, load_cell
+from elastocal.compensation.process import process_courses
+from elastocal.identification import ENOUGH
+from elastocal.planning import (
+    NearProduction,
+    PlanResult,
+    make_plan,
+    plan_coverage,
+    production_findings,
+    read_plan,
+    write_plan,
+)
+from elastocal.workflows import init
+
+
+@pytest.fixture(scope="module", params=["afp", "machining"])
+def kind(request) -> str:
+    """Return each example."""
+    return request.param
+
+
+@pytest.fixture(scope="module")
+def folder(kind, tmp_path_factory):
+    """Return an example as `elastocal init` writes it, with a small pool."""
+    folder = tmp_path_factory.mktemp(kind)
+    path = init(folder, kind=kind).cell
+    text = path.read_text().replace("pool: 3000", "pool: 150")
+    path.write_text(re.sub(r"\n  poses: \d+", "\n  poses: 6", text))
+    return folder
+
+
+@pytest.fixture(scope="module")
+def cell(folder) -> Cell:
+    """Return the example cell."""
+    return load_cell(folder / "cell.yaml")
+
+
+@pytest.fixture(scope="module")
+def plan(cell) -> PlanResult:
+    """Return its plan."""
+    return make_plan(cell, jobs=1).plan
+
+
+def changed(cell: Cell, **search) -> Cell:
+    """Return the cell with another search."""
+    model = cell.file.search.model_copy(update=search)
+    return replace(cell, file=cell.file.model_copy(update={"search": model}))
+
+
+def test_the_process_of_an_example_is_the_one_that_is_simulated(cell, kind):
+    courses = process_courses(kind, cell, 0, None)
+    assert [name for name, _ in cell.process.courses] == [course.name for course in courses]
+    q, force = (np.vstack([getattr(c, name) for c in courses]) for name in ("q", "force"))
+    np.testing.assert_allclose(cell.process.joint_position, q, atol=1e-8)
+    np.testing.assert_allclose(cell.process.force, force, atol=1e-3)
+
+
+def test_six_poses_chosen_for_production_cover_it(plan):
+    assert plan.search.name == "i_optimal"
+    assert plan.production.coverage.covered >= ENOUGH
+    assert not any("not covered" in finding for finding in plan.findings)
+    assert "100% of" in dict(plan.facts())["production"]
+
+
+def test_a_plan_away_from_production_says_so_by_name(cell, kind, folder):
+    """The rail is held where production never runs; the block is pressed on one side face."""
+    text = (folder / "cell.yaml").read_text()
+    away = {
+        "afp": ("external: {rail: search}", 'external: {rail: ["-1.25 m"]}'),
+        "machining": ('max: ["1 m", "1 m", "1 m"]', 'max: ["1 m", "-0.19 m", "1 m"]'),
+    }[kind]
+    assert away[0] in text
+    path = folder / "away.yaml"
+    path.write_text(text.replace(*away).replace("pool: 150", "pool: 60"))
+    found = load_cell(path)
+    if kind == "afp":
+        # As production was planned before: without looking where it runs.
+        blind = make_plan(replace(found, process=None), jobs=1).plan
+        coverage = plan_coverage(cell, np.array([pose.joints for pose in blind.poses]))
+    else:
+        planned = make_plan(found, jobs=1).plan
+        coverage = planned.production.coverage
+        assert any(finding.startswith("production is not covered") for finding in planned.findings)
+    assert not coverage.is_enough
+    assert ("rail" if kind == "afp" else "joint_a") in coverage.sentence()
+
+
+def test_the_error_to_expect_falls_with_every_pose(plan):
+    errors = [each.error for each in plan.production.expected]
+    assert errors == sorted(errors, reverse=True)
+    assert plan.production.expected[-1].poses == 30
+    assert errors == [each.noise for each in plan.production.expected]  # the floor is not known
+
+
+def test_a_wanted_accuracy_decides_the_number_of_poses(cell, plan):
+    wanted = plan.production.expected_of(8).error
+    found = make_plan(changed(cell, accuracy=1.1 * wanted, poses=None), jobs=1).plan.production
+    assert 6 <= found.poses <= 10
+    assert found.expected_of(found.poses).error <= 1.1 * wanted
+    assert found.accuracy == 1.1 * wanted
+
+
+def test_an_accuracy_out_of_reach_is_told_with_what_is_expected(cell):
+    found = make_plan(changed(cell, accuracy=1e-6, poses=5), jobs=1).plan
+    assert found.production.poses == 5
+    assert any("search.accuracy) is not expected from 5 poses" in text for text in found.findings)
+
+
+def test_the_floor_of_the_model_is_no_better_for_more_poses(cell, plan):
+    found = make_plan(changed(cell, floor=50e-6), jobs=1).plan.production
+    assert all(each.error > 50e-6 for each in found.expected)
+    assert found.expected[-1].error == pytest.approx(np.hypot(50e-6, found.expected[-1].noise))
+
+
+def test_the_plan_file_keeps_what_was_promised(tmp_path, plan):
+    write_plan(tmp_path, plan)
+    assert read_plan(tmp_path).production == plan.production
+
+
+def test_postures_near_production_are_nearer_than_their_reach(cell, plan):
+    near = NearProduction.of(cell)
+    assert near.distance(cell.process.joint_position[:5]) == pytest.approx(0.0, abs=1e-9)
+    assert (near.distance(np.array([pose.joints for pose in plan.poses])) <= 1.0).all()
+
+
+def test_missing_load_cases_are_named_with_amplitudes(cell, kind):
+    loads = cell.file.load_cases.model_copy(update={"cases": ("normal",)})
+    bare = replace(cell, file=cell.file.model_copy(update={"load_cases": loads}))
+    texts = list(production_findings(bare, None))
+    assert any("load case east is missing" in text and 'fy: "' in text for text in texts)
+    assert not list(production_findings(cell, None))
+
+
+def test_load_cases_that_are_too_small_come_with_larger_ones(cell):
+    loads = cell.file.load_cases.model_copy(update={"fx": 100.0, "fy": 100.0, "fz": 300.0})
+    weak = replace(cell, file=cell.file.model_copy(update={"load_cases": loads}))
+    texts = " ".join(production_findings(weak, None))
+    assert "ask for load_cases.fx and fy of" in texts
+    assert "ask for load_cases.fz of" in texts
