@@ -147,7 +147,8 @@ def _stations(registration: RegistrationSummary) -> Iterator[blocks.Block]:
     lever = f"{point(registration.lever_arm)} mm"
     yield blocks.Paragraph(
         f"Marker in the tcp frame: {lever} measured, {point(registration.lever_arm_of_cell)} mm"
-        f" in the cell file. Scatter of the readings: {_or_unknown(registration.scatter, um)}."
+        " in the cell file. Scatter of the readings, stops of the arm included:"
+        f" {_or_unknown(registration.scatter, um)}."
     )
     yield blocks.Paragraph(_moves(registration))
     lost = tuple(f"station {name}: {why}" for name, why in registration.unregistered.items())
@@ -176,7 +177,7 @@ def _noise(summary: RunSummary) -> blocks.Block:
          _or_unknown(noise.force_sigma_median_N, "{:.2f} N".format)),
         ("Marker of a reading, median standard deviation",
          _or_unknown(noise.marker_sigma_median, um)),
-        ("Sensor drift within a pose, largest",
+        ("Sensor free again after the presses of a pose, largest change (drift, hysteresis)",
          _or_unknown(drift.largest_N, "{:.2f} N".format) + at_pose),
         ("Moment at the contact, median and largest",
          f"{_or_unknown(moment.median_Nm, '{:.2f}'.format)} and"
