@@ -4,6 +4,10 @@ from pathlib import Path
 
 import pytest
 
+from support import bare
+
+bare.forbid()
+
 TESTS = Path(__file__).parent
 END_TO_END = (
     "cli",

@@ -204,9 +204,11 @@ def test_every_default_of_the_procedure_is_the_one_that_the_reference_tells():
         cell_file_section("Section procedure"),
         flags=re.MULTILINE,
     )
-    told = {key: text for key, text in rows if key != "force_limit"}
-    defaults = ProcedureSettings()
-    assert set(told) == set(ProcedureSettings.model_fields) - {"force_limit"}
+    told, defaults = dict(rows), ProcedureSettings()
+    assert set(told) == set(ProcedureSettings.model_fields)
+    assert told.pop("force_limit").startswith("1.3 times the largest load case")
+    assert told.pop("reference") == f"`{defaults.reference}`"
+    assert told.pop("conditioning") == f"`{str(defaults.conditioning).lower()}`"
     for key, text in told.items():
         number, _, unit = text.partition(" ")
         factors = {"ms": 1e-3, "mm/s": 1e-3, "mm": 1e-3, "µm": 1e-6, "µm/N": 1e-6}

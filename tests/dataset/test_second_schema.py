@@ -9,7 +9,7 @@ from support.datasets import JOINTS, dataset, full_keywords, keywords, second_ke
 
 NEWS = (
     *("sequence", "reference_joint_position", "reference_force", "link_joint_position"),
-    *("campaigns", "gravity", "conditioned"),
+    *("campaigns", "gravity", "conditioned", "check"),
 )
 
 
@@ -49,6 +49,7 @@ def test_files_carry_all_of_it(tmp_path, suffix):
     assert back.campaigns == ("monday", "monday", "in the winter")
     assert back.gravity == (0.0, 9.8, -0.5)
     assert back.conditioned
+    assert back.check_cases == ("north",)
 
 
 def test_the_table_names_its_columns_after_joints_and_axes(tmp_path):
@@ -223,7 +224,7 @@ def test_a_unit_of_its_own_is_converted():
 
 
 def test_readings_carry_reference_order_and_campaign():
-    readings = second().readings(JOINTS[::-1])
+    readings = second(check=()).readings(JOINTS[::-1])
     assert readings.pose.tolist() == [4, 4, 2, 11, 11]
     assert readings.sequence.tolist() == [0, 1, 4, 7, 2]
     assert readings.campaign.tolist() == ["monday"] * 3 + ["in the winter"] * 2
@@ -246,6 +247,15 @@ def test_a_press_that_slipped_stays_among_what_pressed_on_the_arm():
     assert (presses.pose.tolist(), presses.sequence.tolist()) == ([0, 2], [0, 1])
     np.testing.assert_array_equal(presses.force, data.force[[0, 2], [0, 1]])
     assert data.readings(JOINTS).sequence.tolist() == [1, 0, 1, 0]
+
+
+def test_a_load_case_that_is_kept_out_of_the_fit_stays_among_what_pressed_on_the_arm():
+    data = only("check")
+    fitted, checked = data.readings(JOINTS), data.readings(JOINTS, check=True)
+    assert set(fitted.load_case) == {"normal"}
+    assert set(checked.load_case) == {"north"}
+    np.testing.assert_array_equal(fitted.also_pressed.force, checked.force)
+    np.testing.assert_array_equal(checked.also_pressed.force, fitted.force)
 
 
 def test_a_selection_keeps_the_order_in_time():

@@ -139,7 +139,17 @@ def test_the_figures_of_the_calibration_stand_in_the_file(path):
         ),
         (["springs", 0, "offset", 1], float("inf"), r"springs\.0\.offset\.1: .*finite"),
         (["springs", 0, "axes"], [1, 0, 0], r"'springs\.0\.axes'; did you mean 'axis'"),
+        (
+            ["tool"],
+            {"calibrated_tcp": "tpc", "pose": [0, 0, 0.1, 0, 0, 0]},
+            "tool.calibrated_tcp 'tpc' is no link of the robot",
+        ),
         (["observability", "observable"], [True], "observab"),
+        (
+            ["observability", "unobservable"],
+            [[{"spring": "joint_1.axail", "weight": 1.0}]],
+            "'joint_1.axail', which the model does not have; did you mean 'joint_1.axial'",
+        ),
         (["observability", "rank"], 19, "rank|observab"),
         (["extra"], 1, "unknown key 'extra'"),
     ],

@@ -72,6 +72,7 @@ def second_keywords(**changes: Any) -> dict[str, Any]:
         "campaigns": ("monday", "monday", "in the winter"),
         "gravity": (0.0, 9.8, -0.5),
         "conditioned": True,
+        "check": ("north",),
         **changes,
     }
 

@@ -129,6 +129,16 @@ def test_advice_weighs_the_tracker_against_the_errors(parts):
     assert "its readings scatter" not in told(None)
 
 
+def test_scatter_of_the_stops_is_not_laid_at_the_trackers_door(parts):
+    mean = parts.reproduction.unseen.mean.value
+    registration = replace(parts.summary.registration, scatter=0.5 * mean)
+    noise = replace(parts.summary.noise, marker_sigma_median=0.05 * mean)
+    summary = replace(parts.summary, registration=registration, noise=noise)
+    text = " ".join(advise(replace(parts, summary=summary)))
+    assert "Average longer" not in text
+    assert "Where the arm stops scatters by" in text
+
+
 def test_advice_names_the_pose_of_the_largest_error_when_it_stands_out(parts):
     again = replace(parts.reproduction, unseen=errors(worst=0.5, low=0.1, high=0.2))
     found = " ".join(advise(replace(parts, reproduction=again)))

@@ -16,6 +16,7 @@ from .options import (
     Written as Written,
     parse_direction as parse_direction,
     parse_limit as parse_limit,
+    parse_loads as parse_loads,
     split_tools as split_tools,
 )
 from .output import (

@@ -266,7 +266,7 @@ def canonical_attributes(attributes: Mapping[str, object]) -> dict[str, str]:
         if name in ("robot_urdf", "tcp_frame") and not value:
             raise DatasetError(f"attribute {name!r} is empty: leave it out when it is not known")
         if name in _VECTOR_ATTRIBUTES:
-            read_vector(name, value)
+            read_vector(name, {name: value})
     texts = {"robot_name": "", "provenance": "", **attributes}
     return {name: str(texts[name]) for name in known if name in texts}
 
@@ -292,14 +292,16 @@ def write_vector(vector: Vector, unit: str = "m") -> str:
     )
 
 
-def read_vector(name: str, text: str) -> Vector:
-    """Return the point or the acceleration that an attribute states, in m or m/s².
+def read_vector(name: str, attributes: Mapping[str, str]) -> Vector | None:
+    """Return what an attribute of three numbers states, in m or m/s²; None: it is not there.
 
     Raises
     ------
     DatasetError
         If it is not three quantities with their units.
     """
+    if (text := attributes.get(name)) is None:
+        return None
     dimension, example = _VECTOR_ATTRIBUTES[name]
     try:
         x, y, z = (parse_quantity(part.strip(), dimension) for part in text.split(","))

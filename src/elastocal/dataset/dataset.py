@@ -37,12 +37,7 @@ from elastocal.dataset._layout import (
     read_vector,
     write_vector,
 )
-from elastocal.dataset._structure import (
-    assemble,
-    check_names,
-    check_structure,
-    needed_schema,
-)
+from elastocal.dataset._structure import assemble, check_names, check_structure, needed_schema
 from elastocal.dataset._validation import check_numbers, check_plausible
 from elastocal.dataset.merging import selected
 from elastocal.dataset.readings import Readings, usable_readings
@@ -307,19 +302,13 @@ class Dataset:
 
     @property
     def _labels(self) -> Labels:
-        return {
-            "pose": self.poses,
-            "load_case": self.load_cases,
-            "axis": AXES,
-            "joint": self.joint_names,
-            "campaign": self.campaigns,
-        }
+        own = {"pose": self.poses, "load_case": self.load_cases, "joint": self.joint_names}
+        return own | {"axis": AXES, "campaign": self.campaigns}
 
     @property
     def usable(self) -> BoolArray:
         """Whether each reading has the status ok, shape (pose, load_case)."""
-        mask: BoolArray = self.status == OK
-        return mask
+        return np.asarray(self.status == OK)
 
     @property
     def robot_name(self) -> str:
@@ -339,16 +328,12 @@ class Dataset:
     @property
     def marker(self) -> Vector | None:
         """Metrology marker in the tcp frame, in m; None: at the tcp, or the file does not say."""
-        return self._vector("marker")
-
-    def _vector(self, name: str) -> Vector | None:
-        text = self.attributes.get(name)
-        return None if text is None else read_vector(name, text)
+        return read_vector("marker", self.attributes)
 
     @property
     def gravity(self) -> Vector | None:
         """Acceleration of gravity in base, in m/s²; None: the base stands upright."""
-        return self._vector("gravity")
+        return read_vector("gravity", self.attributes)
 
     @property
     def conditioned(self) -> bool:

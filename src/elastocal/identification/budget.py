@@ -215,7 +215,8 @@ class _Ablation:
         problem = self._other(term).reweighted(self.weight)
         squares = _mean_squares(problem, leave_poses_out(problem))
         difference = squares - self.squares if taken else self.squares - squares
-        worth, low, high = map(_signed_root, _with_interval(difference))
+        found = np.array(_with_interval(difference))
+        worth, low, high = (np.sign(found) * np.sqrt(np.abs(found))).tolist()
         return TermWorth(term, taken, float(np.sqrt(squares.mean())), worth, low, high)
 
     def _taken(self, term: TermName) -> bool:
@@ -325,10 +326,6 @@ def _with_interval(squares: FloatArray) -> tuple[float, float, float]:
     """Return the mean over pose blocks and the ends of its 95 % interval, in m^2."""
     found = corrected_mean(squares[:, None], Overlap.leaving_one_out(len(squares)))
     return float(found.mean[0]), float(found.low[0]), float(found.high[0])
-
-
-def _signed_root(square: float) -> float:
-    return float(np.copysign(np.sqrt(abs(square)), square))
 
 
 def _part(square: float, low: float | None, high: float | None, source: str) -> ErrorPart:

@@ -8,7 +8,7 @@ import numpy as np
 
 from elastocal.arrays import FloatArray
 from elastocal.elastic import AnySpring, ElasticModel, require_possible
-from elastocal.errors import SchemaError
+from elastocal.errors import SchemaError, nearest
 from elastocal.files import sha256
 from elastocal.identification.calibrated import CalibratedModel, ToolChange
 from elastocal.identification.domain import CalibrationDomain
@@ -17,7 +17,7 @@ from elastocal.identification.observability import Observability
 from elastocal.identification.options import MINIMUM_DRAWS
 from elastocal.records import read_json, record, write_json
 from elastocal.results import Result, brief_repr
-from elastocal.robot import GRAVITY, Robot
+from elastocal.robot import GRAVITY, Robot, parse_urdf
 from elastocal.units import impossible
 from elastocal.wording import capped, springs_and_parameters
 
@@ -83,6 +83,23 @@ class CalibrateResult(Result):
         seen = self.observability
         if seen.parameters != n or not 0 <= seen.rank <= n:
             raise SchemaError(f"observability (rank {seen.rank}) does not fit {n} parameters")
+        self._require_known_names()
+
+    def _require_known_names(self) -> None:
+        """Refuse combinations of parameters, or a calibrated tcp, that the model does not have."""
+        names = {parameter.name for spring in self.springs for parameter in spring.parameters}
+        for term in (term for group in self.observability.unobservable for term in group):
+            if term.spring not in names:
+                raise SchemaError(
+                    f"observability.unobservable names {term.spring!r}, which the model does not"
+                    f" have{nearest(term.spring, sorted(names))}"
+                )
+        if self.tool is not None:
+            links = [each.get("name") for each in parse_urdf(self.robot.urdf).iterfind("link")]
+            if self.tool.calibrated_tcp not in links:
+                raise SchemaError(
+                    f"tool.calibrated_tcp {self.tool.calibrated_tcp!r} is no link of the robot"
+                )
 
     @classmethod
     def of(

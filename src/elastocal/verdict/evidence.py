@@ -337,7 +337,7 @@ def _summary(evidence: Evidence) -> Iterator[str]:
         yield "the summary is of a run that began at another time than the one of the journal"
     if evidence.dataset is None:
         return
-    usable = len(evidence.dataset.readings(evidence.dataset.joint_names))
+    usable = int(evidence.dataset.usable.sum())
     stated = evidence.summary.readings.counts.get("ok", 0)
     if usable != stated:
         yield (

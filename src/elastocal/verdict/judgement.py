@@ -174,22 +174,27 @@ def advise(evidence: Evidence) -> Iterator[str]:
 
 
 def _noise(evidence: Evidence, unseen: UnseenErrors) -> Iterator[str]:
-    """Tell how much of the error the tracker explains."""
+    """Tell how much of the error the tracker explains, and how much the arm's stops."""
     if evidence.summary is None:
         return
     sigma = evidence.summary.noise.marker_sigma_median
     scatter = evidence.summary.registration.scatter
-    known = [value for value in (sigma, scatter) if value is not None]
-    if not known:
+    # The scatter of the unloaded readings also holds where the arm stops: without the tracker's
+    # own figure it is the most that the tracker can scatter by.
+    noise = scatter if sigma is None else sigma
+    if noise is None:
         return
-    compared = f"its readings scatter by {um(max(known))}, the errors are {um(unseen.mean.value)}"
-    if max(known) > _LOUD * unseen.mean.value:
+    compared = f"its readings scatter by {um(noise)}, the errors are {um(unseen.mean.value)}"
+    if noise > _LOUD * unseen.mean.value:
         yield f"Average longer or bring the tracker nearer: {compared} on average."
-    else:
-        yield (
-            f"A quieter tracker would not help much: {compared} on average. Most of the error is"
-            " what springs cannot express, such as play, friction in the gears and links that bend."
-        )
+        return
+    stops = ""
+    if sigma is not None and scatter is not None and scatter > sigma:
+        stops = f" Where the arm stops scatters by {um(scatter)} in a coordinate."
+    yield (
+        f"A quieter tracker would not help much: {compared} on average.{stops} Most of the error is"
+        " what springs cannot express, such as play, friction in the gears and links that bend."
+    )
 
 
 def _largest(unseen: UnseenErrors) -> Iterator[str]:

@@ -19,6 +19,7 @@ from elastocal.compensation.process import Course, ProcessRun, SimulateProcessRe
 from elastocal.dataset import joint_dimensions
 from elastocal.errors import CompensationError
 from elastocal.files import filling, read_text, sha256
+from elastocal.identification import CalibratedModel, ProductionCoverage
 from elastocal.progress import Progress
 from elastocal.results import brief_repr
 from elastocal.workflows._inputs import NewTool, parse_posture, require_same_robot
@@ -175,11 +176,7 @@ def _simulate(
             budget = run_budget(trial, courses, progress)
     name = _direction_name(settings)
     simulation, usual = cell.file.simulation, loads.pop(1.0)
-    covered = trials[0].model.coverage(
-        np.vstack([course.q for course in programmed]),
-        np.vstack([course.force for course in programmed]),
-        [course.name for course in programmed for _ in course.q],
-    )
+    covered = _coverage(trials[0].model, programmed)
     table = SimulateProcessResult(
         cell=cell.name,
         process=settings.kind or Path(str(settings.path)).name,
@@ -213,10 +210,7 @@ def _simulate(
         path_sha256="" if settings.path is None else sha256(read_text(settings.path)),
         preset=simulation.preset,
         process_stiffness=simulation.contact.process_stiffness,
-        notes=(
-            *_notes(settings, programmed, len(runs)),
-            *(() if covered is None else (covered.sentence(),)),
-        ),
+        notes=_notes(settings, programmed, len(runs), covered),
         coverage=covered,
     )
     return process.SimulatedProcess(table, tuple(deviations)), programmed
@@ -294,8 +288,18 @@ def _direction_name(settings: SimulateProcessSettings) -> str:
     return settings.direction if known else f"along ({settings.direction})"
 
 
+def _coverage(model: CalibratedModel, courses: tuple[Course, ...]) -> ProductionCoverage | None:
+    """Return how much of some courses the calibration of a model covers."""
+    names = [course.name for course in courses for _ in course.q]
+    q, force = (np.vstack(each) for each in zip(*((c.q, c.force) for c in courses), strict=True))
+    return model.coverage(q, force, names)
+
+
 def _notes(
-    settings: SimulateProcessSettings, courses: tuple[Course, ...], seeds: int
+    settings: SimulateProcessSettings,
+    courses: tuple[Course, ...],
+    seeds: int,
+    covered: ProductionCoverage | None,
 ) -> tuple[str, ...]:
     notes = []
     if seeds == 1:
@@ -318,6 +322,8 @@ def _notes(
             "a load below 0 is the force aside and along the feed turned round; along the tool's"
             " axis it keeps its sign, since what presses cannot pull"
         )
+    if covered is not None:
+        notes.append(covered.sentence())
     return tuple(notes)
 
 

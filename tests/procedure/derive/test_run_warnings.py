@@ -26,7 +26,9 @@ ESTIMATE = ToolEstimate(
 )
 FIT = StationFit("A", (0, 1, 2), np.eye(4), 3e-4, np.full(3, 1e-4), np.zeros((3, 3)), 1e-3)
 LEVER = np.array([0.11, 0.0, -0.09])
-REGISTRATION = Registration((FIT,), LEVER, np.full(3, 1e-4), LEVER + 1e-3, (), 4e-5, (), (), {})
+REGISTRATION = Registration(
+    (FIT,), LEVER, np.full(3, 1e-4), LEVER + 1e-3, (), 4e-5, 2e-4, (), (), {}
+)
 ROWS = [LoadRow(0, "normal", ReadingStatus.OK, "", None)]
 
 
@@ -53,9 +55,10 @@ def test_a_run_without_a_fault_has_none():
     ("changes", "said"),
     [
         (
-            {"moves": (StationMove("A", 16, 17, 3.1e-4, 2e-4, -9.0),)},
-            "station A moved between poses 16 and 17: the marker seemed to jump by 0.31 mm, the"
-            " station turned by 0.20 mrad; both stretches are registered by themselves",
+            {"moves": (StationMove("A", 16, 17, 3.1e-4, 2e-5, 2e-4, -6.2),)},
+            "station A moved between poses 16 and 17: the marker seemed to jump by 0.31 ±"
+            " 0.04 mm, the station turned by 0.20 mrad; scatter and errors of the arm look like"
+            " this in one run of 10^6; both stretches are registered by themselves",
         ),
         (
             {"blunders": (Blunder(9, "A", 0.5),)},

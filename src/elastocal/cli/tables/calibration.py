@@ -91,16 +91,14 @@ def _show_fit(console: Console, figures: CalibrationSummary) -> None:
         "at the poses fitted", mm(fit.mean), f"{fit.mean / mean:.2%}", mm(fit.p95), mm(fit.max)
     )
     if (check := figures.check) is not None:
-        label, share = (
-            f"at {', '.join(check.load_cases)}, not fitted",
-            check.mean / check.deflection,
-        )
+        label = f"at {', '.join(check.load_cases)}, not fitted"
+        share = check.mean / check.deflection
         table.add_row(label, mm(check.mean), f"{share:.2%}", mm(check.p95), mm(check.max))
         table.add_row("noise there", "not known" if check.noise is None else mm(check.noise))
     console.print(table)
     if figures.coverage is not None:
         console.print(_coverage_line(figures.coverage), soft_wrap=True)
-    if figures.production is not None:
+    if figures.production:
         console.print(figures.production.sentence(), markup=False, soft_wrap=True)
 
 

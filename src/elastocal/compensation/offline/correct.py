@@ -6,11 +6,9 @@ With programmed tcp position ``p``, orientation ``R`` and force ``f``, find ``q`
 
 by Newton steps of the rigid arm: ``J_arm dq = [p - p(q) - C(q) f; log(R R(q)^T)]``. What is left
 out of the derivative, ``d(C f)/dq``, is a deflection per metre, some 1e-3, so that each step gains
-three digits. The first step alone is what is usually done; its residual is reported. The figures of
-a whole path are added up block by block.
+three digits. The first step alone is what is usually done; its residual is reported.
 
-Rows follow one another in time: gears with friction remember the rows before. A row without load
-is a way through the air, after which friction is taken to be free.
+Rows follow in time: gears with friction remember; a row without load is air, which frees them.
 """
 
 from dataclasses import dataclass, field, replace
@@ -70,14 +68,12 @@ class PathCorrection:
     residual: FloatArray
     """Distance that is left, predicted, shape (row,), in m."""
     pulled: BoolArray
-    """Whether the force draws the tool out, along +z of the tcp, rather than aside or against it;
-    a surface cannot: shape (row,)."""
+    """Whether the force draws the tool out, along +z of the tcp, as no surface can, (row,)."""
     memory: FloatArray
     """What friction remembers after the last row, shape (element,), in N·m."""
     outside: OutsideRows | None = None
     """Rows beyond what was calibrated; none where the model does not know where that was."""
     coverage: ProductionCoverage | None = None
-    """How much of the rows was calibrated; likewise."""
 
 
 def correct_rows(  # noqa: PLR0913 (what goes on from block to block is one more)
@@ -370,17 +366,15 @@ class CorrectionSummary:
             np.linalg.norm(shift, axis=1),
         )
         outside = None if correction.outside is None else correction.outside.summary()
-        if outside is not None and self.outside is not None:
-            outside = self.outside.plus(outside)
         coverage = correction.coverage
-        if coverage is not None and self.coverage is not None:
-            coverage = self.coverage.plus(coverage)
+        if outside is not None and coverage is not None:
+            outside = outside if self.outside is None else self.outside.plus(outside)
+            coverage = coverage if self.coverage is None else self.coverage.plus(coverage)
+        pairs = zip(self.lengths, further, strict=True)
         return replace(
             self,
             rows=self.rows + len(labels),
-            lengths=tuple(
-                sums.plus(new, labels) for sums, new in zip(self.lengths, further, strict=True)
-            ),
+            lengths=tuple(sums.plus(new, labels) for sums, new in pairs),
             jumps=self.jumps + len(jumps),
             first_jump=self.first_jump or (labels[jumps[0]] if jumps else ""),
             pulled=self.pulled + int(correction.pulled.sum()),
@@ -390,9 +384,9 @@ class CorrectionSummary:
 
     def figures(self) -> CorrectionFigures:
         """Return the figures over all rows so far."""
+        rows = max(self.rows, 1)
         deviation, first_order, residual, correction = (
-            LengthStatistics(each.total / max(self.rows, 1), each.largest, each.at)
-            for each in self.lengths
+            LengthStatistics(each.total / rows, each.largest, each.at) for each in self.lengths
         )
         return CorrectionFigures(
             rows=self.rows,

@@ -13,6 +13,8 @@ from .findings import (
     summarise as summarise,
 )
 from .readings import (
+    AXIS_SHIFT as AXIS_SHIFT,
+    AXIS_TILT as AXIS_TILT,
     JOINT_ERROR as JOINT_ERROR,
     LEAST_SAMPLES as LEAST_SAMPLES,
     SAG as SAG,

@@ -29,6 +29,10 @@ _ZEROED = 0.2
 """Share of the tool's mass below which the sensor seems to take the tool weight away itself."""
 _LEVER = 5e-3
 """Difference from the cell file's lever arm that is warned of, in m."""
+_HALF = 2.0
+"""Standard deviations in half a 95 % interval."""
+_MANY = 9
+"""Power of ten of the runs beyond which a test on assumed distributions says no more."""
 _LARGE_ROTATION = 5e-3
 """Standard deviation of a station's rotation that is warned of, in rad: 5 µm for each mm."""
 
@@ -93,11 +97,17 @@ def _registration(found: Registration, dataset: Dataset) -> summary.Registration
         scatter=_number(found.scatter),
         moves=tuple(
             summary.MoveSummary(
-                move.station, move.pose, move.distance, move.angle, move.improbability
+                move.station,
+                move.pose,
+                move.distance,
+                move.angle,
+                move.improbability,
+                move.distance_sigma,
             )
             for move in found.moves
         ),
         blunders=found.blunders,
+        detectable_move=_number(found.detectable),
     )
 
 
@@ -257,10 +267,13 @@ def _about_stations(registration: Registration) -> Iterator[str]:
     for station, reason in registration.unregistered.items():
         yield f"station {station} is not registered, its readings are missing: {reason}"
     for move in registration.moves:
+        jump, half = 1e3 * move.distance, 1e3 * _HALF * move.distance_sigma
+        runs = _power_of_ten(-move.improbability)
         yield (
             f"station {move.station} moved between poses {move.before} and {move.pose}: the marker"
-            f" seemed to jump by {1e3 * move.distance:.2f} mm, the station turned by"
-            f" {1e3 * move.angle:.2f} mrad; both stretches are registered by themselves"
+            f" seemed to jump by {jump:.2f} ± {half:.2f} mm, the station turned by"
+            f" {1e3 * move.angle:.2f} mrad; scatter and errors of the arm look like this in one run"
+            f" of {runs}; both stretches are registered by themselves"
         )
     for blunder in registration.blunders:
         yield (
@@ -274,6 +287,11 @@ def _about_stations(registration: Registration) -> Iterator[str]:
                 f" {1e3 * fit.rotation_sigma:.1f} mrad only, an error of"
                 f" {1e3 * fit.rotation_sigma:.1f} µm for each mm of displacement"
             )
+
+
+def _power_of_ten(exponent: float) -> str:
+    """Return a large number to the power of ten, of which none is told beyond a billion."""
+    return f"more than 10^{_MANY}" if exponent > _MANY else f"10^{exponent:.0f}"
 
 
 def _about_lever(registration: Registration) -> Iterator[str]:

@@ -19,7 +19,7 @@ from elastocal.procedure.derive.tool import RawWrench, UnloadedWrenches
 from elastocal.procedure.record import SAME_TIME, PoseLog, ReadingStatus, Streams, Window
 from elastocal.procedure.registration import UnloadedReadings
 from elastocal.results import brief_repr
-from elastocal.robot import Robot
+from elastocal.robot import ChainJoint, InsertedJoint, Robot, build_model, evaluate_jacobian
 
 LEAST_SAMPLES = 5
 """Fewer good samples than this make no reading: their scatter says nothing."""
@@ -257,6 +257,11 @@ def places_in_time(
 JOINT_ERROR = 0.5e-3
 """Likely offset of a joint's zero, in rad (m for a rail): it makes the 1 mm or so by which an
 arm of 2.5 m that is not calibrated misses its target (ISO 9283 pose accuracy)."""
+AXIS_SHIFT = 0.5e-3
+"""Likely error of the place of a joint's axis along each direction, in m: links and offsets (a KR
+210 was off by 1.2 mm in the mean before its calibration, doi 10.1177/1729881420921644)."""
+AXIS_TILT = 0.3e-3
+"""Likely tilt of a joint's axis about each direction across it, in rad: 0.3 mm on 1 m."""
 SAG = 1e-3
 """Likely turn of a joint under the largest gravity torque of the run, in rad (m)."""
 
@@ -296,8 +301,10 @@ def marker_readings(
 def robot_errors(robot: Robot, q: FloatArray, gravity: FloatArray, lever: FloatArray) -> FloatArray:
     """Return how a robot's likely errors move the marker, shape (pose, 3, error), in m.
 
-    A column for the offset of each joint, and one for its sag under gravity where the robot's
-    link masses are known; each by one standard deviation.
+    Columns, each by one standard deviation: the offset of each joint; where the robot's link
+    masses are known, its sag under gravity; and for each joint the three shifts and two tilts of
+    its axis in the link before it, which with the offset are all errors that a chain of rigid
+    links can have.
 
     Parameters
     ----------
@@ -312,15 +319,31 @@ def robot_errors(robot: Robot, q: FloatArray, gravity: FloatArray, lever: FloatA
     """
     if not len(q):
         return np.empty((0, 3, 0))
-    jacobian = robot.jacobian(q)
-    arm = robot.forward(q)[:, :3, :3] @ lever
+    joints, arm = robot.chain.joints, robot.forward(q)[:, :3, :3] @ lever
+    inserted = [axis for index, joint in enumerate(joints) for axis in _axis_errors(index, joint)]
+    model = build_model(robot.chain, inserted)
+    which = np.concatenate([model.joint_columns, model.inserted_columns])
+    jacobian = evaluate_jacobian(model, q, which)
     marker = jacobian.translation + np.cross(jacobian.rotation, arm[..., None], axis=1)
-    offsets: FloatArray = JOINT_ERROR * marker
-    if not any(joint.mass > 0 for joint in robot.chain.joints):
-        return offsets
-    torque = robot.gravity_torques(q, gravity)
-    largest = max(float(np.abs(torque).max()), np.finfo(float).tiny)
-    return np.concatenate([offsets, SAG * marker * (torque / largest)[:, None, :]], axis=2)
+    offsets, axes = np.split(marker, [len(joints)], axis=2)
+    likely = np.array([AXIS_TILT if axis.revolute else AXIS_SHIFT for axis in inserted])
+    found = [JOINT_ERROR * offsets, likely * axes]
+    if any(joint.mass > 0 for joint in joints):
+        torque = robot.gravity_torques(q, gravity)
+        largest = max(float(np.abs(torque).max()), np.finfo(float).tiny)
+        found.insert(1, SAG * offsets * (torque / largest)[:, None, :])
+    return np.concatenate(found, axis=2)
+
+
+def _axis_errors(index: int, joint: ChainJoint) -> list[InsertedJoint]:
+    """Return the virtual joints that move a joint's axis: three shifts, two tilts across it."""
+    across = np.linalg.svd(joint.axis[None])[2][1:]
+    ways = [(f"shift_{k}", axis, False) for k, axis in enumerate(np.eye(3))]
+    ways += [(f"tilt_{k}", axis, True) for k, axis in enumerate(across)]
+    return [
+        InsertedJoint(f"{joint.name}.{name}", index, axis, revolute, False, np.zeros(3))
+        for name, axis, revolute in ways
+    ]
 
 
 def weighed_poses(poses: Sequence[PoseReadings]) -> list[int]:

@@ -73,6 +73,8 @@ class MoveSummary:
     distance: float
     angle: float
     log10_probability_of_chance: float
+    distance_sigma: Number = None
+    """Standard deviation of the distance, in m; not known of runs derived by older versions."""
 
 
 @brief_repr
@@ -92,6 +94,9 @@ class RegistrationSummary:
     scatter: Number
     moves: tuple[MoveSummary, ...]
     blunders: tuple[Blunder, ...]
+    detectable_move: Number = None
+    """Smallest jump of a station half way that would have been found, in m; see
+    `elastocal.procedure.registration.Registration`."""
 
 
 @record()

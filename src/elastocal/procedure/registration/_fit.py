@@ -6,17 +6,21 @@ Reading ``i`` of a group ``g`` (a station between two moves) says
 
 with the marker ``p_i`` in the tracker's frame, the lever arm ``r`` and the robot's own errors ``b``
 (offsets of its joints, gravity sag), whose effects on the marker are the columns of ``B_i``.
-``r`` has the cell file's value as a weak prior, ``b`` is thought to be 0 with standard deviation 1.
-Without ``b`` those errors, smooth over the workspace, would look like stations that move.
+``r`` has the cell file's value as a weak prior, ``b`` is thought to be 0 with standard deviation
+``k``. Without ``b`` those errors, smooth over the workspace, would look like stations that move.
+How large they are, and how large the scatter ``s`` is that has no shape at all, the readings tell:
+both are where the restricted likelihood of the residuals is largest (Patterson and Thompson 1971),
+with weak priors that few poses fall back on.
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.linalg import solve_triangular
 from scipy.spatial.transform import Rotation
 
-from elastocal.arrays import FloatArray, IndexArray
+from elastocal.arrays import BoolArray, FloatArray, IndexArray
 from elastocal.results import brief_repr
 
 
@@ -86,6 +90,34 @@ def determined(position: FloatArray, scatter: float) -> bool:
     return rotation_sigma(position, scatter) <= _ROTATION_SIGMA
 
 
+def moments(position: FloatArray) -> FloatArray:
+    """Return what `determined_by` adds up of each point, shape (point, 4, 4).
+
+    Parameters
+    ----------
+    position : ndarray, shape (point, 3)
+        In any frame, in m.
+    """
+    ones = np.column_stack([position - position.mean(axis=0), np.ones(len(position))])
+    return np.asarray(ones[:, :, None] * ones[:, None, :])
+
+
+def determined_by(sums: FloatArray) -> BoolArray:
+    """Return whether points determine a rotation well enough, as `determined`, many sets at once.
+
+    Parameters
+    ----------
+    sums : ndarray, shape (set, 4, 4)
+        Sums of `moments`.
+    """
+    count = np.maximum(np.round(sums[:, 3, 3]), 1.0)[:, None]
+    mean = sums[:, :3, 3] / count
+    about = sums[:, :3, :3] - count[:, :, None] * mean[:, :, None] * mean[:, None, :]
+    spread = np.sqrt(np.maximum(np.linalg.eigvalsh(about)[:, 1], 0.0))
+    enough = spread * _ROTATION_SIGMA >= DEFAULT_SCATTER
+    return np.asarray(enough & (count[:, 0] >= 3.0))
+
+
 def align(here: FloatArray, there: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return the rotation and translation that bring points nearest to others (Kabsch 1976).
 
@@ -110,15 +142,19 @@ def rotation_sigma(position: FloatArray, scatter: float) -> float:
 LEVER_SIGMA = 5e-3
 """Standard deviation of the cell file's lever arm, in m: a ruler's reading on a probe holder."""
 DEFAULT_SCATTER = 0.1e-3
-"""Scatter of a coordinate where the readings do not show one, in m."""
-_ROUNDS = 4
-"""Times that the weights are adapted to the scatter; it then is steady to a percent."""
+"""Scatter of a coordinate by which poses are thought to determine a rotation or not, in m."""
+_LIKELY = np.log([30e-6, 1.0])
+"""Logarithms of the scatter in m and of the robot's errors over those that are thought likely."""
+_FACTOR = np.log([3.0, 2.0])
+"""Standard deviations of both: the readings have the last word where they are more than a few."""
+_ROUNDS = 3
+"""Times that scatter and errors are adapted to the residuals; they then are steady to a percent."""
 _MOST_STEPS = 20
 """Gauss-Newton steps that are taken at most."""
 _ARRIVED = 1e-12
 """Step in rad and m below which Gauss-Newton has arrived."""
-_LEAST_SCATTER = 1e-12
-"""Scatter of readings that fit exactly, in m: weights need one above zero."""
+_BOUNDS = [(math.log(1e-9), math.log(1e-2)), (math.log(0.05), math.log(20.0))]
+"""Of the two logarithms; weights need a scatter above zero."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -134,9 +170,11 @@ class Fit:
     lever: FloatArray
     """Shape (3,), in m."""
     errors: FloatArray
-    """Robot errors, in standard deviations, shape (error,)."""
+    """Robot errors, over those that are thought likely, shape (error,)."""
     scatter: float
-    """In m."""
+    """Of a coordinate, tracker noise taken out, in m."""
+    size: float
+    """Standard deviation of the robot errors, over those thought likely."""
     weight: FloatArray
     """One over the standard deviation of each reading, shape (reading,), in 1/m."""
     A: FloatArray
@@ -169,11 +207,11 @@ def fit(readings: UnloadedReadings, group: IndexArray, lever_prior: FloatArray) 
     lever_prior : ndarray, shape (3,)
         Marker in the tcp frame by the cell file, in m.
     """
-    scatter = DEFAULT_SCATTER
+    logs = _LIKELY
     for _ in range(_ROUNDS):
-        result = _gauss_newton(readings, group, lever_prior, scatter)
-        scatter = _scatter(result, readings)
-    return _gauss_newton(readings, group, lever_prior, scatter)
+        result = _gauss_newton(readings, group, lever_prior, *np.exp(logs).tolist())
+        logs = _likeliest(result, readings, logs)
+    return _gauss_newton(readings, group, lever_prior, *np.exp(logs).tolist())
 
 
 def motion_columns(centred: FloatArray) -> FloatArray:
@@ -197,9 +235,15 @@ def centred_points(R: FloatArray, position: FloatArray, group: IndexArray) -> Fl
 
 
 def _gauss_newton(
-    readings: UnloadedReadings, group: IndexArray, lever_prior: FloatArray, scatter: float
+    readings: UnloadedReadings,
+    group: IndexArray,
+    lever_prior: FloatArray,
+    scatter: float,
+    size: float,
 ) -> Fit:
     weight = 1.0 / np.sqrt(readings.variance + scatter**2)
+    # The unknowns of the robot are in units of their standard deviation.
+    readings = replace(readings, robot_error=size * readings.robot_error)
     lever, errors = np.array(lever_prior), np.zeros(readings.robot_error.shape[2])
     R, t = _start(readings, group, lever)
     for _ in range(_MOST_STEPS):
@@ -214,7 +258,7 @@ def _gauss_newton(
     residual = _residual(readings, group, R, t, lever)
     e = _right_side(readings, residual, errors, weight, lever - lever_prior)
     A = _equations(readings, group, R, weight)
-    return Fit(group, R, t, lever, errors, scatter, weight, A, e)
+    return Fit(group, R, t, lever, size * errors, scatter, size, weight, A, e)
 
 
 def _start(
@@ -274,12 +318,44 @@ def _moved(
     return new, place - np.einsum("gij,gj->gi", new, centre)
 
 
-def _scatter(result: Fit, readings: UnloadedReadings) -> float:
-    """Return the scatter that explains what is left, by the trace of the hat matrix."""
-    rows = 3 * len(readings)
-    q, _ = np.linalg.qr(result.A)
-    free = rows - float((q[:rows] ** 2).sum())
-    if not free >= 3.0:
-        return DEFAULT_SCATTER
-    left = (result.e[:rows].reshape(-1, 3) / result.weight[:, None]) ** 2
-    return float(np.sqrt(max(left.sum() / free - readings.variance.mean(), _LEAST_SCATTER**2)))
+def _likeliest(result: Fit, readings: UnloadedReadings, start: FloatArray) -> FloatArray:
+    """Return logarithms of the scatter in m and of the size of the errors, shape (2,).
+
+    With the unknowns ``x`` integrated over, those of the stations without a prior, twice the
+    negative logarithm of the likelihood is, but for a constant,
+
+        3 sum log v - log det P + log det (G + P) + min |e + A x|²,
+
+    with the variance ``v`` of a coordinate of each reading, the equations weighed by it, ``G`` the
+    products of their columns and ``P`` the priors' weights.
+    """
+    from scipy.optimize import minimize
+
+    rows, errors = 3 * len(readings), readings.robot_error.shape[2]
+    free = 6 * len(result.R)
+    plain = np.repeat(1.0 / result.weight, 3)[:, None]
+    columns = plain * np.column_stack([result.A[:rows], result.e[:rows]])
+    columns[:, free + 3 : free + 3 + errors] /= result.size
+    # Priors count from their own means, not from where the fit stands.
+    off = np.zeros(columns.shape[1] - 1)
+    off[free : free + 3] = result.e[rows : rows + 3] * LEVER_SIGMA
+    off[free + 3 :] = result.errors
+    columns[:, -1] -= columns[:, :-1] @ off
+
+    def minus_twice_log(logs: FloatArray) -> float:
+        scatter, size = np.exp(logs)
+        variance = readings.variance + scatter**2
+        G = columns.T @ (columns / np.repeat(variance, 3)[:, None])
+        prior = np.concatenate([np.full(3, LEVER_SIGMA**-2), np.full(errors, size**-2)])
+        M, b = G[:-1, :-1].copy(), G[:-1, -1]
+        M[np.arange(free, len(M)), np.arange(free, len(M))] += prior
+        factor = np.linalg.cholesky(M)
+        half = solve_triangular(factor, b, lower=True)
+        value = 3.0 * np.log(variance).sum() - np.log(prior).sum()
+        value += 2.0 * np.log(np.diag(factor)).sum() + G[-1, -1] - half @ half
+        return float(value + (((logs - _LIKELY) / _FACTOR) ** 2).sum())
+
+    found = minimize(
+        minus_twice_log, start, method="Nelder-Mead", bounds=_BOUNDS, options={"xatol": 0.01}
+    )
+    return np.asarray(found.x, dtype=float)

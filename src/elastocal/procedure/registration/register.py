@@ -3,13 +3,15 @@
 A station that moved, or a reading that is a blunder, is one hypothesis more at a time. Each adds
 columns to the linear equations of a fit: six for a station that stood elsewhere from a pose on,
 three for a reading of its own. How much of the sum of squares they take away is judged by the F
-distribution, against the scatter that is really there, and by Bonferroni's factor for the number of
-hypotheses that were tried (Cook and Weisberg 1982, section 2.2.2, the mean-shift outlier model).
+distribution, against the scatter and the errors of the robot that are really there, and by
+Bonferroni's factor for the number of hypotheses that were tried (Cook and Weisberg 1982, section
+2.2.2, the mean-shift outlier model). All hypotheses together cost as much as the fit: linear in the
+number of poses.
 """
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -24,7 +26,9 @@ from elastocal.procedure.registration._fit import (
     align,
     centred_points,
     determined,
+    determined_by,
     fit,
+    moments,
     motion_columns,
 )
 from elastocal.records import record
@@ -66,10 +70,13 @@ class StationMove:
     """First pose that it measured from the new one."""
     distance: float
     """How far the marker seems to have jumped, at the centre of the poses, in m."""
+    distance_sigma: float
+    """Standard deviation of it, the robot's likely errors included, in m."""
     angle: float
     """How far the station turned, in rad."""
     improbability: float
-    """Decimal logarithm of the probability that chance alone looks like this (F-test)."""
+    """Decimal logarithm of the probability that scatter and errors of the robot alone look like
+    this anywhere in the run (F-test)."""
 
 
 @record()
@@ -100,6 +107,10 @@ class Registration:
     scatter: float
     """Scatter that is left in one coordinate when station, lever arm and the robot's likely
     errors are fitted, tracker noise taken out, in m."""
+    detectable: float
+    """Smallest jump half way through the poses of the station with most of them that would have
+    been found in these readings along each axis of the tracker, of 0.2, 0.3, 0.5, 1, 2, 3 and
+    5 mm, in m; NaN where none would."""
     moves: tuple[StationMove, ...]
     blunders: tuple[Blunder, ...]
     unregistered: dict[str, str]
@@ -113,8 +124,16 @@ class Registration:
 
 _CHANCE = 1e-4
 """Largest probability that a run without any move or blunder is said to have one."""
-_LEAST_MOVE = 50e-6
-"""Smallest shift of the marker that is called a move or a blunder, in m: less does no harm."""
+_LEAST = 0.1e-3
+"""Smallest shift of the marker that is called a move or a blunder, in m. A move of that
+size half way that nobody sees turns the registration by 0.2 mrad: 0.2 µm of each millimetre of
+displacement (docs/explanation/registration.md)."""
+_IMPROBABLE = -300.0
+"""Least logarithm of a probability: smaller ones are no numbers."""
+_DEPENDENT = 1e-12
+"""Share of the largest eigenvalue below which a direction of a hypothesis is one of the fit's."""
+_JUMPS = (0.2e-3, 0.3e-3, 0.5e-3, 1e-3, 2e-3, 3e-3, 5e-3)
+"""Jumps that are planted to tell which would have been found, in m."""
 _MOST_FINDINGS = 0.2
 """Largest share of the readings that may be called moves or blunders."""
 _UNDETERMINED = 0.5
@@ -169,7 +188,10 @@ def register(readings: UnloadedReadings, lever_prior: FloatArray) -> Registratio
         lever_prior=lever_prior,
         undetermined_lever=_undetermined(lever_sigma),
         scatter=result.scatter,
-        moves=tuple(_move(readings, stations, row, f) for row, f in findings if f.move),
+        detectable=_detectable(readings.take(rows), dense, lever_prior),
+        moves=tuple(
+            _move(readings, group, stations, row, f, result) for row, f in findings if f.move
+        ),
         blunders=tuple(_blunder(readings, stations, row) for row, f in findings if not f.move),
         unregistered=bad,
     )
@@ -187,62 +209,110 @@ class _Finding:
     """Decimal logarithm of the probability of chance, Bonferroni's factor included."""
 
 
-@dataclass(frozen=True, eq=False)
-class _Hypothesis:
-    row: int
-    move: bool
-    rows: BoolArray
-    """Readings that it concerns, shape (reading,)."""
-    columns: FloatArray
-    """Effect of its unknowns on them, shape (reading concerned, 3, unknown)."""
-
-
 def _find(readings: UnloadedReadings, fit: Fit) -> _Finding | None:
-    """Return the most convincing move or blunder of fitted readings, if there is one."""
-    q, _ = np.linalg.qr(fit.A)
-    tried = list(_hypotheses(readings, fit))
-    found = [finding for each in tried if (finding := _judge(each, fit, q, len(tried)))]
+    """Return the most convincing move or blunder of fitted readings, if there is one.
+
+    The columns of a blunder are zero but at one reading, those of a move are the station's own
+    from some reading on: what all of them need are sums over readings, run up once.
+    """
+    tried = [*_blunders(readings, fit), *_moves(readings, fit)]
+    found = [finding for each in tried if (finding := _judge(each, fit, len(tried)))]
     return min(found, key=lambda finding: finding.improbability, default=None)
 
 
-def _judge(hypothesis: _Hypothesis, fit: Fit, q: FloatArray, tried: int) -> _Finding | None:
-    count = hypothesis.columns.shape[2]
-    free = fit.A.shape[0] - fit.A.shape[1]
-    if not free - count >= 1:
+@dataclass(frozen=True, eq=False)
+class _Hypothesis:
+    row: int
+    """See `_Finding`."""
+    move: bool
+    gram: FloatArray
+    """Products of its whitened columns beside those of the fit, shape (unknown, unknown)."""
+    along: FloatArray
+    """Products of its whitened columns with the residuals, shape (unknown,)."""
+    squares: FloatArray
+    """Products of its columns, in m, averaged over its readings, shape (unknown, unknown)."""
+
+
+def _judge(hypothesis: _Hypothesis, fit: Fit, tried: int) -> _Finding | None:
+    values, vectors = np.linalg.eigh(hypothesis.gram)
+    seen = values > _DEPENDENT * values[-1]
+    rank, free = int(seen.sum()), fit.A.shape[0] - fit.A.shape[1]
+    if not (values[-1] > 0.0 and free - rank >= 1):
         return None
-    Z = np.zeros((len(fit.e), count))
-    rows = np.flatnonzero(np.repeat(hypothesis.rows, 3))
-    Z[rows] = (hypothesis.columns * fit.weight[hypothesis.rows, None, None]).reshape(-1, count)
-    beside = Z - q @ (q.T @ Z)
-    shift, _, found, _ = np.linalg.lstsq(beside, fit.e, rcond=1e-9)
-    rank = int(found)
-    explained = float(((beside @ shift) ** 2).sum())
+    parts = vectors[:, seen].T @ hypothesis.along
+    explained = float((parts**2 / values[seen]).sum())
+    shift = vectors[:, seen] @ (parts / values[seen])
     left = max(float(fit.e @ fit.e) - explained, np.finfo(float).tiny)
-    f = explained / rank / (left / (free - rank)) if rank else 0.0
-    with np.errstate(divide="ignore"):  # a chance of nothing is the smallest of all
-        log10 = float(np.log10(fdtrc(max(rank, 1), free - rank, f))) + math.log10(tried)
-    size = np.sqrt((np.square(hypothesis.columns @ shift)).sum(axis=1).mean())
-    if not (log10 < math.log10(_CHANCE) and size >= _LEAST_MOVE):
+    f = explained / rank / (left / (free - rank))
+    chance = max(float(fdtrc(rank, free - rank, f)), 10.0**_IMPROBABLE)
+    log10 = math.log10(chance * tried)
+    size = math.sqrt(max(float(shift @ hypothesis.squares @ shift), 0.0))
+    if not (log10 < math.log10(_CHANCE) and size >= _LEAST):
         return None
     return _Finding(hypothesis.row, hypothesis.move, log10)
 
 
-def _hypotheses(readings: UnloadedReadings, fit: Fit) -> Iterator[_Hypothesis]:
-    base, row_of = centred_points(fit.R, readings.position, fit.group), np.arange(len(readings))
-
-    def enough(rows: BoolArray) -> bool:
-        return determined(readings.position[rows], DEFAULT_SCATTER)
-
-    for row, number in enumerate(fit.group):
-        if enough((fit.group == number) & (row_of != row)):
-            yield _Hypothesis(row, False, row_of == row, np.eye(3)[None])
+def _blunders(readings: UnloadedReadings, fit: Fit) -> Iterator[_Hypothesis]:
+    """Each reading may not belong to the others, if they determine the station without it."""
+    q, e = _of_readings(np.linalg.qr(fit.A)[0], readings), _of_readings(fit.e, readings)[..., 0]
     for number in range(len(fit.R)):
-        members = fit.group == number
-        for row in np.flatnonzero(members)[1:].tolist():
-            late = members & (row_of >= row)
-            if enough(members & ~late) and enough(late):
-                columns = motion_columns(base[late] - base[late].mean(axis=0))
-                yield _Hypothesis(row, True, late, columns)
+        mine = np.flatnonzero(fit.group == number)
+        each = moments(readings.position[mine])
+        for row, enough in zip(mine, determined_by(each.sum(axis=0) - each), strict=True):
+            if enough:
+                weight = fit.weight[row]
+                gram = weight**2 * (np.eye(3) - q[row] @ q[row].T)
+                yield _Hypothesis(int(row), False, gram, weight * e[row], np.eye(3))
+
+
+def _moves(readings: UnloadedReadings, fit: Fit) -> Iterator[_Hypothesis]:
+    """Each station may have stood elsewhere from any reading on that parts it into two."""
+    q, e = _of_readings(np.linalg.qr(fit.A)[0], readings), _of_readings(fit.e, readings)
+    plain = motion_columns(centred_points(fit.R, readings.position, fit.group))
+    columns = plain * fit.weight[:, None, None]
+    for number in range(len(fit.R)):
+        mine = np.flatnonzero(fit.group == number)
+        each, Zt = moments(readings.position[mine]), columns[mine].swapaxes(1, 2)
+        late = _from_here_on(each)
+        enough = determined_by(late) & determined_by(each.sum(axis=0) - late)
+        own, fitted = _from_here_on(Zt @ columns[mine]), _from_here_on(Zt @ q[mine])
+        along = _from_here_on(Zt @ e[mine])[..., 0]
+        squares = _from_here_on(plain[mine].swapaxes(1, 2) @ plain[mine])
+        for place in np.flatnonzero(enough).tolist():
+            gram = own[place] - fitted[place] @ fitted[place].T
+            mean = squares[place] / (len(mine) - place)
+            yield _Hypothesis(int(mine[place]), True, gram, along[place], mean)
+
+
+def _of_readings(whitened: FloatArray, readings: UnloadedReadings) -> FloatArray:
+    """Return the rows of the readings, without the priors', shape (reading, 3, column)."""
+    return whitened[: 3 * len(readings)].reshape(len(readings), 3, -1)
+
+
+def _detectable(readings: UnloadedReadings, group: IndexArray, lever_prior: FloatArray) -> float:
+    """Return the smallest of `_JUMPS` that is found wherever it points; see `Registration`.
+
+    It is planted in the readings themselves: a formula does not count that a jump in few poses
+    also makes the arm look worse than it is.
+    """
+    mine = np.flatnonzero(group == np.bincount(group).argmax())
+    late = mine[len(mine) // 2 :]
+
+    def found(jump: FloatArray) -> bool:
+        position = readings.position.copy()
+        position[late] += jump
+        planted = replace(readings, position=position)
+        finding = _find(planted, fit(planted, group, lever_prior))
+        return finding is not None and finding.move
+
+    sizes = (size for size in _JUMPS if all(found(size * axis) for axis in np.eye(3)))
+    return next(sizes, math.nan)
+
+
+def _from_here_on(each: FloatArray) -> FloatArray:
+    """Return the sums of each and all that follow it along the first axis."""
+    sums: FloatArray = np.cumsum(each[::-1], axis=0)[::-1]
+    return sums
 
 
 def _unusable(readings: UnloadedReadings, station: str) -> str | None:
@@ -258,7 +328,16 @@ def _unusable(readings: UnloadedReadings, station: str) -> str | None:
 def _nothing(lever_prior: FloatArray, unregistered: dict[str, str]) -> Registration:
     sigma = np.full(3, LEVER_SIGMA)
     return Registration(
-        (), lever_prior, sigma, lever_prior, _undetermined(sigma), np.nan, (), (), unregistered
+        (),
+        lever_prior,
+        sigma,
+        lever_prior,
+        _undetermined(sigma),
+        np.nan,
+        np.nan,
+        (),
+        (),
+        unregistered,
     )
 
 
@@ -304,21 +383,34 @@ def _accuracy(readings: UnloadedReadings, lever: FloatArray) -> float:
 
 
 def _move(
-    readings: UnloadedReadings, stations: tuple[StationFit, ...], row: int, finding: _Finding
+    readings: UnloadedReadings,
+    group: IndexArray,
+    stations: tuple[StationFit, ...],
+    row: int,
+    finding: _Finding,
+    result: Fit,
 ) -> StationMove:
     """Describe a move by what old and new transform make of the same marker readings."""
     station = readings.station[row]
     before = max(i for i in range(row) if readings.station[i] == station)
-    old, new = (_fit_of(readings, stations, i) for i in (before, row))
+    old, new = (_fit_of(readings, stations, i).T_base_tracker for i in (before, row))
     seen = [i for i, s in enumerate(readings.station) if s == station]
     centre = np.append(readings.position[seen].mean(axis=0), 1.0)
-    turn = new.T_base_tracker[:3, :3] @ old.T_base_tracker[:3, :3].T
+    jump = ((new - old) @ centre)[:3]
+    distance = float(np.linalg.norm(jump))
+    effect = np.zeros(len(result.covariance))
+    for i, T, sign in ((before, old, -1.0), (row, new, 1.0)):
+        own = readings.position[group == group[i]].mean(axis=0)
+        number = int(np.searchsorted(np.unique(group[group >= 0]), group[i]))
+        lever = T[:3, :3] @ (centre[:3] - own)
+        effect[6 * number :][:6] = sign * jump @ motion_columns(lever[None])[0] / distance
     return StationMove(
         station,
         int(readings.pose[before]),
         int(readings.pose[row]),
-        float(np.linalg.norm((new.T_base_tracker - old.T_base_tracker) @ centre)),
-        float(Rotation.from_matrix(turn).magnitude()),
+        distance,
+        float(np.sqrt(effect @ result.covariance @ effect)),
+        float(Rotation.from_matrix(new[:3, :3] @ old[:3, :3].T).magnitude()),
         finding.improbability,
     )
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from elastocal.cell import Cell, Limits
 from elastocal.compensation.conditioning import ToolResult
-from elastocal.procedure.derive import MoveSummary, RegistrationSummary, RunSummary, ToolSummary
+from elastocal.procedure.derive import RegistrationSummary, RunSummary, ToolSummary
 from elastocal.report.document import blocks
 from elastocal.report.plots import StationResiduals, station_figure
 from elastocal.verdict import Evidence
@@ -147,22 +147,25 @@ def _stations(registration: RegistrationSummary) -> Iterator[blocks.Block]:
     lever = f"{point(registration.lever_arm)} mm"
     yield blocks.Paragraph(
         f"Marker in the tcp frame: {lever} measured, {point(registration.lever_arm_of_cell)} mm"
-        f" in the cell file. Scatter of the readings: {_or_unknown(registration.scatter, um)}."
+        " in the cell file. Scatter of the readings, stops of the arm included:"
+        f" {_or_unknown(registration.scatter, um)}."
     )
-    yield blocks.Paragraph(_moves(registration.moves))
+    yield blocks.Paragraph(_moves(registration))
     lost = tuple(f"station {name}: {why}" for name, why in registration.unregistered.items())
     if lost:
         yield blocks.Paragraph("Stations without registration:")
         yield blocks.Bullets(lost)
 
 
-def _moves(moves: tuple[MoveSummary, ...]) -> str:
-    if not moves:
-        return "No station moved during the run."
+def _moves(registration: RegistrationSummary) -> str:
+    if not registration.moves:
+        least = registration.detectable_move
+        seen = "" if least is None else f"; a jump of {mm(least)} half way would have been"
+        return f"No station was seen to move during the run{seen}."
     return " ".join(
         f"Station {each.station} moved before pose {each.from_pose}: the marker seemed to"
         f" jump by {mm(each.distance)}."
-        for each in moves
+        for each in registration.moves
     )
 
 
@@ -174,7 +177,7 @@ def _noise(summary: RunSummary) -> blocks.Block:
          _or_unknown(noise.force_sigma_median_N, "{:.2f} N".format)),
         ("Marker of a reading, median standard deviation",
          _or_unknown(noise.marker_sigma_median, um)),
-        ("Sensor drift within a pose, largest",
+        ("Sensor free again after the presses of a pose, largest change (drift, hysteresis)",
          _or_unknown(drift.largest_N, "{:.2f} N".format) + at_pose),
         ("Moment at the contact, median and largest",
          f"{_or_unknown(moment.median_Nm, '{:.2f}'.format)} and"

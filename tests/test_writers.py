@@ -117,7 +117,7 @@ FULL = """
 import sys
 from pathlib import Path
 from elastocal.errors import FileAccessError
-from contracts.test_writers import WRITERS, left_in
+from test_writers import WRITERS, left_in
 
 disk = Path(sys.argv[1])
 for name, write in WRITERS.items():
