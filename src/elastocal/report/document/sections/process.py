@@ -37,15 +37,14 @@ PAPER = {
     "afp": PublishedCase(
         "Robotized AFP processing of a 3D thermoplastic aerostructure",
         (0.570, 0.956, 0.100), (0.061, 0.285, 0.046), (0.8930, 0.7019, 0.5400),
-        "It measures the lateral deviation of the head with a 6D probe on the real machine: what is"
-        " left there holds backlash, dynamics and servo errors beside what the model misses.",
+        "The paper measures the side deviation of the head by a 6D probe on the real machine: what"
+        " is left there holds backlash, dynamics and servo errors beside what the model misses.",
     ),
     "machining": PublishedCase(
         "Robotized roughing of an Al-7075 aerospace part",
         (0.597, 2.050, 0.725), (0.101, 0.520, 0.342), (0.8308, 0.7463, 0.5283),
-        "It scans the part: before and after hold geometry, cutter, fixture and dynamics beside the"
-        " elastic deviation, which is all that is simulated here; its row is larger for that and"
-        " its reduction smaller.",
+        "The paper scans the part: before and after hold geometry, cutter, fixture and dynamics"
+        " beside the elastic deviation, which is all that is simulated here.",
     ),
 }  # fmt: skip
 """Table 1 of Monsarrat et al., RCIM 2024: mean, maximum and standard deviation."""
