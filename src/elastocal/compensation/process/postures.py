@@ -24,7 +24,7 @@ from elastocal.compensation.process.course import Course, Process
 from elastocal.compensation.process.placement import FibrePlacement
 from elastocal.compensation.process.roughing import Roughing
 from elastocal.errors import CompensationError, PathError
-from elastocal.identification import CalibratedModel
+from elastocal.identification import CalibratedModel, near_postures
 from elastocal.planning import cell_surface
 from elastocal.results import brief_repr
 from elastocal.robot import has_wrist, wrist_angle
@@ -37,8 +37,6 @@ _FINE_SPINS = np.linspace(0.0, 2.0 * np.pi, 36, endpoint=False)
 """The same for the stiffest posture, from the programmed orientation on."""
 _STATIONS = 7
 """Rows of a course that its stiffness is compared at."""
-_NEAR = float(np.radians(30.0))
-"""Largest distance from a calibrated posture in a turning joint, in rad."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -267,11 +265,8 @@ def _calibrated_nearby(calibrated: CalibratedModel) -> tuple[PostureConstraint, 
     if domain is None:
         return ()
     robot, known = calibrated.model.robot, domain.joint_position
-    counted = np.array(robot.revolute)
-    counted[-1] = False  # the last axis only turns the tool
 
     def near(q: FloatArray) -> BoolArray:
-        apart = np.abs(q[:, None, counted] - known[None][..., counted])
-        return np.asarray(np.any(np.all(apart <= _NEAR, axis=2), axis=1))
+        return np.asarray(near_postures(robot, q, known).any(axis=1))
 
     return (PostureConstraint("calibrated near by", near),)
