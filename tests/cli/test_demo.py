@@ -135,7 +135,7 @@ STORY = importlib.import_module("elastocal.workflows.demo")  # its face has the 
 
 
 def look(_show, _operator):
-    return InitResult(Path("cell.yaml"), ())
+    return InitResult(Path("cell.yaml"), (), Path("process.csv"))
 
 
 def test_a_chapter_that_fails_ends_the_demo_with_its_reason(tmp_path, monkeypatch):
