@@ -9,6 +9,8 @@ from typing import Any, Literal, get_args
 
 from pydantic import Field
 
+from elastocal.results import brief_repr
+
 Preset = Literal["kind", "typical", "harsh"]
 """Names of the presets: a well-kept small arm, what published arms show, and about twice that."""
 PRESETS: tuple[Preset, ...] = get_args(Preset)
@@ -16,6 +18,7 @@ PRESETS: tuple[Preset, ...] = get_args(Preset)
 _Value = str | float | tuple[str | float, ...] | None
 
 
+@brief_repr
 @dataclass(frozen=True)
 class PresetFigure:
     """One figure of the simulated truth in every preset."""

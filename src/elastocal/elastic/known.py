@@ -16,6 +16,7 @@ from elastocal.arrays import FloatArray
 from elastocal.elastic.springs import OneAxisSpring, Spring, SpringLoad
 from elastocal.errors import SpringError
 from elastocal.records import StrictModel, record
+from elastocal.results import brief_repr
 from elastocal.units import dimension_of, impossible, parse_quantity
 
 _DIMENSIONS = {
@@ -27,6 +28,7 @@ _DIMENSIONS = {
 """Whether a quantity is of a torsional spring, and whether it is a stiffness."""
 
 
+@brief_repr
 @record()
 class KnownSpring:
     """What is known of a spring, as compliances in rad/(N·m) or m/N."""

@@ -13,8 +13,10 @@ from elastocal.identification.budget import stated_noise
 from elastocal.identification.calibration import Calibration
 from elastocal.identification.displacement import displacement_blocks
 from elastocal.records import record
+from elastocal.results import brief_repr
 
 
+@brief_repr
 @record()
 class LoadCheck:
     """Errors of the fitted model at load cases that are kept out of every fit, in m."""

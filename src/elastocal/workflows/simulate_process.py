@@ -174,23 +174,39 @@ def _simulate(
                 deviations += found.deviations(trial.seed)
         if settings.budget and not budget:
             budget = run_budget(trial, courses, progress)
+    table = _table(settings, cell, runs, (loads, plain, stiffest), programmed, trials[0], budget)
+    return process.SimulatedProcess(table, tuple(deviations)), programmed
+
+
+def _table(
+    settings: SimulateProcessSettings,
+    cell: Cell,
+    runs: tuple[ProcessRun, ...],
+    found: "tuple[dict[float, _Lines], _Lines, process.StiffestPosture | None]",
+    programmed: tuple[Course, ...],
+    first: ProcessTrial,
+    budget: tuple[process.DeviationComparison, ...],
+) -> SimulateProcessResult:
+    """Return the record of all seeds; ``found`` are the lines by load, those unturned, how."""
+    loads, plain, stiffest = found
     name = _direction_name(settings)
-    simulation, usual = cell.file.simulation, loads.pop(1.0)
-    covered = _coverage(trials[0].model, programmed)
-    table = SimulateProcessResult(
+    simulation, usual = cell.file.simulation, loads[1.0]
+    further = {load: each for load, each in loads.items() if load != 1.0}
+    covered = _coverage(first.model, programmed)
+    return SimulateProcessResult(
         cell=cell.name,
         process=settings.kind or Path(str(settings.path)).name,
         runs=runs,
-        settings=compensator.model_dump(mode="json"),
+        settings=first.settings.model_dump(mode="json"),
         versions={package: version(package) for package in _PACKAGES},
         lines=usual.pooled(usual.lines),
         budget=budget,
-        tool=trials[0].model.tool_name,
+        tool=first.model.tool_name,
         direction=name,
         spatial=usual.pooled(usual.spatial),
         loads=tuple(
             process.LoadLines(load, each.pooled(each.lines), each.pooled(each.spatial))
-            for load, each in loads.items()
+            for load, each in further.items()
         ),
         posture=None
         if stiffest is None
@@ -203,7 +219,7 @@ def _simulate(
         ),
         means=tuple(
             process.SeedMeans.of(measure, load, lines)
-            for load, each in ({1.0: usual} | loads).items()
+            for load, each in loads.items()
             for measure, lines in ((name, each.lines), ("3-D", each.spatial))
         ),
         path="" if settings.path is None else str(settings.path),
@@ -213,7 +229,6 @@ def _simulate(
         notes=_notes(settings, programmed, len(runs), covered),
         coverage=covered,
     )
-    return process.SimulatedProcess(table, tuple(deviations)), programmed
 
 
 @dataclass(frozen=True)

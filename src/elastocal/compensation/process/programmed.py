@@ -28,6 +28,7 @@ from elastocal.dataset import (
     wrench_in_base,
 )
 from elastocal.errors import PathError, UnitError
+from elastocal.results import brief_repr
 from elastocal.robot import Robot
 from elastocal.robot.inverse import InverseKinematics, check_limits, inverse_for
 from elastocal.tables import Column, TableError, TableRows, finite_number, write_table
@@ -43,6 +44,7 @@ _FLAT = 1e-3
 LATERAL, NORMAL = "lateral", "normal"
 
 
+@brief_repr
 @dataclass(frozen=True)
 class PathTiming:
     """How a path file becomes courses in time."""

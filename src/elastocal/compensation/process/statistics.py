@@ -11,6 +11,7 @@ from scipy.special import stdtrit
 
 from elastocal.arrays import FloatArray
 from elastocal.records import record
+from elastocal.results import brief_repr
 
 _TAIL = 0.975
 """Of a two-sided interval of 95 %."""
@@ -127,6 +128,7 @@ class SeedMeans:
         return self.name if self.load == 1.0 else f"{self.name}, load {self.load:g}"
 
 
+@brief_repr
 @record()
 class PostureGain:
     """What the posture that the model finds stiffest does, against the programmed one."""
@@ -152,6 +154,7 @@ class PostureGain:
         )
 
 
+@brief_repr
 @record()
 class LoadLines:
     """The process at another share of its load."""

@@ -65,6 +65,7 @@ class ExchangeSelection(Selection):
         return self.runs[self.best].value
 
 
+@brief_repr
 @dataclass(frozen=True)
 class ExchangeSearch:
     """Add the best, drop the worst, until they are the same pose; the best of several starts.
