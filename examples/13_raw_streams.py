@@ -33,7 +33,7 @@ folder.mkdir(parents=True, exist_ok=True)
 # A plan of a single pose: this is about the streams, not about the calibration.
 cell_file = ec.init(folder / "cell", kind="afp").cell
 text = cell_file.read_text(encoding="utf-8")
-text = text.replace("pool: 3000", "pool: 20").replace('d_max: "175 mm"', "poses: 1")
+text = text.replace("pool: 3000", "pool: 20").replace("poses: 31", "poses: 1")
 cell_file.write_text(text, encoding="utf-8")
 cell = ec.load_cell(cell_file)
 plan = make_plan(cell, jobs=1).plan

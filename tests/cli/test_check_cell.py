@@ -76,7 +76,7 @@ def process_of(folder, force):
     """Write a process of one row with a force."""
     joints = [f"joint_a{number}[deg]" for number in range(1, 7)]
     header = ",".join([*joints, *(f"force_{axis}[N]" for axis in "xyz")])
-    (folder / "process.csv").write_text(f"{header}\n{'10,' * 6}{force}\n")
+    (folder / "process.csv").write_text(f"{header}\n0,-90,90,0,45,0,{force}\n")
     return {"process": {"file": "process.csv"}}
 
 

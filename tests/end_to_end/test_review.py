@@ -47,7 +47,8 @@ def test_all_load_cases_at_twelve_poses_reach_what_can_be_reached(data):
     result = elastocal("calibrate", data, "--out", data.with_suffix(".json"), "--json")
     figures = json.loads(result.out)
     assert figures["rank"] == figures["rank_attainable"] == attainable_rank(model())
-    assert figures["warnings"] == []
+    # The arm of these data has no masses, which is said.
+    assert [text for text in figures["warnings"] if "has a mass" not in text] == []
 
 
 @pytest.mark.parametrize("bounds", ["0,0", "1e-9,2e-9", "1,2"])

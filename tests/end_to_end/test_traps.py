@@ -91,7 +91,8 @@ def in_tcp_frame(force: np.ndarray) -> np.ndarray:
 def test_good_data_pass(tmp_path):
     result = calibrate(tmp_path, good())
     assert result.code == 0, result.err
-    assert json.loads(result.out)["warnings"] == []
+    # The arm of these data has no masses, which is said.
+    assert [text for text in json.loads(result.out)["warnings"] if "has a mass" not in text] == []
 
 
 @pytest.mark.parametrize(

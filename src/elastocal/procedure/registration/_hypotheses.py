@@ -12,7 +12,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import fdtrc
+from scipy.special import betainc
 
 from elastocal.arrays import FloatArray
 from elastocal.procedure.registration._fit import (
@@ -82,8 +82,9 @@ def _judge(hypothesis: _Hypothesis, fit: Fit, tried: int) -> Finding | None:
     explained = float((parts**2 / values[seen]).sum())
     shift = vectors[:, seen] @ (parts / values[seen])
     left = max(float(fit.e @ fit.e) - explained, np.finfo(float).tiny)
-    f = explained / rank / (left / (free - rank))
-    chance = max(float(fdtrc(rank, free - rank, f)), 10.0**_IMPROBABLE)
+    # The share that is left is beta distributed; a ratio would overflow where all is explained.
+    share = left / (left + explained)
+    chance = max(float(betainc(0.5 * (free - rank), 0.5 * rank, share)), 10.0**_IMPROBABLE)
     log10 = math.log10(chance * tried)
     size = math.sqrt(max(float(shift @ hypothesis.squares @ shift), 0.0))
     if not (log10 < math.log10(_CHANCE) and size >= _LEAST):
