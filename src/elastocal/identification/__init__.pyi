@@ -140,6 +140,7 @@ from .production import (
     CalibratedLoads as CalibratedLoads,
     ProductionCoverage as ProductionCoverage,
     near_postures as near_postures,
+    poses_in_company as poses_in_company,
     posture_reach as posture_reach,
     production_coverage as production_coverage,
 )
