@@ -438,7 +438,7 @@ def test_an_arm_of_seven_axes_follows_a_path_of_poses_without_a_jump(name):
     robot = Robot.from_urdf(SHAPES[name].text(), "tool0")
     start = np.array([0.3, 0.6, -0.2, -1.2, 0.4, 0.9, 0.1])
     T = np.repeat(robot.forward(start)[None], 20, axis=0)
-    T[:, 0, 3] += np.linspace(0.0, 0.1, 20)
+    T[:, 0, 3] -= np.linspace(0.0, 0.05, 20)
     q = joints_along_path(inverse_for(robot), T, np.empty((20, 0)), start, str)
     np.testing.assert_allclose(robot.forward(q), T, atol=1e-8)
     assert np.abs(np.diff(np.vstack([start, q]), axis=0)).max() < 0.1
