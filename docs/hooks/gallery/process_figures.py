@@ -19,13 +19,15 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from elastocal.cell import load_cell
+from elastocal.cell import SensorLoad, load_cell
 from elastocal.compensation import process
 from elastocal.compensation.conditioning import read_sensor_load
 from elastocal.compensation.process import DeviationComparison
+from elastocal.errors import CompensationError
 from elastocal.identification import CalibrateResult
 from elastocal.progress import silent
 from elastocal.records import from_data, record, to_data
+from elastocal.robot import Robot
 from elastocal.workflows import ProcessTrial, calibrate, init, plan, run, run_trials, tool
 
 QUOTED = Path(__file__).with_name("process_figures.json")
@@ -173,7 +175,7 @@ class Measurement:
         settings = process.PROCESSES[case.kind].compensator
         for springs in campaign.springs:
             result = calibrate(made / "run" / "dataset.nc", springs=springs)
-            load = read_sensor_load(made / "tool.json", result.calibrated.model.robot)
+            load = _load(made / "tool.json", result.calibrated.model.robot)
             trial = ProcessTrial(
                 load_cell(cell), result.calibrated, load, settings, case.seed, jobs=self.jobs
             )
@@ -196,6 +198,17 @@ class Measurement:
         cell = folder / f"{case.preset}.yaml"
         cell.write_text(text.replace("preset: typical", f"preset: {case.preset}"), encoding="utf-8")
         return cell
+
+
+def _load(path: Path, robot: Robot) -> SensorLoad | None:
+    """Return the tool of a campaign; none where its poses do not tilt the tool enough to weigh it.
+
+    The sensor is then zeroed in the air, with the tool of the cell file.
+    """
+    try:
+        return read_sensor_load(path, robot)
+    except CompensationError:
+        return None
 
 
 def _deviation(line: DeviationComparison, load: float) -> Deviation:

@@ -215,7 +215,9 @@ def derive_poses(
     # The press before the reference stays, usable or not: the others' friction begins with it.
     cases = [case for case in plan.contact.load_cases if case in had or case == CONDITIONING]
     dataset = _dataset(poses, rows, cases, cell, registration.lever_arm, tool, provenance)
-    estimate = estimate_tool(tool_readings(poses, tool), tool.mass)
+    entry = cell.file.sensor
+    ranges = None if entry is None else np.hstack([entry.largest_force, entry.largest_moment])
+    estimate = estimate_tool(tool_readings(poses, tool), tool.mass, ranges)
     found = RunFindings(poses, rows, registration, tool, estimate, dataset, plan, entries)
     return DerivedRun(dataset, summarise(found))
 
