@@ -13,8 +13,7 @@ HOOKS = ROOT / "docs" / "hooks"
 
 @pytest.fixture
 def tables(monkeypatch) -> Iterator[ModuleType]:
-    """Return the hook that fills the pages; it needs mkdocs only to be called by it."""
-    pytest.importorskip("mkdocs")
+    """Return the hook that fills the pages."""
     monkeypatch.syspath_prepend(str(HOOKS))
     import process_tables
 

@@ -2,7 +2,7 @@
 
 The figures stand in ``gallery/process_figures.json``, which ``make process-figures`` measures; the
 paper's row comes from the report's own copy of it. ``<!-- process campaigns: afp -->`` becomes the
-table of shorter campaigns, ``<!-- process summary -->`` the sentence that the README quotes too.
+table of shorter campaigns, ``<!-- process summary: typical -->`` the sentences that the README has.
 """
 
 import json
@@ -10,28 +10,30 @@ import re
 from collections.abc import Callable
 from itertools import groupby
 from pathlib import Path
-from typing import Any
-
-from mkdocs.structure.pages import Page
+from typing import TYPE_CHECKING, Any
 
 from elastocal.compensation.process import SeedMean
 from elastocal.report.document.sections.process import PAPER
 
+if TYPE_CHECKING:
+    from mkdocs.structure.pages import Page
+
 _QUOTED = Path(__file__).parent / "gallery" / "process_figures.json"
-_MARK = re.compile(r"<!-- process (table|campaigns|summary)(?:: (\S+))? -->")
+_MARK = re.compile(r"<!-- process (table|campaigns|summary): (\S+) -->")
 _HEAD = ("truth", "springs (taken)", "left-out error, µm", "deviation",
          "mean, mm", "reduction", "max, mm", "reduction", "seeds")  # fmt: skip
 _CAMPAIGNS = ("campaign", "springs", "poses", "minutes in the cell", "left-out error, µm",
               "left of the mean, µm", "reduction", "seeds")  # fmt: skip
+_README = Path(__file__).parents[2] / "README.md"
 _NAMES = {"afp": "fibre placement", "machining": "roughing"}
 _TRUTHS = ("kind", "typical", "harsh")
 Figures = dict[str, Any]
 
 
-def on_page_markdown(markdown: str, page: Page, **_: object) -> str:  # noqa: ARG001 (mkdocs')
+def on_page_markdown(markdown: str, page: "Page", **_: object) -> str:  # noqa: ARG001 (mkdocs')
     """Return the page with the tables in place of their marks."""
     made: dict[str, Callable[[str], str]] = {
-        "table": table, "campaigns": campaigns, "summary": lambda _: summary(),
+        "table": table, "campaigns": campaigns, "summary": summary,
     }  # fmt: skip
     return _MARK.sub(lambda mark: made[mark[1]](mark[2]), markdown)
 
@@ -78,19 +80,28 @@ def campaigns(kind: str) -> str:
     return _markdown(_CAMPAIGNS, rows)
 
 
-def summary() -> str:
-    """Return the figures of the typical truth in sentences, beside those of the paper."""
-    return " ".join(_sentence(kind) for kind in _NAMES)
+def summary(preset: str = "typical") -> str:
+    """Return the figures of a truth in sentences, beside those of the paper."""
+    return " ".join(_sentence(kind, preset) for kind in _NAMES)
 
 
-def _sentence(kind: str) -> str:
-    seeds = _of(quoted(), kind, "typical", campaign="template", springs="auto")
+def renew_readme() -> None:
+    """Write the summary into the README, in place of the one that is there."""
+    text = _README.read_text(encoding="utf-8")
+    new = re.sub(r"(?m)^On the typical truth the correction takes .*$", lambda _: summary(), text)
+    _README.write_text(new, encoding="utf-8")
+
+
+def _sentence(kind: str, preset: str) -> str:
+    seeds = _of(quoted(), kind, preset, campaign="template", springs="auto")
+    if not seeds:
+        return f"The {preset} truth was not measured in {_NAMES[kind]}."
     lateral, paper = [_deviation(each, 1.0) for each in seeds], PAPER[kind].reduction
     mean, largest = (
         _mean([_reduction(each[key]) for each in lateral], ".1%") for key in ("mean", "max")
     )
     return (
-        f"On the typical truth the correction takes {mean} of the mean deviation in"
+        f"On the {preset} truth the correction takes {mean} of the mean deviation in"
         f" {_NAMES[kind]}, and {largest} of the largest, over {_counted(len(seeds))}"
         f" (the paper, on a real robot: {abs(paper[0]):.2%} and {abs(paper[1]):.2%})."
     )
