@@ -1,10 +1,11 @@
 """Bring the clocks of several logs together by what all of them feel: that the cell moves.
 
-Each log is reduced to its *activity*: the rises and falls of the logarithm of the speed at which
-its values change. The arm that starts to travel, the force that starts to build up and the marker
-that comes to a stand mark the same instants, whatever their speeds are in which unit. The offset is
-where the activities correlate most; stretches of the recording, each correlated for itself, then
-say how the offset drifts:
+Each log is reduced to its *activity*, the logarithm of the speed at which its values change. The
+marker travels when the arm does. A force changes when the arm yields to it, at a few mm/s at most;
+beside a force, all faster motion of the arm is left out. The offset is where the activities
+correlate most. A press is much like the next one, so that a force may fit several offsets: then it
+is the one at which the tool's weight alone explains what is felt on the way between the poses.
+Stretches of the recording, each correlated for itself, then say how the offset drifts:
 
     t = t_log + offset + drift (t_log - t_first).
 
@@ -17,10 +18,10 @@ from dataclasses import dataclass
 from itertools import groupby
 
 import numpy as np
-from scipy.signal import correlate
+from scipy.signal import correlate, find_peaks
 from scipy.stats import theilslopes
 
-from elastocal.arrays import BoolArray, FloatArray
+from elastocal.arrays import BoolArray, FloatArray, IndexArray
 from elastocal.errors import LogError
 from elastocal.logs.streams import LogStreams
 from elastocal.records import record
@@ -31,12 +32,23 @@ _STEP = 0.02
 _SMOOTH = 5
 """Samples over which values are averaged before they are differenced."""
 _BLUR = 15
-"""The same of an activity, before its rises are compared: about 0.3 s."""
+"""The same of an activity: about 0.3 s."""
+_PRESSING = 2e-3
+"""Speed in m/s above which an arm travels; below, it stands or yields to a force."""
+_SLOWEST = 1e-5
+"""Speed in m/s below which an arm that may yield stands."""
+_CLOSE, _APART, _MOST_CANDIDATES = 0.15, 1.0, 40
+"""Correlation below the best that is still a candidate, least distance of candidates in s, and
+their greatest number."""
+_TRAVELLING = 10e-3
+"""Speed in m/s above which the tool touches nothing."""
+_LEAST_TRAVELLED = 20
+"""Samples by which a weight is judged."""
 _LONGEST_GAP = 1.0
 """Time without a sample from which on nothing is known of a log, in s."""
 _LEAST_OVERLAP = 0.3
 """Least part of the shorter log that the other must overlap."""
-_LEAST_CORRELATION = 0.35
+_LEAST_CORRELATION = 0.5
 """Correlation below which two logs are not of the same work."""
 _STRETCH = 60.0
 """Length of a stretch that gives an offset of its own, in s."""
@@ -51,12 +63,12 @@ _LONGEST = 1_000_000
 @brief_repr
 @dataclass(frozen=True, eq=False)
 class _Activity:
-    """Where motion starts and stops in a log, on a grid of equal steps."""
+    """How fast a log changes, on a grid of equal steps."""
 
     start: float
     step: float
     value: FloatArray
-    """Rise of the logarithm of the speed, shape (sample,); 0 where nothing is known."""
+    """Logarithm of the speed, shape (sample,), its mean taken off; 0 where nothing is known."""
     known: BoolArray
     """Shape (sample,)."""
 
@@ -124,7 +136,9 @@ def align(
             aligned.append(log.at(time))
         else:
             if log.entry.time is None:
-                raise LogError(f"{log.name}: it has no time, and {reference.name} no handshake")
+                raise LogError(
+                    f"{log.entry.log}: it has no time, and {reference.entry.log} no handshake"
+                )
             if log.clock not in fits:
                 fits[log.clock] = fit_clock(log, reference, lever)
             aligned.append(log.at(fits[log.clock].shifted(log.time)))
@@ -141,12 +155,18 @@ def fit_clock(log: LogStreams, reference: LogStreams, lever: FloatArray) -> Cloc
     """
     longest = max(float(np.ptp(each.time)) for each in (log, reference))
     step = max(_STEP, longest / _LONGEST)
-    ours, theirs = _activity(log, lever, step), _activity(reference, lever, step)
-    lag, correlation = _best_lag(ours, theirs)
+    fastest = None if log.wrench is None else _PRESSING
+    ours, theirs = _activity(log, lever, step), _activity(reference, lever, step, fastest)
+    lags, correlations = _best_lags(ours, theirs)
+    best = 0
+    if log.wrench is not None and len(lags) > 1:
+        shifts = theirs.start - ours.start + lags * step
+        best = int(np.argmin([_weight_misfit(log, reference, each) for each in shifts]))
+    lag, correlation = int(lags[best]), float(correlations[best])
     if not correlation >= _LEAST_CORRELATION:
         raise LogError(
-            f"{log.name} and {reference.name} do not seem to be of the same work: their motions"
-            f" correlate by {correlation:.2f} at best, {_LEAST_CORRELATION} is the least; give"
+            f"{log.entry.log} and {reference.entry.log} do not seem to be of the same work: their"
+            f" motions correlate by {correlation:.2f} at best, {_LEAST_CORRELATION} is the least; give"
             " both the same clock if they share one"
         )
     coarse = theirs.start - ours.start + lag * step
@@ -173,33 +193,42 @@ def fit_clock(log: LogStreams, reference: LogStreams, lever: FloatArray) -> Cloc
     )
 
 
-def _activity(log: LogStreams, lever: FloatArray, step: float) -> _Activity:
-    """Return the activity of a log on a grid of its own clock."""
+def _activity(
+    log: LogStreams, lever: FloatArray, step: float, fastest: float | None = None
+) -> _Activity:
+    """Return the activity of a log on a grid of its own clock.
+
+    Nothing is known of it in gaps and, where ``fastest`` is given, at higher speeds, in m/s.
+    """
     values = _values(log, lever)
     good = np.isfinite(values).all(axis=1)
-    time, values = log.time[good], values[good]
-    time, first = np.unique(time, return_index=True)
+    time, first = np.unique(log.time[good], return_index=True)
     if len(time) < 2:
-        raise LogError(f"{log.name}: it has no two samples at different times")
+        raise LogError(f"{log.entry.log}: it has no two samples at different times")
     grid = np.arange(time[0], time[-1] + 0.5 * step, step)
     smooth = np.column_stack(
-        [np.convolve(np.interp(grid, time, v), _box(_SMOOTH), "same") for v in values[first].T]
+        [_blurred(np.interp(grid, time, axis), _SMOOTH) for axis in values[good][first].T]
     )
     speed = np.linalg.norm(np.gradient(smooth, step, axis=0), axis=1)
     after = np.searchsorted(time, grid, side="right").clip(1, len(time) - 1)
     known = time[after] - time[after - 1] <= _LONGEST_GAP
     known[:_BLUR] = known[-_BLUR:] = False
     if not known.any() or not speed[known].max() > 0.0:
-        raise LogError(f"{log.name}: nothing changes in it, so that its clock cannot be told")
-    fast = float(np.percentile(speed[known], 95))
-    floor = max(float(np.percentile(speed[known], 25)), 1e-3 * fast)
-    rise = np.gradient(np.convolve(np.log10(speed + floor), _box(_BLUR), "same"))
-    rise = np.where(known, rise, 0.0)
-    return _Activity(float(grid[0]), step, rise, known)
+        raise LogError(f"{log.entry.log}: nothing changes in it, so that its clock cannot be told")
+    if fastest is None:
+        fast = float(np.percentile(speed[known], 95))
+        floor = max(float(np.percentile(speed[known], 25)), 1e-3 * fast)
+    else:
+        floor = _SLOWEST
+        known &= speed < fastest
+    value = _blurred(np.log10(speed + floor), _BLUR)
+    centred = value - value[known].mean() if known.any() else value
+    return _Activity(float(grid[0]), step, np.where(known, centred, 0.0), known)
 
 
-def _box(samples: int) -> FloatArray:
-    return np.full(samples, 1.0 / samples)
+def _blurred(values: FloatArray, samples: int) -> FloatArray:
+    """Return running means."""
+    return np.convolve(values, np.full(samples, 1.0 / samples), "same")
 
 
 def _values(log: LogStreams, lever: FloatArray) -> FloatArray:
@@ -213,18 +242,49 @@ def _values(log: LogStreams, lever: FloatArray) -> FloatArray:
     return log.wrench.force
 
 
-def _best_lag(ours: _Activity, theirs: _Activity) -> tuple[int, float]:
-    """Return by how many steps ours begins after theirs, and the correlation then."""
+def _best_lags(ours: _Activity, theirs: _Activity) -> tuple[IndexArray, FloatArray]:
+    """Return by how many steps ours may begin after theirs, the best first, and the correlations.
+
+    Each correlation is over the samples that are known in both.
+    """
     lags = np.arange(-(len(ours.value) - 1), len(theirs.value))
+    seen, there = ours.known.astype(float), theirs.known.astype(float)
     product = correlate(theirs.value, ours.value, method="fft")
-    power_theirs = correlate(theirs.value**2, ours.known.astype(float), method="fft")
-    power_ours = correlate(theirs.known.astype(float), ours.value**2, method="fft")
-    overlap = correlate(theirs.known.astype(float), ours.known.astype(float), method="fft")
-    enough = overlap >= _LEAST_OVERLAP * min(ours.known.sum(), theirs.known.sum())
+    power_theirs = correlate(theirs.value**2, seen, method="fft")
+    power_ours = correlate(there, ours.value**2, method="fft")
+    overlap = correlate(there, seen, method="fft")
+    enough = overlap >= _LEAST_OVERLAP * min(seen.sum(), there.sum())
     scale = np.sqrt(np.maximum(power_theirs * power_ours, 1e-12))
     correlation = np.where(enough, product / scale, -1.0)
-    best = int(np.argmax(correlation))
-    return int(lags[best]), float(correlation[best])
+    peaks, _ = find_peaks(correlation, distance=max(round(_APART / ours.step), 1))
+    peaks = peaks[np.argsort(correlation[peaks])[::-1]][:_MOST_CANDIDATES]
+    if not len(peaks):
+        peaks = np.array([np.argmax(correlation)])
+    peaks = peaks[correlation[peaks] >= correlation[peaks[0]] - _CLOSE]
+    return lags[peaks], correlation[peaks]
+
+
+def _weight_misfit(log: LogStreams, reference: LogStreams, shift: float) -> float:
+    """Return how badly the tool's weight explains the force while the arm travels, in N.
+
+    ``F = A R_base_tcp^T g + b`` with any ``A``, so that the sensor may sit as it likes; the median
+    of what is left.
+    """
+    arm, wrench = reference.arm, log.wrench
+    assert arm is not None
+    assert wrench is not None
+    time, place = arm.time, arm.T_base_tcp[:, :3, 3]
+    speed = np.linalg.norm(np.gradient(place, axis=0), axis=1) / np.maximum(np.gradient(time), 1e-9)
+    own = time[speed > _TRAVELLING] - shift
+    own = own[(own > wrench.time[0]) & (own < wrench.time[-1])]
+    if len(own) < _LEAST_TRAVELLED:
+        return np.inf
+    force = wrench.force[np.searchsorted(wrench.time, own).clip(0, len(wrench.time) - 1)]
+    down = arm.T_base_tcp[np.searchsorted(time, own + shift).clip(0, len(time) - 1), 2, :3]
+    columns = np.column_stack([down, np.ones(len(down))])
+    known = np.isfinite(force).all(axis=1)
+    left = force[known] - columns[known] @ np.linalg.lstsq(columns[known], force[known])[0]
+    return float(np.median(np.linalg.norm(left, axis=1)))
 
 
 def _stretch_offsets(ours: _Activity, theirs: _Activity, lag: int) -> tuple[FloatArray, FloatArray]:
@@ -257,13 +317,13 @@ def _by_handshake(log: LogStreams, reference: LogStreams) -> tuple[FloatArray, C
     common = [word for word in ours if word in theirs]
     if not common:
         raise LogError(
-            f"{log.name} and {reference.name} have no word of their handshake in common"
+            f"{log.entry.log} and {reference.entry.log} have no word of their handshake in common"
             f" ({_some(ours)}; {_some(theirs)})"
         )
     from_times = np.array([time for word in common for time in ours[word]])
     to_times = np.array([time for word in common for time in _ends(theirs[word], ours[word])])
     if not np.all(np.diff(from_times) >= 0.0) or not np.all(np.diff(to_times) >= 0.0):
-        raise LogError(f"{log.name}: the words of its handshake are in another order")
+        raise LogError(f"{log.entry.log}: the words of its handshake are in another order")
     time = np.interp(log.time, from_times, to_times, left=-np.inf, right=np.inf)
     offset = float((to_times - from_times).mean())
     fit = ClockFit(log.clock, reference.clock, offset, None, 0.0, None, 1.0, float(log.time[0]))
@@ -290,7 +350,7 @@ def handshake_spans(log: LogStreams) -> dict[str, tuple[float, float]]:
         first, row = row, row + len(list(rows))
         if word in spans:
             raise LogError(
-                f"{log.name}: handshake {word!r} stands in two places, the second in row"
+                f"{log.entry.log}: handshake {word!r} stands in two places, the second in row"
                 f" {first + 1} of the data: it must name one reading"
             )
         if word:

@@ -14,6 +14,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from datetime import UTC, date, datetime
 from pathlib import Path
+from zipfile import BadZipFile
 
 import numpy as np
 
@@ -174,9 +175,12 @@ def read_text_log(path: Path) -> LogTable:
     except csv.Error as error:
         raise LogError(f"{path}: {error}") from error
     width = Counter(len(row) for row in rows).most_common(1)[0][0]
-    first = next(index for index, row in enumerate(rows) if len(row) == width)
-    header = _header(rows[first])
-    body = rows[first + (header is not None) :]
+    first = next(
+        (index for index, row in enumerate(rows) if len(row) == width and _is_data(row)), 1
+    )
+    # Lines of another program stand above the header, which stands right above the data.
+    header = tuple(_named(rows[first - 1])) if first and len(rows[first - 1]) == width else None
+    body = rows[first:]
     uneven = next((n for n, row in enumerate(body) if len(row) != width), None)
     if uneven is not None:
         raise LogError(
@@ -187,8 +191,7 @@ def read_text_log(path: Path) -> LogTable:
     comma = delimiter != "," and any(
         _DECIMAL_COMMA.fullmatch(cell.strip()) for row in body[:_LOOKED_AT] for cell in row
     )
-    names = header or tuple(str(number) for number in range(1, width + 1))
-    return LogTable(str(path), names, cells, comma)
+    return LogTable(str(path), header or _numbered(width), cells, comma)
 
 
 def read_workbook(path: Path, sheet: str | None = None) -> LogTable:
@@ -210,7 +213,7 @@ def read_workbook(path: Path, sheet: str | None = None) -> LogTable:
     require_file(path)
     try:
         book = load_workbook(path, read_only=True, data_only=True)
-    except (OSError, ValueError, KeyError) as error:
+    except (OSError, ValueError, KeyError, BadZipFile) as error:
         raise LogError(f"{path} is no Excel workbook: {error}") from error
     try:
         if sheet is not None and sheet not in book.sheetnames:
@@ -221,9 +224,10 @@ def read_workbook(path: Path, sheet: str | None = None) -> LogTable:
     rows = [row for row in rows if any(cell is not None for cell in row)]
     if not rows:
         raise LogError(f"{path}: there are no rows in it")
-    header = _header([_as_text(cell) for cell in rows[0]])
-    names = header or tuple(str(number) for number in range(1, len(rows[0]) + 1))
-    return LogTable(str(path), names, tuple(zip(*rows[header is not None :], strict=True)))
+    head = [_as_text(cell) for cell in rows[0]]
+    names = _numbered(len(head)) if _is_data(head) else tuple(_named(head))
+    body = rows if _is_data(head) else rows[1:]
+    return LogTable(str(path), names, tuple(zip(*body, strict=True)) or ((),) * len(head))
 
 
 def _text(path: Path) -> str:
@@ -269,8 +273,10 @@ def _all_decimal(lines: Sequence[str], delimiter: str) -> bool:
     """Return whether every comma of a text stands within a number between blanks."""
     if delimiter != ",":
         return False
-    words = [word for line in lines[1:] for word in line.split() if "," in word]
-    return bool(words) and all(_DECIMAL_COMMA.fullmatch(word) for word in words)
+    rows = [line.split() for line in lines if "," in line]
+    return all(len(row) > 1 for row in rows) and all(
+        _DECIMAL_COMMA.fullmatch(word) for row in rows for word in row if "," in word
+    )
 
 
 def _split(line: str) -> list[str]:
@@ -278,13 +284,20 @@ def _split(line: str) -> list[str]:
     return [first or second for first, second in re.findall(r'"([^"]*)"|(\S+)', line)]
 
 
-def _header(row: Sequence[str]) -> tuple[str, ...] | None:
-    """Return the names of the columns, or None where the row is one of data."""
-    cells = [cell.strip() for cell in row]
-    numbers = sum(bool(_NUMBER.fullmatch(cell) or _CLOCK.fullmatch(cell)) for cell in cells)
-    if numbers * 2 >= len(cells):
-        return None
-    return tuple(cell or str(number) for number, cell in enumerate(cells, 1))
+def _is_data(row: Sequence[str]) -> bool:
+    """Return whether half of the cells of a row are numbers or times."""
+    return 2 * sum(bool(_NUMBER.fullmatch(c) or _CLOCK.fullmatch(c.strip())) for c in row) >= len(
+        row
+    )
+
+
+def _numbered(width: int) -> tuple[str, ...]:
+    """Return the names of columns without any: their numbers."""
+    return tuple(str(number) for number in range(1, width + 1))
+
+
+def _named(row: Sequence[str]) -> list[str]:
+    return [cell.strip() or str(number) for number, cell in enumerate(row, 1)]
 
 
 def _as_text(cell: object) -> str:

@@ -73,11 +73,11 @@ from .demo import (
 from .derive import DeriveResult as DeriveResult, DeriveSettings as DeriveSettings, derive as derive
 from .export import ExportResult as ExportResult, ExportSettings as ExportSettings, export as export
 from .import_logs import (
-    GuessResult as GuessResult,
-    GuessSettings as GuessSettings,
+    GuessMapResult as GuessMapResult,
+    GuessMapSettings as GuessMapSettings,
     ImportFigures as ImportFigures,
-    ImportResult as ImportResult,
-    ImportSettings as ImportSettings,
+    ImportLogsResult as ImportLogsResult,
+    ImportLogsSettings as ImportLogsSettings,
     guess_map as guess_map,
     import_logs as import_logs,
 )

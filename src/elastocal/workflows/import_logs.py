@@ -20,12 +20,12 @@ from elastocal.workflows._workflow import workflow
 
 
 @dataclass(frozen=True)
-class ImportSettings:
+class ImportLogsSettings:
     """Which logs, what they are, and where the dataset goes."""
 
     logs: Sequence[str | PathLike[str]]
     """Files; folders of ROS 2 bags."""
-    map: Path = Path("map.yaml")
+    map: Path
     """What their columns are."""
     out: Path | None = None
     """Dataset to write (.nc or .csv); none: it is only returned."""
@@ -50,7 +50,7 @@ class ImportFigures:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class ImportResult(Result):
+class ImportLogsResult(Result):
     """The dataset of some logs, and how it came about."""
 
     found: ImportedLogs
@@ -80,13 +80,13 @@ class ImportResult(Result):
         return self.found
 
 
-@workflow(ImportSettings)
-def import_logs(settings: ImportSettings, progress: Progress) -> ImportResult:
+@workflow(ImportLogsSettings)
+def import_logs(settings: ImportLogsSettings, progress: Progress) -> ImportLogsResult:
     """Merge the logs of controller, force sensor and tracker; find the readings; write a dataset.
 
     Parameters
     ----------
-    settings : ImportSettings
+    settings : ImportLogsSettings
         Or its ``logs``, and the other fields by name.
     progress : Progress, optional
         Called with stage, done and total.
@@ -124,16 +124,16 @@ def import_logs(settings: ImportSettings, progress: Progress) -> ImportResult:
         clocks=found.clocks,
         warnings=found.warnings,
     )
-    return ImportResult(found, figures)
+    return ImportLogsResult(found, figures)
 
 
 @dataclass(frozen=True)
-class GuessSettings:
+class GuessMapSettings:
     """Of which logs a first map is to be written."""
 
     logs: Sequence[str | PathLike[str]]
     """Files; folders of ROS 2 bags."""
-    map: Path | None = None
+    out: Path | None = None
     """Map to write; none: its text is only returned."""
     cell: Path | None = None
     """Cell file that says robot, tool, sensor and marker."""
@@ -145,7 +145,7 @@ class GuessSettings:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class GuessResult(Result):
+class GuessMapResult(Result):
     """What some logs were taken for."""
 
     logs: tuple[GuessedLog, ...]
@@ -165,13 +165,13 @@ class GuessResult(Result):
         )
 
 
-@workflow(GuessSettings)
-def guess_map(settings: GuessSettings, progress: Progress) -> GuessResult:
+@workflow(GuessMapSettings)
+def guess_map(settings: GuessMapSettings, progress: Progress) -> GuessMapResult:
     """Write a first map of logs, by names and sizes of their columns; a person then corrects it.
 
     Parameters
     ----------
-    settings : GuessSettings
+    settings : GuessMapSettings
         Or its ``logs``, and the other fields by name.
     progress : Progress, optional
         Called with stage, done and total.
@@ -183,7 +183,7 @@ def guess_map(settings: GuessSettings, progress: Progress) -> GuessResult:
     FileAccessError
         If a file cannot be read, or the map is there already.
     """
-    files, out = _files(settings.logs), settings.map
+    files, out = _files(settings.logs), settings.out
     if out is not None and out.exists() and not settings.force:
         raise FileAccessError(f"{out} is there already: name another file, or give --force")
     progress("logs", 0, 1)
@@ -195,7 +195,7 @@ def guess_map(settings: GuessSettings, progress: Progress) -> GuessResult:
     text = foreign.write_guess(guessed, robot)
     if out is not None:
         write_text(out, text)
-    return GuessResult(guessed, text)
+    return GuessMapResult(guessed, text)
 
 
 def _files(logs: Sequence[str | PathLike[str]]) -> list[Path]:

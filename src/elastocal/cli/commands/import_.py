@@ -40,7 +40,7 @@ def _import(
     """Merge logs of controller, force sensor and tracker; find the readings; write a dataset."""
     if guess:
         ask = _ask if sys.stdin.isatty() else None
-        settings = workflows.GuessSettings(logs, map=map_file, cell=cell, force=force, ask=ask)
+        settings = workflows.GuessMapSettings(logs, out=map_file, cell=cell, force=force, ask=ask)
         guessed = workflows.guess_map(settings)
         for label, text in guessed.facts():
             output.console().print(f"{label}: {text}", markup=False, soft_wrap=True)
@@ -49,7 +49,7 @@ def _import(
     if out is None:
         raise typer.BadParameter("is missing: the dataset to write", param_hint="--out")
     with output.progress_bars() as progress:
-        given = workflows.ImportSettings(logs, map=map_file, out=out, picture=picture)
+        given = workflows.ImportLogsSettings(logs, map=map_file, out=out, picture=picture)
         result = workflows.import_logs(given, progress)
     if as_json:
         output.print_json(result.figures)
