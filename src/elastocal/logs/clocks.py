@@ -166,8 +166,8 @@ def fit_clock(log: LogStreams, reference: LogStreams, lever: FloatArray) -> Cloc
     if not correlation >= _LEAST_CORRELATION:
         raise LogError(
             f"{log.entry.log} and {reference.entry.log} do not seem to be of the same work: their"
-            f" motions correlate by {correlation:.2f} at best, {_LEAST_CORRELATION} is the least; give"
-            " both the same clock if they share one"
+            f" motions correlate by {correlation:.2f} at best, {_LEAST_CORRELATION} is the least;"
+            " give both the same clock if they share one"
         )
     coarse = theirs.start - ours.start + lag * step
     at, offset = _stretch_offsets(ours, theirs, lag)
