@@ -13,6 +13,7 @@ from elastocal.logs.map import SCHEMA, UNKNOWN
 from elastocal.logs.recordings import is_recording, read_recording, read_topics
 from elastocal.logs.streams import read_table
 from elastocal.logs.table import LogTable
+from elastocal.results import brief_repr
 
 _UNIT = re.compile(r"[\[(]\s*([^\])]+?)\s*[\])]\s*$|_(mm|m|um|deg|rad|N|kN|Nm|s|ms)$")
 _TIME = re.compile(r"(?i)(time|zeit|t|timestamp|stamp|date ?time|ms|ipoc|uhrzeit)")
@@ -39,6 +40,7 @@ _LONGEST_LEVER = 5.0
 """Of a force about its sensor, in m: a moment beyond is in N mm."""
 
 
+@brief_repr
 @dataclass(frozen=True)
 class GuessedColumns:
     """What some columns of a log were taken for, and why."""
@@ -62,6 +64,7 @@ class GuessedColumns:
         return f"{{columns: [{names}]{unit}}}"
 
 
+@brief_repr
 @dataclass(frozen=True)
 class GuessedLog:
     """What a log, or a topic of it, was taken for."""

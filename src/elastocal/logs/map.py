@@ -46,6 +46,7 @@ from elastocal.cell import (
 )
 from elastocal.errors import ElastocalError, SchemaError
 from elastocal.records import StrictModel, read_yaml
+from elastocal.results import brief_repr
 from elastocal.robot import GRAVITY, Robot, inverse_transform, with_tool_mass
 from elastocal.units import factor
 
@@ -53,9 +54,9 @@ SCHEMA = "elastocal.log-map/1"
 UNKNOWN = "?"
 """Unit that a person still has to write: `elastocal import --guess` could not tell it."""
 
-ColumnName = Annotated[str, BeforeValidator(lambda name: str(name) if name is not True else name)]
+_ColumnName = Annotated[str, BeforeValidator(lambda name: str(name) if name is not True else name)]
 """A name of the header, or the number of a column from 1."""
-Three = tuple[ColumnName, ColumnName, ColumnName]
+_Three = tuple[_ColumnName, _ColumnName, _ColumnName]
 
 
 def _check_unit(unit: str, dimension: str) -> None:
@@ -67,7 +68,7 @@ def _check_unit(unit: str, dimension: str) -> None:
 class TimeColumn(StrictModel):
     """When each row was taken."""
 
-    column: ColumnName
+    column: _ColumnName
     unit: str | None = None
     """Of plain numbers: s, ms; left out for dates and times of day."""
 
@@ -79,9 +80,9 @@ class TimeColumn(StrictModel):
 
 
 class Vector(StrictModel):
-    """Three columns of one unit."""
+    """_Three columns of one unit."""
 
-    columns: Three
+    columns: _Three
     unit: str
 
     def check(self, dimension: str) -> None:
@@ -92,7 +93,7 @@ class Vector(StrictModel):
 class Joints(StrictModel):
     """Columns of joint positions, in the robot's order and sense unless it is said otherwise."""
 
-    columns: tuple[ColumnName, ...]
+    columns: tuple[_ColumnName, ...]
     unit: str
     names: tuple[str, ...] = ()
     """Joint of each column; by default the robot's next ones of such a unit."""
@@ -129,7 +130,7 @@ class ToolPose(StrictModel):
 class MarkerColumns(StrictModel):
     """A reflector as a station states it."""
 
-    columns: Three
+    columns: _Three
     unit: str
     u95: Vector | None = None
     """Uncertainty of each coordinate by the instrument, twice its standard deviation."""
@@ -153,7 +154,7 @@ class LogEntry(StrictModel):
     """Logs with the same word share a clock; by default each file has its own."""
     time: TimeColumn | None = None
     """Left out where a handshake is the only order."""
-    handshake: ColumnName | None = None
+    handshake: _ColumnName | None = None
     """Column with the same word in all logs during a reading; 0 or nothing in between."""
     joints: tuple[Joints, ...] = ()
     pose: ToolPose | None = None
@@ -225,6 +226,7 @@ class LogMap(StrictModel):
         return self
 
 
+@brief_repr
 @dataclass(frozen=True, eq=False)
 class Site:
     """What the logs were taken from."""

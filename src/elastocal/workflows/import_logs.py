@@ -19,6 +19,7 @@ from elastocal.workflows._inputs import refuse_overwriting
 from elastocal.workflows._workflow import workflow
 
 
+@brief_repr
 @dataclass(frozen=True)
 class ImportLogsSettings:
     """Which logs, what they are, and where the dataset goes."""
@@ -127,6 +128,7 @@ def import_logs(settings: ImportLogsSettings, progress: Progress) -> ImportLogsR
     return ImportLogsResult(found, figures)
 
 
+@brief_repr
 @dataclass(frozen=True)
 class GuessMapSettings:
     """Of which logs a first map is to be written."""
