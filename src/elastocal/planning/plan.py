@@ -11,6 +11,7 @@ from elastocal import __version__
 from elastocal.arrays import FloatArray, IndexArray
 from elastocal.cell import Cell, contact_time, fingerprint, straight_time
 from elastocal.errors import PlanningError
+from elastocal.parallel import one_blas_thread
 from elastocal.planning.checks import SightCheck, registration_shortages, shortage_text
 from elastocal.planning.motion import (
     Mover,
@@ -87,6 +88,7 @@ class _Choice:
         return np.argsort(self.route.order)
 
 
+@one_blas_thread()
 def make_plan(
     cell: Cell, compare: str | None = None, jobs: int | None = None, progress: Progress = silent
 ) -> PlanAndPool:
