@@ -20,7 +20,7 @@ import pinocchio as pin
 
 from elastocal.errors import FileAccessError, RobotError, nearest
 from elastocal.robot.chain import ChainJoint, SerialChain
-from elastocal.units import impossible
+from elastocal.units import impossible, parse_number
 
 _PACKAGE, _FILE = "package://", "file://"
 _NUMBERS = {
@@ -205,7 +205,7 @@ def _check_numbers(owner: str, element: ElementTree.Element) -> None:
         if text is None:
             continue
         try:
-            values = [float(part) for part in text.split()]
+            values = [parse_number(part) for part in text.split()]
         except ValueError:
             values = []
         if len(values) != count or not all(math.isfinite(value) for value in values):
