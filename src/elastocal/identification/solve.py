@@ -153,7 +153,9 @@ class PoseGrams:
         rows = np.concatenate([scaled.rows, deflection], axis=2)
         blocks, index = np.unique(problem.block, return_inverse=True)
         gram = np.zeros((len(blocks), rows.shape[2], rows.shape[2]))
-        np.add.at(gram, index, np.swapaxes(rows, 1, 2) @ rows)
+        for number, block in enumerate(gram):
+            system = rows[index == number].reshape(-1, rows.shape[2])
+            np.matmul(system.T, system, out=block)
         prior = problem.prior_rows / np.append(scaled.scale, 1.0)
         return cls(gram, prior.T @ prior, scaled.scale, problem.lower, problem.upper)
 
