@@ -5,9 +5,10 @@ Each variant on each split: choose, fit, verify (lines 8 to 18).
 
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 from importlib.metadata import version
+from itertools import pairwise
 
 import numpy as np
 from numpy.random import Generator
@@ -27,7 +28,7 @@ from elastocal.codec.splits import CodecOptions, Split, make_campaign, make_spli
 from elastocal.codec.variants import Variant, check_different
 from elastocal.dataset import Readings
 from elastocal.errors import CodecError, IdentificationError
-from elastocal.identification import Problem, rung_summary, solve
+from elastocal.identification import MINIMUM_BLOCKS, Problem, rung_summary, solve
 from elastocal.parallel import map_in_processes, one_blas_thread, process_count
 from elastocal.planning.search import Candidates, growing_choices, technique
 from elastocal.progress import Progress, silent
@@ -36,6 +37,8 @@ from elastocal.robot import Robot
 _STAGE = "splits"
 _WORTH_PROCESSES = 6.0
 """Processor time from which on all cores are used, in s; processes need a third of it to start."""
+_GROWTH = 1.8
+"""Ratio of training sizes at which springs are chosen anew."""
 _PACKAGES = ("elastocal", "numpy", "scipy")
 
 
@@ -43,8 +46,8 @@ _PACKAGES = ("elastocal", "numpy", "scipy")
 class _LearningCurve:
     """Choices, fits and errors of a variant on a split, for 1, 2, … training poses."""
 
-    springs: str
-    """Name of the springs that the errors are of."""
+    springs: tuple[str, ...]
+    """Names of the springs that the errors are of, by number of training poses."""
     chosen: tuple[IndexArray, ...]
     """Numbers of the training poses, in the order of choice."""
     compliance: FloatArray
@@ -197,24 +200,28 @@ def _run_split(
 ) -> list[_LearningCurve]:
     """Return the learning curve of each variant on one split."""
     curves = []
-    # Variants that differ in their search alone choose the same springs.
-    known: dict[tuple[str, str, str], str] = {}
+    # Variants that differ in their search alone choose the same springs on the same poses.
+    known: dict[tuple[str, ...], dict[frozenset[int], str]] = {}
     for each in entrants:
         variant = each.taken.variant
-        key = (variant.springs, variant.load_cases, variant.solver)
+        found = known.setdefault((variant.springs, variant.load_cases, variant.solver), {})
         try:
-            known[key] = known.get(key) or each.chosen(split)
-            chosen = each.with_springs(known[key])
-            curve = _train(chosen, split, most, seed)
-            if chosen is not each.taken:
-                curve = replace(curve, compliance=_fit(each.taken, curve.chosen))
-            curves.append(curve)
+            curves.append(_train(each, found, split, most, seed))
         except IdentificationError as error:
             raise IdentificationError(
-                f"variant {each.taken.variant.name!r}, split grown from pose"
-                f" {split.seed_pose}: {error}"
+                f"variant {variant.name!r}, split grown from pose {split.seed_pose}: {error}"
             ) from error
     return curves
+
+
+def _chosen_springs(
+    entrant: Entrant, known: dict[frozenset[int], str], poses: IndexArray
+) -> PreparedVariant:
+    """Return a variant with the springs that training poses carry, known or judged now."""
+    key = frozenset(poses.tolist())
+    if key not in known:
+        known[key] = entrant.chosen(np.sort(poses))
+    return entrant.with_springs(known[key])
 
 
 def _require_a_fit(prepared: PreparedVariant, curves: Sequence[_LearningCurve]) -> None:
@@ -236,13 +243,17 @@ def _padded(chosen: Sequence[IndexArray]) -> IndexArray:
     return filled
 
 
-def _train(prepared: PreparedVariant, split: Split, most: int, seed: int) -> _LearningCurve:
+def _train(
+    entrant: Entrant, known: dict[frozenset[int], str], split: Split, most: int, seed: int
+) -> _LearningCurve:
     """Return the errors that a variant reaches with 1 to ``most`` training poses of a split.
 
     Parameters
     ----------
-    prepared : PreparedVariant
+    entrant : Entrant
         The variant.
+    known : dict
+        Springs by the training poses that carry them; springs chosen here are added.
     split : Split
         The split.
     most : int
@@ -251,18 +262,47 @@ def _train(prepared: PreparedVariant, split: Split, most: int, seed: int) -> _Le
         Searches draw from ``default_rng((seed, seed pose, number of poses))``, so that all
         variants with one technique draw alike.
     """
-    chosen = _choices(prepared, split, most, seed)
-    compliance = _fit(prepared, chosen)
-    verified = np.isin(prepared.problem.block, split.verification)
-    O, d = prepared.problem.O[verified], prepared.problem.d[verified]  # noqa: E741 - paper
+    taken = entrant.taken
+    searched = taken
+    if not technique(taken.variant.search).nested:
+        # A technique that looks at springs looks at those that its whole pool carries.
+        searched = _chosen_springs(entrant, known, taken.can_train(split))
+    chosen = _choices(searched, split, most, seed)
+    compliance = _fit(taken, chosen)
+    springs, errors = [], []
+    for sizes in _sizes_of_choices(most):
+        each = _chosen_springs(entrant, known, chosen[sizes.start])
+        fitted = compliance[sizes] if each is taken else _fit(each, chosen[sizes])
+        springs += len(fitted) * [each.springs]
+        errors.append(_verification_errors(each.problem, split, fitted))
+    error = np.concatenate(errors)
+    return _LearningCurve(
+        tuple(springs), tuple(chosen), compliance, error.mean(axis=1), error.max(axis=1)
+    )
+
+
+def _sizes_of_choices(most: int) -> list[slice]:
+    """Return ranges of places in a learning curve, springs being chosen anew at each start.
+
+    The largest training set makes a choice of its own, each other one of 5 to 9 of
+    than the next, down to the smallest that carries a choice.
+    """
+    starts = [most - 1]
+    while starts[0] + 1 > MINIMUM_BLOCKS:
+        starts.insert(0, max(MINIMUM_BLOCKS, int((starts[0] + 1) / _GROWTH)) - 1)
+    starts = [0, *starts] if starts[0] else starts
+    return [slice(*ends) for ends in pairwise([*starts, most])]
+
+
+def _verification_errors(problem: Problem, split: Split, compliance: FloatArray) -> FloatArray:
+    """Return absolute residuals at the verification poses, shape (n_train, reading, 4), in m."""
+    verified = np.isin(problem.block, split.verification)
+    O, d = problem.O[verified], problem.d[verified]  # noqa: E741 - paper
     # Verification always takes all load cases, whatever was trained with.
     residual = np.abs(compliance @ O.reshape(-1, O.shape[2]).T - d.ravel())
-    residual = residual.reshape(len(chosen), -1, 3)
+    residual = residual.reshape(len(compliance), -1, 3)
     norm = np.sqrt(np.square(residual).sum(axis=2, keepdims=True))
-    errors = np.concatenate([residual, norm], axis=2)
-    return _LearningCurve(
-        prepared.springs, tuple(chosen), compliance, errors.mean(axis=1), errors.max(axis=1)
-    )
+    return np.concatenate([residual, norm], axis=2)
 
 
 def _fit(prepared: PreparedVariant, chosen: Sequence[IndexArray]) -> FloatArray:
