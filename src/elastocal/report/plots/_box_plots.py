@@ -195,7 +195,7 @@ def finish_axes(axes: Axes, last: int, low: float, high: float, log: bool) -> No
     log : bool
         Whether the scale of the values is logarithmic.
     """
-    even, edge = np.arange(2, last + 1, 2), np.zeros(last // 2)
+    even, edge = np.arange(2, last + 1, 2).astype(float), np.zeros(last // 2)
     left, right = even - 0.5, even + 0.5
     _draw_shapes(
         axes, ([left, edge], [right, edge], [right, edge + 1.0], [left, edge + 1.0]), even > 0, 0,
