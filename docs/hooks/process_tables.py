@@ -88,7 +88,7 @@ def summary(preset: str = "typical") -> str:
 def renew_readme() -> None:
     """Write the summary into the README, in place of the one that is there."""
     text = _README.read_text(encoding="utf-8")
-    new = re.sub(r"(?m)^On the typical truth the correction takes .*$", lambda _: summary(), text)
+    new = re.sub(r"(?m)^(On the|The) typical truth .*$", lambda _: summary(), text)
     _README.write_text(new, encoding="utf-8")
 
 
