@@ -45,6 +45,14 @@ def test_the_log_of_a_demo_holds_every_command_with_its_output():
     assert re.search(r"^gears\+friction .* taken", log, flags=re.MULTILINE)
 
 
+def test_the_light_of_the_demo_is_yellow_for_the_reason_that_the_page_gives():
+    page = (Path(__file__).parents[2] / "docs/how-to/read-the-report.md").read_text("utf-8")
+    (reason,) = re.findall(r'ends with a yellow light, and rightly: "([^"]+)"', page)
+    found = (finished_demo("afp") / "report.html").read_text(encoding="utf-8")
+    assert "yellow light" in found
+    assert reason in found
+
+
 def test_a_demo_on_the_typical_truth_takes_out_most_of_the_deviation():
     table = json.loads((finished_demo("afp") / "process/table.json").read_text())
     reduction = table["lines"][-1]["reduction"]

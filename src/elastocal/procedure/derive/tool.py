@@ -14,7 +14,7 @@ a bias that drifts linearly they are linear in the mass, ``h = mass c``, biases 
 Ordinary least squares with intervals by Student's t; what the orientations do not tell apart is
 NaN, and named. What a sensor misreads by cross-talk and gain turns with the tool as its weight
 does: no residual shows it, so the intervals hold it besides, each entry of the matrix thought to be
-off by `CROSS_TALK` of the ranges of its axes. `tool_change` asks whether one mass fits the whole
+off by `_CROSS_TALK` of the ranges of its axes. `tool_change` asks whether one mass fits the whole
 run: a step of it at some reading is one more unknown; the best place for it is the one that takes
 most off the sum of squares, and an F test, with the number of places allowed for, says whether that
 is more than chance.
@@ -110,7 +110,7 @@ def turned_sigma(R: FloatArray, *sigmas: FloatArray) -> FloatArray:
     return np.sqrt(R**2 @ sum(sigma**2 for sigma in sigmas))
 
 
-CROSS_TALK = 0.01
+_CROSS_TALK = 0.01
 """Standard deviation of an entry of a sensor's matrix, in the ranges of its axes: what data sheets
 of six-axis sensors allow. `elastocal tool`, which estimates the matrix too, takes the same."""
 _SURE = 4.0
@@ -274,7 +274,7 @@ def estimate_tool(
     misread = None
     if ranges is not None:
         weight = np.hstack([nominal_mass * gravity, turn @ np.nan_to_num(moment.value[:3])])
-        misread = CROSS_TALK * _misreadings(weight, ranges)
+        misread = _CROSS_TALK * _misreadings(weight, ranges)
         force, moment = force.doubted(misread[0]), moment.doubted(misread[1])
     wide_mass = not force.half_width[0] <= _WIDE_MASS * max(nominal_mass, 1.0)
     mass = nominal_mass if wide_mass else max(float(force.value[0]), _WIDE_MASS * nominal_mass)
