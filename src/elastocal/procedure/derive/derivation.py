@@ -239,8 +239,7 @@ def derive_poses(
         cell.file.load_cases.check_case,
     )
     dataset = dataset_of(poses, rows, cases, arm, registration.lever_arm, tool, provenance)
-    entry = cell.file.sensor
-    ranges = None if entry is None else np.hstack([entry.largest_force, entry.largest_moment])
+    ranges = None if cell.file.sensor is None else cell.file.sensor.ranges
     estimate = estimate_tool(tool_readings(poses, tool), tool.mass, ranges)
     found = RunFindings(poses, rows, registration, tool, estimate, dataset, plan, entries)
     return DerivedRun(dataset, summarise(found))

@@ -14,7 +14,7 @@ a bias that drifts linearly they are linear in the mass, ``h = mass c``, biases 
 Ordinary least squares with intervals by Student's t; what the orientations do not tell apart is
 NaN, and named. What a sensor misreads by cross-talk and gain turns with the tool as its weight
 does: no residual shows it, so the intervals hold it besides, each entry of the matrix thought to be
-off by `_CROSS_TALK` of the ranges of its axes. `tool_change` asks whether one mass fits the whole
+off by a hundredth of the ranges of its axes. `tool_change` asks whether one mass fits the whole
 run: a step of it at some reading is one more unknown; the best place for it is the one that takes
 most off the sum of squares, and an F test, with the number of places allowed for, says whether that
 is more than chance.
