@@ -10,7 +10,7 @@ import numpy as np
 from pydantic import Field, field_validator
 
 from elastocal.arrays import FloatArray
-from elastocal.cell._quantities import IDENTITY, Pose
+from elastocal.cell._quantities import IDENTITY, OptionalName, Pose
 from elastocal.cell.hardware import (
     Marker,
     MeshFile,
@@ -42,6 +42,7 @@ from elastocal.cell.procedure import (
 )
 from elastocal.cell.production import ProcessFile, ProductionPath, read_production
 from elastocal.cell.simulation import Fault, Simulation
+from elastocal.dataset import require_joint_names
 from elastocal.errors import ElastocalError, FileAccessError, SchemaError
 from elastocal.files import read_text
 from elastocal.records import StrictModel, read_yaml
@@ -66,7 +67,7 @@ TOOLING = "tooling"
 class CellFile(StrictModel):
     """All keys of a cell file but ``schema``."""
 
-    name: str = ""
+    name: OptionalName = ""
     robot: RobotEntry
     tcp: Pose = IDENTITY
     """Tool centre point in the flange frame, z out of the tool."""
@@ -287,6 +288,8 @@ def load_cell(path: Path, *, production: bool = True) -> Cell:
     path = Path(path)
     file = read_yaml(path, CellFile, SCHEMA)
     robot = _at(f"{path}: robot", lambda: _robot(path, file))
+    # What the dataset of a run could not hold is refused before there is a run.
+    _at(f"{path}: robot", lambda: require_joint_names(robot.joint_names))
     margins = _at(str(path), lambda: joint_margins(robot, file.limits))
     positions = _at(f"{path}: robot", lambda: external_positions(robot, file.robot, margins))
     torques = _at(f"{path}: limits.torque.values", lambda: torque_limits(robot, file.limits.torque))

@@ -21,6 +21,7 @@ from elastocal.codec import (
 from elastocal.compensation import read_settings
 from elastocal.compensation.conditioning import read_tool
 from elastocal.compensation.process import TABLE, read_process, read_table
+from elastocal.dataset import require_joint_names
 from elastocal.elastic import read_springs
 from elastocal.errors import RobotError, SchemaError
 from elastocal.files import read_text
@@ -147,6 +148,8 @@ def robot_file(path: Path) -> FileDescription:
         if not leaves:
             raise RobotError("URDF has no link at the end of a chain")
         robots = [Robot.from_urdf(text, leaf) for leaf in leaves]
+        for robot in robots:
+            require_joint_names(robot.joint_names)
     return "robot description", {
         "robot": robots[0].name,
         "tips": leaves,

@@ -16,7 +16,7 @@ from elastocal.errors import CompensationError, FileAccessError, ProcedureError
 from elastocal.identification import read_model
 from elastocal.progress import Progress
 from elastocal.robot import GRAVITY, Robot
-from elastocal.workflows._inputs import find_robot, parse_frame, refuse_overwriting
+from elastocal.workflows._inputs import find_robot, parse_frame
 from elastocal.workflows._workflow import workflow
 
 __all__ = ["ToolResult", "ToolSettings", "tool"]
@@ -52,6 +52,8 @@ class ToolSettings:
     must then be derived with this tool file."""
     cross_talk: float = 0.01
     """Cross-talk of the sensor by its data sheet, a share of its ranges; 0: it has none."""
+    force: bool = False
+    """Replace a file that is no former output of this command."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,7 +72,7 @@ class _PostureSource:
     """The sensor's moment range over its force range, in m."""
 
 
-@workflow(ToolSettings)
+@workflow(ToolSettings, marks=("elastocal.tool/",))
 def tool(settings: ToolSettings, progress: Progress) -> ToolResult:  # noqa: ARG001 - done in an instant
     """Find mass, centre of mass and sensor bias from static postures, and what else they carry.
 
@@ -91,7 +93,6 @@ def tool(settings: ToolSettings, progress: Progress) -> ToolResult:  # noqa: ARG
         If a file cannot be read or written, or ``out`` is an input.
     """
     data = Path(settings.postures)
-    refuse_overwriting(settings.out, data)
     _require_postures(data, settings)
     source = _from_run(data) if data.is_dir() else _from_table(data, settings)
     if not 0.0 <= settings.cross_talk < 0.5:

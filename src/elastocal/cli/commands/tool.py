@@ -44,6 +44,7 @@ def _tool(  # noqa: PLR0913 - one parameter an option
     cross_talk: Annotated[
         float, typer.Option(help="Cross-talk by the sensor's data sheet, a share of its ranges.")
     ] = 0.01,
+    force: options.Force = False,
     as_json: options.Written = False,
 ) -> None:
     """Find mass, centre of mass and sensor bias from static postures, and what else they carry."""
@@ -59,6 +60,7 @@ def _tool(  # noqa: PLR0913 - one parameter an option
         free_rotation=free_rotation,
         matrix=matrix,
         cross_talk=cross_talk,
+        force=force,
     )
     if as_json:
         # What this command always printed: the file without its schema.

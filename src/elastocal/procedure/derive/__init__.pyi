@@ -5,6 +5,8 @@ from .derivation import (
     derive_poses as derive_poses,
     derive_run as derive_run,
     read_run as read_run,
+    run_dataset as run_dataset,
+    run_provenance as run_provenance,
     write_derived as write_derived,
 )
 from .findings import (
@@ -31,6 +33,7 @@ from .readings import (
     tool_readings as tool_readings,
     weighed_poses as weighed_poses,
 )
+from .rehearsal import rehearse_derivation as rehearse_derivation
 from .summary import (
     AttemptSummary as AttemptSummary,
     DriftSummary as DriftSummary,

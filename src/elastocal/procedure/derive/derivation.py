@@ -148,7 +148,7 @@ def derive_run(run: Path, sensor: SensorLoad | None = None) -> DerivedRun:
         If no reading is usable.
     """
     found = read_run(run)
-    provenance = _provenance(found.folder, found.record, sensor)
+    provenance = run_provenance(found.folder, found.record, sensor)
     try:
         derived = derive_poses(
             found.poses, found.cell, found.plan, found.entries, provenance, sensor
@@ -214,7 +214,7 @@ def derive_poses(
         raise DatasetError(f"no usable reading among {len(rows)}: {_reasons(rows, registration)}")
     # The press before the reference stays, usable or not: the others' friction begins with it.
     cases = [case for case in plan.contact.load_cases if case in had or case == CONDITIONING]
-    dataset = _dataset(poses, rows, cases, cell, registration.lever_arm, tool, provenance)
+    dataset = run_dataset(poses, rows, cases, cell, registration.lever_arm, tool, provenance)
     estimate = estimate_tool(tool_readings(poses, tool), tool.mass)
     found = RunFindings(poses, rows, registration, tool, estimate, dataset, plan, entries)
     return DerivedRun(dataset, summarise(found))
@@ -253,12 +253,13 @@ def _reasons(rows: Sequence[LoadRow], registration: Registration) -> str:
     return next((row.note for row in rows if row.note), "there is none")
 
 
-def _provenance(folder: RunFolder, record: RunRecord, sensor: SensorLoad | None) -> str:
+def run_provenance(folder: RunFolder, record: RunRecord, sensor: SensorLoad | None) -> str:
+    """Return where the data of a run come from, as its dataset says."""
     corrected = "" if sensor is None else f", {SENSOR_CORRECTED}"
     return f"elastocal run {folder.path.resolve().name}, {record.origin}{corrected}"
 
 
-def _dataset(
+def run_dataset(
     poses: Sequence[PoseReadings],
     rows: Sequence[LoadRow],
     load_cases: Sequence[str],
@@ -267,7 +268,7 @@ def _dataset(
     sensor: SensorLoad,
     provenance: str,
 ) -> Dataset:
-    """Return the dataset of all rows, with the load cases to keep.
+    """Return the dataset of a run: all rows, with the load cases to keep.
 
     The moment is left out: the paper's row takes the force alone, and a moment that is moved from
     the sensor to the tcp carries the sensor's place and cross-talk with the arm of the tool. On
