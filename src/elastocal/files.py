@@ -10,6 +10,7 @@ What is read and written here is held to the rule of the command at work, `elast
 
 import contextlib
 import fcntl
+import glob
 import hashlib
 import json
 import os
@@ -147,9 +148,14 @@ def _move_all(source: Path, folder: Path, last: str) -> None:
             rule.note_output(folder / name)
 
 
-def remove_leftovers(folder: Path) -> None:
-    """Remove what writers that were killed left in a folder; what is at work is left alone."""
-    for place in Path(folder).glob(f".*{_UNDER_WAY}*"):
+def remove_leftovers(output: Path) -> None:
+    """Remove what writers that were killed left beside an output and in it, if it is a folder.
+
+    What is at work is left alone.
+    """
+    pattern = f".*{_UNDER_WAY}*"
+    inside = [*output.glob(pattern), *output.glob(f"*/{pattern}")]
+    for place in (*output.parent.glob(f"{glob.escape(_prefix(output))}*"), *inside):
         with contextlib.suppress(OSError):
             handle = os.open(place, os.O_RDONLY | os.O_NOFOLLOW)
             try:

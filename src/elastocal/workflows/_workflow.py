@@ -87,7 +87,6 @@ def workflow(
             places = _places(chosen)
             written = [path for name in (*outputs, record) for path in places.pop(name, ())]
             for path in written:
-                remove_leftovers(path.parent)
                 remove_leftovers(path)
             rule = OutputRule(
                 force=getattr(chosen, "force", False),

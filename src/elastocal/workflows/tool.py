@@ -21,6 +21,8 @@ from elastocal.workflows._workflow import workflow
 
 __all__ = ["ToolResult", "ToolSettings", "tool"]
 
+_FLANGE = "flange"
+_DOWN = (0.0, 0.0, -1.0)
 _AS_FLANGE = "0 mm, 0 mm, 0 mm, 0 deg, 0 deg, 0 deg"
 """A sensor whose frame is that of its link."""
 _OF_A_TABLE = ("robot", "flange", "sensor", "down")
@@ -39,12 +41,13 @@ class ToolSettings:
     """Tool file to write; none: the result is only returned."""
     robot: str | None = None
     """URDF file, catalogue name or model file, for a CSV with joints."""
-    flange: str = "flange"
-    """Link that the sensor sits on; a run's cell says it itself."""
-    sensor: str = _AS_FLANGE
-    """Sensor in that link as mounted, ``"x, y, z, a, b, c"`` with units (Z-Y'-X'')."""
-    down: tuple[float, float, float] = (0.0, 0.0, -1.0)
-    """Direction of gravity in base, of any length."""
+    flange: str | None = None
+    """Link that the sensor sits on, for a CSV; by default ``flange``."""
+    sensor: str | None = None
+    """Sensor in that link as mounted, ``"x, y, z, a, b, c"`` with units (Z-Y'-X''), for a CSV; by
+    default the link itself."""
+    down: tuple[float, float, float] | None = None
+    """Direction of gravity in base, of any length, for a CSV; by default along -z."""
     free_rotation: bool = False
     """Find the sensor's rotation where unseen postures speak for it; else it is as mounted."""
     matrix: bool = False
@@ -135,7 +138,7 @@ def _require_postures(data: Path, settings: ToolSettings) -> None:
             )
         return
     for name in _OF_A_TABLE:
-        if getattr(settings, name) != getattr(ToolSettings, name):
+        if getattr(settings, name) is not None:
             raise CompensationError(
                 f"--{name} is for a table of postures: the cell of the run {data} says it itself"
             )
@@ -143,23 +146,23 @@ def _require_postures(data: Path, settings: ToolSettings) -> None:
 
 def _from_table(path: Path, settings: ToolSettings) -> _PostureSource:
     """Return the postures of a CSV file."""
-    arm = None
+    arm, flange = None, settings.flange or _FLANGE
     if settings.robot is not None:
         if Path(settings.robot).suffix.lower() == ".json":
             robot = read_model(Path(settings.robot)).model.robot
         else:
-            robot = find_robot(settings.robot, settings.flange, None)
-        arm = Robot.from_urdf(robot.urdf, settings.flange, robot.base)
+            robot = find_robot(settings.robot, flange, None)
+        arm = Robot.from_urdf(robot.urdf, flange, robot.base)
     rule = "must be six quantities, e.g. '0 mm, 0 mm, 45 mm, 0 deg, 0 deg, 0 deg'"
-    T_flange_sensor = parse_frame(settings.sensor, "sensor", rule, CompensationError)
-    down = np.array(settings.down)
+    T_flange_sensor = parse_frame(settings.sensor or _AS_FLANGE, "sensor", rule, CompensationError)
+    down = np.array(settings.down or _DOWN)
     length = float(np.linalg.norm(down))
     if not 0.0 < length < np.inf:
         raise CompensationError(f"direction of gravity {down.tolist()} must be finite and not zero")
     gravity = down * (-GRAVITY[2] / length)
     R, origin = T_flange_sensor[:3, :3], T_flange_sensor[:3, 3]
     points = {} if not np.any(origin) else {"flange": -origin @ R}
-    mount = SensorMount(settings.flange, origin, gravity)
+    mount = SensorMount(flange, origin, gravity)
     return _PostureSource(conditioning.read_postures(path, arm, gravity), mount, R, points=points)
 
 
