@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from markupsafe import Markup
 
 _POLICY = "default-src 'none'; script-src {scripts}; style-src {styles}; img-src data: blob:"
-"""Lets a page load nothing, and run no script and apply no style but its own, by their SHA-256."""
+"""Lets a page load nothing, and run no script but its own, by their SHA-256."""
 
 
 def render(template: str, **values: Any) -> str:
@@ -69,10 +69,9 @@ def _environment() -> "Environment":
 
 def _policy(style: str, drawing: str, script: str) -> str:
     """Return the content security policy of a page with this style and these scripts."""
-    policy = _POLICY.format(scripts=_hashes([drawing, script]), styles=_hashes([style, ""]))
-    # The drawing library makes an empty style of its own, and gives elements attributes of style,
-    # which cannot run anything.
-    return f"{policy}; style-src-attr 'unsafe-inline'" if drawing else policy
+    # The drawing library makes styles of its own, which can run nothing.
+    styles = "'unsafe-inline'" if drawing else _hashes([style])
+    return _POLICY.format(scripts=_hashes([drawing, script]), styles=styles)
 
 
 def _hashes(texts: Iterable[str]) -> str:
