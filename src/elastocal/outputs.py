@@ -24,7 +24,7 @@ FIGURE_MARKS = ("<dc:title>elastocal</dc:title>", "Software\0elastocal", "/Creat
 """How figures of ours are known: SVG, PNG and PDF."""
 _TWINS = {".dat": ".src", ".csv": ".nc"}
 """Suffixes of files that stand for those of the same name with another: program, dataset."""
-_LOOKED_AT = 1 << 16
+_LOOKED_AT = 1 << 20
 """How many bytes at both ends of a file may hold the mark by which it is known."""
 
 _Key = tuple[int, int] | str

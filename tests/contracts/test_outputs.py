@@ -17,8 +17,9 @@ from elastocal.outputs import RUN_RECORD, OutputRule, ruled
 from elastocal.procedure import JOURNAL, RunFolder
 from support.cli import elastocal
 
-WRITTEN = {"out", "c", "figure"}
+WRITTEN = {"out", "c", "figure", "picture"}
 """Parameters that name what is written; every other path is an input."""
+FLAGS = {"map_file": "map"}
 EITHER = {"robot", "springs"}
 """Parameters that take the name of something, or a file."""
 
@@ -38,7 +39,9 @@ def _places(command: Callable[..., None]) -> list[Place]:
     return [
         Place(
             each.name,
-            "" if isinstance(hints[each.name].__metadata__[0], ArgumentInfo) else f"--{each.name}",
+            ""
+            if isinstance(hints[each.name].__metadata__[0], ArgumentInfo)
+            else f"--{FLAGS.get(each.name, each.name)}",
             each.default is each.empty,
         )
         for each in inspect.signature(command).parameters.values()
@@ -130,7 +133,12 @@ def test_files_that_are_one_thing_in_two_stand_for_one_another(tmp_path, source,
 
 
 @pytest.mark.parametrize(
-    ("name", "target"), [*((name, "out") for name in WRITING), ("compare", "figure")]
+    ("name", "target"),
+    [
+        *((name, "out") for name in WRITING),
+        ("compare", "figure"),
+        ("import", "picture"),
+    ],
 )
 def test_a_file_of_somebody_else_is_not_replaced(tmp_path, name, target):
     place = tmp_path / "notes.html"

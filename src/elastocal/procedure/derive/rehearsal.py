@@ -13,7 +13,7 @@ from elastocal.arrays import FloatArray
 from elastocal.cell import LIGHT_CONTACT, Cell
 from elastocal.planning import PlanResult, PoseRecord
 from elastocal.procedure.derive._rows import LoadRow, LoadValues
-from elastocal.procedure.derive.derivation import run_dataset, run_provenance
+from elastocal.procedure.derive.derivation import dataset_of, measured_arm, run_provenance
 from elastocal.procedure.derive.readings import Mean, PoseReadings, Reading, ToolState
 from elastocal.procedure.derive.tool import sensor_load
 from elastocal.procedure.record import PoseLog, ReadingStatus, RunFolder, RunRecord, Window
@@ -49,11 +49,11 @@ def rehearse_derivation(cell: Cell, plan: PlanResult, folder: RunFolder, record:
     poses = [_readings(pose, list(plan.contact.load_cases)) for pose in plan.poses]
     rows = [row for pose in plan.poses for row in _rows(pose, plan)]
     marker = cell.file.marker
-    dataset = run_dataset(
+    dataset = dataset_of(
         poses,
         rows,
         list(dict.fromkeys(row.load_case for row in rows)),
-        cell,
+        measured_arm(cell),
         np.zeros(3) if marker is None else marker.position_tcp,
         sensor_load(cell),
         run_provenance(folder, record, None),
