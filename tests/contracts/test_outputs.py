@@ -55,7 +55,10 @@ PAIRS = [
     for name, places in PLACES.items()
     for source in places
     for target in places
-    if source.name not in WRITTEN and target.name in WRITTEN
+    if source.name not in WRITTEN
+    and target.name in WRITTEN
+    # The cell is for --guess, which has no other output than the map.
+    and (name, source.name) != ("import", "cell")
 ]
 WRITING = [name for name, places in PLACES.items() if "out" in [each.name for each in places]]
 
@@ -64,7 +67,8 @@ def _words(name: str, **given: Path) -> list[object]:
     """Return a command with some of its places, and ``--force``; others are not there."""
     words: list[object] = [name]
     for each in PLACES[name]:
-        place = given.get(each.name, Path("not_there.json") if each.required else None)
+        needed = each.required or each.name == "out"
+        place = given.get(each.name, Path(f"no_{each.name}.json") if needed else None)
         if place is not None:
             words += [*filter(None, [each.option]), place]
     return words

@@ -47,6 +47,8 @@ def _import(
             output.console().print(f"{label}: {text}", markup=False, soft_wrap=True)
         output.console().print(f"wrote {map_file}: look at every line", markup=False)
         return
+    if cell is not None:
+        raise typer.BadParameter("is for --guess: the map names the cell", param_hint="--cell")
     if out is None:
         raise typer.BadParameter("is missing: the dataset to write", param_hint="--out")
     with output.progress_bars() as progress:

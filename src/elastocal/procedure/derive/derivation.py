@@ -40,11 +40,7 @@ from elastocal.procedure.derive.readings import (
     tool_readings,
 )
 from elastocal.procedure.derive.summary import RunSummary
-from elastocal.procedure.derive.tool import (
-    estimate_tool,
-    sensor_load,
-    wrench_on_robot,
-)
+from elastocal.procedure.derive.tool import estimate_tool, sensor_load, wrench_on_robot
 from elastocal.procedure.record import (
     Entry,
     PoseLog,
@@ -240,13 +236,9 @@ def derive_poses(
 
 def measured_arm(cell: Cell) -> MeasuredArm:
     """Return what the readings of a cell are taken with."""
-    return MeasuredArm(
-        cell.robot,
-        cell.urdf_with_tool_mass,
-        cell.gravity_of_mounting,
-        cell.file.procedure.conditioning,
-        cell.file.load_cases.check_case,
-    )
+    conditioned, check = cell.file.procedure.conditioning, cell.file.load_cases.check_case
+    urdf, gravity = cell.urdf_with_tool_mass, cell.gravity_of_mounting
+    return MeasuredArm(cell.robot, urdf, gravity, conditioned, check)
 
 
 def _latest(logs: Sequence[PoseLog]) -> list[PoseLog]:
