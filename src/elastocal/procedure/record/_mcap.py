@@ -22,9 +22,11 @@ from pathlib import Path
 
 import numpy as np
 import zstandard
+from mcap.data_stream import ReadDataStream
 from mcap.exceptions import McapError
-from mcap.records import Channel, Chunk, DataEnd, McapRecord, Message, Metadata
-from mcap.stream_reader import CRCValidationError, StreamReader, breakup_chunk
+from mcap.opcode import Opcode
+from mcap.records import Channel, Chunk, DataEnd, McapRecord, Message, Metadata, Schema
+from mcap.stream_reader import CRCValidationError, StreamReader, get_chunk_data_stream
 from mcap.writer import Writer
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
@@ -42,6 +44,12 @@ _MAGIC = b"\x89MCAP0\r\n"
 _CHUNK = 512 * 1024
 """Bytes of a chunk before it is compressed: as much as viewers load at a time."""
 
+_RECORD, _MESSAGE = struct.Struct("<BQ"), struct.Struct("<HIQQ")
+"""Opcode and length of a record; of a message: channel, sequence, log time, publish time."""
+_DESCRIPTIONS: dict[int, type[Schema] | type[Channel]] = {
+    Opcode.SCHEMA: Schema,
+    Opcode.CHANNEL: Channel,
+}
 _DAMAGE = (
     McapError,
     ValueError,
@@ -158,9 +166,25 @@ def _records(data: bytes) -> Iterator[McapRecord]:
         raise ValueError("its data have no end")
     for record in records:
         if isinstance(record, Chunk):
-            yield from breakup_chunk(record, validate_crc=True)
+            yield from _unpacked(record)
         else:
             yield record
+
+
+def _unpacked(chunk: Chunk) -> Iterator[McapRecord]:
+    """Yield the records of a chunk; a message is read at once, not number by number."""
+    stream, size = get_chunk_data_stream(chunk, validate_crc=True)
+    data, at = stream.read(size), 0
+    while at < size:
+        opcode, length = _RECORD.unpack_from(data, at)
+        begin, at = at + _RECORD.size, at + _RECORD.size + length
+        if at > size:
+            raise ValueError("a record of a chunk is longer than the chunk")
+        if opcode == Opcode.MESSAGE:
+            channel, row, time, published = _MESSAGE.unpack_from(data, begin)
+            yield Message(channel, time, data[begin + _MESSAGE.size : at], published, row)
+        elif opcode in _DESCRIPTIONS:
+            yield _DESCRIPTIONS[opcode].read(ReadDataStream(BytesIO(data[begin:at])))
 
 
 def _contents(records: Iterator[McapRecord]) -> Contents:
