@@ -3,6 +3,9 @@
 A file that is being written lives beside its target under a temporary name and takes the
 target's name only after it has reached the disk, so that neither a crash nor Ctrl-C leaves
 half a file.
+
+What a file may ask for is bounded (`Limit`): a few hundred bytes of other people's can ask for more
+memory, or time, than there is.
 """
 
 import contextlib
@@ -12,14 +15,64 @@ import os
 import stat
 import tempfile
 from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from elastocal.errors import FileAccessError
+from elastocal.errors import FileAccessError, SchemaError
 
 _STANDARD_INPUT = Path("/dev/stdin")
 _DESCRIPTORS = (Path("/dev/fd"), Path("/proc/self/fd"))
 """Where a shell puts what it pipes into a command by name (``<(...)``)."""
+
+
+@dataclass(frozen=True)
+class Limit:
+    """A bound on what a file may ask for, which an environment variable raises."""
+
+    variable: str
+    """Name of the environment variable."""
+    default: int
+    """The bound when it is not set."""
+    unit: str
+    """What is counted."""
+
+    @property
+    def most(self) -> int:
+        """The bound.
+
+        Raises
+        ------
+        FileAccessError
+            If the environment variable is not a whole number above 0.
+        """
+        text = os.environ.get(self.variable, str(self.default))
+        if not (text.isascii() and text.isdigit() and int(text[:18]) > 0):
+            raise FileAccessError(
+                f"{self.variable} is {text!r:.40}: it must be a whole number above 0"
+            )
+        return int(text[:18])
+
+    def require(self, found: float, what: str) -> None:
+        """Refuse what is more than the bound.
+
+        Raises
+        ------
+        SchemaError
+            With the bound and how to raise it.
+        """
+        if not found <= self.most:
+            raise SchemaError(f"{what} {self.exceeded}")
+
+    @property
+    def exceeded(self) -> str:
+        """The end of a sentence on what is more than the bound."""
+        return f"is more than {self.most} {self.unit} (the variable {self.variable} raises this)"
+
+
+MOST_TEXT = Limit("ELASTOCAL_MAX_TEXT_MB", 256, "MB of text")
+"""Size of a file that is read whole."""
+_MEGABYTE = 1_000_000
 
 
 @contextlib.contextmanager
@@ -140,9 +193,12 @@ def read_text(path: Path) -> str:
     ------
     FileAccessError
         If the file is missing, unreadable, empty, or not text.
+    SchemaError
+        If it is larger than `MOST_TEXT`.
     """
     require_file(path)
     try:
+        require_size(path)
         text = Path(path).read_text(encoding="utf-8-sig")
     except OSError as error:
         raise FileAccessError(f"cannot read {path}: {error.strerror or error}") from error
@@ -172,6 +228,20 @@ def require_file(path: Path) -> None:
         return
     if not (stat.S_ISREG(mode) or stat.S_ISDIR(mode)):
         raise FileAccessError(f"cannot read {path}: it is a pipe or a device, not a file")
+
+
+def require_size(path: Path) -> None:
+    """Refuse a file that is too large to be read whole.
+
+    Raises
+    ------
+    SchemaError
+        If it is larger than `MOST_TEXT`.
+    OSError
+        If it is not there.
+    """
+    size = Path(path).stat().st_size / _MEGABYTE
+    MOST_TEXT.require(size, f"{path} has {size:.0f} MB, which")
 
 
 def sha256(text: str) -> str:

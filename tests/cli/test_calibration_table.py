@@ -30,7 +30,7 @@ def test_no_number_is_cut(width):
 def test_a_negative_value_is_at_no_bound_unless_the_fit_says_so():
     assert "bound" not in _known(-1.0, -1.1, -0.9, at_bound=False)
     assert "±10%" in _known(-1.0, -1.1, -0.9, at_bound=False)
-    assert _known(0.0, 0.0, 0.5, at_bound=True).endswith("at bound[/yellow], below 0.500")
+    assert _known(0.0, 0.0, 0.5, at_bound=True) == f"{yellow('at bound')}, below 0.500"
     assert _known(2.0, 1.5, 2.0, at_bound=True).endswith(", above 1.500")
     assert "bound" not in _known(0.0, -0.5, 0.5, at_bound=False)
 

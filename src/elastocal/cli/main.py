@@ -13,6 +13,7 @@ import pkgutil
 import signal
 import sys
 import threading
+import warnings
 from collections.abc import Callable, Iterator
 from types import FrameType, ModuleType
 from typing import Any
@@ -21,6 +22,7 @@ import typer
 from typer.core import TyperGroup
 
 from elastocal.cli import commands
+from elastocal.cli.output import visible
 from elastocal.errors import ElastocalError, FileAccessError
 
 _Handler = Callable[[int, FrameType | None], None]
@@ -104,12 +106,18 @@ def run() -> None:
     # time when all is taken down, takes a sixth of the time of a calibration.
     gc.set_threshold(_GARBAGE)
     atexit.register(gc.freeze)
+    # Warnings of libraries (an overflow, a division by zero) are for whoever looks for a mistake in
+    # the program, with -W; what a user is to know is a note of ours.
+    warnings.simplefilter("ignore", append=True)
     try:
         _check_output()
         with _ended_cleanly():
             app()
     except ElastocalError as error:
         _complain(str(error))
+        sys.exit(1)
+    except MemoryError as error:
+        _complain(f"not enough memory: {error}" if str(error) else "not enough memory")
         sys.exit(1)
     except OSError as error:
         # Standard output that is full or gone; nearly every file of ours has its own refusal.
@@ -135,7 +143,7 @@ def _drop_output() -> None:
 
 
 def _complain(message: str) -> None:
-    typer.echo(f"elastocal: {' '.join(message.split())}", err=True)
+    typer.echo(f"elastocal: {visible(' '.join(message.split()))}", err=True)
 
 
 @contextlib.contextmanager

@@ -13,6 +13,7 @@ import dataclasses
 import typing
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import partial
 from io import BytesIO
 from pathlib import Path
 from typing import Any, TypeVar
@@ -20,7 +21,8 @@ from typing import Any, TypeVar
 import numpy as np
 
 from elastocal.errors import ElastocalError, FileAccessError, SchemaError
-from elastocal.files import require_file, write_bytes
+from elastocal.files import Limit, require_file, write_bytes
+from elastocal.parallel import GuardedError, guarded
 from elastocal.records._codec import schema_of
 from elastocal.results import brief_repr
 
@@ -30,6 +32,23 @@ _SIGNATURE = b"\x89HDF\r\n\x1a\n"
 """First bytes of an HDF5 file, which every NetCDF4 file is (HDF5 file format, section II.A)."""
 _CHECKED = {"fletcher32": True}
 """A checksum for each chunk: a byte that a disk has changed is an error, not another number."""
+_MOST_ARRAYS = Limit("ELASTOCAL_MAX_ARRAYS_MB", 256, "MB of numbers")
+_MOST_SECONDS = Limit("ELASTOCAL_MAX_SECONDS", 8, "s of reading")
+_MEMORY_PER_ARRAYS = 4
+"""Memory that reading takes, in terms of the numbers that are read."""
+_MEGABYTE = 1_000_000
+_DAMAGE = (
+    SchemaError,
+    OSError,
+    ValueError,
+    LookupError,
+    RuntimeError,
+    TypeError,
+    AttributeError,
+    OverflowError,
+    MemoryError,
+)
+"""What h5py and h5netcdf raise for damaged files; to a user all of it means the same."""
 _PACKED = {"compression": "gzip", "compression_opts": 4, "shuffle": True}
 _STORAGE = ("_FillValue", "missing_value", "scale_factor", "add_offset", "_Encoding", "coordinates")
 """Attributes that say how values are stored (CF section 2.5.1, 8.1), not what they mean."""
@@ -111,16 +130,16 @@ def read_arrays(path: Path, schema: str = "") -> LabelledArrays:
         If the file is missing, unreadable or empty.
     """
     _check_signature(path)
-    import h5netcdf
+    # Imported here, or each child would do it anew.
+    import h5netcdf  # noqa: F401
 
     try:
-        # HDF5 without dimension scales gets made-up ones; the validation then names what lacks.
-        with h5netcdf.File(path, "r", decode_vlen_strings=True, phony_dims="sort") as file:
-            found = _contents(file)
-    except (OSError, ValueError, KeyError, RuntimeError) as error:
-        # What the libraries raise for damaged files; their own text is the only diagnosis.
-        reason = " ".join(str(error).split())
-        raise SchemaError(f"{path}: not a readable NetCDF4 file: {reason}") from error
+        memory = _MEMORY_PER_ARRAYS * _MOST_ARRAYS.most
+        found = guarded(partial(_read, Path(path)), _MOST_SECONDS.most, memory)
+    except GuardedError as error:
+        raise SchemaError(f"{path}: not a readable NetCDF4 file: {error}") from error
+    if isinstance(found, str):
+        raise SchemaError(f"{path}: not a readable NetCDF4 file: {found}")
     if schema:
         # Pydantic comes with it, which datasets do without.
         from elastocal.records._validation import check_schema
@@ -165,6 +184,38 @@ def _check_signature(path: Path) -> None:
         raise FileAccessError(f"cannot read {path}: the file is empty")
     if start != _SIGNATURE:
         raise SchemaError(f"{path}: not a NetCDF4 file: it does not begin with the HDF5 signature")
+
+
+def _read(path: Path) -> LabelledArrays | str:
+    """Return the contents of a file, or why it cannot be read."""
+    import h5netcdf
+    import h5py
+
+    try:
+        with h5py.File(path, "r") as image:
+            _require_readable(image)
+            # HDF5 without dimension scales gets made-up ones; the validation names what lacks.
+            with h5netcdf.File(image, "r", decode_vlen_strings=True, phony_dims="sort") as file:
+                return _contents(file)
+    except _DAMAGE as error:
+        # Their own text is the only diagnosis.
+        return " ".join(str(error).split()) or type(error).__name__
+
+
+def _require_readable(image: Any) -> None:
+    """Refuse more numbers than fit into memory, and what lies in other files."""
+    import h5py
+
+    size = 0
+    for name in image:
+        if not isinstance(image.get(name, getlink=True), h5py.HardLink):
+            raise SchemaError(f"{name!r:.60} is a link, maybe into another file")
+        if isinstance(image[name], h5py.Dataset):
+            array = image[name]
+            if array.external or array.is_virtual:
+                raise SchemaError(f"the values of {name!r:.60} lie in another file")
+            size += (array.size or 0) * array.dtype.itemsize
+            _MOST_ARRAYS.require(size / _MEGABYTE, f"what {name!r:.60} and those before it hold")
 
 
 def _contents(file: Any) -> LabelledArrays:
