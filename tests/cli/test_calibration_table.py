@@ -4,8 +4,8 @@ import io
 from dataclasses import replace
 
 import pytest
-from rich.console import Console
 
+from elastocal.cli.output import console, yellow
 from elastocal.cli.tables.calibration import _known, _spring_table, _springs
 from elastocal.identification import SpringSummary
 from support.summaries import made_up_summary
@@ -19,9 +19,9 @@ ROWS = (
 
 @pytest.mark.parametrize("width", [80, 120])
 def test_no_number_is_cut(width):
-    console = Console(file=io.StringIO(), width=width)
-    console.print(_spring_table(replace(made_up_summary(), springs=ROWS)))
-    shown = console.file.getvalue()
+    screen = console(stderr=False, file=io.StringIO(), width=width)
+    screen.print(_spring_table(replace(made_up_summary(), springs=ROWS)))
+    shown = screen.file.getvalue()
     for number in ("0.1235", "-0.025 … 1.250", "8.100", "0.1447 µm/N", "6.911 MN/m"):
         assert number in shown
     assert max(map(len, shown.splitlines())) <= width

@@ -18,6 +18,7 @@ from elastocal.planning import (
     read_plan,
     write_plan,
 )
+from elastocal.planning.checks import registration_shortages
 from elastocal.workflows import init
 
 
@@ -145,3 +146,10 @@ def test_load_cases_that_are_too_small_come_with_larger_ones(cell):
     texts = " ".join(production_findings(weak, None))
     assert "ask for load_cases.fx and fy of" in texts
     assert "ask for load_cases.fz of" in texts
+
+
+def test_no_pose_is_left_to_a_station_that_cannot_be_registered(cell):
+    """The block's second tilt to weigh the tool by is seen by a station that sees little else."""
+    found = make_plan(changed(cell, poses=9), jobs=1).plan
+    assert registration_shortages([pose.seen_by for pose in found.poses]) == {}
+    assert found.production.coverage.is_enough

@@ -35,8 +35,14 @@ bold, dim, red, yellow, green = (partial(_styled, style) for style in _STYLES)
 """Return a text that `console` shows in a style."""
 
 
-def console() -> "Console":
-    """Return the console that people read; standard output stays free for data."""
+def console(**options: Any) -> "Console":
+    """Return the console that people read; standard output stays free for data.
+
+    Parameters
+    ----------
+    **options : object
+        Of Rich's console, in place of ours.
+    """
     from rich.console import Console
     from rich.text import Text
 
@@ -60,7 +66,7 @@ def console() -> "Console":
                     shown.append(visible(part), " ".join(styles) or None)
             return shown
 
-    return Screen(stderr=True, highlight=False, soft_wrap=False)
+    return Screen(**{"stderr": True, "highlight": False, "soft_wrap": False, **options})
 
 
 _PARTS = re.compile(f"([{''.join(_STARTS)}{_END}])")

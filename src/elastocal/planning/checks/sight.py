@@ -154,12 +154,15 @@ class SightCheck(PostureCheck):
 
     def margin(self, postures: Postures) -> FloatArray:
         """Return the margin of each posture, shape (pose,), in rad; -pi when no station sees."""
-        margins = [self._of_station(station, postures) for station in self.stations]
-        return np.asarray(np.max(margins, axis=0), dtype=float)
+        return np.asarray(self.margins(postures).max(axis=0), dtype=float)
+
+    def margins(self, postures: Postures) -> FloatArray:
+        """Return the margin of each station, shape (station, pose), in rad; positive: it sees."""
+        return np.array([self._of_station(station, postures) for station in self.stations])
 
     def seen_by(self, postures: Postures) -> list[str | None]:
         """Return the station that sees each posture's marker best, None where none does."""
-        margins = np.array([self._of_station(station, postures) for station in self.stations])
+        margins = self.margins(postures)
         best = margins.argmax(axis=0)
         return [
             self.stations[station].name if margins[station, pose] > 0.0 else None
@@ -172,8 +175,7 @@ class SightCheck(PostureCheck):
         The one that sees it best, but none that would measure fewer poses than its registration
         needs: see `assign_stations`.
         """
-        margins = np.array([self._of_station(station, postures) for station in self.stations])
-        chosen = assign_stations(margins).tolist()
+        chosen = assign_stations(self.margins(postures)).tolist()
         return [self.stations[station].name if station >= 0 else None for station in chosen]
 
     def _of_station(self, station: Station, postures: Postures) -> FloatArray:
