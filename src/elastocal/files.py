@@ -70,8 +70,8 @@ class Limit:
         return f"is more than {self.most} {self.unit} (the variable {self.variable} raises this)"
 
 
-MOST_TEXT = Limit("ELASTOCAL_MAX_TEXT_MB", 256, "MB of text")
-"""Size of a file that is read whole."""
+_MOST_READ = Limit("ELASTOCAL_MAX_FILE_MB", 256, "MB")
+"""Size of a file that is read whole: texts, meshes, streams."""
 _MEGABYTE = 1_000_000
 
 
@@ -194,7 +194,7 @@ def read_text(path: Path) -> str:
     FileAccessError
         If the file is missing, unreadable, empty, or not text.
     SchemaError
-        If it is larger than `MOST_TEXT`.
+        If it is too large to be read whole.
     """
     require_file(path)
     try:
@@ -236,12 +236,12 @@ def require_size(path: Path) -> None:
     Raises
     ------
     SchemaError
-        If it is larger than `MOST_TEXT`.
+        With the bound and how to raise it.
     OSError
         If it is not there.
     """
     size = Path(path).stat().st_size / _MEGABYTE
-    MOST_TEXT.require(size, f"{path} has {size:.0f} MB, which")
+    _MOST_READ.require(size, f"{path} has {size:.0f} MB, which")
 
 
 def sha256(text: str) -> str:

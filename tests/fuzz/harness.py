@@ -329,12 +329,15 @@ def _main() -> None:
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--seconds", type=float, default=float("inf"))
     parser.add_argument("--kind", action="append", default=[])
+    parser.add_argument("--others", action="store_true", help="not the usual command of a kind: the others")
     parser.add_argument("--show", default="", help="a case as the corpus has it: print what it says")
     given = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
         seeds = Path(folder) / "seeds"
         make_seeds(seeds)
         cases = drawn_cases(given.cases, given.seed, given.kind)
+        if given.others:
+            cases = (case for case in cases if case.kind == "options" or case.command != KINDS[case.kind].commands[0])
         if given.show:
             cases = iter([Case(**json.loads(given.show))])
         _report(run_cases(cases, seeds, given.seconds), bool(given.show))

@@ -244,6 +244,8 @@ def _attributes(holder: Any) -> dict[str, Any]:
 def _decoded(variable: Any, stated: dict[str, Any]) -> LabelledArray:
     """Return the values that a variable means by what it stores (CF section 2.5.1, 8.1)."""
     values, dims = np.asarray(variable[...]), tuple(variable.dimensions)
+    if values.dtype.kind not in "biufSUO":
+        raise SchemaError(f"{variable.name!r:.60} holds values of type {values.dtype}")
     if values.dtype == "S1" and dims:
         # Texts as rows of characters, from before NetCDF had texts.
         values, dims = _joined_characters(values), dims[:-1]
