@@ -38,7 +38,7 @@ import typer
 
 import elastocal
 from elastocal.cli import main
-from fuzz.mutations import BYTES, FORMS, UNREADABLE, NUMBERS, TEXTS
+from fuzz.mutations import BYTES, FORMS, NUMBERS, TEXTS, UNREADABLE
 from fuzz.seeds import KINDS, make_seeds
 
 LONGEST = 10.0
@@ -49,7 +49,9 @@ MOST_MEMORY = 1 << 30
 """In bytes, beside what this process has before."""
 _BATCH = 250
 """Cases of one child."""
-_NOISE = re.compile(r"^(\S+:\d+: )?\w*Warning: |^(Error|Warning): |HDF5-DIAG|^\s+at line \d+ in ", re.M)
+_NOISE = re.compile(
+    r"^(\S+:\d+: )?\w*Warning: |^(Error|Warning): |HDF5-DIAG|^\s+at line \d+ in ", re.M
+)
 """What NumPy, urdfdom and HDF5 print by themselves."""
 
 
@@ -59,7 +61,7 @@ class Case:
 
     kind: str
     command: str
-    """As in `KINDS`; ``{f}`` is the file, ``{s}`` the folder of the seeds, ``{o}`` one to write into."""
+    """As in `KINDS`; ``{f}`` is the file, ``{s}`` the folder of the seeds, ``{o}`` a new one."""
     mutations: tuple[tuple[str, int], ...] = ()
     """Names of mutations in their order, each with its seed."""
 
@@ -75,7 +77,9 @@ class Case:
         names = list(FORMS[known.form])
         count = rng.choice((1, 1, 1, 2, 3))
         # What needs a file that can be read comes first.
-        chosen = sorted(rng.choices(names, k=count), key=lambda name: (name in BYTES, "bomb" in name))
+        chosen = sorted(
+            rng.choices(names, k=count), key=lambda name: (name in BYTES, "bomb" in name)
+        )
         return cls(kind, command, tuple((name, rng.getrandbits(31)) for name in chosen))
 
     def arguments(self, seeds: Path, folder: Path) -> list[str]:
@@ -120,9 +124,30 @@ class Verdict:
     """What it printed to standard error."""
 
 
-_ABSURD = (*TEXTS, *(str(number)[:400] for number in NUMBERS), "0,0", "1 m,2 m", "0 mm, 0 mm, 1e300 m", "nan,nan",
-           "1,0,0", "0,inf", "1e308 m, 0 m, 0 m, 0 deg, 0 deg, 1e308 deg", "1/0", "70/30", "0/0", "99999999999/1",
-           "springs=a[/b]", "search=", "=", "poses=1e9", "5 %, 5 um", "-1 %, nan um", "a.yaml", "out/b.svg", "0:a[/b]")  # fmt: skip
+_ABSURD = (
+    *TEXTS,
+    *(str(number)[:400] for number in NUMBERS),
+    "0,0",
+    "1 m,2 m",
+    "0 mm, 0 mm, 1e300 m",
+    "nan,nan",
+    "1,0,0",
+    "0,inf",
+    "1e308 m, 0 m, 0 m, 0 deg, 0 deg, 1e308 deg",
+    "1/0",
+    "70/30",
+    "0/0",
+    "99999999999/1",
+    "springs=a[/b]",
+    "search=",
+    "=",
+    "poses=1e9",
+    "5 %, 5 um",
+    "-1 %, nan um",
+    "a.yaml",
+    "out/b.svg",
+    "0:a[/b]",
+)
 
 
 def _absurd_command(rng: random.Random) -> str:
@@ -130,7 +155,9 @@ def _absurd_command(rng: random.Random) -> str:
     name = rng.choice([*list(_PLAIN)] + 12 * [each for each in _PLAIN if each not in _SLOW])
     words = _PLAIN[name].split()
     command = _commands().commands[name]
-    options = [each for each in command.params if each.param_type_name == "option" and each.name != "help"]
+    options = [
+        each for each in command.params if each.param_type_name == "option" and each.name != "help"
+    ]
     for _ in range(rng.choice((1, 1, 2))):
         if rng.random() < 0.15 and len(words) > 1:
             words[rng.randrange(1, len(words))] = rng.choice(_ABSURD)
@@ -140,7 +167,7 @@ def _absurd_command(rng: random.Random) -> str:
         if value and rng.random() < 0.4:
             value = [str(rng.choice(NUMBERS))[:400]]
         words += [rng.choice(option.opts), *value]
-    return json.dumps([word.replace("\0", "") .encode("utf-8", "ignore").decode() for word in words])
+    return json.dumps([word.replace("\0", "").encode("utf-8", "ignore").decode() for word in words])
 
 
 _SLOW = ("init", "plan", "codec", "tool", "stiffness", "simulate-process", "report")
@@ -152,20 +179,22 @@ _PLAIN = {
     "plan": "plan {s}/cell.yaml --out {o} --dry-run",
     "run": "run {s}/cell.yaml --plan {s}/plan --out {o} --dry-run",
     "calibrate": "calibrate {s}/dataset.nc --out {o}.json --draws 40",
-    "codec": "codec {s}/dataset.nc --compare springs=actuated,bearing --splits 1 --jobs 1 --out {o}",
+    "codec": "codec {s}/dataset.nc --compare springs=actuated,bearing --splits 1 --out {o}",
     "predict": "predict {s}/model.json {s}/rows.csv --out {o}.csv",
     "tool": "tool {s}/postures.csv --out {o}.json",
     "compensate": "compensate {s}/model.json {s}/path.csv --out {o}.csv",
-    "stiffness": "stiffness {s}/model.json {s}/path.csv --spins 2 --stands 1 --stations 2 --out {o}",
+    "stiffness": "stiffness {s}/model.json {s}/path.csv --stands 1 --stations 2 --out {o}",
     "export": "export {s}/model.json --c {o}",
-    "simulate-process": "simulate-process {s}/cell.yaml --model {s}/model.json --path {s}/path.csv --jobs 1 --out {o}",
+    "simulate-process": "simulate-process {s}/cell.yaml --model {s}/model.json --out {o}",
     "compare": "compare {s}/old.json {s}/model.json",
     "report": "report {s}/model.json --out {o}.html",
 }
 """Commands that work, to which absurd options are added; an option that stands twice: the last."""
 
 
-def run_cases(cases: Iterable[Case], seeds: Path, seconds: float = float("inf")) -> Iterator[Verdict]:
+def run_cases(
+    cases: Iterable[Case], seeds: Path, seconds: float = float("inf")
+) -> Iterator[Verdict]:
     """Yield the verdict of each case, for as long as there is time."""
     for each in pkgutil.walk_packages(elastocal.__path__, "elastocal."):
         if "report" not in each.name and "__main__" not in each.name:
@@ -232,8 +261,12 @@ def _work(batch: list[Case], seeds: Path, place: Path, writing: int) -> None:
     err = os.open(place / "err", os.O_RDWR | os.O_CREAT)
     os.dup2(out, 1)
     os.dup2(err, 2)
-    sys.stdout, sys.stderr = (io.TextIOWrapper(io.FileIO(n, "w", closefd=False), "utf-8", "backslashreplace",
-                                               write_through=True) for n in (1, 2))  # fmt: skip
+    sys.stdout, sys.stderr = (
+        io.TextIOWrapper(
+            io.FileIO(n, "w", closefd=False), "utf-8", "backslashreplace", write_through=True
+        )
+        for n in (1, 2)
+    )
     for number, case in enumerate(batch):
         folder = place / f"case_{number}"
         folder.mkdir()
@@ -260,12 +293,21 @@ def _ended(case: Case, seeds: Path, folder: Path, err: Path) -> dict[str, object
     word = _judged(code, text, seconds, memory)
     if word == "ok" and code and _listed(folder) != before:
         word, text = "half-written", f"{sorted(set(_listed(folder)) ^ set(before))} {text}"
-    return {"word": word, "code": code, "seconds": seconds, "megabytes": memory / 1e6, "text": text[-3000:]}
+    return {
+        "word": word,
+        "code": code,
+        "seconds": seconds,
+        "megabytes": memory / 1e6,
+        "text": text[-3000:],
+    }
 
 
 def _exit_code(words: list[str]) -> int:
     # Typer builds the same commands anew at each call, which takes longer than most cases.
-    with mock.patch.object(sys, "argv", ["elastocal", *words]), mock.patch.object(main, "app", _commands()):
+    with (
+        mock.patch.object(sys, "argv", ["elastocal", *words]),
+        mock.patch.object(main, "app", _commands()),
+    ):
         try:
             main.run()
         except SystemExit as stop:
@@ -298,7 +340,9 @@ def _judged(code: int, text: str, seconds: float, memory: float) -> str:
 def _listed(folder: Path) -> dict[str, tuple[int, int]]:
     """Return size and time of each file in a folder."""
     return {
-        str(path.relative_to(folder)): (path.stat().st_size, path.stat().st_mtime_ns) if path.is_file() else (0, 0)
+        str(path.relative_to(folder)): (path.stat().st_size, path.stat().st_mtime_ns)
+        if path.is_file()
+        else (0, 0)
         for path in folder.rglob("*")
     }
 
@@ -329,15 +373,23 @@ def _main() -> None:
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--seconds", type=float, default=float("inf"))
     parser.add_argument("--kind", action="append", default=[])
-    parser.add_argument("--others", action="store_true", help="not the usual command of a kind: the others")
-    parser.add_argument("--show", default="", help="a case as the corpus has it: print what it says")
+    parser.add_argument(
+        "--others", action="store_true", help="not the usual command of a kind: the others"
+    )
+    parser.add_argument(
+        "--show", default="", help="a case as the corpus has it: print what it says"
+    )
     given = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
         seeds = Path(folder) / "seeds"
         make_seeds(seeds)
         cases = drawn_cases(given.cases, given.seed, given.kind)
         if given.others:
-            cases = (case for case in cases if case.kind == "options" or case.command != KINDS[case.kind].commands[0])
+            cases = (
+                case
+                for case in cases
+                if case.kind == "options" or case.command != KINDS[case.kind].commands[0]
+            )
         if given.show:
             cases = iter([Case(**json.loads(given.show))])
         _report(run_cases(cases, seeds, given.seconds), bool(given.show))
@@ -352,7 +404,10 @@ def _report(verdicts: Iterable[Verdict], show: bool) -> None:
         if verdict.word != "ok" or show:
             last = verdict.text.strip().splitlines() or [""]
             told = "\n".join(last) if show else last[-1][:300]
-            print(f"{verdict.word} [{verdict.code}] {verdict.seconds:.1f} s {verdict.megabytes:.0f} MB: {told}")
+            print(
+                f"{verdict.word} [{verdict.code}] {verdict.seconds:.1f} s"
+                f" {verdict.megabytes:.0f} MB: {told}"
+            )
             print(f"   {json.dumps(asdict(verdict.case))}", flush=True)
     words = sorted({word for counts in table.values() for word in counts})
     print(f"{'kind':14}", *(f"{word:>10.10}" for word in words), f"{'ms a case':>10}")

@@ -27,20 +27,81 @@ Mutation = Callable[[bytes, random.Random], bytes]
 Tree = Any
 """Whatever JSON or YAML holds."""
 
-UNREADABLE = (ValueError, LookupError, TypeError, AttributeError, RecursionError, EOFError, yaml.YAMLError, csv.Error,
-              McapError, zstandard.ZstdError, OverflowError, MemoryError)  # fmt: skip
+UNREADABLE = (
+    ValueError,
+    LookupError,
+    TypeError,
+    AttributeError,
+    RecursionError,
+    EOFError,
+    yaml.YAMLError,
+    csv.Error,
+    McapError,
+    zstandard.ZstdError,
+    OverflowError,
+    MemoryError,
+)
 """What a mutation raises that does not know what an earlier one has left."""
 
 TEXTS = (
-    "", " ", "a[/b]", "[bold]", "[/]", "\x1b[31mred\x1b[0m", "é漢\u202e", "\ud800", "\0", "nan",
-    "=1+1", "<b>x</b>", "../../etc/passwd", "/dev/zero", "x" * 300, "y" * 200_000, "1_100", "1e400",
-    "1e308 m", "5e-324 s", "0.001 deg/s", "-5 mm", "1e9 kg", "nan N", "inf m", "12 parsec", "%s{0}",
-    "rad", "a,b;c#d", "elastocal.cell/1", "elastocal.model/99",
-)  # fmt: skip
+    "",
+    " ",
+    "a[/b]",
+    "[bold]",
+    "[/]",
+    "\x1b[31mred\x1b[0m",
+    "é漢\u202e",
+    "\ud800",
+    "\0",
+    "nan",
+    "=1+1",
+    "<b>x</b>",
+    "../../etc/passwd",
+    "/dev/zero",
+    "x" * 300,
+    "y" * 200_000,
+    "1_100",
+    "1e400",
+    "1e308 m",
+    "5e-324 s",
+    "0.001 deg/s",
+    "-5 mm",
+    "1e9 kg",
+    "nan N",
+    "inf m",
+    "12 parsec",
+    "%s{0}",
+    "rad",
+    "a,b;c#d",
+    "elastocal.cell/1",
+    "elastocal.model/99",
+)
 NUMBERS = (
-    0, -1, 1, 2, 3, 1000, 100_000_000, 2**31, 2**63, 2**64, -(2**63) - 1, 10**400, 0.5, -0.0, 1e-9,
-    5e-324, 1e12, 1e160, 1e308, -1e308, float("nan"), float("inf"), float("-inf"), True,
-)  # fmt: skip
+    0,
+    -1,
+    1,
+    2,
+    3,
+    1000,
+    100_000_000,
+    2**31,
+    2**63,
+    2**64,
+    -(2**63) - 1,
+    10**400,
+    0.5,
+    -0.0,
+    1e-9,
+    5e-324,
+    1e12,
+    1e160,
+    1e308,
+    -1e308,
+    float("nan"),
+    float("inf"),
+    float("-inf"),
+    True,
+)
 
 
 def deep(depth: int, inner: Tree = 0) -> Tree:
@@ -58,9 +119,26 @@ def hostile(rng: random.Random) -> Tree:
     if kind < 6:
         return rng.choice(NUMBERS)
     return rng.choice(
-        (None, [], {}, [[]], [{}], {"a": 1}, {"": None}, [1, 2, 3], ["slip"], {"kind": ["slip"]},
-         [None] * 1000, deep(60), deep(900), {"a[/b]": "a[/b]"}, [float("nan")] * 3, "x", 7)
-    )  # fmt: skip
+        (
+            None,
+            [],
+            {},
+            [[]],
+            [{}],
+            {"a": 1},
+            {"": None},
+            [1, 2, 3],
+            ["slip"],
+            {"kind": ["slip"]},
+            [None] * 1000,
+            deep(60),
+            deep(900),
+            {"a[/b]": "a[/b]"},
+            [float("nan")] * 3,
+            "x",
+            7,
+        )
+    )
 
 
 # Bytes
@@ -76,8 +154,25 @@ def _flip(data: bytes, rng: random.Random) -> bytes:
 
 def _put(data: bytes, rng: random.Random) -> bytes:
     at = rng.randrange(len(data) + 1)
-    new = rng.choice((b"\0", b"\xff", b"\xff" * 8, b"\x1b[31m", b"[/b]", b"\n", b'"', b"[", b"{", b"\r",
-                      b"\x7f\xff\xff\xff", b"9" * 400, b"\xef\xbb\xbf", b",", b"\t"))  # fmt: skip
+    new = rng.choice(
+        (
+            b"\0",
+            b"\xff",
+            b"\xff" * 8,
+            b"\x1b[31m",
+            b"[/b]",
+            b"\n",
+            b'"',
+            b"[",
+            b"{",
+            b"\r",
+            b"\x7f\xff\xff\xff",
+            b"9" * 400,
+            b"\xef\xbb\xbf",
+            b",",
+            b"\t",
+        )
+    )
     over = rng.random() < 0.5
     return data[:at] + new + data[at + len(new) * over :]
 
@@ -117,7 +212,9 @@ def _places(tree: Tree) -> list[tuple[_Holder, Any]]:
     open_nodes = [tree]
     while open_nodes:
         node = open_nodes.pop()
-        keys = node if isinstance(node, dict) else range(len(node)) if isinstance(node, list) else ()
+        keys = (
+            node if isinstance(node, dict) else range(len(node)) if isinstance(node, list) else ()
+        )
         for key in keys:
             found.append((node, key))
             open_nodes.append(node[key])
@@ -177,7 +274,9 @@ def _lengthen(tree: Tree, rng: random.Random) -> Tree:
     if places:
         holder, key = rng.choice(places)
         items = holder[key]
-        holder[key] = rng.choice((items * 2, items[:-1], [items], items * (2000 // (len(items) + 1))))
+        holder[key] = rng.choice(
+            (items * 2, items[:-1], [items], items * (2000 // (len(items) + 1)))
+        )
     return tree
 
 
@@ -243,7 +342,9 @@ def _lines(data: bytes, rng: random.Random) -> bytes:
     elif kind == 2:
         lines[a], lines[b] = lines[b], lines[a]
     else:
-        lines[a] = lines[a].rstrip(b"\n") + rng.choice((b" # [/b]", b"," * 500, b"x" * 150_000)) + b"\n"
+        lines[a] = (
+            lines[a].rstrip(b"\n") + rng.choice((b" # [/b]", b"," * 500, b"x" * 150_000)) + b"\n"
+        )
     return b"".join(lines)
 
 
@@ -258,11 +359,30 @@ def _yaml_bomb(data: bytes, rng: random.Random) -> bytes:
     )
     keys = "".join(f"key_{n}: {n}\n" for n in range(rng.choice((1000, 60_000))))
     more = rng.choice(
-        (alias, merge, keys, "self: &s {me: *s}\n", "l: &l [*l]\n", "t: !!python/object:os.system 1\n",
-         "? {a: 1}\n: 2\n", "? [1]\n: 2\n", "x: 2020-13-45\n", "x: 190:20:30.15\n", "x: 0b" + "1" * 99 + "\n",
-         "x: !!set {a, b}\n", "x: !!binary aaa\n", "x: " + "[" * 5000 + "\n", "x: " + "9" * 5000 + "\n",
-         "name: a\nname: b\n", "- x\n", "--- 1\n--- 2\n", "<<: 1\n", "x: !!timestamp 1\n", "x: =\n")
-    )  # fmt: skip
+        (
+            alias,
+            merge,
+            keys,
+            "self: &s {me: *s}\n",
+            "l: &l [*l]\n",
+            "t: !!python/object:os.system 1\n",
+            "? {a: 1}\n: 2\n",
+            "? [1]\n: 2\n",
+            "x: 2020-13-45\n",
+            "x: 190:20:30.15\n",
+            "x: 0b" + "1" * 99 + "\n",
+            "x: !!set {a, b}\n",
+            "x: !!binary aaa\n",
+            "x: " + "[" * 5000 + "\n",
+            "x: " + "9" * 5000 + "\n",
+            "name: a\nname: b\n",
+            "- x\n",
+            "--- 1\n--- 2\n",
+            "<<: 1\n",
+            "x: !!timestamp 1\n",
+            "x: =\n",
+        )
+    )
     return rng.choice((data + b"\n" + more.encode(), more.encode(), more.encode() + data))
 
 
@@ -284,11 +404,16 @@ def _cells(data: bytes, rng: random.Random) -> bytes:
         elif kind == 2:
             rows = [[*r[:column], *r[column + 1 :]] for r in rows]
         elif kind == 3:
-            rows = [r if n <= first else [*r[:column], value, *r[column + 1 :]] for n, r in enumerate(rows)]
+            rows = [
+                r if n <= first else [*r[:column], value, *r[column + 1 :]]
+                for n, r in enumerate(rows)
+            ]
         else:
             rows = [[*r, r[column]] if column < len(r) else r for r in rows]
     out = io.StringIO()
-    csv.writer(out, delimiter=rng.choice(",,,,,;\t|"), lineterminator=rng.choice(("\n", "\r\n", "\r"))).writerows(rows)
+    csv.writer(
+        out, delimiter=rng.choice(",,,,,;\t|"), lineterminator=rng.choice(("\n", "\r\n", "\r"))
+    ).writerows(rows)
     return out.getvalue().encode("utf-8", "replace")
 
 
@@ -297,11 +422,33 @@ def _cells(data: bytes, rng: random.Random) -> bytes:
 
 def _attribute(rng: random.Random) -> Any:
     return rng.choice(
-        (1, 2.5, np.nan, np.array([1, 2, 3]), np.array([], dtype=float), np.float32(3), b"\xff\xfe", "a[/b]",
-         np.array(["a", "b"], dtype=h5py.string_dtype()), "\x1b[31m", "x" * 5000, np.bool_(True), "[1, 2",
-         '{"a": 1}', "[[1]]", "null", '["x"]', h5py.Empty("f8"), np.array([[1.0]]), "1e999", deep_text(3000),
-         np.array([(1, 2.0)], dtype=[("a", "i4"), ("b", "f8")]), np.array([1 + 2j]), 2**63)
-    )  # fmt: skip
+        (
+            1,
+            2.5,
+            np.nan,
+            np.array([1, 2, 3]),
+            np.array([], dtype=float),
+            np.float32(3),
+            b"\xff\xfe",
+            "a[/b]",
+            np.array(["a", "b"], dtype=h5py.string_dtype()),
+            "\x1b[31m",
+            "x" * 5000,
+            np.bool_(True),
+            "[1, 2",
+            '{"a": 1}',
+            "[[1]]",
+            "null",
+            '["x"]',
+            h5py.Empty("f8"),
+            np.array([[1.0]]),
+            "1e999",
+            deep_text(3000),
+            np.array([(1, 2.0)], dtype=[("a", "i4"), ("b", "f8")]),
+            np.array([1 + 2j]),
+            2**63,
+        )
+    )
 
 
 def deep_text(depth: int) -> str:
@@ -311,8 +458,20 @@ def deep_text(depth: int) -> str:
 
 def _hdf5_attributes(file: h5py.File, rng: random.Random) -> None:
     holder = rng.choice((file, *file.values()))
-    names = [*holder.attrs, "_FillValue", "missing_value", "scale_factor", "add_offset", "coordinates",
-             "units", "_Encoding", "flag_meanings", "schema", "a[/b]", "extra"]  # fmt: skip
+    names = [
+        *holder.attrs,
+        "_FillValue",
+        "missing_value",
+        "scale_factor",
+        "add_offset",
+        "coordinates",
+        "units",
+        "_Encoding",
+        "flag_meanings",
+        "schema",
+        "a[/b]",
+        "extra",
+    ]
     name = rng.choice(names)
     if name in holder.attrs and rng.random() < 0.3:
         del holder.attrs[name]
@@ -340,8 +499,12 @@ def _hdf5_variable(file: h5py.File, rng: random.Random) -> None:
         huge = rng.choice(((10**6, 10**6), (3 * 10**12,), (2**40, 6), (10**9,)))
         file.create_dataset(name, huge, "f8", chunks=rng.choice((True, (1,) * len(huge))))
     else:
-        dtype = rng.choice(("i1", "u8", "f4", "f2", "S4", "c16", "bool", h5py.string_dtype(), "f8", "i8"))
-        dims = rng.choice((shape, shape[:-1], (*shape, 2), (0, *shape[1:]), tuple(n + 1 for n in shape), ()))
+        dtype = rng.choice(
+            ("i1", "u8", "f4", "f2", "S4", "c16", "bool", h5py.string_dtype(), "f8", "i8")
+        )
+        dims = rng.choice(
+            (shape, shape[:-1], (*shape, 2), (0, *shape[1:]), tuple(n + 1 for n in shape), ())
+        )
         file.create_dataset(name, dims, dtype)
 
 
@@ -354,21 +517,30 @@ def _hdf5_values(file: h5py.File, rng: random.Random) -> None:
     if chosen.dtype.kind in "fiu" and chosen.ndim:
         values = np.array(chosen)
         info = np.iinfo(values.dtype) if values.dtype.kind in "iu" else np.finfo(values.dtype)
-        new = rng.choice((0, 1, info.max, info.min, info.max / 2)) if values.dtype.kind != "f" else rng.choice(
-            (np.nan, np.inf, -np.inf, info.max, info.min, info.tiny, 0.0, 1e9, -1.0))
+        new = (
+            rng.choice((0, 1, info.max, info.min, info.max / 2))
+            if values.dtype.kind != "f"
+            else rng.choice(
+                (np.nan, np.inf, -np.inf, info.max, info.min, info.tiny, 0.0, 1e9, -1.0)
+            )
+        )
         if rng.random() < 0.3:
             values[...] = new
         else:
             values.flat[rng.randrange(values.size)] = new
         chosen[...] = values
     elif chosen.dtype.kind == "O" and chosen.ndim:
-        chosen[rng.randrange(len(chosen))] = rng.choice(TEXTS[:14]).encode("utf-8", "replace").replace(b"\0", b"")
+        chosen[rng.randrange(len(chosen))] = (
+            rng.choice(TEXTS[:14]).encode("utf-8", "replace").replace(b"\0", b"")
+        )
 
 
 def _hdf5_more(file: h5py.File, rng: random.Random) -> None:
     name = rng.choice(("more", "a[/b]", "\x1b[31m", "schema", "pose"))
     if name not in file:
-        file.create_dataset(name, data=rng.choice((np.arange(3.0), np.array([[1, 2]]), 5, np.array([b"x"]))))
+        file.create_dataset(
+            name, data=rng.choice((np.arange(3.0), np.array([[1, 2]]), 5, np.array([b"x"])))
+        )
 
 
 def _hdf5(change: Callable[[h5py.File, random.Random], None]) -> Mutation:
@@ -414,23 +586,41 @@ def _messages(change: Callable[[Tree, random.Random], Tree]) -> Mutation:
         at, kind = rng.randrange(len(found)), rng.randrange(6)
         if kind < 4:
             changed = json.dumps(change(json.loads(found[at][2]), rng)).encode()
-            raw = rng.choice((changed,) * 8 + (b"{", b'{"a":' * 3000, b"1e999999", deep_text(99_999).encode(), b"9" * 5000))
+            raw = rng.choice(
+                (changed,) * 8
+                + (b"{", b'{"a":' * 3000, b"1e999999", deep_text(99_999).encode(), b"9" * 5000)
+            )
             found[at] = (found[at][0], found[at][1], raw)
         elif kind == 4 and notes:
-            notes[0][rng.choice((*notes[0], "a[/b]"))] = rng.choice((*TEXTS[:10], "[1,2]", "{}", deep_text(99_999), "[" * 9))
+            notes[0][rng.choice((*notes[0], "a[/b]"))] = rng.choice(
+                (*TEXTS[:10], "[1,2]", "{}", deep_text(99_999), "[" * 9)
+            )
         else:
-            found[at] = (rng.choice(("/arm", "/wrench", "a[/b]")), rng.choice((0, 2**63, 2**64 - 1)), found[at][2])
+            found[at] = (
+                rng.choice(("/arm", "/wrench", "a[/b]")),
+                rng.choice((0, 2**63, 2**64 - 1)),
+                found[at][2],
+            )
         return _mcap(found, notes, rng)
 
     return mutate
 
 
-def _mcap(found: list[tuple[str, int, bytes]], notes: list[dict[str, str]], rng: random.Random) -> bytes:
+def _mcap(
+    found: list[tuple[str, int, bytes]], notes: list[dict[str, str]], rng: random.Random
+) -> bytes:
     out = io.BytesIO()
-    writer = Writer(out, compression=rng.choice(list(CompressionType)[:1] + [CompressionType.ZSTD]), enable_data_crcs=True)
+    writer = Writer(
+        out,
+        compression=rng.choice((CompressionType.NONE, CompressionType.ZSTD)),
+        enable_data_crcs=True,
+    )
     writer.start()
     for note in notes:
-        meta = Metadata(name="elastocal", metadata={k: v.encode("utf-8", "replace").decode() for k, v in note.items()})
+        meta = Metadata(
+            name="elastocal",
+            metadata={k: v.encode("utf-8", "replace").decode() for k, v in note.items()},
+        )
         writer.add_metadata(meta.name, meta.metadata)
     channels: dict[str, int] = {}
     for topic, time, data in found:
@@ -460,7 +650,9 @@ def _element(data: bytes, rng: random.Random) -> bytes:
     elif kind == 5:
         parent.append(child)
     elif kind == 6:
-        child.tag = rng.choice(("link", "joint", "mimic", "axis", "inertial", "transmission", "x", "limit"))
+        child.tag = rng.choice(
+            ("link", "joint", "mimic", "axis", "inertial", "transmission", "x", "limit")
+        )
     else:
         rng.choice(inner)[0].append(child)
     try:
@@ -471,21 +663,30 @@ def _element(data: bytes, rng: random.Random) -> bytes:
 
 def _xml_text(rng: random.Random) -> str:
     numbers = " ".join(str(rng.choice(NUMBERS))[:400] for _ in range(rng.choice((1, 3, 3, 6))))
-    word = rng.choice(("fixed", "revolute", "planar", "floating", "continuous", "prismatic", "-1 0 0", "0 0 0"))
+    word = rng.choice(
+        ("fixed", "revolute", "planar", "floating", "continuous", "prismatic", "-1 0 0", "0 0 0")
+    )
     text = rng.choice((numbers, numbers, word, rng.choice(TEXTS)))
-    return "".join(letter for letter in text if letter.isprintable() and not "\ud800" <= letter <= "\udfff")
+    return "".join(
+        letter for letter in text if letter.isprintable() and not "\ud800" <= letter <= "\udfff"
+    )
 
 
 def _leaves(data: bytes, rng: random.Random) -> bytes:
     """Hang many links on a robot, or nest, or entities that grow."""
     count = rng.choice((40, 3000))
     links = "".join(
-        f'<link name="l{n}"/><joint name="m{n}" type="fixed"><parent link="base"/><child link="l{n}"/></joint>'
+        f'<link name="l{n}"/><joint name="m{n}" type="fixed">'
+        f'<parent link="base"/><child link="l{n}"/></joint>'
         for n in range(count)
     ).encode()
-    bomb = b'<!DOCTYPE r [<!ENTITY a "' + b"x" * 1000 + b'">' + b"".join(
-        b'<!ENTITY %c "' % (98 + n) + b"&%c;" % (97 + n) * 50 + b'">' for n in range(8)
-    ) + b']>\n<robot name="&i;"/>'  # fmt: skip
+    bomb = (
+        b'<!DOCTYPE r [<!ENTITY a "'
+        + b"x" * 1000
+        + b'">'
+        + b"".join(b'<!ENTITY %c "' % (98 + n) + b"&%c;" % (97 + n) * 50 + b'">' for n in range(8))
+        + b']>\n<robot name="&i;"/>'
+    )
     nested = data.replace(b"</robot>", b"<x>" * 20_000 + b"</x>" * 20_000 + b"</robot>")
     return rng.choice((data.replace(b"</robot>", links + b"</robot>"), bomb, nested))
 
@@ -518,7 +719,11 @@ FORMS: dict[str, dict[str, Mutation]] = {
         "values": _hdf5(_hdf5_values),
         "more": _hdf5(_hdf5_more),
     },
-    "mcap": {**BYTES, "zip bomb": _bomb_in_mcap, **{name: _messages(change) for name, change in TREES.items()}},
+    "mcap": {
+        **BYTES,
+        "zip bomb": _bomb_in_mcap,
+        **{name: _messages(change) for name, change in TREES.items()},
+    },
     "xml": {**_TEXT, "element": _element, "elements": _element, "leaves": _leaves},
     "text": _TEXT,
     "bytes": BYTES,

@@ -24,7 +24,7 @@ class Kind:
     form: str
     """As in `fuzz.mutations.FORMS`."""
     commands: tuple[str, ...]
-    """The first is the usual one; ``{f}`` is the file, ``{s}`` the folder of the seeds, ``{o}`` one to write into."""
+    """The first is the usual one; ``{f}`` is the file, ``{s}`` that of seeds, ``{o}`` a new one."""
     beside: tuple[str, ...] = ()
     """Files that must be there, too."""
     others: float = 0.1
@@ -33,8 +33,15 @@ class Kind:
     """How often this kind is drawn, beside others."""
 
 
-_RUN = ("run/cell/cell.yaml", "run/cell/dome.stl", "run/plan/plan.json", "run/journal.jsonl", "run/dataset.nc",
-        "run/summary.json", *(f"run/streams/pose_000{n}_1.mcap" for n in range(7)))  # fmt: skip
+_RUN = (
+    "run/cell/cell.yaml",
+    "run/cell/dome.stl",
+    "run/plan/plan.json",
+    "run/journal.jsonl",
+    "run/dataset.nc",
+    "run/summary.json",
+    *(f"run/streams/pose_000{n}_1.mcap" for n in range(7)),
+)
 _MODEL = (
     "predict {f} {s}/rows.csv --out {o}.csv",
     "compensate {f} {s}/path.csv --out {o}.csv",
@@ -50,44 +57,141 @@ _DATA = (
     "calibrate {f} --out {o}.json --draws 40 --springs actuated --json",
     "compare {s}/old.json {s}/model.json --rows {f}",
 )
-_REPORT = "report run --model {s}/model.json --tool {s}/tool.json --codec {s}/codec --process {s}/process --out {o}.html"
+_REPORT = (
+    "report run --model {s}/model.json --tool {s}/tool.json --codec {s}/codec"
+    " --process {s}/process --out {o}.html"
+)
+_BASE = "--base 0m,0m,0m,0deg,0deg,0deg --out {o}.src"
 
 KINDS: dict[str, Kind] = {
-    "cell": Kind("cell.yaml", "yaml", ("check {f}", "run {f} --plan {s}/plan --out {o} --dry-run"), ("dome.stl",), 0.03, 1.5),
-    "springs": Kind("springs.yaml", "yaml", ("check {f}", "calibrate {s}/dataset.nc --springs {f} --draws 40 --out {o}.json")),
-    "settings": Kind("settings.yaml", "yaml", ("check {f}", "export {s}/model.json --settings {f} --c {o}")),
+    "cell": Kind(
+        "cell.yaml",
+        "yaml",
+        ("check {f}", "run {f} --plan {s}/plan --out {o} --dry-run"),
+        ("dome.stl",),
+        0.03,
+        1.5,
+    ),
+    "springs": Kind(
+        "springs.yaml",
+        "yaml",
+        ("check {f}", "calibrate {s}/dataset.nc --springs {f} --draws 40 --out {o}.json"),
+    ),
+    "settings": Kind(
+        "settings.yaml", "yaml", ("check {f}", "export {s}/model.json --settings {f} --c {o}")
+    ),
     "dataset": Kind("dataset.nc", "netcdf", _DATA, (), 0.1, 1.5),
     "table": Kind("dataset.csv", "csv", _DATA, (), 0.05, 1.0),
-    "rows": Kind("rows.csv", "csv", ("predict {s}/model.json {f} --out {o}.csv", "check {f}"), (), 0.3),
-    "path": Kind("path.csv", "csv", ("check {f}", "compensate {s}/model.json {f} --out {o}.csv",
-                 "stiffness {s}/model.json {f} --spins 2 --stands 1 --stations 2 --out {o}"), (), 0.3, 0.5),
-    "poses": Kind("poses.csv", "csv", ("check {f}", "compensate {s}/model.json {f} --out {o}.csv"), (), 0.3, 0.5),
+    "rows": Kind(
+        "rows.csv", "csv", ("predict {s}/model.json {f} --out {o}.csv", "check {f}"), (), 0.3
+    ),
+    "path": Kind(
+        "path.csv",
+        "csv",
+        (
+            "check {f}",
+            "compensate {s}/model.json {f} --out {o}.csv",
+            "stiffness {s}/model.json {f} --spins 2 --stands 1 --stations 2 --out {o}",
+        ),
+        (),
+        0.3,
+        0.5,
+    ),
+    "poses": Kind(
+        "poses.csv",
+        "csv",
+        ("check {f}", "compensate {s}/model.json {f} --out {o}.csv"),
+        (),
+        0.3,
+        0.5,
+    ),
     "postures": Kind("postures.csv", "csv", ("tool {f} --out {o}.json", "check {f}"), (), 0.3, 0.5),
-    "deviations": Kind("process/deviations.csv", "csv", ("check process", "check {f}"), ("process/table.json",), 0.3, 0.2),
+    "deviations": Kind(
+        "process/deviations.csv",
+        "csv",
+        ("check process", "check {f}"),
+        ("process/table.json",),
+        0.3,
+        0.2,
+    ),
     "model": Kind("model.json", "json", ("check {f}", *_MODEL), (), 0.2, 1.5),
     "tool": Kind("tool.json", "json", ("check {f}", "export {s}/model.json --tool {f} --c {o}")),
-    "plan": Kind("plan/plan.json", "json", ("check {f}", "run {s}/cell.yaml --plan plan --out {o} --dry-run"), (), 0.1),
+    "plan": Kind(
+        "plan/plan.json",
+        "json",
+        ("check {f}", "run {s}/cell.yaml --plan plan --out {o} --dry-run"),
+        (),
+        0.1,
+    ),
     "pool": Kind("pool.nc", "netcdf", ("check {f}",), (), 0.0, 0.5),
-    "codec": Kind("codec/codec.nc", "netcdf", ("check {f}", "check codec"), ("codec/codec.json",), 0.3),
-    "verdicts": Kind("codec/codec.json", "json", ("check {f}", "check codec"), ("codec/codec.nc",), 0.3),
-    "process": Kind("process/table.json", "json", ("check {f}", "check process"), ("process/deviations.csv",), 0.1),
+    "codec": Kind(
+        "codec/codec.nc", "netcdf", ("check {f}", "check codec"), ("codec/codec.json",), 0.3
+    ),
+    "verdicts": Kind(
+        "codec/codec.json", "json", ("check {f}", "check codec"), ("codec/codec.nc",), 0.3
+    ),
+    "process": Kind(
+        "process/table.json",
+        "json",
+        ("check {f}", "check process"),
+        ("process/deviations.csv",),
+        0.1,
+    ),
     "comparison": Kind("comparison.json", "json", ("check {f}",), (), 0.0, 0.5),
     "journal": Kind("run/journal.jsonl", "jsonl", ("check {f}", "check run"), _RUN, 0.05),
     "summary": Kind("run/summary.json", "json", ("check {f}", _REPORT), _RUN, 0.02),
     "stream": Kind("stream.mcap", "mcap", ("check {f}",), (), 0.0, 1.0),
     "derived": Kind("run/streams/pose_0003_1.mcap", "bytes", ("derive run",), _RUN, 0.0, 0.01),
-    "robot": Kind("robot.urdf", "xml", ("check {f}", "calibrate {s}/dataset.nc --robot {f} --tcp tcp --draws 40 --out {o}.json"),
-                  (), 0.05, 1.5),
+    "robot": Kind(
+        "robot.urdf",
+        "xml",
+        ("check {f}", "calibrate {s}/dataset.nc --robot {f} --tcp tcp --draws 40 --out {o}.json"),
+        (),
+        0.05,
+        1.5,
+    ),
     "mesh": Kind("dome.stl", "bytes", ("check cell.yaml",), ("cell.yaml",), 0.0, 0.1),
-    "mesh text": Kind("fixture.stl", "text", ("check meshed.yaml",), ("meshed.yaml", "dome.stl", "fixture.obj"), 0.0, 0.1),
-    "mesh obj": Kind("fixture.obj", "text", ("check meshed.yaml",), ("meshed.yaml", "dome.stl", "fixture.stl"), 0.0, 0.1),
-    "program": Kind("course.src", "text", ("compensate {s}/model.json {f} --forces {s}/forces.csv --base 0m,0m,0m,0deg,0deg,0deg --out {o}.src",),
-                    ("course.dat",), 0.0, 0.5),
-    "positions": Kind("course.dat", "text", ("compensate {s}/model.json course.src --forces {s}/forces.csv --base 0m,0m,0m,0deg,0deg,0deg --out {o}.src",),
-                      ("course.src",), 0.0, 0.5),
-    "forces": Kind("forces.csv", "csv", ("compensate {s}/model.json course.src --forces {f} --base 0m,0m,0m,0deg,0deg,0deg --out {o}.src",),
-                   ("course.src", "course.dat"), 0.0, 0.3),
-}  # fmt: skip
+    "mesh text": Kind(
+        "fixture.stl",
+        "text",
+        ("check meshed.yaml",),
+        ("meshed.yaml", "dome.stl", "fixture.obj"),
+        0.0,
+        0.1,
+    ),
+    "mesh obj": Kind(
+        "fixture.obj",
+        "text",
+        ("check meshed.yaml",),
+        ("meshed.yaml", "dome.stl", "fixture.stl"),
+        0.0,
+        0.1,
+    ),
+    "program": Kind(
+        "course.src",
+        "text",
+        ("compensate {s}/model.json {f} --forces {s}/forces.csv " + _BASE,),
+        ("course.dat",),
+        0.0,
+        0.5,
+    ),
+    "positions": Kind(
+        "course.dat",
+        "text",
+        ("compensate {s}/model.json course.src --forces {s}/forces.csv " + _BASE,),
+        ("course.src",),
+        0.0,
+        0.5,
+    ),
+    "forces": Kind(
+        "forces.csv",
+        "csv",
+        ("compensate {s}/model.json course.src --forces {f} " + _BASE,),
+        ("course.src", "course.dat"),
+        0.0,
+        0.3,
+    ),
+}
 """All kinds of files, by name."""
 
 _SPRINGS = """schema: elastocal.springs/1
@@ -133,8 +237,17 @@ def make_seeds(folder: Path) -> None:
     """Fill a new folder with valid files, each under the name that its kind says."""
     made = reported.finished()
     for name in ("run", "codec", "process", "plan"):
-        shutil.copytree(made / name, folder / name, ignore=shutil.ignore_patterns("*.svg", "*.png", "*.html"))
-    for name in ("model.json", "tool.json", "cell/cell.yaml", "cell/dome.stl", "run/dataset.nc", "plan/pool.nc"):
+        shutil.copytree(
+            made / name, folder / name, ignore=shutil.ignore_patterns("*.svg", "*.png", "*.html")
+        )
+    for name in (
+        "model.json",
+        "tool.json",
+        "cell/cell.yaml",
+        "cell/dome.stl",
+        "run/dataset.nc",
+        "plan/pool.nc",
+    ):
         shutil.copy(made / name, folder / Path(name).name)
     (folder / "springs.yaml").write_text(_SPRINGS)
     (folder / "settings.yaml").write_text(_SETTINGS)
@@ -142,7 +255,8 @@ def make_seeds(folder: Path) -> None:
     (folder / "fixture.obj").write_text(_OBJ)
     cell = (folder / "cell.yaml").read_text(encoding="utf-8")
     meshes = "".join(
-        f"\n  - {{name: {suffix}, mesh: {{file: fixture.{suffix}, unit: mm}}, pose: {{xyz: [\"9 m\", \"9 m\", \"9 m\"]}}}}"
+        f"\n  - {{name: {suffix}, mesh: {{file: fixture.{suffix}, unit: mm}},"
+        ' pose: {xyz: ["9 m", "9 m", "9 m"]}}'
         for suffix in ("stl", "obj")
     )
     (folder / "meshed.yaml").write_text(cell.replace("\nfixtures:", f"\nfixtures:{meshes}", 1))
@@ -155,7 +269,9 @@ def make_seeds(folder: Path) -> None:
     old = json.loads((folder / "model.json").read_text())
     old["compliance"] = [1.02 * value for value in old["compliance"]]
     (folder / "old.json").write_text(json.dumps(old))
-    done = elastocal("compare", folder / "old.json", folder / "model.json", "--out", folder / "comparison.json")
+    done = elastocal(
+        "compare", folder / "old.json", folder / "model.json", "--out", folder / "comparison.json"
+    )
     assert done.code == 0, done.err
 
 
@@ -165,9 +281,14 @@ def _write_paths(folder: Path) -> None:
     names = lines[0].split(",")
     joints = slice(names.index("rail[m]"), None)
     rows = [line.split(",") for line in lines[1::7]]
-    (folder / "rows.csv").write_text("\n".join(",".join(row[joints]) for row in [names, *rows]) + "\n")
+    (folder / "rows.csv").write_text(
+        "\n".join(",".join(row[joints]) for row in [names, *rows]) + "\n"
+    )
     (folder / "path.csv").write_text("\n".join(lines[:40]) + "\n")
-    rng, table = np.random.default_rng(1), "a[deg],b[deg],c[deg],force_x[N],force_y[N],force_z[N],moment_x[N*m],moment_y[N*m],moment_z[N*m]\n"
+    rng, table = (
+        np.random.default_rng(1),
+        "a[deg],b[deg],c[deg],force_x[N],force_y[N],force_z[N],moment_x[N*m],moment_y[N*m],moment_z[N*m]\n",
+    )
     for _ in range(24):
         angles, wrench = rng.uniform(-180, 180, 3), rng.normal(0, (100,) * 3 + (10,) * 3)
         table += ",".join(f"{value:.4f}" for value in (*angles, *wrench)) + "\n"
@@ -175,34 +296,60 @@ def _write_paths(folder: Path) -> None:
 
 
 def _write_poses(folder: Path) -> None:
-    """Write the first rows of the path as poses, and as a KUKA program with its points and forces."""
+    """Write the first rows as poses, and as a KUKA program with its points and forces."""
     rows = [line.split(",") for line in (folder / "rows.csv").read_text().splitlines()[1:6]]
     robot = read_model(folder / "model.json").model.robot
     joints = np.array([[float(cell) for cell in row[:7]] for row in rows])
     units = np.array([1e3] * 3 + [180.0 / np.pi] * 3)
     poses = [xyzabc_from_T(robot.forward(q)) * units for q in joints]
     head = "x[mm],y[mm],z[mm],a[deg],b[deg],c[deg],rail[m],force_x[N],force_y[N],force_z[N]\n"
-    (folder / "poses.csv").write_text(head + "".join(
-        ",".join(map(repr, map(float, (*pose, q[0], 10, 0, -500)))) + "\n" for pose, q in zip(poses, joints, strict=True)
-    ))  # fmt: skip
-    places = [",".join(f"{k} {v:.6f}" for k, v in zip("XYZABC", pose, strict=True)) for pose in poses]
-    extra = [",".join([f"E1 {1e3 * q[0]:.6f}", *(f"E{n} 0.0" for n in range(2, 7))]) for q in joints]
+    (folder / "poses.csv").write_text(
+        head
+        + "".join(
+            ",".join(map(repr, map(float, (*pose, q[0], 10, 0, -500)))) + "\n"
+            for pose, q in zip(poses, joints, strict=True)
+        )
+    )
+    places = [
+        ",".join(f"{k} {v:.6f}" for k, v in zip("XYZABC", pose, strict=True)) for pose in poses
+    ]
+    extra = [
+        ",".join([f"E1 {1e3 * q[0]:.6f}", *(f"E{n} 0.0" for n in range(2, 7))]) for q in joints
+    ]
     axes = ",".join(f"A{n} {v:.6f}" for n, v in enumerate(np.degrees(joints[0, 1:]), start=1))
     points = "".join(f"DECL E6POS XP{n}={{{places[n]},{extra[n]}}}\n" for n in range(5))
-    (folder / "course.dat").write_text(f"DEFDAT course\nDECL E6AXIS XHOME={{{axes},{extra[0]}}}\n{points}ENDDAT\n")
+    (folder / "course.dat").write_text(
+        f"DEFDAT course\nDECL E6AXIS XHOME={{{axes},{extra[0]}}}\n{points}ENDDAT\n"
+    )
     lines = "".join(f"LIN XP{n} C_DIS\n" for n in range(5))
-    (folder / "course.src").write_text(f"DEF course( )\n$BASE = BASE_DATA[1]\nPTP XHOME\n{lines}PTP XHOME\nEND\n")
+    (folder / "course.src").write_text(
+        f"DEF course( )\n$BASE = BASE_DATA[1]\nPTP XHOME\n{lines}PTP XHOME\nEND\n"
+    )
     forces = "".join(f"XP{n},10,0,-500\n" for n in range(5))
-    (folder / "forces.csv").write_text(f"point,force_tcp_x[N],force_tcp_y[N],force_tcp_z[N]\n{forces}")
+    (folder / "forces.csv").write_text(
+        f"point,force_tcp_x[N],force_tcp_y[N],force_tcp_z[N]\n{forces}"
+    )
 
 
 def _write_stream(path: Path, joints: tuple[str, ...]) -> None:
     """Write raw streams of a few samples."""
     recorder, time = PoseRecorder(joints), 0.01 * np.arange(1, 9)
     for moment in time:
-        recorder.arm(ArmState(float(moment), np.zeros(len(joints)), np.eye(4), Motion.HOLDING, False, None, "made up"))
+        recorder.arm(
+            ArmState(
+                float(moment),
+                np.zeros(len(joints)),
+                np.eye(4),
+                Motion.HOLDING,
+                False,
+                None,
+                "made up",
+            )
+        )
     numbers = np.ones((len(time), 3))
     recorder.wrenches(WrenchBlock(time, numbers, numbers, 0.5, 0.02, SensorStatus.OK, "made up"))
-    recorder.points(PointBlock(time, numbers, 1e-5 * numbers, BeamState.LOCKED, "station_1", "made up"))
+    recorder.points(
+        PointBlock(time, numbers, 1e-5 * numbers, BeamState.LOCKED, "station_1", "made up")
+    )
     recorder.mark(0.1, "a mark")
     recorder.save(path)

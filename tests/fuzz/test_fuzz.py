@@ -30,9 +30,9 @@ def seeds() -> Path:
 def fallen(verdicts) -> list[str]:
     """Return what fell, each as a line for the corpus."""
     return [
-        f"{verdict.word} [{verdict.code}] {verdict.text[-300:]!r} {json.dumps(asdict(verdict.case))}"
-        for verdict in verdicts
-        if verdict.word != "ok"
+        f"{each.word} [{each.code}] {each.text[-300:]!r} {json.dumps(asdict(each.case))}"
+        for each in verdicts
+        if each.word != "ok"
     ]
 
 
