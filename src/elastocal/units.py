@@ -18,7 +18,7 @@ _FACTORS: dict[str, dict[str, float]] = {
     "speed": {"m/s": 1.0, "mm/s": 1e-3},
     "angular speed": {"rad/s": 1.0, "deg/s": math.pi / 180.0},
     "force rate": {"N/s": 1.0, "kN/s": 1e3},
-    "time": {"s": 1.0, "ms": 1e-3, "min": 60.0},
+    "time": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0},
     "rotational compliance": {
         "rad/(N*m)": 1.0,
         "rad/Nm": 1.0,
