@@ -18,6 +18,7 @@ from ._codec import (
 from ._netcdf import (
     LabelledArray as LabelledArray,
     LabelledArrays as LabelledArrays,
+    netcdf_image as netcdf_image,
     read_arrays as read_arrays,
     write_arrays as write_arrays,
 )
