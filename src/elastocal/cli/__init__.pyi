@@ -24,5 +24,6 @@ from .output import (
     console as console,
     print_json as print_json,
     print_lines as print_lines,
+    printable as printable,
     progress_bars as progress_bars,
 )

@@ -23,6 +23,7 @@ import typer
 from typer.core import TyperGroup
 
 from elastocal.cli import commands
+from elastocal.cli.output import printable
 from elastocal.errors import ElastocalError, FileAccessError
 
 _GARBAGE = 50_000
@@ -140,7 +141,7 @@ def _drop_output() -> None:
 
 
 def _complain(message: str) -> None:
-    typer.echo(f"elastocal: {' '.join(message.split())}", err=True)
+    typer.echo(f"elastocal: {printable(' '.join(message.split()))}", err=True)
 
 
 heard_again()
