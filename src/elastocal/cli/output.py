@@ -1,63 +1,84 @@
 """Where output goes: people read standard error, programs read standard output.
 
-Names and texts of other people's files pass here on their way to a terminal, which takes some
-characters for commands: `printable` leaves none of them.
+Whatever is printed for people holds names and paths of other people. None of it is taken for
+markup: what is to stand out passes through `bold` and its like, and what moves a terminal's cursor
+or changes its colours is shown as it would be typed.
 
 Rich is imported when something is printed: help does without most of it.
 """
 
 import json
+import re
 import sys
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
-from functools import cache
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from elastocal.progress import Progress
 
 if TYPE_CHECKING:
     from rich.console import Console
-    from rich.segment import Segment
 
 
-_CONTROLS: dict[int, int | str] = {code: 0x2400 + code for code in range(32) if code not in (9, 10)}
-_CONTROLS |= {0x7F: "\u2421"} | dict.fromkeys(range(0x80, 0xA0), "\ufffd")
-# What turns the direction of writing round shows a name as another.
-_CONTROLS |= dict.fromkeys((*range(0x202A, 0x202F), *range(0x2066, 0x206A)), "\ufffd")
+_STYLES = ("bold", "dim", "red", "yellow", "green")
+_FIRST, _END = 0xE000, "\ue0ff"
+"""Letters for private use: a style begins with that of its number, and all end with the same."""
+_STARTS = {chr(_FIRST + number): style for number, style in enumerate(_STYLES)}
 
 
-def printable(text: str) -> str:
-    r"""Return a text whose control characters show as signs, so that a terminal obeys none.
-
-    >>> printable("a\x1b[2J")
-    'a␛[2J'
-    """
-    return text.translate(_CONTROLS)
+def _styled(style: str, text: object) -> str:
+    return f"{chr(_FIRST + _STYLES.index(style))}{text}{_END}"
 
 
-def console(**settings: Any) -> "Console":
-    """Return a console that people read; by default standard error.
+bold, dim, red, yellow, green = (partial(_styled, style) for style in _STYLES)
+"""Return a text that `console` shows in a style."""
+
+
+def console(**options: Any) -> "Console":
+    """Return the console that people read; standard output stays free for data.
 
     Parameters
     ----------
-    **settings
-        See `rich.console.Console`.
+    **options : object
+        Of Rich's console, in place of ours.
     """
-    return _console_class()(**({"stderr": True, "soft_wrap": False} | settings), highlight=False)
-
-
-@cache
-def _console_class() -> "type[Console]":
     from rich.console import Console
+    from rich.text import Text
 
     class Screen(Console):
-        """Shows texts as `printable` has them; the codes for colours are its own."""
+        """A console that knows no markup but ours, in lines and in tables alike."""
 
-        def render(self, *given: Any, **options: Any) -> "Iterator[Segment]":
-            for segment in super().render(*given, **options):
-                yield segment if segment.control else segment._replace(text=printable(segment.text))
+        def render_str(self, text: str, **options: Any) -> Text:
+            """Return a text with its styles."""
+            shown = Text(
+                style=options.get("style", ""),
+                justify=options.get("justify"),
+                overflow=options.get("overflow"),
+            )
+            styles: list[str] = []
+            for part in _PARTS.split(text):
+                if part in _STARTS:
+                    styles.append(_STARTS[part])
+                elif part == _END:
+                    styles = styles[:-1]
+                else:
+                    shown.append(visible(part), " ".join(styles) or None)
+            return shown
 
-    return Screen
+    return Screen(**{"stderr": True, "highlight": False, "soft_wrap": False, **options})
+
+
+_PARTS = re.compile(f"([{''.join(_STARTS)}{_END}])")
+
+
+def visible(text: str) -> str:
+    """Return a text without what a terminal obeys, and without halves of letters."""
+    if text.isprintable():
+        return text
+    return "".join(
+        each if each.isprintable() or each in "\n\t " else ascii(each)[1:-1] for each in text
+    )
 
 
 def print_json(data: object) -> None:
@@ -71,7 +92,7 @@ def print_json(data: object) -> None:
 
 def print_lines(lines: Iterable[str]) -> None:
     """Print lines on standard output, for programs."""
-    sys.stdout.writelines(f"{printable(line)}\n" for line in lines)
+    sys.stdout.writelines(f"{visible(line)}\n" for line in lines)
     sys.stdout.flush()
 
 
@@ -82,7 +103,7 @@ def progress_bars() -> Iterator[Progress]:
 
     screen = console()
     bars = progress.Progress(
-        progress.TextColumn("{task.description}"),
+        progress.TextColumn("{task.description}", markup=False),
         progress.BarColumn(),
         progress.MofNCompleteColumn(),
         progress.TimeElapsedColumn(),
