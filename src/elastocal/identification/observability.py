@@ -20,6 +20,7 @@ from math import comb
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.optimize import linprog
 
 from elastocal.arrays import FloatArray, IndexArray
 from elastocal.elastic import ElasticModel, Parameter, Spring
@@ -35,6 +36,8 @@ _ZERO = 1e-6
 _NOTICEABLE = 1e-2
 """Smaller parts of a combination are not named: the data leave such a spring open by less than a
 hundredth of a sensible value. In rich models nearly every spring has a trace in one of them."""
+_MOVES = 0.5
+"""Of a step that is 0 for a spring that is held at its bound, and 1 for one that is not."""
 _MOST_SETS = 20_000
 """Largest number of coordinate sets to try; beyond it elimination gives a sparse enough basis."""
 _TWICE = 2.0
@@ -226,7 +229,12 @@ class Observability:
         return self.parameters
 
 
-def observability(system: Factored, springs: Sequence[Spring]) -> Observability:
+def observability(
+    system: Factored,
+    springs: Sequence[Spring],
+    problem: Problem | None = None,
+    compliance: FloatArray | None = None,
+) -> Observability:
     """Return what a factored system determines.
 
     Parameters
@@ -235,12 +243,21 @@ def observability(system: Factored, springs: Sequence[Spring]) -> Observability:
         From `solve.factor`.
     springs : sequence of Spring
         In column order.
+    problem, compliance : Problem, ndarray of shape (parameter,), optional
+        What was fitted, and the estimate: combinations that its bounds leave no room to move are
+        in no group, since the fit is the only one. By default bounds have no say.
     """
     parameters = [parameter for spring in springs for parameter in spring.parameters]
     determined = rank(system.s)
-    null_space = system.Vt[determined:].T
-    # The system was solved in x = scale c, so a combination of x is one of c over the scale.
-    groups = _readable(null_space / system.scale[:, None], parameters)
+    # Which weights count as zero is judged in multiples of sensible sizes: they have no unit. The
+    # system was solved in x = scale c, so a combination of x is one of c over the scale.
+    size = relative_sizes(parameters)
+    unseen = np.linalg.qr(system.Vt[determined:].T / (system.scale * size)[:, None])[0]
+    if problem is not None and compliance is not None:
+        scale = parameters[0].scale * size
+        room = (compliance - problem.lower) / scale, (problem.upper - compliance) / scale
+        unseen = _left_open(unseen, *room)
+    groups = _readable(unseen, parameters)
     condition = system.s[0] / system.s[determined - 1] if determined else np.inf
     mixed = {term.spring for group in groups for term in group}
     observable = tuple(parameter.name not in mixed for parameter in parameters)
@@ -360,16 +377,47 @@ def unseen_groups(
     return tuple(found)
 
 
-def _readable(
-    null_space: FloatArray, parameters: Sequence[Parameter]
-) -> tuple[tuple[Term, ...], ...]:
-    """Return the null space of the compliances, by name."""
+def _left_open(null_space: FloatArray, below: FloatArray, above: FloatArray) -> FloatArray:
+    """Return the directions of a null space that bounds leave open, shape (parameter, k).
+
+    A direction is open if no spring at a bound is driven beyond it. Scaled at will, open directions
+    add up: one linear programme finds all springs that any of them moves away from its bound, and
+    the others are held.
+
+    Parameters
+    ----------
+    null_space : ndarray, shape (parameter, k)
+        Orthonormal columns, in sensible sizes.
+    below, above : ndarray, shape (parameter,)
+        Distance of the estimate to its bounds, in sensible sizes.
+    """
+    k = null_space.shape[1]
+    # A trace of a spring holds nothing: it has far to go.
+    matters = np.linalg.norm(null_space, axis=1) > _NOTICEABLE
+    at = [matters & (room < _NOTICEABLE) for room in (below, above)]
+    inward = np.vstack([null_space[at[0]], -null_space[at[1]]])
+    if not inward.size:
+        return null_space
+    inward /= np.linalg.norm(inward, axis=1, keepdims=True)
+    count = len(inward)
+    away = linprog(
+        np.append(np.zeros(k), -np.ones(count)),
+        A_ub=np.hstack([-inward, np.eye(count)]),
+        b_ub=np.zeros(count),
+        bounds=[(None, None)] * k + [(0.0, 1.0)] * count,
+    )
+    held = inward[away.x[k:] < _MOVES]
+    if not len(held):
+        return null_space
+    _, s, Vt = np.linalg.svd(held, full_matrices=True)
+    return np.asarray(null_space @ Vt[np.count_nonzero(s > _ZERO) :].T)
+
+
+def _readable(unseen: FloatArray, parameters: Sequence[Parameter]) -> tuple[tuple[Term, ...], ...]:
+    """Return by name what orthonormal directions, in sensible sizes, are of the compliances."""
     joints = list(dict.fromkeys(parameter.joint for parameter in parameters))
-    # Which weights count as zero is judged in multiples of sensible sizes: they have no unit.
-    size = relative_sizes(parameters)
-    orthonormal = np.linalg.qr(null_space / size[:, None])[0]
-    basis = sparse_basis(orthonormal, [joints.index(each.joint) for each in parameters])
-    basis = np.where(np.abs(basis) < _NOTICEABLE, 0.0, basis) * size
+    basis = sparse_basis(unseen, [joints.index(each.joint) for each in parameters])
+    basis = np.where(np.abs(basis) < _NOTICEABLE, 0.0, basis) * relative_sizes(parameters)
     return tuple(
         tuple(Term(parameters[i].name, float(vector[i])) for i in map(int, np.flatnonzero(vector)))
         for vector in basis

@@ -199,24 +199,29 @@ def _spring_table(figures: CalibrationSummary) -> Table:
     table.add_column("95 %\ninterval", justify="right", no_wrap=True)
     table.add_column(f"stiffness\n{_USUAL_UNIT.stiffness}", justify="right", no_wrap=True)
     table.add_column("known?", overflow="fold")
+    above = ""
     for spring in figures.springs:
-        table.add_row(*_spring_row(spring))
+        # What a gear amounts to at its torque stands under its first row, without the name again.
+        further = bool(above) and spring.name.startswith(f"{above} ")
+        name = spring.name.removeprefix(above) if further else spring.name
+        above = above if further else spring.name
+        table.add_row(escape(f" {name}" if further else name), *_spring_row(spring))
     return table
 
 
 def _spring_row(spring: SpringSummary) -> tuple[str, ...]:
+    """Return the cells of a spring behind its name."""
     shown = unit_of(spring.unit)
     values = (spring.compliance, spring.low, spring.high)
     value, low, high = (shown.factor * each for each in values)
     unit = "" if shown == _USUAL_UNIT else f" {shown.shown}"
     if spring.too_weak:
         note = "[yellow]too weak to see[/yellow]"
-        return escape(spring.name), f"[dim]({value:.4f}{unit})[/dim]", "", "", note
+        return f"[dim]({value:.4f}{unit})[/dim]", "", "", note
     if not spring.observable:
-        note = f"[yellow]not by itself[/yellow], group {spring.group}"
-        return escape(spring.name), f"[dim]({value:.4f}{unit})[/dim]", "", "", note
+        note = f"[yellow]in group {spring.group}[/yellow]"
+        return f"[dim]({value:.4f}{unit})[/dim]", "", "", note
     return (
-        escape(spring.name),
         f"{value:.4f}{unit}",
         f"{low:.3f} … {high:.3f}",
         _stiffness(value, shown),
@@ -233,10 +238,8 @@ def _stiffness(value: float, unit: Unit) -> str:
 
 def _known(value: float, low: float, high: float, at_bound: bool) -> str:
     if at_bound:
-        open_end = f", below {high:.3f}" if high > value else ""
-        return "[yellow]at bound[/yellow]" + (
-            open_end or (f", above {low:.3f}" if low < value else "")
-        )
+        open_end = f"above {low:.3f}" if low < value else "at bound"
+        return f"[yellow]{f'below {high:.3f}' if high > value else open_end}[/yellow]"
     if value == 0.0:
         return ""
     relative = (high - low) / 2.0 / abs(value)
@@ -254,7 +257,12 @@ def _show_groups(console: Console, figures: CalibrationSummary) -> None:
         )
     if not figures.unobservable:
         every = "" if weak else "every spring is observable; "
-        console.print(f"{every}condition number {figures.condition:.0f}")
+        if figures.rank < figures.springs_total:
+            every = (
+                f"rank {figures.rank} of {figures.springs_total}: what the readings leave open,"
+                " the bounds of the springs settle; "
+            )
+        console.print(f"{every}condition number {figures.condition:.0f}", soft_wrap=True)
         return
     missing = figures.rank_attainable - figures.rank
     meaning = (
@@ -269,7 +277,7 @@ def _show_groups(console: Console, figures: CalibrationSummary) -> None:
         f" {figures.condition:.0f}): {meaning}"
     )
     for number, group in enumerate(figures.unobservable, start=1):
-        console.print(f"   group {number}: {escape(describe_briefly(group))}")
+        console.print(f"   group {number}, not by itself: {escape(describe_briefly(group))}")
 
 
 def _show_suspicious(console: Console, suspicious: tuple[SuspiciousReading, ...]) -> None:
