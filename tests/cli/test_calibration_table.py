@@ -34,7 +34,9 @@ def test_every_spring_of_a_rich_model_has_one_line_of_80_columns():
         SpringSummary(gear, "gear", "rad/(N*m)", 1.2e-7, 1e-7, 1.5e-7, True),
         SpringSummary(f"{gear} at 1600 N·m", "gear", "rad/(N*m)", 1e-7, 1e-7, 1.5e-7, True),
         SpringSummary(f"{gear} lost motion", "gear", "rad", 5e-5, 4e-5, 1.2e-4, True),
-        SpringSummary("joint_a1.bend-normal", "hinge", "rad/(N*m)", 0.0, 0.0, 1.15e-7, True, at_bound=True),
+        SpringSummary(
+            "joint_a1.bend-normal", "hinge", "rad/(N*m)", 0.0, 0.0, 1.15e-7, True, at_bound=True
+        ),
         SpringSummary("joint_a5.x", "hinge", "rad/(N*m)", 1e-7, 0.0, 1.15e-7, False, group=1),
     )
     console = Console(file=io.StringIO(), width=80)

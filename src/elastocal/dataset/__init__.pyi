@@ -10,7 +10,7 @@ from .load_rows import (
     read_robot_rows as read_robot_rows,
     write_load_rows as write_load_rows,
 )
-from .merging import merge as merge, selected as selected
+from .merging import merge as merge, selected as selected, usable_readings as usable_readings
 from .path_table import (
     PathColumns as PathColumns,
     PathValues as PathValues,
@@ -28,6 +28,5 @@ from .path_table import (
 from .readings import (
     Presses as Presses,
     Readings as Readings,
-    usable_readings as usable_readings,
     without as without,
 )

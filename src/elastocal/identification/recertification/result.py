@@ -6,7 +6,7 @@ from enum import StrEnum
 import numpy as np
 
 from elastocal.arrays import FloatArray, IndexArray
-from elastocal.identification.observability import Term
+from elastocal.identification.spring_sums import Term
 from elastocal.records import record
 from elastocal.results import Result, brief_repr
 
