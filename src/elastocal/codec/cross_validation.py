@@ -3,6 +3,7 @@
 Each variant on each split: choose, fit, verify (lines 8 to 18).
 """
 
+import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -34,8 +35,8 @@ from elastocal.progress import Progress, silent
 from elastocal.robot import Robot
 
 _STAGE = "splits"
-_WORTH_PROCESSES = 2000
-"""Fits behind a search of their own, or by a robust loss, from which on all cores are used."""
+_WORTH_PROCESSES = 6.0
+"""Processor time from which on all cores are used, in s; processes need a third of it to start."""
 _GROWTH = 1.8
 """Ratio of training sizes at which springs are chosen anew."""
 _PACKAGES = ("elastocal", "numpy", "scipy")
@@ -86,8 +87,8 @@ def cross_validate(
     provenance : str
         Where the readings came from; kept with the arrays.
     jobs : int, optional
-        Processes; default: one, but all cores for long work, where variants search anew for
-        every size or fit by a robust loss. The numbers do not depend on it.
+        Processes; default: one, but all cores where the splits take one process long. The
+        numbers do not depend on it.
     progress : Progress, optional
         Hears of each split that is done.
 
@@ -123,8 +124,7 @@ def cross_validate(
             f"training sets end at {most} of {training} poses: the others have no reading of the"
             " load cases that a variant trains with"
         )
-    processes = _processes(jobs, variants, most, len(splits))
-    curves = _run_splits(entrants, splits, most, options.seed, processes, progress)
+    curves = _run_splits(entrants, splits, most, options.seed, jobs, progress)
     for each, found in zip(prepared, curves, strict=True):
         _require_a_fit(each, found)
     return CodecData(
@@ -170,25 +170,26 @@ def _largest_training_set(prepared: PreparedVariant, splits: Sequence[Split]) ->
     return most
 
 
-def _processes(jobs: int | None, variants: Sequence[Variant], most: int, splits: int) -> int:
-    """Return the number of processes; starting them takes as long as a thousand slow fits."""
-    slow = sum(not technique(v.search).nested or v.options.loss != "linear" for v in variants)
-    return process_count(jobs or None, splits, worthwhile=slow * most * splits > _WORTH_PROCESSES)
-
-
 def _run_splits(
     entrants: Sequence[Entrant],
     splits: Sequence[Split],
     most: int,
     seed: int,
-    processes: int,
+    jobs: int | None,
     progress: Progress,
 ) -> list[list[_LearningCurve]]:
-    """Return the learning curves by variant and split."""
+    """Return the learning curves by variant and split.
+
+    The first split tells how long the others would take one process.
+    """
     run = partial(_run_split, entrants, most, seed)
-    found = []
     progress(_STAGE, 0, len(splits))
-    for curves in map_in_processes(run, splits, processes):
+    begin = time.process_time()
+    found = [run(splits[0])]
+    others = (len(splits) - 1) * (time.process_time() - begin)
+    processes = process_count(jobs or None, len(splits), worthwhile=others > _WORTH_PROCESSES)
+    progress(_STAGE, 1, len(splits))
+    for curves in map_in_processes(run, splits[1:], processes):
         found.append(curves)
         progress(_STAGE, len(found), len(splits))
     return [list(column) for column in zip(*found, strict=True)]

@@ -30,7 +30,7 @@ from elastocal.errors import IdentificationError
 from elastocal.identification.displacement import reference_joints
 from elastocal.identification.options import FitOptions
 from elastocal.identification.paired import Overlap, judge_models
-from elastocal.identification.problem import Problem, build
+from elastocal.identification.problem import Problem, build, pose_blocks
 from elastocal.identification.production import poses_in_company
 from elastocal.identification.solve import PoseGrams
 from elastocal.identification.suspicious import screen
@@ -287,7 +287,7 @@ def climb(
     low, reason = low_loads(readings), _NO_LEVELS
     # The frame of a load case that is left out is not known, so it cannot be judged.
     judged = low & (options.free_frame != "load_case")
-    counted = poses_in_company(robot, readings.joint_position, readings.pose)
+    counted = poses_in_company(robot, readings.joint_position, pose_blocks(readings))
     for rung in rungs:
         if rung.needs_levels and not np.any(low):
             continue

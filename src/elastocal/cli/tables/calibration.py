@@ -1,8 +1,7 @@
-"""Print what ``calibrate``, ``compare`` and ``report`` found: a user's questions, in their order.
+"""Print what ``calibrate`` and ``report`` found: a user's questions, in their order.
 
 How well does it fit; is it better than simpler models; which springs are really known, and how
-well; which readings look wrong. Of two calibrations: which springs moved, what it does, the
-verdict.
+well; which readings look wrong.
 """
 
 from collections.abc import Sequence
@@ -35,12 +34,6 @@ from elastocal.wording import (
 )
 
 if TYPE_CHECKING:
-    from elastocal.identification.recertification import (
-        CompareResult,
-        CompareSummary,
-        Estimate,
-        SpringChange,
-    )
     from elastocal.workflows import ReportResult
 
 _USUAL_UNIT = unit_of("rad/(N*m)")
@@ -297,105 +290,6 @@ def _show_suspicious(console: Console, suspicious: tuple[SuspiciousReading, ...]
         console.print(f"   … and {len(suspicious) - _MOST_SUSPICIOUS} more (--json lists all)")
     first = suspicious[0]
     console.print(f"   to leave one out: --exclude {first.pose}:{escape(first.load_case)}")
-
-
-_COLOURS = {"pass": "green", "fail": "red", "undecided": "yellow"}
-
-
-def show_comparison(console: Console, compared: "CompareResult", hint: Path | None = None) -> None:
-    """Print a comparison for a person.
-
-    Parameters
-    ----------
-    console : Console
-        Where.
-    compared : CompareResult
-        The comparison.
-    hint : Path, optional
-        A dataset that could serve as rows.
-    """
-    found = compared.summary
-    console.print(f"[bold]{escape(found.robot)}[/bold]: {_moved(found)}")
-    if found.springs:
-        sums = {each.name: f"sum {n}" for n, each in enumerate(_sums(found), start=1)}
-        console.print(_change_table(found, sums))
-        for name, short in sums.items():
-            console.print(f"   {short}: {name}", markup=False, soft_wrap=True)
-        console.print(
-            f"the interval holds for all {len(found.springs)} comparisons at once with 95 %"
-            + ("; what has 0 outside it moved" if found.springs_judged else ""),
-            soft_wrap=True,
-        )
-    for names, which in ((found.only_old, "old"), (found.only_new, "new")):
-        if names:
-            console.print(
-                f"only in the {which} model: {', '.join(names)}", markup=False, soft_wrap=True
-            )
-    if found.not_compared:
-        console.print(f"not determined by both: {', '.join(found.not_compared)}", markup=False)
-    if compared.rows is not None:
-        console.print(f"\n{compared.rows.sentence()}", soft_wrap=True)
-    _show_verdict(console, found, hint)
-    for note in found.notes:
-        console.print(f"[yellow]note:[/yellow] {escape(note)}", soft_wrap=True)
-
-
-def _moved(found: "CompareSummary") -> str:
-    if found.unmoved_sentence:
-        return escape(found.unmoved_sentence)
-    names = ", ".join(each.label for each in found.moved_springs)
-    return f"[bold red]{found.verb}[/bold red]: {escape(names)}"
-
-
-def _sums(found: "CompareSummary") -> "list[SpringChange]":
-    return [each for each in found.springs if len(each.terms) > 1]
-
-
-def _change_table(found: "CompareSummary", sums: dict[str, str]) -> Table:
-    """Return a row a spring; linear springs, rare, name their own unit."""
-    table = Table(box=None, pad_edge=False)
-    table.add_column("spring", no_wrap=True)
-    headings = (
-        *(f"{name}\n{_USUAL_UNIT.shown}" for name in ("old", "new", "change")),
-        "95 %, all\nat once",
-    )
-    for heading in headings:
-        table.add_column(heading, justify="right", no_wrap=True)
-    table.add_column("", no_wrap=True)
-    word = "moved" if found.same_springs else "differs"
-    for change in found.springs:
-        unit = unit_of(change.unit)
-        shown = "" if unit.shown == _USUAL_UNIT.shown else f" {unit.shown}"
-        table.add_row(
-            escape(sums.get(change.name, change.name)),
-            f"{unit.factor * change.old.value:.4f}{shown}",
-            f"{unit.factor * change.new.value:.4f}{shown}",
-            f"{unit.factor * change.difference.value:+.4f}",
-            _between(change.together, unit.factor),
-            f"[red]{word}[/red]" if change.moved else "",
-        )
-    return table
-
-
-def _between(estimate: "Estimate", factor: float) -> str:
-    return f"{factor * estimate.low:+.3f} … {factor * estimate.high:+.3f}"
-
-
-def _show_verdict(console: Console, found: "CompareSummary", hint: Path | None) -> None:
-    if found.limit is None:
-        return
-    if found.verdict is None:
-        asked = "give them with --rows"
-        if hint is not None:
-            asked += f", e.g. {hint}, which the new model states it was calibrated on"
-        console.print(f"[yellow]no verdict:[/yellow] {escape(found.reason)}; {escape(asked)}",
-                      soft_wrap=True)  # fmt: skip
-        return
-    colour = _COLOURS[found.verdict]
-    console.print(
-        f"[bold {colour}]{found.verdict.value}[/bold {colour}]: {escape(found.reason)}",
-        soft_wrap=True,
-    )
 
 
 def show_report(console: Console, result: "ReportResult") -> None:

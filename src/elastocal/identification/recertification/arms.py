@@ -14,6 +14,7 @@ from elastocal.dataset import Readings
 from elastocal.elastic import ElasticModel
 from elastocal.errors import IdentificationError
 from elastocal.identification.calibrated import CalibratedModel
+from elastocal.identification.domain import CalibrationDomain
 from elastocal.results import brief_repr
 from elastocal.robot import Robot, link_gap, probe_configurations, same_joints, tool_gap
 
@@ -45,6 +46,11 @@ class ComparedRows:
         """Return readings as rows."""
         q, force, moment = readings.joint_position, readings.force, readings.moment
         return cls(q, force, moment, readings=readings, arm=arm)
+
+    @classmethod
+    def of_calibration(cls, domain: CalibrationDomain) -> "ComparedRows":
+        """Return the readings that a model was calibrated at, each pressed from rest."""
+        return cls(domain.joint_position[domain.reading_pose], domain.force, domain.moment)
 
     def __len__(self) -> int:
         return len(self.q)
