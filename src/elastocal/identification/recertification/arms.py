@@ -144,3 +144,8 @@ def _weighs_otherwise(robot: Robot, arm: Robot) -> bool:
     here, there = (each.gravity_torques(probe_configurations(arm)) for each in (robot, arm))
     largest = max(float(np.abs(here).max()), float(np.abs(there).max()))
     return float(np.abs(here - there).max()) > _WEIGHT * largest
+
+
+def count_outside_limits(robot: Robot, q: FloatArray) -> int:
+    """Return how many rows of joint positions lie outside the robot's limits."""
+    return int(np.sum(np.any(robot.limits.margin(q) < 0.0, axis=1)))

@@ -27,6 +27,7 @@ from elastocal.identification.recertification.arms import (
     ComparedRows,
     arm_notes,
     check_same_robot,
+    count_outside_limits,
     model_on,
 )
 from elastocal.identification.recertification.result import (
@@ -317,7 +318,7 @@ def recertify(
     only_old, only_new = (
         tuple(name for name in each.model.spring_names if name not in common) for each in (old, new)
     )
-    outside = 0 if given is None else int(np.sum(arm.limits.margin(given.q).min(axis=1) < 0.0))
+    outside = 0 if given is None else count_outside_limits(arm, given.q)
     result = CompareSummary(
         robot=new.model.robot.name,
         tcp=arm.tip,
