@@ -9,9 +9,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rich.console import Console
-from rich.markup import escape
 from rich.table import Table
 
+from elastocal.cli.output import bold, dim, green, red, yellow
 from elastocal.elastic import Unit, unit_of
 from elastocal.identification import (
     AUTO,
@@ -46,7 +46,7 @@ def show_calibration(console: Console, result: CalibrateResult, out: Path) -> No
     figures = result.calibration
     if figures is not None:
         _show_figures(console, figures)
-    console.print(f"\nmodel written to [bold]{escape(str(out))}[/bold]")
+    console.print(f"\nmodel written to {bold(str(out))}")
 
 
 def _show_figures(console: Console, figures: CalibrationSummary) -> None:
@@ -59,14 +59,14 @@ def _show_figures(console: Console, figures: CalibrationSummary) -> None:
     _show_budget(console, figures.budget)
     _show_suspicious(console, figures.suspicious)
     for warning in capped(figures.warnings):
-        console.print(f"[yellow]warning:[/yellow] {escape(warning)}")
+        console.print(f"{yellow('warning:')} {warning}")
 
 
 def _show_fit(console: Console, figures: CalibrationSummary) -> None:
     mean, peak = figures.deflection.mean, figures.deflection.max
     fit, held_out = figures.residual, figures.held_out
     console.print(
-        f"[bold]{escape(figures.robot)}[/bold]: {_springs(figures)},"
+        f"{bold(figures.robot)}: {_springs(figures)},"
         f" {figures.readings} readings at {figures.poses} poses,"
         f" measured deflection {mm(mean)} mean, {mm(peak)} max"
     )
@@ -75,7 +75,7 @@ def _show_fit(console: Console, figures: CalibrationSummary) -> None:
         table.add_column(heading, justify="left" if heading == "error norm" else "right")
     table.add_row(
         f"at left-out poses ({held_out.folds} refits)",
-        f"[bold]{mm(held_out.mean)}[/bold]",
+        bold(mm(held_out.mean)),
         f"{held_out.mean / mean:.2%}",
         "",
         mm(held_out.max),
@@ -92,7 +92,7 @@ def _show_fit(console: Console, figures: CalibrationSummary) -> None:
     if figures.coverage is not None:
         console.print(_coverage_line(figures.coverage), soft_wrap=True)
     if figures.production:
-        console.print(figures.production.sentence(), markup=False, soft_wrap=True)
+        console.print(figures.production.sentence(), soft_wrap=True)
 
 
 def _coverage_line(coverage: Coverage) -> str:
@@ -129,15 +129,15 @@ def _show_ladder(console: Console, figures: CalibrationSummary) -> None:
         )
         worse = f"{mean:.1f} µm ({low:.1f} to {high:.1f})" if low != high else ""
         table.add_row(
-            escape(rung.springs),
+            rung.springs,
             str(rung.parameters),
             mm(rung.held_out),
             worse,
-            "[bold]taken[/bold]" if rung.chosen else "",
+            bold("taken") if rung.chosen else "",
         )
     console.print(table)
     if figures.settings is not None and figures.settings.springs == AUTO:
-        console.print(ladder_sentence(ladder), markup=False)
+        console.print(ladder_sentence(ladder))
 
 
 def _show_frames(console: Console, frames: Sequence[FrameSummary]) -> None:
@@ -155,9 +155,7 @@ def _show_frames(console: Console, frames: Sequence[FrameSummary]) -> None:
         )
         for name, (what, part, half) in zip((frame.name, "", ""), parts, strict=True):
             numbers = zip(part, half, strict=True)
-            table.add_row(
-                escape(name), what, *(f"{1e6 * x:.0f} ±{1e6 * h:.0f}" for x, h in numbers)
-            )
+            table.add_row(name, what, *(f"{1e6 * x:.0f} ±{1e6 * h:.0f}" for x, h in numbers))
     console.print(table)
 
 
@@ -198,7 +196,7 @@ def _spring_table(figures: CalibrationSummary) -> Table:
         further = bool(above) and spring.name.startswith(f"{above} ")
         name = spring.name.removeprefix(above) if further else spring.name
         above = above if further else spring.name
-        table.add_row(escape(f" {name}" if further else name), *_spring_row(spring))
+        table.add_row(f" {name}" if further else name, *_spring_row(spring))
     return table
 
 
@@ -209,11 +207,11 @@ def _spring_row(spring: SpringSummary) -> tuple[str, ...]:
     value, low, high = (shown.factor * each for each in values)
     unit = "" if shown == _USUAL_UNIT else f" {shown.shown}"
     if spring.too_weak:
-        note = "[yellow]too weak to see[/yellow]"
-        return f"[dim]({value:.4f}{unit})[/dim]", "", "", note
+        note = yellow("too weak to see")
+        return dim(f"({value:.4f}{unit})"), "", "", note
     if not spring.observable:
-        note = f"[yellow]in group {spring.group}[/yellow]"
-        return f"[dim]({value:.4f}{unit})[/dim]", "", "", note
+        note = yellow(f"in group {spring.group}")
+        return dim(f"({value:.4f}{unit})"), "", "", note
     return (
         f"{value:.4f}{unit}",
         f"{low:.3f} … {high:.3f}",
@@ -232,12 +230,12 @@ def _stiffness(value: float, unit: Unit) -> str:
 def _known(value: float, low: float, high: float, at_bound: bool) -> str:
     if at_bound:
         open_end = f"above {low:.3f}" if low < value else "at bound"
-        return f"[yellow]{f'below {high:.3f}' if high > value else open_end}[/yellow]"
+        return yellow(f"below {high:.3f}" if high > value else open_end)
     if value == 0.0:
         return ""
     relative = (high - low) / 2.0 / abs(value)
-    colour = "green" if relative < 0.2 else "yellow" if relative < 0.5 else "red"
-    return f"[{colour}]±{relative:.0%}[/{colour}]"
+    colour = green if relative < 0.2 else yellow if relative < 0.5 else red
+    return colour(f"±{relative:.0%}")
 
 
 def _show_groups(console: Console, figures: CalibrationSummary) -> None:
@@ -270,7 +268,7 @@ def _show_groups(console: Console, figures: CalibrationSummary) -> None:
         f" {figures.condition:.0f}): {meaning}"
     )
     for number, group in enumerate(figures.unobservable, start=1):
-        console.print(f"   group {number}, not by itself: {escape(describe_briefly(group))}")
+        console.print(f"   group {number}, not by itself: {describe_briefly(group)}")
 
 
 def _show_suspicious(console: Console, suspicious: tuple[SuspiciousReading, ...]) -> None:
@@ -278,24 +276,24 @@ def _show_suspicious(console: Console, suspicious: tuple[SuspiciousReading, ...]
         console.print("no reading looks wrong")
         return
     many = "reading looks" if len(suspicious) == 1 else "readings look"
-    console.print(f"\n[yellow]{len(suspicious)} {many} wrong[/yellow] (robust score):")
+    console.print(f"\n{yellow(f'{len(suspicious)} {many} wrong')} (robust score):")
     for reading in suspicious[:_MOST_SUSPICIOUS]:
-        note = " [red]set aside as a blunder[/red]" if reading.set_aside else ""
+        note = f" {red('set aside as a blunder')}" if reading.set_aside else ""
         off = mm(reading.residual)
         console.print(
-            f"   pose {reading.pose} {escape(reading.load_case)}: {off} off,"
+            f"   pose {reading.pose} {reading.load_case}: {off} off,"
             f" score {reading.score:.1f}{note}"
         )
     if len(suspicious) > _MOST_SUSPICIOUS:
         console.print(f"   … and {len(suspicious) - _MOST_SUSPICIOUS} more (--json lists all)")
     first = suspicious[0]
-    console.print(f"   to leave one out: --exclude {first.pose}:{escape(first.load_case)}")
+    console.print(f"   to leave one out: --exclude {first.pose}:{first.load_case}")
 
 
 def show_report(console: Console, result: "ReportResult") -> None:
     """Print the verdict of a report."""
     verdict = result.verdict
-    console.print(f"[bold]{verdict.word}[/bold]{result.light}: {escape(verdict.sentence)}")
+    console.print(f"{bold(verdict.word)}{result.light}: {verdict.sentence}")
     for reason in verdict.reasons:
-        console.print(f"   {reason}", markup=False)
-    console.print(f"written to {result.files}", markup=False)
+        console.print(f"   {reason}")
+    console.print(f"written to {result.files}")

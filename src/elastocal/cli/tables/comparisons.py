@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from rich.box import SIMPLE
 from rich.console import Console
-from rich.markup import escape
 from rich.table import Table
 
+from elastocal.cli.output import bold, green, red, yellow
 from elastocal.codec import CodecSummary
 from elastocal.codec.study import Share, StudySummary, micrometres, value_text
 from elastocal.elastic import unit_of
@@ -30,15 +30,15 @@ _MOST_SIZES = 12
 
 def show_codec(console: Console, result: CodecSummary, out: Path, names: Sequence[str]) -> None:
     """Print the verdicts of a codec."""
-    console.print(f"[bold]{escape(result.robot)}[/bold]: {result.settings.sentence}")
+    console.print(f"{bold(result.robot)}: {result.settings.sentence}")
     for sentence in result.springs:
-        console.print(sentence, markup=False)
+        console.print(sentence)
     console.print(_codec_table(result))
     for sentence in result.sentences:
-        console.print(sentence, markup=False)
+        console.print(sentence)
     for finding in result.findings:
-        console.print(f"[yellow]note:[/yellow] {escape(finding)}")
-    console.print(f"\n{', '.join(names)} written to [bold]{escape(str(out))}[/bold]")
+        console.print(f"{yellow('note:')} {finding}")
+    console.print(f"\n{', '.join(names)} written to {bold(str(out))}")
 
 
 def _codec_table(result: CodecSummary) -> Table:
@@ -46,7 +46,7 @@ def _codec_table(result: CodecSummary) -> Table:
     table = Table(box=None, pad_edge=False, title="error norm at held-out poses, µm: mean / max")
     table.add_column("training poses", justify="right")
     for name in result.variants:
-        table.add_column(escape(name), justify="right")
+        table.add_column(name, justify="right")
     curves = list(result.variants.values())
     sizes = len(curves[0].n_train)
     for k in np.unique(np.linspace(0, sizes - 1, min(sizes, _MOST_SIZES)).round().astype(int)):
@@ -66,19 +66,19 @@ _CAPTION = (
 
 def show_study(console: Console, summary: StudySummary, out: Path, names: Sequence[str]) -> None:
     """Print what a study says."""
-    console.print(f"[bold]{escape(summary.cell)}[/bold]: {escape(summary.sentence)}")
+    console.print(f"{bold(summary.cell)}: {summary.sentence}")
     console.print(_study_table(summary))
     if len(summary.conditions) > _MOST_CONDITIONS:
         console.print(f"{len(summary.conditions) - _MOST_CONDITIONS} more conditions in study.json")
     if summary.advice:
-        console.print(summary.advice, markup=False)
-    console.print(f"\n{', '.join(names)} written to [bold]{escape(str(out))}[/bold]")
+        console.print(summary.advice)
+    console.print(f"\n{', '.join(names)} written to {bold(str(out))}")
 
 
 def _study_table(summary: StudySummary) -> Table:
     factors = summary.varied or ("poses",)
     table = Table(caption=_CAPTION, box=SIMPLE, pad_edge=False, padding=(0, 1, 0, 0))
-    titles = [escape(name.replace("_", " ")) for name in factors]
+    titles = [name.replace("_", " ") for name in factors]
     titles += ["mean", "95 %", "largest", "95 %"]
     titles += [] if summary.target is None else ["mean good", "largest good"]
     for number, title in enumerate(titles):
@@ -90,7 +90,7 @@ def _study_table(summary: StudySummary) -> Table:
             cells += [micrometres(found.median), micrometres(found.q95)]
         if summary.target is not None:
             cells += [_share(each.mean_reaches), _share(each.max_reaches)]
-        table.add_row(*map(escape, cells))
+        table.add_row(*cells)
     return table
 
 
@@ -101,7 +101,7 @@ def _share(share: Share | None) -> str:
 
 _USUAL_UNIT = unit_of("rad/(N*m)")
 """The unit of most springs stands in the heading; other springs name their own."""
-_COLOURS = {"pass": "green", "fail": "red", "undecided": "yellow"}
+_COLOURS = {"pass": green, "fail": red, "undecided": yellow}
 
 
 def show_comparison(console: Console, compared: "CompareResult", hint: Path | None = None) -> None:
@@ -120,19 +120,17 @@ def show_comparison(console: Console, compared: "CompareResult", hint: Path | No
     for name, rows in (("rows", compared.rows), ("calibrated readings", compared.calibrated)):
         if rows is not None:
             console.print(f"{rows.sentence(name)}\n", soft_wrap=True)
-    console.print(f"[bold]{escape(found.robot)}[/bold]: {_moved(found)}")
+    console.print(f"{bold(found.robot)}: {_moved(found)}")
     if found.springs:
         _show_changes(console, found)
     for names, which in ((found.only_old, "old"), (found.only_new, "new")):
         if names:
-            console.print(
-                f"only in the {which} model: {', '.join(names)}", markup=False, soft_wrap=True
-            )
+            console.print(f"only in the {which} model: {', '.join(names)}", soft_wrap=True)
     if found.not_compared:
-        console.print(f"not determined by both: {', '.join(found.not_compared)}", markup=False)
+        console.print(f"not determined by both: {', '.join(found.not_compared)}")
     _show_verdict(console, found, hint)
     for note in found.notes:
-        console.print(f"[yellow]note:[/yellow] {escape(note)}", soft_wrap=True)
+        console.print(f"{yellow('note:')} {note}", soft_wrap=True)
 
 
 def _show_changes(console: Console, found: "CompareSummary") -> None:
@@ -142,9 +140,9 @@ def _show_changes(console: Console, found: "CompareSummary") -> None:
     sums = {each.name: f"sum {n}" for n, each in enumerate(_sums(soft), start=1)}
     console.print(_change_table(soft, sums))
     for name, short in sums.items():
-        console.print(f"   {short}: {name}", markup=False, soft_wrap=True)
+        console.print(f"   {short}: {name}", soft_wrap=True)
     if rigid:
-        console.print(f"rigid in both: {', '.join(each.name for each in rigid)}", markup=False)
+        console.print(f"rigid in both: {', '.join(each.name for each in rigid)}")
     console.print(
         f"the interval holds for all {len(found.springs)} comparisons at once with 95 %"
         + ("; what has 0 outside it moved" if found.springs_judged else ""),
@@ -154,9 +152,9 @@ def _show_changes(console: Console, found: "CompareSummary") -> None:
 
 def _moved(found: "CompareSummary") -> str:
     if found.unmoved_sentence:
-        return escape(found.unmoved_sentence)
+        return found.unmoved_sentence
     names = ", ".join(each.label for each in found.moved_springs)
-    return f"[bold red]{found.verb}[/bold red]: {escape(names)}"
+    return f"{red(bold(found.verb))}: {names}"
 
 
 def _sums(changes: "Sequence[SpringChange]") -> "list[SpringChange]":
@@ -174,7 +172,7 @@ def _change_table(changes: "Sequence[SpringChange]", sums: dict[str, str]) -> Ta
         name = sums.get(change.name, change.name)
         name += "" if unit == _USUAL_UNIT else f", {unit.shown}"
         table.add_row(
-            escape(name),
+            name,
             f"{unit.factor * change.old.value:.3f}",
             f"{unit.factor * change.new.value:.3f}",
             f"{unit.factor * change.difference.value:+.3f}",
@@ -195,11 +193,7 @@ def _show_verdict(console: Console, found: "CompareSummary", hint: Path | None) 
         asked = "give them with --rows"
         if hint is not None:
             asked += f", e.g. {hint}, which the new model states it was calibrated on"
-        console.print(f"[yellow]no verdict:[/yellow] {escape(found.reason)}; {escape(asked)}",
-                      soft_wrap=True)  # fmt: skip
+        console.print(f"{yellow('no verdict:')} {found.reason}; {asked}", soft_wrap=True)
         return
     colour = _COLOURS[found.verdict]
-    console.print(
-        f"[bold {colour}]{found.verdict.value}[/bold {colour}]: {escape(found.reason)}",
-        soft_wrap=True,
-    )
+    console.print(f"{bold(colour(found.verdict.value))}: {found.reason}", soft_wrap=True)
