@@ -39,9 +39,9 @@ def test_every_spring_of_a_rich_model_has_one_line_of_80_columns():
         ),
         SpringSummary("joint_a5.x", "hinge", "rad/(N*m)", 1e-7, 0.0, 1.15e-7, False, group=1),
     )
-    console = Console(file=io.StringIO(), width=80)
-    console.print(_spring_table(replace(made_up_summary(), springs=springs)))
-    _, _, *rows = console.file.getvalue().splitlines()
+    screen = console(stderr=False, file=io.StringIO(), width=80)
+    screen.print(_spring_table(replace(made_up_summary(), springs=springs)))
+    _, _, *rows = screen.file.getvalue().splitlines()
     assert [row.split("  ")[0].strip() or row.strip()[:11] for row in rows] == [
         gear,
         "at 1600 N·m",
