@@ -44,7 +44,10 @@ def _predict(
     for note in figures.notes:
         output.console().print(f"Note: {note}", markup=False, soft_wrap=True)
     if figures.warning:
-        output.console().print(f"[yellow]warning:[/yellow] {figures.warning}", soft_wrap=True)
+        from rich.markup import escape
+
+        warning = escape(figures.warning)
+        output.console().print(f"[yellow]warning:[/yellow] {warning}", soft_wrap=True)
     if figures.misfit is None:
         output.console().print(
             "Note: the model does not know its errors at left-out poses, so that there are no"
