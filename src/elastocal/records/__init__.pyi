@@ -13,6 +13,7 @@ from ._netcdf import (
     Variable as Variable,
     array_fields as array_fields,
     arrays_of as arrays_of,
+    netcdf_image as netcdf_image,
     read_arrays as read_arrays,
     read_netcdf as read_netcdf,
     variables_of as variables_of,
