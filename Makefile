@@ -7,7 +7,7 @@ BIN := $(VENV)/bin
 # Neighbours stay together, so that what a file prepares is seldom prepared twice.
 SHARED_OUT := -n auto --dist worksteal
 
-.PHONY: demo test lint units end-to-end browser docs-strict nightly slow process-figures coverage mutation docs bench house clean
+.PHONY: demo test lint units end-to-end browser docs-strict nightly slow process-figures coverage mutation docs bench house fuzz clean
 
 demo: $(VENV)/installed
 	$(BIN)/elastocal demo afp --out demo --force
@@ -65,6 +65,12 @@ bench: $(VENV)/installed-dev
 	$(BIN)/python benchmarks/ladder.py
 	$(BIN)/python benchmarks/codec.py
 	$(BIN)/python benchmarks/record.py
+
+# CASES and SEED choose; what falls is printed as lines for tests/fuzz/corpus.json.
+CASES ?= 10000
+SEED ?= 0
+fuzz: $(VENV)/installed-dev
+	cd tests && ../$(BIN)/python -m fuzz.harness --cases $(CASES) --seed $(SEED)
 
 house:
 	$(PYTHON) tools/house.py
