@@ -1,5 +1,16 @@
-from ._layout import SCHEMA as SCHEMA, SCHEMAS as SCHEMAS, STATUSES as STATUSES
-from ._store import read as read, read_dataset as read_dataset, write as write
+from ._layout import (
+    MADE_FROM as MADE_FROM,
+    SCHEMA as SCHEMA,
+    SCHEMAS as SCHEMAS,
+    STATUSES as STATUSES,
+    read_made_from as read_made_from,
+)
+from ._store import (
+    content_sha256 as content_sha256,
+    read as read,
+    read_dataset as read_dataset,
+    write as write,
+)
 from .dataset import Dataset as Dataset
 from .load_rows import (
     LARGEST_FORCE as LARGEST_FORCE,

@@ -5,6 +5,7 @@ variables are those of the paper's Procedure 1: ``P^c``, ``P^m``, ``F^m`` and ``
 """
 
 import difflib
+import json
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -50,6 +51,9 @@ JOINT_UNITS = {"rad": "angle", "deg": "angle", "m": "length", "mm": "length"}
 
 SI_JOINT_UNITS = {"angle": "rad", "length": "m"}
 
+MADE_FROM = "made_from"
+"""Attribute with the SHA-256 of each file that a dataset was made from, as JSON."""
+
 ATTRIBUTES = (
     "schema",
     "robot_name",
@@ -59,6 +63,7 @@ ATTRIBUTES = (
     "gravity",
     "check",
     "provenance",
+    MADE_FROM,
 )
 """Global attributes with a meaning here, in the order in which they are written."""
 
@@ -267,6 +272,8 @@ def canonical_attributes(attributes: Mapping[str, object]) -> dict[str, str]:
             raise DatasetError(f"attribute {name!r} is empty: leave it out when it is not known")
         if name in _VECTOR_ATTRIBUTES:
             read_vector(name, {name: value})
+        if name == MADE_FROM:
+            read_made_from({name: value})
     texts = {"robot_name": "", "provenance": "", **attributes}
     return {name: str(texts[name]) for name in known if name in texts}
 
@@ -311,6 +318,27 @@ def read_vector(name: str, attributes: Mapping[str, str]) -> Vector | None:
             f" {example!r}"
         ) from error
     return x, y, z
+
+
+def read_made_from(attributes: Mapping[str, str]) -> dict[str, str]:
+    """Return the SHA-256 of each file that a dataset was made from, by its name; none: not stated.
+
+    Raises
+    ------
+    DatasetError
+        If it is not JSON of texts.
+    """
+    text = attributes.get(MADE_FROM, "{}")
+    try:
+        found = json.loads(text)
+    except (ValueError, RecursionError):
+        found = None
+    if not isinstance(found, dict) or not all(isinstance(each, str) for each in found.values()):
+        raise DatasetError(
+            f"attribute {MADE_FROM!r} is {text!r:.60}: it must be the SHA-256 of each file, such as"
+            ' \'{"journal.jsonl": "9f86…"}\''
+        )
+    return found
 
 
 def _storable(text: str) -> bool:

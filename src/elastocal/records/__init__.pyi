@@ -1,5 +1,7 @@
 from ._codec import (
+    SEAL as SEAL,
     from_data as from_data,
+    json_sha256 as json_sha256,
     read_json as read_json,
     read_json_data as read_json_data,
     record as record,
@@ -13,6 +15,7 @@ from ._netcdf import (
     Variable as Variable,
     array_fields as array_fields,
     arrays_of as arrays_of,
+    arrays_sha256 as arrays_sha256,
     read_arrays as read_arrays,
     read_netcdf as read_netcdf,
     variables_of as variables_of,

@@ -10,8 +10,10 @@ and attributes of the file.
 """
 
 import dataclasses
+import hashlib
+import json
 import typing
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 from io import BytesIO
 from pathlib import Path
@@ -21,7 +23,7 @@ import numpy as np
 
 from elastocal.errors import ElastocalError, FileAccessError, SchemaError
 from elastocal.files import require_file, write_bytes
-from elastocal.records._codec import schema_of
+from elastocal.records._codec import SEAL, schema_of
 from elastocal.results import brief_repr
 
 T = TypeVar("T")
@@ -127,6 +129,27 @@ def read_arrays(path: Path, schema: str = "") -> LabelledArrays:
 
         check_schema(found.attributes.get("schema"), schema, str(path))
     return found
+
+
+def arrays_sha256(arrays: LabelledArrays, without: Collection[str] = (SEAL,)) -> str:
+    """Return the SHA-256 of values, dimensions and texts, the same for a file and its copy.
+
+    Parameters
+    ----------
+    arrays : LabelledArrays
+        What to hash.
+    without : collection of str
+        Attributes of the whole file that do not count.
+    """
+    digest = hashlib.sha256()
+    for name in sorted(arrays.variables):
+        values = np.ascontiguousarray(arrays[name].values)
+        shape = f"{name} {arrays[name].dims} {values.shape}"
+        listed = json.dumps(values.tolist()) if values.dtype.kind in "OU" else ""
+        digest.update(shape.encode() + (listed.encode() if listed else values.tobytes()))
+    attributes = {k: str(v) for k, v in arrays.attributes.items() if k not in without}
+    digest.update(json.dumps(attributes, sort_keys=True).encode())
+    return digest.hexdigest()
 
 
 def write_arrays(path: Path, arrays: LabelledArrays) -> None:

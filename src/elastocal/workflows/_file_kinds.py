@@ -29,6 +29,7 @@ from elastocal.identification.recertification import CompareSummary
 from elastocal.planning.motion import mover_for, require_free_home
 from elastocal.records import read_json, schema_of
 from elastocal.robot import Robot, leaf_links, parse_urdf, refusals_naming
+from elastocal.verdict import read_signature
 from elastocal.workflows._table_kinds import dataset_file
 
 FileDescription = tuple[str, dict[str, object]]
@@ -211,6 +212,15 @@ def process_folder(path: Path) -> FileDescription:
     courses = len(read_process(path).courses)
     kind, facts = process_table(path / TABLE)
     return kind, {**facts, "courses": courses}
+
+
+def signature_file(path: Path) -> FileDescription:
+    """Describe the signature of a run."""
+    found = read_signature(path)
+    return "signature", {
+        "schema": "elastocal.signature/1",
+        **_picked(found, "of", "sha256", "made", "key"),
+    }
 
 
 def comparison_file(path: Path) -> FileDescription:

@@ -17,6 +17,7 @@ An error of ``R_base_tracker`` by an angle turns the marker's displacement by it
 of each millimetre; the tracker's place does not enter at all.
 """
 
+import json
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -26,7 +27,7 @@ import numpy as np
 
 from elastocal.arrays import FloatArray
 from elastocal.cell import CONDITIONING, SENSOR_CORRECTED, Cell, SensorLoad
-from elastocal.dataset import STATUSES, Dataset, write
+from elastocal.dataset import MADE_FROM, STATUSES, Dataset, write
 from elastocal.errors import DatasetError, FileAccessError, ProcedureError, SchemaError
 from elastocal.planning import PlanResult
 from elastocal.procedure.derive._rows import LoadRow, load_rows
@@ -54,6 +55,7 @@ from elastocal.procedure.record import (
     Streams,
     check_stream,
     commits,
+    file_sha256,
     read_copies,
     read_journal,
     read_streams,
@@ -129,7 +131,7 @@ def read_run(run: Path) -> CommittedRun:
     return CommittedRun(folder, entries, record, cell, plan, poses, signs)
 
 
-def derive_run(run: Path, sensor: SensorLoad | None = None) -> DerivedRun:
+def derive_run(run: Path, sensor: SensorLoad | None = None, tool: Path | None = None) -> DerivedRun:
     """Return dataset and summary of the poses that a run has committed.
 
     Parameters
@@ -139,6 +141,9 @@ def derive_run(run: Path, sensor: SensorLoad | None = None) -> DerivedRun:
     sensor : SensorLoad, optional
         The tool on its sensor, with the matrix that corrects readings, from a tool file; by
         default the cell file's, and readings are taken as they are.
+    tool : Path, optional
+        That file; the dataset states its SHA-256 beside that of the journal, which holds those of
+        the streams.
 
     Raises
     ------
@@ -148,6 +153,8 @@ def derive_run(run: Path, sensor: SensorLoad | None = None) -> DerivedRun:
         If no reading is usable.
     """
     found = read_run(run)
+    files = [found.folder.journal, *([tool] if tool is not None else [])]
+    made_from = {file.name: file_sha256(file) for file in files}
     provenance = _provenance(found.folder, found.record, sensor)
     try:
         derived = derive_poses(
@@ -156,7 +163,11 @@ def derive_run(run: Path, sensor: SensorLoad | None = None) -> DerivedRun:
     except (DatasetError, ProcedureError) as error:
         raise type(error)(f"{found.folder.path}: {error}") from error
     warnings = (*found.signs, *derived.summary.warnings)
-    return replace(derived, summary=replace(derived.summary, warnings=warnings))
+    attributes = {**derived.dataset.attributes, MADE_FROM: json.dumps(made_from)}
+    return DerivedRun(
+        replace(derived.dataset, attributes=attributes),
+        replace(derived.summary, warnings=warnings),
+    )
 
 
 def write_derived(run: Path, derived: DerivedRun) -> None:
