@@ -115,6 +115,16 @@ def counted(number: int, name: str) -> str:
     return f"{number} {name}{'' if number == 1 else 's'}"
 
 
+def listed(names: Sequence[str], most: int = 30) -> str:
+    """Return names, the first of them where there are too many to read.
+
+    >>> listed(["a", "b"]), listed(["a", "b", "c", "d"], most=2)
+    ('a, b', 'a, b and 2 more')
+    """
+    left = len(names) - most
+    return ", ".join(names[:most]) + (f" and {left} more" if left > 0 else "")
+
+
 def capped(texts: Sequence[str], most: int = 3) -> list[str]:
     """Return texts without endless repetition: those that differ in numbers only are counted.
 

@@ -124,12 +124,13 @@ def test_predict_says_which_rows_lie_outside_of_what_was_calibrated(folder):
     rows, out = folder / "far.csv", folder / "far_out.csv"
     rows.write_text("\n".join([lines[0], ",".join(far), ",".join(heavy)]) + "\n")
     result = elastocal("predict", folder / "model.json", rows, "--out", out)
-    assert result.err.count("lie outside of what was calibrated") == 1
+    assert result.err.count("0% of 2 rows given lie within 30 deg in each joint") == 1
+    assert "first: row 2; no interval covers the others" in " ".join(result.err.split())
     assert columns(out, "outside_pose", "outside_load")[:, 1].tolist()[1] == 1.0
     assert columns(out, "outside_pose")[0].tolist() == [1.0]
     figures = elastocal("predict", folder / "model.json", rows, "--out", out, "--json")
-    outside = json.loads(figures.out)["outside"]
-    assert (outside["rows"], outside["of"], outside["first"]) == (2, 2, 0)
+    coverage = json.loads(figures.out)["coverage"]
+    assert (coverage["rows"], coverage["covered"], coverage["first"]) == (2, 0.0, "row 2")
 
 
 def test_rows_of_a_visit_share_what_friction_remembers_and_every_row_is_of_one(tmp_path):

@@ -88,6 +88,14 @@ class TestEveryCriterion:
         assert added.shape == (40,)
         np.testing.assert_allclose(added, expected, rtol=1e-6)
 
+    @pytest.mark.parametrize("count", [0, 1, 3, 10, 30])
+    def test_no_value_after_adding_is_above_its_ceiling(self, criterion, information, count):
+        matrix = information.matrix(np.arange(count))
+        ceiling = criterion.ceiling(matrix, information)
+        if ceiling is not None:
+            values = criterion.after_adding(matrix, information)
+            assert np.all(values <= ceiling + 1e-6 * np.abs(values))
+
     def test_many_matrices_have_the_values_of_each(self, criterion, information):
         matrix = information.matrix(range(5)) + information.gram[:6].reshape(2, 3, RANK, RANK)
         values = criterion.value(matrix)

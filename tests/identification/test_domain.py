@@ -4,7 +4,13 @@ import numpy as np
 import pytest
 
 from elastocal.errors import SchemaError
-from elastocal.identification import CalibrateResult, CalibrationDomain
+from elastocal.identification import (
+    CalibratedLoads,
+    CalibrateResult,
+    CalibrationDomain,
+    CoveredRows,
+    covered_rows,
+)
 from elastocal.records import from_data, to_data
 from support.cells import Cell, linear_truth, robot, unseen
 from support.problems import campaign
@@ -14,69 +20,52 @@ ARM, DOMAIN = robot(), calibrated(linear_truth(), 0).domain
 Q, FORCE = campaign().joint_position, campaign().force
 
 
-def inside(q=Q, force=FORCE) -> np.ndarray:
-    return ~DOMAIN.outside(ARM, q, force).any
+def rows(q=Q, force=FORCE, moment=None) -> CoveredRows:
+    return covered_rows(ARM, CalibratedLoads.of_domain(ARM, DOMAIN), q, force, moment)
 
 
 def test_a_calibration_covers_its_own_readings():
-    assert inside().all()
+    assert rows().covered.all()
     assert len(DOMAIN.joint_position) == 31
-    assert DOMAIN.share_inside(DOMAIN, ARM) == 1.0
 
 
 def test_other_poses_over_the_same_region_are_covered_under_the_same_forces():
     there = unseen(linear_truth())
-    found = DOMAIN.outside(ARM, there.joint_position, there.force)
-    assert np.mean(~found.pose) > 0.9
-    assert np.mean(~found.load) > 0.75
+    found = rows(there.joint_position, there.force)
+    assert np.mean(found.near) > 0.9
+    assert np.mean(found.within_load) > 0.75
 
 
-def test_a_pose_is_outside_by_its_distance_and_a_load_by_its_torque():
-    far = DOMAIN.outside(ARM, Q + 2.5 * (np.arange(6) == 3), FORCE)
-    assert far.pose.all()
-    heavy = DOMAIN.outside(ARM, Q, 2.0 * FORCE)
-    assert not heavy.pose.any()
-    assert heavy.load.mean() > 0.5
+def test_a_pose_is_outside_by_its_joints_and_a_load_by_its_size():
+    far = rows(Q + 2.5 * (np.arange(6) == 3))
+    assert not far.near.any()
+    heavy = rows(force=2.0 * FORCE)
+    assert heavy.near.all()
+    assert not heavy.within_load.any()
 
 
 def test_half_the_load_is_covered():
-    assert inside(force=0.5 * FORCE).all()
+    assert rows(force=0.5 * FORCE).covered.all()
 
 
 def test_a_joint_a_whole_turn_further_stands_at_the_same_place():
-    assert inside(Q + 2.0 * np.pi * (np.arange(6) == 5)).all()
+    assert rows(Q + 2.0 * np.pi * (np.arange(6) == 4)).covered.all()
 
 
 def test_a_moment_beyond_the_calibrated_torques_is_outside():
-    found = DOMAIN.outside(ARM, Q, FORCE, np.full((len(Q), 3), 3000.0))
-    assert found.load.all()
+    found = rows(moment=np.full((len(Q), 3), 3000.0))
+    assert found.near.all()
+    assert not found.within_load.any()
 
 
-def test_poses_measured_twice_do_not_make_the_reach_shrink():
+def test_poses_measured_twice_are_one_posture():
     readings = campaign()
     block = np.unique(readings.pose, return_inverse=True)[1]
-    once = CalibrationDomain.of(ARM, readings, block)
     # The second visit is the same block, a little beside the first.
-    twice = replace(
-        readings,
-        joint_position=readings.joint_position + 1e-4 * (np.arange(len(block)) % 2)[:, None],
-    )
-    assert CalibrationDomain.of(ARM, twice, block).spacing(ARM) == pytest.approx(
-        once.spacing(ARM), rel=1e-3
-    )
-
-
-def test_the_summary_counts_rows_and_names_the_first():
-    q = np.vstack([Q[:3], Q[:2] + 2.5])
-    found = DOMAIN.outside(ARM, q, np.vstack([FORCE[:2], 3.0 * FORCE[2:3], FORCE[:2]])).summary()
-    assert (found.rows, found.of, found.pose, found.first) == (3, 5, 2, 2)
-    assert found.sentence().startswith("3 of 5 rows lie outside of what was calibrated (2 farther")
-    assert "first: row 3" in found.sentence()
-    both = found.plus(found)
-    assert (both.rows, both.of, both.first) == (6, 10, 2)
-    none = DOMAIN.outside(ARM, Q[:4], FORCE[:4]).summary()
-    assert none.sentence() == ""
-    assert none.plus(found).first == 6
+    beside = 1e-4 * (np.arange(len(block)) % 2)[:, None]
+    twice = replace(readings, joint_position=readings.joint_position + beside)
+    once, again = (CalibrationDomain.of(ARM, each, block) for each in (readings, twice))
+    np.testing.assert_allclose(again.joint_position, once.joint_position, atol=1e-4)
 
 
 def test_a_model_file_holds_its_domain_and_one_without_it_is_read():

@@ -5,9 +5,10 @@ import pytest
 
 from elastocal.identification import (
     CalibratedLoads,
+    covered_rows,
     near_postures,
+    poses_in_company,
     posture_reach,
-    production_coverage,
 )
 from elastocal.robot import Rail, Robot, catalogue, on_rail, with_tool
 
@@ -25,17 +26,17 @@ def arm() -> Robot:
     return Robot.from_urdf(on_rail(urdf, rail), "tcp")
 
 
-def calibrated(q=POSTURE, presses=PRESSES) -> CalibratedLoads:
+def calibrated(arm, q=POSTURE, presses=PRESSES) -> CalibratedLoads:
     """Return presses at each posture."""
     pose = np.repeat(np.arange(len(q)), len(presses))
-    return CalibratedLoads.of_forces(q, np.tile(presses, (len(q), 1)), pose)
+    return CalibratedLoads.of_forces(arm, q, np.tile(presses, (len(q), 1)), pose)
 
 
-def covered(arm, move=(0.0,) * 7, force_tcp=(0.0, 0.0, -500.0), loads=None, course=()):
+def covered(arm, move=(0.0,) * 7, force_tcp=(0.0, 0.0, -500.0), loads=None, course=(), moment=None):
     """Return the coverage of one row that lies a move in joints from the calibrated posture."""
     q = POSTURE + np.asarray(move)
     force = arm.forward(q)[:, :3, :3] @ np.asarray(force_tcp, dtype=float)
-    return production_coverage(arm, loads or calibrated(), q, force, course)
+    return covered_rows(arm, loads or calibrated(arm), q, force, moment).figures(course)
 
 
 def move(joint: int, by: float) -> np.ndarray:
@@ -80,7 +81,7 @@ def test_a_rail_half_a_metre_away_is_not_covered_though_the_joints_are(arm):
 
 def test_joints_and_rail_must_be_near_at_one_and_the_same_posture(arm):
     two = np.vstack([POSTURE + move(0, 1.0), POSTURE + move(1, 1.0)])
-    assert covered(arm, loads=calibrated(two)).covered == 0.0
+    assert covered(arm, loads=calibrated(arm, two)).covered == 0.0
 
 
 @pytest.mark.parametrize(
@@ -107,7 +108,7 @@ def test_the_force_counts_in_the_frame_of_the_tool(arm):
 
 
 def test_a_side_to_which_nothing_was_pressed_has_no_level(arm):
-    found = covered(arm, force_tcp=(100.0, 0.0, -500.0), loads=calibrated(presses=PRESSES[:1]))
+    found = covered(arm, force_tcp=(100.0, 0.0, -500.0), loads=calibrated(arm, presses=PRESSES[:1]))
     assert found.level is None
     assert found.load == 0.0
     assert "to a side to which nothing was pressed" in found.sentence()
@@ -117,11 +118,38 @@ def test_loads_between_the_axes_of_the_tool_are_within_themselves(arm):
     c = np.sqrt(0.5)
     turned = PRESSES @ np.array([[c, -c, 0.0], [c, c, 0.0], [0.0, 0.0, 1.0]])
     for force in turned:
-        assert covered(arm, force_tcp=force, loads=calibrated(presses=turned)).load == 1.0
+        assert covered(arm, force_tcp=force, loads=calibrated(arm, presses=turned)).load == 1.0
 
 
 def test_a_force_that_pulls_the_tool_is_never_covered(arm):
     assert covered(arm, force_tcp=(0.0, 0.0, 100.0)).load == 0.0
+
+
+def test_a_moment_is_covered_up_to_the_torques_of_the_presses(arm):
+    q = POSTURE
+    force = arm.forward(q)[:, :3, :3] @ PRESSES.T
+    made = np.abs(np.einsum("rji,rjk->ki", arm.jacobian(q).translation, force)).max(axis=0)
+    along = np.array([[0.0, 100.0, 0.0]])
+    torque = np.abs(np.einsum("rji,rj->ri", arm.jacobian(q).rotation, along))[0]
+    level = (torque / np.maximum(made, 0.05 * made.max())).max()
+    assert covered(arm, moment=along).level == pytest.approx(max(level, 0.5))
+    assert covered(arm, moment=1.04 / level * along).covered == 1.0
+    found = covered(arm, moment=1.06 / level * along)
+    assert (found.covered, found.joints, found.load) == (0.0, 1.0, 0.0)
+
+
+def test_the_first_row_that_is_not_covered_is_named_across_pieces(arm):
+    q = np.vstack([POSTURE, POSTURE + move(2, 1.0), POSTURE])
+    force = np.einsum("rij,j->ri", arm.forward(q)[:, :3, :3], (0.0, 0.0, -500.0))
+    rows = covered_rows(arm, calibrated(arm), q, force)
+    np.testing.assert_array_equal(rows.covered, [True, False, True])
+    found = rows.figures(name=lambda row: f"row {row + 7}")
+    assert found.first == "row 8"
+    assert found.sentence("given").startswith("67% of 3 rows given lie within")
+    assert found.sentence().endswith("(33% of rows); first: row 8")
+    inside = covered_rows(arm, calibrated(arm), q[:1], force[:1]).figures(name=str)
+    assert inside.first == ""
+    assert inside.plus(found).first == found.plus(found).first == "row 8"
 
 
 def test_the_angle_to_the_nearest_press_is_told(arm):
@@ -131,14 +159,24 @@ def test_the_angle_to_the_nearest_press_is_told(arm):
     assert aside.direction == pytest.approx(np.pi / 4 - np.arctan(0.3), abs=1e-6)
 
 
+class TestPosesInCompany:
+    def test_a_pose_far_from_all_others_stands_alone(self, arm):
+        q = np.vstack([POSTURE + move(1, 0.5 * n) for n in range(5)] + [POSTURE + move(4, 1.1)])
+        assert poses_in_company(arm, q, np.arange(len(q))).tolist() == [True] * 5 + [False]
+
+    def test_where_most_poses_stand_alone_all_count(self, arm):
+        q = np.vstack([POSTURE + move(1, 1.1 * n) for n in range(5)])
+        assert poses_in_company(arm, q, np.arange(len(q))).all()
+
+
 def test_the_coverage_of_two_halves_is_that_of_the_whole(arm):
     rng = np.random.default_rng(3)
     q = POSTURE + rng.normal(0.0, 0.4, (200, 7))
     force = np.einsum("rij,j->ri", arm.forward(q)[:, :3, :3], (100.0, 50.0, -900.0))
     names = ("a",) * 100 + ("b",) * 100
-    whole = production_coverage(arm, calibrated(), q, force, names)
+    whole = covered_rows(arm, calibrated(arm), q, force).figures(names)
     first, second = (
-        production_coverage(arm, calibrated(), q[part], force[part], names[part])
+        covered_rows(arm, calibrated(arm), q[part], force[part]).figures(names[part])
         for part in (slice(0, 80), slice(80, 200))
     )
     both = first.plus(second)

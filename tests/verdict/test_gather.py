@@ -217,7 +217,9 @@ def test_an_earlier_model_is_compared_over_the_readings_of_the_run(finished, tmp
     assert made.code == 0, made.err
     parts = gather_evidence(EvidenceOptions(finished, old=old), MADE)
     found = parts.recertification
-    assert found.deflection.rows == len(parts.reproduction.unseen.error)
+    assert found.ground.rows == len(parts.reproduction.unseen.error)
+    # The pose that the old calibration did without has no other within 30 deg.
+    assert found.deflection.rows == found.ground.rows_covered == found.ground.rows - 2
     assert found.limit == pytest.approx(0.1e-3)
 
 

@@ -1,5 +1,6 @@
 """The cell file, validated, and the cell ready to compute with: robot made, files found."""
 
+import contextlib
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -43,7 +44,6 @@ from elastocal.cell.procedure import (
 from elastocal.cell.production import ProcessFile, ProductionPath, read_production
 from elastocal.cell.simulation import Fault, Simulation
 from elastocal.errors import ElastocalError, FileAccessError, SchemaError
-from elastocal.files import read_text
 from elastocal.records import StrictModel, read_yaml
 from elastocal.robot import (
     GRAVITY,
@@ -54,6 +54,8 @@ from elastocal.robot import (
     inverse_transform,
     on_rail,
     parse_urdf,
+    read_urdf,
+    refusals_naming,
     with_tool,
     with_tool_mass,
 )
@@ -97,6 +99,15 @@ class CellFile(StrictModel):
         return "\n  ".join([f"CellFile {self.name!r}", *self.summary()])
 
     __str__ = __repr__
+
+    @property
+    def meshes(self) -> list[tuple[str, MeshFile]]:
+        """Mesh files of surface, tool and fixtures, each with its key in the file."""
+        named: list[tuple[str, MeshFile]] = [("surface", self.surface)]
+        for key, shapes in (("tool.shapes", self.tool.shapes), ("fixtures", self.fixtures)):
+            meshes = ((f"{key}.{i}.mesh", shape.mesh) for i, shape in enumerate(shapes))
+            named += [(place, mesh) for place, mesh in meshes if mesh is not None]
+        return named
 
     @property
     def presses(self) -> dict[str, FloatArray]:
@@ -292,7 +303,7 @@ def load_cell(path: Path, *, production: bool = True) -> Cell:
     torques = _at(f"{path}: limits.torque.values", lambda: torque_limits(robot, file.limits.torque))
     home = _at(f"{path}: motion", lambda: home_position(robot, file.motion))
     speeds = _at(f"{path}: motion", lambda: axis_speeds(robot, file.motion))
-    for key, mesh in _meshes(file):
+    for key, mesh in file.meshes:
         if not (path.parent / mesh.file).is_file():
             raise FileAccessError(f"{path}: {key}.file: there is no file {path.parent / mesh.file}")
     process, entry = None, file.process
@@ -317,26 +328,20 @@ def _at(place: str, make: Callable[[], _Result]) -> _Result:
 
 
 def _robot(path: Path, file: CellFile) -> Robot:
-    entry = file.robot
+    entry, place = file.robot, None
     meshes: tuple[tuple[str, Path], ...] = ()
     if entry.urdf is None:
         urdf = catalogue.urdf(entry.model or "")
     else:
         place = path.parent / entry.urdf
-        urdf = read_text(place)
-        meshes = find_meshes(urdf, place.parent)
-    links = {link.get("name") for link in parse_urdf(urdf).findall("link")}
-    tip = f"cell_{_TCP}" if _TCP in links else _TCP
-    urdf = with_tool(urdf, entry.flange, tip, file.tcp.T)
-    if entry.rail is not None:
-        rail = entry.rail
-        urdf = on_rail(urdf, Rail(rail.name, rail.axis, *rail.travel, T_rail_base=rail.pose.T))
-    return Robot.from_urdf(urdf, tip, meshes=meshes)
-
-
-def _meshes(file: CellFile) -> list[tuple[str, MeshFile]]:
-    def of(key: str, shapes: tuple[Shape, ...]) -> list[tuple[str, MeshFile]]:
-        return [(f"{key}.{i}.mesh", s.mesh) for i, s in enumerate(shapes) if s.mesh is not None]
-
-    tool, fixtures = of("tool.shapes", file.tool.shapes), of("fixtures", file.fixtures)
-    return [("surface", file.surface), *tool, *fixtures]
+        urdf = read_urdf(place)
+    with contextlib.nullcontext() if place is None else refusals_naming(place):
+        if place is not None:
+            meshes = find_meshes(urdf, place.parent)
+        links = {link.get("name") for link in parse_urdf(urdf).findall("link")}
+        tip = f"cell_{_TCP}" if _TCP in links else _TCP
+        urdf = with_tool(urdf, entry.flange, tip, file.tcp.T)
+        if entry.rail is not None:
+            rail = entry.rail
+            urdf = on_rail(urdf, Rail(rail.name, rail.axis, *rail.travel, T_rail_base=rail.pose.T))
+        return Robot.from_urdf(urdf, tip, meshes=meshes)

@@ -34,10 +34,10 @@ from .displacement import (
     reference_joints as reference_joints,
 )
 from .domain import (
-    REACH as REACH,
+    LEVEL_REACH as LEVEL_REACH,
+    CalibratedLoads as CalibratedLoads,
     CalibrationDomain as CalibrationDomain,
-    OutsideRows as OutsideRows,
-    OutsideSummary as OutsideSummary,
+    force_in_tcp as force_in_tcp,
 )
 from .figures import (
     CalibrationSummary as CalibrationSummary,
@@ -135,13 +135,13 @@ from .problem import (
 from .production import (
     ENOUGH as ENOUGH,
     JOINT_REACH as JOINT_REACH,
-    LEVEL_REACH as LEVEL_REACH,
     RAIL_REACH as RAIL_REACH,
-    CalibratedLoads as CalibratedLoads,
+    CoveredRows as CoveredRows,
     ProductionCoverage as ProductionCoverage,
+    covered_rows as covered_rows,
     near_postures as near_postures,
+    poses_in_company as poses_in_company,
     posture_reach as posture_reach,
-    production_coverage as production_coverage,
 )
 from .reproduction import (
     Reproduction as Reproduction,

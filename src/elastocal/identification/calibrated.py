@@ -14,12 +14,12 @@ from numpy.typing import ArrayLike
 from elastocal.arrays import FloatArray
 from elastocal.elastic import ElasticModel, check_vectors
 from elastocal.errors import RobotError, SpringError
-from elastocal.identification.domain import CalibrationDomain
+from elastocal.identification.domain import CalibratedLoads, CalibrationDomain
 from elastocal.identification.observability import Observability
 from elastocal.identification.production import (
-    CalibratedLoads,
+    CoveredRows,
     ProductionCoverage,
-    production_coverage,
+    covered_rows,
 )
 from elastocal.identification.uncertainty import interval
 from elastocal.records import record
@@ -203,18 +203,31 @@ class CalibratedModel:
             where=self.compliance != 0,
         )
 
-    def coverage(
-        self, q: FloatArray, force: FloatArray, course: Sequence[str] = ()
-    ) -> ProductionCoverage | None:
-        """Return how much of some rows of production was calibrated; see `production_coverage`.
+    def covered_rows(
+        self, q: FloatArray, force: FloatArray, moment: FloatArray | None = None
+    ) -> CoveredRows | None:
+        """Return which rows were calibrated; see `elastocal.identification.covered_rows`.
 
         None where the model does not know where it was calibrated.
         """
         if self.domain is None:
             return None
         robot = self.model.robot
-        loads = CalibratedLoads.of_domain(robot, self.domain)
-        return production_coverage(robot, loads, q, force, course)
+        return covered_rows(robot, CalibratedLoads.of_domain(robot, self.domain), q, force, moment)
+
+    def coverage(
+        self,
+        q: FloatArray,
+        force: FloatArray,
+        moment: FloatArray | None = None,
+        course: Sequence[str] = (),
+    ) -> ProductionCoverage | None:
+        """Return how much of some rows of production was calibrated; see `CoveredRows.figures`.
+
+        None where the model does not know where it was calibrated.
+        """
+        found = self.covered_rows(q, force, moment)
+        return None if found is None else found.figures(course)
 
     @property
     def tool_name(self) -> str:

@@ -1,32 +1,38 @@
-"""Where a calibration was made: its poses and loads, and which rows lie outside.
+"""Where a calibration was made: its postures and loads, as the model file holds them.
 
-Intervals speak of poses and forces like those of the calibration. Elsewhere the arm does what
-springs cannot express, and nothing in the data says how much. So a model keeps where it was
-calibrated, and a row lies outside by its *pose* when the nearest calibrated pose is farther than
-`REACH` times the median distance of the calibrated poses from their nearest neighbours; by its
-*load* when the torque about a joint leaves the range from rest to the calibrated torques.
+Which rows lie within them is for `elastocal.identification.production` to say. Presses held by
+friction never point as far aside as a cutter's force; but deflections of small forces add up. So a
+force, in the tool's frame, is within the calibrated loads when the tool was pushed as hard in its
+directions, one by one:
+
+    hypot(fx / Fx, fy / Fy) <= 1,   0 <= -fz / Fz <= 1,
+
+with ``Fx`` the largest calibrated force to the side that ``fx`` points to, and so on; the larger of
+the two is the *level* of the force. A side to which nothing was pushed has no level. A moment,
+where rows have one, is within them when its torque about each joint is within the largest that a
+calibrated load made there.
 """
 
 from dataclasses import dataclass
 
 import numpy as np
 
-from elastocal.arrays import BoolArray, FloatArray, IndexArray
+from elastocal.arrays import FloatArray, IndexArray
 from elastocal.dataset import Readings
 from elastocal.elastic import ElasticModel, actuated
 from elastocal.errors import SchemaError
 from elastocal.records import record
 from elastocal.results import brief_repr
 from elastocal.robot import Robot
-from elastocal.wording import counted
 
-REACH = 2.0
-"""Largest distance from a calibrated pose, in usual distances of these from one another."""
-_TORQUE_ALLOWANCE = 0.05
-"""Part of the largest calibrated torque by which every range is wider: forces are never met
-exactly, and a joint that no force loads has no range of its own."""
-_CHUNK = 2000
-"""Rows whose distances are taken at a time."""
+LEVEL_REACH = 1.05
+"""Largest level of a covered force: forces are never met exactly."""
+_SIDES = ("+x", "-x", "+y", "-y", "press")
+_LEAST = 1e-3
+"""Force in N below which nothing was pushed to a side."""
+_LEAST_TORQUE = 0.05
+"""Part of the largest calibrated torque that every joint is taken to have met: no force presses
+about the axis on which the tool sits."""
 
 
 @brief_repr
@@ -87,7 +93,7 @@ class CalibrationDomain:
         _, pose, counts = np.unique(block, return_inverse=True, return_counts=True)
         q = np.zeros((len(counts), readings.joint_position.shape[1]))
         np.add.at(q, pose, readings.joint_position)
-        torque = _torques(robot, readings.joint_position, readings.force, readings.moment)
+        torque = _load_torques(robot, readings.joint_position, readings.force, readings.moment)
         return cls(
             joint_position=q / counts[:, None],
             force=np.array(readings.force),
@@ -97,143 +103,131 @@ class CalibrationDomain:
             reading_pose=np.asarray(pose, dtype=np.intp),
         )
 
-    def spacing(self, robot: Robot) -> float:
-        """Return the median distance of the poses from their nearest neighbours."""
-        q = self.joint_position
-        if len(q) < 2:
-            return 0.0
-        apart = _distances(robot, q, q)
-        np.fill_diagonal(apart, np.inf)
-        return float(np.median(apart.min(axis=1)))
-
-    def outside(
-        self, robot: Robot, q: FloatArray, force: FloatArray, moment: FloatArray | None = None
-    ) -> "OutsideRows":
-        """Return which rows lie outside.
-
-        Parameters
-        ----------
-        robot : Robot
-            The robot that was calibrated.
-        q : ndarray, shape (row, joint)
-            Joint positions, in rad or m.
-        force, moment : ndarray, shape (row, 3)
-            Load on the robot at the tcp in base, in N and N·m.
-        """
-        distance = [
-            _distances(robot, q[start : start + _CHUNK], self.joint_position).min(axis=1)
-            for start in range(0, len(q), _CHUNK)
-        ]
-        torque = _torques(robot, q, force, moment)
-        spare = _TORQUE_ALLOWANCE * max(self.torque_high.max(), -self.torque_low.min())
-        inside = (torque >= self.torque_low - spare) & (torque <= self.torque_high + spare)
-        far = np.concatenate([np.zeros(0), *distance]) > REACH * self.spacing(robot)
-        return OutsideRows(far, np.asarray(~inside.all(axis=1)))
-
-    def share_inside(
-        self, other: "CalibrationDomain", robot: Robot, *, any_load: bool = False
-    ) -> float:
-        """Return the share of this calibration's readings that another one covers.
-
-        Parameters
-        ----------
-        other : CalibrationDomain
-            The other one.
-        robot : Robot
-            The robot with the tool of this calibration.
-        any_load : bool
-            Whether the pose alone decides.
-        """
-        q = self.joint_position[self.reading_pose]
-        found = other.outside(robot, q, self.force, self.moment)
-        return float(np.mean(~(found.pose if any_load else found.any)))
-
 
 @brief_repr
 @dataclass(frozen=True, eq=False)
-class OutsideRows:
-    """Which rows lie outside of where a model was calibrated."""
+class CalibratedLoads:
+    """Calibrated postures, and how hard was pushed at each."""
 
-    pose: BoolArray
-    """Whether it is too far from every calibrated pose, shape (row,)."""
-    load: BoolArray
-    """Whether a torque leaves the calibrated range, shape (row,)."""
+    joint_position: FloatArray
+    """Shape (pose, joint), in rad or m."""
+    largest: FloatArray
+    """Largest force on the robot towards +x, -x, +y, -y and -z of the tcp, (pose, 5), in N."""
+    direction: FloatArray
+    """Unit vectors along the forces on the robot, tcp frame, shape (load, 3)."""
+    torque: FloatArray
+    """Largest torque of a load about each joint, in size, shape (joint,), in N·m or N."""
 
-    @property
-    def any(self) -> BoolArray:
-        """Whether a row lies outside by its pose or its load, shape (row,)."""
-        return np.asarray(self.pose | self.load)
+    @classmethod
+    def of_domain(cls, robot: Robot, domain: CalibrationDomain) -> "CalibratedLoads":
+        """Return those of a calibration."""
+        q, pose = domain.joint_position, domain.reading_pose
+        torque = np.maximum(domain.torque_high, -domain.torque_low)
+        return cls._of(q, force_in_tcp(robot, q[pose], domain.force), pose, torque)
 
-    def summary(self) -> "OutsideSummary":
-        """Return the figures that files and messages show."""
-        rows = np.flatnonzero(self.any)
-        return OutsideSummary(
-            rows=len(rows),
-            of=len(self.pose),
-            pose=int(self.pose.sum()),
-            load=int(self.load.sum()),
-            first=int(rows[0]) if len(rows) else None,
-        )
-
-
-@record()
-class OutsideSummary:
-    """How many rows lie outside of where a model was calibrated."""
-
-    rows: int
-    """Number of rows that lie outside."""
-    of: int
-    """Number of rows."""
-    pose: int
-    """Number of those too far from every calibrated pose."""
-    load: int
-    """Number of those with a torque beyond the calibrated range."""
-    first: int | None
-    """The first of them, counted from 0."""
-
-    def plus(self, other: "OutsideSummary") -> "OutsideSummary":
-        """Return the figures of these rows and those that follow them."""
-        first = self.first
-        if first is None and other.first is not None:
-            first = self.of + other.first
-        return OutsideSummary(
-            self.rows + other.rows, self.of + other.of, self.pose + other.pose,
-            self.load + other.load, first,
-        )  # fmt: skip
-
-    def sentence(self, rows: str = "row") -> str:
-        """Return the figures in a line; empty where no row lies outside.
+    @classmethod
+    def of_forces(
+        cls, robot: Robot, q: FloatArray, force_tcp: FloatArray, pose: IndexArray
+    ) -> "CalibratedLoads":
+        """Return those of readings.
 
         Parameters
         ----------
-        rows : str
-            The noun for a row.
+        robot : Robot
+            The robot, with its tool.
+        q : ndarray, shape (pose, joint)
+            Postures, in rad or m.
+        force_tcp : ndarray, shape (reading, 3)
+            Force on the robot in the tcp frame, in N.
+        pose : ndarray of int, shape (reading,)
+            Posture of each reading.
         """
-        if self.first is None:
-            return ""
-        parts = [
-            f"{count} {text}"
-            for count, text in (
-                (self.pose, f"farther than {REACH:g} usual distances from every calibrated pose"),
-                (self.load, "with a torque about a joint beyond those calibrated"),
-            )
-            if count
-        ]
-        return (
-            f"{self.rows} of {counted(self.of, rows)} lie outside of what was calibrated"
-            f" ({', '.join(parts)}; first: {rows} {self.first + 1}): no interval covers them"
-        )
+        force = np.einsum("rij,rj->ri", robot.forward(q)[pose, :3, :3], force_tcp)
+        torque = np.abs(_load_torques(robot, q[pose], force, None)).max(axis=0)
+        return cls._of(q, force_tcp, pose, torque)
+
+    @classmethod
+    def _of(
+        cls, q: FloatArray, force_tcp: FloatArray, pose: IndexArray, torque: FloatArray
+    ) -> "CalibratedLoads":
+        pushed = _sides(force_tcp)
+        largest = np.zeros((len(q), len(_SIDES)))
+        np.maximum.at(largest, pose, pushed)
+        # Lateral loads may point between the axes of the tool: each is within what was pressed.
+        own = _aside(_parts(pushed, largest[pose]))
+        beyond = np.ones(len(q))
+        np.maximum.at(beyond, pose, np.where(np.isfinite(own), own, 1.0))
+        largest[:, :4] *= beyond[:, None]
+        size = np.linalg.norm(force_tcp, axis=1, keepdims=True)
+        units = (force_tcp / np.maximum(size, _LEAST))[size[:, 0] > _LEAST]
+        # Readings of one load case at all poses point almost the same way: one of them will do.
+        _, first = np.unique(np.round(units, 1), axis=0, return_index=True)
+        return cls(q, largest, units[first], torque)
+
+    def levels(self, force_tcp: FloatArray) -> FloatArray:
+        """Return the level of forces at each posture, shape (row, pose).
+
+        Parameters
+        ----------
+        force_tcp : ndarray, shape (row, 3)
+            Force on the robot in the tcp frame, in N.
+        """
+        part = _parts(_sides(force_tcp)[:, None], self.largest)
+        pull = np.maximum(force_tcp[:, 2:3], 0.0) / np.maximum(self.largest[:, 4], _LEAST)
+        pulls = np.where(pull > LEVEL_REACH - 1.0, np.inf, 0.0)
+        return np.asarray(np.maximum(np.maximum(_aside(part), part[..., 4]), pulls))
+
+    def moment_levels(self, robot: Robot, q: FloatArray, moment: FloatArray) -> FloatArray:
+        """Return the torques of moments in parts of those calibrated, the largest, shape (row,).
+
+        Parameters
+        ----------
+        robot : Robot
+            The robot, with its tool.
+        q : ndarray, shape (row, joint)
+            Joint positions, in rad or m.
+        moment : ndarray, shape (row, 3)
+            Moment on the robot about the tcp in base, in N·m.
+        """
+        torque = np.abs(_load_torques(robot, q, np.zeros_like(moment), moment))
+        known = np.maximum(self.torque, max(_LEAST_TORQUE * self.torque.max(), _LEAST))
+        return np.asarray((torque / known).max(axis=1))
 
 
-def _distances(robot: Robot, q: FloatArray, poses: FloatArray) -> FloatArray:
-    """Return distances in joint space, shape (row, pose): 1 m of a rail counts as 1 rad."""
-    apart = q[:, None] - poses
-    turns = np.round(apart / (2.0 * np.pi)) * 2.0 * np.pi
-    apart -= np.where(robot.revolute, turns, 0.0)
-    return np.asarray(np.linalg.norm(apart, axis=2))
+def _parts(pushed: FloatArray, largest: FloatArray) -> FloatArray:
+    """Return forces to each side in parts of the largest there; infinite where nothing was."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        part = pushed / np.where(largest > _LEAST, largest, 0.0)
+    return np.where(pushed > _LEAST, part, 0.0)
 
 
-def _torques(
+def _aside(part: FloatArray) -> FloatArray:
+    """Return the level of the lateral forces, shape (...), of their parts (..., 5)."""
+    return np.asarray(np.hypot(part[..., :2].max(axis=-1), part[..., 2:4].max(axis=-1)))
+
+
+def _sides(force_tcp: FloatArray) -> FloatArray:
+    """Return the part of forces towards each of `_SIDES`, shape (row, 5), in N."""
+    x, y, z = force_tcp.T
+    return np.asarray(np.maximum(np.stack([x, -x, y, -y, -z], axis=1), 0.0))
+
+
+def force_in_tcp(robot: Robot, q: FloatArray, force: FloatArray) -> FloatArray:
+    """Return forces in the tcp frame, shape (row, 3), in N.
+
+    Parameters
+    ----------
+    robot : Robot
+        The robot, with its tool.
+    q : ndarray, shape (row, joint)
+        Joint positions, in rad or m.
+    force : ndarray, shape (row, 3)
+        In base, in N.
+    """
+    return np.asarray(np.einsum("rji,rj->ri", robot.forward(q)[:, :3, :3], force))
+
+
+def _load_torques(
     robot: Robot, q: FloatArray, force: FloatArray, moment: FloatArray | None
 ) -> FloatArray:
     return ElasticModel(robot, actuated(robot)).load_torques(q, force, moment)

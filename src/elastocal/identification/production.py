@@ -1,24 +1,21 @@
-"""How much of production a calibration covers: one number, and what lies outside by name.
+"""Which rows a calibration covers: the one rule, a number, and what lies outside by name.
+
+Intervals speak of postures and forces like those of the calibration. Elsewhere the arm does what
+springs cannot express, and nothing in the data says how much.
 
 A row of production is covered when some calibrated posture is near it, within `JOINT_REACH` in each
 joint but the last of the wrist (A1 to A5 of a six-axis arm) and `RAIL_REACH` of every linear axis,
-and its force, in the tool's frame, is within what was pressed there. Presses held by friction never
-point as far aside as a cutter's force; but deflections of small forces add up. So a force is within
-the calibrated loads when the tool was pushed as hard in its directions, one by one:
-
-    hypot(fx / Fx, fy / Fy) <= 1,   0 <= -fz / Fz <= 1,
-
-with ``Fx`` the largest calibrated force to the side that ``fx`` points to, and so on; the larger of
-the two is the *level* of the force. A side to which nothing was pushed has no level.
+and its load is within what was pressed there (`CalibratedLoads`). Every command that says where a
+model holds says it by this.
 """
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, fields
 
 import numpy as np
 
 from elastocal.arrays import BoolArray, FloatArray, IndexArray
-from elastocal.identification.domain import CalibrationDomain
+from elastocal.identification.domain import LEVEL_REACH, CalibratedLoads, force_in_tcp
 from elastocal.records import record
 from elastocal.results import brief_repr
 from elastocal.robot import Robot
@@ -28,95 +25,14 @@ JOINT_REACH = float(np.radians(30.0))
 """Largest distance of a covered row from a calibrated posture in a turning joint, in rad."""
 RAIL_REACH = 0.4
 """The same of a sliding joint, in m."""
-LEVEL_REACH = 1.05
-"""Largest level of a covered force: forces are never met exactly."""
+_MOST_ALONE = 0.25
+"""Part of the poses that may stand alone without counting; where more do, none has neighbours to
+speak of, and all count."""
 ENOUGH = 0.95
 """Share of production that a calibration has to cover."""
 _ARM = 6
 """Joints of an arm from which on the last one only turns the tool."""
-_SIDES = ("+x", "-x", "+y", "-y", "press")
-_LEAST = 1e-3
-"""Force in N below which nothing was pushed to a side."""
 _CHUNK = 2000
-
-
-@brief_repr
-@dataclass(frozen=True, eq=False)
-class CalibratedLoads:
-    """Calibrated postures, and how hard was pushed at each."""
-
-    joint_position: FloatArray
-    """Shape (pose, joint), in rad or m."""
-    largest: FloatArray
-    """Largest force on the robot towards +x, -x, +y, -y and -z of the tcp, (pose, 5), in N."""
-    direction: FloatArray
-    """Unit vectors along the forces on the robot, tcp frame, shape (load, 3)."""
-
-    @classmethod
-    def of_domain(cls, robot: Robot, domain: CalibrationDomain) -> "CalibratedLoads":
-        """Return those of a calibration."""
-        q = domain.joint_position
-        R_base_tcp = robot.forward(q)[domain.reading_pose, :3, :3]
-        force_tcp = np.einsum("rji,rj->ri", R_base_tcp, domain.force)
-        return cls.of_forces(q, force_tcp, domain.reading_pose)
-
-    @classmethod
-    def of_forces(cls, q: FloatArray, force_tcp: FloatArray, pose: IndexArray) -> "CalibratedLoads":
-        """Return those of readings.
-
-        Parameters
-        ----------
-        q : ndarray, shape (pose, joint)
-            Postures, in rad or m.
-        force_tcp : ndarray, shape (reading, 3)
-            Force on the robot in the tcp frame, in N.
-        pose : ndarray of int, shape (reading,)
-            Posture of each reading.
-        """
-        x, y, z = force_tcp.T
-        largest = np.zeros((len(q), len(_SIDES)))
-        np.maximum.at(largest, pose, np.stack([x, -x, y, -y, -z], axis=1))
-        # Lateral loads may point between the axes of the tool: each is within what was pressed.
-        own = _aside(_parts(_sides(force_tcp), largest[pose]))
-        beyond = np.ones(len(q))
-        np.maximum.at(beyond, pose, np.where(np.isfinite(own), own, 1.0))
-        largest[:, :4] *= beyond[:, None]
-        size = np.linalg.norm(force_tcp, axis=1, keepdims=True)
-        units = (force_tcp / np.maximum(size, _LEAST))[size[:, 0] > _LEAST]
-        # Readings of one load case at all poses point almost the same way: one of them will do.
-        _, first = np.unique(np.round(units, 1), axis=0, return_index=True)
-        return cls(q, largest, units[first])
-
-    def levels(self, force_tcp: FloatArray) -> FloatArray:
-        """Return the level of forces at each posture, shape (row, pose).
-
-        Parameters
-        ----------
-        force_tcp : ndarray, shape (row, 3)
-            Force on the robot in the tcp frame, in N.
-        """
-        part = _parts(_sides(force_tcp)[:, None], self.largest)
-        pull = np.maximum(force_tcp[:, 2:3], 0.0) / np.maximum(self.largest[:, 4], _LEAST)
-        pulls = np.where(pull > LEVEL_REACH - 1.0, np.inf, 0.0)
-        return np.asarray(np.maximum(np.maximum(_aside(part), part[..., 4]), pulls))
-
-
-def _parts(pushed: FloatArray, largest: FloatArray) -> FloatArray:
-    """Return forces to each side in parts of the largest there; infinite where nothing was."""
-    with np.errstate(divide="ignore", invalid="ignore"):
-        part = pushed / np.where(largest > _LEAST, largest, 0.0)
-    return np.where(pushed > _LEAST, part, 0.0)
-
-
-def _aside(part: FloatArray) -> FloatArray:
-    """Return the level of the lateral forces, shape (...), of their parts (..., 5)."""
-    return np.asarray(np.hypot(part[..., :2].max(axis=-1), part[..., 2:4].max(axis=-1)))
-
-
-def _sides(force_tcp: FloatArray) -> FloatArray:
-    """Return the part of forces towards each of `_SIDES`, shape (row, 5), in N."""
-    x, y, z = force_tcp.T
-    return np.asarray(np.maximum(np.stack([x, -x, y, -y, -z], axis=1), 0.0))
 
 
 @brief_repr
@@ -147,6 +63,8 @@ class ProductionCoverage:
     presses production pushes, and refuses nothing."""
     courses: tuple[str, ...]
     """Courses with rows that are not covered."""
+    first: str = ""
+    """The first row that is not covered; empty where there is none or rows have no names."""
 
     def plus(self, other: "ProductionCoverage") -> "ProductionCoverage":
         """Return the coverage of these rows and others."""
@@ -171,6 +89,7 @@ class ProductionCoverage:
             level=max(self.level or 0.0, other.level or 0.0) if is_known else None,
             direction=max(self.direction, other.direction),
             courses=tuple(dict.fromkeys((*self.courses, *other.courses))),
+            first=self.first or other.first,
         )
 
     @property
@@ -178,10 +97,16 @@ class ProductionCoverage:
         """Whether the share that is covered is `ENOUGH`."""
         return self.covered >= ENOUGH
 
-    def sentence(self) -> str:
-        """Return the figures in a line, with what lies outside by name."""
+    def sentence(self, of: str = "of production") -> str:
+        """Return the figures in a line, with what lies outside by name.
+
+        Parameters
+        ----------
+        of : str
+            Which rows they are.
+        """
         within = (
-            f"{self.covered:.0%} of {counted(self.rows, 'row')} of production lie within"
+            f"{self.covered:.0%} of {counted(self.rows, 'row')} {of} lie within"
             f" {np.degrees(JOINT_REACH):.0f} deg in each joint,"
             f"{'' if self.rail is None else f' {RAIL_REACH:g} m of rail'} and the loads of a"
             " calibrated posture"
@@ -200,6 +125,7 @@ class ProductionCoverage:
         if not parts:
             return within
         named = f"; in {', '.join(self.courses)}" if self.courses else ""
+        named += f"; first: {self.first}" if self.first else ""
         return f"{within}; outside: {', '.join(parts)}{named}"
 
     @property
@@ -209,14 +135,73 @@ class ProductionCoverage:
         return f"up to {self.level:.2f} times that calibrated"
 
 
-def production_coverage(
+@brief_repr
+@dataclass(frozen=True, eq=False)
+class CoveredRows:
+    """Rows, how far each is from the calibrated postures and loads, and so which are covered."""
+
+    robot: Robot
+    near_joints: BoolArray
+    """Whether a calibrated posture is near in the turning joints, shape (row,)."""
+    near: BoolArray
+    """Whether one is near in the turning joints and the rail, shape (row,)."""
+    gap: FloatArray
+    """Distances from the nearest one joint by joint, shape (row, joint), in rad or m."""
+    level: FloatArray
+    """Level of the force at the near posture where it is least, or of the moment, shape (row,)."""
+    direction: FloatArray
+    """Angle of the force from the nearest calibrated one, shape (row,), in rad."""
+
+    @property
+    def within_load(self) -> BoolArray:
+        """Whether the load is within what was pressed, shape (row,)."""
+        return np.asarray(self.level <= LEVEL_REACH)
+
+    @property
+    def covered(self) -> BoolArray:
+        """Whether posture and load are, shape (row,)."""
+        return np.asarray(self.near & self.within_load)
+
+    def figures(
+        self, course: Sequence[str] = (), name: Callable[[int], str] | None = None
+    ) -> ProductionCoverage:
+        """Return how much of the rows is covered.
+
+        Parameters
+        ----------
+        course : sequence of str, shape (row,)
+            Name of each row's course; empty: production has one.
+        name : callable, optional
+            Names a row for a person.
+        """
+        turning, sliding = _judged(self.robot)
+        angles, slides, outside = self.gap[:, turning], self.gap[:, sliding], ~self.covered
+        worst = np.unravel_index(int(np.argmax(angles)), angles.shape) if angles.size else (0, 0)
+        largest = float(self.level.max(initial=0.0))
+        return ProductionCoverage(
+            rows=len(outside),
+            covered=float(np.mean(~outside)),
+            joints=float(np.mean(self.near_joints)),
+            rail=float(np.mean(self.near)) if len(sliding) else None,
+            load=float(np.mean(self.within_load)),
+            farthest=float(angles[worst]) if angles.size else 0.0,
+            farthest_joint=self.robot.joint_names[turning[worst[1]]] if angles.size else "",
+            farthest_rail=float(slides.max()) if slides.size else None,
+            level=largest if np.isfinite(largest) else None,
+            direction=float(self.direction.max(initial=0.0)),
+            courses=_courses_of(course, outside),
+            first=name(int(np.argmax(outside))) if name and outside.any() else "",
+        )
+
+
+def covered_rows(
     robot: Robot,
     calibrated: CalibratedLoads,
     q: FloatArray,
     force: FloatArray,
-    course: Sequence[str] = (),
-) -> ProductionCoverage:
-    """Return how much of production a calibration covers.
+    moment: FloatArray | None = None,
+) -> CoveredRows:
+    """Return which rows a calibration covers.
 
     Parameters
     ----------
@@ -226,38 +211,46 @@ def production_coverage(
         Where it is, and how hard was pushed there.
     q : ndarray, shape (row, joint)
         Postures of production, in rad or m.
-    force : ndarray, shape (row, 3)
-        Force on the robot at the tcp in base, in N.
-    course : sequence of str, shape (row,)
-        Name of each row's course; empty: production has one.
+    force, moment : ndarray, shape (row, 3)
+        Load on the robot at the tcp in base, in N and N·m.
     """
-    starts = range(0, len(q), _CHUNK)
-    parts = [
-        _Distances.of(robot, calibrated, q[start : start + _CHUNK], force[start : start + _CHUNK])
-        for start in starts
+    pieces = [
+        _covered_piece(robot, calibrated, q[some], force[some])
+        for some in (slice(start, start + _CHUNK) for start in range(0, max(len(q), 1), _CHUNK))
     ]
-    near, nearest, level, direction = (
-        np.concatenate([getattr(part, name) for part in parts])
-        for name in ("near", "nearest", "level", "direction")
+    near_joints, near, gap, level, direction = (
+        np.concatenate([getattr(piece, each.name) for piece in pieces])
+        for each in fields(CoveredRows)[1:]
     )
+    if moment is not None:
+        level = np.maximum(level, calibrated.moment_levels(robot, q, moment))
+    return CoveredRows(robot, near_joints, near, gap, level, direction)
+
+
+def _covered_piece(
+    robot: Robot, calibrated: CalibratedLoads, q: FloatArray, force: FloatArray
+) -> CoveredRows:
+    """Return some rows with their distances; each is held against every posture at once."""
     turning, sliding = _judged(robot)
-    gap = _gaps(robot, q, calibrated.joint_position[nearest])
-    angles, slides = gap[:, turning], gap[:, sliding]
-    worst = np.unravel_index(int(np.argmax(angles)), angles.shape) if angles.size else (0, 0)
-    largest = float(level.max(initial=0.0))
-    outside = ~(near.all(axis=1) & (level <= LEVEL_REACH))
-    return ProductionCoverage(
-        rows=len(q),
-        covered=float(np.mean(~outside)),
-        joints=float(np.mean(near[:, 0])),
-        rail=float(np.mean(near[:, 1])) if len(sliding) else None,
-        load=float(np.mean(level <= LEVEL_REACH)),
-        farthest=float(angles[worst]) if angles.size else 0.0,
-        farthest_joint=robot.joint_names[turning[worst[1]]] if angles.size else "",
-        farthest_rail=float(slides.max()) if slides.size else None,
-        level=largest if np.isfinite(largest) else None,
-        direction=float(direction.max(initial=0.0)),
-        courses=_courses_of(course, outside),
+    angle, slide = (
+        _distances(robot, joints, q, calibrated.joint_position) for joints in (turning, sliding)
+    )
+    apart = np.maximum(angle, slide)
+    is_near = apart <= 1.0
+    nearest = calibrated.joint_position[apart.argmin(axis=1)]
+    force_tcp = force_in_tcp(robot, q, force)
+    # Where no posture is near, those of all tell whether the load alone is at fault.
+    usable = is_near | ~is_near.any(axis=1, keepdims=True)
+    size = np.linalg.norm(force_tcp, axis=1)
+    cosine = (force_tcp @ calibrated.direction.T).max(axis=1, initial=-1.0)
+    aligned = np.where(size > 1.0, cosine / np.maximum(size, 1.0), 1.0)
+    return CoveredRows(
+        robot,
+        near_joints=np.asarray((angle <= 1.0).any(axis=1)),
+        near=np.asarray(is_near.any(axis=1)),
+        gap=np.stack([_gap(robot, j, q[:, j], nearest[:, j]) for j in range(q.shape[1])], axis=1),
+        level=np.where(usable, calibrated.levels(force_tcp), np.inf).min(axis=1),
+        direction=np.arccos(np.clip(aligned, -1.0, 1.0)),
     )
 
 
@@ -266,7 +259,9 @@ def _courses_of(course: Sequence[str], rows: BoolArray) -> tuple[str, ...]:
     return tuple(dict.fromkeys(np.array(course, dtype=str)[rows].tolist())) if course else ()
 
 
-def near_postures(robot: Robot, q: FloatArray, poses: FloatArray) -> BoolArray:
+def near_postures(
+    robot: Robot, q: FloatArray, poses: FloatArray, reaches: float = 1.0
+) -> BoolArray:
     """Return whether postures cover rows of production by their joints, shape (row, pose).
 
     Parameters
@@ -275,14 +270,32 @@ def near_postures(robot: Robot, q: FloatArray, poses: FloatArray) -> BoolArray:
         The robot.
     q, poses : ndarray, shapes (row, joint) and (pose, joint)
         Rows and postures, in rad or m.
+    reaches : float
+        How many times `posture_reach` they may be apart.
     """
-    near = np.ones((len(q), len(poses)), dtype=bool)
-    for joint, reach in enumerate(posture_reach(robot)):
-        apart = q[:, None, joint] - poses[:, joint]
-        if robot.revolute[joint]:
-            apart -= np.round(apart / (2.0 * np.pi)) * 2.0 * np.pi
-        near &= np.abs(apart) <= reach
-    return near
+    return np.asarray(_distances(robot, np.concatenate(_judged(robot)), q, poses) <= reaches)
+
+
+def poses_in_company(robot: Robot, q: FloatArray, pose: IndexArray) -> BoolArray:
+    """Return the poses by which models are compared, those not far from all others, shape (pose,).
+
+    Two poses within twice the reach of coverage cover all that lies between them. A pose farther
+    from every other, such as one that only weighs the tool, is no part of what the others cover:
+    what a model makes of it when it is left out is an extrapolation, and its large error would hide
+    the differences at all others.
+
+    Parameters
+    ----------
+    robot : Robot
+        The robot.
+    q, pose : ndarray, shapes (reading, joint) and (reading,)
+        Joint positions of readings in rad or m, and the poses that they are of.
+    """
+    _, first = np.unique(pose, return_index=True)
+    near = near_postures(robot, q[first], q[first], 2.0)
+    np.fill_diagonal(near, False)
+    company = np.asarray(near.any(axis=1))
+    return company if np.mean(~company) <= _MOST_ALONE else np.ones(len(first), dtype=bool)
 
 
 def posture_reach(robot: Robot) -> FloatArray:
@@ -304,46 +317,19 @@ def _judged(robot: Robot) -> tuple[IndexArray, IndexArray]:
     return (turning[:-1] if arm >= _ARM and revolute[-1] else turning), np.flatnonzero(~revolute)
 
 
-def _gaps(robot: Robot, q: FloatArray, poses: FloatArray) -> FloatArray:
-    """Return distances joint by joint, whole turns aside, in rad or m."""
+def _distances(robot: Robot, joints: IndexArray, q: FloatArray, poses: FloatArray) -> FloatArray:
+    """Return distances in parts of the reach, the largest of some joints, shape (row, pose)."""
+    apart, reach = np.zeros((len(q), len(poses))), posture_reach(robot)
+    # One joint at a time: rows by poses by joints are too many numbers at once.
+    for joint in joints:
+        gap = _gap(robot, joint, q[:, None, joint], poses[:, joint])
+        np.maximum(apart, gap / reach[joint], out=apart)
+    return apart
+
+
+def _gap(robot: Robot, joint: int, q: FloatArray, poses: FloatArray) -> FloatArray:
+    """Return distances in a joint, whole turns aside, in rad or m."""
     apart = q - poses
-    turns = np.round(apart / (2.0 * np.pi)) * 2.0 * np.pi
-    return np.asarray(np.abs(apart - np.where(robot.revolute, turns, 0.0)))
-
-
-@dataclass(frozen=True, eq=False)
-class _Distances:
-    """Distances of some rows of production from their calibrated postures."""
-
-    near: BoolArray
-    """Whether a posture is near in the joints, and one in joints and rail, shape (row, 2)."""
-    nearest: IndexArray
-    """Nearest posture, shape (row,)."""
-    level: FloatArray
-    """Level of the force at the near posture where it is least, shape (row,)."""
-    direction: FloatArray
-    """Angle of the force from the nearest calibrated one, shape (row,), in rad."""
-
-    @classmethod
-    def of(
-        cls, robot: Robot, calibrated: CalibratedLoads, q: FloatArray, force: FloatArray
-    ) -> "_Distances":
-        turning, sliding = _judged(robot)
-        gap = _gaps(robot, q[:, None], calibrated.joint_position)
-        angle = gap[..., turning].max(axis=-1, initial=0.0) / JOINT_REACH
-        slide = gap[..., sliding].max(axis=-1, initial=0.0) / RAIL_REACH
-        apart = np.maximum(angle, slide)
-        is_near = apart <= 1.0
-        force_tcp = np.einsum("rji,rj->ri", robot.forward(q)[:, :3, :3], force)
-        level = calibrated.levels(force_tcp)
-        # Where no posture is near, those of all tell whether the load alone is at fault.
-        usable = is_near | ~is_near.any(axis=1, keepdims=True)
-        size = np.linalg.norm(force_tcp, axis=1)
-        cosine = (force_tcp @ calibrated.direction.T).max(axis=1, initial=-1.0)
-        aligned = np.where(size > 1.0, cosine / np.maximum(size, 1.0), 1.0)
-        return cls(
-            np.stack([(angle <= 1.0).any(axis=1), is_near.any(axis=1)], axis=1),
-            np.asarray(apart.argmin(axis=1), dtype=np.intp),
-            np.where(usable, level, np.inf).min(axis=1),
-            np.arccos(np.clip(aligned, -1.0, 1.0)),
-        )
+    if robot.revolute[joint]:
+        apart -= np.round(apart / (2.0 * np.pi)) * 2.0 * np.pi
+    return np.abs(apart)

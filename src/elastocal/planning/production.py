@@ -21,8 +21,9 @@ from elastocal.identification import (
     LEVEL_REACH,
     CalibratedLoads,
     ProductionCoverage,
+    covered_rows,
+    force_in_tcp,
     near_postures,
-    production_coverage,
 )
 from elastocal.planning.search import CRITERIA, Information
 from elastocal.records import record
@@ -120,10 +121,9 @@ def plan_coverage(cell: Cell, q: FloatArray) -> ProductionCoverage | None:
         return None
     force_tcp = cell.file.load_cases.force_tcp
     pose = np.repeat(np.arange(len(q)), len(force_tcp))
-    loads = CalibratedLoads.of_forces(q, np.tile(force_tcp, (len(q), 1)), pose)
-    return production_coverage(
-        cell.robot, loads, process.joint_position, process.force, process.course
-    )
+    loads = CalibratedLoads.of_forces(cell.robot, q, np.tile(force_tcp, (len(q), 1)), pose)
+    rows = covered_rows(cell.robot, loads, process.joint_position, process.force, process.moment)
+    return rows.figures(process.course)
 
 
 def covering_candidates(cell: Cell, q: FloatArray) -> IndexArray:
@@ -226,11 +226,9 @@ def _load_findings(cell: Cell) -> Iterator[str]:
     process, loads = cell.process, cell.file.load_cases
     if process is None:
         return
-    R_base_tcp = cell.robot.forward(process.joint_position)[:, :3, :3]
-    force_tcp = np.einsum("rji,rj->ri", R_base_tcp, process.force)
-    pressed = CalibratedLoads.of_forces(
-        process.joint_position[:1], loads.force_tcp, np.zeros(len(loads.force_tcp), dtype=np.intp)
-    )
+    q, somewhere = process.joint_position, np.zeros(len(loads.force_tcp), dtype=np.intp)
+    force_tcp = force_in_tcp(cell.robot, q, process.force)
+    pressed = CalibratedLoads.of_forces(cell.robot, q[:1], loads.force_tcp, somewhere)
     level = pressed.levels(force_tcp)[:, 0]
     if not np.any(level > LEVEL_REACH):
         return

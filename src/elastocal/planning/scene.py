@@ -33,6 +33,7 @@ from elastocal.planning.surface import (
     mesh_findings,
     placement_findings,
     read_mesh,
+    size_findings,
     unit_findings,
 )
 from elastocal.results import brief_repr
@@ -40,6 +41,9 @@ from elastocal.robot import Robot, collision_model
 from elastocal.robot.inverse import inverse_for
 from elastocal.shapes import Body, Box, Cylinder, Mesh, Solid, Sphere, solid_of
 
+_NO_MASSES = (
+    "torques are not judged: the links of robot {name!r} have no masses (<inertial> in its URDF)"
+)
 _NEIGHBOURS = 1
 """Links this many joints apart touch by construction and are not checked against each other."""
 
@@ -220,7 +224,7 @@ def cell_surface(cell: Cell) -> Surface:
 
 
 def surface_findings(cell: Cell, surface: Surface, rng: Generator) -> tuple[Finding, ...]:
-    """Return what a user should know of the mesh and of where it stands.
+    """Return what a user should know of the meshes, of where the surface stands, and of the arm.
 
     Parameters
     ----------
@@ -241,7 +245,14 @@ def surface_findings(cell: Cell, surface: Surface, rng: Generator) -> tuple[Find
     external = cell.external_positions
     # The middle and the ends of a grid will do to see from which side the robot can work.
     few = external[np.unique(np.linspace(0, len(external) - 1, 3).astype(int))]
-    found = unit_findings(cell.surface_path, cell.file.surface.unit)
+    found: list[Finding] = []
+    for key, mesh in cell.file.meshes:
+        path = cell.find(mesh.file)
+        found += unit_findings(path, mesh.unit, key)
+        if key != "surface":
+            found += size_findings(path, mesh.metres, key, arm_reach(cell.robot))
+    if not cell.robot.has_masses and np.isfinite(cell.torque_limits).any():
+        found.append(Finding("masses", _NO_MASSES.format(name=cell.robot.name)))
     found += mesh_findings(surface) + placement_findings(
         surface,
         first_joint_positions(cell.robot, external),
@@ -252,7 +263,7 @@ def surface_findings(cell: Cell, surface: Surface, rng: Generator) -> tuple[Find
     for finding in found:
         if finding.fatal:
             raise PlanningError(finding.message)
-    return found
+    return tuple(found)
 
 
 def collision_scene(cell: Cell, surface: Surface) -> CollisionScene:

@@ -5,6 +5,11 @@ from .chain import (
     SerialChain as SerialChain,
     build_model as build_model,
 )
+from .collision import (
+    collision_model as collision_model,
+    find_meshes as find_meshes,
+    is_relative as is_relative,
+)
 from .identity import (
     Gap as Gap,
     link_gap as link_gap,
@@ -25,7 +30,6 @@ from .robot import (
     Jacobian as Jacobian,
     JointLimits as JointLimits,
     Robot as Robot,
-    collision_model as collision_model,
     evaluate_jacobian as evaluate_jacobian,
     evaluate_weight as evaluate_weight,
 )
@@ -44,12 +48,13 @@ from .transforms import (
 from .urdf import (
     Assumption as Assumption,
     assumptions as assumptions,
-    find_meshes as find_meshes,
-    is_relative as is_relative,
     leaf_links as leaf_links,
     parse_urdf as parse_urdf,
     read_chain as read_chain,
+    read_urdf as read_urdf,
     refusals_naming as refusals_naming,
     robot_name as robot_name,
     root_link as root_link,
+    serial_urdf as serial_urdf,
+    tip_links as tip_links,
 )

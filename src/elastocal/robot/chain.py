@@ -38,8 +38,6 @@ class ChainJoint:
     """Mass in kg of the links behind the joint; 0 when not known."""
     centre_of_mass: FloatArray
     """Centre of that mass in the joint frame, shape (3,), in m."""
-    inertia: FloatArray
-    """Inertia about the centre of mass, in the joint frame, shape (3, 3), in kg·m²."""
 
 
 @dataclass(frozen=True)
@@ -124,9 +122,9 @@ def build_model(chain: SerialChain, inserted: Sequence[InsertedJoint] = ()) -> C
         for virtual in (v for v in here if v.distal):
             parent, behind = _insert(model, parent, virtual, behind)
             column_of[virtual.name] = model.idx_vs[parent]
-        model.appendBodyToJoint(
-            parent, pin.Inertia(joint.mass, joint.centre_of_mass, joint.inertia), behind
-        )
+        # What stands still needs no inertia tensor, which many URDFs have wrong.
+        body = pin.Inertia(joint.mass, joint.centre_of_mass, np.zeros((3, 3)))
+        model.appendBodyToJoint(parent, body, behind)
     T_last_tip = behind * pin.SE3(chain.T_last_tip)
     tip = model.addFrame(pin.Frame(chain.tip, parent, T_last_tip, pin.FrameType.OP_FRAME))
     return ChainModel(

@@ -14,6 +14,7 @@ from elastocal.results import brief_repr
 from elastocal.robot.transforms import xyzabc_from_T
 from elastocal.robot.urdf import parse_urdf, robot_name, root_link
 from elastocal.units import impossible
+from elastocal.wording import listed
 
 _RIGID = 1e-6
 """How far R R^T of a transform that a person wrote may be from identity."""
@@ -95,7 +96,7 @@ def with_tool(
     if parent not in links:
         raise RobotError(
             f"URDF of {robot_name(root)} has no link {parent!r} to mount {tool!r} on"
-            f"{nearest(parent, links)} (links: {', '.join(links)})"
+            f"{nearest(parent, links)} (links: {listed(links)})"
         )
     _refuse_taken(root, "link", tool)
     _refuse_taken(root, "joint", f"{tool}_joint")
@@ -203,9 +204,7 @@ def on_rail(urdf: str, rail: Rail) -> str:
 
 def _parse(urdf: str) -> ElementTree.Element:
     """Return the root element with its comments, which name the sources of the numbers."""
-    parse_urdf(urdf)
-    builder = ElementTree.TreeBuilder(insert_comments=True)
-    return ElementTree.fromstring(urdf, ElementTree.XMLParser(target=builder))
+    return parse_urdf(urdf, comments=True)
 
 
 def _write(root: ElementTree.Element) -> str:
@@ -222,7 +221,7 @@ def _refuse_taken(root: ElementTree.Element, tag: str, name: str) -> None:
     if not name or name in taken:
         raise RobotError(
             f"URDF of {robot_name(root)} cannot get a {tag} {name!r}: the name must be new"
-            f" (there are {', '.join(taken)})"
+            f" (there are {listed(taken)})"
         )
 
 

@@ -1,7 +1,7 @@
 """The rigid robot: kinematics, limits and gravity torques of a serial chain."""
 
-import xml.etree.ElementTree as ElementTree
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from elastocal.arrays import FloatArray, IndexArray
 from elastocal.errors import RobotError
-from elastocal.files import read_text, sha256
+from elastocal.files import sha256
 from elastocal.results import brief_repr
 from elastocal.robot.chain import ChainJoint, ChainModel, SerialChain, build_model
 from elastocal.robot.urdf import (
@@ -18,12 +18,17 @@ from elastocal.robot.urdf import (
     assumptions,
     parse_urdf,
     read_chain,
+    read_urdf,
     refusals_naming,
     robot_name,
 )
 
 GRAVITY = (0.0, 0.0, -9.80665)
 """Standard gravity in the base frame of a robot that stands upright, in m/s² (ISO 80000-3)."""
+_ARM, _REDUNDANT = 6, 7
+"""Numbers of joints of an arm."""
+_CROSSED = 0.1
+"""Sine of the angle from which on two axes cross; calibrated parallel axes are nearer."""
 _JOINTS_SHOWN = 12
 """Most joints that the `repr` of a robot lists."""
 
@@ -76,7 +81,7 @@ class JointLimits:
 class Robot:
     """A serial robot from its base link to its tool centre point.
 
-    Joints before the last six are *external axes*: a rail, a turntable. Make one with
+    Joints before the arm's six or seven are *external axes*: a rail, a turntable. Make one with
     `from_urdf`, `from_file` or `elastocal.robot.catalogue.load`.
     """
 
@@ -135,7 +140,7 @@ class Robot:
     @classmethod
     def from_file(cls, path: Path, tip: str, base: str | None = None) -> "Robot":
         """Return the robot that a URDF file describes; see `from_urdf`."""
-        text = read_text(path)
+        text = read_urdf(path)
         with refusals_naming(path):
             return cls.from_urdf(text, tip, base)
 
@@ -154,10 +159,21 @@ class Robot:
         """Name of the link at the tool centre point."""
         return self.chain.tip
 
-    @property
+    @cached_property
     def external_axes(self) -> int:
-        """Number of joints before the six of the arm."""
-        return max(0, len(self.chain.joints) - 6)
+        """Number of joints before the arm, which has six joints, or seven.
+
+        Seven revolute joints are one arm, unless the last six are: then their second and third
+        axes are parallel (shoulder and elbow), as they are on no arm with a redundant joint, whose
+        axes cross one after the other. A turntable under six joints stays an external axis.
+        """
+        last = self.chain.joints[-_REDUNDANT:]
+        if len(last) == _REDUNDANT and all(joint.revolute for joint in last):
+            shoulder, elbow = last[2], last[3]
+            across = np.cross(shoulder.axis, elbow.placement[:3, :3] @ elbow.axis)
+            if float(np.linalg.norm(across)) > _CROSSED:
+                return len(self.chain.joints) - _REDUNDANT
+        return max(0, len(self.chain.joints) - _ARM)
 
     @property
     def revolute(self) -> tuple[bool, ...]:
@@ -363,34 +379,3 @@ def evaluate_jacobian(chain: ChainModel, q: FloatArray, columns: IndexArray) -> 
         target[:] = jacobian(model, data, configuration, frame, axes)
     picked = np.take(rows, columns, axis=2).reshape(*q.shape[:-1], 6, len(columns))
     return Jacobian(picked[..., :3, :], picked[..., 3:, :])
-
-
-def collision_model(robot: Robot) -> tuple[pin.Model, pin.GeometryModel]:
-    """Return the tree of a robot's URDF and the collision shapes of its links.
-
-    Parameters
-    ----------
-    robot : Robot
-        With its `Robot.meshes` found.
-
-    Raises
-    ------
-    RobotError
-        If a mesh cannot be read.
-    """
-    text = robot.urdf
-    if robot.meshes:
-        places = dict(robot.meshes)
-        root = parse_urdf(text)
-        for mesh in root.iterfind("link/collision/geometry/mesh"):
-            name = mesh.get("filename", "")
-            mesh.set("filename", str(places.get(name, name)))
-        text = ElementTree.tostring(root, encoding="unicode")
-    model = pin.buildModelFromXML(text)
-    try:
-        return model, pin.buildGeomFromUrdfString(model, text, pin.GeometryType.COLLISION)
-    except ValueError as error:
-        reason = " ".join(str(error).partition("message:")[2].split()) or str(error)
-        raise RobotError(
-            f"collision shapes of {robot_name(parse_urdf(text))} cannot be read: {reason}"
-        ) from error

@@ -1,7 +1,7 @@
 """How near a configuration is to losing a direction of motion.
 
-All measures look at the arm alone (the last six joints): a rail in front of it would hide a
-singular wrist, and does not help a correction that the arm has to make.
+All measures look at the arm alone (the joints behind the external axes): a rail in front of it
+would hide a singular wrist, and does not help a correction that the arm has to make.
 """
 
 import numpy as np

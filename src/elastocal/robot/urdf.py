@@ -1,52 +1,50 @@
-"""Read a URDF: check it by name, then let Pinocchio parse it into a serial chain.
+"""Read a URDF, as people publish them: check it by name, then let Pinocchio chain it.
+
+Only the joints from the base to the asked tip are a robot here. Every other joint is fixed at zero,
+whatever it is (a mimicking piston, a gripper's fingers), so that what hangs on it keeps its place
+and its weight; frames beside the chain (``base``, twins of the flange) do no harm.
 
 The checks come before Pinocchio because its parser reports problems on the C++ error stream;
-a user of elastocal gets one line that names the link, the joint and the allowed ones.
-
-A URDF keeps the names that its author gave to the mesh files of collision shapes, also in the files
-that elastocal writes: kinematics reads no mesh, so that a plan or a model needs none.
+a user of elastocal gets one line that names the link, the joint and the allowed ones. Pinocchio
+gets a copy (`serial_urdf`) with nothing in it but what is computed with: statics needs masses and
+their centres, no inertia tensor.
 """
 
+import codecs
 import contextlib
-import math
+import re
 import xml.etree.ElementTree as ElementTree
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from urllib.parse import unquote
 
 import numpy as np
 import pinocchio as pin
 
 from elastocal.errors import FileAccessError, RobotError, nearest
+from elastocal.files import require_file
+from elastocal.robot._urdf_elements import (
+    check_elements,
+    is_movable,
+    joints_between,
+    joints_by_child,
+    limits_of,
+    link_names,
+    link_of,
+)
 from elastocal.robot.chain import ChainJoint, SerialChain
-from elastocal.units import impossible
+from elastocal.wording import listed
 
-_PACKAGE, _FILE = "package://", "file://"
-_NUMBERS = {
-    "origin": {"xyz": 3, "rpy": 3},
-    "axis": {"xyz": 3},
-    "limit": {"lower": 1, "upper": 1, "effort": 1, "velocity": 1},
-    "mass": {"value": 1},
-    "inertia": dict.fromkeys(("ixx", "ixy", "ixz", "iyy", "iyz", "izz"), 1),
-    "box": {"size": 3},
-    "sphere": {"radius": 1},
-    "cylinder": {"radius": 1, "length": 1},
-    "mesh": {"scale": 3},
-}
-"""How many numbers each attribute of each element holds (ROS wiki, urdf/XML)."""
-_DIMENSIONS = {
-    ("origin", "xyz"): "length",
-    ("origin", "rpy"): "angle",
-    ("mass", "value"): "mass",
-    ("box", "size"): "length",
-    ("sphere", "radius"): "length",
-    ("cylinder", "radius"): "length",
-    ("cylinder", "length"): "length",
-}
-"""Of those whose size is bounded: limits of joints often hold 1e16 for "none"."""
-_AXIS_LENGTHS = (1e-6, 1e6)
-"""Lengths of a joint's axis: its square must neither vanish nor overflow when it is normed."""
+_ENCODING = re.compile(rb"<\?xml[^>]*?encoding\s*=\s*[\"']([\w.-]+)")
+_BEFORE_ROOT = re.compile(r"\A(?:\ufeff|\s|<!--.*?-->)*(?:<\?xml\b.*?\?>)?", re.S)
+"""What authors put before the XML declaration, where XML allows nothing; and the declaration."""
+_NO_INERTIA = dict.fromkeys(("ixx", "ixy", "ixz", "iyy", "iyz", "izz"), "0")
+_ANY_LIMIT = dict.fromkeys(("lower", "upper", "effort", "velocity"), "0")
+"""Pinocchio wants limits; `_joint_of` takes them from where they were written."""
+_XACRO = (
+    "this is a xacro template, not a URDF: expand it (ROS package xacro) with"
+    " `xacro FILE.xacro > ROBOT.urdf` and give ROBOT.urdf"
+)
 
 
 @dataclass(frozen=True)
@@ -73,21 +71,87 @@ def refusals_naming(path: Path) -> Iterator[None]:
         raise RobotError(f"{path}: {error}") from error
 
 
-def parse_urdf(text: str) -> ElementTree.Element:
+def read_urdf(path: Path) -> str:
+    """Return the text of a URDF file, in the encoding that it declares (UTF-8 by default).
+
+    Raises
+    ------
+    FileAccessError
+        If the file is missing, unreadable, or not text in that encoding.
+    """
+    require_file(path)
+    try:
+        data = path.read_bytes()
+    except OSError as error:
+        raise FileAccessError(f"cannot read {path}: {error.strerror or error}") from error
+    for encoding in _encodings(data):
+        try:
+            text = data.decode(encoding).removeprefix("\ufeff")
+        except (UnicodeError, LookupError):
+            continue
+        if text.strip():
+            return text
+        raise FileAccessError(f"cannot read {path}: the file is empty")
+    raise FileAccessError(f"cannot read {path}: not a UTF-8 text file")
+
+
+def _encodings(data: bytes) -> Iterator[str]:
+    """Yield how a URDF may be encoded: as its mark or declaration says, UTF-8, western comments."""
+    if data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
+        yield "utf-16"
+    declared = _ENCODING.search(data[:1000])
+    if declared:
+        yield declared[1].decode()
+    yield "utf-8"
+    if b"<robot" in data:
+        yield "latin-1"
+
+
+def parse_urdf(text: str, comments: bool = False) -> ElementTree.Element:
     """Return the root element of a URDF.
+
+    Parameters
+    ----------
+    text : str
+        The URDF; blank lines and comments may stand before its XML declaration.
+    comments : bool
+        Whether comments are kept.
 
     Raises
     ------
     RobotError
-        If the text is not XML or its root is not ``<robot>``.
+        If the text is not XML, its root is not ``<robot>``, or it is a xacro template.
     """
+    builder = ElementTree.TreeBuilder(insert_comments=comments)
     try:
-        root = ElementTree.fromstring(text)
+        # Line breaks stay, so that the parser's messages name the line of the file.
+        bare = _BEFORE_ROOT.sub(lambda found: "\n" * found[0].count("\n"), text, count=1)
+        root = ElementTree.fromstring(bare, ElementTree.XMLParser(target=builder))
     except ElementTree.ParseError as error:
+        if "<xacro:" in text:
+            raise RobotError(_XACRO) from error
         raise RobotError(f"URDF is not valid XML: {error}") from error
-    if root.tag != "robot":
+    namespace = root.tag.removesuffix("robot")
+    if namespace not in ("", f"{{{namespace[1:-1]}}}"):
         raise RobotError(f"URDF root element is <{root.tag}>, not <robot>")
+    for element in root.iter():
+        if isinstance(element.tag, str):  # that of a comment is a function
+            _refuse_template(element)
+            element.tag = element.tag.removeprefix(namespace)
     return root
+
+
+def _refuse_template(element: ElementTree.Element) -> None:
+    """Refuse what xacro replaces.
+
+    Raises
+    ------
+    RobotError
+        With the command that does it.
+    """
+    values = element.attrib.values()
+    if "xacro}" in element.tag or any("${" in value or "$(" in value for value in values):
+        raise RobotError(_XACRO)
 
 
 def robot_name(root: ElementTree.Element) -> str:
@@ -103,18 +167,62 @@ def root_link(root: ElementTree.Element) -> str:
     RobotError
         If the links do not form one tree.
     """
-    links = _link_names(root)
-    children = {_link_of(joint, "child") for joint in root.findall("joint")}
-    roots = [link for link in links if link not in children]
+    return _links_downward(root)[0]
+
+
+def _links_downward(root: ElementTree.Element) -> list[str]:
+    """Return the links, each behind the one that it hangs on."""
+    links, joint_to = link_names(root), joints_by_child(root)
+    roots = [link for link in links if link not in joint_to]
     if len(roots) != 1:
         raise RobotError(f"URDF must have exactly one root link, has {roots or 'none'}")
-    return roots[0]
+    children: dict[str, list[str]] = {}
+    for child, joint in joint_to.items():
+        children.setdefault(link_of(joint, "parent"), []).append(child)
+    downward = list(roots)
+    for link in downward:
+        downward += children.get(link, [])
+    loose = sorted(set(links) - set(downward))
+    if loose:
+        raise RobotError(f"URDF joints form a loop: {listed(loose)} do not hang on {roots[0]!r}")
+    return downward
 
 
 def leaf_links(root: ElementTree.Element) -> list[str]:
-    """Return the links that have no child: the candidates for a tool centre point."""
-    parents = {_link_of(joint, "parent") for joint in root.findall("joint")}
-    return [link for link in _link_names(root) if link not in parents]
+    """Return the links that have no child."""
+    parents = {link_of(joint, "parent") for joint in root.findall("joint")}
+    return [link for link in link_names(root) if link not in parents]
+
+
+def tip_links(root: ElementTree.Element) -> dict[str, int]:
+    """Return the candidates for a tool centre point: leaf links that a serial chain moves.
+
+    Returns
+    -------
+    dict of int
+        The number of joints of each chain from the root.
+
+    Raises
+    ------
+    RobotError
+        If there is none, with the reason; or if the URDF is damaged.
+    """
+    check_elements(root)
+    joint_to, refusal = joints_by_child(root), RobotError("URDF has no joint that moves")
+    first, *others = _links_downward(root)
+    moved = {first: 0}
+    for link in others:
+        joint = joint_to[link]
+        before = moved.get(link_of(joint, "parent"))
+        try:
+            if before is not None:
+                moved[link] = before + is_movable(joint)
+        except RobotError as error:
+            refusal = error
+    tips = {leaf: moved[leaf] for leaf in leaf_links(root) if moved.get(leaf)}
+    if not tips:
+        raise refusal
+    return tips
 
 
 def assumptions(root: ElementTree.Element) -> tuple[Assumption, ...]:
@@ -143,232 +251,98 @@ def read_chain(text: str, tip: str, base: str | None = None) -> SerialChain:
         If the URDF cannot be parsed, a link is missing, or the chain is not serial.
     """
     root = parse_urdf(text)
-    links = _link_names(root)
+    links = link_names(root)
     base = base or root_link(root)
     for role, link in (("tip", tip), ("base", base)):
         if link not in links:
             raise RobotError(
                 f"URDF of {robot_name(root)} has no {role} link {link!r}{nearest(link, links)}"
-                f" (links: {', '.join(links)})"
+                f" (links: {listed(links)})"
             )
-    _check_elements(root)
-    joints = _joints_between(root, base, tip)
+    check_elements(root)
+    root_link(root)
+    joints = joints_between(joints_by_child(root), base, tip)
+    serial = serial_urdf(root, [joint.get("name", "") for joint in joints])
     try:
-        model = pin.buildModelFromXML(text)
+        model = pin.buildModelFromXML(serial)
     except ValueError as error:
         raise RobotError(f"URDF of {robot_name(root)} is refused by Pinocchio: {error}") from error
     return _chain_of(model, joints, base, tip)
 
 
-def _check_elements(root: ElementTree.Element) -> None:
-    """Refuse numbers that are none, and names that are missing or stand twice.
+def serial_urdf(root: ElementTree.Element, joints: Iterable[str], shapes: bool = False) -> str:
+    """Return a URDF in which only the named joints move: what Pinocchio is to compute with.
 
-    Raises
-    ------
-    RobotError
-        With the link or joint, the element and its value.
+    Parameters
+    ----------
+    root : Element
+        A URDF that `read_chain` accepts.
+    joints : iterable of str
+        Names of the joints that move, each by one number: a continuous one becomes a revolute one.
+        The others are fixed at zero. Limits are not told.
+    shapes : bool
+        Whether links keep their collision shapes.
     """
-    for kind in ("link", "joint"):
-        names = [element.get("name", "") for element in root.findall(kind)]
-        unnamed = [index for index, name in enumerate(names) if not name.strip()]
-        if unnamed:
-            raise RobotError(f"URDF: {_place(root, kind, unnamed[0])} has no name")
-        twice = sorted({name for name in names if names.count(name) > 1})
-        if twice:
-            raise RobotError(f"URDF has two {kind}s named {twice[0]!r}")
-        for owner in root.findall(kind):
-            for element in owner.iter():
-                _check_numbers(f"{kind} {owner.get('name')!r}", element)
-    links = _link_names(root)
+    serial, moving = ElementTree.Element("robot", name=robot_name(root)), set(joints)
+    for link in root.findall("link"):
+        copy = ElementTree.SubElement(serial, "link", name=link.get("name", ""))
+        _copy_mass(link, copy)
+        copy.extend(link.findall("collision") if shapes else ())
     for joint in root.findall("joint"):
-        for role in ("parent", "child"):
-            found = joint.find(role)
-            name = "" if found is None else found.get("link", "")
-            if name and name not in links:
-                raise RobotError(
-                    f"URDF joint {joint.get('name')!r}: no link {name!r} ({role})"
-                    f"{nearest(name, links)} (links: {', '.join(links)})"
-                )
+        name = joint.get("name", "")
+        slides = joint.get("type") == "prismatic"
+        kind = ("prismatic" if slides else "revolute") if name in moving else "fixed"
+        copy = ElementTree.SubElement(serial, "joint", name=name, type=kind)
+        parts = ("origin", "parent", "child", *(("axis",) if name in moving else ()))
+        for tag in parts:
+            copy.extend(joint.findall(tag)[:1])
+        if name in moving:
+            ElementTree.SubElement(copy, "limit", _ANY_LIMIT)
+    return ElementTree.tostring(serial, encoding="unicode")
 
 
-def _place(root: ElementTree.Element, kind: str, index: int) -> str:
-    """Return where a link or joint without a name stands, in words."""
-    element = root.findall(kind)[index]
-    ends = (element.find(role) for role in ("parent", "child"))
-    linked = " to ".join(repr(end.get("link", "")) for end in ends if end is not None)
-    return f"{kind} {index + 1} of the file{f', from {linked},' if linked else ''}"
+def _copy_mass(link: ElementTree.Element, copy: ElementTree.Element) -> None:
+    """Give the copy of a link its mass and its centre, if it has one."""
+    mass = link.find("inertial/mass")
+    if mass is None or mass.get("value") is None:
+        return
+    inertial = ElementTree.SubElement(copy, "inertial")
+    inertial.extend(link.findall("inertial/origin")[:1])
+    inertial.append(mass)
+    ElementTree.SubElement(inertial, "inertia", _NO_INERTIA)
 
 
-def _check_numbers(owner: str, element: ElementTree.Element) -> None:
-    for name, count in _NUMBERS.get(element.tag, {}).items():
-        text = element.get(name)
-        if text is None:
-            continue
-        try:
-            values = [float(part) for part in text.split()]
-        except ValueError:
-            values = []
-        if len(values) != count or not all(math.isfinite(value) for value in values):
-            what = "a finite number" if count == 1 else f"{count} finite numbers"
-            raise RobotError(f"URDF {owner}: <{element.tag} {name}={text!r}> must be {what}")
-        if element.tag == "axis" and not any(values):
-            raise RobotError(f"URDF {owner}: <axis xyz={text!r}> must not be zero")
-        low, high = _AXIS_LENGTHS
-        if element.tag == "axis" and not low <= math.hypot(*values) <= high:
-            raise RobotError(
-                f"URDF {owner}: <axis xyz={text!r}> must have a length from {low:g} to {high:g}"
-            )
-        dimension = _DIMENSIONS.get((element.tag, name))
-        problem = impossible(dimension, *values) if dimension else None
-        if problem is not None:
-            raise RobotError(f"URDF {owner}: <{element.tag} {name}={text!r}> is {problem}")
-
-
-def _link_names(root: ElementTree.Element) -> list[str]:
-    return [link.get("name", "") for link in root.findall("link")]
-
-
-def _link_of(joint: ElementTree.Element, role: str) -> str:
-    element = joint.find(role)
-    if element is None or not element.get("link"):
-        raise RobotError(f"URDF joint {joint.get('name')!r} has no {role} link")
-    return element.get("link", "")
-
-
-def _joints_between(root: ElementTree.Element, base: str, tip: str) -> list[str]:
-    """Return the names of the movable joints from base to tip, checked one by one."""
-    parent_joint = {_link_of(joint, "child"): joint for joint in root.findall("joint")}
-    names: list[str] = []
-    link, seen = tip, set[str]()
-    while link != base:
-        joint = parent_joint.get(link)
-        if joint is None or link in seen:
-            raise RobotError(f"URDF has no chain from base link {base!r} to tip link {tip!r}")
-        seen.add(link)
-        if joint.get("type") != "fixed":
-            _check_movable(joint)
-            names.append(joint.get("name", ""))
-        link = _link_of(joint, "parent")
-    if not names:
-        raise RobotError(f"URDF has no movable joint between {base!r} and {tip!r}")
-    return names[::-1]
-
-
-def _check_movable(joint: ElementTree.Element) -> None:
-    name, kind = joint.get("name"), joint.get("type")
-    if kind not in ("revolute", "continuous", "prismatic"):
-        raise RobotError(
-            f"URDF joint {name!r} is {kind}: the chain may have revolute, continuous, prismatic"
-            " and fixed joints"
-        )
-    if joint.find("mimic") is not None:
-        raise RobotError(f"URDF joint {name!r} mimics another one: not possible inside the chain")
-    if kind != "continuous" and joint.find("limit") is None:
-        raise RobotError(f"URDF joint {name!r} is {kind} and has no <limit>")
-
-
-def _chain_of(model: pin.Model, names: list[str], base: str, tip: str) -> SerialChain:
-    """Cut the joints ``names`` out of a tree; everything else is locked at zero."""
-    locked = [i for i in range(1, model.njoints) if model.names[i] not in names]
-    if locked:
-        model = pin.buildReducedModel(model, locked, pin.neutral(model))
+def _chain_of(
+    model: pin.Model, joints: list[ElementTree.Element], base: str, tip: str
+) -> SerialChain:
+    """Return the chain of the joints that move in a model, with the limits of the URDF."""
     T_root_base = _placement_in_joint(model, base)
-    joints = []
-    for index, name in enumerate(names):
-        joint_id = model.getJointId(name)
+    chain = []
+    for index, joint in enumerate(joints):
+        joint_id = model.getJointId(joint.get("name", ""))
         placement = model.jointPlacements[joint_id]
         if index == 0:
             placement = T_root_base.actInv(placement)
-        joints.append(_joint_of(model, joint_id, placement))
-    return SerialChain(tuple(joints), base, tip, _placement_in_joint(model, tip).homogeneous)
+        chain.append(_joint_of(model, joint_id, placement, limits_of(joint)))
+    return SerialChain(tuple(chain), base, tip, _placement_in_joint(model, tip).homogeneous)
 
 
 def _placement_in_joint(model: pin.Model, link: str) -> pin.SE3:
     return model.frames[model.getFrameId(link, pin.FrameType.BODY)].placement
 
 
-def _joint_of(model: pin.Model, joint_id: int, placement: pin.SE3) -> ChainJoint:
-    joint = model.joints[joint_id]
-    motion = np.asarray(joint.createData().S).ravel()
+def _joint_of(
+    model: pin.Model, joint_id: int, placement: pin.SE3, limits: dict[str, float]
+) -> ChainJoint:
+    motion = np.asarray(model.joints[joint_id].createData().S).ravel()
     revolute = bool(np.any(motion[3:]))
-    bounded = joint.nq == 1
     inertia = model.inertias[joint_id]
-    effort, velocity = model.upperEffortLimit[joint.idx_v], model.upperVelocityLimit[joint.idx_v]
     return ChainJoint(
         name=model.names[joint_id],
         revolute=revolute,
         axis=motion[3:] if revolute else motion[:3],
         placement=placement.homogeneous,
-        lower=model.lowerPositionLimit[joint.idx_q] if bounded else -np.inf,
-        upper=model.upperPositionLimit[joint.idx_q] if bounded else np.inf,
-        velocity=velocity if velocity > 0 else np.nan,
-        effort=effort if effort > 0 else np.nan,
         mass=inertia.mass,
         centre_of_mass=inertia.lever,
-        inertia=inertia.inertia,
+        **limits,
     )
-
-
-def find_meshes(urdf: str, folder: Path) -> tuple[tuple[str, Path], ...]:
-    """Return the meshes of a URDF's collision shapes.
-
-    Parameters
-    ----------
-    urdf : str
-        The URDF.
-    folder : Path
-        Its folder. Relative names are relative to it; ``package://NAME/REST`` is ``NAME/REST``
-        in it or in the nearest folder above, else ``REST`` in it or in the one above;
-        ``file://`` and absolute names are taken as they are.
-
-    Returns
-    -------
-    tuple of (str, Path)
-        Each name as the URDF has it, once, and its file.
-
-    Raises
-    ------
-    FileAccessError
-        If there is no such file; with the link and the name.
-    RobotError
-        If the URDF is not valid XML.
-    """
-    found: dict[str, Path] = {}
-    for link in parse_urdf(urdf).findall("link"):
-        for mesh in link.iterfind("collision/geometry/mesh"):
-            name = mesh.get("filename", "")
-            if name not in found:
-                found[name] = _find(name, link.get("name", ""), folder.absolute())
-    return tuple(found.items())
-
-
-def is_relative(name: str) -> bool:
-    """Return whether a mesh name of a URDF moves with the URDF's folder."""
-    return not (name.startswith(_FILE) or Path(name).is_absolute())
-
-
-def _find(name: str, link: str, folder: Path) -> Path:
-    places = list(_places(name, folder))
-    for place in places:
-        if place.is_file():
-            return place
-    where = f"there is no file {places[0]}"
-    if name.startswith(_PACKAGE):
-        where += ", nor one of that name in the folders above"
-    raise FileAccessError(f"link {link!r}: mesh {name!r}: {where}")
-
-
-def _places(name: str, folder: Path) -> Iterator[Path]:
-    """Yield where the file of a mesh name may be, the likeliest place first."""
-    if name.startswith(_PACKAGE):
-        package, _, rest = name.removeprefix(_PACKAGE).partition("/")
-        for parent in (folder, *folder.parents):
-            yield parent / package / rest
-        # The folder of a package may have been renamed, or copied without its name; farther up
-        # there may be a file of that name that has nothing to do with it.
-        yield folder / rest
-        yield folder.parent / rest
-    elif name.startswith(_FILE):
-        yield Path(unquote(name.removeprefix(_FILE)))
-    else:
-        yield folder / name

@@ -188,7 +188,9 @@ class Evidence:
         process = None if self.cell is None else self.cell.process
         if process is None or self.calibrated is None:
             return None
-        return self.calibrated.model.coverage(process.joint_position, process.force, process.course)
+        return self.calibrated.model.coverage(
+            process.joint_position, process.force, process.moment, process.course
+        )
 
     @property
     def saturation(self) -> Saturation | None:

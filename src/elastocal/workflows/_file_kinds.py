@@ -22,13 +22,19 @@ from elastocal.compensation import read_settings
 from elastocal.compensation.conditioning import read_tool
 from elastocal.compensation.process import TABLE, read_process, read_table
 from elastocal.elastic import read_springs
-from elastocal.errors import RobotError, SchemaError
-from elastocal.files import read_text
+from elastocal.errors import SchemaError
 from elastocal.identification import read_model
 from elastocal.identification.recertification import CompareSummary
 from elastocal.planning.motion import mover_for, require_free_home
 from elastocal.records import read_json, schema_of
-from elastocal.robot import Robot, leaf_links, parse_urdf, refusals_naming
+from elastocal.robot import (
+    Robot,
+    leaf_links,
+    parse_urdf,
+    read_urdf,
+    refusals_naming,
+    tip_links,
+)
 from elastocal.verdict import read_signature
 from elastocal.workflows._table_kinds import dataset_file
 
@@ -140,19 +146,23 @@ def summary_file(path: Path) -> FileDescription:
     return "summary of a run", {"schema": schema, "readings": counts, "warnings": warnings}
 
 
-def robot_file(path: Path) -> FileDescription:
-    """Describe a robot description."""
-    text = read_text(path)
+def robot_file(path: Path, tcp: str | None = None) -> FileDescription:
+    """Describe a robot description, up to a link: by default to the tip with the most joints."""
+    text = read_urdf(path)
     with refusals_naming(path):
-        leaves = leaf_links(parse_urdf(text))
-        if not leaves:
-            raise RobotError("URDF has no link at the end of a chain")
-        robots = [Robot.from_urdf(text, leaf) for leaf in leaves]
+        root = parse_urdf(text)
+        tips = tip_links(root)
+        robot = Robot.from_urdf(text, tcp or max(tips, key=lambda tip: tips[tip]))
+        beside = [leaf for leaf in leaf_links(root) if leaf not in tips]
     return "robot description", {
-        "robot": robots[0].name,
-        "tips": leaves,
-        "joints": list(max(robots, key=lambda robot: len(robot.joint_names)).joint_names),
-        "assumptions": [f"{a.field}: {a.reason}" for a in robots[0].assumptions],
+        "robot": robot.name,
+        "tips": list(tips),
+        "other_leaves": beside,
+        "tcp": robot.tip,
+        "joints": list(robot.joint_names),
+        "external_axes": list(robot.joint_names[: robot.external_axes]),
+        "masses": not robot.chain.weight_gap,
+        "assumptions": [f"{a.field}: {a.reason}" for a in robot.assumptions],
     }
 
 

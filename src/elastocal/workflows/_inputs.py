@@ -14,7 +14,6 @@ from numpy.typing import ArrayLike
 from elastocal.arrays import FloatArray
 from elastocal.dataset import Dataset
 from elastocal.errors import ElastocalError, FileAccessError, RobotError, UnitError
-from elastocal.files import read_text
 from elastocal.identification import (
     CalibratedModel,
     attainable_rank,
@@ -26,17 +25,21 @@ from elastocal.robot import (
     Robot,
     T_from_xyzabc,
     catalogue,
-    leaf_links,
     parse_urdf,
+    read_urdf,
     refusals_naming,
     same_joints,
     tcp_gap,
+    tip_links,
     with_tool,
 )
 from elastocal.units import parse_point, parse_quantity
+from elastocal.wording import listed
 
 _LONGEST_TOOL = 10.0
 """In m: no tool of a robot is longer; what is, was meant in mm."""
+ROBOT_SUFFIXES = (".urdf", ".xml", ".xacro")
+"""Names of robot descriptions; a template of xacro is refused with the command that expands it."""
 _TOOL_LINK = "tcp"
 """Name of the link that a tool given by numbers gets."""
 _NOT_COVERED = (
@@ -63,7 +66,8 @@ def find_robot(
     robot : str or None
         A URDF file, a catalogue name, or None for the dataset's own.
     tcp : str or None
-        Link at the tool centre point; by default the dataset's, or the robot's only leaf link.
+        Link at the tool centre point; by default the dataset's, or the robot's only tip
+        (`elastocal.robot.tip_links`).
     tool : str or None
         Pose of the tcp behind that link, ``"x, y, z, a, b, c"`` with units (KUKA Z-Y'-X'').
     dataset : Dataset, optional
@@ -261,12 +265,12 @@ def refuse_overwriting(out: Path | None, *inputs: Path) -> None:
 
 
 def _robot_at(urdf: str, tcp: str | None, T_tcp_tool: FloatArray | None) -> Robot:
-    """Return the robot of a URDF up to a link, its only leaf by default, or to a tool behind it."""
+    """Return the robot of a URDF up to a link, its only tip by default, or to a tool behind it."""
     if not tcp:
-        leaves = leaf_links(parse_urdf(urdf))
-        if len(leaves) != 1:
-            raise RobotError(f"name the tool centre point with --tcp: {', '.join(leaves)}")
-        tcp = leaves[0]
+        tips = list(tip_links(parse_urdf(urdf)))
+        if len(tips) != 1:
+            raise RobotError(f"name the tool centre point with --tcp: {listed(tips)}")
+        tcp = tips[0]
     if T_tcp_tool is not None:
         urdf, tcp = with_tool(urdf, tcp, _TOOL_LINK, T_tcp_tool), _TOOL_LINK
     return Robot.from_urdf(urdf, tcp)
@@ -282,8 +286,8 @@ def _find_urdf(robot: str | None, dataset: Dataset | None) -> tuple[str, Path | 
             )
         return dataset.robot_urdf, None
     path = Path(robot)
-    if path.suffix.lower() in (".urdf", ".xml") or _is_file(path):
-        return read_text(path), path
+    if path.suffix.lower() in ROBOT_SUFFIXES or _is_file(path):
+        return read_urdf(path), path
     return catalogue.urdf(robot), None
 
 

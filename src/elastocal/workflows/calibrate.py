@@ -124,7 +124,7 @@ def _coverage(path: Path, calibrated: CalibratedModel) -> ProductionCoverage | N
     start = nearest_zero_posture(robot)
     held = start[None, : robot.external_axes]
     found = read_production(path, ProcessFile(file=path.name), robot, start, held)
-    return calibrated.coverage(found.joint_position, found.force, found.course)
+    return calibrated.coverage(found.joint_position, found.force, found.moment, found.course)
 
 
 def _measured(found: Sequence[tuple[Path, Dataset]]) -> tuple[Dataset, str]:

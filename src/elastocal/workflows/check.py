@@ -12,7 +12,7 @@ from pathlib import Path
 from elastocal.codec import ARRAYS, VERDICTS
 from elastocal.codec.study import DESIGN, PARTS
 from elastocal.compensation.process import TABLE
-from elastocal.errors import DatasetError, SchemaError, nearest
+from elastocal.errors import DatasetError, RobotError, SchemaError, nearest
 from elastocal.planning import PLAN
 from elastocal.procedure import JOURNAL
 from elastocal.progress import Progress
@@ -20,6 +20,7 @@ from elastocal.records import read_arrays, read_json_data, read_yaml_data
 from elastocal.results import Result, brief
 from elastocal.workflows import _file_kinds as kinds
 from elastocal.workflows._file_kinds import FileDescription
+from elastocal.workflows._inputs import ROBOT_SUFFIXES
 from elastocal.workflows._table_kinds import dataset_file, table_file
 from elastocal.workflows._workflow import workflow
 
@@ -68,6 +69,8 @@ class CheckSettings:
 
     file: str | PathLike[str]
     """Any file of ours, a dataset, a robot, or a folder that a command made."""
+    tcp: str | None = None
+    """Link of a robot at the tool centre point; by default that behind the most joints."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -101,9 +104,15 @@ def check(settings: CheckSettings, progress: Progress) -> CheckResult:  # noqa: 
     SchemaError
         If the suffix is not one of ours, or a folder holds nothing of ours.
     ElastocalError
-        If the contents are not valid.
+        If the contents are not valid, or a tcp is asked for and is no link of a robot.
     """
-    kind, holds = describe_file(Path(settings.file))
+    path = Path(settings.file)
+    if settings.tcp is None:
+        kind, holds = describe_file(path)
+    elif path.suffix.lower() in ROBOT_SUFFIXES:
+        kind, holds = kinds.robot_file(path, settings.tcp)
+    else:
+        raise RobotError(f"{path} is no robot description: a tcp is a link of one")
     return CheckResult(str(settings.file), kind, holds)
 
 
@@ -176,7 +185,7 @@ _BY_SUFFIX: dict[str, _Describe] = {
     ".nc": _netcdf,
     ".csv": table_file,
     ".json": _json,
-    ".urdf": kinds.robot_file,
+    **dict.fromkeys(ROBOT_SUFFIXES, kinds.robot_file),
     ".jsonl": kinds.journal_file,
     ".mcap": kinds.streams_file,
     ".yaml": _settings,

@@ -13,7 +13,7 @@ from elastocal.compensation.offline import (
 )
 from elastocal.compensation.programs import PROGRAM_READERS, compensate_program
 from elastocal.errors import FileAccessError
-from elastocal.identification import OutsideSummary, ProductionCoverage
+from elastocal.identification import ProductionCoverage
 from elastocal.progress import Progress
 from elastocal.records import record
 from elastocal.results import Result
@@ -57,10 +57,9 @@ class CompensateResult(Result, CorrectionFigures):
     """The tool that the correction is for, in words."""
     notes: tuple[str, ...]
     """Sentences that a person must know."""
-    outside: OutsideSummary | None = None
-    """Rows beyond what was calibrated; none where the model does not know where that was."""
     coverage: ProductionCoverage | None = None
-    """How much of the path was calibrated: postures, rail and loads; likewise."""
+    """How much of the path was calibrated: postures, rail and loads; none where the
+    model does not know where that was."""
 
     def facts(self) -> tuple[tuple[str, str], ...]:
         """Return what a person wants to know first."""
@@ -127,8 +126,7 @@ def compensate(settings: CompensateSettings, progress: Progress) -> CompensateRe
     return CompensateResult(
         **{each.name: getattr(figures, each.name) for each in fields(figures)},
         tool=calibrated.tool_name,
-        notes=(*coverage_notes(calibrated), *notes, *_force_notes(summary), *_outside(summary)),
-        outside=summary.outside,
+        notes=(*coverage_notes(calibrated), *notes, *_force_notes(summary), *_covered(summary)),
         coverage=summary.coverage,
     )
 
@@ -150,10 +148,8 @@ def _path_notes(summary: CorrectionSummary, robot: Robot, start: str | None) -> 
     return tuple(notes)
 
 
-def _outside(summary: CorrectionSummary) -> tuple[str, ...]:
-    text = "" if summary.outside is None else summary.outside.sentence()
-    coverage = "" if summary.coverage is None else summary.coverage.sentence()
-    return tuple(each for each in (text, coverage) if each)
+def _covered(summary: CorrectionSummary) -> tuple[str, ...]:
+    return () if summary.coverage is None else (summary.coverage.sentence(),)
 
 
 def _force_notes(summary: CorrectionSummary) -> tuple[str, ...]:

@@ -8,7 +8,7 @@ import numpy as np
 
 from elastocal.arrays import FloatArray
 from elastocal.dataset import read_robot_rows, write_load_rows
-from elastocal.identification import DeflectionSummary, OutsideRows, OutsideSummary, Prediction
+from elastocal.identification import CoveredRows, DeflectionSummary, Prediction, ProductionCoverage
 from elastocal.progress import Progress
 from elastocal.records import record
 from elastocal.results import Result, brief_repr
@@ -42,13 +42,15 @@ class PredictSummary:
     """The tool that the rows are of, in words."""
     notes: tuple[str, ...]
     """Sentences that a person must know."""
-    outside: OutsideSummary | None = None
-    """Rows beyond what was calibrated; none where the model does not know where that was."""
+    coverage: ProductionCoverage | None = None
+    """How much of the rows was calibrated; none where the model does not know where that was."""
 
     @property
     def warning(self) -> str:
         """The line on rows beyond what was calibrated; empty without any."""
-        return "" if self.outside is None else self.outside.sentence()
+        if self.coverage is None or self.coverage.covered == 1.0:
+            return ""
+        return f"{self.coverage.sentence('given')}; no interval covers the others"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -100,21 +102,21 @@ def predict(settings: PredictSettings, progress: Progress) -> PredictResult:  # 
     loads = read_robot_rows(rows, robot)
     prediction = calibrated.predict(loads.joint_position, loads.force, loads.moment, loads.visit)
     misfit = float(calibrated.misfit) if np.isfinite(calibrated.misfit) else None
-    outside = None
-    if calibrated.domain is not None:
-        outside = calibrated.domain.outside(robot, loads.joint_position, loads.force, loads.moment)
+    covered = calibrated.covered_rows(loads.joint_position, loads.force, loads.moment)
     if settings.out is not None:
-        write_load_rows(settings.out, loads, _columns(prediction, outside, misfit is not None))
+        write_load_rows(settings.out, loads, _columns(prediction, covered, misfit is not None))
     norms = np.linalg.norm(prediction.deflection, axis=1)
     size = DeflectionSummary(float(norms.mean()), float(norms.max()))
     notes = coverage_notes(calibrated) if calibrated.tool is not None else ()
-    beyond = None if outside is None else outside.summary()
-    summary = PredictSummary(len(norms), size, misfit, calibrated.tool_name, notes, beyond)
+    coverage = None
+    if covered is not None:
+        coverage = covered.figures(name=lambda row: f"row {loads.lines[row]}")
+    summary = PredictSummary(len(norms), size, misfit, calibrated.tool_name, notes, coverage)
     return PredictResult(prediction, summary)
 
 
 def _columns(
-    prediction: Prediction, outside: OutsideRows | None, with_measured: bool
+    prediction: Prediction, covered: CoveredRows | None, with_measured: bool
 ) -> dict[str, FloatArray]:
     """Return the columns to add, by their headings."""
     parts = {"": prediction.deflection, "_low": prediction.low, "_high": prediction.high}
@@ -126,7 +128,7 @@ def _columns(
         for suffix, values in parts.items()
         for index, axis in enumerate("xyz")
     }
-    if outside is not None:
-        flags = {"outside_pose": outside.pose, "outside_load": outside.load}
+    if covered is not None:
+        flags = {"outside_pose": ~covered.near, "outside_load": ~covered.within_load}
         columns |= {name: flag.astype(float) for name, flag in flags.items()}
     return columns

@@ -307,7 +307,7 @@ def _coverage(model: CalibratedModel, courses: tuple[Course, ...]) -> Production
     """Return how much of some courses the calibration of a model covers."""
     names = [course.name for course in courses for _ in course.q]
     q, force = (np.vstack(each) for each in zip(*((c.q, c.force) for c in courses), strict=True))
-    return model.coverage(q, force, names)
+    return model.coverage(q, force, course=names)
 
 
 def _notes(

@@ -155,6 +155,27 @@ def test_e_and_o3_choose_alike():
     np.testing.assert_array_equal(*orders)
 
 
+@pytest.mark.parametrize("name", ["d", "i"])
+def test_a_search_of_many_poses_looks_closely_at_few_and_chooses_as_if_at_all(name, monkeypatch):
+    pool = dome(400)
+    looked: list[int] = []
+    after_adding = CRITERIA[name].after_adding
+
+    def counted(criterion, matrix, information):
+        looked.append(len(information))
+        return after_adding(criterion, matrix, information)
+
+    monkeypatch.setattr(CRITERIA[name], "after_adding", counted)
+    search = ExchangeSearch(name, starts=1)
+    few = search.search(pool, 12, np.random.default_rng(0))
+    some, steps = sum(looked), len(few.runs[0].added)
+    monkeypatch.setattr(CRITERIA[name], "ceiling", Criterion.ceiling)
+    every = search.search(pool, 12, np.random.default_rng(0))
+    np.testing.assert_array_equal(few.order, every.order)
+    assert some < 0.5 * (sum(looked) - some)
+    assert steps > 1
+
+
 def test_each_pose_of_the_order_raises_the_criterion_most():
     pool = dome(40)
     selection = ExchangeSearch("d", starts=1).search(pool, 9, np.random.default_rng(0))

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+import trimesh
 
 from elastocal.cell import load_cell
 from elastocal.cell.examples import EXAMPLES, block_mesh, dome_section, write_example
@@ -17,6 +18,7 @@ from elastocal.planning.surface import (
     mesh_findings,
     placement_findings,
     sample_uniform,
+    size_findings,
     unit_findings,
 )
 from elastocal.robot.inverse import inverse_for
@@ -88,12 +90,29 @@ def test_a_mesh_in_inches_that_is_read_as_mm_is_named(cell):
 def test_a_mesh_that_speaks_of_inches_is_named(tmp_path, head, unit, found):
     path = tmp_path / "part.stl"
     path.write_text(f"{head}\n")
-    words = [finding.message for finding in unit_findings(path, unit)]
+    words = [finding.message for finding in unit_findings(path, unit, "fixtures.0.mesh")]
+    advice = "write fixtures.0.mesh.unit: in, if it is so"
     assert words == (
-        [f"part.stl speaks of inches and is read in {unit}: write surface.unit: in, if it is so"]
-        if found
-        else []
+        [f"part.stl speaks of inches and is read in {unit}: {advice}"] if found else []
     )
+
+
+@pytest.mark.parametrize(
+    ("key", "size", "unit", "mistake"),
+    [
+        ("tool.shapes.0.mesh", 1500.0, 1.0, "mm and read as m"),
+        ("tool.shapes.0.mesh", 1500.0, 1e-3, None),
+        ("fixtures.0.mesh", 2000.0 / 25.4, 1.0, "inches and read as m"),
+        ("fixtures.0.mesh", 30.0, 1.0, None),
+        ("fixtures.0.mesh", 1.5, 1e-3, "m and read as mm"),
+    ],
+)
+def test_a_solid_of_no_likely_size_is_suspected_of_its_unit(tmp_path, key, size, unit, mistake):
+    path = tmp_path / "part.stl"
+    trimesh.creation.box((size, 0.1, 0.1)).export(path)
+    words = [finding.message for finding in size_findings(path, unit, key, reach=2.5)]
+    assert len(words) == (mistake is not None)
+    assert all(f"is the mesh in {mistake} ({key}.unit)?" in word for word in words)
 
 
 def test_the_reach_is_a_bound_that_a_stretched_arm_nearly_attains(cell):

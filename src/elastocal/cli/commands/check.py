@@ -17,6 +17,10 @@ def _check(
             " robot (.urdf), or the folder of a plan, run, process, codec or study."
         ),
     ],
+    tcp: Annotated[
+        str | None,
+        typer.Option(help="Of a robot: the link at the tool centre point (default: its longest)."),
+    ] = None,
     as_json: Annotated[
         bool, typer.Option("--json", help="Print the findings as one JSON object.")
     ] = False,
@@ -24,7 +28,7 @@ def _check(
     """Validate a file and say what it holds."""
     from rich.markup import escape
 
-    result = workflows.check(file)
+    result = workflows.check(file, tcp=tcp)
     if as_json:
         output.print_json({"file": result.file, "kind": result.kind, **result.holds})
         return

@@ -19,8 +19,7 @@ from elastocal.arrays import BoolArray, FloatArray, IndexArray
 from elastocal.errors import PathError
 from elastocal.identification import (
     CalibratedModel,
-    OutsideRows,
-    OutsideSummary,
+    CoveredRows,
     ProductionCoverage,
 )
 from elastocal.records import record
@@ -71,9 +70,8 @@ class PathCorrection:
     """Whether the force draws the tool out, along +z of the tcp, as no surface can, (row,)."""
     memory: FloatArray
     """What friction remembers after the last row, shape (element,), in N·m."""
-    outside: OutsideRows | None = None
-    """Rows beyond what was calibrated; none where the model does not know where that was."""
-    coverage: ProductionCoverage | None = None
+    covered: CoveredRows | None = None
+    """Rows that were calibrated; none where the model does not know where that was."""
 
 
 def correct_rows(  # noqa: PLR0913 (what goes on from block to block is one more)
@@ -162,8 +160,7 @@ def correct_rows(  # noqa: PLR0913 (what goes on from block to block is one more
         np.linalg.norm(residual, axis=1),
         np.asarray(along > 0.5 * np.linalg.norm(wrench[0], axis=1)),
         load.after,
-        None if calibrated.domain is None else calibrated.domain.outside(robot, q, *wrench),
-        calibrated.coverage(q, wrench[0]),
+        calibrated.covered_rows(q, *wrench),
     )
 
 
@@ -338,10 +335,8 @@ class CorrectionSummary:
     """Rows at which the force draws the tool out, which a surface cannot."""
     start: tuple[float, ...] = ()
     """Joints that were found for the first row of a path of poses, in rad or m."""
-    outside: OutsideSummary | None = None
-    """Rows beyond what was calibrated; none where the model does not know where that was."""
     coverage: ProductionCoverage | None = None
-    """How much of the rows was calibrated; likewise."""
+    """How much of the rows was calibrated; none where the model does not know where that was."""
 
     def plus(
         self, correction: PathCorrection, shift: FloatArray, labels: list[str], jumps: list[int]
@@ -365,11 +360,10 @@ class CorrectionSummary:
             correction.residual,
             np.linalg.norm(shift, axis=1),
         )
-        outside = None if correction.outside is None else correction.outside.summary()
-        coverage = correction.coverage
-        if outside is not None and coverage is not None:
-            outside = outside if self.outside is None else self.outside.plus(outside)
-            coverage = coverage if self.coverage is None else self.coverage.plus(coverage)
+        coverage = self.coverage
+        if correction.covered is not None:
+            found = correction.covered.figures(name=labels.__getitem__)
+            coverage = found if coverage is None else coverage.plus(found)
         pairs = zip(self.lengths, further, strict=True)
         return replace(
             self,
@@ -378,7 +372,6 @@ class CorrectionSummary:
             jumps=self.jumps + len(jumps),
             first_jump=self.first_jump or (labels[jumps[0]] if jumps else ""),
             pulled=self.pulled + int(correction.pulled.sum()),
-            outside=outside,
             coverage=coverage,
         )
 

@@ -35,6 +35,8 @@ from elastocal.arrays import FloatArray, IndexArray
 from elastocal.elastic import ElasticModel
 from elastocal.identification.calibrated import CalibratedModel
 from elastocal.identification.displacement import displacement_blocks
+from elastocal.identification.domain import CalibratedLoads, CalibrationDomain
+from elastocal.identification.production import CoveredRows, covered_rows
 from elastocal.identification.recertification._sums import (
     comparable_sums,
     shared_numbers,
@@ -137,25 +139,36 @@ def common_ground(
     if old.domain is None or new.domain is None:
         return None, number
     if rows is not None:
-        outside = [
-            each.outside(arm, rows.q, rows.force, rows.moment).any
+        old_rows, new_rows = (
+            _covered(each, arm, rows.q, rows.force, rows.moment)
             for each in (old.domain, new.domain)
-        ]
-        number = np.flatnonzero(~(outside[0] | outside[1]))
-    pairs = ((old, new), (new, old))
-
-    def shares(any_load: bool) -> list[float]:
-        return [
-            own.domain.share_inside(other.domain, own.model.robot, any_load=any_load)
-            for own, other in pairs
-            if own.domain is not None and other.domain is not None
-        ]
-
-    covered = shares(any_load=False)
+        )
+        number = np.flatnonzero(old_rows.covered & new_rows.covered)
+    of_old = _readings_covered(old.domain, new.domain, old.model.robot)
+    of_new = _readings_covered(new.domain, old.domain, new.model.robot)
+    covered = float(of_old.covered.mean()), float(of_new.covered.mean())
     stiffen = old.model.bears_weight and new.model.bears_weight
-    judged = min(shares(any_load=stiffen)) >= LEAST_COVERED
+    near = float(of_old.near.mean()), float(of_new.near.mean())
+    judged = min(near if stiffen else covered) >= LEAST_COVERED
     counts = (None, None) if rows is None else (count, len(number))
-    return CommonGround(covered[0], covered[1], judged, *counts), number
+    return CommonGround(*covered, judged, *counts), number
+
+
+def _covered(
+    domain: CalibrationDomain,
+    robot: Robot,
+    q: FloatArray,
+    force: FloatArray,
+    moment: FloatArray | None,
+) -> CoveredRows:
+    return covered_rows(robot, CalibratedLoads.of_domain(robot, domain), q, force, moment)
+
+
+def _readings_covered(
+    own: CalibrationDomain, other: CalibrationDomain, robot: Robot
+) -> CoveredRows:
+    """Return which readings of a calibration another one covers, with the tool of the first."""
+    return _covered(other, robot, own.joint_position[own.reading_pose], own.force, own.moment)
 
 
 def over(numbers: FloatArray, scale: FloatArray) -> FloatArray:

@@ -87,7 +87,7 @@ _Triple = tuple[float, float, float]
 @brief_repr
 @record()
 class CommonGround:
-    """How far two campaigns cover the same poses and loads; see `CalibrationDomain`."""
+    """How far two campaigns cover the same poses and loads; see `CoveredRows`."""
 
     old_covered: float
     """Share of the old campaign's readings that the new one covers."""

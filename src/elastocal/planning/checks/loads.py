@@ -85,7 +85,14 @@ class TorqueCheck(PostureCheck):
 
     @classmethod
     def of(cls, cell: Cell, surface: Surface) -> Self | None:
-        """Return the check of the actuators; None when the torque of no joint is known."""
+        """Return the check of the actuators; None when the torque of no joint is known.
+
+        Limits of the URDF alone are not judged on an arm without masses, whose own share of the
+        torque nobody knows; those that the cell file states are (`require_loads_possible_anywhere`
+        refuses them).
+        """
+        if not (cell.robot.has_masses or cell.file.limits.torque.values):
+            return None
         check = cls(
             cell.robot,
             np.array([*cell.file.presses.values()]),

@@ -83,10 +83,36 @@ class Criterion(ABC):
         ]
         return np.concatenate(parts)
 
+    def ceiling(
+        self,
+        matrix: FloatArray,  # noqa: ARG002 - most know none
+        information: Information,  # noqa: ARG002
+    ) -> FloatArray | None:
+        """Return a bound that `after_adding` stays below, for next to nothing; None: none known.
+
+        A search looks closer only at the poses whose bound reaches the best value.
+
+        Parameters
+        ----------
+        matrix, information : ndarray, Information
+            As for `after_adding`.
+
+        Returns
+        -------
+        ndarray, shape (pose,)
+        """
+        return None
+
 
 def singular_values(matrix: FloatArray) -> FloatArray:
     """Return the singular values behind information matrices, rising, shape (..., r)."""
     return np.asarray(np.sqrt(np.maximum(np.linalg.eigvalsh(matrix), 0.0)))
+
+
+def _log_determinant(matrix: FloatArray) -> FloatArray:
+    """Return ``log det`` of positive definite matrices, shape (..., r, r) to (...)."""
+    diagonal = np.diagonal(np.linalg.cholesky(matrix), axis1=-2, axis2=-1)
+    return np.asarray(2.0 * np.log(diagonal).sum(axis=-1))
 
 
 def log_determinant_gain(matrix: FloatArray, rows: FloatArray) -> FloatArray:
@@ -171,14 +197,21 @@ class DOptimal(Criterion):
 
     def value(self, matrix: FloatArray) -> FloatArray:
         """Return the geometric mean of the singular values."""
-        return np.asarray(np.exp(np.linalg.slogdet(matrix)[1] / (2 * matrix.shape[-1])))
+        return np.asarray(np.exp(_log_determinant(matrix) / (2 * matrix.shape[-1])))
 
     def after_adding(self, matrix: FloatArray, information: Information) -> FloatArray:
         """Return the values by the determinant lemma."""
         if not information.updates_pay:
             return super().after_adding(matrix, information)
         gain = log_determinant_gain(matrix, information.rows)
-        whole = np.linalg.slogdet(matrix)[1] + gain
+        whole = _log_determinant(matrix) + gain
+        return np.asarray(np.exp(whole / (2 * information.rank)))
+
+    def ceiling(self, matrix: FloatArray, information: Information) -> FloatArray:
+        """Return the bound of Jensen: ``log det(I + K) <= m log(1 + tr K / m)`` for m rows."""
+        rows, inverse = len(information.rows), np.asarray(np.linalg.inv(matrix), dtype=float)
+        trace = information.products(inverse)
+        whole = _log_determinant(matrix) + rows * np.log1p(trace / rows)
         return np.asarray(np.exp(whole / (2 * information.rank)))
 
 
@@ -335,6 +368,11 @@ class IOptimal(Criterion):
         eigenvalues, vectors = np.linalg.eigh(self.process)
         root = vectors * np.sqrt(np.maximum(eigenvalues, 0.0))
         return self.value(matrix) + inverse_trace_loss(matrix, information.rows, root)
+
+    def ceiling(self, matrix: FloatArray, information: Information) -> FloatArray:
+        """Return the tangent at ``S``, which a concave function stays below."""
+        weighed = np.linalg.solve(matrix, self.process)
+        return self.value(matrix) + information.products(np.linalg.solve(matrix, weighed.T))
 
 
 CRITERIA: dict[str, type[Criterion]] = {

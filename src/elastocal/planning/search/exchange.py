@@ -5,6 +5,7 @@ Paper Pseudocode 1 (IOOPS) with any criterion: T. J. Mitchell's DETMAX with excu
 robot calibration with the local convergence method and Tabu search", IJRR 24, 2005.
 """
 
+import math
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -20,6 +21,8 @@ from elastocal.results import brief_repr
 
 _TIE = 1e-9
 """Values closer than this part of the best are equal but for round-off."""
+_SLACK = 1e-6
+"""Part of the best value by which round-off may lower a bound of another."""
 
 
 @brief_repr
@@ -223,8 +226,21 @@ def _best_addition(information: Information, criterion: Criterion, chosen: Index
     PlanningError
         If the criterion gives NaN.
     """
-    values = np.array(criterion.after_adding(information.matrix(chosen), information))
-    values[chosen] = -np.inf
+    matrix = information.matrix(chosen)
+    ceiling = criterion.ceiling(matrix, information)
+    if ceiling is None:
+        values = np.array(criterion.after_adding(matrix, information))
+        values[chosen] = -np.inf
+        return int(_best(values, criterion)[0])
+    left = np.delete(np.arange(len(information)), chosen)
+    order = left[np.argsort(-ceiling[left])]
+    first, others = np.split(order, [1 + math.isqrt(len(order))])
+    values = np.full(len(information), -np.inf)
+    values[first] = criterion.after_adding(matrix, information.take(first))
+    best = values.max()
+    others = others[ceiling[others] >= best - _SLACK * abs(best)]
+    if len(others):
+        values[others] = criterion.after_adding(matrix, information.take(others))
     return int(_best(values, criterion)[0])
 
 

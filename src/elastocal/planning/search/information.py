@@ -24,9 +24,9 @@ defined from the first pose on, where few directions are spanned."""
 _CHUNK = 4096
 """Poses worked on at once, so that temporaries stay small for large pools."""
 
-_ROWS_SQUARED = 1.5
-"""Poses for each square row from which on updates pay, measured for 6 and 14
-rows: 2.4 for D, 1.3 for I."""
+_UPDATES = 1e4
+"""Operations on whole matrices, ``rank^3`` a pose, for each square row from which on updates pay;
+measured for 6 to 15 rows and rank 14 to 45: 14 000 for D, 6000 to 8000 for I."""
 
 _NEGLIGIBLE = 1e-13
 """Part of a pose's own information below which a further row is round-off."""
@@ -72,12 +72,16 @@ class Information:
         An elimination takes some ``row^2 / 2`` whole-array operations however few the poses;
         the matrices take one decomposition each.
         """
-        return len(self) > _ROWS_SQUARED * len(self.rows) ** 2
+        return len(self) * self.rank**3 > _UPDATES * len(self.rows) ** 2
 
     def matrix(self, chosen: ArrayLike) -> FloatArray:
         """Return ``S = eps I + sum of gram`` over chosen poses, shape (r, r)."""
         total: FloatArray = self.gram[np.asarray(chosen, dtype=np.intp)].sum(axis=0)
         return total + EPSILON * np.eye(self.rank)
+
+    def products(self, weight: FloatArray) -> FloatArray:
+        """Return ``tr(weight gram[p])`` of each pose for a symmetric weight, shape (pose,)."""
+        return self.gram.reshape(len(self), -1) @ weight.ravel()
 
     def take(self, index: ArrayLike) -> "Information":
         """Return the information of some of the poses, about the directions of the whole pool."""

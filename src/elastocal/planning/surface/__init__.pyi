@@ -17,6 +17,7 @@ from .findings import (
     inverted_finding as inverted_finding,
     mesh_findings as mesh_findings,
     placement_findings as placement_findings,
+    size_findings as size_findings,
     unit_findings as unit_findings,
 )
 from .mesh import (

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.random import Generator
 
 from elastocal.arrays import BoolArray, FloatArray
-from elastocal.meshes import says_inches
+from elastocal.meshes import load_triangles, says_inches
 from elastocal.planning.surface.contact import contact_frames
 from elastocal.planning.surface.sampling import sample_uniform
 from elastocal.planning.surface.surface import Surface, SurfacePoints
@@ -23,6 +23,8 @@ _HUGE = 50.0
 """So is one whose bounding box is larger than this many reaches: a ship is not."""
 _TINY = 0.02
 """So is one whose bounding box is smaller than this part of the reach."""
+_LARGEST_TOOL, _LARGEST_FIXTURE, _SMALLEST_SOLID = 1.5, 20.0, 1e-3
+"""Sizes of solids over the reach, beyond which they are suspected; fixtures may be a hall."""
 _TOO_LARGE = {"mm and read as m": 1e-3, "inches and read as m": 0.0254}
 _TOO_SMALL = {"m and read as mm": 1e3, "inches and read as mm": 25.4}
 """Mistakes about a unit, and by what the size is to be multiplied to mend them."""
@@ -40,7 +42,7 @@ class Finding:
 
     kind: str
     """``open``, ``non-manifold``, ``winding``, ``degenerate``, ``duplicate``, ``far``, ``huge``,
-    ``tiny``, ``inches`` or ``inverted``."""
+    ``tiny``, ``inches``, ``inverted`` or ``masses``."""
     message: str
     """One line."""
     fatal: bool = False
@@ -126,7 +128,7 @@ def _misread(size: float, reach: float) -> str:
     return min(mistakes, key=lambda words: abs(math.log(mistakes[words] * size / reach)))
 
 
-def unit_findings(path: Path, unit: str) -> tuple[Finding, ...]:
+def unit_findings(path: Path, unit: str, key: str) -> tuple[Finding, ...]:
     """Return a finding when a mesh file speaks of inches and is read in another unit.
 
     Parameters
@@ -135,6 +137,8 @@ def unit_findings(path: Path, unit: str) -> tuple[Finding, ...]:
         The mesh file.
     unit : str
         What its numbers are read in.
+    key : str
+        Where the cell file names it.
 
     Raises
     ------
@@ -143,10 +147,39 @@ def unit_findings(path: Path, unit: str) -> tuple[Finding, ...]:
     """
     if unit == "in" or not says_inches(path):
         return ()
-    text = (
-        f"{path.name} speaks of inches and is read in {unit}: write surface.unit: in, if it is so"
-    )
+    text = f"{path.name} speaks of inches and is read in {unit}: write {key}.unit: in, if it is so"
     return (Finding("inches", text),)
+
+
+def size_findings(path: Path, unit: float, key: str, reach: float) -> tuple[Finding, ...]:
+    """Return a finding when a solid of the cell is larger or smaller than such a thing can be.
+
+    Parameters
+    ----------
+    path : Path
+        The mesh file.
+    unit : float
+        Length of one unit of the file, in m.
+    key : str
+        Where the cell file names it: under ``tool``, or else.
+    reach : float
+        Of the arm with its tool, in m; an upper bound will do.
+
+    Raises
+    ------
+    FileAccessError, SchemaError
+        If the file cannot be read.
+    """
+    vertices = np.asarray(load_triangles(path).vertices).reshape(-1, 3)
+    size = unit * float(np.linalg.norm(np.ptp(vertices, axis=0))) if len(vertices) else 0.0
+    largest = _LARGEST_TOOL if key.startswith("tool") else _LARGEST_FIXTURE
+    if not size > 0.0 or _SMALLEST_SOLID * reach <= size <= largest * reach:
+        return ()
+    text = (
+        f"{path.name} is {size:.3g} m across; the reach of the robot is {reach:.3g} m: is the mesh"
+        f" in {_misread(size, reach)} ({key}.unit)?"
+    )
+    return (Finding("tiny" if size < reach else "huge", text),)
 
 
 def inverted_finding(surface: Surface, reachable: Reachable, rng: Generator) -> tuple[Finding, ...]:

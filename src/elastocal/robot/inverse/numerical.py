@@ -26,7 +26,7 @@ def inverse_for(robot: Robot, seed: int = 0) -> InverseKinematics:
     Parameters
     ----------
     robot : Robot
-        Its last six joints are the arm, those before it external axes.
+        With the arm behind its external axes.
     seed : int
         Seed of the numerical solver, should it be needed.
 
@@ -45,14 +45,14 @@ def inverse_for(robot: Robot, seed: int = 0) -> InverseKinematics:
 class NumericalInverse(InverseKinematics):
     """Levenberg-Marquardt descents of the pose error from seeded random starts.
 
-    For any arm of up to six joints, revolute or prismatic. **It may miss solutions**, also the
+    For any arm of up to seven joints, revolute or prismatic. **It may miss solutions**, also the
     only one: an empty answer is no proof that the pose is out of reach. More starts find more.
     The work is bounded by ``starts * iterations`` evaluations a pose, and the answer is the
     same on every call: it depends on the pose, the robot, the seed and nothing else.
 
     Slots hold the solutions in ascending order of the joints, first joint first. They are not
-    the same branch from pose to pose. At a singular pose with infinitely many solutions, up
-    to 16 of them are returned.
+    the same branch from pose to pose. Where solutions are infinitely many, at a singular pose
+    and for an arm of seven joints, up to 16 of them are returned; `follow` goes on from one.
 
     Raises
     ------
@@ -96,6 +96,28 @@ class NumericalInverse(InverseKinematics):
             arm = distinct(self.robot, arm, _SAME)[:_MOST_SOLUTIONS]
             slots[: len(arm)] = arm
         return found
+
+    def follow(self, T_base_tcp: FloatArray, q: FloatArray) -> FloatArray:
+        """Return joints that reach a pose, from a posture beside it and near to that.
+
+        Parameters
+        ----------
+        T_base_tcp : ndarray, shape (4, 4)
+            The pose, in m.
+        q : ndarray, shape (joint,)
+            Where the descent begins, in rad or m; external axes stay there.
+
+        Returns
+        -------
+        ndarray, shape (joint,)
+            NaN if the descent ends elsewhere, or outside the limits.
+        """
+        pose = T_base_tcp[None]
+        found = self._descend(q[None], pose, characteristic_length(self.robot))
+        inside = self.robot.limits.margin(found).min() >= 0.0
+        return (
+            found[0] if inside and reaches(self.robot, found, pose)[0] else np.full(len(q), np.nan)
+        )
 
     def _arm_starts(self, length: float) -> FloatArray:
         """Return seeded arm configurations, shape (start, arm joint)."""

@@ -7,12 +7,14 @@ import numpy as np
 from elastocal.arrays import FloatArray, IndexArray
 from elastocal.errors import PathError
 from elastocal.robot import Robot
-from elastocal.robot.inverse import TURN, InverseKinematics
+from elastocal.robot.inverse import TURN, InverseKinematics, NumericalInverse
 
 RowName = Callable[[int], str]
 """Names a row for a person, e.g. ``row 12``."""
 _ON_LIMIT = 1e-9
 """Outside by less than this, in rad or m, is on the limit."""
+_FREE = 6
+"""An arm with more joints than a pose has coordinates reaches it in infinitely many ways."""
 _JUMP = 0.5 * np.pi
 """A joint that turns farther than this from one row to the next has changed its posture, in rad."""
 
@@ -110,17 +112,48 @@ def joints_along_path(
     RobotError
         If an external position is outside its limits.
     """
+    robot = solver.robot
+    if (
+        isinstance(solver, NumericalInverse)
+        and len(robot.joint_names) - robot.external_axes > _FREE
+    ):
+        external = np.broadcast_to(external, (len(T_base_tcp), robot.external_axes))
+        return _followed(solver, T_base_tcp, external, previous, where)
     found = solver.solve_many(T_base_tcp, external)
     if not found.reachable.all():
         row = int(np.argmin(found.reachable))
-        x, y, z = 1e3 * T_base_tcp[row, :3, 3]
-        raise PathError(
-            f"{where(row)}: no posture of {solver.robot.name} reaches ({x:.1f}, {y:.1f},"
-            f" {z:.1f}) mm in this orientation within the joint limits"
-        )
-    robot = solver.robot
+        raise _unreachable(robot, T_base_tcp[row], where(row))
     slots = _branches(robot, found.q, previous)
     return _unwound(robot, found.q[np.arange(len(slots)), slots], previous)
+
+
+def _followed(
+    solver: NumericalInverse,
+    T_base_tcp: FloatArray,
+    external: FloatArray,
+    previous: FloatArray,
+    where: RowName,
+) -> FloatArray:
+    """Return joints of an arm with a joint to spare: each row goes on from the one before."""
+    q, fixed = np.empty((len(T_base_tcp), len(previous))), solver.robot.external_axes
+    for row, T in enumerate(T_base_tcp):
+        start = np.concatenate([external[row], previous[fixed:]])
+        q[row] = solver.follow(T, start)
+        if not np.isfinite(q[row]).all():
+            options = solver.solve(T, external[row])
+            if not len(options):
+                raise _unreachable(solver.robot, T, where(row))
+            q[row] = options[largest_move(solver.robot, options - start).argmin()]
+        previous = q[row]
+    return q
+
+
+def _unreachable(robot: Robot, T_base_tcp: FloatArray, row: str) -> PathError:
+    x, y, z = 1e3 * T_base_tcp[:3, 3]
+    return PathError(
+        f"{row}: no posture of {robot.name} reaches ({x:.1f}, {y:.1f}, {z:.1f}) mm in this"
+        " orientation within the joint limits"
+    )
 
 
 def posture_jumps(robot: Robot, q: FloatArray, previous: FloatArray) -> IndexArray:

@@ -59,7 +59,7 @@ class InverseSolutions:
 class InverseKinematics(ABC):
     """All joint configurations that reach a pose: `Robot.forward`, solved for ``q``.
 
-    The arm is the last six joints; the positions of the external axes before it are given.
+    The positions of the external axes before the arm are given.
     A revolute joint counts modulo a turn: each branch is returned once, every joint at the
     equivalent position nearest to zero that its limits allow (plus rather than minus half a
     turn). `elastocal.robot.inverse.turns` lists the others.
