@@ -71,6 +71,10 @@ PositiveForce = Annotated[float, _read("force"), _POSITIVE]
 """In N, above 0."""
 
 
+SignedForce = Annotated[float, _read("force")]
+"""In N."""
+
+
 PositiveMoment = Annotated[float, _read("moment"), _POSITIVE]
 """In N·m, above 0."""
 

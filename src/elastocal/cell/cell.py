@@ -297,7 +297,7 @@ def load_cell(path: Path, *, production: bool = True) -> Cell:
     """
     path = Path(path)
     file = read_yaml(path, CellFile, SCHEMA)
-    robot = _at(f"{path}: robot", lambda: _robot(path, file))
+    robot = _at(f"{path}: robot", lambda: mounted_robot(path, file.robot, file.tcp))
     margins = _at(str(path), lambda: joint_margins(robot, file.limits))
     positions = _at(f"{path}: robot", lambda: external_positions(robot, file.robot, margins))
     torques = _at(f"{path}: limits.torque.values", lambda: torque_limits(robot, file.limits.torque))
@@ -327,8 +327,26 @@ def _at(place: str, make: Callable[[], _Result]) -> _Result:
         raise SchemaError(f"{place}: {error}") from error
 
 
-def _robot(path: Path, file: CellFile) -> Robot:
-    entry, place = file.robot, None
+def mounted_robot(path: Path, entry: RobotEntry, tcp: Pose) -> Robot:
+    """Return the robot of an entry up to the tool centre point, its rail included.
+
+    Parameters
+    ----------
+    path : Path
+        File that holds the entry; the URDF that it names is relative to it.
+    entry : RobotEntry
+        The robot.
+    tcp : Pose
+        Tool centre point in the flange.
+
+    Raises
+    ------
+    RobotError
+        If there is no such robot, or its URDF cannot be used.
+    FileAccessError
+        If the URDF cannot be read.
+    """
+    place = None
     meshes: tuple[tuple[str, Path], ...] = ()
     if entry.urdf is None:
         urdf = catalogue.urdf(entry.model or "")
@@ -340,7 +358,7 @@ def _robot(path: Path, file: CellFile) -> Robot:
             meshes = find_meshes(urdf, place.parent)
         links = {link.get("name") for link in parse_urdf(urdf).findall("link")}
         tip = f"cell_{_TCP}" if _TCP in links else _TCP
-        urdf = with_tool(urdf, entry.flange, tip, file.tcp.T)
+        urdf = with_tool(urdf, entry.flange, tip, tcp.T)
         if entry.rail is not None:
             rail = entry.rail
             urdf = on_rail(urdf, Rail(rail.name, rail.axis, *rail.travel, T_rail_base=rail.pose.T))

@@ -59,8 +59,8 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
 )
 _ORDER = (
-    "robots", "init", "check", "plan", "run", "derive", "calibrate", "codec", "study", "predict",
-    "tool", "compensate", "stiffness", "export", "simulate_process", "compare", "report",
+    "robots", "init", "check", "plan", "run", "derive", "import_", "calibrate", "codec", "study",
+    "predict", "tool", "compensate", "stiffness", "export", "simulate_process", "compare", "report",
     "verify", "demo",
 )  # fmt: skip
 """The order in which help lists commands: that of the work; others follow by name."""
@@ -71,9 +71,13 @@ def _found_commands() -> dict[str, Callable[..., None]]:
     names = {module.name for module in pkgutil.iter_modules(commands.__path__)}
     ordered = [*(name for name in _ORDER if name in names), *sorted(names - set(_ORDER))]
     package = commands.__name__
+    # A module cannot be named as a word of Python: the command import is in import_.py.
+    plain = {name: name.rstrip("_") for name in ordered}
     return {
-        name.replace("_", "-"): getattr(importlib.import_module(f"{package}.{name}"), f"_{name}")
-        for name in ordered
+        command.replace("_", "-"): getattr(
+            importlib.import_module(f"{package}.{name}"), f"_{command}"
+        )
+        for name, command in plain.items()
     }
 
 

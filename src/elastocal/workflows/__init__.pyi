@@ -7,6 +7,8 @@ __all__ = [
     "demo",
     "derive",
     "export",
+    "guess_map",
+    "import_logs",
     "init",
     "plan",
     "predict",
@@ -71,6 +73,15 @@ from .demo import (
 )
 from .derive import DeriveResult as DeriveResult, DeriveSettings as DeriveSettings, derive as derive
 from .export import ExportResult as ExportResult, ExportSettings as ExportSettings, export as export
+from .import_logs import (
+    GuessMapResult as GuessMapResult,
+    GuessMapSettings as GuessMapSettings,
+    ImportFigures as ImportFigures,
+    ImportLogsResult as ImportLogsResult,
+    ImportLogsSettings as ImportLogsSettings,
+    guess_map as guess_map,
+    import_logs as import_logs,
+)
 from .init import InitResult as InitResult, InitSettings as InitSettings, init as init
 from .plan import (
     ComparedSpread as ComparedSpread,

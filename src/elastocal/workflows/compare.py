@@ -5,7 +5,7 @@ from os import PathLike
 from pathlib import Path
 
 from elastocal import dataset
-from elastocal.dataset import read_robot_rows
+from elastocal.dataset import PathTable, find_columns, in_file
 from elastocal.errors import DatasetError
 from elastocal.identification import read_model
 from elastocal.identification.recertification import (
@@ -90,10 +90,11 @@ def _read_rows(path: Path, model: Path) -> ComparedRows:
         raise DatasetError(f"{path}: suffix {path.suffix!r} is not one of .csv, .nc")
     if suffix == ".nc":
         return _readings(path, robot, model)
-    rows = read_robot_rows(path, robot)
-    if not len(rows.joint_position):
-        raise DatasetError(f"{path} holds no row")
-    return ComparedRows(rows.joint_position, rows.force, rows.moment, rows.visit)
+    with in_file(path):
+        table = PathTable.open(path, lambda header: find_columns(header, robot, poses=False))
+        rows = table.rows()
+        wrench = rows.wrench_in_base(robot.forward(rows.joints))
+        return ComparedRows(rows.joints, *wrench, rows.names("visit"))
 
 
 def _readings(path: Path, robot: Robot, model: Path) -> ComparedRows:

@@ -33,6 +33,7 @@ from elastocal.identification import ProductionCoverage
 from elastocal.records import read_json, record, write_json
 from elastocal.results import Result, brief_repr
 from elastocal.tables import TableError, TableRows, opened_table, write_table
+from elastocal.units import parse_number
 
 TABLE = "table.json"
 """Name of the file by which the folder is known."""
@@ -258,7 +259,7 @@ def _numbers(path: Path, header: Sequence[str], rows: TableRows) -> FloatArray:
         for column, (name, place) in enumerate(zip(names, places, strict=True)):
             value = cells[place]
             try:
-                number = int(value) if name == "seed" else float(value)
+                number = int(value) if name == "seed" else parse_number(value)
             except ValueError:
                 number = np.nan
             if not np.isfinite(number):

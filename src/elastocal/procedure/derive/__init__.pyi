@@ -1,7 +1,9 @@
-from ._rows import LoadRow as LoadRow, LoadValues as LoadValues
+from ._rows import LoadRow as LoadRow, LoadValues as LoadValues, load_rows as load_rows
 from .derivation import (
     CommittedRun as CommittedRun,
     DerivedRun as DerivedRun,
+    MeasuredArm as MeasuredArm,
+    dataset_of as dataset_of,
     derive_poses as derive_poses,
     derive_run as derive_run,
     read_run as read_run,
