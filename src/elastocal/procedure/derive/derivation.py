@@ -21,7 +21,6 @@ import json
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 
@@ -30,7 +29,7 @@ from elastocal.cell import CONDITIONING, SENSOR_CORRECTED, Cell, SensorLoad
 from elastocal.dataset import MADE_FROM, STATUSES, Dataset, write
 from elastocal.errors import DatasetError, FileAccessError, ProcedureError, SchemaError
 from elastocal.planning import PlanResult
-from elastocal.procedure.derive._rows import LoadRow, load_rows
+from elastocal.procedure.derive._rows import LoadRow, load_rows, unloaded_references
 from elastocal.procedure.derive.findings import RunFindings, summarise
 from elastocal.procedure.derive.readings import (
     PoseReadings,
@@ -44,7 +43,6 @@ from elastocal.procedure.derive.summary import RunSummary
 from elastocal.procedure.derive.tool import (
     estimate_tool,
     sensor_load,
-    wrench_on_robot,
 )
 from elastocal.procedure.record import (
     Entry,
@@ -354,7 +352,7 @@ def dataset_of(
         values = array(name)
         return values if np.all(values[ok] > 0) else None
 
-    zero = _zeros(poses, labels, sensor)
+    zero = unloaded_references(poses, labels, sensor)
     return Dataset.from_arrays(
         joint_position=array("q", len(robot.joint_names)),
         force=array("force"),
@@ -381,30 +379,3 @@ def dataset_of(
         check=[case for case in load_cases if case == arm.check],
         provenance=provenance,
     )
-
-
-class _Zeros(NamedTuple):
-    """Where the displacements of each pose count from; NaN where that is not known."""
-
-    q: FloatArray
-    """Joints there, shape (pose, joint), in rad or m."""
-    force: FloatArray
-    """Force on the robot there, in base, shape (pose, 3), in N; 0 where it is not known."""
-    tcp: FloatArray
-    """Tcp without load, in base, shape (pose, 3), in m."""
-
-
-def _zeros(poses: Sequence[PoseReadings], labels: Sequence[int], sensor: SensorLoad) -> _Zeros:
-    found = {
-        pose.pose: (pose.zero.tool, pose.reference.tool)
-        for pose in poses
-        if pose.zero and pose.zero.tool and pose.reference and pose.reference.tool
-    }
-    joints = max((len(zero.q) for zero, _ in found.values()), default=0)
-    q, force, tcp = (np.full((len(labels), width), np.nan) for width in (joints, 3, 3))
-    force[:] = 0.0
-    for pose, (zero, tare) in found.items():
-        index = labels.index(pose)
-        q[index], tcp[index] = zero.q, tare.T_base_tcp[:3, 3]
-        force[index] = wrench_on_robot(zero.wrench, tare.wrench, sensor).force
-    return _Zeros(q, force, tcp)
