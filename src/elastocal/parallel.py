@@ -8,7 +8,10 @@ run one thread each, and so do the workflows with `one_blas_thread`.
 """
 
 import importlib
+import os
 import signal
+import threading
+import time
 import warnings
 from collections.abc import Callable, Generator, Iterable, Iterator
 from contextlib import contextmanager
@@ -20,6 +23,8 @@ from elastocal.errors import ElastocalError
 if TYPE_CHECKING:
     from threadpoolctl import ThreadpoolController
 
+_WATCH = 1.0
+"""Between two looks of a worker at whether its parent lives, in s."""
 _Task = TypeVar("_Task")
 _Result = TypeVar("_Result")
 
@@ -82,7 +87,8 @@ def map_in_processes(
 
     with _one_thread_each(processes):
         parallel = Parallel(return_as="generator")
-    yield from _to_the_end(parallel(delayed(function)(task) for task in tasks))
+    work = delayed(_work_for)
+    yield from _to_the_end(parallel(work(os.getpid(), function, task) for task in tasks))
 
 
 class ProcessPool:
@@ -156,7 +162,8 @@ class ProcessPool:
                 pre_dispatch=at_once,
                 return_as="generator" if ordered else "generator_unordered",
             )
-        return parallel(delayed(function)(task) for task in tasks)
+        work = delayed(_work_for)
+        return parallel(work(os.getpid(), function, task) for task in tasks)
 
 
 @contextmanager
@@ -231,6 +238,23 @@ def _blas() -> "ThreadpoolController":
     # Only libraries that are loaded are found.
     importlib.import_module("scipy.linalg")
     return ThreadpoolController()
+
+
+def _work_for(parent: int, function: Callable[[_Task], _Result], task: _Task) -> _Result:
+    """Do a task in a process that ends with its parent, and does not wait minutes for the next."""
+    _end_with(parent)
+    return function(task)
+
+
+@cache
+def _end_with(parent: int) -> None:
+    def watch() -> None:
+        while os.getppid() == parent:
+            time.sleep(_WATCH)
+        os._exit(1)
+
+    # Nobody is left to hear of a worker whose parent was killed, nor to clean up for it.
+    threading.Thread(target=watch, daemon=True).start()
 
 
 def _call(task: Callable[[], object]) -> object:

@@ -4,6 +4,7 @@ from .options import (
     CompensatorFile as CompensatorFile,
     Exclude as Exclude,
     Figures as Figures,
+    Force as Force,
     KeyFigures as KeyFigures,
     Marker as Marker,
     NewTool as NewTool,

@@ -4,6 +4,8 @@ from ._layout import (
     SCHEMAS as SCHEMAS,
     STATUSES as STATUSES,
     read_made_from as read_made_from,
+    require_joint_names as require_joint_names,
+    require_labels as require_labels,
 )
 from ._store import (
     content_sha256 as content_sha256,

@@ -16,6 +16,7 @@ from ._netcdf import (
     array_fields as array_fields,
     arrays_of as arrays_of,
     arrays_sha256 as arrays_sha256,
+    netcdf_image as netcdf_image,
     read_arrays as read_arrays,
     read_netcdf as read_netcdf,
     variables_of as variables_of,

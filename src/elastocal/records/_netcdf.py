@@ -162,9 +162,14 @@ def write_arrays(path: Path, arrays: LabelledArrays) -> None:
     FileAccessError
         If the file cannot be written.
     """
+    # In memory: HDF5 crashes the process when a disk is full, at the latest when it closes.
+    write_bytes(path, netcdf_image(arrays))
+
+
+def netcdf_image(arrays: LabelledArrays) -> memoryview:
+    """Return the bytes of a NetCDF4 file."""
     import h5netcdf
 
-    # In memory: HDF5 crashes the process when a disk is full, at the latest when it closes.
     image = BytesIO()
     with h5netcdf.File(image, "w") as file:
         file.attrs.update(arrays.attributes)
@@ -174,7 +179,7 @@ def write_arrays(path: Path, arrays: LabelledArrays) -> None:
             labels = [each for each in arrays.auxiliary if _labels(arrays, each, name)]
             if labels:
                 file.variables[name].attrs["coordinates"] = " ".join(labels)
-    write_bytes(path, image.getbuffer())
+    return image.getbuffer()
 
 
 def _check_signature(path: Path) -> None:

@@ -51,7 +51,6 @@ from .manifest import (
 from .signing import (
     OF_REPORT as OF_REPORT,
     OF_RUN as OF_RUN,
-    SIGNATURE as SIGNATURE,
     Signature as Signature,
     check_signature as check_signature,
     make_key as make_key,

@@ -29,7 +29,7 @@ from elastocal.procedure import (
 from elastocal.procedure.record import check_stream
 from elastocal.records import record, to_data
 from elastocal.verdict.evidence import Evidence, Seal
-from elastocal.verdict.signing import OF_RUN, SIGNATURE, check_signature, read_signature
+from elastocal.verdict.signing import OF_RUN, check_signature, read_signature
 from elastocal.wording import capped, counted
 
 _SAME = 1e-4
@@ -142,12 +142,12 @@ def _seals(evidence: Evidence) -> Iterator[Link]:
 
 def _signed(run: RunFolder, record: RunRecord, files: ChainFiles) -> Link:
     """Return who vouches for the journal, which names all that was recorded."""
-    place, trusted = run.path / SIGNATURE, files.signer or record.signer
+    place, trusted = run.signature, files.signer or record.signer
     if not place.exists():
         if trusted is None:
             text = "the run is not signed: whoever edits its record can renew the hashes"
             return Link("signature", LinkState.UNSIGNED, text)
-        return _broken("signature", f"the run should be signed, and there is no {SIGNATURE}")
+        return _broken("signature", f"the run should be signed, and there is no {place.name}")
     try:
         found = read_signature(place)
         check_signature(found, OF_RUN, file_sha256(run.journal), trusted)

@@ -19,8 +19,6 @@ from elastocal.records import read_json, record, to_data, write_json
 if TYPE_CHECKING:
     from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey
 
-SIGNATURE = "signature.json"
-"""Name of the file in the folder of a run."""
 OF_RUN, OF_REPORT = "run", "report"
 """What a signature may be of."""
 _SHOWN = 16
@@ -225,17 +223,15 @@ def check_signature(found: Signature, of: str, sha256: str, trusted: str | None)
         raise VerificationError(f"the {of} was changed after it was signed")
 
 
-def write_signature(folder: Path, signature: Signature) -> Path:
-    """Write the signature of a run into its folder; return its file.
+def write_signature(path: Path, signature: Signature) -> None:
+    """Write the signature of a run to its file.
 
     Raises
     ------
     FileAccessError
         If it cannot be written.
     """
-    path = Path(folder) / SIGNATURE
     write_json(path, signature)
-    return path
 
 
 def read_signature(path: Path) -> Signature:

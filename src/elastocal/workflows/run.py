@@ -170,7 +170,7 @@ class _Job:
     key: "Ed25519PrivateKey | None"
 
 
-@workflow(RunSettings)
+@workflow(RunSettings, record="out")
 def run(settings: RunSettings, progress: Progress) -> RunResult:
     """Press on the tooling at every pose of a plan, record what happens, derive the dataset.
 
@@ -211,13 +211,13 @@ def run(settings: RunSettings, progress: Progress) -> RunResult:
         result = _carry_out(session, devices, journal, settings.operator, progress)
     if job.key is not None:
         vouched = sign(job.key, OF_RUN, procedure.file_sha256(journal_file), _now())
-        write_signature(job.folder.path, vouched)
+        write_signature(job.folder.signature, vouched)
     if result.end is RunEnd.STOPPED:
         raise ProcedureError(f"{result.message}. The arm is {result.location.value}")
     return _derived(job, result)
 
 
-@workflow(RunSettings)
+@workflow(RunSettings, record="out")
 def dry_run(settings: RunSettings, progress: Progress) -> DryRunResult:  # noqa: ARG001 - an instant
     """Return the steps that a run would take; nothing is written or moved.
 
@@ -245,17 +245,19 @@ def _prepare(settings: RunSettings) -> _Job:
     key = None if settings.sign is None else read_private_key(settings.sign)
     text = read_text(folder / PLAN)
     seed = loaded.file.simulation.seed if settings.seed is None else settings.seed
-    place, signer = procedure.cell_path_in_run(loaded), public_key(key) if key else None
-    stated = procedure.run_record(loaded, read, text, place, seed, _now(), signer)
+    copy, signer = procedure.cell_path_in_run(loaded), public_key(key) if key else None
+    stated = procedure.run_record(loaded, read, text, copy, seed, _now(), signer)
     procedure.check_compatible(read, loaded)
+    carried_out, place = procedure.run_settings(loaded, read), RunFolder(Path(settings.out))
+    procedure.rehearse_derivation(loaded, read, place, stated)
     return _Job(
         loaded,
         read,
         folder,
-        procedure.run_settings(loaded, read),
+        carried_out,
         device_source(loaded),
         stated,
-        RunFolder(Path(settings.out)),
+        place,
         procedure.registration_warnings(read),
         key,
     )

@@ -11,7 +11,6 @@ from elastocal.progress import Progress
 from elastocal.results import Result
 from elastocal.verdict import (
     OF_REPORT,
-    SIGNATURE,
     EvidenceOptions,
     Link,
     LinkState,
@@ -163,5 +162,5 @@ def _run(folder: Path, trusted: str | None, *, required: bool = False) -> list[L
         Link("whole run", LinkState.BROKEN, text) for text in evidence.doubts if text not in told
     ]
     if required and not any(link.name == "signature" for link in links):
-        links.append(Link("signature", LinkState.BROKEN, f"there is no {SIGNATURE} to verify"))
+        links.append(Link("signature", LinkState.BROKEN, "there is no run that could be signed"))
     return links

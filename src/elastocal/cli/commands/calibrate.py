@@ -57,6 +57,7 @@ def _calibrate(  # noqa: PLR0913 - one parameter an option
     ] = None,
     draws: Annotated[int, typer.Option(help="Bootstrap draws.")] = 200,
     seed: Annotated[int, typer.Option(min=0, help="Seed of the bootstrap.")] = 0,
+    force: options.Force = False,
     as_json: options.Figures = False,
 ) -> None:
     """Identify the compliances of a robot from a measured dataset."""
@@ -79,6 +80,7 @@ def _calibrate(  # noqa: PLR0913 - one parameter an option
         process=process,
         draws=draws,
         seed=seed,
+        force=force,
     )
     if as_json:
         output.print_json(result.calibration)

@@ -17,6 +17,7 @@ def _predict(
     tool: options.NewTool = None,
     tool_mass: options.ToolMass = None,
     tool_centre: options.ToolCentre = None,
+    force: options.Force = False,
     as_json: Annotated[
         bool, typer.Option("--json", help="Print a summary as one JSON object.")
     ] = False,
@@ -29,6 +30,7 @@ def _predict(
         tool_frame=tool,
         tool_mass=tool_mass,
         tool_centre=tool_centre,
+        force=force,
     )
     if as_json:
         output.print_json(result.summary)
