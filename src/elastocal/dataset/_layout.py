@@ -4,6 +4,7 @@ This is the one list; the NetCDF file, its CSV twin and every check are made fro
 variables are those of the paper's Procedure 1: ``P^c``, ``P^m``, ``F^m`` and ``Theta^c``.
 """
 
+import contextlib
 import difflib
 import json
 import re
@@ -387,16 +388,13 @@ def read_made_from(attributes: Mapping[str, str]) -> dict[str, str]:
         If it is not JSON of texts.
     """
     text = attributes.get(MADE_FROM, "{}")
-    try:
+    with contextlib.suppress(ValueError, RecursionError):
         found = json.loads(text)
-    except (ValueError, RecursionError):
-        found = None
-    if not isinstance(found, dict) or not all(isinstance(each, str) for each in found.values()):
-        raise DatasetError(
-            f"attribute {MADE_FROM!r} is {text!r:.60}: it must be the SHA-256 of each file, such as"
-            ' \'{"journal.jsonl": "9f86…"}\''
-        )
-    return found
+        if isinstance(found, dict) and all(isinstance(each, str) for each in found.values()):
+            return found
+    raise DatasetError(
+        f"attribute {MADE_FROM!r} is {text!r:.60}: it must be JSON, the SHA-256 of each file"
+    )
 
 
 def _storable(text: str) -> bool:
