@@ -6,6 +6,9 @@ half a file. It is locked as long as its writer lives: what a killed one leaves 
 and `remove_leftovers` removes it.
 
 What is read and written here is held to the rule of the command at work, `elastocal.outputs`.
+
+What a file may ask for is bounded (`Limit`): a few hundred bytes of other people's can ask for more
+memory, or time, than there is.
 """
 
 import contextlib
@@ -18,10 +21,11 @@ import shutil
 import stat
 import tempfile
 from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from elastocal.errors import FileAccessError
+from elastocal.errors import FileAccessError, SchemaError
 from elastocal.outputs import current_rule
 
 _STANDARD_INPUT = Path("/dev/stdin")
@@ -31,6 +35,55 @@ _UNDER_WAY = ".elastocal-"
 """In the names of what is being written, behind a dot and the name that it will have."""
 _LONGEST_NAME = 200
 """Letters of a name that are kept there: file systems take 255 bytes."""
+
+
+@dataclass(frozen=True)
+class Limit:
+    """A bound on what a file may ask for, which an environment variable raises."""
+
+    variable: str
+    """Name of the environment variable."""
+    default: int
+    """The bound when it is not set."""
+    unit: str
+    """What is counted."""
+
+    @property
+    def most(self) -> int:
+        """The bound.
+
+        Raises
+        ------
+        FileAccessError
+            If the environment variable is not a whole number above 0.
+        """
+        text = os.environ.get(self.variable, str(self.default))
+        if not (text.isascii() and text.isdigit() and int(text[:18]) > 0):
+            raise FileAccessError(
+                f"{self.variable} is {text!r:.40}: it must be a whole number above 0"
+            )
+        return int(text[:18])
+
+    def require(self, found: float, what: str) -> None:
+        """Refuse what is more than the bound.
+
+        Raises
+        ------
+        SchemaError
+            With the bound and how to raise it.
+        """
+        if not found <= self.most:
+            raise SchemaError(f"{what} {self.exceeded}")
+
+    @property
+    def exceeded(self) -> str:
+        """The end of a sentence on what is more than the bound."""
+        return f"is more than {self.most} {self.unit} (the variable {self.variable} raises this)"
+
+
+_MOST_READ = Limit("ELASTOCAL_MAX_FILE_MB", 256, "MB")
+"""Size of a file that is read whole: texts, meshes, streams."""
+_MEGABYTE = 1_000_000
 
 
 @contextlib.contextmanager
@@ -220,9 +273,12 @@ def read_text(path: Path) -> str:
     ------
     FileAccessError
         If the file is missing, unreadable, empty, or not text.
+    SchemaError
+        If it is too large to be read whole.
     """
     require_file(path)
     try:
+        require_size(path)
         text = Path(path).read_text(encoding="utf-8-sig")
     except OSError as error:
         raise FileAccessError(f"cannot read {path}: {error.strerror or error}") from error
@@ -256,6 +312,20 @@ def require_file(path: Path) -> None:
         raise FileAccessError(f"cannot read {path}: it is a pipe or a device, not a file")
     if (rule := current_rule()) is not None and stat.S_ISREG(mode):
         rule.note_input(path)
+
+
+def require_size(path: Path) -> None:
+    """Refuse a file that is too large to be read whole.
+
+    Raises
+    ------
+    SchemaError
+        With the bound and how to raise it.
+    OSError
+        If it is not there.
+    """
+    size = Path(path).stat().st_size / _MEGABYTE
+    _MOST_READ.require(size, f"{path} has {size:.0f} MB, which")
 
 
 def sha256(text: str) -> str:

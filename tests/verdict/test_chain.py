@@ -251,7 +251,7 @@ def test_a_seal_is_read_of_whatever_there_is(tmp_path, text, seal):
 def test_a_bad_statement_in_a_dataset_is_refused(finished):
     data = dataset.read(finished / "run" / "dataset.nc")
     for text in ("{", "[]", '{"a": 1}'):
-        with pytest.raises(ElastocalError, match=r"made_from.*it must be JSON, the SHA-256"):
+        with pytest.raises(ElastocalError, match=r"made_from.*it must be SHA-256s"):
             replace(data, attributes={**data.attributes, "made_from": text})
 
 

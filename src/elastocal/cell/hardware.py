@@ -269,6 +269,11 @@ class SensorEntry(StrictModel):
         """Shape (3,), in N·m."""
         return vector(self.moment_range)
 
+    @property
+    def ranges(self) -> FloatArray:
+        """Largest forces and moments, shape (6,), in N and N·m."""
+        return np.concatenate([self.largest_force, self.largest_moment])
+
 
 class Tracker(StrictModel):
     """One station: where a tracker stands."""

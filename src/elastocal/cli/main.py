@@ -15,6 +15,7 @@ import importlib
 import os
 import pkgutil
 import sys
+import warnings
 from collections.abc import Callable
 from types import ModuleType
 from typing import Any
@@ -23,6 +24,7 @@ import typer
 from typer.core import TyperGroup
 
 from elastocal.cli import commands
+from elastocal.cli.output import visible
 from elastocal.errors import ElastocalError, FileAccessError
 
 _GARBAGE = 50_000
@@ -106,6 +108,9 @@ def run() -> None:
     # time when all is taken down, takes a sixth of the time of a calibration.
     gc.set_threshold(_GARBAGE)
     atexit.register(gc.freeze)
+    # Warnings of libraries (an overflow, a division by zero) are for whoever looks for a mistake in
+    # the program, with -W; what a user is to know is a note of ours.
+    warnings.simplefilter("ignore", append=True)
     try:
         _check_output()
         with ended_cleanly():
@@ -115,6 +120,9 @@ def run() -> None:
         sys.exit(130)
     except ElastocalError as error:
         _complain(str(error))
+        sys.exit(1)
+    except MemoryError as error:
+        _complain(f"not enough memory: {error}" if str(error) else "not enough memory")
         sys.exit(1)
     except OSError as error:
         # Standard output that is full or gone; nearly every file of ours has its own refusal.
@@ -140,7 +148,7 @@ def _drop_output() -> None:
 
 
 def _complain(message: str) -> None:
-    typer.echo(f"elastocal: {' '.join(message.split())}", err=True)
+    typer.echo(f"elastocal: {visible(' '.join(message.split()))}", err=True)
 
 
 heard_again()

@@ -392,9 +392,7 @@ def read_made_from(attributes: Mapping[str, str]) -> dict[str, str]:
         found = json.loads(text)
         if isinstance(found, dict) and all(isinstance(each, str) for each in found.values()):
             return found
-    raise DatasetError(
-        f"attribute {MADE_FROM!r} is {text!r:.60}: it must be JSON, the SHA-256 of each file"
-    )
+    raise DatasetError(f"attribute {MADE_FROM!r} is {text!r:.60}: it must be SHA-256s as JSON")
 
 
 def _storable(text: str) -> bool:

@@ -1,3 +1,11 @@
+from ._array_records import (
+    Variable as Variable,
+    array_fields as array_fields,
+    arrays_of as arrays_of,
+    read_netcdf as read_netcdf,
+    variables_of as variables_of,
+    write_netcdf as write_netcdf,
+)
 from ._codec import (
     SEAL as SEAL,
     from_data as from_data,
@@ -12,16 +20,10 @@ from ._codec import (
 from ._netcdf import (
     LabelledArray as LabelledArray,
     LabelledArrays as LabelledArrays,
-    Variable as Variable,
-    array_fields as array_fields,
-    arrays_of as arrays_of,
     arrays_sha256 as arrays_sha256,
     netcdf_image as netcdf_image,
     read_arrays as read_arrays,
-    read_netcdf as read_netcdf,
-    variables_of as variables_of,
     write_arrays as write_arrays,
-    write_netcdf as write_netcdf,
 )
 from ._strict import (
     StrictModel as StrictModel,

@@ -52,4 +52,4 @@ def _compare(
     hint = workflows.measured_rows(found.summary.new_provenance) if asked else None
     tables.show_comparison(output.console(), found, hint)
     for path in (each for each in (out, figure) if each is not None):
-        output.console().print(f"written to {path}", markup=False, soft_wrap=True)
+        output.console().print(f"written to {path}", soft_wrap=True)

@@ -44,8 +44,8 @@ def _import(
         settings = workflows.GuessMapSettings(logs, out=map_file, cell=cell, force=force, ask=ask)
         guessed = workflows.guess_map(settings)
         for label, text in guessed.facts():
-            output.console().print(f"{label}: {text}", markup=False, soft_wrap=True)
-        output.console().print(f"wrote {map_file}: look at every line", markup=False)
+            output.console().print(f"{label}: {text}", soft_wrap=True)
+        output.console().print(f"wrote {map_file}: look at every line")
         return
     if cell is not None:
         raise typer.BadParameter("is for --guess: the map names the cell", param_hint="--cell")
@@ -61,9 +61,9 @@ def _import(
         return
     console = output.console()
     for label, text in result.facts():
-        console.print(f"{label}: {text}", markup=False, soft_wrap=True)
+        console.print(f"{label}: {text}", soft_wrap=True)
     written = f"wrote {result.figures.dataset}, look at {result.figures.picture}"
-    console.print(written, markup=False, soft_wrap=True)
+    console.print(written, soft_wrap=True)
 
 
 def _ask(question: str) -> str:

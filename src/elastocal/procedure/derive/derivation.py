@@ -239,7 +239,8 @@ def derive_poses(
     cases = [case for case in plan.contact.load_cases if case in had or case == CONDITIONING]
     arm = measured_arm(cell)
     dataset = dataset_of(poses, rows, cases, arm, registration.lever_arm, tool, provenance)
-    estimate = estimate_tool(tool_readings(poses, tool), tool.mass)
+    ranges = None if cell.file.sensor is None else cell.file.sensor.ranges
+    estimate = estimate_tool(tool_readings(poses, tool), tool.mass, ranges)
     found = RunFindings(poses, rows, registration, tool, estimate, dataset, plan, entries)
     return DerivedRun(dataset, summarise(found))
 
