@@ -14,7 +14,7 @@ from ._store import (
     write as write,
 )
 from .dataset import Dataset as Dataset
-from .merging import merge as merge, selected as selected
+from .merging import merge as merge, selected as selected, usable_readings as usable_readings
 from .path_columns import (
     LARGEST_FORCE as LARGEST_FORCE,
     LARGEST_MOMENT as LARGEST_MOMENT,
@@ -39,6 +39,5 @@ from .path_table import (
 from .readings import (
     Presses as Presses,
     Readings as Readings,
-    usable_readings as usable_readings,
     without as without,
 )

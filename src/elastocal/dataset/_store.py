@@ -30,7 +30,13 @@ from elastocal.dataset.dataset import Dataset
 from elastocal.errors import DatasetError, SchemaError, nearest
 from elastocal.files import read_text
 from elastocal.records import LabelledArrays, arrays_sha256, read_arrays, write_arrays
-from elastocal.tables import Column, TableError, number_in_cell, write_table as write_rows
+from elastocal.tables import (
+    Column,
+    TableError,
+    number_in_cell,
+    plain_text,
+    write_table as write_rows,
+)
 from elastocal.units import parse_number, split_column
 
 _MEASURED = ("force", "moment", "controller_displacement", "marker_displacement")
@@ -228,7 +234,7 @@ def _grid(table: TableText, text: Mapping[str, int]) -> _Grid:
     line_of: dict[tuple[int, int], int] = {}
     for line, row in zip(table.rows.lines, table.rows.cells, strict=True):
         pose = _integer("pose", row[text["pose"]], line)
-        case = row[text["load_case"]].strip()
+        case = plain_text(row[text["load_case"]].strip())
         if not case:
             raise DatasetError(f"row {line}: load_case is empty: it must be a name")
         place = (poses.setdefault(pose, len(poses)), cases.setdefault(case, len(cases)))
@@ -295,7 +301,7 @@ def _campaigns(table: TableText, grid: _Grid, text: Mapping[str, int]) -> list[s
     """Return the campaign of each pose, shape (pose,), on which its rows must agree."""
     campaigns = [""] * len(grid.poses)
     for index, row in enumerate(table.rows.cells):
-        name, pose = row[text["campaign"]].strip(), int(grid.pose[index])
+        name, pose = plain_text(row[text["campaign"]].strip()), int(grid.pose[index])
         if campaigns[pose] not in ("", name):
             raise DatasetError(
                 f"row {table.rows.lines[index]}: campaign of pose {grid.poses[pose]} is {name!r},"
