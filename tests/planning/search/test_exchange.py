@@ -247,7 +247,7 @@ def test_a_choice_that_comes_back_ends_the_run():
         def value(self, matrix):
             return np.asarray(0.0) if matrix.ndim == 2 else np.array([1.0, 0.0])  # drops the old
 
-        def after_adding(self, matrix, information):
+        def after_adding(self, matrix, information):  # noqa: ARG002
             assert len(information) == 2  # those that are not chosen
             self.turn += 1
             return np.eye(2)[int(self.turn % 2 == 0)]  # of these the next of the circle
