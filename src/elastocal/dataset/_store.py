@@ -12,6 +12,7 @@ from elastocal.dataset._header import TableText, attribute_lines, cut, missing_c
 from elastocal.dataset._layout import (
     JOINT_POSITION,
     JOINT_PREFIXES,
+    MADE_FROM,
     MISSING,
     OK,
     SCHEMA_2,
@@ -28,7 +29,7 @@ from elastocal.dataset._structure import assemble
 from elastocal.dataset.dataset import Dataset
 from elastocal.errors import DatasetError, SchemaError, nearest
 from elastocal.files import read_text
-from elastocal.records import LabelledArrays, read_arrays, write_arrays
+from elastocal.records import LabelledArrays, arrays_sha256, read_arrays, write_arrays
 from elastocal.tables import (
     Column,
     TableError,
@@ -92,6 +93,14 @@ def write(dataset: Dataset, path: Path | str) -> None:
         write_arrays(path, dataset.to_labelled())
     else:
         write_table(dataset, path)
+
+
+def content_sha256(dataset: Dataset) -> str:
+    """Return the SHA-256 of what a dataset says: the same for a NetCDF file and its CSV twin.
+
+    Its origin does not count, so that a run that is moved and derived again has the same.
+    """
+    return arrays_sha256(dataset.to_labelled(), without=("provenance", MADE_FROM))
 
 
 def _suffix(path: Path) -> str:

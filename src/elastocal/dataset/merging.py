@@ -10,6 +10,7 @@ import numpy as np
 from elastocal.dataset._layout import (
     INTEGERS,
     LINK_JOINT_POSITION,
+    MADE_FROM,
     MISSING,
     SEQUENCE,
     VARIABLES,
@@ -70,6 +71,8 @@ def merge(
     joined: dict[str, np.ndarray] = {name: _joined(datasets, name, cases) for name in names}
     sources = [dataset.provenance for dataset in datasets if dataset.provenance]
     provenance = "; ".join(dict.fromkeys(sources))
+    # What the first was made from, the others were not.
+    stated = {name: each for name, each in datasets[0].attributes.items() if name != MADE_FROM}
     return replace(
         datasets[0],
         # Said again for the type checker: the arrays by name are none of these.
@@ -80,7 +83,7 @@ def merge(
         status=np.concatenate([_spread(each, each.status, cases, MISSING) for each in datasets]),
         sequence=_sequence(datasets, cases),
         campaigns=_campaigns(datasets, campaigns),
-        attributes={**datasets[0].attributes, **_check(datasets), "provenance": provenance},
+        attributes={**stated, **_check(datasets), "provenance": provenance},
         **joined,
     )
 
