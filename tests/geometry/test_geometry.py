@@ -22,7 +22,7 @@ from elastocal.progress import silent
 from elastocal.records import read_json
 from elastocal.robot import GRAVITY, Robot, catalogue, with_joint_origins
 from support.cli import elastocal
-from support.measured_arms import MARKERS, measure
+from support.measured_arms import MARKERS, measure, write_positions
 
 NOISE = 3e-5
 FLOOR = NOISE * np.sqrt(8.0 / np.pi)
@@ -191,25 +191,9 @@ def test_with_joint_origins_moves_a_joint_in_its_own_frame():
     assert np.allclose(moved.chain.joints[3].placement, placement, atol=1e-12)
 
 
-def _write(path, measured, unit="deg"):
-    data, names = measured.data, measured.robot.joint_names
-    markers = data.markers.shape[1]
-    heads = [f"{name}[{unit}]" for name in names] + ["station", "payload[kg]"]
-    heads += [f"marker{m}_{a}[mm]" for m in range(1, markers + 1) for a in "xyz"]
-    q = np.degrees(data.q) if unit == "deg" else data.q
-    lines = [
-        ",".join(
-            [*map(repr, row.tolist()), s, repr(float(p)), *map(repr, (1e3 * m).ravel().tolist())]
-        )
-        for row, s, p, m in zip(q, data.station, data.payload, data.markers, strict=True)
-    ]
-    path.write_text("\n".join([",".join(heads), *lines]) + "\n", encoding="utf-8")
-    return path
-
-
 def test_the_command_writes_model_and_urdf_and_prints_the_contract(tmp_path):
     measured = measure(kuka(), 60, blunders=5)
-    path = _write(tmp_path / "positions.csv", measured)
+    path = write_positions(tmp_path / "positions.csv", measured)
     arguments = ("--robot", "KR 210 R2700-2", "--tcp", measured.robot.tip, "--draws", 40)
     result = elastocal(
         *("geometry", path, *arguments, "--out", tmp_path / "model.json"),
@@ -242,7 +226,7 @@ def test_the_command_writes_model_and_urdf_and_prints_the_contract(tmp_path):
     ],
 )
 def test_bad_positions_are_refused_in_a_line(tmp_path, change, message):
-    path = _write(tmp_path / "positions.csv", measure(kuka(), 30, markers=1))
+    path = write_positions(tmp_path / "positions.csv", measure(kuka(), 30, markers=1))
     path.write_text(change(path.read_text(encoding="utf-8")), encoding="utf-8")
     result = elastocal(
         *("geometry", path, "--robot", "KR 210 R2700-2", "--tcp", "flange"),

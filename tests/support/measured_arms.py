@@ -1,6 +1,7 @@
 """Arms with planted geometric errors, measured by a tracker; no equation of the fit is used."""
 
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -65,6 +66,23 @@ def measure(  # noqa: PLR0913 (a campaign has as many properties)
         force=np.zeros((rows, 3)),
     )
     return Measured(robot, truth, data, frozenset(wrong.tolist()))
+
+
+def write_positions(path: Path, measured: Measured) -> Path:
+    """Write the table of a campaign; return its path."""
+    data, names = measured.data, measured.robot.joint_names
+    markers = data.markers.shape[1]
+    heads = [f"{name}[deg]" for name in names] + ["station", "payload[kg]"]
+    heads += [f"marker{m}_{a}[mm]" for m in range(1, markers + 1) for a in "xyz"]
+    q = np.degrees(data.q)
+    lines = [
+        ",".join(
+            [*map(repr, row.tolist()), s, repr(float(p)), *map(repr, (1e3 * m).ravel().tolist())]
+        )
+        for row, s, p, m in zip(q, data.station, data.payload, data.markers, strict=True)
+    ]
+    path.write_text("\n".join([",".join(heads), *lines]) + "\n", encoding="utf-8")
+    return path
 
 
 def _small(rng: np.random.Generator, error: float) -> np.ndarray:

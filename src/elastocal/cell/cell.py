@@ -11,7 +11,7 @@ import numpy as np
 from pydantic import Field, field_validator
 
 from elastocal.arrays import FloatArray
-from elastocal.cell._quantities import IDENTITY, Pose
+from elastocal.cell._quantities import IDENTITY, OptionalName, Pose
 from elastocal.cell.hardware import (
     Marker,
     MeshFile,
@@ -43,6 +43,7 @@ from elastocal.cell.procedure import (
 )
 from elastocal.cell.production import ProcessFile, ProductionPath, read_production
 from elastocal.cell.simulation import Fault, Simulation
+from elastocal.dataset import require_joint_names
 from elastocal.errors import ElastocalError, FileAccessError, SchemaError
 from elastocal.records import StrictModel, read_yaml
 from elastocal.robot import (
@@ -68,7 +69,7 @@ TOOLING = "tooling"
 class CellFile(StrictModel):
     """All keys of a cell file but ``schema``."""
 
-    name: str = ""
+    name: OptionalName = ""
     robot: RobotEntry
     tcp: Pose = IDENTITY
     """Tool centre point in the flange frame, z out of the tool."""
@@ -343,6 +344,8 @@ def mounted_robot(path: Path, entry: RobotEntry, tcp: Pose) -> Robot:
     ------
     RobotError
         If there is no such robot, or its URDF cannot be used.
+    DatasetError
+        If a joint has a name that no dataset can hold.
     FileAccessError
         If the URDF cannot be read.
     """
@@ -362,4 +365,7 @@ def mounted_robot(path: Path, entry: RobotEntry, tcp: Pose) -> Robot:
         if entry.rail is not None:
             rail = entry.rail
             urdf = on_rail(urdf, Rail(rail.name, rail.axis, *rail.travel, T_rail_base=rail.pose.T))
-        return Robot.from_urdf(urdf, tip, meshes=meshes)
+        robot = Robot.from_urdf(urdf, tip, meshes=meshes)
+    # What the dataset of a run could not hold is refused before there is a run.
+    require_joint_names(robot.joint_names)
+    return robot

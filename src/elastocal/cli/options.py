@@ -50,6 +50,9 @@ Exclude = Annotated[
     list[str] | None, typer.Option(help="Leave out POSE or POSE:LOAD_CASE; repeatable.")
 ]
 CompensatorFile = Annotated[Path | None, typer.Option(help="Settings of the compensator (.yaml).")]
+Force = Annotated[
+    bool, typer.Option("--force", help="Replace a file that this command did not write.")
+]
 Figures = Annotated[bool, typer.Option("--json", help="Print the figures as one JSON object.")]
 KeyFigures = Annotated[
     bool, typer.Option("--json", help="Print the key figures as one JSON object.")

@@ -1,4 +1,10 @@
-from ._layout import SCHEMA as SCHEMA, SCHEMAS as SCHEMAS, STATUSES as STATUSES
+from ._layout import (
+    SCHEMA as SCHEMA,
+    SCHEMAS as SCHEMAS,
+    STATUSES as STATUSES,
+    require_joint_names as require_joint_names,
+    require_labels as require_labels,
+)
 from ._store import read as read, read_dataset as read_dataset, write as write
 from .dataset import Dataset as Dataset
 from .merging import merge as merge, selected as selected

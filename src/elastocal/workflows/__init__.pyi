@@ -22,11 +22,7 @@ __all__ = [
 ]  # the commands: what the package itself exports of these
 
 from ._file_kinds import FileDescription as FileDescription
-from ._inputs import (
-    NewTool as NewTool,
-    find_robot as find_robot,
-    refuse_overwriting as refuse_overwriting,
-)
+from ._inputs import NewTool as NewTool, find_robot as find_robot
 from ._operator_and_devices import (
     KINDS as KINDS,
     SOURCES as SOURCES,

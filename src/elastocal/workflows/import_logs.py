@@ -10,12 +10,12 @@ from elastocal.dataset import Dataset, write
 from elastocal.errors import FileAccessError, LogError
 from elastocal.files import write_text
 from elastocal.logs import ClockFit, GuessedLog, ImportedLogs
+from elastocal.outputs import FIGURE_MARKS
 from elastocal.progress import Progress
 from elastocal.records import record
 from elastocal.report.plots import write_timeline_figure
 from elastocal.results import Result, brief_repr
 from elastocal.wording import counted
-from elastocal.workflows._inputs import refuse_overwriting
 from elastocal.workflows._workflow import workflow
 
 
@@ -32,6 +32,8 @@ class ImportLogsSettings:
     """Dataset to write (.nc or .csv); none: it is only returned."""
     picture: Path | None = None
     """Figure of the merged time lines (.png, .svg, .pdf); by default beside the dataset."""
+    force: bool = False
+    """Replace a file that is no former output of this command."""
 
 
 @brief_repr
@@ -81,7 +83,9 @@ class ImportLogsResult(Result):
         return self.found
 
 
-@workflow(ImportLogsSettings)
+@workflow(
+    ImportLogsSettings, outputs=("out", "picture"), marks=("elastocal.dataset/", *FIGURE_MARKS)
+)
 def import_logs(settings: ImportLogsSettings, progress: Progress) -> ImportLogsResult:
     """Merge the logs of controller, force sensor and tracker; find the readings; write a dataset.
 
@@ -104,7 +108,6 @@ def import_logs(settings: ImportLogsSettings, progress: Progress) -> ImportLogsR
         If a file cannot be read or written.
     """
     files, path = _files(settings.logs), Path(settings.map)
-    refuse_overwriting(settings.out, path, *files)
     log_map = foreign.read_map(path)
     found = foreign.import_streams(log_map, foreign.site(path, log_map), files, progress)
     picture = settings.picture

@@ -12,7 +12,7 @@ from elastocal.identification import CoveredRows, DeflectionSummary, Prediction,
 from elastocal.progress import Progress
 from elastocal.records import record
 from elastocal.results import Result, brief_repr
-from elastocal.workflows._inputs import NewTool, coverage_notes, refuse_overwriting
+from elastocal.workflows._inputs import NewTool, coverage_notes
 from elastocal.workflows._workflow import workflow
 
 
@@ -26,6 +26,8 @@ class PredictSettings(NewTool):
     """CSV with joint columns, ``force_x[N] …`` and optionally ``moment_x[N*m] …`` and ``visit``."""
     out: Path | None = None
     """CSV to write: the rows with their deflections and intervals."""
+    force: bool = False
+    """Replace a file that is no former output of this command."""
 
 
 @brief_repr
@@ -77,7 +79,7 @@ class PredictResult(Result):
         return self.prediction
 
 
-@workflow(PredictSettings)
+@workflow(PredictSettings, marks=("deflection_x_low[m]",))
 def predict(settings: PredictSettings, progress: Progress) -> PredictResult:  # noqa: ARG001 - done in an instant
     """Predict the deflection of each row, with 95 % intervals of the fit and of a measurement.
 
@@ -96,7 +98,6 @@ def predict(settings: PredictSettings, progress: Progress) -> PredictResult:  # 
         If a file cannot be read or written, or ``out`` is an input.
     """
     model, rows = Path(settings.model), Path(settings.rows)
-    refuse_overwriting(settings.out, model, rows)
     calibrated = settings.read_model(model)
     robot = calibrated.model.robot
     with in_file(rows):

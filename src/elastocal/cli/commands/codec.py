@@ -40,7 +40,7 @@ def _codec(  # noqa: PLR0913 - one parameter an option
         ),
     ] = False,
     splits: Annotated[
-        int | None, typer.Option(help="Verification sets; default: as many as poses.")
+        int | None, typer.Option(max=100_000, help="Verification sets; default: as many as poses.")
     ] = None,
     ratio: Annotated[
         str, typer.Option(metavar="A/B", help="Training to verification poses.")
@@ -64,7 +64,8 @@ def _codec(  # noqa: PLR0913 - one parameter an option
         bool, typer.Option("--per-axis", help="Also print the errors along x, y and z.")
     ] = False,
     jobs: Annotated[
-        int | None, typer.Option(min=1, help="Processes; default: all cores for long work.")
+        int | None,
+        typer.Option(min=1, max=1024, help="Processes; default: all cores for long work."),
     ] = None,
     force: Annotated[
         bool, typer.Option("--force", help="Replace the files of a codec that is there.")

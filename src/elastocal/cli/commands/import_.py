@@ -31,7 +31,8 @@ def _import(
         typer.Option(help="Figure of the merged time lines; default: beside the dataset."),
     ] = None,
     force: Annotated[
-        bool, typer.Option("--force", help="With --guess: replace a map that is there.")
+        bool,
+        typer.Option("--force", help="Replace a map that is there, or a file of somebody else."),
     ] = False,
     as_json: Annotated[
         bool, typer.Option("--json", help="Print the figures as one JSON object.")
@@ -43,22 +44,26 @@ def _import(
         settings = workflows.GuessMapSettings(logs, out=map_file, cell=cell, force=force, ask=ask)
         guessed = workflows.guess_map(settings)
         for label, text in guessed.facts():
-            output.console().print(f"{label}: {text}", markup=False, soft_wrap=True)
-        output.console().print(f"wrote {map_file}: look at every line", markup=False)
+            output.console().print(f"{label}: {text}", soft_wrap=True)
+        output.console().print(f"wrote {map_file}: look at every line")
         return
+    if cell is not None:
+        raise typer.BadParameter("is for --guess: the map names the cell", param_hint="--cell")
     if out is None:
         raise typer.BadParameter("is missing: the dataset to write", param_hint="--out")
     with output.progress_bars() as progress:
-        given = workflows.ImportLogsSettings(logs, map=map_file, out=out, picture=picture)
+        given = workflows.ImportLogsSettings(
+            logs, map=map_file, out=out, picture=picture, force=force
+        )
         result = workflows.import_logs(given, progress)
     if as_json:
         output.print_json(result.figures)
         return
     console = output.console()
     for label, text in result.facts():
-        console.print(f"{label}: {text}", markup=False, soft_wrap=True)
+        console.print(f"{label}: {text}", soft_wrap=True)
     written = f"wrote {result.figures.dataset}, look at {result.figures.picture}"
-    console.print(written, markup=False, soft_wrap=True)
+    console.print(written, soft_wrap=True)
 
 
 def _ask(question: str) -> str:

@@ -97,6 +97,11 @@ class SimulateProcessResult(Result):
     coverage: ProductionCoverage | None = None
     """How much of the process the first model's calibration covers; none where it is not known."""
 
+    def __post_init__(self) -> None:
+        """Refuse a table of nothing."""
+        if not self.runs or len(self.lines) < len(self.runs):
+            raise ValueError(f"{len(self.lines)} lines for {len(self.runs)} runs")
+
     def facts(self) -> tuple[tuple[str, str], ...]:
         """Return what a person wants to know first."""
         return (

@@ -40,11 +40,7 @@ from elastocal.procedure.derive.readings import (
     tool_readings,
 )
 from elastocal.procedure.derive.summary import RunSummary
-from elastocal.procedure.derive.tool import (
-    estimate_tool,
-    sensor_load,
-    wrench_on_robot,
-)
+from elastocal.procedure.derive.tool import estimate_tool, sensor_load, wrench_on_robot
 from elastocal.procedure.record import (
     Entry,
     PoseLog,
@@ -165,7 +161,7 @@ def derive_run(run: Path, sensor: SensorLoad | None = None) -> DerivedRun:
         If no reading is usable.
     """
     found = read_run(run)
-    provenance = _provenance(found.folder, found.record, sensor)
+    provenance = run_provenance(found.folder, found.record, sensor)
     try:
         derived = derive_poses(
             found.poses, found.cell, found.plan, found.entries, provenance, sensor
@@ -231,17 +227,19 @@ def derive_poses(
         raise DatasetError(f"no usable reading among {len(rows)}: {_reasons(rows, registration)}")
     # The press before the reference stays, usable or not: the others' friction begins with it.
     cases = [case for case in plan.contact.load_cases if case in had or case == CONDITIONING]
-    arm = MeasuredArm(
-        cell.robot,
-        cell.urdf_with_tool_mass,
-        cell.gravity_of_mounting,
-        conditioned,
-        cell.file.load_cases.check_case,
-    )
+    arm = measured_arm(cell)
     dataset = dataset_of(poses, rows, cases, arm, registration.lever_arm, tool, provenance)
-    estimate = estimate_tool(tool_readings(poses, tool), tool.mass)
+    ranges = None if cell.file.sensor is None else cell.file.sensor.ranges
+    estimate = estimate_tool(tool_readings(poses, tool), tool.mass, ranges)
     found = RunFindings(poses, rows, registration, tool, estimate, dataset, plan, entries)
     return DerivedRun(dataset, summarise(found))
+
+
+def measured_arm(cell: Cell) -> MeasuredArm:
+    """Return what the readings of a cell are taken with."""
+    conditioned, check = cell.file.procedure.conditioning, cell.file.load_cases.check_case
+    urdf, gravity = cell.urdf_with_tool_mass, cell.gravity_of_mounting
+    return MeasuredArm(cell.robot, urdf, gravity, conditioned, check)
 
 
 def _latest(logs: Sequence[PoseLog]) -> list[PoseLog]:
@@ -277,7 +275,8 @@ def _reasons(rows: Sequence[LoadRow], registration: Registration) -> str:
     return next((row.note for row in rows if row.note), "there is none")
 
 
-def _provenance(folder: RunFolder, record: RunRecord, sensor: SensorLoad | None) -> str:
+def run_provenance(folder: RunFolder, record: RunRecord, sensor: SensorLoad | None) -> str:
+    """Return where the data of a run come from, as its dataset says."""
     corrected = "" if sensor is None else f", {SENSOR_CORRECTED}"
     return f"elastocal run {folder.path.resolve().name}, {record.origin}{corrected}"
 
@@ -291,7 +290,7 @@ def dataset_of(
     sensor: SensorLoad,
     provenance: str,
 ) -> Dataset:
-    """Return the dataset of all rows, with the load cases to keep.
+    """Return the dataset of a run: all rows, with the load cases to keep.
 
     Parameters
     ----------

@@ -32,7 +32,7 @@ from scipy.spatial.transform import Rotation
 from elastocal.arrays import FloatArray
 from elastocal.cell import ArmState, PointBlock, WrenchBlock
 from elastocal.errors import FileAccessError, SchemaError
-from elastocal.files import require_file, write_bytes
+from elastocal.files import Limit, require_file, require_size, write_bytes
 
 TimeArray = NDArray[np.int64]
 """Times in ns."""
@@ -42,11 +42,16 @@ _MAGIC = b"\x89MCAP0\r\n"
 _CHUNK = 512 * 1024
 """Bytes of a chunk before it is compressed: as much as viewers load at a time."""
 
+_MOST_UNPACKED = Limit("ELASTOCAL_MAX_STREAM_MB", 256, "MB")
+"""An hour of a pose, at the rates of the simulated devices, takes a tenth."""
+_MEGABYTE = 1_000_000
 _DAMAGE = (
     McapError,
     ValueError,
     OverflowError,
     RuntimeError,
+    MemoryError,
+    LookupError,
     struct.error,
     zstandard.ZstdError,
 )
@@ -132,6 +137,7 @@ def read_mcap(path: Path) -> Contents:
     """
     require_file(path)
     try:
+        require_size(path)
         data = Path(path).read_bytes()
     except OSError as error:
         raise FileAccessError(f"cannot read {path}: {error.strerror or error}") from error
@@ -156,11 +162,22 @@ def _records(data: bytes) -> Iterator[McapRecord]:
     records = list(reader.records)
     if not any(isinstance(record, DataEnd) for record in records):
         raise ValueError("its data have no end")
+    unpacked = 0.0
     for record in records:
         if isinstance(record, Chunk):
+            unpacked += _unpacked_size(record) / _MEGABYTE
+            _MOST_UNPACKED.require(unpacked, "what its chunks hold when they are unpacked")
             yield from breakup_chunk(record, validate_crc=True)
         else:
             yield record
+
+
+def _unpacked_size(chunk: Chunk) -> int:
+    """Return the bytes that a chunk may take unpacked: what it states, and what its frame does."""
+    packed = chunk.data if chunk.compression == "zstd" else b""
+    frame = zstandard.get_frame_parameters(packed).content_size if packed else 0
+    unknown = frame in (zstandard.CONTENTSIZE_UNKNOWN, zstandard.CONTENTSIZE_ERROR)
+    return max(chunk.uncompressed_size, 0 if unknown else frame)
 
 
 def _contents(records: Iterator[McapRecord]) -> Contents:
