@@ -16,6 +16,7 @@ from .ladder import (
 )
 from .model import (
     SCHEMA as SCHEMA,
+    URDF_MARK as URDF_MARK,
     DistanceFigures as DistanceFigures,
     FixedParameter as FixedParameter,
     GeometryModel as GeometryModel,

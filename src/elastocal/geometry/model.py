@@ -13,6 +13,8 @@ from elastocal.results import brief_repr
 from elastocal.robot import Robot, with_joint_origins
 
 SCHEMA = "elastocal.geometry/1"
+URDF_MARK = "made by elastocal geometry"
+"""Comment by which a calibrated URDF is known."""
 _OFFSET = MOTION.index("offset")
 
 
@@ -133,7 +135,8 @@ class GeometryModel:
             else:
                 T[:3, 3] += T[:3, :3] @ offset
             corrections[joint.name] = T
-        return with_joint_origins(self.robot_urdf, corrections)
+        urdf = with_joint_origins(self.robot_urdf, corrections)
+        return urdf.replace("</robot>", f"  <!-- {URDF_MARK}: {self.provenance} -->\n</robot>")
 
 
 def geometry_model(

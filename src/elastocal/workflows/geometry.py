@@ -7,12 +7,19 @@ from pathlib import Path
 import numpy as np
 
 from elastocal.files import write_text
-from elastocal.geometry import GeometryModel, GeometryProblem, climb, geometry_model, read_positions
+from elastocal.geometry import (
+    URDF_MARK,
+    GeometryModel,
+    GeometryProblem,
+    climb,
+    geometry_model,
+    read_positions,
+)
 from elastocal.progress import Progress
 from elastocal.records import write_json
 from elastocal.results import Result
 from elastocal.wording import counted
-from elastocal.workflows._inputs import find_robot, refuse_overwriting
+from elastocal.workflows._inputs import find_robot
 from elastocal.workflows._workflow import workflow
 
 _MM = 1e3
@@ -58,7 +65,7 @@ class GeometryResult(Result):
         )
 
 
-@workflow(GeometrySettings)
+@workflow(GeometrySettings, outputs=("out", "urdf"), marks=("elastocal.geometry/", URDF_MARK))
 def geometry(settings: GeometrySettings, progress: Progress) -> GeometryResult:
     """Find the geometric errors of an arm, and what it yields under its weight and payloads.
 
@@ -79,8 +86,6 @@ def geometry(settings: GeometrySettings, progress: Progress) -> GeometryResult:
         If a file cannot be read or written.
     """
     path = Path(settings.positions)
-    refuse_overwriting(settings.out, path)
-    refuse_overwriting(settings.urdf, path)
     robot = find_robot(settings.robot, settings.tcp, None)
     problem = GeometryProblem(robot, read_positions(path, robot))
     found = climb(problem, settings.draws, np.random.default_rng(settings.seed), progress)
