@@ -20,6 +20,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from elastocal.arrays import FloatArray
+from elastocal.results import brief_repr
 from elastocal.robot import Robot
 
 KINDS = ("shift_x", "shift_y", "shift_z", "turn_x", "turn_y", "turn_z")
@@ -28,6 +29,7 @@ MOTION = ("offset", "scale", "sin", "cos", "sin2", "cos2", "compliance")
 """Errors of a joint's motion."""
 
 
+@brief_repr
 @dataclass(frozen=True, eq=False)
 class ArmErrors:
     """Geometric errors of a chain."""
@@ -43,6 +45,7 @@ class ArmErrors:
         return cls(np.zeros((joints, len(KINDS))), np.zeros((joints, len(MOTION))))
 
 
+@brief_repr
 @dataclass(frozen=True, eq=False)
 class ArmFrames:
     """Where the joints and the tcp of an arm are at some poses."""

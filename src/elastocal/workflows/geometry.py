@@ -17,7 +17,7 @@ from elastocal.geometry import (
 )
 from elastocal.progress import Progress
 from elastocal.records import write_json
-from elastocal.results import Result
+from elastocal.results import Result, brief_repr
 from elastocal.wording import counted
 from elastocal.workflows._inputs import find_robot
 from elastocal.workflows._workflow import workflow
@@ -25,6 +25,7 @@ from elastocal.workflows._workflow import workflow
 _MM = 1e3
 
 
+@brief_repr
 @dataclass(frozen=True)
 class GeometrySettings:
     """Which positions, of which robot."""
