@@ -133,6 +133,15 @@ def test_the_plan_file_keeps_what_was_promised(tmp_path, plan):
     assert read_plan(tmp_path).production == plan.production
 
 
+def test_a_plan_of_before_the_first_uncovered_row_was_told_is_still_read(tmp_path, plan):
+    write_plan(tmp_path, plan)
+    path = tmp_path / "plan.json"
+    data = json.loads(path.read_text(encoding="utf-8"))
+    assert data["production"]["coverage"].pop("first") == ""
+    path.write_text(json.dumps(data), encoding="utf-8")
+    assert read_plan(tmp_path).production == plan.production
+
+
 def test_postures_near_production_are_nearer_than_their_reach(cell, plan):
     near = NearProduction.of(cell)
     assert near.distance(cell.process.joint_position[:5]) == pytest.approx(0.0, abs=1e-9)
