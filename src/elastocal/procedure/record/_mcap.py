@@ -22,9 +22,11 @@ from pathlib import Path
 
 import numpy as np
 import zstandard
+from mcap.data_stream import ReadDataStream
 from mcap.exceptions import McapError
-from mcap.records import Channel, Chunk, DataEnd, McapRecord, Message, Metadata
-from mcap.stream_reader import CRCValidationError, StreamReader, breakup_chunk
+from mcap.opcode import Opcode
+from mcap.records import Channel, Chunk, DataEnd, McapRecord, Message, Metadata, Schema
+from mcap.stream_reader import CRCValidationError, StreamReader, get_chunk_data_stream
 from mcap.writer import Writer
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
@@ -42,6 +44,12 @@ _MAGIC = b"\x89MCAP0\r\n"
 _CHUNK = 512 * 1024
 """Bytes of a chunk before it is compressed: as much as viewers load at a time."""
 
+_RECORD, _MESSAGE = struct.Struct("<BQ"), struct.Struct("<HIQQ")
+"""Opcode and length of a record; of a message: channel, sequence, log time, publish time."""
+_DESCRIPTIONS: dict[int, type[Schema] | type[Channel]] = {
+    Opcode.SCHEMA: Schema,
+    Opcode.CHANNEL: Channel,
+}
 _MOST_UNPACKED = Limit("ELASTOCAL_MAX_STREAM_MB", 256, "MB")
 """An hour of a pose, at the rates of the simulated devices, takes a tenth."""
 _MEGABYTE = 1_000_000
@@ -167,7 +175,7 @@ def _records(data: bytes) -> Iterator[McapRecord]:
         if isinstance(record, Chunk):
             unpacked += _unpacked_size(record) / _MEGABYTE
             _MOST_UNPACKED.require(unpacked, "what its chunks hold when they are unpacked")
-            yield from breakup_chunk(record, validate_crc=True)
+            yield from _unpacked(record)
         else:
             yield record
 
@@ -178,6 +186,22 @@ def _unpacked_size(chunk: Chunk) -> int:
     frame = zstandard.get_frame_parameters(packed).content_size if packed else 0
     unknown = frame in (zstandard.CONTENTSIZE_UNKNOWN, zstandard.CONTENTSIZE_ERROR)
     return max(chunk.uncompressed_size, 0 if unknown else frame)
+
+
+def _unpacked(chunk: Chunk) -> Iterator[McapRecord]:
+    """Yield the records of a chunk; a message is read at once, not number by number."""
+    stream, size = get_chunk_data_stream(chunk, validate_crc=True)
+    data, at = stream.read(size), 0
+    while at < size:
+        opcode, length = _RECORD.unpack_from(data, at)
+        begin, at = at + _RECORD.size, at + _RECORD.size + length
+        if at > size:
+            raise ValueError("a record of a chunk is longer than the chunk")
+        if opcode == Opcode.MESSAGE:
+            channel, row, time, published = _MESSAGE.unpack_from(data, begin)
+            yield Message(channel, time, data[begin + _MESSAGE.size : at], published, row)
+        elif opcode in _DESCRIPTIONS:
+            yield _DESCRIPTIONS[opcode].read(ReadDataStream(BytesIO(data[begin:at])))
 
 
 def _contents(records: Iterator[McapRecord]) -> Contents:
