@@ -5,7 +5,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from elastocal.codec import CodecOptions, Variant, cross_validate, judge, make_variants
+from elastocal import parallel
+from elastocal.codec import (
+    CodecOptions,
+    Variant,
+    cross_validate,
+    cross_validation,
+    judge,
+    make_variants,
+)
 from elastocal.dataset import Readings
 from elastocal.errors import CodecError, ConventionError, DatasetError, IdentificationError
 from elastocal.sim.arm import (
@@ -30,6 +38,21 @@ def test_processes_do_not_change_a_number(readings):
     few = CodecOptions(splits=3)
     alone, helped = (cross_validate(robot(), readings, variants, few, jobs=n) for n in (1, 2))
     assert same(alone, helped)
+
+
+@pytest.mark.parametrize(("worth", "processes"), [(0.0, 3), (1e9, 1)])
+def test_all_cores_are_used_where_the_first_split_is_slow(readings, monkeypatch, worth, processes):
+    asked = []
+
+    def alone(run, splits, count):
+        asked.append(count)
+        return map(run, splits)
+
+    monkeypatch.setattr(cross_validation, "map_in_processes", alone)
+    monkeypatch.setattr(cross_validation, "_WORTH_PROCESSES", worth)
+    monkeypatch.setattr(parallel, "core_count", lambda: 3)
+    cross_validate(robot(), readings, [SIX])
+    assert asked == [processes]
 
 
 def test_variants_are_what_they_are_alone(readings):

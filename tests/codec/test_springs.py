@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import xarray as xr
 
 from elastocal.codec import (
     CodecOptions,
@@ -109,12 +110,31 @@ def test_verification_poses_have_no_part_in_the_choice_of_springs(readings):
 
 def test_errors_are_those_of_the_springs_that_each_split_chose(readings):
     auto = cross_validate(robot(), readings, [Variant()])
-    names = sorted(set(auto.split_layouts[0]))
+    names = sorted({name for split in auto.split_layouts[0] for name in split})
+    assert len(names) > 1
     given = cross_validate(robot(), readings, make_variants({"springs": names}))
-    for split, name in enumerate(auto.split_layouts[0]):
-        np.testing.assert_array_equal(
-            auto.error_mean[0, split], given.error_mean[given.index(name), split]
-        )
+    for split, sizes in enumerate(auto.split_layouts[0]):
+        for n, name in enumerate(sizes):
+            np.testing.assert_allclose(
+                auto.error_mean[0, split, n],
+                given.error_mean[given.index(name), split, n],
+                rtol=1e-6,
+            )
+
+
+@pytest.mark.parametrize("search", ["cover", "ioops"])
+def test_springs_of_a_small_training_set_are_what_calibrate_takes_on_it(readings, search):
+    """They were those of all training poses: a tensor at each joint, from a single pose on."""
+    data = cross_validate(robot(), readings, [Variant(search=search)], FEW)
+    chosen = np.array(data.split_layouts[0])
+    assert set(chosen[:, :2].ravel()) == {"actuated"}
+    for split, sizes in enumerate(chosen):
+        anew = (3, 5, len(sizes))
+        for n, to in zip(anew, (*anew[1:], len(sizes) + 1), strict=True):
+            poses = [data.pose_labels[pose][0] for pose in data.chosen[0, split, n - 1, :n]]
+            few = readings.take(np.isin(readings.pose, poses))
+            taken = choose_model(robot(), few, "auto", FitOptions(set_blunders_aside=False)).taken
+            assert set(sizes[n - 1 : to - 1]) == {taken}
 
 
 def test_files_and_words_say_which_springs_were_taken(readings, tmp_path):
@@ -130,11 +150,23 @@ def test_files_and_words_say_which_springs_were_taken(readings, tmp_path):
     assert "chosen in each split from its training poses alone" in found.springs[1]
 
 
+def test_a_file_with_one_choice_a_split_has_it_at_every_size(readings, tmp_path):
+    data = cross_validate(robot(), readings, [Variant()], FEW)
+    now = xr.load_dataset(write_codec(tmp_path, data))
+    before = now.assign(split_layout=now["split_layout"][:, :, -1])
+    before.to_netcdf(tmp_path / "codec.nc", engine="h5netcdf")
+    last = [split[-1] for split in data.split_layouts[0]]
+    assert read_codec(tmp_path).split_layouts == (
+        tuple((name,) * len(data.n_train) for name in last),
+    )
+
+
 def test_a_codec_of_before_has_the_springs_of_its_variants(readings):
     data = cross_validate(robot(), readings, PAIR, FEW)
     old = replace(data, layouts=(), split_layouts=(), ladder=(), left_out=None)
     assert old.layouts == ("actuated", "bearing")
-    assert old.split_layouts == (("actuated",) * 3, ("bearing",) * 3)
+    sizes = len(old.n_train)
+    assert old.split_layouts == ((("actuated",) * sizes,) * 3, (("bearing",) * sizes,) * 3)
     verdicts = judge(old)
     assert verdicts.springs == ()
     assert verdicts.pairs[0].all_but_one is None
@@ -168,7 +200,7 @@ def test_splits_keep_the_order_in_which_friction_was_loaded():
     variant = [Variant(springs="gears")]
     told = cross_validate(robot(), readings, variant, FEW)
     assert told.layouts == ("gears+friction",)
-    assert set(told.split_layouts[0]) == {"gears+friction"}
+    assert {each[-1] for each in told.split_layouts[0]} == {"gears+friction"}
     turned = replace(readings, sequence=readings.sequence.max() - readings.sequence)
     mixed = cross_validate(robot(), turned, variant, FEW)
     assert told.error_mean[0, :, -1, 3].mean() < 0.3 * mixed.error_mean[0, :, -1, 3].mean()

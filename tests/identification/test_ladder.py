@@ -83,6 +83,22 @@ def test_the_best_rung_differs_from_itself_by_nothing():
     assert (best.difference, best.low, best.high) == (0.0, 0.0, 0.0)
 
 
+def test_a_pose_that_stands_alone_does_not_hide_which_rung_is_better():
+    """It is extrapolated to: the rungs there miss by millimetres, one way or the other."""
+    best = chosen("rich", 31)["links"]
+    worse = replace(best, name="bearing", score=best.score + 30e-6)
+    spoiled = best.score.copy()
+    spoiled[7] += 3e-3
+    tried = [worse, replace(best, score=spoiled)]
+    allowed = ["bearing", "links"]
+    company = np.arange(31) != 7
+    alone = [replace(each, counted=company) for each in tried]
+    assert (
+        take_simplest([replace(each, counted=None) for each in tried], allowed).taken == "bearing"
+    )
+    assert take_simplest(alone, allowed).taken == "links"
+
+
 def test_the_interval_counts_that_refits_overlap():
     """Nadeau and Bengio: wider by sqrt(2) than for independent errors, but for 1 / (n - 1)."""
     rung = chosen("rich", 31)["actuated"]

@@ -7,6 +7,7 @@ from elastocal.identification import (
     CalibratedLoads,
     covered_rows,
     near_postures,
+    poses_in_company,
     posture_reach,
 )
 from elastocal.robot import Rail, Robot, catalogue, on_rail, with_tool
@@ -156,6 +157,16 @@ def test_the_angle_to_the_nearest_press_is_told(arm):
     assert found.direction == pytest.approx(0.0, abs=1e-6)
     aside = covered(arm, force_tcp=(300.0, 0.0, -300.0))
     assert aside.direction == pytest.approx(np.pi / 4 - np.arctan(0.3), abs=1e-6)
+
+
+class TestPosesInCompany:
+    def test_a_pose_far_from_all_others_stands_alone(self, arm):
+        q = np.vstack([POSTURE + move(1, 0.5 * n) for n in range(5)] + [POSTURE + move(4, 1.1)])
+        assert poses_in_company(arm, q, np.arange(len(q))).tolist() == [True] * 5 + [False]
+
+    def test_where_most_poses_stand_alone_all_count(self, arm):
+        q = np.vstack([POSTURE + move(1, 1.1 * n) for n in range(5)])
+        assert poses_in_company(arm, q, np.arange(len(q))).all()
 
 
 def test_the_coverage_of_two_halves_is_that_of_the_whole(arm):

@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from elastocal import workflows
 from elastocal.cell import Cell, load_cell
 from elastocal.compensation.process import process_courses
 from elastocal.identification import ENOUGH
@@ -18,6 +19,7 @@ from elastocal.planning import (
     read_plan,
     write_plan,
 )
+from elastocal.planning.checks import registration_shortages
 from elastocal.workflows import init
 
 
@@ -145,3 +147,19 @@ def test_load_cases_that_are_too_small_come_with_larger_ones(cell):
     texts = " ".join(production_findings(weak, None))
     assert "ask for load_cases.fx and fy of" in texts
     assert "ask for load_cases.fz of" in texts
+
+
+def test_a_plan_of_fewer_poses_than_the_cell_says_is_still_a_plan_of_that_cell(folder, tmp_path):
+    cell = folder / "cell.yaml"
+    workflows.plan(cell, out=tmp_path / "plan", poses=5, compare="none", jobs=1)
+    found = read_plan(tmp_path / "plan")
+    assert len(found.poses) == 5
+    assert found.time_of(10) == pytest.approx(2.0 * found.total_time)
+    assert workflows.dry_run(cell, plan=tmp_path / "plan", out=tmp_path / "run").poses == 5
+
+
+def test_no_pose_is_left_to_a_station_that_cannot_be_registered(cell):
+    """The block's second tilt to weigh the tool by is seen by a station that sees little else."""
+    found = make_plan(changed(cell, poses=9), jobs=1).plan
+    assert registration_shortages([pose.seen_by for pose in found.poses]) == {}
+    assert found.production.coverage.is_enough

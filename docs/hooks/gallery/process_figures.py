@@ -1,93 +1,241 @@
-"""Table 1 over truths and seeds: measured by one command, quoted by the build.
+"""Table 1 over truths, seeds and campaigns: measured by one command, quoted by the build.
 
-``python -m gallery.process_figures``, run in ``docs/hooks``, plans each example cell once, and for
-each preset, seed and layout of springs runs the procedure, calibrates, weighs the tool and
-simulates the process, at the programmed, half and turned load. That takes an hour on two cores, so
-the site quotes ``process_figures.json``, which it writes; ``docs/hooks/process_tables.py`` makes
-the tables of it.
+``make process-figures`` runs this file. It takes an hour or two on two cores, so the site and the
+README quote ``process_figures.json``, which it writes after every case: a run that is cut goes on
+where it ended. ``docs/hooks/process_tables.py`` makes the tables of it.
+
+A case is an example cell with a preset and a seed. The procedure is run, calibrated with each
+layout of springs, the tool is weighed, and the process simulated at the programmed, half and turned
+load, as `elastocal simulate-process` does. On `typical` the same is done, at the programmed load,
+with shorter campaigns and with that of the paper.
 """
 
+import argparse
 import json
+import re
+import sys
 import tempfile
-from dataclasses import dataclass
+from collections.abc import Iterator
+from dataclasses import dataclass, field
 from pathlib import Path
 
-from elastocal.compensation.process import SeedMeans
+from elastocal.cell import load_cell
+from elastocal.compensation import process
+from elastocal.compensation.conditioning import read_sensor_load
+from elastocal.compensation.process import DeviationComparison
+from elastocal.identification import CalibrateResult
+from elastocal.progress import silent
 from elastocal.records import from_data, record, to_data
-from elastocal.workflows import calibrate, init, plan, run, simulate_process, tool
+from elastocal.workflows import ProcessTrial, calibrate, init, plan, run, run_trials, tool
 
 QUOTED = Path(__file__).with_name("process_figures.json")
 KINDS = ("afp", "machining")
-PRESETS = ("kind", "typical", "harsh")
-SPRINGS = ("bearing", "auto")
+TYPICAL, OTHERS = "typical", ("kind", "harsh")
 SEEDS = (1, 2, 3, 4, 5)
-LOADS = (0.5, -1.0)
-
-
-@record()
-class ProcessCase:
-    """One row group of the tables."""
-
-    kind: str
-    preset: str
-    springs: str
-    means: tuple[SeedMeans, ...]
+_LOADS = (1.0, 0.5, -1.0)
 
 
 @dataclass(frozen=True)
-class _Campaign:
-    """A cell that is measured anew for every seed."""
+class Campaign:
+    """A way to plan a cell, and the springs that its readings are given."""
 
-    folder: Path
+    name: str
+    search: dict[str, str]
+    """Keys of ``search`` that differ from the cell file."""
+    springs: tuple[str, ...]
+
+
+TEMPLATE = Campaign("template", {}, ("bearing", "auto"))
+SHORTER = (
+    Campaign("cover 30", {"technique": "cover", "poses": "30"}, ("bearing",)),
+    Campaign("i_optimal 8", {"poses": "8"}, ("auto",)),
+    Campaign("i_optimal 6", {"poses": "6"}, ("auto",)),
+)
+
+
+@record()
+class Case:
+    """What is measured at once."""
+
     kind: str
     preset: str
+    seed: int
 
-    def cases(self) -> list[ProcessCase]:
-        cell = self.folder / "cell" / "cell.yaml"
-        init(cell.parent, kind=self.kind)
-        text = cell.read_text(encoding="utf-8")
-        changed = text.replace("preset: typical", f"preset: {self.preset}")
-        cell.write_text(changed.replace("preset: kind", f"preset: {self.preset}"), encoding="utf-8")
-        plan(cell, out=self.folder / "plan", compare=None)
-        for seed in SEEDS:
-            made = self.folder / f"run{seed}"
-            run(cell, plan=self.folder / "plan", out=made, seed=seed)
-            tool(made, out=self.folder / f"tool{seed}.json")
-        return [self._case(cell, springs) for springs in SPRINGS]
 
-    def _case(self, cell: Path, springs: str) -> ProcessCase:
-        models = tuple(self.folder / f"{springs}{seed}.json" for seed in SEEDS)
-        for seed, model in zip(SEEDS, models, strict=True):
-            calibrate(self.folder / f"run{seed}" / "dataset.nc", out=model, springs=springs)
-        found = simulate_process(
-            cell, kind=self.kind, models=models, seeds=SEEDS, loads=LOADS,
-            tools=tuple(self.folder / f"tool{seed}.json" for seed in SEEDS),
-            out=self.folder / f"process-{springs}",
+@record()
+class Deviation:
+    """One measure of the deviation at one load: before and after correction, in m."""
+
+    name: str
+    load: float
+    mean: tuple[float, float]
+    max: tuple[float, float]
+
+
+@record()
+class ProcessFigures:
+    """What a campaign with one layout of springs made of a case."""
+
+    case: Case
+    campaign: str
+    springs: str
+    chosen: str
+    """The layout that was taken, where the readings were to decide."""
+    poses: int
+    minutes: float
+    """Time of the campaign in the cell."""
+    left_out: float
+    """Mean error at left-out poses, in m, noise of the readings in it."""
+    deviations: tuple[Deviation, ...]
+
+
+def all_cases() -> Iterator[Case]:
+    """Yield every case, a seed more of `typical` than of the others at any time."""
+    turns = [(1, TYPICAL)]
+    for seed in SEEDS:
+        turns += [(seed + 1, TYPICAL)] if seed + 1 in SEEDS else []
+        turns += [(seed, preset) for preset in OTHERS]
+    for seed, preset in turns:
+        for kind in KINDS:
+            yield Case(kind, preset, seed)
+
+
+def quoted() -> list[ProcessFigures]:
+    """Return the figures as they are written down."""
+    data = json.loads(QUOTED.read_text(encoding="utf-8")) if QUOTED.exists() else []
+    return [from_data(ProcessFigures, figures, QUOTED.name) for figures in data]
+
+
+def write(figures: list[ProcessFigures]) -> None:
+    """Write figures down, a line each."""
+    lines = ",\n".join(json.dumps(to_data(each)) for each in figures)
+    QUOTED.write_text(f"[\n{lines}\n]\n", encoding="utf-8")
+
+
+@dataclass(frozen=True)
+class _Model:
+    """A calibration, and the trial of its correction."""
+
+    campaign: Campaign
+    springs: str
+    poses: int
+    minutes: float
+    result: CalibrateResult
+    trial: ProcessTrial
+    deviations: list[Deviation] = field(default_factory=list)
+
+    def figures(self, case: Case) -> ProcessFigures:
+        """Return what is written down of it."""
+        found = self.result.calibration
+        assert found is not None
+        taken = [rung.springs for rung in found.ladder if rung.chosen]
+        return ProcessFigures(
+            case, self.campaign.name, self.springs, taken[0] if taken else self.springs,
+            self.poses, self.minutes, _rounded(found.held_out.mean), tuple(self.deviations),
         )  # fmt: skip
-        return ProcessCase(self.kind, self.preset, springs, found.means)
 
 
-def quoted() -> list[ProcessCase]:
-    """Return the cases as they are written down."""
-    data = json.loads(QUOTED.read_text(encoding="utf-8"))
-    return [from_data(ProcessCase, case, QUOTED.name) for case in data]
+@dataclass(frozen=True)
+class Measurement:
+    """Measures cases, with the plans that it has made so far."""
+
+    folder: Path
+    jobs: int = 1
+    _plans: dict[tuple[str, str], Path] = field(default_factory=dict)
+
+    def of(
+        self, case: Case, campaigns: tuple[Campaign, ...], loads: tuple[float, ...] = _LOADS
+    ) -> list[ProcessFigures]:
+        """Return the figures of a case, one for each campaign and layout of springs.
+
+        Loads other than the programmed one are run with the first campaign alone.
+        """
+        models = [each for campaign in campaigns for each in self._models(case, campaign)]
+        first = models[0].trial
+        courses = process.process_courses(case.kind, first.cell, case.seed, None)
+        name = process.PROCESSES[case.kind].direction
+        for load in loads:
+            loaded = courses if load == 1.0 else tuple(process.at_load(c, load) for c in courses)
+            some = [each for each in models if load == 1.0 or each.campaign == campaigns[0]]
+            found = run_trials([each.trial for each in some], loaded, silent)
+            for model, runs in zip(some, found, strict=True):
+                model.deviations.append(_deviation(runs.line(name), load))
+                model.deviations.append(_deviation(runs.spatial("3-D"), load))
+        return [model.figures(case) for model in models]
+
+    def _models(self, case: Case, campaign: Campaign) -> Iterator[_Model]:
+        """Run a campaign, and yield a model for each of its layouts of springs."""
+        cell = self._cell(case, campaign)
+        made = self.folder / f"{campaign.name} {case.kind} {case.preset} {case.seed}"
+        ended = run(cell, plan=cell.parent / "plan", out=made / "run", seed=case.seed)
+        poses, minutes = ended.figures.committed, round(ended.figures.seconds / 60.0, 2)
+        tool(made / "run", out=made / "tool.json")
+        settings = process.PROCESSES[case.kind].compensator
+        for springs in campaign.springs:
+            result = calibrate(made / "run" / "dataset.nc", springs=springs)
+            load = read_sensor_load(made / "tool.json", result.calibrated.model.robot)
+            trial = ProcessTrial(
+                load_cell(cell), result.calibrated, load, settings, case.seed, jobs=self.jobs
+            )
+            yield _Model(campaign, springs, poses, minutes, result, trial)
+
+    def _cell(self, case: Case, campaign: Campaign) -> Path:
+        """Return the cell file of a case beside its plan; presets share a plan."""
+        key = case.kind, campaign.name
+        folder = self.folder / " ".join(key)
+        if key not in self._plans:
+            init(folder, kind=case.kind)
+            cell = folder / "cell.yaml"
+            text = cell.read_text(encoding="utf-8")
+            for name, value in campaign.search.items():
+                text = re.sub(rf"(?m)^  (# )?{name}: \S+", f"  {name}: {value}", text)
+            cell.write_text(text, encoding="utf-8")
+            plan(cell, out=folder / "plan", compare="none")
+            self._plans[key] = folder
+        text = (folder / "cell.yaml").read_text(encoding="utf-8")
+        cell = folder / f"{case.preset}.yaml"
+        cell.write_text(text.replace("preset: typical", f"preset: {case.preset}"), encoding="utf-8")
+        return cell
 
 
-def measure() -> list[ProcessCase]:
-    """Return all cases, measured anew."""
-    cases: list[ProcessCase] = []
-    for kind in KINDS:
-        for preset in PRESETS:
-            with tempfile.TemporaryDirectory() as folder:
-                cases += _Campaign(Path(folder), kind, preset).cases()
-    return cases
+def _deviation(line: DeviationComparison, load: float) -> Deviation:
+    mean, largest = (
+        (_rounded(before), _rounded(after))
+        for before, after in (
+            (line.before.mean, line.after.mean),
+            (line.before.max, line.after.max),
+        )
+    )
+    return Deviation(line.name, load, mean, largest)
 
 
-def write(cases: list[ProcessCase]) -> None:
-    """Write cases down."""
-    text = json.dumps([to_data(case) for case in cases], indent=1)
-    QUOTED.write_text(text + "\n", encoding="utf-8")
+def _rounded(length: float) -> float:
+    """Return a length in m to 10 nm: what is quoted is small, and alike on all machines."""
+    return round(length, 8)
+
+
+def measure(seeds: int, kinds: list[str], anew: bool) -> None:
+    """Measure the cases that are not yet written down, or all of them."""
+    figures = [each for each in quoted() if not (anew and each.case.kind in kinds)]
+    done = {each.case for each in figures}
+    order = list(all_cases())
+    with tempfile.TemporaryDirectory() as folder:
+        measurement = Measurement(Path(folder))
+        for case in order:
+            if case in done or case.kind not in kinds or case.seed > seeds:
+                continue
+            shorter = SHORTER if case.preset == TYPICAL else ()
+            figures += measurement.of(case, (TEMPLATE, *shorter))
+            figures.sort(key=lambda each: order.index(each.case))
+            write(figures)
+            sys.stdout.write(f"{case}\n")
+            sys.stdout.flush()
 
 
 if __name__ == "__main__":
-    write(measure())
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--anew", action="store_true", help="measure also what is written down")
+    parser.add_argument("--seeds", type=int, default=len(SEEDS), help="how many seeds")
+    parser.add_argument("--kinds", nargs="*", choices=KINDS, default=list(KINDS))
+    given = parser.parse_args()
+    measure(given.seeds, given.kinds, given.anew)

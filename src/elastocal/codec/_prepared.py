@@ -1,9 +1,10 @@
 """Variants prepared for a campaign: their rows, and the springs that readings carry.
 
 Where a variant leaves its springs to the readings (``auto``), the ladder of `calibrate` is climbed
-once on all of them, which says what springs the file carries; and anew in each split on its
-training poses alone, so that errors at the verification poses have seen no choice that these had a
-part in. Rows are those of all readings at a pose, so that friction remembers the same in any split.
+once on all of them, which says what springs the file carries; and anew on training poses of each
+split, at some sizes of the training set, so that errors at the verification poses have seen no
+choice that these or later training poses had a part in. Rows are those of all readings at a pose,
+so that friction remembers the same in any split.
 """
 
 from collections.abc import Mapping, Sequence
@@ -110,9 +111,12 @@ class Entrant:
     low: BoolArray
     """Whether each reading is of low load, shape (reading,)."""
 
-    def chosen(self, split: Split) -> str:
-        """Return the name of the springs that the training poses of a split carry."""
-        poses = self.taken.can_train(split)
+    def chosen(self, poses: IndexArray) -> str:
+        """Return the name of the springs that training poses carry.
+
+        Those that `calibrate` would take on them; it refuses fewer than `MINIMUM_BLOCKS` poses,
+        which carry no choice: the simplest.
+        """
         if len(self.allowed) == 1 or len(poses) < MINIMUM_BLOCKS:
             return self.allowed[0].springs
         rows = self.taken.trains & np.isin(self.taken.problem.block, poses)

@@ -3,10 +3,12 @@
 Each variant on each split: choose, fit, verify (lines 8 to 18).
 """
 
+import time
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 from importlib.metadata import version
+from itertools import pairwise
 
 import numpy as np
 from numpy.random import Generator
@@ -26,15 +28,17 @@ from elastocal.codec.splits import CodecOptions, Split, make_campaign, make_spli
 from elastocal.codec.variants import Variant, check_different
 from elastocal.dataset import Readings
 from elastocal.errors import CodecError, IdentificationError
-from elastocal.identification import Problem, rung_summary, solve
+from elastocal.identification import MINIMUM_BLOCKS, Problem, rung_summary, solve
 from elastocal.parallel import map_in_processes, one_blas_thread, process_count
 from elastocal.planning.search import Candidates, growing_choices, technique
 from elastocal.progress import Progress, silent
 from elastocal.robot import Robot
 
 _STAGE = "splits"
-_WORTH_PROCESSES = 2000
-"""Fits behind a search of their own, or by a robust loss, from which on all cores are used."""
+_WORTH_PROCESSES = 6.0
+"""Processor time from which on all cores are used, in s; processes need a third of it to start."""
+_GROWTH = 1.8
+"""Ratio of training sizes at which springs are chosen anew."""
 _PACKAGES = ("elastocal", "numpy", "scipy")
 
 
@@ -42,8 +46,8 @@ _PACKAGES = ("elastocal", "numpy", "scipy")
 class _LearningCurve:
     """Choices, fits and errors of a variant on a split, for 1, 2, … training poses."""
 
-    springs: str
-    """Name of the springs that the errors are of."""
+    springs: tuple[str, ...]
+    """Names of the springs that the errors are of, by number of training poses."""
     chosen: tuple[IndexArray, ...]
     """Numbers of the training poses, in the order of choice."""
     compliance: FloatArray
@@ -83,8 +87,8 @@ def cross_validate(
     provenance : str
         Where the readings came from; kept with the arrays.
     jobs : int, optional
-        Processes; default: one, but all cores for long work, where variants search anew for
-        every size or fit by a robust loss. The numbers do not depend on it.
+        Processes; default: one, but all cores where the splits take one process long. The
+        numbers do not depend on it.
     progress : Progress, optional
         Hears of each split that is done.
 
@@ -120,8 +124,7 @@ def cross_validate(
             f"training sets end at {most} of {training} poses: the others have no reading of the"
             " load cases that a variant trains with"
         )
-    processes = _processes(jobs, variants, most, len(splits))
-    curves = _run_splits(entrants, splits, most, options.seed, processes, progress)
+    curves = _run_splits(entrants, splits, most, options.seed, jobs, progress)
     for each, found in zip(prepared, curves, strict=True):
         _require_a_fit(each, found)
     return CodecData(
@@ -167,25 +170,26 @@ def _largest_training_set(prepared: PreparedVariant, splits: Sequence[Split]) ->
     return most
 
 
-def _processes(jobs: int | None, variants: Sequence[Variant], most: int, splits: int) -> int:
-    """Return the number of processes; starting them takes as long as a thousand slow fits."""
-    slow = sum(not technique(v.search).nested or v.options.loss != "linear" for v in variants)
-    return process_count(jobs or None, splits, worthwhile=slow * most * splits > _WORTH_PROCESSES)
-
-
 def _run_splits(
     entrants: Sequence[Entrant],
     splits: Sequence[Split],
     most: int,
     seed: int,
-    processes: int,
+    jobs: int | None,
     progress: Progress,
 ) -> list[list[_LearningCurve]]:
-    """Return the learning curves by variant and split."""
+    """Return the learning curves by variant and split.
+
+    The first split tells how long the others would take one process.
+    """
     run = partial(_run_split, entrants, most, seed)
-    found = []
     progress(_STAGE, 0, len(splits))
-    for curves in map_in_processes(run, splits, processes):
+    begin = time.process_time()
+    found = [run(splits[0])]
+    others = (len(splits) - 1) * (time.process_time() - begin)
+    processes = process_count(jobs or None, len(splits), worthwhile=others > _WORTH_PROCESSES)
+    progress(_STAGE, 1, len(splits))
+    for curves in map_in_processes(run, splits[1:], processes):
         found.append(curves)
         progress(_STAGE, len(found), len(splits))
     return [list(column) for column in zip(*found, strict=True)]
@@ -196,24 +200,28 @@ def _run_split(
 ) -> list[_LearningCurve]:
     """Return the learning curve of each variant on one split."""
     curves = []
-    # Variants that differ in their search alone choose the same springs.
-    known: dict[tuple[str, str, str], str] = {}
+    # Variants that differ in their search alone choose the same springs on the same poses.
+    known: dict[tuple[str, ...], dict[frozenset[int], str]] = {}
     for each in entrants:
         variant = each.taken.variant
-        key = (variant.springs, variant.load_cases, variant.solver)
+        found = known.setdefault((variant.springs, variant.load_cases, variant.solver), {})
         try:
-            known[key] = known.get(key) or each.chosen(split)
-            chosen = each.with_springs(known[key])
-            curve = _train(chosen, split, most, seed)
-            if chosen is not each.taken:
-                curve = replace(curve, compliance=_fit(each.taken, curve.chosen))
-            curves.append(curve)
+            curves.append(_train(each, found, split, most, seed))
         except IdentificationError as error:
             raise IdentificationError(
-                f"variant {each.taken.variant.name!r}, split grown from pose"
-                f" {split.seed_pose}: {error}"
+                f"variant {variant.name!r}, split grown from pose {split.seed_pose}: {error}"
             ) from error
     return curves
+
+
+def _chosen_springs(
+    entrant: Entrant, known: dict[frozenset[int], str], poses: IndexArray
+) -> PreparedVariant:
+    """Return a variant with the springs that training poses carry, known or judged now."""
+    key = frozenset(poses.tolist())
+    if key not in known:
+        known[key] = entrant.chosen(np.sort(poses))
+    return entrant.with_springs(known[key])
 
 
 def _require_a_fit(prepared: PreparedVariant, curves: Sequence[_LearningCurve]) -> None:
@@ -235,13 +243,17 @@ def _padded(chosen: Sequence[IndexArray]) -> IndexArray:
     return filled
 
 
-def _train(prepared: PreparedVariant, split: Split, most: int, seed: int) -> _LearningCurve:
+def _train(
+    entrant: Entrant, known: dict[frozenset[int], str], split: Split, most: int, seed: int
+) -> _LearningCurve:
     """Return the errors that a variant reaches with 1 to ``most`` training poses of a split.
 
     Parameters
     ----------
-    prepared : PreparedVariant
+    entrant : Entrant
         The variant.
+    known : dict
+        Springs by the training poses that carry them; springs chosen here are added.
     split : Split
         The split.
     most : int
@@ -250,18 +262,47 @@ def _train(prepared: PreparedVariant, split: Split, most: int, seed: int) -> _Le
         Searches draw from ``default_rng((seed, seed pose, number of poses))``, so that all
         variants with one technique draw alike.
     """
-    chosen = _choices(prepared, split, most, seed)
-    compliance = _fit(prepared, chosen)
-    verified = np.isin(prepared.problem.block, split.verification)
-    O, d = prepared.problem.O[verified], prepared.problem.d[verified]  # noqa: E741 - paper
+    taken = entrant.taken
+    searched = taken
+    if not technique(taken.variant.search).nested:
+        # A technique that looks at springs looks at those that its whole pool carries.
+        searched = _chosen_springs(entrant, known, taken.can_train(split))
+    chosen = _choices(searched, split, most, seed)
+    compliance = _fit(taken, chosen)
+    springs, errors = [], []
+    for sizes in _sizes_of_choices(most):
+        each = _chosen_springs(entrant, known, chosen[sizes.start])
+        fitted = compliance[sizes] if each is taken else _fit(each, chosen[sizes])
+        springs += len(fitted) * [each.springs]
+        errors.append(_verification_errors(each.problem, split, fitted))
+    error = np.concatenate(errors)
+    return _LearningCurve(
+        tuple(springs), tuple(chosen), compliance, error.mean(axis=1), error.max(axis=1)
+    )
+
+
+def _sizes_of_choices(most: int) -> list[slice]:
+    """Return ranges of places in a learning curve, springs being chosen anew at each start.
+
+    The largest training set makes a choice of its own, each other one of 5 to 9 of
+    than the next, down to the smallest that carries a choice.
+    """
+    starts = [most - 1]
+    while starts[0] + 1 > MINIMUM_BLOCKS:
+        starts.insert(0, max(MINIMUM_BLOCKS, int((starts[0] + 1) / _GROWTH)) - 1)
+    starts = [0, *starts] if starts[0] else starts
+    return [slice(*ends) for ends in pairwise([*starts, most])]
+
+
+def _verification_errors(problem: Problem, split: Split, compliance: FloatArray) -> FloatArray:
+    """Return absolute residuals at the verification poses, shape (n_train, reading, 4), in m."""
+    verified = np.isin(problem.block, split.verification)
+    O, d = problem.O[verified], problem.d[verified]  # noqa: E741 - paper
     # Verification always takes all load cases, whatever was trained with.
     residual = np.abs(compliance @ O.reshape(-1, O.shape[2]).T - d.ravel())
-    residual = residual.reshape(len(chosen), -1, 3)
+    residual = residual.reshape(len(compliance), -1, 3)
     norm = np.sqrt(np.square(residual).sum(axis=2, keepdims=True))
-    errors = np.concatenate([residual, norm], axis=2)
-    return _LearningCurve(
-        prepared.springs, tuple(chosen), compliance, errors.mean(axis=1), errors.max(axis=1)
-    )
+    return np.concatenate([residual, norm], axis=2)
 
 
 def _fit(prepared: PreparedVariant, chosen: Sequence[IndexArray]) -> FloatArray:

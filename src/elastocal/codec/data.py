@@ -129,9 +129,9 @@ class CodecData:
     shape (cv,), in m; none in files of elastocal 0.1.0."""
     layouts: tuple[str, ...] = ()
     """Springs of each variant: what `calibrate` takes on this file for the variant's word."""
-    split_layouts: tuple[tuple[str, ...], ...] = ()
-    """Springs that the errors are of, by variant and split: chosen from the split's training poses
-    where there is a choice."""
+    split_layouts: tuple[tuple[tuple[str, ...], ...], ...] = ()
+    """Springs that the errors are of, by variant, split and number of training poses: chosen from
+    training poses of that split where there is a choice."""
     ladder: tuple[RungSummary, ...] = ()
     """The ladder of `calibrate` on this file, and other compared layouts; empty in files before."""
     left_out: FloatArray | None = None
@@ -149,7 +149,8 @@ class CodecData:
             self._own("left_out", np.array(self.left_out, dtype=float))
         # Before there was a choice, every split had the springs of its variant.
         layouts = self.layouts or tuple(each.springs for each in self.variants)
-        splits = self.split_layouts or tuple((name,) * len(self.seed_pose) for name in layouts)
+        sizes, sets = self.error_mean.shape[2], len(self.seed_pose)
+        splits = self.split_layouts or tuple(((name,) * sizes,) * sets for name in layouts)
         object.__setattr__(self, "layouts", layouts)
         object.__setattr__(self, "split_layouts", splits)
         compliance = tuple(np.array(each, dtype=float) for each in self.compliance)
@@ -217,7 +218,7 @@ class CodecData:
             expected["left_out"] = (v, self.left_out.shape[-1])
         found = {name: getattr(self, name).shape for name in expected}
         found["split_layouts"] = np.shape(self.split_layouts)
-        expected["split_layouts"] = (v, cv)
+        expected["split_layouts"] = (v, cv, n)
         for k, (array, springs) in enumerate(zip(self.compliance, self.springs, strict=True)):
             expected[f"compliance of variant {k}"] = (cv, n, len(springs.names))
             found[f"compliance of variant {k}"] = array.shape
@@ -286,7 +287,7 @@ def _arrays_of(data: CodecData) -> LabelledArrays:
         variables["left_out"] = LabelledArray(by_pose, data.left_out, notes, packed=True)
     variables["variant_layout"] = _texts("variant", data.layouts)
     names = np.array(data.split_layouts, dtype=np.str_)
-    variables["split_layout"] = LabelledArray(("variant", "cv"), names)
+    variables["split_layout"] = LabelledArray(("variant", "cv", "n_train"), names)
     for key in KEYS:
         variables[f"variant_{key}"] = _texts("variant", [getattr(v, key) for v in data.variants])
     labels = [", ".join(map(str, group)) for group in data.pose_labels]
@@ -348,7 +349,7 @@ def _data_of(found: LabelledArrays) -> CodecData:
         versions=json.loads(found.attributes["versions"]),
         zero_error=found["zero_error"].values if "zero_error" in found else None,
         layouts=_listed(found["variant_layout"]) if "variant_layout" in found else (),
-        split_layouts=_rows(found["split_layout"]) if "split_layout" in found else (),
+        split_layouts=_split_layouts(found),
         ladder=tuple(
             from_data(RungSummary, rung, "ladder")
             for rung in json.loads(found.attributes.get("ladder", "[]"))
@@ -358,8 +359,14 @@ def _data_of(found: LabelledArrays) -> CodecData:
     )
 
 
-def _rows(texts: LabelledArray) -> tuple[tuple[str, ...], ...]:
-    return tuple(tuple(map(str, row)) for row in texts.values.tolist())
+def _split_layouts(found: LabelledArrays) -> tuple[tuple[tuple[str, ...], ...], ...]:
+    if "split_layout" not in found:
+        return ()
+    names = found["split_layout"].values
+    if names.ndim == 2:
+        # Before, a split had one choice for all sizes.
+        names = np.repeat(names[:, :, None], len(found["n_train"].values), axis=2)
+    return tuple(tuple(tuple(map(str, sizes)) for sizes in row) for row in names.tolist())
 
 
 def _listed(texts: LabelledArray) -> tuple[str, ...]:

@@ -67,7 +67,8 @@ class Curve:
     layout: str = ""
     """Springs that `calibrate` takes on this file for the word in ``springs``."""
     layouts: dict[str, int] = field(default_factory=dict)
-    """Springs that the errors are of, with the number of splits whose training poses chose them."""
+    """Springs that the errors at the largest training sets are of, with the number of splits whose
+    training poses chose them."""
 
 
 @brief_repr
@@ -173,13 +174,23 @@ def _springs(data: CodecData) -> tuple[str, ...]:
     rows = zip(data.variants, data.layouts, data.split_layouts, strict=True)
     for variant, layout, splits in rows:
         if variant.springs != layout:
-            chosen = ", ".join(f"{n} in {counted(k, 'split')}" for n, k in Counter(splits).items())
             found.append(
                 f"{variant.name}: springs {variant.springs} are {layout} on these readings; its"
-                " errors are those of springs chosen in each split from its training poses alone:"
-                f" {chosen}"
+                " errors are those of springs chosen in each split from its training poses alone,"
+                f" as many as there are: {_chosen_by_size(splits)}"
             )
     return tuple(found)
+
+
+def _chosen_by_size(splits: Sequence[Sequence[str]]) -> str:
+    """Return how many splits chose which springs, at each size where one of them changes."""
+    sizes = list(zip(*splits, strict=True))
+    changes = [0, *(n for n in range(1, len(sizes)) if sizes[n] != sizes[n - 1])]
+    return "; ".join(
+        f"from {counted(n + 1, 'pose')} on "
+        + ", ".join(f"{name} in {k}" for name, k in Counter(sizes[n]).most_common())
+        for n in changes
+    )
 
 
 def _left_out(data: CodecData, a: str, b: str) -> FloatArray | None:
@@ -286,5 +297,5 @@ def _curve(data: CodecData, name: str) -> Curve:
         tuple(np.median(data.errors(name, "max"), axis=0).tolist()),
         **{key: getattr(variant, key) for key in KEYS},
         layout=data.layouts[number],
-        layouts=dict(Counter(data.split_layouts[number])),
+        layouts=dict(Counter(each[-1] for each in data.split_layouts[number])),
     )

@@ -140,6 +140,7 @@ from .production import (
     ProductionCoverage as ProductionCoverage,
     covered_rows as covered_rows,
     near_postures as near_postures,
+    poses_in_company as poses_in_company,
     posture_reach as posture_reach,
 )
 from .reproduction import (

@@ -117,16 +117,15 @@ def _bounded_below(A: FloatArray, y: FloatArray, lower: FloatArray) -> FloatArra
     bounded = np.isfinite(lower)
     # Moved to the lower bound the problem is a non-negative one, which `nnls` solves at once, in
     # what the free variables cannot explain.
+    if np.all(bounded):
+        return np.asarray(lower + _nonnegative(A, y - A @ lower))
     x = np.where(bounded, lower, 0.0)
     rest = y - A @ x
     Q, R = np.linalg.qr(A[:, ~bounded])
     A_bounded = A[:, bounded]
-    if Q.size:
-        projected = A_bounded - Q @ (Q.T @ A_bounded)
-        step = _nonnegative(projected, rest - Q @ (Q.T @ rest))
-        x[~bounded] = np.linalg.solve(R, Q.T @ (rest - A_bounded @ step))
-    else:
-        step = _nonnegative(A_bounded, rest)
+    projected = A_bounded - Q @ (Q.T @ A_bounded)
+    step = _nonnegative(projected, rest - Q @ (Q.T @ rest))
+    x[~bounded] = np.linalg.solve(R, Q.T @ (rest - A_bounded @ step))
     x[bounded] += step
     return x
 

@@ -1,10 +1,10 @@
 """A ladder of spring models, from few springs to gears that remember, and how high to climb.
 
 More springs always fit better; whether they predict better is seen at poses that a refit has not
-seen, and at a low load that it has not seen, where there is one. (A refit without the full load
-would have to extrapolate, which no rung is asked to.) The rung taken is the simplest that is not
-worse than the best by more than one standard error of their paired difference, which counts that
-the refits overlap (`elastocal.identification.paired`).
+seen, and at a low load that it has not seen, where there is one. (A refit without the full load, or
+without a pose that stands alone, would have to extrapolate, which no rung is asked to.) The rung
+taken is the simplest that is not worse than the best by more than one standard error of their
+paired difference, which counts that the refits overlap (`elastocal.identification.paired`).
 """
 
 from collections.abc import Callable, Sequence
@@ -30,7 +30,8 @@ from elastocal.errors import IdentificationError
 from elastocal.identification.displacement import reference_joints
 from elastocal.identification.options import FitOptions
 from elastocal.identification.paired import Overlap, judge_models
-from elastocal.identification.problem import Problem, build
+from elastocal.identification.problem import Problem, build, pose_blocks
+from elastocal.identification.production import poses_in_company
 from elastocal.identification.solve import PoseGrams
 from elastocal.identification.suspicious import screen
 from elastocal.identification.uncertainty import HeldOut, leave_poses_out
@@ -91,6 +92,8 @@ class Climbed:
     standard_error: float = 0.0
     """Of the difference, in m."""
     chosen: bool = False
+    counted: BoolArray | None = None
+    """Pose blocks whose score decides, shape (block,); none: all. See `poses_in_company`."""
     apart: float = float("nan")
     """Root mean square distance of its predictions at left-out poses from those of the chosen
     rung, in m; NaN where it was not to choose from."""
@@ -242,8 +245,7 @@ def usable_for_choice(
         As for `choose_model`.
     """
     # Sought once, not for every rung.
-    sought = reference_joints(robot, readings)
-    readings = replace(readings, reference_joint_position=sought)
+    readings = replace(readings, reference_joint_position=reference_joints(robot, readings))
     if not options.set_blunders_aside:
         return readings
     # Judged by springs that every reading can be judged by; they would decide otherwise.
@@ -285,13 +287,14 @@ def climb(
     low, reason = low_loads(readings), _NO_LEVELS
     # The frame of a load case that is left out is not known, so it cannot be judged.
     judged = low & (options.free_frame != "load_case")
+    counted = poses_in_company(robot, readings.joint_position, pose_blocks(readings))
     for rung in rungs:
         if rung.needs_levels and not np.any(low):
             continue
         model = ElasticModel(robot, rung.springs(robot, readings))
         try:
             problem = build(model, readings, options, marker_offset)
-            tried.append(try_rung(rung.name, model, problem, judged))
+            tried.append(replace(try_rung(rung.name, model, problem, judged), counted=counted))
         except IdentificationError as error:
             reason = str(error)
     if not any(each.name in allowed for each in tried):
@@ -318,6 +321,7 @@ def take_simplest(tried: Sequence[Climbed], allowed: Sequence[str]) -> Choice:
     if not np.any(may):
         raise IdentificationError(f"springs {', '.join(allowed)} were not tried: {_NO_LEVELS}")
     score = np.stack([each.score for each in tried], axis=1)
+    score = score if tried[0].counted is None else score[tried[0].counted]
     found = judge_models(score, may, Overlap.leaving_one_out(len(score)))
     each = found.difference
     figures = (each.mean, each.low, each.high, np.nan_to_num(each.standard_error))

@@ -25,6 +25,9 @@ JOINT_REACH = float(np.radians(30.0))
 """Largest distance of a covered row from a calibrated posture in a turning joint, in rad."""
 RAIL_REACH = 0.4
 """The same of a sliding joint, in m."""
+_MOST_ALONE = 0.25
+"""Part of the poses that may stand alone without counting; where more do, none has neighbours to
+speak of, and all count."""
 ENOUGH = 0.95
 """Share of production that a calibration has to cover."""
 _ARM = 6
@@ -256,7 +259,9 @@ def _courses_of(course: Sequence[str], rows: BoolArray) -> tuple[str, ...]:
     return tuple(dict.fromkeys(np.array(course, dtype=str)[rows].tolist())) if course else ()
 
 
-def near_postures(robot: Robot, q: FloatArray, poses: FloatArray) -> BoolArray:
+def near_postures(
+    robot: Robot, q: FloatArray, poses: FloatArray, reaches: float = 1.0
+) -> BoolArray:
     """Return whether postures cover rows of production by their joints, shape (row, pose).
 
     Parameters
@@ -265,8 +270,32 @@ def near_postures(robot: Robot, q: FloatArray, poses: FloatArray) -> BoolArray:
         The robot.
     q, poses : ndarray, shapes (row, joint) and (pose, joint)
         Rows and postures, in rad or m.
+    reaches : float
+        How many times `posture_reach` they may be apart.
     """
-    return np.asarray(_distances(robot, np.concatenate(_judged(robot)), q, poses) <= 1.0)
+    return np.asarray(_distances(robot, np.concatenate(_judged(robot)), q, poses) <= reaches)
+
+
+def poses_in_company(robot: Robot, q: FloatArray, pose: IndexArray) -> BoolArray:
+    """Return the poses by which models are compared, those not far from all others, shape (pose,).
+
+    Two poses within twice the reach of coverage cover all that lies between them. A pose farther
+    from every other, such as one that only weighs the tool, is no part of what the others cover:
+    what a model makes of it when it is left out is an extrapolation, and its large error would hide
+    the differences at all others.
+
+    Parameters
+    ----------
+    robot : Robot
+        The robot.
+    q, pose : ndarray, shapes (reading, joint) and (reading,)
+        Joint positions of readings in rad or m, and the poses that they are of.
+    """
+    _, first = np.unique(pose, return_index=True)
+    near = near_postures(robot, q[first], q[first], 2.0)
+    np.fill_diagonal(near, False)
+    company = np.asarray(near.any(axis=1))
+    return company if np.mean(~company) <= _MOST_ALONE else np.ones(len(first), dtype=bool)
 
 
 def posture_reach(robot: Robot) -> FloatArray:

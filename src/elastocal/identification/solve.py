@@ -150,10 +150,11 @@ class PoseGrams:
         """Return the Gram blocks of a problem, in the order of its sorted block numbers."""
         scaled = problem.scaled()
         deflection = (problem.d * problem.weight)[..., None]
-        rows = np.concatenate([scaled.rows, deflection], axis=2)
-        blocks, index = np.unique(problem.block, return_inverse=True)
-        gram = np.zeros((len(blocks), rows.shape[2], rows.shape[2]))
-        np.add.at(gram, index, np.swapaxes(rows, 1, 2) @ rows)
+        order = np.argsort(problem.block, kind="stable")
+        _, start = np.unique(problem.block[order], return_index=True)
+        rows = np.concatenate([scaled.rows, deflection], axis=2)[order]
+        blocks = (block.reshape(-1, rows.shape[2]) for block in np.split(rows, start[1:]))
+        gram = np.stack([block.T @ block for block in blocks])
         prior = problem.prior_rows / np.append(scaled.scale, 1.0)
         return cls(gram, prior.T @ prior, scaled.scale, problem.lower, problem.upper)
 

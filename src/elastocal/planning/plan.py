@@ -12,7 +12,12 @@ from elastocal.arrays import FloatArray, IndexArray
 from elastocal.cell import Cell, contact_time, fingerprint, straight_time
 from elastocal.errors import PlanningError
 from elastocal.parallel import one_blas_thread
-from elastocal.planning.checks import SightCheck, registration_shortages, shortage_text
+from elastocal.planning.checks import (
+    SightCheck,
+    registration_shortages,
+    shortage_text,
+    unseen_bumps,
+)
 from elastocal.planning.motion import (
     Mover,
     Route,
@@ -158,6 +163,7 @@ def make_plan(
             *(each.message for each in findings),
             *_notes(cell, sampled.pool, search),
             *_shortages(poses),
+            *unseen_bumps([pose.seen_by for pose in poses]),
             *production_findings(cell, production),
         ),
         production=production,

@@ -245,6 +245,10 @@ class PlanResult(Result):
         """Estimated seconds from HOME to HOME, all load cases included."""
         return self.travel_time + sum(pose.contact_time for pose in self.poses)
 
+    def time_of(self, poses: int) -> float:
+        """Return about how many seconds another number of poses takes, in proportion."""
+        return self.total_time * poses / len(self.poses)
+
 
 @record(_SCHEMA)
 class _WrittenPlan(PlanResult):

@@ -5,12 +5,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.random import Generator
 
-from elastocal.arrays import FloatArray, IndexArray
+from elastocal.arrays import BoolArray, FloatArray, IndexArray
 from elastocal.cell import Cell
 from elastocal.dataset import Readings
 from elastocal.elastic import ElasticModel, layout
 from elastocal.errors import PlanningError
 from elastocal.identification import RUNGS
+from elastocal.planning.checks import REGISTRATION_POSES, SightCheck, assign_stations
 from elastocal.planning.near_production import NearProduction
 from elastocal.planning.plan_result import SpreadRecord
 from elastocal.planning.pool_sampling import SampledPool
@@ -76,6 +77,9 @@ class SearchPool:
     """Postures of the candidates in contact, shape (candidate, joint), in rad or m."""
     springs: str = _SPRINGS
     """Model whose parameters the observation rows are of."""
+    sight: FloatArray | None = None
+    """Margin with which each tracker station sees each candidate, shape (station, candidate), in
+    rad; none where a single station sees them all."""
 
     @staticmethod
     def of(cell: Cell, surface: Surface, sampled: SampledPool) -> "SearchPool":
@@ -94,7 +98,15 @@ class SearchPool:
             rows.reshape(-1, rows.shape[2]) if production is None else production,
         )
         edge = distance_to_boundary(surface, points)
-        return SearchPool(candidates, build_information(candidates), edge, postures.q, springs)
+        check = SightCheck.of(cell, surface) if len(cell.file.trackers) > 1 else None
+        return SearchPool(
+            candidates,
+            build_information(candidates),
+            edge,
+            postures.q,
+            springs,
+            None if check is None else check.margins(postures),
+        )
 
     def spread(self, chosen: IndexArray) -> SpreadRecord:
         """Return how chosen candidates lie in the pool, shape (n,)."""
@@ -111,7 +123,9 @@ class SearchPool:
         """Return the poses that the cell file asks for.
 
         COVER stops at ``d_max`` or at the number of poses, whichever comes first. Techniques
-        without a distance choose as many poses as COVER would.
+        without a distance choose as many poses as COVER would. Poses that only a station sees which
+        sees too few to be registered would have no readings: others are chosen in their place,
+        unless production is covered by them alone.
 
         Parameters
         ----------
@@ -127,6 +141,30 @@ class SearchPool:
         PlanningError
             If the technique is unknown, or more poses are wanted than there are candidates.
         """
+        found = self._choose_among(cell, left, rng)
+        measurable = left[self._measurable(found.order)[left]]
+        if len(measurable) == len(left) or len(measurable) < len(found):
+            return found
+        again = self._choose_among(cell, measurable, rng)
+        needed = self._is_covered(cell, found.order) and not self._is_covered(cell, again.order)
+        return found if needed else again
+
+    def _measurable(self, chosen: IndexArray) -> BoolArray:
+        """Return which candidates a station sees that chosen poses can register, (candidate,)."""
+        if self.sight is None:
+            return np.ones(len(self.q), dtype=bool)
+        station = assign_stations(self.sight[:, chosen])
+        count = np.bincount(station[station >= 0], minlength=len(self.sight))
+        short = (count > 0) & (count < REGISTRATION_POSES)
+        if not short.any():
+            return np.ones(len(self.q), dtype=bool)
+        return np.asarray((self.sight[~short] > 0.0).any(axis=0))
+
+    def _is_covered(self, cell: Cell, chosen: IndexArray) -> bool:
+        coverage = plan_coverage(cell, self.q[chosen])
+        return coverage is None or coverage.is_enough
+
+    def _choose_among(self, cell: Cell, left: IndexArray, rng: Generator) -> Selection:
         search = cell.file.search
         wanted = technique(cell.technique)
         cover = Cover(search.d_max)

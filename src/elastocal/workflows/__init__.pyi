@@ -91,6 +91,7 @@ from .process_trial import (
     TrialRuns as TrialRuns,
     run_budget as run_budget,
     run_trial as run_trial,
+    run_trials as run_trials,
 )
 from .report import (
     ReportFigures as ReportFigures,

@@ -1,12 +1,13 @@
 """``plan``: from a cell to an ordered, checked, executable set of poses, with its files."""
 
 from collections import Counter
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from os import PathLike
 from pathlib import Path
 
 from elastocal import planning
-from elastocal.cell import Cell, load_cell
+from elastocal.cell import Cell, fingerprint, load_cell
+from elastocal.errors import PlanningError
 from elastocal.files import filling
 from elastocal.planning import PLAN, PlanResult, ProductionRecord, SpreadRecord
 from elastocal.planning.export import PLAN_TABLE, check_name, takes_krl, write_krl, write_table
@@ -40,6 +41,8 @@ class PlanSettings:
     """Replace the files of a plan that is there."""
     dry_run: bool = False
     """Make the plan, and write nothing."""
+    poses: int | None = None
+    """Number of poses in place of the cell's ``search.poses``."""
 
 
 @record()
@@ -105,7 +108,7 @@ def plan(settings: PlanSettings, progress: Progress) -> PlanResult:
         If a file cannot be read or written, or the folder holds files.
     """
     check_name(settings.program)
-    cell = load_cell(Path(settings.cell))
+    cell = _wanted_cell(settings)
     compare = settings.compare
     if compare is None:
         compare = "cover" if cell.technique != "cover" else "ioops"
@@ -114,8 +117,24 @@ def plan(settings: PlanSettings, progress: Progress) -> PlanResult:
         return planning.make_plan(cell, other, settings.jobs, progress).plan
     with filling(Path(settings.out), PLAN, settings.force) as folder:
         planned = planning.make_plan(cell, other, settings.jobs, progress)
+        if settings.poses is not None:
+            # A plan is of the cell file, whatever number of poses was asked for beside it.
+            own = fingerprint(load_cell(Path(settings.cell)))
+            record = replace(planned.plan.cell, fingerprint=own)
+            planned = replace(planned, plan=replace(planned.plan, cell=record))
         _write_folder(folder, cell, planned, settings.program)
     return planned.plan
+
+
+def _wanted_cell(settings: PlanSettings) -> Cell:
+    """Return the cell with the number of poses that is asked for."""
+    cell = load_cell(Path(settings.cell))
+    if settings.poses is None:
+        return cell
+    if not settings.poses >= 1:
+        raise PlanningError(f"--poses {settings.poses}: must be at least 1")
+    search = cell.file.search.model_copy(update={"poses": settings.poses, "accuracy": None})
+    return replace(cell, file=cell.file.model_copy(update={"search": search}))
 
 
 def plan_figures(found: PlanResult, folder: Path, program: str) -> PlanFigures:

@@ -3,7 +3,7 @@
 The error budget switches effects of the truth off, one after the other.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 
@@ -21,7 +21,7 @@ from elastocal.results import brief_repr
 from elastocal.robot import inverse_transform
 from elastocal.sim.workcell import ProcessCell
 
-__all__ = ["ProcessTrial", "TrialRuns", "run_budget", "run_trial"]
+__all__ = ["ProcessTrial", "TrialRuns", "run_budget", "run_trial", "run_trials"]
 _ZEROING = 250
 """Readings in the air that a sensor is zeroed by when no tool file says its bias."""
 
@@ -139,7 +139,29 @@ def run_trial(trial: ProcessTrial, courses: tuple[Course, ...], progress: Progre
     DeviceError, EquilibriumError
         If the cell cannot be simulated, or not under these forces.
     """
-    return _run_courses(trial, courses, False, progress)
+    return _run_courses((trial,), courses, False, progress)[0]
+
+
+def run_trials(
+    trials: Sequence[ProcessTrial], courses: tuple[Course, ...], progress: Progress
+) -> list[TrialRuns]:
+    """Run courses once without correction, and with that of each trial.
+
+    Parameters
+    ----------
+    trials : sequence of ProcessTrial
+        Of one cell, seed and controller, with settings that sample alike; their models differ.
+    courses : tuple of Course
+        The process.
+    progress : callable
+        Told how many courses are done.
+
+    Raises
+    ------
+    DeviceError, EquilibriumError
+        If the cell cannot be simulated, or not under these forces.
+    """
+    return _run_courses(trials, courses, False, progress)
 
 
 def run_budget(
@@ -163,44 +185,50 @@ def _run_effect(
             controller=replace(trial.controller, dead_cycles=0, lag=0.0),
         )
         courses = tuple(replace(course, ripple=()) for course in courses)
-    return _run_courses(changed, courses, effect.exact, progress, effect.name)
+    return _run_courses((changed,), courses, effect.exact, progress, effect.name)[0]
 
 
 def _run_courses(
-    trial: ProcessTrial,
+    trials: Sequence[ProcessTrial],
     courses: tuple[Course, ...],
     exact: bool,
     progress: Progress,
     stage: str = "courses",
-) -> TrialRuns:
-    """Run every course without and with correction.
+) -> list[TrialRuns]:
+    """Run every course without correction, and with that of each trial.
 
     With ``exact``, a corrector that knows the deflection acts as late as the filters make it, in
     place of the model's.
     """
-    runs: dict[int, tuple[CourseRun, CourseRun]] = {}
+    runs: dict[int, list[CourseRun]] = {}
     # The longest first, or the last one would be run while the other processes wait.
     order = sorted(range(len(courses)), key=lambda number: -len(courses[number].q))
     progress(stage, 0, len(courses))
-    run = partial(_run_twice, trial, zeroed_at=courses[0].q[0], exact=exact)
-    processes = process_count(trial.jobs, len(courses))
+    run = partial(_run_course, trials, zeroed_at=courses[0].q[0], exact=exact)
+    processes = process_count(trials[0].jobs, len(courses))
     found = map_in_processes(run, [courses[number] for number in order], processes)
-    for number, pair in zip(order, found, strict=True):
-        runs[number] = pair
+    for number, each in zip(order, found, strict=True):
+        runs[number] = each
         progress(stage, len(runs), len(courses))
-    before, after = zip(*(runs[number] for number in range(len(courses))), strict=True)
-    return TrialRuns(before, after)
+    before, *corrected = zip(*(runs[number] for number in range(len(courses))), strict=True)
+    return [TrialRuns(before, after) for after in corrected]
 
 
-def _run_twice(
-    trial: ProcessTrial, course: Course, *, zeroed_at: FloatArray, exact: bool
-) -> tuple[CourseRun, CourseRun]:
-    """Return a course without and with correction; courses know nothing of one another."""
-    truth, robot = ProcessCell(trial.cell, trial.seed), trial.cell.robot
-    corrector = _perfect(trial.settings) if exact else _corrector(trial, truth, zeroed_at)
+def _run_course(
+    trials: Sequence[ProcessTrial], course: Course, *, zeroed_at: FloatArray, exact: bool
+) -> list[CourseRun]:
+    """Return a course without and with each correction; courses know nothing of one another."""
+    first = trials[0]
+    truth, robot = ProcessCell(first.cell, first.seed), first.cell.robot
+    correctors = [
+        _perfect(trial.settings) if exact else _corrector(trial, truth, zeroed_at)
+        for trial in trials
+    ]
     air = process.air_shifts(truth, course)
-    before = process.run_course(truth, robot, course, air, trial.clocked, None)
-    return before, process.run_course(truth, robot, course, air, trial.clocked, corrector)
+    return [
+        process.run_course(truth, robot, course, air, first.clocked, corrector)
+        for corrector in (None, *correctors)
+    ]
 
 
 def _perfect(settings: CompensatorSettings) -> process.Corrector:

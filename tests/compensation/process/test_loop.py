@@ -42,7 +42,7 @@ class Spring:
     def free_shift(self, q):  # noqa: ARG002
         return np.array([0.0, 0.0, -1e-3])
 
-    def press(self, q, force, path_base=None):  # noqa: ARG002
+    def press(self, q, force, path_base=None, outward_base=None):  # noqa: ARG002
         self.joints.append(q)
         felt = np.concatenate([force, np.zeros(3)])
         return Pressed(self.free_shift(q) + COMPLIANCE * force, felt + 5.0, felt)

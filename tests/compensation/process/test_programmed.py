@@ -1,5 +1,6 @@
 """A user's own process: a path file becomes courses in time."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -167,6 +168,16 @@ class TestAtLoad:
         ]
         assert np.abs(lateral[0]).max() > 100.0
         np.testing.assert_allclose(lateral[1], -lateral[0], atol=1e-9)
+
+    def test_reversed_presses_on_along_the_normal_where_it_is_not_the_tools_axis(self):
+        course = programme()
+        normal = np.tile([0.0, np.sin(0.6), np.cos(0.6)], (len(course.force), 1))
+        force = np.tile([100.0, 0.0, 300.0], (len(course.force), 1))
+        turned = at_load(replace(course, normal=normal, force=force), -1.0).force
+        np.testing.assert_allclose(
+            np.einsum("rk,rk->r", turned, normal), 300.0 * np.cos(0.6), atol=1e-9
+        )
+        np.testing.assert_allclose(turned[:, 0], -100.0, atol=1e-9)
 
 
 def test_joints_beyond_their_limits_are_refused(folder):

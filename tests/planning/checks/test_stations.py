@@ -8,6 +8,7 @@ from elastocal.planning.checks import (
     assign_stations,
     registration_shortages,
     shortage_text,
+    unseen_bumps,
 )
 
 UNSEEN = -np.pi
@@ -51,6 +52,12 @@ def test_who_keeps_too_few_poses_could_not_have_been_given_more(seed):
         if len(own) < REGISTRATION_POSES:
             others = np.delete(margins, station, axis=0)[:, own]
             assert not (others > 0.0).any(axis=0).all() or len(own) == np.count_nonzero(seen)
+
+
+def test_few_poses_do_not_show_a_small_bump_and_many_do():
+    assert "bumped by less than about 2 mm" in unseen_bumps(["a"] * 8)[0]
+    assert unseen_bumps(["a"] * 30) == ()
+    assert unseen_bumps([None] * 8) == ()
 
 
 def test_a_shortage_names_station_and_poses():

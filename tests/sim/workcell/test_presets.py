@@ -306,6 +306,23 @@ class TestProcessStiffness:
         assert force == pytest.approx(1100.0 - 1e5 * away, abs=0.05)
         assert abs(away) > 1e-5
 
+    def test_the_force_reacts_along_the_normal_of_the_surface_and_not_along_the_tool(self):
+        q = places()[0].q
+        cell = process(contact={"process_stiffness": "100 N/mm"})
+        cell.lift("a", q)
+        T = cell._statics.robot.forward(q)
+        path = T[:3, 3] + cell.free_shift(q)
+        aslant = T[:3, :3] @ [0.0, np.sin(0.7), -np.cos(0.7)]
+        felt = {}
+        for name, step in (("along", aslant), ("square", np.cross(aslant, T[:3, 0]))):
+            there = cell._statics.along(q, T[:3, :3], (T[:3, 3] + 1e-3 * step)[None])[0]
+            free = cell.free_shift(there) - cell.free_shift(q)
+            here, moved = (cell.press(each, T[:3, :3] @ FORCE, path, aslant) for each in (q, there))
+            felt[name] = np.linalg.norm(moved.felt[:3] - here.felt[:3])
+            assert np.linalg.norm(free) < 1e-4
+        assert felt["along"] > 50.0
+        assert felt["square"] < 0.1 * felt["along"]
+
     def test_without_stiffness_it_is_the_programmed_one(self):
         assert self.shift("0 N/mm", 1e-3)[0] == pytest.approx(1100.0, abs=1e-6)
 

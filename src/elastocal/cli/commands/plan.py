@@ -10,7 +10,7 @@ from elastocal import workflows
 from elastocal.cli import options, output, tables
 
 
-def _plan(
+def _plan(  # noqa: PLR0913 - one parameter an option
     cell: Annotated[Path, typer.Argument(help="Cell file, .yaml.")],
     out: Annotated[Path, typer.Option(metavar="DIR", help="Folder to write the plan into.")],
     *,
@@ -20,6 +20,10 @@ def _plan(
             help="Search technique to lay beside the cell's, or none."
             " Default: ioops beside cover, else cover."
         ),
+    ] = None,
+    poses: Annotated[
+        int | None,
+        typer.Option(min=1, help="Number of poses; default: search.poses of the cell file."),
     ] = None,
     program: Annotated[str, typer.Option(help="Name of the KRL program.")] = "calib",
     jobs: Annotated[
@@ -39,7 +43,7 @@ def _plan(
     """Choose calibration poses on the tooling, check them, and put them in order."""
     from elastocal.planning.export import pose_lines
 
-    settings = workflows.PlanSettings(cell, out, compare, program, jobs, force, dry_run)
+    settings = workflows.PlanSettings(cell, out, compare, program, jobs, force, dry_run, poses)
     with output.progress_bars() as progress:
         found = workflows.plan(settings, progress)
     figures = workflows.plan_figures(found, out, program)

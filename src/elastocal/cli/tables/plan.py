@@ -39,7 +39,7 @@ def show_plan(console: Console, plan: PlanResult, figures: PlanFigures) -> None:
     console.print(_spread_table(plan))
     console.print(_check_table(plan))
     if plan.production is not None:
-        console.print(_expected_table(plan.production))
+        console.print(_expected_table(plan, plan.production))
         for name, text in plan.production.facts():
             console.print(f"{name}: {text}", markup=False, soft_wrap=True)
     if figures.stations:
@@ -71,10 +71,10 @@ def _lengths(spread: SpreadRecord) -> list[str]:
     return ["none" if value is None else f"{1e3 * value:.1f} mm" for value in values]
 
 
-def _expected_table(production: ProductionRecord) -> Table:
-    """Return the error to expect on production from some numbers of poses."""
+def _expected_table(plan: PlanResult, production: ProductionRecord) -> Table:
+    """Return the error to expect on production from some numbers of poses, and what they take."""
     table = Table(title="Error to expect on production", title_justify="left")
-    for title in ("poses", "from noise", "with the model's own"):
+    for title in ("poses", "from noise", "with the model's own", "in the cell"):
         table.add_column(title, justify="right")
     for each in production.some_expected():
         mark = " <- plan" if each.poses == production.poses else ""
@@ -82,6 +82,7 @@ def _expected_table(production: ProductionRecord) -> Table:
             f"{each.poses}{mark}",
             um(each.noise),
             "not known" if production.floor is None else um(each.error),
+            f"{plan.time_of(each.poses) / 60.0:.0f} min",
         )
     return table
 

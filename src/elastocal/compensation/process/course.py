@@ -48,6 +48,14 @@ class Course:
     ripple: tuple[Ripple, ...] = ()
     q: FloatArray = field(default_factory=lambda: np.zeros((0, 0)))
     """Programmed joints, shape (row, joint), in rad or m; none before a posture is chosen."""
+    normal: FloatArray | None = None
+    """Unit normal of the surface, out of the part, in base, shape (row, 3); none where only the
+    tool's axis is known."""
+
+    @property
+    def outward(self) -> FloatArray:
+        """Unit vectors away from the part, in base, shape (row, 3): a force reacts along them."""
+        return -self.T_base_tcp[:, :3, 2] if self.normal is None else self.normal
 
 
 @dataclass(frozen=True)
@@ -82,7 +90,7 @@ class Process(ABC):
 def at_load(course: Course, load: float) -> Course:
     """Return a course under a share of its force; below 0 with the lateral force turned round.
 
-    The part of the force along the tool's axis keeps its sign, since a roller or cutter that
+    The part of the force along the surface's normal keeps its sign, since a roller or cutter that
     presses cannot pull: -1 is the same pressure with the force aside and against the feed turned.
 
     Parameters
@@ -92,8 +100,8 @@ def at_load(course: Course, load: float) -> Course:
     load : float
         Share, not 0.
     """
-    axis = course.T_base_tcp[:, :3, 2]
-    along = np.einsum("rk,rk->r", course.force, axis)[:, None] * axis
+    normal = course.outward
+    along = np.einsum("rk,rk->r", course.force, normal)[:, None] * normal
     return replace(course, force=abs(load) * along + load * (course.force - along))
 
 

@@ -124,9 +124,16 @@ class TrueCell(Protocol):
         """Return the shift of the tool in the air, shape (3,), in m."""
 
     def press(
-        self, q: FloatArray, force_base: FloatArray, path_base: FloatArray | None = None
+        self,
+        q: FloatArray,
+        force_base: FloatArray,
+        path_base: FloatArray | None = None,
+        outward_base: FloatArray | None = None,
     ) -> LoadedRobot:
-        """Go on to joints and a force on the robot, programmed for the path in the air (3,)."""
+        """Go on to joints and a force on the robot, programmed for the path in the air (3,).
+
+        Away from that path, along the surface's normal (3,), the force is another.
+        """
 
     def read(self, since: FloatArray, wrench: FloatArray) -> FloatArray:
         """Return what the sensor says of true wrenches, shape (sample, 6)."""
@@ -238,11 +245,12 @@ def run_course(
     drives = _Drives(controller)
     into_joints = _into_joints(robot, course.q)
     paths = course.T_base_tcp[:, :3, 3] + air
-    before = cell.press(course.q[0], course.force[0], paths[0])
+    outward = course.outward
+    before = cell.press(course.q[0], course.force[0], paths[0], outward[0])
     shifts = []
     for row in range(1, len(course.q)):
         q = course.q[row] + into_joints[row] @ drives.done
-        now = cell.press(q, course.force[row], paths[row])
+        now = cell.press(q, course.force[row], paths[row], outward[row])
         time, raw = _readings(cell, course, (row, cycles), controller.readings, before, now)
         deflection = _between(before.shift - air[row - 1], now.shift - air[row], parts)
         joints = _between(course.q[row - 1], course.q[row], parts)

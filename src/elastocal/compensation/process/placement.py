@@ -88,7 +88,7 @@ class FibrePlacement(Process):
         aside = mean + self.lateral_swing * swing(time, rng)
         tcp = np.stack([np.full(len(kept), -self.drag), aside, -press], axis=1) * share[:, None]
         force = np.einsum("rij,rj->ri", T[:, :3, :3], tcp)
-        return Course(name, self.step, T, force, T[:, :3, 1])
+        return Course(name, self.step, T, force, T[:, :3, 1], normal=normal)
 
 
 def _hits(surface: Surface, where: tuple[float, float, float, float]) -> FloatArray:

@@ -90,7 +90,7 @@ class SimulateProcessResult(Result):
     preset: str = ""
     """How hard the truth of the cell is; see `elastocal.cell.presets`."""
     process_stiffness: float = 0.0
-    """How the force reacts to the tool's shift along its axis, in N/m; 0: forces are given."""
+    """How the force reacts to a shift along the surface's normal, in N/m; 0: forces are given."""
     notes: tuple[str, ...] = ()
     """Sentences that a person must know."""
     coverage: ProductionCoverage | None = None

@@ -117,4 +117,4 @@ class Roughing(Process):
         )
         still = np.ones((len(path), 1))
         T = tool_frames(path, still * R[:, 0], -still * R[:, 2])
-        return Course(name, self.step, T, force, normal, self.ripple)
+        return Course(name, self.step, T, force, normal, self.ripple, normal=normal)

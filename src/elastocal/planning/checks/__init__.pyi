@@ -28,5 +28,6 @@ from .sight import (
     registration_shortages as registration_shortages,
     shortage_text as shortage_text,
     sight_solid as sight_solid,
+    unseen_bumps as unseen_bumps,
 )
 from .singularity import SingularityCheck as SingularityCheck, WristCheck as WristCheck

@@ -61,6 +61,7 @@ def write_plan_page(
                 each.poses,
                 um(each.noise),
                 "not known" if production.floor is None else um(each.error),
+                f"{plan.time_of(each.poses) / 60.0:.0f} min",
             )
             for production in [plan.production]
             if production is not None

@@ -102,7 +102,7 @@ class TrueRobot:
     _points: FloatArray = field(init=False, repr=False)
     _after: IndexArray = field(init=False, repr=False)
     _weights: FloatArray = field(init=False, repr=False)
-    _recent: dict[tuple[tuple[int, ...], bytes], tuple[FloatArray, FloatArray]] = field(
+    _recent: dict[bool, tuple[bytes, FloatArray]] = field(
         init=False, repr=False, default_factory=dict
     )
 
@@ -156,20 +156,19 @@ class TrueRobot:
         q : ndarray, shape (..., joint)
             In rad or m.
         """
-        return self.undeformed(q)[0]
+        return self._tip(self.linkage, q)
 
     def undeformed(self, q: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return T_base_tcp of the undeformed robot as described and as built, (..., 4, 4) each.
+        """Return T_base_tcp of the undeformed robot as described and as built, (..., 4, 4) each."""
+        return self._tip(self.linkage, q), self._tip(self.built, q)
 
-        One posture is asked for again and again; the last one is remembered.
-        """
-        key = (q.shape, q.tobytes())
-        if key not in self._recent:
-            T = self.linkage.forward(q)
-            exact = self.built is self.linkage
-            self._recent.clear()
-            self._recent[key] = (T, T if exact else self.built.forward(q))
-        return self._recent[key]
+    def _tip(self, linkage: Linkage, q: FloatArray) -> FloatArray:
+        """Return T_base_tcp; one posture is asked for again and again, so the last is kept."""
+        described, asked = linkage is self.linkage, q.tobytes()
+        known = self._recent.get(described)
+        if known is None or known[0] != asked or known[1].shape[:-2] != q.shape[:-1]:
+            known = self._recent[described] = (asked, linkage.forward(q))
+        return known[1]
 
     def solve(self, T_base_tcp: FloatArray, start: FloatArray) -> InverseResult:
         """Return joints that bring the undeformed tool to poses, external axes where they start.

@@ -13,8 +13,8 @@ Assumptions of the process, beside those of `elastocal.sim.workcell._quasistatic
 * the path in the air is that of a cold arm, the process finds it warm;
 * gears begin a course with strains that the free move before it has left; in the air they keep
   those (the way along the course twists no gear by more than the weight does);
-* a force reacts to where the tool is: along the tool's axis it falls by `process_stiffness` times
-  the shift away from the surface, at rest with the arm.
+* a force reacts to where the tool is: along the surface's normal it falls by `process_stiffness`
+  times the shift away from the surface, at rest with the arm.
 """
 
 from dataclasses import dataclass, replace
@@ -176,7 +176,11 @@ class ProcessCell:
         return twist - self._statics.compensation * self._state.sag
 
     def press(
-        self, q: FloatArray, force_base: FloatArray, path_base: FloatArray | None = None
+        self,
+        q: FloatArray,
+        force_base: FloatArray,
+        path_base: FloatArray | None = None,
+        outward_base: FloatArray | None = None,
     ) -> ProcessState:
         """Go on to joints and a force on the robot.
 
@@ -189,6 +193,9 @@ class ProcessCell:
         path_base : ndarray, shape (3,), optional
             Where the tool centre point is on the programmed path in the air, in base, in m: there
             the force is the programmed one. Without it the force is given.
+        outward_base : ndarray, shape (3,), optional
+            Unit normal of the surface, out of the part, in base, along which the force reacts; the
+            tool's axis where it is not known.
         """
         assert self._state is not None, "lift comes first"
         statics = self._statics
@@ -198,7 +205,8 @@ class ProcessCell:
         if path_base is None or self._stiffness == 0.0:
             state = statics.loaded(state, q, force_base, self._stop, attack)
         else:
-            state = self._reacting(state, q, force_base, path_base, attack)
+            outward = -T[:3, 2] if outward_base is None else outward_base
+            state = self._reacting(state, q, force_base, (path_base, outward), attack)
         self._pressed.went(state)
         self._state, twist = state, state.twist
         nothing = np.zeros(3)
@@ -213,13 +221,16 @@ class ProcessCell:
         state: RobotState,
         q: FloatArray,
         force_base: FloatArray,
-        path_base: FloatArray,
+        place: tuple[FloatArray, FloatArray],
         attack: FloatArray | None,
     ) -> RobotState:
-        """Return the robot at rest with a process whose force depends on where the tool is."""
+        """Return the robot at rest with a process whose force depends on where the tool is.
+
+        ``place`` is the programmed place, and the surface's normal there.
+        """
         statics, robot = self._statics, self._statics.robot
         T, real = robot.undeformed(q)
-        outward = -T[:3, 2]
+        path_base, outward = place
         # The tool is where the springs have it, and beside that by what the controller knows
         # (a part of the sag) and what no spring makes; the rest of the way is the springs'.
         bare = statics.deviation(q, np.zeros(9)) - statics.compensation * state.sag

@@ -20,7 +20,7 @@ def _body(evidence: Evidence) -> Iterator[blocks.Block]:
     yield blocks.Facts(key_figures(plan))
     yield _spreads(plan)
     if plan.production is not None:
-        yield _expected(plan.production)
+        yield _expected(plan, plan.production)
     pictures = tuple(_pictures(evidence, plan))
     yield from pictures or (blocks.Paragraph("Without cell, mesh and pool there is no picture."),)
     yield from _notes(plan)
@@ -78,14 +78,19 @@ def _spreads(plan: PlanResult) -> blocks.Block:
     )
 
 
-def _expected(production: ProductionRecord) -> blocks.Block:
-    """Return the error to expect from some numbers of poses."""
+def _expected(plan: PlanResult, production: ProductionRecord) -> blocks.Block:
+    """Return the error to expect from some numbers of poses, and what they take."""
     floor = production.floor
     return blocks.Table(
         f"Error to expect on production, planned with sigma {um(production.sigma)}",
-        ("Poses", "From noise", "With the model's own"),
+        ("Poses", "From noise", "With the model's own", "In the cell"),
         tuple(
-            (str(each.poses), um(each.noise), "not known" if floor is None else um(each.error))
+            (
+                str(each.poses),
+                um(each.noise),
+                "not known" if floor is None else um(each.error),
+                f"{plan.time_of(each.poses) / 60.0:.0f} min",
+            )
             for each in production.some_expected()
         ),
     )

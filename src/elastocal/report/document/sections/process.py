@@ -149,7 +149,8 @@ def _truth(table: SimulateProcessResult) -> Iterator[str]:
         return
     reacts = table.process_stiffness
     forces = (
-        f"process forces react to the tool's shift along its axis, by {1e-3 * reacts:g} N/mm"
+        "process forces react to the tool's shift along the surface's normal, by"
+        f" {1e-3 * reacts:g} N/mm"
         if reacts
         else "process forces are given, they do not react to the tool's shift"
     )
