@@ -37,6 +37,16 @@ def print_lines(lines: Iterable[str]) -> None:
     sys.stdout.flush()
 
 
+def print_remarks(console: "Console", label: str, texts: Iterable[str]) -> None:
+    """Print warnings or notes, a line each; many of one kind are one line with their number."""
+    from rich.text import Text
+
+    from elastocal.results import counted_alike
+
+    for text in counted_alike(texts):
+        console.print(Text.assemble((f"{label}:", "yellow"), f" {text}"), soft_wrap=True)
+
+
 @contextmanager
 def progress_bars() -> Iterator[Progress]:
     """Yield a function that shows progress; nothing is shown where no person looks."""

@@ -13,6 +13,7 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
+from elastocal.cli.output import print_remarks
 from elastocal.elastic import Unit, unit_of
 from elastocal.identification import (
     AUTO,
@@ -27,7 +28,6 @@ from elastocal.identification import (
     ladder_sentence,
 )
 from elastocal.wording import (
-    capped,
     counted,
     lengths_with_interval,
     mm,
@@ -65,8 +65,7 @@ def _show_figures(console: Console, figures: CalibrationSummary) -> None:
     _show_frames(console, figures.frames)
     _show_budget(console, figures.budget)
     _show_suspicious(console, figures.suspicious)
-    for warning in capped(figures.warnings):
-        console.print(f"[yellow]warning:[/yellow] {escape(warning)}")
+    print_remarks(console, "warning", figures.warnings)
 
 
 def _show_fit(console: Console, figures: CalibrationSummary) -> None:

@@ -9,6 +9,7 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
+from elastocal.cli.output import print_remarks
 from elastocal.codec import CodecSummary
 from elastocal.codec.study import Share, StudySummary, micrometres, value_text
 
@@ -23,8 +24,7 @@ def show_codec(console: Console, result: CodecSummary, out: Path, names: Sequenc
     console.print(_codec_table(result))
     for sentence in result.sentences:
         console.print(sentence, markup=False)
-    for finding in result.findings:
-        console.print(f"[yellow]note:[/yellow] {escape(finding)}")
+    print_remarks(console, "note", result.findings)
     console.print(f"\n{', '.join(names)} written to [bold]{escape(str(out))}[/bold]")
 
 

@@ -10,6 +10,7 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
+from elastocal.cli.output import print_remarks
 from elastocal.planning import PlanResult, ProductionRecord, SpreadRecord
 from elastocal.records import record
 from elastocal.robot import catalogue
@@ -45,8 +46,7 @@ def show_plan(console: Console, plan: PlanResult, figures: PlanFigures) -> None:
     if figures.stations:
         seen = ", ".join(f"{name} {count}" for name, count in figures.stations.items())
         console.print(f"marker seen by: {seen}", markup=False)
-    for finding in plan.findings:
-        console.print(f"note: {finding}", markup=False, soft_wrap=True)
+    print_remarks(console, "note", plan.findings)
     written = f"written to {figures.folder}: {', '.join(figures.files)}"
     console.print(
         written if figures.files else "Nothing was written.", markup=False, soft_wrap=True
@@ -166,8 +166,7 @@ def show_itinerary(console: Console, found: DryRunResult) -> None:
         " Nothing was moved.",
         soft_wrap=True,
     )
-    for warning in found.warnings:
-        console.print(f"warning: {warning}", soft_wrap=True, markup=False)
+    print_remarks(console, "warning", found.warnings)
 
 
 def show_run(console: Console, result: RunResult) -> None:
@@ -184,8 +183,7 @@ def show_run(console: Console, result: RunResult) -> None:
     if found.message:
         console.print(found.message, soft_wrap=True, markup=False)
     if found.dataset:
-        for warning in found.warnings:
-            console.print(f"warning: {warning}", soft_wrap=True, markup=False)
+        print_remarks(console, "warning", found.warnings)
         console.print(
             f"wrote [bold]{found.dataset}[/bold] and summary.json:"
             f" `elastocal calibrate {found.dataset} --out model.json`",
