@@ -7,7 +7,7 @@ BIN := $(VENV)/bin
 # Neighbours stay together, so that what a file prepares is seldom prepared twice.
 SHARED_OUT := -n auto --dist worksteal
 
-.PHONY: demo test lint units end-to-end browser docs-strict nightly slow coverage lowest lock mutation docs bench house clean
+.PHONY: demo test lint units end-to-end browser docs-strict nightly slow process-figures coverage lowest lock mutation docs bench house fuzz clean
 
 demo: $(VENV)/installed
 	$(BIN)/elastocal demo afp --out demo --force
@@ -32,10 +32,15 @@ browser: $(VENV)/installed-dev
 docs-strict: $(VENV)/installed-dev
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet
 
-nightly: slow coverage lowest mutation
+nightly: slow process-figures coverage lowest mutation
 
 slow: $(VENV)/installed-dev
 	$(BIN)/pytest $(SHARED_OUT) -m slow -rA
+
+# The tables of simulated processes that the site and the README quote: what is not yet written down
+# in docs/hooks/gallery/process_figures.json, or all of it with ANEW=--anew. Up to two hours.
+process-figures: $(VENV)/installed-dev
+	cd docs/hooks && OMP_NUM_THREADS=1 ../../$(BIN)/python -m gallery.process_figures $(ANEW)
 
 # Tests that count imported modules would count those of coverage.
 coverage: $(VENV)/installed-nightly
@@ -76,6 +81,12 @@ bench: $(VENV)/installed-dev
 	$(BIN)/python benchmarks/ladder.py
 	$(BIN)/python benchmarks/codec.py
 	$(BIN)/python benchmarks/record.py
+
+# CASES and SEED choose; what falls is printed as lines for tests/fuzz/corpus.json.
+CASES ?= 10000
+SEED ?= 0
+fuzz: $(VENV)/installed-dev
+	cd tests && ../$(BIN)/python -m fuzz.harness --cases $(CASES) --seed $(SEED)
 
 house:
 	$(PYTHON) tools/house.py

@@ -10,6 +10,7 @@ import shutil
 import subprocess
 import tempfile
 import time
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -126,33 +127,48 @@ def python_seconds(numbers: Design, data: np.ndarray) -> np.ndarray:
     return np.array(taken)
 
 
+def side_by_side(
+    models: Sequence[CalibratedModel], data: np.ndarray
+) -> tuple[list[Design], list[float]]:
+    """Return the designs of models, and the usual time of their Python steps in us."""
+    designs = [design(each, SETTINGS) for each in models]
+    long = np.tile(data, (3, 1))
+    return designs, [1e6 * float(np.median(python_seconds(each, long))) for each in designs]
+
+
+def c_microseconds(designs: Sequence[Design], data: np.ndarray) -> list[np.ndarray] | None:
+    """Return the times of the exported deflections and steps in us; None, said, without gcc."""
+    if shutil.which("gcc") is None:
+        print("no gcc: the C is not timed")
+        return None
+    return [1e6 * np.array(c_seconds(each, data)) for each in designs]
+
+
 def main() -> None:
     """Measure and print."""
     model, rich = calibrated(), calibrated(gears=True)
     data = rows(model.model)
-    pairs = [design(each, SETTINGS) for each in (model, rich)]
-    plain, geared = (np.median(python_seconds(each, np.tile(data, (3, 1)))) for each in pairs)
+    designs, (plain, geared) = side_by_side((model, rich), data)
     print(
-        f"Python step with median, notch and low-pass: {1e6 * plain:.1f} us with 18 springs,"
-        f" {1e6 * geared:.1f} us with gears, weight and friction, {geared / plain:.2f} of it"
+        f"Python step with median, notch and low-pass: {plain:.1f} us with 18 springs,"
+        f" {geared:.1f} us with gears, weight and friction, {geared / plain:.2f} of it"
     )
-    called, own = pinocchio_seconds(model.model, data)
+    called, own = (1e6 * each for each in pinocchio_seconds(model.model, data))
     print(
-        f"Pinocchio's Jacobian of the same 18 springs: {1e6 * called:.2f} us from Python,"
-        f" {1e6 * own:.2f} us without the call"
+        f"Pinocchio's Jacobian of the same 18 springs: {called:.2f} us from Python,"
+        f" {own:.2f} us without the call"
     )
-    if shutil.which("gcc") is None:
-        print("no gcc: the C is not timed")
+    timed = c_microseconds(designs, data)
+    if timed is None:
         return
-    (deflection, step), (richer, further) = (c_seconds(each, data) for each in pairs)
+    (deflection, step), (richer, further) = timed
     print(
-        f"C deflection, -O2: {1e6 * deflection:.3f} us, {deflection / called:.2f} and"
-        f" {deflection / own:.2f} of these;"
-        f" C step with filters and interval: {1e6 * step:.2f} us"
+        f"C deflection, -O2: {deflection:.3f} us, {deflection / called:.2f} and"
+        f" {deflection / own:.2f} of these; C step with filters and interval: {step:.2f} us"
     )
     print(
-        f"C deflection with gears, weight and friction: {1e6 * richer:.3f} us,"
-        f" {richer / deflection:.1f} times the 18 springs; its step: {1e6 * further:.2f} us"
+        f"C deflection with gears, weight and friction: {richer:.3f} us,"
+        f" {richer / deflection:.1f} times the 18 springs; its step: {further:.2f} us"
     )
 
 

@@ -16,9 +16,9 @@ from pathlib import Path
 import numpy as np
 from record import processor_seconds
 
-from compensation import HARNESS, SETTINGS, TOOL, c_seconds, python_seconds, rows
+from compensation import HARNESS, TOOL, c_microseconds, rows, side_by_side
 from elastocal.compensation.export import write_c
-from elastocal.compensation.online import Design, design
+from elastocal.compensation.online import Design
 from elastocal.dataset import Readings
 from elastocal.elastic import ElasticModel
 from elastocal.identification import RUNGS, Calibration, FitOptions, calibrate, choose_model
@@ -96,19 +96,18 @@ def main() -> None:
         )
     plain, rich = (single(robot, readings, s).calibrated for s in ("bearing", "gears+friction"))
     data = rows(rich.model)
-    pair = [design(each, SETTINGS) for each in (plain, rich)]
-    steps = [1e6 * np.median(python_seconds(each, np.tile(data, (3, 1)))) for each in pair]
+    pair, steps = side_by_side((plain, rich), data)
     print(
         f"Python step with filters and interval: {steps[0]:.1f} us with 18 springs,"
         f" {steps[1]:.1f} us with {len(rich.model.parameters)} parameters of the last rung"
     )
-    if shutil.which("gcc") is None:
-        print("no gcc: the C is not timed")
+    timed = c_microseconds(pair, data)
+    if timed is None:
         return
-    (bare, _), (full, step) = (c_seconds(each, data) for each in pair)
+    (bare, _), (full, step) = timed
     print(
-        f"C deflection, -O2: {1e6 * bare:.3f} us with 18 springs, {1e6 * full:.3f} us with the"
-        f" last rung; its step: {1e6 * step:.2f} us"
+        f"C deflection, -O2: {bare:.3f} us with 18 springs, {full:.3f} us with the"
+        f" last rung; its step: {step:.2f} us"
     )
     if shutil.which("valgrind") is None:
         print("no valgrind: instructions are not counted")

@@ -11,6 +11,7 @@ bare.forbid()
 TESTS = Path(__file__).parent
 END_TO_END = (
     "cli",
+    "fuzz",
     "end_to_end",
     "report/document",
     "verdict",

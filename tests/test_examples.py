@@ -30,6 +30,7 @@ TOLD = {
     "12_own_search_technique.py": (r"median +(?:\d+ +)*(\d+)\n", 40, 90),
     "13_raw_streams.py": (r"normal +\d+ .* N +(\S+) mm", 2.5, 4.0),
     "14_sensor_logs.py": (r"error at left-out poses: (\S+) mm", 0.01, 0.1),
+    "15_import_logs.py": (r"marker displacements differ by (\S+) µm", 0.1, 3.0),
 }
 """Of each example: what is looked for in its output, and the range of the number found."""
 

@@ -1,11 +1,14 @@
 import hashlib
 import os
 import stat
+import subprocess
+import sys
 
 import pytest
 
 from elastocal.errors import FileAccessError
-from elastocal.files import filling, read_text, replacing, sha256, write_text
+from elastocal.files import filling, read_text, remove_leftovers, replacing, sha256, write_text
+from support.cli import elastocal
 
 
 def test_text_comes_back_as_it_was_written(tmp_path):
@@ -188,3 +191,46 @@ def test_a_file_where_a_folder_should_be_is_called_one(tmp_path, below):
         filling(tmp_path / "model.json" / below, "a.c"),
     ):
         pass
+
+
+KILLED = """
+import os, signal, sys
+from pathlib import Path
+from elastocal.files import filling, replacing
+where = Path(sys.argv[1])
+with replacing(where / "a.json") as temporary, filling(where / "plan", "plan.json") as folder:
+    temporary.write_text("half")
+    (folder / "plan.json").write_text("half")
+    os.kill(os.getpid(), signal.SIGKILL)
+"""
+
+
+class TestWhatAKilledWriterLeaves:
+    @pytest.fixture
+    def where(self, tmp_path):
+        subprocess.run([sys.executable, "-c", KILLED, tmp_path], check=False, timeout=60)
+        assert len(list(tmp_path.iterdir())) == 2
+        return tmp_path
+
+    def test_it_is_removed_by_the_next_command_that_writes_there(self, where):
+        remove_leftovers(where)
+        assert list(where.iterdir()) == []
+
+    def test_so_it_is_beside_a_folder_and_a_file_that_are_written(self, where):
+        remove_leftovers(where / "plan")
+        assert [each.name.partition(".elastocal-")[0] for each in where.iterdir()] == [".a.json"]
+        remove_leftovers(where / "a.json")
+        assert list(where.iterdir()) == []
+
+    def test_it_is_no_file_of_somebody_else_to_a_demo(self, where):
+        (where / "README.md").write_text("# A demo of elastocal: afp\n")
+        assert "holds a demo already" in elastocal("demo", "--out", where).reason
+
+    def test_what_is_at_work_is_left_alone(self, tmp_path):
+        with filling(tmp_path / "plan", "plan.json") as folder:
+            write_text(folder / "plan.json", "whole")
+            with replacing(tmp_path / "a.json") as temporary:
+                temporary.write_text("whole")
+                remove_leftovers(tmp_path)
+        assert read_text(tmp_path / "plan" / "plan.json") == "whole"
+        assert read_text(tmp_path / "a.json") == "whole"

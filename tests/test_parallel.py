@@ -2,7 +2,9 @@ import os
 import signal
 import subprocess
 import sys
+import time
 from concurrent.futures.process import BrokenProcessPool
+from pathlib import Path
 
 import pytest
 
@@ -115,3 +117,24 @@ def test_libraries_that_are_loaded_within_the_block_are_not_forgotten():
     )
     found = subprocess.run([sys.executable, "-c", code], capture_output=True, check=True)
     assert found.stdout.strip() == b"{1}"
+
+
+def test_workers_end_when_their_parent_is_killed(tmp_path):
+    code = (
+        "import os, signal, sys\n"
+        "from pathlib import Path\n"
+        "from elastocal.parallel import map_in_processes\n"
+        "def told(number):\n"
+        "    Path(sys.argv[1], str(os.getpid())).touch()\n"
+        "    return number\n"
+        "list(map_in_processes(told, range(4), 2))\n"
+        "os.kill(os.getpid(), signal.SIGKILL)\n"
+    )
+    subprocess.run([sys.executable, "-c", code, tmp_path], check=False, timeout=120)
+    workers = [int(each.name) for each in tmp_path.iterdir()]
+    assert workers
+    for _ in range(100):
+        if not any(Path(f"/proc/{each}").exists() for each in workers):
+            return
+        time.sleep(0.1)
+    pytest.fail(f"{workers} outlive their parent")

@@ -107,6 +107,21 @@ def test_the_output_in_the_readme_is_what_the_commands_print(toured):
             words = words[after(part.split(), words) :]
 
 
+def test_the_page_on_the_table_quotes_what_the_tour_prints(toured):
+    """The condition number is of no meaning to its last digits."""
+    page = (ROOT / "docs/how-to/read-the-table.md").read_text(encoding="utf-8")
+    quoted = re.findall(r"^```text\n(.*?)^```", page, flags=re.MULTILINE | re.DOTALL)
+    with contextlib.chdir(toured.folder):
+        bearing = elastocal(
+            "calibrate", "demo/run/dataset.nc", "--out", "b.json", "--springs", "bearing"
+        )
+    auto = toured.results["elastocal calibrate demo/run/dataset.nc --out model.json"]
+    for number, told in ((0, auto), (1, auto), (3, bearing), (4, auto)):
+        words = re.sub(r"\d{5,}", "many", told.err).split()
+        for part in re.split(r"^…$", quoted[number], flags=re.MULTILINE):
+            words = words[after(re.sub(r"\d{5,}", "many", part).split(), words) :]
+
+
 def after(wanted: list[str], words: list[str]) -> int:
     """Return where the words that follow the wanted ones begin; fail when they do not stand."""
     for start in range(len(words) - len(wanted) + 1):

@@ -71,6 +71,8 @@ def test_numbers_come_in_si_units():
         ("", "row 4, column 'x[mm]': '' is not a number"),
         ("inf", "row 4, column 'x[mm]': 'inf' is not a finite number"),
         ("nan", "row 4, column 'x[mm]': 'nan' is not a finite number"),
+        ("1_5", "row 4, column 'x[mm]': '1_5' is not a number"),
+        ("\u0661", "row 4, column 'x[mm]': '\u0661' is not a number"),
     ],
 )
 def test_a_cell_that_is_no_number_is_refused_by_row_and_column(cell, said):
@@ -130,3 +132,22 @@ def test_what_cannot_be_opened_or_is_no_text_is_named(tmp_path):
         opened_table(path) as table,
     ):
         table.rows()
+
+
+def test_a_decimal_comma_is_read_where_another_delimiter_parts_the_cells():
+    rows = reader("name;x[mm]\na;1500,5\nb;-2\n").rows()
+    assert rows.decimal_comma
+    np.testing.assert_array_equal(rows.numbers(LENGTH), [1500.5e-3, -2e-3])
+
+
+@pytest.mark.parametrize(
+    ("text", "cell"), [("a;1,500\n0.5;2\n", "1,500"), ("a;1,2,3\n", "1,2,3"), ("a;1,5\nb;x\n", "x")]
+)
+def test_a_comma_beside_points_may_part_thousands(text, cell):
+    rows = reader(f"name;x[mm]\n{text}").rows()
+    with pytest.raises(TableError, match=f"{cell!r} is not a number"):
+        rows.numbers(LENGTH)
+
+
+def test_a_comma_that_parts_the_cells_is_no_decimal_comma():
+    assert not reader('name,x[mm]\n"a,5","1,5"\n').rows().decimal_comma

@@ -4,7 +4,14 @@ import pytest
 from hypothesis import given, strategies as st
 
 from elastocal.errors import UnitError
-from elastocal.units import dimension_of, factor, impossible, parse_quantity, split_column
+from elastocal.units import (
+    dimension_of,
+    factor,
+    impossible,
+    parse_number,
+    parse_quantity,
+    split_column,
+)
 
 
 @pytest.mark.parametrize(
@@ -122,3 +129,17 @@ def test_a_number_that_is_none_of_a_robot_cell_is_named(dimension, values, words
 )
 def test_the_unit_says_the_dimension(text, dimension):
     assert dimension_of(text) == dimension
+
+
+@pytest.mark.parametrize(
+    "text", ["1_100", "-1_100", "\u0661\u0662", "\uff11", "1e", "0x10", "", "1 0", "one"]
+)
+def test_what_only_python_takes_for_a_number_is_none(text):
+    with pytest.raises(ValueError):  # noqa: PT011 - a builtin on purpose
+        parse_number(text)
+    with pytest.raises(UnitError):
+        parse_quantity(f"{text} mm", "length")
+
+
+def test_a_number_may_stand_between_spaces_of_any_kind():
+    assert parse_number("\u00a0-1.5e3 ") == -1500.0

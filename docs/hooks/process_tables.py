@@ -1,62 +1,182 @@
-"""Fill pages with Table 1 over truths and seeds: ``<!-- process table: afp -->``.
+"""Fill pages with Table 1 over truths, seeds and campaigns: ``<!-- process table: afp -->``.
 
-The figures stand in ``gallery/process_figures.json``, which ``python -m gallery.process_figures``
-writes; the paper's row comes from the report's own copy of it.
+The figures stand in ``gallery/process_figures.json``, which ``make process-figures`` measures; the
+paper's row comes from the report's own copy of it. ``<!-- process campaigns: afp -->`` becomes the
+table of shorter campaigns, ``<!-- process summary: typical -->`` the sentences that the README has.
 """
 
 import json
 import re
+from collections.abc import Callable
+from itertools import groupby
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from mkdocs.structure.pages import Page
-
+from elastocal.compensation.process import SeedMean
 from elastocal.report.document.sections.process import PAPER
 
+if TYPE_CHECKING:
+    from mkdocs.structure.pages import Page
+
 _QUOTED = Path(__file__).parent / "gallery" / "process_figures.json"
-_MARK = re.compile(r"<!-- process table: (\S+) -->")
-_HEAD = ("truth", "springs", "deviation", "mean, mm", "reduction", "max, mm", "reduction")
+_MARK = re.compile(r"<!-- process (table|campaigns|summary): (\S+) -->")
+_HEAD = ("truth", "springs (taken)", "left-out error, µm", "deviation",
+         "mean, mm", "reduction", "max, mm", "reduction", "seeds")  # fmt: skip
+_CAMPAIGNS = ("campaign", "springs", "poses", "minutes in the cell", "left-out error, µm",
+              "left of the mean, µm", "reduction", "seeds")  # fmt: skip
+_README = Path(__file__).parents[2] / "README.md"
+_NAMES = {"afp": "fibre placement", "machining": "roughing"}
+_TRUTHS = ("kind", "typical", "harsh")
+Figures = dict[str, Any]
 
 
-def on_page_markdown(markdown: str, page: Page, **_: object) -> str:  # noqa: ARG001 (mkdocs')
+def on_page_markdown(markdown: str, page: "Page", **_: object) -> str:  # noqa: ARG001 (mkdocs')
     """Return the page with the tables in place of their marks."""
-    return _MARK.sub(lambda mark: _table(mark[1]), markdown)
+    made: dict[str, Callable[[str], str]] = {
+        "table": table, "campaigns": campaigns, "summary": summary,
+    }  # fmt: skip
+    return _MARK.sub(lambda mark: made[mark[1]](mark[2]), markdown)
 
 
-def _table(kind: str) -> str:
-    cases = json.loads(_QUOTED.read_text(encoding="utf-8"))
+def table(kind: str) -> str:
+    """Return Table 1 of a process: truths, springs, measures, and the paper's row."""
+    found = [each for each in quoted() if each["campaign"] == "template"]
     rows = [
-        (case["preset"], f"`{case['springs']}`", *_measured(means))
-        for case in cases
-        if case["kind"] == kind
-        for means in case["means"]
+        row
+        for truth in _TRUTHS
+        for springs in ("bearing", "auto")
+        for row in _rows(_of(found, kind, truth, springs=springs))
     ]
-    seeds = sorted({m["seeds"] for case in cases if case["kind"] == kind for m in case["means"]})
-    table = "\n".join("| " + " | ".join(row) + " |" for row in (_HEAD, ("---",) * 7, *rows))
     paper = PAPER[kind]
+    own = (
+        "paper", "18 springs", "", "Table 1",
+        f"{paper.before[0]:.3f} → {paper.after[0]:.3f}", f"{paper.reduction[0]:.2%}",
+        f"{paper.before[1]:.3f} → {paper.after[1]:.3f}", f"{paper.reduction[1]:.2%}", "",
+    )  # fmt: skip
+    return f"{_markdown(_HEAD, [*rows, own])}\n\n{_INTERVALS} {paper.measures}"
+
+
+_INTERVALS = (
+    "Means over the seeds that the last column counts, in brackets their 95 % interval (Student's"
+    " t); of one seed there is none."
+)
+
+
+def campaigns(kind: str) -> str:
+    """Return what shorter campaigns reach on the typical truth."""
+    found = _of(quoted(), kind, "typical")
+    rows = []
+    for (name, springs), some in groupby(found, lambda each: (each["campaign"], each["springs"])):
+        seeds = list(some)
+        lateral = [_deviation(each, 1.0) for each in seeds]
+        poses, minutes = ({each[key] for each in seeds} for key in ("poses", "minutes"))
+        rows.append((
+            "as `init` writes it" if name == "template" else f"`{name.split()[0]}`",
+            f"`{springs}`", _span(poses, "d"), _span(minutes, ".1f"),
+            _mean([1e6 * each["left_out"] for each in seeds], ".0f"),
+            _mean([1e6 * each["mean"][1] for each in lateral], ".0f"),
+            _mean([_reduction(each["mean"]) for each in lateral], ".1%"), str(len(seeds)),
+        ))  # fmt: skip
+    return _markdown(_CAMPAIGNS, rows)
+
+
+def summary(preset: str = "typical") -> str:
+    """Return the figures of a truth in sentences, beside those of the paper."""
+    return " ".join(_sentence(kind, preset) for kind in _NAMES)
+
+
+def renew_readme() -> None:
+    """Write the summary into the README, in place of the one that is there."""
+    text = _README.read_text(encoding="utf-8")
+    new = re.sub(r"(?m)^(On the|The) typical truth .*$", lambda _: summary(), text)
+    _README.write_text(new, encoding="utf-8")
+
+
+def _sentence(kind: str, preset: str) -> str:
+    seeds = _of(quoted(), kind, preset, campaign="template", springs="auto")
+    if not seeds:
+        return f"The {preset} truth was not measured in {_NAMES[kind]}."
+    lateral, paper = [_deviation(each, 1.0) for each in seeds], PAPER[kind].reduction
+    mean, largest = (
+        _mean([_reduction(each[key]) for each in lateral], ".1%") for key in ("mean", "max")
+    )
     return (
-        f"{table}\n| paper | 18 springs | Table 1 | {paper.before[0]:.3f} → {paper.after[0]:.3f} |"
-        f" {paper.reduction[0]:.2%} | {paper.before[1]:.3f} → {paper.after[1]:.3f} |"
-        f" {paper.reduction[1]:.2%} |\n\n{_over(seeds)} {paper.measures}"
+        f"On the {preset} truth the correction takes {mean} of the mean deviation in"
+        f" {_NAMES[kind]}, and {largest} of the largest, over {_counted(len(seeds))}"
+        f" (the paper, on a real robot: {abs(paper[0]):.2%} and {abs(paper[1]):.2%})."
     )
 
 
-def _over(seeds: list[int]) -> str:
-    """Return how many seeds the figures are of."""
-    if seeds == [1]:
-        return "A single seed: there is no interval, and another seed has other figures."
-    return (
-        f"Means over {' or '.join(map(str, seeds))} seeds, in brackets their 95 % interval"
-        " (Student's t)."
-    )
+def quoted() -> list[Figures]:
+    """Return the figures as they are written down, those of one table row behind one another."""
+    found: list[Figures] = json.loads(_QUOTED.read_text(encoding="utf-8"))
+    order = list(dict.fromkeys((each["campaign"], each["springs"]) for each in found))
+    return sorted(found, key=lambda each: order.index((each["campaign"], each["springs"])))
 
 
-def _measured(means: dict[str, Any]) -> tuple[str, ...]:
-    load = "" if means["load"] == 1.0 else f", load {means['load']:g}"
-    cells = [f"{means['name']}{load}"]
-    for part in ("mean", "max"):
-        before, after = (1e3 * means[f"{part}_{side}"]["mean"] for side in ("before", "after"))
-        share = means[f"{part}_reduction"]
-        span = "" if share["low"] is None else f" ({share['low']:.1%} to {share['high']:.1%})"
-        cells += [f"{before:.3f} → {after:.3f}", f"{share['mean']:.1%}{span}"]
-    return tuple(cells)
+def _of(found: list[Figures], kind: str, preset: str, **others: str) -> list[Figures]:
+    return [
+        each
+        for each in found
+        if each["case"]["kind"] == kind
+        and each["case"]["preset"] == preset
+        and all(each[key] == value for key, value in others.items())
+    ]
+
+
+def _rows(seeds: list[Figures]) -> list[tuple[str, ...]]:
+    """Return a row for each measure at each load, of the same model over seeds."""
+    if not seeds:
+        return []
+    first = seeds[0]
+    chosen = sorted({each["chosen"] for each in seeds})
+    springs = f"`{first['springs']}`"
+    if chosen != [first["springs"]]:
+        springs += f" ({', '.join(f'`{each}`' for each in chosen)})"
+    left_out = _mean([1e6 * each["left_out"] for each in seeds], ".0f")
+    rows = []
+    for number, own in enumerate(first["deviations"]):
+        some = [each["deviations"][number] for each in seeds]
+        cells: list[str] = []
+        for key in ("mean", "max"):
+            before, after = (sum(each[key][k] for each in some) / len(some) for k in (0, 1))
+            cells.append(f"{1e3 * before:.3f} → {1e3 * after:.3f}")
+            cells.append(_mean([_reduction(each[key]) for each in some], ".1%"))
+        load = "" if own["load"] == 1.0 else f", load {own['load']:g}"
+        rows.append((
+            first["case"]["preset"], springs, left_out, f"{own['name']}{load}", *cells,
+            str(len(seeds)),
+        ))  # fmt: skip
+    return rows
+
+
+def _deviation(figures: Figures, load: float) -> Figures:
+    """Return the component that counts, at a load."""
+    found: Figures = next(each for each in figures["deviations"] if each["load"] == load)
+    return found
+
+
+def _reduction(pair: list[float]) -> float:
+    return 1.0 - pair[1] / pair[0]
+
+
+def _mean(values: list[float], form: str) -> str:
+    """Return a mean with its interval, both in a format."""
+    found = SeedMean.of(values)
+    if found.low is None or found.high is None:
+        return f"{found.mean:{form}}"
+    return f"{found.mean:{form}} ({found.low:{form}} to {found.high:{form}})"
+
+
+def _span(values: set[float], form: str) -> str:
+    low, high = f"{min(values):{form}}", f"{max(values):{form}}"
+    return low if low == high else f"{low} to {high}"
+
+
+def _counted(seeds: int) -> str:
+    return "one seed" if seeds == 1 else f"{seeds} seeds"
+
+
+def _markdown(head: tuple[str, ...], rows: list[tuple[str, ...]]) -> str:
+    lines = (head, ("---",) * len(head), *rows)
+    return "\n".join("| " + " | ".join(line) + " |" for line in lines)

@@ -61,6 +61,10 @@ class ProcedureError(ElastocalError, RuntimeError):
     """The calibration procedure cannot start or go on."""
 
 
+class LogError(ElastocalError, ValueError):
+    """A log of another program that cannot be used: its form, its columns, its clock."""
+
+
 class CompensationError(ElastocalError, ValueError):
     """A correction that cannot be made: bad limits, a filter beyond Nyquist, an unknown tool."""
 

@@ -2,24 +2,88 @@
 
 A file that is being written lives beside its target under a temporary name and takes the
 target's name only after it has reached the disk, so that neither a crash nor Ctrl-C leaves
-half a file.
+half a file. It is locked as long as its writer lives: what a killed one leaves is known by that,
+and `remove_leftovers` removes it.
+
+What is read and written here is held to the rule of the command at work, `elastocal.outputs`.
+
+What a file may ask for is bounded (`Limit`): a few hundred bytes of other people's can ask for more
+memory, or time, than there is.
 """
 
 import contextlib
+import fcntl
+import glob
 import hashlib
 import json
 import os
+import shutil
 import stat
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from elastocal.errors import FileAccessError
+from elastocal.errors import FileAccessError, SchemaError
+from elastocal.outputs import current_rule
 
 _STANDARD_INPUT = Path("/dev/stdin")
 _DESCRIPTORS = (Path("/dev/fd"), Path("/proc/self/fd"))
 """Where a shell puts what it pipes into a command by name (``<(...)``)."""
+_UNDER_WAY = ".elastocal-"
+"""In the names of what is being written, behind a dot and the name that it will have."""
+_LONGEST_NAME = 200
+"""Letters of a name that are kept there: file systems take 255 bytes."""
+
+
+@dataclass(frozen=True)
+class Limit:
+    """A bound on what a file may ask for, which an environment variable raises."""
+
+    variable: str
+    """Name of the environment variable."""
+    default: int
+    """The bound when it is not set."""
+    unit: str
+    """What is counted."""
+
+    @property
+    def most(self) -> int:
+        """The bound.
+
+        Raises
+        ------
+        FileAccessError
+            If the environment variable is not a whole number above 0.
+        """
+        text = os.environ.get(self.variable, str(self.default))
+        if not (text.isascii() and text.isdigit() and int(text[:18]) > 0):
+            raise FileAccessError(
+                f"{self.variable} is {text!r:.40}: it must be a whole number above 0"
+            )
+        return int(text[:18])
+
+    def require(self, found: float, what: str) -> None:
+        """Refuse what is more than the bound.
+
+        Raises
+        ------
+        SchemaError
+            With the bound and how to raise it.
+        """
+        if not found <= self.most:
+            raise SchemaError(f"{what} {self.exceeded}")
+
+    @property
+    def exceeded(self) -> str:
+        """The end of a sentence on what is more than the bound."""
+        return f"is more than {self.most} {self.unit} (the variable {self.variable} raises this)"
+
+
+_MOST_READ = Limit("ELASTOCAL_MAX_FILE_MB", 256, "MB")
+"""Size of a file that is read whole: texts, meshes, streams."""
+_MEGABYTE = 1_000_000
 
 
 @contextlib.contextmanager
@@ -29,28 +93,40 @@ def replacing(path: Path) -> Iterator[Path]:
     Raises
     ------
     FileAccessError
-        If the folder does not exist or cannot be written.
+        If the folder does not exist or cannot be written, or the command at work must not write
+        there.
     """
-    path = Path(path)
+    path, rule = Path(path), current_rule()
+
+    def make() -> str:
+        handle, name = tempfile.mkstemp(path.suffix, _prefix(path), path.parent)
+        os.close(handle)
+        return name
+
     try:
         if path.exists() and not path.is_file():
             raise IsADirectoryError("it is a folder or a device, not a file")
-        handle, name = tempfile.mkstemp(path.suffix, f".{path.name}.", path.parent)
-        os.close(handle)
+        if rule is not None:
+            rule.require(path)
+        temporary, lock = _locked(make)
     except OSError as error:
+        if isinstance(error, FileAccessError):
+            raise
         raise FileAccessError(f"cannot write {path}: {error.strerror or error}") from error
-    temporary = Path(name)
     try:
         yield temporary
         _flush_to_disk(temporary)
         temporary.chmod(0o666 & ~_umask())
         temporary.replace(path)
+        if rule is not None:
+            rule.note_output(path)
     except FileAccessError:
         raise  # of another file: it says so itself
     except OSError as error:
         raise FileAccessError(f"cannot write {path}: {error.strerror or error}") from error
     finally:
         temporary.unlink(missing_ok=True)
+        os.close(lock)
 
 
 @contextlib.contextmanager
@@ -72,9 +148,10 @@ def filling(folder: Path, last: str, force: bool = False) -> Iterator[Path]:
     Raises
     ------
     FileAccessError
-        If the folder holds files and ``force`` is not given, or it or a file cannot be written.
+        If the folder holds files and ``force`` is not given, it or a file cannot be written, or
+        the command at work must not write there.
     """
-    folder = Path(folder)
+    folder, rule = Path(folder), current_rule()
     for place in (folder, *folder.parents):
         if place.is_file():
             raise FileAccessError(f"cannot write {folder}: {place} is a file, not a folder")
@@ -85,27 +162,83 @@ def filling(folder: Path, last: str, force: bool = False) -> Iterator[Path]:
                 f"{folder} holds files already ({holds[0]}{' and others' if holds[1:] else ''}):"
                 " name another folder, or give --force to replace what is in it"
             )
+        if rule is not None:
+            rule.require(folder / last)
         folder.parent.mkdir(parents=True, exist_ok=True)
-        made = tempfile.TemporaryDirectory(dir=folder.parent, prefix=f".{folder.name}.")
+        temporary, lock = _locked(
+            lambda: tempfile.mkdtemp(prefix=_prefix(folder), dir=folder.parent)
+        )
     except OSError as error:
         if isinstance(error, FileAccessError):
             raise
         raise FileAccessError(f"cannot write {folder}: {error.strerror or error}") from error
-    with made as temporary:
-        try:
-            yield Path(temporary)
-            folder.mkdir(exist_ok=True)
-            (folder / last).unlink(missing_ok=True)
-            names = sorted(entry.name for entry in Path(temporary).iterdir())
-            for name in sorted(names, key=lambda name: name == last):
-                (Path(temporary) / name).replace(folder / name)
-        except FileAccessError as error:
-            # Nobody has asked for the temporary folder, and it is gone when this is read.
-            raise FileAccessError(str(error).replace(temporary, str(folder))) from error
-        except OSError as error:
-            if error.filename is not None and temporary not in str(error.filename):
-                raise  # of a file elsewhere, which its name says
-            raise FileAccessError(f"cannot write {folder}: {error.strerror or error}") from error
+    try:
+        yield temporary
+        _move_all(temporary, folder, last)
+    except FileAccessError as error:
+        # Nobody has asked for the temporary folder, and it is gone when this is read.
+        raise FileAccessError(str(error).replace(str(temporary), str(folder))) from error
+    except OSError as error:
+        if error.filename is not None and str(temporary) not in str(error.filename):
+            raise  # of a file elsewhere, which its name says
+        raise FileAccessError(f"cannot write {folder}: {error.strerror or error}") from error
+    finally:
+        shutil.rmtree(temporary, ignore_errors=True)
+        os.close(lock)
+
+
+def _move_all(source: Path, folder: Path, last: str) -> None:
+    """Move what a folder holds into another, one of it last; all of it, or nothing, is allowed."""
+    names, rule = sorted(entry.name for entry in source.iterdir()), current_rule()
+    if rule is not None:
+        for name in names:
+            rule.require(folder / name)
+    folder.mkdir(exist_ok=True)
+    (folder / last).unlink(missing_ok=True)
+    for name in sorted(names, key=lambda name: name == last):
+        (source / name).replace(folder / name)
+        if rule is not None:
+            rule.note_output(folder / name)
+
+
+def remove_leftovers(output: Path) -> None:
+    """Remove what writers that were killed left beside an output and in it, if it is a folder.
+
+    What is at work is left alone.
+    """
+    pattern = f".*{_UNDER_WAY}*"
+    inside = [*output.glob(pattern), *output.glob(f"*/{pattern}")]
+    for place in (*output.parent.glob(f"{glob.escape(_prefix(output))}*"), *inside):
+        with contextlib.suppress(OSError):
+            handle = os.open(place, os.O_RDONLY | os.O_NOFOLLOW)
+            try:
+                fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                if place.is_dir():
+                    shutil.rmtree(place)
+                else:
+                    place.unlink()
+            finally:
+                os.close(handle)
+
+
+def _locked(make: Callable[[], str]) -> tuple[Path, int]:
+    """Return a new temporary file or folder, and the descriptor whose lock says that we live.
+
+    Where a file system knows no locks, nobody can tell it from one at work, and it is left alone.
+    """
+    while True:
+        place = Path(make())
+        handle = os.open(place, os.O_RDONLY)
+        with contextlib.suppress(OSError):
+            fcntl.flock(handle, fcntl.LOCK_SH | fcntl.LOCK_NB)
+        # Between the two, another process may have taken it for a leftover.
+        if place.exists():
+            return place, handle
+        os.close(handle)
+
+
+def _prefix(path: Path) -> str:
+    return f".{path.name[:_LONGEST_NAME]}{_UNDER_WAY}"
 
 
 def write_bytes(path: Path, data: bytes | memoryview) -> None:
@@ -140,9 +273,12 @@ def read_text(path: Path) -> str:
     ------
     FileAccessError
         If the file is missing, unreadable, empty, or not text.
+    SchemaError
+        If it is too large to be read whole.
     """
     require_file(path)
     try:
+        require_size(path)
         text = Path(path).read_text(encoding="utf-8-sig")
     except OSError as error:
         raise FileAccessError(f"cannot read {path}: {error.strerror or error}") from error
@@ -155,6 +291,8 @@ def read_text(path: Path) -> str:
 
 def require_file(path: Path) -> None:
     """Refuse a pipe, a socket or a device: reading it may wait for ever, or never end.
+
+    What is a file is an input of the command at work from here on.
 
     What is not there, and a folder, are left to whoever opens it; standard input may be read.
 
@@ -172,6 +310,22 @@ def require_file(path: Path) -> None:
         return
     if not (stat.S_ISREG(mode) or stat.S_ISDIR(mode)):
         raise FileAccessError(f"cannot read {path}: it is a pipe or a device, not a file")
+    if (rule := current_rule()) is not None and stat.S_ISREG(mode):
+        rule.note_input(path)
+
+
+def require_size(path: Path) -> None:
+    """Refuse a file that is too large to be read whole.
+
+    Raises
+    ------
+    SchemaError
+        With the bound and how to raise it.
+    OSError
+        If it is not there.
+    """
+    size = Path(path).stat().st_size / _MEGABYTE
+    _MOST_READ.require(size, f"{path} has {size:.0f} MB, which")
 
 
 def sha256(text: str) -> str:

@@ -13,9 +13,11 @@ import io
 import re
 from pathlib import Path
 
+import numpy as np
 import trimesh
 
 from elastocal.errors import FileAccessError, SchemaError
+from elastocal.files import require_size
 
 SUFFIXES = (".stl", ".obj", ".ply")
 """Kinds of mesh files."""
@@ -55,11 +57,16 @@ def load_triangles(path: Path) -> trimesh.Trimesh:
         # Old Macs, and some exporters since, end lines by a carriage return alone.
         data = data.translate(_ASCII).replace(b"\r\n", b"\n").replace(b"\r", b"\n")
     try:
-        return trimesh.load_mesh(io.BytesIO(data), file_type=suffix[1:], process=False)
+        mesh = trimesh.load_mesh(io.BytesIO(data), file_type=suffix[1:], process=False)
     # What the readers of trimesh raise on bad contents is not documented; these were seen.
     except (ValueError, IndexError, KeyError, TypeError, AttributeError) as error:
         reason = " ".join(str(error).split()) or type(error).__name__
         raise SchemaError(f"mesh {path} is not a readable {suffix[1:]}: {reason}") from error
+    for name in ("vertices", "faces"):
+        shape = np.shape(getattr(mesh, name, ()))
+        if 0 not in shape and shape[1:] != (3,):
+            raise SchemaError(f"mesh {path}: its {name} have {shape[-1]} numbers each, not 3")
+    return mesh
 
 
 def says_inches(path: Path) -> bool:
@@ -75,6 +82,7 @@ def says_inches(path: Path) -> bool:
 
 def _bytes_of(path: Path) -> bytes:
     try:
+        require_size(path)
         return path.read_bytes().removeprefix(b"\xef\xbb\xbf")  # the mark of Windows
     except OSError as error:
         raise FileAccessError(f"cannot read {path}: {error.strerror or error}") from error

@@ -8,18 +8,26 @@ run one thread each, and so do the workflows with `one_blas_thread`.
 """
 
 import importlib
+import os
+import pickle
 import signal
+import sys
+import threading
+import time
 import warnings
 from collections.abc import Callable, Generator, Iterable, Iterator
 from contextlib import contextmanager
 from functools import cache
-from typing import TYPE_CHECKING, Any, TypeVar
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NoReturn, TypeVar
 
 from elastocal.errors import ElastocalError
 
 if TYPE_CHECKING:
     from threadpoolctl import ThreadpoolController
 
+_WATCH = 1.0
+"""Between two looks of a worker at whether its parent lives, in s."""
 _Task = TypeVar("_Task")
 _Result = TypeVar("_Result")
 
@@ -82,7 +90,8 @@ def map_in_processes(
 
     with _one_thread_each(processes):
         parallel = Parallel(return_as="generator")
-    yield from _to_the_end(parallel(delayed(function)(task) for task in tasks))
+    work = delayed(_work_for)
+    yield from _to_the_end(parallel(work(os.getpid(), function, task) for task in tasks))
 
 
 class ProcessPool:
@@ -156,7 +165,8 @@ class ProcessPool:
                 pre_dispatch=at_once,
                 return_as="generator" if ordered else "generator_unordered",
             )
-        return parallel(delayed(function)(task) for task in tasks)
+        work = delayed(_work_for)
+        return parallel(work(os.getpid(), function, task) for task in tasks)
 
 
 @contextmanager
@@ -233,6 +243,23 @@ def _blas() -> "ThreadpoolController":
     return ThreadpoolController()
 
 
+def _work_for(parent: int, function: Callable[[_Task], _Result], task: _Task) -> _Result:
+    """Do a task in a process that ends with its parent, and does not wait minutes for the next."""
+    _end_with(parent)
+    return function(task)
+
+
+@cache
+def _end_with(parent: int) -> None:
+    def watch() -> None:
+        while os.getppid() == parent:
+            time.sleep(_WATCH)
+        os._exit(1)
+
+    # Nobody is left to hear of a worker whose parent was killed, nor to clean up for it.
+    threading.Thread(target=watch, daemon=True).start()
+
+
 def _call(task: Callable[[], object]) -> object:
     return task()
 
@@ -278,3 +305,85 @@ def _interrupts_blocked() -> Iterator[None]:
         yield
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+class GuardedError(ElastocalError, RuntimeError):
+    """Work in a child process that came to no end: it took too long, or crashed."""
+
+
+def guarded(work: Callable[[], _Result], seconds: int, megabytes: int) -> _Result:
+    """Return what ``work`` returns, done in a child process with bounded time and memory.
+
+    For libraries that hang where no signal handler runs, ask for any amount of memory, crash, or
+    print: with files of which a byte has changed HDF5 does all of that. Elsewhere than on Linux,
+    where a process with threads cannot be forked safely, this process does the work.
+
+    Parameters
+    ----------
+    work : callable
+        What is to be done. Its result comes back over a pipe; what it prints is lost.
+    seconds : int
+        Of a processor, at most.
+    megabytes : int
+        Of memory, at most, beside what this process has.
+
+    Raises
+    ------
+    GuardedError
+        If the child ends without a result.
+    """
+    if not sys.platform.startswith("linux"):
+        return work()
+    reading, writing = os.pipe()
+    with warnings.catch_warnings():
+        # Threads that hold a lock now will never release it in the child, which needs none of them.
+        warnings.simplefilter("ignore", DeprecationWarning)
+        child = os.fork()
+    if child == 0:
+        _work_guarded(work, writing, seconds, megabytes)
+    os.close(writing)
+    status = 0
+    try:
+        with os.fdopen(reading, "rb") as pipe:
+            result: _Result = pickle.load(pipe)
+            return result
+    except (EOFError, pickle.UnpicklingError):
+        status = os.waitpid(child, 0)[1]
+        child = 0
+    finally:
+        if child:
+            os.kill(child, signal.SIGKILL)
+            os.waitpid(child, 0)
+    if status == signal.SIGXCPU:
+        raise GuardedError(f"it takes more than {seconds} s")
+    raise GuardedError("the library that reads it crashed")
+
+
+def _work_guarded(
+    work: Callable[[], object], writing: int, seconds: int, megabytes: int
+) -> NoReturn:
+    """Do the work and send the result; this is the child."""
+    import gc
+    import resource
+
+    gc.disable()  # looking for garbage would copy all memory of the parent
+    try:
+        # By default the system ends a process that has used its time, whatever it is doing.
+        for number in (signal.SIGXCPU, signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+            signal.signal(number, signal.SIG_DFL)
+        nothing = os.open(os.devnull, os.O_RDWR)
+        os.dup2(nothing, 1)
+        os.dup2(nothing, 2)
+        resource.setrlimit(resource.RLIMIT_CPU, (seconds, seconds + 1))
+        resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+        size = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
+        hard = resource.getrlimit(resource.RLIMIT_AS)[1]
+        most = size + megabytes * 1_000_000
+        resource.setrlimit(
+            resource.RLIMIT_AS, (most if hard == resource.RLIM_INFINITY else min(most, hard), hard)
+        )
+        with os.fdopen(writing, "wb") as pipe:
+            pickle.dump(work(), pipe, protocol=pickle.HIGHEST_PROTOCOL)
+    finally:
+        # No handler of the parent, no buffer of its output: they are the parent's.
+        os._exit(0)

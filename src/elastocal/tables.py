@@ -8,9 +8,11 @@ how long a row must be, is for whoever reads it to refuse in the words of its fi
 
 import csv
 import math
+import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import chain, islice
 from pathlib import Path
 
@@ -19,9 +21,12 @@ import numpy as np
 from elastocal.arrays import FloatArray
 from elastocal.errors import ElastocalError, FileAccessError
 from elastocal.files import replacing, require_file
+from elastocal.units import parse_number
 
 DELIMITERS = ",;\t"
 """Delimiters that are recognised; the first is the one that is written."""
+_NUMBER = r"\s*[-+]?[0-9]*{}[0-9]*(?:[eE][-+]?[0-9]+)?\s*"
+_POINT, _COMMA = (re.compile(_NUMBER.format(re.escape(sign))) for sign in ".,")
 
 
 class TableError(ElastocalError, ValueError):
@@ -39,6 +44,8 @@ class Column:
     """The unit as the header states it; empty for a plain number."""
     scale: float
     """The SI value of one such unit."""
+    dimension: str = ""
+    """Physical dimension, as `elastocal.units` names it; empty for a plain number."""
 
     @property
     def header(self) -> str:
@@ -66,6 +73,18 @@ class TableRows:
     """As they stand in the file."""
     lines: list[int]
     """Line of the file that each row ends on."""
+    delimiter: str = DELIMITERS[0]
+
+    @cached_property
+    def decimal_comma(self) -> bool:
+        """Whether numbers are written ``1,5``: no comma parts the cells, and no number has a point.
+
+        Beside points a comma may part thousands.
+        """
+        if self.delimiter == ",":
+            return False
+        cells = [cell for row in self.cells for cell in row]
+        return any(map(_COMMA.fullmatch, cells)) and not any(map(_POINT.fullmatch, cells))
 
     def __len__(self) -> int:
         """Return the number of rows."""
@@ -94,17 +113,19 @@ class TableRows:
         TableError
             If a cell cannot be read; the message names row and column.
         """
-        parse = finite_number if parse is None else parse
+        parse = _finite_number if parse is None else parse
         cells = [row[column.index] for row in self.cells]
         try:
             values = np.array([float(cell) for cell in cells])
-            ordinary = bool(np.isfinite(values).all()) and "_" not in "".join(cells)
+            text = "".join(cells)
+            ordinary = bool(np.isfinite(values).all()) and "_" not in text and text.isascii()
         except ValueError:
             ordinary = False
         if not ordinary:
             # Rarely taken: some cell is blank or no number, and its row has to be found.
+            comma = "," if self.decimal_comma else ""
             pairs = zip(self.lines, cells, strict=True)
-            values = np.array([_parsed(cell, line, column, parse) for line, cell in pairs])
+            values = np.array([_parsed(cell, comma, line, column, parse) for line, cell in pairs])
         # x * 1.0 is x, bit for bit: data in SI units pass unchanged.
         return values * column.scale
 
@@ -135,11 +156,11 @@ class TableReader:
                 break
             preamble.append(line)
         self._above = len(preamble)
-        delimiter = max(DELIMITERS, key=first.count)
-        self._reader = csv.reader(chain([first], remaining), delimiter=delimiter, strict=True)
+        self._delimiter = max(DELIMITERS, key=first.count)
+        self._reader = csv.reader(chain([first], remaining), delimiter=self._delimiter, strict=True)
         line_end = first[len(first.rstrip("\r\n")) :] or "\n"
         header = tuple(next(self._cells(), (0, []))[1]) if first else ()
-        self.layout = TableLayout(header, tuple(preamble), delimiter, line_end)
+        self.layout = TableLayout(header, tuple(preamble), self._delimiter, line_end)
 
     def rows(self) -> TableRows:
         """Return all rows that are left.
@@ -165,7 +186,7 @@ class TableReader:
     def _taken(self, size: int | None) -> TableRows:
         numbered = ((n, row) for n, row in self._cells() if any(map(str.strip, row)))
         some = list(islice(numbered, size))
-        return TableRows([row for _, row in some], [number for number, _ in some])
+        return TableRows([row for _, row in some], [line for line, _ in some], self._delimiter)
 
     def _cells(self) -> Iterator[tuple[int, list[str]]]:
         try:
@@ -198,8 +219,8 @@ def opened_table(path: Path) -> Iterator[TableReader]:
         raise FileAccessError(f"cannot read {path}: {error.strerror or error}") from error
 
 
-def finite_number(cell: str) -> float:
-    """Return the finite number in a cell.
+def number_in_cell(cell: str) -> float:
+    """Return the number in a cell; it may be NaN or infinite.
 
     Raises
     ------
@@ -207,9 +228,21 @@ def finite_number(cell: str) -> float:
         Saying what the cell is.
     """
     try:
-        value = float(cell)
+        return parse_number(cell)
     except ValueError:
-        raise ValueError("is not a number") from None
+        hint = " (the decimal sign is a point)" if "," in cell else ""
+        raise ValueError(f"is not a number{hint}") from None
+
+
+def _finite_number(cell: str) -> float:
+    """Return the finite number in a cell.
+
+    Raises
+    ------
+    ValueError
+        Saying what the cell is.
+    """
+    value = number_in_cell(cell)
     if not math.isfinite(value):
         raise ValueError("is not a finite number")
     return value
@@ -263,8 +296,10 @@ def new_table(
         yield writer.writerows
 
 
-def _parsed(cell: str, line: int, column: Column, parse: Callable[[str], float]) -> float:
+def _parsed(
+    cell: str, comma: str, line: int, column: Column, parse: Callable[[str], float]
+) -> float:
     try:
-        return parse(cell)
+        return parse(cell.replace(comma, ".") if comma else cell)
     except ValueError as error:
         raise TableError(f"row {line}, column {column.header!r}: {cell!r} {error}") from error

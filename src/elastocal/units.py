@@ -18,7 +18,7 @@ _FACTORS: dict[str, dict[str, float]] = {
     "speed": {"m/s": 1.0, "mm/s": 1e-3},
     "angular speed": {"rad/s": 1.0, "deg/s": math.pi / 180.0},
     "force rate": {"N/s": 1.0, "kN/s": 1e3},
-    "time": {"s": 1.0, "ms": 1e-3, "min": 60.0},
+    "time": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0},
     "rotational compliance": {
         "rad/(N*m)": 1.0,
         "rad/Nm": 1.0,
@@ -67,7 +67,8 @@ _NEVER_NEGATIVE = ("mass", "rotational stiffness", "translational stiffness")
 _SMALLEST = 1e-12
 """Smallest magnitude of the same, in SI, but for 0."""
 
-_QUANTITY = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*([^\s\d.].*)\s*")
+_NUMBER = r"[-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?"
+_QUANTITY = re.compile(rf"\s*({_NUMBER})\s*([^\s\d.].*)\s*")
 _COLUMN = re.compile(r"\s*(?P<name>[^\[\]]+?)\s*(?:\[(?P<unit>[^\[\]]*)\])?\s*")
 
 
@@ -114,6 +115,34 @@ def parse_quantity(text: object, dimension: str) -> float:
     return value
 
 
+def parse_number(text: str) -> float:
+    """Return the number that a text is, as people and controllers write it; it may be NaN or inf.
+
+    Python's own ``float`` also takes ``1_100`` and the digits of any script.
+
+    >>> parse_number(" -1.1e3 ")
+    -1100.0
+
+    Raises
+    ------
+    ValueError
+        If it is none.
+    """
+    plain = text.strip()
+    if not plain.isascii() or "_" in plain:
+        raise ValueError(f"{text!r} is not a number")
+    return float(plain)
+
+
+def largest(dimension: str) -> tuple[float, str]:
+    """Return the largest magnitude of a dimension in a robot cell, in SI, and its name.
+
+    >>> largest("length")
+    (1000.0, '1 km')
+    """
+    return _LARGEST[dimension]
+
+
 def impossible(dimension: str, *values: float) -> str | None:
     """Return why a number in SI can be none of a robot cell's; None if all can. NaN is none.
 
@@ -139,8 +168,15 @@ def dimension_of(quantity: object) -> str | None:
     'rotational stiffness'
     """
     match = _QUANTITY.fullmatch(quantity) if isinstance(quantity, str) else None
-    unit = match[2].strip() if match else ""
-    # A unit belongs to one dimension.
+    return dimension_of_unit(match[2].strip()) if match else None
+
+
+def dimension_of_unit(unit: str) -> str | None:
+    """Return the dimension of a unit, which has but one; None if it is not known.
+
+    >>> dimension_of_unit("kN")
+    'force'
+    """
     return next((name for name, table in _FACTORS.items() if unit in table), None)
 
 

@@ -4,8 +4,8 @@ import io
 from dataclasses import replace
 
 import pytest
-from rich.console import Console
 
+from elastocal.cli.output import console, yellow
 from elastocal.cli.tables.calibration import _known, _spring_table, _springs
 from elastocal.identification import SpringSummary
 from support.summaries import made_up_summary
@@ -19,9 +19,9 @@ ROWS = (
 
 @pytest.mark.parametrize("width", [80, 120])
 def test_no_number_is_cut(width):
-    console = Console(file=io.StringIO(), width=width)
-    console.print(_spring_table(replace(made_up_summary(), springs=ROWS)))
-    shown = console.file.getvalue()
+    screen = console(stderr=False, file=io.StringIO(), width=width)
+    screen.print(_spring_table(replace(made_up_summary(), springs=ROWS)))
+    shown = screen.file.getvalue()
     for number in ("0.1235", "-0.025 … 1.250", "8.100", "0.1447 µm/N", "6.911 MN/m"):
         assert number in shown
     assert max(map(len, shown.splitlines())) <= width
@@ -30,7 +30,7 @@ def test_no_number_is_cut(width):
 def test_a_negative_value_is_at_no_bound_unless_the_fit_says_so():
     assert "bound" not in _known(-1.0, -1.1, -0.9, at_bound=False)
     assert "±10%" in _known(-1.0, -1.1, -0.9, at_bound=False)
-    assert _known(0.0, 0.0, 0.5, at_bound=True).endswith("at bound[/yellow], below 0.500")
+    assert _known(0.0, 0.0, 0.5, at_bound=True) == f"{yellow('at bound')}, below 0.500"
     assert _known(2.0, 1.5, 2.0, at_bound=True).endswith(", above 1.500")
     assert "bound" not in _known(0.0, -0.5, 0.5, at_bound=False)
 

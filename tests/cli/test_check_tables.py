@@ -54,7 +54,7 @@ def test_rows_of_every_command_are_known_by_their_columns(tmp_path, header, row,
         (f"{JOINTS},{FORCE}", "10,0.2,1,2", "row 2 has 4 cells, the header has 5"),
         (f"{JOINTS},force_x[N],force_y[N],force_z[mm]", "1,2,3,4,5", "'force_z[mm]'"),
         (f"{QUATERNION},{FORCE}", "1,2,3,0,0,0,2,1,2,3", "row 2"),
-        (f"{JOINTS},{JOINTS},{FORCE}", "1,1,1,1,1,2,3", "'joint_a1[deg]' stands twice"),
+        (f"{JOINTS},{JOINTS},{FORCE}", "1,1,1,1,1,2,3", "'joint_a1' stands twice"),
         (f"{JOINTS},{FORCE}", "", "has a header but no row"),
     ],
 )

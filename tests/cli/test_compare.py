@@ -120,7 +120,7 @@ def test_one_file_twice_is_refused(folder):
 def test_rows_that_cannot_be_used_are_refused(folder, tmp_path):
     text = (folder / "rows.csv").read_text()
     for name, content, said in (
-        ("other.csv", text.replace("joint_3", "elbow"), "column 'joint_3[…]' is missing"),
+        ("other.csv", text.replace("joint_3", "elbow"), "column 'joint_3[deg]' is missing"),
         ("empty.csv", text.splitlines()[0], "no row"),
         ("bare.csv", text.replace("[N]", ""), "has no unit"),
         ("rows.txt", text, "suffix '.txt' is not one of .csv, .nc"),

@@ -45,22 +45,50 @@ def test_the_log_of_a_demo_holds_every_command_with_its_output():
     assert re.search(r"^gears\+friction .* taken", log, flags=re.MULTILINE)
 
 
-def test_a_demo_on_the_typical_truth_takes_out_two_thirds_of_the_deviation():
+def test_the_light_of_the_demo_is_yellow_for_the_reason_that_the_page_gives():
+    page = (Path(__file__).parents[2] / "docs/how-to/read-the-report.md").read_text("utf-8")
+    (reason,) = re.findall(r'ends with a yellow light, and rightly: "([^"]+)"', page)
+    found = (finished_demo("afp") / "report.html").read_text(encoding="utf-8")
+    assert "yellow light" in found
+    assert reason in found
+
+
+def test_a_demo_on_the_typical_truth_takes_out_most_of_the_deviation():
     table = json.loads((finished_demo("afp") / "process/table.json").read_text())
     reduction = table["lines"][-1]["reduction"]
-    # On the truth `typical`, calibrated at another place of the rail than it works (issue 14):
-    # the paper's 0.89 and 0.70 were reached on `kind` (tests/end_to_end/test_table1.py).
-    assert reduction["mean"] >= 0.70
-    assert reduction["max"] >= 0.40
-    assert table["lines"][-1]["after"]["max"] <= 0.6e-3
+    # On the truth `typical`, measured where production runs; the paper has 0.89 and 0.70.
+    assert reduction["mean"] >= 0.87
+    assert reduction["max"] >= 0.80
+    assert table["lines"][-1]["after"]["max"] <= 0.15e-3
 
 
 @pytest.mark.slow
-def test_the_machining_demo_reaches_the_papers_reductions():
+def test_the_machining_demo_takes_out_four_fifths_of_the_deviation():
+    """On the truth `typical`; the page on processes has it over seeds, beside the paper's."""
     table = json.loads((finished_demo("machining") / "process/table.json").read_text())
     reduction = table["lines"][-1]["reduction"]
-    assert reduction["mean"] >= 0.83
-    assert reduction["max"] >= 0.74
+    assert reduction["mean"] >= 0.80
+    assert reduction["max"] >= 0.65
+
+
+@pytest.mark.slow
+def test_the_page_on_postures_quotes_the_machining_demo():
+    table = json.loads((finished_demo("machining") / "process/table.json").read_text())
+    page = Path(__file__).parents[2] / "docs/how-to/choose-a-posture.md"
+    quoted = re.findall(r"^\| .* \| ([\d.]+) → ([\d.]+) \| ([\d.]+) → ([\d.]+) \|$",
+                        page.read_text(encoding="utf-8"), flags=re.MULTILINE)  # fmt: skip
+    for lines, shown in zip((table["posture"]["lines"], table["lines"]), quoted, strict=True):
+        before, after = lines[-1]["before"], lines[-1]["after"]
+        found = [each[part] for part in ("mean", "max") for each in (before, after)]
+        assert [float(each) for each in shown] == pytest.approx(
+            [1e3 * each for each in found], abs=0.002
+        )
+
+
+@pytest.mark.slow
+def test_the_light_of_the_machining_demo_is_green():
+    page = (finished_demo("machining") / "report.html").read_text(encoding="utf-8")
+    assert "green light" in page
 
 
 @pytest.mark.parametrize("kind", ["afp", "machining"])

@@ -128,8 +128,10 @@ def recorded(tmp_path_factory):
     "option",
     [
         ("--flange", "link_6"),
+        ("--flange", "flange"),
         ("--sensor", "0 mm, 0 mm, 45 mm, 0 deg, 0 deg, 0 deg"),
         ("--down", "0, 0, 1"),
+        ("--down", "0, 0, -1"),
         ("--robot", "KR 120 R2700-2"),
     ],
 )

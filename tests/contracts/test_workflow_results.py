@@ -11,7 +11,7 @@ from elastocal.compensation.process import read_process
 from elastocal.errors import ReportError
 from elastocal.procedure import RunEnd
 from elastocal.results import MOST_CHARACTERS, MOST_LINES, Result
-from support import plans, reported, studies
+from support import foreign_logs, plans, reported, studies
 
 CLASSES = {
     name: getattr(workflows, name)
@@ -20,6 +20,7 @@ CLASSES = {
 }
 WITHOUT = {
     "CheckResult",
+    "GuessMapResult",
     "DryRunResult",
     "ExportResult",
     "InitResult",
@@ -39,6 +40,8 @@ def results(tmp_path_factory) -> dict[str, Result]:
     derived = workflows.derive(run)
     process = read_process(done / "process").table
     design = studies.settings()
+    logs = foreign_logs.write_logs(foreign_logs.rows_of(run), out)
+    log_map = foreign_logs.write_map(out, cell)
     samples = tuple(studies.batch(number)[0] for number in (0, 1, 2))
     figures = workflows.RunFigures(
         str(run), "done", "at HOME", "", 7, 7, (), {"ok": 14}, 0, 60.0, "dataset.nc", (), None
@@ -54,6 +57,8 @@ def results(tmp_path_factory) -> dict[str, Result]:
         workflows.dry_run(settings),
         workflows.DemoResult(out, process),
         workflows.export(model, out=out / "c"),
+        workflows.guess_map(logs),
+        workflows.import_logs(logs, map=log_map),
         workflows.init(out / "new"),
         plans.plan(),
         workflows.predict(model, rows=path),

@@ -2,6 +2,7 @@
 
 import contextlib
 import io
+import signal
 import sys
 from dataclasses import dataclass
 from unittest import mock
@@ -30,7 +31,7 @@ class Result:
 
 def elastocal(*arguments: object) -> Result:
     """Run ``elastocal ARGUMENTS`` and return its exit code and output."""
-    out, err = io.StringIO(), io.StringIO()
+    out, err, heard = io.StringIO(), io.StringIO(), signal.getsignal(signal.SIGINT)
     argv = ["elastocal", *map(str, arguments)]
     with (
         mock.patch.object(sys, "argv", argv),
@@ -41,4 +42,6 @@ def elastocal(*arguments: object) -> Result:
             run()
         except SystemExit as stop:
             return Result(int(stop.code or 0), out.getvalue(), err.getvalue())
+        finally:
+            signal.signal(signal.SIGINT, heard)  # the command line leaves it to the system
     raise AssertionError("run() returned without an exit code")

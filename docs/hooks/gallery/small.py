@@ -1,4 +1,4 @@
-"""Small figures: the k-centre problem (paper Fig. 4), and the streams of one pose (Procedure 1)."""
+"""Small figures: the k-centre problem (paper Fig. 4), streams of one pose (Procedure 1), logs."""
 
 import shutil
 from functools import partial
@@ -25,12 +25,15 @@ from elastocal.procedure import (
     run_settings,
 )
 from elastocal.procedure.record import PoseRecorder, Streams, read_commits
-from elastocal.report.plots import new_figure, style, write_figure
+from elastocal.report.plots import new_figure, style, write_figure, write_timeline_figure
 from elastocal.sim.workcell import simulated_devices
+from elastocal.workflows import import_logs
 from gallery.campaign import example_cell
 
 POINTS, CENTRES = 60, 4
-ONE_POSE = {"pool: 3000": "pool: 20", 'd_max: "175 mm"': "poses: 1"}
+FEW_POSES = {"pool: 3000": "pool: 40", "poses: 31": "poses: 5"}
+CLOCKS = {"force.csv": 3.2, "tracker.csv": -41.7}
+"""What the clocks of two logs are behind the controller's, in s."""
 
 
 def make(folder: Path) -> dict[str, str]:
@@ -75,10 +78,15 @@ def _draw_k_centre(points: np.ndarray, found: dict[str, tuple[np.ndarray, float]
 
 
 def _streams(folder: Path) -> dict[str, str]:
-    """Visit one pose of the simulated cell and draw what was recorded."""
-    cell = example_cell(folder / "cell", "afp", ONE_POSE)
-    streams, commit = _visit(cell, RunFolder(folder / "run"))
+    """Visit some poses of the simulated cell; draw what was recorded, and the same from logs."""
+    cell = example_cell(folder / "cell", "afp", FEW_POSES)
+    visits = _visit(cell, RunFolder(folder / "run"))
+    streams, commit = visits[0]
     write_figure(folder / "pose-streams.svg", partial(_draw_streams, cell, streams, commit))
+    logs = _write_logs(folder / "run", [each for each, _ in visits])
+    found = import_logs(logs, map=_write_map(folder / "run", cell)).found
+    title = f"Merged logs: {', '.join(log.name for log in logs)}"
+    write_timeline_figure(folder / "merged-logs.png", found, title)
     shutil.rmtree(folder / "cell")
     shutil.rmtree(folder / "run")
     seconds = streams.arm.time[-1] - streams.arm.time[0]
@@ -86,7 +94,48 @@ def _streams(folder: Path) -> dict[str, str]:
     return {"pose-streams": f"{seconds:.0f} s of the cell's time, {samples} samples of the sensor"}
 
 
-def _visit(cell: Cell, run: RunFolder) -> tuple[Streams, PoseLog]:
+def _write_logs(folder: Path, visits: list[Streams]) -> list[Path]:
+    """Write what the devices said as three logs, each by its own clock."""
+    arm = [np.column_stack([each.arm.time, each.arm.q]) for each in visits]
+    wrench = [np.column_stack([s.wrench.time, s.wrench.force, s.wrench.moment]) for s in visits]
+    points = [np.column_stack([each.points.time, each.points.position]) for each in visits]
+    tables = {
+        "controller.csv": (["t", *visits[0].joint_names], arm),
+        "force.csv": (["t", "fx", "fy", "fz", "mx", "my", "mz"], wrench),
+        "tracker.csv": (["t", "x", "y", "z"], points),
+    }
+    for name, (header, rows) in tables.items():
+        table = np.vstack(rows)
+        table[:, 0] -= CLOCKS.get(name, 0.0)
+        np.savetxt(folder / name, table, "%.9g", ",", header=",".join(header), comments="")
+    return [folder / name for name in tables]
+
+
+def _write_map(folder: Path, cell: Cell) -> Path:
+    joints = ", ".join(cell.robot.joint_names[1:])
+    path = folder / "map.yaml"
+    path.write_text(
+        f"""\
+schema: elastocal.log-map/1
+cell: {cell.path}
+logs:
+  - log: controller.csv
+    time: {{column: t, unit: s}}
+    joints: [{{columns: [rail], unit: m}}, {{columns: [{joints}], unit: rad}}]
+  - log: force.csv
+    time: {{column: t, unit: s}}
+    force: {{columns: [fx, fy, fz], unit: N}}
+    moment: {{columns: [mx, my, mz], unit: N*m}}
+  - log: tracker.csv
+    time: {{column: t, unit: s}}
+    markers: [{{columns: [x, y, z], unit: m}}]
+""",
+        encoding="utf-8",
+    )
+    return path
+
+
+def _visit(cell: Cell, run: RunFolder) -> list[tuple[Streams, PoseLog]]:
     plan = make_plan(cell, jobs=1).plan
     run.streams.mkdir(parents=True)
     devices = simulated_devices(cell, seed=1)
@@ -97,8 +146,10 @@ def _visit(cell: Cell, run: RunFolder) -> tuple[Streams, PoseLog]:
         journal.write(devices.clock.now(), Event.START, run=record)
         hooks = SessionHooks(lambda: PoseRecorder(plan.robot.joints))
         Runner(Session(plan, run_settings(cell, plan), run), devices, journal, hooks).run()
-    (commit,) = read_commits(run.journal)
-    return read_streams(run.stream(commit.pose, commit.attempt)), commit
+    return [
+        (read_streams(run.stream(commit.pose, commit.attempt)), commit)
+        for commit in read_commits(run.journal)
+    ]
 
 
 def _draw_streams(cell: Cell, streams: Streams, commit: PoseLog) -> Figure:

@@ -1,9 +1,14 @@
 from ._quantities import (
+    IDENTITY as IDENTITY,
     Angle as Angle,
     Distance as Distance,
+    Length as Length,
+    Point as Point,
+    Pose as Pose,
     PositiveForce as PositiveForce,
     PositiveLength as PositiveLength,
     PositiveMoment as PositiveMoment,
+    SignedForce as SignedForce,
 )
 from .cell import (
     SCHEMA as SCHEMA,
@@ -11,6 +16,7 @@ from .cell import (
     Cell as Cell,
     CellFile as CellFile,
     load_cell as load_cell,
+    mounted_robot as mounted_robot,
 )
 from .devices import (
     ArmState as ArmState,

@@ -7,6 +7,7 @@ import numpy as np
 from pydantic import AfterValidator, BeforeValidator, Field, FiniteFloat, ValidationInfo
 
 from elastocal.arrays import FloatArray
+from elastocal.dataset import require_labels
 from elastocal.records import StrictModel
 from elastocal.robot import T_from_xyzabc
 from elastocal.units import parse_quantity
@@ -27,6 +28,19 @@ def _ascending(values: tuple[float, float]) -> tuple[float, float]:
     if not values[0] < values[1]:
         raise ValueError("the first must be below the second")
     return values
+
+
+def _label(text: str) -> str:
+    require_labels("name", [text])
+    return text
+
+
+Name = Annotated[str, AfterValidator(_label)]
+"""As the labels of a dataset: not empty, printable, no spaces around it."""
+
+
+OptionalName = Annotated[str, AfterValidator(lambda text: _label(text) if text else text)]
+"""The same, or empty."""
 
 
 _POSITIVE = Field(gt=0.0)
@@ -69,6 +83,10 @@ Force = Annotated[float, _read("force"), _NOT_NEGATIVE]
 
 PositiveForce = Annotated[float, _read("force"), _POSITIVE]
 """In N, above 0."""
+
+
+SignedForce = Annotated[float, _read("force")]
+"""In N."""
 
 
 PositiveMoment = Annotated[float, _read("moment"), _POSITIVE]

@@ -11,7 +11,7 @@ import numpy as np
 from pydantic import Field, field_validator
 
 from elastocal.arrays import FloatArray
-from elastocal.cell._quantities import IDENTITY, Pose
+from elastocal.cell._quantities import IDENTITY, OptionalName, Pose
 from elastocal.cell.hardware import (
     Marker,
     MeshFile,
@@ -43,6 +43,7 @@ from elastocal.cell.procedure import (
 )
 from elastocal.cell.production import ProcessFile, ProductionPath, read_production
 from elastocal.cell.simulation import Fault, Simulation
+from elastocal.dataset import require_joint_names
 from elastocal.errors import ElastocalError, FileAccessError, SchemaError
 from elastocal.records import StrictModel, read_yaml
 from elastocal.robot import (
@@ -68,7 +69,7 @@ TOOLING = "tooling"
 class CellFile(StrictModel):
     """All keys of a cell file but ``schema``."""
 
-    name: str = ""
+    name: OptionalName = ""
     robot: RobotEntry
     tcp: Pose = IDENTITY
     """Tool centre point in the flange frame, z out of the tool."""
@@ -297,7 +298,7 @@ def load_cell(path: Path, *, production: bool = True) -> Cell:
     """
     path = Path(path)
     file = read_yaml(path, CellFile, SCHEMA)
-    robot = _at(f"{path}: robot", lambda: _robot(path, file))
+    robot = _at(f"{path}: robot", lambda: mounted_robot(path, file.robot, file.tcp))
     margins = _at(str(path), lambda: joint_margins(robot, file.limits))
     positions = _at(f"{path}: robot", lambda: external_positions(robot, file.robot, margins))
     torques = _at(f"{path}: limits.torque.values", lambda: torque_limits(robot, file.limits.torque))
@@ -327,8 +328,28 @@ def _at(place: str, make: Callable[[], _Result]) -> _Result:
         raise SchemaError(f"{place}: {error}") from error
 
 
-def _robot(path: Path, file: CellFile) -> Robot:
-    entry, place = file.robot, None
+def mounted_robot(path: Path, entry: RobotEntry, tcp: Pose) -> Robot:
+    """Return the robot of an entry up to the tool centre point, its rail included.
+
+    Parameters
+    ----------
+    path : Path
+        File that holds the entry; the URDF that it names is relative to it.
+    entry : RobotEntry
+        The robot.
+    tcp : Pose
+        Tool centre point in the flange.
+
+    Raises
+    ------
+    RobotError
+        If there is no such robot, or its URDF cannot be used.
+    DatasetError
+        If a joint has a name that no dataset can hold.
+    FileAccessError
+        If the URDF cannot be read.
+    """
+    place = None
     meshes: tuple[tuple[str, Path], ...] = ()
     if entry.urdf is None:
         urdf = catalogue.urdf(entry.model or "")
@@ -340,8 +361,11 @@ def _robot(path: Path, file: CellFile) -> Robot:
             meshes = find_meshes(urdf, place.parent)
         links = {link.get("name") for link in parse_urdf(urdf).findall("link")}
         tip = f"cell_{_TCP}" if _TCP in links else _TCP
-        urdf = with_tool(urdf, entry.flange, tip, file.tcp.T)
+        urdf = with_tool(urdf, entry.flange, tip, tcp.T)
         if entry.rail is not None:
             rail = entry.rail
             urdf = on_rail(urdf, Rail(rail.name, rail.axis, *rail.travel, T_rail_base=rail.pose.T))
-        return Robot.from_urdf(urdf, tip, meshes=meshes)
+        robot = Robot.from_urdf(urdf, tip, meshes=meshes)
+    # What the dataset of a run could not hold is refused before there is a run.
+    require_joint_names(robot.joint_names)
+    return robot

@@ -35,7 +35,7 @@ _WITH_PROCESS = (
         re.compile(
             r'^  (?:d_max: "175 mm" .*\n  # poses: (\d+) .*|poses: (\d+) .*\n  # .*)\n', re.M
         ),
-        r"  poses: \1\2                           # 6 to 8 may do: the plan tells what to expect"
+        r"  poses: \1\2                           # six to eight may do: `plan --poses 8`"
         '\n  # accuracy: "0.05 mm"               # or the error on production that is wanted\n',
     ),
     (

@@ -12,6 +12,8 @@ from elastocal.cell._quantities import (
     Direction,
     Length,
     Mass,
+    Name,
+    OptionalName,
     Point,
     Pose,
     PositiveAngleUpToPi,
@@ -75,7 +77,7 @@ class MeshFile(StrictModel):
 class Shape(StrictModel):
     """One solid with its place: a box, a cylinder, a sphere or a mesh."""
 
-    name: str = ""
+    name: OptionalName = ""
     pose: Pose = IDENTITY
     """Pose of the shape in its frame: the flange for parts of the tool, the base for fixtures."""
     box: Box | None = None
@@ -194,7 +196,7 @@ def _in_polygon(points: FloatArray, corners: FloatArray) -> BoolArray:
 class RailEntry(StrictModel):
     """A linear axis that carries the robot; its frame is then the base."""
 
-    name: str = "rail"
+    name: Name = "rail"
     """Name of its joint."""
     axis: Direction
     """Direction of positive travel in the rail's frame."""
@@ -244,7 +246,7 @@ class Tool(StrictModel):
 class SensorEntry(StrictModel):
     """A force/torque sensor between flange and tool."""
 
-    name: str = ""
+    name: OptionalName = ""
     pose: Pose = IDENTITY
     """Pose of its measuring frame in the flange frame."""
     force_range: tuple[PositiveForce, PositiveForce, PositiveForce]
@@ -267,11 +269,16 @@ class SensorEntry(StrictModel):
         """Shape (3,), in N·m."""
         return vector(self.moment_range)
 
+    @property
+    def ranges(self) -> FloatArray:
+        """Largest forces and moments, shape (6,), in N and N·m."""
+        return np.concatenate([self.largest_force, self.largest_moment])
+
 
 class Tracker(StrictModel):
     """One station: where a tracker stands."""
 
-    name: str
+    name: Name
     position: Point
     """Place of its beam's origin in base, in m; a rough value will do."""
     range: Range

@@ -19,6 +19,8 @@ from elastocal.units import parse_quantity
 
 _SLOWEST = 1e-12
 """A joint that is slower, in rad/s or m/s, has no speed."""
+_USABLE = 1e-4
+"""Slowest speed that is used, in rad/s or m/s: a quarter turn takes four hours."""
 _STEP_LENGTH = 0.25
 """Largest distance between positions of a linear axis that are searched, in m."""
 _STEP_ANGLE = math.radians(15.0)
@@ -142,6 +144,12 @@ def axis_speeds(robot: Robot, entry: MotionEntry) -> FloatArray:
             )
         if not speeds[index] >= _SLOWEST:
             raise RobotError(f"speed.{name}: {entry.speed[name]} must be above 0")
+        if not entry.override * speeds[index] >= _USABLE:
+            unit = "rad/s" if robot.revolute[index] else "m/s"
+            raise RobotError(
+                f"speed.{name}: {speeds[index]:.3g} {unit}, of which {entry.override:.3g} is used,"
+                f" is too slow: at least {_USABLE:g} {unit} must be used"
+            )
     return entry.override * speeds
 
 

@@ -16,26 +16,23 @@ import numpy as np
 
 from elastocal.arrays import FloatArray
 from elastocal.cell.motion import joint_positions
-from elastocal.dataset import (
-    find_columns,
-    in_file,
-    read_layout,
-    read_values,
-    row_blocks,
-    wrench_in_base,
-)
+from elastocal.dataset import PathTable, find_columns, in_file
 from elastocal.errors import PathError
 from elastocal.records import StrictModel
 from elastocal.results import brief_repr
 from elastocal.robot import Robot
-from elastocal.robot.inverse import InverseKinematics, check_limits, inverse_for, joints_along_path
-from elastocal.tables import TableRows
+from elastocal.robot.inverse import (
+    InverseKinematics,
+    RowName,
+    check_limits,
+    inverse_for,
+    joints_along_path,
+)
 
 _MOST = 500_000
 """Rows of a file: the robot's controller would take a day of them."""
 _FEW = 25
 """Rows of a course at which the positions of the rail are tried."""
-_COURSE = "course"
 
 
 class ProcessFile(StrictModel):
@@ -101,32 +98,21 @@ def read_production(
     """
     start = joint_positions(robot, "start", entry.start) if entry.start else home
     with in_file(path):
-        layout = read_layout(path)
-        columns = find_columns(layout.header, robot)
-        blocks = row_blocks(path, layout, _MOST)
-        table = next(blocks)
-        if next(blocks, None) is not None:
-            raise PathError(f"path has more than {_MOST} rows: keep every tenth of them")
-        values = read_values(table, columns)
-        names = _names(layout.header, table)
-        if values.T_base_tcp is None:
-            check_limits(robot, values.joints, lambda row: f"row {table.lines[row]}", "is")
-            q, T = values.joints, robot.forward(values.joints)
+        table = PathTable.open(path, lambda header: find_columns(header, robot))
+        rows = table.rows(_MOST, "keep every tenth of them")
+        names = rows.names("course") or ()
+        if rows.T_base_tcp is None:
+            check_limits(robot, rows.joints, rows.label, "is")
+            q, T = rows.joints, robot.forward(rows.joints)
         else:
-            T, posture = values.T_base_tcp, _PostureSearch(inverse_for(robot), start, external)
+            T, posture = rows.T_base_tcp, _PostureSearch(inverse_for(robot), start, external)
             q = np.vstack(
                 [
-                    posture.joints(T[rows], values.joints[rows], table.lines[rows])
-                    for _, rows in _courses(names, len(T))
+                    posture.joints(T[some], rows.joints[some], rows.part(some).label)
+                    for _, some in _courses(names, len(T))
                 ]
             )
-        return ProductionPath(q, *wrench_in_base(values, columns, T), names)
-
-
-def _names(header: Sequence[str], table: TableRows) -> tuple[str, ...]:
-    """Return the course of each row; nothing where there is no column of that name."""
-    places = [place for place, name in enumerate(header) if name.strip() == _COURSE]
-    return tuple(cells[place].strip() for place in places[:1] for cells in table.cells)
+        return ProductionPath(q, *rows.wrench_in_base(T), names)
 
 
 def _courses(names: Sequence[str], count: int) -> Iterator[tuple[str, slice]]:
@@ -149,7 +135,7 @@ class _PostureSearch:
     external: FloatArray
     """Positions of the external axes to choose from, shape (combination, external axis)."""
 
-    def joints(self, T_base_tcp: FloatArray, given: FloatArray, lines: Sequence[int]) -> FloatArray:
+    def joints(self, T_base_tcp: FloatArray, given: FloatArray, where: RowName) -> FloatArray:
         """Return the joints of a course, shape (row, joint), in rad or m.
 
         Parameters
@@ -158,16 +144,14 @@ class _PostureSearch:
             Poses, in m.
         given : ndarray, shape (row, external axis)
             Positions of the external axes; no columns where the file has none.
-        lines : sequence of int
-            Line of the file of each row.
+        where : callable
+            Names a row in a refusal.
         """
         axes = self.solver.robot.external_axes
         if axes and not given.shape[1]:
             given = np.broadcast_to(self._best_position(T_base_tcp), (len(T_base_tcp), axes))
-        check_limits(self.solver.robot, given, lambda row: f"row {lines[row]}", "is")
-        return joints_along_path(
-            self.solver, T_base_tcp, given, self.start, lambda row: f"row {lines[row]}"
-        )
+        check_limits(self.solver.robot, given, where, "is")
+        return joints_along_path(self.solver, T_base_tcp, given, self.start, where)
 
     def _best_position(self, T_base_tcp: FloatArray) -> FloatArray:
         """Return where the external axes stand farthest from the arm's joint limits."""

@@ -343,8 +343,8 @@ class Fault(StrictModel):
     @classmethod
     def _only_its_keys(cls, data: Any) -> Any:
         """Refuse a key that has no meaning for this kind of fault."""
-        if isinstance(data, dict) and data.get("kind") in _KEYS:
-            allowed = _KEYS[data["kind"]]
+        if isinstance(data, dict) and str(data.get("kind")) in _KEYS:
+            allowed = _KEYS[str(data["kind"])]
             for key in data:
                 if key in cls.model_fields and key not in _ALWAYS | allowed:
                     raise ValueError(

@@ -4,6 +4,7 @@ from .options import (
     CompensatorFile as CompensatorFile,
     Exclude as Exclude,
     Figures as Figures,
+    Force as Force,
     KeyFigures as KeyFigures,
     Marker as Marker,
     NewTool as NewTool,
@@ -20,8 +21,14 @@ from .options import (
     split_tools as split_tools,
 )
 from .output import (
+    bold as bold,
     console as console,
+    dim as dim,
+    green as green,
     print_json as print_json,
     print_lines as print_lines,
     progress_bars as progress_bars,
+    red as red,
+    visible as visible,
+    yellow as yellow,
 )

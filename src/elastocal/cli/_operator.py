@@ -159,7 +159,7 @@ class _Lines(_Screen):
             super().tell(step)
 
     def show(self, step: Progress) -> None:
-        self._console.print(progress_text(step), soft_wrap=True, markup=False)
+        self._console.print(progress_text(step), soft_wrap=True)
 
 
 def _leave_off() -> None:
@@ -222,7 +222,7 @@ class TerminalOperator:
     def warn(self, lines: Sequence[str]) -> None:
         """Print what should be known before anything moves."""
         for line in lines:
-            self._console.print(line, soft_wrap=True, markup=False)
+            self._console.print(line, soft_wrap=True)
 
     def confirm(self) -> None:
         """Ask whether the cell is clear.

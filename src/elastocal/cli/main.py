@@ -4,32 +4,31 @@ Exit codes: 0 done; 1 the work could not be done, with a one-line reason; 2 usag
 130 interrupted; 143 terminated. Commands import what they need when they run: help is quick.
 """
 
+# First: Ctrl-C during the imports below ends the program without a traceback.
+from elastocal.cli._signals import ended_cleanly, heard_again
+
+# isort: split
 import atexit
 import contextlib
 import gc
 import importlib
 import os
 import pkgutil
-import signal
 import sys
-import threading
-from collections.abc import Callable, Iterator
-from types import FrameType, ModuleType
+import warnings
+from collections.abc import Callable
+from types import ModuleType
 from typing import Any
 
 import typer
 from typer.core import TyperGroup
 
 from elastocal.cli import commands
+from elastocal.cli.output import visible
 from elastocal.errors import ElastocalError, FileAccessError
 
-_Handler = Callable[[int, FrameType | None], None]
-_PAUSE = 0.05
-"""Until a signal is sent once more, in s."""
 _GARBAGE = 50_000
 """Objects made before garbage is looked for: a short command makes fewer that are any."""
-_IMPORTS = "<frozen importlib"
-"""How the file names of Python's import machinery begin."""
 _UNUSED_BY_HELP = {"rich.markdown": "Markdown", "rich.traceback": "Traceback"}
 """Modules that typer imports with its help and that ours never needs: Markdown, tracebacks."""
 
@@ -59,8 +58,9 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
 )
 _ORDER = (
-    "robots", "init", "check", "plan", "run", "derive", "calibrate", "codec", "study", "predict",
-    "tool", "compensate", "stiffness", "export", "simulate_process", "compare", "report", "demo",
+    "robots", "init", "check", "plan", "run", "derive", "import_", "calibrate", "codec", "study",
+    "predict", "tool", "compensate", "stiffness", "export", "simulate_process", "compare", "report",
+    "demo",
 )  # fmt: skip
 """The order in which help lists commands: that of the work; others follow by name."""
 
@@ -70,9 +70,13 @@ def _found_commands() -> dict[str, Callable[..., None]]:
     names = {module.name for module in pkgutil.iter_modules(commands.__path__)}
     ordered = [*(name for name in _ORDER if name in names), *sorted(names - set(_ORDER))]
     package = commands.__name__
+    # A module cannot be named as a word of Python: the command import is in import_.py.
+    plain = {name: name.rstrip("_") for name in ordered}
     return {
-        name.replace("_", "-"): getattr(importlib.import_module(f"{package}.{name}"), f"_{name}")
-        for name in ordered
+        command.replace("_", "-"): getattr(
+            importlib.import_module(f"{package}.{name}"), f"_{command}"
+        )
+        for name, command in plain.items()
     }
 
 
@@ -104,12 +108,21 @@ def run() -> None:
     # time when all is taken down, takes a sixth of the time of a calibration.
     gc.set_threshold(_GARBAGE)
     atexit.register(gc.freeze)
+    # Warnings of libraries (an overflow, a division by zero) are for whoever looks for a mistake in
+    # the program, with -W; what a user is to know is a note of ours.
+    warnings.simplefilter("ignore", append=True)
     try:
         _check_output()
-        with _ended_cleanly():
+        with ended_cleanly():
             app()
+    except KeyboardInterrupt:
+        # Before typer is at work, or after it.
+        sys.exit(130)
     except ElastocalError as error:
         _complain(str(error))
+        sys.exit(1)
+    except MemoryError as error:
+        _complain(f"not enough memory: {error}" if str(error) else "not enough memory")
         sys.exit(1)
     except OSError as error:
         # Standard output that is full or gone; nearly every file of ours has its own refusal.
@@ -135,85 +148,7 @@ def _drop_output() -> None:
 
 
 def _complain(message: str) -> None:
-    typer.echo(f"elastocal: {' '.join(message.split())}", err=True)
+    typer.echo(f"elastocal: {visible(' '.join(message.split()))}", err=True)
 
 
-@contextlib.contextmanager
-def _ended_cleanly() -> Iterator[None]:
-    """Turn signals that end a program into exceptions that arrive.
-
-    SIGINT raises KeyboardInterrupt, SIGTERM and SIGHUP raise SystemExit with 128 and their
-    number, so that whoever writes a folder cleans it up. What ignores a signal already, as
-    ``nohup`` does, goes on ignoring it.
-
-    Python loses such an exception in two places, and a command would go on as if nothing had
-    happened: in finalisers and callbacks of weak references, where it is dropped, and in libraries
-    that catch everything while they are imported. So a signal that arrives during an import waits
-    for its end, and one that was dropped is sent once more. `elastocal run`, which has an arm to
-    bring to safety, has a way of its own: `elastocal.cli._operator`.
-    """
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
-    handlers: dict[int, _Handler] = {signal.SIGINT: _interrupt, signal.SIGTERM: _leave}
-    if hasattr(signal, "SIGHUP"):
-        handlers[signal.SIGHUP] = _leave
-    heeded = {n: h for n, h in handlers.items() if signal.getsignal(n) is not signal.SIG_IGN}
-    before = {number: signal.signal(number, handler) for number, handler in heeded.items()}
-    reported = sys.unraisablehook
-
-    def again(dropped: "sys.UnraisableHookArgs") -> None:
-        number = _number_of(dropped.exc_value)
-        if number is None:
-            reported(dropped)
-            return
-        signal.signal(number, handlers[number])
-        _send_soon(number)
-
-    sys.unraisablehook = again
-    try:
-        yield
-    finally:
-        sys.unraisablehook = reported
-        for number, handler in before.items():
-            signal.signal(number, handler)
-
-
-def _interrupt(number: int, frame: FrameType | None) -> None:
-    if _importing(frame):
-        _send_soon(number)
-    else:
-        raise KeyboardInterrupt
-
-
-def _leave(number: int, frame: FrameType | None) -> None:
-    if _importing(frame):
-        _send_soon(number)
-        return
-    # A second one must not break into the cleaning up.
-    signal.signal(number, signal.SIG_IGN)
-    sys.exit(128 + number)
-
-
-def _importing(frame: FrameType | None) -> bool:
-    while frame is not None:
-        if frame.f_code.co_filename.startswith(_IMPORTS):
-            return True
-        frame = frame.f_back
-    return False
-
-
-def _number_of(raised: BaseException | None) -> int | None:
-    """Return the signal that raised an exception; None where none did."""
-    if isinstance(raised, KeyboardInterrupt):
-        return signal.SIGINT
-    if isinstance(raised, SystemExit) and isinstance(raised.code, int) and raised.code > 128:
-        return raised.code - 128
-    return None
-
-
-def _send_soon(number: int) -> None:
-    # Sent to the main thread itself, or it would not wake up from what it waits for.
-    timer = threading.Timer(_PAUSE, signal.pthread_kill, (threading.main_thread().ident, number))
-    timer.daemon = True
-    timer.start()
+heard_again()

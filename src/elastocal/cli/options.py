@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from elastocal.errors import CompensationError, UnitError
-from elastocal.units import parse_quantity
+from elastocal.units import parse_number, parse_quantity
 
 START_HELP = (
     "Posture before the first row, a quantity a joint from base to tip:"
@@ -50,6 +50,9 @@ Exclude = Annotated[
     list[str] | None, typer.Option(help="Leave out POSE or POSE:LOAD_CASE; repeatable.")
 ]
 CompensatorFile = Annotated[Path | None, typer.Option(help="Settings of the compensator (.yaml).")]
+Force = Annotated[
+    bool, typer.Option("--force", help="Replace a file that this command did not write.")
+]
 Figures = Annotated[bool, typer.Option("--json", help="Print the figures as one JSON object.")]
 KeyFigures = Annotated[
     bool, typer.Option("--json", help="Print the key figures as one JSON object.")
@@ -89,7 +92,7 @@ def parse_direction(text: str) -> tuple[float, float, float]:
         If the text is not three numbers.
     """
     try:
-        x, y, z = (float(part) for part in text.split(","))
+        x, y, z = (parse_number(part) for part in text.split(","))
     except ValueError as error:
         raise CompensationError(
             f"direction {text!r} must be three numbers, e.g. '0, 0, -1'"
@@ -109,7 +112,7 @@ def parse_loads(text: str | None) -> tuple[float, ...]:
         If a part is not a number.
     """
     try:
-        return tuple(float(part) for part in (text or "").split(",") if text)
+        return tuple(parse_number(part) for part in (text or "").split(",") if text)
     except ValueError as error:
         raise CompensationError(f"--load {text!r} must be numbers, e.g. '0.5,-1'") from error
 

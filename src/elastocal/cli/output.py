@@ -1,25 +1,85 @@
 """Where output goes: people read standard error, programs read standard output.
 
+Whatever is printed for people holds names and paths of other people. None of it is taken for
+markup: what is to stand out passes through `bold` and its like, and what moves a terminal's cursor
+or changes its colours is shown as it would be typed.
+
 Rich is imported when something is printed: help does without most of it.
 """
 
 import json
+import re
 import sys
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
-from typing import TYPE_CHECKING
+from functools import partial
+from typing import TYPE_CHECKING, Any
 
 from elastocal.progress import Progress
+from elastocal.results import counted_alike
 
 if TYPE_CHECKING:
     from rich.console import Console
 
 
-def console() -> "Console":
-    """Return the console that people read; standard output stays free for data."""
-    from rich.console import Console
+_STYLES = ("bold", "dim", "red", "yellow", "green")
+_FIRST, _END = 0xE000, "\ue0ff"
+"""Letters for private use: a style begins with that of its number, and all end with the same."""
+_STARTS = {chr(_FIRST + number): style for number, style in enumerate(_STYLES)}
 
-    return Console(stderr=True, highlight=False, soft_wrap=False)
+
+def _styled(style: str, text: object) -> str:
+    return f"{chr(_FIRST + _STYLES.index(style))}{text}{_END}"
+
+
+bold, dim, red, yellow, green = (partial(_styled, style) for style in _STYLES)
+"""Return a text that `console` shows in a style."""
+
+
+def console(**options: Any) -> "Console":
+    """Return the console that people read; standard output stays free for data.
+
+    Parameters
+    ----------
+    **options : object
+        Of Rich's console, in place of ours.
+    """
+    from rich.console import Console
+    from rich.text import Text
+
+    class Screen(Console):
+        """A console that knows no markup but ours, in lines and in tables alike."""
+
+        def render_str(self, text: str, **options: Any) -> Text:
+            """Return a text with its styles."""
+            shown = Text(
+                style=options.get("style", ""),
+                justify=options.get("justify"),
+                overflow=options.get("overflow"),
+            )
+            styles: list[str] = []
+            for part in _PARTS.split(text):
+                if part in _STARTS:
+                    styles.append(_STARTS[part])
+                elif part == _END:
+                    styles = styles[:-1]
+                else:
+                    shown.append(visible(part), " ".join(styles) or None)
+            return shown
+
+    return Screen(**{"stderr": True, "highlight": False, "soft_wrap": False, **options})
+
+
+_PARTS = re.compile(f"([{''.join(_STARTS)}{_END}])")
+
+
+def visible(text: str) -> str:
+    """Return a text without what a terminal obeys, and without halves of letters."""
+    if text.isprintable():
+        return text
+    return "".join(
+        each if each.isprintable() or each in "\n\t " else ascii(each)[1:-1] for each in text
+    )
 
 
 def print_json(data: object) -> None:
@@ -37,14 +97,10 @@ def print_lines(lines: Iterable[str]) -> None:
     sys.stdout.flush()
 
 
-def print_remarks(console: "Console", label: str, texts: Iterable[str]) -> None:
+def print_remarks(screen: "Console", label: str, texts: Iterable[str]) -> None:
     """Print warnings or notes, a line each; many of one kind are one line with their number."""
-    from rich.text import Text
-
-    from elastocal.results import counted_alike
-
     for text in counted_alike(texts):
-        console.print(Text.assemble((f"{label}:", "yellow"), f" {text}"), soft_wrap=True)
+        screen.print(f"{yellow(f'{label}:')} {text}", soft_wrap=True)
 
 
 @contextmanager
@@ -54,7 +110,7 @@ def progress_bars() -> Iterator[Progress]:
 
     screen = console()
     bars = progress.Progress(
-        progress.TextColumn("{task.description}"),
+        progress.TextColumn("{task.description}", markup=False),
         progress.BarColumn(),
         progress.MofNCompleteColumn(),
         progress.TimeElapsedColumn(),

@@ -42,8 +42,8 @@ from elastocal.progress import Progress, silent
 from elastocal.robot import Robot
 
 _STAGE = "splits"
-_WORTH_PROCESSES = 6.0
-"""Processor time from which on all cores are used, in s; processes need a third of it to start."""
+_WORTH_PROCESSES = 4.0
+"""Processor time from which on all cores are used, in s; processes need half of it to start."""
 _GROWTH = 1.8
 """Ratio of training sizes at which springs are chosen anew."""
 _PACKAGES = ("elastocal", "numpy", "scipy")

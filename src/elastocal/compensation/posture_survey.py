@@ -27,16 +27,14 @@ from elastocal.arrays import BoolArray, FloatArray
 from elastocal.cell import Cell
 from elastocal.compensation.offline import programmed_rows
 from elastocal.compensation.process import arc_length
-from elastocal.dataset import find_columns, in_file, read_layout, read_values, row_blocks
+from elastocal.dataset import PathTable, find_columns, in_file
 from elastocal.errors import PathError
 from elastocal.identification import CalibratedModel, interval
 from elastocal.planning import cell_surface, collision_scene
 from elastocal.results import brief_repr
 from elastocal.robot import Robot, characteristic_length, smallest_singular_value
 from elastocal.robot.inverse import InverseKinematics
-from elastocal.tables import TableLayout, TableRows
 
-_BLOCK = 20_000
 """Rows of a path that are read at a time."""
 _MOST = 3_000_000
 """Postures of one survey; bounds memory and time."""
@@ -161,23 +159,12 @@ def read_stations(
     if not most >= 1:
         raise PathError(f"{most} stations: there must be at least 1")
     with in_file(path):
-        layout = read_layout(path)
-        columns = find_columns(layout.header, solver.robot, forces=False)
-        count = sum(len(block.lines) for block in row_blocks(path, layout, _BLOCK))
-        wanted = np.linspace(0, count - 1, min(most, count)).round().astype(int)
-        block = _rows(path, layout, set(wanted.tolist()))
-        values = read_values(block, columns)
-        labels = [f"row {line}" for line in block.lines]
-        q, T = programmed_rows(solver, values, start, labels.__getitem__)
-    return PathStations(tuple(block.lines), T, q)
-
-
-def _rows(path: Path, layout: TableLayout, wanted: set[int]) -> TableRows:
-    """Return some rows of a file by their numbers, in the order of the file."""
-    blocks = row_blocks(path, layout, _BLOCK)
-    rows = (row for block in blocks for row in zip(block.lines, block.cells, strict=True))
-    found = [row for number, row in enumerate(rows) if number in wanted]
-    return TableRows([cells for _, cells in found], [line for line, _ in found])
+        table = PathTable.open(
+            path, lambda header: find_columns(header, solver.robot, forces=False)
+        )
+        rows = table.spread(most)
+        q, T = programmed_rows(solver, rows.joints, rows.T_base_tcp, start, rows.label)
+    return PathStations(tuple(rows.table.lines), T, q)
 
 
 @brief_repr

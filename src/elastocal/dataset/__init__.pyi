@@ -1,29 +1,33 @@
-from ._layout import SCHEMA as SCHEMA, SCHEMAS as SCHEMAS, STATUSES as STATUSES
+from ._layout import (
+    SCHEMA as SCHEMA,
+    SCHEMAS as SCHEMAS,
+    STATUSES as STATUSES,
+    require_joint_names as require_joint_names,
+    require_labels as require_labels,
+)
 from ._store import read as read, read_dataset as read_dataset, write as write
 from .dataset import Dataset as Dataset
-from .load_rows import (
+from .merging import merge as merge, selected as selected
+from .path_columns import (
     LARGEST_FORCE as LARGEST_FORCE,
     LARGEST_MOMENT as LARGEST_MOMENT,
-    LoadRows as LoadRows,
-    joint_dimensions as joint_dimensions,
-    read_load_rows as read_load_rows,
-    read_robot_rows as read_robot_rows,
-    write_load_rows as write_load_rows,
-)
-from .merging import merge as merge, selected as selected
-from .path_table import (
     PathColumns as PathColumns,
-    PathValues as PathValues,
     WrenchColumns as WrenchColumns,
     find_columns as find_columns,
+    find_names as find_names,
+    find_posture_columns as find_posture_columns,
+    find_time as find_time,
     find_wrench_columns as find_wrench_columns,
+    guess_columns as guess_columns,
+    joint_dimensions as joint_dimensions,
+    plausible_range as plausible_range,
+)
+from .path_table import (
+    PathRows as PathRows,
+    PathTable as PathTable,
     in_file as in_file,
-    read_layout as read_layout,
-    read_values as read_values,
+    new_rows as new_rows,
     require_within_a_turn as require_within_a_turn,
-    row_blocks as row_blocks,
-    turned_to_base as turned_to_base,
-    wrench_in_base as wrench_in_base,
 )
 from .readings import (
     Presses as Presses,

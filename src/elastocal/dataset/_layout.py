@@ -6,7 +6,7 @@ variables are those of the paper's Procedure 1: ``P^c``, ``P^m``, ``F^m`` and ``
 
 import difflib
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -232,6 +232,64 @@ def joint_name_problem(name: str) -> str | None:
         return "a joint name is not empty and has no brackets, delimiters, quotes or line breaks"
     similar = difflib.get_close_matches(name, COLUMN_NAMES, n=1, cutoff=SIMILAR)
     return f"it is not a joint; did you mean {similar[0]!r}?" if similar else None
+
+
+def require_joint_names(names: Sequence[str]) -> None:
+    """Refuse joints that no dataset can hold; whatever reads a robot to measure with asks this.
+
+    Raises
+    ------
+    DatasetError
+        If there is none, or one cannot name a column of its own, or stands twice.
+    """
+    if not names:
+        raise DatasetError("coordinate 'joint' is empty: a robot has at least one joint")
+    for name in names:
+        if problem := joint_name_problem(name):
+            raise DatasetError(f"joint {name!r}: {problem}")
+        if any(prefix + other == name for prefix in JOINT_PREFIXES for other in names):
+            raise DatasetError(f"joint {name!r}: the name stands for a column of another joint")
+    require_unique("joint", names)
+
+
+def require_labels(kind: str, labels: Iterable[object]) -> None:
+    """Refuse labels that a table or a terminal cannot show as they are.
+
+    Parameters
+    ----------
+    kind : str
+        What they name: load case, campaign, station; for the message.
+    labels : iterable
+        The labels.
+
+    Raises
+    ------
+    DatasetError
+        With the first that is empty, not printable, or has spaces around it.
+    """
+    for label in map(str, labels):
+        if not label or label != label.strip() or not label.isprintable():
+            raise DatasetError(
+                f"{kind} {label!r} must be a printable name without spaces around it"
+            )
+
+
+def require_unique(kind: str, labels: Sequence[object]) -> None:
+    """Refuse labels that stand twice.
+
+    Raises
+    ------
+    DatasetError
+        With the first of them and both its places.
+    """
+    first: dict[object, int] = {}
+    for index, label in enumerate(labels):
+        if label in first:
+            raise DatasetError(
+                f"{kind} {label!r} stands twice, at positions {first[label]} and {index}:"
+                f" every {kind} needs its own label"
+            )
+        first[label] = index
 
 
 def freeze(array: NDArray[np.generic]) -> None:

@@ -29,8 +29,8 @@ from elastocal.dataset.dataset import Dataset
 from elastocal.errors import DatasetError, SchemaError, nearest
 from elastocal.files import read_text
 from elastocal.records import LabelledArrays, read_arrays, write_arrays
-from elastocal.tables import Column, TableError, write_table as write_rows
-from elastocal.units import split_column
+from elastocal.tables import Column, TableError, number_in_cell, write_table as write_rows
+from elastocal.units import parse_number, split_column
 
 _MEASURED = ("force", "moment", "controller_displacement", "marker_displacement")
 """Vectors that, with the joint positions, make a reading; a row with none of them is missing."""
@@ -235,7 +235,7 @@ def _grid(table: TableText, text: Mapping[str, int]) -> _Grid:
 
 def _integer(name: str, cell: str, line: int) -> int:
     try:
-        _refuse_underscore(cell)
+        parse_number(cell)
         return int(cell)
     except ValueError as error:
         raise DatasetError(f"row {line}: {name} is {cell!r}: it must be an integer") from error
@@ -252,18 +252,7 @@ def _numbers(table: TableText, columns: Sequence[Column]) -> FloatArray:
 def _number(cell: str) -> float:
     if not cell.strip():
         return math.nan
-    try:
-        _refuse_underscore(cell)
-        return float(cell)
-    except ValueError:
-        hint = " (the decimal sign is a point)" if "," in cell else ""
-        raise ValueError(f"is not a number{hint}") from None
-
-
-def _refuse_underscore(text: str) -> None:
-    """Refuse ``1_5``, which is 15 to Python and a slip of the pen in a table."""
-    if "_" in text:
-        raise ValueError(text)
+    return number_in_cell(cell)
 
 
 def _statuses(table: TableText, text: Mapping[str, int], empty: BoolArray) -> StatusArray:

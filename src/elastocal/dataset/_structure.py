@@ -11,7 +11,6 @@ from elastocal.dataset._layout import (
     CONDITIONED,
     COORDINATES,
     INTEGERS,
-    JOINT_PREFIXES,
     JOINT_VARIABLES,
     SCHEMA,
     SCHEMA_2,
@@ -22,7 +21,9 @@ from elastocal.dataset._layout import (
     Arrays,
     Labels,
     Variable,
-    joint_name_problem,
+    require_joint_names,
+    require_labels,
+    require_unique,
 )
 from elastocal.errors import DatasetError, nearest
 from elastocal.records import LabelledArray, LabelledArrays
@@ -91,39 +92,19 @@ def check_structure(labels: Labels, arrays: Arrays, joint_units: Sequence[str]) 
     DatasetError
         Naming the label, or the array and its shape.
     """
-    _check_unique("pose", labels["pose"])
-    _check_printable("load case", labels["load_case"])
-    _check_unique("load case", labels["load_case"])
-    _check_printable("campaign", labels["campaign"])
+    require_unique("pose", labels["pose"])
+    require_labels("load case", labels["load_case"])
+    require_unique("load case", labels["load_case"])
+    require_labels("campaign", labels["campaign"])
     if len(labels["campaign"]) not in (0, len(labels["pose"])):
         raise DatasetError(
             f"{len(labels['campaign'])} campaigns given for {len(labels['pose'])} poses"
         )
-    _check_joint_names([str(label) for label in labels["joint"]])
+    require_joint_names([str(label) for label in labels["joint"]])
     sizes = _sizes(labels, joint_units)
     for variable in (*VARIABLES, *INTEGERS):
         if variable.name in arrays:
             _fitted(arrays[variable.name], variable, sizes, broadcast=False)
-
-
-def _check_printable(kind: str, labels: Sequence[object]) -> None:
-    for label in map(str, labels):
-        if not label or label != label.strip() or not label.isprintable():
-            raise DatasetError(
-                f"{kind} {label!r} must be a printable name without spaces around it"
-            )
-
-
-def _check_joint_names(joints: Sequence[str]) -> None:
-    if not joints:
-        raise DatasetError("coordinate 'joint' is empty: a robot has at least one joint")
-    for label in joints:
-        problem = joint_name_problem(label)
-        if problem:
-            raise DatasetError(f"joint {label!r}: {problem}")
-        if any(prefix + other == label for prefix in JOINT_PREFIXES for other in joints):
-            raise DatasetError(f"joint {label!r}: the name stands for a column of another joint")
-    _check_unique("joint", joints)
 
 
 def check_names(data: LabelledArrays) -> None:
@@ -181,17 +162,6 @@ def _news(names: Collection[str], attributes: Mapping[str, object]) -> list[str]
     news += [f"attribute {name!r}" for name in ("gravity", "check") if name in attributes]
     conditioned = attributes.get("history") == CONDITIONED
     return news + ([f"attribute 'history' {CONDITIONED!r}"] if conditioned else [])
-
-
-def _check_unique(kind: str, labels: Sequence[object]) -> None:
-    first: dict[object, int] = {}
-    for index, label in enumerate(labels):
-        if label in first:
-            raise DatasetError(
-                f"{kind} {label!r} stands twice, at positions {first[label]} and {index}:"
-                f" every {kind} needs its own label"
-            )
-        first[label] = index
 
 
 def _text_array(labels: ArrayLike | None) -> np.ndarray:

@@ -137,9 +137,7 @@ def calibrate(
     held_out = leave_poses_out(weighted)
     unexplained = held_out.mean / float(np.linalg.norm(kept.d, axis=1).mean())
     draws = bootstrap(PoseGrams.of(weighted), options.draws, rng)
-    by = _widening(weighted, solution.compliance, draws, held_out, ladder)
-    if unexplained > MOST_UNEXPLAINED:
-        by = max(by, distrust_factor(weighted, solution.compliance, draws, held_out))
+    by = _widening(weighted, solution.compliance, draws, held_out, ladder, unexplained)
     widened = widen_draws(weighted, solution.compliance, draws, by)
     springs, frames = weighted.springs, slice(weighted.springs.stop, None)
     compliance, plain = solution.compliance[springs], weighted.without_frames()
@@ -185,14 +183,18 @@ def _widening(
     draws: FloatArray,
     held_out: HeldOut,
     ladder: Sequence[Climbed],
+    unexplained: float,
 ) -> float:
-    """Return how far draws are stretched for few poses, and for doubt about the model."""
+    """Return how far draws are stretched: for few poses, and for doubt about or in the model."""
     by = widening_factor(problem, compliance, draws, held_out.compliance)
     stretched = compliance + by * (draws - compliance)
     open_to_choice = [each for each in ladder if np.isfinite(each.apart)]
     figures = [(each.difference, each.standard_error, each.apart) for each in open_to_choice]
     moved = doubt(*np.array(figures).reshape(-1, 3).T)
-    return by * doubt_factor(problem, compliance, stretched, moved)
+    by *= doubt_factor(problem, compliance, stretched, moved)
+    if unexplained > MOST_UNEXPLAINED:
+        return max(by, distrust_factor(problem, compliance, draws, held_out))
+    return by
 
 
 def _data_warnings(

@@ -18,6 +18,7 @@ from elastocal.arrays import FloatArray
 from elastocal.errors import IdentificationError, nearest
 from elastocal.records import record
 from elastocal.results import brief_repr
+from elastocal.units import parse_number
 
 Weights = Literal["none", "sigma"]
 _WEIGHTS: tuple[Weights, ...] = get_args(Weights)
@@ -210,7 +211,7 @@ def parse_bounds(bounds: str | Sequence[float]) -> tuple[float, float]:
     """
     parts = [each.strip() for each in bounds.split(",")] if isinstance(bounds, str) else bounds
     try:
-        low, high = map(float, parts)
+        low, high = (parse_number(str(part)) for part in parts)
     except (TypeError, ValueError) as error:
         raise IdentificationError(f"bounds {bounds!r} must be two numbers, e.g. '0,inf'") from error
     for part, value in zip(parts, (low, high), strict=True):

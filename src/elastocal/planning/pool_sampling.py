@@ -66,10 +66,8 @@ def point_checks(cell: Cell, surface: Surface, points: SurfacePoints) -> tuple[P
 
     Parameters
     ----------
-    cell : Cell
-        The cell.
-    surface : Surface
-        What the robot presses on.
+    cell, surface : Cell, Surface
+        Who presses, and on what.
     points : SurfacePoints
         The sampled points that postures refer to.
     """
@@ -104,10 +102,8 @@ def sample_pool(
 
     Parameters
     ----------
-    cell : Cell
-        The cell.
-    surface : Surface
-        What the robot presses on.
+    cell, surface : Cell, Surface
+        Who presses, and on what.
     rng : Generator
         Seeded source of randomness.
     jobs : int, optional

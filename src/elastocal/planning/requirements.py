@@ -55,10 +55,8 @@ def require_loads_possible_anywhere(cell: Cell, surface: Surface) -> None:
 
     Parameters
     ----------
-    cell : Cell
-        The cell.
-    surface : Surface
-        What the robot presses on.
+    cell, surface : Cell, Surface
+        Who presses, and on what.
 
     Raises
     ------

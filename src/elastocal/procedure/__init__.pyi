@@ -6,6 +6,7 @@ from .derive import (
     read_run as read_run,
     read_summary as read_summary,
     reduce_pose as reduce_pose,
+    rehearse_derivation as rehearse_derivation,
     write_derived as write_derived,
 )
 from .record import (

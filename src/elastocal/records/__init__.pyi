@@ -1,3 +1,11 @@
+from ._array_records import (
+    Variable as Variable,
+    array_fields as array_fields,
+    arrays_of as arrays_of,
+    read_netcdf as read_netcdf,
+    variables_of as variables_of,
+    write_netcdf as write_netcdf,
+)
 from ._codec import (
     from_data as from_data,
     read_json as read_json,
@@ -10,14 +18,9 @@ from ._codec import (
 from ._netcdf import (
     LabelledArray as LabelledArray,
     LabelledArrays as LabelledArrays,
-    Variable as Variable,
-    array_fields as array_fields,
-    arrays_of as arrays_of,
+    netcdf_image as netcdf_image,
     read_arrays as read_arrays,
-    read_netcdf as read_netcdf,
-    variables_of as variables_of,
     write_arrays as write_arrays,
-    write_netcdf as write_netcdf,
 )
 from ._strict import (
     StrictModel as StrictModel,

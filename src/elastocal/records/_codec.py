@@ -13,9 +13,10 @@ import numpy as np
 
 from elastocal import files
 from elastocal.errors import SchemaError
-from elastocal.files import read_text
+from elastocal.files import Limit, read_text
 
 T = TypeVar("T")
+_MOST_NESTING = Limit("ELASTOCAL_MAX_NESTING", 64, "levels")
 _CONFIG = {"extra": "forbid", "allow_inf_nan": False}
 
 
@@ -147,9 +148,32 @@ def read_json_data(path: Path) -> Any:
     """
     text = read_text(path)
     try:
-        return json.loads(text)
+        data = json.loads(text)
     except (ValueError, RecursionError) as error:
         raise SchemaError(f"{path} is not valid JSON: {parser_reason(error)}") from error
+    require_shallow(data, str(path))
+    return data
+
+
+def require_shallow(data: Any, what: str) -> None:
+    """Refuse lists and mappings that are nested so deeply that who follows them runs out of stack.
+
+    Raises
+    ------
+    SchemaError
+        If they are; ``what`` is the file, for the message.
+    """
+    level, depth, most = [data] if isinstance(data, dict | list) else [], 0, _MOST_NESTING.most
+    while level:
+        depth += 1
+        if depth > most:
+            _MOST_NESTING.require(depth, f"{what}: how deeply its brackets are nested")
+        level = [
+            inner
+            for node in level
+            for inner in (node.values() if isinstance(node, dict) else node)
+            if isinstance(inner, dict | list)
+        ]
 
 
 def parser_reason(error: Exception) -> str:

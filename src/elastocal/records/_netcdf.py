@@ -2,34 +2,43 @@
 
 What is written here is what ``xarray.open_dataset`` and any other reader of NetCDF expects: the
 data model is theirs, the conventions are CF (https://cfconventions.org).
-
-A record whose fields are arrays says in its annotations how each lies in the file: a field
-``contact: Annotated[FloatArray, Variable(("candidate", "axis"), "m", "contact point")]`` is the
-variable ``contact``; a tuple of texts labels a dimension. Fields without a `Variable` are texts,
-and attributes of the file.
 """
 
-import dataclasses
-import typing
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import partial
 from io import BytesIO
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 
-from elastocal.errors import ElastocalError, FileAccessError, SchemaError
-from elastocal.files import require_file, write_bytes
-from elastocal.records._codec import schema_of
+from elastocal.errors import FileAccessError, SchemaError
+from elastocal.files import Limit, require_file, write_bytes
+from elastocal.parallel import GuardedError, guarded
 from elastocal.results import brief_repr
-
-T = TypeVar("T")
 
 _SIGNATURE = b"\x89HDF\r\n\x1a\n"
 """First bytes of an HDF5 file, which every NetCDF4 file is (HDF5 file format, section II.A)."""
 _CHECKED = {"fletcher32": True}
 """A checksum for each chunk: a byte that a disk has changed is an error, not another number."""
+_MOST_ARRAYS = Limit("ELASTOCAL_MAX_ARRAYS_MB", 256, "MB of numbers")
+_MOST_SECONDS = Limit("ELASTOCAL_MAX_SECONDS", 8, "s of reading")
+_MEMORY_PER_ARRAYS = 4
+"""Memory that reading takes, in terms of the numbers that are read."""
+_MEGABYTE = 1_000_000
+_DAMAGE = (
+    SchemaError,
+    OSError,
+    ValueError,
+    LookupError,
+    RuntimeError,
+    TypeError,
+    AttributeError,
+    OverflowError,
+    MemoryError,
+)
+"""What h5py and h5netcdf raise for damaged files; to a user all of it means the same."""
 _PACKED = {"compression": "gzip", "compression_opts": 4, "shuffle": True}
 _STORAGE = ("_FillValue", "missing_value", "scale_factor", "add_offset", "_Encoding", "coordinates")
 """Attributes that say how values are stored (CF section 2.5.1, 8.1), not what they mean."""
@@ -111,16 +120,16 @@ def read_arrays(path: Path, schema: str = "") -> LabelledArrays:
         If the file is missing, unreadable or empty.
     """
     _check_signature(path)
-    import h5netcdf
+    # Imported here, or each child would do it anew.
+    import h5netcdf  # noqa: F401
 
     try:
-        # HDF5 without dimension scales gets made-up ones; the validation then names what lacks.
-        with h5netcdf.File(path, "r", decode_vlen_strings=True, phony_dims="sort") as file:
-            found = _contents(file)
-    except (OSError, ValueError, KeyError, RuntimeError) as error:
-        # What the libraries raise for damaged files; their own text is the only diagnosis.
-        reason = " ".join(str(error).split())
-        raise SchemaError(f"{path}: not a readable NetCDF4 file: {reason}") from error
+        memory = _MEMORY_PER_ARRAYS * _MOST_ARRAYS.most
+        found = guarded(partial(_read, Path(path)), _MOST_SECONDS.most, memory)
+    except GuardedError as error:
+        raise SchemaError(f"{path}: not a readable NetCDF4 file: {error}") from error
+    if isinstance(found, str):
+        raise SchemaError(f"{path}: not a readable NetCDF4 file: {found}")
     if schema:
         # Pydantic comes with it, which datasets do without.
         from elastocal.records._validation import check_schema
@@ -139,9 +148,14 @@ def write_arrays(path: Path, arrays: LabelledArrays) -> None:
     FileAccessError
         If the file cannot be written.
     """
+    # In memory: HDF5 crashes the process when a disk is full, at the latest when it closes.
+    write_bytes(path, netcdf_image(arrays))
+
+
+def netcdf_image(arrays: LabelledArrays) -> memoryview:
+    """Return the bytes of a NetCDF4 file."""
     import h5netcdf
 
-    # In memory: HDF5 crashes the process when a disk is full, at the latest when it closes.
     image = BytesIO()
     with h5netcdf.File(image, "w") as file:
         file.attrs.update(arrays.attributes)
@@ -151,7 +165,7 @@ def write_arrays(path: Path, arrays: LabelledArrays) -> None:
             labels = [each for each in arrays.auxiliary if _labels(arrays, each, name)]
             if labels:
                 file.variables[name].attrs["coordinates"] = " ".join(labels)
-    write_bytes(path, image.getbuffer())
+    return image.getbuffer()
 
 
 def _check_signature(path: Path) -> None:
@@ -165,6 +179,38 @@ def _check_signature(path: Path) -> None:
         raise FileAccessError(f"cannot read {path}: the file is empty")
     if start != _SIGNATURE:
         raise SchemaError(f"{path}: not a NetCDF4 file: it does not begin with the HDF5 signature")
+
+
+def _read(path: Path) -> LabelledArrays | str:
+    """Return the contents of a file, or why it cannot be read."""
+    import h5netcdf
+    import h5py
+
+    try:
+        with h5py.File(path, "r") as image:
+            _require_readable(image)
+            # HDF5 without dimension scales gets made-up ones; the validation names what lacks.
+            with h5netcdf.File(image, "r", decode_vlen_strings=True, phony_dims="sort") as file:
+                return _contents(file)
+    except _DAMAGE as error:
+        # Their own text is the only diagnosis.
+        return " ".join(str(error).split()) or type(error).__name__
+
+
+def _require_readable(image: Any) -> None:
+    """Refuse more numbers than fit into memory, and what lies in other files."""
+    import h5py
+
+    size = 0
+    for name in image:
+        if not isinstance(image.get(name, getlink=True), h5py.HardLink):
+            raise SchemaError(f"{name!r:.60} is a link, maybe into another file")
+        if isinstance(image[name], h5py.Dataset):
+            array = image[name]
+            if array.external or array.is_virtual:
+                raise SchemaError(f"the values of {name!r:.60} lie in another file")
+            size += (array.size or 0) * array.dtype.itemsize
+            _MOST_ARRAYS.require(size / _MEGABYTE, f"what {name!r:.60} and those before it hold")
 
 
 def _contents(file: Any) -> LabelledArrays:
@@ -193,6 +239,8 @@ def _attributes(holder: Any) -> dict[str, Any]:
 def _decoded(variable: Any, stated: dict[str, Any]) -> LabelledArray:
     """Return the values that a variable means by what it stores (CF section 2.5.1, 8.1)."""
     values, dims = np.asarray(variable[...]), tuple(variable.dimensions)
+    if values.dtype.kind not in "biufSUO":
+        raise SchemaError(f"{variable.name!r:.60} holds values of type {values.dtype}")
     if values.dtype == "S1" and dims:
         # Texts as rows of characters, from before NetCDF had texts.
         values, dims = _joined_characters(values), dims[:-1]
@@ -248,118 +296,3 @@ def _labels(arrays: LabelledArrays, label: str, name: str) -> bool:
     if name in arrays.coordinates:
         return False
     return set(arrays[label].dims) <= set(arrays[name].dims)
-
-
-@brief_repr
-@dataclass(frozen=True)
-class Variable:
-    """How a field lies in a NetCDF file."""
-
-    dims: tuple[str, ...]
-    """Name of each dimension."""
-    units: str = ""
-    """Unit of the numbers; empty where they have none, or not all the same."""
-    meaning: str = ""
-    """What the numbers are, in words (``long_name``)."""
-    flags: str = ""
-    """Field whose texts the numbers count; -1 is none of them (CF section 3.5)."""
-
-
-def variables_of(cls: type) -> dict[str, Variable]:
-    """Return the variables of a record's file, by field."""
-    hints = typing.get_type_hints(cls, include_extras=True)
-    return {
-        each.name: note
-        for each in dataclasses.fields(cls)
-        for note in getattr(hints[each.name], "__metadata__", ())
-        if isinstance(note, Variable)
-    }
-
-
-def arrays_of(value: Any) -> dict[str, LabelledArray]:
-    """Return the fields of a record that are variables: numbers first, then texts.
-
-    Integers take 32 bits. Numbers are compressed and without a fill value, so that NaN and inf
-    are stored as they are.
-    """
-    numbers: dict[str, LabelledArray] = {}
-    texts: dict[str, LabelledArray] = {}
-    for name, variable in variables_of(type(value)).items():
-        values = getattr(value, name)
-        if isinstance(values, tuple):
-            texts[name] = LabelledArray(variable.dims, np.array(values, dtype=np.str_))
-            continue
-        notes: dict[str, Any] = {"long_name": variable.meaning} if variable.meaning else {}
-        notes |= {"units": variable.units} if variable.units else {}
-        if variable.flags:
-            words = getattr(value, variable.flags)
-            notes["flag_values"] = np.arange(-1, len(words), dtype=np.int32)
-            notes["flag_meanings"] = " ".join(["none", *words])
-        stored = values.astype(np.int32) if values.dtype.kind in "iu" else values
-        numbers[name] = LabelledArray(variable.dims, stored, notes, packed=True)
-    return numbers | texts
-
-
-def array_fields(cls: type, arrays: LabelledArrays) -> dict[str, Any]:
-    """Return the fields of a record that a file holds as variables; other variables are left alone.
-
-    Raises
-    ------
-    SchemaError
-        If a variable is missing or has other dimensions; the message does not name the file.
-    """
-    variables = variables_of(cls)
-    for name, variable in variables.items():
-        if name not in arrays:
-            raise SchemaError(f"variable {name!r} is missing")
-        if arrays[name].dims != variable.dims:
-            raise SchemaError(f"{name} has dimensions {arrays[name].dims}, not {variable.dims}")
-    found: dict[str, Any] = {}
-    for name, variable in variables.items():
-        array = arrays[name]
-        is_text = array.values.dtype.kind in "OU"
-        found[name] = tuple(array.values.tolist()) if is_text else array.values
-        if variable.flags:
-            words = str(array.attributes.get("flag_meanings", "")).split()
-            found[variable.flags] = tuple(words[1:])
-    return found
-
-
-def write_netcdf(path: Path, value: Any) -> None:
-    """Write a record of arrays to a NetCDF4 file, whole or not at all.
-
-    Raises
-    ------
-    FileAccessError
-        If the file cannot be written.
-    """
-    cls = type(value)
-    attributes = {name: getattr(value, name) for name in _text_fields(cls)}
-    write_arrays(path, LabelledArrays(arrays_of(value), {"schema": schema_of(cls)} | attributes))
-
-
-def read_netcdf(path: Path, cls: type[T]) -> T:
-    """Return the record of arrays in a NetCDF4 file.
-
-    Raises
-    ------
-    SchemaError
-        If the file is not NetCDF4, states another schema, or does not fit the record.
-    FileAccessError
-        If the file cannot be read.
-    """
-    arrays = read_arrays(path, schema_of(cls))
-    try:
-        texts = {name: str(arrays.attributes[name]) for name in _text_fields(cls)}
-        return cls(**array_fields(cls, arrays), **texts)
-    except KeyError as error:
-        raise SchemaError(f"{path}: attribute {error} is missing") from error
-    except (ElastocalError, TypeError, ValueError) as error:
-        # A damaged file may hold anything; what it is says the record's own refusal.
-        raise SchemaError(f"{path}: {' '.join(str(error).split())}") from error
-
-
-def _text_fields(cls: Any) -> list[str]:
-    variables = variables_of(cls)
-    taken = {*variables, *(variable.flags for variable in variables.values())}
-    return [each.name for each in dataclasses.fields(cls) if each.name not in taken]

@@ -4,8 +4,11 @@ Unknown keys are refused with the nearest known one; a problem is reported by it
 file, for example ``springs.2.axis``.
 """
 
+import math
+from collections import Counter
 from collections.abc import Iterable
 from functools import cache
+from itertools import chain
 from pathlib import Path
 from typing import Annotated, Any, TypeVar, get_args, get_origin
 
@@ -13,8 +16,8 @@ import yaml
 from pydantic import BaseModel, BeforeValidator, ConfigDict, ValidationInfo, field_validator
 
 from elastocal.errors import SchemaError
-from elastocal.files import read_text
-from elastocal.records._codec import from_data, parser_reason
+from elastocal.files import Limit, read_text
+from elastocal.records._codec import from_data, parser_reason, require_shallow
 
 
 class StrictModel(BaseModel):
@@ -31,16 +34,54 @@ class StrictModel(BaseModel):
         return value
 
 
+_KILOBYTE = 1_000
+_PARSER_ERRORS = (ValueError, TypeError, AttributeError, LookupError, OverflowError, RecursionError)
+"""What PyYAML raises for scalars and keys that it takes for a date, a number, a set."""
 Model = TypeVar("Model", bound=StrictModel)
 
 
+_MOST_YAML = Limit("ELASTOCAL_MAX_YAML_KB", 1_000, "kB of YAML")
+_MOST_VALUES = Limit("ELASTOCAL_MAX_YAML_VALUES", 20_000, "values in a YAML file")
+"""Both are a hundred times what the largest cell has, and a second or two of reading."""
+
+
 class _UniqueKeyLoader(yaml.SafeLoader):
-    """The safe loader, but a key that stands twice is an error instead of the last one winning."""
+    """The safe loader, but a key that stands twice is an error instead of the last one winning.
+
+    The values of a file are counted before they are made: aliases and merge keys make few of
+    them into any number.
+    """
+
+    _count = 0
+
+    def compose_node(self, parent: yaml.Node | None, index: Any) -> yaml.Node | None:
+        """Return the next node; called for each."""
+        self._count += 1
+        if self._count > _MOST_VALUES.most:
+            _MOST_VALUES.require(self._count, "what it holds")
+        return super().compose_node(parent, index)
+
+    def get_single_node(self) -> yaml.Node | None:
+        """Return the file as nodes, of which there are not too many once aliases are followed."""
+        node = super().get_single_node()
+        if node is not None:
+            _MOST_VALUES.require(_count_values(node, {}), "what it holds with its aliases")
+        return node
+
+
+def _count_values(node: yaml.Node, known: dict[int, float]) -> float:
+    """Return the number of values that a node stands for; infinite where it holds itself."""
+    if id(node) not in known:
+        known[id(node)] = math.inf
+        inner = node.value if isinstance(node, yaml.CollectionNode) else ()
+        parts = chain.from_iterable(inner) if isinstance(node, yaml.MappingNode) else inner
+        known[id(node)] = 1.0 + sum(_count_values(part, known) for part in parts)
+    return known[id(node)]
 
 
 def _unique_mapping(loader: yaml.SafeLoader, node: yaml.MappingNode) -> dict[Any, Any]:
-    keys = [key.value for key, _ in node.value]
-    twice = sorted({str(key) for key in keys if keys.count(key) > 1})
+    counts = Counter(key.value for key, _ in node.value if isinstance(key, yaml.ScalarNode))
+    twice = sorted(key for key, count in counts.items() if count > 1)
     if twice:
         raise yaml.YAMLError(f"key {twice[0]!r} stands twice,{node.start_mark}")
     return loader.construct_mapping(node, deep=True)
@@ -68,16 +109,21 @@ def read_yaml_data(path: Path) -> Any:
     Raises
     ------
     SchemaError
-        If the file is not YAML, or a key stands twice.
+        If the file is not YAML, a key stands twice, or it holds more than can be read in seconds.
     FileAccessError
         If it cannot be read.
     """
     text = read_text(path)
+    _MOST_YAML.require(len(text) / _KILOBYTE, f"{path} has {len(text) / _KILOBYTE:.0f} kB, which")
     try:
         # The loader is PyYAML's safe one with duplicate keys refused.
-        return yaml.load(text, _UniqueKeyLoader)
-    except (yaml.YAMLError, ValueError, RecursionError) as error:
+        data = yaml.load(text, _UniqueKeyLoader)
+        require_shallow(data, "it")
+    except SchemaError as error:
+        raise SchemaError(f"{path}: {error}") from error
+    except (*_PARSER_ERRORS, yaml.YAMLError) as error:
         raise SchemaError(f"{path} is not valid YAML: {parser_reason(error)}") from error
+    return data
 
 
 def _holds_truth(value: Any) -> bool:

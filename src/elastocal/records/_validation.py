@@ -49,6 +49,10 @@ def validate(data: Any, cls: type[T], what: str) -> T:
         return adapter.validate_json(json.dumps(data), strict=True)
     except ValidationError as error:
         raise SchemaError(f"{what}: {_first_problem(error, cls, data)}") from error
+    except (TypeError, LookupError, AttributeError, OverflowError, RecursionError) as error:
+        # Of a validator that was given something of another shape than the field's.
+        reason = " ".join(str(error).split())
+        raise SchemaError(f"{what} does not fit its schema: {reason}") from error
 
 
 @cache

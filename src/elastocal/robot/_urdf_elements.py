@@ -5,7 +5,7 @@ import xml.etree.ElementTree as ElementTree
 from collections import Counter
 
 from elastocal.errors import RobotError, nearest
-from elastocal.units import impossible
+from elastocal.units import impossible, parse_number
 from elastocal.wording import listed
 
 _NUMBERS = {
@@ -102,7 +102,7 @@ def _floats(text: str) -> list[float]:
     if "_" in text or not text.isascii():
         return []
     try:
-        return [float(part) for part in text.split()]
+        return [parse_number(part) for part in text.split()]
     except ValueError:
         return []
 

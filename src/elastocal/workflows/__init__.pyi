@@ -7,6 +7,8 @@ __all__ = [
     "demo",
     "derive",
     "export",
+    "guess_map",
+    "import_logs",
     "init",
     "plan",
     "predict",
@@ -19,11 +21,7 @@ __all__ = [
 ]  # the commands: what the package itself exports of these
 
 from ._file_kinds import FileDescription as FileDescription
-from ._inputs import (
-    NewTool as NewTool,
-    find_robot as find_robot,
-    refuse_overwriting as refuse_overwriting,
-)
+from ._inputs import NewTool as NewTool, find_robot as find_robot
 from ._operator_and_devices import (
     KINDS as KINDS,
     SOURCES as SOURCES,
@@ -70,6 +68,15 @@ from .demo import (
 )
 from .derive import DeriveResult as DeriveResult, DeriveSettings as DeriveSettings, derive as derive
 from .export import ExportResult as ExportResult, ExportSettings as ExportSettings, export as export
+from .import_logs import (
+    GuessMapResult as GuessMapResult,
+    GuessMapSettings as GuessMapSettings,
+    ImportFigures as ImportFigures,
+    ImportLogsResult as ImportLogsResult,
+    ImportLogsSettings as ImportLogsSettings,
+    guess_map as guess_map,
+    import_logs as import_logs,
+)
 from .init import InitResult as InitResult, InitSettings as InitSettings, init as init
 from .plan import (
     ComparedSpread as ComparedSpread,

@@ -21,6 +21,7 @@ from elastocal.codec import (
 from elastocal.compensation import read_settings
 from elastocal.compensation.conditioning import read_tool
 from elastocal.compensation.process import TABLE, read_process, read_table
+from elastocal.dataset import require_joint_names
 from elastocal.elastic import read_springs
 from elastocal.errors import SchemaError
 from elastocal.identification import read_model
@@ -152,6 +153,7 @@ def robot_file(path: Path, tcp: str | None = None) -> FileDescription:
         root = parse_urdf(text)
         tips = tip_links(root)
         robot = Robot.from_urdf(text, tcp or max(tips, key=lambda tip: tips[tip]))
+        require_joint_names(robot.joint_names)
         beside = [leaf for leaf in leaf_links(root) if leaf not in tips]
     return "robot description", {
         "robot": robot.name,

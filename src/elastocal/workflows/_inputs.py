@@ -1,6 +1,6 @@
 """What several workflows ask of their inputs: robot, postures and frames as people write them.
 
-Also that a model fits the cell, how far it carries, and that no output takes an input's place.
+Also that a model fits the cell, and how far it carries.
 """
 
 import contextlib
@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from elastocal.arrays import FloatArray
-from elastocal.dataset import Dataset
-from elastocal.errors import ElastocalError, FileAccessError, RobotError, UnitError
+from elastocal.dataset import Dataset, require_joint_names
+from elastocal.errors import ElastocalError, RobotError, UnitError
 from elastocal.identification import (
     CalibratedModel,
     attainable_rank,
@@ -252,18 +252,6 @@ def parse_frame(
     return T_from_xyzabc(*(parse_quantity(p, kind) for p, kind in zip(parts, kinds, strict=True)))
 
 
-def refuse_overwriting(out: Path | None, *inputs: Path) -> None:
-    """Refuse an output path that is also an input: measurements are not to be replaced.
-
-    Raises
-    ------
-    FileAccessError
-        If the paths are the same file.
-    """
-    if out is not None and any(out.resolve() == path.resolve() for path in inputs):
-        raise FileAccessError(f"--out {out} is an input of this command: name another file")
-
-
 def _robot_at(urdf: str, tcp: str | None, T_tcp_tool: FloatArray | None) -> Robot:
     """Return the robot of a URDF up to a link, its only tip by default, or to a tool behind it."""
     if not tcp:
@@ -273,7 +261,9 @@ def _robot_at(urdf: str, tcp: str | None, T_tcp_tool: FloatArray | None) -> Robo
         tcp = tips[0]
     if T_tcp_tool is not None:
         urdf, tcp = with_tool(urdf, tcp, _TOOL_LINK, T_tcp_tool), _TOOL_LINK
-    return Robot.from_urdf(urdf, tcp)
+    robot = Robot.from_urdf(urdf, tcp)
+    require_joint_names(robot.joint_names)
+    return robot
 
 
 def _find_urdf(robot: str | None, dataset: Dataset | None) -> tuple[str, Path | None]:

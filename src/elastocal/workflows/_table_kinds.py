@@ -1,25 +1,16 @@
 """Describe what CSV files hold, as ``check`` says: a CSV states no schema, its columns tell.
 
-Without a robot at hand, the joints are those columns of an angle or a length that have no other
-meaning in a table of ours.
+Without a robot at hand, the joints of rows with forces are guessed (`guess_columns`).
 """
 
 import re
-from collections.abc import Mapping
 from pathlib import Path
 
 from elastocal import dataset
-from elastocal.dataset import (
-    PathColumns,
-    find_wrench_columns,
-    in_file,
-    read_layout,
-    read_values,
-    row_blocks,
-)
-from elastocal.errors import PathError, SchemaError, UnitError
-from elastocal.tables import Column, opened_table
-from elastocal.units import factor, split_column
+from elastocal.dataset import PathTable, guess_columns, in_file
+from elastocal.errors import SchemaError, UnitError
+from elastocal.tables import opened_table
+from elastocal.units import split_column
 
 TableDescription = tuple[str, dict[str, object]]
 """The kind of a table, and what it holds: figures by name, JSON-ready."""
@@ -34,8 +25,6 @@ _RESULTS: dict[tuple[str, ...], str] = {
 """What a table of results is, by its first columns."""
 _POSITION, _EULER, _QUATERNION = ("x", "y", "z"), ("a", "b", "c"), ("qx", "qy", "qz", "qw")
 _DISPLACEMENTS = re.compile(r"load_case|(controller|marker)_displacement_[xyz]")
-_OTHERS = re.compile(r"[xyzabc]|deflection_.*|(controller|marker)_.*|tcp_.*")
-"""Columns of an angle or a length that are no joints."""
 _ROWS_AT_A_TIME = 20_000
 
 
@@ -53,25 +42,16 @@ def table_file(path: Path) -> TableDescription:
     """
     with opened_table(path) as table:
         header = table.layout.header
-    columns = _split(header)
-    names = tuple(columns)
+    names = _names(header)
     if names[:3] in _RESULTS:
         return _results(path, names[:3])
     if any(map(_DISPLACEMENTS.fullmatch, names)):
         return dataset_file(path)
-    turned = next((k for k in (_EULER, _QUATERNION) if {*k} <= {*names}), ())
-    has_force = {"force_x", "force_tcp_x"} & {*names}
-    if {*_POSITION} <= {*names} and turned and has_force:
-        return _loads(path, "programmed path of tool poses (PATH.csv)", header, (_POSITION, turned))
-    if turned and {"force_x", "moment_x"} <= {*names}:
-        return _loads(path, "table of static postures of a tool", header, ((), turned))
-    if has_force and _joints(columns):
-        kind = "table of joints and forces (ROWS.csv, also read as PATH.csv or a process)"
-        if "deflection_x" in names:
-            kind = "table of rows with predicted deflections (OUT.csv)"
-        elif {"course", "time", "force_tcp_x"} & {*names}:
-            kind = "programmed path of joints (PATH.csv)"
-        return _loads(path, kind, header, ((), ()))
+    if {"force_x", "force_tcp_x"} & {*names}:
+        with in_file(path):
+            described = _loads(path, names)
+        if described is not None:
+            return described
     raise SchemaError(
         f"{path}: columns {', '.join(header) or 'none'} are of no table of ours: a dataset has"
         " load_case and controller_displacement_x[mm] …; a path or rows to predict have joints,"
@@ -103,87 +83,38 @@ def _results(path: Path, first: tuple[str, ...]) -> TableDescription:
     return _RESULTS[first], {"rows": len(rows), "columns": header}
 
 
-def _loads(
-    path: Path, kind: str, header: tuple[str, ...], pose: tuple[tuple[str, ...], tuple[str, ...]]
-) -> TableDescription:
+def _loads(path: Path, names: tuple[str, ...]) -> TableDescription | None:
     """Describe rows with forces; every number that a command would read is read."""
-    columns, position, orientation = _split(header), *pose
-    # Beside a pose, an angle or a length is that of an external axis.
-    joints = _joints(columns)
-    rows = 0
-    with in_file(path):
-        _require_named_once(header)
-        wrenches = find_wrench_columns(header)
-        found = PathColumns(
-            tuple(_column(columns, name) for name in joints),
-            tuple(_column(columns, name, "length") for name in position),
-            tuple(
-                _column(columns, name, "angle" if orientation == _EULER else None)
-                for name in (orientation if position else ())
-            ),
-            wrenches.force,
-            wrenches.moment,
-        )
-        for block in row_blocks(path, read_layout(path), _ROWS_AT_A_TIME):
-            read_values(block, found)
-            rows += len(block)
-    assert found.force is not None
+    table = PathTable.open(path, guess_columns)
+    columns = table.columns
+    assert columns.force is not None
+    if columns.by_pose:
+        kind = "programmed path of tool poses (PATH.csv)"
+    elif columns.orientation and columns.moment is not None and not columns.force.in_tcp:
+        kind = "table of static postures of a tool"
+    elif not columns.joints:
+        return None
+    elif "deflection_x" in names:
+        kind = "table of rows with predicted deflections (OUT.csv)"
+    elif {"course", "time", "force_tcp_x"} & {*names}:
+        kind = "programmed path of joints (PATH.csv)"
+    else:
+        kind = "table of joints and forces (ROWS.csv, also read as PATH.csv or a process)"
     return kind, {
-        "rows": rows,
-        "joints": list(joints),
-        "force_in": "tcp" if found.force.in_tcp else "base",
-        "moment": found.moment is not None,
-        "columns": list(header),
+        "rows": sum(map(len, table.blocks(_ROWS_AT_A_TIME))),
+        "joints": [column.name for column in columns.joints],
+        "force_in": "tcp" if columns.force.in_tcp else "base",
+        "moment": columns.moment is not None,
+        "columns": list(table.layout.header),
     }
 
 
-def _split(header: tuple[str, ...]) -> dict[str, tuple[int, str | None]]:
-    """Return place and unit of each column by its name; one that cannot be split is left out."""
-    columns: dict[str, tuple[int, str | None]] = {}
-    for index, cell in enumerate(header):
+def _names(header: tuple[str, ...]) -> tuple[str, ...]:
+    """Return the names of the columns; one that cannot be split is left out."""
+    names: list[str] = []
+    for cell in header:
         try:
-            name, unit = split_column(cell)
+            names.append(split_column(cell)[0])
         except UnitError:
             continue
-        columns[name] = (index, unit)
-    return columns
-
-
-def _joints(columns: Mapping[str, tuple[int, str | None]]) -> tuple[str, ...]:
-    """Return the columns of an angle or a length that have no other meaning."""
-    return tuple(
-        name
-        for name, (_, unit) in columns.items()
-        if _dimension(unit) is not None and not _OTHERS.fullmatch(name)
-    )
-
-
-def _dimension(unit: str | None) -> str | None:
-    """Return the dimension of a joint's unit; None where it is no angle and no length."""
-    for dimension in ("angle", "length"):
-        try:
-            factor(unit or "", dimension)
-        except UnitError:
-            continue
-        return dimension
-    return None
-
-
-def _column(
-    columns: Mapping[str, tuple[int, str | None]], name: str, dimension: str | None = ""
-) -> Column:
-    """Return a column; its dimension is its unit's by default, None is a plain number."""
-    index, unit = columns[name]
-    if dimension is None:
-        return Column(index, name, "", 1.0)
-    try:
-        scale = factor(unit or "", dimension or _dimension(unit) or "angle")
-    except UnitError as error:
-        raise PathError(f"column {name!r}: {error}") from error
-    return Column(index, name, unit or "", scale)
-
-
-def _require_named_once(header: tuple[str, ...]) -> None:
-    twice = [cell for cell in header if header.count(cell) > 1]
-    if twice:
-        raise PathError(f"column {twice[0]!r} stands twice in the header")
+    return tuple(names)

@@ -1,4 +1,7 @@
-"""How workflows are called: with a record of settings, or with its fields."""
+"""How workflows are called: with a record of settings, or with its fields.
+
+Each runs under a rule for what it may write (`elastocal.outputs`), made from its settings.
+"""
 
 import dataclasses
 import functools
@@ -20,6 +23,8 @@ from typing import (
 )
 
 from elastocal.errors import nearest
+from elastocal.files import remove_leftovers
+from elastocal.outputs import OutputRule, ruled
 from elastocal.progress import Progress, silent
 
 S = TypeVar("S", contravariant=True)
@@ -37,7 +42,13 @@ class Workflow(Protocol[S, R]):
     def __call__(self, source: Any = ..., /, progress: Progress = ..., **options: Any) -> R: ...
 
 
-def workflow(settings: type[S]) -> Callable[[Callable[[S, Progress], R]], Workflow[S, R]]:
+def workflow(
+    settings: type[S],
+    *,
+    marks: tuple[str, ...] = (),
+    outputs: tuple[str, ...] = ("out",),
+    record: str = "",
+) -> Callable[[Callable[[S, Progress], R]], Workflow[S, R]]:
     """Let a function of settings and progress also be called with the fields of its settings.
 
     Files may be given as texts, and one item instead of several; `inspect.signature` shows the
@@ -47,6 +58,13 @@ def workflow(settings: type[S]) -> Callable[[Callable[[S, Progress], R]], Workfl
     ----------
     settings : type
         The record of settings; its first positional field is what the work starts from.
+    marks : tuple of str, optional
+        Texts by which a file is known as a former output, which may be replaced. Without any, no
+        file is replaced but in a folder of ours, or where the settings have ``force``.
+    outputs : tuple of str, optional
+        Fields that name what is written; every other one that names a file or folder, an input.
+    record : str, optional
+        Field with the folder of a run whose record is written; no other workflow may.
     """
     fields = inspect.signature(settings).parameters
     first = next(name for name, each in fields.items() if each.kind is not each.KEYWORD_ONLY)
@@ -65,7 +83,19 @@ def workflow(settings: type[S]) -> Callable[[Callable[[S, Progress], R]], Workfl
                 raise TypeError(f"{function.__name__}() needs {first!r}")
             else:
                 chosen = settings(*source, **options)
-            return function(_as_hinted(chosen), *(hears or (progress,)))
+            chosen = _as_hinted(chosen)
+            places = _places(chosen)
+            written = [path for name in (*outputs, record) for path in places.pop(name, ())]
+            for path in written:
+                remove_leftovers(path)
+            rule = OutputRule(
+                force=getattr(chosen, "force", False),
+                marks=marks,
+                folder=next(iter(written), None),
+                record=written[0] if record else None,
+            )
+            with ruled(rule, (path for paths in places.values() for path in paths), written):
+                return function(chosen, *(hears or (progress,)))
 
         shown = [each.replace(kind=each.KEYWORD_ONLY) for each in fields.values()]
         shown.sort(key=lambda each: each.name != first)
@@ -82,6 +112,30 @@ def _require_known(function: str, options: Collection[str], fields: Collection[s
     for name in options:
         if name not in fields:
             raise TypeError(f"{function}() has no option {name!r}{nearest(name, fields)}")
+
+
+def _places(settings: Any) -> dict[str, list[Path]]:
+    """Return the files and folders that each field of settings names.
+
+    A text may be a name of something else: it counts where it is a file, or is meant as a place.
+    """
+    places: dict[str, list[Path]] = {}
+    for name, hint in get_type_hints(type(settings)).items():
+        value, meant = getattr(settings, name), "Path" in str(hint)
+        items = value if isinstance(value, tuple | list) else (value,)
+        places[name] = [
+            Path(each)
+            for each in items
+            if isinstance(each, PathLike) or (isinstance(each, str) and (meant or _is_file(each)))
+        ]
+    return places
+
+
+def _is_file(text: str) -> bool:
+    try:
+        return Path(text).is_file()
+    except (OSError, ValueError):  # too long for a name, or no name at all
+        return False
 
 
 def _as_hinted(given: Any) -> Any:

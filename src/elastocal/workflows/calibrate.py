@@ -27,7 +27,7 @@ from elastocal.progress import Progress
 from elastocal.records import write_json
 from elastocal.results import brief_repr
 from elastocal.robot.inverse import nearest_zero_posture
-from elastocal.workflows._inputs import find_robot, refuse_overwriting
+from elastocal.workflows._inputs import find_robot
 from elastocal.workflows._workflow import workflow
 
 __all__ = ["CalibrateResult", "CalibrateSettings", "calibrate"]
@@ -52,6 +52,8 @@ class CalibrateSettings(FitSettings):
     """State also what the error at left-out poses is made of."""
     process: Path | None = None
     """Path of production, ``.csv``: state also how much of it the readings cover."""
+    force: bool = False
+    """Replace a file that is no former output of this command."""
 
     @property
     def files(self) -> tuple[Path, ...]:
@@ -66,7 +68,7 @@ class CalibrateSettings(FitSettings):
         return FitSettings(**{each.name: getattr(self, each.name) for each in fields(FitSettings)})
 
 
-@workflow(CalibrateSettings)
+@workflow(CalibrateSettings, marks=("elastocal.model/",))
 def calibrate(settings: CalibrateSettings, progress: Progress) -> CalibrateResult:  # noqa: ARG001 - done in an instant
     """Identify the compliances of a robot from a measured dataset.
 
@@ -82,10 +84,9 @@ def calibrate(settings: CalibrateSettings, progress: Progress) -> CalibrateResul
     DatasetError, ConventionError, IdentificationError, RobotError, SpringError
         If the readings, the robot or the settings do not fit; see `identification.calibrate`.
     FileAccessError
-        If a file cannot be read or written, or ``out`` is a dataset.
+        If a file cannot be read or written, or ``out`` is an input, or another's file.
     """
     options = settings.options()
-    refuse_overwriting(settings.out, *settings.files)
     measured, source = _measured(settings.files)
     arm = find_robot(settings.robot, settings.tcp, settings.tool_frame, measured)
     readings = without(measured.readings(arm.joint_names), settings.exclude)

@@ -5,7 +5,7 @@ from os import PathLike
 from pathlib import Path
 
 from elastocal import dataset
-from elastocal.dataset import read_robot_rows
+from elastocal.dataset import PathTable, find_columns, in_file
 from elastocal.errors import DatasetError
 from elastocal.identification import read_model
 from elastocal.identification.recertification import (
@@ -14,10 +14,10 @@ from elastocal.identification.recertification import (
     check_same_robot,
     recertify_files,
 )
+from elastocal.outputs import FIGURE_MARKS
 from elastocal.progress import Progress
 from elastocal.records import write_json
 from elastocal.robot import Robot
-from elastocal.workflows._inputs import refuse_overwriting
 from elastocal.workflows._workflow import workflow
 
 __all__ = ["CompareResult", "CompareSettings", "compare", "measured_rows"]
@@ -39,9 +39,13 @@ class CompareSettings:
     """Comparison file to write, ``.json``."""
     figure: Path | None = None
     """Figure to write: ``.svg``, ``.png`` or ``.pdf``."""
+    force: bool = False
+    """Replace a file that is no former output of this command."""
 
 
-@workflow(CompareSettings)
+@workflow(
+    CompareSettings, outputs=("out", "figure"), marks=("elastocal.comparison/", *FIGURE_MARKS)
+)
 def compare(settings: CompareSettings, progress: Progress) -> CompareResult:  # noqa: ARG001 - done in an instant
     """Say which springs moved between two calibrations, and whether predictions changed.
 
@@ -62,9 +66,6 @@ def compare(settings: CompareSettings, progress: Progress) -> CompareResult:  # 
         If a file cannot be read or written, or an output is an input.
     """
     old, new = Path(settings.old), Path(settings.new)
-    inputs = [old, new] if settings.rows is None else [old, new, settings.rows]
-    for path in (settings.out, settings.figure):
-        refuse_overwriting(path, *inputs)
     rows = None if settings.rows is None else _read_rows(settings.rows, new)
     found = recertify_files(old, new, rows=rows, limit=settings.limit)
     if settings.figure is not None:
@@ -90,10 +91,11 @@ def _read_rows(path: Path, model: Path) -> ComparedRows:
         raise DatasetError(f"{path}: suffix {path.suffix!r} is not one of .csv, .nc")
     if suffix == ".nc":
         return _readings(path, robot, model)
-    rows = read_robot_rows(path, robot)
-    if not len(rows.joint_position):
-        raise DatasetError(f"{path} holds no row")
-    return ComparedRows(rows.joint_position, rows.force, rows.moment, rows.visit)
+    with in_file(path):
+        table = PathTable.open(path, lambda header: find_columns(header, robot, poses=False))
+        rows = table.rows()
+        wrench = rows.wrench_in_base(robot.forward(rows.joints))
+        return ComparedRows(rows.joints, *wrench, rows.names("visit"))
 
 
 def _readings(path: Path, robot: Robot, model: Path) -> ComparedRows:

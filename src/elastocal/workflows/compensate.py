@@ -23,7 +23,6 @@ from elastocal.workflows._inputs import (
     coverage_notes,
     parse_frame,
     parse_posture,
-    refuse_overwriting,
     write_posture,
 )
 from elastocal.workflows._workflow import workflow
@@ -47,6 +46,8 @@ class CompensateSettings(NewTool):
     """Posture before the first row, a quantity a joint from base to tip."""
     largest: float = LARGEST_DEFLECTION
     """Largest deflection that is taken for one, in m."""
+    force: bool = False
+    """Replace a file that is no former output of this command."""
 
 
 @record()
@@ -83,7 +84,7 @@ class CompensateResult(Result, CorrectionFigures):
         )
 
 
-@workflow(CompensateSettings)
+@workflow(CompensateSettings, marks=("deflection_x_low[m]",))
 def compensate(settings: CompensateSettings, progress: Progress) -> CompensateResult:
     """Correct a programmed path so that the loaded tool is where it was programmed.
 
@@ -104,7 +105,6 @@ def compensate(settings: CompensateSettings, progress: Progress) -> CompensateRe
         If a file cannot be read or written, is an input, or does not belong to this kind of path.
     """
     path, forces = settings.path, settings.forces
-    refuse_overwriting(settings.out, Path(settings.model), path, *([forces] if forces else []))
     is_program = path.suffix.lower() in PROGRAM_READERS
     if is_program != (settings.out.suffix.lower() in PROGRAM_READERS):
         raise FileAccessError(f"--out {settings.out} must end in {path.suffix} like {path}")

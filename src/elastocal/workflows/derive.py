@@ -66,7 +66,7 @@ class DeriveResult(Result):
         return ", ".join(f"{number} {status}" for status, number in counts.items() if number)
 
 
-@workflow(DeriveSettings)
+@workflow(DeriveSettings, record="run")
 def derive(settings: DeriveSettings, progress: Progress) -> DeriveResult:  # noqa: ARG001 - an instant
     """Derive ``dataset.nc`` and ``summary.json`` of a run again from its raw streams.
 

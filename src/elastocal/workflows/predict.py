@@ -7,12 +7,12 @@ from pathlib import Path
 import numpy as np
 
 from elastocal.arrays import FloatArray
-from elastocal.dataset import read_robot_rows, write_load_rows
+from elastocal.dataset import PathTable, find_columns, in_file, new_rows
 from elastocal.identification import CoveredRows, DeflectionSummary, Prediction, ProductionCoverage
 from elastocal.progress import Progress
 from elastocal.records import record
 from elastocal.results import Result, brief_repr
-from elastocal.workflows._inputs import NewTool, coverage_notes, refuse_overwriting
+from elastocal.workflows._inputs import NewTool, coverage_notes
 from elastocal.workflows._workflow import workflow
 
 
@@ -26,6 +26,8 @@ class PredictSettings(NewTool):
     """CSV with joint columns, ``force_x[N] …`` and optionally ``moment_x[N*m] …`` and ``visit``."""
     out: Path | None = None
     """CSV to write: the rows with their deflections and intervals."""
+    force: bool = False
+    """Replace a file that is no former output of this command."""
 
 
 @brief_repr
@@ -77,7 +79,7 @@ class PredictResult(Result):
         return self.prediction
 
 
-@workflow(PredictSettings)
+@workflow(PredictSettings, marks=("deflection_x_low[m]",))
 def predict(settings: PredictSettings, progress: Progress) -> PredictResult:  # noqa: ARG001 - done in an instant
     """Predict the deflection of each row, with 95 % intervals of the fit and of a measurement.
 
@@ -90,27 +92,31 @@ def predict(settings: PredictSettings, progress: Progress) -> PredictResult:  # 
 
     Raises
     ------
-    SchemaError, DatasetError
+    SchemaError, PathError
         If the model or the rows are not valid: a joint far outside its limits among them.
     FileAccessError
         If a file cannot be read or written, or ``out`` is an input.
     """
     model, rows = Path(settings.model), Path(settings.rows)
-    refuse_overwriting(settings.out, model, rows)
     calibrated = settings.read_model(model)
     robot = calibrated.model.robot
-    loads = read_robot_rows(rows, robot)
-    prediction = calibrated.predict(loads.joint_position, loads.force, loads.moment, loads.visit)
-    misfit = float(calibrated.misfit) if np.isfinite(calibrated.misfit) else None
-    covered = calibrated.covered_rows(loads.joint_position, loads.force, loads.moment)
-    if settings.out is not None:
-        write_load_rows(settings.out, loads, _columns(prediction, covered, misfit is not None))
+    with in_file(rows):
+        table = PathTable.open(rows, lambda header: find_columns(header, robot, poses=False))
+        loads = table.rows()
+        wrench = loads.wrench_in_base(robot.forward(loads.joints))
+        prediction = calibrated.predict(loads.joints, *wrench, loads.names("visit"))
+        misfit = float(calibrated.misfit) if np.isfinite(calibrated.misfit) else None
+        covered = calibrated.covered_rows(loads.joints, *wrench)
+        if settings.out is not None:
+            added = _columns(prediction, covered, misfit is not None)
+            with new_rows(settings.out, table, tuple(added)) as write:
+                write(loads, np.column_stack([*added.values()]), ())
     norms = np.linalg.norm(prediction.deflection, axis=1)
     size = DeflectionSummary(float(norms.mean()), float(norms.max()))
     notes = coverage_notes(calibrated) if calibrated.tool is not None else ()
     coverage = None
     if covered is not None:
-        coverage = covered.figures(name=lambda row: f"row {loads.lines[row]}")
+        coverage = covered.figures(name=loads.label)
     summary = PredictSummary(len(norms), size, misfit, calibrated.tool_name, notes, coverage)
     return PredictResult(prediction, summary)
 

@@ -162,7 +162,7 @@ class _Job:
     warnings: tuple[str, ...]
 
 
-@workflow(RunSettings)
+@workflow(RunSettings, record="out")
 def run(settings: RunSettings, progress: Progress) -> RunResult:
     """Press on the tooling at every pose of a plan, record what happens, derive the dataset.
 
@@ -206,7 +206,7 @@ def run(settings: RunSettings, progress: Progress) -> RunResult:
     return _derived(job, result)
 
 
-@workflow(RunSettings)
+@workflow(RunSettings, record="out")
 def dry_run(settings: RunSettings, progress: Progress) -> DryRunResult:  # noqa: ARG001 - an instant
     """Return the steps that a run would take; nothing is written or moved.
 
@@ -236,14 +236,16 @@ def _prepare(settings: RunSettings) -> _Job:
     seed = loaded.file.simulation.seed if settings.seed is None else settings.seed
     stated = procedure.run_record(loaded, read, text, procedure.cell_path_in_run(loaded), seed, now)
     procedure.check_compatible(read, loaded)
+    carried_out, place = procedure.run_settings(loaded, read), RunFolder(Path(settings.out))
+    procedure.rehearse_derivation(loaded, read, place, stated)
     return _Job(
         loaded,
         read,
         folder,
-        procedure.run_settings(loaded, read),
+        carried_out,
         device_source(loaded),
         stated,
-        RunFolder(Path(settings.out)),
+        place,
         procedure.registration_warnings(read),
     )
 

@@ -152,83 +152,13 @@ def _simulate(
 ) -> tuple[process.SimulatedProcess, tuple[Course, ...]]:
     """Run the process for every seed; return also the path with the forces of the first."""
     compensator = _compensator_settings(settings)
-    trials = [_trial(cell, compensator, run, settings) for run in runs]
+    trials = tuple(_trial(cell, compensator, run, settings) for run in runs)
     own = None if settings.path is None else _own_courses(settings, cell, compensator)
     loads = {load: _Lines() for load in (1.0, *_further_loads(settings))}
-    deviations: list[process.CourseDeviation] = []
-    budget: tuple[process.DeviationComparison, ...] = ()
-    programmed: tuple[Course, ...] = ()
-    plain, stiffest = _Lines(), None
+    found = _SeedRuns(settings, cell, runs, trials, loads)
     for trial in trials:
-        courses = own or _built_in_courses(settings, cell, trial.seed)
-        if settings.posture == STIFFEST:
-            plain.add(f"seed {trial.seed}", run_trial(trial, courses, progress))
-            stiffest = process.stiffest_posture(trials[0].model, cell, courses)
-            courses = stiffest.courses
-        programmed = programmed or courses
-        for load, lines in loads.items():
-            loaded = courses if load == 1.0 else tuple(process.at_load(c, load) for c in courses)
-            found = run_trial(trial, loaded, progress)
-            lines.add(f"seed {trial.seed}", found)
-            if load == 1.0:
-                deviations += found.deviations(trial.seed)
-        if settings.budget and not budget:
-            budget = run_budget(trial, courses, progress)
-    table = _table(settings, cell, runs, (loads, plain, stiffest), programmed, trials[0], budget)
-    return process.SimulatedProcess(table, tuple(deviations)), programmed
-
-
-def _table(
-    settings: SimulateProcessSettings,
-    cell: Cell,
-    runs: tuple[ProcessRun, ...],
-    found: "tuple[dict[float, _Lines], _Lines, process.StiffestPosture | None]",
-    programmed: tuple[Course, ...],
-    first: ProcessTrial,
-    budget: tuple[process.DeviationComparison, ...],
-) -> SimulateProcessResult:
-    """Return the record of all seeds; ``found`` are the lines by load, those unturned, how."""
-    loads, plain, stiffest = found
-    name = _direction_name(settings)
-    simulation, usual = cell.file.simulation, loads[1.0]
-    further = {load: each for load, each in loads.items() if load != 1.0}
-    covered = _coverage(first.model, programmed)
-    return SimulateProcessResult(
-        cell=cell.name,
-        process=settings.kind or Path(str(settings.path)).name,
-        runs=runs,
-        settings=first.settings.model_dump(mode="json"),
-        versions={package: version(package) for package in _PACKAGES},
-        lines=usual.pooled(usual.lines),
-        budget=budget,
-        tool=first.model.tool_name,
-        direction=name,
-        spatial=usual.pooled(usual.spatial),
-        loads=tuple(
-            process.LoadLines(load, each.pooled(each.lines), each.pooled(each.spatial))
-            for load, each in further.items()
-        ),
-        posture=None
-        if stiffest is None
-        else process.PostureGain(
-            stiffest.spin,
-            stiffest.softest,
-            stiffest.softest_programmed,
-            plain.pooled(plain.lines),
-            plain.pooled(plain.spatial),
-        ),
-        means=tuple(
-            process.SeedMeans.of(measure, load, lines)
-            for load, each in loads.items()
-            for measure, lines in ((name, each.lines), ("3-D", each.spatial))
-        ),
-        path="" if settings.path is None else str(settings.path),
-        path_sha256="" if settings.path is None else sha256(read_text(settings.path)),
-        preset=simulation.preset,
-        process_stiffness=simulation.contact.process_stiffness,
-        notes=_notes(settings, programmed, len(runs), covered),
-        coverage=covered,
-    )
+        found.add(trial, own or _built_in_courses(settings, cell, trial.seed), progress)
+    return process.SimulatedProcess(found.table(), tuple(found.deviations)), found.programmed
 
 
 @dataclass(frozen=True)
@@ -248,6 +178,89 @@ class _Lines:
     ) -> tuple[process.DeviationComparison, ...]:
         """Return the lines, with one over all where there are several."""
         return (*lines, process.pooled("all seeds", lines)) if len(lines) > 1 else tuple(lines)
+
+
+@dataclass
+class _SeedRuns:
+    """The runs of the seeds so far, and the record of all."""
+
+    settings: SimulateProcessSettings
+    cell: Cell
+    runs: tuple[ProcessRun, ...]
+    trials: tuple[ProcessTrial, ...]
+    loads: dict[float, _Lines]
+    """Lines by the share of the force."""
+    unturned: _Lines = field(default_factory=_Lines)
+    """Those of the programmed posture, where another is taken."""
+    stiffest: process.StiffestPosture | None = None
+    programmed: tuple[Course, ...] = ()
+    """Courses of the first seed."""
+    deviations: list[process.CourseDeviation] = field(default_factory=list)
+    budget: tuple[process.DeviationComparison, ...] = ()
+
+    def add(self, trial: ProcessTrial, courses: tuple[Course, ...], progress: Progress) -> None:
+        """Run the courses of a seed, at every load."""
+        name = f"seed {trial.seed}"
+        if self.settings.posture == STIFFEST:
+            self.unturned.add(name, run_trial(trial, courses, progress))
+            self.stiffest = process.stiffest_posture(self.trials[0].model, self.cell, courses)
+            courses = self.stiffest.courses
+        self.programmed = self.programmed or courses
+        for load, lines in self.loads.items():
+            loaded = courses if load == 1.0 else tuple(process.at_load(c, load) for c in courses)
+            found = run_trial(trial, loaded, progress)
+            lines.add(name, found)
+            if load == 1.0:
+                self.deviations += found.deviations(trial.seed)
+        if self.settings.budget and not self.budget:
+            self.budget = run_budget(trial, courses, progress)
+
+    def table(self) -> SimulateProcessResult:
+        """Return the record of all seeds."""
+        settings, simulation, usual = self.settings, self.cell.file.simulation, self.loads[1.0]
+        name = _direction_name(settings)
+        covered = _coverage(self.trials[0].model, self.programmed)
+        return SimulateProcessResult(
+            cell=self.cell.name,
+            process=settings.kind or Path(str(settings.path)).name,
+            runs=self.runs,
+            settings=self.trials[0].settings.model_dump(mode="json"),
+            versions={package: version(package) for package in _PACKAGES},
+            lines=usual.pooled(usual.lines),
+            budget=self.budget,
+            tool=self.trials[0].model.tool_name,
+            direction=name,
+            spatial=usual.pooled(usual.spatial),
+            loads=tuple(
+                process.LoadLines(load, each.pooled(each.lines), each.pooled(each.spatial))
+                for load, each in self.loads.items()
+                if load != 1.0
+            ),
+            posture=self._posture_gain(),
+            means=tuple(
+                process.SeedMeans.of(measure, load, lines)
+                for load, each in self.loads.items()
+                for measure, lines in ((name, each.lines), ("3-D", each.spatial))
+            ),
+            path="" if settings.path is None else str(settings.path),
+            path_sha256="" if settings.path is None else sha256(read_text(settings.path)),
+            preset=simulation.preset,
+            process_stiffness=simulation.contact.process_stiffness,
+            notes=_notes(settings, self.programmed, len(self.runs), covered),
+            coverage=covered,
+        )
+
+    def _posture_gain(self) -> process.PostureGain | None:
+        found, plain = self.stiffest, self.unturned
+        if found is None:
+            return None
+        return process.PostureGain(
+            found.spin,
+            found.softest,
+            found.softest_programmed,
+            plain.pooled(plain.lines),
+            plain.pooled(plain.spatial),
+        )
 
 
 def _built_in_courses(

@@ -23,6 +23,7 @@ from elastocal.report import Curve, drawn, stiffness_figure, write_stiffness_fig
 from elastocal.results import Result, brief_repr
 from elastocal.robot import Robot
 from elastocal.robot.inverse import inverse_for, posture_jumps
+from elastocal.units import parse_number
 from elastocal.workflows._inputs import NewTool, coverage_notes, parse_posture, require_same_robot
 from elastocal.workflows._workflow import workflow
 
@@ -267,7 +268,7 @@ def _parse_direction(text: str, stations: PathStations) -> FloatArray:
     if text == "normal":
         return stations.normal
     try:
-        vector = np.array([float(part) for part in text.split(",")])
+        vector = np.array([parse_number(part) for part in text.split(",")])
     except ValueError:
         vector = np.zeros(0)
     length = float(np.linalg.norm(vector))

@@ -16,11 +16,13 @@ from elastocal.errors import CompensationError, FileAccessError, ProcedureError
 from elastocal.identification import read_model
 from elastocal.progress import Progress
 from elastocal.robot import GRAVITY, Robot
-from elastocal.workflows._inputs import find_robot, parse_frame, refuse_overwriting
+from elastocal.workflows._inputs import find_robot, parse_frame
 from elastocal.workflows._workflow import workflow
 
 __all__ = ["ToolResult", "ToolSettings", "tool"]
 
+_FLANGE = "flange"
+_DOWN = (0.0, 0.0, -1.0)
 _AS_FLANGE = "0 mm, 0 mm, 0 mm, 0 deg, 0 deg, 0 deg"
 """A sensor whose frame is that of its link."""
 _OF_A_TABLE = ("robot", "flange", "sensor", "down")
@@ -39,12 +41,13 @@ class ToolSettings:
     """Tool file to write; none: the result is only returned."""
     robot: str | None = None
     """URDF file, catalogue name or model file, for a CSV with joints."""
-    flange: str = "flange"
-    """Link that the sensor sits on; a run's cell says it itself."""
-    sensor: str = _AS_FLANGE
-    """Sensor in that link as mounted, ``"x, y, z, a, b, c"`` with units (Z-Y'-X'')."""
-    down: tuple[float, float, float] = (0.0, 0.0, -1.0)
-    """Direction of gravity in base, of any length."""
+    flange: str | None = None
+    """Link that the sensor sits on, for a CSV; by default ``flange``."""
+    sensor: str | None = None
+    """Sensor in that link as mounted, ``"x, y, z, a, b, c"`` with units (Z-Y'-X''), for a CSV; by
+    default the link itself."""
+    down: tuple[float, float, float] | None = None
+    """Direction of gravity in base, of any length, for a CSV; by default along -z."""
     free_rotation: bool = False
     """Find the sensor's rotation where unseen postures speak for it; else it is as mounted."""
     matrix: bool = False
@@ -52,6 +55,8 @@ class ToolSettings:
     must then be derived with this tool file."""
     cross_talk: float = 0.01
     """Cross-talk of the sensor by its data sheet, a share of its ranges; 0: it has none."""
+    force: bool = False
+    """Replace a file that is no former output of this command."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,7 +75,7 @@ class _PostureSource:
     """The sensor's moment range over its force range, in m."""
 
 
-@workflow(ToolSettings)
+@workflow(ToolSettings, marks=("elastocal.tool/",))
 def tool(settings: ToolSettings, progress: Progress) -> ToolResult:  # noqa: ARG001 - done in an instant
     """Find mass, centre of mass and sensor bias from static postures, and what else they carry.
 
@@ -91,7 +96,6 @@ def tool(settings: ToolSettings, progress: Progress) -> ToolResult:  # noqa: ARG
         If a file cannot be read or written, or ``out`` is an input.
     """
     data = Path(settings.postures)
-    refuse_overwriting(settings.out, data)
     _require_postures(data, settings)
     source = _from_run(data) if data.is_dir() else _from_table(data, settings)
     if not 0.0 <= settings.cross_talk < 0.5:
@@ -134,7 +138,7 @@ def _require_postures(data: Path, settings: ToolSettings) -> None:
             )
         return
     for name in _OF_A_TABLE:
-        if getattr(settings, name) != getattr(ToolSettings, name):
+        if getattr(settings, name) is not None:
             raise CompensationError(
                 f"--{name} is for a table of postures: the cell of the run {data} says it itself"
             )
@@ -142,23 +146,23 @@ def _require_postures(data: Path, settings: ToolSettings) -> None:
 
 def _from_table(path: Path, settings: ToolSettings) -> _PostureSource:
     """Return the postures of a CSV file."""
-    arm = None
+    arm, flange = None, settings.flange or _FLANGE
     if settings.robot is not None:
         if Path(settings.robot).suffix.lower() == ".json":
             robot = read_model(Path(settings.robot)).model.robot
         else:
-            robot = find_robot(settings.robot, settings.flange, None)
-        arm = Robot.from_urdf(robot.urdf, settings.flange, robot.base)
+            robot = find_robot(settings.robot, flange, None)
+        arm = Robot.from_urdf(robot.urdf, flange, robot.base)
     rule = "must be six quantities, e.g. '0 mm, 0 mm, 45 mm, 0 deg, 0 deg, 0 deg'"
-    T_flange_sensor = parse_frame(settings.sensor, "sensor", rule, CompensationError)
-    down = np.array(settings.down)
+    T_flange_sensor = parse_frame(settings.sensor or _AS_FLANGE, "sensor", rule, CompensationError)
+    down = np.array(settings.down or _DOWN)
     length = float(np.linalg.norm(down))
     if not 0.0 < length < np.inf:
         raise CompensationError(f"direction of gravity {down.tolist()} must be finite and not zero")
     gravity = down * (-GRAVITY[2] / length)
     R, origin = T_flange_sensor[:3, :3], T_flange_sensor[:3, 3]
     points = {} if not np.any(origin) else {"flange": -origin @ R}
-    mount = SensorMount(settings.flange, origin, gravity)
+    mount = SensorMount(flange, origin, gravity)
     return _PostureSource(conditioning.read_postures(path, arm, gravity), mount, R, points=points)
 
 

@@ -51,8 +51,8 @@ def test_joints(read):
     ("header", "row", "reason"),
     [
         ("j[deg]", "1", "no orientation of the flange .* give --robot"),
-        ("qx,qy,qz,qw", "1,1,0,0", "quaternion .* of posture 1 has not length 1"),
-        ("qx,qy,qz,qw", "1,x,0,0", "a quaternion is not four numbers"),
+        ("qx,qy,qz,qw", "1,1,0,0", "row 3: quaternion .* it must be 1"),
+        ("qx,qy,qz,qw", "1,x,0,0", "row 3, column 'qy': 'x' is not a number"),
         ("a[mm],b[deg],c[deg]", "0,0,0", "'mm' is not an angle"),
         ("a,b[deg],c[deg]", "0,0,0", "column 'a' has no unit"),
     ],
@@ -76,5 +76,7 @@ def test_forces_without_moments_are_refused(tmp_path):
 
 def test_degrees_in_a_column_of_radians_are_refused_by_posture(read):
     rows = [f"{a},{b},{c},{VALUES}" for a, b, c in np.degrees(ANGLES)]
-    with pytest.raises(CompensationError, match=r"posture 1: a of 573 deg is more than a turn"):
+    with pytest.raises(
+        CompensationError, match=r"row 3, column 'a.rad.': .* of 573 deg is more than a turn"
+    ):
         read("a[rad],b[rad],c[rad]", rows)

@@ -4,12 +4,11 @@ import numpy as np
 import pytest
 
 from elastocal.dataset import (
+    PathColumns,
+    PathTable,
     find_columns,
+    find_wrench_columns,
     in_file,
-    read_layout,
-    read_values,
-    row_blocks,
-    turned_to_base,
 )
 from elastocal.errors import CompensationError, FileAccessError, PathError
 from elastocal.robot import Robot
@@ -23,11 +22,16 @@ FORCE = ["force_x[N]", "force_y[N]", "force_z[N]"]
 ON_RAIL = Robot.from_urdf(opw_arm_urdf(**KR_LIKE, rail=(-2.0, 2.0)), "tcp")
 
 
-def values_of(path):
-    layout = read_layout(path)
-    columns = find_columns(layout.header, robot())
-    (piece,) = row_blocks(path, layout, 1000)
-    return read_values(piece, columns), columns
+def table_of(path):
+    return PathTable.open(path, lambda header: find_columns(header, robot()))
+
+
+def no_columns(header):
+    return PathColumns((), (), (), None, None)
+
+
+def rows_of(path):
+    return table_of(path).rows()
 
 
 class TestColumns:
@@ -82,14 +86,18 @@ class TestColumns:
 class TestText:
     def test_layout_is_kept_comments_delimiter_and_line_ends(self, tmp_path):
         path = tmp_path / "path.csv"
-        path.write_bytes(b'# made by hand\r\n\r\nx[mm];"a; b"\r\n1;2\r\n\r\n3;4\r\n')
-        layout = read_layout(path)
+        header = b"force_x[N];force_y[N];force_z[N]"
+        path.write_bytes(
+            b'# made by hand\r\n\r\n"a; b";' + header + b"\r\n1;2;2;2\r\n\r\n3;4;4;4\r\n"
+        )
+        table = PathTable.open(path, find_wrench_columns)
+        layout = table.layout
         assert layout.preamble == ("# made by hand\r\n", "\r\n")
-        assert layout.header == ("x[mm]", "a; b")
+        assert layout.header[0] == "a; b"
         assert (layout.delimiter, layout.line_end) == (";", "\r\n")
-        found = list(row_blocks(path, layout, 1))
-        assert [piece.cells for piece in found] == [[["1", "2"]], [["3", "4"]]]
-        assert [piece.lines for piece in found] == [[4], [6]]
+        found = list(table.blocks(1))
+        assert [rows.table.cells for rows in found] == [[["1", *"222"]], [["3", *"444"]]]
+        assert [rows.label(0) for rows in found] == ["row 4", "row 6"]
 
     @pytest.mark.parametrize(
         ("text", "why"),
@@ -104,7 +112,7 @@ class TestText:
         path = tmp_path / "path.csv"
         path.write_text(text)
         with pytest.raises(PathError) as refusal, in_file(path):
-            list(row_blocks(path, read_layout(path), 10))
+            PathTable.open(path, no_columns).rows()
         assert why in str(refusal.value)
         assert str(path) in str(refusal.value)
 
@@ -114,7 +122,7 @@ class TestText:
         if data is not None:
             path.write_bytes(data)
         with pytest.raises(FileAccessError, match="cannot read"):
-            list(row_blocks(path, read_layout(path), 10))
+            PathTable.open(path, no_columns).rows()
 
 
 class TestValues:
@@ -122,37 +130,39 @@ class TestValues:
         T = dome_course(5)
         force = force_columns(np.ones((5, 3)))
         for name, columns in (("e.csv", euler_columns(T)), ("q.csv", quaternion_columns(T))):
-            found, _ = values_of(write_csv(tmp_path / name, columns | force))
+            found = rows_of(write_csv(tmp_path / name, columns | force))
             np.testing.assert_allclose(found.T_base_tcp, T, atol=1e-12)
 
     def test_units_of_the_header_count(self, tmp_path):
         columns = euler_columns(dome_course(2)) | {
             f"force_{axis}[kN]": [1.0, 2.0] for axis in "xyz"
         }
-        found, _ = values_of(write_csv(tmp_path / "p.csv", columns))
+        found = rows_of(write_csv(tmp_path / "p.csv", columns))
         np.testing.assert_allclose(found.force, [[1e3] * 3, [2e3] * 3])
 
     def test_forces_in_the_tcp_frame_are_turned_by_the_programmed_orientation(self, tmp_path):
         T = dome_course(3)
         pressing = force_columns(np.tile([0.0, 0.0, -1100.0], (3, 1)), "force_tcp_")
-        found, columns = values_of(write_csv(tmp_path / "p.csv", euler_columns(T) | pressing))
-        turned = turned_to_base(found.force, columns.force, T)
-        np.testing.assert_allclose(turned, -1100.0 * T[:, :3, 2])
-        assert turned_to_base(None, None, T) is None
+        found = rows_of(write_csv(tmp_path / "p.csv", euler_columns(T) | pressing))
+        force, moment = found.wrench_in_base(T)
+        np.testing.assert_allclose(force, -1100.0 * T[:, :3, 2])
+        assert moment is None
 
-    @pytest.mark.parametrize("cell", ["nan", "inf", "", "7x"])
+    @pytest.mark.parametrize(
+        "cell", ["nan", "inf", "", "7x", "-1_100", "\u0661\u0662", "1e", "0x10", "1e999", "1 000"]
+    )
     def test_a_cell_that_is_no_finite_number_is_refused_by_line_and_column(self, tmp_path, cell):
         columns = euler_columns(dome_course(3)) | force_columns(np.ones((3, 3)))
         columns["z[mm]"] = ["700.0", cell, "700.0"]
         with pytest.raises(PathError) as refusal:
-            values_of(write_csv(tmp_path / "p.csv", columns))
+            rows_of(write_csv(tmp_path / "p.csv", columns))
         assert f"row 3, column 'z[mm]': {cell!r}" in str(refusal.value)
 
     def test_a_quaternion_of_another_length_is_refused(self, tmp_path):
         columns = quaternion_columns(dome_course(3)) | force_columns(np.ones((3, 3)))
         columns["qw"] = columns["qw"] + 0.1
         with pytest.raises(PathError, match="row 2: quaternion"):
-            values_of(write_csv(tmp_path / "p.csv", columns))
+            rows_of(write_csv(tmp_path / "p.csv", columns))
 
 
 def test_degrees_in_a_column_of_radians_are_refused_by_row(tmp_path):
@@ -160,4 +170,4 @@ def test_degrees_in_a_column_of_radians_are_refused_by_row(tmp_path):
     in_rad = {name.replace("deg", "rad"): values for name, values in columns.items()}
     path = write_csv(tmp_path / "path.csv", in_rad)
     with pytest.raises(PathError, match=r"row 2, column 'b\[rad\]': .* more than a turn: is it in"):
-        values_of(path)
+        rows_of(path)

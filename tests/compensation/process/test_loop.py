@@ -39,8 +39,8 @@ class Spring:
     def lift(self, course, q):  # noqa: ARG002
         self.joints.clear()
 
-    def free_shift(self, q):  # noqa: ARG002
-        return np.array([0.0, 0.0, -1e-3])
+    def free_shift(self, q):
+        return np.broadcast_to([0.0, 0.0, -1e-3], (*q.shape[:-1], 3))
 
     def press(self, q, force, path_base=None, outward_base=None):  # noqa: ARG002
         self.joints.append(q)

@@ -124,7 +124,11 @@ TIMES = [repr(0.1 * n) for n in range(40)]
         ({"time": TIMES}, None, "column 'time' has no unit"),
         ({"time[s]": [*TIMES[:5], *TIMES[4:-1]]}, None, "row 7: time does not advance"),
         ({"course": ["a"] * 10 + ["b"] * 10 + ["a"] * 20}, SPEED, "row 22: course 'a' begins a s"),
-        ({"course": [""] * 40}, SPEED, "row 2: column 'course' is empty"),
+        (
+            {"course": [""] * 40},
+            SPEED,
+            "row 2, column 'course': empty, but every row is of some course",
+        ),
         ({"course": ["a"] * 39 + ["b"]}, SPEED, "row 41: course 'b' has a single row"),
         ({}, 1e3, "it must take 0.04 s and more"),
     ],
@@ -190,5 +194,5 @@ def test_joints_beyond_their_limits_are_refused(folder):
                                     course.direction, q=q)],
         joint_dimensions(cell.robot.joint_names, cell.robot.revolute),
     )  # fmt: skip
-    with pytest.raises(PathError, match=r"row 5: joint_a2 is programmed to 515.7 deg"):
+    with pytest.raises(PathError, match=r"row 5, column 'joint_a2\[rad\]': 9 rad is not within"):
         read_programmed_path(folder / "far.csv", cell.robot, PathTiming())

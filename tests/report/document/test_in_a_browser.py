@@ -18,6 +18,7 @@ from elastocal.verdict import (
     Evidence,
 )
 from support.browser import Look, look
+from support.pages import with_script
 from support.reported import MADE
 
 LOOKS = (Look(1280, "light"), Look(1280, "dark"), Look(390, "dark"), Look(390, "light"))
@@ -124,11 +125,22 @@ def test_the_probe_sees_what_is_wrong(browser, tmp_path):
 
 def test_the_page_refuses_itself_the_network(browser, tmp_path):
     page = write_report(tmp_path / "report.html", Evidence(made=MADE)).path
-    asked = '<script>fetch("http://127.0.0.1:9/asked").catch(() => {});</script></body>'
-    page.write_text(page.read_text("utf-8").replace("</body>", asked), "utf-8")
+    asked = 'fetch("http://127.0.0.1:9/asked").catch(() => {});'
+    page.write_text(with_script(page.read_text("utf-8"), asked), "utf-8")
     seen = look(browser, page, [Look(390, "light")])
     assert seen.requests == []
     assert any("Content Security Policy" in line for line in seen.complaints)
+
+
+def test_a_script_that_the_page_did_not_come_with_is_not_run(browser, tmp_path):
+    page = write_report(tmp_path / "report.html", Evidence(made=MADE)).path
+    text = page.read_text("utf-8")
+    assert "unsafe" not in text.partition("<body>")[0].partition("</title>")[0]
+    planted = '<img src="" onerror="console.error(1)"><script>console.error("run")</script></body>'
+    page.write_text(text.replace("</body>", planted), "utf-8")
+    seen = look(browser, page, [Look(390, "light")])
+    assert seen.complaints
+    assert all("Content Security Policy" in line for line in seen.complaints)
 
 
 def test_it_prints_to_pages_of_a4(browser, report, tmp_path):

@@ -19,7 +19,7 @@ from elastocal.report.plots import (
     write_figure,
 )
 from support.codecs import judged, renamed, without_errors
-from support.pages import Page
+from support.pages import Page, with_script
 
 
 @pytest.fixture(scope="module")
@@ -179,14 +179,14 @@ def test_page_draws_in_a_browser_and_tells_what_the_slider_asks(tmp_path, text):
     browser = next(filter(None, map(shutil.which, ("chromium", "chromium-browser"))), None)
     if browser is None:
         pytest.skip("no chromium on the path to draw the page with")
-    asked = """<script>setTimeout(() => {
+    asked = """setTimeout(() => {
       const slider = document.getElementById("errors-size");
       slider.value = 3; slider.dispatchEvent(new Event("input"));
       document.querySelector("#variants input").click();
       document.getElementById("log").click();
-    }, 2000);</script></body>"""
+    }, 2000);"""
     page = tmp_path / "p.html"
-    page.write_text(text.replace("</body>", asked), encoding="utf-8")
+    page.write_text(with_script(text, asked), encoding="utf-8")
     run = subprocess.run(
         [browser, "--headless", "--no-sandbox", "--use-angle=swiftshader",
          "--enable-unsafe-swiftshader", "--disable-background-networking", "--no-first-run",

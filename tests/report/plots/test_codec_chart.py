@@ -4,8 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from matplotlib.collections import PathCollection, PolyCollection
 from matplotlib.colors import to_hex
+from matplotlib.patches import PathPatch
+from matplotlib.path import Path
 from matplotlib.text import Text
 
 from elastocal.codec import AXES
@@ -21,6 +22,7 @@ from elastocal.report.plots import (
     tint,
     variant_styles,
 )
+from elastocal.report.plots._box_plots import PALE
 from support.codecs import judged, renamed, without_errors
 
 
@@ -29,12 +31,15 @@ def known():
     return judged()
 
 
-def boxes_in(axes) -> list[PolyCollection]:
-    return [
-        each
-        for each in axes.collections
-        if isinstance(each, PolyCollection) and len(each.get_paths()) > 1
-    ]
+def boxes_in(axes) -> list[PathPatch]:
+    """Return the boxes of each look, before their whiskers and behind their medians."""
+    return [each for each in axes.patches if each.get_fill() and each.get_zorder() == 3]
+
+
+def points_in(axes, marker: str) -> np.ndarray:
+    """Return the places of all marks of a kind, shape (mark, 2)."""
+    lines = [each.get_xydata() for each in axes.lines if each.get_marker() == marker]
+    return np.concatenate([*lines, np.empty((0, 2))])
 
 
 def texts_of(figure) -> str:
@@ -81,19 +86,18 @@ def test_every_box_is_inside_its_panel(known):
     for axis in AXES:
         for axes in codec_chart(known.data, known.verdicts, axis).axes[:2]:
             low, high = axes.get_ylim()
-            drawn = np.concatenate([each.get_paths()[0].vertices for each in boxes_in(axes)])
+            drawn = np.concatenate([each.get_path().vertices for each in boxes_in(axes)])
             assert low < drawn[:, 1].min() < drawn[:, 1].max() < high
-            dots = [each for each in axes.collections if isinstance(each, PathCollection)]
-            values = np.concatenate([each.get_offsets()[:, 1] for each in dots])
+            values = points_in(axes, "o")[:, 1]
             assert np.all((low < values) & (values < high))
 
 
 def test_a_variant_has_its_colour_and_a_box_for_every_size(known):
     axes = codec_chart(known.data, known.verdicts).axes[0]
     for each, look in zip(boxes_in(axes), variant_styles(["a", "b"]), strict=True):
-        assert len(each.get_paths()) == known.data.n_train[-1]
-        assert to_hex(each.get_edgecolor()[0]) == look.colour
-    assert [to_hex(each.get_edgecolor()[0]) for each in boxes_in(axes)] == [
+        assert np.sum(each.get_path().codes == Path.MOVETO) == known.data.n_train[-1]
+        assert to_hex(each.get_edgecolor()) == look.colour
+    assert [to_hex(each.get_edgecolor()) for each in boxes_in(axes)] == [
         style.BLUE,
         style.VERMILLION,
     ]
@@ -171,9 +175,10 @@ def test_springs_that_are_not_told_apart_say_so(known):
 def test_boxes_of_training_sets_that_tell_nothing_are_hollow(known):
     figure = compliance_chart(known.data, known.insight.seen)
     (axes,) = [each for each in figure.axes if each.get_title("left") == "joint_5.axial"]
-    actuated, bearing = boxes_in(axes)
-    assert to_hex(actuated.get_facecolor()[-1]) == tint(style.BLUE)
-    assert {to_hex(each) for each in bearing.get_facecolor()} == {style.PAPER}
+    faces = [to_hex(each.get_facecolor()) for each in boxes_in(axes)]
+    assert faces == [tint(style.BLUE), style.PAPER]
+    *_, bearing = boxes_in(axes)
+    assert to_hex(bearing.get_edgecolor()) == tint(style.VERMILLION, PALE)
 
 
 def test_boxes_beyond_the_scale_have_an_arrow(known):
@@ -182,12 +187,7 @@ def test_boxes_beyond_the_scale_have_an_arrow(known):
     data = replace(known.data, compliance=tuple(compliance))
     axes = compliance_chart(data, known.insight.seen).axes[0]
     top = axes.get_ylim()[1]
-    arrows = [
-        spot[0]
-        for each in axes.collections
-        for spot in each.get_offsets()
-        if spot[1] == pytest.approx(top)
-    ]
+    arrows = [x for x, y in points_in(axes, "^") if y == pytest.approx(top)]
     assert 1.0 + variant_styles(["actuated", "bearing"])[1].place in arrows
     assert all(0.5 < x < 1.5 for x in arrows)
 

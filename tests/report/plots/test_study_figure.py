@@ -28,8 +28,8 @@ def test_groups_are_pose_counts_in_rising_order():
 def test_boxes_show_the_samples_of_their_condition():
     figure = drawn(settings(10, 5))
     lower = figure.axes[0]
-    medians = [each.get_segments() for each in lower.collections if hasattr(each, "get_segments")]
-    heights = {round(float(s[0][1]), 9) for s in medians[-1]}
+    (medians,) = [each for each in lower.patches if each.get_zorder() == 4]
+    heights = {round(float(y), 9) for y in medians.get_path().vertices[:, 1]}
     expected = {
         round(1e3 * float(np.median([r.outcomes[k].error_max for r in RESULTS])), 9) for k in (0, 1)
     }

@@ -29,6 +29,14 @@ def test_a_quiet_cell_without_force_is_where_it_is_in_the_air(q):
     np.testing.assert_allclose(shift(cell, q, [np.zeros(3)])[0], cell.free_shift(q), atol=1e-9)
 
 
+def test_many_postures_in_the_air_are_shifted_as_each_alone(q):
+    cell = ProcessCell(example_cell("afp"), 0)
+    cell.lift("a", q)
+    many = q + np.linspace(0.0, 0.2, 4)[:, None]
+    alone = [cell.free_shift(each) for each in many]
+    np.testing.assert_allclose(cell.free_shift(many), alone, rtol=0.0, atol=1e-12)
+
+
 def test_the_gears_remember_the_way_to_a_force(q):
     straight = shift(quiet(), q, [0.5 * FORCE, FORCE])[-1]
     beyond = shift(quiet(), q, [0.5 * FORCE, FORCE, 1.5 * FORCE, FORCE])[-1]

@@ -55,8 +55,9 @@ def _calibrate(  # noqa: PLR0913 - one parameter an option
         Path | None,
         typer.Option(help="Path of production (.csv): state also how much of it is covered."),
     ] = None,
-    draws: Annotated[int, typer.Option(help="Bootstrap draws.")] = 200,
+    draws: Annotated[int, typer.Option(max=100_000, help="Bootstrap draws.")] = 200,
     seed: Annotated[int, typer.Option(min=0, help="Seed of the bootstrap.")] = 0,
+    force: options.Force = False,
     as_json: options.Figures = False,
 ) -> None:
     """Identify the compliances of a robot from a measured dataset."""
@@ -79,6 +80,7 @@ def _calibrate(  # noqa: PLR0913 - one parameter an option
         process=process,
         draws=draws,
         seed=seed,
+        force=force,
     )
     if as_json:
         output.print_json(result.calibration)

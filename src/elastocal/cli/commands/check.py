@@ -26,12 +26,10 @@ def _check(
     ] = False,
 ) -> None:
     """Validate a file and say what it holds."""
-    from rich.markup import escape
-
     result = workflows.check(file, tcp=tcp)
     if as_json:
         output.print_json({"file": result.file, "kind": result.kind, **result.holds})
         return
-    output.console().print(f"[green]ok[/green] {escape(result.file)} is a {result.kind}")
+    output.console().print(f"{output.green('ok')} {result.file} is a {result.kind}")
     for name, value in result.holds.items():
-        output.console().print(f"   {name.replace('_', ' ')}: {value}", markup=False)
+        output.console().print(f"   {name.replace('_', ' ')}: {value}")

@@ -7,7 +7,7 @@ import typer
 
 from elastocal import workflows
 from elastocal.cli import options, output, tables
-from elastocal.units import parse_point
+from elastocal.units import parse_number, parse_point, parse_quantity
 
 if TYPE_CHECKING:
     from elastocal.codec import Tolerance
@@ -40,7 +40,7 @@ def _codec(  # noqa: PLR0913 - one parameter an option
         ),
     ] = False,
     splits: Annotated[
-        int | None, typer.Option(help="Verification sets; default: as many as poses.")
+        int | None, typer.Option(max=100_000, help="Verification sets; default: as many as poses.")
     ] = None,
     poses: Annotated[
         int, typer.Option(help="Most poses; of a larger dataset as many are drawn by the seed.")
@@ -67,7 +67,8 @@ def _codec(  # noqa: PLR0913 - one parameter an option
         bool, typer.Option("--per-axis", help="Also print the errors along x, y and z.")
     ] = False,
     jobs: Annotated[
-        int | None, typer.Option(min=1, help="Processes; default: all cores for long work.")
+        int | None,
+        typer.Option(min=1, max=1024, help="Processes; default: all cores for long work."),
     ] = None,
     force: Annotated[
         bool, typer.Option("--force", help="Replace the files of a codec that is there.")
@@ -119,7 +120,7 @@ def _parse_ratio(text: str) -> float:
 
     above, _, below = text.partition("/")
     try:
-        return float(above) / float(below or 1.0)
+        return parse_number(above) / parse_number(below or "1")
     except (ValueError, ZeroDivisionError) as error:
         raise CodecError(f"ratio {text!r} must be two numbers above 0, e.g. '70/30'") from error
 
@@ -139,12 +140,11 @@ def _parse_tolerance(text: str) -> "Tolerance":
     """
     from elastocal.codec import Tolerance
     from elastocal.errors import CodecError, UnitError
-    from elastocal.units import parse_quantity
 
     part, _, length = (each.strip() for each in text.partition(","))
     percent = part.endswith("%")
     try:
-        relative = float(part.removesuffix("%")) / (100.0 if percent else 1.0)
+        relative = parse_number(part.removesuffix("%")) / (100.0 if percent else 1.0)
         floor = parse_quantity(length, "length") if length else Tolerance.floor
     except (ValueError, UnitError) as error:
         raise CodecError(

@@ -27,6 +27,7 @@ def _compare(
     figure: Annotated[
         Path | None, typer.Option(help="Figure to write: .svg, .png or .pdf.")
     ] = None,
+    force: options.Force = False,
     as_json: Annotated[
         bool, typer.Option("--json", help="Print the comparison as one JSON object.")
     ] = False,
@@ -42,6 +43,7 @@ def _compare(
         limit=None if limit is None else options.parse_limit(limit),
         out=out,
         figure=figure,
+        force=force,
     )
     if as_json:
         output.print_json(found.summary)
@@ -50,4 +52,4 @@ def _compare(
     hint = workflows.measured_rows(found.summary.new_provenance) if asked else None
     tables.show_comparison(output.console(), found, hint)
     for path in (each for each in (out, figure) if each is not None):
-        output.console().print(f"written to {path}", markup=False, soft_wrap=True)
+        output.console().print(f"written to {path}", soft_wrap=True)

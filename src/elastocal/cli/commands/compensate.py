@@ -29,6 +29,7 @@ def _compensate(  # noqa: PLR0913 (a command has as many options as it has)
     tool: options.NewTool = None,
     tool_mass: options.ToolMass = None,
     tool_centre: options.ToolCentre = None,
+    force: options.Force = False,
     as_json: options.Figures = False,
 ) -> None:
     """Correct a programmed path so that the loaded tool is where it was programmed."""
@@ -49,6 +50,7 @@ def _compensate(  # noqa: PLR0913 (a command has as many options as it has)
         tool_frame=tool,
         tool_mass=tool_mass,
         tool_centre=tool_centre,
+        force=force,
     )
     with output.progress_bars() as progress:
         result = workflows.compensate(given, progress)

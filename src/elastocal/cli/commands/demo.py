@@ -52,7 +52,7 @@ def _demo(
 
     result = workflows.demo(kind, out=out, seed=seed, force=force, display=display)
     for line in result.closing():
-        screen.print(line, soft_wrap=True, markup=False)
+        screen.print(line, soft_wrap=True)
 
 
 class _Display:
@@ -123,10 +123,10 @@ def _bars(console: "Console", story: "Sequence[Chapter]") -> Iterator[Callable[.
     from rich.progress import BarColumn, Progress as ProgressBars, TextColumn, TimeElapsedColumn
 
     bars = ProgressBars(
-        TextColumn("{task.description}"),
+        TextColumn("{task.description}", markup=False),
         BarColumn(bar_width=24),
         TimeElapsedColumn(),
-        TextColumn("[dim]{task.fields[stage]}"),
+        TextColumn("{task.fields[stage]}", style="dim", markup=False),
         console=console,
     )
     tasks = {each: bars.add_task(each.title, start=False, total=1.0, stage="") for each in story}
@@ -160,9 +160,9 @@ def _lines(console: "Console", story: "Sequence[Chapter]") -> Callable[..., Any]
 
         number = list(story).index(chapter) + 1
         head = f"{number} of {len(story)}  {chapter.title}: {chapter.line}"
-        console.print(head, soft_wrap=True, markup=False)
+        console.print(head, soft_wrap=True)
         began = time.monotonic()
         yield silent
-        console.print(f"    {time.monotonic() - began:.1f} s", markup=False)
+        console.print(f"    {time.monotonic() - began:.1f} s")
 
     return show

@@ -27,7 +27,8 @@ def _plan(  # noqa: PLR0913 - one parameter an option
     ] = None,
     program: Annotated[str, typer.Option(help="Name of the KRL program.")] = "calib",
     jobs: Annotated[
-        int | None, typer.Option(min=1, help="Processes for large pools; default: all cores.")
+        int | None,
+        typer.Option(min=1, max=1024, help="Processes for large pools; default: all cores."),
     ] = None,
     force: Annotated[
         bool, typer.Option("--force", help="Replace the files of a plan that is there.")

@@ -17,6 +17,7 @@ def _predict(
     tool: options.NewTool = None,
     tool_mass: options.ToolMass = None,
     tool_centre: options.ToolCentre = None,
+    force: options.Force = False,
     as_json: Annotated[
         bool, typer.Option("--json", help="Print a summary as one JSON object.")
     ] = False,
@@ -29,6 +30,7 @@ def _predict(
         tool_frame=tool,
         tool_mass=tool_mass,
         tool_centre=tool_centre,
+        force=force,
     )
     if as_json:
         output.print_json(result.summary)
@@ -37,14 +39,13 @@ def _predict(
     output.console().print(
         f"{figures.rows} rows: predicted deflection {1e3 * size.mean:.3f} mm mean,"
         f" {1e3 * size.max:.3f} mm max; written to {out}",
-        markup=False,
         soft_wrap=True,
     )
-    output.console().print(f"tool: {figures.tool}", markup=False, soft_wrap=True)
+    output.console().print(f"tool: {figures.tool}", soft_wrap=True)
     for note in figures.notes:
-        output.console().print(f"Note: {note}", markup=False, soft_wrap=True)
+        output.console().print(f"Note: {note}", soft_wrap=True)
     if figures.warning:
-        output.console().print(f"[yellow]warning:[/yellow] {figures.warning}", soft_wrap=True)
+        output.console().print(f"{output.yellow('warning:')} {figures.warning}", soft_wrap=True)
     if figures.misfit is None:
         output.console().print(
             "Note: the model does not know its errors at left-out poses, so that there are no"

@@ -47,12 +47,14 @@ def _simulate_process(  # noqa: PLR0913 (a command has as many options as it has
     ] = None,
     settings: options.CompensatorFile = None,
     courses: Annotated[
-        int | None, typer.Option(min=1, help="Courses or rings; default: 5.")
+        int | None, typer.Option(min=1, max=1000, help="Courses or rings; default: 5.")
     ] = None,
     budget: Annotated[
         bool, typer.Option("--budget", help="Switch each effect off in turn, for the first seed.")
     ] = False,
-    jobs: Annotated[int | None, typer.Option(min=1, help="Processes; default: all cores.")] = None,
+    jobs: Annotated[
+        int | None, typer.Option(min=1, max=1024, help="Processes; default: all cores.")
+    ] = None,
     force: Annotated[bool, typer.Option("--force", help="Replace files that are there.")] = False,
     as_json: options.Figures = False,
 ) -> None:

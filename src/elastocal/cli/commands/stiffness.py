@@ -17,11 +17,18 @@ def _stiffness(  # noqa: PLR0913 (a command has as many options as it has)
     direction: Annotated[
         str, typer.Option(help="'normal' (axis of the tool) or a vector in base: '1,0,0'.")
     ] = "normal",
-    spins: Annotated[int, typer.Option(min=1, help="Turns about the tool's axis to try.")] = 36,
+    spins: Annotated[
+        int, typer.Option(min=1, max=3600, help="Turns about the tool's axis to try.")
+    ] = 36,
     stands: Annotated[
-        int, typer.Option(min=1, help="Positions of each external axis to try (with --cell: its).")
+        int,
+        typer.Option(
+            min=1, max=1000, help="Positions of each external axis to try (with --cell: its)."
+        ),
     ] = 9,
-    stations: Annotated[int, typer.Option(min=1, help="Rows of the path to look at.")] = 60,
+    stations: Annotated[
+        int, typer.Option(min=1, max=100_000, help="Rows of the path to look at.")
+    ] = 60,
     cell: Annotated[
         Path | None, typer.Option(help="Cell file: its margins, tooling and fixtures.")
     ] = None,

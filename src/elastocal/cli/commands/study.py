@@ -15,7 +15,9 @@ def _study(  # noqa: PLR0913 - one parameter an option
         Path, typer.Option(metavar="DIR", help="Folder of the study; one that is there goes on.")
     ],
     *,
-    samples: Annotated[int, typer.Option(help="Simulated arms, each calibrated anew.")] = 200,
+    samples: Annotated[
+        int, typer.Option(max=1_000_000, help="Simulated arms, each calibrated anew.")
+    ] = 200,
     vary: Annotated[
         list[str] | None,
         typer.Option(
@@ -29,10 +31,15 @@ def _study(  # noqa: PLR0913 - one parameter an option
         typer.Option(metavar="LENGTH", help="Error that is good enough, e.g. '0.05 mm'."),
     ] = None,
     verification: Annotated[
-        int, typer.Option(help="Poses at which every calibration is judged; none is chosen.")
+        int,
+        typer.Option(
+            max=10_000, help="Poses at which every calibration is judged; none is chosen."
+        ),
     ] = 25,
     seed: Annotated[int, typer.Option(min=0, help="Seed of arms and noise.")] = 0,
-    jobs: Annotated[int | None, typer.Option(min=1, help="Processes; default: all cores.")] = None,
+    jobs: Annotated[
+        int | None, typer.Option(min=1, max=1024, help="Processes; default: all cores.")
+    ] = None,
     dask: Annotated[
         str | None,
         typer.Option(metavar="ADDRESS", help="Dask scheduler to work on, e.g. tcp://host:8786."),

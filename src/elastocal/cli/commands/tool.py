@@ -19,13 +19,18 @@ def _tool(  # noqa: PLR0913 - one parameter an option
         str | None,
         typer.Option(help="URDF, catalogue name or model (.json), for a CSV with joints."),
     ] = None,
-    flange: Annotated[str, typer.Option(help="Link that the sensor sits on.")] = "flange",
+    flange: Annotated[
+        str | None, typer.Option(help="Link that the sensor sits on; default: flange.")
+    ] = None,
     sensor: Annotated[
-        str, typer.Option(help="Sensor in that link as mounted: 'x, y, z, a, b, c' with units.")
-    ] = "0 mm, 0 mm, 0 mm, 0 deg, 0 deg, 0 deg",
-    down: Annotated[str, typer.Option(help="Direction of gravity in base: 'x, y, z'.")] = (
-        "0, 0, -1"
-    ),
+        str | None,
+        typer.Option(
+            help="Sensor in that link as mounted: 'x, y, z, a, b, c' with units; default: the link."
+        ),
+    ] = None,
+    down: Annotated[
+        str | None, typer.Option(help="Direction of gravity in base: 'x, y, z'; default: 0, 0, -1.")
+    ] = None,
     free_rotation: Annotated[
         bool,
         typer.Option(
@@ -44,6 +49,7 @@ def _tool(  # noqa: PLR0913 - one parameter an option
     cross_talk: Annotated[
         float, typer.Option(help="Cross-talk by the sensor's data sheet, a share of its ranges.")
     ] = 0.01,
+    force: options.Force = False,
     as_json: options.Written = False,
 ) -> None:
     """Find mass, centre of mass and sensor bias from static postures, and what else they carry."""
@@ -55,10 +61,11 @@ def _tool(  # noqa: PLR0913 - one parameter an option
         robot=robot,
         flange=flange,
         sensor=sensor,
-        down=options.parse_direction(down),
+        down=None if down is None else options.parse_direction(down),
         free_rotation=free_rotation,
         matrix=matrix,
         cross_talk=cross_talk,
+        force=force,
     )
     if as_json:
         # What this command always printed: the file without its schema.

@@ -10,10 +10,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rich.console import Console
-from rich.markup import escape
 from rich.table import Table
 
-from elastocal.cli.output import print_remarks
+from elastocal.cli.output import bold, dim, green, print_remarks, red, yellow
 from elastocal.elastic import Unit, unit_of
 from elastocal.identification import (
     AUTO,
@@ -53,7 +52,7 @@ def show_calibration(console: Console, result: CalibrateResult, out: Path) -> No
     figures = result.calibration
     if figures is not None:
         _show_figures(console, figures)
-    console.print(f"\nmodel written to [bold]{escape(str(out))}[/bold]")
+    console.print(f"\nmodel written to {bold(str(out))}")
 
 
 def _show_figures(console: Console, figures: CalibrationSummary) -> None:
@@ -72,7 +71,7 @@ def _show_fit(console: Console, figures: CalibrationSummary) -> None:
     mean, peak = figures.deflection.mean, figures.deflection.max
     fit, held_out = figures.residual, figures.held_out
     console.print(
-        f"[bold]{escape(figures.robot)}[/bold]: {_springs(figures)},"
+        f"{bold(figures.robot)}: {_springs(figures)},"
         f" {figures.readings} readings at {figures.poses} poses,"
         f" measured deflection {mm(mean)} mean, {mm(peak)} max"
     )
@@ -81,7 +80,7 @@ def _show_fit(console: Console, figures: CalibrationSummary) -> None:
         table.add_column(heading, justify="left" if heading == "error norm" else "right")
     table.add_row(
         f"at left-out poses ({held_out.folds} refits)",
-        f"[bold]{mm(held_out.mean)}[/bold]",
+        bold(mm(held_out.mean)),
         f"{held_out.mean / mean:.2%}",
         "",
         mm(held_out.max),
@@ -98,7 +97,7 @@ def _show_fit(console: Console, figures: CalibrationSummary) -> None:
     if figures.coverage is not None:
         console.print(_coverage_line(figures.coverage), soft_wrap=True)
     if figures.production:
-        console.print(figures.production.sentence(), markup=False, soft_wrap=True)
+        console.print(figures.production.sentence(), soft_wrap=True)
 
 
 def _coverage_line(coverage: Coverage) -> str:
@@ -135,15 +134,15 @@ def _show_ladder(console: Console, figures: CalibrationSummary) -> None:
         )
         worse = f"{mean:.1f} µm ({low:.1f} to {high:.1f})" if low != high else ""
         table.add_row(
-            escape(rung.springs),
+            rung.springs,
             str(rung.parameters),
             mm(rung.held_out),
             worse,
-            "[bold]taken[/bold]" if rung.chosen else "",
+            bold("taken") if rung.chosen else "",
         )
     console.print(table)
     if figures.settings is not None and figures.settings.springs == AUTO:
-        console.print(ladder_sentence(ladder), markup=False)
+        console.print(ladder_sentence(ladder))
 
 
 def _show_frames(console: Console, frames: Sequence[FrameSummary]) -> None:
@@ -161,9 +160,7 @@ def _show_frames(console: Console, frames: Sequence[FrameSummary]) -> None:
         )
         for name, (what, part, half) in zip((frame.name, "", ""), parts, strict=True):
             numbers = zip(part, half, strict=True)
-            table.add_row(
-                escape(name), what, *(f"{1e6 * x:.0f} ±{1e6 * h:.0f}" for x, h in numbers)
-            )
+            table.add_row(name, what, *(f"{1e6 * x:.0f} ±{1e6 * h:.0f}" for x, h in numbers))
     console.print(table)
 
 
@@ -209,13 +206,13 @@ def _spring_row(spring: SpringSummary) -> tuple[str, ...]:
     value, low, high = (shown.factor * each for each in values)
     unit = "" if shown == _USUAL_UNIT else f" {shown.shown}"
     if spring.too_weak:
-        note = "[yellow]too weak to see[/yellow]"
-        return escape(spring.name), f"[dim]({value:.4f}{unit})[/dim]", "", "", note
+        note = yellow("too weak to see")
+        return spring.name, dim(f"({value:.4f}{unit})"), "", "", note
     if not spring.observable:
-        note = f"[yellow]not by itself[/yellow], group {spring.group}"
-        return escape(spring.name), f"[dim]({value:.4f}{unit})[/dim]", "", "", note
+        note = f"{yellow('not by itself')}, group {spring.group}"
+        return spring.name, dim(f"({value:.4f}{unit})"), "", "", note
     return (
-        escape(spring.name),
+        spring.name,
         f"{value:.4f}{unit}",
         f"{low:.3f} … {high:.3f}",
         _stiffness(value, shown),
@@ -233,14 +230,12 @@ def _stiffness(value: float, unit: Unit) -> str:
 def _known(value: float, low: float, high: float, at_bound: bool) -> str:
     if at_bound:
         open_end = f", below {high:.3f}" if high > value else ""
-        return "[yellow]at bound[/yellow]" + (
-            open_end or (f", above {low:.3f}" if low < value else "")
-        )
+        return yellow("at bound") + (open_end or (f", above {low:.3f}" if low < value else ""))
     if value == 0.0:
         return ""
     relative = (high - low) / 2.0 / abs(value)
-    colour = "green" if relative < 0.2 else "yellow" if relative < 0.5 else "red"
-    return f"[{colour}]±{relative:.0%}[/{colour}]"
+    colour = green if relative < 0.2 else yellow if relative < 0.5 else red
+    return colour(f"±{relative:.0%}")
 
 
 def _show_groups(console: Console, figures: CalibrationSummary) -> None:
@@ -268,7 +263,7 @@ def _show_groups(console: Console, figures: CalibrationSummary) -> None:
         f" {figures.condition:.0f}): {meaning}"
     )
     for number, group in enumerate(figures.unobservable, start=1):
-        console.print(f"   group {number}: {escape(describe_briefly(group))}")
+        console.print(f"   group {number}: {describe_briefly(group)}")
 
 
 def _show_suspicious(console: Console, suspicious: tuple[SuspiciousReading, ...]) -> None:
@@ -276,21 +271,21 @@ def _show_suspicious(console: Console, suspicious: tuple[SuspiciousReading, ...]
         console.print("no reading looks wrong")
         return
     many = "reading looks" if len(suspicious) == 1 else "readings look"
-    console.print(f"\n[yellow]{len(suspicious)} {many} wrong[/yellow] (robust score):")
+    console.print(f"\n{yellow(f'{len(suspicious)} {many} wrong')} (robust score):")
     for reading in suspicious[:_MOST_SUSPICIOUS]:
-        note = " [red]set aside as a blunder[/red]" if reading.set_aside else ""
+        note = f" {red('set aside as a blunder')}" if reading.set_aside else ""
         off = mm(reading.residual)
         console.print(
-            f"   pose {reading.pose} {escape(reading.load_case)}: {off} off,"
+            f"   pose {reading.pose} {reading.load_case}: {off} off,"
             f" score {reading.score:.1f}{note}"
         )
     if len(suspicious) > _MOST_SUSPICIOUS:
         console.print(f"   … and {len(suspicious) - _MOST_SUSPICIOUS} more (--json lists all)")
     first = suspicious[0]
-    console.print(f"   to leave one out: --exclude {first.pose}:{escape(first.load_case)}")
+    console.print(f"   to leave one out: --exclude {first.pose}:{first.load_case}")
 
 
-_COLOURS = {"pass": "green", "fail": "red", "undecided": "yellow"}
+_COLOURS = {"pass": green, "fail": red, "undecided": yellow}
 
 
 def show_comparison(console: Console, compared: "CompareResult", hint: Path | None = None) -> None:
@@ -306,12 +301,12 @@ def show_comparison(console: Console, compared: "CompareResult", hint: Path | No
         A dataset that could serve as rows.
     """
     found = compared.summary
-    console.print(f"[bold]{escape(found.robot)}[/bold]: {_moved(found)}")
+    console.print(f"{bold(found.robot)}: {_moved(found)}")
     if found.springs:
         sums = {each.name: f"sum {n}" for n, each in enumerate(_sums(found), start=1)}
         console.print(_change_table(found, sums))
         for name, short in sums.items():
-            console.print(f"   {short}: {name}", markup=False, soft_wrap=True)
+            console.print(f"   {short}: {name}", soft_wrap=True)
         console.print(
             f"the interval holds for all {len(found.springs)} comparisons at once with 95 %"
             + ("; what has 0 outside it moved" if found.springs_judged else ""),
@@ -319,23 +314,21 @@ def show_comparison(console: Console, compared: "CompareResult", hint: Path | No
         )
     for names, which in ((found.only_old, "old"), (found.only_new, "new")):
         if names:
-            console.print(
-                f"only in the {which} model: {', '.join(names)}", markup=False, soft_wrap=True
-            )
+            console.print(f"only in the {which} model: {', '.join(names)}", soft_wrap=True)
     if found.not_compared:
-        console.print(f"not determined by both: {', '.join(found.not_compared)}", markup=False)
+        console.print(f"not determined by both: {', '.join(found.not_compared)}")
     if compared.rows is not None:
         console.print(f"\n{compared.rows.sentence()}", soft_wrap=True)
     _show_verdict(console, found, hint)
     for note in found.notes:
-        console.print(f"[yellow]note:[/yellow] {escape(note)}", soft_wrap=True)
+        console.print(f"{yellow('note:')} {note}", soft_wrap=True)
 
 
 def _moved(found: "CompareSummary") -> str:
     if found.unmoved_sentence:
-        return escape(found.unmoved_sentence)
+        return found.unmoved_sentence
     names = ", ".join(each.label for each in found.moved_springs)
-    return f"[bold red]{found.verb}[/bold red]: {escape(names)}"
+    return f"{red(bold(found.verb))}: {names}"
 
 
 def _sums(found: "CompareSummary") -> "list[SpringChange]":
@@ -358,12 +351,12 @@ def _change_table(found: "CompareSummary", sums: dict[str, str]) -> Table:
         unit = unit_of(change.unit)
         shown = "" if unit.shown == _USUAL_UNIT.shown else f" {unit.shown}"
         table.add_row(
-            escape(sums.get(change.name, change.name)),
+            sums.get(change.name, change.name),
             f"{unit.factor * change.old.value:.4f}{shown}",
             f"{unit.factor * change.new.value:.4f}{shown}",
             f"{unit.factor * change.difference.value:+.4f}",
             _between(change.together, unit.factor),
-            f"[red]{word}[/red]" if change.moved else "",
+            red(word) if change.moved else "",
         )
     return table
 
@@ -379,12 +372,12 @@ def _show_verdict(console: Console, found: "CompareSummary", hint: Path | None) 
         asked = "give them with --rows"
         if hint is not None:
             asked += f", e.g. {hint}, which the new model states it was calibrated on"
-        console.print(f"[yellow]no verdict:[/yellow] {escape(found.reason)}; {escape(asked)}",
+        console.print(f"{yellow('no verdict:')} {found.reason}; {asked}",
                       soft_wrap=True)  # fmt: skip
         return
     colour = _COLOURS[found.verdict]
     console.print(
-        f"[bold {colour}]{found.verdict.value}[/bold {colour}]: {escape(found.reason)}",
+        f"{bold(colour(found.verdict.value))}: {found.reason}",
         soft_wrap=True,
     )
 
@@ -392,7 +385,7 @@ def _show_verdict(console: Console, found: "CompareSummary", hint: Path | None) 
 def show_report(console: Console, result: "ReportResult") -> None:
     """Print the verdict of a report."""
     verdict = result.verdict
-    console.print(f"[bold]{verdict.word}[/bold]{result.light}: {escape(verdict.sentence)}")
+    console.print(f"{bold(verdict.word)}{result.light}: {verdict.sentence}")
     for reason in verdict.reasons:
-        console.print(f"   {reason}", markup=False)
-    console.print(f"written to {result.files}", markup=False)
+        console.print(f"   {reason}")
+    console.print(f"written to {result.files}")

@@ -6,10 +6,9 @@ from pathlib import Path
 import numpy as np
 from rich.box import SIMPLE
 from rich.console import Console
-from rich.markup import escape
 from rich.table import Table
 
-from elastocal.cli.output import print_remarks
+from elastocal.cli.output import bold, print_remarks
 from elastocal.codec import CodecSummary
 from elastocal.codec.study import Share, StudySummary, micrometres, value_text
 
@@ -18,14 +17,14 @@ _MOST_SIZES = 12
 
 def show_codec(console: Console, result: CodecSummary, out: Path, names: Sequence[str]) -> None:
     """Print the verdicts of a codec."""
-    console.print(f"[bold]{escape(result.robot)}[/bold]: {result.settings.sentence}")
+    console.print(f"{bold(result.robot)}: {result.settings.sentence}")
     for sentence in result.springs:
-        console.print(sentence, markup=False)
+        console.print(sentence)
     console.print(_codec_table(result))
     for sentence in result.sentences:
-        console.print(sentence, markup=False)
+        console.print(sentence)
+    console.print(f"\n{', '.join(names)} written to {bold(str(out))}")
     print_remarks(console, "note", result.findings)
-    console.print(f"\n{', '.join(names)} written to [bold]{escape(str(out))}[/bold]")
 
 
 def _codec_table(result: CodecSummary) -> Table:
@@ -33,7 +32,7 @@ def _codec_table(result: CodecSummary) -> Table:
     table = Table(box=None, pad_edge=False, title="error norm at held-out poses, µm: mean / max")
     table.add_column("training poses", justify="right")
     for name in result.variants:
-        table.add_column(escape(name), justify="right")
+        table.add_column(name, justify="right")
     curves = list(result.variants.values())
     sizes = len(curves[0].n_train)
     for k in np.unique(np.linspace(0, sizes - 1, min(sizes, _MOST_SIZES)).round().astype(int)):
@@ -53,19 +52,19 @@ _CAPTION = (
 
 def show_study(console: Console, summary: StudySummary, out: Path, names: Sequence[str]) -> None:
     """Print what a study says."""
-    console.print(f"[bold]{escape(summary.cell)}[/bold]: {escape(summary.sentence)}")
+    console.print(f"{bold(summary.cell)}: {summary.sentence}")
     console.print(_study_table(summary))
     if len(summary.conditions) > _MOST_CONDITIONS:
         console.print(f"{len(summary.conditions) - _MOST_CONDITIONS} more conditions in study.json")
     if summary.advice:
-        console.print(summary.advice, markup=False)
-    console.print(f"\n{', '.join(names)} written to [bold]{escape(str(out))}[/bold]")
+        console.print(summary.advice)
+    console.print(f"\n{', '.join(names)} written to {bold(str(out))}")
 
 
 def _study_table(summary: StudySummary) -> Table:
     factors = summary.varied or ("poses",)
     table = Table(caption=_CAPTION, box=SIMPLE, pad_edge=False, padding=(0, 1, 0, 0))
-    titles = [escape(name.replace("_", " ")) for name in factors]
+    titles = [name.replace("_", " ") for name in factors]
     titles += ["mean", "95 %", "largest", "95 %"]
     titles += [] if summary.target is None else ["mean good", "largest good"]
     for number, title in enumerate(titles):
@@ -77,7 +76,7 @@ def _study_table(summary: StudySummary) -> Table:
             cells += [micrometres(found.median), micrometres(found.q95)]
         if summary.target is not None:
             cells += [_share(each.mean_reaches), _share(each.max_reaches)]
-        table.add_row(*map(escape, cells))
+        table.add_row(*cells)
     return table
 
 

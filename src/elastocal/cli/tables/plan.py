@@ -7,10 +7,9 @@ import math
 
 import numpy as np
 from rich.console import Console
-from rich.markup import escape
 from rich.table import Table
 
-from elastocal.cli.output import print_remarks
+from elastocal.cli.output import bold, dim, green, print_remarks, yellow
 from elastocal.planning import PlanResult, ProductionRecord, SpreadRecord
 from elastocal.records import record
 from elastocal.robot import catalogue
@@ -20,10 +19,10 @@ from elastocal.workflows import DryRunResult, InitResult, PlanFigures, RunResult
 
 def show_example(console: Console, result: InitResult) -> None:
     """Print where an example cell was written, and what comes next."""
-    cell = escape(str(result.cell))
+    cell = str(result.cell)
     names = ", ".join(path.name for path in (*result.meshes, result.process))
     console.print(
-        f"wrote [bold]{cell}[/bold] and {names}: edit it, then `elastocal check {cell}`",
+        f"wrote {bold(cell)} and {names}: edit it, then `elastocal check {cell}`",
         soft_wrap=True,
     )
 
@@ -32,7 +31,7 @@ def show_plan(console: Console, plan: PlanResult, figures: PlanFigures) -> None:
     """Print the plan for a person."""
     search, pool = plan.search, plan.pool
     console.print(
-        f"[bold]{len(plan.poses)} poses[/bold] by {search.name} from {pool.valid} candidates"
+        f"{bold(f'{len(plan.poses)} poses')} by {search.name} from {pool.valid} candidates"
         f" ({pool.sampled} points tried); covering radius"
         f" {1e3 * search.covering_radius:.1f} mm; about {_minutes(plan.total_time)}"
         f" ({_minutes(plan.travel_time)} on the way)"
@@ -42,15 +41,13 @@ def show_plan(console: Console, plan: PlanResult, figures: PlanFigures) -> None:
     if plan.production is not None:
         console.print(_expected_table(plan, plan.production))
         for name, text in plan.production.facts():
-            console.print(f"{name}: {text}", markup=False, soft_wrap=True)
+            console.print(f"{name}: {text}", soft_wrap=True)
     if figures.stations:
         seen = ", ".join(f"{name} {count}" for name, count in figures.stations.items())
-        console.print(f"marker seen by: {seen}", markup=False)
+        console.print(f"marker seen by: {seen}")
     print_remarks(console, "note", plan.findings)
     written = f"written to {figures.folder}: {', '.join(figures.files)}"
-    console.print(
-        written if figures.files else "Nothing was written.", markup=False, soft_wrap=True
-    )
+    console.print(written if figures.files else "Nothing was written.", soft_wrap=True)
 
 
 def _spread_table(plan: PlanResult) -> Table:
@@ -181,11 +178,11 @@ def show_run(console: Console, result: RunResult) -> None:
         soft_wrap=True,
     )
     if found.message:
-        console.print(found.message, soft_wrap=True, markup=False)
+        console.print(found.message, soft_wrap=True)
     if found.dataset:
         print_remarks(console, "warning", found.warnings)
         console.print(
-            f"wrote [bold]{found.dataset}[/bold] and summary.json:"
+            f"wrote {bold(found.dataset)} and summary.json:"
             f" `elastocal calibrate {found.dataset} --out model.json`",
             soft_wrap=True,
         )
@@ -242,14 +239,16 @@ def show_robots(console: Console, rows: list[_RobotFacts]) -> None:
         table.add_row(row.name, reach, *_marks(row))
     console.print(table)
     console.print(
-        "\n[dim]sourced: from a named source; assumed: no source, never used silently; -: not"
-        " known. `elastocal robots NAME` shows every source.[/dim]"
+        dim(
+            "\nsourced: from a named source; assumed: no source, never used silently; -: not"
+            " known. `elastocal robots NAME` shows every source."
+        )
     )
 
 
 def show_robot(console: Console, row: _RobotFacts) -> None:
     """Print one robot with its sources."""
-    console.print(f"[bold]{row.name}[/bold]")
+    console.print(bold(row.name))
     table = Table(box=None, pad_edge=False)
     for heading in ("joint", "from", "to", "speed", "torque"):
         table.add_column(heading, justify="left" if heading == "joint" else "right")
@@ -264,7 +263,7 @@ def show_robot(console: Console, row: _RobotFacts) -> None:
     console.print(table)
     for title, texts in (("source of", row.sources), ("assumed", row.assumptions)):
         for field, text in texts.items():
-            console.print(f"{title} {field}: {text}", markup=False)
+            console.print(f"{title} {field}: {text}")
 
 
 def _marks(row: _RobotFacts) -> tuple[str, ...]:
@@ -280,8 +279,8 @@ def _marks(row: _RobotFacts) -> tuple[str, ...]:
 
 def _mark(assumed: bool, known: bool) -> str:
     if not known:
-        return "[dim]-[/dim]"
-    return "[yellow]assumed[/yellow]" if assumed else "[green]sourced[/green]"
+        return dim("-")
+    return yellow("assumed") if assumed else green("sourced")
 
 
 def _degrees(value: float | None, unit: str) -> str:

@@ -11,6 +11,7 @@ from elastocal.codec.variants import ALL_LOADS, values_by_key
 from elastocal.errors import CodecError, ElastocalError, nearest
 from elastocal.planning.search import technique
 from elastocal.records import record
+from elastocal.units import parse_number
 
 Value = int | float | str
 _LARGEST_SCALE = 100.0
@@ -46,7 +47,7 @@ def _count(text: str) -> int:
 
 def _number(largest: float) -> Callable[[str], float]:
     def read(text: str) -> float:
-        value = float(text)
+        value = parse_number(text)
         if not 0.0 <= value <= largest:
             raise ValueError
         return value + 0.0

@@ -9,21 +9,17 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from elastocal.arrays import BoolArray, FloatArray
-from elastocal.dataset import LoadRows, joint_dimensions, read_load_rows, require_within_a_turn
-from elastocal.errors import CompensationError
+from elastocal.dataset import PathTable, find_posture_columns, in_file
+from elastocal.errors import CompensationError, PathError
 from elastocal.results import brief_repr
-from elastocal.robot import GRAVITY, Robot, T_from_xyzabc
-from elastocal.tables import opened_table
+from elastocal.robot import GRAVITY, Robot
 
 LEAST_POSTURES = 3
 """Postures; with fewer nothing is left to tell whether the numbers fit."""
-_ANGLES = ("a", "b", "c")
-_QUATERNION = ("qx", "qy", "qz", "qw")
-_UNIT = 1e-2
-"""Largest distance of the length of a quaternion from 1."""
+_QUATERNION = 4
+"""Columns of an orientation as a quaternion."""
 
 
 @brief_repr
@@ -137,52 +133,24 @@ def read_postures(
     Raises
     ------
     CompensationError
-        If there is neither joints nor orientations, too few rows, or an orientation that is none.
-    DatasetError, FileAccessError
+        If there is neither joints nor orientations, too few rows, or a number that cannot be meant.
+    FileAccessError
         If the file cannot be read.
     """
-    with opened_table(path) as table:
-        header = [name.split("[")[0].strip() for name in table.layout.header]
-    if set(_QUATERNION) <= set(header):
-        rows = read_load_rows(path, {})
-        R = _from_quaternions(path, rows, header)
-    elif set(_ANGLES) <= set(header):
-        rows = read_load_rows(path, dict.fromkeys(_ANGLES, "angle"))
-        require_within_a_turn(
-            rows.joint_position, lambda row, k: f"{path}: posture {row + 1}: {_ANGLES[k]}"
-        )
-        zero = np.zeros(len(rows.force))
-        R = T_from_xyzabc(zero, zero, zero, *rows.joint_position.T)[:, :3, :3]
-    elif robot is not None:
-        rows = read_load_rows(path, joint_dimensions(robot.joint_names, robot.revolute))
-        R = robot.forward(rows.joint_position)[:, :3, :3]
-    else:
-        raise CompensationError(
-            f"{path}: no orientation of the flange (a[deg] b[deg] c[deg], or qx qy qz qw): give"
-            " --robot for a file with joints"
-        )
-    if rows.moment is None:
-        raise CompensationError(
-            f"{path}: columns moment_x[N*m] … are missing: the centre of mass"
-            " and three biases come from them"
-        )
+    with in_file(path):
+        table = PathTable.open(path, lambda header: find_posture_columns(header, robot))
+        rows = table.rows()
+        if rows.force is None or rows.moment is None:
+            raise PathError(
+                "columns moment_x[N*m] … are missing: the centre of mass and three biases come"
+                " from them"
+            )
+        T = rows.T_base_tcp
+        if T is None:
+            assert robot is not None
+            T = robot.forward(rows.joints)
     try:
-        postures = static_postures(R, rows.force, rows.moment, gravity)
-        return replace(postures, quaternions=set(_QUATERNION) <= set(header))
+        postures = static_postures(T[:, :3, :3], rows.force, rows.moment, gravity)
     except CompensationError as error:
         raise CompensationError(f"{path}: {error}") from error
-
-
-def _from_quaternions(path: Path, rows: LoadRows, header: list[str]) -> FloatArray:
-    columns = [header.index(name) for name in _QUATERNION]
-    try:
-        quaternions = np.array([[float(cells[k]) for k in columns] for cells in rows.cells])
-    except ValueError as error:
-        raise CompensationError(f"{path}: a quaternion is not four numbers: {error}") from error
-    off = np.abs(np.linalg.norm(quaternions, axis=1) - 1.0)
-    if not off.max() <= _UNIT:
-        row = int(np.argmax(np.where(np.isnan(off), np.inf, off)))
-        raise CompensationError(
-            f"{path}: quaternion {quaternions[row].tolist()} of posture {row + 1} has not length 1"
-        )
-    return Rotation.from_quat(quaternions).as_matrix()
+    return replace(postures, quaternions=len(table.columns.orientation) == _QUATERNION)

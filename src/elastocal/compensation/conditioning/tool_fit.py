@@ -18,7 +18,7 @@ left where they started; force and moment weighed by their own scatter. The inte
 the last linear step with the prior as further rows, by Student's t.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -219,13 +219,13 @@ def fit_tool(
     least = _ROUNDING * np.where(size > 0.0, size, 1.0)
     # Without the matrix first: the prior is worth what the scatter says, which is not known yet.
     start = ToolModel(model.rotation, model.drift) if model.has_matrix else model
-    values, weights = np.zeros(_ALL), np.ones(2)
+    found = _WeighedFit(postures, start, np.zeros(_ALL), R, np.ones(2))
     for stage in (start, start, model, model):
-        values, R = _descend(postures, values, R, stage, weights)
-        scatter = _scatter(postures, values, R, stage, weights)
+        found = replace(found, model=stage).descended()
+        scatter = found.scatter()
         if np.all(np.isfinite(scatter)):
-            weights = 1.0 / np.maximum(scatter, least)
-    return _result(postures, values, R, model, weights, scatter)
+            found = replace(found, weights=1.0 / np.maximum(scatter, least))
+    return found.result(scatter)
 
 
 def tool_residual(postures: StaticPostures, fit: ToolFit) -> tuple[FloatArray, FloatArray]:
@@ -251,128 +251,114 @@ def _rotation_between(postures: StaticPostures, nominal: FloatArray) -> FloatArr
     return rotation
 
 
-def _descend(
-    postures: StaticPostures,
-    values: FloatArray,
-    R: FloatArray,
-    model: ToolModel,
-    weights: FloatArray,
-) -> tuple[FloatArray, FloatArray]:
-    """Return values (rotation 0, about the R returned) of the least squares."""
-    measured = np.hstack([postures.force, postures.moment])
-    values, free = values.copy(), model.free
-    for _ in range(_STEPS):
-        left = (measured - tool_wrenches(postures, values, R, model)) * np.repeat(weights, 3)
-        rows = np.concatenate([left.ravel(), -values[_MATRIX][free[_MATRIX]]])
-        u, s, vt, scale, kept = _decomposed(postures, values, R, model, weights)
-        step = np.zeros(_ALL)
-        step[free] = (vt[kept].T @ ((u[:, kept].T @ rows) / s[kept])) / scale
-        values = values + step
-        R = R @ Rotation.from_rotvec(step[_ROTATION]).as_matrix()
-        values[_ROTATION] = 0.0
-        if np.abs(step).max() <= _DONE * max(1.0, float(np.abs(values).max())):
-            break
-    return values, R
+@dataclass(frozen=True, eq=False)
+class _WeighedFit:
+    """Values of a model of the tool, and the weights of force and moment components."""
 
+    postures: StaticPostures
+    model: ToolModel
+    values: FloatArray
+    """As in `tool_wrenches`; the rotation is 0, about ``R``."""
+    R: FloatArray
+    weights: FloatArray
+    """Of a force and of a moment component, shape (2,)."""
 
-def _decomposed(
-    postures: StaticPostures,
-    values: FloatArray,
-    R: FloatArray,
-    model: ToolModel,
-    weights: FloatArray,
-) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, BoolArray]:
-    """Return the singular value decomposition ``u s vt`` of the weighed derivatives.
+    def left(self) -> FloatArray:
+        """Return what is left of forces and moments, shape (posture, 6)."""
+        measured = np.hstack([self.postures.force, self.postures.moment])
+        return measured - tool_wrenches(self.postures, self.values, self.R, self.model)
 
-    Below the postures' rows stand those of the prior. Before it the columns of the free unknowns
-    are divided by their ``scale``; the last array tells the directions that are determined.
-    """
-    free = model.free
-    J = tool_derivatives(postures, values, R, model) * np.repeat(weights, 3)[:, None]
-    prior = np.eye(_ALL)[_MATRIX][free[_MATRIX]]
-    J = np.vstack([J.reshape(-1, _ALL), prior])[:, free]
-    scale = np.linalg.norm(J, axis=0)
-    scale[scale <= _DEPENDENT * scale.max()] = scale.max()
-    u, s, vt = np.linalg.svd(J / scale, full_matrices=False)
-    return u, s, vt, scale, s > _DEPENDENT * s[0]
+    def descended(self) -> "_WeighedFit":
+        """Return the least squares."""
+        fit, free = self, self.model.free
+        for _ in range(_STEPS):
+            left = fit.left() * np.repeat(fit.weights, 3)
+            rows = np.concatenate([left.ravel(), -fit.values[_MATRIX][free[_MATRIX]]])
+            u, s, vt, scale, kept = fit.decomposed()
+            step = np.zeros(_ALL)
+            step[free] = (vt[kept].T @ ((u[:, kept].T @ rows) / s[kept])) / scale
+            values = fit.values + step
+            values[_ROTATION] = 0.0
+            turn = Rotation.from_rotvec(step[_ROTATION]).as_matrix()
+            fit = replace(fit, values=values, R=fit.R @ turn)
+            if np.abs(step).max() <= _DONE * max(1.0, float(np.abs(values).max())):
+                break
+        return fit
 
+    def decomposed(self) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, BoolArray]:
+        """Return the singular value decomposition ``u s vt`` of the weighed derivatives.
 
-def _scatter(
-    postures: StaticPostures,
-    values: FloatArray,
-    R: FloatArray,
-    model: ToolModel,
-    weights: FloatArray,
-) -> FloatArray:
-    """Return the standard deviations of what is left of force and moment components."""
-    left = np.hstack([postures.force, postures.moment]) - tool_wrenches(postures, values, R, model)
-    squares = (left.reshape(-1, 2, 3) ** 2).sum(axis=(0, 2))
-    over = _left_over(postures, values, R, model, weights)
-    return np.where(over > 0.5, np.sqrt(squares / np.maximum(over, 0.5)), np.nan)
+        Below the postures' rows stand those of the prior. Before it the columns of the free
+        unknowns are divided by their ``scale``; the last array tells the directions that are
+        determined.
+        """
+        free = self.model.free
+        J = tool_derivatives(self.postures, self.values, self.R, self.model)
+        J *= np.repeat(self.weights, 3)[:, None]
+        prior = np.eye(_ALL)[_MATRIX][free[_MATRIX]]
+        J = np.vstack([J.reshape(-1, _ALL), prior])[:, free]
+        scale = np.linalg.norm(J, axis=0)
+        scale[scale <= _DEPENDENT * scale.max()] = scale.max()
+        u, s, vt = np.linalg.svd(J / scale, full_matrices=False)
+        return u, s, vt, scale, s > _DEPENDENT * s[0]
 
+    def scatter(self) -> FloatArray:
+        """Return the standard deviations of what is left of force and moment components."""
+        squares = (self.left().reshape(-1, 2, 3) ** 2).sum(axis=(0, 2))
+        over = self.left_over()
+        return np.where(over > 0.5, np.sqrt(squares / np.maximum(over, 0.5)), np.nan)
 
-def _left_over(
-    postures: StaticPostures,
-    values: FloatArray,
-    R: FloatArray,
-    model: ToolModel,
-    weights: FloatArray,
-) -> FloatArray:
-    """Return how many of the force and moment components are left over, by their leverage."""
-    u, _, _, _, kept = _decomposed(postures, values, R, model, weights)
-    rows = 6 * len(postures)
-    taken = (u[:rows, kept] ** 2).sum(axis=1).reshape(-1, 2, 3).sum(axis=(0, 2))
-    over: FloatArray = 0.5 * rows - taken
-    return over
+    def left_over(self) -> FloatArray:
+        """Return how many force and moment components are left over, by their leverage."""
+        u, _, _, _, kept = self.decomposed()
+        rows = 6 * len(self.postures)
+        taken = (u[:rows, kept] ** 2).sum(axis=1).reshape(-1, 2, 3).sum(axis=(0, 2))
+        over: FloatArray = 0.5 * rows - taken
+        return over
 
-
-def _result(
-    postures: StaticPostures,
-    values: FloatArray,
-    R: FloatArray,
-    model: ToolModel,
-    weights: FloatArray,
-    scatter: FloatArray,
-) -> ToolFit:
-    free = model.free
-    _, s, vt, scale, kept = _decomposed(postures, values, R, model, weights)
-    mass = float(values[0])
-    centre = values[7:10] / (mass if abs(mass) > 0.0 else np.inf)
-    # Rows: how each unknown moves with the independent directions, each by its deviation.
-    moves = np.zeros((_ALL, int(kept.sum())))
-    moves[free] = (vt[kept] / s[kept, None]).T / scale[:, None]
-    moves[7:10] = (moves[7:10] - centre[:, None] * moves[0]) / max(abs(mass), _NO_MASS)
-    sigma = np.linalg.norm(moves, axis=1)
-    # Columns that are weighed have scatter 1; those that are not have what is left of them.
-    unit = 1.0 if np.all(scatter > 0.0) else float(np.nan_to_num(scatter).max())
-    degrees = float(_left_over(postures, values, R, model, weights).sum())
-    half = stdtrit(max(degrees, 1.0), 0.5 + _LEVEL / 2) * sigma[:_PLAIN] * unit
-    loose = np.zeros(_ALL, dtype=bool)
-    loose[free] = np.linalg.norm(vt[~kept], axis=0) > _LOADING
-    loose = loose[:_PLAIN]
-    if degrees < 0.5:
-        half[:] = np.nan
-    loose |= ~(half <= _widest(mass, postures))
-    half[loose] = np.nan
-    # In deviations of the prior the entries' covariance is the identity before any posture.
-    entries = moves[_MATRIX] @ moves[_MATRIX].T if model.has_matrix else np.eye(36)
-    return ToolFit(
-        mass=mass,
-        centre=centre,
-        force_bias=values[4:7],
-        moment_bias=values[10:13],
-        R_flange_sensor=R,
-        half_width=dict(zip(TOOL_UNKNOWNS, half.tolist(), strict=True)),
-        undetermined=tuple(name for name, open_ in zip(TOOL_UNKNOWNS, loose, strict=True) if open_),
-        count=len(postures),
-        force_scatter=float(scatter[0]),
-        moment_scatter=float(scatter[1]),
-        model=model,
-        drift=values[_DRIFT],
-        matrix=np.eye(6) + values[_MATRIX].reshape(6, 6) * model.spread,
-        matrix_determined=np.clip(1.0 - np.diag(entries), 0.0, 1.0).reshape(6, 6),
-        matrix_rank=int((np.linalg.eigvalsh(entries) < 0.25).sum()),
-    )
+    def result(self, scatter: FloatArray) -> ToolFit:
+        """Return tool and sensor with their intervals."""
+        postures, model, values, free = self.postures, self.model, self.values, self.model.free
+        _, s, vt, scale, kept = self.decomposed()
+        mass = float(values[0])
+        centre = values[7:10] / (mass if abs(mass) > 0.0 else np.inf)
+        # Rows: how each unknown moves with the independent directions, each by its deviation.
+        moves = np.zeros((_ALL, int(kept.sum())))
+        moves[free] = (vt[kept] / s[kept, None]).T / scale[:, None]
+        moves[7:10] = (moves[7:10] - centre[:, None] * moves[0]) / max(abs(mass), _NO_MASS)
+        sigma = np.linalg.norm(moves, axis=1)
+        # Columns that are weighed have scatter 1; those that are not have what is left of them.
+        unit = 1.0 if np.all(scatter > 0.0) else float(np.nan_to_num(scatter).max())
+        degrees = float(self.left_over().sum())
+        half = stdtrit(max(degrees, 1.0), 0.5 + _LEVEL / 2) * sigma[:_PLAIN] * unit
+        loose = np.zeros(_ALL, dtype=bool)
+        loose[free] = np.linalg.norm(vt[~kept], axis=0) > _LOADING
+        loose = loose[:_PLAIN]
+        if degrees < 0.5:
+            half[:] = np.nan
+        loose |= ~(half <= _widest(mass, postures))
+        half[loose] = np.nan
+        # In deviations of the prior the entries' covariance is the identity before any posture.
+        entries = moves[_MATRIX] @ moves[_MATRIX].T if model.has_matrix else np.eye(36)
+        return ToolFit(
+            mass=mass,
+            centre=centre,
+            force_bias=values[4:7],
+            moment_bias=values[10:13],
+            R_flange_sensor=self.R,
+            half_width=dict(zip(TOOL_UNKNOWNS, half.tolist(), strict=True)),
+            undetermined=tuple(
+                name for name, open_ in zip(TOOL_UNKNOWNS, loose, strict=True) if open_
+            ),
+            count=len(postures),
+            force_scatter=float(scatter[0]),
+            moment_scatter=float(scatter[1]),
+            model=model,
+            drift=values[_DRIFT],
+            matrix=np.eye(6) + values[_MATRIX].reshape(6, 6) * model.spread,
+            matrix_determined=np.clip(1.0 - np.diag(entries), 0.0, 1.0).reshape(6, 6),
+            matrix_rank=int((np.linalg.eigvalsh(entries) < 0.25).sum()),
+        )
 
 
 def _widest(mass: float, postures: StaticPostures) -> FloatArray:

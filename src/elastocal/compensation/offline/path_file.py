@@ -1,6 +1,5 @@
 """``PATH.csv`` to ``OUT.csv``: rows corrected block by block, everything else as it stood."""
 
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -13,16 +12,7 @@ from elastocal.compensation.offline.correct import (
     PathCorrection,
     correct_rows,
 )
-from elastocal.dataset import (
-    PathColumns,
-    PathValues,
-    find_columns,
-    in_file,
-    read_layout,
-    read_values,
-    row_blocks,
-    wrench_in_base,
-)
+from elastocal.dataset import PathRows, PathTable, find_columns, in_file, new_rows
 from elastocal.errors import FileAccessError, PathError
 from elastocal.files import require_file
 from elastocal.identification import CalibratedModel
@@ -37,7 +27,7 @@ from elastocal.robot.inverse import (
     nearest_zero_posture,
     posture_jumps,
 )
-from elastocal.tables import TableRows, new_table
+from elastocal.tables import Column
 
 _ROWS_AT_A_TIME = 2000
 """Rows corrected at a time; bounds memory."""
@@ -85,48 +75,48 @@ def compensate_path(
         If a file cannot be read or written.
     """
     settings = CorrectionSettings() if settings is None else settings
+    robot, solver = calibrated.model.robot, inverse_for(calibrated.model.robot)
     with in_file(path):
-        layout = read_layout(path)
-        columns = find_columns(layout.header, calibrated.model.robot)
-        robot, solver = calibrated.model.robot, inverse_for(calibrated.model.robot)
-        total = _count_lines(path) - len(layout.preamble) - 1
-        kept = [i for i, name in enumerate(layout.header) if name.strip() not in _ADDED]
-        header = (*(layout.header[i] for i in kept), *_ADDED)
+        table = PathTable.open(path, lambda header: find_columns(header, robot))
+        total = _count_lines(path) - len(table.layout.preamble) - 1
         summary, previous, memory = CorrectionSummary(), settings.start, None
-        with new_table(out, replace(layout, header=header)) as write:
-            for block in row_blocks(path, layout, _ROWS_AT_A_TIME):
-                values = read_values(block, columns)
-                labels = [f"row {line}" for line in block.lines]
-                q, T = programmed_rows(solver, values, previous, labels.__getitem__)
+        with new_rows(out, table, _ADDED) as write:
+            for rows in table.blocks(_ROWS_AT_A_TIME):
+                q, T = programmed_rows(solver, rows.joints, rows.T_base_tcp, previous, rows.label)
                 found = correct_rows(
                     solver,
                     calibrated,
                     q,
                     T,
-                    wrench_in_base(values, columns, T),
-                    labels.__getitem__,
-                    may_turn=columns.by_pose,
+                    rows.wrench_in_base(T),
+                    rows.label,
+                    may_turn=table.columns.by_pose,
                     largest=settings.largest,
                     memory=memory,
                 )
                 turned: list[int] = []
-                if columns.by_pose:
+                if table.columns.by_pose:
                     # How the first row is reached is not the path's.
                     before = previous if summary.rows and previous is not None else q[0]
                     turned = posture_jumps(robot, q, before).tolist()
                     if not summary.rows:
                         summary = replace(summary, start=tuple(q[0].tolist()))
-                summary = summary.plus(
-                    found, found.T_base_tcp[:, :3, 3] - T[:, :3, 3], labels, turned
-                )
+                shift = found.T_base_tcp[:, :3, 3] - T[:, :3, 3]
+                labels = [rows.label(row) for row in range(len(rows))]
+                summary = summary.plus(found, shift, labels, turned)
                 previous, memory = q[-1], found.memory
-                write(_new_cells(columns, robot.external_axes, block, kept, found))
+                ends = np.hstack([found.deflection, found.low, found.high])
+                write(rows, ends, _corrected_columns(rows, found, robot.external_axes))
                 progress("rows", summary.rows, total)
     return summary
 
 
 def programmed_rows(
-    solver: InverseKinematics, values: PathValues, previous: FloatArray | None, where: RowName
+    solver: InverseKinematics,
+    joints: FloatArray,
+    T_base_tcp: FloatArray | None,
+    previous: FloatArray | None,
+    where: RowName,
 ) -> tuple[FloatArray, FloatArray]:
     """Return joints and poses as programmed, shapes (row, joint) and (row, 4, 4).
 
@@ -134,8 +124,10 @@ def programmed_rows(
     ----------
     solver : InverseKinematics
         Of the robot.
-    values : PathValues
-        What the file says.
+    joints : ndarray, shape (row, …)
+        All joints, or the external axes that a path of poses gives, in rad or m.
+    T_base_tcp : ndarray, shape (row, 4, 4), or None
+        Poses; None in a path of joints.
     previous : ndarray, shape (joint,), or None
         Joints before the first row, in rad or m; a rail without columns stays there. None: the
         posture nearest to zero.
@@ -148,45 +140,29 @@ def programmed_rows(
         If a row is out of reach, or nothing says where the external axes stand.
     """
     robot = solver.robot
-    if values.T_base_tcp is None:
-        return values.joints, robot.forward(values.joints)
-    external, names = values.joints, robot.joint_names[: robot.external_axes]
+    if T_base_tcp is None:
+        return joints, robot.forward(joints)
+    external, names = joints, robot.joint_names[: robot.external_axes]
     if names and not external.shape[1]:
         if previous is None:
             raise PathError(
                 f"nothing says where {', '.join(names)} stands: give its column"
                 f" ({names[0]}[…]), or hold it where --start has it"
             )
-        held = previous[: robot.external_axes]
-        external = np.broadcast_to(held, (len(values.T_base_tcp), len(names)))
+        external = np.broadcast_to(previous[: len(names)], (len(T_base_tcp), len(names)))
     check_limits(robot, external, where, "is programmed")
     before = nearest_zero_posture(robot) if previous is None else previous
-    return joints_along_path(solver, values.T_base_tcp, external, before, where), values.T_base_tcp
+    return joints_along_path(solver, T_base_tcp, external, before, where), T_base_tcp
 
 
-def _new_cells(
-    columns: PathColumns,
-    external_axes: int,
-    block: TableRows,
-    kept: list[int],
-    found: PathCorrection,
-) -> Iterator[list[str]]:
-    """Yield the cells of corrected rows; only those that were corrected are new text."""
-    new: list[tuple[int, list[str]]] = []
-    if columns.by_pose:
+def _corrected_columns(
+    rows: PathRows, found: PathCorrection, external_axes: int
+) -> list[tuple[Column, FloatArray]]:
+    """Return the columns that a correction replaces, with their numbers."""
+    if rows.columns.by_pose:
         # The orientation is kept, and so is its text.
-        position = found.T_base_tcp[:, :3, 3]
-        pairs = list(zip(columns.position, position.T, strict=True))
-    else:
-        pairs = list(zip(columns.joints, found.q.T, strict=True))[external_axes:]
-    for column, numbers in pairs:
-        new.append((column.index, list(map(repr, (numbers / column.scale).tolist()))))
-    deflection = np.hstack([found.deflection, found.low, found.high])
-    ends = [list(map(repr, row)) for row in deflection.tolist()]
-    for row, (cells, end) in enumerate(zip(block.cells, ends, strict=True)):
-        for index, text in new:
-            cells[index] = text[row]
-        yield [*(cells[i] for i in kept), *end]
+        return list(zip(rows.columns.position, found.T_base_tcp[:, :3, 3].T, strict=True))
+    return list(zip(rows.columns.joints, found.q.T, strict=True))[external_axes:]
 
 
 def _count_lines(path: Path) -> int:

@@ -121,7 +121,7 @@ class TrueCell(Protocol):
         """Begin a course in the air."""
 
     def free_shift(self, q: FloatArray) -> FloatArray:
-        """Return the shift of the tool in the air, shape (3,), in m."""
+        """Return the shift of the tool in the air at joints (..., joint), shape (..., 3), in m."""
 
     def press(
         self,
@@ -209,7 +209,7 @@ class _Drives:
 def air_shifts(cell: TrueCell, course: Course) -> FloatArray:
     """Return where the tool is on the programmed path in the air, shape (row, 3), in m."""
     cell.lift(course.name, course.q[0])
-    return np.array([cell.free_shift(q) for q in course.q])
+    return cell.free_shift(course.q)
 
 
 def run_course(

@@ -18,21 +18,17 @@ from elastocal.arrays import FloatArray
 from elastocal.compensation.offline import programmed_rows
 from elastocal.compensation.process.course import Course, arc_length, unit_tangents
 from elastocal.dataset import (
-    PathColumns,
-    PathValues,
+    PathRows,
+    PathTable,
     find_columns,
     in_file,
-    read_layout,
-    read_values,
-    row_blocks,
-    wrench_in_base,
 )
-from elastocal.errors import PathError, UnitError
+from elastocal.errors import PathError
 from elastocal.results import brief_repr
 from elastocal.robot import Robot
 from elastocal.robot.inverse import InverseKinematics, check_limits, inverse_for
-from elastocal.tables import Column, TableError, TableRows, finite_number, write_table
-from elastocal.units import factor, split_column
+from elastocal.tables import write_table
+from elastocal.units import parse_number
 
 _UNITS = {"angle": "rad", "length": "m"}
 _STEP = 0.02
@@ -92,18 +88,16 @@ def read_programmed_path(
     """
     solver = inverse_for(robot)
     with in_file(path):
-        layout = read_layout(path)
-        columns = find_columns(layout.header, robot)
-        extra = _ExtraColumns.of(layout.header)
-        if timing.speed is None and extra.time is None:
+        table = PathTable.open(path, lambda header: find_columns(header, robot))
+        rows = table.rows(_MOST, "simulate a part of it")
+        time = rows.times()
+        if timing.speed is None and time is None:
             raise PathError("nothing says how fast the path is run: give column time[s] or --speed")
-        table = _whole(row_blocks(path, layout, _MOST))
-        values = read_values(table, columns)
-        names = extra.names(table)
         courses, previous = [], timing.start
-        for name, rows in _runs(names, table):
-            stretch = _Stretch(name, rows, table, _part(values, rows))
-            course = _course(solver, columns, extra, stretch, timing, previous)
+        for name, some in _runs(rows):
+            of_course = None if time is None else time[some]
+            stretch = _Stretch(name, rows.part(some), of_course)
+            course = _course(solver, stretch, timing, previous)
             courses.append(_directed(course, direction))
             previous = course.q[-1]
         return tuple(courses)
@@ -143,135 +137,70 @@ def write_programmed_path(
     write_table(path, header, rows)
 
 
-@dataclass(frozen=True)
-class _ExtraColumns:
-    """The columns that make a process of a path."""
-
-    course: int | None
-    time: Column | None
-
-    @classmethod
-    def of(cls, header: Sequence[str]) -> "_ExtraColumns":
-        course = time = None
-        for index, cell in enumerate(header):
-            try:
-                name, unit = split_column(cell)
-            except UnitError:
-                continue
-            if name == "course" and unit is None:
-                course = index
-            elif name == "time":
-                if unit is None:
-                    raise PathError("column 'time' has no unit: it is written time[s]")
-                try:
-                    time = Column(index, name, unit, factor(unit, "time"))
-                except UnitError as error:
-                    raise PathError(f"column 'time[{unit}]': {error}") from error
-        return cls(course, time)
-
-    def names(self, table: TableRows) -> list[str]:
-        """Return the course of each row."""
-        if self.course is None:
-            return ["path"] * len(table)
-        return [cells[self.course].strip() for cells in table.cells]
-
-
 @dataclass(frozen=True, eq=False)
 class _Stretch:
     """The rows of one course, as the file has them."""
 
     name: str
-    rows: slice
-    table: TableRows
-    values: PathValues
-
-    def label(self, row: int) -> str:
-        return f"row {self.table.lines[self.rows.start + row]}"
+    rows: PathRows
+    time: FloatArray | None
+    """As the file has it, shape (row,), in s; None: it has none."""
 
 
-def _whole(blocks: Iterator[TableRows]) -> TableRows:
-    """Return all rows of a file, if they can be simulated."""
-    table = next(blocks)
-    if next(blocks, None) is not None:
-        raise PathError(f"path has more than {_MOST} rows: simulate a part of it")
-    return table
-
-
-def _runs(names: list[str], table: TableRows) -> Iterator[tuple[str, slice]]:
+def _runs(rows: PathRows) -> Iterator[tuple[str, slice]]:
     """Yield courses with their rows; a name that comes back is another course's."""
     seen: set[str] = set()
+    names = rows.names("course") or ("path",) * len(rows)
     for name, indices in groupby(range(len(names)), key=names.__getitem__):
-        rows = list(indices)
-        line = table.lines[rows[0]]
+        run = list(indices)
+        first = rows.label(run[0])
         if name in seen:
-            raise PathError(f"row {line}: course {name!r} begins a second time: name each once")
-        if not name:
-            raise PathError(f"row {line}: column 'course' is empty")
-        if len(rows) < 2:
-            raise PathError(f"row {line}: course {name!r} has a single row, it must have two")
+            raise PathError(f"{first}: course {name!r} begins a second time: name each once")
+        if len(run) < 2:
+            raise PathError(f"{first}: course {name!r} has a single row, it must have two")
         seen.add(name)
-        yield name, slice(rows[0], rows[-1] + 1)
-
-
-def _part(values: PathValues, rows: slice) -> PathValues:
-    def some(array: FloatArray | None) -> FloatArray | None:
-        return None if array is None else array[rows]
-
-    return PathValues(
-        values.joints[rows], some(values.T_base_tcp), some(values.force), some(values.moment)
-    )
+        yield name, slice(run[0], run[-1] + 1)
 
 
 def _course(
-    solver: InverseKinematics,
-    columns: PathColumns,
-    extra: _ExtraColumns,
-    stretch: _Stretch,
-    timing: PathTiming,
-    previous: FloatArray | None,
+    solver: InverseKinematics, stretch: _Stretch, timing: PathTiming, previous: FloatArray | None
 ) -> Course:
     """Return a course at even steps, its direction not known yet."""
-    robot, values = solver.robot, stretch.values
-    if not columns.by_pose:
-        check_limits(robot, values.joints, stretch.label, "is programmed")
-    given = robot.forward(values.joints) if values.T_base_tcp is None else values.T_base_tcp
-    time = _times(extra, stretch, given, timing.speed)
+    robot, rows = solver.robot, stretch.rows
+    if rows.T_base_tcp is None:
+        check_limits(robot, rows.joints, rows.label, "is programmed")
+    given = robot.forward(rows.joints) if rows.T_base_tcp is None else rows.T_base_tcp
+    time = _times(stretch, given, timing.speed)
     at = np.arange(0.0, time[-1] + 1e-9, timing.step)
     if len(at) < 3:
         raise PathError(
-            f"{stretch.label(0)}: course {stretch.name!r} takes {time[-1]:.3g} s, it must take"
+            f"{rows.label(0)}: course {stretch.name!r} takes {time[-1]:.3g} s, it must take"
             f" {2.0 * timing.step:.3g} s and more"
         )
     # Forces are turned at the file's own rows: the tool may turn in between.
-    force = _interpolated(time, wrench_in_base(values, columns, given)[0], at)
-    poses = None if values.T_base_tcp is None else _poses_at(time, values.T_base_tcp, at)
-    evenly = PathValues(_interpolated(time, values.joints, at), poses, None, None)
+    force = _interpolated(time, rows.wrench_in_base(given)[0], at)
+    poses = None if rows.T_base_tcp is None else _poses_at(time, rows.T_base_tcp, at)
+    joints = _interpolated(time, rows.joints, at)
     nearest = np.searchsorted(time, at, side="right") - 1
     q, T = programmed_rows(
-        solver, evenly, previous, lambda row: f"after {stretch.label(int(nearest[row]))}"
+        solver, joints, poses, previous, lambda row: f"after {rows.label(int(nearest[row]))}"
     )
     nowhere = np.zeros((len(q), 3))
     return Course(stretch.name, timing.step, T, force, nowhere, q=q)
 
 
-def _times(
-    extra: _ExtraColumns, stretch: _Stretch, T_base_tcp: FloatArray, speed: float | None
-) -> FloatArray:
+def _times(stretch: _Stretch, T_base_tcp: FloatArray, speed: float | None) -> FloatArray:
     """Return the time of each row of the file since the first, shape (row,), in s."""
     if speed is not None:
         time = arc_length(T_base_tcp[:, :3, 3]) / speed
         problem = "does not move on: a path without --speed may stand, with column time[s]"
     else:
-        assert extra.time is not None
-        try:
-            every = stretch.table.numbers(extra.time, finite_number)
-        except TableError as error:
-            raise PathError(str(error)) from error
-        time = every[stretch.rows] - every[stretch.rows.start]
+        assert stretch.time is not None
+        time = stretch.time - stretch.time[0]
         problem = "time does not advance from the row before"
     back = ~(np.diff(time) > 0.0)
     if back.any():
-        raise PathError(f"{stretch.label(int(np.argmax(back)) + 1)}: {problem}")
+        raise PathError(f"{stretch.rows.label(int(np.argmax(back)) + 1)}: {problem}")
     return time
 
 
@@ -310,7 +239,7 @@ def _directed(course: Course, direction: str) -> Course:
 
 def _vector(text: str) -> FloatArray:
     try:
-        vector = np.array([float(part) for part in text.split(",")])
+        vector = np.array([parse_number(part) for part in text.split(",")])
     except ValueError:
         vector = np.zeros(0)
     if vector.shape != (3,) or not 0.0 < float(np.linalg.norm(vector)) < np.inf:

@@ -33,6 +33,7 @@ from elastocal.identification import ProductionCoverage
 from elastocal.records import read_json, record, write_json
 from elastocal.results import Result, brief_repr
 from elastocal.tables import TableError, TableRows, opened_table, write_table
+from elastocal.units import parse_number
 
 TABLE = "table.json"
 """Name of the file by which the folder is known."""
@@ -95,6 +96,11 @@ class SimulateProcessResult(Result):
     """Sentences that a person must know."""
     coverage: ProductionCoverage | None = None
     """How much of the process the first model's calibration covers; none where it is not known."""
+
+    def __post_init__(self) -> None:
+        """Refuse a table of nothing."""
+        if not self.runs or len(self.lines) < len(self.runs):
+            raise ValueError(f"{len(self.lines)} lines for {len(self.runs)} runs")
 
     def facts(self) -> tuple[tuple[str, str], ...]:
         """Return what a person wants to know first."""
@@ -258,7 +264,7 @@ def _numbers(path: Path, header: Sequence[str], rows: TableRows) -> FloatArray:
         for column, (name, place) in enumerate(zip(names, places, strict=True)):
             value = cells[place]
             try:
-                number = int(value) if name == "seed" else float(value)
+                number = int(value) if name == "seed" else parse_number(value)
             except ValueError:
                 number = np.nan
             if not np.isfinite(number):

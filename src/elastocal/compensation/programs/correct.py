@@ -1,8 +1,7 @@
 """A controller's program corrected: new numbers at its points, all else as it stood."""
 
-import sys
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -22,14 +21,10 @@ from elastocal.compensation.programs.program import (
     ProgramPoint,
 )
 from elastocal.dataset import (
-    PathColumns,
-    PathValues,
+    PathRows,
+    PathTable,
     find_wrench_columns,
     in_file,
-    read_layout,
-    read_values,
-    row_blocks,
-    wrench_in_base,
 )
 from elastocal.errors import PathError, nearest
 from elastocal.identification import CalibratedModel
@@ -129,27 +124,24 @@ class _PointForces:
 
     rows: dict[str, int]
     """Row of each point, by its name in capitals."""
-    values: PathValues
-    columns: PathColumns
+    values: PathRows
 
 
 def _read_forces(path: Path) -> _PointForces:
-    layout = read_layout(path)
-    columns = find_wrench_columns(layout.header)
-    header = [name.strip() for name in layout.header]
-    if header.count(_POINT) != 1:
+    table = PathTable.open(path, find_wrench_columns)
+    values = table.rows()
+    names = values.names(_POINT)
+    if names is None:
         raise PathError(
-            f"one column {_POINT!r} must name the points; the columns are {', '.join(header)}"
+            f"one column {_POINT!r} must name the points; the columns are"
+            f" {', '.join(map(str.strip, values.header))}"
         )
-    place = header.index(_POINT)
-    (table,) = row_blocks(path, layout, sys.maxsize)
     rows: dict[str, int] = {}
-    for line, cells in zip(table.lines, table.cells, strict=True):
-        name = cells[place].strip().upper()
-        if not name or name in rows:
-            raise PathError(f"row {line}: point {name!r} stands twice or has no name")
-        rows[name] = len(rows)
-    return _PointForces(rows, read_values(table, columns), columns)
+    for row, name in enumerate(map(str.upper, names)):
+        if name in rows:
+            raise PathError(f"{values.label(row)}: point {name!r} stands twice")
+        rows[name] = row
+    return _PointForces(rows, values)
 
 
 def _targets(program: ControllerProgram, table: _PointForces, forces: Path) -> frozenset[str]:
@@ -194,10 +186,9 @@ def _corrected(
     labels = [f"point {point.name}" for point in points]
     T = np.array([follower.pose(point, q[row]) for row, point in enumerate(points)])
     rows = [table.rows[name] for name in postures]
-    force, moment = (
-        None if each is None else each[rows] for each in (table.values.force, table.values.moment)
-    )
-    values = replace(table.values, force=force, moment=moment)
+    T_of_row = np.tile(np.eye(4), (len(table.values), 1, 1))
+    T_of_row[rows] = T
+    force, moment = table.values.wrench_in_base(T_of_row)
     # A point by axes means its joints as they stand; the turn of a frame is the controller's.
     frames = not any(point.by_axes for point in points)
     found = correct_rows(
@@ -205,7 +196,7 @@ def _corrected(
         calibrated,
         q,
         T,
-        wrench_in_base(values, table.columns, T),
+        (force[rows], None if moment is None else moment[rows]),
         labels.__getitem__,
         may_turn=frames,
         largest=largest,

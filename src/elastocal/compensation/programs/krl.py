@@ -32,7 +32,7 @@ _DECLARED = re.compile(
 )
 _LITERAL_AXES = re.compile(r"\{\s*(?:E6AXIS\s*:|AXIS\s*:)?\s*(A1\s[^{}]*)\}", re.IGNORECASE)
 _COMPONENT = re.compile(
-    r"\s*([A-Z]\d?)\s+([-+]?(?:\d+\.?\d*|\.\d+)(?:E[-+]?\d+)?)\s*", re.IGNORECASE
+    r"\s*([A-Z]\d?)\s+([-+]?(?:\d+\.?\d*|\.\d+)(?:E[-+]?\d+)?)\s*", re.ASCII | re.IGNORECASE
 )
 _MOVE = re.compile(
     r"(S?PTP|S?LIN|S?CIRC|SPL|ASYPTP|(?:S?PTP|S?LIN|S?CIRC|SPL)_REL)\b(?!\s*[=(\[.])\s*(.*)",

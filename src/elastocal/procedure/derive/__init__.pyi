@@ -1,10 +1,14 @@
-from ._rows import LoadRow as LoadRow, LoadValues as LoadValues
+from ._rows import LoadRow as LoadRow, LoadValues as LoadValues, load_rows as load_rows
 from .derivation import (
     CommittedRun as CommittedRun,
     DerivedRun as DerivedRun,
+    MeasuredArm as MeasuredArm,
+    dataset_of as dataset_of,
     derive_poses as derive_poses,
     derive_run as derive_run,
+    measured_arm as measured_arm,
     read_run as read_run,
+    run_provenance as run_provenance,
     write_derived as write_derived,
 )
 from .findings import (
@@ -31,6 +35,7 @@ from .readings import (
     tool_readings as tool_readings,
     weighed_poses as weighed_poses,
 )
+from .rehearsal import rehearse_derivation as rehearse_derivation
 from .summary import (
     AttemptSummary as AttemptSummary,
     DriftSummary as DriftSummary,

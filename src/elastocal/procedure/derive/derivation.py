@@ -40,11 +40,7 @@ from elastocal.procedure.derive.readings import (
     tool_readings,
 )
 from elastocal.procedure.derive.summary import RunSummary
-from elastocal.procedure.derive.tool import (
-    estimate_tool,
-    sensor_load,
-    wrench_on_robot,
-)
+from elastocal.procedure.derive.tool import estimate_tool, sensor_load, wrench_on_robot
 from elastocal.procedure.record import (
     Entry,
     PoseLog,
@@ -62,6 +58,7 @@ from elastocal.procedure.record import (
 from elastocal.procedure.registration import Registration, register
 from elastocal.records import write_json
 from elastocal.results import brief_repr
+from elastocal.robot import Robot
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,6 +85,22 @@ class CommittedRun:
     """In the order of time, the last one of each."""
     signs: tuple[str, ...]
     """Signs that the journal has lost its end; see `signs_of_a_cut`."""
+
+
+@brief_repr
+@dataclass(frozen=True, eq=False)
+class MeasuredArm:
+    """The arm that readings were taken with."""
+
+    robot: Robot
+    urdf: str
+    """With the tool's mass."""
+    gravity: tuple[float, float, float] | None = None
+    """Acceleration of gravity in base, in m/s²; None: the base stands upright."""
+    conditioned: bool = False
+    """Whether a full press went before each reference."""
+    check: str | None = None
+    """Load case that no fit is to see."""
 
 
 def read_run(run: Path) -> CommittedRun:
@@ -148,7 +161,7 @@ def derive_run(run: Path, sensor: SensorLoad | None = None) -> DerivedRun:
         If no reading is usable.
     """
     found = read_run(run)
-    provenance = _provenance(found.folder, found.record, sensor)
+    provenance = run_provenance(found.folder, found.record, sensor)
     try:
         derived = derive_poses(
             found.poses, found.cell, found.plan, found.entries, provenance, sensor
@@ -214,10 +227,19 @@ def derive_poses(
         raise DatasetError(f"no usable reading among {len(rows)}: {_reasons(rows, registration)}")
     # The press before the reference stays, usable or not: the others' friction begins with it.
     cases = [case for case in plan.contact.load_cases if case in had or case == CONDITIONING]
-    dataset = _dataset(poses, rows, cases, cell, registration.lever_arm, tool, provenance)
-    estimate = estimate_tool(tool_readings(poses, tool), tool.mass)
+    arm = measured_arm(cell)
+    dataset = dataset_of(poses, rows, cases, arm, registration.lever_arm, tool, provenance)
+    ranges = None if cell.file.sensor is None else cell.file.sensor.ranges
+    estimate = estimate_tool(tool_readings(poses, tool), tool.mass, ranges)
     found = RunFindings(poses, rows, registration, tool, estimate, dataset, plan, entries)
     return DerivedRun(dataset, summarise(found))
+
+
+def measured_arm(cell: Cell) -> MeasuredArm:
+    """Return what the readings of a cell are taken with."""
+    conditioned, check = cell.file.procedure.conditioning, cell.file.load_cases.check_case
+    urdf, gravity = cell.urdf_with_tool_mass, cell.gravity_of_mounting
+    return MeasuredArm(cell.robot, urdf, gravity, conditioned, check)
 
 
 def _latest(logs: Sequence[PoseLog]) -> list[PoseLog]:
@@ -253,27 +275,52 @@ def _reasons(rows: Sequence[LoadRow], registration: Registration) -> str:
     return next((row.note for row in rows if row.note), "there is none")
 
 
-def _provenance(folder: RunFolder, record: RunRecord, sensor: SensorLoad | None) -> str:
+def run_provenance(folder: RunFolder, record: RunRecord, sensor: SensorLoad | None) -> str:
+    """Return where the data of a run come from, as its dataset says."""
     corrected = "" if sensor is None else f", {SENSOR_CORRECTED}"
     return f"elastocal run {folder.path.resolve().name}, {record.origin}{corrected}"
 
 
-def _dataset(
+def dataset_of(
     poses: Sequence[PoseReadings],
     rows: Sequence[LoadRow],
     load_cases: Sequence[str],
-    cell: Cell,
+    arm: MeasuredArm,
     lever: FloatArray,
     sensor: SensorLoad,
     provenance: str,
 ) -> Dataset:
-    """Return the dataset of all rows, with the load cases to keep.
+    """Return the dataset of a run: all rows, with the load cases to keep.
 
+    Parameters
+    ----------
+    poses : sequence of PoseReadings
+        In the order of time.
+    rows : sequence of LoadRow
+        Their loads, as `load_rows` returns them.
+    load_cases : sequence of str
+        In order in time.
+    arm : MeasuredArm
+        What they were taken with.
+    lever : ndarray, shape (3,)
+        Marker in the tcp frame, in m.
+    sensor : SensorLoad
+        The tool on its sensor.
+    provenance : str
+        Where the data come from.
+
+    Raises
+    ------
+    DatasetError
+        If the numbers look like a unit mistake.
+
+    Notes
+    -----
     The moment is left out: the paper's row takes the force alone, and a moment that is moved from
     the sensor to the tcp carries the sensor's place and cross-talk with the arm of the tool. On
     the example cell (preset typical, 5 N·m) it makes no difference (decision 72).
     """
-    robot, labels = cell.robot, tuple(dict.fromkeys(row.pose for row in rows))
+    robot, labels = arm.robot, tuple(dict.fromkeys(row.pose for row in rows))
     placed = {
         (labels.index(r.pose), load_cases.index(r.load_case)): r
         for r in rows
@@ -314,12 +361,12 @@ def _dataset(
         # As all forces counted from where the tool was off the surface: none, or light contact.
         reference_force=zero.force,
         robot_name=robot.name,
-        robot_urdf=cell.urdf_with_tool_mass,
+        robot_urdf=arm.urdf,
         tcp_frame=robot.tip,
         marker=tuple(lever.tolist()),
-        gravity=cell.gravity_of_mounting,
-        conditioned=cell.file.procedure.conditioning,
-        check=[case for case in load_cases if case == cell.file.load_cases.check_case],
+        gravity=arm.gravity,
+        conditioned=arm.conditioned,
+        check=[case for case in load_cases if case == arm.check],
         provenance=provenance,
     )
 

@@ -80,7 +80,7 @@ class Reading:
     """In the frame of the window's station, in m; None where the station gave too few."""
 
 
-def average(streams: Streams, window: Window) -> Reading:
+def average(streams: Streams, window: Window, least: int = LEAST_SAMPLES) -> Reading:
     """Return the means of every stream over a window, its ends included.
 
     Parameters
@@ -89,12 +89,14 @@ def average(streams: Streams, window: Window) -> Reading:
         Of the window's pose.
     window : Window
         When, and which station measured.
+    least : int
+        Samples that a mean needs; 1 where samples are means already.
 
     Returns
     -------
     Reading
-        A stream with fewer than `LEAST_SAMPLES` good samples has no mean, and an ok window is
-        then ``missing``. Samples that are not finite, that the sensor calls bad, or that another
+        A stream with fewer good samples than ``least`` has no mean, and an ok window is then
+        ``missing``. Samples that are not finite, that the sensor calls bad, or that another
         station took are not good. One state of the arm is enough: it has no noise.
     """
     arm, wrench, points = streams.arm, streams.wrench, streams.points
@@ -103,19 +105,20 @@ def average(streams: Streams, window: Window) -> Reading:
     at_point = _inside(points.time, window) & _finite(points.position)
     at_point &= points.station == (window.station or "")
     stated = wrench.force_sigma[at_wrench, None]
-    force = _mean(wrench.time[at_wrench], wrench.force[at_wrench], stated)
-    moment = _mean(wrench.time[at_wrench], wrench.moment[at_wrench])
+    force = _mean(wrench.time[at_wrench], wrench.force[at_wrench], least, stated)
+    moment = _mean(wrench.time[at_wrench], wrench.moment[at_wrench], least)
     tool = None
     if at_arm.any() and force is not None and moment is not None:
         q, T = arm.q[at_arm].mean(axis=0), _mean_pose(arm.T_base_tcp[at_arm])
         tool = ToolState(q, T, force, moment)
     counts = {
         "states of the arm": (int(at_arm.sum()), 1),
-        "wrenches": (int(at_wrench.sum()), LEAST_SAMPLES),
+        "wrenches": (int(at_wrench.sum()), least),
     }
     if window.station:
-        counts[f"points of station {window.station}"] = (int(at_point.sum()), LEAST_SAMPLES)
-    marker = _mean(points.time[at_point], points.position[at_point], points.sigma[at_point])
+        counts[f"points of station {window.station}"] = (int(at_point.sum()), least)
+    seen = points.time[at_point], points.position[at_point]
+    marker = _mean(*seen, least, points.sigma[at_point])
     return Reading(_judged(window, counts), tool, marker)
 
 
@@ -138,12 +141,15 @@ def _finite(*arrays: FloatArray) -> BoolArray:
     return np.asarray(np.isfinite(np.hstack(arrays)).all(axis=1), dtype=bool)
 
 
-def _mean(time: FloatArray, samples: FloatArray, stated: FloatArray | None = None) -> Mean | None:
+def _mean(
+    time: FloatArray, samples: FloatArray, least: int, stated: FloatArray | None = None
+) -> Mean | None:
     count = len(samples)
-    if count < LEAST_SAMPLES:
+    if count < least:
         return None
     value = samples.mean(axis=0)
-    deviation = samples.std(axis=0, ddof=1)
+    # One sample has no scatter of its own: what the maker states is all that is known.
+    deviation = samples.std(axis=0, ddof=1) if count > 1 else np.zeros_like(value)
     sigma = deviation * np.sqrt(_inflation(samples - value) / count)
     if stated is not None and np.all(np.isfinite(stated)):
         sigma = np.maximum(sigma, np.sqrt((stated**2).mean(axis=0) / count))

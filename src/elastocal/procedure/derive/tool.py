@@ -12,12 +12,15 @@ a bias that drifts linearly they are linear in the mass, ``h = mass c``, biases 
     M_i = -[R_i^T g]x h + b_m + d_m (t_i - t_mean).
 
 Ordinary least squares with intervals by Student's t; what the orientations do not tell apart is
-NaN, and named. `tool_change` asks whether one mass fits the whole run: a step of it at some reading
-is one more unknown; the best place for it is the one that takes most off the sum of squares, and an
-F test, with the number of places allowed for, says whether that is more than chance.
+NaN, and named. What a sensor misreads by cross-talk and gain turns with the tool as its weight
+does: no residual shows it, so the intervals hold it besides, each entry of the matrix thought to be
+off by a hundredth of the ranges of its axes. `tool_change` asks whether one mass fits the whole
+run: a step of it at some reading is one more unknown; the best place for it is the one that takes
+most off the sum of squares, and an F test, with the number of places allowed for, says whether that
+is more than chance.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.special import fdtrc, stdtrit
@@ -107,6 +110,11 @@ def turned_sigma(R: FloatArray, *sigmas: FloatArray) -> FloatArray:
     return np.sqrt(R**2 @ sum(sigma**2 for sigma in sigmas))
 
 
+_CROSS_TALK = 0.01
+"""Standard deviation of an entry of a sensor's matrix, in the ranges of its axes: what data sheets
+of six-axis sensors allow. `elastocal tool`, which estimates the matrix too, takes the same."""
+_SURE = 4.0
+"""Standard deviations of what cross-talk makes of a step, up to which it may be cross-talk."""
 _CHANCE_OF_STEP = 1e-4
 """Probability of a step that is only chance, over all places, below which it is believed."""
 _SHARE = 0.05
@@ -124,7 +132,11 @@ class ToolChange:
 
 
 def tool_change(
-    blocks: FloatArray, force: FloatArray, gravity: FloatArray, nominal_mass: float
+    blocks: FloatArray,
+    force: FloatArray,
+    gravity: FloatArray,
+    nominal_mass: float,
+    misread: FloatArray | None = None,
 ) -> ToolChange | None:
     """Return the step of the mass that the unloaded readings show; None: one mass fits them all.
 
@@ -138,6 +150,8 @@ def tool_change(
         In the sensor's axes, in m/s².
     nominal_mass : float
         Mass of the tool by the cell file, in kg.
+    misread : ndarray, shape (entry, row), optional
+        What each entry of the sensor's matrix may add to all components, in N.
     """
     count, free = len(force), force.size - blocks.shape[2] - 1
     if free < 1:
@@ -156,7 +170,9 @@ def tool_change(
     best = int(np.argmax(gain))
     rest = max(float(left @ left - gain[best]), np.finfo(float).tiny)
     chance = (count - 1) * fdtrc(1, free, gain[best] / (rest / free))
-    if not (chance < _CHANCE_OF_STEP and abs(change[best]) > _SHARE * nominal_mass):
+    doubt = 0.0 if misread is None else float(np.linalg.norm(misread @ own[:, best]))
+    least = max(_SHARE * nominal_mass, _SURE * doubt / max(squares[best], np.finfo(float).tiny))
+    if not (chance < _CHANCE_OF_STEP and abs(change[best]) > least):
         return None
     return ToolChange(best + 1, float(change[best]))
 
@@ -232,7 +248,9 @@ class ToolEstimate:
     tool."""
 
 
-def estimate_tool(unloaded: UnloadedWrenches, nominal_mass: float) -> ToolEstimate:
+def estimate_tool(
+    unloaded: UnloadedWrenches, nominal_mass: float, ranges: FloatArray | None = None
+) -> ToolEstimate:
     """Return tool and sensor as the unloaded references show them.
 
     Parameters
@@ -242,6 +260,8 @@ def estimate_tool(unloaded: UnloadedWrenches, nominal_mass: float) -> ToolEstima
     nominal_mass : float
         Mass of the tool by the cell file, in kg: the scale of what is too wide, and the divisor
         of the centre of mass where the mass is not determined.
+    ranges : ndarray, shape (6,), optional
+        Largest forces and moments of the sensor, in N and N·m; without them it has no cross-talk.
     """
     time = unloaded.time - unloaded.time.mean() if len(unloaded.time) else unloaded.time
     gravity = unloaded.gravity @ unloaded.R_base_sensor
@@ -251,6 +271,11 @@ def estimate_tool(unloaded: UnloadedWrenches, nominal_mass: float) -> ToolEstima
     force = _solve(blocks, unloaded.force)
     turn = np.cross(np.eye(3)[None], gravity[:, None, :]).swapaxes(1, 2)
     moment = _solve(np.concatenate([turn, eye, drift], axis=2), unloaded.moment)
+    misread = None
+    if ranges is not None:
+        weight = np.hstack([nominal_mass * gravity, turn @ np.nan_to_num(moment.value[:3])])
+        misread = _CROSS_TALK * _misreadings(weight, ranges)
+        force, moment = force.doubted(misread[0]), moment.doubted(misread[1])
     wide_mass = not force.half_width[0] <= _WIDE_MASS * max(nominal_mass, 1.0)
     mass = nominal_mass if wide_mass else max(float(force.value[0]), _WIDE_MASS * nominal_mass)
     centre = Interval(moment.value[:3] / mass, moment.half_width[:3] / mass)
@@ -269,13 +294,35 @@ def estimate_tool(unloaded: UnloadedWrenches, nominal_mass: float) -> ToolEstima
         force_scatter=force.scatter,
         moment_scatter=moment.scatter,
         undetermined=tuple(dict.fromkeys(unknown)),
-        change=tool_change(blocks, unloaded.force, gravity, nominal_mass),
+        change=tool_change(
+            blocks, unloaded.force, gravity, nominal_mass, None if misread is None else misread[0]
+        ),
     )
+
+
+def _misreadings(weight: FloatArray, ranges: FloatArray) -> FloatArray:
+    """Return what each entry of a sensor's matrix adds to forces and moments of the tool's weight.
+
+    Shape (2, entry, row), per part of the ranges; ``weight`` has forces and moments, shape
+    (reading, 6).
+    """
+    scale = np.divide.outer(ranges, ranges).reshape(2, 3, 6)
+    entries = np.einsum("skl,rl,ka->sklra", scale, weight, np.eye(3))
+    return np.asarray(entries.reshape(2, 18, -1))
 
 
 @dataclass(frozen=True, eq=False)
 class _Solution(Interval):
     scatter: float
+    inverse: FloatArray
+    """From readings to the solution, shape (unknown, row)."""
+    free: int
+
+    def doubted(self, misread: FloatArray) -> "_Solution":
+        """Return the solution with intervals that hold errors of unit size too, (error, row)."""
+        sigma = np.linalg.norm(self.inverse @ misread.T, axis=1)
+        width = np.hypot(self.half_width, stdtrit(max(self.free, 1), 0.5 + _LEVEL / 2) * sigma)
+        return replace(self, half_width=width)
 
 
 def _solve(blocks: FloatArray, readings: FloatArray) -> _Solution:
@@ -285,18 +332,20 @@ def _solve(blocks: FloatArray, readings: FloatArray) -> _Solution:
     free = len(b) - unknowns
     nothing = np.full(unknowns, np.nan)
     if free < 1:
-        return _Solution(nothing, nothing, float("nan"))
+        return _Solution(nothing, nothing, float("nan"), np.zeros(A.T.shape), free)
     scale = np.linalg.norm(A, axis=0)
     scale[scale == 0] = 1.0
     u, s, vt = np.linalg.svd(A / scale, full_matrices=False)
     kept = s > _DEPENDENT * s[0]
-    value = (vt[kept].T @ ((u[:, kept].T @ b) / s[kept])) / scale
+    inverse = (vt[kept].T / s[kept]) @ u[:, kept].T / scale[:, None]
+    value = inverse @ b
     left = b - A @ value
     scatter = float(np.sqrt(left @ left / (free + int((~kept).sum()))))
     sigma = scatter * np.sqrt(((vt[kept] / s[kept, None]) ** 2).sum(axis=0)) / scale
     half = stdtrit(free, 0.5 + _LEVEL / 2) * sigma
     loose = np.linalg.norm(vt[~kept], axis=0) > np.sqrt(_DEPENDENT)
-    return _Solution(np.where(loose, np.nan, value), np.where(loose, np.nan, half), scatter)
+    value, half = (np.where(loose, np.nan, each) for each in (value, half))
+    return _Solution(value, half, scatter, inverse, free)
 
 
 def _part(solution: _Solution, start: int) -> Interval:

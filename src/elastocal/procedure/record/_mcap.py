@@ -22,9 +22,11 @@ from pathlib import Path
 
 import numpy as np
 import zstandard
+from mcap.data_stream import ReadDataStream
 from mcap.exceptions import McapError
-from mcap.records import Channel, Chunk, DataEnd, McapRecord, Message, Metadata
-from mcap.stream_reader import CRCValidationError, StreamReader, breakup_chunk
+from mcap.opcode import Opcode
+from mcap.records import Channel, Chunk, DataEnd, McapRecord, Message, Metadata, Schema
+from mcap.stream_reader import CRCValidationError, StreamReader, get_chunk_data_stream
 from mcap.writer import Writer
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
@@ -32,7 +34,7 @@ from scipy.spatial.transform import Rotation
 from elastocal.arrays import FloatArray
 from elastocal.cell import ArmState, PointBlock, WrenchBlock
 from elastocal.errors import FileAccessError, SchemaError
-from elastocal.files import require_file, write_bytes
+from elastocal.files import Limit, require_file, require_size, write_bytes
 
 TimeArray = NDArray[np.int64]
 """Times in ns."""
@@ -42,11 +44,22 @@ _MAGIC = b"\x89MCAP0\r\n"
 _CHUNK = 512 * 1024
 """Bytes of a chunk before it is compressed: as much as viewers load at a time."""
 
+_RECORD, _MESSAGE = struct.Struct("<BQ"), struct.Struct("<HIQQ")
+"""Opcode and length of a record; of a message: channel, sequence, log time, publish time."""
+_DESCRIPTIONS: dict[int, type[Schema] | type[Channel]] = {
+    Opcode.SCHEMA: Schema,
+    Opcode.CHANNEL: Channel,
+}
+_MOST_UNPACKED = Limit("ELASTOCAL_MAX_STREAM_MB", 256, "MB")
+"""An hour of a pose, at the rates of the simulated devices, takes a tenth."""
+_MEGABYTE = 1_000_000
 _DAMAGE = (
     McapError,
     ValueError,
     OverflowError,
     RuntimeError,
+    MemoryError,
+    LookupError,
     struct.error,
     zstandard.ZstdError,
 )
@@ -132,6 +145,7 @@ def read_mcap(path: Path) -> Contents:
     """
     require_file(path)
     try:
+        require_size(path)
         data = Path(path).read_bytes()
     except OSError as error:
         raise FileAccessError(f"cannot read {path}: {error.strerror or error}") from error
@@ -156,11 +170,38 @@ def _records(data: bytes) -> Iterator[McapRecord]:
     records = list(reader.records)
     if not any(isinstance(record, DataEnd) for record in records):
         raise ValueError("its data have no end")
+    unpacked = 0.0
     for record in records:
         if isinstance(record, Chunk):
-            yield from breakup_chunk(record, validate_crc=True)
+            unpacked += _unpacked_size(record) / _MEGABYTE
+            _MOST_UNPACKED.require(unpacked, "what its chunks hold when they are unpacked")
+            yield from _unpacked(record)
         else:
             yield record
+
+
+def _unpacked_size(chunk: Chunk) -> int:
+    """Return the bytes that a chunk may take unpacked: what it states, and what its frame does."""
+    packed = chunk.data if chunk.compression == "zstd" else b""
+    frame = zstandard.get_frame_parameters(packed).content_size if packed else 0
+    unknown = frame in (zstandard.CONTENTSIZE_UNKNOWN, zstandard.CONTENTSIZE_ERROR)
+    return max(chunk.uncompressed_size, 0 if unknown else frame)
+
+
+def _unpacked(chunk: Chunk) -> Iterator[McapRecord]:
+    """Yield the records of a chunk; a message is read at once, not number by number."""
+    stream, size = get_chunk_data_stream(chunk, validate_crc=True)
+    data, at = stream.read(size), 0
+    while at < size:
+        opcode, length = _RECORD.unpack_from(data, at)
+        begin, at = at + _RECORD.size, at + _RECORD.size + length
+        if at > size:
+            raise ValueError("a record of a chunk is longer than the chunk")
+        if opcode == Opcode.MESSAGE:
+            channel, row, time, published = _MESSAGE.unpack_from(data, begin)
+            yield Message(channel, time, data[begin + _MESSAGE.size : at], published, row)
+        elif opcode in _DESCRIPTIONS:
+            yield _DESCRIPTIONS[opcode].read(ReadDataStream(BytesIO(data[begin:at])))
 
 
 def _contents(records: Iterator[McapRecord]) -> Contents:

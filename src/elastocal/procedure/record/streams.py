@@ -47,6 +47,8 @@ _METADATA = "elastocal"
 """Name of the metadata record that carries the schema."""
 _NANOSECONDS = 1e9
 """In a second."""
+_DAMAGE = (ValueError, TypeError, LookupError, AttributeError, OverflowError, RecursionError)
+"""What JSON of another shape, of other types, of endless numbers or brackets raises."""
 
 _Stream = TypeVar("_Stream")
 
@@ -268,7 +270,7 @@ def read_streams(path: Path, spans: Sequence[tuple[float, float]] | None = None)
     def topic(name: str, make: Callable[[FloatArray, list[Any]], _Stream]) -> _Stream:
         try:
             return make(*_parsed(contents.topics.get(name, Messages()), spans))
-        except (ValueError, TypeError, KeyError, RecursionError) as error:
+        except _DAMAGE as error:
             reason = f"{type(error).__name__} {' '.join(str(error).split())}"
             message = f"{path}: {name} holds a message that is not ours: {reason}"
             raise SchemaError(message) from error
@@ -285,7 +287,7 @@ def read_streams(path: Path, spans: Sequence[tuple[float, float]] | None = None)
 def _joints(path: Path, note: Mapping[str, str]) -> tuple[str, ...]:
     try:
         return tuple(map(str, json.loads(note["joints"])))
-    except (ValueError, TypeError, KeyError) as error:
+    except _DAMAGE as error:
         raise SchemaError(f"{path}: its metadata do not name the joints of the arm") from error
 
 

@@ -14,7 +14,7 @@ import shutil
 import subprocess
 import time
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -29,11 +29,12 @@ _SECONDS = 180.0
 _GRACE = 5.0
 """Longest wait for a browser to end by itself."""
 _FLAGS = (
-    "--headless", "--no-sandbox", "--remote-debugging-pipe", "--use-gl=angle",
+    "--headless", "--remote-debugging-pipe", "--use-gl=angle",
     "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--disable-gpu-sandbox",
     "--disable-background-networking", "--disable-component-update", "--disable-extensions",
     "--disable-sync", "--no-first-run", "--no-default-browser-check", "--hide-scrollbars",
 )  # fmt: skip
+_NO_SANDBOX = "--no-sandbox"
 _READY = """new Promise((done) => {
   const ready = () => document.documentElement?.dataset.ready === "yes";
   const look = () => ready() ? done(true) : setTimeout(look, 20);
@@ -159,6 +160,9 @@ class Tab:
 def open_tab(browser: str) -> Iterator[Tab]:
     """Start a browser with a profile of its own and yield a tab; end it with the block.
 
+    It runs in its sandbox, but for where there is none: for root it refuses to, and in many
+    containers the kernel does.
+
     Parameters
     ----------
     browser : str
@@ -169,12 +173,22 @@ def open_tab(browser: str) -> Iterator[Tab]:
     FileAccessError
         If it cannot be started.
     """
+    with ExitStack() as started:
+        tab = None
+        if os.geteuid() != 0:
+            with suppress(FileAccessError):
+                tab = started.enter_context(_tab(browser, *_FLAGS))
+        yield tab or started.enter_context(_tab(browser, *_FLAGS, _NO_SANDBOX))
+
+
+@contextmanager
+def _tab(browser: str, *flags: str) -> Iterator[Tab]:
     with TemporaryDirectory(prefix="elastocal-", ignore_cleanup_errors=True) as profile:
         ends = [_high(end) for end in (*os.pipe(), *os.pipe())]
         to_child, write, read, from_child = ends
         process = None
         try:
-            process = _start([browser, *_FLAGS, f"--user-data-dir={profile}"], to_child, from_child)
+            process = _start([browser, *flags, f"--user-data-dir={profile}"], to_child, from_child)
             for end in (to_child, from_child):
                 os.close(end)
                 ends.remove(end)

@@ -93,3 +93,7 @@ from .style import (
     write_figure as write_figure,
     write_kinds as write_kinds,
 )
+from .timeline_figure import (
+    timeline_figure as timeline_figure,
+    write_timeline_figure as write_timeline_figure,
+)

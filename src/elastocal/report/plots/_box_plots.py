@@ -2,11 +2,12 @@
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.collections import LineCollection, PolyCollection
-from matplotlib.patches import Patch
+from matplotlib.patches import Patch, PathPatch
+from matplotlib.path import Path
 from matplotlib.ticker import FixedLocator, FuncFormatter, MultipleLocator, NullFormatter
 
 from elastocal.arrays import BoolArray, FloatArray, IndexArray
@@ -128,26 +129,56 @@ def draw_boxes(axes: Axes, boxes: Boxes, variant: VariantStyle) -> None:
     """
     x, half = variant.at(boxes.n), 0.5 * variant.width
     left, right = x - half, x + half
-    corners = np.array(
-        [[left, right, right, left], [boxes.q1, boxes.q1, boxes.q3, boxes.q3]]
-    ).T  # fmt: skip
-    faces = [style.PAPER if hollow else variant.fill for hollow in boxes.hollow]
-    edges = [tint(variant.colour, PALE) if hollow else variant.colour for hollow in boxes.hollow]
-    for near, far in ((boxes.q1, boxes.low), (boxes.q3, boxes.high)):
-        whiskers = np.array([[x, x], [near, far]]).T
-        axes.add_collection(LineCollection(list(whiskers), colors=edges, lw=0.8, zorder=2))
-    axes.add_collection(
-        PolyCollection(list(corners), facecolors=faces, edgecolors=edges, lw=0.8, zorder=3)
-    )
-    line = np.array([[left, right], [boxes.median, boxes.median]]).T
     # A box without height shows nothing but its median, which then has to tell the variant.
     full = np.where(boxes.q3 > boxes.q1, style.INK, variant.colour)
-    inks = np.where(boxes.hollow, style.REFUSED, full).tolist()
-    axes.add_collection(LineCollection(list(line), colors=inks, lw=1.3, zorder=4))
-    axes.scatter(
-        x[boxes.outlier_box], boxes.outlier, s=4.0, linewidths=0, zorder=3, clip_on=True,
-        c=[edges[box] for box in boxes.outlier_box] or variant.colour,
-    )  # fmt: skip
+    inks = np.where(boxes.hollow, style.REFUSED, full)
+    corners = [left, boxes.q1], [right, boxes.q1], [right, boxes.q3], [left, boxes.q3]
+    for hollow, face, edge in (
+        (False, variant.fill, variant.colour),
+        (True, style.PAPER, tint(variant.colour, PALE)),
+    ):
+        drawn = boxes.hollow == hollow
+        for near, far in ((boxes.q1, boxes.low), (boxes.q3, boxes.high)):
+            _draw_shapes(axes, ([x, near], [x, far]), drawn, 2, edgecolor=edge, lw=0.8)
+        _draw_shapes(axes, corners, drawn, 3, facecolor=face, edgecolor=edge, lw=0.8)
+        beyond = drawn[boxes.outlier_box]
+        if np.any(beyond):
+            axes.plot(
+                x[boxes.outlier_box][beyond], boxes.outlier[beyond], ls="none", marker="o", ms=2.0,
+                mew=0.0, color=edge, zorder=3,
+            )  # fmt: skip
+    for ink in np.unique(inks):
+        ends = [left, boxes.median], [right, boxes.median]
+        _draw_shapes(axes, ends, inks == ink, 4, edgecolor=ink, lw=1.3)
+
+
+def _draw_shapes(
+    axes: Axes, corners: Sequence[Sequence[FloatArray]], drawn: BoolArray, layer: int, **kind: Any
+) -> None:
+    """Draw lines, or polygons of three corners and more, as one path: there are thousands a page.
+
+    Parameters
+    ----------
+    axes : Axes
+        Panel; its limits stay.
+    corners : sequence of pairs of ndarray, shape (shape,)
+        x and y of each corner.
+    drawn : ndarray of bool, shape (shape,)
+        Which of the shapes.
+    layer : int
+        Higher ones hide lower ones.
+    **kind : object
+        Colours and line width.
+    """
+    if not np.any(drawn):
+        return
+    codes = [Path.MOVETO, *[Path.LINETO] * (len(corners) - 1)]
+    if len(corners) > 2:
+        corners, codes = [*corners, corners[0]], [*codes, Path.CLOSEPOLY]
+    places = np.array(corners)[:, :, drawn].transpose(2, 0, 1)
+    path = Path(places.reshape(-1, 2), np.tile(codes, len(places)))
+    filled = "facecolor" in kind
+    axes.add_artist(PathPatch(path, fill=filled, joinstyle="round", zorder=layer, **kind))
 
 
 def finish_axes(axes: Axes, last: int, low: float, high: float, log: bool) -> None:
@@ -164,8 +195,12 @@ def finish_axes(axes: Axes, last: int, low: float, high: float, log: bool) -> No
     log : bool
         Whether the scale of the values is logarithmic.
     """
-    for n in range(2, last + 1, 2):
-        axes.axvspan(n - 0.5, n + 0.5, color=style.BAND, lw=0, zorder=0)
+    even, edge = np.arange(2, last + 1, 2).astype(float), np.zeros(last // 2)
+    left, right = even - 0.5, even + 0.5
+    _draw_shapes(
+        axes, ([left, edge], [right, edge], [right, edge + 1.0], [left, edge + 1.0]), even > 0, 0,
+        facecolor=style.BAND, lw=0, transform=axes.get_xaxis_transform(),
+    )  # fmt: skip
     axes.set_xlim(0.5, last + 0.5)
     if log:
         axes.set_yscale("log")

@@ -223,14 +223,16 @@ def _draw_compliance(
         # An arrow at the upper edge over every box that goes beyond it.
         boxes = each.boxes[variant.name]
         x = variant.at(boxes.n)[boxes.ends()[1] > top]
-        axes.scatter(
-            x, np.full(len(x), top), marker="^", s=13.0, c=variant.colour, linewidths=0,
-            clip_on=False, zorder=5,
-        )  # fmt: skip
-    axes.set_title(literal(each.spring), loc="left", fontsize=8.5, weight="bold", pad=5)
+        if len(x):
+            axes.plot(
+                x, np.full(len(x), top), ls="none", marker="^", ms=3.6, mew=0.0,
+                color=variant.colour, clip_on=False, zorder=5,
+            )  # fmt: skip
+    # With their height given, titles are not fitted to the labels of every tick.
+    axes.set_title(literal(each.spring), loc="left", fontsize=8.5, weight="bold", pad=5, y=1.0)
     axes.set_title(
         literal(never_told_apart(each)), loc="right", fontsize=7.5, color=style.MUTED,
-        style="italic", pad=5,
+        style="italic", pad=5, y=1.0,
     )  # fmt: skip
     axes.set_ylabel(each.unit, fontsize=7.5, labelpad=2)
     axes.tick_params(labelsize=7.5)

@@ -18,11 +18,13 @@ from elastocal.dataset import Dataset
 from elastocal.errors import ReportError
 from elastocal.identification import CalibrateResult, Prediction
 from elastocal.identification.recertification import CompareResult
+from elastocal.logs import ImportedLogs
 from elastocal.planning import PlanResult
 from elastocal.procedure import RunSummary
 from elastocal.report.plots import style
 from elastocal.report.plots.spring_figures import recertification_figure, spring_bars, spring_figure
 from elastocal.report.plots.style import literal, new_figure, open_frame, variant_styles
+from elastocal.report.plots.timeline_figure import timeline_figure
 from elastocal.results import brief_repr
 
 _P = ParamSpec("_P")
@@ -189,8 +191,8 @@ def drawn(figure: Callable[_P, Figure], *arguments: _P.args, **options: _P.kwarg
 def _draw(result: object) -> Figure:
     raise ReportError(
         f"there is no picture of a {type(result).__name__}: pictures show calibrations,"
-        " comparisons, plans, runs, readings, predictions, corrections, processes, codecs, studies"
-        " and stiffness"
+        " comparisons, plans, runs, logs, readings, predictions, corrections, processes, codecs,"
+        " studies and stiffness"
     )
 
 
@@ -214,6 +216,11 @@ def _readings(dataset: Dataset) -> Figure:
     columns = [cases.index(case) for case in readings.load_case]
     size[rows, columns] = _MM * np.linalg.norm(readings.deflection, axis=1)
     return pose_grid([("Measured deflection, norm in mm", size)], poses, cases)
+
+
+@_draw.register
+def _logs(found: ImportedLogs) -> Figure:
+    return timeline_figure(found, "Merged logs")
 
 
 @_draw.register

@@ -14,6 +14,7 @@ as a first-order process of `_AIR_TIME`.
 """
 
 import math
+from abc import ABC, abstractmethod
 from collections.abc import Callable
 
 import numpy as np
@@ -110,7 +111,7 @@ class NoiseStream:
         return self._block
 
 
-class _SimulatedInstrument:
+class _SimulatedInstrument(ABC):
     """A device that samples what goes on, with noise that belongs to what the arm was sent to."""
 
     def __init__(self, plant: Plant, rate: float, name: str, draw: Draw) -> None:
@@ -133,9 +134,9 @@ class _SimulatedInstrument:
             if len(times):
                 self._buffer.add(times, values)
 
+    @abstractmethod
     def _measure(self, times: IndexArray, noise: FloatArray) -> tuple[IndexArray, FloatArray]:
         """Return which samples come, by their times in µs, and their six columns."""
-        raise NotImplementedError
 
 
 class SimulatedForceSensor(_SimulatedInstrument):

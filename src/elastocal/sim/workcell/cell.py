@@ -133,7 +133,7 @@ class ProcessCell:
         share = simulation.sensor.hysteresis
         self._hysteresis = SensorHysteresis(share, run.sensor.range) if share > 0.0 else None
         self._state: RobotState | None = None
-        self._pressed = self._free = _SpringTrail()
+        self._pressed = _SpringTrail()
         self._stop = np.zeros(3)
         self._rng = generator(seed, "process", "")
         self._slope = np.zeros(6)
@@ -154,21 +154,25 @@ class ProcessCell:
         self._chance = VisitChance.of(self._seed, f"process {course}")
         self._statics = self._statics.visited(self._chance, np.ones(()))
         self._state = self._statics.free(q, np.zeros(3), None)
-        self._pressed, self._free = _SpringTrail(self._state), _SpringTrail(self._state)
+        self._pressed = _SpringTrail(self._state)
         if self._hysteresis is not None:
             self._hysteresis.relax()
             self._hysteresis.lag(self._seen(self._state))
 
     def free_shift(self, q: FloatArray) -> FloatArray:
-        """Return the shift of the tool in the air, shape (3,), in m.
+        """Return the shift of the tool in the air, shape (..., 3), in m.
 
         The gears remember nothing of it. `lift` comes first.
+
+        Parameters
+        ----------
+        q : ndarray, shape (..., joint)
+            In rad or m.
         """
         assert self._state is not None, "lift comes first"
-        state = self._statics.free(q, np.zeros(3), self._free.next())
-        self._free.went(state)
+        state = self._statics.free(q, np.zeros(3), None)
         cold = replace(self._statics, warmth=np.zeros(()))
-        return self._left(cold.deviation(q, state.sag))[:3]
+        return self._left(cold.deviation(q, state.sag))[..., :3]
 
     def _left(self, twist: FloatArray) -> FloatArray:
         """Take out what the controller does of the sag, as it was where the course began."""

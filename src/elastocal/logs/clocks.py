@@ -1,0 +1,362 @@
+"""Bring the clocks of several logs together by what all of them feel: that the cell moves.
+
+Each log is reduced to its *activity*, the logarithm of the speed at which its values change. The
+marker travels when the arm does. A force changes when the arm yields to it, at a few mm/s at most;
+beside a force, all faster motion of the arm is left out. The offset is where the activities
+correlate most. A press is much like the next one, so that a force may fit several offsets: then it
+is the one at which the tool's weight alone explains what is felt on the way between the poses.
+Stretches of the recording, each correlated for itself, then say how the offset drifts:
+
+    t = t_log + offset + drift (t_log - t_first).
+
+Where the logs hold a handshake, its words say which times belong together, and nothing is fitted.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import groupby
+
+import numpy as np
+from scipy.signal import correlate, find_peaks
+from scipy.stats import theilslopes
+
+from elastocal.arrays import BoolArray, FloatArray, IndexArray
+from elastocal.errors import LogError
+from elastocal.logs.streams import LogStreams
+from elastocal.records import record
+from elastocal.results import brief_repr
+
+_STEP = 0.02
+"""Distance of the samples of an activity, in s."""
+_SMOOTH = 5
+"""Samples over which values are averaged before they are differenced."""
+_BLUR = 15
+"""The same of an activity: about 0.3 s."""
+_PRESSING = 2e-3
+"""Speed in m/s above which an arm travels; below, it stands or yields to a force."""
+_SLOWEST = 1e-5
+"""Speed in m/s below which an arm that may yield stands."""
+_CLOSE, _APART, _MOST_CANDIDATES = 0.15, 1.0, 40
+"""Correlation below the best that is still a candidate, least distance of candidates in s, and
+their greatest number."""
+_TRAVELLING = 10e-3
+"""Speed in m/s above which the tool touches nothing."""
+_LEAST_TRAVELLED = 20
+"""Samples by which a weight is judged."""
+_LONGEST_GAP = 1.0
+"""Time without a sample from which on nothing is known of a log, in s."""
+_LEAST_OVERLAP = 0.3
+"""Least part of the shorter log that the other must overlap."""
+_LEAST_CORRELATION = 0.5
+"""Correlation below which two logs are not of the same work."""
+_STRETCH = 60.0
+"""Length of a stretch that gives an offset of its own, in s."""
+_SEARCHED = 0.6
+"""How far from the common offset that of a stretch is looked for, in s."""
+_LEAST_STRETCHES = 5
+"""Stretches from which on a drift is estimated."""
+_LONGEST = 1_000_000
+"""Samples of the longest activity; longer recordings are looked at in larger steps."""
+
+
+@brief_repr
+@dataclass(frozen=True, eq=False)
+class _Activity:
+    """How fast a log changes, on a grid of equal steps."""
+
+    start: float
+    step: float
+    value: FloatArray
+    """Logarithm of the speed, shape (sample,), its mean taken off; 0 where nothing is known."""
+    known: BoolArray
+    """Shape (sample,)."""
+
+
+@record()
+class ClockFit:
+    """How the clock of a log stands to that of the joints."""
+
+    clock: str
+    reference: str
+    offset: float
+    """What is added to its first time, in s."""
+    offset_sigma: float | None
+    """Standard deviation, in s; None where the logs hold a handshake."""
+    drift: float
+    """Change of the offset a second; 0 where the recording is too short to tell."""
+    drift_sigma: float | None
+    """None where no drift was estimated."""
+    correlation: float
+    """Of the activities; 1 for the handshake."""
+    first: float
+    """Its first time, by its own clock, in s."""
+
+    def shifted(self, time: FloatArray) -> FloatArray:
+        """Return times by the clock of the joints, shape (sample,), in s."""
+        return time + self.offset + self.drift * (time - self.first)
+
+    @property
+    def sentence(self) -> str:
+        """What a person wants to know of it."""
+        if self.offset_sigma is None:
+            return f"{self.clock}: by the handshake"
+        drift = "" if self.drift_sigma is None else f", drift {1e6 * self.drift:+.0f} ppm"
+        return (
+            f"{self.clock}: {self.offset:+.3f} s ± {1e3 * 2.0 * self.offset_sigma:.0f} ms{drift}"
+            f" to {self.reference} (correlation {self.correlation:.2f})"
+        )
+
+
+def align(
+    logs: Sequence[LogStreams], lever: FloatArray
+) -> tuple[tuple[LogStreams, ...], tuple[ClockFit, ...]]:
+    """Return the logs by the clock of the joints, and how each clock stood to it.
+
+    Parameters
+    ----------
+    logs : sequence of LogStreams
+        One of them with joints.
+    lever : ndarray, shape (3,)
+        Roughly the marker in the tcp frame, in m.
+
+    Raises
+    ------
+    LogError
+        If a log has nothing in common with the joints: no motion, no overlap, other work.
+    """
+    reference = next(log for log in logs if log.arm is not None)
+    fits: dict[str, ClockFit] = {}
+    aligned: list[LogStreams] = []
+    for log in logs:
+        if log.clock == reference.clock:
+            aligned.append(log)
+        elif log.handshake is not None and reference.handshake is not None:
+            time, fits[log.clock] = _by_handshake(log, reference)
+            aligned.append(log.at(time))
+        else:
+            if log.entry.time is None:
+                raise LogError(
+                    f"{log.entry.log}: it has no time, and {reference.entry.log} no handshake"
+                )
+            if log.clock not in fits:
+                fits[log.clock] = fit_clock(log, reference, lever)
+            aligned.append(log.at(fits[log.clock].shifted(log.time)))
+    return tuple(aligned), tuple(fits.values())
+
+
+def fit_clock(log: LogStreams, reference: LogStreams, lever: FloatArray) -> ClockFit:
+    """Return how the clock of a log stands to that of the joints, by what both feel.
+
+    Raises
+    ------
+    LogError
+        If they do not correlate.
+    """
+    longest = max(float(np.ptp(each.time)) for each in (log, reference))
+    step = max(_STEP, longest / _LONGEST)
+    fastest = None if log.wrench is None else _PRESSING
+    ours, theirs = _activity(log, lever, step), _activity(reference, lever, step, fastest)
+    lags, correlations = _best_lags(ours, theirs)
+    best = 0
+    if log.wrench is not None and len(lags) > 1:
+        shifts = theirs.start - ours.start + lags * step
+        best = int(np.argmin([_weight_misfit(log, reference, each) for each in shifts]))
+    lag, correlation = int(lags[best]), float(correlations[best])
+    if not correlation >= _LEAST_CORRELATION:
+        raise LogError(
+            f"{log.entry.log} and {reference.entry.log} do not seem to be of the same work: their"
+            f" motions correlate by {correlation:.2f} at best, {_LEAST_CORRELATION} is the least;"
+            " give both the same clock if they share one"
+        )
+    coarse = theirs.start - ours.start + lag * step
+    at, offset = _stretch_offsets(ours, theirs, lag)
+    first = float(log.time[0])
+    # What neither log has sampled finely enough to show.
+    unseen = 0.25 * max(float(np.median(np.diff(each.time))) for each in (log, reference))
+    if len(at) < _LEAST_STRETCHES:
+        sigma = math.hypot(step, unseen)
+        return ClockFit(log.clock, reference.clock, coarse, sigma, 0.0, None, correlation, first)
+    drift, level, *_ = theilslopes(offset, at)
+    scatter = max(1.4826 * float(np.median(np.abs(offset - level - drift * at))), 0.1 * step)
+    drift_sigma = scatter / math.sqrt(((at - at.mean()) ** 2).sum())
+    sigma = math.hypot(scatter / math.sqrt(len(at)), drift_sigma * float(at.mean()), unseen)
+    return ClockFit(
+        log.clock,
+        reference.clock,
+        coarse + float(level),
+        sigma,
+        float(drift),
+        drift_sigma,
+        correlation,
+        first,
+    )
+
+
+def _activity(
+    log: LogStreams, lever: FloatArray, step: float, fastest: float | None = None
+) -> _Activity:
+    """Return the activity of a log on a grid of its own clock.
+
+    Nothing is known of it in gaps and, where ``fastest`` is given, at higher speeds, in m/s.
+    """
+    values = _values(log, lever)
+    good = np.isfinite(values).all(axis=1)
+    time, first = np.unique(log.time[good], return_index=True)
+    if len(time) < 2:
+        raise LogError(f"{log.entry.log}: it has no two samples at different times")
+    grid = np.arange(time[0], time[-1] + 0.5 * step, step)
+    smooth = np.column_stack(
+        [_blurred(np.interp(grid, time, axis), _SMOOTH) for axis in values[good][first].T]
+    )
+    speed = np.linalg.norm(np.gradient(smooth, step, axis=0), axis=1)
+    after = np.searchsorted(time, grid, side="right").clip(1, len(time) - 1)
+    known = time[after] - time[after - 1] <= _LONGEST_GAP
+    known[:_BLUR] = known[-_BLUR:] = False
+    if not known.any() or not speed[known].max() > 0.0:
+        raise LogError(f"{log.entry.log}: nothing changes in it, so that its clock cannot be told")
+    if fastest is None:
+        fast = float(np.percentile(speed[known], 95))
+        floor = max(float(np.percentile(speed[known], 25)), 1e-3 * fast)
+    else:
+        floor = _SLOWEST
+        known &= speed < fastest
+    value = _blurred(np.log10(speed + floor), _BLUR)
+    centred = value - value[known].mean() if known.any() else value
+    return _Activity(float(grid[0]), step, np.where(known, centred, 0.0), known)
+
+
+def _blurred(values: FloatArray, samples: int) -> FloatArray:
+    """Return running means."""
+    return np.convolve(values, np.full(samples, 1.0 / samples), "same")
+
+
+def _values(log: LogStreams, lever: FloatArray) -> FloatArray:
+    """Return what changes in a log, shape (row, 3)."""
+    if log.arm is not None:
+        T = log.arm.T_base_tcp
+        return T[:, :3, 3] + T[:, :3, :3] @ lever
+    if log.points is not None:
+        return log.points.position
+    assert log.wrench is not None
+    return log.wrench.force
+
+
+def _best_lags(ours: _Activity, theirs: _Activity) -> tuple[IndexArray, FloatArray]:
+    """Return by how many steps ours may begin after theirs, the best first, and the correlations.
+
+    Each correlation is over the samples that are known in both.
+    """
+    lags = np.arange(-(len(ours.value) - 1), len(theirs.value))
+    seen, there = ours.known.astype(float), theirs.known.astype(float)
+    product = correlate(theirs.value, ours.value, method="fft")
+    power_theirs = correlate(theirs.value**2, seen, method="fft")
+    power_ours = correlate(there, ours.value**2, method="fft")
+    overlap = correlate(there, seen, method="fft")
+    enough = overlap >= _LEAST_OVERLAP * min(seen.sum(), there.sum())
+    scale = np.sqrt(np.maximum(power_theirs * power_ours, 1e-12))
+    correlation = np.where(enough, product / scale, -1.0)
+    peaks, _ = find_peaks(correlation, distance=max(round(_APART / ours.step), 1))
+    peaks = peaks[np.argsort(correlation[peaks])[::-1]][:_MOST_CANDIDATES]
+    if not len(peaks):
+        peaks = np.array([np.argmax(correlation)])
+    peaks = peaks[correlation[peaks] >= correlation[peaks[0]] - _CLOSE]
+    return lags[peaks], correlation[peaks]
+
+
+def _weight_misfit(log: LogStreams, reference: LogStreams, shift: float) -> float:
+    """Return how badly the tool's weight explains the force while the arm travels, in N.
+
+    ``F = A R_base_tcp^T g + b`` with any ``A``, so that the sensor may sit as it likes; the median
+    of what is left.
+    """
+    arm, wrench = reference.arm, log.wrench
+    assert arm is not None
+    assert wrench is not None
+    time, place = arm.time, arm.T_base_tcp[:, :3, 3]
+    speed = np.linalg.norm(np.gradient(place, axis=0), axis=1) / np.maximum(np.gradient(time), 1e-9)
+    own = time[speed > _TRAVELLING] - shift
+    own = own[(own > wrench.time[0]) & (own < wrench.time[-1])]
+    if len(own) < _LEAST_TRAVELLED:
+        return np.inf
+    force = wrench.force[np.searchsorted(wrench.time, own).clip(0, len(wrench.time) - 1)]
+    down = arm.T_base_tcp[np.searchsorted(time, own + shift).clip(0, len(time) - 1), 2, :3]
+    columns = np.column_stack([down, np.ones(len(down))])
+    known = np.isfinite(force).all(axis=1)
+    left = force[known] - columns[known] @ np.linalg.lstsq(columns[known], force[known])[0]
+    return float(np.median(np.linalg.norm(left, axis=1)))
+
+
+def _stretch_offsets(ours: _Activity, theirs: _Activity, lag: int) -> tuple[FloatArray, FloatArray]:
+    """Return time since the start and offset beside the common one of each stretch, in s."""
+    step, found = ours.step, []
+    length, reach = round(_STRETCH / step), round(_SEARCHED / step)
+    for start in range(0, len(ours.value) - length + 1, length // 2):
+        low, high = start + lag - reach, start + lag + length + reach
+        if low < 0 or high > len(theirs.value):
+            continue
+        own, other = ours.value[start : start + length], theirs.value[low:high]
+        known = ours.known[start : start + length]
+        if known.mean() < 0.5 or not own.any() or not other.any():
+            continue
+        product = correlate(other, own, mode="valid", method="fft")
+        power = correlate(other**2, known.astype(float), mode="valid", method="fft")
+        correlation = product / np.sqrt(np.maximum(power * (own**2).sum(), 1e-12))
+        best = int(np.argmax(correlation))
+        if 0 < best < len(correlation) - 1 and correlation[best] >= _LEAST_CORRELATION:
+            before, at, after = correlation[best - 1 : best + 2]
+            vertex = 0.5 * (before - after) / (before - 2.0 * at + after)
+            found.append(((start + 0.5 * length) * step, (best + vertex - reach) * step))
+    times = np.array(found).reshape(-1, 2)
+    return times[:, 0], times[:, 1]
+
+
+def _by_handshake(log: LogStreams, reference: LogStreams) -> tuple[FloatArray, ClockFit]:
+    """Return the times of a log by the clock of the joints: words begin and end together."""
+    ours, theirs = handshake_spans(log), handshake_spans(reference)
+    common = [word for word in ours if word in theirs]
+    if not common:
+        raise LogError(
+            f"{log.entry.log} and {reference.entry.log} have no word of their handshake in common"
+            f" ({_some(ours)}; {_some(theirs)})"
+        )
+    from_times = np.array([time for word in common for time in ours[word]])
+    to_times = np.array([time for word in common for time in _ends(theirs[word], ours[word])])
+    if not np.all(np.diff(from_times) >= 0.0) or not np.all(np.diff(to_times) >= 0.0):
+        raise LogError(f"{log.entry.log}: the words of its handshake are in another order")
+    time = np.interp(log.time, from_times, to_times, left=-np.inf, right=np.inf)
+    offset = float((to_times - from_times).mean())
+    fit = ClockFit(log.clock, reference.clock, offset, None, 0.0, None, 1.0, float(log.time[0]))
+    return time, fit
+
+
+def _ends(theirs: tuple[float, float], ours: tuple[float, float]) -> tuple[float, float]:
+    """Return where the ends of our span of a word belong: a single row in the middle of theirs."""
+    middle = 0.5 * (theirs[0] + theirs[1])
+    return (middle, middle) if ours[0] == ours[1] else theirs
+
+
+def handshake_spans(log: LogStreams) -> dict[str, tuple[float, float]]:
+    """Return the first and last time of each word of a handshake, in order.
+
+    Raises
+    ------
+    LogError
+        If a word stands in two places.
+    """
+    spans: dict[str, tuple[float, float]] = {}
+    row = 0
+    for word, rows in groupby(log.handshake or ()):
+        first, row = row, row + len(list(rows))
+        if word in spans:
+            raise LogError(
+                f"{log.entry.log}: handshake {word!r} stands in two places, the second in row"
+                f" {first + 1} of the data: it must name one reading"
+            )
+        if word:
+            spans[word] = float(log.time[first]), float(log.time[row - 1])
+    return spans
+
+
+def _some(words: Sequence[str] | dict[str, tuple[float, float]]) -> str:
+    return ", ".join(list(words)[:4]) or "none"

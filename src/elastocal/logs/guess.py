@@ -1,0 +1,345 @@
+"""A first map of logs, by the names and sizes of their columns; a person then corrects it."""
+
+import re
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from elastocal.arrays import FloatArray
+from elastocal.errors import LogError
+from elastocal.logs.map import SCHEMA, UNKNOWN
+from elastocal.logs.recordings import is_recording, read_recording, read_topics
+from elastocal.logs.streams import read_table
+from elastocal.logs.table import LogTable
+from elastocal.results import brief_repr
+
+_UNIT = re.compile(r"[\[(]\s*([^\])]+?)\s*[\])]\s*$|_(mm|m|um|deg|rad|N|kN|Nm|s|ms)$")
+_TIME = re.compile(r"(?i)(time|zeit|t|timestamp|stamp|date ?time|ms|ipoc|uhrzeit)")
+_AXIS = re.compile(r"(?i)(?:.*[._ ])?(?:joint|achse|axis|ax|a|j|q|theta)[_ ]?a?(\d)")
+_EXTERNAL = re.compile(r"(?i)(?:.*[._ ])?(?:e1|rail|linear|track)")
+_FORCE = re.compile(r"(?i)(.*?)(?:f|force)[._ ]?([xyz])")
+_MOMENT = re.compile(r"(?i)(.*?)(?:t|m|torque|moment)[._ ]?([xyz])")
+_SIGMA = re.compile(r"(?i)(.*?)(?:u95|u|sigma|unc)[._ ]?([xyz])|()([xyz])[._ ]?(?:u95|unc)")
+_POINT = re.compile(r"(?i)(.*?)([xyz])")
+_ANGLE = re.compile(r"(?i)(.*?)([abc])")
+_STEP = re.compile(r"(?i)(step|reading|handshake|plateau|messpunkt)")
+_PLAIN_UNITS = {"°": "deg", "degrees": "deg", "nm": "N*m", "nmm": "N*mm", "sec": "s"}
+_LEAST_AXES = 5
+"""Columns with numbers that are the joints of an arm."""
+_SURELY_DEGREES = 7.0
+"""A joint beyond this many units is not in rad."""
+_SURELY_MM = 20.0
+"""A place or rail beyond this many units is not in m."""
+_SURELY_PLACED = 0.2
+"""A place below this many units says nothing: the instruments stand farther away in any unit."""
+_SURELY_NEWTONS = 20.0
+"""A press of more than this many units is not in kN."""
+_LONGEST_LEVER = 5.0
+"""Of a force about its sensor, in m: a moment beyond is in N mm."""
+
+
+@brief_repr
+@dataclass(frozen=True)
+class GuessedColumns:
+    """What some columns of a log were taken for, and why."""
+
+    key: str
+    """Of the map."""
+    columns: tuple[str, ...]
+    unit: str | None
+    """``?`` where a person must say; None for dates and words."""
+    why: str
+
+    @property
+    def yaml(self) -> str:
+        """The columns as the map has them."""
+        names = ", ".join(_quoted(name) for name in self.columns)
+        if self.key == "handshake":
+            return names
+        unit = "" if self.unit is None else f", unit: {_quoted(self.unit)}"
+        if self.key == "time":
+            return f"{{column: {names}{unit}}}"
+        return f"{{columns: [{names}]{unit}}}"
+
+
+@brief_repr
+@dataclass(frozen=True)
+class GuessedLog:
+    """What a log, or a topic of it, was taken for."""
+
+    log: str
+    topic: str | None
+    columns: tuple[GuessedColumns, ...] = ()
+
+    def answered(self, ask: Callable[[str], str]) -> "GuessedLog":
+        """Return the same with the units that a person says; an empty answer leaves one open."""
+
+        def said(each: GuessedColumns) -> GuessedColumns:
+            if each.unit != UNKNOWN:
+                return each
+            unit = ask(f"{self.log}: unit of {', '.join(each.columns)} ({each.key}, {each.why})")
+            return replace(each, unit=unit.strip() or UNKNOWN)
+
+        return replace(self, columns=tuple(map(said, self.columns)))
+
+    def lines(self) -> list[str]:
+        """Return its entry of the map, with the reasons as comments."""
+        topic = [] if self.topic is None else [f"    topic: {_quoted(self.topic)}"]
+        found = [f"  - log: {_quoted(self.log)}", *topic]
+        for key in ("time", "handshake", "joints", "pose", "force", "moment", "markers"):
+            own = [each for each in self.columns if each.key.split(".")[0] == key]
+            if key in ("joints", "markers") and own:
+                found.append(f"    {key}:")
+                found += [f"      - {each.yaml}  # {each.why}" for each in own]
+            elif key == "pose" and own:
+                found.append("    pose:")
+                found += [f"      {e.key.split('.')[1]}: {e.yaml}  # {e.why}" for e in own]
+            else:
+                found += [f"    {key}: {each.yaml}  # {each.why}" for each in own]
+        return found
+
+
+def guess_logs(files: Sequence[Path]) -> tuple[GuessedLog, ...]:
+    """Return what each log, and each topic of a recording, looks like.
+
+    Raises
+    ------
+    LogError
+        If a log cannot be read, or none of them holds anything that is known.
+    FileAccessError
+        If a file cannot be read.
+    """
+    found = []
+    for path in files:
+        if not is_recording(path):
+            found.append(guess_log(path.name, None, read_table(path, None)))
+            continue
+        for topic in read_topics(path):
+            try:
+                table = read_recording(path, topic)
+            except LogError:
+                continue  # no numbers in it: a log of texts, pictures
+            found.append(guess_log(path.name, topic, table))
+    known = tuple(each for each in found if any(c.key not in _ORDER for c in each.columns))
+    if not known:
+        raise LogError("no column looks like joints, a force or a marker: write the map by hand")
+    return known
+
+
+_ORDER = ("time", "handshake")
+"""What says when, not what."""
+
+
+def guess_log(log: str, topic: str | None, table: LogTable) -> GuessedLog:
+    """Return what the columns of a table look like.
+
+    Parameters
+    ----------
+    log : str
+        Name of its file.
+    topic : str or None
+        Of a recording.
+    table : LogTable
+        Its columns.
+    """
+    if all(name.isdigit() for name in table.header):
+        return GuessedLog(log, topic, _without_names(table))
+    names = {name: _bare(name) for name in table.header}
+    when = _when(table, names)
+    arm = _joints(table, names)
+    rest = _without(names, when + arm)
+    force = _force(table, rest)
+    rest = _without(rest, force)
+    where = [] if force else _places(table, rest, of_tool=bool(arm))
+    return GuessedLog(log, topic, (*when, *arm, *force, *where))
+
+
+def _without(names: dict[str, str], taken: Sequence[GuessedColumns]) -> dict[str, str]:
+    """Return the columns that are not taken yet, with their names without units."""
+    gone = {name for each in taken for name in each.columns}
+    return {name: bare for name, bare in names.items() if name not in gone}
+
+
+def _when(table: LogTable, names: dict[str, str]) -> list[GuessedColumns]:
+    """Return the columns that say when a row was taken."""
+    times = [name for name, bare in names.items() if _TIME.fullmatch(bare)][:1]
+    steps = [name for name, bare in names.items() if _STEP.fullmatch(bare)][:1]
+    return [
+        *(GuessedColumns("time", (name,), *_time_unit(table, name)) for name in times),
+        *(GuessedColumns("handshake", (name,), None, "its name") for name in steps),
+    ]
+
+
+def _joints(table: LogTable, names: dict[str, str]) -> list[GuessedColumns]:
+    """Return the columns of joints, a rail before the axes of the arm."""
+    axes = sorted((m[1], n) for n, bare in names.items() if (m := _AXIS.fullmatch(bare)))
+    if len(axes) < _LEAST_AXES:
+        return []
+    rail = tuple(name for name, bare in names.items() if _EXTERNAL.fullmatch(bare))
+    arm = tuple(name for _, name in axes)
+    return [
+        GuessedColumns("joints", group, *_unit(table, group, kind))
+        for group, kind in ((rail, "length"), (arm, "angle"))
+        if group
+    ]
+
+
+def _force(table: LogTable, names: dict[str, str]) -> list[GuessedColumns]:
+    """Return the columns of a force and its moment."""
+    forces, moments = _triples(_FORCE, names), _triples(_MOMENT, names)
+    if not forces:
+        return []
+    unit, why = _unit(table, forces[0], "force")
+    found = [GuessedColumns("force", forces[0], unit, why)]
+    if moments:
+        reason = _moment_unit(table, moments[0], forces[0], unit)
+        found.append(GuessedColumns("moment", moments[0], *reason))
+    return found
+
+
+def _places(table: LogTable, names: dict[str, str], *, of_tool: bool) -> list[GuessedColumns]:
+    """Return the columns of the tool's frame beside joints, elsewhere those of markers."""
+    sigmas = {name for columns in _triples(_SIGMA, names) for name in columns}
+    places = _triples(_POINT, {n: bare for n, bare in names.items() if n not in sigmas})
+    if not of_tool:
+        return [GuessedColumns("markers", each, *_unit(table, each, "length")) for each in places]
+    angles = _triples(_ANGLE, names)
+    if not places or not angles:
+        return []
+    return [
+        GuessedColumns("pose.position", places[0], *_unit(table, places[0], "length")),
+        GuessedColumns("pose.angles", angles[0], *_unit(table, angles[0], "angle")),
+    ]
+
+
+def _without_names(table: LogTable) -> tuple[GuessedColumns, ...]:
+    """Return a point list: three numbers after texts, and what only rises is the time."""
+    numeric = [n for n in table.header if np.isfinite(_numbers(table, n)).all()]
+    rising = [n for n in numeric if np.all(np.diff(table.numbers(n)) > 0.0)]
+    places = [name for name in numeric if name not in rising][:3]
+    found = []
+    if rising:
+        found.append(GuessedColumns("time", (rising[0],), *_time_unit(table, rising[0])))
+    if len(places) == 3:
+        unit, why = _unit(table, places, "length")
+        found.append(GuessedColumns("markers", tuple(places), unit, f"three numbers, {why}"))
+    return tuple(found)
+
+
+def write_guess(logs: Sequence[GuessedLog], robot: str) -> str:
+    """Return the text of a map.
+
+    Parameters
+    ----------
+    logs : sequence of GuessedLog
+        What they were taken for.
+    robot : str
+        Lines that say robot, tool and sensor, or the cell file.
+    """
+    head = [
+        f"schema: {SCHEMA}",
+        "# Guessed by names and sizes of columns: look at every line. A unit ? is yours to write.",
+        *robot.rstrip().splitlines(),
+        "logs:",
+    ]
+    tail = [
+        "# load_cases: {normal: ['0 N', '0 N', '-1100 N']}  # on the robot, in the tcp; in order",
+    ]
+    return "\n".join([*head, *(line for each in logs for line in each.lines()), *tail]) + "\n"
+
+
+ROBOT_TO_WRITE = """\
+robot: {model: "?"}                       # of the catalogue (elastocal robots), or urdf: FILE
+tcp: {xyz: ["0 mm", "0 mm", "0 mm"]}      # in the flange, z out of the tool
+# tool: {mass: "0 kg", centre_of_mass: ["0 mm", "0 mm", "0 mm"]}   # in the flange
+sensor: {xyz: ["0 mm", "0 mm", "0 mm"]}   # measuring frame in the flange
+marker: ["0 mm", "0 mm", "0 mm"]          # in the tcp, roughly
+"""
+"""What no log says of the cell."""
+
+
+def _bare(name: str) -> str:
+    """Return the name of a column without its unit."""
+    return _UNIT.sub("", name).strip()
+
+
+def _stated(name: str) -> str | None:
+    match = _UNIT.search(name)
+    if match is None:
+        return None
+    unit = (match[1] or match[2]).strip()
+    return _PLAIN_UNITS.get(unit.lower(), unit)
+
+
+def _triples(pattern: re.Pattern[str], names: dict[str, str]) -> list[tuple[str, ...]]:
+    """Return the columns of each x, y, z (or a, b, c) of equal prefix."""
+    groups: dict[str, dict[str, str]] = {}
+    for name, bare in names.items():
+        if match := pattern.fullmatch(bare):
+            prefix, axis = [part for part in match.groups() if part is not None][-2:]
+            groups.setdefault(prefix, {})[axis.lower()] = name
+    found = [[own[axis] for axis in sorted(own)] for own in groups.values()]
+    return [tuple(columns) for columns in found if len(columns) == 3]
+
+
+def _largest(table: LogTable, columns: Sequence[str]) -> float:
+    values = np.abs(np.stack([_numbers(table, name) for name in columns]))
+    return float(np.nanmax(values, initial=0.0)) if np.isfinite(values).any() else 0.0
+
+
+def _numbers(table: LogTable, name: str) -> FloatArray:
+    try:
+        return table.numbers(name)
+    except LogError:
+        return np.full(len(table), np.nan)
+
+
+def _unit(table: LogTable, columns: Sequence[str], kind: str) -> tuple[str, str]:
+    """Return the unit of some columns, and why: their header, else their size."""
+    stated = {_stated(name) for name in columns}
+    if len(stated) == 1 and (unit := stated.pop()) is not None:
+        return unit, "the header's unit"
+    largest = _largest(table, columns)
+    why = f"up to {largest:.4g}"
+    if kind == "angle":
+        return ("deg" if largest > _SURELY_DEGREES else "rad" if largest <= 3.5 else UNKNOWN), why
+    if kind == "length":
+        return ("mm" if largest > _SURELY_MM else "m" if largest > _SURELY_PLACED else UNKNOWN), why
+    return ("N" if largest > _SURELY_NEWTONS else UNKNOWN), why
+
+
+def _moment_unit(
+    table: LogTable, columns: Sequence[str], force: Sequence[str], force_unit: str
+) -> tuple[str, str]:
+    stated = {_stated(name) for name in columns}
+    if len(stated) == 1 and (unit := stated.pop()) is not None:
+        return unit, "the header's unit"
+    if force_unit != "N":
+        return UNKNOWN, "the force's unit says nothing of it"
+    lever = _largest(table, columns) / max(_largest(table, force), 1e-9)
+    unit = "N*mm" if lever > _LONGEST_LEVER else "N*m"
+    return unit, f"{lever:.3g} times the force"
+
+
+def _time_unit(table: LogTable, name: str) -> tuple[str | None, str]:
+    stated = _stated(name) or ("ms" if _bare(name).lower() in ("ms", "ipoc") else None)
+    if stated is not None:
+        return stated, "its name"
+    try:
+        steps = np.diff(table.numbers(name))
+    except LogError:
+        return None, "a date, or a time of day"
+    step = float(np.median(steps)) if len(steps) else np.nan
+    # Instruments take from some to some thousand samples a second.
+    unit = "s" if step <= 0.5 else "ms" if step <= 500.0 else UNKNOWN
+    return unit, f"steps of {step:.4g}"
+
+
+def _quoted(text: str) -> str:
+    return (
+        text
+        if re.fullmatch(r"[A-Za-z_][\w./-]*|\d+", text)
+        else "'" + text.replace("'", "''") + "'"
+    )

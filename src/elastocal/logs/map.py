@@ -1,0 +1,312 @@
+"""The map: what the columns of foreign logs are, as a person writes it.
+
+Example::
+
+    schema: elastocal.log-map/1
+    robot: {model: KR 120 R2700 extra HA}     # as in a cell file; or cell: CELL.yaml for all of it
+    tcp: {xyz: ["0 mm", "0 mm", "450 mm"]}    # in the flange
+    tool: {mass: "43 kg", centre_of_mass: ["0 mm", "0 mm", "200 mm"]}
+    sensor: {xyz: ["0 mm", "0 mm", "30 mm"]}  # measuring frame in the flange
+    marker: ["110 mm", "0 mm", "-90 mm"]      # in the tcp, roughly
+    logs:
+      - log: controller.csv
+        time: {column: Time, unit: s}
+        joints: [{columns: [A1, A2, A3, A4, A5, A6], unit: deg}]
+      - log: force.csv
+        time: {column: t, unit: ms}
+        force: {columns: [Fx, Fy, Fz], unit: N}
+        moment: {columns: [Tx, Ty, Tz], unit: N*m}
+      - log: tracker.txt
+        time: {column: Timestamp}
+        markers: [{columns: [X, Y, Z], unit: mm, u95: {columns: [UX, UY, UZ], unit: mm}}]
+    load_cases: {normal: ["0 N", "0 N", "-1100 N"]}   # force on the robot, in the tcp
+"""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Literal
+
+import numpy as np
+from pydantic import BeforeValidator, Field, field_validator, model_validator
+
+from elastocal.arrays import FloatArray
+from elastocal.cell import (
+    CONDITIONING,
+    IDENTITY,
+    Angle,
+    Length,
+    Point,
+    Pose,
+    RobotEntry,
+    SensorLoad,
+    SignedForce,
+    Tool,
+    load_cell,
+    mounted_robot,
+)
+from elastocal.errors import ElastocalError, SchemaError
+from elastocal.records import StrictModel, read_yaml
+from elastocal.results import brief_repr
+from elastocal.robot import GRAVITY, Robot, inverse_transform, with_tool_mass
+from elastocal.units import factor
+
+SCHEMA = "elastocal.log-map/1"
+UNKNOWN = "?"
+"""Unit that a person still has to write: `elastocal import --guess` could not tell it."""
+
+_ColumnName = Annotated[str, BeforeValidator(lambda name: str(name) if name is not True else name)]
+"""A name of the header, or the number of a column from 1."""
+_Three = tuple[_ColumnName, _ColumnName, _ColumnName]
+
+
+def _check_unit(unit: str, dimension: str) -> None:
+    if unit == UNKNOWN:
+        raise ValueError(f"the unit is still to be written: a {dimension}, such as mm, deg, N")
+    factor(unit, dimension)
+
+
+class TimeColumn(StrictModel):
+    """When each row was taken."""
+
+    column: _ColumnName
+    unit: str | None = None
+    """Of plain numbers: s, ms; left out for dates and times of day."""
+
+    @model_validator(mode="after")
+    def _known_unit(self) -> "TimeColumn":
+        if self.unit is not None:
+            _check_unit(self.unit, "time")
+        return self
+
+
+class Vector(StrictModel):
+    """_Three columns of one unit."""
+
+    columns: _Three
+    unit: str
+
+    def check(self, dimension: str) -> None:
+        """Refuse another unit than of this dimension."""
+        _check_unit(self.unit, dimension)
+
+
+class Joints(StrictModel):
+    """Columns of joint positions, in the robot's order and sense unless it is said otherwise."""
+
+    columns: tuple[_ColumnName, ...]
+    unit: str
+    names: tuple[str, ...] = ()
+    """Joint of each column; by default the robot's next ones of such a unit."""
+    signs: tuple[Literal[-1, 1], ...] = ()
+    """-1 where the controller counts the other way round."""
+    offsets: tuple[Angle | Length, ...] = ()
+    """What is added after the sign, with its unit."""
+
+    @model_validator(mode="after")
+    def _matching(self) -> "Joints":
+        if self.unit == UNKNOWN:
+            _check_unit(self.unit, "angle")
+        for name in ("names", "signs", "offsets"):
+            if (count := len(getattr(self, name))) not in (0, len(self.columns)):
+                raise ValueError(f"{count} {name} for {len(self.columns)} columns")
+        return self
+
+
+class ToolPose(StrictModel):
+    """The tool frame as the controller states it; finer than joints of four digits."""
+
+    position: Vector
+    """x, y, z in base."""
+    angles: Vector
+    """a, b, c: turns about z, the new y, the new x (KUKA Z-Y'-X'')."""
+
+    @model_validator(mode="after")
+    def _known_units(self) -> "ToolPose":
+        self.position.check("length")
+        self.angles.check("angle")
+        return self
+
+
+class MarkerColumns(StrictModel):
+    """A reflector as a station states it."""
+
+    columns: _Three
+    unit: str
+    u95: Vector | None = None
+    """Uncertainty of each coordinate by the instrument, twice its standard deviation."""
+
+    @model_validator(mode="after")
+    def _known_units(self) -> "MarkerColumns":
+        _check_unit(self.unit, "length")
+        if self.u95 is not None:
+            self.u95.check("length")
+        return self
+
+
+class LogEntry(StrictModel):
+    """One log, or one topic or sheet of it."""
+
+    log: str
+    """Name of the file, or a pattern such as ``tracker_*.txt``; several are joined in time."""
+    topic: str | None = None
+    """Of a recording, or sheet of a workbook."""
+    clock: str = ""
+    """Logs with the same word share a clock; by default each file has its own."""
+    time: TimeColumn | None = None
+    """Left out where a handshake is the only order."""
+    handshake: _ColumnName | None = None
+    """Column with the same word in all logs during a reading; 0 or nothing in between."""
+    joints: tuple[Joints, ...] = ()
+    pose: ToolPose | None = None
+    force: Vector | None = None
+    moment: Vector | None = None
+    frame: Literal["sensor", "tcp", "base"] = "sensor"
+    """Frame of force and moment."""
+    acts_on: Literal["robot", "environment"] = "robot"
+    """Whose force it is."""
+    station: str = "tracker"
+    """Name of the tracker station."""
+    markers: tuple[MarkerColumns, ...] = ()
+    """Reflectors of one rigid body."""
+
+    @field_validator("force", "moment")
+    @classmethod
+    def _known_unit(cls, value: Vector | None, info: object) -> Vector | None:
+        if value is not None:
+            value.check(str(getattr(info, "field_name", "")))
+        return value
+
+    @model_validator(mode="after")
+    def _says_something(self) -> "LogEntry":
+        if not (self.joints or self.force or self.markers):
+            raise ValueError("one of joints, force, markers must say what the log holds")
+        if self.moment is not None and self.force is None:
+            raise ValueError("a moment needs its force")
+        if self.time is None and self.handshake is None:
+            raise ValueError("it needs a time or a handshake")
+        return self
+
+
+class LogMap(StrictModel):
+    """All keys of a map but ``schema``."""
+
+    cell: str | None = None
+    """Cell file that says robot, tool, sensor and marker; else these keys."""
+    robot: RobotEntry | None = None
+    tcp: Pose = IDENTITY
+    """In the flange, z out of the tool."""
+    tool: Tool | None = None
+    """Everything behind the flange; left out where the sensor's tare takes its weight."""
+    sensor: Pose = IDENTITY
+    """Measuring frame in the flange."""
+    marker: Point = (0.0, 0.0, 0.0)
+    """Marker, or centre of the markers, in the tcp, roughly: it is estimated where poses allow."""
+    logs: Annotated[tuple[LogEntry, ...], Field(min_length=1)]
+    load_cases: dict[str, tuple[SignedForce, SignedForce, SignedForce]] = Field(
+        default_factory=dict
+    )
+    """Force on the robot in the tcp, in order in time; by default what is found is numbered."""
+    check: str | None = None
+    """Load case that no fit is to see."""
+
+    @model_validator(mode="after")
+    def _whole(self) -> "LogMap":
+        if (self.cell is None) == (self.robot is None):
+            raise ValueError("give cell or robot, one of them")
+        for name, present in (
+            ("joints", any(each.joints for each in self.logs)),
+            ("force", any(each.force for each in self.logs)),
+        ):
+            if not present:
+                raise ValueError(f"no log holds {name}")
+        if self.check is not None and self.check not in self.load_cases:
+            raise ValueError(f"check {self.check!r} is none of the load cases")
+        if CONDITIONING in self.load_cases:
+            raise ValueError(f"load case {CONDITIONING!r} is a word of our own: name it otherwise")
+        return self
+
+
+@brief_repr
+@dataclass(frozen=True, eq=False)
+class Site:
+    """What the logs were taken from."""
+
+    robot: Robot
+    urdf: str
+    """With the tool's mass."""
+    gravity: tuple[float, float, float] | None
+    """In base, in m/s²; None: the base stands upright."""
+    sensor: SensorLoad
+    marker: FloatArray
+    """In the tcp, shape (3,), in m."""
+
+
+def read_map(path: Path) -> LogMap:
+    """Return the map in a file.
+
+    Raises
+    ------
+    SchemaError
+        If it does not fit: unknown key, a unit that is missing or still to be written.
+    FileAccessError
+        If it cannot be read.
+    """
+    return read_yaml(Path(path), LogMap, SCHEMA)
+
+
+def site(path: Path, log_map: LogMap) -> Site:
+    """Return what a map says that its logs were taken from.
+
+    Parameters
+    ----------
+    path : Path
+        The map; the files that it names are relative to it.
+    log_map : LogMap
+        Its contents.
+
+    Raises
+    ------
+    SchemaError
+        If robot or cell cannot be used; the message names the map.
+    FileAccessError
+        If one of the files cannot be read.
+    """
+    if log_map.cell is not None:
+        cell = load_cell(path.parent / log_map.cell, production=False)
+        file = cell.file
+        T_flange_sensor = file.sensor.T_flange_sensor if file.sensor else np.eye(4)
+        marker = file.marker.position if file.marker else log_map.marker
+        return _site(cell.robot, file.robot, file.tcp, file.tool, T_flange_sensor, marker)
+    assert log_map.robot is not None
+    try:
+        robot = mounted_robot(path, log_map.robot, log_map.tcp)
+    except ElastocalError as error:
+        raise SchemaError(f"{path}: robot: {error}") from error
+    T_flange_sensor = log_map.sensor.T
+    return _site(robot, log_map.robot, log_map.tcp, log_map.tool, T_flange_sensor, log_map.marker)
+
+
+def _site(
+    robot: Robot,
+    entry: RobotEntry,
+    tcp: Pose,
+    tool: Tool | None,
+    T_flange_sensor: FloatArray,
+    marker: Point,
+) -> Site:
+    gravity = entry.mounting.T[:3, :3].T @ np.array(GRAVITY)
+    upright = bool(np.allclose(gravity, GRAVITY, rtol=0.0, atol=1e-9))
+    T_tcp_flange, urdf = inverse_transform(tcp.T), robot.urdf
+    mass, centre = (0.0, np.zeros(3)) if tool is None else (tool.mass, tool.centre)
+    if tool is not None:
+        centre_tcp = T_tcp_flange[:3, :3] @ centre + T_tcp_flange[:3, 3]
+        urdf = with_tool_mass(urdf, robot.tip, mass, centre_tcp)
+    T_sensor_flange = inverse_transform(T_flange_sensor)
+    load = SensorLoad(
+        mass,
+        T_sensor_flange[:3, :3] @ centre + T_sensor_flange[:3, 3],
+        T_tcp_sensor=T_tcp_flange @ T_flange_sensor,
+        gravity=gravity,
+    )
+    named = None if upright else (float(gravity[0]), float(gravity[1]), float(gravity[2]))
+    return Site(robot, urdf, named, load, np.array(marker))

@@ -1,0 +1,289 @@
+"""From logs of three instruments to one dataset: one clock, plateaus, readings, registration.
+
+What an own run knows from its journal is found here in the logs: when everything stood
+(`elastocal.logs.plateaus`), by one clock (`elastocal.logs.clocks`). From there on both go the same
+way, `elastocal.procedure.derive`: means, tare and tool weight, registration of the stations.
+"""
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TypeVar
+
+import numpy as np
+from scipy.spatial.transform import Rotation, Slerp
+
+from elastocal.arrays import FloatArray
+from elastocal.dataset import Dataset
+from elastocal.errors import LogError
+from elastocal.logs.clocks import ClockFit, align, handshake_spans
+from elastocal.logs.map import LogMap, Site
+from elastocal.logs.plateaus import (
+    Plateau,
+    averaged_part,
+    name_loads,
+    number_poses,
+    standing_spans,
+)
+from elastocal.logs.streams import LogStreams, read_streams_of
+from elastocal.procedure import PoseLog, PoseReadings
+from elastocal.procedure.derive import (
+    LEAST_SAMPLES,
+    LoadRow,
+    MeasuredArm,
+    Reading,
+    average,
+    dataset_of,
+    load_rows,
+    marker_readings,
+)
+from elastocal.procedure.record import (
+    SAME_TIME,
+    ArmStream,
+    PointStream,
+    ReadingStatus,
+    Streams,
+    Window,
+    WrenchStream,
+)
+from elastocal.procedure.registration import Registration, register
+from elastocal.progress import Progress
+from elastocal.results import brief_repr
+from elastocal.wording import counted
+
+_Stream = TypeVar("_Stream", ArmStream, WrenchStream, PointStream)
+
+_LEAST_POSES = 2
+"""Poses that a dataset is worth."""
+
+
+@brief_repr
+@dataclass(frozen=True, eq=False)
+class ImportedLogs:
+    """The dataset of foreign logs, and how it came about."""
+
+    dataset: Dataset
+    streams: Streams
+    """By the clock of the joints."""
+    plateaus: tuple[Plateau, ...]
+    """All that were found; those of no use have the pose -1."""
+    clocks: tuple[ClockFit, ...]
+    registration: Registration
+    warnings: tuple[str, ...]
+
+
+def import_streams(
+    log_map: LogMap, site: Site, files: Sequence[Path], progress: Progress
+) -> ImportedLogs:
+    """Return the dataset of logs.
+
+    Parameters
+    ----------
+    log_map : LogMap
+        What their columns are.
+    site : Site
+        What they were taken from.
+    files : sequence of Path
+        The logs.
+    progress : Progress
+        Called with stage, done and total.
+
+    Raises
+    ------
+    LogError
+        If a log cannot be read as the map says, the clocks cannot be told, there are no plateaus,
+        no reference or load among them, or the stations cannot be registered.
+    DatasetError
+        If the numbers look like a unit mistake.
+    FileAccessError
+        If a file cannot be read.
+    """
+    progress("logs", 0, 4)
+    logs = read_streams_of(log_map, files, site.robot)
+    progress("clocks", 1, 4)
+    logs, clocks = align(logs, site.marker)
+    streams = _merged(logs, site)
+    progress("plateaus", 2, 4)
+    by_word = next((log for log in logs if log.arm is not None and log.handshake), None)
+    least = LEAST_SAMPLES if by_word is None else 1
+    plateaus = _plateaus(streams, site, log_map, by_word, least)
+    progress("readings", 3, 4)
+    poses = _readings(streams, plateaus, least)
+    seen = marker_readings(poses, site.robot, site.sensor.gravity, site.marker)
+    registration = register(seen, site.marker)
+    rows = load_rows(poses, registration, site.sensor, conditioned=False)
+    dataset = _dataset(poses, rows, log_map, site, registration, files)
+    progress("readings", 4, 4)
+    warnings = _warnings(plateaus, rows, registration, log_map)
+    return ImportedLogs(dataset, streams, tuple(plateaus), clocks, registration, warnings)
+
+
+def _merged(logs: Sequence[LogStreams], site: Site) -> Streams:
+    """Return the streams of all logs by one clock, forces in the sensor's frame."""
+    arm = next(log.arm for log in logs if log.arm is not None)
+    known = np.isfinite(arm.q).all(axis=1) & np.isfinite(arm.T_base_tcp).all(axis=(1, 2))
+    arm = ArmStream(arm.time[known], arm.q[known], arm.T_base_tcp[known])
+    wrenches = [_in_sensor(log, arm, site) for log in logs if log.wrench is not None]
+    points = [log.points for log in logs if log.points is not None]
+    none = PointStream(np.empty(0), np.empty((0, 3)), np.empty((0, 3)), np.empty(0, dtype=np.str_))
+    return Streams(
+        site.robot.joint_names, arm, _chained(wrenches), _chained(points) if points else none, ()
+    )
+
+
+def _chained(streams: Sequence[_Stream]) -> _Stream:
+    """Return one stream of several, in order of time."""
+    order = np.argsort(np.concatenate([each.time for each in streams]), kind="stable")
+    columns = {
+        name: np.concatenate([getattr(each, name) for each in streams])[order]
+        for name in vars(streams[0])
+    }
+    return replace(streams[0], **columns)
+
+
+def _in_sensor(log: LogStreams, arm: ArmStream, site: Site) -> WrenchStream:
+    """Return wrenches in the frame and about the origin of the sensor."""
+    wrench = log.wrench
+    assert wrench is not None
+    if log.entry.frame == "sensor":
+        return wrench
+    T = site.sensor.T_tcp_sensor
+    R: FloatArray = np.broadcast_to(T[:3, :3], (len(wrench.time), 3, 3))
+    if log.entry.frame == "base":
+        _, first = np.unique(arm.time, return_index=True)
+        turns = Slerp(arm.time[first], Rotation.from_matrix(arm.T_base_tcp[first, :3, :3]))
+        inside = np.clip(wrench.time, arm.time[first[0]], arm.time[first[-1]])
+        R = turns(inside).as_matrix() @ T[:3, :3]
+    force = np.einsum("nji,nj->ni", R, wrench.force)
+    moment = np.einsum("nji,nj->ni", R, wrench.moment)
+    # Both other frames state moments about the tcp.
+    return replace(wrench, force=force, moment=moment - np.cross(T[:3, :3].T @ T[:3, 3], force))
+
+
+def _plateaus(
+    streams: Streams, site: Site, log_map: LogMap, by_word: LogStreams | None, least: int
+) -> list[Plateau]:
+    """Return all plateaus, with pose and load case."""
+    if by_word is not None:
+        spans = list(handshake_spans(by_word).values())
+        parts = spans
+    else:
+        spans = standing_spans(streams, site.marker)
+        parts = [averaged_part(*span) for span in spans]
+    if not spans:
+        raise LogError(
+            "there is no plateau in the logs: nowhere do arm, force and marker stand for half a"
+            " second at the same time; are the clocks the same, is the noise that large?"
+        )
+    numbers = number_poses(spans, streams)
+    bare = [Plateau(*part, pose) for part, pose in zip(parts, numbers, strict=True)]
+    states = [_reading(each, streams, least).tool for each in bare]
+    return _with_references(name_loads(bare, states, site.sensor, log_map.load_cases))
+
+
+def _with_references(plateaus: Sequence[Plateau]) -> list[Plateau]:
+    """Return plateaus, those of poses without reference or load set aside, poses numbered anew."""
+    kept: list[int] = []
+    for pose in dict.fromkeys(each.pose for each in plateaus if each.pose >= 0):
+        loads = [each.load for each in plateaus if each.pose == pose]
+        first = next((n for n, load in enumerate(loads) if load is not None), None)
+        if first:
+            kept.append(pose)
+    numbers = {pose: number for number, pose in enumerate(kept)}
+    return [replace(each, pose=numbers.get(each.pose, -1)) for each in plateaus]
+
+
+def _readings(streams: Streams, plateaus: Sequence[Plateau], least: int) -> list[PoseReadings]:
+    """Return the readings of each pose, its last unloaded plateau before the loads first."""
+    found = []
+    for pose in range(max((each.pose for each in plateaus), default=-1) + 1):
+        own = [each for each in plateaus if each.pose == pose]
+        first = next(n for n, each in enumerate(own) if each.load is not None)
+        readings = [_reading(each, streams, least) for each in own[first - 1 :]]
+        windows = tuple(each.window for each in readings)
+        log = PoseLog(pose=pose, attempt=1, streams="", windows=windows)
+        loads = tuple(each for each in readings[1:] if each.window.load_case is not None)
+        after = [each for each in readings[1:] if each.window.load_case is None]
+        found.append(PoseReadings(log, readings[0], loads, after[-1] if after else None))
+    if len(found) < _LEAST_POSES:
+        raise LogError(
+            f"only {counted(len(found), 'pose')} of {len(plateaus)} plateaus has an unloaded"
+            " reference and loads after it: a dataset needs two"
+        )
+    return found
+
+
+def _reading(plateau: Plateau, streams: Streams, least: int) -> Reading:
+    """Return the means over a plateau, by the station that saw most of it."""
+    near = plateau.start - SAME_TIME, plateau.end + SAME_TIME
+
+    def cut(stream: _Stream) -> _Stream:
+        inside = slice(*np.searchsorted(stream.time, near))
+        return replace(stream, **{name: each[inside] for name, each in vars(stream).items()})
+
+    own = replace(
+        streams, arm=cut(streams.arm), wrench=cut(streams.wrench), points=cut(streams.points)
+    )
+    stations = Counter(own.points.station.tolist()).most_common(1)
+    window = Window(
+        load_case=plateau.load,
+        start=plateau.start,
+        end=plateau.end,
+        station=stations[0][0] if stations else None,
+        status=ReadingStatus.OK,
+    )
+    return average(own, window, least)
+
+
+def _dataset(
+    poses: Sequence[PoseReadings],
+    rows: Sequence[LoadRow],
+    log_map: LogMap,
+    site: Site,
+    registration: Registration,
+    files: Sequence[Path],
+) -> Dataset:
+    had = {row.load_case for row in rows if row.status is ReadingStatus.OK}
+    if not had:
+        reasons = [*registration.unregistered.values(), *(row.note for row in rows if row.note)]
+        raise LogError(f"no usable reading among {len(rows)}: {next(iter(reasons), 'none')}")
+    found = [str(load.window.load_case) for pose in poses for load in pose.loads]
+    cases = [case for case in log_map.load_cases or dict.fromkeys(found) if case in had]
+    arm = MeasuredArm(site.robot, site.urdf, site.gravity, check=log_map.check)
+    names = ", ".join(path.name for path in files)
+    return dataset_of(
+        poses, rows, cases, arm, registration.lever_arm, site.sensor, f"elastocal import {names}"
+    )
+
+
+def _warnings(
+    plateaus: Sequence[Plateau],
+    rows: Sequence[LoadRow],
+    registration: Registration,
+    log_map: LogMap,
+) -> tuple[str, ...]:
+    """Return what a person should look at before the dataset is believed."""
+    found = []
+    unnamed = sum(each.pose < 0 and each.load == "" for each in plateaus)
+    if unnamed:
+        found.append(f"{counted(unnamed, 'loaded plateau')} near none of the load cases of the map")
+    missing = [name for name in log_map.load_cases if all(r.load_case != name for r in rows)]
+    if missing:
+        found.append(f"load case {', '.join(missing)} is at no pose")
+    lost = [row for row in rows if row.status is not ReadingStatus.OK]
+    if lost:
+        found.append(f"{counted(len(lost), 'reading')} missing, the first: {lost[0].note}")
+    for blunder in registration.blunders:
+        found.append(
+            f"pose {blunder.pose}: the marker is {1e3 * blunder.distance:.3g} mm from where it"
+            " should be"
+        )
+    for move in registration.moves:
+        found.append(
+            f"station {move.station} moved {1e3 * move.distance:.2g} mm before pose {move.pose}"
+        )
+    if registration.undetermined_lever:
+        axes = ", ".join(registration.undetermined_lever)
+        found.append(f"the place of the marker along {axes} of the tcp is the map's")
+    return tuple(found)

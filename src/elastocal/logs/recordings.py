@@ -1,0 +1,228 @@
+"""Recordings of middleware as tables: MCAP with JSON messages, ROS 1 and ROS 2 bags.
+
+A topic becomes a table with a column a number: fields by their path (``wrench.force.x``), joints
+of a ``JointState`` by their names (``position.joint_a1``), and the column ``time``: the stamp of
+the message's header, or when it was recorded where it has none. Of a topic of transforms one frame
+is a table: ``/tf:tool0``.
+"""
+
+import json
+import sqlite3
+import struct
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from mcap.exceptions import McapError
+from mcap.reader import McapReader, make_reader
+from mcap.summary import Summary
+
+from elastocal.errors import FileAccessError, LogError, nearest
+from elastocal.files import require_file
+from elastocal.logs.table import LogTable
+
+if TYPE_CHECKING:
+    from rosbags.highlevel import AnyReader
+
+RECORDINGS = (".mcap", ".bag", ".db3")
+_NANOSECONDS = 1e-9
+_LONGEST_ARRAY = 64
+"""Longer fields are clouds and pictures, which are no logs of numbers."""
+_DEEPEST = 8
+_Row = tuple[float, Any]
+"""Time of recording in s, and the message."""
+
+
+def is_recording(path: Path) -> bool:
+    """Return whether a path is that of a recording: a file of such a name, or a ROS 2 folder."""
+    path = Path(path)
+    return path.suffix.lower() in RECORDINGS or (path / "metadata.yaml").is_file()
+
+
+def read_topics(path: Path) -> dict[str, int]:
+    """Return the number of messages of each topic that holds some.
+
+    Raises
+    ------
+    LogError
+        If the file is no recording.
+    FileAccessError
+        If it cannot be read, or rosbags is not installed.
+    """
+    if _is_json(path):
+        with _mcap(path) as reader:
+            summary = _summary(path, reader)
+            counts = summary.statistics.channel_message_counts if summary.statistics else {}
+            return {c.topic: counts.get(c.id, 0) for c in summary.channels.values()}
+    with _bag(path) as bag:
+        return {name: topic.msgcount for name, topic in bag.topics.items() if topic.msgcount}
+
+
+def read_recording(path: Path, topic: str | None) -> LogTable:
+    """Return a topic of a recording as a table.
+
+    Parameters
+    ----------
+    path : Path
+        The file or folder.
+    topic : str or None
+        Its topic, of transforms with ``:`` and the frame; None: the only one.
+
+    Raises
+    ------
+    LogError
+        If the file is no recording, there is no such topic, or its messages hold no numbers.
+    FileAccessError
+        If it cannot be read, or rosbags is not installed.
+    """
+    known = read_topics(path)
+    name, _, frame = (topic or "").partition(":")
+    if topic is None and len(known) == 1:
+        name = next(iter(known))
+    if name not in known:
+        raise LogError(
+            f"{path}: name one of its topics, not {name or 'none'!r}{nearest(name, known)}"
+            f" ({', '.join(sorted(known))})"
+        )
+    messages = _json_messages(path, name) if _is_json(path) else _bag_messages(path, name)
+    rows = [
+        {"time": _stamp(message) or time, **dict(_numbers(message))}
+        for time, whole in messages
+        for message in _parts(whole, frame)
+    ]
+    if not rows:
+        raise LogError(
+            f"{path}: topic {topic} holds no message" + (f" of {frame}" if frame else "")
+        )
+    header = tuple(dict.fromkeys(key for row in rows for key in row))
+    values = np.array([[row.get(key, np.nan) for key in header] for row in rows])
+    return LogTable(f"{path} {topic or name}", header, tuple(values.T))
+
+
+def _parts(message: Any, frame: str) -> Sequence[Any]:
+    """Return the transforms of a frame in a message of transforms, or the message itself."""
+    transforms = _field(message, "transforms")
+    if transforms is None:
+        return (message,)
+    return [each for each in transforms if _field(each, "child_frame_id") == frame]
+
+
+def _field(message: Any, name: str) -> Any:
+    return message.get(name) if isinstance(message, Mapping) else getattr(message, name, None)
+
+
+def _stamp(message: Any) -> float | None:
+    """Return the time in the header of a message in s; None where there is none."""
+    stamp = _field(_field(message, "header"), "stamp")
+    if stamp is None:
+        return None
+    seconds = _field(stamp, "sec") or _field(stamp, "secs") or 0
+    rest = _field(stamp, "nanosec") or _field(stamp, "nsec") or _field(stamp, "nsecs") or 0
+    return float(seconds) + _NANOSECONDS * float(rest) or None
+
+
+def _numbers(message: Any, path: str = "", depth: int = 0) -> Iterator[tuple[str, float]]:
+    """Yield path and value of each number in a message."""
+    if isinstance(message, bool | int | float | np.number):
+        yield path, float(message)
+    elif message is None:
+        yield path, np.nan
+    elif depth < _DEEPEST and not isinstance(message, str | bytes):
+        for name, value in _fields(message):
+            yield from _numbers(value, f"{path}.{name}" if path else name, depth + 1)
+
+
+def _fields(message: Any) -> Iterator[tuple[str, Any]]:
+    """Yield name and value of each field; of arrays by joint name where the message names them."""
+    if isinstance(message, Mapping):
+        yield from ((str(name), value) for name, value in message.items())
+        return
+    if isinstance(message, list | tuple | np.ndarray):
+        if len(message) <= _LONGEST_ARRAY:
+            yield from ((str(index), value) for index, value in enumerate(message))
+        return
+    names = getattr(message, "name", None)
+    joints = names if isinstance(names, list) else None
+    for name in getattr(message, "__dataclass_fields__", ()):
+        value = getattr(message, name)
+        if name not in ("header", "name") and not name.startswith("__"):
+            named = joints is not None and isinstance(value, np.ndarray)
+            yield name, dict(zip(joints or (), value, strict=False)) if named else value
+
+
+def _is_json(path: Path) -> bool:
+    """Return whether a recording is an MCAP file with JSON messages."""
+    if Path(path).suffix.lower() != ".mcap":
+        return False
+    with _mcap(path) as reader:
+        channels = _summary(path, reader).channels.values()
+        return all(channel.message_encoding == "json" for channel in channels)
+
+
+def _summary(path: Path, reader: McapReader) -> Summary:
+    summary = reader.get_summary()
+    if summary is None:
+        raise LogError(f"{path} has no summary: the recording was cut off (`mcap recover`)")
+    return summary
+
+
+def _json_messages(path: Path, topic: str) -> Iterator[_Row]:
+    with _mcap(path) as reader:
+        for _, _, message in reader.iter_messages(topics=[topic]):
+            yield message.log_time * _NANOSECONDS, json.loads(message.data)
+
+
+def _bag_messages(path: Path, topic: str) -> Iterator[_Row]:
+    with _bag(path) as bag:
+        wanted = [each for each in bag.connections if each.topic == topic]
+        for connection, time, data in bag.messages(connections=wanted):
+            yield time * _NANOSECONDS, bag.deserialize(data, connection.msgtype)
+
+
+@contextmanager
+def _mcap(path: Path) -> Iterator[McapReader]:
+    """Yield the reader of an MCAP file; what goes wrong meanwhile is one of our errors."""
+    require_file(path)
+    try:
+        with Path(path).open("rb") as file:
+            yield make_reader(file, validate_crcs=True)
+    except (McapError, struct.error, ValueError, KeyError, RecursionError, EOFError) as error:
+        if isinstance(error, LogError):
+            raise
+        raise _damaged(path, error) from error
+    except OSError as error:
+        if isinstance(error, FileAccessError):
+            raise
+        raise FileAccessError(f"cannot read {path}: {error.strerror or error}") from error
+
+
+@contextmanager
+def _bag(path: Path) -> Iterator["AnyReader"]:
+    """Yield the reader of a ROS bag; what goes wrong meanwhile is one of our errors."""
+    try:
+        from rosbags.highlevel import AnyReader, AnyReaderError
+        from rosbags.rosbag1 import ReaderError as BagOneError
+        from rosbags.rosbag2 import ReaderError as BagTwoError
+        from rosbags.serde import SerdeError
+        from rosbags.typesys import Stores, TypesysError, get_typestore
+    except ImportError as error:
+        raise FileAccessError(
+            f"cannot read {path}: ROS bags need rosbags: pip install 'elastocal[logs]'"
+        ) from error
+    damage = (AnyReaderError, BagOneError, BagTwoError, SerdeError, TypesysError, sqlite3.Error)
+    try:
+        with AnyReader([Path(path)], default_typestore=get_typestore(Stores.LATEST)) as bag:
+            yield bag
+    except (*damage, struct.error, ValueError, KeyError, AssertionError) as error:
+        if isinstance(error, LogError):
+            raise
+        raise _damaged(path, error) from error
+    except OSError as error:
+        raise FileAccessError(f"cannot read {path}: {error.strerror or error}") from error
+
+
+def _damaged(path: Path, error: BaseException) -> LogError:
+    reason = " ".join(str(error).split()) or type(error).__name__
+    return LogError(f"{path} is no recording, or damaged: {reason}")

@@ -1,0 +1,388 @@
+"""From mapped logs to the streams of arm, force sensor and tracker, each still by its own clock."""
+
+import fnmatch
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TypeVar
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from elastocal.arrays import FloatArray
+from elastocal.errors import LogError, UnitError
+from elastocal.logs.map import Joints, LogEntry, LogMap, MarkerColumns, Vector
+from elastocal.logs.recordings import is_recording, read_recording
+from elastocal.logs.table import LogTable, read_text_log, read_workbook
+from elastocal.procedure.record import ArmStream, PointStream, WrenchStream
+from elastocal.results import brief_repr
+from elastocal.robot import Robot
+from elastocal.units import factor
+
+_WORKBOOKS = (".xlsx", ".xlsm")
+_NO_READING = ("", "0", "nan", "none", "false")
+"""Words of a handshake column between readings."""
+_LARGEST_GAP = (20e-3, np.radians(2.0))
+"""Distance in m and angle in rad of the logged tool frame from that of the logged joints: an arm
+that is not calibrated is off by some millimetres, another frame by more."""
+_BEYOND_LIMITS = 0.2
+"""Share of a joint's travel by which a log may be outside its limits."""
+_K = 2.0
+"""Coverage factor of a 95 % uncertainty."""
+
+_Stream = TypeVar("_Stream", ArmStream, WrenchStream, PointStream)
+
+
+@brief_repr
+@dataclass(frozen=True, eq=False)
+class LogStreams:
+    """What one entry of the map says; None where its logs do not hold it."""
+
+    name: str
+    clock: str
+    entry: LogEntry
+    time: FloatArray
+    """Of each row, shape (row,), in s of the log's clock; the row's number without one."""
+    handshake: tuple[str, ...] | None
+    """Word of each row, empty between readings."""
+    arm: ArmStream | None
+    wrench: WrenchStream | None
+    points: PointStream | None
+
+    def at(self, time: FloatArray) -> "LogStreams":
+        """Return the same with other times, shape (row,)."""
+
+        def moved(stream: _Stream | None) -> _Stream | None:
+            return None if stream is None else replace(stream, time=time)
+
+        return replace(
+            self,
+            time=time,
+            arm=moved(self.arm),
+            wrench=moved(self.wrench),
+            points=moved(self.points),
+        )
+
+
+def read_streams_of(log_map: LogMap, files: Sequence[Path], robot: Robot) -> tuple[LogStreams, ...]:
+    """Return the streams of every entry of a map.
+
+    Parameters
+    ----------
+    log_map : LogMap
+        What the columns are.
+    files : sequence of Path
+        The logs; each must be named by an entry, and each entry name some.
+    robot : Robot
+        The robot of the map.
+
+    Raises
+    ------
+    LogError
+        If files and entries do not match, a column is missing or holds no numbers, times go
+        backwards, or joints are far outside their limits.
+    FileAccessError
+        If a file cannot be read.
+    """
+    found = {
+        index: [path for path in files if fnmatch.fnmatch(path.name, entry.log)]
+        for index, entry in enumerate(log_map.logs)
+    }
+    for index, entry in enumerate(log_map.logs):
+        if not found[index]:
+            raise LogError(
+                f"log {entry.log!r} of the map is none of the files"
+                f" {', '.join(path.name for path in files)}"
+            )
+    mapped = {path for paths in found.values() for path in paths}
+    for path in files:
+        if path not in mapped:
+            names = ", ".join(entry.log for entry in log_map.logs)
+            raise LogError(f"{path}: no entry of the map is about it (logs: {names})")
+    if sum(bool(entry.joints) for entry in log_map.logs) > 1:
+        raise LogError("joints stand in two entries of the map: one log must hold them all")
+    return tuple(
+        _streams(entry, [read_table(path, entry.topic) for path in sorted(found[index])], robot)
+        for index, entry in enumerate(log_map.logs)
+    )
+
+
+def read_table(path: Path, topic: str | None) -> LogTable:
+    """Return a log of any form as a table.
+
+    Parameters
+    ----------
+    path : Path
+        The file, or the folder of a ROS 2 bag.
+    topic : str or None
+        Topic of a recording, sheet of a workbook; None: the only or the first one.
+
+    Raises
+    ------
+    LogError
+        If it cannot be read as a table.
+    FileAccessError
+        If it cannot be read at all.
+    """
+    if is_recording(path):
+        return read_recording(path, topic)
+    if path.suffix.lower() in _WORKBOOKS:
+        return read_workbook(path, topic)
+    return read_text_log(path)
+
+
+def _streams(entry: LogEntry, tables: Sequence[LogTable], robot: Robot) -> LogStreams:
+    parts = [_stream(entry, table, robot) for table in tables]
+    parts.sort(key=lambda part: part.time[0] if len(part.time) else 0.0)
+    whole = parts[0] if len(parts) == 1 else _joined(parts)
+    if entry.time is not None:
+        back = np.flatnonzero(~(np.diff(whole.time) >= 0.0))
+        if len(back):
+            row = int(back[0]) + 2
+            raise LogError(
+                f"{whole.name}: row {row} of the data, column {entry.time.column!r}: its time is"
+                " before that of the row above, or missing"
+            )
+    return whole
+
+
+def _stream(entry: LogEntry, table: LogTable, robot: Robot) -> LogStreams:
+    if not len(table):
+        raise LogError(f"{table.name}: there are no rows in it")
+    if entry.time is None:
+        time = np.arange(len(table), dtype=float)
+    elif entry.time.unit is None:
+        time = table.seconds(entry.time.column)
+    else:
+        time = table.numbers(entry.time.column) * factor(entry.time.unit, "time")
+    words = None
+    if entry.handshake is not None:
+        texts = table.texts(entry.handshake)
+        words = tuple("" if text.lower() in _NO_READING else text for text in texts)
+    return LogStreams(
+        table.name,
+        entry.clock or entry.log,
+        entry,
+        time,
+        words,
+        _arm(entry, table, time, robot) if entry.joints else None,
+        _wrench(entry, table, time) if entry.force else None,
+        _points(entry, table, time) if entry.markers else None,
+    )
+
+
+def _joined(parts: Sequence[LogStreams]) -> LogStreams:
+    """Return one log of several that follow one another by one clock."""
+    first = parts[0]
+
+    def chain(streams: Iterable[_Stream | None]) -> _Stream | None:
+        each = [stream for stream in streams if stream is not None]
+        if not each:
+            return None
+        names = list(vars(each[0]))
+        return replace(each[0], **{n: np.concatenate([getattr(s, n) for s in each]) for n in names})
+
+    words = None
+    if first.handshake is not None:
+        words = tuple(word for part in parts for word in part.handshake or ())
+    return LogStreams(
+        first.entry.log,
+        first.entry.clock or first.entry.log,
+        first.entry,
+        np.concatenate([part.time for part in parts]),
+        words,
+        chain(part.arm for part in parts),
+        chain(part.wrench for part in parts),
+        chain(part.points for part in parts),
+    )
+
+
+def _arm(entry: LogEntry, table: LogTable, time: FloatArray, robot: Robot) -> ArmStream:
+    q = np.full((len(table), len(robot.joint_names)), np.nan)
+    for block in entry.joints:
+        for column, joint, sign, offset in _placed(block, table, robot):
+            dimension = "angle" if robot.revolute[joint] else "length"
+            try:
+                scale = factor(block.unit, dimension)
+            except UnitError as error:
+                raise LogError(
+                    f"{table.name}: column {column!r} is joint {robot.joint_names[joint]}: {error}"
+                ) from error
+            q[:, joint] = sign * scale * table.numbers(column) + offset
+    missing = [
+        n for n, values in zip(robot.joint_names, q.T, strict=True) if np.isnan(values).all()
+    ]
+    if missing:
+        raise LogError(f"{table.name}: no column is mapped to joint {', '.join(missing)}")
+    _require_within_limits(table.name, q, robot)
+    T = robot.forward(q)
+    if entry.pose is not None:
+        T = _stated_poses(entry, table, T)
+    return ArmStream(time, q, T)
+
+
+def _placed(
+    block: Joints, table: LogTable, robot: Robot
+) -> Iterable[tuple[str, int, float, float]]:
+    """Yield column, number of the joint, sign and offset of each column of a block."""
+    names = block.names or _names_by_unit(block, robot)
+    for index, (column, name) in enumerate(zip(block.columns, names, strict=True)):
+        if name not in robot.joint_names:
+            raise LogError(
+                f"{table.name}: {name!r} is no joint of {robot.name}"
+                f" ({', '.join(robot.joint_names)})"
+            )
+        sign = float(block.signs[index]) if block.signs else 1.0
+        offset = float(block.offsets[index]) if block.offsets else 0.0
+        yield column, robot.joint_names.index(name), sign, offset
+
+
+def _names_by_unit(block: Joints, robot: Robot) -> list[str]:
+    """Return the robot's joints that are measured in a unit as this, in its order.
+
+    Raises
+    ------
+    LogError
+        If there is another number of them than columns.
+    """
+    angle = block.unit in ("rad", "deg")
+    of_unit = zip(robot.joint_names, robot.revolute, strict=True)
+    names = [name for name, turns in of_unit if bool(turns) == angle]
+    if len(names) != len(block.columns):
+        raise LogError(
+            f"{len(block.columns)} columns of joints in {block.unit}, but {robot.name} has"
+            f" {len(names)} such ({', '.join(names)}): name the joint of each column (names)"
+        )
+    return names
+
+
+def _require_within_limits(name: str, q: FloatArray, robot: Robot) -> None:
+    low, high = robot.limits.lower, robot.limits.upper
+    slack = _BEYOND_LIMITS * np.where(np.isfinite(high - low), high - low, 0.0)
+    with np.errstate(invalid="ignore"):
+        outside = (q < low - slack) | (q > high + slack)
+    if outside.any():
+        row, joint = np.argwhere(outside)[0].tolist()
+        unit = "rad" if robot.revolute[joint] else "m"
+        raise LogError(
+            f"{name}: row {row + 1} of the data: {robot.joint_names[joint]} at"
+            f" {q[row, joint]:.4g} {unit} is far outside its limits {low[joint]:.4g} to"
+            f" {high[joint]:.4g} {unit}: is the unit right?"
+        )
+
+
+def _stated_poses(entry: LogEntry, table: LogTable, T_joints: FloatArray) -> FloatArray:
+    """Return the tool frames that a log states, shape (row, 4, 4), if they are of the tcp.
+
+    Raises
+    ------
+    LogError
+        If they are too far from those of its joints.
+    """
+    assert entry.pose is not None
+    position = _vectors(table, entry.pose.position, "length")
+    angles = _vectors(table, entry.pose.angles, "angle")
+    known = np.asarray(np.isfinite(np.hstack([position, angles])).all(axis=1))
+    if not known.any():
+        raise LogError(f"{table.name}: no row states the whole tool frame")
+    T: FloatArray = np.full((len(table), 4, 4), np.nan)
+    T[known] = np.eye(4)
+    T[known, :3, :3] = Rotation.from_euler("ZYX", angles[known]).as_matrix()
+    T[:, :3, 3] = position
+    gap = np.linalg.norm(position - T_joints[:, :3, 3], axis=1)
+    relative = np.swapaxes(T_joints[known, :3, :3], 1, 2) @ T[known, :3, :3]
+    turn = np.atleast_1d(Rotation.from_matrix(relative).magnitude())
+    worst = float(np.nanmedian(gap)), float(np.median(turn))
+    if not (worst[0] <= _LARGEST_GAP[0] and worst[1] <= _LARGEST_GAP[1]):
+        raise LogError(
+            f"{table.name}: the logged tool frame lies {1e3 * worst[0]:.4g} mm and"
+            f" {np.degrees(worst[1]):.3g} deg (median) from the tcp of the logged joints: its tool,"
+            " its base, or a joint's sign is another"
+        )
+    return T
+
+
+def _wrench(entry: LogEntry, table: LogTable, time: FloatArray) -> WrenchStream:
+    assert entry.force is not None
+    sign = 1.0 if entry.acts_on == "robot" else -1.0
+    force = sign * _vectors(table, entry.force, "force")
+    moment = np.zeros_like(force)
+    if entry.moment is not None:
+        moment = sign * _vectors(table, entry.moment, "moment")
+    ok = np.asarray(np.isfinite(np.hstack([force, moment])).all(axis=1))
+    return WrenchStream(time, force, moment, np.full(len(time), np.nan), ok)
+
+
+def _points(entry: LogEntry, table: LogTable, time: FloatArray) -> PointStream:
+    """Return the marker of a log; of several on one body its centre."""
+    position = np.stack([_vectors(table, each, "length") for each in entry.markers], axis=1)
+    sigma = np.stack([_marker_sigma(table, each) for each in entry.markers], axis=1)
+    centre = position[:, 0] if len(entry.markers) == 1 else body_centre(position, table.name)
+    with np.errstate(invalid="ignore"):
+        mean = np.sqrt((sigma**2).mean(axis=1) / sigma.shape[1])
+    return PointStream(time, centre, mean, np.full(len(time), entry.station))
+
+
+def _marker_sigma(table: LogTable, marker: MarkerColumns) -> FloatArray:
+    if marker.u95 is None:
+        return np.full((len(table), 3), np.nan)
+    return _vectors(table, marker.u95, "length") / _K
+
+
+def _vectors(table: LogTable, vector: Vector | MarkerColumns, dimension: str) -> FloatArray:
+    scale = factor(vector.unit, dimension)
+    return scale * np.column_stack([table.numbers(column) for column in vector.columns])
+
+
+def body_centre(position: FloatArray, name: str = "markers") -> FloatArray:
+    """Return the centre of the markers of a rigid body, also where some are hidden.
+
+    The body's shape is the mean of the samples that see all markers, each brought onto the first by
+    the best rotation (Kabsch, Acta Crystallographica A32, 1976); where three or more are seen it is
+    fitted to them.
+
+    Parameters
+    ----------
+    position : ndarray, shape (sample, marker, 3)
+        In m; NaN where a marker is hidden.
+    name : str
+        For the message.
+
+    Returns
+    -------
+    ndarray, shape (sample, 3)
+        NaN where fewer than three are seen, of two markers where one is hidden.
+
+    Raises
+    ------
+    LogError
+        If no sample sees all markers.
+    """
+    seen = np.asarray(np.isfinite(position).all(axis=2))
+    whole = np.asarray(seen.all(axis=1))
+    if not whole.any():
+        raise LogError(f"{name}: no row sees all {position.shape[1]} markers of the body")
+    centre = np.full((len(position), 3), np.nan)
+    centre[whole] = position[whole].mean(axis=1)
+    shapes = position[whole] - centre[whole, None]
+    turns = _rotations(np.broadcast_to(shapes[0], shapes.shape), shapes)
+    shape = np.einsum("sji,smj->smi", turns, shapes).mean(axis=0)
+    for pattern in np.unique(seen[~whole], axis=0):
+        if pattern.sum() < 3:
+            continue
+        rows = np.flatnonzero((seen == pattern).all(axis=1))
+        some, middle = shape[pattern], shape[pattern].mean(axis=0)
+        points = position[np.ix_(rows, np.flatnonzero(pattern))]
+        found = points.mean(axis=1)
+        model = np.broadcast_to(some - middle, points.shape)
+        centre[rows] = found - _rotations(model, points - found[:, None]) @ middle
+    return centre
+
+
+def _rotations(model: FloatArray, points: FloatArray) -> FloatArray:
+    """Return the rotations that bring centred models onto centred points, shape (sample, 3, 3)."""
+    u, _, vt = np.linalg.svd(np.einsum("smi,smj->sij", points, model))
+    mirrored = np.linalg.det(u @ vt) < 0.0
+    u[mirrored, :, 2] *= -1.0
+    rotations: FloatArray = u @ vt
+    return rotations

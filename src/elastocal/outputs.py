@@ -1,0 +1,162 @@
+"""What a command may write: over no input, into no record of a run, over no file of another's.
+
+One rule for every command. `elastocal.workflows` opens it around the work with the places that
+the settings name, and `elastocal.files`, through which every file is read and written, asks it:
+a file that was read is an input, whichever way its name was found.
+
+An input is known by its inode and by its name, in which capitals do not count: controllers and
+two of three operating systems take ``A.SRC`` for ``a.src``. Files that are one thing in two, such
+as a program's ``.src`` and ``.dat``, stand for one another.
+"""
+
+import contextlib
+import os
+from collections.abc import Iterable, Iterator
+from contextvars import ContextVar
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from elastocal.errors import FileAccessError
+
+RUN_RECORD = ("journal.jsonl", "cell", "plan", "streams", "dataset.nc", "summary.json")
+"""What a folder of a run holds as a record of it; the first, the journal, makes it one."""
+FIGURE_MARKS = ("<dc:title>elastocal</dc:title>", "Software\0elastocal", "/Creator (elastocal)")
+"""How figures of ours are known: SVG, PNG and PDF."""
+_TWINS = {".dat": ".src", ".csv": ".nc"}
+"""Suffixes of files that stand for those of the same name with another: program, dataset."""
+_LOOKED_AT = 1 << 20
+"""How many bytes at both ends of a file may hold the mark by which it is known."""
+
+_Key = tuple[int, int] | str
+
+
+@dataclass
+class OutputRule:
+    """The rule of one command at work."""
+
+    force: bool = False
+    """Replace what somebody else wrote, too."""
+    marks: tuple[str, ...] = ()
+    """Texts by one of which a former output of this command is known."""
+    folder: Path | None = None
+    """Folder of the outputs; whoever opens it has refused what is another's."""
+    record: Path | None = None
+    """Folder of a run whose record this command writes."""
+    _inputs: dict[_Key, Path] = field(default_factory=dict)
+    _written: set[_Key] = field(default_factory=set)
+    """Names alone."""
+
+    def note_input(self, path: Path) -> None:
+        """Remember a file or folder that is read; what the command wrote itself is no input."""
+        keys = _keys(path)
+        if keys[0] not in self._written:
+            self._inputs |= dict.fromkeys(keys, path)
+
+    def note_output(self, path: Path) -> None:
+        """Remember a file that was written: it may be read, and replaced."""
+        self._written.add(_keys(path)[0])
+
+    def require(self, path: Path) -> None:
+        """Refuse a place for an output.
+
+        Raises
+        ------
+        FileAccessError
+            If it is, or stands for, an input; if it belongs to the record of a run; if somebody
+            else's file is there.
+        """
+        keys = _keys(path)
+        if keys[0] in self._written:
+            return
+        for key in keys:
+            if (found := self._inputs.get(key)) is not None:
+                other = _keys(found)
+                is_same = other[0] == keys[0] or (other[2:] == keys[2:] != ())
+                same = "it is" if is_same else f"it stands for {found}, which is"
+                raise FileAccessError(
+                    f"cannot write {path}: {same} an input of this command; name another file"
+                )
+        if (run := _run_of(path)) is not None and not _same(run, self.record):
+            raise FileAccessError(
+                f"cannot write {path}: it is in the record of the run {run}; name another file"
+            )
+        inside = any(_same(above, self.folder) for above in path.parents)
+        if not self.force and not inside and path.is_file() and not self._is_ours(path):
+            raise FileAccessError(
+                f"cannot write {path}: it is there already, and no former output of this command;"
+                " name another file, or give --force to replace it"
+            )
+
+    def _is_ours(self, path: Path) -> bool:
+        """Return whether a file has the mark of this command, or nothing in it."""
+        try:
+            with path.open("rb") as file:
+                found = file.read(_LOOKED_AT)
+                file.seek(max(len(found), os.fstat(file.fileno()).st_size - _LOOKED_AT))
+                found += file.read(_LOOKED_AT)
+        except OSError as error:
+            raise FileAccessError(f"cannot read {path}: {error.strerror or error}") from error
+        return not found or any(mark.encode() in found for mark in self.marks)
+
+
+_AT_WORK: ContextVar[OutputRule | None] = ContextVar("output_rule", default=None)
+
+
+@contextlib.contextmanager
+def ruled(
+    rule: OutputRule, inputs: Iterable[Path] = (), outputs: Iterable[Path] = ()
+) -> Iterator[None]:
+    """Hold a command to a rule, which its outputs are asked for before it begins.
+
+    Parameters
+    ----------
+    rule : OutputRule
+        The rule.
+    inputs, outputs : iterable of Path
+        Places that the settings name.
+
+    Raises
+    ------
+    FileAccessError
+        If an output may not be written; see `OutputRule.require`.
+    """
+    for path in inputs:
+        rule.note_input(path)
+    for path in outputs:
+        rule.require(path)
+    token = _AT_WORK.set(rule)
+    try:
+        yield
+    finally:
+        _AT_WORK.reset(token)
+
+
+def current_rule() -> OutputRule | None:
+    """Return the rule of the command at work; None outside of one, as in a library's caller."""
+    return _AT_WORK.get()
+
+
+def _keys(path: Path) -> tuple[_Key, ...]:
+    """Return by what a file is known: its name, that of its twins, and its inode if it is there."""
+    place = Path(os.path.realpath(path))
+    suffix = place.suffix.lower()
+    twin = place.with_suffix(_TWINS.get(suffix, suffix)) if suffix else place
+    try:
+        found = place.stat()
+    except (OSError, ValueError):
+        return str(place).casefold(), str(twin).casefold()
+    return str(place).casefold(), str(twin).casefold(), (found.st_dev, found.st_ino)
+
+
+def _run_of(path: Path) -> Path | None:
+    """Return the folder of the run to whose record a place belongs."""
+    place = Path(os.path.realpath(path))
+    for folder in place.parents:
+        part = place.relative_to(folder).parts[0].casefold()
+        if part in RUN_RECORD and (folder / RUN_RECORD[0]).is_file():
+            return folder
+    return None
+
+
+def _same(path: Path, other: Path | None) -> bool:
+    return other is not None and os.path.realpath(path) == os.path.realpath(other)

@@ -1,0 +1,221 @@
+"""``import``: from other people's logs to a dataset, and a first map of their columns."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from os import PathLike
+from pathlib import Path
+
+from elastocal import logs as foreign
+from elastocal.dataset import Dataset, write
+from elastocal.errors import FileAccessError, LogError
+from elastocal.files import write_text
+from elastocal.logs import ClockFit, GuessedLog, ImportedLogs
+from elastocal.outputs import FIGURE_MARKS
+from elastocal.progress import Progress
+from elastocal.records import record
+from elastocal.report.plots import write_timeline_figure
+from elastocal.results import Result, brief_repr
+from elastocal.wording import counted
+from elastocal.workflows._workflow import workflow
+
+
+@brief_repr
+@dataclass(frozen=True)
+class ImportLogsSettings:
+    """Which logs, what they are, and where the dataset goes."""
+
+    logs: Sequence[str | PathLike[str]]
+    """Files; folders of ROS 2 bags."""
+    map: Path
+    """What their columns are."""
+    out: Path | None = None
+    """Dataset to write (.nc or .csv); none: it is only returned."""
+    picture: Path | None = None
+    """Figure of the merged time lines (.png, .svg, .pdf); by default beside the dataset."""
+    force: bool = False
+    """Replace a file that is no former output of this command."""
+
+
+@brief_repr
+@record()
+class ImportFigures:
+    """The figures of ``import --json``."""
+
+    dataset: str | None
+    picture: str | None
+    poses: int
+    readings: int
+    load_cases: tuple[str, ...]
+    plateaus: int
+    """All that were found, those of no use included."""
+    clocks: tuple[ClockFit, ...]
+    warnings: tuple[str, ...]
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class ImportLogsResult(Result):
+    """The dataset of some logs, and how it came about."""
+
+    found: ImportedLogs
+    figures: ImportFigures
+
+    @property
+    def dataset(self) -> Dataset:
+        """The dataset."""
+        return self.found.dataset
+
+    def facts(self) -> tuple[tuple[str, str], ...]:
+        """Return what a person wants to know first."""
+        figures = self.figures
+        return (
+            (
+                "found",
+                f"{counted(figures.readings, 'reading')} at {counted(figures.poses, 'pose')} in"
+                f" {counted(figures.plateaus, 'plateau')}",
+            ),
+            ("load cases", ", ".join(figures.load_cases)),
+            *(("clock", each.sentence) for each in figures.clocks),
+            *(("warning", text) for text in figures.warnings),
+        )
+
+    def pictured(self) -> object:
+        """Return the merged logs."""
+        return self.found
+
+
+@workflow(
+    ImportLogsSettings, outputs=("out", "picture"), marks=("elastocal.dataset/", *FIGURE_MARKS)
+)
+def import_logs(settings: ImportLogsSettings, progress: Progress) -> ImportLogsResult:
+    """Merge the logs of controller, force sensor and tracker; find the readings; write a dataset.
+
+    Parameters
+    ----------
+    settings : ImportLogsSettings
+        Or its ``logs``, and the other fields by name.
+    progress : Progress, optional
+        Called with stage, done and total.
+
+    Raises
+    ------
+    LogError
+        If a log cannot be read as the map says, or no dataset can be made of them.
+    DatasetError
+        If the numbers look like a unit mistake.
+    SchemaError
+        If the map does not fit.
+    FileAccessError
+        If a file cannot be read or written.
+    """
+    files, path = _files(settings.logs), Path(settings.map)
+    log_map = foreign.read_map(path)
+    found = foreign.import_streams(log_map, foreign.site(path, log_map), files, progress)
+    picture = settings.picture
+    if settings.out is not None:
+        write(found.dataset, settings.out)
+        picture = picture or settings.out.with_suffix(".png")
+    if picture is not None:
+        names = ", ".join(file.name for file in files[:4]) + (" …" if len(files) > 4 else "")
+        write_timeline_figure(picture, found, f"Merged logs: {names}")
+    dataset = found.dataset
+    figures = ImportFigures(
+        dataset=None if settings.out is None else str(settings.out),
+        picture=None if picture is None else str(picture),
+        poses=len(dataset.poses),
+        readings=int(dataset.usable.sum()),
+        load_cases=dataset.load_cases,
+        plateaus=len(found.plateaus),
+        clocks=found.clocks,
+        warnings=found.warnings,
+    )
+    return ImportLogsResult(found, figures)
+
+
+@brief_repr
+@dataclass(frozen=True)
+class GuessMapSettings:
+    """Of which logs a first map is to be written."""
+
+    logs: Sequence[str | PathLike[str]]
+    """Files; folders of ROS 2 bags."""
+    out: Path | None = None
+    """Map to write; none: its text is only returned."""
+    cell: Path | None = None
+    """Cell file that says robot, tool, sensor and marker."""
+    force: bool = False
+    """Replace a map that is there."""
+    ask: Callable[[str], str] | None = None
+    """Asks a person for what cannot be told, and returns the answer; an empty one leaves it ``?``
+    in the map. None: nobody is asked."""
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class GuessMapResult(Result):
+    """What some logs were taken for."""
+
+    logs: tuple[GuessedLog, ...]
+    text: str
+    """The map."""
+
+    def facts(self) -> tuple[tuple[str, str], ...]:
+        """Return what each column was taken for, and why."""
+        return tuple(
+            (
+                each.log if each.topic is None else f"{each.log} {each.topic}",
+                f"{columns.key}: {', '.join(columns.columns)}"
+                f"{'' if columns.unit is None else f' in {columns.unit}'} ({columns.why})",
+            )
+            for each in self.logs
+            for columns in each.columns
+        )
+
+
+@workflow(GuessMapSettings)
+def guess_map(settings: GuessMapSettings, progress: Progress) -> GuessMapResult:
+    """Write a first map of logs, by names and sizes of their columns; a person then corrects it.
+
+    Parameters
+    ----------
+    settings : GuessMapSettings
+        Or its ``logs``, and the other fields by name.
+    progress : Progress, optional
+        Called with stage, done and total.
+
+    Raises
+    ------
+    LogError
+        If a log cannot be read, or none looks like one of a calibration.
+    FileAccessError
+        If a file cannot be read, or the map is there already.
+    """
+    files, out = _files(settings.logs), settings.out
+    if out is not None and out.exists() and not settings.force:
+        raise FileAccessError(f"{out} is there already: name another file, or give --force")
+    progress("logs", 0, 1)
+    guessed = foreign.guess_logs(files)
+    if settings.ask is not None:
+        guessed = tuple(each.answered(settings.ask) for each in guessed)
+    progress("logs", 1, 1)
+    robot = foreign.ROBOT_TO_WRITE if settings.cell is None else f"cell: {settings.cell}"
+    text = foreign.write_guess(guessed, robot)
+    if out is not None:
+        write_text(out, text)
+    return GuessMapResult(guessed, text)
+
+
+def _files(logs: Sequence[str | PathLike[str]]) -> list[Path]:
+    """Return the files of some logs, each once.
+
+    Raises
+    ------
+    LogError
+        If there is none, or two have the same name: the map could not tell them apart.
+    """
+    files = list(dict.fromkeys(Path(log) for log in logs))
+    if not files:
+        raise LogError("no log is given")
+    names = [file.name for file in files]
+    twice = next((name for name in names if names.count(name) > 1), None)
+    if twice is not None:
+        raise LogError(f"two logs are named {twice!r}: rename one, the map names logs by file")
+    return files

@@ -1,0 +1,355 @@
+"""Valid files of every kind that commands read, and the commands that read them."""
+
+import json
+import shutil
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from elastocal import dataset
+from elastocal.cell import ArmState, BeamState, Motion, PointBlock, SensorStatus, WrenchBlock
+from elastocal.identification import read_model
+from elastocal.procedure import PoseRecorder
+from elastocal.robot import xyzabc_from_T
+from support import reported
+from support.cli import elastocal
+
+
+@dataclass(frozen=True)
+class Kind:
+    """A kind of file."""
+
+    file: str
+    form: str
+    """As in `fuzz.mutations.FORMS`."""
+    commands: tuple[str, ...]
+    """The first is the usual one; ``{f}`` is the file, ``{s}`` that of seeds, ``{o}`` a new one."""
+    beside: tuple[str, ...] = ()
+    """Files that must be there, too."""
+    others: float = 0.1
+    """How often another command than the first runs."""
+    share: float = 1.0
+    """How often this kind is drawn, beside others."""
+
+
+_RUN = (
+    "run/cell/cell.yaml",
+    "run/cell/dome.stl",
+    "run/plan/plan.json",
+    "run/journal.jsonl",
+    "run/dataset.nc",
+    "run/summary.json",
+    *(f"run/streams/pose_000{n}_1.mcap" for n in range(7)),
+)
+_MODEL = (
+    "predict {f} {s}/rows.csv --out {o}.csv",
+    "compensate {f} {s}/path.csv --out {o}.csv",
+    "compare {f} {s}/old.json --json",
+    "compare {s}/old.json {f} --rows {s}/rows.csv --out {o}.json",
+    "export {f} --c {o}",
+    "stiffness {f} {s}/path.csv --spins 2 --stands 1 --stations 2 --out {o}",
+    "report {f} --out {o}.html",
+)
+_DATA = (
+    "check {f}",
+    "calibrate {f} --out {o}.json --draws 40",
+    "calibrate {f} --out {o}.json --draws 40 --springs actuated --json",
+    "compare {s}/old.json {s}/model.json --rows {f}",
+)
+_REPORT = (
+    "report run --model {s}/model.json --tool {s}/tool.json --codec {s}/codec"
+    " --process {s}/process --out {o}.html"
+)
+_BASE = "--base 0m,0m,0m,0deg,0deg,0deg --out {o}.src"
+
+KINDS: dict[str, Kind] = {
+    "cell": Kind(
+        "cell.yaml",
+        "yaml",
+        ("check {f}", "run {f} --plan {s}/plan --out {o} --dry-run"),
+        ("dome.stl",),
+        0.03,
+        1.5,
+    ),
+    "springs": Kind(
+        "springs.yaml",
+        "yaml",
+        ("check {f}", "calibrate {s}/dataset.nc --springs {f} --draws 40 --out {o}.json"),
+    ),
+    "settings": Kind(
+        "settings.yaml", "yaml", ("check {f}", "export {s}/model.json --settings {f} --c {o}")
+    ),
+    "dataset": Kind("dataset.nc", "netcdf", _DATA, (), 0.1, 1.5),
+    "table": Kind("dataset.csv", "csv", _DATA, (), 0.05, 1.0),
+    "rows": Kind(
+        "rows.csv", "csv", ("predict {s}/model.json {f} --out {o}.csv", "check {f}"), (), 0.3
+    ),
+    "path": Kind(
+        "path.csv",
+        "csv",
+        (
+            "check {f}",
+            "compensate {s}/model.json {f} --out {o}.csv",
+            "stiffness {s}/model.json {f} --spins 2 --stands 1 --stations 2 --out {o}",
+        ),
+        (),
+        0.3,
+        0.5,
+    ),
+    "poses": Kind(
+        "poses.csv",
+        "csv",
+        ("check {f}", "compensate {s}/model.json {f} --out {o}.csv"),
+        (),
+        0.3,
+        0.5,
+    ),
+    "postures": Kind("postures.csv", "csv", ("tool {f} --out {o}.json", "check {f}"), (), 0.3, 0.5),
+    "deviations": Kind(
+        "process/deviations.csv",
+        "csv",
+        ("check process", "check {f}"),
+        ("process/table.json",),
+        0.3,
+        0.2,
+    ),
+    "model": Kind("model.json", "json", ("check {f}", *_MODEL), (), 0.2, 1.5),
+    "tool": Kind("tool.json", "json", ("check {f}", "export {s}/model.json --tool {f} --c {o}")),
+    "plan": Kind(
+        "plan/plan.json",
+        "json",
+        ("check {f}", "run {s}/cell.yaml --plan plan --out {o} --dry-run"),
+        (),
+        0.1,
+    ),
+    "pool": Kind("pool.nc", "netcdf", ("check {f}",), (), 0.0, 0.5),
+    "codec": Kind(
+        "codec/codec.nc", "netcdf", ("check {f}", "check codec"), ("codec/codec.json",), 0.3
+    ),
+    "verdicts": Kind(
+        "codec/codec.json", "json", ("check {f}", "check codec"), ("codec/codec.nc",), 0.3
+    ),
+    "process": Kind(
+        "process/table.json",
+        "json",
+        ("check {f}", "check process"),
+        ("process/deviations.csv",),
+        0.1,
+    ),
+    "comparison": Kind("comparison.json", "json", ("check {f}",), (), 0.0, 0.5),
+    "journal": Kind("run/journal.jsonl", "jsonl", ("check {f}", "check run"), _RUN, 0.05),
+    "summary": Kind("run/summary.json", "json", ("check {f}", _REPORT), _RUN, 0.02),
+    "stream": Kind("stream.mcap", "mcap", ("check {f}",), (), 0.0, 1.0),
+    "derived": Kind("run/streams/pose_0003_1.mcap", "bytes", ("derive run",), _RUN, 0.0, 0.01),
+    "robot": Kind(
+        "robot.urdf",
+        "xml",
+        ("check {f}", "calibrate {s}/dataset.nc --robot {f} --tcp tcp --draws 40 --out {o}.json"),
+        (),
+        0.05,
+        1.5,
+    ),
+    "mesh": Kind("dome.stl", "bytes", ("check cell.yaml",), ("cell.yaml",), 0.0, 0.1),
+    "mesh text": Kind(
+        "fixture.stl",
+        "text",
+        ("check meshed.yaml",),
+        ("meshed.yaml", "dome.stl", "fixture.obj"),
+        0.0,
+        0.1,
+    ),
+    "mesh obj": Kind(
+        "fixture.obj",
+        "text",
+        ("check meshed.yaml",),
+        ("meshed.yaml", "dome.stl", "fixture.stl"),
+        0.0,
+        0.1,
+    ),
+    "program": Kind(
+        "course.src",
+        "text",
+        ("compensate {s}/model.json {f} --forces {s}/forces.csv " + _BASE,),
+        ("course.dat",),
+        0.0,
+        0.5,
+    ),
+    "positions": Kind(
+        "course.dat",
+        "text",
+        ("compensate {s}/model.json course.src --forces {s}/forces.csv " + _BASE,),
+        ("course.src",),
+        0.0,
+        0.5,
+    ),
+    "forces": Kind(
+        "forces.csv",
+        "csv",
+        ("compensate {s}/model.json course.src --forces {f} " + _BASE,),
+        ("course.src", "course.dat"),
+        0.0,
+        0.3,
+    ),
+}
+"""All kinds of files, by name."""
+
+_SPRINGS = """schema: elastocal.springs/1
+include: actuated
+springs:
+  - {joint: joint_a2, axis: x, name: "between [x]"}
+  - {joint: joint_a3, axis: [0, 1, 1], frame: distal, bounds: ["0.5 MN*m/rad", "5 MN*m/rad"]}
+  - {joint: joint_a6, axis: z, kind: prismatic, offset: ["0 mm", "0 mm", "150 mm"]}
+  - {joint: joint_a4, axis: x, stiffness: "1.2 MN*m/rad", uncertainty: "20 %"}
+"""
+_SETTINGS = """schema: elastocal.compensator/1
+cycle: "4 ms"
+deadband: "0.01 mm"
+uncertain_above: "5 mm"
+filter:
+  median: 3
+  notches: [{frequency: "50 Hz", width: "10 Hz"}]
+  low_pass: {cutoff: "15 Hz", order: 4}
+sensor: {force: ["2500 N", "2500 N", "6250 N"], moment: ["400 N*m", "400 N*m", "400 N*m"]}
+limits: {correction: "3 mm", rate: "30 mm/s", fade: "5 mm/s"}
+"""
+_CUBE = """solid cube
+facet normal 0 0 1
+outer loop
+vertex 0 0 100
+vertex 100 0 100
+vertex 0 100 100
+endloop
+endfacet
+facet normal 0 0 -1
+outer loop
+vertex 0 0 0
+vertex 0 100 0
+vertex 100 0 0
+endloop
+endfacet
+endsolid cube
+"""
+_OBJ = "# a wedge\nv 0 0 0\nv 100 0 0\nv 0 100 0\nv 0 0 100\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
+
+
+def make_seeds(folder: Path) -> None:
+    """Fill a new folder with valid files, each under the name that its kind says."""
+    made = reported.finished()
+    for name in ("run", "codec", "process", "plan"):
+        shutil.copytree(
+            made / name, folder / name, ignore=shutil.ignore_patterns("*.svg", "*.png", "*.html")
+        )
+    for name in (
+        "model.json",
+        "tool.json",
+        "cell/cell.yaml",
+        "cell/dome.stl",
+        "run/dataset.nc",
+        "plan/pool.nc",
+    ):
+        shutil.copy(made / name, folder / Path(name).name)
+    (folder / "springs.yaml").write_text(_SPRINGS)
+    (folder / "settings.yaml").write_text(_SETTINGS)
+    (folder / "fixture.stl").write_text(_CUBE)
+    (folder / "fixture.obj").write_text(_OBJ)
+    cell = (folder / "cell.yaml").read_text(encoding="utf-8")
+    meshes = "".join(
+        f"\n  - {{name: {suffix}, mesh: {{file: fixture.{suffix}, unit: mm}},"
+        ' pose: {xyz: ["9 m", "9 m", "9 m"]}}'
+        for suffix in ("stl", "obj")
+    )
+    (folder / "meshed.yaml").write_text(cell.replace("\nfixtures:", f"\nfixtures:{meshes}", 1))
+    data = dataset.read(folder / "dataset.nc")
+    dataset.write(data, folder / "dataset.csv")
+    (folder / "robot.urdf").write_text(str(data.attributes["robot_urdf"]))
+    _write_paths(folder)
+    _write_poses(folder)
+    _write_stream(folder / "stream.mcap", data.joint_names)
+    old = json.loads((folder / "model.json").read_text())
+    old["compliance"] = [1.02 * value for value in old["compliance"]]
+    (folder / "old.json").write_text(json.dumps(old))
+    done = elastocal(
+        "compare", folder / "old.json", folder / "model.json", "--out", folder / "comparison.json"
+    )
+    assert done.code == 0, done.err
+
+
+def _write_paths(folder: Path) -> None:
+    """Write rows of joints, a path of joints and one of poses, and postures of a tool."""
+    lines = (folder / "process" / "path.csv").read_text().splitlines()
+    names = lines[0].split(",")
+    joints = slice(names.index("rail[m]"), None)
+    rows = [line.split(",") for line in lines[1::7]]
+    (folder / "rows.csv").write_text(
+        "\n".join(",".join(row[joints]) for row in [names, *rows]) + "\n"
+    )
+    (folder / "path.csv").write_text("\n".join(lines[:40]) + "\n")
+    rng, table = (
+        np.random.default_rng(1),
+        "a[deg],b[deg],c[deg],force_x[N],force_y[N],force_z[N],moment_x[N*m],moment_y[N*m],moment_z[N*m]\n",
+    )
+    for _ in range(24):
+        angles, wrench = rng.uniform(-180, 180, 3), rng.normal(0, (100,) * 3 + (10,) * 3)
+        table += ",".join(f"{value:.4f}" for value in (*angles, *wrench)) + "\n"
+    (folder / "postures.csv").write_text(table)
+
+
+def _write_poses(folder: Path) -> None:
+    """Write the first rows as poses, and as a KUKA program with its points and forces."""
+    rows = [line.split(",") for line in (folder / "rows.csv").read_text().splitlines()[1:6]]
+    robot = read_model(folder / "model.json").model.robot
+    joints = np.array([[float(cell) for cell in row[:7]] for row in rows])
+    units = np.array([1e3] * 3 + [180.0 / np.pi] * 3)
+    poses = [xyzabc_from_T(robot.forward(q)) * units for q in joints]
+    head = "x[mm],y[mm],z[mm],a[deg],b[deg],c[deg],rail[m],force_x[N],force_y[N],force_z[N]\n"
+    (folder / "poses.csv").write_text(
+        head
+        + "".join(
+            ",".join(map(repr, map(float, (*pose, q[0], 10, 0, -500)))) + "\n"
+            for pose, q in zip(poses, joints, strict=True)
+        )
+    )
+    places = [
+        ",".join(f"{k} {v:.6f}" for k, v in zip("XYZABC", pose, strict=True)) for pose in poses
+    ]
+    extra = [
+        ",".join([f"E1 {1e3 * q[0]:.6f}", *(f"E{n} 0.0" for n in range(2, 7))]) for q in joints
+    ]
+    axes = ",".join(f"A{n} {v:.6f}" for n, v in enumerate(np.degrees(joints[0, 1:]), start=1))
+    points = "".join(f"DECL E6POS XP{n}={{{places[n]},{extra[n]}}}\n" for n in range(5))
+    (folder / "course.dat").write_text(
+        f"DEFDAT course\nDECL E6AXIS XHOME={{{axes},{extra[0]}}}\n{points}ENDDAT\n"
+    )
+    lines = "".join(f"LIN XP{n} C_DIS\n" for n in range(5))
+    (folder / "course.src").write_text(
+        f"DEF course( )\n$BASE = BASE_DATA[1]\nPTP XHOME\n{lines}PTP XHOME\nEND\n"
+    )
+    forces = "".join(f"XP{n},10,0,-500\n" for n in range(5))
+    (folder / "forces.csv").write_text(
+        f"point,force_tcp_x[N],force_tcp_y[N],force_tcp_z[N]\n{forces}"
+    )
+
+
+def _write_stream(path: Path, joints: tuple[str, ...]) -> None:
+    """Write raw streams of a few samples."""
+    recorder, time = PoseRecorder(joints), 0.01 * np.arange(1, 9)
+    for moment in time:
+        recorder.arm(
+            ArmState(
+                float(moment),
+                np.zeros(len(joints)),
+                np.eye(4),
+                Motion.HOLDING,
+                False,
+                None,
+                "made up",
+            )
+        )
+    numbers = np.ones((len(time), 3))
+    recorder.wrenches(WrenchBlock(time, numbers, numbers, 0.5, 0.02, SensorStatus.OK, "made up"))
+    recorder.points(
+        PointBlock(time, numbers, 1e-5 * numbers, BeamState.LOCKED, "station_1", "made up")
+    )
+    recorder.mark(0.1, "a mark")
+    recorder.save(path)

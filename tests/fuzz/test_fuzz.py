@@ -1,0 +1,98 @@
+"""Damaged files and absurd options end in an answer or in one line: quickly, and leave nothing."""
+
+import datetime
+import json
+from dataclasses import asdict
+from pathlib import Path
+
+import pytest
+
+from fuzz import harness
+from fuzz.harness import Case, drawn_cases, run_cases
+from fuzz.seeds import KINDS, make_seeds
+from support.kept import kept
+
+CORPUS = json.loads((Path(__file__).parent / "corpus.json").read_text(encoding="utf-8"))
+PARTS = 4
+"""Tests that share the cases, so that several processes can."""
+CASES = 2_000
+NIGHTLY = 100_000
+NIGHT = 3_600.0
+"""In s, of each part of the nightly cases."""
+TODAY = datetime.datetime.now(tz=datetime.UTC).date().toordinal()
+
+
+@pytest.fixture(scope="module")
+def seeds() -> Path:
+    return kept("fuzz", lambda folder: make_seeds(folder / "seeds")) / "seeds"
+
+
+def fallen(verdicts) -> list[str]:
+    """Return what fell, each as a line for the corpus."""
+    return [
+        f"{each.word} [{each.code}] {each.text[-300:]!r} {json.dumps(asdict(each.case))}"
+        for each in verdicts
+        if each.word != "ok"
+    ]
+
+
+def test_every_command_reads_the_files_as_they_are(seeds):
+    cases = [Case(kind, command) for kind, known in KINDS.items() for command in known.commands[:1]]
+    assert [v for v in run_cases(cases, seeds) if v.word != "ok" or v.code] == []
+
+
+def test_what_fell_once_does_not_fall_again(seeds):
+    assert fallen(run_cases([Case(**entry) for entry in CORPUS], seeds)) == []
+
+
+@pytest.mark.parametrize("part", range(PARTS))
+def test_no_case_of_two_thousand_falls(seeds, part):
+    assert fallen(run_cases(drawn_cases(CASES // PARTS, 100 + part), seeds)) == []
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("part", range(2 * PARTS))
+def test_none_of_a_hundred_thousand_new_cases_falls(seeds, part):
+    cases = drawn_cases(NIGHTLY // (2 * PARTS), TODAY * 100 + part)
+    assert fallen(run_cases(cases, seeds, NIGHT)) == []
+
+
+def test_a_number_gives_the_same_case(seeds):
+    data = (seeds / "dataset.nc").read_bytes()
+    for number in range(20):
+        one, two = (Case.drawn("dataset", number) for _ in range(2))
+        assert one == two
+        assert one.content(data) == two.content(data)
+
+
+def busy(*_: object) -> None:
+    while True:
+        pass
+
+
+def crash(*_: object) -> None:
+    [].__getitem__(0)
+
+
+def filled(*_: object) -> None:
+    assert len(bytearray(3 << 30)) < 0
+
+
+@pytest.mark.parametrize(
+    ("fault", "word"), [(crash, "traceback"), (busy, "hang"), (filled, "memory")]
+)
+def test_the_harness_sees_a_fault(seeds, monkeypatch, fault, word):
+    monkeypatch.setattr(harness, "_PATIENCE", 1.0)
+    monkeypatch.setattr("elastocal.workflows.check.describe_file", fault)
+    (found,) = run_cases([Case("tool", "check {f}")], seeds)
+    assert found.word == word
+
+
+def test_the_harness_sees_noise_before_a_line():
+    judged = harness._judged
+    line = "elastocal: no\n"
+    assert judged(1, line, 0.0, 0.0) == "ok"
+    assert judged(1, f"a.py:1: RuntimeWarning: overflow\n{line}", 0.0, 0.0) == "noise"
+    assert judged(1, f"Error: no\n         at line 3 in model.cpp\n{line}", 0.0, 0.0) == "noise"
+    assert judged(1, f"{line}more\n", 0.0, 0.0) == "lines"
+    assert judged(3, "", 0.0, 0.0) == "code"

@@ -1,0 +1,37 @@
+"""Markers of one body, and joints as a controller counts them."""
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from elastocal.errors import LogError
+from elastocal.logs import body_centre
+
+SHAPE = np.array([[0.0, 0.0, 0.0], [0.1, 0.0, 0.0], [0.0, 0.15, 0.0], [0.02, 0.03, 0.12]])
+
+
+def _moving_body(samples: int = 30):
+    rng = np.random.default_rng(1)
+    R = Rotation.random(samples, random_state=2).as_matrix()
+    p = rng.uniform(-1.0, 1.0, (samples, 3))
+    return p[:, None] + np.einsum("sij,mj->smi", R, SHAPE), p + R @ SHAPE.mean(axis=0)
+
+
+def test_the_centre_of_a_body_is_found_where_a_marker_is_hidden():
+    position, centre = _moving_body()
+    for sample in range(1, 30):
+        position[sample, sample % 4] = np.nan
+    assert np.allclose(body_centre(position), centre, atol=1e-12)
+
+
+def test_two_markers_do_not_tell_the_centre_of_four():
+    position, _ = _moving_body()
+    position[3, :2] = np.nan
+    assert np.isnan(body_centre(position)[3]).all()
+
+
+def test_a_body_that_is_never_seen_whole_is_refused():
+    position, _ = _moving_body()
+    position[:, 0] = np.nan
+    with pytest.raises(LogError, match="no row sees all 4 markers"):
+        body_centre(position)

@@ -1,0 +1,88 @@
+"""Pages and README quote the figures of simulated processes as they were measured."""
+
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from types import ModuleType
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+HOOKS = ROOT / "docs" / "hooks"
+
+
+@pytest.fixture
+def tables(monkeypatch) -> Iterator[ModuleType]:
+    """Return the hook that fills the pages."""
+    monkeypatch.syspath_prepend(str(HOOKS))
+    import process_tables
+
+    yield process_tables
+    for name in [each for each in sys.modules if each.startswith(("process_tables", "gallery"))]:
+        del sys.modules[name]
+
+
+def quoted(page: str) -> str:
+    return (ROOT / page).read_text(encoding="utf-8")
+
+
+def test_the_readme_quotes_the_figures_of_the_typical_truth(tables):
+    assert tables.summary() in quoted("README.md")
+    assert "chance" in quoted("README.md")
+
+
+def test_the_page_has_every_figure_that_was_measured(tables):
+    page = tables.on_page_markdown(quoted("docs/how-to/simulate-a-process.md"), None)
+    assert tables.summary() in page
+    for each in tables.quoted():
+        assert f"`{each['springs']}`" in page
+    assert "<!-- process" not in page
+    assert "nan" not in page
+
+
+@pytest.mark.parametrize("kind", ["afp", "machining"])
+def test_a_table_tells_its_seeds_and_stands_beside_the_paper(tables, kind):
+    *rows, paper = tables.table(kind).split("\n\n")[0].splitlines()[2:]
+    assert paper.startswith("| paper |")
+    cells = [row.strip("| ").split(" | ") for row in rows]
+    assert kind != "afp" or "typical" in {row[0] for row in cells}
+    for row in cells:
+        # An interval over several seeds; none of a single one.
+        assert (" to " in row[5]) == (int(row[-1]) > 1)
+
+
+def test_short_campaigns_on_typical_are_no_worse_than_the_papers_way_and_take_8_minutes(tables):
+    for kind in ("afp", "machining"):
+        left = {}
+        for each in tables.quoted():
+            case = each["case"]
+            if case["kind"] == kind and case["preset"] == "typical":
+                lateral = each["deviations"][0]["mean"][1]
+                left.setdefault((each["campaign"], each["springs"]), []).append(lateral)
+                assert not each["campaign"].startswith("i_optimal") or each["minutes"] <= 8.0
+        mean = {key: sum(values) / len(values) for key, values in left.items()}
+        if not mean:
+            continue
+        short = min(mean["i_optimal 8", "auto"], mean["i_optimal 6", "auto"])
+        assert short <= 1.1 * mean["cover 30", "bearing"]
+
+
+@pytest.mark.slow
+def test_a_case_measured_anew_gives_the_figures_that_are_quoted(tables, tmp_path):
+    from gallery.process_figures import SHORTER, Case, Measurement
+
+    tables.quoted()
+    (campaign,) = (each for each in SHORTER if each.name == "i_optimal 8")
+    (found,) = Measurement(tmp_path).of(Case("afp", "typical", 1), (campaign,), (1.0,))
+    (stated,) = (
+        each
+        for each in tables.quoted()
+        if each["case"] == {"kind": "afp", "preset": "typical", "seed": 1}
+        and each["campaign"] == campaign.name
+    )
+    assert found.chosen == stated["chosen"]
+    assert found.minutes == pytest.approx(stated["minutes"], abs=0.05)
+    assert found.left_out == pytest.approx(stated["left_out"], rel=0.02)
+    for new, old in zip(found.deviations, stated["deviations"], strict=False):
+        assert new.mean == pytest.approx(tuple(old["mean"]), rel=0.03, abs=1e-6)
+        assert new.max == pytest.approx(tuple(old["max"]), rel=0.03, abs=2e-6)
