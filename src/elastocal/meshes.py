@@ -66,7 +66,8 @@ def load_triangles(path: Path) -> trimesh.Trimesh:
         shape = np.shape(getattr(mesh, name, ()))
         if 0 not in shape and shape[1:] != (3,):
             raise SchemaError(f"mesh {path}: its {name} have {shape[-1]} numbers each, not 3")
-    return mesh
+    # Of a file without triangles some releases of trimesh make an empty scene.
+    return mesh if isinstance(mesh, trimesh.Trimesh) else trimesh.Trimesh()
 
 
 def says_inches(path: Path) -> bool:

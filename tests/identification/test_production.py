@@ -187,7 +187,7 @@ def test_the_coverage_of_two_halves_is_that_of_the_whole(arm):
     assert both.courses == whole.courses == ("a", "b")
 
 
-@pytest.mark.parametrize("spread", [1.0, 2.0])
+@pytest.mark.parametrize("spread", [3.0, 4.0])
 def test_company_is_found_by_a_tree_as_by_all_distances(arm, spread):
     q = np.random.default_rng(3).normal(0.0, 0.5, (80, 7))
     q[:12] *= spread

@@ -310,7 +310,8 @@ def _nearest_others(robot: Robot, q: FloatArray) -> FloatArray:
     places[:, turns] %= box[turns]
     # A tiny negative angle becomes the whole turn, which is outside of the tree's box.
     places[:, turns] = np.where(places[:, turns] < box[turns], places[:, turns], 0.0)
-    return np.asarray(cKDTree(places, boxsize=box).query(places, k=2, p=np.inf)[0][:, 1])
+    distance, _ = cKDTree(places, boxsize=box).query(places, k=2, p=np.inf)
+    return np.asarray(distance)[:, 1]
 
 
 def posture_reach(robot: Robot) -> FloatArray:
