@@ -1,5 +1,6 @@
 """CSV tables: read by line, written whole, of any length."""
 
+import csv
 import io
 
 import numpy as np
@@ -13,6 +14,7 @@ from elastocal.tables import (
     TableReader,
     new_table,
     opened_table,
+    plain_text,
     write_table,
 )
 
@@ -151,3 +153,13 @@ def test_a_comma_beside_points_may_part_thousands(text, cell):
 
 def test_a_comma_that_parts_the_cells_is_no_decimal_comma():
     assert not reader('name,x[mm]\n"a,5","1,5"\n').rows().decimal_comma
+
+
+@pytest.mark.parametrize("text", ["=1+1", "+cmd|' /C calc'!A0", "-2+3", "@SUM(A1)", "\t=1"])
+def test_no_text_is_written_that_a_spreadsheet_would_compute(tmp_path, text):
+    write_table(tmp_path / "a.csv", [text, "n[m]"], [[text, -1.5], ["-1,5", "+2e-3"]])
+    cells = list(csv.reader(io.StringIO((tmp_path / "a.csv").read_text("utf-8"))))
+    assert cells == [[f"'{text}", "n[m]"], [f"'{text}", "-1.5"], ["-1,5", "+2e-3"]]
+    with opened_table(tmp_path / "a.csv") as table:
+        assert table.layout.header[0] == text
+        assert plain_text(table.rows().cells[0][0]) == text

@@ -111,7 +111,13 @@ def quoted() -> list[Figures]:
     """Return the figures as they are written down, those of one table row behind one another."""
     found: list[Figures] = json.loads(_QUOTED.read_text(encoding="utf-8"))
     order = list(dict.fromkeys((each["campaign"], each["springs"]) for each in found))
-    return sorted(found, key=lambda each: order.index((each["campaign"], each["springs"])))
+    return sorted(
+        found, key=lambda each: (order.index((each["campaign"], each["springs"])), *_case(each))
+    )
+
+
+def _case(figures: Figures) -> tuple[str, int]:
+    return figures["case"]["kind"], figures["case"]["seed"]
 
 
 def _of(found: list[Figures], kind: str, preset: str, **others: str) -> list[Figures]:

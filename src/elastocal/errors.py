@@ -77,6 +77,10 @@ class ReportError(ElastocalError, ValueError):
     """A picture or page that cannot be made."""
 
 
+class VerificationError(ElastocalError, ValueError):
+    """A file that is not what it was when it was made, or not signed as it should be."""
+
+
 class FileAccessError(ElastocalError, OSError):
     """A file that cannot be read or written."""
 

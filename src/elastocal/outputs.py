@@ -18,7 +18,9 @@ from pathlib import Path
 
 from elastocal.errors import FileAccessError
 
-RUN_RECORD = ("journal.jsonl", "cell", "plan", "streams", "dataset.nc", "summary.json")
+RUN_RECORD = (
+    *("journal.jsonl", "cell", "plan", "streams", "dataset.nc", "summary.json", "signature.json"),
+)
 """What a folder of a run holds as a record of it; the first, the journal, makes it one."""
 FIGURE_MARKS = ("<dc:title>elastocal</dc:title>", "Software\0elastocal", "/Creator (elastocal)")
 """How figures of ours are known: SVG, PNG and PDF."""

@@ -29,6 +29,10 @@ _NUMBER = r"\s*[-+]?[0-9]*{}[0-9]*(?:[eE][-+]?[0-9]+)?\s*"
 _POINT, _COMMA = (re.compile(_NUMBER.format(re.escape(sign))) for sign in ".,")
 
 
+_FORMULA = re.compile(r"[=@\t\r]|[+-](?!(?:[0-9]*[.,]?[0-9]*(?:[eE][-+]?[0-9]+)?|inf|nan)\s*\Z)")
+"""How a cell begins that a spreadsheet computes; a number with its sign is none."""
+
+
 class TableError(ElastocalError, ValueError):
     """A table that cannot be read: quotes that do not match, a cell that is no number."""
 
@@ -159,7 +163,7 @@ class TableReader:
         self._delimiter = max(DELIMITERS, key=first.count)
         self._reader = csv.reader(chain([first], remaining), delimiter=self._delimiter, strict=True)
         line_end = first[len(first.rstrip("\r\n")) :] or "\n"
-        header = tuple(next(self._cells(), (0, []))[1]) if first else ()
+        header = tuple(map(plain_text, next(self._cells(), (0, []))[1])) if first else ()
         self.layout = TableLayout(header, tuple(preamble), self._delimiter, line_end)
 
     def rows(self) -> TableRows:
@@ -248,6 +252,22 @@ def _finite_number(cell: str) -> float:
     return value
 
 
+def plain_text(cell: str) -> str:
+    """Return the text of a cell without the apostrophe that keeps a spreadsheet from computing it.
+
+    >>> plain_text("'=1+1"), plain_text("'quoted'")
+    ('=1+1', "'quoted'")
+    """
+    return cell[1:] if cell[:1] == "'" and _FORMULA.match(cell, 1) else cell
+
+
+def _inert(cell: object) -> object:
+    """Return a cell that no spreadsheet takes for a formula; numbers stay what they are."""
+    if isinstance(cell, str) and _FORMULA.match(cell):
+        return f"'{cell}"
+    return cell
+
+
 def write_table(
     path: Path,
     header: Sequence[str],
@@ -256,7 +276,8 @@ def write_table(
 ) -> None:
     """Write a table, whole or not at all; rows are taken one by one.
 
-    Floating-point numbers keep all their digits.
+    Floating-point numbers keep all their digits. An apostrophe goes before a text that a
+    spreadsheet would compute (``=``, ``+``, ``-``, ``@``); `plain_text` takes it away.
 
     Parameters
     ----------
@@ -292,8 +313,8 @@ def new_table(
     with replacing(path) as temporary, temporary.open("w", encoding="utf-8", newline="") as file:
         file.writelines(layout.preamble)
         writer = csv.writer(file, delimiter=layout.delimiter, lineterminator=layout.line_end)
-        writer.writerow(layout.header)
-        yield writer.writerows
+        writer.writerow(map(_inert, layout.header))
+        yield lambda rows: writer.writerows(map(_inert, row) for row in rows)
 
 
 def _parsed(

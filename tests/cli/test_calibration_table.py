@@ -27,11 +27,38 @@ def test_no_number_is_cut(width):
     assert max(map(len, shown.splitlines())) <= width
 
 
+def test_every_spring_of_a_rich_model_has_one_line_of_80_columns():
+    """Names, notes of bounds and what gears amount to were folded over two and three lines."""
+    gear = "joint_a2.axial"
+    springs = (
+        SpringSummary(gear, "gear", "rad/(N*m)", 1.2e-7, 1e-7, 1.5e-7, True),
+        SpringSummary(f"{gear} at 1600 N·m", "gear", "rad/(N*m)", 1e-7, 1e-7, 1.5e-7, True),
+        SpringSummary(f"{gear} lost motion", "gear", "rad", 5e-5, 4e-5, 1.2e-4, True),
+        SpringSummary(
+            "joint_a1.bend-normal", "hinge", "rad/(N*m)", 0.0, 0.0, 1.15e-7, True, at_bound=True
+        ),
+        SpringSummary("joint_a5.x", "hinge", "rad/(N*m)", 1e-7, 0.0, 1.15e-7, False, group=1),
+    )
+    screen = console(stderr=False, file=io.StringIO(), width=80)
+    screen.print(_spring_table(replace(made_up_summary(), springs=springs)))
+    _, _, *rows = screen.file.getvalue().splitlines()
+    assert [row.split("  ")[0].strip() or row.strip()[:11] for row in rows] == [
+        gear,
+        "at 1600 N·m",
+        "lost motion",
+        "joint_a1.bend-normal",
+        "joint_a5.x",
+    ]
+    assert rows[3].rstrip().endswith("rigid  below 0.115")
+    assert rows[4].rstrip().endswith("in group 1")
+
+
 def test_a_negative_value_is_at_no_bound_unless_the_fit_says_so():
     assert "bound" not in _known(-1.0, -1.1, -0.9, at_bound=False)
     assert "±10%" in _known(-1.0, -1.1, -0.9, at_bound=False)
-    assert _known(0.0, 0.0, 0.5, at_bound=True) == f"{yellow('at bound')}, below 0.500"
-    assert _known(2.0, 1.5, 2.0, at_bound=True).endswith(", above 1.500")
+    assert _known(0.0, 0.0, 0.5, at_bound=True) == yellow("below 0.500")
+    assert _known(2.0, 1.5, 2.0, at_bound=True) == yellow("above 1.500")
+    assert _known(0.0, 0.0, 0.0, at_bound=True) == yellow("at bound")
     assert "bound" not in _known(0.0, -0.5, 0.5, at_bound=False)
 
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from elastocal import dataset
-from elastocal.identification import write_model
+from elastocal.identification import CalibrateResult, write_model
 from elastocal.identification.recertification import CompareSummary
 from elastocal.records import read_json
 from support.cells import Cell, linear_truth, unseen
@@ -95,6 +95,37 @@ def test_file_and_figure_are_written_and_checked(folder, tmp_path):
     # Fewer than the 200 that were given: both campaigns have to cover a row.
     assert checked["compared"] == 14
     assert 150 < checked["rows"] < 200
+
+
+def test_without_rows_the_headline_is_the_change_where_both_measured(folder):
+    shown = run(folder).err
+    assert shown.startswith("predicted deflection over 145 calibrated readings: ")
+    found = json.loads(run(folder, "--json").out)
+    assert found["deflection"] is None
+    assert found["calibrated"]["rows"] == 145
+    at_rows = json.loads(run(folder, "--rows", folder / "measured.nc", "--json").out)
+    assert at_rows["calibrated"] is None
+    # The readings of this dataset are those poses and forces, but for some micrometres of sag.
+    for name in ("mean", "largest"):
+        here, there = found["calibrated"][name], at_rows["deflection"][name]
+        assert here["value"] == pytest.approx(there["value"], rel=0.05)
+
+
+def test_the_table_has_80_columns_and_tells_rigid_springs_apart(folder, tmp_path):
+    made = {name: read_json(folder / f"{name}.json", CalibrateResult) for name in ("old", "soft")}
+    for name, each in made.items():
+        model = each.calibrated
+        stiff = [model.model.parameter_names.index(spring) for spring in ("joint_1.x", "joint_2.x")]
+        compliance, draws = model.compliance.copy(), model.draws.copy()
+        compliance[stiff], draws[:, stiff] = 0.0, 0.0
+        rigid = replace(model, compliance=compliance, draws=draws)
+        write_model(tmp_path / f"{name}.json", rigid, made_up_summary(1e-3))
+    shown = run(tmp_path).err
+    assert "rigid in both: joint_1.x, joint_2.x\n" in shown
+    table = shown.split("compliance, µrad")[1].split("rigid in both")[0]
+    assert "…" not in table.replace(" … ", "")
+    assert not any(line.startswith(("joint_1.x", "joint_2.x")) for line in table.splitlines())
+    assert max(map(len, table.split("   sum 1:")[0].splitlines())) <= 80
 
 
 def test_models_with_other_springs_are_compared_with_a_word_of_warning(folder):

@@ -19,7 +19,7 @@ from elastocal.elastic import ElasticModel, layout
 from elastocal.identification import calibrate
 from elastocal.sim.workcell import ErrorDraws, ErrorScales
 from elastocal.workflows import study_conditions
-from elastocal.workflows._study_simulation import prepare_study
+from elastocal.workflows.study import _prepare_study
 from support.cli import elastocal
 from support.simulated import example_cell
 from support.studies import numbers
@@ -35,7 +35,7 @@ def cell_path(**sections):
 @cache
 def prepared(*vary, cell=None):
     cell = load_cell(cell or cell_path())
-    return prepare_study(cell, study_conditions(cell, vary), seed=0, verification=12, jobs=1)
+    return _prepare_study(cell, study_conditions(cell, vary), seed=0, verification=12, jobs=1)
 
 
 def errors(simulation, samples, which="error_mean"):

@@ -100,7 +100,7 @@ SAME = {
 
 
 def test_every_command_that_writes_is_looked_at():
-    silent = {"check", "robots", "derive"}
+    silent = {"check", "robots", "derive", "verify"}
     assert {name for name, *_ in PAIRS} == COMMANDS.keys() - silent - {"init", "demo"}
 
 
@@ -171,7 +171,7 @@ def test_no_part_of_a_record_is_written_but_by_its_run(tmp_path, part):
 
 def test_the_record_of_a_run_is_what_its_folder_holds(tmp_path):
     run = RunFolder(tmp_path)
-    places = (run.journal, run.cell, run.plan, run.streams, run.dataset, run.summary)
+    places = (run.journal, run.cell, run.plan, run.streams, run.dataset, run.summary, run.signature)
     assert tuple(place.name for place in places) == RUN_RECORD
 
 

@@ -26,6 +26,7 @@ WITHOUT = {
     "InitResult",
     "ReportResult",
     "ToolResult",
+    "VerifyResult",
 }
 """Results that no picture shows."""
 
@@ -68,6 +69,7 @@ def results(tmp_path_factory) -> dict[str, Result]:
         workflows.stiffness(model, path=path, spins=4, external_positions=3, stations=5),
         workflows.StudyResult(study_summary(design, samples, None), design, samples, ()),
         workflows.tool(run),
+        workflows.verify(run),
     )
     return {type(each).__name__: each for each in made}
 

@@ -3,7 +3,7 @@ import pytest
 
 from elastocal.elastic import ElasticModel, Gear, Hinge, Tensor, bearing_joint, layout
 from elastocal.errors import FileAccessError, SchemaError, SpringError
-from elastocal.robot import Robot
+from elastocal.robot import Rail, Robot, on_rail
 from support.cells import robot
 from support.urdfs import sliding_arm_urdf
 
@@ -81,12 +81,21 @@ def test_a_tensor_sits_at_the_offset_that_a_file_gives(read):
     assert spring == Tensor("joint_6.tensor-axial", "joint_6", (0.001, 0.0, 0.002))
 
 
-def test_tensors_of_joints_that_slide_stand_behind_linear_springs():
+def test_joints_that_slide_have_a_linear_spring_and_no_tensor():
     sliding = Robot.from_urdf(sliding_arm_urdf(), "tcp")
     springs = layout(sliding, "tensor")
-    joints = [joint.name for joint in sliding.chain.joints]
-    assert [spring.name for spring in springs] == ["slide.axial", *(f"{j}.tensor" for j in joints)]
-    assert [spring.kind for spring in springs] == ["prismatic"] + ["tensor"] * len(joints)
+    turning = [joint.name for joint in sliding.chain.joints if joint.revolute]
+    assert [spring.name for spring in springs] == ["slide.axial", *(f"{j}.tensor" for j in turning)]
+
+
+def test_tensors_say_the_same_of_an_arm_wherever_its_rail_stands():
+    """One at the rail's own origin learnt a lever that changed with the rail."""
+    urdf = on_rail(robot().urdf, Rail("rail", (0.0, 1.0, 0.0), -1.5, 1.5))
+    rail = Robot.from_urdf(urdf, "tcp")
+    model = ElasticModel(rail, layout(rail, "tensor"))
+    q = np.array([[0.0, 0.3, -1.0, 1.2, 0.4, 0.9, -0.2], [1.4, 0.3, -1.0, 1.2, 0.4, 0.9, -0.2]])
+    here, there = model.observation_blocks(q, np.tile([150.0, -80.0, 900.0], (2, 1)))
+    np.testing.assert_allclose(there, here, atol=1e-12 * np.abs(here).max())
 
 
 def test_virtual_springs_may_sit_behind_the_motion():

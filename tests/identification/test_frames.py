@@ -146,7 +146,7 @@ def test_the_planted_frames_are_found_as_far_as_poses_tell_them_apart():
 
 
 def test_columns_are_the_derivative_of_what_a_tracker_reads():
-    readings = payload_readings(poses=4)
+    readings = payload_readings(poses=5)
     offset = np.array([0.02, -0.01, 0.05])
     found = frame_columns(ROBOT, readings, "load_case", offset)
     t, w, e = np.array([[1.0, 2.0, -1.0], [0.5, -1.0, 2.0], [1.0, -2.0, 0.5]]) * 1e-5
@@ -311,3 +311,25 @@ def test_a_payload_beside_the_tcp_is_a_load_case_with_a_moment():
     np.testing.assert_allclose(found.compliance[1:], c[1:], rtol=1e-6)
     forgotten = fitted(replace(hung, moment=None)).calibrated.compliance
     assert np.abs(forgotten / c - 1.0)[1:].max() > 0.1
+
+
+def test_a_free_frame_needs_five_poses_and_says_how_many_there_are():
+    """With three or four the frames took all that was measured, and the springs were luck."""
+    with pytest.raises(IdentificationError) as refusal:
+        frame_columns(ROBOT, payload_readings(poses=4), "load_case")
+    message = str(refusal.value)
+    assert message.startswith("load case '10 kg' was read at 4 poses (2 more have too few): ")
+    assert "needs readings at 5 poses" in message
+    assert "\n" not in message
+    assert len(frame_columns(ROBOT, payload_readings(poses=5), "load_case").names) == 3
+
+
+def test_a_load_case_read_at_few_of_many_poses_has_no_frame():
+    readings = payload_readings(poses=8)
+    kept = (readings.load_case != "20 kg") | (readings.pose < 2)
+    with pytest.raises(IdentificationError, match="load case '20 kg' was read at 2 poses: "):
+        build(
+            ElasticModel(ROBOT, actuated(ROBOT)),
+            readings.take(kept),
+            FitOptions(free_frame="load_case"),
+        )

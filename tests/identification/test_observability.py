@@ -90,6 +90,31 @@ def test_an_arm_of_another_maker_has_the_same_gaps_in_its_own_axes():
     ]
 
 
+def test_a_combination_that_bounds_leave_no_room_is_in_no_group():
+    """Both springs end at zero: neither can give way to the other, and the fit is the only one."""
+    model, problem = elastic(), build(elastic(), campaign())
+    system, names = factor(problem), list(model.parameter_names)
+    pair = ("joint_5.axial", "joint_6.y")
+
+    def groups(*at_zero):
+        c = np.full(18, 1e-6)
+        c[[names.index(name) for name in at_zero]] = 0.0
+        found = observability(system, model.springs, problem, c)
+        assert found.rank == 15
+        return [describe(group) for group in found.unobservable]
+
+    every = [describe(group) for group in observability(system, model.springs).unobservable]
+    assert groups() == every
+    # One of them alone may still grow at the expense of the other.
+    assert groups(pair[0]) == groups(pair[1]) == every
+    assert groups(*pair) == [every[0], every[2]]
+    # A spring of two combinations lets one grow into the other.
+    assert len(groups("joint_4.axial", "joint_5.z")) == 3
+    free = replace(problem, lower=np.full(18, -np.inf))
+    both = np.where(np.isin(names, pair), 0.0, 1e-6)
+    assert len(observability(system, model.springs, free, both).unobservable) == 3
+
+
 def test_springs_in_no_combination_are_observable():
     found = seen(elastic(), campaign())
     named = {term.spring for group in found.unobservable for term in group}

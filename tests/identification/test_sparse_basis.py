@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from elastocal.identification.observability import sparse_basis
+from elastocal.identification.spring_sums import sparse_basis
 
 
 def orthonormal(vectors, seed=0):

@@ -17,7 +17,7 @@ from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
 PYPROJECT = Path(__file__).resolve().parents[2] / "pyproject.toml"
-OPTIONAL = frozenset({"dask", "distributed", "openpyxl", "rosbags"})
+OPTIONAL = frozenset({"cryptography", "dask", "distributed", "openpyxl", "rosbags"})
 """Modules of an extra that elastocal itself looks for, and joblib for it."""
 
 

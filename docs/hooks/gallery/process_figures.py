@@ -93,15 +93,20 @@ class ProcessFigures:
     deviations: tuple[Deviation, ...]
 
 
-def all_cases() -> Iterator[Case]:
-    """Yield every case: one seed of all truths, then the others, of `typical` first."""
-    rest = [(preset, seed) for seed in SEEDS[1:] for preset in OTHERS]
-    turns = [(preset, 1) for preset in (TYPICAL, *OTHERS)]
-    turns += [(TYPICAL, seed) for seed in SEEDS[1:3]] + rest[:4]
-    turns += [(TYPICAL, seed) for seed in SEEDS[3:]] + rest[4:]
-    for preset, seed in turns:
+def all_turns() -> Iterator[tuple[Case, tuple[Campaign, ...]]]:
+    """Yield every case with what is measured of it, in an order that may be cut anywhere.
+
+    One seed of each truth comes first, and of `typical` all campaigns; then a seed after the other.
+    """
+    order = [(TYPICAL, 1), (OTHERS[0], 1), (TYPICAL, 2), (OTHERS[1], 1), (TYPICAL, 3)]
+    every = [(preset, seed) for seed in SEEDS for preset in (TYPICAL, *OTHERS)]
+    for preset, seed in dict.fromkeys((*order, *every)):
         for kind in KINDS:
-            yield Case(kind, preset, seed)
+            case = Case(kind, preset, seed)
+            yield case, (TEMPLATE, *SHORTER) if (preset, seed) == (TYPICAL, 1) else (TEMPLATE,)
+    for seed in SEEDS[1:]:
+        for kind in KINDS:
+            yield Case(kind, TYPICAL, seed), SHORTER
 
 
 def quoted() -> list[ProcessFigures]:
@@ -230,18 +235,17 @@ def _rounded(length: float) -> float:
 
 
 def measure(seeds: int, kinds: list[str], anew: bool) -> None:
-    """Measure the cases that are not yet written down, or all of them."""
+    """Measure what is not yet written down, or all of it."""
     figures = [each for each in quoted() if not (anew and each.case.kind in kinds)]
-    done = {each.case for each in figures}
-    order = list(all_cases())
+    done = {(each.case, each.campaign) for each in figures}
     with tempfile.TemporaryDirectory() as folder:
         measurement = Measurement(Path(folder))
-        for case in order:
-            if case in done or case.kind not in kinds or case.seed > seeds:
+        for case, campaigns in all_turns():
+            missing = tuple(each for each in campaigns if (case, each.name) not in done)
+            if not missing or case.kind not in kinds or case.seed > seeds:
                 continue
-            shorter = SHORTER if case.preset == TYPICAL else ()
-            figures += measurement.of(case, (TEMPLATE, *shorter))
-            figures.sort(key=lambda each: order.index(each.case))
+            loads = _LOADS if missing[0] == TEMPLATE else _LOADS[:1]
+            figures += measurement.of(case, missing, loads)
             write(figures)
             renew_readme()
             sys.stdout.write(f"{case}\n")

@@ -102,7 +102,7 @@ def read_production(
         rows = table.rows(_MOST, "keep every tenth of them")
         names = rows.names("course") or ()
         if rows.T_base_tcp is None:
-            check_limits(robot, rows.joints, rows.label, "is")
+            check_limits(robot, rows.joints, rows.label, "is programmed")
             q, T = rows.joints, robot.forward(rows.joints)
         else:
             T, posture = rows.T_base_tcp, _PostureSearch(inverse_for(robot), start, external)
@@ -150,7 +150,7 @@ class _PostureSearch:
         axes = self.solver.robot.external_axes
         if axes and not given.shape[1]:
             given = np.broadcast_to(self._best_position(T_base_tcp), (len(T_base_tcp), axes))
-        check_limits(self.solver.robot, given, where, "is")
+        check_limits(self.solver.robot, given, where, "is programmed")
         return joints_along_path(self.solver, T_base_tcp, given, self.start, where)
 
     def _best_position(self, T_base_tcp: FloatArray) -> FloatArray:

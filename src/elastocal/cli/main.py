@@ -60,7 +60,7 @@ app = typer.Typer(
 _ORDER = (
     "robots", "init", "check", "plan", "run", "derive", "import_", "calibrate", "codec", "study",
     "predict", "tool", "compensate", "stiffness", "export", "simulate_process", "compare", "report",
-    "demo",
+    "verify", "demo",
 )  # fmt: skip
 """The order in which help lists commands: that of the work; others follow by name."""
 

@@ -21,11 +21,13 @@ from elastocal.elastic import Spring
 from elastocal.errors import CodecError, SchemaError, nearest
 from elastocal.identification import RungSummary
 from elastocal.records import (
+    SEAL,
     LabelledArray,
     LabelledArrays,
     Variable,
     array_fields,
     arrays_of,
+    arrays_sha256,
     from_data,
     read_arrays,
     to_data,
@@ -140,6 +142,8 @@ class CodecData:
     left_out: FloatArray | None = None
     """Errors at left-out poses by which `calibrate` judges, shape (variant, left-out pose), in m;
     NaN for variants that it cannot judge; none in files before."""
+    made_from: dict[str, str] = field(default_factory=dict)
+    """SHA-256 of what the dataset says (`elastocal.dataset.content_sha256`), by its file."""
 
     def __post_init__(self) -> None:
         for name in ("contact", "error_mean", "error_max"):
@@ -250,7 +254,9 @@ def write_codec(folder: Path, data: CodecData) -> Path:
         If it cannot be written.
     """
     path = Path(folder) / ARRAYS
-    write_arrays(path, _arrays_of(data))
+    arrays = _arrays_of(data)
+    arrays.attributes[SEAL] = arrays_sha256(arrays)
+    write_arrays(path, arrays)
     return path
 
 
@@ -318,6 +324,7 @@ def _attributes(data: CodecData) -> dict[str, str]:
         "findings": json.dumps(data.findings),
         "versions": json.dumps(data.versions),
         "ladder": json.dumps([to_data(rung) for rung in data.ladder]),
+        "made_from": json.dumps(data.made_from),
     }
 
 
@@ -358,6 +365,7 @@ def _data_of(found: LabelledArrays) -> CodecData:
             for rung in json.loads(found.attributes.get("ladder", "[]"))
         ),
         left_out=found["left_out"].values if "left_out" in found else None,
+        made_from=json.loads(found.attributes.get("made_from", "{}")),
         **arrays,
     )
 

@@ -98,7 +98,7 @@ class CodecSetup:
 
 
 @brief_repr
-@record(VERDICTS_SCHEMA)
+@record(VERDICTS_SCHEMA, sealed=True)
 class CodecSummary:
     """The figures of a codec: contents of ``codec.json``, for people's scripts."""
 

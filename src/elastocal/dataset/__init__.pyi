@@ -1,13 +1,20 @@
 from ._layout import (
+    MADE_FROM as MADE_FROM,
     SCHEMA as SCHEMA,
     SCHEMAS as SCHEMAS,
     STATUSES as STATUSES,
+    read_made_from as read_made_from,
     require_joint_names as require_joint_names,
     require_labels as require_labels,
 )
-from ._store import read as read, read_dataset as read_dataset, write as write
+from ._store import (
+    content_sha256 as content_sha256,
+    read as read,
+    read_dataset as read_dataset,
+    write as write,
+)
 from .dataset import Dataset as Dataset
-from .merging import merge as merge, selected as selected
+from .merging import merge as merge, selected as selected, usable_readings as usable_readings
 from .path_columns import (
     LARGEST_FORCE as LARGEST_FORCE,
     LARGEST_MOMENT as LARGEST_MOMENT,
@@ -32,6 +39,5 @@ from .path_table import (
 from .readings import (
     Presses as Presses,
     Readings as Readings,
-    usable_readings as usable_readings,
     without as without,
 )

@@ -4,7 +4,9 @@ This is the one list; the NetCDF file, its CSV twin and every check are made fro
 variables are those of the paper's Procedure 1: ``P^c``, ``P^m``, ``F^m`` and ``Theta^c``.
 """
 
+import contextlib
 import difflib
+import json
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -50,6 +52,9 @@ JOINT_UNITS = {"rad": "angle", "deg": "angle", "m": "length", "mm": "length"}
 
 SI_JOINT_UNITS = {"angle": "rad", "length": "m"}
 
+MADE_FROM = "made_from"
+"""Attribute with the SHA-256 of each file that a dataset was made from, as JSON."""
+
 ATTRIBUTES = (
     "schema",
     "robot_name",
@@ -59,6 +64,7 @@ ATTRIBUTES = (
     "gravity",
     "check",
     "provenance",
+    MADE_FROM,
 )
 """Global attributes with a meaning here, in the order in which they are written."""
 
@@ -325,6 +331,8 @@ def canonical_attributes(attributes: Mapping[str, object]) -> dict[str, str]:
             raise DatasetError(f"attribute {name!r} is empty: leave it out when it is not known")
         if name in _VECTOR_ATTRIBUTES:
             read_vector(name, {name: value})
+        if name == MADE_FROM:
+            read_made_from({name: value})
     texts = {"robot_name": "", "provenance": "", **attributes}
     return {name: str(texts[name]) for name in known if name in texts}
 
@@ -369,6 +377,22 @@ def read_vector(name: str, attributes: Mapping[str, str]) -> Vector | None:
             f" {example!r}"
         ) from error
     return x, y, z
+
+
+def read_made_from(attributes: Mapping[str, str]) -> dict[str, str]:
+    """Return the SHA-256 of each file that a dataset was made from, by its name; none: not stated.
+
+    Raises
+    ------
+    DatasetError
+        If it is not JSON of texts.
+    """
+    text = attributes.get(MADE_FROM, "{}")
+    with contextlib.suppress(ValueError, RecursionError):
+        found = json.loads(text)
+        if isinstance(found, dict) and all(isinstance(each, str) for each in found.values()):
+            return found
+    raise DatasetError(f"attribute {MADE_FROM!r} is {text!r:.60}: it must be SHA-256s as JSON")
 
 
 def _storable(text: str) -> bool:

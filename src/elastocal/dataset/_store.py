@@ -12,6 +12,7 @@ from elastocal.dataset._header import TableText, attribute_lines, cut, missing_c
 from elastocal.dataset._layout import (
     JOINT_POSITION,
     JOINT_PREFIXES,
+    MADE_FROM,
     MISSING,
     OK,
     SCHEMA_2,
@@ -28,8 +29,14 @@ from elastocal.dataset._structure import assemble
 from elastocal.dataset.dataset import Dataset
 from elastocal.errors import DatasetError, SchemaError, nearest
 from elastocal.files import read_text
-from elastocal.records import LabelledArrays, read_arrays, write_arrays
-from elastocal.tables import Column, TableError, number_in_cell, write_table as write_rows
+from elastocal.records import LabelledArrays, arrays_sha256, read_arrays, write_arrays
+from elastocal.tables import (
+    Column,
+    TableError,
+    number_in_cell,
+    plain_text,
+    write_table as write_rows,
+)
 from elastocal.units import parse_number, split_column
 
 _MEASURED = ("force", "moment", "controller_displacement", "marker_displacement")
@@ -86,6 +93,14 @@ def write(dataset: Dataset, path: Path | str) -> None:
         write_arrays(path, dataset.to_labelled())
     else:
         write_table(dataset, path)
+
+
+def content_sha256(dataset: Dataset) -> str:
+    """Return the SHA-256 of what a dataset says: the same for a NetCDF file and its CSV twin.
+
+    Its origin does not count, so that a run that is moved and derived again has the same.
+    """
+    return arrays_sha256(dataset.to_labelled(), without=("provenance", MADE_FROM))
 
 
 def _suffix(path: Path) -> str:
@@ -219,7 +234,7 @@ def _grid(table: TableText, text: Mapping[str, int]) -> _Grid:
     line_of: dict[tuple[int, int], int] = {}
     for line, row in zip(table.rows.lines, table.rows.cells, strict=True):
         pose = _integer("pose", row[text["pose"]], line)
-        case = row[text["load_case"]].strip()
+        case = plain_text(row[text["load_case"]].strip())
         if not case:
             raise DatasetError(f"row {line}: load_case is empty: it must be a name")
         place = (poses.setdefault(pose, len(poses)), cases.setdefault(case, len(cases)))
@@ -286,7 +301,7 @@ def _campaigns(table: TableText, grid: _Grid, text: Mapping[str, int]) -> list[s
     """Return the campaign of each pose, shape (pose,), on which its rows must agree."""
     campaigns = [""] * len(grid.poses)
     for index, row in enumerate(table.rows.cells):
-        name, pose = row[text["campaign"]].strip(), int(grid.pose[index])
+        name, pose = plain_text(row[text["campaign"]].strip()), int(grid.pose[index])
         if campaigns[pose] not in ("", name):
             raise DatasetError(
                 f"row {table.rows.lines[index]}: campaign of pose {grid.poses[pose]} is {name!r},"

@@ -12,6 +12,7 @@ from elastocal.dataset._layout import (
     COORDINATES,
     INTEGERS,
     JOINT_VARIABLES,
+    MADE_FROM,
     SCHEMA,
     SCHEMA_2,
     STATUS,
@@ -159,7 +160,9 @@ def _news(names: Collection[str], attributes: Mapping[str, object]) -> list[str]
     late = [each.name for each in (*VARIABLES, *INTEGERS) if each.schema != SCHEMA]
     news = [f"variable {name!r}" for name in late if name in names]
     news += ["coordinate 'campaign'"] if "campaign" in names else []
-    news += [f"attribute {name!r}" for name in ("gravity", "check") if name in attributes]
+    news += [
+        f"attribute {name!r}" for name in ("gravity", "check", MADE_FROM) if name in attributes
+    ]
     conditioned = attributes.get("history") == CONDITIONED
     return news + ([f"attribute 'history' {CONDITIONED!r}"] if conditioned else [])
 

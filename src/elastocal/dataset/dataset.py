@@ -39,8 +39,8 @@ from elastocal.dataset._layout import (
 )
 from elastocal.dataset._structure import assemble, check_names, check_structure, needed_schema
 from elastocal.dataset._validation import check_numbers, check_plausible
-from elastocal.dataset.merging import selected
-from elastocal.dataset.readings import Readings, usable_readings
+from elastocal.dataset.merging import selected, usable_readings
+from elastocal.dataset.readings import Readings
 from elastocal.records import LabelledArrays
 
 if TYPE_CHECKING:

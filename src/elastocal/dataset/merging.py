@@ -1,4 +1,4 @@
-"""Parts and wholes: some poses of a dataset, and several datasets of one robot as one."""
+"""Parts and wholes: readings or some poses of a dataset, several datasets of one robot as one."""
 
 import math
 from collections.abc import Hashable, Sequence
@@ -7,7 +7,17 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from elastocal.dataset._layout import INTEGERS, MISSING, SEQUENCE, VARIABLES, FloatArray, IntArray
+from elastocal.dataset._layout import (
+    INTEGERS,
+    LINK_JOINT_POSITION,
+    MADE_FROM,
+    MISSING,
+    SEQUENCE,
+    VARIABLES,
+    FloatArray,
+    IntArray,
+)
+from elastocal.dataset.readings import Presses, Readings
 from elastocal.errors import DatasetError, nearest
 
 if TYPE_CHECKING:
@@ -61,6 +71,8 @@ def merge(
     joined: dict[str, np.ndarray] = {name: _joined(datasets, name, cases) for name in names}
     sources = [dataset.provenance for dataset in datasets if dataset.provenance]
     provenance = "; ".join(dict.fromkeys(sources))
+    # What the first was made from, the others were not.
+    stated = {name: each for name, each in datasets[0].attributes.items() if name != MADE_FROM}
     return replace(
         datasets[0],
         # Said again for the type checker: the arrays by name are none of these.
@@ -71,7 +83,7 @@ def merge(
         status=np.concatenate([_spread(each, each.status, cases, MISSING) for each in datasets]),
         sequence=_sequence(datasets, cases),
         campaigns=_campaigns(datasets, campaigns),
-        attributes={**datasets[0].attributes, **_check(datasets), "provenance": provenance},
+        attributes={**stated, **_check(datasets), "provenance": provenance},
         **joined,
     )
 
@@ -148,6 +160,62 @@ def _taken(dataset: "Dataset", rows: Sequence[int], columns: Sequence[int]) -> "
             name: values[index] if "load_case" in _DIMS[name] else values[list(rows)]
             for name, values in variables.items()
         },
+    )
+
+
+def usable_readings(
+    dataset: "Dataset", joint_names: Sequence[str], *, check: bool = False
+) -> Readings:
+    """Return the usable readings of a dataset as flat arrays; see `Dataset.readings`."""
+    if dataset.marker_displacement is None:
+        raise DatasetError(
+            "dataset has no marker_displacement: to identify springs, metrology is needed"
+            " (a tracker that measures the marker)"
+        )
+    wanted = list(joint_names)
+    if sorted(wanted) != sorted(dataset.joint_names):
+        raise DatasetError(
+            f"joints of the dataset are {list(dataset.joint_names)}, those of the robot {wanted}:"
+            " they must have the same names"
+        )
+    order = [dataset.joint_names.index(name) for name in wanted]
+    pose, case = np.nonzero(dataset.usable)
+    flat: dict[str, np.ndarray] = {}
+    for variable in VARIABLES:
+        values = dataset.arrays.get(variable.name)
+        if values is not None and variable != LINK_JOINT_POSITION:
+            rows = values[pose, case] if "load_case" in variable.dims else values[pose]
+            flat[variable.name] = rows[:, order] if "joint" in variable.dims else rows
+    presses = _unusable_presses(dataset, order)
+    if dataset.sequence is not None or presses is not None:
+        flat["sequence"] = dataset.order[pose, case]
+    if dataset.campaigns:
+        flat["campaign"] = np.array(dataset.campaigns)[pose]
+    readings = Readings(
+        np.array(dataset.poses)[pose],
+        np.array(dataset.load_cases)[case],
+        conditioned=dataset.conditioned,
+        also_pressed=presses,
+        **flat,
+    )
+    kept_out = np.isin(readings.load_case, dataset.check_cases)
+    return readings.set_aside(~kept_out if check else kept_out)
+
+
+def _unusable_presses(dataset: "Dataset", order: Sequence[int]) -> Presses | None:
+    """Return what pressed on the arm without a usable reading, as far as it is known."""
+    known = np.isfinite(dataset.joint_position).all(axis=2) & np.isfinite(dataset.force).all(axis=2)
+    if dataset.moment is not None:
+        known &= np.isfinite(dataset.moment).all(axis=2)
+    pose, case = np.nonzero(known & ~dataset.usable)
+    if not len(pose):
+        return None
+    return Presses(
+        np.array(dataset.poses)[pose],
+        dataset.order[pose, case],
+        dataset.joint_position[pose, case][:, order],
+        dataset.force[pose, case],
+        None if dataset.moment is None else dataset.moment[pose, case],
     )
 
 

@@ -2,14 +2,11 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, fields, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from elastocal.dataset._layout import (
-    LINK_JOINT_POSITION,
-    VARIABLES,
     FloatArray,
     IntArray,
     StringArray,
@@ -17,9 +14,6 @@ from elastocal.dataset._layout import (
 )
 from elastocal.errors import DatasetError, nearest
 from elastocal.results import brief_repr
-
-if TYPE_CHECKING:
-    from elastocal.dataset.dataset import Dataset
 
 _LARGEST = 1e9
 """No SI number of a robot's reading comes near; what does is a damaged file."""
@@ -198,62 +192,6 @@ class Readings:
             raise DatasetError(f"{name} of the readings has shape {array.shape}, not {shape}")
         freeze(array)
         object.__setattr__(self, name, array)
-
-
-def usable_readings(
-    dataset: "Dataset", joint_names: Sequence[str], *, check: bool = False
-) -> Readings:
-    """Return the usable readings of a dataset as flat arrays; see `Dataset.readings`."""
-    if dataset.marker_displacement is None:
-        raise DatasetError(
-            "dataset has no marker_displacement: to identify springs, metrology is needed"
-            " (a tracker that measures the marker)"
-        )
-    wanted = list(joint_names)
-    if sorted(wanted) != sorted(dataset.joint_names):
-        raise DatasetError(
-            f"joints of the dataset are {list(dataset.joint_names)}, those of the robot {wanted}:"
-            " they must have the same names"
-        )
-    order = [dataset.joint_names.index(name) for name in wanted]
-    pose, case = np.nonzero(dataset.usable)
-    flat: dict[str, np.ndarray] = {}
-    for variable in VARIABLES:
-        values = dataset.arrays.get(variable.name)
-        if values is not None and variable != LINK_JOINT_POSITION:
-            rows = values[pose, case] if "load_case" in variable.dims else values[pose]
-            flat[variable.name] = rows[:, order] if "joint" in variable.dims else rows
-    presses = _unusable_presses(dataset, order)
-    if dataset.sequence is not None or presses is not None:
-        flat["sequence"] = dataset.order[pose, case]
-    if dataset.campaigns:
-        flat["campaign"] = np.array(dataset.campaigns)[pose]
-    readings = Readings(
-        np.array(dataset.poses)[pose],
-        np.array(dataset.load_cases)[case],
-        conditioned=dataset.conditioned,
-        also_pressed=presses,
-        **flat,
-    )
-    kept_out = np.isin(readings.load_case, dataset.check_cases)
-    return readings.set_aside(~kept_out if check else kept_out)
-
-
-def _unusable_presses(dataset: "Dataset", order: Sequence[int]) -> Presses | None:
-    """Return what pressed on the arm without a usable reading, as far as it is known."""
-    known = np.isfinite(dataset.joint_position).all(axis=2) & np.isfinite(dataset.force).all(axis=2)
-    if dataset.moment is not None:
-        known &= np.isfinite(dataset.moment).all(axis=2)
-    pose, case = np.nonzero(known & ~dataset.usable)
-    if not len(pose):
-        return None
-    return Presses(
-        np.array(dataset.poses)[pose],
-        dataset.order[pose, case],
-        dataset.joint_position[pose, case][:, order],
-        dataset.force[pose, case],
-        None if dataset.moment is None else dataset.moment[pose, case],
-    )
 
 
 def without(readings: Readings, excluded: str | Sequence[str]) -> Readings:

@@ -123,14 +123,22 @@ def bearing_joint(robot: Robot, distal: bool = False) -> tuple[Spring, ...]:
 
 
 def tensor(robot: Robot) -> tuple[Spring, ...]:
-    """Return a symmetric compliance tensor at every joint, at its Hartenberg-Denavit origin.
+    """Return a symmetric compliance tensor at every joint that turns, at its origin.
 
     What 18 springs of any directions can express and more: bearings that tilt about axes which
-    are not the frame's. Joints that slide have a linear spring as well, first.
+    are not the frame's; origins are the Hartenberg-Denavit ones. Joints that slide have a linear
+    spring, first, and no tensor: it would stand still while the arm goes by, and what one position
+    on a rail says of it is wrong at another. A carriage that tilts is in the tensor of the joint
+    that it carries.
     """
     pairs = list(zip(robot.chain.joints, joint_origins(robot.chain), strict=True))
     sliding = tuple(axial(joint) for joint, _ in pairs if not joint.revolute)
-    return (*sliding, *(Tensor(f"{j.name}.tensor", j.name, origin.offset) for j, origin in pairs))
+    turning = (
+        Tensor(f"{joint.name}.tensor", joint.name, origin.offset)
+        for joint, origin in pairs
+        if joint.revolute
+    )
+    return (*sliding, *turning)
 
 
 def orthogonal_axes(axis: ArrayLike) -> dict[str, tuple[float, float, float]]:

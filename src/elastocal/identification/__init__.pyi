@@ -88,13 +88,9 @@ from .model_file import (
 from .observability import (
     FaintParameter as FaintParameter,
     Observability as Observability,
-    Term as Term,
     attainable_rank as attainable_rank,
-    describe as describe,
-    describe_briefly as describe_briefly,
     find_faint as find_faint,
     observability as observability,
-    sparse_basis as sparse_basis,
     unseen_groups as unseen_groups,
 )
 from .options import (
@@ -157,6 +153,12 @@ from .solve import (
     factor as factor,
     normalised_residuals as normalised_residuals,
     solve as solve,
+)
+from .spring_sums import (
+    Term as Term,
+    describe as describe,
+    describe_briefly as describe_briefly,
+    sparse_basis as sparse_basis,
 )
 from .suspicious import (
     BLUNDER_SCORE as BLUNDER_SCORE,

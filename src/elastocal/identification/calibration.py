@@ -142,7 +142,7 @@ def calibrate(
     springs, frames = weighted.springs, slice(weighted.springs.stop, None)
     compliance, plain = solution.compliance[springs], weighted.without_frames()
     # A prior makes nothing observable: what was believed before is not measured.
-    seen = observability(factor(plain.without_prior()), model.springs)
+    seen = observability(factor(plain.without_prior()), model.springs, plain, compliance)
     calibrated = CalibratedModel(
         model,
         compliance,

@@ -17,9 +17,9 @@ from elastocal.identification.calibration import Calibration
 from elastocal.identification.frames import FrameSummary
 from elastocal.identification.ladder import Climbed
 from elastocal.identification.load_check import LoadCheck
-from elastocal.identification.observability import Term
 from elastocal.identification.options import FitOptions, FitSettings, bounds
 from elastocal.identification.production import ProductionCoverage
+from elastocal.identification.spring_sums import Term
 from elastocal.identification.suspicious import Screening
 from elastocal.identification.uncertainty import Coverage, HeldOut, interval
 from elastocal.records import record

@@ -27,7 +27,7 @@ They are columns of the observation system beside the springs', without bounds. 
 determine of them is kept at zero by a prior too weak to pull on what they do.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -40,9 +40,13 @@ from elastocal.identification.options import FreeFrame
 from elastocal.records import record
 from elastocal.results import brief_repr
 from elastocal.robot import Robot
+from elastocal.wording import counted
 
 NUMBERS = 9
 """Columns of a session: translation, rotation, marker."""
+_LEAST_POSES = 5
+"""Poses that a session needs: three for its nine numbers, one that says anything of the springs
+beside them, and one that a refit leaves out."""
 _SIZE = 1e-4
 """A sensible size of each, in m or rad."""
 _WIDE = 1e-2
@@ -112,12 +116,13 @@ def frame_columns(
     Raises
     ------
     IdentificationError
-        If campaigns are asked for and the readings name none.
+        If campaigns are asked for and the readings name none, or a session has too few poses.
     """
     if free == "none":
         return FrameColumns((), np.zeros((len(readings), 3, 0)))
     session = _sessions(readings, free)
     names = tuple(dict.fromkeys(session.tolist()))
+    _require_poses(readings, session, names, free)
     T_base_tcp = robot.forward(readings.joint_position)
     R = T_base_tcp[:, :3, :3]
     marker = np.zeros(3) if marker_offset is None else np.asarray(marker_offset, dtype=float)
@@ -148,6 +153,22 @@ def _sessions(readings: Readings, free: FreeFrame) -> np.ndarray:
         return readings.load_case
     pairs = zip(campaign.tolist(), readings.load_case.tolist(), strict=True)
     return np.array([f"{name}, {case}" for name, case in pairs])
+
+
+def _require_poses(
+    readings: Readings, session: np.ndarray, names: Sequence[str], free: FreeFrame
+) -> None:
+    """Refuse sessions with fewer poses than their frames need."""
+    poses = {name: len(np.unique(readings.pose[session == name])) for name in names}
+    if not (few := [name for name in names if poses[name] < _LEAST_POSES]):
+        return
+    worst = min(few, key=lambda name: poses[name])
+    more = f" ({len(few) - 1} more have too few)" if len(few) > 1 else ""
+    raise IdentificationError(
+        f"{free.replace('_', ' ')} {worst!r} was read at {counted(poses[worst], 'pose')}{more}: a"
+        f" frame that is free has {NUMBERS} numbers, and needs readings at {_LEAST_POSES} poses and"
+        " more beside the springs; leave such readings out (--exclude), or give --free-frame none"
+    )
 
 
 def frame_summaries(

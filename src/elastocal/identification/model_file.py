@@ -1,6 +1,6 @@
 """Model file ``*.json``: a calibrated model with draws, observability, provenance and figures."""
 
-from dataclasses import replace
+from dataclasses import field, replace
 from functools import cached_property
 from pathlib import Path
 
@@ -36,7 +36,7 @@ class RobotRecord:
     """Acceleration in base, in m/s²; none: the base stands upright."""
 
 
-@record("elastocal.model/1", eq=False)
+@record("elastocal.model/1", eq=False, sealed=True)
 class CalibrateResult(Result):
     """A calibrated model as its file holds it: what ``calibrate`` returns and writes."""
 
@@ -57,6 +57,9 @@ class CalibrateResult(Result):
     """The tool that the model is for; none: the one that it was calibrated with."""
     domain: CalibrationDomain | None = None
     """Poses and loads of the calibration; none in files of elastocal 0.1.0."""
+    made_from: dict[str, str] = field(default_factory=dict)
+    """SHA-256 of what each dataset says (`elastocal.dataset.content_sha256`), by its file; empty
+    in files before it was written."""
 
     def __post_init__(self) -> None:
         """Refuse parts that contradict one another.

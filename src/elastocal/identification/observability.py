@@ -4,146 +4,40 @@ With forces only and positions only, springs that share an origin add up to one 
 and consecutive wrist frames share axes, so some springs can never be told apart, however many
 poses are taken. Predictions need only the combinations that are observable; tables must say
 which springs are not (docs/explanation/observability.md).
-
-Combinations are written in a readable basis of the null space: few springs a vector, springs of
-near joints together. Every vector of a subspace with the fewest possible non-zeros vanishes on
-``k - 1`` independent coordinates (``k`` the dimension), so the sparsest vectors are found by trying
-those sets of coordinates; the greedy choice among them, sparsest first, is optimal because linear
-independence is a matroid (Coleman and Pothen, "The null space problem I", SIAM J. Alg. Disc.
-Meth. 7, 1986).
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from itertools import combinations
-from math import comb
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.optimize import linprog
 
-from elastocal.arrays import FloatArray, IndexArray
+from elastocal.arrays import FloatArray
 from elastocal.elastic import ElasticModel, Parameter, Spring
 from elastocal.identification._least_squares import rank
 from elastocal.identification.options import MEDIAN_NORM
 from elastocal.identification.problem import Problem, relative_sizes, unit_columns
 from elastocal.identification.solve import Factored
+from elastocal.identification.spring_sums import Term, sparse_basis
 from elastocal.records import record
 from elastocal.results import brief_repr
 
-_ZERO = 1e-6
-"""Components below this part of the largest count as zero."""
 _NOTICEABLE = 1e-2
 """Smaller parts of a combination are not named: the data leave such a spring open by less than a
 hundredth of a sensible value. In rich models nearly every spring has a trace in one of them."""
-_MOST_SETS = 20_000
-"""Largest number of coordinate sets to try; beyond it elimination gives a sparse enough basis."""
+_MOVES = 0.5
+"""Of a step that is 0 for a spring that is held at its bound, and 1 for one that is not."""
 _TWICE = 2.0
 """Standard deviations to either side of a 95 % interval, about."""
 _MUCH_MORE = 2.0
 """Times that forces at another tool must load a combination more than at the calibrated one."""
-_MOST_TERMS = 6
 _PROBES, _PROBE_SEED = 60, 0
 """Number and seed of the configurations that show what could be observed at all."""
 
 
-def sparse_basis(null_space: FloatArray, joints: Sequence[int]) -> FloatArray:
-    """Return a sparse basis of the column space of ``null_space``.
-
-    Parameters
-    ----------
-    null_space : ndarray, shape (spring, k)
-        Orthonormal columns.
-    joints : sequence of int
-        Joint number of each spring; among equally sparse vectors those that touch fewer
-        joints come first, so that a reader sees neighbours.
-
-    Returns
-    -------
-    ndarray, shape (k, spring)
-        A vector a row; largest component 1 in size, positive at the first joint it touches.
-    """
-    n, k = null_space.shape
-    if k == 0:
-        return np.zeros((0, n))
-    involved = np.flatnonzero(np.abs(null_space).max(axis=1) > _ZERO)
-    if comb(len(involved), k - 1) > _MOST_SETS:
-        candidates = list(_eliminated(null_space))
-    else:
-        candidates = list(_circuits(null_space, involved))
-    candidates.sort(key=lambda vector: _complexity(vector, joints))
-    return np.array([_oriented(vector, joints) for vector in _independent(candidates, k)])
-
-
-def _circuits(null_space: FloatArray, involved: IndexArray) -> Iterator[FloatArray]:
-    """Yield the vectors that vanish on each set of ``k - 1`` coordinates."""
-    k = null_space.shape[1]
-    sets = np.array(list(combinations(involved, k - 1)), dtype=np.intp).reshape(
-        comb(len(involved), k - 1), k - 1
-    )
-    _, s, Vt = np.linalg.svd(null_space[sets], full_matrices=True)
-    unique = s[:, -1] > _ZERO if k > 1 else np.ones(len(sets), dtype=bool)
-    seen: set[tuple[float, ...]] = set()
-    for coefficients in Vt[unique, -1]:
-        vector = _normalised(null_space @ coefficients)
-        key = tuple(np.round(vector, 4))
-        if key not in seen:
-            seen.add(key)
-            yield vector
-
-
-def _eliminated(null_space: FloatArray) -> Iterator[FloatArray]:
-    """Yield a basis by Gauss-Jordan elimination with full pivoting."""
-    work = null_space.T.copy()
-    for row in range(len(work)):
-        below, column = divmod(int(np.abs(work[row:]).argmax()), work.shape[1])
-        work[[row, row + below]] = work[[row + below, row]]
-        work[row] /= work[row, column]
-        others = np.arange(len(work)) != row
-        work[others] -= np.outer(work[others, column], work[row])
-    yield from (_normalised(vector) for vector in work)
-
-
-def _normalised(vector: FloatArray) -> FloatArray:
-    vector = vector / np.abs(vector).max()
-    vector[np.abs(vector) <= _ZERO] = 0.0
-    rounded = np.round(vector * 2.0) / 2.0
-    vector = np.where(np.abs(vector - rounded) < _ZERO, rounded, vector)
-    return np.asarray(vector * np.sign(vector[np.flatnonzero(vector)[0]]))
-
-
-def _oriented(vector: FloatArray, joints: Sequence[int]) -> FloatArray:
-    first = min(map(int, np.flatnonzero(vector)), key=lambda i: (joints[i], i))
-    return np.asarray(vector * np.sign(vector[first]))
-
-
-def _complexity(vector: FloatArray, joints: Sequence[int]) -> tuple[int, int, tuple[int, ...]]:
-    support = [int(i) for i in np.flatnonzero(vector)]
-    return len(support), len({joints[i] for i in support}), tuple(support)
-
-
-def _independent(candidates: Sequence[FloatArray], k: int) -> list[FloatArray]:
-    """Take candidates in order as long as each adds a dimension."""
-    chosen: list[FloatArray] = []
-    for vector in candidates:
-        trial = np.array([*chosen, vector])
-        scaled = trial / np.linalg.norm(trial, axis=1, keepdims=True)
-        if np.linalg.svd(scaled, compute_uv=False)[-1] > _ZERO:
-            chosen.append(vector)
-        if len(chosen) == k:
-            break
-    return chosen
-
-
 _CANCELS = 1e-6
 """Share of its parts that a sum may leave over and still count as none."""
-
-
-@record()
-class Term:
-    """One spring (or parameter of one) in an unobservable combination."""
-
-    spring: str
-    weight: float
 
 
 @brief_repr
@@ -226,7 +120,12 @@ class Observability:
         return self.parameters
 
 
-def observability(system: Factored, springs: Sequence[Spring]) -> Observability:
+def observability(
+    system: Factored,
+    springs: Sequence[Spring],
+    problem: Problem | None = None,
+    compliance: FloatArray | None = None,
+) -> Observability:
     """Return what a factored system determines.
 
     Parameters
@@ -235,12 +134,21 @@ def observability(system: Factored, springs: Sequence[Spring]) -> Observability:
         From `solve.factor`.
     springs : sequence of Spring
         In column order.
+    problem, compliance : Problem, ndarray of shape (parameter,), optional
+        What was fitted, and the estimate: combinations that its bounds leave no room to move are
+        in no group, since the fit is the only one. By default bounds have no say.
     """
     parameters = [parameter for spring in springs for parameter in spring.parameters]
     determined = rank(system.s)
-    null_space = system.Vt[determined:].T
-    # The system was solved in x = scale c, so a combination of x is one of c over the scale.
-    groups = _readable(null_space / system.scale[:, None], parameters)
+    # Which weights count as zero is judged in multiples of sensible sizes: they have no unit. The
+    # system was solved in x = scale c, so a combination of x is one of c over the scale.
+    size = relative_sizes(parameters)
+    unseen = np.linalg.qr(system.Vt[determined:].T / (system.scale * size)[:, None])[0]
+    if problem is not None and compliance is not None:
+        scale = parameters[0].scale * size
+        room = (compliance - problem.lower) / scale, (problem.upper - compliance) / scale
+        unseen = _left_open(unseen, *room)
+    groups = _readable(unseen, parameters)
     condition = system.s[0] / system.s[determined - 1] if determined else np.inf
     mixed = {term.spring for group in groups for term in group}
     observable = tuple(parameter.name not in mixed for parameter in parameters)
@@ -360,41 +268,48 @@ def unseen_groups(
     return tuple(found)
 
 
-def _readable(
-    null_space: FloatArray, parameters: Sequence[Parameter]
-) -> tuple[tuple[Term, ...], ...]:
-    """Return the null space of the compliances, by name."""
+def _left_open(null_space: FloatArray, below: FloatArray, above: FloatArray) -> FloatArray:
+    """Return the directions of a null space that bounds leave open, shape (parameter, k).
+
+    A direction is open if no spring at a bound is driven beyond it. Scaled at will, open directions
+    add up: one linear programme finds all springs that any of them moves away from its bound, and
+    the others are held.
+
+    Parameters
+    ----------
+    null_space : ndarray, shape (parameter, k)
+        Orthonormal columns, in sensible sizes.
+    below, above : ndarray, shape (parameter,)
+        Distance of the estimate to its bounds, in sensible sizes.
+    """
+    k = null_space.shape[1]
+    # A trace of a spring holds nothing: it has far to go.
+    matters = np.linalg.norm(null_space, axis=1) > _NOTICEABLE
+    at = [matters & (room < _NOTICEABLE) for room in (below, above)]
+    inward = np.vstack([null_space[at[0]], -null_space[at[1]]])
+    if not inward.size:
+        return null_space
+    inward /= np.linalg.norm(inward, axis=1, keepdims=True)
+    count = len(inward)
+    away = linprog(
+        np.append(np.zeros(k), -np.ones(count)),
+        A_ub=np.hstack([-inward, np.eye(count)]),
+        b_ub=np.zeros(count),
+        bounds=[(None, None)] * k + [(0.0, 1.0)] * count,
+    )
+    held = inward[np.asarray(away.x, dtype=float)[k:] < _MOVES]
+    if not len(held):
+        return null_space
+    _, s, Vt = np.linalg.svd(held, full_matrices=True)
+    return np.asarray(null_space @ Vt[rank(s) :].T)
+
+
+def _readable(unseen: FloatArray, parameters: Sequence[Parameter]) -> tuple[tuple[Term, ...], ...]:
+    """Return by name what orthonormal directions, in sensible sizes, are of the compliances."""
     joints = list(dict.fromkeys(parameter.joint for parameter in parameters))
-    # Which weights count as zero is judged in multiples of sensible sizes: they have no unit.
-    size = relative_sizes(parameters)
-    orthonormal = np.linalg.qr(null_space / size[:, None])[0]
-    basis = sparse_basis(orthonormal, [joints.index(each.joint) for each in parameters])
-    basis = np.where(np.abs(basis) < _NOTICEABLE, 0.0, basis) * size
+    basis = sparse_basis(unseen, [joints.index(each.joint) for each in parameters])
+    basis = np.where(np.abs(basis) < _NOTICEABLE, 0.0, basis) * relative_sizes(parameters)
     return tuple(
         tuple(Term(parameters[i].name, float(vector[i])) for i in map(int, np.flatnonzero(vector)))
         for vector in basis
     )
-
-
-def describe(group: Sequence[Term]) -> str:
-    """Return an unobservable combination as a person would write it.
-
-    >>> describe([Term("a4.y", 1.0), Term("a4.z", 1.0), Term("a5.axial", -1.0)])
-    '(a4.y + a4.z) - a5.axial'
-    """
-    sides = (
-        [_written(term) for term in group if term.weight > 0],
-        [_written(term) for term in group if term.weight < 0],
-    )
-    written = [f"({' + '.join(side)})" if len(side) > 1 else side[0] for side in sides if side]
-    return " - ".join(written)
-
-
-def describe_briefly(group: Sequence[Term]) -> str:
-    """Return an unobservable combination for a line of text, a long one by its size."""
-    return describe(group) if len(group) <= _MOST_TERMS else f"{len(group)} springs mixed"
-
-
-def _written(term: Term) -> str:
-    size = abs(term.weight)
-    return term.spring if size == 1.0 else f"{size:.3g} {term.spring}"

@@ -7,7 +7,9 @@ from ._array_records import (
     write_netcdf as write_netcdf,
 )
 from ._codec import (
+    SEAL as SEAL,
     from_data as from_data,
+    json_sha256 as json_sha256,
     read_json as read_json,
     read_json_data as read_json_data,
     record as record,
@@ -18,6 +20,7 @@ from ._codec import (
 from ._netcdf import (
     LabelledArray as LabelledArray,
     LabelledArrays as LabelledArrays,
+    arrays_sha256 as arrays_sha256,
     netcdf_image as netcdf_image,
     read_arrays as read_arrays,
     write_arrays as write_arrays,

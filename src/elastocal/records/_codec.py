@@ -18,11 +18,13 @@ from elastocal.files import Limit, read_text
 T = TypeVar("T")
 _MOST_NESTING = Limit("ELASTOCAL_MAX_NESTING", 64, "levels")
 _CONFIG = {"extra": "forbid", "allow_inf_nan": False}
+SEAL = "content_sha256"
+"""Key or attribute by which a file states the hash of all else that it says."""
 
 
 @dataclass_transform(frozen_default=True, field_specifiers=(dataclasses.field,))
 def record(
-    schema: str = "", *, eq: bool = True, kw_only: bool = False
+    schema: str = "", *, eq: bool = True, kw_only: bool = False, sealed: bool = False
 ) -> Callable[[type[T]], type[T]]:
     """Make a class a frozen dataclass that the codec reads and writes.
 
@@ -35,6 +37,8 @@ def record(
         Whether two of them compare by value; False where fields are arrays.
     kw_only : bool
         Whether fields are given by name only.
+    sealed : bool
+        Whether its file states the hash of its own content.
     """
 
     def mark(cls: type[T]) -> type[T]:
@@ -43,9 +47,19 @@ def record(
         made = dataclasses.dataclass(frozen=True, eq=eq, repr=not own, kw_only=kw_only)(cls)
         made.__pydantic_config__ = _CONFIG  # type: ignore[attr-defined]
         made.__schema__ = schema  # type: ignore[attr-defined]
+        made.__sealed__ = sealed  # type: ignore[attr-defined]
         return made
 
     return mark
+
+
+def json_sha256(data: Any) -> str:
+    """Return the SHA-256 of JSON-ready data, the same whatever the order of keys and the spaces.
+
+    The key `SEAL` is left out: a hash cannot count itself.
+    """
+    kept = {key: each for key, each in data.items() if key != SEAL} if SEAL in data else data
+    return files.sha256(json.dumps(kept, sort_keys=True, separators=(",", ":")))
 
 
 def schema_of(cls: type) -> str:
@@ -111,7 +125,10 @@ def write_json(path: Path, value: Any) -> None:
     FileAccessError
         If the file cannot be written.
     """
-    files.write_json(path, to_data(value))
+    data = to_data(value)
+    if type(value).__dict__.get("__sealed__"):
+        data[SEAL] = json_sha256(data)
+    files.write_json(path, data)
 
 
 def read_json(path: Path, cls: type[T], schema: str = "") -> T:
@@ -196,6 +213,8 @@ def _unstated(cls: Any, data: Any, what: str, schema: str = "") -> Any:
             raise SchemaError(f"{what} must hold keys and values, among them the schema {schema!r}")
         data = dict(data)
         check_schema(data.pop("schema", None), schema, what)
+        if cls.__dict__.get("__sealed__"):
+            data.pop(SEAL, None)
     if isinstance(data, dict) and dataclasses.is_dataclass(cls):
         for name, inner in _stating_fields(cls):
             if data.get(name) is not None:

@@ -4,7 +4,9 @@ What is written here is what ``xarray.open_dataset`` and any other reader of Net
 data model is theirs, the conventions are CF (https://cfconventions.org).
 """
 
-from collections.abc import Mapping
+import hashlib
+import json
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 from functools import partial
 from io import BytesIO
@@ -16,6 +18,7 @@ import numpy as np
 from elastocal.errors import FileAccessError, SchemaError
 from elastocal.files import Limit, require_file, write_bytes
 from elastocal.parallel import GuardedError, guarded
+from elastocal.records._codec import SEAL
 from elastocal.results import brief_repr
 
 _SIGNATURE = b"\x89HDF\r\n\x1a\n"
@@ -136,6 +139,27 @@ def read_arrays(path: Path, schema: str = "") -> LabelledArrays:
 
         check_schema(found.attributes.get("schema"), schema, str(path))
     return found
+
+
+def arrays_sha256(arrays: LabelledArrays, without: Collection[str] = (SEAL,)) -> str:
+    """Return the SHA-256 of values, dimensions and texts, the same for a file and its copy.
+
+    Parameters
+    ----------
+    arrays : LabelledArrays
+        What to hash.
+    without : collection of str
+        Attributes of the whole file that do not count.
+    """
+    digest = hashlib.sha256()
+    for name in sorted(arrays.variables):
+        values = np.ascontiguousarray(arrays[name].values)
+        shape = f"{name} {arrays[name].dims} {values.shape}"
+        listed = json.dumps(values.tolist()) if values.dtype.kind in "OU" else ""
+        digest.update(shape.encode() + (listed.encode() if listed else values.tobytes()))
+    attributes = {k: str(v) for k, v in arrays.attributes.items() if k not in without}
+    digest.update(json.dumps(attributes, sort_keys=True).encode())
+    return digest.hexdigest()
 
 
 def write_arrays(path: Path, arrays: LabelledArrays) -> None:

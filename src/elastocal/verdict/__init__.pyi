@@ -1,10 +1,17 @@
 from ._files import BYTES as BYTES, CONTENT as CONTENT, content_hash as content_hash
+from .chain import (
+    ChainFiles as ChainFiles,
+    Link as Link,
+    LinkState as LinkState,
+    verify_chain as verify_chain,
+)
 from .evidence import (
     AcceptanceLimits as AcceptanceLimits,
     CodecEvidence as CodecEvidence,
     Evidence as Evidence,
     MissingPart as MissingPart,
     ModelEvidence as ModelEvidence,
+    Seal as Seal,
     UsedFile as UsedFile,
     check_codec as check_codec,
     check_model as check_model,
@@ -31,4 +38,26 @@ from .judgement import (
     advise as advise,
     judge as judge,
     judge_evidence as judge_evidence,
+)
+from .manifest import (
+    EMPTY_MANIFEST as EMPTY_MANIFEST,
+    Manifest as Manifest,
+    ManifestFile as ManifestFile,
+    embed_manifest as embed_manifest,
+    file_links as file_links,
+    manifest_of as manifest_of,
+    read_manifest as read_manifest,
+)
+from .signing import (
+    OF_REPORT as OF_REPORT,
+    OF_RUN as OF_RUN,
+    Signature as Signature,
+    check_signature as check_signature,
+    make_key as make_key,
+    public_key as public_key,
+    read_private_key as read_private_key,
+    read_public_key as read_public_key,
+    read_signature as read_signature,
+    sign as sign,
+    write_signature as write_signature,
 )

@@ -13,23 +13,27 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, TypeVar
 
-import numpy as np
-
 from elastocal.codec import ARRAYS, VERDICTS
 from elastocal.compensation.process import DEVIATIONS, TABLE
+from elastocal.dataset import MADE_FROM
 from elastocal.errors import ElastocalError, FileAccessError
 from elastocal.files import read_text
 from elastocal.procedure import JOURNAL, RunFolder, file_sha256
-from elastocal.records import read_arrays
-from elastocal.verdict.evidence import MissingPart, UsedFile
+from elastocal.records import SEAL, arrays_sha256, json_sha256, read_arrays, read_json_data
+from elastocal.verdict.evidence import MissingPart, Seal, UsedFile
 
 BYTES, CONTENT = "bytes", "content without times and folders"
 _LEFT_OUT = (
     "provenance", "started", "source", "sha256", "file", "findings", "model", "model_sha256",
-    "tool", "tool_sha256", "plan", "streams_sha256",
+    "tool", "tool_sha256", "plan", "streams_sha256", SEAL,
 )  # fmt: skip
 """Keys and attributes that tell when and where, or are hashes of what does."""
 _STAMPED = (".json", ".jsonl", ".nc")
+_SEALED = (
+    "elastocal.model", "elastocal.tool", "elastocal.process", "elastocal.codec_verdicts",
+    "elastocal.codec",
+)  # fmt: skip
+"""Schemas of files that state the hash of their own content."""
 
 
 def content_hash(path: Path) -> tuple[str, str]:
@@ -51,7 +55,7 @@ def content_hash(path: Path) -> tuple[str, str]:
 
 def _content(path: Path) -> str:
     if path.suffix == ".nc":
-        return _arrays(path)
+        return arrays_sha256(read_arrays(path), (*_LEFT_OUT, MADE_FROM))
     text = read_text(path)
     documents = text.splitlines() if path.suffix == ".jsonl" else [text]
     digest = hashlib.sha256()
@@ -69,20 +73,29 @@ def _kept(value: Any) -> Any:
 
 def _left_out(key: str, value: Any) -> bool:
     # A section of that name, such as the tool in the summary of a run, says more than where.
-    return key in _LEFT_OUT and not isinstance(value, dict)
+    return key == MADE_FROM or (key in _LEFT_OUT and not isinstance(value, dict))
 
 
-def _arrays(path: Path) -> str:
-    data = read_arrays(path)
-    digest = hashlib.sha256()
-    for name in sorted(data.variables):
-        values = np.ascontiguousarray(data[name].values)
-        shape = f"{name} {data[name].dims} {values.shape}"
-        listed = json.dumps(values.tolist()) if values.dtype.kind in "OU" else ""
-        digest.update(shape.encode() + (listed.encode() if listed else values.tobytes()))
-    attributes = {k: str(v) for k, v in data.attributes.items() if k not in _LEFT_OUT}
-    digest.update(json.dumps(attributes, sort_keys=True).encode())
-    return digest.hexdigest()
+def read_seal(path: Path) -> Seal:
+    """Return whether a file says what it said when it was written, by the hash that it states."""
+    try:
+        if path.name == ARRAYS:
+            arrays = read_arrays(path)
+            stated, schema = arrays.attributes.get(SEAL), arrays.attributes.get("schema")
+            found = arrays_sha256(arrays)
+        elif path.suffix == ".json":
+            data = read_json_data(path)
+            held = data if isinstance(data, dict) else {}
+            stated, schema, found = held.get(SEAL), held.get("schema"), json_sha256(held)
+        else:
+            return Seal.NONE
+    except ElastocalError:
+        return Seal.BROKEN
+    if str(schema).partition("/")[0] not in _SEALED:
+        return Seal.NONE
+    if stated is None:
+        return Seal.ABSENT
+    return Seal.WHOLE if stated == found else Seal.BROKEN
 
 
 MODEL, TOOL, CODEC, PROCESS = "model.json", "tool.json", "codec", "process"
@@ -133,7 +146,7 @@ class PartReader:
         except ElastocalError as error:
             if named:
                 raise
-            self.note_missing(name, self._without_folders(error), damaged=True)
+            self.note_missing(name, self.without_folders(error), damaged=True)
             return None
         self.use(path)
         return part
@@ -162,9 +175,10 @@ class PartReader:
         for file in sorted(_files_of(path)):
             shown = self.folders.shown(file)
             if shown not in {each.name for each in self.files}:
-                self.files.append(UsedFile(shown, *content_hash(file)))
+                hashes = *content_hash(file), file_sha256(file)
+                self.files.append(UsedFile(shown, *hashes, read_seal(file)))
 
-    def _without_folders(self, error: ElastocalError) -> str:
+    def without_folders(self, error: ElastocalError) -> str:
         """Return a reason without the folder that the run happens to lie in."""
         text = " ".join(str(error).split())
         for root in self.folders.roots:

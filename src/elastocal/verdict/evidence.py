@@ -5,9 +5,11 @@ part is a doubt. A dataset of another run with the model made from it agrees wit
 figure; only the origins that the files state tell that it is not the run whose journal is shown.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
+from enum import Enum
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -31,6 +33,9 @@ from elastocal.procedure import Entry, RunRecord, RunSummary, commits
 from elastocal.results import brief_repr
 from elastocal.robot import parse_urdf
 
+if TYPE_CHECKING:
+    from elastocal.verdict.chain import Link
+
 
 @dataclass(frozen=True)
 class MissingPart:
@@ -44,6 +49,17 @@ class MissingPart:
     """Whether there is a file, but none that can be used."""
 
 
+class Seal(Enum):
+    """Whether a file says what it said when it was written."""
+
+    WHOLE = "whole"
+    BROKEN = "broken"
+    ABSENT = "absent"
+    """It should state the hash of its content and does not: it was made before, or edited."""
+    NONE = "none"
+    """Files of its kind state none."""
+
+
 @dataclass(frozen=True)
 class UsedFile:
     """A file that the report was made from."""
@@ -53,6 +69,9 @@ class UsedFile:
     sha256: str
     of: str
     """The part of the file that was hashed; see `content_hash`."""
+    bytes_sha256: str = ""
+    """Hash of the file as it is: what ``sha256sum`` gives."""
+    seal: Seal = Seal.NONE
 
 
 @dataclass(frozen=True)
@@ -67,6 +86,7 @@ class AcceptanceLimits:
     """Origin of the tolerance, for the verdict."""
 
 
+@brief_repr
 @dataclass(frozen=True, eq=False)
 class ModelEvidence:
     """A model file."""
@@ -77,6 +97,8 @@ class ModelEvidence:
     urdf_sha256: str
     sha256: str
     """Hash of the file."""
+    made_from: Mapping[str, str] = field(default_factory=dict)
+    """Hash of what each dataset says that it was made from, by its file."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,6 +107,8 @@ class CodecEvidence:
 
     data: CodecData
     verdicts: Verdicts
+    name: str = ""
+    """Its folder, as the report shows it."""
 
 
 @brief_repr
@@ -120,8 +144,10 @@ class Evidence:
     limits: AcceptanceLimits = field(default_factory=AcceptanceLimits)
     files: tuple[UsedFile, ...] = ()
     missing: tuple[MissingPart, ...] = ()
+    chain: "tuple[Link, ...]" = ()
+    """Every part held against what it was made from."""
     doubts: tuple[str, ...] = ()
-    """Contradictions between parts that are sound by themselves."""
+    """Contradictions between parts that are sound by themselves, broken links among them."""
 
     @property
     def robot(self) -> str:
@@ -294,7 +320,7 @@ def _doubts(evidence: Evidence) -> Iterator[str]:
             f" file: {_why_not_reproduced(evidence)}"
         )
     # The origins that the files state tell which part is of another run than the others.
-    for doubts in (_dataset, _summary, _codecs, _process):
+    for doubts in (_dataset, _summary, _codecs):
         yield from doubts(evidence)
     if plan is not None and dataset is not None:
         planned = {pose.id for pose in plan.poses}
@@ -352,20 +378,3 @@ def _codecs(evidence: Evidence) -> Iterator[str]:
     origin = "" if evidence.dataset is None else evidence.dataset.provenance
     if not all(origin in codec.data.provenance for codec in evidence.codecs):
         yield "a codec does not say that it is of the readings of this report"
-
-
-def _process(evidence: Evidence) -> Iterator[str]:
-    if evidence.process is None or evidence.calibrated is None:
-        return
-    runs = evidence.process.table.runs
-    own = [run for run in runs if run.model_sha256 == evidence.calibrated.sha256]
-    if not own:
-        yield "the process was run with another model than the one of this report"
-    elif evidence.tool_sha256 and evidence.tool_sha256 not in {run.tool_sha256 for run in own}:
-        yield "the process was run with another tool file than the one of this report"
-    record = evidence.run_record
-    if own and evidence.simulated and record and record.seed not in {run.seed for run in own}:
-        yield (
-            f"the process was run on the simulated cell of seed {own[0].seed}, the run on that of"
-            f" seed {record.seed}"
-        )

@@ -7,12 +7,14 @@ from elastocal.identification import SuspiciousReading
 from elastocal.identification.recertification import Verdict as Recertified
 from elastocal.procedure import commits
 from elastocal.results import counted_alike
+from elastocal.verdict.chain import LinkState
 from elastocal.verdict.evidence import Evidence
 from elastocal.wording import counted, mm, spans
 
 _ESSENTIAL = ("run", "journal", "cell", "plan", "summary of the run", "dataset",
-              "calibrated model", "calibration made again")  # fmt: skip
-"""Parts without which no light is green; the codec has a finding of its own."""
+              "calibrated model", "calibration made again", "process")  # fmt: skip
+"""Parts without which no light is green: whatever could hold it back must not do so less by being
+taken away. The codec has a finding of its own."""
 _TOLD_ELSEWHERE = ("codec", "earlier calibration")
 """A codec has a finding of its own; a first calibration has no earlier one."""
 
@@ -230,9 +232,18 @@ def missing_findings(evidence: Evidence) -> Iterator[Finding]:
             advice = (
                 "Run `elastocal tool`: without it the compensation relies on the cell file's tool."
             )
-        yield Finding(f"the {each.name} {word}: {each.reason}", each.name in _ESSENTIAL, advice)
+        holds_back = each.damaged or each.name in _ESSENTIAL
+        yield Finding(f"the {each.name} {word}: {each.reason}", holds_back, advice)
     for doubt in evidence.doubts:
         yield Finding(doubt)
+    unstated = [link.name for link in evidence.chain if link.state is LinkState.UNSTATED]
+    if unstated:
+        yield Finding(
+            f"not verifiable by hashes: {', '.join(dict.fromkeys(unstated))} (see Provenance)",
+            holds_back=False,
+            advice="Derive, calibrate and make the codec again: today's files state what they were"
+            " made from.",
+        )
 
 
 FINDINGS: tuple[Callable[[Evidence], Iterator[Finding]], ...] = (

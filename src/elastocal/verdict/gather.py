@@ -50,6 +50,7 @@ from elastocal.verdict._files import (
     find_folders,
     run_files,
 )
+from elastocal.verdict.chain import ChainFiles, LinkState, verify_chain
 from elastocal.verdict.evidence import (
     AcceptanceLimits,
     CodecEvidence,
@@ -78,6 +79,8 @@ class EvidenceOptions:
     """In m; in place of that of the cell file."""
     drift: float | None = None
     """In m; likewise."""
+    signer: str | None = None
+    """Public key that must have signed the run, 64 hexadecimal digits."""
 
 
 def gather_evidence(options: EvidenceOptions, made: str) -> Evidence:
@@ -101,12 +104,15 @@ def gather_evidence(options: EvidenceOptions, made: str) -> Evidence:
     evidence = replace(evidence, limits=_limits(evidence.cell, options))
     evidence = _with_rest(evidence, reader, options)
     evidence = _with_old(evidence, reader, options)
+    evidence = replace(evidence, files=tuple(reader.files), missing=tuple(reader.missing))
+    tool = options.tool or reader.folders.default(TOOL)
+    files = ChainFiles(reader.folders.run, tool, reader.without_folders, options.signer)
+    evidence = replace(evidence, chain=verify_chain(evidence, files))
+    broken = (link.text for link in evidence.chain if link.state is LinkState.BROKEN)
     return replace(
         evidence,
         name=evidence.cell.name if evidence.cell else evidence.robot or "robot",
-        files=tuple(reader.files),
-        missing=tuple(reader.missing),
-        doubts=find_doubts(evidence),
+        doubts=tuple(dict.fromkeys((*find_doubts(evidence), *broken))),
     )
 
 
@@ -154,6 +160,9 @@ def _with_plan(evidence: Evidence, reader: PartReader, run: RunFolder) -> Eviden
         check_pool_of(plan, pool)
         return pool
 
+    if not (run.plan / POOL).exists():
+        reader.note_missing("pool", f"there is no {reader.folders.shown(run.plan / POOL)}")
+        return replace(evidence, plan=plan)
     pool = reader.read("pool", run.plan / POOL, pool_of_plan)
     return replace(evidence, plan=plan, pool=pool)
 
@@ -190,7 +199,7 @@ def _calibrated(path: Path, dataset: Dataset | None) -> ModelEvidence:
     result = read_json(path, CalibrateResult)
     check_model(result.calibrated, dataset, path)
     hashes = result.robot.urdf_sha256, file_sha256(path)
-    return ModelEvidence(result.calibrated, result.calibration, *hashes)
+    return ModelEvidence(result.calibrated, result.calibration, *hashes, result.made_from)
 
 
 def _with_rest(evidence: Evidence, reader: PartReader, options: EvidenceOptions) -> Evidence:
@@ -222,7 +231,7 @@ def _codecs(
 
     def codec(path: Path) -> CodecEvidence:
         data = check_codec(read_codec(path), evidence, path)
-        return CodecEvidence(data, judge(data))
+        return CodecEvidence(data, judge(data), reader.folders.shown(path))
 
     root = given or reader.folders.default(CODEC)
     inner = sorted(path.parent for path in root.glob(f"*/{ARRAYS}")) if root else []

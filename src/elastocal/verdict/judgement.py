@@ -67,7 +67,7 @@ def judge(evidence: Evidence, findings: Sequence[Finding], advice: Sequence[str]
     held = list(dict.fromkeys(each.text for each in findings if each.holds_back))
     notes = list(dict.fromkeys(each.text for each in findings if not each.holds_back))
     all_advice = dict.fromkeys((*(each.advice for each in findings if each.advice), *advice))
-    light, own = _light(unseen, tolerance, bool(held))
+    light, own = _light(evidence, unseen, tolerance, bool(held))
     left = evidence.figures.unexplained if evidence.figures is not None else 0.0
     useless = left > MOST_UNEXPLAINED
     if useless:
@@ -89,13 +89,18 @@ def _word(light: Light | None, by_the_errors: bool) -> str:
 
 
 def _light(
-    unseen: UnseenErrors | None, tolerance: float | None, held: bool
+    evidence: Evidence, unseen: UnseenErrors | None, tolerance: float | None, held: bool
 ) -> tuple[Light | None, list[str]]:
     """Return the light, and the reasons that the errors themselves give."""
     if tolerance is None:
         return None, []
     if unseen is None:
-        return Light.YELLOW, ["the errors at unseen poses have no interval"]
+        own = ["the errors at unseen poses have no interval"]
+        stated = evidence.figures.held_out.max if evidence.figures is not None else 0.0
+        if stated <= tolerance:
+            return Light.YELLOW, own
+        # To take the dataset away must not lift a red light.
+        return Light.RED, [f"the model file states errors of up to {mm(stated)}", *own]
     own = list(_against(unseen, tolerance))
     if not unseen.p95.low <= tolerance:
         return Light.RED, own

@@ -18,6 +18,7 @@ __all__ = [
     "stiffness",
     "study",
     "tool",
+    "verify",
 ]  # the commands: what the package itself exports of these
 
 from ._file_kinds import FileDescription as FileDescription
@@ -140,3 +141,8 @@ from .study import (
     study_conditions as study_conditions,
 )
 from .tool import ToolResult as ToolResult, ToolSettings as ToolSettings, tool as tool
+from .verify import (
+    VerifyResult as VerifyResult,
+    VerifySettings as VerifySettings,
+    verify as verify,
+)

@@ -36,6 +36,7 @@ from elastocal.robot import (
     refusals_naming,
     tip_links,
 )
+from elastocal.verdict import read_signature
 from elastocal.workflows._table_kinds import dataset_file
 
 FileDescription = tuple[str, dict[str, object]]
@@ -223,6 +224,15 @@ def process_folder(path: Path) -> FileDescription:
     courses = len(read_process(path).courses)
     kind, facts = process_table(path / TABLE)
     return kind, {**facts, "courses": courses}
+
+
+def signature_file(path: Path) -> FileDescription:
+    """Describe the signature of a run."""
+    found = read_signature(path)
+    return "signature", {
+        "schema": "elastocal.signature/1",
+        **_picked(found, "of", "sha256", "made", "key"),
+    }
 
 
 def comparison_file(path: Path) -> FileDescription:

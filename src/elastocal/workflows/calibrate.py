@@ -9,7 +9,7 @@ import numpy as np
 
 from elastocal import identification
 from elastocal.cell import ProcessFile, read_production
-from elastocal.dataset import Dataset, merge, read, without
+from elastocal.dataset import Dataset, content_sha256, merge, read, without
 from elastocal.elastic import known_springs
 from elastocal.errors import DatasetError
 from elastocal.identification import (
@@ -87,7 +87,9 @@ def calibrate(settings: CalibrateSettings, progress: Progress) -> CalibrateResul
         If a file cannot be read or written, or ``out`` is an input, or another's file.
     """
     options = settings.options()
-    measured, source = _measured(settings.files)
+    found = [(path, read(path)) for path in settings.files]
+    made_from = {str(path): content_sha256(each) for path, each in found}
+    measured, source = _measured(found)
     arm = find_robot(settings.robot, settings.tcp, settings.tool_frame, measured)
     readings = without(measured.readings(arm.joint_names), settings.exclude)
     marker = measured.marker if settings.marker is None else settings.marker
@@ -111,7 +113,7 @@ def calibrate(settings: CalibrateSettings, progress: Progress) -> CalibrateResul
         figures = replace(figures, budget=error_budget(choice.model, readings, options, marker))
     if settings.process is not None:
         figures = replace(figures, production=_coverage(settings.process, calibration.calibrated))
-    result = CalibrateResult.of(calibration.calibrated, figures)
+    result = replace(CalibrateResult.of(calibration.calibrated, figures), made_from=made_from)
     if settings.out is not None:
         write_json(settings.out, result)
     return result
@@ -126,17 +128,18 @@ def _coverage(path: Path, calibrated: CalibratedModel) -> ProductionCoverage | N
     return calibrated.coverage(found.joint_position, found.force, found.moment, found.course)
 
 
-def _measured(files: Sequence[Path]) -> tuple[Dataset, str]:
+def _measured(found: Sequence[tuple[Path, Dataset]]) -> tuple[Dataset, str]:
     """Return the readings of all campaigns as one dataset, and where they come from."""
-    if not files:
+    if not found:
         raise DatasetError("nothing to calibrate from: give at least one dataset")
-    found, source = [read(path) for path in files], ", ".join(map(str, files))
+    files, read_ones = zip(*found, strict=True)
+    source = ", ".join(map(str, files))
     if len(files) == 1:
-        return found[0], source
+        return read_ones[0], source
     # Two campaigns of one name in two folders are two campaigns.
     stems = [path.stem for path in files]
     names = stems if len(set(stems)) == len(stems) else [str(path) for path in files]
     try:
-        return merge(found, relabel=True, campaigns=names), source
+        return merge(read_ones, relabel=True, campaigns=names), source
     except DatasetError as error:
         raise DatasetError(f"{source}: {error}") from error

@@ -37,6 +37,7 @@ _JSON_KINDS: dict[str, _Describe] = {
     "elastocal.process": kinds.process_table,
     "elastocal.comparison": kinds.comparison_file,
     "elastocal.model": kinds.model_file,
+    "elastocal.signature": kinds.signature_file,
 }
 """JSON files by the schema that they state, without its version."""
 _NETCDF_KINDS: dict[str, _Describe] = {

@@ -23,7 +23,7 @@ from elastocal.codec import (
     write_codec_summary,
     write_index_table,
 )
-from elastocal.dataset import read, without
+from elastocal.dataset import content_sha256, read, without
 from elastocal.files import filling
 from elastocal.progress import Progress
 from elastocal.results import Result, brief_repr
@@ -131,6 +131,7 @@ def codec(settings: CodecSettings, progress: Progress) -> CodecResult:
             jobs=settings.jobs,
             progress=progress,
         )
+        data = replace(data, made_from={str(path): content_sha256(measured)})
         verdicts = judge(data, settings.saturation)
         analysis = analyse(arm, readings, data, marker_offset=marker, with_indices=settings.indices)
         summary = codec_summary(data, verdicts, analysis.correlations)

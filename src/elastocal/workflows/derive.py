@@ -85,7 +85,7 @@ def derive(settings: DeriveSettings, progress: Progress) -> DeriveResult:  # noq
         If a file cannot be read or written.
     """
     folder = RunFolder(Path(settings.run))
-    derived = derive_run(folder.path, _sensor(folder, settings.tool))
+    derived = derive_run(folder.path, _sensor(folder, settings.tool), settings.tool)
     write_derived(folder.path, derived)
     return DeriveResult(folder, derived.dataset, derived.summary)
 

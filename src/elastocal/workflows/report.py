@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from datetime import UTC, datetime
+from functools import partial
 from os import PathLike
 from pathlib import Path
 
@@ -11,7 +12,14 @@ from elastocal.progress import Progress
 from elastocal.records import record
 from elastocal.report.document import find_browser, write_pdf, write_report
 from elastocal.results import Result, brief_repr
-from elastocal.verdict import EvidenceOptions, Verdict, gather_evidence
+from elastocal.verdict import (
+    OF_REPORT,
+    EvidenceOptions,
+    Verdict,
+    gather_evidence,
+    read_private_key,
+    sign,
+)
 from elastocal.workflows._workflow import workflow
 
 
@@ -41,6 +49,8 @@ class ReportSettings:
     """Also print a PDF beside it; needs a Chromium."""
     force: bool = False
     """Replace a report that is there."""
+    sign: Path | None = None
+    """Private key that signs the report; see `elastocal.verdict.make_key`."""
 
 
 @brief_repr
@@ -116,13 +126,14 @@ def report(settings: ReportSettings, progress: Progress) -> ReportResult:
     FileAccessError
         If a file cannot be read, or the report cannot be written where it should be.
     ElastocalError
-        If a part that was named cannot be used.
+        If a part that was named cannot be used, or the key.
     """
     out = Path(settings.out)
     paper = out.with_suffix(".pdf") if settings.pdf else None
     _check_places(out, paper, settings.force)
     browser = find_browser() if settings.pdf else ""
     made = datetime.now(UTC).isoformat(timespec="seconds")
+    key = None if settings.sign is None else read_private_key(settings.sign)
     options = EvidenceOptions(
         Path(settings.run),
         settings.model,
@@ -137,7 +148,8 @@ def report(settings: ReportSettings, progress: Progress) -> ReportResult:
     progress("report", 0, steps)
     evidence = gather_evidence(options, made)
     progress("report", 1, steps)
-    written = write_report(out, evidence)
+    signed = None if key is None else partial(sign, key, OF_REPORT, made=made)
+    written = write_report(out, evidence, signed)
     progress("report", 2, steps)
     if paper is not None:
         write_pdf(out, paper, browser)

@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from os import PathLike
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from elastocal import procedure
 from elastocal.cell import Cell, Devices, load_cell
@@ -22,6 +23,7 @@ from elastocal.procedure.run import PlannedStep
 from elastocal.progress import Progress
 from elastocal.records import record
 from elastocal.results import Result, brief_repr
+from elastocal.verdict import OF_RUN, public_key, read_private_key, sign, write_signature
 from elastocal.workflows._operator_and_devices import (
     DeviceSource,
     Operator,
@@ -29,6 +31,9 @@ from elastocal.workflows._operator_and_devices import (
     device_source,
 )
 from elastocal.workflows._workflow import workflow
+
+if TYPE_CHECKING:
+    from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey
 
 POSES_MEASURED = "poses measured"
 """The stage that a run reports to its progress."""
@@ -51,6 +56,8 @@ class RunSettings:
     seed: int | None = None
     """Seed of simulated devices; by default the cell's."""
     operator: Operator = field(default_factory=Unattended)
+    sign: Path | None = None
+    """Private key that signs the journal at the end; see `elastocal.verdict.make_key`."""
 
 
 @brief_repr
@@ -160,6 +167,7 @@ class _Job:
     record: procedure.RunRecord
     folder: RunFolder
     warnings: tuple[str, ...]
+    key: "Ed25519PrivateKey | None"
 
 
 @workflow(RunSettings, record="out")
@@ -201,6 +209,9 @@ def run(settings: RunSettings, progress: Progress) -> RunResult:
         else:
             journal.write(devices.clock.now(), Event.RESUME)
         result = _carry_out(session, devices, journal, settings.operator, progress)
+    if job.key is not None:
+        vouched = sign(job.key, OF_RUN, procedure.file_sha256(journal_file), _now())
+        write_signature(job.folder.signature, vouched)
     if result.end is RunEnd.STOPPED:
         raise ProcedureError(f"{result.message}. The arm is {result.location.value}")
     return _derived(job, result)
@@ -231,10 +242,11 @@ def _prepare(settings: RunSettings) -> _Job:
     plan = Path(settings.plan)
     loaded, read = load_cell(Path(settings.cell)), read_plan(plan)
     folder = plan if plan.is_dir() else plan.parent
-    now = datetime.now(UTC).isoformat(timespec="seconds")
+    key = None if settings.sign is None else read_private_key(settings.sign)
     text = read_text(folder / PLAN)
     seed = loaded.file.simulation.seed if settings.seed is None else settings.seed
-    stated = procedure.run_record(loaded, read, text, procedure.cell_path_in_run(loaded), seed, now)
+    copy, signer = procedure.cell_path_in_run(loaded), public_key(key) if key else None
+    stated = procedure.run_record(loaded, read, text, copy, seed, _now(), signer)
     procedure.check_compatible(read, loaded)
     carried_out, place = procedure.run_settings(loaded, read), RunFolder(Path(settings.out))
     procedure.rehearse_derivation(loaded, read, place, stated)
@@ -247,7 +259,12 @@ def _prepare(settings: RunSettings) -> _Job:
         stated,
         place,
         procedure.registration_warnings(read),
+        key,
     )
+
+
+def _now() -> str:
+    return datetime.now(UTC).isoformat(timespec="seconds")
 
 
 def _carry_out(

@@ -3,7 +3,7 @@ import pytest
 
 from elastocal.errors import IdentificationError
 from elastocal.identification.recertification import check_same_robot
-from elastocal.identification.recertification.comparison import _count_outside_limits
+from elastocal.identification.recertification.arms import count_outside_limits
 from elastocal.robot import Robot, catalogue
 from support.cells import robot, urdf
 
@@ -55,4 +55,4 @@ def test_rows_outside_the_limits_are_counted():
     q[1, 2] = 90.0
     limits = robot().limits
     q[0] = q[2] = 0.5 * (limits.lower + limits.upper)
-    assert _count_outside_limits(robot(), q) == 1
+    assert count_outside_limits(robot(), q) == 1

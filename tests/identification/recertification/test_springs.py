@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -41,9 +43,16 @@ def test_a_spring_that_both_calibrations_hold_at_its_bound_has_not_moved():
     assert np.isnan(found[1].relative)
 
 
-def _at_zero(calibrated):
-    from dataclasses import replace
+def test_a_percentage_needs_a_base_that_is_surely_not_zero():
+    """A compliance of nearly nothing was said to have moved by -64357 %."""
+    (known, *_) = changes(made_up(0), made_up(1))
+    assert known.relative == pytest.approx(known.difference.value / known.old.value)
+    doubtful = replace(known, old=replace(known.old, low=0.0))
+    assert np.isnan(doubtful.relative)
+    assert doubtful.label == known.name
 
+
+def _at_zero(calibrated):
     compliance, draws = calibrated.compliance.copy(), calibrated.draws.copy()
     compliance[1], draws[:, 1] = 0.0, 0.0
     return replace(calibrated, compliance=compliance, draws=draws)

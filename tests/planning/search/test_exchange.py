@@ -245,12 +245,12 @@ def test_a_choice_that_comes_back_ends_the_run():
         turn = 0
 
         def value(self, matrix):
-            if matrix.ndim == 2:
-                return np.asarray(0.0)
-            if len(matrix) == 3:  # what to add: the next of the circle
-                self.turn += 1
-                return np.eye(3)[self.turn % 3]
-            return np.array([1.0, 0.0])  # what to drop: the old one
+            return np.asarray(0.0) if matrix.ndim == 2 else np.array([1.0, 0.0])  # drops the old
+
+        def after_adding(self, matrix, information):  # noqa: ARG002
+            assert len(information) == 2  # those that are not chosen
+            self.turn += 1
+            return np.eye(2)[int(self.turn % 2 == 0)]  # of these the next of the circle
 
     run = _exchange_poses(build_information(dome(3)), Circle(None), [0], 50)
     assert run.ended == "cycle"

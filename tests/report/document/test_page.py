@@ -1,5 +1,6 @@
 """The whole document: self-contained, in order, the same for equal runs."""
 
+import json
 import re
 from dataclasses import replace
 from html.parser import HTMLParser
@@ -10,6 +11,7 @@ import pytest
 from elastocal import dataset
 from elastocal.codec import read_codec, write_codec
 from elastocal.errors import FileAccessError
+from elastocal.procedure import file_sha256
 from elastocal.report.document import (
     SECTIONS,
     write_report,
@@ -23,6 +25,7 @@ from elastocal.verdict import (
 from support.reported import MADE
 
 LATER = "2027-08-09T10:11:12+00:00"
+MANIFEST = re.compile(r'id="manifest">.*?<')
 STAMP = re.compile(r"\d{4}-\d\d-\d\dT[\d:]+\+00:00")
 
 
@@ -106,13 +109,16 @@ def test_equal_runs_give_equal_reports_but_for_times(text, copied, tmp_path):
         path.write_text(STAMP.sub(LATER, found))
     data = dataset.read(folder / "run" / "dataset.nc").to_xarray().copy()
     data.attrs["provenance"] = STAMP.sub(LATER, data.attrs["provenance"])
+    sha256 = file_sha256(folder / "run" / "journal.jsonl")
+    data.attrs["made_from"] = json.dumps({"journal.jsonl": sha256})
     dataset.write(dataset.Dataset.from_xarray(data), folder / "run" / "dataset.nc")
     codec = read_codec(folder / "codec")
     write_codec(folder / "codec", replace(codec, provenance=STAMP.sub(LATER, codec.provenance)))
     again = write_report(tmp_path / "b.html", gather_evidence(EvidenceOptions(folder), LATER))
     other = again.path.read_text(encoding="utf-8")
     assert other != text
-    assert STAMP.sub("T", other) == STAMP.sub("T", text)
+    # The manifest has the hashes of files as they are, times included.
+    assert MANIFEST.sub("", STAMP.sub("T", other)) == MANIFEST.sub("", STAMP.sub("T", text))
 
 
 def test_times_are_marked_as_such(page):
@@ -129,7 +135,7 @@ def test_names_are_escaped(parts, tmp_path):
     text = write_report(tmp_path / "p.html", spoilt).path.read_text(encoding="utf-8")
     assert "alert(1)</script>" not in text
     assert "<img src=" not in text.replace('<img src="data:', "")
-    assert len(Page(text).named("script")) == 3
+    assert len(Page(text).named("script")) == 4
 
 
 def test_without_a_view_the_drawing_library_is_left_out(tmp_path):

@@ -82,9 +82,7 @@ class _Display:
 
 
 def _log_console(file: TextIO) -> "Console":
-    from rich.console import Console
-
-    return Console(file=file, width=_WIDTH, highlight=False, force_terminal=False)
+    return output.console(file=file, stderr=False, width=_WIDTH, force_terminal=False)
 
 
 def _print(console: "Console", chapter: "Chapter", result: Any, out: Path) -> None:

@@ -52,6 +52,10 @@ def _report(  # noqa: PLR0913 - one parameter an option
         bool, typer.Option("--pdf", help="Also print a PDF beside it; needs a Chromium.")
     ] = False,
     force: Annotated[bool, typer.Option("--force", help="Replace a report that is there.")] = False,
+    sign: Annotated[
+        Path | None,
+        typer.Option(metavar="KEY", help="Private key to sign with; `verify --new-key` makes one."),
+    ] = None,
     as_json: Annotated[
         bool, typer.Option("--json", help="Print the verdict as one JSON object.")
     ] = False,
@@ -60,7 +64,7 @@ def _report(  # noqa: PLR0913 - one parameter an option
     accepted = None if tolerance is None else options.parse_limit(tolerance, "--tolerance")
     drift = None if limit is None else options.parse_limit(limit)
     settings = workflows.ReportSettings(
-        run, out, model, tool, codec, process, old, accepted, drift, pdf, force
+        run, out, model, tool, codec, process, old, accepted, drift, pdf, force, sign
     )
     result = workflows.report(settings)
     if as_json:

@@ -9,7 +9,7 @@ from elastocal import workflows
 from elastocal.cli import options, output, tables
 
 
-def _run(
+def _run(  # noqa: PLR0913 - one parameter an option
     cell: Annotated[Path, typer.Argument(help="Cell file, .yaml.")],
     plan: Annotated[Path, typer.Option(metavar="DIR", help="Folder with the cell's plan.")],
     out: Annotated[Path, typer.Option(metavar="RUN", help="Folder of the run.")],
@@ -29,6 +29,10 @@ def _run(
     seed: Annotated[
         int | None, typer.Option(min=0, help="Seed of simulated devices; default: the cell's.")
     ] = None,
+    sign: Annotated[
+        Path | None,
+        typer.Option(metavar="KEY", help="Private key to sign with; `verify --new-key` makes one."),
+    ] = None,
     as_json: options.Figures = False,
 ) -> None:
     """Press on the tooling at every pose of a plan and record what happens."""
@@ -36,7 +40,7 @@ def _run(
     from elastocal.procedure import RunEnd
 
     settings = workflows.RunSettings(
-        cell, plan, out, resume, yes, seed, TerminalOperator(output.console())
+        cell, plan, out, resume, yes, seed, TerminalOperator(output.console()), sign
     )
     if dry_run:
         rehearsed = workflows.dry_run(settings)

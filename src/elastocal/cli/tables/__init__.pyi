@@ -1,9 +1,12 @@
 from .calibration import (
     show_calibration as show_calibration,
-    show_comparison as show_comparison,
     show_report as show_report,
 )
-from .codec import show_codec as show_codec, show_study as show_study
+from .comparisons import (
+    show_codec as show_codec,
+    show_comparison as show_comparison,
+    show_study as show_study,
+)
 from .compensation import (
     show_compensation as show_compensation,
     show_export as show_export,

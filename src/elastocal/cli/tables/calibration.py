@@ -1,8 +1,7 @@
-"""Print what ``calibrate``, ``compare`` and ``report`` found: a user's questions, in their order.
+"""Print what ``calibrate`` and ``report`` found: a user's questions, in their order.
 
 How well does it fit; is it better than simpler models; which springs are really known, and how
-well; which readings look wrong. Of two calibrations: which springs moved, what it does, the
-verdict.
+well; which readings look wrong.
 """
 
 from collections.abc import Sequence
@@ -34,12 +33,6 @@ from elastocal.wording import (
 )
 
 if TYPE_CHECKING:
-    from elastocal.identification.recertification import (
-        CompareResult,
-        CompareSummary,
-        Estimate,
-        SpringChange,
-    )
     from elastocal.workflows import ReportResult
 
 _USUAL_UNIT = unit_of("rad/(N*m)")
@@ -195,24 +188,29 @@ def _spring_table(figures: CalibrationSummary) -> Table:
     table.add_column("95 %\ninterval", justify="right", no_wrap=True)
     table.add_column(f"stiffness\n{_USUAL_UNIT.stiffness}", justify="right", no_wrap=True)
     table.add_column("known?", overflow="fold")
+    above = ""
     for spring in figures.springs:
-        table.add_row(*_spring_row(spring))
+        # What a gear amounts to at its torque stands under its first row, without the name again.
+        further = bool(above) and spring.name.startswith(f"{above} ")
+        name = spring.name.removeprefix(above) if further else spring.name
+        above = above if further else spring.name
+        table.add_row(f" {name}" if further else name, *_spring_row(spring))
     return table
 
 
 def _spring_row(spring: SpringSummary) -> tuple[str, ...]:
+    """Return the cells of a spring behind its name."""
     shown = unit_of(spring.unit)
     values = (spring.compliance, spring.low, spring.high)
     value, low, high = (shown.factor * each for each in values)
     unit = "" if shown == _USUAL_UNIT else f" {shown.shown}"
     if spring.too_weak:
         note = yellow("too weak to see")
-        return spring.name, dim(f"({value:.4f}{unit})"), "", "", note
+        return dim(f"({value:.4f}{unit})"), "", "", note
     if not spring.observable:
-        note = f"{yellow('not by itself')}, group {spring.group}"
-        return spring.name, dim(f"({value:.4f}{unit})"), "", "", note
+        note = yellow(f"in group {spring.group}")
+        return dim(f"({value:.4f}{unit})"), "", "", note
     return (
-        spring.name,
         f"{value:.4f}{unit}",
         f"{low:.3f} … {high:.3f}",
         _stiffness(value, shown),
@@ -229,8 +227,8 @@ def _stiffness(value: float, unit: Unit) -> str:
 
 def _known(value: float, low: float, high: float, at_bound: bool) -> str:
     if at_bound:
-        open_end = f", below {high:.3f}" if high > value else ""
-        return yellow("at bound") + (open_end or (f", above {low:.3f}" if low < value else ""))
+        open_end = f"above {low:.3f}" if low < value else "at bound"
+        return yellow(f"below {high:.3f}" if high > value else open_end)
     if value == 0.0:
         return ""
     relative = (high - low) / 2.0 / abs(value)
@@ -248,7 +246,12 @@ def _show_groups(console: Console, figures: CalibrationSummary) -> None:
         )
     if not figures.unobservable:
         every = "" if weak else "every spring is observable; "
-        console.print(f"{every}condition number {figures.condition:.0f}")
+        if figures.rank < figures.springs_total:
+            every = (
+                f"rank {figures.rank} of {figures.springs_total}: what the readings leave open,"
+                " the bounds of the springs settle; "
+            )
+        console.print(f"{every}condition number {figures.condition:.0f}", soft_wrap=True)
         return
     missing = figures.rank_attainable - figures.rank
     meaning = (
@@ -263,7 +266,7 @@ def _show_groups(console: Console, figures: CalibrationSummary) -> None:
         f" {figures.condition:.0f}): {meaning}"
     )
     for number, group in enumerate(figures.unobservable, start=1):
-        console.print(f"   group {number}: {describe_briefly(group)}")
+        console.print(f"   group {number}, not by itself: {describe_briefly(group)}")
 
 
 def _show_suspicious(console: Console, suspicious: tuple[SuspiciousReading, ...]) -> None:
@@ -283,103 +286,6 @@ def _show_suspicious(console: Console, suspicious: tuple[SuspiciousReading, ...]
         console.print(f"   … and {len(suspicious) - _MOST_SUSPICIOUS} more (--json lists all)")
     first = suspicious[0]
     console.print(f"   to leave one out: --exclude {first.pose}:{first.load_case}")
-
-
-_COLOURS = {"pass": green, "fail": red, "undecided": yellow}
-
-
-def show_comparison(console: Console, compared: "CompareResult", hint: Path | None = None) -> None:
-    """Print a comparison for a person.
-
-    Parameters
-    ----------
-    console : Console
-        Where.
-    compared : CompareResult
-        The comparison.
-    hint : Path, optional
-        A dataset that could serve as rows.
-    """
-    found = compared.summary
-    console.print(f"{bold(found.robot)}: {_moved(found)}")
-    if found.springs:
-        sums = {each.name: f"sum {n}" for n, each in enumerate(_sums(found), start=1)}
-        console.print(_change_table(found, sums))
-        for name, short in sums.items():
-            console.print(f"   {short}: {name}", soft_wrap=True)
-        console.print(
-            f"the interval holds for all {len(found.springs)} comparisons at once with 95 %"
-            + ("; what has 0 outside it moved" if found.springs_judged else ""),
-            soft_wrap=True,
-        )
-    for names, which in ((found.only_old, "old"), (found.only_new, "new")):
-        if names:
-            console.print(f"only in the {which} model: {', '.join(names)}", soft_wrap=True)
-    if found.not_compared:
-        console.print(f"not determined by both: {', '.join(found.not_compared)}")
-    if compared.rows is not None:
-        console.print(f"\n{compared.rows.sentence()}", soft_wrap=True)
-    _show_verdict(console, found, hint)
-    for note in found.notes:
-        console.print(f"{yellow('note:')} {note}", soft_wrap=True)
-
-
-def _moved(found: "CompareSummary") -> str:
-    if found.unmoved_sentence:
-        return found.unmoved_sentence
-    names = ", ".join(each.label for each in found.moved_springs)
-    return f"{red(bold(found.verb))}: {names}"
-
-
-def _sums(found: "CompareSummary") -> "list[SpringChange]":
-    return [each for each in found.springs if len(each.terms) > 1]
-
-
-def _change_table(found: "CompareSummary", sums: dict[str, str]) -> Table:
-    """Return a row a spring; linear springs, rare, name their own unit."""
-    table = Table(box=None, pad_edge=False)
-    table.add_column("spring", no_wrap=True)
-    headings = (
-        *(f"{name}\n{_USUAL_UNIT.shown}" for name in ("old", "new", "change")),
-        "95 %, all\nat once",
-    )
-    for heading in headings:
-        table.add_column(heading, justify="right", no_wrap=True)
-    table.add_column("", no_wrap=True)
-    word = "moved" if found.same_springs else "differs"
-    for change in found.springs:
-        unit = unit_of(change.unit)
-        shown = "" if unit.shown == _USUAL_UNIT.shown else f" {unit.shown}"
-        table.add_row(
-            sums.get(change.name, change.name),
-            f"{unit.factor * change.old.value:.4f}{shown}",
-            f"{unit.factor * change.new.value:.4f}{shown}",
-            f"{unit.factor * change.difference.value:+.4f}",
-            _between(change.together, unit.factor),
-            red(word) if change.moved else "",
-        )
-    return table
-
-
-def _between(estimate: "Estimate", factor: float) -> str:
-    return f"{factor * estimate.low:+.3f} … {factor * estimate.high:+.3f}"
-
-
-def _show_verdict(console: Console, found: "CompareSummary", hint: Path | None) -> None:
-    if found.limit is None:
-        return
-    if found.verdict is None:
-        asked = "give them with --rows"
-        if hint is not None:
-            asked += f", e.g. {hint}, which the new model states it was calibrated on"
-        console.print(f"{yellow('no verdict:')} {found.reason}; {asked}",
-                      soft_wrap=True)  # fmt: skip
-        return
-    colour = _COLOURS[found.verdict]
-    console.print(
-        f"{bold(colour(found.verdict.value))}: {found.reason}",
-        soft_wrap=True,
-    )
 
 
 def show_report(console: Console, result: "ReportResult") -> None:

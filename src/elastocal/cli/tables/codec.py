@@ -23,8 +23,8 @@ def show_codec(console: Console, result: CodecSummary, out: Path, names: Sequenc
     console.print(_codec_table(result))
     for sentence in result.sentences:
         console.print(sentence)
-    console.print(f"\n{', '.join(names)} written to {bold(str(out))}")
     print_remarks(console, "note", result.findings)
+    console.print(f"\n{', '.join(names)} written to {bold(str(out))}")
 
 
 def _codec_table(result: CodecSummary) -> Table:

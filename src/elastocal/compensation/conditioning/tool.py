@@ -18,7 +18,7 @@ _Triple = tuple[float, float, float]
 _Rows = tuple[tuple[float, ...], ...]
 
 
-@record("elastocal.tool/1")
+@record("elastocal.tool/1", sealed=True)
 class ToolResult(Result):
     """Tool and sensor from static postures: the contents of a tool file; SI units."""
 

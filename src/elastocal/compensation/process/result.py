@@ -60,7 +60,7 @@ class ProcessRun:
     tool_sha256: str | None
 
 
-@record("elastocal.process/1")
+@record("elastocal.process/1", sealed=True)
 class SimulateProcessResult(Result):
     """The contents of ``table.json``."""
 

@@ -2,6 +2,7 @@ from .arms import (
     ComparedRows as ComparedRows,
     arm_notes as arm_notes,
     check_same_robot as check_same_robot,
+    count_outside_limits as count_outside_limits,
     model_on as model_on,
 )
 from .comparison import (

@@ -43,7 +43,7 @@ from elastocal.identification.recertification._sums import (
     sum_text,
     weights,
 )
-from elastocal.identification.recertification.arms import ComparedRows
+from elastocal.identification.recertification.arms import ComparedRows, model_on
 from elastocal.identification.recertification.result import (
     LEAST_COVERED,
     CommonGround,
@@ -263,6 +263,22 @@ def compare_rows(
         mean=Estimate(mean, max(mean - off, 0.0), mean + off),
         largest=Estimate(float(size.max()), max(float(surely.max()), 0.0), float(high.max())),
     )
+
+
+def compare_calibrated_poses(
+    old: CalibratedModel, new: CalibratedModel, spread: Spread
+) -> RowComparison | None:
+    """Return the change over the readings of the new calibration that the old one covers.
+
+    None where there are none, or a model does not know where it was calibrated.
+    """
+    if new.domain is None:
+        return None
+    arm, rows = new.model.robot, ComparedRows.of_calibration(new.domain)
+    ground, number = common_ground(old, new, rows, arm)
+    if ground is None or not len(number):
+        return None
+    return compare_rows(model_on(old, arm), new, spread, rows, number, alike=ground.alike)
 
 
 def _misfit(models: tuple[CalibratedModel, CalibratedModel], deflection: FloatArray) -> FloatArray:

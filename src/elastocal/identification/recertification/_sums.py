@@ -23,7 +23,7 @@ from elastocal.arrays import FloatArray
 from elastocal.elastic import OneAxisSpring, Parameter, Spring, SpringLoad
 from elastocal.errors import IdentificationError
 from elastocal.identification.calibrated import CalibratedModel
-from elastocal.identification.observability import Term, describe, sparse_basis
+from elastocal.identification.spring_sums import Term, describe, sparse_basis
 
 _SAME = 1e-4
 """Singular value, over the largest, below which unobservable combinations of the two models

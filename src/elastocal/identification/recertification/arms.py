@@ -14,6 +14,7 @@ from elastocal.dataset import Readings
 from elastocal.elastic import ElasticModel
 from elastocal.errors import IdentificationError
 from elastocal.identification.calibrated import CalibratedModel
+from elastocal.identification.domain import CalibrationDomain
 from elastocal.results import brief_repr
 from elastocal.robot import Robot, link_gap, probe_configurations, same_joints, tool_gap
 
@@ -45,6 +46,11 @@ class ComparedRows:
         """Return readings as rows."""
         q, force, moment = readings.joint_position, readings.force, readings.moment
         return cls(q, force, moment, readings=readings, arm=arm)
+
+    @classmethod
+    def of_calibration(cls, domain: CalibrationDomain) -> "ComparedRows":
+        """Return the readings that a model was calibrated at, each pressed from rest."""
+        return cls(domain.joint_position[domain.reading_pose], domain.force, domain.moment)
 
     def __len__(self) -> int:
         return len(self.q)
@@ -138,3 +144,8 @@ def _weighs_otherwise(robot: Robot, arm: Robot) -> bool:
     here, there = (each.gravity_torques(probe_configurations(arm)) for each in (robot, arm))
     largest = max(float(np.abs(here).max()), float(np.abs(there).max()))
     return float(np.abs(here - there).max()) > _WEIGHT * largest
+
+
+def count_outside_limits(robot: Robot, q: FloatArray) -> int:
+    """Return how many rows of joint positions lie outside the robot's limits."""
+    return int(np.sum(np.any(robot.limits.margin(q) < 0.0, axis=1)))

@@ -11,7 +11,6 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike
 
-from elastocal.arrays import FloatArray
 from elastocal.errors import IdentificationError, RobotError, SpringError
 from elastocal.identification.calibrated import CalibratedModel, check_rows
 from elastocal.identification.figures import CalibrationSummary
@@ -19,6 +18,7 @@ from elastocal.identification.model_file import CalibrateResult
 from elastocal.identification.recertification._changes import (
     Spread,
     common_ground,
+    compare_calibrated_poses,
     compare_rows,
     compare_springs,
 )
@@ -27,6 +27,7 @@ from elastocal.identification.recertification.arms import (
     ComparedRows,
     arm_notes,
     check_same_robot,
+    count_outside_limits,
     model_on,
 )
 from elastocal.identification.recertification.result import (
@@ -306,6 +307,7 @@ def recertify(
         alike = ground is None or ground.alike
         on_arm = model_on(old, arm), model_on(new, arm)
         changes = compare_rows(*on_arm, spread, given, number, alike=alike)
+    measured = compare_calibrated_poses(old, new, spread) if given is None else None
     verdict, reason = _judge(changes, limit, ground)
     springs = _judged_springs(old, new, spread, ground)
     moved = sorted(
@@ -316,7 +318,7 @@ def recertify(
     only_old, only_new = (
         tuple(name for name in each.model.spring_names if name not in common) for each in (old, new)
     )
-    outside = 0 if given is None else _count_outside_limits(arm, given.q)
+    outside = 0 if given is None else count_outside_limits(arm, given.q)
     result = CompareSummary(
         robot=new.model.robot.name,
         tcp=arm.tip,
@@ -336,8 +338,9 @@ def recertify(
             *arm_notes((old, new), arm, names),
         ),
         ground=ground,
+        calibrated=None if measured is None else measured.summary(),
     )
-    return CompareResult(result, changes)
+    return CompareResult(result, changes, measured)
 
 
 def _judged_springs(
@@ -382,11 +385,6 @@ def _given_rows(
     if rows is not None and rows.visit is not None and len(rows.visit) != len(joints):
         raise SpringError(f"visit has {len(rows.visit)} values for {len(joints)} rows")
     return rows or ComparedRows(joints, forces, moments)
-
-
-def _count_outside_limits(robot: Robot, q: FloatArray) -> int:
-    """Return how many rows of joint positions lie outside the robot's limits."""
-    return int(np.sum(np.any(robot.limits.margin(q) < 0.0, axis=1)))
 
 
 def _read(path: Path) -> tuple[CalibratedModel, CalibrationSummary | None]:

@@ -6,7 +6,7 @@ from enum import StrEnum
 import numpy as np
 
 from elastocal.arrays import FloatArray, IndexArray
-from elastocal.identification.observability import Term
+from elastocal.identification.spring_sums import Term
 from elastocal.records import record
 from elastocal.results import Result, brief_repr
 
@@ -65,8 +65,8 @@ class SpringChange:
 
     @property
     def relative(self) -> float:
-        """Difference over the old value; NaN where that is not positive."""
-        return self.difference.value / self.old.value if self.old.value > 0.0 else float("nan")
+        """Difference over the old value; NaN where that is not surely above zero."""
+        return self.difference.value / self.old.value if self.old.low > 0.0 else float("nan")
 
     @property
     def label(self) -> str:
@@ -195,6 +195,9 @@ class CompareSummary:
     """Caveats that belong to the figures, a sentence each."""
     ground: CommonGround | None = None
     """None where a model does not know where it was calibrated."""
+    calibrated: DeflectionChange | None = None
+    """Over the readings of the new calibration that the old one covers, where no rows were given;
+    None with rows, or where a model does not know where it was calibrated."""
 
     @property
     def springs_judged(self) -> bool:
@@ -296,15 +299,15 @@ class RowComparison:
         size, low, high = (tuple(each.tolist()) for each in (self.size, self.low, self.high))
         return DeflectionChange(len(self.q), self.mean, self.largest, where, size, low, high)
 
-    def sentence(self) -> str:
+    def sentence(self, rows: str = "rows") -> str:
         """Return the change in words, a line each: before, change, where it is largest."""
         place = ", ".join(f"{1e3 * x:.0f}" for x in self.tcp_position[self.where])
         before = 1e3 * np.linalg.norm(self.old, axis=1)
         return (
-            f"predicted deflection over {len(self.q)} rows: {before.mean():.3f} mm mean,"
+            f"predicted deflection over {len(self.q)} {rows}: {before.mean():.3f} mm mean,"
             f" {before.max():.3f} mm max by the old model\n"
             f"   change: {_in_mm(self.mean)} mean, {_in_mm(self.largest)} max\n"
-            f"   largest at row {self.number[self.where] + 1}, tcp at ({place}) mm in base"
+            f"   largest at {rows[:-1]} {self.number[self.where] + 1}, tcp at ({place}) mm in base"
         )
 
 
@@ -316,6 +319,8 @@ class CompareResult(Result):
     """The figures and the verdict, as files hold them."""
     rows: RowComparison | None
     """None without rows."""
+    calibrated: RowComparison | None = None
+    """See `CompareSummary.calibrated`."""
 
     def facts(self) -> tuple[tuple[str, str], ...]:
         """Return what a person wants to know first."""

@@ -207,8 +207,13 @@ class DOptimal(Criterion):
         whole = _log_determinant(matrix) + gain
         return np.asarray(np.exp(whole / (2 * information.rank)))
 
-    def ceiling(self, matrix: FloatArray, information: Information) -> FloatArray:
-        """Return the bound of Jensen: ``log det(I + K) <= m log(1 + tr K / m)`` for m rows."""
+    def ceiling(self, matrix: FloatArray, information: Information) -> FloatArray | None:
+        """Return the bound of Jensen: ``log det(I + K) <= m log(1 + tr K / m)`` for m rows.
+
+        None in pools as small as those whose whole matrices cost less.
+        """
+        if not information.updates_pay:
+            return None
         rows, inverse = len(information.rows), np.asarray(np.linalg.inv(matrix), dtype=float)
         trace = information.products(inverse)
         whole = _log_determinant(matrix) + rows * np.log1p(trace / rows)

@@ -227,20 +227,17 @@ def _best_addition(information: Information, criterion: Criterion, chosen: Index
         If the criterion gives NaN.
     """
     matrix = information.matrix(chosen)
-    ceiling = criterion.ceiling(matrix, information)
-    if ceiling is None:
-        values = np.array(criterion.after_adding(matrix, information))
-        values[chosen] = -np.inf
-        return int(_best(values, criterion)[0])
     left = np.delete(np.arange(len(information)), chosen)
-    order = left[np.argsort(-ceiling[left])]
-    first, others = np.split(order, [1 + math.isqrt(len(order))])
     values = np.full(len(information), -np.inf)
-    values[first] = criterion.after_adding(matrix, information.take(first))
-    best = values.max()
-    others = others[ceiling[others] >= best - _SLACK * abs(best)]
-    if len(others):
-        values[others] = criterion.after_adding(matrix, information.take(others))
+    ceiling = criterion.ceiling(matrix, information)
+    if ceiling is not None:
+        order = left[np.argsort(-ceiling[left])]
+        first, others = np.split(order, [1 + math.isqrt(len(order))])
+        values[first] = criterion.after_adding(matrix, information.take(first))
+        best = values.max()
+        left = others[ceiling[others] >= best - _SLACK * abs(best)]
+    if len(left):
+        values[left] = criterion.after_adding(matrix, information.take(left))
     return int(_best(values, criterion)[0])
 
 

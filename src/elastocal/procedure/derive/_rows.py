@@ -6,6 +6,7 @@ from the unloaded sensor, whichever it is.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -162,3 +163,33 @@ def _numbers(pair: _LoadAndReference, lever: FloatArray, tool: SensorLoad) -> Lo
         moment=wrench.moment,
         force_sigma=turned_sigma(tool.R_base_sensor(T), load.force.sigma, pair.tare.force.sigma),
     )
+
+
+class UnloadedReferences(NamedTuple):
+    """Where the displacements of each pose count from; NaN where that is not known."""
+
+    q: FloatArray
+    """Joints there, shape (pose, joint), in rad or m."""
+    force: FloatArray
+    """Force on the robot there, in base, shape (pose, 3), in N; 0 where it is not known."""
+    tcp: FloatArray
+    """Tcp without load, in base, shape (pose, 3), in m."""
+
+
+def unloaded_references(
+    poses: Sequence[PoseReadings], labels: Sequence[int], sensor: SensorLoad
+) -> UnloadedReferences:
+    """Return where the displacements of poses, given by their labels, count from."""
+    found = {
+        pose.pose: (pose.zero.tool, pose.reference.tool)
+        for pose in poses
+        if pose.zero and pose.zero.tool and pose.reference and pose.reference.tool
+    }
+    joints = max((len(zero.q) for zero, _ in found.values()), default=0)
+    q, force, tcp = (np.full((len(labels), width), np.nan) for width in (joints, 3, 3))
+    force[:] = 0.0
+    for pose, (zero, tare) in found.items():
+        index = labels.index(pose)
+        q[index], tcp[index] = zero.q, tare.T_base_tcp[:3, 3]
+        force[index] = wrench_on_robot(zero.wrench, tare.wrench, sensor).force
+    return UnloadedReferences(q, force, tcp)

@@ -17,19 +17,19 @@ An error of ``R_base_tracker`` by an angle turns the marker's displacement by it
 of each millimetre; the tracker's place does not enter at all.
 """
 
+import json
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 
 from elastocal.arrays import FloatArray
 from elastocal.cell import CONDITIONING, SENSOR_CORRECTED, Cell, SensorLoad
-from elastocal.dataset import STATUSES, Dataset, write
+from elastocal.dataset import MADE_FROM, STATUSES, Dataset, write
 from elastocal.errors import DatasetError, FileAccessError, ProcedureError, SchemaError
 from elastocal.planning import PlanResult
-from elastocal.procedure.derive._rows import LoadRow, load_rows
+from elastocal.procedure.derive._rows import LoadRow, load_rows, unloaded_references
 from elastocal.procedure.derive.findings import RunFindings, summarise
 from elastocal.procedure.derive.readings import (
     PoseReadings,
@@ -40,7 +40,7 @@ from elastocal.procedure.derive.readings import (
     tool_readings,
 )
 from elastocal.procedure.derive.summary import RunSummary
-from elastocal.procedure.derive.tool import estimate_tool, sensor_load, wrench_on_robot
+from elastocal.procedure.derive.tool import estimate_tool, sensor_load
 from elastocal.procedure.record import (
     Entry,
     PoseLog,
@@ -50,6 +50,7 @@ from elastocal.procedure.record import (
     Streams,
     check_stream,
     commits,
+    file_sha256,
     read_copies,
     read_journal,
     read_streams,
@@ -142,7 +143,7 @@ def read_run(run: Path) -> CommittedRun:
     return CommittedRun(folder, entries, record, cell, plan, poses, signs)
 
 
-def derive_run(run: Path, sensor: SensorLoad | None = None) -> DerivedRun:
+def derive_run(run: Path, sensor: SensorLoad | None = None, tool: Path | None = None) -> DerivedRun:
     """Return dataset and summary of the poses that a run has committed.
 
     Parameters
@@ -152,6 +153,9 @@ def derive_run(run: Path, sensor: SensorLoad | None = None) -> DerivedRun:
     sensor : SensorLoad, optional
         The tool on its sensor, with the matrix that corrects readings, from a tool file; by
         default the cell file's, and readings are taken as they are.
+    tool : Path, optional
+        That file; the dataset states its SHA-256 beside that of the journal, which holds those of
+        the streams.
 
     Raises
     ------
@@ -161,6 +165,8 @@ def derive_run(run: Path, sensor: SensorLoad | None = None) -> DerivedRun:
         If no reading is usable.
     """
     found = read_run(run)
+    files = [found.folder.journal, *([tool] if tool is not None else [])]
+    made_from = {file.name: file_sha256(file) for file in files}
     provenance = run_provenance(found.folder, found.record, sensor)
     try:
         derived = derive_poses(
@@ -169,7 +175,11 @@ def derive_run(run: Path, sensor: SensorLoad | None = None) -> DerivedRun:
     except (DatasetError, ProcedureError) as error:
         raise type(error)(f"{found.folder.path}: {error}") from error
     warnings = (*found.signs, *derived.summary.warnings)
-    return replace(derived, summary=replace(derived.summary, warnings=warnings))
+    attributes = {**derived.dataset.attributes, MADE_FROM: json.dumps(made_from)}
+    return DerivedRun(
+        replace(derived.dataset, attributes=attributes),
+        replace(derived.summary, warnings=warnings),
+    )
 
 
 def write_derived(run: Path, derived: DerivedRun) -> None:
@@ -342,7 +352,7 @@ def dataset_of(
         values = array(name)
         return values if np.all(values[ok] > 0) else None
 
-    zero = _zeros(poses, labels, sensor)
+    zero = unloaded_references(poses, labels, sensor)
     return Dataset.from_arrays(
         joint_position=array("q", len(robot.joint_names)),
         force=array("force"),
@@ -369,30 +379,3 @@ def dataset_of(
         check=[case for case in load_cases if case == arm.check],
         provenance=provenance,
     )
-
-
-class _Zeros(NamedTuple):
-    """Where the displacements of each pose count from; NaN where that is not known."""
-
-    q: FloatArray
-    """Joints there, shape (pose, joint), in rad or m."""
-    force: FloatArray
-    """Force on the robot there, in base, shape (pose, 3), in N; 0 where it is not known."""
-    tcp: FloatArray
-    """Tcp without load, in base, shape (pose, 3), in m."""
-
-
-def _zeros(poses: Sequence[PoseReadings], labels: Sequence[int], sensor: SensorLoad) -> _Zeros:
-    found = {
-        pose.pose: (pose.zero.tool, pose.reference.tool)
-        for pose in poses
-        if pose.zero and pose.zero.tool and pose.reference and pose.reference.tool
-    }
-    joints = max((len(zero.q) for zero, _ in found.values()), default=0)
-    q, force, tcp = (np.full((len(labels), width), np.nan) for width in (joints, 3, 3))
-    force[:] = 0.0
-    for pose, (zero, tare) in found.items():
-        index = labels.index(pose)
-        q[index], tcp[index] = zero.q, tare.T_base_tcp[:3, 3]
-        force[index] = wrench_on_robot(zero.wrench, tare.wrench, sensor).force
-    return _Zeros(q, force, tcp)

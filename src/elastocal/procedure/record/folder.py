@@ -56,6 +56,11 @@ class RunFolder:
         """The summary, derived."""
         return self.path / "summary.json"
 
+    @property
+    def signature(self) -> Path:
+        """The signature of the journal; there where somebody vouches for the run."""
+        return self.path / "signature.json"
+
     def stream(self, pose: int, attempt: int) -> Path:
         """Return the place of the raw streams of an attempt at a pose.
 

@@ -111,6 +111,11 @@ class RunRecord(StrictModel):
     """Seed of simulated devices."""
     started: str
     """Date and time of day, ISO 8601, UTC."""
+    cell_sha256: str | None = None
+    """SHA-256 of the cell file: the fingerprint leaves out by what a result is judged. None in
+    journals before it was written."""
+    signer: str | None = None
+    """Public key of who signs it; None: nobody does."""
 
     @property
     def origin(self) -> str:

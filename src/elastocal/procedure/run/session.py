@@ -12,7 +12,7 @@ from enum import Enum
 from elastocal import __version__
 from elastocal.cell import Cell, fingerprint
 from elastocal.errors import ProcedureError
-from elastocal.files import sha256
+from elastocal.files import read_text, sha256
 from elastocal.planning import PlanResult
 from elastocal.procedure.record import (
     Action,
@@ -169,7 +169,13 @@ def last_known(entries: tuple[Entry, ...]) -> LastKnown:
 
 
 def run_record(
-    cell: Cell, plan: PlanResult, plan_text: str, cell_file: str, seed: int, started: str
+    cell: Cell,
+    plan: PlanResult,
+    plan_text: str,
+    cell_file: str,
+    seed: int,
+    started: str,
+    signer: str | None = None,
 ) -> RunRecord:
     """Return the record by which a run is known again.
 
@@ -192,6 +198,8 @@ def run_record(
         cell_file=cell_file,
         seed=seed,
         started=started,
+        cell_sha256=sha256(read_text(cell.path)),
+        signer=signer,
     )
 
 
@@ -207,6 +215,7 @@ def check_same_run(record: RunRecord, wanted: RunRecord, where: str) -> None:
         "plan": "give the plan that it was begun with",
         "cell": "set the cell file back, which is in its folder cell",
         "seed": f"give --seed {record.seed}",
+        "signer": "give --sign with its key" if record.signer else "leave --sign out",
     }
     for key, remedy in remedies.items():
         found, asked = getattr(record, key), getattr(wanted, key)

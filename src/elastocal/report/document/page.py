@@ -1,8 +1,10 @@
 """The whole document: verdict, contents, sections, a place to sign."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
+
+from markupsafe import Markup
 
 from elastocal import __version__
 from elastocal.files import write_text
@@ -10,7 +12,15 @@ from elastocal.identification import UnseenErrors
 from elastocal.report.document import sections as exported
 from elastocal.report.document.blocks import Block, Facts, Paragraph, Section
 from elastocal.report.pages import render
-from elastocal.verdict import Evidence, Verdict, judge_evidence
+from elastocal.verdict import (
+    EMPTY_MANIFEST,
+    Evidence,
+    Signature,
+    Verdict,
+    embed_manifest,
+    judge_evidence,
+    manifest_of,
+)
 from elastocal.wording import mm
 
 _EXPORTED = (getattr(exported, name) for name in dir(exported))
@@ -28,7 +38,9 @@ class WrittenReport:
     verdict: Verdict
 
 
-def write_report(path: Path, evidence: Evidence) -> WrittenReport:
+def write_report(
+    path: Path, evidence: Evidence, sign: Callable[[str], Signature] | None = None
+) -> WrittenReport:
     """Write the report, atomically.
 
     Parameters
@@ -37,6 +49,8 @@ def write_report(path: Path, evidence: Evidence) -> WrittenReport:
         An HTML file.
     evidence : Evidence
         Whatever is there.
+    sign : callable, optional
+        Returns the signature of a hash, here of the manifest; by default there is none.
 
     Raises
     ------
@@ -59,8 +73,10 @@ def write_report(path: Path, evidence: Evidence) -> WrittenReport:
         version=__version__,
         verdict=verdict,
         blocks=tuple(_accuracy(evidence, verdict)),
+        empty_manifest=Markup(EMPTY_MANIFEST),
     )
-    write_text(path, page)
+    manifest = manifest_of(page, evidence, verdict, __version__, sign)
+    write_text(path, embed_manifest(page, manifest))
     return WrittenReport(Path(path), verdict)
 
 

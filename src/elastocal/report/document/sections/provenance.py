@@ -20,6 +20,7 @@ def _provenance(evidence: Evidence) -> Iterator[blocks.Block]:
     yield blocks.Table(
         "Seeds and fingerprints", ("What", "Value"), tuple(_seeds(evidence)), texts=2
     )
+    yield from _chain(evidence)
     yield from _files(evidence)
     yield from _settings(evidence)
     if evidence.cell_text is not None:
@@ -77,6 +78,14 @@ def _seeds(evidence: Evidence) -> Iterator[blocks.Row]:
         yield "Seeds of the process", ", ".join(str(run.seed) for run in runs)
     if evidence.calibrated is not None:
         yield "SHA-256 of the robot's URDF", evidence.calibrated.urdf_sha256
+
+
+def _chain(evidence: Evidence) -> Iterator[blocks.Block]:
+    if not evidence.chain:
+        return
+    rows = tuple((link.name, link.state.value, link.text) for link in evidence.chain)
+    yield blocks.Heading("From the streams to this report")
+    yield blocks.Table("Links", ("Link", "State", "Found"), rows, texts=3)
 
 
 def _files(evidence: Evidence) -> Iterator[blocks.Block]:

@@ -1,0 +1,144 @@
+"""Sums of springs that a reader can take in: a sparse basis of a subspace, and its text.
+
+Combinations are written in a readable basis of the null space: few springs a vector, springs of
+near joints together. Every vector of a subspace with the fewest possible non-zeros vanishes on
+``k - 1`` independent coordinates (``k`` the dimension), so the sparsest vectors are found by trying
+those sets of coordinates; the greedy choice among them, sparsest first, is optimal because linear
+independence is a matroid (Coleman and Pothen, "The null space problem I", SIAM J. Alg. Disc.
+Meth. 7, 1986).
+"""
+
+from collections.abc import Iterator, Sequence
+from itertools import combinations
+from math import comb
+
+import numpy as np
+
+from elastocal.arrays import FloatArray, IndexArray
+from elastocal.records import record
+
+_ZERO = 1e-6
+"""Components below this part of the largest count as zero."""
+_MOST_SETS = 20_000
+"""Largest number of coordinate sets to try; beyond it elimination gives a sparse enough basis."""
+_MOST_TERMS = 6
+
+
+@record()
+class Term:
+    """One spring (or parameter of one) in an unobservable combination."""
+
+    spring: str
+    weight: float
+
+
+def sparse_basis(null_space: FloatArray, joints: Sequence[int]) -> FloatArray:
+    """Return a sparse basis of the column space of ``null_space``.
+
+    Parameters
+    ----------
+    null_space : ndarray, shape (spring, k)
+        Orthonormal columns.
+    joints : sequence of int
+        Joint number of each spring; among equally sparse vectors those that touch fewer
+        joints come first, so that a reader sees neighbours.
+
+    Returns
+    -------
+    ndarray, shape (k, spring)
+        A vector a row; largest component 1 in size, positive at the first joint it touches.
+    """
+    n, k = null_space.shape
+    if k == 0:
+        return np.zeros((0, n))
+    involved = np.flatnonzero(np.abs(null_space).max(axis=1) > _ZERO)
+    if comb(len(involved), k - 1) > _MOST_SETS:
+        candidates = list(_eliminated(null_space))
+    else:
+        candidates = list(_circuits(null_space, involved))
+    candidates.sort(key=lambda vector: _complexity(vector, joints))
+    return np.array([_oriented(vector, joints) for vector in _independent(candidates, k)])
+
+
+def _circuits(null_space: FloatArray, involved: IndexArray) -> Iterator[FloatArray]:
+    """Yield the vectors that vanish on each set of ``k - 1`` coordinates."""
+    k = null_space.shape[1]
+    sets = np.array(list(combinations(involved, k - 1)), dtype=np.intp).reshape(
+        comb(len(involved), k - 1), k - 1
+    )
+    _, s, Vt = np.linalg.svd(null_space[sets], full_matrices=True)
+    unique = s[:, -1] > _ZERO if k > 1 else np.ones(len(sets), dtype=bool)
+    seen: set[tuple[float, ...]] = set()
+    for coefficients in Vt[unique, -1]:
+        vector = _normalised(null_space @ coefficients)
+        key = tuple(np.round(vector, 4))
+        if key not in seen:
+            seen.add(key)
+            yield vector
+
+
+def _eliminated(null_space: FloatArray) -> Iterator[FloatArray]:
+    """Yield a basis by Gauss-Jordan elimination with full pivoting."""
+    work = null_space.T.copy()
+    for row in range(len(work)):
+        below, column = divmod(int(np.abs(work[row:]).argmax()), work.shape[1])
+        work[[row, row + below]] = work[[row + below, row]]
+        work[row] /= work[row, column]
+        others = np.arange(len(work)) != row
+        work[others] -= np.outer(work[others, column], work[row])
+    yield from (_normalised(vector) for vector in work)
+
+
+def _normalised(vector: FloatArray) -> FloatArray:
+    vector = vector / np.abs(vector).max()
+    vector[np.abs(vector) <= _ZERO] = 0.0
+    rounded = np.round(vector * 2.0) / 2.0
+    vector = np.where(np.abs(vector - rounded) < _ZERO, rounded, vector)
+    return np.asarray(vector * np.sign(vector[np.flatnonzero(vector)[0]]))
+
+
+def _oriented(vector: FloatArray, joints: Sequence[int]) -> FloatArray:
+    first = min(map(int, np.flatnonzero(vector)), key=lambda i: (joints[i], i))
+    return np.asarray(vector * np.sign(vector[first]))
+
+
+def _complexity(vector: FloatArray, joints: Sequence[int]) -> tuple[int, int, tuple[int, ...]]:
+    support = [int(i) for i in np.flatnonzero(vector)]
+    return len(support), len({joints[i] for i in support}), tuple(support)
+
+
+def _independent(candidates: Sequence[FloatArray], k: int) -> list[FloatArray]:
+    """Take candidates in order as long as each adds a dimension."""
+    chosen: list[FloatArray] = []
+    for vector in candidates:
+        trial = np.array([*chosen, vector])
+        scaled = trial / np.linalg.norm(trial, axis=1, keepdims=True)
+        if np.linalg.svd(scaled, compute_uv=False)[-1] > _ZERO:
+            chosen.append(vector)
+        if len(chosen) == k:
+            break
+    return chosen
+
+
+def describe(group: Sequence[Term]) -> str:
+    """Return an unobservable combination as a person would write it.
+
+    >>> describe([Term("a4.y", 1.0), Term("a4.z", 1.0), Term("a5.axial", -1.0)])
+    '(a4.y + a4.z) - a5.axial'
+    """
+    sides = (
+        [_written(term) for term in group if term.weight > 0],
+        [_written(term) for term in group if term.weight < 0],
+    )
+    written = [f"({' + '.join(side)})" if len(side) > 1 else side[0] for side in sides if side]
+    return " - ".join(written)
+
+
+def describe_briefly(group: Sequence[Term]) -> str:
+    """Return an unobservable combination for a line of text, a long one by its size."""
+    return describe(group) if len(group) <= _MOST_TERMS else f"{len(group)} springs mixed"
+
+
+def _written(term: Term) -> str:
+    size = abs(term.weight)
+    return term.spring if size == 1.0 else f"{size:.3g} {term.spring}"

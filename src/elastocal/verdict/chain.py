@@ -1,0 +1,372 @@
+"""The chain from the raw streams to the verdict, each link held against the one before it.
+
+Streams, cell and plan are held against the hashes of the journal. Dataset and summary are made
+again from the streams: a hash beside them could be renewed by whoever edits them. Model, codec
+and process state by hash what they were made from, and the hash of what they say themselves.
+"""
+
+from collections.abc import Callable, Collection, Iterator, Mapping
+from dataclasses import dataclass
+from enum import Enum
+from pathlib import Path
+
+import numpy as np
+
+from elastocal.cell import SENSOR_CORRECTED, SensorLoad
+from elastocal.compensation.conditioning import read_sensor_load
+from elastocal.dataset import Dataset, content_sha256, read_made_from
+from elastocal.errors import ElastocalError, SchemaError
+from elastocal.files import read_text, sha256
+from elastocal.procedure import (
+    JOURNAL,
+    DerivedRun,
+    RunFolder,
+    RunRecord,
+    derive_run,
+    file_sha256,
+    read_copies,
+)
+from elastocal.procedure.record import check_stream
+from elastocal.records import record, to_data
+from elastocal.verdict.evidence import Evidence, Seal
+from elastocal.verdict.signing import OF_RUN, check_signature, read_signature
+from elastocal.wording import capped, counted
+
+_SAME = 1e-4
+"""Difference, by the largest number of its kind, below which two derivations are one: versions and
+machines round differently, and what is smaller changes no verdict."""
+_OLD = "made before files stated it"
+_ADVICE = "; `elastocal derive` makes it again"
+
+
+class LinkState(Enum):
+    """How a link was found."""
+
+    WHOLE = "whole"
+    BROKEN = "broken"
+    """It costs the green light."""
+    UNSTATED = "not verifiable"
+    """Nothing contradicts it, and nothing proves it: files made before hashes were stated."""
+    UNSIGNED = "not signed"
+    """Nobody vouches for it; hashes alone can be renewed by whoever edits a file."""
+
+
+@record()
+class Link:
+    """A file, or a kind of files, held against what it was made from."""
+
+    name: str
+    state: LinkState
+    text: str
+    """A sentence without its full stop."""
+
+
+@dataclass(frozen=True)
+class ChainFiles:
+    """Where the parts lie that are made again."""
+
+    run: RunFolder | None
+    tool: Path | None
+    """The tool file that a dataset may have been derived with."""
+    plain: Callable[[ElastocalError], str]
+    """Returns a reason without the folder that the run happens to lie in."""
+    signer: str | None = None
+    """Public key that must have signed the run; None: the one that its journal states."""
+
+
+def verify_chain(evidence: Evidence, files: ChainFiles) -> tuple[Link, ...]:
+    """Return every link that the parts at hand have, from the streams to the process.
+
+    Parameters
+    ----------
+    evidence : Evidence
+        All parts.
+    files : ChainFiles
+        Where they lie.
+    """
+    links = [*_seals(evidence)]
+    if files.run is not None and evidence.run_record is not None:
+        links += [_signed(files.run, evidence.run_record, files), *_recorded(evidence, files)]
+        broken = {link.text for link in links}
+        links += _derived(evidence, files, broken)
+    links += [*_model(evidence), *_codecs(evidence), *_process(evidence)]
+    return tuple(links)
+
+
+def _whole(name: str, text: str) -> Link:
+    return Link(name, LinkState.WHOLE, text)
+
+
+def _broken(name: str, text: str) -> Link:
+    return Link(name, LinkState.BROKEN, text)
+
+
+def _made_from(evidence: Evidence) -> Mapping[str, str]:
+    """Return what the dataset states that it was made from; nothing for one of before."""
+    return {} if evidence.dataset is None else read_made_from(evidence.dataset.attributes)
+
+
+def _is_old(evidence: Evidence) -> bool:
+    """Return whether no part states a hash: then none was taken out, all are from before them."""
+    stated = (
+        _made_from(evidence),
+        evidence.calibrated is not None and evidence.calibrated.made_from,
+        *(codec.data.made_from for codec in evidence.codecs),
+        *(file.seal in (Seal.WHOLE, Seal.BROKEN) for file in evidence.files),
+    )
+    return not any(stated)
+
+
+def _unstated(evidence: Evidence, name: str, text: str) -> Link:
+    """Return a link without a statement, which only files from before hashes may lack."""
+    if _is_old(evidence):
+        return Link(name, LinkState.UNSTATED, f"{text} ({_OLD})")
+    return _broken(name, f"{text}, although other parts state theirs: make it again")
+
+
+def _seals(evidence: Evidence) -> Iterator[Link]:
+    """Yield the files whose content is not the one that they state."""
+    for file in evidence.files:
+        if file.seal is Seal.BROKEN:
+            yield _broken(
+                file.name,
+                f"{file.name} was changed after it was written: its content does not have the"
+                " SHA-256 that it states",
+            )
+    if silent := [file.name for file in evidence.files if file.seal is Seal.ABSENT]:
+        more = f" and {counted(len(silent) - 1, 'other file')}" if silent[1:] else ""
+        verb = "do" if more else "does"
+        text = f"{silent[0]}{more} {verb} not state the SHA-256 of their content"
+        yield _unstated(evidence, "content", text)
+
+
+def _signed(run: RunFolder, record: RunRecord, files: ChainFiles) -> Link:
+    """Return who vouches for the journal, which names all that was recorded."""
+    place, trusted = run.signature, files.signer or record.signer
+    if not place.exists():
+        if trusted is None:
+            text = "the run is not signed: whoever edits its record can renew the hashes"
+            return Link("signature", LinkState.UNSIGNED, text)
+        return _broken("signature", f"the run should be signed, and there is no {place.name}")
+    try:
+        found = read_signature(place)
+        check_signature(found, OF_RUN, file_sha256(run.journal), trusted)
+    except ElastocalError as error:
+        return _broken("signature", files.plain(error))
+    return _whole("signature", f"the journal is signed by key {found.signer}")
+
+
+def _recorded(evidence: Evidence, files: ChainFiles) -> Iterator[Link]:
+    """Yield cell, plan, streams and the journal itself."""
+    run, record, entries = files.run, evidence.run_record, evidence.journal
+    assert run is not None
+    assert record is not None
+    assert entries is not None
+    try:
+        cell, _ = read_copies(run, record)
+        # The fingerprint leaves out the tolerance, by which the light is given.
+        if record.cell_sha256 in (None, sha256(read_text(cell.path))):
+            yield _whole("cell and plan", "cell and plan are those that the run began with")
+        else:
+            text = f"cell/{record.cell_file} was changed after the run began"
+            yield _broken("cell and plan", text)
+    except ElastocalError as error:
+        yield _broken("cell and plan", files.plain(error))
+    known = {e.log.streams: e.streams_sha256 for e in entries if e.log is not None}
+    wrong = []
+    for name, stated_hash in known.items():
+        try:
+            check_stream(run.streams / name, stated_hash)
+        except ElastocalError as error:
+            wrong.append(files.plain(error))
+    if wrong:
+        yield from (_broken("streams", text) for text in capped(wrong))
+    else:
+        found = counted(len(known), "recording")
+        yield _whole("streams", f"{found}: those that the journal names, by their SHA-256")
+    stated = _made_from(evidence).get(JOURNAL)
+    if evidence.dataset is None:
+        return
+    if stated is None:
+        text = "the dataset does not state which journal it was derived from"
+        yield _unstated(evidence, "journal", text)
+    elif stated == file_sha256(run.journal):
+        yield _whole("journal", "the journal is the one that the dataset was derived from")
+    else:
+        yield _broken("journal", f"{JOURNAL} was changed after the dataset was derived from it")
+
+
+def _derived(evidence: Evidence, files: ChainFiles, told: Collection[str]) -> Iterator[Link]:
+    """Yield dataset and summary, made again from the streams; what was told is not told again."""
+    dataset, summary = evidence.dataset, evidence.summary
+    if dataset is None:
+        return
+    old = _is_old(evidence)
+    try:
+        again = _derive(evidence, dataset, files)
+    except ElastocalError as error:
+        text, reason = "the dataset cannot be made again from the streams", files.plain(error)
+        again_told = Link("dataset", LinkState.UNSTATED, f"{text}, see above")
+        yield again_told if reason in told else _broken("dataset", f"{text}: {reason}")
+        return
+    text = "the dataset is not what the streams give"
+    if difference := _difference(dataset, again.dataset, old):
+        yield _broken("dataset", f"{text}: {difference}{_ADVICE}")
+    elif difference := _other_texts(dataset, again.dataset):
+        yield _unlike(old, "dataset", f"{text}: {difference}")
+    else:
+        yield _whole("dataset", "the dataset is what the streams give, made again from them")
+    if summary is None:
+        return
+    if place := _changed_place(to_data(summary), to_data(again.summary)):
+        text = f"the summary of the run is not what the streams give: {place} differs"
+        yield _unlike(old, "summary", text)
+    else:
+        yield _whole("summary", "the summary of the run is what the streams give")
+
+
+def _unlike(old: bool, name: str, text: str) -> Link:
+    """Return what differs beside the readings: an earlier version said other things about them."""
+    if old:
+        return Link(name, LinkState.UNSTATED, f"{text} ({_OLD}, by another version){_ADVICE}")
+    return _broken(name, f"{text}{_ADVICE}")
+
+
+def _derive(evidence: Evidence, dataset: Dataset, files: ChainFiles) -> DerivedRun:
+    assert files.run is not None
+    return derive_run(files.run.path, _sensor(evidence, dataset, files))
+
+
+def _sensor(evidence: Evidence, dataset: Dataset, files: ChainFiles) -> SensorLoad | None:
+    """Return the tool that a dataset was derived with; None where it was derived without."""
+    if SENSOR_CORRECTED not in dataset.provenance:
+        return None
+    stated = {name: sha for name, sha in _made_from(evidence).items() if name != JOURNAL}
+    at_hand = None if files.tool is None else file_sha256(files.tool)
+    if at_hand is None or (stated and at_hand not in stated.values()):
+        name = next(iter(stated), "a tool file")
+        raise SchemaError(f"it was derived with {name}, which is not here as it was then")
+    assert evidence.cell is not None
+    return read_sensor_load(files.tool, evidence.cell.robot)
+
+
+def _other_texts(stated: Dataset, found: Dataset) -> str:
+    """Return which text of a dataset is not that of the one made again; empty where none is."""
+    told = ("robot_name", "robot_urdf", "tcp_frame", "marker", "gravity", "history", "check")
+    for name in told:
+        if stated.attributes.get(name) != found.attributes.get(name):
+            return f"its attribute {name} is another"
+    return ""
+
+
+def _difference(stated: Dataset, found: Dataset, old: bool) -> str:
+    """Return how readings differ from those made again; empty where they do not.
+
+    What a dataset of before does not have at all is no difference.
+    """
+    if content_sha256(stated) == content_sha256(found):
+        return ""
+    for name in ("poses", "load_cases", "joint_names", "joint_units", "campaigns"):
+        if getattr(stated, name) != getattr(found, name):
+            return f"its {name.replace('_', ' ')} are others"
+    mine, again = stated.to_labelled(), found.to_labelled()
+    for name, array in again.variables.items():
+        if array.values.dtype.kind not in "iuf" or (name not in mine and old):
+            continue
+        if name not in mine:
+            return f"it has no {name}"
+        unit = str(array.attributes.get("units", ""))
+        if text := _largest_difference(stated, mine[name].values, array.values, unit):
+            return f"{name} {text}"
+    added = sorted(mine.variables.keys() - again.variables.keys())
+    return f"it has {added[0]}, which the streams do not give" if added else ""
+
+
+def _largest_difference(dataset: Dataset, stated: np.ndarray, found: np.ndarray, unit: str) -> str:
+    """Return the place where two arrays differ most, with both numbers; empty where they agree."""
+    a, b = np.asarray(stated, dtype=float), np.asarray(found, dtype=float)
+    size = float(np.nanmax(np.abs(b), initial=0.0))
+    gap = np.where(np.isnan(a) & np.isnan(b), 0.0, np.abs(a - b))
+    gap = np.where(np.isnan(gap), np.inf, gap)
+    if not np.any(gap > _SAME * size):
+        return ""
+    place = np.unravel_index(int(np.argmax(gap)), gap.shape)
+    pose = f"of pose {dataset.poses[place[0]]}" if place else ""
+    case = f" {dataset.load_cases[place[1]]}" if dataset.status.shape == gap.shape[:2] else ""
+    return f"{pose}{case} is {a[place]:.6g} {unit}, the streams give {b[place]:.6g} {unit}"
+
+
+def _changed_place(stated: object, found: object, place: str = "") -> str:
+    """Return the path of the first entry in which two JSON-ready records differ."""
+    if isinstance(stated, dict) and isinstance(found, dict) and stated.keys() == found.keys():
+        inner = [(f"{place}.{key}".lstrip("."), stated[key], found[key]) for key in stated]
+        # Which version derived it is no finding.
+        pairs = [each for each in inner if each[0] != "elastocal"]
+    elif isinstance(stated, list) and isinstance(found, list) and len(stated) == len(found):
+        pairs = [(f"{place}.{n}", a, b) for n, (a, b) in enumerate(zip(stated, found, strict=True))]
+    else:
+        return "" if stated == found or _is_close(stated, found) else place
+    return next((text for key, a, b in pairs if (text := _changed_place(a, b, key))), "")
+
+
+def _is_close(a: object, b: object) -> bool:
+    if not (isinstance(a, int | float) and isinstance(b, int | float)):
+        return False
+    # A thousandth: standard deviations of what is hardly determined round most.
+    return abs(a - b) <= max(10.0 * _SAME * abs(b), 1e-12)
+
+
+def _model(evidence: Evidence) -> Iterator[Link]:
+    if evidence.calibrated is None or evidence.dataset is None:
+        return
+    stated = evidence.calibrated.made_from
+    if not stated:
+        yield _unstated(evidence, "model", "the model does not state which dataset it is made from")
+    elif content_sha256(evidence.dataset) not in stated.values():
+        yield _broken(
+            "model", f"the model was made from another dataset ({', '.join(stated)}) than this one"
+        )
+    elif len(stated) > 1:
+        others = f"the model was made from {len(stated)} datasets, of which only one is here"
+        yield Link("model", LinkState.UNSTATED, others)
+    else:
+        yield _whole("model", "the model was made from this dataset")
+
+
+def _codecs(evidence: Evidence) -> Iterator[Link]:
+    for codec in evidence.codecs if evidence.dataset is not None else ():
+        stated, name = codec.data.made_from, codec.name or "codec"
+        if not stated:
+            text = f"{name} does not state which dataset it is made from"
+            yield _unstated(evidence, "codec", text)
+        elif content_sha256(evidence.dataset) not in stated.values():  # type: ignore[arg-type]
+            yield _broken(
+                "codec", f"{name} was made from another dataset ({', '.join(stated)}) than this one"
+            )
+        else:
+            yield _whole("codec", f"{name} was made from this dataset")
+
+
+def _process(evidence: Evidence) -> Iterator[Link]:
+    if evidence.process is None or evidence.calibrated is None:
+        return
+    runs = evidence.process.table.runs
+    own = [run for run in runs if run.model_sha256 == evidence.calibrated.sha256]
+    tools = {run.tool_sha256 for run in own}
+    if not own:
+        text = "the process was run with another model than the one of this report"
+        yield _broken("process", text)
+    elif tools - {None} and evidence.tool_sha256 is None:
+        yield _broken("process", "the process was run with a tool file that is not here")
+    elif evidence.tool_sha256 not in tools:
+        text = "the process was run with another tool file than the one of this report"
+        yield _broken("process", text)
+    else:
+        yield _whole("process", "the process was run with this model and this tool file")
+    record = evidence.run_record
+    if own and evidence.simulated and record and record.seed not in {run.seed for run in own}:
+        yield _broken(
+            "process",
+            f"the process was run on the simulated cell of seed {own[0].seed}, the run on that of"
+            f" seed {record.seed}",
+        )

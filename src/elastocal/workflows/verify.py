@@ -1,0 +1,166 @@
+"""``verify``: is a run, or a report, what it was when it was made; who vouches for it."""
+
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from os import PathLike
+from pathlib import Path
+
+from elastocal.errors import ElastocalError, FileAccessError, VerificationError
+from elastocal.procedure import JOURNAL
+from elastocal.progress import Progress
+from elastocal.results import Result
+from elastocal.verdict import (
+    OF_REPORT,
+    EvidenceOptions,
+    Link,
+    LinkState,
+    Manifest,
+    check_signature,
+    file_links,
+    gather_evidence,
+    read_manifest,
+    read_public_key,
+)
+from elastocal.workflows._workflow import workflow
+
+_OF_A_RUN = ("run", "journal", "cell", "plan", "dataset", "summary of the run")
+"""Parts that a run has, whatever was made from it; without one nothing is verified."""
+
+
+@dataclass(frozen=True)
+class VerifySettings:
+    """What to verify, and by whom it should be signed."""
+
+    file: str | PathLike[str]
+    """A report, or the folder of a run, or a folder that holds one."""
+    key: Path | None = None
+    """Public key that must have signed it; by default none need have."""
+    run: Path | None = None
+    """Folder of the run that a report shows; by default the report's own."""
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class VerifyResult(Result):
+    """Every link of the chain, and how it was found."""
+
+    file: str
+    links: tuple[Link, ...]
+
+    @property
+    def broken(self) -> Link | None:
+        """The first link that is broken; None where none is."""
+        return next((link for link in self.links if link.state is LinkState.BROKEN), None)
+
+    def facts(self) -> tuple[tuple[str, str], ...]:
+        """Return what a person wants to know first."""
+        return tuple((link.name, f"{link.state.value}: {link.text}") for link in self.links)
+
+    def require_whole(self) -> None:
+        """Refuse what is broken.
+
+        Raises
+        ------
+        VerificationError
+            With the first broken link.
+        """
+        if self.broken is not None:
+            raise VerificationError(f"{self.file}: {self.broken.text}")
+
+
+@workflow(VerifySettings)
+def verify(settings: VerifySettings, progress: Progress) -> VerifyResult:  # noqa: ARG001 - seconds
+    """Verify the chain of a run from its streams to its model, or a report with what it shows.
+
+    Parameters
+    ----------
+    settings : VerifySettings
+        Or its ``file``, and the other fields by name.
+    progress : Progress, optional
+        Called with stage, done and total.
+
+    Raises
+    ------
+    FileAccessError
+        If there is nothing of ours.
+    SchemaError
+        If the page is no report, or one made before reports could be verified.
+    VerificationError
+        If the key cannot be read.
+    """
+    target = Path(settings.file)
+    trusted = None if settings.key is None else read_public_key(settings.key)
+    if target.is_file() and target.suffix.lower() in (".html", ".htm"):
+        return VerifyResult(str(target), (*_report(target, settings.run, trusted),))
+    if not target.exists():
+        raise FileAccessError(f"cannot read {target}: there is no such file or folder")
+    if not target.is_dir():
+        raise FileAccessError(f"{target} is neither a report (.html) nor the folder of a run")
+    if settings.run is not None:
+        raise FileAccessError(f"--run {settings.run}: it says where the run of a report lies")
+    return VerifyResult(str(target), (*_run(target, trusted, required=settings.key is not None),))
+
+
+def _report(path: Path, run: Path | None, trusted: str | None) -> list[Link]:
+    """Return the links of a report: page, signature, files, and those of the run beside it."""
+    manifest, page = read_manifest(path)
+    if page == manifest.page_sha256:
+        text = f"the page is the one that was written: {_light(manifest)}"
+        links = [Link("page", LinkState.WHOLE, text)]
+    else:
+        text = "the page was edited after it was written: its SHA-256 is not that of its manifest"
+        links = [Link("page", LinkState.BROKEN, text)]
+    links.append(_signature(manifest, trusted))
+    folder = path.parent if run is None else run
+    folders = tuple(dict.fromkeys((folder, folder.resolve().parent))) if run else (folder,)
+    files = file_links(manifest, folders)
+    links += files
+    if manifest.chain and _holds_run(folder):
+        links += _run(folder, None)
+    return links
+
+
+def _holds_run(folder: Path) -> bool:
+    return any((folder / place).is_file() for place in (JOURNAL, f"run/{JOURNAL}"))
+
+
+def _light(manifest: Manifest) -> str:
+    return f"{manifest.verdict} ({manifest.light} light)" if manifest.light else manifest.verdict
+
+
+def _signature(manifest: Manifest, trusted: str | None) -> Link:
+    if manifest.signature is None:
+        state = LinkState.UNSIGNED if trusted is None else LinkState.BROKEN
+        return Link("signature", state, "the report is not signed: whoever edits it can renew it")
+    try:
+        check_signature(manifest.signature, OF_REPORT, manifest.sha256, trusted)
+    except VerificationError as error:
+        return Link("signature", LinkState.BROKEN, str(error))
+    signer = f"the report is signed by key {manifest.signature.signer}"
+    text = signer if trusted else f"{signer}; give --key to hold it against one that you trust"
+    return Link("signature", LinkState.WHOLE, text)
+
+
+def _run(folder: Path, trusted: str | None, *, required: bool = False) -> list[Link]:
+    """Return the links of a run, with every part that is damaged and every doubt about it."""
+    made = datetime.now(UTC).isoformat(timespec="seconds")
+    try:
+        evidence = gather_evidence(EvidenceOptions(folder, signer=trusted), made)
+    except ElastocalError as error:
+        return [Link("run", LinkState.BROKEN, str(error))]
+    links = [
+        Link(
+            each.name,
+            LinkState.BROKEN,
+            f"the {each.name} {'cannot be used' if each.damaged else 'is missing'}: {each.reason}",
+        )
+        for each in evidence.missing
+        if each.damaged or each.name in _OF_A_RUN
+    ]
+    links += evidence.chain
+    told = {link.text for link in links}
+    links += [
+        Link("whole run", LinkState.BROKEN, text) for text in evidence.doubts if text not in told
+    ]
+    if required and not any(link.name == "signature" for link in links):
+        links.append(Link("signature", LinkState.BROKEN, "there is no run that could be signed"))
+    return links

@@ -1,0 +1,35 @@
+"""Names of other people's files reach a terminal as text, never as commands to it."""
+
+import io
+import json
+
+import pytest
+
+from elastocal.cli import bold, console
+from elastocal.cli.commands.demo import _log_console
+from support.cli import elastocal
+
+WICKED = "a\x1b[2J\x1b]0;title\x07b\x9b31m\u202e"
+
+
+@pytest.mark.parametrize("terminal", [False, True])
+def test_a_console_shows_the_codes_of_others_as_they_are_typed(terminal):
+    shown = io.StringIO()
+    screen = console(file=shown, stderr=False, force_terminal=terminal, width=60)
+    screen.print(bold(WICKED))
+    assert r"a\x1b[2J\x1b]0;title\x07b\x9b31m\u202e" in shown.getvalue()
+    assert shown.getvalue().count("\x1b") == (2 if terminal else 0)  # bold, and its end
+
+
+def test_so_does_the_log_of_a_demo():
+    shown = io.StringIO()
+    _log_console(shown).print(WICKED, markup=False)
+    assert "\x1b" not in shown.getvalue()
+
+
+def test_a_refusal_is_one_line_without_any(tmp_path):
+    path = tmp_path / f"{WICKED}.json"
+    path.write_text(json.dumps({"schema": f"elastocal.model/{WICKED}"}))
+    reason = elastocal("check", path).reason
+    assert reason.isprintable()
+    assert r"\x1b[2J" in reason

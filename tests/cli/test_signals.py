@@ -1,0 +1,57 @@
+"""A signal ends a short command, whenever it comes: by its own exit code, without a traceback."""
+
+import signal
+import subprocess
+import sys
+
+import pytest
+
+LATE = """
+import importlib.abc, os, signal, sys
+from elastocal.cli import main
+
+class Sends(importlib.abc.MetaPathFinder):
+    def find_spec(self, name, path, target=None):
+        if name == "{module}":
+            os.kill(os.getpid(), signal.{name})
+
+sys.meta_path.insert(0, Sends())
+main.run()
+"""
+EARLY = """
+import importlib.abc, os, signal, sys
+
+class Sends(importlib.abc.MetaPathFinder):
+    def find_spec(self, name, path, target=None):
+        if name == "typer":
+            os.kill(os.getpid(), signal.{name})
+
+sys.meta_path.insert(0, Sends())
+from elastocal.cli.main import run
+run()
+"""
+
+
+def _ended(code, *words):
+    command = [sys.executable, "-c", code, *words]
+    return subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
+
+
+@pytest.mark.parametrize("name", ["SIGINT", "SIGTERM"])
+@pytest.mark.parametrize(
+    ("words", "module"),
+    [(["--version"], "importlib.metadata"), (["--help"], "rich.panel"), (["robots"], "rich.table")],
+)
+def test_one_that_comes_during_the_last_import_is_not_swallowed(name, words, module):
+    """It is held back until the import has ended, by which time a short command has, too."""
+    ended = _ended(LATE.format(name=name, module=module), *words)
+    number = getattr(signal, name)
+    assert ended.returncode in (128 + number, -number)
+    assert "Traceback" not in ended.stderr
+
+
+@pytest.mark.parametrize("name", ["SIGINT", "SIGTERM"])
+def test_one_that_comes_while_the_command_line_is_imported_ends_it_at_once(name):
+    ended = _ended(EARLY.format(name=name), "--version")
+    assert ended.returncode == -getattr(signal, name)
+    assert (ended.stdout, ended.stderr) == ("", "")

@@ -1,0 +1,266 @@
+"""From the streams to the verdict: whatever is edited, damaged or taken away costs the green."""
+
+import hashlib
+import json
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from elastocal import dataset
+from elastocal.codec import read_codec, write_codec
+from elastocal.errors import ElastocalError
+from elastocal.records import read_arrays, write_arrays
+from elastocal.verdict import (
+    EvidenceOptions,
+    Light,
+    LinkState,
+    Seal,
+    find_everything,
+    gather_evidence,
+    judge,
+    missing_findings,
+    reading_findings,
+)
+from elastocal.verdict._files import read_seal
+from support.cli import elastocal
+from support.reported import MADE
+
+
+def gathered(folder):
+    return gather_evidence(EvidenceOptions(folder), MADE)
+
+
+def judged(evidence):
+    """Return the verdict but for the codec, which at seven poses has not saturated."""
+    findings = [
+        each for each in find_everything(evidence) if "codec does not show" not in each.text
+    ]
+    return judge(evidence, findings)
+
+
+def edit(path, change):
+    """Change a JSON file in place, as by hand: its hash stays what it was."""
+    record = json.loads(path.read_text())
+    change(record)
+    path.write_text(json.dumps(record))
+
+
+def scale_residuals(folder):
+    path = folder / "run" / "dataset.nc"
+    data = dataset.read(path).to_xarray().copy(deep=True)
+    controller = data["controller_displacement"].values
+    residual = data["marker_displacement"].values - controller
+    data["marker_displacement"] = data["marker_displacement"].copy(data=controller + 0.2 * residual)
+    dataset.write(dataset.Dataset.from_xarray(data), path)
+
+
+def flip_a_byte_of_a_stream(folder):
+    path = sorted((folder / "run" / "streams").iterdir())[2]
+    data = bytearray(path.read_bytes())
+    data[len(data) // 2] ^= 1
+    path.write_bytes(data)
+
+
+def edit_a_line_of_the_journal(folder):
+    path = folder / "run" / "journal.jsonl"
+    lines = path.read_text().splitlines(keepends=True)
+    record = json.loads(lines[-1])
+    lines[-1] = json.dumps(record | {"time": record["time"] + 1.0}) + "\n"
+    path.write_text("".join(lines))
+
+
+def raise_the_tolerance(folder):
+    path = folder / "run" / "cell" / "cell.yaml"
+    path.write_text(path.read_text().replace('tolerance: "0.3 mm"', 'tolerance: "3 mm"'))
+
+
+def drop_the_warnings(folder):
+    edit(folder / "run" / "summary.json", lambda record: record.update(warnings=["none"]))
+
+
+def edit_a_compliance(folder):
+    edit(folder / "model.json", lambda record: record["compliance"].__setitem__(0, 1e-9))
+
+
+def cut_the_table(folder):
+    path = folder / "process" / "table.json"
+    path.write_bytes(path.read_bytes()[:500])
+
+
+def edit_the_settings_of_the_process(folder):
+    edit(folder / "process" / "table.json", lambda record: record["settings"].update(gain=0.5))
+
+
+def take_the_hash_out_of_the_table(folder):
+    edit(folder / "process" / "table.json", lambda record: record.pop("content_sha256"))
+
+
+def swap_the_codec(folder):
+    data = read_codec(folder / "codec")
+    write_codec(folder / "codec", replace(data, made_from={"other.nc": "0" * 64}))
+
+
+def edit_the_verdicts_of_the_codec(folder):
+    edit(folder / "codec" / "codec.json", lambda record: record.update(sentences=["enough"]))
+
+
+def remove(*names):
+    def removing(folder):
+        for name in names:
+            path = folder / name
+            for inner in sorted(path.rglob("*"), reverse=True) if path.is_dir() else ():
+                inner.unlink()
+            path.rmdir() if path.is_dir() else path.unlink()
+
+    return removing
+
+
+BROKEN = {
+    "scaled residuals": (scale_residuals, "dataset is not what the streams give: marker_disp"),
+    "a byte of a stream": (flip_a_byte_of_a_stream, "pose_0002_1.mcap is not what the run wrote"),
+    "a stream is gone": (remove("run/streams/pose_0001_1.mcap"), "cannot read .*pose_0001_1.mcap"),
+    "all streams are gone": (remove("run/streams"), "cannot read .*pose_0000_1.mcap"),
+    "a line of the journal": (edit_a_line_of_the_journal, "journal.jsonl was changed after"),
+    "the tolerance": (raise_the_tolerance, "cell/cell.yaml was changed after the run began"),
+    "the run's warnings": (drop_the_warnings, "summary of the run is not .*: warnings differs"),
+    "a compliance": (edit_a_compliance, "model.json was changed after it was written"),
+    "half a table": (cut_the_table, "the process cannot be used: process/table.json"),
+    "a setting in the table": (edit_the_settings_of_the_process, "process/table.json was changed"),
+    "the table's hash": (take_the_hash_out_of_the_table, "table.json does not state the SHA-256"),
+    "no process": (remove("process"), "the process is missing"),
+    "no tool": (remove("tool.json"), "run with a tool file that is not here"),
+    "another codec": (swap_the_codec, "codec was made from another dataset .other.nc."),
+    "a verdict of the codec": (edit_the_verdicts_of_the_codec, "codec/codec.json was changed"),
+    "no codec": (remove("codec"), "whether there were enough poses was not verified"),
+}
+
+
+def test_a_whole_chain_is_green(parts):
+    assert {link.state for link in parts.chain} == {LinkState.WHOLE, LinkState.UNSIGNED}
+    assert [link.name for link in parts.chain] == [
+        *("signature", "cell and plan", "streams", "journal", "dataset", "summary"),
+        *("model", "codec", "process"),
+    ]
+    assert judged(parts).light is Light.GREEN
+
+
+@pytest.mark.parametrize("name", BROKEN)
+def test_what_is_broken_is_named_and_costs_the_green(copied, name):
+    folder = copied()
+    damage, told = BROKEN[name]
+    damage(folder)
+    verdict = judged(gathered(folder))
+    assert verdict.light is Light.YELLOW
+    reasons = [reason for reason in verdict.reasons if re.search(told, reason)]
+    assert len(reasons) == 1, verdict.reasons
+    assert str(folder) not in reasons[0]
+
+
+def strip(folder):
+    """Make every file one of before hashes were stated."""
+    path = folder / "run" / "dataset.nc"
+    data = dataset.read(path)
+    attributes = {name: text for name, text in data.attributes.items() if name != "made_from"}
+    dataset.write(replace(data, attributes=attributes), path)
+    for name in ("model.json", "tool.json", "process/table.json", "codec/codec.json"):
+        edit(
+            folder / name, lambda record: (record.pop("content_sha256"), record.pop("made_from", 0))
+        )
+    arrays = read_arrays(folder / "codec" / "codec.nc")
+    for name in ("content_sha256", "made_from"):
+        del arrays.attributes[name]
+    write_arrays(folder / "codec" / "codec.nc", arrays)
+
+
+def test_a_run_of_before_keeps_its_light_and_is_called_not_verifiable(copied):
+    folder = copied()
+    strip(folder)
+    table = folder / "process" / "table.json"
+    sha = hashlib.sha256
+    hashes = {
+        f"{kind}_sha256": sha((folder / f"{kind}.json").read_bytes()).hexdigest()
+        for kind in ("model", "tool")
+    }
+    edit(table, lambda record: record["runs"][0].update(hashes))
+    evidence = gathered(folder)
+    verdict = judged(evidence)
+    assert verdict.light is Light.GREEN
+    (note,) = (text for text in verdict.notes if "not verifiable" in text)
+    assert "content, journal, model, codec" in note
+    assert any("made before files stated it" in link.text for link in evidence.chain)
+    # Readings are made again from the streams, however old the dataset is.
+    scale_residuals(folder)
+    assert judged(gathered(folder)).light is not Light.GREEN
+
+
+def test_a_dataset_derived_with_a_tool_file_needs_that_file(copied):
+    folder = copied()
+    run, data = folder / "run", folder / "run" / "dataset.nc"
+    assert elastocal("derive", run, "--tool", folder / "tool.json").code == 0
+    assert set(dataset.read_made_from(dataset.read(data).attributes)) == {
+        *("journal.jsonl", "tool.json"),
+    }
+    states = {link.name: link.state for link in gathered(folder).chain}
+    assert states["dataset"] is states["summary"] is LinkState.WHOLE
+    assert states["model"] is LinkState.BROKEN
+    edit(folder / "tool.json", lambda record: record.update(source="elsewhere"))
+    (link,) = (link for link in gathered(folder).chain if link.name == "dataset")
+    assert "derived with tool.json, which is not here as it was then" in link.text
+
+
+def test_a_model_of_a_csv_twin_is_of_the_same_dataset(finished, tmp_path):
+    data = dataset.read(finished / "run" / "dataset.nc")
+    dataset.write(data, tmp_path / "twin.csv")
+    assert dataset.content_sha256(dataset.read(tmp_path / "twin.csv")) == dataset.content_sha256(
+        data
+    )
+
+
+def test_to_take_the_dataset_away_does_not_lift_a_red_light(parts):
+    far = replace(parts, reproduction=None, limits=replace(parts.limits, tolerance=1e-6))
+    verdict = judge(far, ())
+    assert verdict.light is Light.RED
+    assert "the model file states errors of up to" in verdict.reasons[0]
+
+
+def test_every_damaged_part_holds_back(parts):
+    for each in parts.missing:
+        damaged = replace(parts, missing=(replace(each, name="pool", damaged=True),))
+        assert any(found.holds_back for found in missing_findings(damaged))
+    assert not any(found.holds_back for found in reading_findings(parts))
+
+
+@pytest.mark.parametrize(
+    ("text", "seal"),
+    [
+        ("{}", Seal.NONE),
+        ("[1]", Seal.NONE),
+        ("{", Seal.BROKEN),
+        ('{"schema": "elastocal.tool/1"}', Seal.ABSENT),
+        ('{"schema": "elastocal.tool/1", "content_sha256": 1}', Seal.BROKEN),
+    ],
+)
+def test_a_seal_is_read_of_whatever_there_is(tmp_path, text, seal):
+    path = tmp_path / "a.json"
+    path.write_text(text)
+    assert read_seal(path) is seal
+
+
+def test_a_bad_statement_in_a_dataset_is_refused(finished):
+    data = dataset.read(finished / "run" / "dataset.nc")
+    for text in ("{", "[]", '{"a": 1}'):
+        with pytest.raises(ElastocalError, match=r"made_from.*it must be SHA-256s"):
+            replace(data, attributes={**data.attributes, "made_from": text})
+
+
+def test_a_difference_below_rounding_is_none(copied):
+    folder = copied()
+    path = folder / "run" / "dataset.nc"
+    data = dataset.read(path).to_xarray().copy(deep=True)
+    data["marker_displacement"] = data["marker_displacement"] * (1.0 + 1e-9)
+    dataset.write(dataset.Dataset.from_xarray(data), path)
+    links = {link.name: link.state for link in gathered(folder).chain}
+    assert links["dataset"] is LinkState.WHOLE
+    assert np.isfinite(data["marker_displacement"]).all()
