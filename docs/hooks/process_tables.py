@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from mkdocs.structure.pages import Page
 
 _QUOTED = Path(__file__).parent / "gallery" / "process_figures.json"
-_MARK = re.compile(r"<!-- process (table|campaigns|summary): (\S+) -->")
+_MARK = re.compile(r"<!-- process (table|campaigns|summary|short): (\S+) -->")
 _HEAD = ("truth", "springs (taken)", "left-out error, µm", "deviation",
          "mean, mm", "reduction", "max, mm", "reduction", "seeds")  # fmt: skip
 _CAMPAIGNS = ("campaign", "springs", "poses", "minutes in the cell", "left-out error, µm",
@@ -33,7 +33,7 @@ Figures = dict[str, Any]
 def on_page_markdown(markdown: str, page: "Page", **_: object) -> str:  # noqa: ARG001 (mkdocs')
     """Return the page with the tables in place of their marks."""
     made: dict[str, Callable[[str], str]] = {
-        "table": table, "campaigns": campaigns, "summary": summary,
+        "table": table, "campaigns": campaigns, "summary": summary, "short": short,
     }  # fmt: skip
     return _MARK.sub(lambda mark: made[mark[1]](mark[2]), markdown)
 
@@ -83,6 +83,24 @@ def campaigns(kind: str) -> str:
 def summary(preset: str = "typical") -> str:
     """Return the figures of a truth in sentences, beside those of the paper."""
     return " ".join(_sentence(kind, preset) for kind in _NAMES)
+
+
+def short(preset: str) -> str:
+    """Return where the correction on a truth takes less of the mean than the paper's does."""
+    found = []
+    for kind, name in _NAMES.items():
+        seeds = _of(quoted(), kind, preset, campaign="template", springs="auto")
+        paper = abs(PAPER[kind].reduction[0])
+        rows = zip(*(each["deviations"] for each in seeds), strict=True)
+        below = [
+            f"{_title(own[0])} ({taken:.1%})"
+            for own in rows
+            for taken in [sum(_reduction(each["mean"]) for each in own) / len(own)]
+            if taken < paper
+        ]
+        if seeds:
+            found.append(f"{name}: {', '.join(below) or 'none'}")
+    return f"Measures below the paper's reduction of the mean on {preset}: {'; '.join(found)}."
 
 
 def renew_readme() -> None:
@@ -148,12 +166,16 @@ def _rows(seeds: list[Figures]) -> list[tuple[str, ...]]:
             before, after = (sum(each[key][k] for each in some) / len(some) for k in (0, 1))
             cells.append(f"{1e3 * before:.3f} → {1e3 * after:.3f}")
             cells.append(_mean([_reduction(each[key]) for each in some], ".1%"))
-        load = "" if own["load"] == 1.0 else f", load {own['load']:g}"
         rows.append((
-            first["case"]["preset"], springs, left_out, f"{own['name']}{load}", *cells,
+            first["case"]["preset"], springs, left_out, _title(own), *cells,
             str(len(seeds)),
         ))  # fmt: skip
     return rows
+
+
+def _title(deviation: Figures) -> str:
+    load = "" if deviation["load"] == 1.0 else f", load {deviation['load']:g}"
+    return f"{deviation['name']}{load}"
 
 
 def _deviation(figures: Figures, load: float) -> Figures:

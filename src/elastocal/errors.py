@@ -65,6 +65,10 @@ class LogError(ElastocalError, ValueError):
     """A log of another program that cannot be used: its form, its columns, its clock."""
 
 
+class GeometryError(ElastocalError, ValueError):
+    """Positions from which no geometry can be found."""
+
+
 class CompensationError(ElastocalError, ValueError):
     """A correction that cannot be made: bad limits, a filter beyond Nyquist, an unknown tool."""
 

@@ -64,6 +64,25 @@ def test_calibrate_prints_a_table_that_answers_the_first_questions(folder):
         assert text in shown
 
 
+def test_calibrate_json_has_the_ladder_and_the_measured_coverage_of_its_intervals(folder):
+    """Spec section 8: ``ladder: [{springs, held_out, chosen}]``, ``coverage``."""
+    result = elastocal("calibrate", folder / "data.nc", "--out", folder / "again.json", "--json")
+    figures = json.loads(result.out)
+    ladder = figures["ladder"]
+    assert [rung["springs"] for rung in ladder] == [
+        "actuated", "bearing", "bearing-ends", "links", "tensor", "gears",
+    ]  # fmt: skip
+    assert [rung["chosen"] for rung in ladder].count(True) == 1
+    assert all(0.0 < rung["held_out"] < 1e-3 for rung in ladder)
+    taken = next(rung for rung in ladder if rung["chosen"])
+    assert taken["held_out"] == figures["held_out"]["mean"]
+    measurement, fit = (figures["coverage"][name] for name in ("measurement", "fit"))
+    assert (measurement["nominal"], measurement["count"]) == (0.95, 3 * figures["readings"])
+    assert 0.8 < measurement["share"] <= 1.0
+    assert fit["share"] is None
+    assert "the true deflection is not measured" in fit["reason"]
+
+
 def test_calibrate_json_has_the_contract_keys_and_nothing_else_on_standard_output(folder):
     result = elastocal("calibrate", folder / "data.nc", "--out", folder / "again.json", "--json")
     figures = json.loads(result.out)

@@ -11,7 +11,8 @@ from elastocal.compensation.process import read_process
 from elastocal.errors import ReportError
 from elastocal.procedure import RunEnd
 from elastocal.results import MOST_CHARACTERS, MOST_LINES, Result
-from support import foreign_logs, plans, reported, studies
+from elastocal.robot import catalogue
+from support import foreign_logs, measured_arms, plans, reported, studies
 
 CLASSES = {
     name: getattr(workflows, name)
@@ -20,6 +21,7 @@ CLASSES = {
 }
 WITHOUT = {
     "CheckResult",
+    "GeometryResult",
     "GuessMapResult",
     "DryRunResult",
     "ExportResult",
@@ -42,6 +44,8 @@ def results(tmp_path_factory) -> dict[str, Result]:
     process = read_process(done / "process").table
     design = studies.settings()
     logs = foreign_logs.write_logs(foreign_logs.rows_of(run), out)
+    arm = measured_arms.measure(catalogue.load("KR 210 R2700-2"), 60)
+    positions = measured_arms.write_positions(out / "positions.csv", arm)
     log_map = foreign_logs.write_map(out, cell)
     samples = tuple(studies.batch(number)[0] for number in (0, 1, 2))
     figures = workflows.RunFigures(
@@ -58,6 +62,7 @@ def results(tmp_path_factory) -> dict[str, Result]:
         workflows.dry_run(settings),
         workflows.DemoResult(out, process),
         workflows.export(model, out=out / "c"),
+        workflows.geometry(positions, robot="KR 210 R2700-2", tcp="flange", draws=40),
         workflows.guess_map(logs),
         workflows.import_logs(logs, map=log_map),
         workflows.init(out / "new"),

@@ -1,5 +1,6 @@
 """A plan is made where production runs, says so, and says what error to expect there."""
 
+import json
 import re
 from dataclasses import replace
 
@@ -124,6 +125,20 @@ def test_the_floor_of_the_model_is_no_better_for_more_poses(cell, plan):
 
 def test_the_plan_file_keeps_what_was_promised(tmp_path, plan):
     write_plan(tmp_path, plan)
+    assert read_plan(tmp_path).production == plan.production
+    # Plans of before do not name the first row that is not covered.
+    older = json.loads((tmp_path / "plan.json").read_text())
+    assert older["production"]["coverage"].pop("first") == ""
+    (tmp_path / "plan.json").write_text(json.dumps(older))
+    assert read_plan(tmp_path).production == plan.production
+
+
+def test_a_plan_of_before_the_first_uncovered_row_was_told_is_still_read(tmp_path, plan):
+    write_plan(tmp_path, plan)
+    path = tmp_path / "plan.json"
+    data = json.loads(path.read_text(encoding="utf-8"))
+    assert data["production"]["coverage"].pop("first") == ""
+    path.write_text(json.dumps(data), encoding="utf-8")
     assert read_plan(tmp_path).production == plan.production
 
 

@@ -176,8 +176,8 @@ def _springs(data: CodecData) -> tuple[str, ...]:
         if variant.springs != layout:
             found.append(
                 f"{variant.name}: springs {variant.springs} are {layout} on these readings; its"
-                " errors are those of springs chosen in each split from its training poses alone,"
-                f" as many as there are: {_chosen_by_size(splits)}"
+                " errors are those of springs chosen in each split from its training poses alone:"
+                f" {_chosen_by_size(splits)}"
             )
     return tuple(found)
 
@@ -187,8 +187,9 @@ def _chosen_by_size(splits: Sequence[Sequence[str]]) -> str:
     sizes = list(zip(*splits, strict=True))
     changes = [0, *(n for n in range(1, len(sizes)) if sizes[n] != sizes[n - 1])]
     return "; ".join(
-        f"from {counted(n + 1, 'pose')} on "
+        f"with {counted(n + 1, 'pose')} "
         + ", ".join(f"{name} in {k}" for name, k in Counter(sizes[n]).most_common())
+        + (" splits" if n == 0 else "")
         for n in changes
     )
 

@@ -270,6 +270,8 @@ def _content_hash(plan: PlanResult) -> str:
         del data["contact"]["straight_time"]
     if plan.production is None:
         del data["production"]
+    elif not plan.production.coverage.first:
+        del data["production"]["coverage"]["first"]
     return sha256(json.dumps(data, separators=(",", ":"), allow_nan=False))
 
 

@@ -21,6 +21,7 @@ from .identity import (
 from .mounting import (
     Rail as Rail,
     on_rail as on_rail,
+    with_joint_origins as with_joint_origins,
     with_tool as with_tool,
     with_tool_mass as with_tool_mass,
     without_tool_mass as without_tool_mass,

@@ -2,7 +2,7 @@
 
 import math
 import xml.etree.ElementTree as ElementTree
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from elastocal.arrays import FloatArray
 from elastocal.errors import RobotError, nearest
 from elastocal.results import brief_repr
-from elastocal.robot.transforms import xyzabc_from_T
+from elastocal.robot.transforms import T_from_xyzabc, xyzabc_from_T
 from elastocal.robot.urdf import parse_urdf, robot_name, root_link
 from elastocal.units import impossible
 from elastocal.wording import listed
@@ -199,6 +199,39 @@ def on_rail(urdf: str, rail: Rail) -> str:
     ElementTree.SubElement(joint, "limit", {key: repr(float(v)) for key, v in limits.items()})
     ElementTree.SubElement(root, "link", name=rail_base)
     root.append(joint)
+    return _write(root)
+
+
+def with_joint_origins(urdf: str, T_joint_new: Mapping[str, ArrayLike]) -> str:
+    """Return a URDF whose joints stand elsewhere in the links before them.
+
+    Parameters
+    ----------
+    urdf : str
+        The robot; comments and everything else of it stay.
+    T_joint_new : mapping of str to array_like, shape (4, 4)
+        New frame of each joint in its present one; translation in m.
+
+    Raises
+    ------
+    RobotError
+        If the URDF cannot be read, a joint is missing, or a transform is not rigid.
+    """
+    root = _parse(urdf)
+    joints = {joint.get("name"): joint for joint in root.iterfind("joint")}
+    for name, T in T_joint_new.items():
+        if name not in joints:
+            raise RobotError(f"URDF of {robot_name(root)} has no joint {name!r}")
+        origin = joints[name].find("origin")
+        if origin is None:
+            origin = ElementTree.SubElement(joints[name], "origin")
+        xyz, rpy = (
+            [float(number) for number in (origin.get(key) or "0 0 0").split()]
+            for key in ("xyz", "rpy")
+        )
+        pose = xyzabc_from_T(T_from_xyzabc(*xyz, *rpy[::-1]) @ _transform(T, f"joint {name}"))
+        origin.set("xyz", _text(pose[:3]))
+        origin.set("rpy", _text(pose[:2:-1]))
     return _write(root)
 
 

@@ -7,6 +7,7 @@ __all__ = [
     "demo",
     "derive",
     "export",
+    "geometry",
     "guess_map",
     "import_logs",
     "init",
@@ -69,6 +70,11 @@ from .demo import (
 )
 from .derive import DeriveResult as DeriveResult, DeriveSettings as DeriveSettings, derive as derive
 from .export import ExportResult as ExportResult, ExportSettings as ExportSettings, export as export
+from .geometry import (
+    GeometryResult as GeometryResult,
+    GeometrySettings as GeometrySettings,
+    geometry as geometry,
+)
 from .import_logs import (
     GuessMapResult as GuessMapResult,
     GuessMapSettings as GuessMapSettings,

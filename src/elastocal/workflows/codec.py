@@ -25,6 +25,7 @@ from elastocal.codec import (
 )
 from elastocal.dataset import content_sha256, read, without
 from elastocal.files import filling
+from elastocal.parallel import one_blas_thread
 from elastocal.progress import Progress
 from elastocal.results import Result, brief_repr
 from elastocal.workflows._inputs import find_robot
@@ -95,6 +96,7 @@ class CodecResult(Result):
 
 
 @workflow(CodecSettings)
+@one_blas_thread()
 def codec(settings: CodecSettings, progress: Progress) -> CodecResult:
     """Cross-validate growing training sets: how many poses, which technique.
 

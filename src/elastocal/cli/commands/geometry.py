@@ -1,0 +1,36 @@
+"""``elastocal geometry``: from absolute positions of markers to the geometry of the arm."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from elastocal import workflows
+from elastocal.cli import options, output, tables
+
+
+def _geometry(
+    positions: Annotated[Path, typer.Argument(help="CSV of joints and positions of markers.")],
+    out: Annotated[Path, typer.Option(help="Model file (.json) to write.")],
+    *,
+    robot: Annotated[str | None, typer.Option(help="URDF file or catalogue name.")] = None,
+    tcp: Annotated[str | None, typer.Option(help="Link that carries the markers.")] = None,
+    urdf: Annotated[Path | None, typer.Option(help="Calibrated URDF to write.")] = None,
+    draws: Annotated[int, typer.Option(min=40, help="Draws of the bootstrap.")] = 200,
+    seed: Annotated[int, typer.Option(min=0, help="Of these draws.")] = 0,
+    as_json: options.Figures = False,
+) -> None:
+    """Find the geometric errors of an arm and its sag from absolute positions of markers."""
+    from elastocal.records import to_data
+
+    given = workflows.GeometrySettings(
+        positions, robot=robot, tcp=tcp, out=out, urdf=urdf, draws=draws, seed=seed
+    )
+    with output.progress_bars() as progress:
+        result = workflows.geometry(given, progress)
+    if as_json:
+        data = to_data(result.model)
+        keys = ("held_out", "ladder", "parameters", "fixed", "blunders")
+        output.print_json({key: data[key] for key in keys})
+        return
+    tables.show_geometry(output.console(), result.model, out)

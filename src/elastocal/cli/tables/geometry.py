@@ -1,0 +1,59 @@
+"""Print what ``geometry`` found: how far off the arm was and is, and which errors are known."""
+
+from pathlib import Path
+
+from rich.console import Console
+from rich.markup import escape
+from rich.table import Table
+
+from elastocal.geometry import GeometryModel, GeometryParameter
+from elastocal.wording import counted
+
+_UNITS = {
+    "m": (1e3, "mm"),
+    "rad": (1e3, "mrad"),
+    "rad/(N*m)": (1e6, "µrad/(N·m)"),
+    "1": (1e6, "ppm"),
+}
+_MOST_ROWS = 12
+"""Rows with blunders that are named."""
+
+
+def show_geometry(console: Console, model: GeometryModel, out: Path) -> None:
+    """Print a calibrated geometry for a person."""
+    rungs = Table(title="errors at poses left out, mm", title_justify="left", box=None)
+    for heading in ("model", "unknowns", "mean", "95 %", "largest", ""):
+        rungs.add_column(heading, justify="left" if heading == "model" else "right")
+    for each in model.ladder:
+        figures = [f"{1e3 * x:.3f}" for x in vars(each.held_out).values()]
+        rungs.add_row(each.rung, str(each.unknowns), *figures, "chosen" if each.chosen else "")
+    console.print(rungs)
+    table = Table(title="errors of the arm", title_justify="left", box=None)
+    for heading in ("error", "value", "95 % interval", "unit", ""):
+        table.add_column(
+            heading, justify="right" if heading in ("value", "95 % interval") else "left"
+        )
+    for parameter in model.parameters:
+        table.add_row(*_cells(parameter))
+    console.print(table)
+    blunders = model.blunders
+    if blunders:
+        named = ", ".join(map(str, blunders[:_MOST_ROWS]))
+        more = " …" if len(blunders) > _MOST_ROWS else ""
+        count = counted(len(blunders), "row")
+        console.print(f"{count} left out as blunders (counted from 0): {named}{more}")
+    fixed = counted(len(model.fixed), "error")
+    written = f"{fixed} not told apart from others; wrote {out}"
+    console.print(written, markup=False, soft_wrap=True)
+
+
+def _cells(parameter: GeometryParameter) -> tuple[str, ...]:
+    scale, unit = _UNITS.get(parameter.unit, (1.0, parameter.unit))
+    low, high = scale * parameter.low, scale * parameter.high
+    return (
+        escape(parameter.name),
+        f"{scale * parameter.value:.3f}",
+        f"{low:.3f} to {high:.3f}",
+        unit,
+        "" if parameter.known else "not known",
+    )

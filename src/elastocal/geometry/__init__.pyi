@@ -1,0 +1,47 @@
+from .arm import (
+    KINDS as KINDS,
+    MOTION as MOTION,
+    ArmErrors as ArmErrors,
+    ArmFrames as ArmFrames,
+    derivatives as derivatives,
+    frames as frames,
+    motion_terms as motion_terms,
+)
+from .ladder import (
+    FOLDS as FOLDS,
+    GeometryLadder as GeometryLadder,
+    RungErrors as RungErrors,
+    blocks as blocks,
+    climb as climb,
+)
+from .model import (
+    SCHEMA as SCHEMA,
+    URDF_MARK as URDF_MARK,
+    DistanceFigures as DistanceFigures,
+    FixedParameter as FixedParameter,
+    GeometryModel as GeometryModel,
+    GeometryParameter as GeometryParameter,
+    GeometryRung as GeometryRung,
+    HeldOutFigures as HeldOutFigures,
+    geometry_model as geometry_model,
+)
+from .position_file import AXES as AXES, read_positions as read_positions
+from .positions import (
+    LEAST_READINGS as LEAST_READINGS,
+    Positions as Positions,
+    joint_torques as joint_torques,
+)
+from .problem import (
+    RUNGS as RUNGS,
+    GeometryProblem as GeometryProblem,
+    State as State,
+    Unknown as Unknown,
+    unknowns as unknowns,
+)
+from .solve import (
+    Fixed as Fixed,
+    GeometryFit as GeometryFit,
+    fit as fit,
+    register as register,
+    told_apart as told_apart,
+)

@@ -1,0 +1,141 @@
+"""The arm with its geometric errors: forward kinematics and their derivatives, all poses at once.
+
+Each joint's frame is placed in the link before it by ``placement · [R(r) | t]``, three shifts ``t``
+and three small turns ``r`` along and about the axes of that frame; the joint then moves by
+
+    q' = q + o + s q + a1 sin q + b1 cos q + a2 sin 2q + b2 cos 2q + c tau,
+
+its offset ``o``, transmission ``s``, errors of its gear once and twice a turn, and the turn by
+which it yields to the torque ``tau`` of weight, payload and process force. A turn of the placement
+about the joint's own axis is its offset and is not counted twice. Where the base stands and where a
+marker sits are further unknowns (`elastocal.geometry.problem`). This is the product of exponentials
+about the nominal frames (R. He et al., IEEE Transactions on Robotics 26(3), 2010): it needs no case
+for parallel axes, as Denavit and Hartenberg's parameters do; which numbers the positions do not
+tell apart is found from the derivatives themselves.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from elastocal.arrays import FloatArray
+from elastocal.results import brief_repr
+from elastocal.robot import Robot
+
+KINDS = ("shift_x", "shift_y", "shift_z", "turn_x", "turn_y", "turn_z")
+"""Errors of a joint's place in the link before it."""
+MOTION = ("offset", "scale", "sin", "cos", "sin2", "cos2", "compliance")
+"""Errors of a joint's motion."""
+
+
+@brief_repr
+@dataclass(frozen=True, eq=False)
+class ArmErrors:
+    """Geometric errors of a chain."""
+
+    place: FloatArray
+    """Shape (joint, 6): shifts in m, turns in rad."""
+    motion: FloatArray
+    """Shape (joint, 7): in the order of `MOTION`; rad (m) of each unit term, rad/(N·m)."""
+
+    @classmethod
+    def none(cls, joints: int) -> "ArmErrors":
+        """Return the nominal arm."""
+        return cls(np.zeros((joints, len(KINDS))), np.zeros((joints, len(MOTION))))
+
+
+@brief_repr
+@dataclass(frozen=True, eq=False)
+class ArmFrames:
+    """Where the joints and the tcp of an arm are at some poses."""
+
+    rotation: FloatArray
+    """Frames of the joints before their motion, in base, shape (joint, pose, 3, 3)."""
+    origin: FloatArray
+    """Their origins, shape (joint, pose, 3), in m."""
+    axis: FloatArray
+    """Axes of the joints in base, shape (joint, pose, 3)."""
+    T_base_tcp: FloatArray
+    """Shape (pose, 4, 4), in m."""
+
+
+def frames(robot: Robot, q: FloatArray, torque: FloatArray, errors: ArmErrors) -> ArmFrames:
+    """Return the frames of an arm with errors.
+
+    Parameters
+    ----------
+    robot : Robot
+        The nominal arm.
+    q : ndarray, shape (pose, joint)
+        Joints as the controller states them, in rad or m.
+    torque : ndarray, shape (pose, joint)
+        Torques that the joints yield to, in N·m (N).
+    errors : ArmErrors
+        Its errors.
+    """
+    count, joints = len(q), robot.chain.joints
+    R, p = np.broadcast_to(np.eye(3), (count, 3, 3)), np.zeros((count, 3))
+    rotation, origin, axis = [], [], []
+    moved = q + np.einsum("pjm,jm->pj", motion_terms(q, torque), errors.motion)
+    for index, joint in enumerate(joints):
+        place = errors.place[index]
+        T = joint.placement
+        p = p + R @ T[:3, 3]
+        R = R @ T[:3, :3]
+        p = p + R @ place[:3]
+        R = R @ Rotation.from_rotvec(place[3:]).as_matrix()
+        rotation.append(R)
+        origin.append(p)
+        axis.append(R @ joint.axis)
+        if joint.revolute:
+            R = R @ Rotation.from_rotvec(moved[:, index, None] * joint.axis).as_matrix()
+        else:
+            p = p + axis[-1] * moved[:, index, None]
+    T_tip = robot.chain.T_last_tip
+    tip = np.zeros((count, 4, 4))
+    tip[:, 3, 3] = 1.0
+    tip[:, :3, :3] = R @ T_tip[:3, :3]
+    tip[:, :3, 3] = p + R @ T_tip[:3, 3]
+    return ArmFrames(np.array(rotation), np.array(origin), np.array(axis), tip)
+
+
+def motion_terms(q: FloatArray, torque: FloatArray) -> FloatArray:
+    """Return what each error of a joint's motion is multiplied by, shape (pose, joint, 7)."""
+    one = np.ones_like(q)
+    return np.stack(
+        [one, q, np.sin(q), np.cos(q), np.sin(2.0 * q), np.cos(2.0 * q), torque], axis=2
+    )
+
+
+def derivatives(
+    robot: Robot, at: ArmFrames, q: FloatArray, torque: FloatArray, points: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return how points on the tool move by each error.
+
+    Parameters
+    ----------
+    robot : Robot
+        The nominal arm.
+    at : ArmFrames
+        Of the arm with its errors.
+    q, torque : ndarray, shape (pose, joint)
+        As for `frames`.
+    points : ndarray, shape (pose, 3)
+        Points that move with the tool, in base, in m.
+
+    Returns
+    -------
+    place : ndarray, shape (pose, 3, joint, 6)
+        By shifts and turns of the joints' places.
+    motion : ndarray, shape (pose, 3, joint, 7)
+        By errors of their motion.
+    """
+    arm = points - at.origin  # (joint, pose, 3)
+    shifts = at.rotation
+    turns = np.cross(np.swapaxes(at.rotation, 2, 3), arm[:, :, None]).swapaxes(2, 3)
+    place = np.concatenate([shifts, turns], axis=3)
+    revolute = np.array([joint.revolute for joint in robot.chain.joints])
+    by_axis = np.where(revolute[:, None, None], np.cross(at.axis, arm), at.axis)
+    motion = by_axis[..., None] * motion_terms(q, torque).swapaxes(0, 1)[:, :, None]
+    return place.transpose(1, 2, 0, 3), motion.transpose(1, 2, 0, 3)

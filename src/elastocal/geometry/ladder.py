@@ -1,0 +1,169 @@
+"""Which errors of the arm the positions speak for: a ladder, judged at poses that were left out.
+
+All rungs and folds share one linearisation: errors of a millimetre and a milliradian make the
+problem linear to a micrometre. The normal equations are sums over blocks of consecutive poses, so
+that a fold, or a draw of the bootstrap, is a sum of some of them.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from elastocal.arrays import FloatArray, IndexArray
+from elastocal.geometry.problem import RUNGS, GeometryProblem, State
+from elastocal.geometry.solve import GeometryFit, fit, register, told_apart
+from elastocal.identification import Overlap, judge_models
+from elastocal.progress import Progress
+from elastocal.results import brief_repr
+
+FOLDS = 5
+_BLOCKS = 100
+"""Most blocks of consecutive poses."""
+_WIDE = 30.0
+"""Standard deviation of the prior of an unknown, in its likely sizes."""
+
+
+@brief_repr
+@dataclass(frozen=True, eq=False)
+class RungErrors:
+    """Errors of a rung at poses that it was not fitted to."""
+
+    rung: str
+    distance: FloatArray
+    """Of each position that is no blunder, shape (point,), in m."""
+    free: int
+    """Unknowns that the positions tell apart."""
+
+
+@brief_repr
+@dataclass(frozen=True, eq=False)
+class GeometryLadder:
+    """All rungs, the one that was chosen, its fit and draws of it."""
+
+    rungs: tuple[RungErrors, ...]
+    chosen: str
+    fit: GeometryFit
+    values: FloatArray
+    """Value of each unknown, shape (unknown,); 0 of what is fixed."""
+    draws: FloatArray
+    """Bootstrap over blocks of poses, shape (draw, unknown)."""
+
+
+def climb(
+    problem: GeometryProblem, draws: int, rng: np.random.Generator, progress: Progress
+) -> GeometryLadder:
+    """Return the ladder of some positions.
+
+    Parameters
+    ----------
+    problem : GeometryProblem
+        What is fitted.
+    draws : int
+        Draws of the bootstrap.
+    rng : Generator
+        For it.
+    progress : Progress
+        Called with stage, done and total.
+
+    Raises
+    ------
+    GeometryError
+        If there are too few positions, or the fit does not settle.
+    """
+    progress("geometry", 0, 4)
+    start = register(problem)
+    progress("geometry", 1, 4)
+    nominal = problem.linearise(start)[1]
+    free = {rung: told_apart(nominal, problem, rung) for rung in RUNGS}
+    reference = fit(problem, free["weight"], start)
+    progress("geometry", 2, 4)
+    block = blocks(problem)
+    sums = _Sums(problem, reference, block)
+    rungs = [sums.held_out(rung, free[rung][0]) for rung in RUNGS]
+    used = np.flatnonzero(reference.used)
+    fold = block[used] % FOLDS
+    errors = np.array([[each.distance[fold == k].mean() for each in rungs] for k in range(FOLDS)])
+    overlap = Overlap(FOLDS, 0.0, 1.0 / FOLDS)
+    judged = judge_models(errors, np.ones(len(rungs), dtype=bool), overlap)
+    chosen = RUNGS[judged.chosen]
+    progress("geometry", 3, 4)
+    final = fit(problem, free[chosen], _without(reference, problem, chosen), reference.used)
+    values = problem.values(final.state)
+    spread = _Sums(problem, final, block).draws(draws, rng)
+    progress("geometry", 4, 4)
+    return GeometryLadder(tuple(rungs), chosen, final, values, values + spread)
+
+
+def blocks(problem: GeometryProblem) -> IndexArray:
+    """Return the block of each position: consecutive poses, whose rows stay together."""
+    _, first, pose = np.unique(problem.data.pose, return_index=True, return_inverse=True)
+    rank = np.argsort(np.argsort(first))[pose]
+    count = int(rank.max()) + 1
+    many = min(_BLOCKS, max(count // 2, FOLDS), count)
+    return np.asarray(rank * many // count)[problem.row]
+
+
+def _without(reference: GeometryFit, problem: GeometryProblem, rung: str) -> State:
+    """Return a state with what a rung does not have set to zero."""
+    values = problem.values(reference.state)
+    kept = RUNGS[: RUNGS.index(rung) + 1]
+    back = np.array(
+        [0.0 if u.rung in kept else -v for u, v in zip(problem.unknowns, values, strict=True)]
+    )
+    return problem.moved(reference.state, back)
+
+
+class _Sums:
+    """Normal equations of each block of positions about a fit, weighed columns."""
+
+    def __init__(self, problem: GeometryProblem, about: GeometryFit, block: IndexArray) -> None:
+        self.problem, self.about = problem, about
+        self.size = np.array([u.size for u in problem.unknowns])
+        self.values = problem.values(about.state) / self.size
+        used = np.flatnonzero(about.used)
+        self.block = block[used]
+        self.count = int(block.max()) + 1
+        self.A = (about.J[used] * self.size).reshape(3 * len(used), -1)
+        self.b = about.residual[used].ravel()
+        p = self.A.shape[1]
+        self.G, self.h = np.zeros((self.count, p, p)), np.zeros((self.count, p))
+        rows = np.repeat(self.block, 3)
+        for k in np.unique(self.block):
+            own = rows == k
+            self.G[k] = self.A[own].T @ self.A[own]
+            self.h[k] = self.A[own].T @ self.b[own]
+        self.ridge = (about.sigma / _WIDE) ** 2
+
+    def held_out(self, rung: str, free: IndexArray) -> RungErrors:
+        """Return the errors of a rung at each fold, fitted to the others."""
+        frames = np.array([u.rung == "registration" for u in self.problem.unknowns])
+        # What the fit has and the rung has not goes back to zero.
+        back = np.where(frames, 0.0, -self.values)
+        back[free] = np.where(frames[free], 0.0, -self.values[free])
+        b = self.b - self.A @ back
+        distance = np.empty(len(self.block))
+        for k in range(FOLDS):
+            train = np.arange(self.count) % FOLDS != k
+            G = self.G[train].sum(axis=0)
+            h = self.h[train].sum(axis=0) - G @ back
+            x = self._solved(G, h, free)
+            out = self.block % FOLDS == k
+            rows = np.repeat(out, 3)
+            left = b[rows] - self.A[np.ix_(rows, free)] @ x
+            distance[out] = np.linalg.norm(left.reshape(-1, 3), axis=1)
+        return RungErrors(rung, distance, len(free))
+
+    def draws(self, count: int, rng: np.random.Generator) -> FloatArray:
+        """Return how far draws of blocks take the unknowns from the fit, (draw, unknown)."""
+        free = self.about.free
+        there = np.unique(self.block)
+        found = np.zeros((count, len(self.size)))
+        for draw in found:
+            chosen = rng.choice(there, len(there))
+            x = self._solved(self.G[chosen].sum(axis=0), self.h[chosen].sum(axis=0), free)
+            draw[free] = x * self.size[free]
+        return found
+
+    def _solved(self, G: FloatArray, h: FloatArray, free: IndexArray) -> FloatArray:
+        own = G[np.ix_(free, free)]
+        return np.asarray(np.linalg.solve(own + self.ridge * np.eye(len(free)), h[free]))

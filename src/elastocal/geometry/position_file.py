@@ -1,0 +1,169 @@
+"""Read a table of absolute positions: joints, markers, station, payload, force."""
+
+import math
+import re
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from elastocal.arrays import FloatArray
+from elastocal.errors import GeometryError, UnitError, nearest
+from elastocal.geometry.positions import LEAST_READINGS, Positions
+from elastocal.robot import Robot
+from elastocal.tables import Column, TableError, TableRows, number_in_cell, opened_table
+from elastocal.units import factor, split_column
+
+AXES = ("x", "y", "z")
+_MARKER = re.compile(r"marker(\d*)_x")
+_SAME_POSE = 1e-2
+"""Joints that differ by less, in rad or m, are of one pose, whatever the payload."""
+_FAR = 100.0
+"""In m: no tracker sees as far in a hall."""
+_BEYOND = 0.1
+"""Distance beyond a joint's limit, in rad or m, that the limits of a drawing may be wrong by."""
+
+
+def read_positions(path: Path, robot: Robot) -> Positions:
+    """Return the rows of a CSV file.
+
+    Parameters
+    ----------
+    path : Path
+        Columns ``<joint>[deg|rad|mm|m]``, ``marker_x[mm] …`` (or ``marker1_x[mm] …`` of several),
+        optional ``station``, ``campaign``, ``pose``, ``payload[kg]`` with its centre
+        ``payload_x[mm] …`` in the tcp, ``force_x[N] …`` on the robot in base. A marker that was
+        hidden is empty.
+    robot : Robot
+        Whose joints they are.
+
+    Raises
+    ------
+    GeometryError
+        If a column is missing or has no unit, a cell is no number, a joint is far outside its
+        limits, or there are too few rows.
+    FileAccessError
+        If the file cannot be read.
+    """
+    try:
+        with opened_table(path) as table:
+            header, rows = table.layout.header, table.rows()
+        uneven = rows.uneven(len(header))
+        if uneven is not None:
+            raise GeometryError(f"row {uneven[0]} has {uneven[1]} cells, the header {len(header)}")
+        return _positions(header, rows, robot)
+    except (GeometryError, TableError, UnitError) as error:
+        raise GeometryError(f"{path}: {error}") from error
+
+
+class _Columns:
+    """Columns of a header by name, and their numbers."""
+
+    def __init__(self, header: Sequence[str], rows: TableRows) -> None:
+        self.rows = rows
+        self.found: dict[str, tuple[int, str | None]] = {}
+        for index, cell in enumerate(header):
+            name, unit = split_column(cell)
+            if name in self.found:
+                raise GeometryError(f"column {name!r} stands twice in the header")
+            self.found[name] = index, unit
+
+    def numbers(self, name: str, dimension: str, *, blank: bool = False) -> FloatArray:
+        """Return the numbers of a column in SI units, shape (row,)."""
+        if name not in self.found:
+            raise GeometryError(
+                f"column '{name}[…]' is missing{nearest(name, self.found)}"
+                f" (columns: {', '.join(self.found)})"
+            )
+        index, unit = self.found[name]
+        if unit is None:
+            raise GeometryError(f"column {name!r} has no unit: it is a {dimension}")
+        column = Column(index, name, unit, factor(unit, dimension))
+        return self.rows.numbers(column, _or_hidden if blank else None)
+
+    def vectors(self, name: str, dimension: str, *, blank: bool = False) -> FloatArray:
+        """Return three columns, shape (row, 3)."""
+        each = [self.numbers(f"{name}_{axis}", dimension, blank=blank) for axis in AXES]
+        return np.column_stack(each)
+
+    def words(self, name: str, default: str) -> np.ndarray:
+        """Return the texts of a column, shape (row,)."""
+        if name not in self.found:
+            return np.full(len(self.rows), default)
+        index = self.found[name][0]
+        return np.array([cells[index].strip() or default for cells in self.rows.cells])
+
+
+def _positions(header: Sequence[str], rows: TableRows, robot: Robot) -> Positions:
+    columns, count = _Columns(header, rows), len(rows)
+    if count < LEAST_READINGS:
+        raise GeometryError(f"{count} rows are too few: at least {LEAST_READINGS}")
+    kinds = ["angle" if turns else "length" for turns in robot.revolute]
+    names = zip(robot.joint_names, kinds, strict=True)
+    q = np.column_stack([columns.numbers(name, kind) for name, kind in names])
+    _require_within_limits(q, robot, rows.lines)
+    found = sorted(m[1] for name in columns.found if (m := _MARKER.fullmatch(name)))
+    if not found:
+        raise GeometryError(
+            "no column 'marker_x[…]' (or 'marker1_x[…]' of several markers); columns:"
+            f" {', '.join(columns.found)}"
+        )
+    markers = np.stack(
+        [columns.vectors(f"marker{number}", "length", blank=True) for number in found], axis=1
+    )
+    _require_markers(markers, rows.lines)
+    zeros = np.zeros((count, 3))
+    has_centre = "payload_x" in columns.found
+    return Positions(
+        q=q,
+        markers=markers,
+        station=columns.words("station", "tracker"),
+        pose=_poses(q) if "pose" not in columns.found else _labels(columns.words("pose", "")),
+        campaign=columns.words("campaign", ""),
+        payload=columns.numbers("payload", "mass") if "payload" in columns.found else zeros[:, 0],
+        payload_centre=columns.vectors("payload", "length") if has_centre else zeros,
+        force=columns.vectors("force", "force") if "force_x" in columns.found else zeros,
+        lines=tuple(rows.lines),
+    )
+
+
+def _or_hidden(cell: str) -> float:
+    """Return the number in a cell; NaN of an empty one."""
+    if cell.strip().lower() in ("", "nan"):
+        return math.nan
+    value = number_in_cell(cell)
+    if not math.isfinite(value):
+        raise ValueError("is not a finite number")
+    return value
+
+
+def _require_within_limits(q: FloatArray, robot: Robot, lines: Sequence[int]) -> None:
+    low, high = robot.limits.lower - _BEYOND, robot.limits.upper + _BEYOND
+    outside = ~((q >= low) & (q <= high) & (np.abs(q) < _FAR))
+    for row, joint in np.argwhere(outside)[:1].tolist():
+        value, unit = q[row, joint], "rad" if robot.revolute[joint] else "m"
+        degrees = robot.revolute[joint] and low[joint] <= np.radians(value) <= high[joint]
+        raise GeometryError(
+            f"row {lines[row]}: {robot.joint_names[joint]} of {value:.4g} {unit} is outside its"
+            f" limits{': is it in degrees?' if degrees else ''}"
+        )
+
+
+def _require_markers(markers: FloatArray, lines: Sequence[int]) -> None:
+    seen = np.asarray(np.isfinite(markers).all(axis=2))
+    for marker in np.flatnonzero(~seen.any(axis=0)).tolist():
+        raise GeometryError(f"marker {marker + 1} is seen in no row")
+    for row, marker in np.argwhere(np.abs(np.nan_to_num(markers)).max(axis=2) > _FAR)[:1].tolist():
+        raise GeometryError(
+            f"row {lines[row]}: marker {marker + 1} is more than {_FAR:g} m away: is it in mm?"
+        )
+
+
+def _poses(q: FloatArray) -> np.ndarray:
+    """Return a label for each row: rows of about the same joints are of one pose."""
+    _, label = np.unique(np.round(q / _SAME_POSE).astype(np.int64), axis=0, return_inverse=True)
+    return np.asarray(label.ravel())
+
+
+def _labels(words: np.ndarray) -> np.ndarray:
+    return np.asarray(np.unique(words, return_inverse=True)[1])

@@ -1,0 +1,189 @@
+"""One least-squares problem of frames, markers, and all errors of an arm."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from elastocal.arrays import FloatArray
+from elastocal.geometry.arm import KINDS, MOTION, ArmErrors, ArmFrames, derivatives, frames
+from elastocal.geometry.positions import Positions, joint_torques
+from elastocal.results import brief_repr
+from elastocal.robot import ChainJoint, Robot
+
+RUNGS = ("registration", "offsets", "geometry", "weight", "harmonics")
+"""From the frames alone to errors of the gears; each has all of those before."""
+_SIZES = {"shift": 1e-3, "turn": 1e-3, "offset": 1e-3, "scale": 1e-3, "compliance": 1e-6}
+"""Likely sizes in m, rad, rad/(N·m): a column is weighed by its parameter's."""
+_OF_ANY_JOINT = ("offset", "scale", "compliance")
+"""Errors of motion that linear axes have too."""
+_GEAR_SIZE = 2e-4
+"""Of an error of a gear once or twice a turn, in rad."""
+_FRAME_SIZE = 1e-2
+"""Of what frames and markers are off by after the first registration, in m and rad."""
+
+
+@dataclass(frozen=True)
+class Unknown:
+    """A number that is fitted."""
+
+    name: str
+    unit: str
+    rung: str
+    """The first one that has it."""
+    size: float
+    """Likely size, in SI."""
+
+
+@brief_repr
+@dataclass(frozen=True, eq=False)
+class State:
+    """Values of everything that is fitted."""
+
+    T_station_base: FloatArray
+    """Base in the frame of each station, shape (station, 4, 4), in m."""
+    markers: FloatArray
+    """Markers in the tcp, shape (marker, 3), in m."""
+    errors: ArmErrors
+
+
+class GeometryProblem:
+    """Residuals and derivatives of positions, in the order of their seen markers.
+
+    Parameters
+    ----------
+    robot : Robot
+        The nominal arm.
+    data : Positions
+        What was measured.
+    """
+
+    def __init__(self, robot: Robot, data: Positions) -> None:
+        self.robot, self.data = robot, data
+        self.torque = joint_torques(robot, data)
+        self.row, self.marker = np.nonzero(data.seen)
+        index = {name: n for n, name in enumerate(data.stations)}
+        self.station = np.array([index[name] for name in data.station.tolist()])[self.row]
+        self.measured = data.markers[self.row, self.marker]
+        self.unknowns = unknowns(robot, data)
+
+    def __len__(self) -> int:
+        """Return the number of seen markers."""
+        return len(self.row)
+
+    def linearise(self, at: State) -> tuple[FloatArray, FloatArray]:
+        """Return residuals, shape (point, 3), in m, and derivatives, shape (point, 3, unknown).
+
+        Derivatives are of the prediction, so that ``J x = residual`` is the next step.
+        """
+        arm = frames(self.robot, self.data.q, self.torque, at.errors)
+        T = arm.T_base_tcp[self.row]
+        points = T[:, :3, 3] + np.einsum("nij,nj->ni", T[:, :3, :3], at.markers[self.marker])
+        R, t = at.T_station_base[self.station, :3, :3], at.T_station_base[self.station, :3, 3]
+        predicted = t + np.einsum("nij,nj->ni", R, points)
+        J = np.zeros((len(self), 3, len(self.unknowns)))
+        stations, markers = len(self.data.stations), at.markers.shape[0]
+        each = np.arange(len(self))
+        turned = predicted - t
+        for axis in range(3):
+            unit = np.zeros(3)
+            unit[axis] = 1.0
+            J[each, axis, 6 * self.station + axis] = 1.0
+            J[each, :, 6 * self.station + 3 + axis] = np.cross(unit, turned)
+            J[each, :, 6 * stations + 3 * self.marker + axis] = np.einsum(
+                "nij,nj->ni", R, T[:, :3, axis]
+            )
+        start = 6 * stations + 3 * markers
+        J[:, :, start:] = self._arm_columns(arm, points, R)
+        return self.measured - predicted, J
+
+    def _arm_columns(self, arm: ArmFrames, points: FloatArray, R: FloatArray) -> FloatArray:
+        """Return how the points move by the errors of the arm, in their stations' frames."""
+        own = replace(
+            arm,
+            rotation=arm.rotation[:, self.row],
+            origin=arm.origin[:, self.row],
+            axis=arm.axis[:, self.row],
+        )
+        q, torque = self.data.q[self.row], self.torque[self.row]
+        place, motion = derivatives(self.robot, own, q, torque, points)
+        joints = self.robot.chain.joints
+        columns = [place[:, :, j, k] for j, k in _placed(joints)]
+        columns += [motion[:, :, j, k] for j, k in _moving(joints)]
+        return np.asarray(np.einsum("nij,njk->nik", R, np.stack(columns, axis=2)))
+
+    def moved(self, at: State, step: FloatArray) -> State:
+        """Return the state after a step of all unknowns, shape (unknown,)."""
+        stations, markers = len(self.data.stations), len(at.markers)
+        frame = step[: 6 * stations].reshape(-1, 6)
+        T = at.T_station_base.copy()
+        T[:, :3, 3] += frame[:, :3]
+        T[:, :3, :3] = Rotation.from_rotvec(frame[:, 3:]).as_matrix() @ T[:, :3, :3]
+        start = 6 * stations
+        shift = step[start : start + 3 * markers].reshape(-1, 3)
+        arm = step[start + 3 * markers :]
+        joints = self.robot.chain.joints
+        place, motion = at.errors.place.copy(), at.errors.motion.copy()
+        placed, moving = np.array(_placed(joints)).reshape(-1, 2), np.array(_moving(joints))
+        place[tuple(placed.T)] += arm[: len(placed)]
+        motion[tuple(moving.T)] += arm[len(placed) :]
+        return State(T, at.markers + shift, ArmErrors(place, motion))
+
+    def values(self, at: State) -> FloatArray:
+        """Return the value of each unknown, shape (unknown,); frames and markers count as 0."""
+        joints = self.robot.chain.joints
+        placed, moving = np.array(_placed(joints)).reshape(-1, 2), np.array(_moving(joints))
+        arm = np.concatenate([at.errors.place[tuple(placed.T)], at.errors.motion[tuple(moving.T)]])
+        return np.concatenate([np.zeros(len(self.unknowns) - len(arm)), arm])
+
+
+def _placed(joints: Sequence[ChainJoint]) -> list[tuple[int, int]]:
+    """Return joint and kind of the errors of place: all but a turn about the joint's own axis.
+
+    The first joint's place is that of the base, which the stations' frames say.
+    """
+    found = []
+    for index, joint in enumerate(joints):
+        for kind in range(len(KINDS)):
+            own = joint.revolute and kind >= 3 and abs(joint.axis[kind - 3]) > 1.0 - 1e-9
+            if index and not own:
+                found.append((index, kind))
+    return found
+
+
+def _moving(joints: Sequence[ChainJoint]) -> list[tuple[int, int]]:
+    """Return joint and kind of the errors of motion; a linear axis has none once a turn."""
+    return [
+        (number, kind)
+        for kind, name in enumerate(MOTION)
+        for number, joint in enumerate(joints)
+        if joint.revolute or name in _OF_ANY_JOINT
+    ]
+
+
+def unknowns(robot: Robot, data: Positions) -> tuple[Unknown, ...]:
+    """Return everything that may be fitted, in the order of the columns."""
+    joints, found = robot.chain.joints, []
+    for station in data.stations:
+        found += [Unknown(f"{station}.{a}", "m", "registration", _FRAME_SIZE) for a in "xyz"]
+        found += [Unknown(f"{station}.turn_{a}", "rad", "registration", _FRAME_SIZE) for a in "xyz"]
+    for marker in range(data.markers.shape[1]):
+        name = f"marker{marker + 1}" if data.markers.shape[1] > 1 else "marker"
+        found += [Unknown(f"{name}.{a}", "m", "registration", _FRAME_SIZE) for a in "xyz"]
+    for joint, kind in _placed(joints):
+        size = _SIZES[KINDS[kind].split("_")[0]]
+        unit = "m" if kind < 3 else "rad"
+        found.append(Unknown(f"{joints[joint].name}.{KINDS[kind]}", unit, "geometry", size))
+    for joint, kind in _moving(joints):
+        found.append(_motion_unknown(joints[joint], MOTION[kind]))
+    return tuple(found)
+
+
+def _motion_unknown(joint: ChainJoint, kind: str) -> Unknown:
+    unit = {"scale": "1", "compliance": "rad/(N*m)" if joint.revolute else "m/N"}
+    length = "rad" if joint.revolute else "m"
+    rung = {"offset": "offsets", "compliance": "weight"}.get(kind, "harmonics")
+    return Unknown(
+        f"{joint.name}.{kind}", unit.get(kind, length), rung, _SIZES.get(kind, _GEAR_SIZE)
+    )

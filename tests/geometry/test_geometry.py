@@ -1,0 +1,251 @@
+"""Planted geometries are found again, to the noise, with blunders named and intervals that hold."""
+
+import json
+
+import numpy as np
+import pytest
+
+from elastocal.errors import GeometryError
+from elastocal.geometry import (
+    ArmErrors,
+    GeometryModel,
+    GeometryProblem,
+    climb,
+    derivatives,
+    fit,
+    frames,
+    geometry_model,
+    register,
+    told_apart,
+)
+from elastocal.progress import silent
+from elastocal.records import read_json
+from elastocal.robot import GRAVITY, Robot, catalogue, with_joint_origins
+from support.cli import elastocal
+from support.measured_arms import MARKERS, measure, write_positions
+
+NOISE = 3e-5
+FLOOR = NOISE * np.sqrt(8.0 / np.pi)
+"""Mean distance of three coordinates of that noise."""
+
+UR_LIKE = """<robot name="parallel"><link name="l0"/>{}<link name="tcp"/>
+<joint name="tip" type="fixed"><parent link="l6"/><child link="tcp"/>
+<origin xyz="0 0 0.09"/></joint></robot>"""
+JOINT = """<link name="l{n}"/><joint name="j{n}" type="revolute"><parent link="l{m}"/>
+<child link="l{n}"/><origin xyz="{xyz}"/><axis xyz="{axis}"/>
+<limit lower="-3" upper="3" effort="0" velocity="0"/></joint>"""
+
+
+def chain(*joints: tuple[str, str]) -> Robot:
+    """Return an arm of revolute joints: place in the link before, axis."""
+    parts = [
+        JOINT.format(n=n, m=n - 1, xyz=xyz, axis=axis) for n, (xyz, axis) in enumerate(joints, 1)
+    ]
+    text = UR_LIKE.format("".join(parts)).replace('"l6"/><child', f'"l{len(joints)}"/><child')
+    return Robot.from_urdf(text, "tcp")
+
+
+def kuka() -> Robot:
+    return catalogue.load("KR 210 R2700-2")
+
+
+def universal() -> Robot:
+    """Return six axes of which the second, third and fourth are parallel."""
+    z, y = "0 0 1", "0 1 0"
+    return chain(
+        ("0 0 0.13", z), ("0 0.14 0", y), ("0 -0.12 0.61", y), ("0 0 0.57", y),
+        ("0 0.12 0", z), ("0 0 0.12", y),
+    )  # fmt: skip
+
+
+def seven_axes() -> Robot:
+    z, y = "0 0 1", "0 1 0"
+    return chain(
+        ("0 0 0.16", z), ("0 0 0.2", y), ("0 0 0.2", z), ("0 0 0.22", y), ("0 0 0.2", z),
+        ("0 0 0.2", y), ("0 0 0.1", z),
+    )  # fmt: skip
+
+
+ARMS = {"spherical wrist": kuka, "parallel axes": universal, "seven axes": seven_axes}
+
+
+def ladder(measured, draws=100):
+    problem = GeometryProblem(measured.robot, measured.data)
+    return problem, climb(problem, draws, np.random.default_rng(1), silent)
+
+
+def test_derivatives_are_those_of_finite_differences():
+    robot, rng, step = kuka(), np.random.default_rng(2), 1e-6
+    q, torque = rng.uniform(-1.0, 1.0, (3, 6)), rng.normal(0.0, 1.0, (3, 6))
+
+    def place(errors):
+        T = frames(robot, q, torque, errors).T_base_tcp
+        return T[:, :3, 3] + T[:, :3, :3] @ np.array([0.1, 0.2, 0.3])
+
+    nominal = ArmErrors.none(6)
+    found = derivatives(robot, frames(robot, q, torque, nominal), q, torque, place(nominal))
+    for which, columns in zip(("place", "motion"), found, strict=True):
+        for index in np.ndindex(*columns.shape[2:]):
+            up, down = ({n: v.copy() for n, v in vars(nominal).items()} for _ in range(2))
+            up[which][index] += step
+            down[which][index] -= step
+            slope = (place(ArmErrors(**up)) - place(ArmErrors(**down))) / (2.0 * step)
+            assert np.allclose(columns[:, :, *index], slope, atol=1e-8)
+
+
+@pytest.mark.parametrize("arm", ARMS)
+def test_a_planted_geometry_is_found_to_the_noise(arm):
+    measured = measure(ARMS[arm](), 80, blunders=8)
+    problem, found = ladder(measured)
+    chosen = next(each for each in found.rungs if each.rung == found.chosen)
+    assert found.chosen == "geometry"
+    assert chosen.distance.mean() < 1.1 * FLOOR
+    assert set(problem.row[~found.fit.used].tolist()) == measured.blunders
+
+
+@pytest.mark.parametrize(
+    ("arm", "markers", "count"),
+    [
+        # 4 R + 6 of a fully measured end-effector (Everett, Driels and Mooring 1987), of which 6
+        # are the base's and 6 the tool's; one marker shows three of the tool's alone, and then the
+        # last joint's offset, two shifts and a turn are the marker's place.
+        ("spherical wrist", 3, 4 * 6 - 6),
+        ("parallel axes", 3, 4 * 6 - 6),
+        ("seven axes", 3, 4 * 7 - 6),
+        ("spherical wrist", 1, 4 * 6 - 6),
+    ],
+)
+def test_as_many_errors_are_told_apart_as_theory_says(arm, markers, count):
+    measured = measure(ARMS[arm](), 60, markers=markers, noise=0.0)
+    problem = GeometryProblem(measured.robot, measured.data)
+    J = problem.linearise(register(problem))[1]
+    free, fixed = told_apart(J, problem, "geometry")
+    arm_errors = [i for i in free if problem.unknowns[i].rung != "registration"]
+    assert len(arm_errors) == count
+    assert all(each.why.startswith(("as ", "moves no")) for each in fixed)
+
+
+def test_sag_under_weight_and_payload_is_told_from_geometry():
+    measured = measure(kuka(), 120, payloads=(0.0, 80.0), compliance=2e-7)
+    problem, found = ladder(measured, draws=200)
+    assert found.chosen == "weight"
+    low, high = np.percentile(found.draws, [2.5, 97.5], axis=0)
+    names = [each.name for each in problem.unknowns]
+    for joint in ("joint_a2", "joint_a3"):
+        index = names.index(f"{joint}.compliance")
+        assert 0.9 * low[index] < 2e-7 < 1.1 * high[index]
+        assert abs(found.values[index] - 2e-7) < 2e-8
+
+
+def test_a_quarter_of_blunders_is_found():
+    measured = measure(kuka(), 40, blunders=10, markers=1, stations=1)
+    problem, found = ladder(measured)
+    assert set(problem.row[~found.fit.used].tolist()) == measured.blunders
+
+
+def test_the_nominal_arm_is_kept_where_it_is_right():
+    found = ladder(measure(kuka(), 60, error=0.0))[1]
+    assert found.chosen == "registration"
+
+
+def test_a_prediction_is_where_the_marker_will_be():
+    """At poses and under a payload that the fit has not seen."""
+    measured = measure(kuka(), 150, payloads=(0.0, 60.0, 30.0), compliance=2e-7)
+    unseen = measured.data.payload == 30.0
+    problem = GeometryProblem(measured.robot, measured.data.rows(~unseen))
+    found = climb(problem, 40, np.random.default_rng(1), silent)
+    model = geometry_model(problem, found, "test")
+    held_out = measured.data.rows(unseen)
+    distance = np.linalg.norm(model.predict(held_out) - held_out.markers, axis=2)
+    assert distance.mean() < 1.15 * FLOOR
+
+
+def test_the_calibrated_urdf_is_the_arm_as_built():
+    measured = measure(universal(), 100, noise=0.0, compliance=0.0)
+    problem, found = ladder(measured)
+    model = geometry_model(problem, found, "test")
+    robot = Robot.from_urdf(model.calibrated_urdf(), "tcp")
+    q = measured.data.q[:20]
+    ours, truth = _path(robot, q, model.markers[0]), _path(measured.truth, q, MARKERS[0])
+    before = _path(measured.robot, q, MARKERS[0])
+    # The base is where the stations of the fit say: shapes of paths are compared.
+    assert _shape_error(ours, truth) < 1e-3 * _shape_error(before, truth)
+
+
+def _path(robot: Robot, q: np.ndarray, marker: np.ndarray) -> np.ndarray:
+    T = robot.forward(q)
+    return T[:, :3, 3] + T[:, :3, :3] @ marker
+
+
+def _shape_error(a: np.ndarray, b: np.ndarray) -> float:
+    """Return the largest difference of the distances between all pairs of points."""
+    apart = [np.linalg.norm(each[:, None] - each[None], axis=2) for each in (a, b)]
+    return float(np.abs(apart[0] - apart[1]).max())
+
+
+def test_with_joint_origins_moves_a_joint_in_its_own_frame():
+    robot, T = kuka(), np.eye(4)
+    T[:3, 3] = (0.0, 0.0, 0.1)
+    moved = Robot.from_urdf(with_joint_origins(robot.urdf, {"joint_a4": T}), robot.tip)
+    placement = robot.chain.joints[3].placement @ T
+    assert np.allclose(moved.chain.joints[3].placement, placement, atol=1e-12)
+
+
+def test_the_command_writes_model_and_urdf_and_prints_the_contract(tmp_path):
+    measured = measure(kuka(), 60, blunders=5)
+    path = write_positions(tmp_path / "positions.csv", measured)
+    arguments = ("--robot", "KR 210 R2700-2", "--tcp", measured.robot.tip, "--draws", 40)
+    result = elastocal(
+        *("geometry", path, *arguments, "--out", tmp_path / "model.json"),
+        *("--urdf", tmp_path / "out.urdf", "--json"),
+    )
+    figures = json.loads(result.out)
+    assert set(figures) == {"held_out", "ladder", "parameters", "fixed", "blunders"}
+    assert figures["held_out"]["chosen"]["mean"] < 1.2 * FLOOR
+    assert figures["held_out"]["registration"]["mean"] > 5e-4
+    assert set(figures["blunders"]) == measured.blunders
+    assert {"name", "value", "unit", "low", "high", "known"} == set(figures["parameters"][0])
+    model = read_json(tmp_path / "model.json", GeometryModel)
+    assert model.positions == 180
+    assert Robot.from_urdf((tmp_path / "out.urdf").read_text(), measured.robot.tip)
+    shown = elastocal("geometry", path, *arguments, "--out", tmp_path / "model.json")
+    assert "chosen" in shown.err
+    assert "left out as blunders" in shown.err
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (lambda text: text.replace("[deg]", "[rad]"), "is it in degrees?"),
+        (lambda text: text.replace("[mm]", "[m]"), "is it in mm?"),
+        (lambda text: text.replace("marker1_x", "marker_q"), "no column 'marker_x"),
+        (lambda text: text.replace("joint_a3[", "joint_b3["), "joint_a3"),
+        (lambda text: "\n".join(text.splitlines()[:3]), "2 rows are too few"),
+        (lambda text: "\n".join(text.splitlines()[:6]), "measure more poses"),
+        (lambda text: text.replace("s0", "s0,", 1), "cells, the header"),
+    ],
+)
+def test_bad_positions_are_refused_in_a_line(tmp_path, change, message):
+    path = write_positions(tmp_path / "positions.csv", measure(kuka(), 30, markers=1))
+    path.write_text(change(path.read_text(encoding="utf-8")), encoding="utf-8")
+    result = elastocal(
+        *("geometry", path, "--robot", "KR 210 R2700-2", "--tcp", "flange"),
+        *("--out", tmp_path / "model.json"),
+    )
+    assert message in result.reason
+    assert not (tmp_path / "model.json").exists()
+
+
+def test_a_fit_of_nonsense_is_refused():
+    measured = measure(kuka(), 60)
+    rng = np.random.default_rng(5)
+    measured.data.markers[:] = rng.uniform(-2.0, 2.0, measured.data.markers.shape)
+    problem = GeometryProblem(measured.robot, measured.data)
+    start = register(problem)
+    free = told_apart(problem.linearise(start)[1], problem, "geometry")
+    with pytest.raises(GeometryError, match="does not settle"):
+        fit(problem, free, start)
+
+
+def test_gravity_pulls_down():
+    assert GRAVITY[2] < 0.0

@@ -1,0 +1,104 @@
+"""Arms with planted geometric errors, measured by a tracker; no equation of the fit is used."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from elastocal.geometry import Positions
+from elastocal.robot import Robot, with_joint_origins
+
+MARKERS = np.array([[0.10, 0.20, 0.30], [0.30, -0.10, 0.20], [-0.10, -0.20, 0.40]])
+
+
+@dataclass(frozen=True, eq=False)
+class Measured:
+    """What a tracker saw, and what it was made from."""
+
+    robot: Robot
+    """The nominal arm."""
+    truth: Robot
+    """The arm as it was built."""
+    data: Positions
+    blunders: frozenset[int]
+
+
+def measure(  # noqa: PLR0913 (a campaign has as many properties)
+    robot: Robot,
+    rows: int,
+    *,
+    seed: int = 0,
+    error: float = 5e-4,
+    noise: float = 3e-5,
+    markers: int = 3,
+    stations: int = 2,
+    payloads: tuple[float, ...] = (0.0,),
+    compliance: float = 0.0,
+    blunders: int = 0,
+) -> Measured:
+    """Return positions of markers on an arm whose joints stand and turn elsewhere than drawn."""
+    rng = np.random.default_rng(seed)
+    truth = Robot.from_urdf(
+        with_joint_origins(robot.urdf, {n: _small(rng, error) for n in robot.joint_names}),
+        robot.tip,
+    )
+    low, high = np.maximum(robot.limits.lower, -2.0), np.minimum(robot.limits.upper, 2.0)
+    q = rng.uniform(low, high, (rows, len(low)))
+    payload = np.resize(payloads, rows).astype(float)
+    yielded = q + compliance * _torque(robot, q, payload)
+    T = truth.forward(yielded)
+    points = T[:, None, :3, 3] + np.einsum("nij,mj->nmi", T[:, :3, :3], MARKERS[:markers])
+    station = np.arange(rows) % stations
+    R = Rotation.random(stations, random_state=seed).as_matrix()[station]
+    t = rng.uniform(-4.0, 4.0, (stations, 3))[station]
+    seen = t[:, None] + np.einsum("nij,nmj->nmi", R, points) + rng.normal(0.0, noise, points.shape)
+    wrong = rng.choice(rows, blunders, replace=False)
+    seen[wrong] += rng.normal(0.0, 0.05, (blunders, 1, 3))
+    data = Positions(
+        q=q,
+        markers=seen,
+        station=np.array([f"s{number}" for number in station]),
+        pose=np.arange(rows),
+        campaign=np.full(rows, ""),
+        payload=payload,
+        payload_centre=np.zeros((rows, 3)),
+        force=np.zeros((rows, 3)),
+    )
+    return Measured(robot, truth, data, frozenset(wrong.tolist()))
+
+
+def write_positions(path: Path, measured: Measured) -> Path:
+    """Write the table of a campaign; return its path."""
+    data, names = measured.data, measured.robot.joint_names
+    markers = data.markers.shape[1]
+    heads = [f"{name}[deg]" for name in names] + ["station", "payload[kg]"]
+    heads += [f"marker{m}_{a}[mm]" for m in range(1, markers + 1) for a in "xyz"]
+    q = np.degrees(data.q)
+    lines = [
+        ",".join(
+            [*map(repr, row.tolist()), s, repr(float(p)), *map(repr, (1e3 * m).ravel().tolist())]
+        )
+        for row, s, p, m in zip(q, data.station, data.payload, data.markers, strict=True)
+    ]
+    path.write_text("\n".join([",".join(heads), *lines]) + "\n", encoding="utf-8")
+    return path
+
+
+def _small(rng: np.random.Generator, error: float) -> np.ndarray:
+    T = np.eye(4)
+    T[:3, :3] = Rotation.from_rotvec(rng.normal(0.0, error, 3)).as_matrix()
+    T[:3, 3] = rng.normal(0.0, error, 3)
+    return T
+
+
+def _torque(robot: Robot, q: np.ndarray, payload: np.ndarray) -> np.ndarray:
+    """Return the torque of weight and payload, the latter by central differences of its height."""
+    torque = -robot.gravity_torques(q) if robot.has_masses else np.zeros_like(q)
+    step = 1e-6
+    for joint in range(q.shape[1]):
+        to = np.zeros(q.shape[1])
+        to[joint] = step
+        rise = (robot.forward(q + to)[:, 2, 3] - robot.forward(q - to)[:, 2, 3]) / (2.0 * step)
+        torque[:, joint] -= payload * 9.80665 * rise
+    return torque
