@@ -1,3 +1,4 @@
+import importlib
 import os
 import signal
 import subprocess
@@ -107,6 +108,27 @@ def test_a_function_can_be_kept_to_one_thread_too():
     before = blas_threads()
     assert set(one_blas_thread()(blas_threads)()) == {1}
     assert blas_threads() == before
+
+
+@pytest.mark.parametrize(
+    ("module", "first", "run"),
+    [
+        ("elastocal.workflows.codec", "read", lambda module: module.codec("a.nc", out="a")),
+        ("elastocal.planning.plan", "require_possible_search", lambda module: module.make_plan(0)),
+    ],
+)
+def test_long_work_on_small_systems_keeps_to_one_thread(monkeypatch, module, first, run):
+    seen = []
+
+    def stop(*_):
+        seen.extend(blas_threads())
+        raise ElastocalError("enough")
+
+    found = importlib.import_module(module)
+    monkeypatch.setattr(found, first, stop)
+    with pytest.raises((ElastocalError, AttributeError)):
+        run(found)
+    assert set(seen) == {1}
 
 
 def test_libraries_that_are_loaded_within_the_block_are_not_forgotten():
