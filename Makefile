@@ -7,7 +7,7 @@ BIN := $(VENV)/bin
 # Neighbours stay together, so that what a file prepares is seldom prepared twice.
 SHARED_OUT := -n auto --dist worksteal
 
-.PHONY: demo test lint units end-to-end browser docs-strict nightly slow process-figures coverage mutation docs bench house fuzz clean
+.PHONY: demo test lint units end-to-end browser docs-strict nightly slow process-figures coverage lowest lock mutation docs bench house fuzz clean
 
 demo: $(VENV)/installed
 	$(BIN)/elastocal demo afp --out demo --force
@@ -32,7 +32,7 @@ browser: $(VENV)/installed-dev
 docs-strict: $(VENV)/installed-dev
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet
 
-nightly: slow process-figures coverage mutation
+nightly: slow process-figures coverage lowest mutation
 
 slow: $(VENV)/installed-dev
 	$(BIN)/pytest $(SHARED_OUT) -m slow -rA
@@ -45,6 +45,22 @@ process-figures: $(VENV)/installed-dev
 # Tests that count imported modules would count those of coverage.
 coverage: $(VENV)/installed-nightly
 	$(BIN)/pytest $(SHARED_OUT) --cov --cov-report=term:skip-covered --deselect tests/test_startup.py
+
+# The lowest versions that pyproject.toml allows, as wheels: what a user without a compiler gets.
+LOWEST := .venv-lowest
+lowest: $(VENV)/installed-nightly
+	$(BIN)/uv venv --quiet --clear --python $(BIN)/python $(LOWEST)
+	$(BIN)/uv pip install --quiet --python $(LOWEST)/bin/python --resolution lowest-direct \
+		--only-binary :all: --no-binary elastocal -e . $(TESTING)
+	OMP_NUM_THREADS=1 $(LOWEST)/bin/python -m pytest $(SHARED_OUT) -p no:cacheprovider $(QUICK)
+TESTING := 'pytest>=8.3' 'pytest-xdist>=3.6' 'hypothesis>=6.120' 'py-opw-kinematics>=1.3'
+QUICK := tests/test_units.py tests/test_files.py tests/test_meshes.py tests/test_tables.py \
+	$(addprefix tests/,cell dataset elastic records robot shapes sim)
+
+# What developers share, with hashes: `pip install --require-hashes -r requirements/dev.lock`.
+lock: $(VENV)/installed-nightly
+	$(BIN)/uv pip compile pyproject.toml --extra dev --extra docs --universal \
+		--python-version 3.11 --generate-hashes --quiet --no-header -o requirements/dev.lock
 
 # A tenth of all mutants, another one each day of ten; `make mutation TENTH=3` chooses. Two hours at
 # most: what is not tried then is not counted.
@@ -76,7 +92,7 @@ house:
 	$(PYTHON) tools/house.py
 
 clean:
-	rm -rf $(VENV) demo site mutants
+	rm -rf $(VENV) $(LOWEST) demo site mutants
 
 $(VENV)/bin/python:
 	$(PYTHON) -m venv $(VENV)

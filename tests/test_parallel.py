@@ -12,7 +12,9 @@ import pytest
 from elastocal import parallel
 from elastocal.errors import ElastocalError
 from elastocal.parallel import (
+    GuardedError,
     core_count,
+    guarded,
     map_in_processes,
     one_blas_thread,
     process_count,
@@ -160,3 +162,30 @@ def test_workers_end_when_their_parent_is_killed(tmp_path):
             return
         time.sleep(0.1)
     pytest.fail(f"{workers} outlive their parent")
+
+
+def spin() -> None:
+    while True:
+        pass
+
+
+def fill() -> int:
+    return len(bytearray(200_000_000))
+
+
+def crash() -> None:
+    os.kill(os.getpid(), signal.SIGSEGV)
+
+
+def test_guarded_work_comes_back():
+    assert guarded(lambda: [0, 1, 2], 5, 100) == [0, 1, 2]
+
+
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="elsewhere nothing is guarded")
+@pytest.mark.parametrize(
+    ("work", "reason"), [(spin, "more than 1 s"), (crash, "crashed"), (fill, "more than 100 MB")]
+)
+def test_what_takes_too_much_is_ended_without_a_word(work, reason, capfd):
+    with pytest.raises(GuardedError, match=reason):
+        guarded(work, 1, 100)
+    assert capfd.readouterr() == ("", "")

@@ -57,7 +57,7 @@ def load_triangles(path: Path) -> trimesh.Trimesh:
         # Old Macs, and some exporters since, end lines by a carriage return alone.
         data = data.translate(_ASCII).replace(b"\r\n", b"\n").replace(b"\r", b"\n")
     try:
-        mesh = trimesh.load_mesh(io.BytesIO(data), file_type=suffix[1:], process=False)
+        mesh: object = trimesh.load_mesh(io.BytesIO(data), file_type=suffix[1:], process=False)
     # What the readers of trimesh raise on bad contents is not documented; these were seen.
     except (ValueError, IndexError, KeyError, TypeError, AttributeError) as error:
         reason = " ".join(str(error).split()) or type(error).__name__
@@ -66,7 +66,8 @@ def load_triangles(path: Path) -> trimesh.Trimesh:
         shape = np.shape(getattr(mesh, name, ()))
         if 0 not in shape and shape[1:] != (3,):
             raise SchemaError(f"mesh {path}: its {name} have {shape[-1]} numbers each, not 3")
-    return mesh
+    # Of a file without triangles some releases of trimesh make an empty scene.
+    return mesh if isinstance(mesh, trimesh.Trimesh) else trimesh.Trimesh()
 
 
 def says_inches(path: Path) -> bool:

@@ -356,16 +356,18 @@ def guarded(work: Callable[[], _Result], seconds: int, megabytes: int) -> _Resul
             os.waitpid(child, 0)
     if status == signal.SIGXCPU:
         raise GuardedError(f"it takes more than {seconds} s")
-    raise GuardedError("the library that reads it crashed")
+    raise GuardedError(f"the library that reads it crashed, or takes more than {megabytes} MB")
 
 
 def _work_guarded(
     work: Callable[[], object], writing: int, seconds: int, megabytes: int
 ) -> NoReturn:
     """Do the work and send the result; this is the child."""
+    import faulthandler
     import gc
     import resource
 
+    faulthandler.disable()  # where somebody has asked for it: what crashes here is told in a line
     gc.disable()  # looking for garbage would copy all memory of the parent
     try:
         # By default the system ends a process that has used its time, whatever it is doing.

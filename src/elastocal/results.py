@@ -3,13 +3,18 @@
 import dataclasses
 import html
 import importlib
-from collections.abc import Collection
+import re
+from collections.abc import Collection, Iterable
 from typing import Any, TypeVar
 
 MOST_LINES = 20
 """Longest representation in a console."""
 MOST_CHARACTERS = 1500
 """Longest representation in a console."""
+_VARYING = re.compile(r"'[^']*'|[-+]?\d[\d.,e ]*(?:(?<= )[-+]?\d[\d.,e]*)*")
+"""What differs between texts of one kind: names in quotes, numbers and lists of them."""
+_REMARKS = ("warning", "finding")
+"""Labels of facts of which there may be hundreds of one kind."""
 _LONGEST = 60
 _LONGEST_LINE = 200
 
@@ -47,18 +52,29 @@ class Result:
 
     def __repr__(self) -> str:
         """Return the facts, at most 20 lines of them."""
-        lines = [_cut(f"  {label}: {text}", _LONGEST_LINE) for label, text in self.facts()]
+        lines = [_cut(f"  {label}: {text}", _LONGEST_LINE) for label, text in self._shown()]
         shown = len(lines) if len(lines) < MOST_LINES else MOST_LINES - 2
         while sum(map(len, lines[:shown])) > MOST_CHARACTERS - 100:
             shown -= 1
         rest = [f"  … and {len(lines) - shown} more"] if shown < len(lines) else []
         return "\n".join([type(self).__name__, *lines[:shown], *rest])
 
+    def _shown(self) -> list[tuple[str, str]]:
+        """Return the facts; warnings of one kind are one, where the first of all stands."""
+        facts, shown = self.facts(), list[tuple[str, str]]()
+        for label, text in facts:
+            if label not in _REMARKS:
+                shown.append((label, text))
+            elif (label, text) == next(fact for fact in facts if fact[0] == label):
+                alike = (each for name, each in facts if name == label)
+                shown += [(label, each) for each in counted_alike(alike)]
+        return shown
+
     def _repr_html_(self) -> str:
         """Return the facts as a table, for notebooks."""
         rows = "".join(
             f"<tr><th scope='row'>{html.escape(label)}</th><td>{html.escape(text)}</td></tr>"
-            for label, text in self.facts()
+            for label, text in self._shown()
         )
         return f"<table><caption>{type(self).__name__}</caption>{rows}</table>"
 
@@ -104,6 +120,27 @@ def brief(value: Any) -> str:
     if isinstance(value, Collection) and not isinstance(value, str | bytes):
         return _entries(value)
     return _cut(" ".join(str(value).split()), _LONGEST)
+
+
+def counted_alike(texts: Iterable[str], most: int = 3) -> list[str]:
+    """Return texts without endless repetition: many of one kind are one, with their number.
+
+    Of one kind are those that differ only in their numbers and in what stands in quotes. Whoever
+    shows warnings to a person shows them so; files and ``--json`` hold them all.
+
+    >>> counted_alike([f"pose {n} is odd" for n in range(9)])
+    ['pose 0 is odd (and 8 more of this kind)']
+    >>> counted_alike(["pose 0 is odd", "pose 1 is odd"])
+    ['pose 0 is odd', 'pose 1 is odd']
+    """
+    kinds: dict[str, list[str]] = {}
+    for text in texts:
+        kinds.setdefault(_VARYING.sub("#", text), []).append(text)
+    shown: list[str] = []
+    for alike in kinds.values():
+        few = len(alike) <= most
+        shown += alike if few else [f"{alike[0]} (and {len(alike) - 1} more of this kind)"]
+    return shown
 
 
 def _literally(value: Any) -> str:

@@ -20,9 +20,11 @@ import numpy as np
 
 from elastocal.arrays import FloatArray
 from elastocal.errors import ElastocalError, FileAccessError
-from elastocal.files import replacing, require_file
+from elastocal.files import Limit, replacing, require_file
 from elastocal.units import parse_number
 
+_MOST_CELL = Limit("ELASTOCAL_MAX_CELL_KB", 128, "kB")
+_KILOBYTE = 1_000
 DELIMITERS = ",;\t"
 """Delimiters that are recognised; the first is the one that is written."""
 _NUMBER = r"\s*[-+]?[0-9]*{}[0-9]*(?:[eE][-+]?[0-9]+)?\s*"
@@ -160,6 +162,7 @@ class TableReader:
                 break
             preamble.append(line)
         self._above = len(preamble)
+        csv.field_size_limit(_MOST_CELL.most * _KILOBYTE)
         self._delimiter = max(DELIMITERS, key=first.count)
         self._reader = csv.reader(chain([first], remaining), delimiter=self._delimiter, strict=True)
         line_end = first[len(first.rstrip("\r\n")) :] or "\n"
@@ -197,7 +200,9 @@ class TableReader:
             for row in self._reader:
                 yield self._above + self._reader.line_num, row
         except csv.Error as error:
-            raise TableError(f"row {self._above + self._reader.line_num}: {error}") from error
+            too_long = "field limit" in str(error)
+            reason = f"a cell {_MOST_CELL.exceeded}" if too_long else str(error)
+            raise TableError(f"row {self._above + self._reader.line_num}: {reason}") from error
 
 
 @contextmanager

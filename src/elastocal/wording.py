@@ -1,10 +1,8 @@
 """Quantities and counts as people read them: millimetres, degrees, minutes, plurals."""
 
 import math
-import re
 from collections.abc import Sequence
 
-_NUMBERS = re.compile(r"[-+]?\d[\d.,e ]*(?:(?<= )[-+]?\d[\d.,e]*)*")
 _READABLE = {
     "m": (1e3, " mm"),
     "rad": (180.0 / math.pi, "°"),
@@ -123,23 +121,6 @@ def listed(names: Sequence[str], most: int = 30) -> str:
     """
     left = len(names) - most
     return ", ".join(names[:most]) + (f" and {left} more" if left > 0 else "")
-
-
-def capped(texts: Sequence[str], most: int = 3) -> list[str]:
-    """Return texts without endless repetition: those that differ in numbers only are counted.
-
-    >>> capped([f"pose {n} is odd" for n in range(9)], most=2)
-    ['pose 0 is odd', 'pose 1 is odd', '… and 7 more like "pose 1 is odd"']
-    """
-    kinds: dict[str, list[str]] = {}
-    for text in texts:
-        kinds.setdefault(_NUMBERS.sub("#", text), []).append(text)
-    shown: list[str] = []
-    for alike in kinds.values():
-        shown += alike[:most] if len(alike) > most + 1 else alike
-        if len(alike) > most + 1:
-            shown.append(f'… and {len(alike) - most} more like "{alike[most - 1]}"')
-    return shown
 
 
 def point(values: Sequence[float | None], scale: float = 1e3, digits: int = 1) -> str:

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import pytest
 
-from elastocal.cli.output import console, yellow
+from elastocal.cli.output import bold, console, visible, yellow
 from elastocal.cli.tables.calibration import _known, _spring_table, _springs
 from elastocal.identification import SpringSummary
 from support.summaries import made_up_summary
@@ -15,6 +15,15 @@ ROWS = (
     SpringSummary(NAME, "gear", "rad/(N*m)", 1.23456e-7, -2.5e-8, 1.25e-6, True),
     SpringSummary("rail.axial", "hinge", "m/N", 1.447e-7, 3.8e-8, 2.86e-7, True),
 )
+
+
+@pytest.mark.parametrize("name", ["a[/b]", "[bold]x[/]", "a:warning:b", "\x1b[31mred", "\udcff"])
+def test_a_name_is_shown_as_it_is_in_lines_and_tables(name):
+    screen = console(stderr=False, file=io.StringIO(), width=200)
+    screen.print(f"{bold(name)} {name}")
+    screen.print(_spring_table(replace(made_up_summary(), springs=(replace(ROWS[0], name=name),))))
+    assert screen.file.getvalue().count(visible(name)) == 3
+    assert "\x1b" not in screen.file.getvalue()
 
 
 @pytest.mark.parametrize("width", [80, 120])

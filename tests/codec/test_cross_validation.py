@@ -13,6 +13,7 @@ from elastocal.codec import (
     cross_validation,
     judge,
     make_variants,
+    prepared_variants,
 )
 from elastocal.dataset import Readings
 from elastocal.errors import CodecError, ConventionError, DatasetError, IdentificationError
@@ -31,6 +32,15 @@ def readings() -> Readings:
 
 def same(a, b) -> bool:
     return np.array_equal(a.error_max, b.error_max) and np.array_equal(a.chosen, b.chosen)
+
+
+def test_a_codec_on_drawn_poses_says_so_and_is_prepared_on_the_same(readings):
+    options = CodecOptions(splits=2, poses=12)
+    data = cross_validate(robot(), readings, [SIX], options)
+    assert len(data.contact) == 12
+    assert data.findings[0].startswith("made on 12 of the 31 poses, drawn with seed 0")
+    (prepared,) = prepared_variants(robot(), readings, data)
+    assert len(prepared.contact) == 12
 
 
 def test_processes_do_not_change_a_number(readings):

@@ -3,9 +3,10 @@
 import numpy as np
 import pytest
 
-from elastocal.codec import CodecOptions, make_splits, split_sizes
+from elastocal.codec import CodecOptions, drawn_poses, make_splits, split_sizes
 from elastocal.errors import CodecError
 from elastocal.planning.search import Candidates, Cover
+from support.problems import campaign
 
 
 @pytest.mark.parametrize(
@@ -42,3 +43,15 @@ def test_each_set_is_a_cover_set_of_its_own_seed_and_training_is_the_rest():
 def test_more_sets_than_poses_are_refused(count):
     with pytest.raises(CodecError, match=rf"{count} splits .* from 1 to the 12 poses"):
         make_splits(np.random.default_rng(0).normal(size=(12, 3)), count, 4)
+
+
+def test_of_a_large_dataset_as_many_poses_are_drawn_as_asked_for_the_same_for_a_seed():
+    readings = campaign(31)
+    few, again, other = (
+        drawn_poses(readings, CodecOptions(poses=7, seed=seed)) for seed in (0, 0, 1)
+    )
+    assert len(np.unique(few.pose)) == 7
+    assert len(few) == np.isin(readings.pose, few.pose).sum()
+    np.testing.assert_array_equal(few.pose, again.pose)
+    assert set(few.pose) != set(other.pose)
+    assert drawn_poses(readings, CodecOptions(poses=31)) is readings

@@ -43,8 +43,8 @@ from fuzz.seeds import KINDS, make_seeds
 
 LONGEST = 10.0
 """In s of a processor, of one case."""
-_PATIENCE = 6 * LONGEST
-"""In s, until a child that says nothing is taken for one that hangs: others may be at work."""
+_PATIENCE = 60 * LONGEST
+"""In s, until a child that says nothing and does nothing is taken for one that waits for ever."""
 MOST_MEMORY = 1 << 30
 """In bytes, beside what this process has before."""
 _BATCH = 250
@@ -223,10 +223,10 @@ def _in_child(batch: list[Case], seeds: Path) -> Iterator[Verdict]:
         os.close(writing)
         done = 0
         try:
-            with os.fdopen(reading, "rb") as lines:
+            with os.fdopen(reading, "rb", buffering=0) as lines:
                 while done < len(batch):
-                    if not select.select([lines], [], [], _PATIENCE)[0]:
-                        yield Verdict(batch[done], "hang", seconds=_PATIENCE)
+                    if not _answers(child, reading):
+                        yield Verdict(batch[done], "hang", seconds=LONGEST)
                         return
                     line = lines.readline()
                     if not line:
@@ -237,6 +237,24 @@ def _in_child(batch: list[Case], seeds: Path) -> Iterator[Verdict]:
         finally:
             os.kill(child, signal.SIGKILL)
             os.waitpid(child, 0)
+
+
+def _answers(child: int, reading: int) -> bool:
+    """Wait for the next line of a child; False when it has used up its time on a case.
+
+    Its own time counts, not that of the clock: others may be at work on the machine.
+    """
+    used, patience = _processor_time(child), time.monotonic() + _PATIENCE
+    while not select.select([reading], [], [], 0.2)[0]:
+        if _processor_time(child) - used > 1.5 * LONGEST or time.monotonic() > patience:
+            return False
+    return True
+
+
+def _processor_time(process: int) -> float:
+    """Return the time that a process has used of a processor, in s."""
+    fields = Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()
+    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
 
 
 def _quick_place(seeds: Path) -> Path:
@@ -331,7 +349,7 @@ def _judged(code: int, text: str, seconds: float, memory: float) -> str:
         "noise": bool(_NOISE.search(text)),
         "code": code not in (0, 1, 2),
         "hang": seconds > LONGEST,
-        "memory": memory > MOST_MEMORY or "MemoryError" in text,
+        "memory": memory > MOST_MEMORY or "not enough memory" in text,
         "lines": code == 1 and (text.count("\n") != 1 or not text.startswith("elastocal: ")),
     }
     return next((word for word, is_so in faults.items() if is_so), "ok")

@@ -4,6 +4,7 @@ A mutation is a function of the bytes of a valid file and a seeded generator. `F
 of each form by name, so that a case can be written down as names and seeds.
 """
 
+import copy
 import csv
 import io
 import json
@@ -648,13 +649,13 @@ def _element(data: bytes, rng: random.Random) -> bytes:
     elif kind == 4:
         parent.remove(child)
     elif kind == 5:
-        parent.append(child)
+        parent.append(copy.deepcopy(child))
     elif kind == 6:
         child.tag = rng.choice(
             ("link", "joint", "mimic", "axis", "inertial", "transmission", "x", "limit")
         )
     else:
-        rng.choice(inner)[0].append(child)
+        rng.choice(inner)[0].append(copy.deepcopy(child))
     try:
         return ElementTree.tostring(root)
     except (RecursionError, TypeError, ValueError):

@@ -3,6 +3,7 @@
 import datetime
 import json
 from dataclasses import asdict
+from importlib import import_module
 from pathlib import Path
 
 import pytest
@@ -82,8 +83,8 @@ def filled(*_: object) -> None:
     ("fault", "word"), [(crash, "traceback"), (busy, "hang"), (filled, "memory")]
 )
 def test_the_harness_sees_a_fault(seeds, monkeypatch, fault, word):
-    monkeypatch.setattr(harness, "_PATIENCE", 1.0)
-    monkeypatch.setattr("elastocal.workflows.check.describe_file", fault)
+    monkeypatch.setattr(harness, "LONGEST", 1.0)
+    monkeypatch.setattr(import_module("elastocal.workflows.check"), "describe_file", fault)
     (found,) = run_cases([Case("tool", "check {f}")], seeds)
     assert found.word == word
 

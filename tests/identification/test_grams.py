@@ -79,3 +79,10 @@ def test_a_choice_of_nothing_is_refused():
     problem, _ = planted()
     with pytest.raises(IdentificationError, match="load no spring"):
         PoseGrams.of(problem).refit(np.zeros((1, 31)))
+
+
+def test_sums_of_blocks_a_few_at_a_time_are_those_of_all_at_once(monkeypatch):
+    problem, _ = planted(sigma=1e-5)
+    whole = PoseGrams.of(problem).refit(CHOICES)
+    monkeypatch.setitem(PoseGrams._sums.__globals__, "_BLOCKS", 4)
+    np.testing.assert_allclose(PoseGrams.of(problem).refit(CHOICES), whole, rtol=1e-9)

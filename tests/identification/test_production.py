@@ -185,3 +185,16 @@ def test_the_coverage_of_two_halves_is_that_of_the_whole(arm):
     for name in ("rows", "covered", "joints", "rail", "load", "farthest", "level", "direction"):
         assert getattr(both, name) == pytest.approx(getattr(whole, name)), name
     assert both.courses == whole.courses == ("a", "b")
+
+
+@pytest.mark.parametrize("spread", [3.0, 4.0])
+def test_company_is_found_by_a_tree_as_by_all_distances(arm, spread):
+    q = np.random.default_rng(3).normal(0.0, 0.5, (80, 7))
+    q[:12] *= spread
+    q[20:40] += 2.0 * np.pi  # whole turns aside
+    q[20:40, 0] -= 2.0 * np.pi  # on the rail there are none
+    near = near_postures(arm, q, q, 2.0)
+    np.fill_diagonal(near, False)
+    alone = ~near.any(axis=1)
+    assert 0 < alone.mean() < 0.25
+    np.testing.assert_array_equal(poses_in_company(arm, q, np.arange(80)), ~alone)

@@ -1,5 +1,7 @@
 """NetCDF files: labelled arrays and records of arrays, lossless and readable by others."""
 
+import contextlib
+import gc
 from dataclasses import replace
 from typing import Annotated
 
@@ -181,3 +183,32 @@ def test_files_without_checksums_are_read(tmp_path):
     with h5py.File(tmp_path / "a.nc", "w") as file:
         file["a"] = np.arange(3.0)
     assert read_arrays(tmp_path / "a.nc")["a"].values.tolist() == [0.0, 1.0, 2.0]
+
+
+def test_more_numbers_than_fit_into_memory_are_refused_by_their_bound(tmp_path):
+    path = tmp_path / "huge.nc"
+    with h5py.File(path, "w") as file:
+        file.create_dataset("x", (3 * 10**12,), "f8", chunks=(1024,))
+    with pytest.raises(SchemaError, match=r"more than 256 MB.*ELASTOCAL_MAX_ARRAYS_MB"):
+        read_arrays(path)
+
+
+@pytest.mark.parametrize("link", [h5py.SoftLink("/y"), h5py.ExternalLink("other.nc", "/x")])
+def test_values_of_other_files_are_not_read(tmp_path, link):
+    path = tmp_path / "linked.nc"
+    with h5py.File(path, "w") as file:
+        file["x"] = link
+    with pytest.raises(SchemaError, match="'x' is a link"):
+        read_arrays(path)
+
+
+def test_a_damaged_file_prints_nothing_but_its_refusal(tmp_path, capfd):
+    path = tmp_path / "a.nc"
+    write_arrays(path, LabelledArrays({"x": LabelledArray(("n",), np.arange(100.0))}))
+    data = path.read_bytes()
+    for at in range(len(data) // 40, len(data), len(data) // 40):
+        path.write_bytes(data[:at] + bytes([data[at] ^ 0xFF]) + data[at + 1 :])
+        with contextlib.suppress(SchemaError):
+            read_arrays(path)
+        gc.collect()
+    assert capfd.readouterr() == ("", "")

@@ -4,7 +4,14 @@ from typing import Literal
 import pytest
 
 from elastocal.errors import FileAccessError, SchemaError
-from elastocal.records import StrictModel, check_schema, read_json, read_yaml, validate
+from elastocal.records import (
+    StrictModel,
+    check_schema,
+    read_json,
+    read_json_data,
+    read_yaml,
+    validate,
+)
 
 
 class Station(StrictModel):
@@ -147,3 +154,47 @@ def test_the_first_problem_of_several_is_named():
 
 def test_the_known_schema_passes():
     check_schema(SCHEMA, SCHEMA, "a file")
+
+
+ALIASES = "a0: &a0 [x, x]\n" + "".join(
+    f"a{n}: &a{n} [{', '.join([f'*a{n - 1}'] * 4)}]\n" for n in range(1, 25)
+)
+MERGED = "m0: &m0 {k: 1}\n" + "".join(
+    f"m{n}: &m{n} {{<<: [*m{n - 1}, *m{n - 1}]}}\n" for n in range(1, 25)
+)
+
+
+@pytest.mark.parametrize(
+    ("text", "variable"),
+    [
+        (ALIASES, "ELASTOCAL_MAX_YAML_VALUES"),
+        (MERGED, "ELASTOCAL_MAX_YAML_VALUES"),
+        ("me: &me [*me]\n", "ELASTOCAL_MAX_YAML_VALUES"),
+        ("".join(f"key_{n}: 1\n" for n in range(60_000)), "ELASTOCAL_MAX_YAML_VALUES"),
+        ("#" * 1_100_000 + "\na: 1\n", "ELASTOCAL_MAX_YAML_KB"),
+        ("a: " + "[" * 70 + "]" * 70, "ELASTOCAL_MAX_NESTING"),
+    ],
+)
+def test_a_small_file_cannot_ask_for_everything_and_the_refusal_says_what_raises_the_bound(
+    tmp_path, text, variable
+):
+    path = tmp_path / "cell.yaml"
+    path.write_text(text)
+    with pytest.raises(SchemaError, match=variable):
+        read_yaml(path, Cell, SCHEMA)
+
+
+def test_a_variable_raises_a_bound_and_must_be_a_number(tmp_path, monkeypatch):
+    path = tmp_path / "deep.json"
+    path.write_text("[" * 70 + "]" * 70)
+    monkeypatch.setenv("ELASTOCAL_MAX_NESTING", "80")
+    assert read_json_data(path)[0]
+    monkeypatch.setenv("ELASTOCAL_MAX_NESTING", "-1")
+    with pytest.raises(FileAccessError, match="ELASTOCAL_MAX_NESTING is '-1'"):
+        read_json_data(path)
+
+
+def test_aliases_are_read(tmp_path):
+    path = tmp_path / "cell.yaml"
+    path.write_text(f"schema: {SCHEMA}\nrobot: &r arm\nstations: [{{name: *r}}]\n")
+    assert read_yaml(path, Cell, SCHEMA).stations[0].name == "arm"

@@ -27,6 +27,7 @@ from .output import (
     green as green,
     print_json as print_json,
     print_lines as print_lines,
+    print_remarks as print_remarks,
     progress_bars as progress_bars,
     red as red,
     visible as visible,

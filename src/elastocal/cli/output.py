@@ -16,6 +16,7 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from elastocal.progress import Progress
+from elastocal.results import counted_alike
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -94,6 +95,12 @@ def print_lines(lines: Iterable[str]) -> None:
     """Print lines on standard output, for programs."""
     sys.stdout.writelines(f"{visible(line)}\n" for line in lines)
     sys.stdout.flush()
+
+
+def print_remarks(screen: "Console", label: str, texts: Iterable[str]) -> None:
+    """Print warnings or notes, a line each; many of one kind are one line with their number."""
+    for text in counted_alike(texts):
+        screen.print(f"{yellow(f'{label}:')} {text}", soft_wrap=True)
 
 
 @contextmanager

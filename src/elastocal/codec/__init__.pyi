@@ -46,6 +46,7 @@ from .splits import (
     Campaign as Campaign,
     CodecOptions as CodecOptions,
     Split as Split,
+    drawn_poses as drawn_poses,
     make_campaign as make_campaign,
     make_splits as make_splits,
     split_sizes as split_sizes,

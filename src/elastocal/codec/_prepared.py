@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 
 from elastocal.arrays import BoolArray, FloatArray, IndexArray
 from elastocal.codec.data import CodecData
-from elastocal.codec.splits import Campaign, CodecOptions, Split, make_campaign
+from elastocal.codec.splits import Campaign, CodecOptions, Split, drawn_poses, make_campaign
 from elastocal.codec.variants import ALL_LOADS, Variant, training_cases
 from elastocal.dataset import Readings
 from elastocal.elastic import ElasticModel
@@ -217,6 +217,7 @@ def prepared_variants(
     DatasetError
         If the data lack a load case, or joints are not this robot's.
     """
+    readings = drawn_poses(readings, data.options)
     aside = FitOptions(set_blunders_aside=data.options.set_blunders_aside)
     kept = usable_for_choice(robot, readings, aside, marker_offset)
     models = {

@@ -24,7 +24,14 @@ from elastocal.codec._prepared import (
     taken_springs,
 )
 from elastocal.codec.data import NO_POSE, CodecData, SpringLabels
-from elastocal.codec.splits import CodecOptions, Split, make_campaign, make_splits, split_sizes
+from elastocal.codec.splits import (
+    CodecOptions,
+    Split,
+    drawn_poses,
+    make_campaign,
+    make_splits,
+    split_sizes,
+)
 from elastocal.codec.variants import Variant, check_different
 from elastocal.dataset import Readings
 from elastocal.errors import CodecError, IdentificationError
@@ -104,6 +111,7 @@ def cross_validate(
         sign or frame read otherwise.
     """
     options = options or CodecOptions()
+    measured, readings = readings, drawn_poses(readings, options)
     ladder = climbed_ladder(robot, readings, variants, options, marker_offset)
     taken = [taken_springs(ladder, each.springs) for each in variants]
     models = {each.name: each.model for each in ladder.ladder}
@@ -118,7 +126,7 @@ def cross_validate(
     ]
     prepared = [each.taken for each in entrants]
     most = min(_largest_training_set(each, splits) for each in prepared)
-    findings = list(campaign.findings)
+    findings = [*_draw_findings(measured, readings, options), *campaign.findings]
     if most < training:
         findings.append(
             f"training sets end at {most} of {training} poses: the others have no reading of the"
@@ -150,6 +158,17 @@ def cross_validate(
         ladder=tuple(map(rung_summary, ladder.ladder)),
         left_out=left_out_errors(ladder, variants),
     )
+
+
+def _draw_findings(measured: Readings, drawn: Readings, options: CodecOptions) -> list[str]:
+    """Return what a person has to know of a codec that was not made on all poses."""
+    poses, of = (len(np.unique(readings.pose)) for readings in (drawn, measured))
+    if poses == of:
+        return []
+    return [
+        f"made on {poses} of the {of} poses, drawn with seed {options.seed}: work and memory grow"
+        " with the cube of their number (--poses takes more)"
+    ]
 
 
 def _zero_error(problem: Problem, split: Split) -> float:

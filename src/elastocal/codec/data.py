@@ -6,6 +6,7 @@ layouts differ in their numbers of springs.
 """
 
 import json
+import sys
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -42,7 +43,9 @@ NO_POSE = -1
 ARRAYS_SCHEMA = "elastocal.codec/1"
 ARRAYS = "codec.nc"
 """Name of the file in a codec's folder."""
-_OPTIONS = ("ratio", "seed", "set_blunders_aside", "trust_conventions")
+_OPTIONS = ("ratio", "seed", "set_blunders_aside", "trust_conventions", "poses")
+_ALL_POSES = {"poses": sys.maxsize}
+"""Of a file that does not say: elastocal 0.1.0 drew none."""
 
 
 @brief_repr
@@ -349,7 +352,7 @@ def _data_of(found: LabelledArrays) -> CodecData:
         pose_labels=tuple(labels),
         compliance=tuple(found[f"compliance_{k}"].values for k in numbers),
         load_cases=tuple(json.loads(found.attributes["load_cases"])),
-        options=CodecOptions(**json.loads(found.attributes["options"])),
+        options=CodecOptions(**(_ALL_POSES | json.loads(found.attributes["options"]))),
         robot=str(found.attributes["robot_name"]),
         provenance=str(found.attributes["provenance"]),
         findings=tuple(json.loads(found.attributes["findings"])),

@@ -15,6 +15,7 @@ from elastocal.dataset import Readings
 from elastocal.elastic import ElasticModel
 from elastocal.errors import CodecError, ConventionError
 from elastocal.identification import (
+    MINIMUM_BLOCKS,
     build,
     check_conventions,
     check_joints,
@@ -44,8 +45,12 @@ class CodecOptions:
     """Leave out readings that cannot be measurements of this robot."""
     trust_conventions: bool = False
     """Go on with data that fit far better with a sign or frame read otherwise."""
+    poses: int = 100
+    """Most poses; of a larger dataset as many are drawn. Work and memory grow with their cube."""
 
     def __post_init__(self) -> None:
+        if not self.poses >= MINIMUM_BLOCKS:
+            raise CodecError(f"{self.poses} poses: at least {MINIMUM_BLOCKS} are needed")
         if not 0.0 < self.ratio < np.inf:
             raise CodecError(
                 f"ratio {self.ratio:g} of training to verification poses: must be above 0"
@@ -82,6 +87,26 @@ class Campaign:
     def load_cases(self) -> tuple[str, ...]:
         """Load cases that have readings, in the order of the dataset."""
         return tuple(dict.fromkeys(self.readings.load_case.tolist()))
+
+
+def drawn_poses(readings: Readings, options: CodecOptions) -> Readings:
+    """Return the readings of the poses that a codec is made on, the same for the same seed.
+
+    They are drawn, not spread, so that errors at them are those at the poses of the dataset.
+
+    Parameters
+    ----------
+    readings : Readings
+        All measurements.
+    options : CodecOptions
+        How many poses at most, and the seed.
+    """
+    labels = np.unique(readings.pose)
+    if len(labels) <= options.poses:
+        return readings
+    rng = np.random.default_rng((options.seed, len(labels)))
+    drawn = rng.choice(labels, options.poses, replace=False)
+    return readings.take(np.isin(readings.pose, drawn))
 
 
 def make_campaign(

@@ -391,7 +391,7 @@ def _distance(one: Climbed, other: Climbed) -> float:
 def _left_out(problem: Problem, rows: BoolArray) -> FloatArray:
     """Return the errors of some readings under a refit to the others, shape (row,), in m."""
     rest = PoseGrams.of(problem.take(~rows))
-    compliance = rest.refit(np.ones((1, len(rest.gram))))[0]
+    compliance = rest.refit(np.ones((1, len(rest))))[0]
     return np.asarray(np.linalg.norm(problem.take(rows).residuals(compliance), axis=1))
 
 

@@ -19,7 +19,7 @@ from elastocal.records import read_json, record, write_json
 from elastocal.results import Result, brief_repr
 from elastocal.robot import GRAVITY, Robot, parse_urdf
 from elastocal.units import impossible
-from elastocal.wording import capped, springs_and_parameters
+from elastocal.wording import springs_and_parameters
 
 
 @brief_repr
@@ -187,7 +187,7 @@ class CalibrateResult(Result):
                     f" {1e3 * held.max:.3f} mm max, {held.folds} refits",
                 ),
             ]
-            facts += [("warning", text) for text in capped(figures.warnings)]
+            facts += [("warning", text) for text in figures.warnings]
         return (*facts, ("provenance", self.provenance))
 
 

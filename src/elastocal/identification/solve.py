@@ -22,6 +22,8 @@ from elastocal.identification.options import LOSSES, MEDIAN_NORM, check_loss
 from elastocal.identification.problem import Problem, column_scaling
 from elastocal.results import brief_repr
 
+_BLOCKS = 500
+"""Pose blocks whose Gram matrices are in memory at once."""
 _ITERATIONS = 50
 _SETTLED = 1e-6
 """Largest change of a weight at which reweighting has converged."""
@@ -137,8 +139,11 @@ def _solve_linear(problem: Problem, reading_weight: FloatArray) -> Solution:
 class PoseGrams:
     """Gram blocks of the column-scaled, weighted system."""
 
-    gram: FloatArray
-    """``[O d]^T [O d]`` of each pose block, shape (block, spring + 1, spring + 1)."""
+    rows: FloatArray
+    """``[O d]`` of the readings, those of a pose block one after the other, shape
+    (reading, 3, spring + 1)."""
+    start: IndexArray
+    """First reading of each block, shape (block,)."""
     prior: FloatArray
     """The same of the prior's rows, shape (spring + 1, spring + 1)."""
     scale: FloatArray
@@ -153,10 +158,30 @@ class PoseGrams:
         order = np.argsort(problem.block, kind="stable")
         _, start = np.unique(problem.block[order], return_index=True)
         rows = np.concatenate([scaled.rows, deflection], axis=2)[order]
-        blocks = (block.reshape(-1, rows.shape[2]) for block in np.split(rows, start[1:]))
-        gram = np.stack([block.T @ block for block in blocks])
         prior = problem.prior_rows / np.append(scaled.scale, 1.0)
-        return cls(gram, prior.T @ prior, scaled.scale, problem.lower, problem.upper)
+        return cls(rows, start, prior.T @ prior, scaled.scale, problem.lower, problem.upper)
+
+    def __len__(self) -> int:
+        """Return the number of pose blocks."""
+        return len(self.start)
+
+    def _sums(self, multiplicity: FloatArray) -> FloatArray:
+        """Return the Gram matrix of each choice of poses.
+
+        Shape (choice, spring + 1, spring + 1). Blocks of ten thousand poses take gigabytes: they
+        are made some hundred at a time.
+        """
+        width = self.rows.shape[2]
+        ends = np.append(self.start[1:], len(self.rows))
+        total = np.zeros((len(multiplicity), width, width))
+        for first in range(0, len(self), _BLOCKS):
+            part = slice(first, first + _BLOCKS)
+            gram = np.empty((len(self.start[part]), width, width))
+            for each, begin, end in zip(gram, self.start[part], ends[part], strict=True):
+                block = self.rows[begin:end].reshape(-1, width)
+                np.matmul(block.T, block, out=each)
+            total += np.tensordot(multiplicity[:, part], gram, axes=1)
+        return total
 
     def refit(self, multiplicity: FloatArray) -> FloatArray:
         """Return the compliances of each choice of poses.
@@ -170,7 +195,7 @@ class PoseGrams:
         -------
         ndarray, shape (choice, spring)
         """
-        total = np.tensordot(multiplicity, self.gram, axes=1) + self.prior
+        total = self._sums(multiplicity) + self.prior
         n = len(self.scale)
         # G = V diag(s^2) V^T gives what `minimise` takes of A = U diag(s) V^T: eigenvalues rise,
         # singular values fall, and U^T b = diag(1/s) V^T (A^T b). Round-off may leave an eigenvalue

@@ -34,6 +34,8 @@ MOST_UNEXPLAINED = 0.5
 no model of this arm: its bias, which no resampling sees, is larger than what it explains."""
 
 
+_READINGS = 2000
+"""Readings whose predictions by all draws are in memory at once."""
 MOST_FOLDS = 100
 """With more pose blocks than this, several are left out together."""
 
@@ -134,7 +136,11 @@ def measured_coverage(problem: Problem, held_out: HeldOut, deviations: FloatArra
         [_conformal(held_out.share[held_out.fold != fold]) for fold in range(held_out.folds)]
     )
     error = misfit[held_out.fold, None] * np.linalg.norm(deflection, axis=1, keepdims=True)
-    low, high = interval(np.moveaxis(problem.O @ deviations.T, -1, 0))
+    pieces = range(0, len(problem), _READINGS)
+    ends = [
+        interval(np.moveaxis(problem.O[i : i + _READINGS] @ deviations.T, -1, 0)) for i in pieces
+    ]
+    low, high = (np.concatenate(end) for end in zip(*ends, strict=True))
     off = problem.d - predicted
     inside = (off >= -np.hypot(np.minimum(low, 0.0), error)) & (
         off <= np.hypot(np.maximum(high, 0.0), error)
@@ -189,7 +195,7 @@ def bootstrap(grams: PoseGrams, draws: int, rng: Generator) -> FloatArray:
     -------
     ndarray, shape (draw, spring)
     """
-    blocks = len(grams.gram)
+    blocks = len(grams)
     chosen = rng.integers(blocks, size=(draws, blocks))
     multiplicity = np.stack([np.bincount(draw, minlength=blocks) for draw in chosen])
     return grams.refit(multiplicity.astype(float))

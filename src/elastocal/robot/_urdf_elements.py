@@ -50,18 +50,9 @@ def check_elements(root: ElementTree.Element) -> None:
         for part in (*link.findall("inertial"), *link.findall("collision")):
             for element in part.iter():
                 _check_numbers(f"link {link.get('name')!r}", element)
-    links = dict.fromkeys(link_names(root))
     for joint in root.findall("joint"):
         for element in joint.findall("origin"):
             _check_numbers(f"joint {joint.get('name')!r}", element)
-        for role in ("parent", "child"):
-            found = joint.find(role)
-            name = "" if found is None else found.get("link", "")
-            if name and name not in links:
-                raise RobotError(
-                    f"URDF joint {joint.get('name')!r}: no link {name!r} ({role})"
-                    f"{nearest(name, links)} (links: {listed(list(links))})"
-                )
 
 
 def _check_names(root: ElementTree.Element, kind: str) -> None:
@@ -133,11 +124,18 @@ def joints_by_child(root: ElementTree.Element) -> dict[str, ElementTree.Element]
     Raises
     ------
     RobotError
-        If two joints carry the same.
+        If two joints carry the same, or a joint names a link that is not there.
     """
+    links = dict.fromkeys(link_names(root))
     joint_to: dict[str, ElementTree.Element] = {}
     for joint in root.findall("joint"):
-        link_of(joint, "parent")
+        for role in ("parent", "child"):
+            name = link_of(joint, role)
+            if name not in links:
+                raise RobotError(
+                    f"URDF joint {joint.get('name')!r}: no link {name!r} ({role})"
+                    f"{nearest(name, links)} (links: {listed(list(links))})"
+                )
         first = joint_to.setdefault(link_of(joint, "child"), joint)
         if first is not joint:
             raise RobotError(

@@ -251,6 +251,7 @@ def read_chain(text: str, tip: str, base: str | None = None) -> SerialChain:
         If the URDF cannot be parsed, a link is missing, or the chain is not serial.
     """
     root = parse_urdf(text)
+    check_elements(root)
     links = link_names(root)
     base = base or root_link(root)
     for role, link in (("tip", tip), ("base", base)):
@@ -259,7 +260,6 @@ def read_chain(text: str, tip: str, base: str | None = None) -> SerialChain:
                 f"URDF of {robot_name(root)} has no {role} link {link!r}{nearest(link, links)}"
                 f" (links: {listed(links)})"
             )
-    check_elements(root)
     root_link(root)
     joints = joints_between(joints_by_child(root), base, tip)
     serial = serial_urdf(root, [joint.get("name", "") for joint in joints])

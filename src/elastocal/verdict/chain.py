@@ -28,9 +28,10 @@ from elastocal.procedure import (
 )
 from elastocal.procedure.record import check_stream
 from elastocal.records import record, to_data
+from elastocal.results import counted_alike
 from elastocal.verdict.evidence import Evidence, Seal
 from elastocal.verdict.signing import OF_RUN, check_signature, read_signature
-from elastocal.wording import capped, counted
+from elastocal.wording import counted
 
 _SAME = 1e-4
 """Difference, by the largest number of its kind, below which two derivations are one: versions and
@@ -180,7 +181,7 @@ def _recorded(evidence: Evidence, files: ChainFiles) -> Iterator[Link]:
         except ElastocalError as error:
             wrong.append(files.plain(error))
     if wrong:
-        yield from (_broken("streams", text) for text in capped(wrong))
+        yield from (_broken("streams", text) for text in counted_alike(wrong))
     else:
         found = counted(len(known), "recording")
         yield _whole("streams", f"{found}: those that the journal names, by their SHA-256")

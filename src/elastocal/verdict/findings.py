@@ -6,9 +6,10 @@ from dataclasses import dataclass
 from elastocal.identification import SuspiciousReading
 from elastocal.identification.recertification import Verdict as Recertified
 from elastocal.procedure import commits
+from elastocal.results import counted_alike
 from elastocal.verdict.chain import LinkState
 from elastocal.verdict.evidence import Evidence
-from elastocal.wording import capped, counted, mm, spans
+from elastocal.wording import counted, mm, spans
 
 _ESSENTIAL = ("run", "journal", "cell", "plan", "summary of the run", "dataset",
               "calibrated model", "calibration made again", "process")  # fmt: skip
@@ -48,7 +49,7 @@ def reading_findings(evidence: Evidence) -> Iterator[Finding]:
             " figure of this report speaks of it",
             advice="Measure again what was left out, so that nothing has to be.",
         )
-    for warning in capped(figures.warnings):
+    for warning in counted_alike(figures.warnings):
         yield Finding(f"calibration: {warning}")
     yield from _outside(evidence)
 
@@ -123,7 +124,7 @@ def instrument_findings(evidence: Evidence) -> Iterator[Finding]:
     """Yield findings on stations, sensor and tool: the warnings of the run."""
     if evidence.summary is None:
         return
-    for warning in evidence.summary.warnings:
+    for warning in counted_alike(evidence.summary.warnings):
         moved = "moved between" in warning
         advice = (
             "Fix the tracker's stand before the next run: a station that moves splits its poses."

@@ -42,6 +42,9 @@ def _codec(  # noqa: PLR0913 - one parameter an option
     splits: Annotated[
         int | None, typer.Option(max=100_000, help="Verification sets; default: as many as poses.")
     ] = None,
+    poses: Annotated[
+        int, typer.Option(help="Most poses; of a larger dataset as many are drawn by the seed.")
+    ] = 100,
     ratio: Annotated[
         str, typer.Option(metavar="A/B", help="Training to verification poses.")
     ] = "70/30",
@@ -76,7 +79,8 @@ def _codec(  # noqa: PLR0913 - one parameter an option
     from elastocal.codec import CodecOptions
     from elastocal.records import to_data
 
-    chosen = CodecOptions(splits, _parse_ratio(ratio), seed, not keep_blunders, trust_conventions)
+    parts = _parse_ratio(ratio)
+    chosen = CodecOptions(splits, parts, seed, not keep_blunders, trust_conventions, poses)
     with output.progress_bars() as progress:
         result = workflows.codec(
             data,

@@ -27,6 +27,5 @@ def _derive(
         return
     console, folder = output.console(), result.folder
     console.print(f"{result.poses()}, readings: {result.counts()}")
-    for warning in result.summary.warnings:
-        console.print(f"warning: {warning}", soft_wrap=True)
     console.print(f"wrote {folder.dataset} and {folder.summary.name}", soft_wrap=True)
+    output.print_remarks(console, "warning", result.summary.warnings)

@@ -39,7 +39,6 @@ def _verify(
         public = make_key(new_key)
         output.console().print(
             f"wrote {new_key} (keep it secret) and {public} (give it away)",
-            markup=False,
             soft_wrap=True,
         )
         return
@@ -50,6 +49,6 @@ def _verify(
     else:
         for link in found.links:
             output.console().print(
-                f"{link.state.value:<14} {link.name}: {link.text}", markup=False, soft_wrap=True
+                f"{link.state.value:<14} {link.name}: {link.text}", soft_wrap=True
             )
     found.require_whole()

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from rich.console import Console
 from rich.table import Table
 
-from elastocal.cli.output import bold, dim, green, red, yellow
+from elastocal.cli.output import bold, dim, green, print_remarks, red, yellow
 from elastocal.elastic import Unit, unit_of
 from elastocal.identification import (
     AUTO,
@@ -26,7 +26,6 @@ from elastocal.identification import (
     ladder_sentence,
 )
 from elastocal.wording import (
-    capped,
     counted,
     lengths_with_interval,
     mm,
@@ -58,8 +57,7 @@ def _show_figures(console: Console, figures: CalibrationSummary) -> None:
     _show_frames(console, figures.frames)
     _show_budget(console, figures.budget)
     _show_suspicious(console, figures.suspicious)
-    for warning in capped(figures.warnings):
-        console.print(f"{yellow('warning:')} {warning}")
+    print_remarks(console, "warning", figures.warnings)
 
 
 def _show_fit(console: Console, figures: CalibrationSummary) -> None:

@@ -12,7 +12,7 @@ from rich.box import SIMPLE
 from rich.console import Console
 from rich.table import Table
 
-from elastocal.cli.output import bold, green, red, yellow
+from elastocal.cli.output import bold, green, print_remarks, red, yellow
 from elastocal.codec import CodecSummary
 from elastocal.codec.study import Share, StudySummary, micrometres, value_text
 from elastocal.elastic import unit_of
@@ -36,8 +36,7 @@ def show_codec(console: Console, result: CodecSummary, out: Path, names: Sequenc
     console.print(_codec_table(result))
     for sentence in result.sentences:
         console.print(sentence)
-    for finding in result.findings:
-        console.print(f"{yellow('note:')} {finding}")
+    print_remarks(console, "note", result.findings)
     console.print(f"\n{', '.join(names)} written to {bold(str(out))}")
 
 

@@ -3,7 +3,6 @@
 from pathlib import Path
 
 from rich.console import Console
-from rich.markup import escape
 from rich.table import Table
 
 from elastocal.geometry import GeometryModel, GeometryParameter
@@ -44,14 +43,14 @@ def show_geometry(console: Console, model: GeometryModel, out: Path) -> None:
         console.print(f"{count} left out as blunders (counted from 0): {named}{more}")
     fixed = counted(len(model.fixed), "error")
     written = f"{fixed} not told apart from others; wrote {out}"
-    console.print(written, markup=False, soft_wrap=True)
+    console.print(written, soft_wrap=True)
 
 
 def _cells(parameter: GeometryParameter) -> tuple[str, ...]:
     scale, unit = _UNITS.get(parameter.unit, (1.0, parameter.unit))
     low, high = scale * parameter.low, scale * parameter.high
     return (
-        escape(parameter.name),
+        parameter.name,
         f"{scale * parameter.value:.3f}",
         f"{low:.3f} to {high:.3f}",
         unit,

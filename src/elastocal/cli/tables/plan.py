@@ -9,7 +9,7 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from elastocal.cli.output import bold, dim, green, yellow
+from elastocal.cli.output import bold, dim, green, print_remarks, yellow
 from elastocal.planning import PlanResult, ProductionRecord, SpreadRecord
 from elastocal.records import record
 from elastocal.robot import catalogue
@@ -45,8 +45,7 @@ def show_plan(console: Console, plan: PlanResult, figures: PlanFigures) -> None:
     if figures.stations:
         seen = ", ".join(f"{name} {count}" for name, count in figures.stations.items())
         console.print(f"marker seen by: {seen}")
-    for finding in plan.findings:
-        console.print(f"note: {finding}", soft_wrap=True)
+    print_remarks(console, "note", plan.findings)
     written = f"written to {figures.folder}: {', '.join(figures.files)}"
     console.print(written if figures.files else "Nothing was written.", soft_wrap=True)
 
@@ -164,8 +163,7 @@ def show_itinerary(console: Console, found: DryRunResult) -> None:
         " Nothing was moved.",
         soft_wrap=True,
     )
-    for warning in found.warnings:
-        console.print(f"warning: {warning}", soft_wrap=True)
+    print_remarks(console, "warning", found.warnings)
 
 
 def show_run(console: Console, result: RunResult) -> None:
@@ -182,8 +180,7 @@ def show_run(console: Console, result: RunResult) -> None:
     if found.message:
         console.print(found.message, soft_wrap=True)
     if found.dataset:
-        for warning in found.warnings:
-            console.print(f"warning: {warning}", soft_wrap=True)
+        print_remarks(console, "warning", found.warnings)
         console.print(
             f"wrote {bold(found.dataset)} and summary.json:"
             f" `elastocal calibrate {found.dataset} --out model.json`",

@@ -33,6 +33,7 @@ import numpy as np
 
 from elastocal.arrays import FloatArray, IndexArray
 from elastocal.elastic import ElasticModel
+from elastocal.errors import IdentificationError
 from elastocal.identification.calibrated import CalibratedModel
 from elastocal.identification.displacement import displacement_blocks
 from elastocal.identification.domain import CalibratedLoads, CalibrationDomain
@@ -297,7 +298,13 @@ def _widest(blocks: _Blocks, spread: Spread) -> tuple[FloatArray, FloatArray]:
         rows @ S @ np.swapaxes(rows, -1, -2)
         for rows, S in zip(blocks, spread.covariance(), strict=True)
     ]
-    variance, axes = np.linalg.eigh(parts[0] + parts[1])
+    both = parts[0] + parts[1]
+    if not np.all(np.isfinite(both)):
+        raise IdentificationError(
+            "the intervals of the models at the rows are no finite numbers: draws or forces are of"
+            " an impossible size"
+        )
+    variance, axes = np.linalg.eigh(both)
     widest, axis = np.maximum(variance[:, -1], 0.0), axes[:, :, -1]
     old = np.einsum("ri,rij,rj->r", axis, parts[0], axis)
     share = over(old, widest)

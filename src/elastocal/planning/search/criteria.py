@@ -34,8 +34,7 @@ class Criterion(ABC):
     """A value of the information matrix ``S = eps I + sum O_p^T O_p``; larger is better.
 
     With the singular values ``s1 >= … >= sr`` of the observation matrix, scaled by column and
-    projected on the observable directions of the pool, the eigenvalues of ``S`` are
-    ``si^2 + eps``.
+    projected on the pool's observable directions, the eigenvalues of ``S`` are ``si^2 + eps``.
     """
 
     name: ClassVar[str]

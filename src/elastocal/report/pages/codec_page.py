@@ -32,6 +32,7 @@ from elastocal.report.plots import (
     variant_styles,
     write_kinds,
 )
+from elastocal.results import counted_alike
 
 KINDS = (".svg", ".png")
 """In which kinds every figure is written."""
@@ -139,7 +140,7 @@ def write_codec_page(
         saturations=verdicts.sentences[:first],
         pairs=verdicts.sentences[first:],
         pair_count=len(verdicts.pairs),
-        findings=data.findings,
+        findings=counted_alike(data.findings),
         how=how_to_read(data),
         last=data.n_train[-1],
         names=names,

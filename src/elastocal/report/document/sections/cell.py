@@ -10,6 +10,7 @@ from elastocal.compensation.conditioning import ToolResult
 from elastocal.procedure.derive import RegistrationSummary, RunSummary, ToolSummary
 from elastocal.report.document import blocks
 from elastocal.report.plots import StationResiduals, station_figure
+from elastocal.results import counted_alike
 from elastocal.verdict import Evidence
 from elastocal.wording import counted, mm, point, spans, um
 
@@ -113,7 +114,8 @@ def _stations_sensor_tool(evidence: Evidence) -> Iterator[blocks.Block]:
     yield _tool_file(evidence.tool, evidence.cell)
     yield blocks.Heading("Warnings of the run")
     none = blocks.Paragraph("The run gave no warning.")
-    yield blocks.Bullets(summary.warnings) if summary.warnings else none
+    warnings = tuple(counted_alike(summary.warnings))
+    yield blocks.Bullets(warnings) if warnings else none
 
 
 def _stations(registration: RegistrationSummary) -> Iterator[blocks.Block]:
