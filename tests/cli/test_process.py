@@ -99,7 +99,7 @@ try:
 except BaseException:
     pass
 """
-ENDS = [("SIGTERM", 143), ("SIGHUP", 129), ("SIGINT", -signal.SIGINT)]
+ENDS = [("SIGTERM", 143), ("SIGHUP", 129), ("SIGINT", 130)]
 
 
 def ended(script):

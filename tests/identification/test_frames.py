@@ -216,7 +216,7 @@ def test_refits_by_gram_blocks_are_those_of_the_solver_with_frames_too():
     model = ElasticModel(ROBOT, actuated(ROBOT))
     problem = build(model, readings, FitOptions(free_frame="load_case"))
     grams = PoseGrams.of(problem)
-    found = grams.refit(np.ones((1, len(grams.gram))))[0]
+    found = grams.refit(np.ones((1, len(grams))))[0]
     # The marker beside a shift is told apart by orientations alone; predictions are what counts.
     expected = problem.O @ solve(problem).compliance
     np.testing.assert_allclose(problem.O @ found, expected, atol=1e-9)

@@ -44,6 +44,8 @@ class GeometrySettings:
     """Draws of the bootstrap over blocks of poses."""
     seed: int = 0
     """Of these draws."""
+    force: bool = False
+    """Replace a file that this command did not write."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -9,7 +9,7 @@ from elastocal import workflows
 from elastocal.cli import options, output, tables
 
 
-def _geometry(
+def _geometry(  # noqa: PLR0913 (a command has as many options as it has)
     positions: Annotated[Path, typer.Argument(help="CSV of joints and positions of markers.")],
     out: Annotated[Path, typer.Option(help="Model file (.json) to write.")],
     *,
@@ -18,13 +18,14 @@ def _geometry(
     urdf: Annotated[Path | None, typer.Option(help="Calibrated URDF to write.")] = None,
     draws: Annotated[int, typer.Option(min=40, help="Draws of the bootstrap.")] = 200,
     seed: Annotated[int, typer.Option(min=0, help="Of these draws.")] = 0,
+    force: options.Force = False,
     as_json: options.Figures = False,
 ) -> None:
     """Find the geometric errors of an arm and its sag from absolute positions of markers."""
     from elastocal.records import to_data
 
     given = workflows.GeometrySettings(
-        positions, robot=robot, tcp=tcp, out=out, urdf=urdf, draws=draws, seed=seed
+        positions, robot=robot, tcp=tcp, out=out, urdf=urdf, draws=draws, seed=seed, force=force
     )
     with output.progress_bars() as progress:
         result = workflows.geometry(given, progress)
