@@ -31,7 +31,7 @@ from elastocal.workflows import import_logs
 from gallery.campaign import example_cell
 
 POINTS, CENTRES = 60, 4
-FEW_POSES = {"pool: 3000": "pool: 40", "poses: 31": "poses: 5"}
+FEW_POSES = {"pool: 3000": "pool: 40", 'd_max: "175 mm"': "poses: 5"}
 CLOCKS = {"force.csv": 3.2, "tracker.csv": -41.7}
 """What the clocks of two logs are behind the controller's, in s."""
 

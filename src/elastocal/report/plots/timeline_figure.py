@@ -83,11 +83,11 @@ def _overview(axes: Axes, found: ImportedLogs, poses: int) -> None:
             )  # fmt: skip
     lost = sum(each.pose < 0 for each in found.plateaus)
     axes.set_title(
-        f"{counted(poses, 'pose')}, {counted(len(found.plateaus) - lost, 'plateau')} used,"
-        f" {lost} not (no reference, no load)",
+        f"Force from unloaded. {counted(poses, 'pose')},"
+        f" {counted(len(found.plateaus) - lost, 'plateau')} used, {lost} not (no reference, no load)",
         fontsize=9, loc="left", pad=14, color=style.INK,
     )  # fmt: skip
-    axes.set_ylabel("force, N\n(from unloaded)")
+    axes.set_ylabel("force, N")
     axes.set_xlim(found.streams.arm.time[0], found.streams.arm.time[-1])
 
 
@@ -118,7 +118,7 @@ def _closely(
         for axis, colour in zip(drawn[1].T, colours, strict=True):
             axes.plot(drawn[0], axis, color=colour, linewidth=0.9)
         if not as_norm:
-            axes.legend(["x", "y", "z"], loc="lower left", fontsize=6.5, ncols=3, frameon=False)
+            axes.legend(["x", "y", "z"], loc="center right", fontsize=6.5, frameon=False)
         axes.set_ylabel(name)
         axes.set_xlim(*span)
         for each in own:
