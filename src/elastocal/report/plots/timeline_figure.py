@@ -82,9 +82,10 @@ def _overview(axes: Axes, found: ImportedLogs, poses: int) -> None:
                 va="bottom", fontsize=6.5, color=style.MUTED,
             )  # fmt: skip
     lost = sum(each.pose < 0 for each in found.plateaus)
+    used = counted(len(found.plateaus) - lost, "plateau")
     axes.set_title(
-        f"Force from unloaded. {counted(poses, 'pose')},"
-        f" {counted(len(found.plateaus) - lost, 'plateau')} used, {lost} not (no reference, no load)",
+        f"Force from unloaded. {counted(poses, 'pose')}, {used} used, {lost} not (no reference, no"
+        " load)",
         fontsize=9, loc="left", pad=14, color=style.INK,
     )  # fmt: skip
     axes.set_ylabel("force, N")
