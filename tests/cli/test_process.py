@@ -9,7 +9,7 @@ import pytest
 
 from elastocal.cell.examples import write_example
 from elastocal.cli import main
-from support.cli import elastocal
+from support.cli import default_signals, elastocal
 
 COMMAND = (sys.executable, "-c", "from elastocal.cli.main import run; run()")
 
@@ -104,8 +104,9 @@ ENDS = [("SIGTERM", 143), ("SIGHUP", 129), ("SIGINT", 130)]
 
 def ended(script):
     result = subprocess.run(
-        [sys.executable, "-c", script], capture_output=True, text=True, check=False, timeout=60
-    )
+        [sys.executable, "-c", script],
+        capture_output=True, text=True, check=False, timeout=60, preexec_fn=default_signals,
+    )  # fmt: skip
     assert "went on" not in result.stdout
     return result.returncode
 

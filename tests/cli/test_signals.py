@@ -6,6 +6,8 @@ import sys
 
 import pytest
 
+from support.cli import default_signals
+
 LATE = """
 import importlib.abc, os, signal, sys
 from elastocal.cli import main
@@ -34,7 +36,10 @@ run()
 
 def _ended(code, *words):
     command = [sys.executable, "-c", code, *words]
-    return subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
+    return subprocess.run(
+        command,
+        capture_output=True, text=True, timeout=60, check=False, preexec_fn=default_signals,
+    )  # fmt: skip
 
 
 @pytest.mark.parametrize("name", ["SIGINT", "SIGTERM"])

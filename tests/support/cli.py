@@ -45,3 +45,12 @@ def elastocal(*arguments: object) -> Result:
         finally:
             signal.signal(signal.SIGINT, heard)  # the command line leaves it to the system
     raise AssertionError("run() returned without an exit code")
+
+
+def default_signals() -> None:
+    """Let a child take signals as on a terminal, whoever started the tests (``preexec_fn``).
+
+    What ``nohup`` or a job in the background ignores is inherited, and rightly stays ignored.
+    """
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+        signal.signal(number, signal.SIG_DFL)
