@@ -1,5 +1,7 @@
 """How much of production a calibration covers: known distances, loads and names come back."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -11,6 +13,7 @@ from elastocal.identification import (
     posture_reach,
 )
 from elastocal.robot import Rail, Robot, catalogue, on_rail, with_tool
+from support import compensated
 
 PRESSES = np.array(
     [[0, 0, -1000], [300, 0, -1000], [-300, 0, -1000], [0, -200, -1000], [0, 200, -1000.0]]
@@ -198,3 +201,16 @@ def test_company_is_found_by_a_tree_as_by_all_distances(arm, spread):
     alone = ~near.any(axis=1)
     assert 0 < alone.mean() < 0.25
     np.testing.assert_array_equal(poses_in_company(arm, q, np.arange(80)), ~alone)
+
+
+def test_a_prediction_with_a_wide_interval_on_production_is_told():
+    """Readings fit alike with springs that production loads otherwise: the draws disagree."""
+    model, rng = compensated.arm(), np.random.default_rng(4)
+    q, force = rng.uniform(-0.5, 0.5, (20, 6)), rng.normal(0.0, 300.0, (20, 3))
+    sure = model.doubt(q, force)
+    assert sure.is_small
+    wild = replace(model, draws=model.compliance * rng.uniform(0.0, 8.0, model.draws.shape))
+    doubt = wild.doubt(q, force)
+    assert not doubt.is_small
+    assert "a correction may do harm" in doubt.sentence
+    assert doubt.deflection == pytest.approx(sure.deflection)

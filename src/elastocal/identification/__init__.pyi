@@ -129,10 +129,12 @@ from .problem import (
     unit_columns as unit_columns,
 )
 from .production import (
+    DOUBT_ROWS as DOUBT_ROWS,
     ENOUGH as ENOUGH,
     JOINT_REACH as JOINT_REACH,
     RAIL_REACH as RAIL_REACH,
     CoveredRows as CoveredRows,
+    PredictionDoubt as PredictionDoubt,
     ProductionCoverage as ProductionCoverage,
     covered_rows as covered_rows,
     near_postures as near_postures,

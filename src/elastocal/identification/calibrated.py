@@ -17,7 +17,9 @@ from elastocal.errors import RobotError, SpringError
 from elastocal.identification.domain import CalibratedLoads, CalibrationDomain
 from elastocal.identification.observability import Observability
 from elastocal.identification.production import (
+    DOUBT_ROWS,
     CoveredRows,
+    PredictionDoubt,
     ProductionCoverage,
     covered_rows,
 )
@@ -228,6 +230,26 @@ class CalibratedModel:
         """
         found = self.covered_rows(q, force, moment)
         return None if found is None else found.figures(course)
+
+    def doubt(
+        self, q: FloatArray, force: FloatArray, moment: FloatArray | None = None
+    ) -> PredictionDoubt:
+        """Return how sure predictions along some rows are, from some of them.
+
+        Parameters
+        ----------
+        q : ndarray, shape (row, joint)
+            In rad or m.
+        force, moment : ndarray, shape (row, 3)
+            On the robot at the tcp in base, in N and N·m; rows without a load say nothing.
+        """
+        loaded = np.flatnonzero(np.linalg.norm(force, axis=1) > 0.0)
+        few = loaded[np.unique(np.linspace(0, len(loaded) - 1, DOUBT_ROWS).astype(np.intp))]
+        found = self.predict(q[few], force[few], None if moment is None else moment[few])
+        return PredictionDoubt(
+            float(np.linalg.norm(found.deflection, axis=1).mean()),
+            float(np.linalg.norm(found.high - found.low, axis=1).mean() / 2.0),
+        )
 
     @property
     def tool_name(self) -> str:

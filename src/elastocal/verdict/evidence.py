@@ -22,6 +22,7 @@ from elastocal.errors import CodecError, CompensationError, IdentificationError
 from elastocal.identification import (
     CalibratedModel,
     CalibrationSummary,
+    PredictionDoubt,
     ProductionCoverage,
     Reproduction,
     UnseenErrors,
@@ -191,6 +192,15 @@ class Evidence:
         return self.calibrated.model.coverage(
             process.joint_position, process.force, process.moment, process.course
         )
+
+    @property
+    def doubt_on_production(self) -> PredictionDoubt | None:
+        """How sure predictions on the cell's production are; none where it is not known."""
+        process = None if self.cell is None else self.cell.process
+        if process is None or self.calibrated is None or not np.any(process.force):
+            return None
+        model = self.calibrated.model
+        return model.doubt(process.joint_position, process.force, process.moment)
 
     @property
     def saturation(self) -> Saturation | None:

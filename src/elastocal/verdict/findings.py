@@ -68,6 +68,10 @@ def _outside(evidence: Evidence) -> Iterator[Finding]:
         " process.file of the cell file.",
     )
 
+    doubt = evidence.doubt_on_production
+    if doubt is not None and not doubt.is_small:
+        yield Finding(doubt.sentence)
+
 
 def _missing_poses(evidence: Evidence) -> Iterator[Finding]:
     if evidence.plan is None or evidence.dataset is None:

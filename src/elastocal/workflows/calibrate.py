@@ -16,6 +16,7 @@ from elastocal.identification import (
     CalibratedModel,
     CalibrateResult,
     FitSettings,
+    PredictionDoubt,
     ProductionCoverage,
     check_loads,
     choose_model,
@@ -112,20 +113,26 @@ def calibrate(settings: CalibrateSettings, progress: Progress) -> CalibrateResul
     if settings.budget:
         figures = replace(figures, budget=error_budget(choice.model, readings, options, marker))
     if settings.process is not None:
-        figures = replace(figures, production=_coverage(settings.process, calibration.calibrated))
+        coverage, doubt = _on_production(settings.process, calibration.calibrated)
+        told = () if doubt is None or doubt.is_small else (doubt.sentence,)
+        figures = replace(figures, production=coverage, warnings=(*figures.warnings, *told))
     result = replace(CalibrateResult.of(calibration.calibrated, figures), made_from=made_from)
     if settings.out is not None:
         write_json(settings.out, result)
     return result
 
 
-def _coverage(path: Path, calibrated: CalibratedModel) -> ProductionCoverage | None:
-    """Return how much of a production path the calibration covers."""
+def _on_production(
+    path: Path, calibrated: CalibratedModel
+) -> tuple[ProductionCoverage | None, PredictionDoubt | None]:
+    """Return how much of a production path the calibration covers, and how sure it is there."""
     robot = calibrated.model.robot
     start = nearest_zero_posture(robot)
     held = start[None, : robot.external_axes]
     found = read_production(path, ProcessFile(file=path.name), robot, start, held)
-    return calibrated.coverage(found.joint_position, found.force, found.moment, found.course)
+    loads = found.joint_position, found.force, found.moment
+    doubt = calibrated.doubt(*loads) if np.any(found.force) else None
+    return calibrated.coverage(*loads, found.course), doubt
 
 
 def _measured(found: Sequence[tuple[Path, Dataset]]) -> tuple[Dataset, str]:
