@@ -39,6 +39,7 @@ from .problem import (
     unknowns as unknowns,
 )
 from .solve import (
+    PRIOR_WIDTH as PRIOR_WIDTH,
     Fixed as Fixed,
     GeometryFit as GeometryFit,
     fit as fit,

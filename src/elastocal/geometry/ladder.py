@@ -11,7 +11,7 @@ import numpy as np
 
 from elastocal.arrays import FloatArray, IndexArray
 from elastocal.geometry.problem import RUNGS, GeometryProblem, State
-from elastocal.geometry.solve import GeometryFit, fit, register, told_apart
+from elastocal.geometry.solve import PRIOR_WIDTH, GeometryFit, fit, register, told_apart
 from elastocal.identification import Overlap, judge_models
 from elastocal.progress import Progress
 from elastocal.results import brief_repr
@@ -19,8 +19,6 @@ from elastocal.results import brief_repr
 FOLDS = 5
 _BLOCKS = 100
 """Most blocks of consecutive poses."""
-_WIDE = 30.0
-"""Standard deviation of the prior of an unknown, in its likely sizes."""
 
 
 @brief_repr
@@ -132,7 +130,7 @@ class _Sums:
             own = rows == k
             self.G[k] = self.A[own].T @ self.A[own]
             self.h[k] = self.A[own].T @ self.b[own]
-        self.ridge = (about.sigma / _WIDE) ** 2
+        self.ridge = (about.sigma / PRIOR_WIDTH) ** 2
 
     def held_out(self, rung: str, free: IndexArray) -> RungErrors:
         """Return the errors of a rung at each fold, fitted to the others."""

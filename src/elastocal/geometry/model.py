@@ -8,6 +8,7 @@ from elastocal.geometry.arm import MOTION, ArmErrors, frames
 from elastocal.geometry.ladder import GeometryLadder
 from elastocal.geometry.positions import Positions, joint_torques
 from elastocal.geometry.problem import GeometryProblem
+from elastocal.identification import interval
 from elastocal.records import record
 from elastocal.results import brief_repr
 from elastocal.robot import Robot, with_joint_origins
@@ -144,7 +145,7 @@ def geometry_model(
 ) -> GeometryModel:
     """Return the model that a ladder has found."""
     robot, data, state = problem.robot, problem.data, found.fit.state
-    low, high = np.percentile(found.draws, [2.5, 97.5], axis=0)
+    low, high = interval(found.draws)
     free = set(found.fit.free.tolist())
     parameters = tuple(
         GeometryParameter(

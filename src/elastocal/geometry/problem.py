@@ -67,6 +67,10 @@ class GeometryProblem:
         self.station = np.array([index[name] for name in data.station.tolist()])[self.row]
         self.measured = data.markers[self.row, self.marker]
         self.unknowns = unknowns(robot, data)
+        joints = robot.chain.joints
+        # Joint and kind of each error of place and of motion, in the order of their columns.
+        self._placed = tuple(np.array(_placed(joints), dtype=np.intp).reshape(-1, 2).T)
+        self._moving = tuple(np.array(_moving(joints), dtype=np.intp).T)
 
     def __len__(self) -> int:
         """Return the number of seen markers."""
@@ -108,10 +112,9 @@ class GeometryProblem:
         )
         q, torque = self.data.q[self.row], self.torque[self.row]
         place, motion = derivatives(self.robot, own, q, torque, points)
-        joints = self.robot.chain.joints
-        columns = [place[:, :, j, k] for j, k in _placed(joints)]
-        columns += [motion[:, :, j, k] for j, k in _moving(joints)]
-        return np.asarray(np.einsum("nij,njk->nik", R, np.stack(columns, axis=2)))
+        (joint, kind), (moving, error) = self._placed, self._moving
+        columns = np.concatenate([place[:, :, joint, kind], motion[:, :, moving, error]], axis=2)
+        return np.asarray(np.einsum("nij,njk->nik", R, columns))
 
     def moved(self, at: State, step: FloatArray) -> State:
         """Return the state after a step of all unknowns, shape (unknown,)."""
@@ -123,18 +126,15 @@ class GeometryProblem:
         start = 6 * stations
         shift = step[start : start + 3 * markers].reshape(-1, 3)
         arm = step[start + 3 * markers :]
-        joints = self.robot.chain.joints
         place, motion = at.errors.place.copy(), at.errors.motion.copy()
-        placed, moving = np.array(_placed(joints)).reshape(-1, 2), np.array(_moving(joints))
-        place[tuple(placed.T)] += arm[: len(placed)]
-        motion[tuple(moving.T)] += arm[len(placed) :]
+        placed = len(self._placed[0])
+        place[self._placed] += arm[:placed]
+        motion[self._moving] += arm[placed:]
         return State(T, at.markers + shift, ArmErrors(place, motion))
 
     def values(self, at: State) -> FloatArray:
         """Return the value of each unknown, shape (unknown,); frames and markers count as 0."""
-        joints = self.robot.chain.joints
-        placed, moving = np.array(_placed(joints)).reshape(-1, 2), np.array(_moving(joints))
-        arm = np.concatenate([at.errors.place[tuple(placed.T)], at.errors.motion[tuple(moving.T)]])
+        arm = np.concatenate([at.errors.place[self._placed], at.errors.motion[self._moving]])
         return np.concatenate([np.zeros(len(self.unknowns) - len(arm)), arm])
 
 

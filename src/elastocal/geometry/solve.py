@@ -23,7 +23,7 @@ _CHI = 1.538
 """Median distance of three coordinates of standard deviation 1."""
 _FINEST = 1e-7
 """No tracker is finer, in m."""
-_WIDE = 30.0
+PRIOR_WIDTH = 30.0
 """Standard deviation of the prior of an unknown, in its likely sizes."""
 _MOST_ROWS = 3000
 """Positions by which it is told which unknowns are independent."""
@@ -193,7 +193,7 @@ def fit(
         now = distance < _BLUNDER * sigma if used is None and step >= _ROBUST_STEPS else keep
         root = np.sqrt(np.where(now, weight, 0.0))[:, None]
         A = (J[:, :, free] * (size * root[:, None])).reshape(-1, len(free))
-        G = A.T @ A + np.diag(np.full(len(free), (sigma / _WIDE) ** 2))
+        G = A.T @ A + np.diag(np.full(len(free), (sigma / PRIOR_WIDTH) ** 2))
         x = np.zeros(J.shape[2])
         x[free] = size * np.linalg.solve(G, A.T @ (r * root).ravel())
         same, keep = bool((now == keep).all()), now
