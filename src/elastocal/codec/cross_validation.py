@@ -303,8 +303,8 @@ def _train(
 def _sizes_of_choices(most: int) -> list[slice]:
     """Return ranges of places in a learning curve, springs being chosen anew at each start.
 
-    The largest training set makes a choice of its own, each other one of 5 to 9 of
-    than the next, down to the smallest that carries a choice.
+    The largest training set makes a choice of its own, and so does one of 5 poses for each 9 of
+    the next, down to the smallest that carries a choice.
     """
     starts = [most - 1]
     while starts[0] + 1 > MINIMUM_BLOCKS:

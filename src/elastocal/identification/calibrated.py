@@ -233,8 +233,8 @@ class CalibratedModel:
 
     def doubt(
         self, q: FloatArray, force: FloatArray, moment: FloatArray | None = None
-    ) -> PredictionDoubt:
-        """Return how sure predictions along some rows are, from some of them.
+    ) -> PredictionDoubt | None:
+        """Return how sure predictions along some rows are, from some of them; None without a load.
 
         Parameters
         ----------
@@ -244,6 +244,8 @@ class CalibratedModel:
             On the robot at the tcp in base, in N and N·m; rows without a load say nothing.
         """
         loaded = np.flatnonzero(np.linalg.norm(force, axis=1) > 0.0)
+        if not len(loaded):
+            return None
         few = loaded[np.unique(np.linspace(0, len(loaded) - 1, DOUBT_ROWS).astype(np.intp))]
         found = self.predict(q[few], force[few], None if moment is None else moment[few])
         return PredictionDoubt(

@@ -197,7 +197,7 @@ class Evidence:
     def doubt_on_production(self) -> PredictionDoubt | None:
         """How sure predictions on the cell's production are; none where it is not known."""
         process = None if self.cell is None else self.cell.process
-        if process is None or self.calibrated is None or not np.any(process.force):
+        if process is None or self.calibrated is None:
             return None
         model = self.calibrated.model
         return model.doubt(process.joint_position, process.force, process.moment)

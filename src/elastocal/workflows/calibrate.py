@@ -131,8 +131,7 @@ def _on_production(
     held = start[None, : robot.external_axes]
     found = read_production(path, ProcessFile(file=path.name), robot, start, held)
     loads = found.joint_position, found.force, found.moment
-    doubt = calibrated.doubt(*loads) if np.any(found.force) else None
-    return calibrated.coverage(*loads, found.course), doubt
+    return calibrated.coverage(*loads, found.course), calibrated.doubt(*loads)
 
 
 def _measured(found: Sequence[tuple[Path, Dataset]]) -> tuple[Dataset, str]:

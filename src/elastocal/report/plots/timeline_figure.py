@@ -1,12 +1,13 @@
 """Figure of merged logs: what each instrument felt by one clock, and where a reading was taken."""
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from elastocal.arrays import FloatArray
+from elastocal.arrays import BoolArray, FloatArray
 from elastocal.logs import ImportedLogs, Plateau
 from elastocal.report.plots import style
 from elastocal.wording import counted
@@ -65,11 +66,8 @@ def timeline_figure(found: ImportedLogs, title: str) -> Figure:
 def _overview(axes: Axes, found: ImportedLogs, poses: int) -> None:
     """Draw the size of the force and the poses of a whole recording."""
     wrench = found.streams.wrench
-    unloaded = np.zeros(len(wrench.time), dtype=bool)
-    for each in found.plateaus:
-        if each.load is None and each.pose >= 0:
-            unloaded |= (wrench.time >= each.start) & (wrench.time <= each.end)
-    force = wrench.force - wrench.force[unloaded].mean(axis=0)
+    unloaded = [each for each in found.plateaus if each.load is None and each.pose >= 0]
+    force = wrench.force - wrench.force[_during(wrench.time, unloaded)].mean(axis=0)
     time, size = _thinned(wrench.time, np.linalg.norm(force, axis=1)[:, None])
     axes.plot(time, size[:, 0], color=style.BLUE, linewidth=0.6)
     for pose in range(poses):
@@ -97,7 +95,6 @@ def _closely(
 ) -> None:
     """Draw arm, force and marker about one pose, from its reference."""
     arm, wrench, points = found.streams.arm, found.streams.wrench, found.streams.points
-    zero = own[0].start, own[0].end
     curves = (
         ("arm, mm", arm.time, 1e3 * arm.T_base_tcp[:, :3, 3], True),
         ("force, N", wrench.time, wrench.force, False),
@@ -105,15 +102,12 @@ def _closely(
     )
     for axes, (name, time, values, as_norm) in zip(panels, curves, strict=True):
         inside = (time >= span[0]) & (time <= span[1])
-        at_zero = (time >= zero[0]) & (time <= zero[1])
-        change = values[inside] - values[at_zero].mean(axis=0)
+        change = values[inside] - values[_during(time, own[:1])].mean(axis=0)
         if as_norm:
             change = np.linalg.norm(change, axis=1, keepdims=True)
             # Travel to and from the pose goes off the scale: what counts is what the loads do.
-            used = np.zeros(len(change), dtype=bool)
-            for each in own:
-                used |= (time[inside] >= each.start) & (time[inside] <= each.end)
-            axes.set_ylim(-0.05 * change[used].max(), 1.15 * change[used].max())
+            most = change[_during(time[inside], own)].max()
+            axes.set_ylim(-0.05 * most, 1.15 * most)
         drawn = _thinned(time[inside], change)
         colours = (style.INK,) if as_norm else (style.BLUE, style.VERMILLION, style.GREEN)
         for axis, colour in zip(drawn[1].T, colours, strict=True):
@@ -131,6 +125,14 @@ def _closely(
             transform=panels[1].get_xaxis_transform(), fontsize=6, color=style.INK, ha="center",
             va="bottom", bbox={"facecolor": style.PAPER, "alpha": 0.6, "lw": 0, "pad": 0.6},
         )  # fmt: skip
+
+
+def _during(time: FloatArray, plateaus: Sequence[Plateau]) -> BoolArray:
+    """Return whether each time lies within one of some plateaus, shape (sample,)."""
+    during = np.zeros(len(time), dtype=bool)
+    for each in plateaus:
+        during |= (time >= each.start) & (time <= each.end)
+    return during
 
 
 def _thinned(time: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatArray]:
