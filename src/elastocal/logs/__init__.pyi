@@ -43,9 +43,12 @@ from .recordings import (
 )
 from .streams import (
     LogStreams as LogStreams,
+    Stream as Stream,
     body_centre as body_centre,
+    joined_streams as joined_streams,
     read_streams_of as read_streams_of,
     read_table as read_table,
+    stream_rows as stream_rows,
 )
 from .table import (
     LARGEST_LOG as LARGEST_LOG,

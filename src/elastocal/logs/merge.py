@@ -9,7 +9,6 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TypeVar
 
 import numpy as np
 from scipy.spatial.transform import Rotation, Slerp
@@ -26,7 +25,13 @@ from elastocal.logs.plateaus import (
     number_poses,
     standing_spans,
 )
-from elastocal.logs.streams import LogStreams, read_streams_of
+from elastocal.logs.streams import (
+    LogStreams,
+    Stream,
+    joined_streams,
+    read_streams_of,
+    stream_rows,
+)
 from elastocal.procedure import PoseLog, PoseReadings
 from elastocal.procedure.derive import (
     LEAST_SAMPLES,
@@ -51,8 +56,6 @@ from elastocal.procedure.registration import Registration, register
 from elastocal.progress import Progress
 from elastocal.results import brief_repr
 from elastocal.wording import counted
-
-_Stream = TypeVar("_Stream", ArmStream, WrenchStream, PointStream)
 
 _LEAST_POSES = 2
 """Poses that a dataset is worth."""
@@ -123,7 +126,7 @@ def _merged(logs: Sequence[LogStreams], site: Site) -> Streams:
     """Return the streams of all logs by one clock, forces in the sensor's frame."""
     arm = next(log.arm for log in logs if log.arm is not None)
     known = np.isfinite(arm.q).all(axis=1) & np.isfinite(arm.T_base_tcp).all(axis=(1, 2))
-    arm = ArmStream(arm.time[known], arm.q[known], arm.T_base_tcp[known])
+    arm = stream_rows(arm, known)
     wrenches = [_in_sensor(log, arm, site) for log in logs if log.wrench is not None]
     points = [log.points for log in logs if log.points is not None]
     none = PointStream(np.empty(0), np.empty((0, 3)), np.empty((0, 3)), np.empty(0, dtype=np.str_))
@@ -132,14 +135,10 @@ def _merged(logs: Sequence[LogStreams], site: Site) -> Streams:
     )
 
 
-def _chained(streams: Sequence[_Stream]) -> _Stream:
+def _chained(streams: Sequence[Stream]) -> Stream:
     """Return one stream of several, in order of time."""
-    order = np.argsort(np.concatenate([each.time for each in streams]), kind="stable")
-    columns = {
-        name: np.concatenate([getattr(each, name) for each in streams])[order]
-        for name in vars(streams[0])
-    }
-    return replace(streams[0], **columns)
+    joined = joined_streams(streams)
+    return stream_rows(joined, np.argsort(joined.time, kind="stable"))
 
 
 def _in_sensor(log: LogStreams, arm: ArmStream, site: Site) -> WrenchStream:
@@ -218,9 +217,8 @@ def _reading(plateau: Plateau, streams: Streams, least: int) -> Reading:
     """Return the means over a plateau, by the station that saw most of it."""
     near = plateau.start - SAME_TIME, plateau.end + SAME_TIME
 
-    def cut(stream: _Stream) -> _Stream:
-        inside = slice(*np.searchsorted(stream.time, near))
-        return replace(stream, **{name: each[inside] for name, each in vars(stream).items()})
+    def cut(stream: Stream) -> Stream:
+        return stream_rows(stream, slice(*np.searchsorted(stream.time, near)))
 
     own = replace(
         streams, arm=cut(streams.arm), wrench=cut(streams.wrench), points=cut(streams.points)

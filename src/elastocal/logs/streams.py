@@ -9,7 +9,7 @@ from typing import TypeVar
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from elastocal.arrays import FloatArray
+from elastocal.arrays import BoolArray, FloatArray, IndexArray
 from elastocal.errors import LogError, UnitError
 from elastocal.logs.map import Joints, LogEntry, LogMap, MarkerColumns, Vector
 from elastocal.logs.recordings import is_recording, read_recording
@@ -30,7 +30,8 @@ _BEYOND_LIMITS = 0.2
 _K = 2.0
 """Coverage factor of a 95 % uncertainty."""
 
-_Stream = TypeVar("_Stream", ArmStream, WrenchStream, PointStream)
+Stream = TypeVar("Stream", ArmStream, WrenchStream, PointStream)
+"""Samples of one kind of instrument."""
 
 
 @brief_repr
@@ -52,7 +53,7 @@ class LogStreams:
     def at(self, time: FloatArray) -> "LogStreams":
         """Return the same with other times, shape (row,)."""
 
-        def moved(stream: _Stream | None) -> _Stream | None:
+        def moved(stream: Stream | None) -> Stream | None:
             return None if stream is None else replace(stream, time=time)
 
         return replace(
@@ -175,12 +176,9 @@ def _joined(parts: Sequence[LogStreams]) -> LogStreams:
     """Return one log of several that follow one another by one clock."""
     first = parts[0]
 
-    def chain(streams: Iterable[_Stream | None]) -> _Stream | None:
+    def chain(streams: Iterable[Stream | None]) -> Stream | None:
         each = [stream for stream in streams if stream is not None]
-        if not each:
-            return None
-        names = list(vars(each[0]))
-        return replace(each[0], **{n: np.concatenate([getattr(s, n) for s in each]) for n in names})
+        return joined_streams(each) if each else None
 
     words = None
     if first.handshake is not None:
@@ -195,6 +193,18 @@ def _joined(parts: Sequence[LogStreams]) -> LogStreams:
         chain(part.wrench for part in parts),
         chain(part.points for part in parts),
     )
+
+
+def joined_streams(streams: Sequence[Stream]) -> Stream:
+    """Return the samples of several streams of one kind, one stream after the other."""
+    names = vars(streams[0])
+    joined = {name: np.concatenate([getattr(each, name) for each in streams]) for name in names}
+    return replace(streams[0], **joined)
+
+
+def stream_rows(stream: Stream, rows: slice | IndexArray | BoolArray) -> Stream:
+    """Return some samples of a stream."""
+    return replace(stream, **{name: values[rows] for name, values in vars(stream).items()})
 
 
 def _arm(entry: LogEntry, table: LogTable, time: FloatArray, robot: Robot) -> ArmStream:
