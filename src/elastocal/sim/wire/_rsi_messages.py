@@ -129,7 +129,7 @@ class RobWriter:
         self._fields: list[tuple[str, int, bool]] = []
         elements: dict[str, list[tuple[str, str]]] = {}
         for channel in channels:
-            number = "{:.%df}" % precision if channel.kind == "DOUBLE" else "{:.0f}"
+            number = f"{{:.{precision}f}}" if channel.kind == "DOUBLE" else "{:.0f}"
             attributes = _INTERNAL.get(channel.name) if channel.internal else None
             element, _, attribute = channel.name.partition(".")
             names = attributes or (attribute,)

@@ -38,7 +38,7 @@ Steps = Generator[None, None, None]
 """A KRL program as it runs: it gives the interpreter back at every wait."""
 
 
-class RsiStop(DeviceError):
+class RsiStopError(DeviceError):
     """The controller stops the arm and the RSI context; an operator has to reset it."""
 
 
@@ -72,7 +72,7 @@ class PosCorr:
 
         Raises
         ------
-        RsiStop
+        RsiStopError
             Where their sum is beyond what POSCORRMON allows.
         """
         values = np.array([channels.get(tag, 0.0) for tag in _CORRECTIONS])
@@ -81,10 +81,10 @@ class PosCorr:
             self.shift = np.clip(way, self.limits.lower, self.limits.upper)
         if np.any(values[3:]) or self.absolute:
             self._turn(values[3:])
-        way, angle = float(np.linalg.norm(self.shift)), _angle(self.turn)
-        if way > self.limits.monitor_way or angle > self.limits.monitor_rotation:
-            raise RsiStop(
-                f"KSS29000 POSCORRMON: correction {1e3 * way:.3f} mm, {math.degrees(angle):.3f}°"
+        length, angle = float(np.linalg.norm(self.shift)), _angle(self.turn)
+        if length > self.limits.monitor_way or angle > self.limits.monitor_rotation:
+            raise RsiStopError(
+                f"KSS29000 POSCORRMON: correction {1e3 * length:.3f} mm, {math.degrees(angle):.3f}°"
                 f" beyond {1e3 * self.limits.monitor_way:g} mm,"
                 f" {math.degrees(self.limits.monitor_rotation):g}°"
             )
@@ -154,39 +154,42 @@ def corrected_program(robot: "RsiRobot") -> Steps:
     yield from robot.move_corr()
 
 
+@dataclass(frozen=True)
+class RsiContext:
+    """How the controller is set up, and how patient the simulation is."""
+
+    program: KrlProgram = run_program
+    """The KRL program that runs."""
+    absolute: bool = False
+    """Whether corrections are absolute (RSI_ON #ABSOLUTE), for compensation; else relative."""
+    limits: PosCorrLimits = field(default_factory=PosCorrLimits)
+    cycle: float = 0.004
+    """In s: 4 ms (IPO_FAST) or 12 ms (IPO)."""
+    delay: float = 0.012
+    """From a correction to the motion, in s; at least a cycle. RSI 2 has 120 ms, and nobody has
+    published a number for later ones."""
+    timeout: int = 100
+    """Cycles in a row without an answer after which the controller stops; 10 by default on a
+    controller, 100 in the contexts that public drivers come with."""
+    precision: int = 6
+    """Decimals of the ETHERNET object; 1 by default on a controller."""
+    patience: float = 0.0
+    """Time that the robot at least waits for an answer, in s of the wall; above the cycle its time
+    is stretched. For machines that are busy."""
+    operator: float | None = None
+    """Time after which an operator resets a controller that has stopped, in s of the wall; None:
+    only when asked."""
+
+
 class RsiRobot:
     """The controller with its arm."""
 
-    def __init__(
-        self,
-        live: LiveCell,
-        receive: Sequence[Channel],
-        program: KrlProgram = run_program,
-        *,
-        corrections: PosCorr | None = None,
-        cycle: float = 0.004,
-        delay: float = 0.012,
-    ) -> None:
-        """Stand ready.
-
-        Parameters
-        ----------
-        live : LiveCell
-            The cell.
-        receive : sequence of Channel
-            Channels from the PC.
-        program : callable
-            The KRL program that runs.
-        corrections : PosCorr, optional
-            By default relative ones.
-        cycle : float
-            In s.
-        delay : float
-            From a correction to the motion, in s; at least a cycle.
-        """
-        self._live, self._receive, self._program, self._cycle = live, receive, program, cycle
-        self._latency = max(0, round(delay / cycle) - 1)
-        self._corrections = corrections or PosCorr(PosCorrLimits(), absolute=False)
+    def __init__(self, live: LiveCell, receive: Sequence[Channel], context: RsiContext) -> None:
+        """Stand ready; ``receive`` are the channels from the PC."""
+        self._live, self._receive, self._program = live, receive, context.program
+        self._cycle = context.cycle
+        self._latency = max(0, round(context.delay / context.cycle) - 1)
+        self._corrections = PosCorr(context.limits, context.absolute)
         self._follower = live.apart(lambda sim: PoseFollower(sim.plant))
         cell, self._true = live.cell, live.sim.plant.statics.robot
         self._fastest = cell.axis_speeds / cell.file.motion.override
@@ -259,7 +262,7 @@ class RsiRobot:
 
         Raises
         ------
-        RsiStop
+        RsiStopError
             When something stops the arm.
         """
         for channel in self._receive:
@@ -286,7 +289,7 @@ class RsiRobot:
         self._looked -= 1
         fault = self._follower.stopped if self._led else sim.arm.state().fault
         if fault is not None:
-            raise RsiStop(fault)
+            raise RsiStopError(fault)
 
     def _lead(self, offset: FloatArray) -> None:
         """Lead the arm to its corrected pose; refuse what its axes cannot follow."""
@@ -295,7 +298,9 @@ class RsiRobot:
         speed = np.abs(self._follower.q - before) / self._cycle / self._fastest
         if not float(speed.max()) <= 1.0:
             axis = self._live.cell.robot.joint_names[int(np.nanargmax(speed))]
-            raise RsiStop(f"KSS00421 command velocity of {axis} is {speed.max():.0%} of the most")
+            raise RsiStopError(
+                f"KSS00421 command velocity of {axis} is {speed.max():.0%} of the most"
+            )
 
     def _corrected(self, q: FloatArray, offset: FloatArray) -> FloatArray:
         T = self._true.forward(q).copy()
@@ -322,7 +327,7 @@ class RsiRobot:
         if np.abs(T - self._true.forward(target)).max() > _NONE:
             found = self._true.solve(T[None], target[None])
             if not found.ok[0]:
-                raise RsiStop("KSS01422 the corrected target is out of reach")
+                raise RsiStopError("KSS01422 the corrected target is out of reach")
             self._corrected_by = found.q[0] - target
         else:
             self._corrected_by = np.zeros_like(target)
@@ -352,7 +357,7 @@ class RsiRobot:
         try:
             self._arm().move_joints(q, speed)
         except DeviceError as error:
-            raise RsiStop(str(error)) from error
+            raise RsiStopError(str(error)) from error
         self._led, self._moving = False, True
 
     def _arm(self) -> RobotArm:
@@ -361,7 +366,7 @@ class RsiRobot:
 
 def _frame(T: FloatArray) -> list[float]:
     """Return X, Y, Z in mm and A, B, C in deg (about Z, Y', X'') of a frame."""
-    (ux, vx, wx), (uy, vy, wy), (uz, vz, wz) = T[:3, :3].tolist()
+    (ux, vx, _), (uy, vy, _), (uz, vz, wz) = T[:3, :3].tolist()
     flat = math.hypot(vz, wz)
     angles = (
         (math.atan2(uy, ux), math.atan2(-uz, flat), math.atan2(vz, wz))

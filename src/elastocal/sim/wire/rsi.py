@@ -3,7 +3,7 @@
 The robot is the client: each cycle it sends a ``<Rob>`` datagram to the PC and waits for the
 ``<Sen>`` with the same ``IPOC``, a count of milliseconds. An answer that is late, or to another
 cycle, has not come; after ``timeout`` cycles in a row without one the controller stops the arm, and
-is silent until an operator resets it. What a correction does is in `elastocal.sim.wire._rsi_robot`.
+is silent until an operator resets it. What a correction does depends on the `RsiContext`.
 
 Written from public descriptions of RSI 3 to 5 and from programs that talk to it; never compared
 with a real controller. Assumptions beside those: late answers count in a row; before the first
@@ -22,14 +22,7 @@ from typing import Literal
 from elastocal.cell import LOOPBACK, WallClock
 from elastocal.errors import DeviceError
 from elastocal.sim.wire._rsi_messages import LARGEST, Answer, EthernetConfig, RobWriter, SenReader
-from elastocal.sim.wire._rsi_robot import (
-    KrlProgram,
-    PosCorr,
-    PosCorrLimits,
-    RsiRobot,
-    RsiStop,
-    run_program,
-)
+from elastocal.sim.wire._rsi_robot import RsiContext, RsiRobot, RsiStopError
 from elastocal.sim.wire.live_cell import LiveCell
 from elastocal.sim.wire.servers import Told, serves
 
@@ -40,6 +33,8 @@ _MALFORMED = (
     b"\xff\x00" * 700,
     b'<!DOCTYPE x [<!ENTITY a "b">]><Rob>&a;</Rob>',
 )
+_LOOK = 0.05
+"""Longest time without a look whether the server is to be closed, in s of the wall."""
 _BEHIND = 1.0
 """Cycles that the robot may be behind the clock before its time is stretched."""
 RsiFault = Literal[
@@ -115,15 +110,10 @@ class RsiServer:
         self,
         live: LiveCell,
         config: EthernetConfig,
-        robot: RsiRobot,
+        context: RsiContext | None = None,
         *,
         address: str = LOOPBACK,
         port: int = 0,
-        cycle: float = 0.004,
-        timeout: int = 100,
-        precision: int = 6,
-        patience: float = 0.0,
-        operator: float | None = None,
     ) -> None:
         """Take a port to send from; see `rsi_server` for one that is made as usual.
 
@@ -133,34 +123,26 @@ class RsiServer:
             The cell.
         config : EthernetConfig
             Where the PC is, and the channels.
-        robot : RsiRobot
-            With the same channels and cycle.
+        context : RsiContext, optional
+            How the controller is set up.
         address, port : str, int
             Of the robot; 0: any free port.
-        cycle : float
-            In s: 4 ms (IPO_FAST) or 12 ms (IPO).
-        timeout : int
-            Cycles in a row without an answer after which the controller stops; 10 by default on a
-            controller, 100 in the contexts that are shipped with public drivers.
-        precision : int
-            Decimals of the ETHERNET object; 1 by default on a controller.
-        patience : float
-            Time that the robot at least waits for an answer, in s of the wall; above the cycle its
-            time is stretched. For machines that are busy.
-        operator : float, optional
-            Time after which an operator resets a controller that has stopped, in s of the wall;
-            None: only by `reset`.
+
+        Raises
+        ------
+        DeviceError
+            If the port is taken.
         """
-        self._live, self._config, self._robot = live, config, robot
-        self._cycle, self._timeout, self._patience = cycle, timeout, patience
-        self._operator = operator
-        self._writer = RobWriter(config.send, precision)
+        self._live, self._config = live, config
+        self._context = context = context or RsiContext()
+        self._robot = RsiRobot(live, config.receive, context)
+        self._writer = RobWriter(config.send, context.precision)
         self._reader = SenReader(config.receive, config.sentype)
         self._peer = (config.address, config.port)
         rate = live.clock.rate if isinstance(live.clock, WallClock) else 1.0
-        self._window = max(cycle / rate, patience)
+        self._window = max(context.cycle / rate, context.patience)
         self.statistics = RsiStatistics()
-        self._faults: deque[RsiFault] = deque()
+        self._faults: deque[RsiFault | None] = deque()
         self._held: bytes | None = None
         self._closing, self._reset = threading.Event(), threading.Event()
         self._thread = threading.Thread(target=self._run, name="simulated RSI", daemon=True)
@@ -197,9 +179,9 @@ class RsiServer:
         """Reset the controller and start its program again, as an operator does."""
         self._reset.set()
 
-    def inject(self, *faults: RsiFault) -> None:
-        """Let faults happen, one a cycle from the next one on."""
-        self._faults.extend(faults)
+    def inject(self, *faults: RsiFault, after: int = 0) -> None:
+        """Let faults happen, one a cycle, after so many cycles without."""
+        self._faults.extend([*[None] * after, *faults])
 
     def _run(self) -> None:
         started = 0
@@ -216,7 +198,7 @@ class RsiServer:
                 return
             self.statistics.stops.append(stop)
             if stop != "restart":
-                self._reset.wait(self._operator)
+                self._reset.wait(self._context.operator)
 
     def _session(self, ipoc: int) -> str:
         """Be in RSI from RSI_ON on; return why it has ended."""
@@ -239,14 +221,14 @@ class RsiServer:
                 missed = missed + 1 if heard and answer is None else 0
                 counts.answered += answer is not None
                 counts.late += missed > 0
-            if missed > self._timeout:
+            if missed > self._context.timeout:
                 return f"KSS29002 SEN: RSI execution error: no valid answer for {missed} cycles"
             try:
                 self._robot.cycle(None if answer is None else answer.values)
-            except RsiStop as stop:
+            except RsiStopError as stop:
                 return str(stop)
-            ipoc += round(1e3 * self._cycle)
-            due = self._wait(due + self._cycle)
+            ipoc += round(1e3 * self._context.cycle)
+            due = self._wait(due + self._context.cycle)
         return "closed"
 
     def _wait(self, due: float) -> float:
@@ -256,7 +238,7 @@ class RsiServer:
         if left > 0.0:
             clock.sleep(left)
             return due
-        if -left > _BEHIND * self._cycle:
+        if -left > _BEHIND * self._context.cycle:
             self.statistics.stretched += 1
             return due - left
         return due
@@ -287,20 +269,22 @@ class RsiServer:
     def _await(self, ipoc: int, window: float) -> Answer | None:
         """Return the answer to a cycle; None when it does not come within a time of the wall."""
         end = time.monotonic() + window
-        while True:
-            self._socket.settimeout(max(end - time.monotonic(), 0.0))
+        while not self._closing.is_set():
+            left = end - time.monotonic()
+            self._socket.settimeout(min(max(left, 0.0), _LOOK))
             try:
                 data, source = self._socket.recvfrom(LARGEST + 1)
             except (TimeoutError, BlockingIOError):
-                return None
-            except OSError:
+                if left <= _LOOK:
+                    return None
                 continue
-            answer = self._reader.read(data) if source[0] == self._peer[0] else None
+            answer = self._reader.read(data) if source == self._peer else None
             if answer is not None and answer.ipoc == ipoc:
                 return answer
+        return None
 
 
-def free_port(address: str) -> int:
+def _free_port(address: str) -> int:
     """Return a UDP port that nobody has at the moment."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
         probe.bind((address, 0))
@@ -308,18 +292,7 @@ def free_port(address: str) -> int:
 
 
 @serves("kuka_rsi")
-def rsi_server(
-    live: LiveCell,
-    told: Told,
-    *,
-    program: KrlProgram = run_program,
-    absolute: bool = False,
-    limits: PosCorrLimits | None = None,
-    cycle: float = 0.004,
-    timeout: int = 100,
-    patience: float = 0.0,
-    operator: float | None = 2.0,
-) -> RsiServer:
+def rsi_server(live: LiveCell, told: Told, context: RsiContext | None = None) -> RsiServer:
     """Return the controller for a PC that listens where a cell file says.
 
     Parameters
@@ -329,25 +302,15 @@ def rsi_server(
     told : Told
         ``port`` and ``address`` of the PC, ``robot`` (address of the controller), ``delay`` (from
         a correction to the motion, in s). Without a port a free one is chosen for the PC.
-    program : callable
-        The KRL program.
-    absolute : bool
-        Whether corrections are absolute, for compensation.
-    limits : PosCorrLimits, optional
-        Of the RSI context.
-    cycle, timeout, patience, operator : float, int, float, float
-        See `RsiServer`.
+    context : RsiContext, optional
+        How the controller is set up; by default with that delay, and with an operator who resets it
+        2 s after a stop.
     """
-    port = told.port() or free_port(told.address)
-    config = EthernetConfig.from_xml(ethernet_config(told.address, port, absolute=absolute))
-    corrections = PosCorr(limits or PosCorrLimits(), absolute)
-    delay = told.settings.get("delay", 0.012)
-    if not isinstance(delay, float | int):
+    delay = told.settings.get("delay") or RsiContext.delay
+    if not isinstance(delay, float):
         raise DeviceError(f"delay is {delay!r}: must be a time in s")
-    robot = RsiRobot(
-        live, config.receive, program, corrections=corrections, cycle=cycle, delay=float(delay)
-    )
-    return RsiServer(
-        live, config, robot, address=str(told.settings.get("robot", LOOPBACK)),
-        cycle=cycle, timeout=timeout, patience=patience, operator=operator,
-    )  # fmt: skip
+    context = context or RsiContext(delay=delay, operator=2.0)
+    address = str(told.settings.get("address") or told.address)
+    text = ethernet_config(address, told.port() or _free_port(address), absolute=context.absolute)
+    config = EthernetConfig.from_xml(text)
+    return RsiServer(live, config, context, address=str(told.settings.get("robot") or LOOPBACK))

@@ -30,7 +30,7 @@ from elastocal.sim.workcell._plant import Plant
 from elastocal.sim.workcell._tangent import GearCurves, Tangent, View, contact_compliance, cross
 from elastocal.sim.workcell._timeline import Knots, RobotPath, RobotState, Uniform
 
-STANDSTILL = 20e-6
+_STANDSTILL = 20e-6
 """A commanded pose that stays so near counts as standing, in m."""
 _SETTLE = 0.4
 """Time that it must stay so, in s."""
@@ -179,7 +179,7 @@ class PoseFollower:
             if way > _DEPARTED:
                 self._standing, self._way = False, 0.0
                 self._depart()
-        elif way > STANDSTILL:
+        elif way > _STANDSTILL:
             self._way += way
             self._chance.part = min(1.0, self._way / _BLEND)
             self._rest, self._still = here, 0.0
@@ -299,7 +299,7 @@ class PoseFollower:
         self.force, pressed = np.zeros(3), bool(np.any(self.force))
         self._load_now = self._load_change(self.force)
         tool = self.T[:3, 3] + self._twist()[:3]
-        gone = float((tool - contact.anchor) @ contact.normal) > STANDSTILL
+        gone = float((tool - contact.anchor) @ contact.normal) > _STANDSTILL
         if gone:
             self.contact = self._ahead = None
         if gone or pressed:
