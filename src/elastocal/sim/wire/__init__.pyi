@@ -1,4 +1,13 @@
+from ._rsi_robot import PosCorrLimits as PosCorrLimits, RsiContext as RsiContext
 from .live_cell import LiveCell as LiveCell
+from .rsi import (
+    IPOC_START as IPOC_START,
+    RsiFault as RsiFault,
+    RsiServer as RsiServer,
+    RsiStatistics as RsiStatistics,
+    ethernet_config as ethernet_config,
+    rsi_server as rsi_server,
+)
 from .servers import (
     SERVERS as SERVERS,
     MakeServer as MakeServer,
