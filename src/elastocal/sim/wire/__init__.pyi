@@ -1,9 +1,15 @@
 from .live_cell import LiveCell as LiveCell
+from .net_ft import (
+    NetFtBox as NetFtBox,
+    NetFtServer as NetFtServer,
+    net_ft_server as net_ft_server,
+)
 from .servers import (
     SERVERS as SERVERS,
     MakeServer as MakeServer,
     Told as Told,
     WireServer as WireServer,
+    bound as bound,
     serves as serves,
     wire_servers as wire_servers,
 )
