@@ -26,7 +26,7 @@ def test_pynetft_reads_counts_units_and_wrenches(live, server):
     config = pynetft.Config(
         sensor_host="127.0.0.1", rdt_port=server.ports["udp"], http_port=server.ports["http"]
     )
-    with pynetft.Client(config) as client:
+    with pynetft.Client(config, queue_size=256) as client:
         samples = client.samples()
         seen = [next(samples) for _ in range(100)]
         health = client.health()
