@@ -2,6 +2,7 @@ from ._rsi_robot import PosCorrLimits as PosCorrLimits, RsiContext as RsiContext
 from .live_cell import LiveCell as LiveCell
 from .rsi import (
     IPOC_START as IPOC_START,
+    SENTYPE as SENTYPE,
     RsiFault as RsiFault,
     RsiServer as RsiServer,
     RsiStatistics as RsiStatistics,
