@@ -1,0 +1,14 @@
+"""The simulated cell on the wire: servers that speak as controllers, sensors and trackers do.
+
+They are written from what vendors and public programs state, not from `elastocal.drivers`: two
+readings of one fact. All bind to one address, the loopback unless told otherwise.
+
+============  =================================================================================
+`live_cell`   `LiveCell`, which all of them show: the simulated plant, moved along by a clock
+`servers`     the table of servers by the driver that they answer
+============  =================================================================================
+"""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
