@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from elastocal import planning, procedure
+from elastocal import logs, planning, procedure
 from elastocal.cell import load_cell
 from elastocal.codec import (
     ARRAYS_SCHEMA,
@@ -24,12 +24,14 @@ from elastocal.compensation.process import TABLE, read_process, read_table
 from elastocal.dataset import require_joint_names
 from elastocal.elastic import read_springs
 from elastocal.errors import SchemaError
+from elastocal.geometry import read_geometry
 from elastocal.identification import read_model
 from elastocal.identification.recertification import CompareSummary
 from elastocal.planning.motion import mover_for, require_free_home
-from elastocal.records import read_json, schema_of
+from elastocal.records import read_json, read_yaml_data, schema_of
 from elastocal.robot import (
     Robot,
+    catalogue,
     leaf_links,
     parse_urdf,
     read_urdf,
@@ -173,6 +175,39 @@ def springs_file(path: Path) -> FileDescription:
     file = read_springs(path)
     facts = {"include": file.include, "springs": len(file.springs)}
     return "spring file", {"schema": "elastocal.springs/1", **facts}
+
+
+def catalogue_file(path: Path) -> FileDescription:
+    """Describe a catalogue of robots; the URDF of each is made and loaded."""
+    robots = catalogue.read_table(read_yaml_data(path), str(path))
+    with refusals_naming(path):
+        for entry in robots.values():
+            Robot.from_urdf(catalogue.urdf_of(entry), "flange")
+    return "catalogue of robots", {"schema": catalogue.SCHEMA, "robots": list(robots)}
+
+
+def log_map_file(path: Path) -> FileDescription:
+    """Describe a map of logs; the cell or robot that it names is read, too."""
+    found = logs.read_map(path)
+    place = logs.site(path, found)
+    return "map of logs", {
+        "schema": logs.SCHEMA,
+        "robot": place.robot.name,
+        "logs": [each.log for each in found.logs],
+        "load_cases": list(found.load_cases),
+    }
+
+
+def geometry_file(path: Path) -> FileDescription:
+    """Describe a calibrated geometry."""
+    found = read_geometry(path)
+    return "calibrated geometry", {
+        "schema": schema_of(type(found)),
+        "robot": found.robot.name,
+        "positions": found.positions,
+        "blunders": len(found.blunders),
+        "held_out_mean_m": found.held_out.chosen.mean,
+    }
 
 
 def model_file(path: Path) -> FileDescription:
