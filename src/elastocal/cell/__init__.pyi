@@ -3,11 +3,14 @@ from ._quantities import (
     Angle as Angle,
     Distance as Distance,
     Length as Length,
+    Name as Name,
     Point as Point,
     Pose as Pose,
     PositiveForce as PositiveForce,
     PositiveLength as PositiveLength,
     PositiveMoment as PositiveMoment,
+    PositiveTime as PositiveTime,
+    SampleRate as SampleRate,
     SignedForce as SignedForce,
 )
 from .cell import (
@@ -20,6 +23,7 @@ from .cell import (
 )
 from .devices import (
     ArmState as ArmState,
+    AskedMetrology as AskedMetrology,
     BeamState as BeamState,
     Clock as Clock,
     Devices as Devices,

@@ -3,10 +3,12 @@
 They are written from what vendors and public programs state, not from `elastocal.drivers`: two
 readings of one fact. All bind to one address, the loopback unless told otherwise.
 
-============  =================================================================================
+============= =================================================================================
 `live_cell`   `LiveCell`, which all of them show: the simulated plant, moved along by a clock
 `servers`     the table of servers by the driver that they answer
-============  =================================================================================
+`emscon`      a Leica tracker: emScon TPI over TCP
+`line_stream` trackers by an adapter that speaks in lines over TCP
+============= =================================================================================
 """
 
 import lazy_loader

@@ -1,3 +1,10 @@
+from .emscon import (
+    EmsconServer as EmsconServer,
+    restart as restart,
+    say_change as say_change,
+    say_error as say_error,
+)
+from .line_stream import LineStreamServer as LineStreamServer
 from .live_cell import LiveCell as LiveCell
 from .servers import (
     SERVERS as SERVERS,
