@@ -84,7 +84,9 @@ GROUP = "elastocal.drivers"
 
 def driver_names() -> tuple[str, ...]:
     """Return the names of all drivers: ours, then those of packages that are installed here."""
-    own = [SIMULATED, *sorted(module.name for module in pkgutil.iter_modules(drivers.__path__))]
+    found = pkgutil.iter_modules(drivers.__path__)
+    # What several drivers share is a module beside their packages.
+    own = [SIMULATED, *sorted(module.name for module in found if module.ispkg)]
     others = {entry.name for entry in entry_points(group=GROUP)} - set(own)
     return (*own, *sorted(others))
 
