@@ -12,6 +12,7 @@ from .packets import (
     Complaint as Complaint,
     MeasuredPoints as MeasuredPoints,
     Mode as Mode,
+    Packet as Packet,
     PacketReader as PacketReader,
     Reflector as Reflector,
     StatusChange as StatusChange,

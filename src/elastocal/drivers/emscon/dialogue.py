@@ -44,7 +44,7 @@ from elastocal.drivers.stations import StationFeed
 from elastocal.errors import DeviceError, nearest
 from elastocal.records import StrictModel
 
-PORT = 700
+_PORT = 700
 _OK, _BUSY, _IN_USE, _NOT_INITIALIZED = 0, 1, 35, 39
 _AGAIN = 0.2
 """After how long a command is repeated that found the server busy, in s."""
@@ -81,14 +81,14 @@ _ROTATION_ERROR = 1 << 1
 _WEATHER = ((-20.0, 60.0, "temperature", "degC"), (500.0, 1200.0, "pressure", "mbar"))
 """A distance is wrong by 1 ppm a degree and 0.27 ppm a mbar."""
 
-Port = Annotated[int, Field(ge=1, le=65535)]
+_Port = Annotated[int, Field(ge=1, le=65535)]
 
 
 class EmsconStation(StrictModel):
     """Where one tracker is."""
 
     address: str = LOOPBACK
-    port: Port = PORT
+    port: _Port = _PORT
 
 
 class EmsconSettings(DeviceSettings):
@@ -96,7 +96,7 @@ class EmsconSettings(DeviceSettings):
 
     address: str = LOOPBACK
     """Of the controller of the only station."""
-    port: Port = PORT
+    port: _Port = _PORT
     stations: dict[Name, EmsconStation] = Field(default_factory=dict)
     """A controller for each station of the cell, where there are several."""
     marker: Literal["reflector", "probe"] = "reflector"

@@ -10,6 +10,7 @@ from .lines import (
     AdapterFault as AdapterFault,
     BeamLine as BeamLine,
     Column as Column,
+    Event as Event,
     FrameLine as FrameLine,
     LineReader as LineReader,
     MarkerPoint as MarkerPoint,

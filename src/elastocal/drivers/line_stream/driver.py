@@ -43,7 +43,7 @@ from elastocal.drivers.stations import (
 from elastocal.errors import DeviceError
 from elastocal.records import StrictModel
 
-Port = Annotated[int, Field(ge=0, le=65535)]
+_Port = Annotated[int, Field(ge=0, le=65535)]
 _RECEIVED = 65536
 """Bytes that are read at once."""
 _WAKE = 0.05
@@ -54,7 +54,7 @@ class StationLine(StrictModel):
     """Where one station is, where each has a line of its own."""
 
     address: str = LOOPBACK
-    port: Port
+    port: _Port
 
 
 class LineStreamSettings(DeviceSettings):
@@ -64,7 +64,7 @@ class LineStreamSettings(DeviceSettings):
     """Whether we connect to the adapter, or it connects to us."""
     address: str = LOOPBACK
     """Of the adapter; as server, the one that we bind to."""
-    port: Port = 0
+    port: _Port = 0
     """Of the one line that all stations share."""
     peer: str = LOOPBACK
     """As server: the only address that may connect."""
