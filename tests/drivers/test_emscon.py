@@ -17,14 +17,7 @@ from elastocal.drivers.emscon import (
     StatusChange,
 )
 from elastocal.errors import DeviceError
-from elastocal.sim.wire import (
-    EmsconServer,
-    LiveCell,
-    Told,
-    restart,
-    say_change,
-    say_error,
-)
+from elastocal.sim.wire import EmsconServer, LiveCell, Told
 from elastocal.sim.workcell import SimClock
 from support.simulated import QUIET, example_cell
 from support.stations_on_wire import connect, eventually, read_until
@@ -209,19 +202,20 @@ def test_points_of_bad_quality_are_left_out_and_the_reason_is_told(
 @pytest.mark.parametrize(
     ("fault", "message"),
     [
-        (say_error(57), "temperature, pressure or humidity is out of range"),
-        (say_error(38), "no tracker is connected"),
-        (say_change(999), "its server was started anew: its frame may be another one"),
-        (say_change(851), "its sensor was disconnected"),
-        (say_change(6), "another program has changed its units"),
-        (say_change(15), "another program has changed its station orientation"),
-        (restart, "was started anew"),
+        (("say_error", 57), "temperature, pressure or humidity is out of range"),
+        (("say_error", 38), "no tracker is connected"),
+        (("say_change", 999), "its server was started anew: its frame may be another one"),
+        (("say_change", 851), "its sensor was disconnected"),
+        (("say_change", 6), "another program has changed its units"),
+        (("say_change", 15), "another program has changed its station orientation"),
+        (("lose_power",), "was started anew"),
     ],
 )
 def test_a_tracker_out_of_order_is_named(clock, server, opened, fault, message):
     devices = connected(clock, opened, server)
     read_until(devices, clock, has_points)
-    server.faults.append(fault)
+    name, *codes = fault
+    getattr(server, name)(*codes)
     assert message in refused(devices, clock)
 
 

@@ -9,9 +9,11 @@ from ._quantities import (
     PositiveForce as PositiveForce,
     PositiveLength as PositiveLength,
     PositiveMoment as PositiveMoment,
+    PositiveSpeed as PositiveSpeed,
     PositiveTime as PositiveTime,
     SampleRate as SampleRate,
     SignedForce as SignedForce,
+    TranslationalStiffness as TranslationalStiffness,
 )
 from .cell import (
     SCHEMA as SCHEMA,

@@ -20,7 +20,7 @@ from elastocal.sim.wire.servers import Told, serves
 
 _OK, _BUSY, _UNKNOWN, _WRONG_PARAMETER, _NOT_INITIALIZED = 0, 1, 2, 3, 39
 _NOT_READY, _MANY_CONNECTIONS = 10004, 10011
-_LOST, _FOUND, _STARTED = 25, 27, 999
+_LOST, _FOUND = 25, 27
 _UNITS = (1.0, 1e3, 1e6, 1.0 / 0.3048, 1.0 / 0.9144, 1.0 / 0.0254)
 """Numbers a metre, by the number of the unit of length."""
 _MILLIMETRE = 1
@@ -67,8 +67,7 @@ class EmsconServer(TcpServer):
         self._initialize_time = initialize_time
         point = told.settings.get("point") or (0.0, 0.0, 0.0)
         self._point = np.array(point, dtype=float)
-        self.faults: list[Callable[[EmsconServer, Peer], None]] = []
-        """What is to be done next to whoever is connected."""
+        self._faults: list[Callable[[Peer], None]] = []
         self.busy = 0
         """So many commands are answered "busy"."""
         self.refusal = 0
@@ -89,6 +88,23 @@ class EmsconServer(TcpServer):
         self._unit, self._since = _MILLIMETRE, 0.0
         self._later: list[tuple[float, bytes]] = []
         self._still: list[FloatArray] = []
+
+    def say_change(self, code: int) -> None:
+        """Say next that the system's state has changed."""
+        self._faults.append(lambda peer: self.send(peer, _status_change(code)))
+
+    def say_error(self, status: int) -> None:
+        """Say next an error that nobody has asked for."""
+        self._faults.append(lambda peer: self.send(peer, _error(0, status)))
+
+    def lose_power(self) -> None:
+        """Restart under the client: the line drops, and all settings are lost."""
+
+        def fault(peer: Peer) -> None:
+            self.start_anew()
+            self.drop(peer)
+
+        self._faults.append(fault)
 
     def opened(self, peer: Peer) -> None:
         """Refuse a second client."""
@@ -169,13 +185,13 @@ class EmsconServer(TcpServer):
         block, now = self._tracker.read(), self._live.clock.now()
         due = [data for time, data in self._later if time <= now]
         self._later = [each for each in self._later if each[0] > now]
-        faults, self.faults = (self.faults, []) if self.peers else ([], self.faults)
+        faults, self._faults = (self._faults, []) if self.peers else ([], self._faults)
         if self._measures:
             due += self._measured(block, now)
         for peer in list(self.peers):
             self.send(peer, b"".join(due))
             for fault in faults:
-                fault(self, peer)
+                fault(peer)
 
     def _measured(self, block: PointBlock, now: float) -> list[bytes]:
         if block.beam is BeamState.BROKEN:
@@ -246,19 +262,3 @@ def _status_change(code: int) -> bytes:
 def _reflector(number: int, name: str) -> bytes:
     text = name.encode("utf-16-le").ljust(64, b"\0")
     return _packet(0, struct.pack("<iiiiid", 42, _OK, len(_REFLECTORS), number, 1, 0.0) + text)
-
-
-def say_change(code: int) -> Callable[[EmsconServer, Peer], None]:
-    """Return a fault: a change of the system's state."""
-    return lambda server, peer: server.send(peer, _status_change(code))
-
-
-def say_error(status: int) -> Callable[[EmsconServer, Peer], None]:
-    """Return a fault: an error that nobody has asked for."""
-    return lambda server, peer: server.send(peer, _error(0, status))
-
-
-def restart(server: EmsconServer, peer: Peer) -> None:
-    """Restart the server under its client, as after a loss of power: the line drops."""
-    server.start_anew()
-    server.drop(peer)
