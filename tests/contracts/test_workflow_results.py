@@ -27,6 +27,7 @@ WITHOUT = {
     "ExportResult",
     "InitResult",
     "ReportResult",
+    "SimulateResult",
     "ToolResult",
     "VerifyResult",
 }
@@ -71,6 +72,7 @@ def results(tmp_path_factory) -> dict[str, Result]:
         workflows.report(run, out=out / "report.html"),
         workflows.RunResult(figures, RunEnd.DONE, derived.summary, None),
         process,
+        workflows.simulate(cell, meanwhile=lambda _: None),
         workflows.stiffness(model, path=path, spins=4, external_positions=3, stations=5),
         workflows.StudyResult(study_summary(design, samples, None), design, samples, ()),
         workflows.tool(run),

@@ -456,7 +456,7 @@ def _write_geometry(folder: Path) -> None:
         *("geometry", folder / "positions.csv", "--robot", folder / "arm.urdf", "--tcp", "flange"),
         *("--draws", 40, "--out", folder / "geometry.json"),
     )
-    table = importlib.resources.files(catalogue) / "kuka.yaml"
+    table = importlib.resources.files(catalogue) / "robots.yaml"
     (folder / "catalogue.yaml").write_text(table.read_text(encoding="utf-8"))
     write_table(folder, read_plan(folder / "plan" / "plan.json"))
 

@@ -29,6 +29,7 @@ from .model import (
 from .position_file import AXES as AXES, read_positions as read_positions
 from .positions import (
     LEAST_READINGS as LEAST_READINGS,
+    Payload as Payload,
     Positions as Positions,
     joint_torques as joint_torques,
 )

@@ -15,6 +15,7 @@ __all__ = [
     "predict",
     "report",
     "run",
+    "simulate",
     "simulate_process",
     "stiffness",
     "study",
@@ -25,12 +26,14 @@ __all__ = [
 from ._file_kinds import FileDescription as FileDescription
 from ._inputs import NewTool as NewTool, find_robot as find_robot
 from ._operator_and_devices import (
-    KINDS as KINDS,
-    SOURCES as SOURCES,
-    DeviceSource as DeviceSource,
+    GROUP as GROUP,
     Operator as Operator,
+    Rig as Rig,
     Supervision as Supervision,
     Unattended as Unattended,
+    driver_names as driver_names,
+    find_driver as find_driver,
+    rig_of as rig_of,
 )
 from .calibrate import (
     CalibrateResult as CalibrateResult,
@@ -122,6 +125,12 @@ from .run import (
     RunSettings as RunSettings,
     dry_run as dry_run,
     run as run,
+)
+from .simulate import (
+    Ports as Ports,
+    SimulateResult as SimulateResult,
+    SimulateSettings as SimulateSettings,
+    simulate as simulate,
 )
 from .simulate_process import (
     PROGRAMMED as PROGRAMMED,

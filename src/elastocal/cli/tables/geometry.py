@@ -41,6 +41,9 @@ def show_geometry(console: Console, model: GeometryModel, out: Path) -> None:
         more = " …" if len(blunders) > _MOST_ROWS else ""
         count = counted(len(blunders), "row")
         console.print(f"{count} left out as blunders (counted from 0): {named}{more}")
+    if model.T_tcp_built is not None:
+        x, y, z = 1e3 * model.T_tcp_built[:3, 3]
+        console.print(f"tcp: {x:.3f}, {y:.3f}, {z:.3f} mm from where it is described")
     fixed = counted(len(model.fixed), "error")
     written = f"{fixed} not told apart from others; wrote {out}"
     console.print(written, soft_wrap=True)
