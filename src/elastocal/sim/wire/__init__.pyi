@@ -7,6 +7,7 @@ from .net_ft import (
 )
 from .rsi import (
     IPOC_START as IPOC_START,
+    SENTYPE as SENTYPE,
     RsiFault as RsiFault,
     RsiServer as RsiServer,
     RsiStatistics as RsiStatistics,
