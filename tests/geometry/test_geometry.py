@@ -4,6 +4,7 @@ import json
 
 import numpy as np
 import pytest
+import xarray
 
 from elastocal.errors import GeometryError
 from elastocal.geometry import (
@@ -14,6 +15,7 @@ from elastocal.geometry import (
     fit,
     frames,
     geometry_model,
+    read_positions,
     register,
     screws,
     told_apart,
@@ -21,6 +23,7 @@ from elastocal.geometry import (
 from elastocal.progress import silent
 from elastocal.records import read_json
 from elastocal.robot import GRAVITY, Robot, catalogue, with_joint_origins
+from elastocal.units import split_column
 from support.cli import elastocal
 from support.measured_arms import MARKERS, measure, write_positions
 
@@ -249,6 +252,25 @@ def test_bad_positions_are_refused_in_a_line(tmp_path, change, message):
     )
     assert message in result.reason
     assert not (tmp_path / "model.json").exists()
+
+
+def test_positions_in_netcdf_are_those_of_the_table(tmp_path):
+    measured = measure(kuka(), 20)
+    measured.data.markers[3, 1] = np.nan
+    path = write_positions(tmp_path / "positions.csv", measured)
+    header, *rows = (line.split(",") for line in path.read_text(encoding="utf-8").splitlines())
+    columns = {}
+    for heading, cells in zip(header, zip(*rows, strict=True), strict=True):
+        name, unit = split_column(heading)
+        values = np.array(cells) if unit is None else np.array(cells, dtype=float)
+        columns[name] = ("row", values, {} if unit is None else {"units": unit})
+    xarray.Dataset(columns).to_netcdf(tmp_path / "positions.nc", engine="h5netcdf")
+    table, twin = (read_positions(tmp_path / f"positions.{end}", kuka()) for end in ("csv", "nc"))
+    for name, values in vars(table).items():
+        if name != "lines":
+            assert np.array_equal(values, getattr(twin, name), equal_nan=values.dtype == float), (
+                name
+            )
 
 
 def test_a_fit_of_nonsense_is_refused():
