@@ -8,7 +8,10 @@ from ._quantities import (
     PositiveForce as PositiveForce,
     PositiveLength as PositiveLength,
     PositiveMoment as PositiveMoment,
+    PositiveSpeed as PositiveSpeed,
+    PositiveTime as PositiveTime,
     SignedForce as SignedForce,
+    TranslationalStiffness as TranslationalStiffness,
 )
 from .cell import (
     SCHEMA as SCHEMA,

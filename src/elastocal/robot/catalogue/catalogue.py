@@ -1,6 +1,6 @@
-"""The robot catalogue: dimensions, limits and masses of KUKA robots, each with its source.
+"""The robot catalogue: dimensions, limits and masses of robots, each with its source.
 
-The table `kuka.yaml` beside this file is the only copy of the numbers; the URDF is made from it
+The table `robots.yaml` beside this file is the only copy of the numbers; the URDF is made from it
 on demand. What has no source says so in `Robot.assumptions`.
 """
 
@@ -15,16 +15,27 @@ import yaml
 
 from elastocal.errors import RobotError, SchemaError
 from elastocal.records import check_schema, validate
+from elastocal.robot.catalogue.arm_urdf import urdf_of
 from elastocal.robot.catalogue.record import (
     CatalogueEntry,
     Dimensions,
+    Maker,
+    ParallelEntry,
+    WristEntry,
     inertias_like,
-    urdf_of,
 )
 from elastocal.robot.robot import Robot
 
-_FILE = "kuka.yaml"
+_FILE = "robots.yaml"
 SCHEMA = "elastocal.catalogue/1"
+_MAKERS: Mapping[Maker, re.Pattern[str]] = {
+    "KUKA": re.compile(r"\b(kuka|kr ?\d+|lbr)\b", re.IGNORECASE),
+    "ABB": re.compile(r"\b(abb|irb ?\d*)\b", re.IGNORECASE),
+    "FANUC": re.compile(r"\b(fanuc|(r|m|lr) ?(mate )?\d+ ?i[a-d])", re.IGNORECASE),
+    "Staeubli": re.compile(r"\b(sta?eubli|staubli|stäubli|(rx|tx)2?[ -]?\d+)", re.IGNORECASE),
+    "Universal Robots": re.compile(r"\b(universal robots?|ur ?\d{1,2}e?)\b", re.IGNORECASE),
+}
+"""How makers name their robots, in words."""
 _SUGGESTED = 3
 """Most names that are proposed for one that is not known."""
 _ALIKE = 0.4
@@ -60,8 +71,26 @@ def entry(name: str) -> CatalogueEntry:
     return table[known]
 
 
+def maker_of(name: str) -> Maker | None:
+    """Return the maker of a robot by its name, in the catalogue or as its maker names others.
+
+    >>> maker_of("my_irb_4600"), maker_of("arm")
+    ('ABB', None)
+
+    Parameters
+    ----------
+    name : str
+        Of the robot, as its URDF has it.
+    """
+    for known, robot in _entries().items():
+        if _key(known) == _key(name):
+            return robot.maker
+    words = re.sub(r"[\s_./-]+", " ", name)
+    return next((maker for maker, how in _MAKERS.items() if how.search(words)), None)
+
+
 def urdf(name: str) -> str:
-    """Return the URDF of a robot; see `elastocal.robot.catalogue.record`."""
+    """Return the URDF of a robot; see `elastocal.robot.catalogue.arm_urdf`."""
     return urdf_of(entry(name))
 
 
@@ -127,12 +156,14 @@ def _entry(name: str, by_name: Mapping[str, Mapping[str, Any]], what: str) -> Ca
                 f"{what}: inertia of {name} is like {sister_name!r}, which has none of its own"
             )
         arm = validate(robot["dimensions"], Dimensions, f"{what}: {name}")
-        robot = {**robot, "inertia": inertias_like(_entry(sister_name, by_name, what), arm)}
-    return validate(robot, CatalogueEntry, f"{what}: {name}")
+        sister = validate(by_name[sister_name], WristEntry, f"{what}: {sister_name}")
+        robot = {**robot, "inertia": inertias_like(sister, arm)}
+    kind = ParallelEntry if "d6" in robot["dimensions"] else WristEntry
+    return validate(robot, kind, f"{what}: {name}")
 
 
 def _key(name: str) -> str:
-    return re.sub(r"[\s_-]+", "", name).casefold()
+    return re.sub(r"[\s_./-]+", "", name).casefold()
 
 
 def _suggestion(name: str, by_key: dict[str, str]) -> str:

@@ -5,6 +5,7 @@ readings of one fact. All bind to one address, the loopback unless told otherwis
 
 ============  =================================================================================
 `live_cell`   `LiveCell`, which all of them show: the simulated plant, moved along by a clock
+`net_ft`      a box of a force sensor: RDT, configuration page, calibration command
 `servers`     the table of servers by the driver that they answer
 `rsi`         a KUKA controller over RSI: corrections, KRL program, faults on demand
 ============  =================================================================================

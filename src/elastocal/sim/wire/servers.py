@@ -5,6 +5,7 @@ A server shows a `LiveCell` to whoever connects, in threads of its own, from `st
 
 import importlib
 import pkgutil
+import socket
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Protocol, TypeVar
@@ -75,3 +76,31 @@ def wire_servers() -> Mapping[str, MakeServer]:
     for module in pkgutil.iter_modules(package.__path__):
         importlib.import_module(f"{package.__name__}.{module.name}")
     return SERVERS
+
+
+def bound(kind: socket.SocketKind, port: int, address: str = LOOPBACK) -> socket.socket:
+    """Return a socket that has a port.
+
+    Parameters
+    ----------
+    kind : SocketKind
+        ``SOCK_DGRAM`` or ``SOCK_STREAM``.
+    port : int
+        0: any that is free.
+    address : str
+        Of this machine.
+
+    Raises
+    ------
+    DeviceError
+        If it cannot be had.
+    """
+    line = socket.socket(socket.AF_INET, kind)
+    try:
+        if kind == socket.SOCK_STREAM:
+            line.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        line.bind((address, port))
+    except OSError as error:
+        line.close()
+        raise DeviceError(f"cannot take port {port} of {address}: {error.strerror}") from error
+    return line
