@@ -90,6 +90,14 @@ KINDS: dict[str, Kind] = {
         0.03,
         1.5,
     ),
+    "rig": Kind(
+        "rig.yaml",
+        "yaml",
+        ("run {f} --plan {s}/plan --out {o} --dry-run",),
+        ("dome.stl",),
+        0.0,
+        0.5,
+    ),
     "springs": Kind(
         "springs.yaml",
         "yaml",
@@ -265,6 +273,11 @@ KINDS: dict[str, Kind] = {
 }
 """All kinds of files, by name."""
 
+_DEVICES = """devices:
+  arm: simulated
+  sensor: {driver: net_ft, address: 127.0.0.1, port: 49152, tcp_port: null, rate: 1000.0}
+  clock_rate: 2
+"""
 _SPRINGS = """schema: elastocal.springs/1
 include: actuated
 springs:
@@ -331,6 +344,7 @@ def make_seeds(folder: Path) -> None:
         for suffix in ("stl", "obj")
     )
     (folder / "meshed.yaml").write_text(cell.replace("\nfixtures:", f"\nfixtures:{meshes}", 1))
+    (folder / "rig.yaml").write_text(f"{cell}\n{_DEVICES}")
     data = dataset.read(folder / "dataset.nc")
     dataset.write(data, folder / "dataset.csv")
     (folder / "robot.urdf").write_text(str(data.attributes["robot_urdf"]))

@@ -39,6 +39,7 @@ from elastocal.robot import (
     tip_links,
 )
 from elastocal.verdict import read_signature
+from elastocal.workflows._operator_and_devices import rig_of
 from elastocal.workflows._table_kinds import dataset_file
 
 FileDescription = tuple[str, dict[str, object]]
@@ -58,6 +59,7 @@ def cell_file(path: Path) -> FileDescription:
         the search technique, the place of the surface, or a collision at HOME.
     """
     cell = load_cell(path)
+    rig_of(cell)
     search = cell.file.search
     planning.require_possible_search(cell)
     surface = planning.cell_surface(cell)
