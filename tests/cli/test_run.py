@@ -15,9 +15,9 @@ import xarray as xr
 
 from elastocal import procedure
 from elastocal.cell import fingerprint, load_cell
+from elastocal.compensation.programs import speeds_of
 from elastocal.errors import DatasetError, FileAccessError
 from elastocal.planning import read_plan, write_plan
-from elastocal.planning.export._krl_motion import speeds_of
 from elastocal.procedure import (
     Journal,
     RunFolder,

@@ -4,15 +4,17 @@ from dataclasses import replace
 
 import pytest
 
-from elastocal.planning.export.krl_program import _head_notes
+from elastocal.compensation.programs import KrlWriter, plan_program
+from elastocal.robot import Robot
 from support import plans, urdfs
 
 
-def text(rail=True, plan=None):
-    lines = _head_notes(plan or plans.plan(rail), plans.robot(rail))
-    assert all(line.startswith("; ") for line in lines)
-    assert max(map(len, lines)) <= 100
-    return " ".join(line.removeprefix("; ") for line in lines)
+def text(rail=True, plan=None, robot=None):
+    writer = KrlWriter()
+    program = plan_program(plan or plans.plan(rail), writer)
+    lines = writer.head(program if robot is None else replace(program, robot=robot))
+    assert max(map(len, lines)) <= 96
+    return " ".join(lines)
 
 
 @pytest.mark.parametrize("rail", [True, False])
@@ -56,11 +58,9 @@ def test_it_says_which_speeds_it_drives_and_for_which_the_times_hold():
 
 
 def test_a_tilted_tool_is_written_in_kukas_angles():
-    plan = plans.plan()
     urdf = urdfs.opw_arm_urdf(**urdfs.KR_LIKE).replace(
         'xyz="0.0 0.0 0.215" rpy="0 0 0"', 'xyz="0.1 0.0 0.215" rpy="0.5 0.25 1.0"'
     )
-    robot = replace(plan.robot, urdf=urdf, base="base")
-    said = text(plan=replace(plan, robot=robot))
+    said = text(robot=Robot.from_urdf(urdf, "tcp", "base"))
     assert "X 100.000, Y 0.000, Z 215.000, A 57.296, B 14.324, C 28.648" in said
     assert "the tcp in link 'link_6'" in said

@@ -2,27 +2,26 @@
 
 import pytest
 
+from elastocal.compensation.programs import KrlWriter, plain
 from elastocal.errors import PlanningError
-from elastocal.planning.export import check_name
-from elastocal.planning.export.krl_program import _comment_text
 
 
 @pytest.mark.parametrize("name", ["calib", "_x", "Plan_2", 20 * "Z"])
 def test_plain_names_pass(name):
-    check_name(name)
+    KrlWriter().check_name(name)
 
 
 def test_a_taken_name_is_refused_in_either_case():
     with pytest.raises(PlanningError, match="'xHome' cannot name a KRL program"):
-        check_name("xHome", frozenset({"XHOME"}))
+        KrlWriter().check_name("xHome", frozenset({"XHOME"}))
 
 
 def test_a_reserved_word_inside_a_name_is_fine():
-    check_name("linear")
+    KrlWriter().check_name("linear")
 
 
 @pytest.mark.parametrize(
-    ("text", "plain"),
+    ("text", "shown"),
     [
         ("Höhe, Straße", "Hohe, Stra?e"),
         ("a\r\nPTP XHOME", "a PTP XHOME"),
@@ -31,9 +30,9 @@ def test_a_reserved_word_inside_a_name_is_fine():
         ("", ""),
     ],
 )
-def test_a_comment_is_one_line_of_ascii(text, plain):
-    assert _comment_text(text) == plain
+def test_a_comment_is_one_line_of_ascii(text, shown):
+    assert plain(text) == shown
 
 
 def test_a_comment_is_cut_short():
-    assert len(_comment_text(1000 * "x")) == 80
+    assert len(plain(1000 * "x")) == 80

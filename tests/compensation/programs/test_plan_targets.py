@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from elastocal.compensation.programs import KrlWriter, plan_program
 from elastocal.errors import PlanningError
-from elastocal.planning.export._krl_motion import build_targets, robot_of
 from elastocal.robot import Robot
-from support import plans, urdfs
+from support import krl, plans, urdfs
 
 
 def plan_of(urdf: str, **changes):
@@ -36,7 +36,7 @@ def with_pose(**changes):
 
 def refusal(plan):
     with pytest.raises(PlanningError) as caught:
-        build_targets(plan, robot_of(plan))
+        plan_program(plan, KrlWriter())
     assert "\n" not in str(caught.value)
     return str(caught.value)
 
@@ -59,12 +59,13 @@ def test_joints_in_another_order_than_the_urdf_are_refused():
     assert "are not those of its URDF (rail, joint_a1," in said
 
 
-def test_a_turntable_is_an_external_axis_in_degrees():
+def test_a_turntable_is_an_external_axis_in_degrees(tmp_path):
     urdf = urdfs.opw_arm_urdf(**urdfs.KR_LIKE, rail=(-1, 1), turntable=(-3, 3))
     plan = replace(
         plan_of(urdf, home=(0.25, np.pi / 2, *(0.1,) * 6)), poses=(), moves=plans.plan().moves[:1]
     )
-    home = dict(build_targets(plan, robot_of(plan)).home.values)
+    files = KrlWriter().write(tmp_path, plan_program(plan, KrlWriter()))
+    home = krl.read(*files).positions["XHOME"].values
     assert home["E1"] == pytest.approx(250.0)
     assert home["E2"] == pytest.approx(90.0)
     assert [home[f"E{i}"] for i in range(3, 7)] == [0.0] * 4
@@ -84,13 +85,14 @@ def test_a_pose_in_another_turn_than_its_approach_is_refused():
     joints = np.array(plans.plan().poses[0].joints)
     joints[-1] += 2 * np.pi
     said = refusal(with_pose(joints=tuple(joints.tolist())))
-    assert "A6 changes by 360.5 deg from approach to contact" in said
+    assert "axis 6 changes by 360.5 deg from approach to contact" in said
 
 
-def test_a_declaration_has_no_minus_zero_and_no_exponent():
+def test_a_declaration_has_no_minus_zero_and_no_exponent(tmp_path):
     plan = plans.plan()
     home = (0.0, -1e-12, 1e-9, *plan.robot.home[3:])
     plan = replace(plan, robot=replace(plan.robot, home=home))
-    text = build_targets(plan, robot_of(plan)).home.declaration
+    _, dat = KrlWriter().write(tmp_path, plan_program(plan, KrlWriter()))
+    (text,) = [line for line in krl.lines_of(dat) if " XHOME=" in line]
     assert text.startswith("DECL E6AXIS XHOME={A1 0.00000,A2 0.00000,A3 108.86198,")
     assert text.endswith(",E5 0.00000,E6 0.00000}")

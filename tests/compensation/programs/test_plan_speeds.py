@@ -4,8 +4,14 @@ from dataclasses import replace
 
 import pytest
 
-from elastocal.planning.export import write_krl
-from elastocal.planning.export._krl_motion import LIN_SPEED, PTP_PERCENT, TOUCH_SPEED, speeds_of
+from elastocal.compensation.programs import (
+    LIN_SPEED,
+    PTP_PERCENT,
+    TOUCH_SPEED,
+    KrlWriter,
+    speeds_of,
+    write_plan_program,
+)
 from support import krl, plans
 
 
@@ -27,7 +33,7 @@ def test_the_slower_of_cell_and_program_is_driven(tmp_path, override, contact_sp
     plan = plan_with(axis_override=override, contact_speed=contact_speed)
     speeds = speeds_of(plan)
     assert (speeds.ptp_percent, speeds.lin, speeds.touch) == wanted
-    program = krl.read(*write_krl(tmp_path, plan))
+    program = krl.read(*write_plan_program(tmp_path, plan, KrlWriter()))
     assert f"BAS (#VEL_PTP,{wanted[0]} )" in program.setup
     driven = {value for kind, value in program.orders if kind == "VEL.CP"}
     assert driven == {wanted[1], wanted[2]}

@@ -6,12 +6,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from elastocal.compensation.programs import TOUCH_SPEED, KrlWriter, write_plan_program
 from elastocal.errors import FileAccessError, PlanningError, SchemaError
-from elastocal.planning.export import write_krl
-from elastocal.planning.export._krl_motion import TOUCH_SPEED
 from support import krl, plans
 
 DEG = MM = 1e-3
+
+
+def write_krl(folder, plan, name="calib"):
+    return write_plan_program(folder, plan, KrlWriter(), name)
 
 
 @pytest.fixture(scope="module", params=[True, False], ids=["rail", "still"])
