@@ -126,8 +126,6 @@ class KukaArm:
         weight = self._cell.file.tool.mass * self._cell.gravity_base
         return reader, CollisionWatch(weight, self._settings.collision_force)
 
-    # --- the protocol -------------------------------------------------------------------------
-
     def state(self) -> ArmState:
         """Return the newest state."""
         self._require_link()
@@ -141,7 +139,7 @@ class KukaArm:
                 q=cycle.q.copy(),
                 T_base_tcp=cycle.T_base_tcp.copy(),
                 motion=self._state,
-                in_contact=self._in_contact,
+                in_contact=self._touched is not None,
                 fault=self._fault,
                 source=_SOURCE,
             )
@@ -256,8 +254,6 @@ class KukaArm:
             self._start(_Task(MotionState.MOVING, motion))
         return recorder
 
-    # --- the link's thread ----------------------------------------------------------------------
-
     def step(self, message: RobMessage, arrival: Arrival, now: float) -> SenMessage | None:
         """Return the answer to a message; see `elastocal.drivers.kuka_rsi.Handler`."""
         with self._lock:
@@ -327,12 +323,6 @@ class KukaArm:
         again = self._disobeyed % _EDGE_AGAIN == _EDGE_AGAIN - 1
         return SenMessage(shift, step.order, target, self._settings.sentype, again)
 
-    # --- what the arm is doing ------------------------------------------------------------------
-
-    @property
-    def _in_contact(self) -> bool:
-        return self._touched is not None and self._state is not MotionState.APPROACHING
-
     def _start(self, task: _Task) -> None:
         self._task, self._running, self._state = task, None, task.state
         if self._watch is not None:
@@ -364,8 +354,6 @@ class KukaArm:
         bounds = self.bounds
         limits = (self._touched_at, bounds.travel, bounds.force)
         return Press(self._reader, self.law, wanted, rate, *limits)
-
-    # --- refusals -------------------------------------------------------------------------------
 
     def _require_link(self) -> None:
         if self.link is not None:
