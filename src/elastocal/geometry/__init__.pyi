@@ -3,9 +3,9 @@ from .arm import (
     MOTION as MOTION,
     ArmErrors as ArmErrors,
     ArmFrames as ArmFrames,
-    derivatives as derivatives,
     frames as frames,
     motion_terms as motion_terms,
+    screws as screws,
 )
 from .ladder import (
     FOLDS as FOLDS,
