@@ -24,6 +24,7 @@ from .model import (
     GeometryRung as GeometryRung,
     HeldOutFigures as HeldOutFigures,
     geometry_model as geometry_model,
+    read_geometry as read_geometry,
 )
 from .position_file import AXES as AXES, read_positions as read_positions
 from .positions import (
