@@ -38,7 +38,7 @@ _DEPARTED = 50e-6
 """Way from a standstill that begins another movement, in m."""
 _BLEND = 2e-4
 """Way on which the random part of a stop comes in, in m."""
-_FORCE_STEP, _WAY_FREE, _WAY_PRESSED = 60.0, 5e-3, 1e-3
+_FORCE_STEP, _WAY_FREE, _WAY_PRESSED = 150.0, 10e-3, 2e-3
 """Change of force in N, and of pose in m, after which the equilibrium is found anew."""
 _REFRESH_GAP = 10
 """Fewest cycles between two exact equilibria."""
@@ -52,8 +52,8 @@ _SAME_PLACE = 2e-4
 """Joints so near to where they were led to have not been moved by anything else, in rad or m."""
 _ENDS = np.array([0.0, 1.0])
 _ROUNDS = 6
-_CLOSED = 1e-3
-"""Change of force that counts as none, in N."""
+_CLOSED = 1.0
+"""A Newton step below this is the last one of a cycle, in N: what it leaves is far below 0.01 N."""
 _LATERAL = 5e-4
 """Way along the surface after which it is looked for again, in m."""
 _REACH = 0.5
