@@ -245,9 +245,7 @@ class TestRefusals:
     def test_a_guarded_move_that_would_press_too_hard_is_refused_with_the_speed(self):
         bench = Bench.of(delay="120 ms", contact_stiffness="4 MN/m")
         bench.ready()
-        with pytest.raises(
-            DeviceError, match=r"delay 144 ms, stiffness 4 N/um\).*at most 3 mm/s"
-        ):
+        with pytest.raises(DeviceError, match=r"delay 144 ms, stiffness 4 N/um\).*at most 3 mm/s"):
             bench.arm.approach(-bench.place.normal, 0.1, 0.02, 50.0)
 
     def test_a_stretched_wrist_is_no_place_for_straight_moves(self, bench):
