@@ -29,7 +29,7 @@ from elastocal.drivers.stations import require_station, require_trackers
 from elastocal.errors import DeviceError
 from elastocal.units import factor
 
-RATE = 5.0
+RATE = 20.0
 """Points a second by which a reading is repeated: the procedure averages what stands still."""
 LEAST_BEAM_TIMEOUT = 30.0
 """A person does not read and type in less, in s."""
