@@ -100,6 +100,10 @@ def _root(
     ),
 ) -> None:
     """In-situ elastic calibration of industrial robots."""
+    import logging  # not for help
+
+    # What libraries log is, as their warnings are, for whoever sets up a handler.
+    logging.lastResort = None
 
 
 def run() -> None:

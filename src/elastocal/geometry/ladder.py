@@ -73,7 +73,7 @@ def climb(
     progress("geometry", 1, 4)
     nominal = problem.linearise(start)[1]
     free = {rung: told_apart(nominal, problem, rung) for rung in RUNGS}
-    reference = fit(problem, free["weight"], start)
+    reference = fit(problem, free["weight"], start, J=nominal)
     progress("geometry", 2, 4)
     block = blocks(problem)
     sums = _Sums(problem, reference, block)
@@ -85,7 +85,8 @@ def climb(
     judged = judge_models(errors, np.ones(len(rungs), dtype=bool), overlap)
     chosen = RUNGS[judged.chosen]
     progress("geometry", 3, 4)
-    final = fit(problem, free[chosen], _without(reference, problem, chosen), reference.used)
+    begin = _without(reference, problem, chosen)
+    final = fit(problem, free[chosen], begin, reference.used, reference.J)
     values = problem.values(final.state)
     spread = _Sums(problem, final, block).draws(draws, rng)
     progress("geometry", 4, 4)
