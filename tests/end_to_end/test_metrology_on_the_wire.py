@@ -27,7 +27,7 @@ def own(planned, tmp_path_factory):
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("tracker", "apart"),
-    [("emscon", 1e-9), ("line_stream", 0.1 * MICROMETRE), ("operator_entry", 30 * MICROMETRE)],
+    [("emscon", 1e-9), ("line_stream", 0.1 * MICROMETRE), ("operator_entry", 100 * MICROMETRE)],
 )
 def test_the_dataset_is_that_of_the_run_in_process(
     planned, own, tmp_path, monkeypatch, tracker, apart

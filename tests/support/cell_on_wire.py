@@ -19,7 +19,7 @@ from support.run_cells import PlannedCell
 
 _PATIENCE = 20.0
 _LATE = 0.1
-_READ = 50
+_READ = 3
 """Samples that the display of an instrument averages."""
 
 
