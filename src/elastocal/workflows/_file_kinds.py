@@ -22,6 +22,7 @@ from elastocal.compensation import read_settings
 from elastocal.compensation.conditioning import read_tool
 from elastocal.compensation.process import TABLE, read_process, read_table
 from elastocal.dataset import require_joint_names
+from elastocal.drivers.kuka_rsi import CommissioningRecord
 from elastocal.elastic import read_springs
 from elastocal.errors import SchemaError
 from elastocal.geometry import read_geometry
@@ -269,6 +270,16 @@ def signature_file(path: Path) -> FileDescription:
     return "signature", {
         "schema": "elastocal.signature/1",
         **_picked(found, "of", "sha256", "made", "key"),
+    }
+
+
+def commissioning_file(path: Path) -> FileDescription:
+    """Describe the record of a delay from command to motion."""
+    found = read_json(path, CommissioningRecord)
+    return "commissioning record", {
+        "schema": "elastocal.commissioning/1",
+        **_picked(found, "cell", "robot", "controller", "made", "cycle", "delay"),
+        "line": found.link.sentence(),
     }
 
 

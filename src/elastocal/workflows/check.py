@@ -36,6 +36,7 @@ _JSON_KINDS: dict[str, _Describe] = {
     "elastocal.study_samples": kinds.study_samples,
     "elastocal.process": kinds.process_table,
     "elastocal.comparison": kinds.comparison_file,
+    "elastocal.commissioning": kinds.commissioning_file,
     "elastocal.model": kinds.model_file,
     "elastocal.signature": kinds.signature_file,
     "elastocal.geometry": kinds.geometry_file,
