@@ -14,6 +14,7 @@ from .ladder import (
     blocks as blocks,
     climb as climb,
 )
+from .mistakes import findings as findings, require_own_joints as require_own_joints
 from .model import (
     SCHEMA as SCHEMA,
     URDF_MARK as URDF_MARK,
