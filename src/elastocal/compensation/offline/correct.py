@@ -75,8 +75,14 @@ class PathCorrection:
     """What friction remembers after the last row, shape (element,), in N·m."""
     covered: CoveredRows | None = None
     """Rows that were calibrated; none where the model does not know where that was."""
-    doubt: PredictionDoubt | None = None
-    """How sure the predictions are; none where no row has a load."""
+
+    @property
+    def doubt(self) -> PredictionDoubt | None:
+        """How sure the predictions are; None where no row has a load."""
+        loaded = self.deflection.any(axis=1)
+        return PredictionDoubt.of(
+            *(each[loaded] for each in (self.deflection, self.low, self.high))
+        )
 
 
 def correct_rows(  # noqa: PLR0913 (what goes on from block to block is one more)
@@ -160,7 +166,6 @@ def correct_rows(  # noqa: PLR0913 (what goes on from block to block is one more
     commanded[:, :3, 3] = reached[:, :3, 3]
     residual = reached[:, :3, 3] + off - T_base_tcp[:, :3, 3]
     predicted = calibrated.predict(q, *wrench, friction=load.borne)
-    intervals, loaded = (predicted.deflection, predicted.low, predicted.high), wrench[0].any(axis=1)
     along = np.einsum("ri,ri->r", T_base_tcp[:, :3, 2], wrench[0])
     return PathCorrection(
         q,
@@ -174,7 +179,6 @@ def correct_rows(  # noqa: PLR0913 (what goes on from block to block is one more
         np.asarray(along > 0.5 * np.linalg.norm(wrench[0], axis=1)),
         load.after,
         calibrated.covered_rows(q, *wrench),
-        PredictionDoubt.of(*(each[loaded] for each in intervals)),
     )
 
 
