@@ -25,7 +25,7 @@ from elastocal.dataset import require_joint_names
 from elastocal.drivers.kuka_rsi import CommissioningRecord
 from elastocal.elastic import read_springs
 from elastocal.errors import SchemaError
-from elastocal.geometry import read_geometry
+from elastocal.geometry import PositionPlan, read_geometry
 from elastocal.identification import read_model
 from elastocal.identification.recertification import CompareSummary
 from elastocal.planning.motion import mover_for, require_free_home
@@ -210,6 +210,18 @@ def geometry_file(path: Path) -> FileDescription:
         "positions": found.positions,
         "blunders": len(found.blunders),
         "held_out_mean_m": found.held_out.chosen.mean,
+    }
+
+
+def position_plan_file(path: Path) -> FileDescription:
+    """Describe a plan of positions in free space."""
+    found = read_json(path, PositionPlan)
+    return "plan of positions", {
+        "schema": schema_of(type(found)),
+        "cell": found.cell.name,
+        "poses": len(found.poses),
+        "technique": found.technique,
+        "errors": found.errors,
     }
 
 
