@@ -307,6 +307,7 @@ def test_usage_mistakes_exit_with_2():
     assert elastocal("calibrate").code == 2
     assert elastocal("calibrat").code == 2
     assert elastocal("predict", "--nonsense").code == 2
+    assert "'1_0' is not a number" in elastocal("study", "a.yaml", "--out", "b", "--seed", "1_0").err
 
 
 def test_help_and_version_load_no_numerical_library():
