@@ -14,6 +14,7 @@ from .ladder import (
     blocks as blocks,
     climb as climb,
 )
+from .mistakes import findings as findings, require_own_joints as require_own_joints
 from .model import (
     SCHEMA as SCHEMA,
     URDF_MARK as URDF_MARK,
@@ -27,6 +28,12 @@ from .model import (
     read_geometry as read_geometry,
 )
 from .position_file import AXES as AXES, read_positions as read_positions
+from .position_plan import (
+    PosesNeeded as PosesNeeded,
+    PositionPlan as PositionPlan,
+    PositionPose as PositionPose,
+    plan_positions as plan_positions,
+)
 from .positions import (
     LEAST_READINGS as LEAST_READINGS,
     Payload as Payload,

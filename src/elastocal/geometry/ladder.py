@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from elastocal.arrays import FloatArray, IndexArray
+from elastocal.geometry.mistakes import require_own_joints
 from elastocal.geometry.problem import RUNGS, GeometryProblem, State
 from elastocal.geometry.solve import PRIOR_WIDTH, GeometryFit, fit, register, told_apart
 from elastocal.identification import Overlap, judge_models
@@ -70,6 +71,7 @@ def climb(
     """
     progress("geometry", 0, 4)
     start = register(problem)
+    require_own_joints(problem, start)
     progress("geometry", 1, 4)
     nominal = problem.linearise(start)[1]
     free = {rung: told_apart(nominal, problem, rung) for rung in RUNGS}

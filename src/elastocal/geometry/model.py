@@ -10,6 +10,7 @@ from elastocal.arrays import FloatArray
 from elastocal.errors import GeometryError, SchemaError
 from elastocal.geometry.arm import KINDS, MOTION, ArmErrors, frames
 from elastocal.geometry.ladder import GeometryLadder
+from elastocal.geometry.mistakes import findings
 from elastocal.geometry.positions import Payload, Positions, joint_torques
 from elastocal.geometry.problem import GeometryProblem
 from elastocal.identification import interval
@@ -109,6 +110,8 @@ class GeometryModel:
     positions: int
     """Positions of markers, blunders included."""
     provenance: str
+    findings: tuple[str, ...] = ()
+    """What a person should know of the positions, a sentence each."""
     T_tcp_built: FloatArray | None = None
     """The tcp as built in the tcp as described, shape (4, 4), in m; none where nobody knew where on
     the tool the markers are."""
@@ -291,6 +294,7 @@ def geometry_model(
         blunders=tuple(sorted(set(problem.row[~found.fit.used].tolist()))),
         positions=len(problem),
         provenance=provenance,
+        findings=findings(problem, found.fit),
         T_tcp_built=T_tcp_built,
     )
 

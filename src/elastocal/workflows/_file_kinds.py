@@ -22,9 +22,10 @@ from elastocal.compensation import read_settings
 from elastocal.compensation.conditioning import read_tool
 from elastocal.compensation.process import TABLE, read_process, read_table
 from elastocal.dataset import require_joint_names
+from elastocal.drivers.kuka_rsi import CommissioningRecord
 from elastocal.elastic import read_springs
 from elastocal.errors import SchemaError
-from elastocal.geometry import read_geometry
+from elastocal.geometry import PositionPlan, read_geometry
 from elastocal.identification import read_model
 from elastocal.identification.recertification import CompareSummary
 from elastocal.planning.motion import mover_for, require_free_home
@@ -212,6 +213,18 @@ def geometry_file(path: Path) -> FileDescription:
     }
 
 
+def position_plan_file(path: Path) -> FileDescription:
+    """Describe a plan of positions in free space."""
+    found = read_json(path, PositionPlan)
+    return "plan of positions", {
+        "schema": schema_of(type(found)),
+        "cell": found.cell.name,
+        "poses": len(found.poses),
+        "technique": found.technique,
+        "errors": found.errors,
+    }
+
+
 def model_file(path: Path) -> FileDescription:
     """Describe a calibrated model."""
     calibrated = read_model(path)
@@ -269,6 +282,16 @@ def signature_file(path: Path) -> FileDescription:
     return "signature", {
         "schema": "elastocal.signature/1",
         **_picked(found, "of", "sha256", "made", "key"),
+    }
+
+
+def commissioning_file(path: Path) -> FileDescription:
+    """Describe the record of a delay from command to motion."""
+    found = read_json(path, CommissioningRecord)
+    return "commissioning record", {
+        "schema": "elastocal.commissioning/1",
+        **_picked(found, "cell", "robot", "controller", "made", "cycle", "delay"),
+        "line": found.link.sentence(),
     }
 
 

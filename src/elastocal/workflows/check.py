@@ -36,9 +36,11 @@ _JSON_KINDS: dict[str, _Describe] = {
     "elastocal.study_samples": kinds.study_samples,
     "elastocal.process": kinds.process_table,
     "elastocal.comparison": kinds.comparison_file,
+    "elastocal.commissioning": kinds.commissioning_file,
     "elastocal.model": kinds.model_file,
     "elastocal.signature": kinds.signature_file,
     "elastocal.geometry": kinds.geometry_file,
+    "elastocal.position-plan": kinds.position_plan_file,
 }
 """JSON files by the schema that they state, without its version."""
 _NETCDF_KINDS: dict[str, _Describe] = {
