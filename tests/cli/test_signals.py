@@ -29,7 +29,7 @@ class Sends(importlib.abc.MetaPathFinder):
             os.kill(os.getpid(), signal.{name})
 
 sys.meta_path.insert(0, Sends())
-from elastocal_program import run
+from _elastocal_program import run
 run()
 """
 

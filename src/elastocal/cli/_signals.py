@@ -21,7 +21,7 @@ _waiting: set[int] = set()
 
 
 def _is_pythons(handler: object) -> bool:
-    """Return whether Ctrl-C is as Python or `elastocal_program` has it, and may be set here."""
+    """Return whether Ctrl-C is as Python or `_elastocal_program` has it, and may be set here."""
     is_main = threading.current_thread() is threading.main_thread()
     return is_main and handler in (signal.default_int_handler, signal.SIG_DFL)
 

@@ -9,4 +9,4 @@ import signal
 if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
     signal.signal(signal.SIGINT, signal.SIG_DFL)
 
-from elastocal.cli.main import run as run
+from elastocal.cli import run as run
