@@ -218,8 +218,7 @@ def position_plan_file(path: Path) -> FileDescription:
         "schema": schema_of(type(found)),
         "cell": found.cell.name,
         "poses": len(found.poses),
-        "technique": found.technique,
-        "errors": found.errors,
+        **_picked(found, "technique", "errors"),
     }
 
 
