@@ -39,7 +39,7 @@ from elastocal.progress import Progress, silent
 from elastocal.records import record
 from elastocal.results import brief_repr
 
-SCHEMA = "elastocal.position-plan/1"
+_SCHEMA = "elastocal.position-plan/1"
 _RUNG = "weight"
 """The errors that the poses are chosen for: places and zeros of the joints, and what they yield."""
 _POOL, _BATCH, _MOST_DRAWN = 500, 1000, 60_000
@@ -81,7 +81,7 @@ class PosesNeeded:
 
 
 @brief_repr
-@record(SCHEMA)
+@record(_SCHEMA)
 class PositionPlan:
     """Poses for `elastocal geometry`, in visiting order; also its file."""
 

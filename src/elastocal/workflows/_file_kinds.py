@@ -192,10 +192,9 @@ def catalogue_file(path: Path) -> FileDescription:
 def log_map_file(path: Path) -> FileDescription:
     """Describe a map of logs; the cell or robot that it names is read, too."""
     found = logs.read_map(path)
-    place = logs.site(path, found)
     return "map of logs", {
         "schema": logs.SCHEMA,
-        "robot": place.robot.name,
+        "robot": logs.site(path, found).robot.name,
         "logs": [each.log for each in found.logs],
         "load_cases": list(found.load_cases),
     }
@@ -208,7 +207,6 @@ def geometry_file(path: Path) -> FileDescription:
         "schema": schema_of(type(found)),
         "robot": found.robot.name,
         "positions": found.positions,
-        "blunders": len(found.blunders),
         "held_out_mean_m": found.held_out.chosen.mean,
     }
 
@@ -220,8 +218,7 @@ def position_plan_file(path: Path) -> FileDescription:
         "schema": schema_of(type(found)),
         "cell": found.cell.name,
         "poses": len(found.poses),
-        "technique": found.technique,
-        "errors": found.errors,
+        **_picked(found, "technique", "errors"),
     }
 
 

@@ -11,7 +11,7 @@ from elastocal import workflows
 from elastocal.cli import options, output, tables
 
 
-class Purpose(StrEnum):
+class _Purpose(StrEnum):
     """What the poses are for."""
 
     ELASTICITY = "elasticity"
@@ -30,13 +30,13 @@ def _plan(  # noqa: PLR0913 - one parameter an option
         ),
     ] = None,
     purpose: Annotated[
-        Purpose,
+        _Purpose,
         typer.Option(
             "--for",
             help="elasticity: presses on the tooling; geometry: positions in free space for"
             " elastocal geometry.",
         ),
-    ] = Purpose.ELASTICITY,
+    ] = _Purpose.ELASTICITY,
     search: Annotated[
         str | None,
         typer.Option(help="With --for geometry: search technique; default: i_optimal."),
@@ -78,7 +78,7 @@ def _plan(  # noqa: PLR0913 - one parameter an option
     from elastocal.errors import PlanningError
     from elastocal.planning.export import pose_lines
 
-    if purpose is Purpose.GEOMETRY:
+    if purpose is _Purpose.GEOMETRY:
         if dry_run or compare or jobs:
             raise PlanningError("--dry-run, --compare and --jobs are for presses, not for geometry")
         free = workflows.PlanPositionsSettings(

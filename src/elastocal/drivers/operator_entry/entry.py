@@ -27,7 +27,7 @@ from elastocal.cell import (
 )
 from elastocal.drivers.stations import require_station, require_trackers
 from elastocal.errors import DeviceError
-from elastocal.units import factor
+from elastocal.units import factor, parse_number
 
 LEAST_BEAM_TIMEOUT = 30.0
 """A person does not read and type in less, in s."""
@@ -184,7 +184,7 @@ class OperatorEntry:
         if len(words) == 1:
             words = line.split(",")
         try:
-            x, y, z = (float(word.strip(",").replace(",", ".")) for word in words)
+            x, y, z = (parse_number(word.strip(",").replace(",", ".")) for word in words)
         except ValueError:
             return nothing, "three numbers are wanted"
         unit = self._settings.unit
