@@ -133,7 +133,10 @@ class KukaArm:
             cycle = self._newest()
             silent = self._clock.now() - cycle.time
             if silent > _SILENT and self._state not in _RESTING:
-                self._break_down(f"nothing from the controller for {silent:.2f} s: RSI has ended")
+                line = "" if self.link is None else f" ({self.link.statistics().sentence()})"
+                self._break_down(
+                    f"nothing from the controller for {silent:.2f} s: RSI has ended{line}"
+                )
             return ArmState(
                 time=cycle.time,
                 q=cycle.q.copy(),
