@@ -1,8 +1,11 @@
 """The contracts that every driver keeps, and every set of devices, simulated or real."""
 
 import importlib
+import itertools
 import pkgutil
+import struct
 import tomllib
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,8 +14,10 @@ import pytest
 from elastocal import drivers
 from elastocal.cell import KINDS, LOOPBACK, SIMULATED, DeviceSettings
 from elastocal.cell.devices import BeamState, Devices, Motion, SensorStatus
+from elastocal.drivers.net_ft import CountScale, NetFtSensor
 from elastocal.errors import DeviceError, ElastocalError
 from elastocal.records import validate
+from elastocal.sim.wire import NetFtBox
 from elastocal.workflows import GROUP, driver_names, find_driver
 from support.simulated import CYCLE, Place, Session, example_cell, places
 
@@ -23,7 +28,26 @@ def _simulated(like: str) -> tuple[Devices, Place]:
     return Session.of(example_cell(like), start=5.0).devices, places(like)[0]
 
 
+def _read_from_a_box(like: str) -> tuple[Devices, Place]:
+    """Return the simulated devices with their sensor behind the records of a Net F/T box."""
+    devices, place = _simulated(like)
+    box, there = NetFtBox.of(example_cell(like)), devices.sensor
+    units = CountScale(box.counts_per_force, box.counts_per_torque, "N", "N-m")
+    sensor = NetFtSensor(devices.clock, units, there.rate, "Net F/T at 127.0.0.1")
+    sent = itertools.count(1)
+
+    def send(now: int) -> None:
+        block = there.read()
+        for counts in box.count(block):
+            number = next(sent)
+            sensor.received(struct.pack(">III6i", number, 70 * number, 0, *counts))
+
+    devices.clock.on_wake(send)
+    return replace(devices, sensor=sensor), place
+
+
 RIGS = {
+    "Net F/T": lambda: _read_from_a_box("afp"),
     "simulated fibre placement": lambda: _simulated("afp"),
     "simulated machining": lambda: _simulated("machining"),
 }

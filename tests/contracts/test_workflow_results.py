@@ -12,7 +12,7 @@ from elastocal.errors import ReportError
 from elastocal.procedure import RunEnd
 from elastocal.results import MOST_CHARACTERS, MOST_LINES, Result
 from elastocal.robot import catalogue
-from support import foreign_logs, measured_arms, plans, reported, studies
+from support import foreign_logs, kuka_bench, measured_arms, plans, reported, studies
 
 CLASSES = {
     name: getattr(workflows, name)
@@ -26,6 +26,8 @@ WITHOUT = {
     "DryRunResult",
     "ExportResult",
     "InitResult",
+    "KrcConfigResult",
+    "MeasureDelayResult",
     "ReportResult",
     "SimulateResult",
     "ToolResult",
@@ -67,6 +69,8 @@ def results(tmp_path_factory) -> dict[str, Result]:
         workflows.guess_map(logs),
         workflows.import_logs(logs, map=log_map),
         workflows.init(out / "new"),
+        workflows.krc_config(kuka_bench.write_cell(out), out=out / "krc"),
+        workflows.MeasureDelayResult(out / "record.json", kuka_bench.record()),
         plans.plan(),
         workflows.predict(model, rows=path),
         workflows.report(run, out=out / "report.html"),

@@ -1,13 +1,54 @@
 """A KUKA arm of the driver on a bench: its peer, its link without socket, its feed, one clock."""
 
+import shutil
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
+import yaml
 
 from elastocal.cell import ArmState, Cell, Motion
-from elastocal.drivers.kuka_rsi import KukaArm, LinkAddress, RsiLink, RsiSettings
+from elastocal.drivers.kuka_rsi import (
+    CommissioningRecord,
+    DelayEstimate,
+    KukaArm,
+    LinkAddress,
+    RsiLink,
+    RsiSettings,
+)
 from support.kuka_peer import KukaPeer, PeerClock, PeerFeed
 from support.simulated import Place, example_cell, places
+
+
+def write_cell(folder: Path, **arm: object) -> Path:
+    """Write the example cell with a KUKA on this machine; return its file."""
+    cell = example_cell("afp")
+    data = yaml.safe_load(cell.path.read_text())
+    data["devices"] = {"arm": {"driver": "kuka_rsi", **arm}}
+    for mesh in cell.path.parent.glob("*.stl"):
+        shutil.copy(mesh, folder)
+    if "process" in data:
+        shutil.copy(cell.path.parent / data["process"]["file"], folder)
+    path = folder / "kuka.yaml"
+    path.write_text(yaml.safe_dump(data))
+    return path
+
+
+def record(cycle: float = 0.004) -> CommissioningRecord:
+    """Return the record of an arm of the example cell, 25 ms."""
+    bench = Bench.of()
+    return CommissioningRecord(
+        cell="cell",
+        robot=bench.peer.robot.name,
+        controller="127.0.0.1",
+        made="2026-11-22T12:00:00",
+        cycle=cycle,
+        delay=0.025,
+        amplitude=5e-4,
+        chirps=(DelayEstimate(0.02, 0.005, 1.0, 0.01),),
+        link=bench.link.statistics(),
+    )
+
 
 SETTINGS = {
     "cycle": "12 ms",
@@ -43,7 +84,7 @@ class Bench:
             "127.0.0.1", 0, "127.0.0.1", settings.cycle, settings.mode != "measure"
         )
         link = RsiLink(address, arm, clock, timer=lambda: 0.0)
-        arm.broken, clock.link = link.require, link
+        arm.link = clock.link = link
         clock.sleep(0.1)
         return cls(arm, peer, link, clock, feed, place)
 

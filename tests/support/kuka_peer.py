@@ -224,7 +224,7 @@ class PeerClock:
             self._next += self.peer.cycle
             if self.link is None or self.quiet:
                 continue
-            answer = self.link.answer(self.peer.rob(), "127.0.0.1")
+            answer = self.link.answer(self.peer.rob(), ("127.0.0.1", 50_000))
             if self.lose:
                 self.lose, answer = self.lose - 1, None
             self.peer.take(answer)

@@ -3,6 +3,7 @@ from ._quantities import (
     Angle as Angle,
     Distance as Distance,
     Length as Length,
+    Name as Name,
     Point as Point,
     Pose as Pose,
     PositiveForce as PositiveForce,
@@ -10,6 +11,7 @@ from ._quantities import (
     PositiveMoment as PositiveMoment,
     PositiveSpeed as PositiveSpeed,
     PositiveTime as PositiveTime,
+    SampleRate as SampleRate,
     SignedForce as SignedForce,
     TranslationalStiffness as TranslationalStiffness,
 )
@@ -23,6 +25,7 @@ from .cell import (
 )
 from .devices import (
     ArmState as ArmState,
+    AskedMetrology as AskedMetrology,
     BeamState as BeamState,
     Clock as Clock,
     Devices as Devices,

@@ -17,7 +17,7 @@ docs/how-to/write-a-driver.md.
 from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 from elastocal.arrays import FloatArray
 from elastocal.results import brief_repr
@@ -218,6 +218,8 @@ class PointBlock:
     station: str
     """Which station measures."""
     source: str
+    note: str = ""
+    """Why the beam is broken, where the device says so."""
 
     def __len__(self) -> int:
         """Return the number of samples."""
@@ -243,6 +245,22 @@ class Metrology(Protocol):
 
     def read(self) -> PointBlock:
         """Return the positions since the last call, at once; none while the beam is broken."""
+
+
+@runtime_checkable
+class AskedMetrology(Metrology, Protocol):
+    """Metrology that measures when it is asked: a person reads the instrument."""
+
+    def ask(self, what: str) -> None:
+        """Ask for a reading of the marker, which stands still; returns at once.
+
+        Until it has come the beam is broken; from then on it stands, until the next is asked for.
+
+        Parameters
+        ----------
+        what : str
+            Where in the procedure, for the person.
+        """
 
 
 def close_nothing() -> None:

@@ -1,20 +1,28 @@
 """The geometric model of an arm: what a fit found, as a file, and as a URDF."""
 
 from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from elastocal.arrays import FloatArray
-from elastocal.errors import GeometryError
-from elastocal.geometry.arm import MOTION, ArmErrors, frames
+from elastocal.errors import GeometryError, SchemaError
+from elastocal.geometry.arm import KINDS, MOTION, ArmErrors, frames
 from elastocal.geometry.ladder import GeometryLadder
+from elastocal.geometry.mistakes import findings
 from elastocal.geometry.positions import Payload, Positions, joint_torques
 from elastocal.geometry.problem import GeometryProblem
 from elastocal.identification import interval
-from elastocal.records import record
+from elastocal.records import read_json, record
 from elastocal.results import brief_repr
-from elastocal.robot import Robot, probe_configurations, same_joints, with_joint_origins
+from elastocal.robot import (
+    Robot,
+    probe_configurations,
+    refusals_naming,
+    same_joints,
+    with_joint_origins,
+)
 from elastocal.wording import counted
 
 SCHEMA = "elastocal.geometry/1"
@@ -102,6 +110,8 @@ class GeometryModel:
     positions: int
     """Positions of markers, blunders included."""
     provenance: str
+    findings: tuple[str, ...] = ()
+    """What a person should know of the positions, a sentence each."""
     T_tcp_built: FloatArray | None = None
     """The tcp as built in the tcp as described, shape (4, 4), in m; none where nobody knew where on
     the tool the markers are."""
@@ -197,6 +207,33 @@ class GeometryModel:
         return urdf.replace("</robot>", f"  <!-- {URDF_MARK}: {self.provenance} -->\n</robot>")
 
 
+def read_geometry(path: Path) -> GeometryModel:
+    """Return the model in a file.
+
+    Raises
+    ------
+    SchemaError
+        If it does not fit its schema, or its arrays do not fit its robot.
+    RobotError
+        If the robot in it cannot be used.
+    FileAccessError
+        If it cannot be read.
+    """
+    found = read_json(path, GeometryModel)
+    with refusals_naming(path):
+        joints = len(found.robot.joint_names)
+    wanted = {
+        "place": (found.place, (joints, len(KINDS))),
+        "motion": (found.motion, (joints, len(MOTION))),
+        "markers": (found.markers, (*found.markers.shape[:1], 3)),
+        **{f"stations.{name}": (T, (4, 4)) for name, T in found.stations.items()},
+    }
+    for name, (values, shape) in wanted.items():
+        if values.shape != shape:
+            raise SchemaError(f"{path}: {name} has shape {values.shape}, not {shape}")
+    return found
+
+
 def geometry_model(
     problem: GeometryProblem,
     found: GeometryLadder,
@@ -257,6 +294,7 @@ def geometry_model(
         blunders=tuple(sorted(set(problem.row[~found.fit.used].tolist()))),
         positions=len(problem),
         provenance=provenance,
+        findings=findings(problem, found.fit),
         T_tcp_built=T_tcp_built,
     )
 

@@ -11,6 +11,8 @@ __all__ = [
     "guess_map",
     "import_logs",
     "init",
+    "krc_config",
+    "measure_delay",
     "plan",
     "predict",
     "report",
@@ -88,6 +90,17 @@ from .import_logs import (
     import_logs as import_logs,
 )
 from .init import InitResult as InitResult, InitSettings as InitSettings, init as init
+from .krc_config import (
+    KrcConfigResult as KrcConfigResult,
+    KrcConfigSettings as KrcConfigSettings,
+    krc_config as krc_config,
+    kuka_settings as kuka_settings,
+)
+from .measure_delay import (
+    MeasureDelayResult as MeasureDelayResult,
+    MeasureDelaySettings as MeasureDelaySettings,
+    measure_delay as measure_delay,
+)
 from .plan import (
     ComparedSpread as ComparedSpread,
     PlanFigures as PlanFigures,

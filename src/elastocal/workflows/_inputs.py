@@ -21,7 +21,6 @@ from elastocal.identification import (
     read_model,
     unseen_groups,
 )
-from elastocal.records import read_json
 from elastocal.robot import (
     Robot,
     T_from_xyzabc,
@@ -182,11 +181,11 @@ class ArmAsBuilt:
             if self.payload is not None or self.payload_centre is not None:
                 raise GeometryError("a payload needs the arm that it bends: give --geometry")
             return None
-        from elastocal.geometry import GeometryModel, Payload
+        from elastocal.geometry import Payload, read_geometry
 
         mass = 0.0 if self.payload is None else parse_quantity(self.payload, "mass")
         x, y, z = (0.0,) * 3 if self.payload_centre is None else parse_point(self.payload_centre)
-        return read_json(self.geometry, GeometryModel).tool_of(robot, Payload(mass, (x, y, z)))
+        return read_geometry(self.geometry).tool_of(robot, Payload(mass, (x, y, z)))
 
 
 def _require_near(what: str, point: ArrayLike, origin: str) -> None:

@@ -69,6 +69,7 @@ class GeometryResult(Result):
             ("calibrated", _phrase(after.mean, after.p95, after.max)),
             ("model", next(each.rung for each in model.ladder if each.chosen)),
             ("errors of the arm", f"{known} known of {len(model.parameters)} fitted"),
+            *(("warning", each) for each in model.findings),
         )
 
 

@@ -6,7 +6,6 @@ import pytest
 from elastocal.cell import Motion
 from elastocal.drivers.kuka_rsi import (
     CommissioningRecord,
-    DelayEstimate,
     Excitation,
     RsiSettings,
     chirp,
@@ -14,6 +13,7 @@ from elastocal.drivers.kuka_rsi import (
 )
 from elastocal.errors import DeviceError, ElastocalError
 from elastocal.records import write_json
+from support import kuka_bench
 from support.kuka_bench import Bench
 from support.simulated import example_cell
 
@@ -77,12 +77,7 @@ def test_an_arm_is_measured_in_the_air():
 
 @pytest.fixture
 def record() -> CommissioningRecord:
-    statistics = Bench.of().link.statistics()
-    chirps = (DelayEstimate(0.02, 0.005, 1.0, 0.01),)
-    name = example_cell("afp").robot.name
-    return CommissioningRecord(
-        "cell", name, "127.0.0.1", "2026-11-22T12:00:00", 0.004, 0.025, 5e-4, chirps, statistics
-    )
+    return kuka_bench.record()
 
 
 def test_settings_take_the_delay_of_their_record(record):

@@ -16,6 +16,7 @@ from elastocal.drivers.kuka_rsi import (
 from elastocal.errors import DeviceError
 
 ROBOT = "127.0.0.1"
+CONTROLLER = (ROBOT, 50_000)
 
 
 class Echo:
@@ -56,7 +57,7 @@ def make(answers: bool = True, step: float = 1e-4, cycle: float = 0.004) -> tupl
 def test_messages_are_counted_by_how_they_follow():
     link, echo = make()
     order = [1000, 1004, 1016, 1012, 1020, 900_000, 900_004]
-    answers = [link.answer(rob(ipoc), ROBOT) for ipoc in order]
+    answers = [link.answer(rob(ipoc), CONTROLLER) for ipoc in order]
     assert [arrival for _, arrival in echo.heard] == [
         Arrival.FIRST,
         Arrival.NEXT,
@@ -92,23 +93,34 @@ def test_an_ipoc_between_the_cycles_is_a_jump():
 
 def test_nobody_but_the_controller_is_read_or_answered():
     link, echo = make()
-    assert link.answer(rob(4), "127.0.0.2") is None
+    assert link.answer(rob(4), ("127.0.0.2", 50_000)) is None
     assert not echo.heard
     assert link.statistics().foreign == 1
 
 
+def test_a_second_robot_at_the_same_address_is_not_heard_until_the_first_is_silent():
+    link, _ = make(step=0.001)
+    second = (ROBOT, 50_001)
+    link.answer(rob(4), CONTROLLER)
+    assert link.answer(rob(8), second) is None
+    assert link.answer(rob(8), CONTROLLER) is not None
+    assert link.statistics().foreign == 1
+    link._timer.time += 0.6
+    assert link.answer(rob(900), second) is not None
+
+
 def test_the_short_first_message_of_rsi_2_is_dropped_and_only_the_first():
     link, _ = make()
-    assert link.answer(b"<Rob></Rob>", ROBOT) is None
-    assert link.answer(b"<Rob></Rob>", ROBOT) is None
+    assert link.answer(b"<Rob></Rob>", CONTROLLER) is None
+    assert link.answer(b"<Rob></Rob>", CONTROLLER) is None
     counts = link.statistics()
     assert (counts.overtures, counts.malformed) == (1, 1)
 
 
 def test_what_is_malformed_is_counted_and_not_answered():
     link, echo = make()
-    link.answer(rob(4), ROBOT)
-    assert link.answer(b"<Rob", ROBOT) is None
+    link.answer(rob(4), CONTROLLER)
+    assert link.answer(b"<Rob", CONTROLLER) is None
     assert len(echo.heard) == 1
     assert link.statistics().malformed == 1
 
@@ -116,18 +128,18 @@ def test_what_is_malformed_is_counted_and_not_answered():
 def test_late_answers_and_the_controllers_own_count_are_kept():
     link, _ = make(step=0.0036)
     for number, ipoc in enumerate((4, 8, 12)):
-        link.answer(rob(ipoc, delay=number), ROBOT)
+        link.answer(rob(ipoc, delay=number), CONTROLLER)
     counts = link.statistics()
     assert (counts.late, counts.controller_delay) == (3, 2)
     assert counts.answer_longest == pytest.approx(0.0036)
     quick, _ = make(step=0.0034)
-    quick.answer(rob(4), ROBOT)
+    quick.answer(rob(4), CONTROLLER)
     assert quick.statistics().late == 0
 
 
 def test_who_only_measures_never_answers():
     link, echo = make(answers=False)
-    assert link.answer(rob(4), ROBOT) is None
+    assert link.answer(rob(4), CONTROLLER) is None
     assert echo.heard
     assert link.statistics().answered == 0
 

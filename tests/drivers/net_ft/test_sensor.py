@@ -69,6 +69,27 @@ def test_two_records_of_one_datagram_have_two_times(stream):
     assert np.all(np.diff(stream.sensor.read().time) > 0.0)
 
 
+def test_records_that_come_in_a_bunch_are_as_far_apart_as_the_box_says(stream):
+    for number in range(1, 401):
+        if number % 4 == 1:
+            stream.clock.sleep(4e-3)
+        stream.sensor.received(struct.pack(">III6i", number, 7 * number, 0, *(0,) * 6))
+    block = stream.sensor.read()
+    np.testing.assert_allclose(np.diff(block.time)[40:], 1e-3, atol=1e-5)
+    assert np.all(np.diff(block.time) > 0.0)
+    assert stream.clock.now() - block.time[-1] < 1e-4
+
+
+@pytest.mark.parametrize("slower", [-0.05, -0.002, 0.002, 0.05])
+def test_a_box_whose_rate_is_not_the_stated_one_keeps_the_time_of_the_rig(stream, slower):
+    for number in range(1, 5001):
+        stream.clock.sleep(1e-3 * (1.0 + slower))
+        stream.sensor.received(struct.pack(">III6i", number, 7 * number, 0, *(0,) * 6))
+    block = stream.sensor.read()
+    assert 0.0 <= stream.clock.now() - block.time[-1] <= 0.051
+    assert np.all(np.diff(block.time) > 0.0)
+
+
 def test_a_lost_record_is_counted_and_a_late_one_dropped(stream):
     stream.send()
     stream.send(rdt=3)

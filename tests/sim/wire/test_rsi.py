@@ -15,7 +15,9 @@ from elastocal.sim.wire import (
     PosCorrLimits,
     RsiContext,
     RsiServer,
+    Told,
     ethernet_config,
+    rsi_server,
 )
 from elastocal.sim.wire._rsi_messages import EthernetConfig, RobWriter, SenReader
 from elastocal.sim.wire._rsi_robot import RsiRobot, RsiStopError, corrected_program
@@ -32,7 +34,8 @@ class Desk:
     def __init__(self, absolute=False, **context):
         self.clock = SimClock()
         self.live = LiveCell(example_cell(simulation=QUIET), 0, self.clock)
-        config = EthernetConfig.from_xml(ethernet_config("127.0.0.1", 49152, absolute=absolute))
+        mode = "compensation" if absolute else "contact"
+        config = EthernetConfig.from_xml(ethernet_config("127.0.0.1", 49152, mode))
         self.robot = RsiRobot(self.live, config.receive, RsiContext(absolute=absolute, **context))
         self.robot.start()
         self.wanted = {"Stop": 1.0, "Cmd.N": 0.0, "Cmd.Op": 0.0, "Cmd.V": 100.0}
@@ -323,9 +326,9 @@ def wire():
     """Return what starts a controller that sends to a PC; its time runs fifty times as fast."""
     opened = []
 
-    def start(pc, only_send=False, faults=(), **context):
+    def start(pc, mode="contact", faults=(), **context):
         live = LiveCell(example_cell(simulation=QUIET), 0, WallClock(rate=50.0))
-        text = ethernet_config("127.0.0.1", pc.port, only_send=only_send)
+        text = ethernet_config("127.0.0.1", pc.port, mode)
         context = RsiContext(**{"patience": 5.0} | context)
         server = RsiServer(live, EthernetConfig.from_xml(text), context)
         opened.extend([server.close, pc.socket.close])
@@ -395,7 +398,7 @@ class TestWire:
 
     def test_only_sending_expects_no_answer(self, wire):
         pc = Pc()
-        server = wire(pc, only_send=True, timeout=3)
+        server = wire(pc, mode="measure", timeout=3)
         ipocs = [pc.hear()[1] for _ in range(30)]
         assert ipocs == list(range(IPOC_START, IPOC_START + 120, 4))
         assert server.statistics.late == 0
@@ -411,6 +414,39 @@ class TestWire:
         pc.exchange(5, guide)
         after = re.search(rb'RIst X="([-\d.]+)"', pc.hear()[0])
         assert float(after[1]) - float(before[1]) == pytest.approx(0.1, abs=1e-5)
+
+
+class TestServer:
+    """What `elastocal simulate` starts."""
+
+    def test_it_is_what_the_cell_file_says(self):
+        live = LiveCell(example_cell(simulation=QUIET), 0, SimClock())
+        pc = Pc()
+        settings = {
+            "port": pc.port,
+            "delay": 0.004,
+            "cycle": 0.012,
+            "timeout": 7,
+            "mode": "contact",
+        }
+        server = rsi_server(live, Told(settings=settings | {"commissioning": None}))
+        assert server.ports["udp"] == pc.port
+        server.start()
+        data, _ = pc.hear()
+        assert b'<Krl N="0" State="0"/>' in data
+        pc.answer(IPOC_START)
+        assert pc.hear()[1] == IPOC_START + 12
+        server.close(), pc.socket.close()
+
+    def test_without_a_port_it_says_where_the_pc_has_to_listen(self):
+        live = LiveCell(example_cell(simulation=QUIET), 0, SimClock())
+        server = rsi_server(live, Told())
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as pc:
+            pc.bind(("127.0.0.1", server.ports["udp"]))
+            pc.settimeout(5.0)
+            server.start()
+            assert pc.recv(4096).startswith(b"<Rob")
+        server.close()
 
 
 class TestFaults:

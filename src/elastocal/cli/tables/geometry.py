@@ -5,6 +5,7 @@ from pathlib import Path
 from rich.console import Console
 from rich.table import Table
 
+from elastocal.cli.output import yellow
 from elastocal.geometry import GeometryModel, GeometryParameter
 from elastocal.wording import counted
 
@@ -35,6 +36,8 @@ def show_geometry(console: Console, model: GeometryModel, out: Path) -> None:
     for parameter in model.parameters:
         table.add_row(*_cells(parameter))
     console.print(table)
+    for finding in model.findings:
+        console.print(f"{yellow('warning:')} {finding}", soft_wrap=True)
     blunders = model.blunders
     if blunders:
         named = ", ".join(map(str, blunders[:_MOST_ROWS]))

@@ -9,6 +9,14 @@ from .commissioning import (
     chirp as chirp,
     estimate_delay as estimate_delay,
 )
+from .controller_files import (
+    LONGEST_NAME as LONGEST_NAME,
+    PROGRAMS as PROGRAMS,
+    SHEET as SHEET,
+    ControllerSet as ControllerSet,
+    controller_files as controller_files,
+    write_controller_files as write_controller_files,
+)
 from .corrections import (
     CorrectionGuard as CorrectionGuard,
     CorrectionSource as CorrectionSource,
@@ -17,9 +25,14 @@ from .corrections import (
 )
 from .driver import (
     DRIVER as DRIVER,
-    ConnectedArm as ConnectedArm,
     KukaRsiDriver as KukaRsiDriver,
     connect_arm as connect_arm,
+)
+from .ethernet_file import (
+    MODES as MODES,
+    EthernetChannel as EthernetChannel,
+    EthernetFile as EthernetFile,
+    check_ethernet_file as check_ethernet_file,
 )
 from .force_control import (
     CollisionWatch as CollisionWatch,

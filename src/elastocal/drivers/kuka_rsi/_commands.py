@@ -9,6 +9,7 @@ from elastocal.arrays import FloatArray
 from elastocal.drivers.kuka_rsi.force_control import ForceLaw, overshoot
 from elastocal.drivers.kuka_rsi.settings import Bounds
 from elastocal.errors import DeviceError
+from elastocal.robot import Robot
 
 _WRIST = math.radians(5.0)
 """Least |A5| at which the tool is moved straight: near 0 axes 4 and 6 run away."""
@@ -40,6 +41,23 @@ def check_vector(what: str, values: FloatArray, size: int) -> FloatArray:
     fits = array.shape == (size,) and bool(np.all(np.isfinite(array)))
     require(fits, what, array.tolist(), f"{size} finite numbers")
     return array
+
+
+def check_joint_move(robot: Robot, q: FloatArray, speed: float) -> FloatArray:
+    """Return the target of a joint move, shape (joint,), in rad or m, as an array of its own.
+
+    Raises
+    ------
+    DeviceError
+        If it is beyond a limit, or the speed is no part of the axis speeds.
+    """
+    target, limits = check_vector("joint target", q, len(robot.joint_names)), robot.limits
+    for name, value, low, high in zip(
+        robot.joint_names, target, limits.lower, limits.upper, strict=True
+    ):
+        require(low <= value <= high, f"joint target {name}", value, f"{low:g} to {high:g}")
+    require(0.0 < speed <= 1.0, "speed", speed, "a part of the axis speeds in (0, 1]")
+    return target
 
 
 def check_line(what: str, direction: FloatArray, distance: float, speed: float) -> FloatArray:

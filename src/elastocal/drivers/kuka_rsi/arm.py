@@ -19,6 +19,7 @@ from elastocal.arrays import FloatArray
 from elastocal.cell import ArmState, Cell, Clock, Motion as MotionState, WrenchFeed
 from elastocal.drivers.kuka_rsi._commands import (
     StraightMoveRules,
+    check_joint_move,
     check_line,
     check_vector,
     require,
@@ -26,7 +27,7 @@ from elastocal.drivers.kuka_rsi._commands import (
 from elastocal.drivers.kuka_rsi.commissioning import AnswerRecorder
 from elastocal.drivers.kuka_rsi.corrections import CorrectionGuard, as_millimetres
 from elastocal.drivers.kuka_rsi.force_control import CollisionWatch, ForceLaw, ForceReader
-from elastocal.drivers.kuka_rsi.link import Arrival
+from elastocal.drivers.kuka_rsi.link import Arrival, RsiLink
 from elastocal.drivers.kuka_rsi.messages import (
     MoveTarget,
     Order,
@@ -56,6 +57,8 @@ from elastocal.robot import inverse_transform
 _SOURCE = "kuka_rsi"
 _SILENT = 0.25
 """Time without a message after which the arm counts as stopped, in s."""
+_EDGE_AGAIN = 25
+"""Cycles for which a program stays guided against its order before STOP rises again."""
 _RESTING = (MotionState.DISARMED, MotionState.STOPPED)
 _STANDING = (MotionState.IDLE,)
 _FORCED = (MotionState.IDLE, MotionState.HOLDING, MotionState.RELEASING)
@@ -106,8 +109,9 @@ class KukaArm:
         self._number = 0
         self._touched: ContactGuard | None = None
         self._touched_at: FloatArray = np.zeros(3)
-        self.broken: Callable[[], None] = lambda: None
-        """Raises what has broken the link to the controller."""
+        self._disobeyed = 0
+        self.link: RsiLink | None = None
+        """Line to the controller; its failure is raised at the next call."""
 
     def _feeling(self, feed: WrenchFeed | None) -> tuple[ForceReader | None, CollisionWatch | None]:
         T_sensor_tcp = self._cell.T_sensor_tcp
@@ -118,15 +122,13 @@ class KukaArm:
                 f"{self._cell.path}: devices.arm: mode contact needs a force sensor whose driver"
                 " feeds the arm (section sensor, and devices.sensor)"
             )
-        weight = self._cell.file.tool.mass * self._cell.gravity_base
         reader = ForceReader(feed, inverse_transform(T_sensor_tcp), self._settings.cycle)
+        weight = self._cell.file.tool.mass * self._cell.gravity_base
         return reader, CollisionWatch(weight, self._settings.collision_force)
-
-    # --- the protocol -------------------------------------------------------------------------
 
     def state(self) -> ArmState:
         """Return the newest state."""
-        self.broken()
+        self._require_link()
         with self._lock:
             cycle = self._newest()
             silent = self._clock.now() - cycle.time
@@ -137,14 +139,14 @@ class KukaArm:
                 q=cycle.q.copy(),
                 T_base_tcp=cycle.T_base_tcp.copy(),
                 motion=self._state,
-                in_contact=self._in_contact,
+                in_contact=self._touched is not None,
                 fault=self._fault,
                 source=_SOURCE,
             )
 
     def enable(self) -> None:
         """Release the arm for motion; it then is idle. Refused while a fault stands."""
-        self.broken()
+        self._require_link()
         with self._lock:
             cycle = self._newest()
             self._require_ready(cycle)
@@ -168,13 +170,7 @@ class KukaArm:
 
     def move_joints(self, q: FloatArray, speed: float) -> None:
         """Start a joint move; see `RobotArm.move_joints`."""
-        target = check_vector("joint target", q, len(self.joint_names))
-        limits = self._cell.robot.limits
-        for name, value, low, high in zip(
-            self.joint_names, target, limits.lower, limits.upper, strict=True
-        ):
-            require(low <= value <= high, f"joint target {name}", value, f"{low:g} to {high:g}")
-        require(0.0 < speed <= 1.0, "speed", speed, "a part of the axis speeds in (0, 1]")
+        target = check_joint_move(self._cell.robot, q, speed)
         with self._lock:
             self._allow("move_joints", _STANDING)
             if self._touched is not None:
@@ -258,8 +254,6 @@ class KukaArm:
             self._start(_Task(MotionState.MOVING, motion))
         return recorder
 
-    # --- the link's thread ----------------------------------------------------------------------
-
     def step(self, message: RobMessage, arrival: Arrival, now: float) -> SenMessage | None:
         """Return the answer to a message; see `elastocal.drivers.kuka_rsi.Handler`."""
         with self._lock:
@@ -275,7 +269,10 @@ class KukaArm:
             if self._settings.mode == "measure":
                 return None
             self._look(cycle, arrival)
-            return self._message(self._next(cycle))
+            step = self._next(cycle)
+            disobeys = step.order is not Order.GUIDE and cycle.state == ProgramState.GUIDED
+            self._disobeyed = self._disobeyed + 1 if disobeys else 0
+            return self._message(step)
 
     def _next(self, cycle: Cycle) -> Step:
         """Return the next step of what is being carried out."""
@@ -322,13 +319,9 @@ class KukaArm:
     def _message(self, step: Step) -> SenMessage:
         target = step.target or MoveTarget(self._number)
         shift = as_millimetres(step.shift)
-        return SenMessage(shift, step.order, target, self._settings.sentype)
-
-    # --- what the arm is doing ------------------------------------------------------------------
-
-    @property
-    def _in_contact(self) -> bool:
-        return self._touched is not None and self._state is not MotionState.APPROACHING
+        # The edge of STOP may have come before RSI_MOVECORR began: then it comes once more.
+        again = self._disobeyed % _EDGE_AGAIN == _EDGE_AGAIN - 1
+        return SenMessage(shift, step.order, target, self._settings.sentype, again)
 
     def _start(self, task: _Task) -> None:
         self._task, self._running, self._state = task, None, task.state
@@ -362,7 +355,9 @@ class KukaArm:
         limits = (self._touched_at, bounds.travel, bounds.force)
         return Press(self._reader, self.law, wanted, rate, *limits)
 
-    # --- refusals -------------------------------------------------------------------------------
+    def _require_link(self) -> None:
+        if self.link is not None:
+            self.link.require()
 
     def _newest(self) -> Cycle:
         if self._problem is not None:

@@ -11,18 +11,10 @@ from elastocal.errors import DeviceError
 from elastocal.results import brief_repr
 
 
-@dataclass(frozen=True)
-class ConnectedArm:
-    """An arm and the link that it lives on."""
-
-    arm: KukaArm
-    link: RsiLink
-
-
 def connect_arm(
     cell: Cell, settings: RsiSettings, clock: Clock, feed: WrenchFeed | None
-) -> ConnectedArm:
-    """Return the arm of a cell once its controller has spoken.
+) -> KukaArm:
+    """Return the arm of a cell once its controller has spoken; its `link` is to be closed.
 
     Raises
     ------
@@ -39,7 +31,7 @@ def connect_arm(
         settings.address, settings.port, settings.robot, settings.cycle, settings.mode != "measure"
     )
     link = RsiLink(place, arm, clock)
-    arm.broken = link.require
+    arm.link = link
     link.start()
     if not link.wait(settings.wait):
         statistics = link.statistics()
@@ -50,7 +42,7 @@ def connect_arm(
             f" {statistics.foreign} from elsewhere): start the program on the controller now,"
             " while elastocal listens"
         )
-    return ConnectedArm(arm, link)
+    return arm
 
 
 @brief_repr
@@ -71,8 +63,9 @@ class KukaRsiDriver:
         """Return the arm."""
         settings = wanted["arm"]
         assert isinstance(settings, RsiSettings)
-        connected = connect_arm(cell, settings, context.clock, context.feed)
-        return DeviceSet(arm=connected.arm, close=connected.link.close)
+        arm = connect_arm(cell, settings, context.clock, context.feed)
+        assert arm.link is not None
+        return DeviceSet(arm=arm, close=arm.link.close)
 
 
 DRIVER = KukaRsiDriver()

@@ -7,6 +7,7 @@ time happens elsewhere. A stock kernel keeps this most of the time, not always: 
 bounds the motion are the controller's own limits, not this thread.
 """
 
+import math
 import socket
 import threading
 import time
@@ -38,6 +39,8 @@ _FAR = 250
 """Cycles by which an IPOC that is no jump may be off: a second at 4 ms."""
 _KEPT = 20_000
 """Answers whose times are kept for the statistics."""
+_SESSION = 0.5
+"""Time after the last message at which a controller may come back from another port, in s."""
 _MOST_BACKLOG = 64
 """Datagrams that are skipped at once at most, before one is answered."""
 
@@ -189,6 +192,7 @@ class RsiLink:
         self._closing, self._heard = threading.Event(), threading.Event()
         self._failure: str | None = None
         self._came: float | None = None
+        self._from, self._heard_at = 0, -math.inf
         self.port = place.port
         """The port that it listens at."""
 
@@ -262,18 +266,19 @@ class RsiLink:
             jitter=float(np.std(between)) if between else float("nan"),
         )
 
-    def answer(self, datagram: bytes, sender: str) -> bytes | None:
+    def answer(self, datagram: bytes, sender: tuple[str, int]) -> bytes | None:
         """Return the answer to a datagram; None where there is none.
 
         Parameters
         ----------
         datagram : bytes
             As it came.
-        sender : str
-            Address that it came from.
+        sender : tuple of (str, int)
+            Address and port that it came from. The port is the controller's own choice at each
+            start: another one counts as somebody else's until the one before falls silent.
         """
         counts, came = self._counts, self._timer()
-        if sender != self._place.robot:
+        if not self._is_controller(sender, came):
             counts.foreign += 1
             return None
         counts.received += 1
@@ -291,6 +296,15 @@ class RsiLink:
         data = write_sen(reply, message.ipoc)
         self._note_time(came)
         return data
+
+    def _is_controller(self, sender: tuple[str, int], came: float) -> bool:
+        """Return whether the controller sends; remember its port."""
+        if sender[0] != self._place.robot:
+            return False
+        if sender[1] != self._from and came - self._heard_at <= _SESSION:
+            return False
+        self._from, self._heard_at = sender[1], came
+        return True
 
     def _reply(self, message: RobMessage) -> SenMessage | None:
         counts, arrival = self._counts, self._ipoc.classify(message.ipoc)
@@ -334,12 +348,12 @@ class RsiLink:
         except TimeoutError:
             return
         for datagram, sender in self._newest(waiting):
-            data = self.answer(datagram, sender[0])
+            data = self.answer(datagram, sender)
             if data is not None:
                 self._socket.sendto(data, sender)
 
     def _newest(self, first: tuple[bytes, tuple[str, int]]) -> list[tuple[bytes, tuple[str, int]]]:
-        """Return the newest datagram of the controller, and all of others, that are waiting."""
+        """Return what is waiting, of the controller the newest alone."""
         assert self._socket is not None
         waiting = [first]
         self._socket.setblocking(False)
@@ -350,7 +364,8 @@ class RsiLink:
             pass
         finally:
             self._socket.settimeout(_PATIENCE)
-        ours = [each for each in waiting if each[1][0] == self._place.robot]
+        known = (self._place.robot, self._from)
+        ours = [each for each in waiting if each[1] == known]
         self._counts.skipped += max(len(ours) - 1, 0)
         self._counts.received += max(len(ours) - 1, 0)
-        return [each for each in waiting if each[1][0] != self._place.robot] + ours[-1:]
+        return [each for each in waiting if each[1] != known] + ours[-1:]

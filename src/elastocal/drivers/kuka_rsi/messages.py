@@ -123,11 +123,13 @@ class SenMessage:
     """Target of the ``PTP``, for programs that know such; None leaves it out."""
     sentype: str = "elastocal"
     """``SENTYPE`` of the controller's ETHERNET file."""
+    rearm: bool = False
+    """Take the STOP channel back for once, so that it can rise again."""
 
     @property
     def stop(self) -> bool:
         """The channel of the STOP object; its rising edge ends ``RSI_MOVECORR``."""
-        return self.order is not Order.GUIDE
+        return self.order is not Order.GUIDE and not self.rearm
 
 
 def is_overture(datagram: bytes) -> bool:

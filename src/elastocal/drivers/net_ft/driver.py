@@ -138,10 +138,18 @@ class BoxLine:
             try:
                 self.sensor.received(self._socket.recv(MOST_PAGE))
             except TimeoutError:
-                if not self._closed.is_set():
-                    self.sensor.fail(self._why_silent())
+                self._end_or_go_on()
             except OSError as error:
                 self.sensor.fail(f"{error.strerror or error}")
+
+    def _end_or_go_on(self) -> None:
+        """Look why nothing comes; a stream that comes again meanwhile was only held up."""
+        why = self._why_silent()
+        try:
+            self.sensor.received(self._socket.recv(MOST_PAGE))
+        except TimeoutError:
+            if not self._closed.is_set():
+                self.sensor.fail(why)
 
     def _why_silent(self) -> str:
         text = f"no record for {_SILENCE:g} s"

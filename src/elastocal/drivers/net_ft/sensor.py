@@ -27,6 +27,10 @@ _STANDING = 100
 """Records without progress of the box's own counter after which it counts as stalled."""
 _MOST_MALFORMED = 10
 """Datagrams in a row that are no records."""
+_FOLLOWS = 1e-3
+"""How fast the way from the box to here may grow, in s a second: beyond is a slower quartz."""
+_LONGEST_WAY = 0.05
+"""In s: a sample is never taken for older."""
 _WRAP = 1 << 32
 _BACK = 1 << 31
 
@@ -40,7 +44,8 @@ class NetFtSensor:
     Parameters
     ----------
     clock : Clock
-        Of the rig: a sample has the time of its arrival.
+        Of the rig. Samples are as far apart as the box says, and have the time of arrival of those
+        that came quickest.
     scale : CountScale
         As the box states it.
     rate : float
@@ -61,7 +66,11 @@ class NetFtSensor:
         self._newest: tuple[float, tuple[int, ...], SensorStatus] | None = None
         self._failure: str | None = None
         self._last: RdtRecord | None = None
-        self._time = -np.inf
+        self._time = self._arrived = -np.inf
+        self._count = 0
+        """Place of the last record in the stream, wraps of its number undone."""
+        self._offset = np.inf
+        """Time of arrival less place over rate, of those that came quickest."""
         self._standing = self._malformed_now = 0
         self._window = self._window_lost = 0
 
@@ -98,8 +107,7 @@ class NetFtSensor:
         if status is SensorStatus.FAULT:
             self.fail(f"status {status_names(record.status)}")
             return
-        # Times ascend, also where two came at once.
-        self._time = max(now, float(np.nextafter(self._time, np.inf)))
+        self._time = self._time_of(now)
         with self._lock:
             self._rows.append((self._time, record.counts))
             self._saturated |= status is SensorStatus.SATURATED
@@ -129,8 +137,18 @@ class NetFtSensor:
         if self._standing >= _STANDING:
             self.fail(f"it repeats sample {record.ft_sequence}: it has stalled")
             return False
+        self._count += step
         self._count_lost(step - 1)
         return True
+
+    def _time_of(self, now: float) -> float:
+        """Return when a record was measured; records that wait for one another come in bunches."""
+        since = self._count / self.rate
+        if self._offset < np.inf:
+            self._offset += _FOLLOWS * (now - self._arrived)
+        self._offset, self._arrived = min(self._offset, now - since), now
+        time = min(max(since + self._offset, now - _LONGEST_WAY), now)
+        return max(time, float(np.nextafter(self._time, np.inf)))
 
     def _count_lost(self, lost: int) -> None:
         self.lost += lost

@@ -11,10 +11,10 @@ import re
 from collections.abc import Mapping
 from typing import Any
 
-import yaml
+from pydantic import Field
 
 from elastocal.errors import RobotError, SchemaError
-from elastocal.records import check_schema, validate
+from elastocal.records import StrictModel, from_data, read_yaml_data, validate
 from elastocal.robot.catalogue.arm_urdf import urdf_of
 from elastocal.robot.catalogue.record import (
     CatalogueEntry,
@@ -115,13 +115,21 @@ def load(name: str, tip: str = "flange") -> Robot:
     return Robot.from_urdf(urdf(name), tip)
 
 
-def read_table(text: str, what: str) -> dict[str, CatalogueEntry]:
-    """Return the robots of a table text by name.
+class _CatalogueTable(StrictModel):
+    """All keys of a table but ``schema``."""
+
+    sources: dict[str, str] = Field(default_factory=dict)
+    """Texts to refer to by aliases."""
+    robots: tuple[dict[str, Any], ...]
+
+
+def read_table(data: object, what: str) -> dict[str, CatalogueEntry]:
+    """Return the robots of a table by name.
 
     Parameters
     ----------
-    text : str
-        YAML: `schema`, free `sources` to refer to, and the list `robots`.
+    data : object
+        What its YAML holds: `schema`, free `sources` to refer to, and the list `robots`.
     what : str
         Name of the table, for messages.
 
@@ -131,10 +139,9 @@ def read_table(text: str, what: str) -> dict[str, CatalogueEntry]:
         If the table has another schema, a robot does not fit `CatalogueEntry`, two have the
         same name, or an inertia is ``like`` a robot that has no inertia of its own.
     """
-    data = yaml.safe_load(text)
-    check_schema(data.get("schema"), SCHEMA, what)
-    by_name = {str(robot["name"]): robot for robot in data["robots"]}
-    if len(by_name) != len(data["robots"]):
+    robots = from_data(_CatalogueTable, data, what, SCHEMA).robots
+    by_name = {str(robot.get("name")): robot for robot in robots}
+    if len(by_name) != len(robots):
         raise SchemaError(f"{what}: two robots have the same name")
     return {name: _entry(name, by_name, what) for name in by_name}
 
@@ -142,24 +149,30 @@ def read_table(text: str, what: str) -> dict[str, CatalogueEntry]:
 @functools.cache
 def _entries() -> dict[str, CatalogueEntry]:
     """Return the robots of the package by name, in the order of the table."""
-    text = importlib.resources.files(__package__).joinpath(_FILE).read_text(encoding="utf-8")
-    return read_table(text, _FILE)
+    with importlib.resources.as_file(importlib.resources.files(__package__) / _FILE) as path:
+        return read_table(read_yaml_data(path), _FILE)
 
 
 def _entry(name: str, by_name: Mapping[str, Mapping[str, Any]], what: str) -> CatalogueEntry:
     """Return one robot; masses that are ``like`` a sister's are estimated from hers."""
     robot = by_name[name]
-    sister_name = robot.get("inertia", {}).get("like")
+    sister_name = _inertia(robot).get("like")
     if sister_name is not None:
-        if "links" not in by_name.get(sister_name, {}).get("inertia", {}):
+        if "links" not in _inertia(by_name.get(str(sister_name), {})):
             raise SchemaError(
                 f"{what}: inertia of {name} is like {sister_name!r}, which has none of its own"
             )
-        arm = validate(robot["dimensions"], Dimensions, f"{what}: {name}")
-        sister = validate(by_name[sister_name], WristEntry, f"{what}: {sister_name}")
+        arm = validate(robot.get("dimensions"), Dimensions, f"{what}: {name}")
+        sister = validate(by_name[str(sister_name)], WristEntry, f"{what}: {sister_name}")
         robot = {**robot, "inertia": inertias_like(sister, arm)}
-    kind = ParallelEntry if "d6" in robot["dimensions"] else WristEntry
-    return validate(robot, kind, f"{what}: {name}")
+    dimensions = robot.get("dimensions")
+    parallel = isinstance(dimensions, Mapping) and "d6" in dimensions
+    return validate(robot, ParallelEntry if parallel else WristEntry, f"{what}: {name}")
+
+
+def _inertia(robot: Mapping[str, Any]) -> Mapping[str, Any]:
+    found = robot.get("inertia")
+    return found if isinstance(found, Mapping) else {}
 
 
 def _key(name: str) -> str:

@@ -1,4 +1,6 @@
 from ._rsi_robot import PosCorrLimits as PosCorrLimits, RsiContext as RsiContext
+from .emscon import EmsconServer as EmsconServer
+from .line_stream import LineStreamServer as LineStreamServer
 from .live_cell import LiveCell as LiveCell
 from .net_ft import (
     NetFtBox as NetFtBox,
@@ -7,6 +9,7 @@ from .net_ft import (
 )
 from .rsi import (
     IPOC_START as IPOC_START,
+    SENTYPE as SENTYPE,
     RsiFault as RsiFault,
     RsiServer as RsiServer,
     RsiStatistics as RsiStatistics,

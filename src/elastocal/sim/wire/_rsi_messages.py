@@ -90,7 +90,7 @@ class EthernetConfig:
     def read(cls, path: Path) -> "EthernetConfig":
         """Return the config in a file; see `from_xml`."""
         try:
-            return cls.from_xml(path.read_text(encoding="utf-8"))
+            return cls.from_xml(path.read_text(encoding="utf-8-sig"))
         except OSError as error:
             raise DeviceError(f"RSI_CREATE: {path}: {error.strerror}") from error
 

@@ -16,18 +16,25 @@ import threading
 import time
 from collections import deque
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 from elastocal.cell import LOOPBACK, WallClock
 from elastocal.errors import DeviceError
 from elastocal.sim.wire._rsi_messages import LARGEST, Answer, EthernetConfig, RobWriter, SenReader
-from elastocal.sim.wire._rsi_robot import RsiContext, RsiRobot, RsiStopError
+from elastocal.sim.wire._rsi_robot import (
+    RsiContext,
+    RsiRobot,
+    RsiStopError,
+    corrected_program,
+)
 from elastocal.sim.wire.live_cell import LiveCell
 from elastocal.sim.wire.servers import Told, serves
 
 IPOC_START = 4_208_163_634
 """First count of milliseconds of a session; a restart of the controller begins lower."""
+SENTYPE = "elastocal"
+"""``Type`` of the answers, where nothing else is told."""
 _MALFORMED = (
     b"<Rob Type='KUKA'><RIst X='",
     b"\xff\x00" * 700,
@@ -44,31 +51,30 @@ RsiFault = Literal[
 come twice, or make no sense; a second robot; answers that come late; a controller that restarts."""
 
 
-def _elements(tags: Sequence[tuple[str, str, int]], first: int = 1) -> str:
+def _elements(tags: Sequence[tuple[str, str, int]]) -> str:
     """Return the elements of numbered channels: tag, type, and whether it keeps its value."""
     return "".join(
         f'<ELEMENT TAG="{tag}" TYPE="{kind}" INDX="{index}" HOLDON="{hold}"/>'
-        for index, (tag, kind, hold) in enumerate(tags, first)
+        for index, (tag, kind, hold) in enumerate(tags, 1)
     )
 
 
-def ethernet_config(
-    address: str, port: int, *, absolute: bool = False, only_send: bool = False
-) -> str:
-    """Return the config file of the ETHERNET object that a run is made with.
+def ethernet_config(address: str, port: int, mode: str = "contact", sentype: str = SENTYPE) -> str:
+    """Return a config file of the ETHERNET object, for the KRL program of a mode.
 
     Parameters
     ----------
     address, port : str, int
         Of the PC.
-    absolute : bool
-        Corrections that keep their value when no answer comes, and no commands: compensation.
-    only_send : bool
-        Nothing is expected from the PC.
+    mode : str
+        ``contact``: the program of a run, its corrections relative; ``compensation``: corrections
+        alone, which keep their value when no answer comes; ``measure``: no answer is expected.
+    sentype : str
+        ``Type`` of the answers.
     """
-    hold = int(absolute)
+    hold = int(mode == "compensation")
     wanted = [("Stop", "BOOL", 1), *((f"RKorr.{axis}", "DOUBLE", hold) for axis in "XYZABC")]
-    if not absolute:
+    if mode == "contact":
         wanted += [("Cmd.N", "LONG", 1), ("Cmd.Op", "LONG", 1), ("Cmd.V", "DOUBLE", 1)]
         wanted += [(f"Ax.A{k}", "DOUBLE", 1) for k in range(1, 7)]
         wanted += [(f"Ex.E{k}", "DOUBLE", 1) for k in range(1, 7)]
@@ -77,15 +83,14 @@ def ethernet_config(
         for tag in ("RIst", "RSol", "AIPos", "ASPos", "EIPos", "MACur")
     )
     own += '<ELEMENT TAG="DEF_Delay" TYPE="LONG" INDX="INTERNAL"/>'
-    program = "".join(
-        f'<ELEMENT TAG="{tag}" TYPE="LONG" INDX="{index}"/>'
-        for index, tag in enumerate(("Krl.N", "Krl.State"), 1)
-    )
+    program = [] if mode == "measure" else [("Krl.N", "LONG", 0), ("Krl.State", "LONG", 0)]
+    only_send = str(mode == "measure").upper()
     return (
         f"<ROOT><CONFIG><IP_NUMBER>{address}</IP_NUMBER><PORT>{port}</PORT>"
-        f"<SENTYPE>elastocal</SENTYPE><ONLYSEND>{str(only_send).upper()}</ONLYSEND></CONFIG>"
-        f"<SEND><ELEMENTS>{own}{program}</ELEMENTS></SEND>"
-        f"<RECEIVE><ELEMENTS>{'' if only_send else _elements(wanted)}</ELEMENTS></RECEIVE></ROOT>"
+        f"<SENTYPE>{sentype}</SENTYPE><ONLYSEND>{only_send}</ONLYSEND></CONFIG>"
+        f"<SEND><ELEMENTS>{own}{_elements(program)}</ELEMENTS></SEND>"
+        f"<RECEIVE><ELEMENTS>{'' if mode == 'measure' else _elements(wanted)}</ELEMENTS></RECEIVE>"
+        "</ROOT>"
     )
 
 
@@ -300,17 +305,30 @@ def rsi_server(live: LiveCell, told: Told, context: RsiContext | None = None) ->
     live : LiveCell
         The cell.
     told : Told
-        ``port`` and ``address`` of the PC, ``robot`` (address of the controller), ``delay`` (from
-        a correction to the motion, in s). Without a port a free one is chosen for the PC.
+        ``port`` and ``address`` of the PC, ``robot`` (address of the controller), ``mode`` (see
+        `ethernet_config`), ``sentype``, ``cycle`` and ``delay`` in s, ``timeout`` in cycles.
+        Without a port a free one is chosen for the PC.
     context : RsiContext, optional
-        How the controller is set up; by default with that delay, and with an operator who resets it
-        2 s after a stop.
+        How the controller is set up; by default as the cell file says, with an operator who resets
+        it 2 s after a stop, and patient: a machine that is busy with other things for 100 ms does
+        not cost the run.
     """
-    delay = told.settings.get("delay") or RsiContext.delay
-    if not isinstance(delay, float):
-        raise DeviceError(f"delay is {delay!r}: must be a time in s")
-    context = context or RsiContext(delay=delay, operator=2.0)
-    address = str(told.settings.get("address") or told.address)
-    text = ethernet_config(address, told.port() or _free_port(address), absolute=context.absolute)
-    config = EthernetConfig.from_xml(text)
-    return RsiServer(live, config, context, address=str(told.settings.get("robot") or LOOPBACK))
+    settings = {key: value for key, value in told.settings.items() if value is not None}
+    mode = str(settings.get("mode", "contact"))
+    if context is None:
+        known = {key: settings[key] for key in ("cycle", "delay", "timeout") if key in settings}
+        context = replace(_CONTEXTS[mode], operator=2.0, patience=_PATIENCE, **known)  # type: ignore[arg-type]
+    address = str(settings.get("address", told.address))
+    port, sentype = told.port() or _free_port(address), str(settings.get("sentype", SENTYPE))
+    config = EthernetConfig.from_xml(ethernet_config(address, port, mode, sentype))
+    return RsiServer(live, config, context, address=str(settings.get("robot", LOOPBACK)))
+
+
+_PATIENCE = 0.1
+"""Of a controller that `elastocal simulate` starts, in s."""
+_CONTEXTS = {
+    "measure": RsiContext(),
+    "contact": RsiContext(),
+    "compensation": RsiContext(program=corrected_program, absolute=True),
+}
+"""Contexts of the modes of the driver."""

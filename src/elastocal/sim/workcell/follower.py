@@ -100,7 +100,7 @@ class PoseFollower:
         """Why the safety controller has stopped the arm; a fault of the cell file."""
 
     def begin(self) -> None:
-        """Take the robot over where it stands, free: the visit of a posture begins.
+        """Take the robot over where it stands, free; a visit begins when it sets out from there.
 
         Where nothing else has moved it since, it goes on instead.
         """
@@ -108,7 +108,6 @@ class PoseFollower:
         here = plant.segment.path.end.q
         if self._led and np.abs(here - self.q).max() < _SAME_PLACE:
             return
-        plant.begin_visit()
         stands, self._statics = plant.robot_state(), plant.statics
         free = self._statics.free(stands.q, np.zeros(3), stands.theta)
         self.contact, self.force, self.stopped = None, np.zeros(3), None
@@ -116,8 +115,6 @@ class PoseFollower:
         error = (stands.twist - free.twist)[:3]
         values = np.concatenate([error, plant.chance.load(0), np.zeros(2)])
         self._chance, self._load = _Chance(values, values), -1
-        faults = plant.schedule.at(plant.visit)
-        self._missed = any(fault.kind == "contact_missed" for fault in faults)
         self._view = View.of(self._statics)
         self.q, self.T = free.q, self._statics.robot.forward(free.q)
         self._rest, self._still, self._way, self._standing = self.T[:3, 3], 0.0, 0.0, True
@@ -126,8 +123,17 @@ class PoseFollower:
         self._take(free)
         self._row = self._see()
         self._steps = ["approach", "reference", "engage"]
+        self._missed, self._led = False, True
+
+    def _begin_visit(self) -> None:
+        """Begin the visit of the posture that the arm stands in."""
+        plant = self._plant
+        plant.begin_visit()
+        self._statics = plant.statics
+        self._view = View.of(self._statics)
+        faults = plant.schedule.at(plant.visit)
+        self._missed = any(fault.kind == "contact_missed" for fault in faults)
         self._begin_step("approach")
-        self._led = True
 
     def follow(self, T_base_tcp: FloatArray, duration: float) -> None:
         """Go to a commanded pose of the tool, evenly within some time.
@@ -186,11 +192,15 @@ class PoseFollower:
         else:
             self._still += duration
             self._standing = self._still >= _SETTLE
-            if self._standing:
+            if self._standing and self.contact is None:
                 self._begin_step("reference")
 
     def _depart(self) -> None:
         plant, chance, slips = self._plant, self._chance, np.zeros(2)
+        if self._steps[:1] == ["approach"]:
+            self._begin_visit()
+        elif self.contact is None:
+            self._begin_step("engage")
         if self.contact is not None:
             # What has slipped so far stays where it is.
             self.contact = self.contact.slipped(self._slipped(self.contact))
@@ -201,8 +211,6 @@ class PoseFollower:
         chance.after, chance.part = np.concatenate([plant.stop_error(), load, slips]), 0.0
         if self.contact is not None:
             self._fail(self._plant.schedule.begin("hold", plant.visit, self._load, plant.now))
-        else:
-            self._begin_step("engage")
 
     def _slipped(self, contact: Contact) -> FloatArray:
         """Return how far the ring has slipped at random, tcp frame, shape (2,), in m."""
