@@ -1,10 +1,13 @@
 """The arm of a Universal Robots controller: each step of the procedure as one of its commands.
 
-A guarded approach and the load cases are force mode: the controller itself stops at the contact
-force and holds the load. The ramps of `RobotArm.hold` and `RobotArm.release` are made here, a new
-force each cycle. All commands go out from one thread, which no caller waits for.
+A slow approach and the load cases are force mode: the controller itself stops at the contact force
+and holds the load. A faster approach, which is to end before the surface, is a line that the
+controller ends at its distance; a touch is seen and stopped here. The ramps of `RobotArm.hold` and
+`RobotArm.release` are made here, a new force each cycle. All commands go out from one thread, which
+no caller waits for.
 """
 
+import contextlib
 import threading
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -13,6 +16,7 @@ import numpy as np
 
 from elastocal.arrays import FloatArray
 from elastocal.cell import ArmState, Clock, Motion
+from elastocal.drivers.rtde._guard import Guard, frame_along, unit_vector
 from elastocal.drivers.rtde._ur_rtde import UrControl
 from elastocal.drivers.rtde.line import UrLine, UrSample, pose_of_T
 from elastocal.errors import DeviceError
@@ -24,8 +28,8 @@ _TOOL_ACCELERATION = 0.5
 """In m/s²."""
 _STOP = 2.0
 """Deceleration of a stop, in rad/s²."""
-_FELT = 0.8
-"""Part of the contact force at which the approach has ended."""
+_FORCE_MODE_SPEED = 0.008
+"""Fastest approach by force mode, in m/s, whose end we have to see: 0.1 s of ours are 0.8 mm."""
 _IN_FRAME = 2
 """Type of force mode: the task frame is not changed."""
 _SIDEWAYS, _TURN = 0.01, 0.05
@@ -37,7 +41,7 @@ _SETTLED = 5
 _STANDING = (Motion.IDLE,)
 _FORCED = (Motion.IDLE, Motion.HOLDING, Motion.RELEASING)
 
-Step = Callable[[UrSample], Motion | None]
+_Step = Callable[[UrSample], Motion | None]
 """One cycle of a command: None while it goes on, else what the arm does after it."""
 
 
@@ -45,7 +49,7 @@ Step = Callable[[UrSample], Motion | None]
 class _Order:
     """A command on its way to the thread."""
 
-    begin: Callable[[UrSample], Step]
+    begin: Callable[[UrSample], _Step]
     motion: Motion
 
 
@@ -83,7 +87,7 @@ class UrArm:
         self._touched = self._forced = False
         self._fault: str | None = None
         self._order: _Order | None = None
-        self._step: Step | None = None
+        self._step: _Step | None = None
         self._force_tcp = np.zeros(3)
         """Force on the robot that is asked for now."""
         self._halt = False
@@ -151,7 +155,7 @@ class UrArm:
         if self._touched:
             raise DeviceError(f"{_SOURCE} refuses move_joints: the tool is at the surface, retract")
 
-        def begin(sample: UrSample) -> Step:
+        def begin(sample: UrSample) -> _Step:
             way = np.abs(np.asarray(q) - sample.q)
             # The controller takes the speed of the joint that goes farthest.
             part = way / max(float(way.max()), 1e-9)
@@ -165,29 +169,17 @@ class UrArm:
         self, direction_base: FloatArray, distance: float, speed: float, contact_force: float
     ) -> None:
         """Start a guarded straight move; see `RobotArm.approach`."""
-        direction = _unit(direction_base)
+        direction = unit_vector(direction_base)
         if self._touched:
             raise DeviceError(f"{_SOURCE} refuses approach: in contact, retract first")
 
-        def begin(sample: UrSample) -> Step:
+        def begin(sample: UrSample) -> _Step:
             if not np.isfinite(contact_force):
                 return self._line_by(sample, distance * direction, speed)
             self._control.zeroFtSensor()
-            frame = _frame_along(direction, sample.T_base_tcp[:3, 3])
-            limits = [_SIDEWAYS, _SIDEWAYS, speed, _TURN, _TURN, _TURN]
-            along = [0.0, 0.0, contact_force, 0.0, 0.0, 0.0]
-            self._press(pose_of_T(frame), [0, 0, 1, 0, 0, 0], along, limits)
-            start = sample.T_base_tcp[:3, 3]
-
-            def step(now: UrSample) -> Motion | None:
-                felt = float(-now.force_base @ direction) >= _FELT * contact_force
-                if felt or float((now.T_base_tcp[:3, 3] - start) @ direction) >= distance:
-                    self._end_force()
-                    self._touched = felt
-                    return Motion.IDLE
-                return None
-
-            return step
+            goal = Guard(direction, distance, contact_force, sample)
+            guarded = self._pressed_way if speed <= _FORCE_MODE_SPEED else self._watched_way
+            return guarded(goal, speed)
 
         self._give("approach", _Order(begin, Motion.APPROACHING), _STANDING)
 
@@ -208,9 +200,9 @@ class UrArm:
 
     def retract(self, direction_base: FloatArray, distance: float, speed: float) -> None:
         """Start a straight move away from the surface; see `RobotArm.retract`."""
-        way = distance * _unit(direction_base)
+        way = distance * unit_vector(direction_base)
 
-        def begin(sample: UrSample) -> Step:
+        def begin(sample: UrSample) -> _Step:
             self._end_force()
             arrival = self._line_by(sample, way, speed)
 
@@ -228,8 +220,10 @@ class UrArm:
         self.stop()
         self._closed.set()
         self._thread.join(5.0)
-        self._control.stopScript()
-        self._control.disconnect()
+        # A controller that is gone needs neither.
+        with contextlib.suppress(RuntimeError, OSError):
+            self._control.stopScript()
+            self._control.disconnect()
 
     def _give(self, command: str, order: _Order, states: tuple[Motion, ...]) -> None:
         with self._lock:
@@ -247,7 +241,7 @@ class UrArm:
         while not self._closed.wait(_CYCLE):
             try:
                 self._cycle(self._line.sample())
-            except (DeviceError, RuntimeError) as error:
+            except (DeviceError, RuntimeError, OSError) as error:
                 with self._lock:
                     self._fail(str(error))
         if self._halt:
@@ -274,14 +268,44 @@ class UrArm:
         try:
             self._end_force()
             self._control.stopJ(_STOP, True)
-        except RuntimeError as error:
+        except (RuntimeError, OSError) as error:
             with self._lock:
                 self._fail(str(error))
 
     def _fail(self, fault: str) -> None:
         self._fault, self._motion, self._step = " ".join(fault.split()), Motion.STOPPED, None
 
-    def _arrival(self) -> Step:
+    def _pressed_way(self, goal: Guard, speed: float) -> _Step:
+        """Return an approach in force mode: the controller stops at the force, we at the end."""
+        frame = frame_along(goal.direction, goal.start.T_base_tcp[:3, 3])
+        limits = [_SIDEWAYS, _SIDEWAYS, speed, _TURN, _TURN, _TURN]
+        along = [0.0, 0.0, goal.force, 0.0, 0.0, 0.0]
+        self._press(pose_of_T(frame), [0, 0, 1, 0, 0, 0], along, limits)
+
+        def step(now: UrSample) -> Motion | None:
+            felt = goal.felt(now)
+            if not (felt or goal.gone(now) >= goal.distance):
+                return None
+            self._end_force()
+            self._touched = felt
+            return Motion.IDLE
+
+        return step
+
+    def _watched_way(self, goal: Guard, speed: float) -> _Step:
+        """Return an approach along a line: the controller stops at the end, we at the force."""
+        arrival = self._line_by(goal.start, goal.distance * goal.direction, speed)
+
+        def step(now: UrSample) -> Motion | None:
+            if not goal.felt(now):
+                return arrival(now)
+            self._control.stopJ(_STOP, True)
+            self._touched = True
+            return Motion.IDLE
+
+        return step
+
+    def _arrival(self) -> _Step:
         still = 0
 
         def step(_: UrSample) -> Motion | None:
@@ -292,7 +316,7 @@ class UrArm:
 
         return step
 
-    def _line_by(self, sample: UrSample, way: FloatArray, speed: float) -> Step:
+    def _line_by(self, sample: UrSample, way: FloatArray, speed: float) -> _Step:
         T = sample.T_base_tcp.copy()
         T[:3, 3] += way
         self._control.moveL(pose_of_T(T), speed, _TOOL_ACCELERATION, True)
@@ -300,12 +324,12 @@ class UrArm:
 
     def _ramp_to(
         self, wanted: FloatArray, rate: float, after: Motion | None
-    ) -> Callable[[UrSample], Step]:
+    ) -> Callable[[UrSample], _Step]:
         """Return what ramps the force; ``after``: what follows at its end, None: it is held."""
         if not (np.isfinite(rate) and rate > 0.0):
             raise DeviceError(f"{_SOURCE}: force rate {rate:g} N/s: must be above 0 and finite")
 
-        def begin(sample: UrSample) -> Step:
+        def begin(sample: UrSample) -> _Step:
             frame, last = pose_of_T(sample.T_base_tcp), self._clock.now()
             limits = [_PRESS_SPEED] * 3 + [_TURN] * 3
 
@@ -340,21 +364,3 @@ class UrArm:
         if self._forced:
             self._forced = False
             self._control.forceModeStop()
-
-
-def _unit(direction: FloatArray) -> FloatArray:
-    found = np.asarray(direction, dtype=float)
-    if not (found.shape == (3,) and abs(float(np.linalg.norm(found)) - 1.0) < 1e-6):
-        raise DeviceError(f"{_SOURCE}: direction {found}: must be a unit vector")
-    return found
-
-
-def _frame_along(direction: FloatArray, origin: FloatArray) -> FloatArray:
-    """Return a frame whose z axis is a direction, shape (4, 4)."""
-    side = np.eye(3)[int(np.argmin(np.abs(direction)))]
-    x = np.cross(side, direction)
-    x /= np.linalg.norm(x)
-    T = np.eye(4)
-    T[:3, :3] = np.column_stack([x, np.cross(direction, x), direction])
-    T[:3, 3] = origin
-    return T

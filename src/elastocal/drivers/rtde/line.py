@@ -1,6 +1,7 @@
 """The line to a controller: its newest sample, and its force sensor."""
 
 import threading
+import time
 from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -10,13 +11,14 @@ from scipy.spatial.transform import Rotation
 
 from elastocal.arrays import FloatArray
 from elastocal.cell import Clock, SensorStatus, WrenchBlock, WrenchSample
+from elastocal.drivers.device_clock import DeviceClock
 from elastocal.drivers.rtde._ur_rtde import UrReceive
 from elastocal.errors import DeviceError
 from elastocal.results import brief_repr
 
 _KEPT = 500
 """Samples of the sensor that wait for a reader; older ones are lost."""
-_DEAF = 0.5
+_DEAF = 1.0
 """A controller that says nothing new for so long, in s of the wall, is lost."""
 _SAFE = (1, 2)
 """Safety modes in which it works: normal, reduced."""
@@ -56,13 +58,12 @@ class UrLine:
     def __init__(self, receive: UrReceive, clock: Clock, rate: float) -> None:
         self._receive, self._clock, self.rate = receive, clock, rate
         self._lock = threading.Lock()
-        self._ahead: float | None = None
-        """Clock minus the controller's time stamps, at the least."""
+        self._stamps = DeviceClock("rtde")
         self._stamp = float("nan")
         self._wrenches: deque[WrenchSample] = deque(maxlen=_KEPT)
         self._newest: WrenchSample | None = None
         self._sample: UrSample | None = None
-        self._silent = 0.0
+        self._heard = time.monotonic()
         self._closed = threading.Event()
         self._thread = threading.Thread(target=self._hear, daemon=True)
 
@@ -94,7 +95,7 @@ class UrLine:
             If the controller is lost.
         """
         with self._lock:
-            sample, silent = self._sample, self._silent
+            sample, silent = self._sample, time.monotonic() - self._heard
         if sample is None or silent > _DEAF:
             raise DeviceError(f"rtde: the controller has said nothing for {silent:.1f} s")
         return sample
@@ -114,29 +115,24 @@ class UrLine:
     def _hear(self) -> None:
         pause = 0.5 / self.rate
         while not self._closed.wait(pause):
-            self._look(pause)
+            self._look()
 
-    def _look(self, passed: float = 0.0) -> None:
+    def _look(self) -> None:
         receive, stamp = self._receive, self._receive.getTimestamp()
         if stamp == self._stamp or not receive.isConnected():
-            with self._lock:
-                self._silent += passed
             return
-        now = self._clock.now()
-        # The least delay that was ever seen is nearest to none.
-        ahead = now - stamp
-        self._ahead = ahead if self._ahead is None else min(self._ahead, ahead)
-        time, raw = stamp + self._ahead, np.array(receive.getFtRawWrench())
-        wrench = WrenchSample(time, raw[:3], raw[3:], SensorStatus.OK)
+        taken = self._stamps.rig_time(stamp, self._clock.now())
+        raw = np.array(receive.getFtRawWrench())
+        wrench = WrenchSample(taken, raw[:3], raw[3:], SensorStatus.OK)
         sample = UrSample(
-            time=time,
+            time=taken,
             q=np.array(receive.getActualQ()),
             T_base_tcp=T_of_pose(receive.getActualTCPPose()),
             force_base=np.array(receive.getActualTCPForce()[:3]),
             fault=_fault(receive.getRobotMode(), receive.getSafetyMode()),
         )
         with self._lock:
-            self._stamp, self._silent = stamp, 0.0
+            self._stamp, self._heard = stamp, time.monotonic()
             self._sample, self._newest = sample, wrench
             self._wrenches.append(wrench)
 
