@@ -83,6 +83,8 @@ class RtdeServer:
 
     def start(self) -> None:
         """Answer from now on."""
+        for line in self._lines.values():
+            line.listen()
         for thread in self._threads:
             thread.start()
 
@@ -101,7 +103,6 @@ class RtdeServer:
                 self.robot.cycle()
 
     def _accept(self, line: socket.socket, serve: Callable[[socket.socket], None]) -> None:
-        line.listen()
         line.settimeout(_LISTEN)
         while not self._closed.is_set():
             with contextlib.suppress(TimeoutError):
