@@ -69,8 +69,7 @@ def _outside(evidence: Evidence) -> Iterator[Finding]:
     )
 
     doubt = evidence.doubt_on_production
-    if doubt is not None and not doubt.is_small:
-        yield Finding(doubt.sentence)
+    yield from map(Finding, doubt.warnings if doubt else ())
 
 
 def _missing_poses(evidence: Evidence) -> Iterator[Finding]:
