@@ -8,6 +8,7 @@
   other, each only if it foretells left-out postures better by a paired interval that counts the
   overlap of the training sets (Nadeau and Bengio 2003). A rotation must also be larger than its
   interval beside a matrix with its prior: cross-talk looks like a rotation.
+* **Cross-talk.** Where the matrix is not freed, the intervals are still those beside it.
 * **Order.** Residuals that resemble their neighbours' are no independent readings. Where shuffling
   the postures shows that, intervals grow by ``sqrt((1 + r) / (1 - r))``; and where a half of the
   postures, first or last, disagrees with all of them, they reach to what it says.
@@ -125,9 +126,29 @@ def choose_tool(
     used[[each.posture - 1 for each in aside]] = False
     good = postures.chosen(used)
     model, ladder, notes = _climb(good, R_nominal, richest)
-    fit = fit_tool(good, R_nominal, model)
+    fit = _beside_cross_talk(good, R_nominal, fit_tool(good, R_nominal, model), richest)
     fit, correlation, more = _in_order(good, R_nominal, fit)
     return ToolChoice(fit, used, aside, ladder, correlation, (*notes, *more))
+
+
+def _beside_cross_talk(
+    postures: StaticPostures, R_nominal: FloatArray | None, fit: ToolFit, richest: ToolModel
+) -> ToolFit:
+    """Return a fit whose intervals count the cross-talk that a sensor may have, shown or not.
+
+    That left-out postures do not ask for a matrix says that they cannot show it, not that there is
+    none. Intervals reach to the ends of those beside a matrix with its prior.
+    """
+    if fit.model.has_matrix or not richest.cross_talk > 0.0:
+        return fit
+    model = replace(fit.model, cross_talk=richest.cross_talk, lever=richest.lever)
+    beside = fit_tool(postures, R_nominal, model)
+    widths = dict(fit.half_width)
+    for k, name in enumerate(TOOL_UNKNOWNS):
+        end = abs(_values(beside)[k] - _values(fit)[k]) + beside.half_width[name]
+        # What is not determined stays so; a matrix that leaves nothing over says nothing.
+        widths[name] = max(widths[name], float(np.nan_to_num(end)))
+    return replace(fit, half_width=widths)
 
 
 def affine_scatter(postures: StaticPostures) -> FloatArray | None:
@@ -389,5 +410,6 @@ def _halves(
 
 
 def _values(fit: ToolFit) -> FloatArray:
+    """Return the values of a fit in the order of `TOOL_UNKNOWNS`, the rotation as 0."""
     turn = np.zeros(3)
     return np.concatenate([[fit.mass], turn, fit.force_bias, fit.centre, fit.moment_bias])

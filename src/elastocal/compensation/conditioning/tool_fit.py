@@ -27,6 +27,7 @@ from scipy.special import stdtrit
 from elastocal.arrays import BoolArray, FloatArray
 from elastocal.compensation.conditioning.postures import StaticPostures
 from elastocal.results import brief_repr
+from elastocal.robot import nearest_rotation
 
 TOOL_UNKNOWNS = (
     "mass",
@@ -243,12 +244,10 @@ def _rotation_between(postures: StaticPostures, nominal: FloatArray) -> FloatArr
     """Return the rotation that best turns gravity into forces, the nominal one where open."""
     u = postures.gravity_flange - postures.gravity_flange.mean(axis=0)
     F = postures.force - postures.force.mean(axis=0)
-    U, s, Vt = np.linalg.svd(u.T @ F)
+    s = np.linalg.svd(u.T @ F, compute_uv=False)
     if not s[1] > _LOADING * max(s[0], np.finfo(float).tiny):
         return nominal
-    turn = np.diag([1.0, 1.0, np.sign(np.linalg.det(U @ Vt))])
-    rotation: FloatArray = U @ turn @ Vt
-    return rotation
+    return nearest_rotation(u.T @ F)
 
 
 @dataclass(frozen=True, eq=False)
